@@ -1,0 +1,186 @@
+//! The claims of the paper beside what a run shows.
+
+use serde::Serialize;
+
+/// The variables that the claims are about, in the order of the values given to
+/// [`Measurement::add`].
+pub(crate) const WATCHED: [&str; 5] =
+    ["plant.x_p", "plant.theta", "plant.f_fric", "controller.f_hat", "plant.regime"];
+
+/// The state after the activation counts from this long after it, as in NOTES of the experiment:
+/// t > 60 s for an activation at 40 s.
+const SETTLING: f64 = 20.0;
+/// The limit cycle is measured over this last part of the time before the activation.
+const CYCLE: f64 = 0.5;
+/// A slide counts from this distance on, in m: near the end of a creep, rounding alone makes the
+/// cart stick and slip.
+const SLIDE: f64 = 1e-3;
+
+/// Smallest and largest value seen.
+#[derive(Clone, Copy)]
+struct Extremes {
+    low: f64,
+    high: f64,
+}
+
+impl Extremes {
+    const NONE: Self = Self { low: f64::INFINITY, high: f64::NEG_INFINITY };
+
+    fn add(&mut self, value: f64) {
+        self.low = self.low.min(value);
+        self.high = self.high.max(value);
+    }
+
+    /// Half of peak to peak.
+    fn amplitude(self) -> f64 {
+        0.5 * (self.high - self.low)
+    }
+}
+
+/// What is seen of a run in one window of time.
+struct Window {
+    from: f64,
+    to: f64,
+    x_p: Extremes,
+    theta: Extremes,
+    /// Of f_fric - f_hat.
+    squares: f64,
+    largest: f64,
+    count: f64,
+    /// Slides of more than [`SLIDE`] that begin and end at rest, and where the last rest was.
+    slides: u32,
+    rest: Option<f64>,
+}
+
+impl Window {
+    fn new(from: f64, to: f64) -> Self {
+        Self {
+            from,
+            to,
+            x_p: Extremes::NONE,
+            theta: Extremes::NONE,
+            squares: 0.0,
+            largest: 0.0,
+            count: 0.0,
+            slides: 0,
+            rest: None,
+        }
+    }
+
+    fn add(&mut self, time: f64, [x_p, theta, f_fric, f_hat, regime]: [f64; 5]) {
+        if time < self.from || time > self.to {
+            return;
+        }
+        self.x_p.add(x_p);
+        self.theta.add(theta);
+        let difference = f_fric - f_hat;
+        self.squares += difference * difference;
+        self.largest = self.largest.max(difference.abs());
+        self.count += 1.0;
+        if regime == 0.0 {
+            let slid = self.rest.is_some_and(|rest| (x_p - rest).abs() > SLIDE);
+            self.slides += u32::from(slid);
+            self.rest = Some(x_p);
+        }
+    }
+
+    fn rms(&self) -> f64 {
+        (self.squares / self.count).sqrt()
+    }
+}
+
+/// Everything that the claims need of a run, gathered step by step.
+pub(crate) struct Measurement {
+    before: Window,
+    after: Window,
+}
+
+/// One line of the table.
+#[derive(Debug, Serialize)]
+pub(crate) struct Claim {
+    pub(crate) claim: String,
+    pub(crate) paper: &'static str,
+    pub(crate) measured: f64,
+    pub(crate) unit: &'static str,
+    /// None where the run ended before it could be judged.
+    pub(crate) holds: Option<bool>,
+}
+
+impl Measurement {
+    /// For a run whose compensation starts at `t_on`.
+    pub(crate) fn new(t_on: f64) -> Self {
+        Self {
+            before: Window::new((1.0 - CYCLE) * t_on, t_on),
+            after: Window::new(t_on + SETTLING, f64::INFINITY),
+        }
+    }
+
+    /// Takes the values of [`WATCHED`] at `time`.
+    pub(crate) fn add(&mut self, time: f64, values: [f64; 5]) {
+        self.before.add(time, values);
+        self.after.add(time, values);
+    }
+
+    /// The claims; `end` is the time reached, `lost` whether that is not the one planned.
+    pub(crate) fn claims(&self, end: f64, lost: bool) -> Vec<Claim> {
+        let Self { before, after } = self;
+        let whole = before.count > 0.0 && end >= before.to;
+        let settled = after.count > 1.0;
+        let early = |claim: &str, paper, measured, unit, holds: bool| Claim {
+            claim: format!("{claim}, {} to {} s", before.from, before.to),
+            paper,
+            measured,
+            unit,
+            holds: if whole { Some(holds) } else { lost.then_some(false) },
+        };
+        let late = |claim: &str, paper, measured, unit, holds: bool| Claim {
+            claim: format!("{claim}, t > {} s", after.from),
+            paper,
+            measured,
+            unit,
+            holds: if lost { Some(false) } else { settled.then_some(holds) },
+        };
+        let (cart, angle) = (before.x_p.amplitude(), before.theta.amplitude());
+        let (rest, rest_angle) = (after.x_p.amplitude(), after.theta.amplitude());
+        let slides = f64::from(before.slides);
+        let (rms, spike) = (after.rms(), after.largest);
+        vec![
+            early("limit cycle of the cart", "a limit cycle", cart, "m", cart > 0.01),
+            early("limit cycle of the pendulum", "a limit cycle", angle, "rad", angle > 0.01),
+            early("slides between two rests", "stick-slip", slides, "", slides >= 1.0),
+            late("cart after compensation", "below 1 mm", 1e3 * rest, "mm", rest < 1e-3),
+            late(
+                "pendulum after compensation",
+                "below 2 mrad",
+                1e3 * rest_angle,
+                "mrad",
+                rest_angle < 2e-3,
+            ),
+            late("rms of f_fric - f_hat", "accurate, Figure 6", rms, "N", rms < 0.2 * LEVEL),
+            late("largest |f_fric - f_hat|", "spikes, Figure 6", spike, "N", spike > 3.0 * rms),
+        ]
+    }
+}
+
+/// The Coulomb friction of the paper in N: an estimate whose error is below a fifth of it follows
+/// the friction.
+const LEVEL: f64 = 25.0;
+
+/// The table, one line for each claim.
+pub(crate) fn table(claims: &[Claim]) -> String {
+    let mut lines = vec![format!("{:<44} {:<20} {:>14}  holds", "claim", "paper", "measured")];
+    for claim in claims {
+        let holds = match claim.holds {
+            Some(true) => "yes",
+            Some(false) => "NO",
+            None => "not judged: the run ended before",
+        };
+        let measured = if claim.measured.is_finite() {
+            format!("{:.4} {}", claim.measured, claim.unit)
+        } else {
+            "-".to_owned()
+        };
+        lines.push(format!("{:<44} {:<20} {:>14}  {holds}", claim.claim, claim.paper, measured));
+    }
+    lines.join("\n")
+}

@@ -1,0 +1,304 @@
+//! Line plots of time series: one SVG, and a PNG rasterised from that SVG.
+//!
+//! The text of the PNG is set in a font that is linked into the program, so a figure looks the
+//! same on a machine without fonts.
+
+mod axis;
+mod canvas;
+mod trace;
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use axis::Axis;
+use canvas::{Anchor, Canvas};
+
+pub(crate) use canvas::rasterise;
+
+use crate::whole_file;
+
+/// Width of a figure in SVG units; the PNG has twice as many pixels.
+const WIDTH: f64 = 1000.0;
+
+const LEFT: f64 = 100.0;
+const RIGHT: f64 = 22.0;
+const TITLE_HEIGHT: f64 = 40.0;
+const LEGEND_HEIGHT: f64 = 32.0;
+const PLOT_HEIGHT: f64 = 168.0;
+const TICK_HEIGHT: f64 = 26.0;
+const LABEL_HEIGHT: f64 = 24.0;
+const GAP: f64 = 12.0;
+
+const TITLE_SIZE: f64 = 20.0;
+const TEXT_SIZE: f64 = 16.0;
+
+const TEXT: &str = "#222222";
+const FRAME: &str = "#444444";
+const GRID: &str = "#e2e2e2";
+
+const LIMIT_DASH: &str = "7 4";
+const MARK_DASH: &str = "4 3";
+
+/// Panels below each other under one title.
+#[derive(Debug)]
+pub(crate) struct Figure<'a> {
+    pub(crate) title: &'a str,
+    pub(crate) panels: Vec<Panel<'a>>,
+}
+
+/// One pair of axes. Labels carry the unit, as in "time in s".
+#[derive(Debug, Default)]
+pub(crate) struct Panel<'a> {
+    /// Text below the axis; an empty one takes no space.
+    pub(crate) x_label: &'a str,
+    pub(crate) y_label: &'a str,
+    /// Part of the time axis that is shown; without it, all finite times.
+    pub(crate) x_range: Option<(f64, f64)>,
+    /// The vertical axis follows the data up to this magnitude; what lies beyond leaves the frame,
+    /// and the legend says so.
+    pub(crate) y_cap: Option<f64>,
+    pub(crate) series: Vec<Series<'a>>,
+    /// Moments in time: vertical dashed lines with a text.
+    pub(crate) marks: Vec<(f64, &'a str)>,
+    /// A magnitude that is claimed: thin lines at plus and minus it, named in the legend.
+    pub(crate) limit: Option<(f64, &'a str)>,
+}
+
+/// A curve. A value that is not finite leaves a gap.
+#[derive(Debug)]
+pub(crate) struct Series<'a> {
+    pub(crate) label: &'a str,
+    pub(crate) time: &'a [f64],
+    /// As long as `time`.
+    pub(crate) values: &'a [f64],
+    pub(crate) ink: Ink,
+    /// A broad curve stays visible below a later one that covers it.
+    pub(crate) broad: bool,
+}
+
+/// Line colours that differ for the colour-blind too (Okabe and Ito, 2008).
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Ink {
+    Blue,
+    Sky,
+    Vermilion,
+    Green,
+}
+
+impl Ink {
+    fn code(self) -> &'static str {
+        match self {
+            Self::Blue => "#0072b2",
+            Self::Sky => "#56b4e9",
+            Self::Vermilion => "#d55e00",
+            Self::Green => "#009e73",
+        }
+    }
+}
+
+impl Series<'_> {
+    fn width(&self) -> &'static str {
+        if self.broad { "5" } else { "1.8" }
+    }
+}
+
+/// Why a figure was not written.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum FigureError {
+    #[error("curve {label:?}: {times} times, but {values} values")]
+    Lengths {
+        label: String,
+        times: usize,
+        values: usize,
+    },
+    #[error("cannot write {}: {source}", path.display())]
+    Write { path: PathBuf, source: io::Error },
+    #[error("cannot turn the drawing into pixels: {0}")]
+    Pixels(String),
+}
+
+impl Figure<'_> {
+    /// Writes `stem`.svg and `stem`.png, each whole or not at all; makes the folder if it is not
+    /// there. The same figure gives the same bytes.
+    ///
+    /// # Errors
+    ///
+    /// [`FigureError`]: a curve with unequal lengths, or a file that cannot be written.
+    pub(crate) fn write(&self, stem: &Path) -> Result<(), FigureError> {
+        let svg = self.svg()?;
+        let png = rasterise(&svg)?;
+        write_whole(&with_ending(stem, ".svg"), svg.as_bytes())?;
+        write_whole(&with_ending(stem, ".png"), &png)
+    }
+
+    /// The drawing as SVG text.
+    ///
+    /// # Errors
+    ///
+    /// [`FigureError::Lengths`].
+    pub(crate) fn svg(&self) -> Result<String, FigureError> {
+        for series in self.panels.iter().flat_map(|panel| &panel.series) {
+            if series.time.len() != series.values.len() {
+                return Err(FigureError::Lengths {
+                    label: series.label.to_owned(),
+                    times: series.time.len(),
+                    values: series.values.len(),
+                });
+            }
+        }
+        let height = TITLE_HEIGHT + self.panels.iter().map(Panel::height).sum::<f64>();
+        let mut canvas = Canvas::new(WIDTH, height, self.title);
+        canvas.text(
+            (WIDTH / 2.0, 30.0),
+            Anchor::Middle,
+            TITLE_SIZE,
+            TEXT,
+            self.title,
+        );
+        let mut top = TITLE_HEIGHT;
+        for panel in &self.panels {
+            panel.draw(&mut canvas, top + LEGEND_HEIGHT);
+            top += panel.height();
+        }
+        Ok(canvas.finish())
+    }
+}
+
+impl Panel<'_> {
+    fn height(&self) -> f64 {
+        let label = if self.x_label.is_empty() {
+            0.0
+        } else {
+            LABEL_HEIGHT
+        };
+        LEGEND_HEIGHT + PLOT_HEIGHT + TICK_HEIGHT + label + GAP
+    }
+
+    fn draw(&self, canvas: &mut Canvas, top: f64) {
+        let (right, bottom) = (WIDTH - RIGHT, top + PLOT_HEIGHT);
+        let (start, end) = self.x_range.unwrap_or_else(|| self.times());
+        let horizontal = Axis::exact((start, end), (LEFT, right), 10);
+        let visible = self.values_between(horizontal.range());
+        let limit = self.limit.into_iter().flat_map(|(size, _)| [size, -size]);
+        let vertical = Axis::around(visible.clone().chain(limit), self.y_cap, (bottom, top), 7);
+
+        self.draw_grid(canvas, &horizontal, &vertical);
+        if let Some((size, _)) = self.limit {
+            for level in [size, -size] {
+                let y = vertical.place(level);
+                canvas.line((LEFT, y), (right, y), FRAME, "1.2", LIMIT_DASH);
+            }
+        }
+        let window = canvas.window((LEFT, top), (right, bottom));
+        for series in &self.series {
+            let path = trace::path(series.time, series.values, &horizontal, &vertical);
+            canvas.curve(window, &path, series.ink.code(), series.width());
+        }
+        for (at, _) in self.visible_marks(&horizontal) {
+            let x = horizontal.place(*at);
+            canvas.line((x, top), (x, bottom), TEXT, "1.5", MARK_DASH);
+        }
+        canvas.frame((LEFT, top), (right, bottom), FRAME);
+        let outside = visible.clone().any(|value| !vertical.contains(value));
+        self.draw_legend(canvas, top - 10.0, &horizontal, outside);
+        if visible.count() == 0 {
+            let middle = (
+                f64::midpoint(LEFT, right),
+                f64::midpoint(top, bottom) - 20.0,
+            );
+            canvas.text(middle, Anchor::Middle, TEXT_SIZE, TEXT, "no finite data");
+        }
+    }
+
+    fn times(&self) -> (f64, f64) {
+        let times = self
+            .series
+            .iter()
+            .flat_map(|series| series.time)
+            .filter(|time| time.is_finite());
+        times.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &time| {
+            (low.min(time), high.max(time))
+        })
+    }
+
+    /// The finite values of all curves inside a stretch of time.
+    fn values_between(&self, (start, end): (f64, f64)) -> impl Iterator<Item = f64> + Clone {
+        self.series
+            .iter()
+            .flat_map(|series| series.time.iter().zip(series.values))
+            .filter(move |(time, value)| (start..=end).contains(*time) && value.is_finite())
+            .map(|(_, value)| *value)
+    }
+
+    fn draw_grid(&self, canvas: &mut Canvas, horizontal: &Axis, vertical: &Axis) {
+        let ((left, right), (bottom, top)) = (horizontal.pixels(), vertical.pixels());
+        for (at, label) in horizontal.ticks() {
+            let x = horizontal.place(at);
+            canvas.line((x, top), (x, bottom), GRID, "1", "none");
+            canvas.text((x, bottom + 20.0), Anchor::Middle, TEXT_SIZE, TEXT, &label);
+        }
+        for (at, label) in vertical.ticks() {
+            let y = vertical.place(at);
+            canvas.line((left, y), (right, y), GRID, "1", "none");
+            canvas.text((left - 8.0, y + 5.5), Anchor::End, TEXT_SIZE, TEXT, &label);
+        }
+        let below = (
+            f64::midpoint(left, right),
+            bottom + TICK_HEIGHT + LABEL_HEIGHT - 8.0,
+        );
+        canvas.text(below, Anchor::Middle, TEXT_SIZE, TEXT, self.x_label);
+        canvas.upward_text(
+            (20.0, f64::midpoint(top, bottom)),
+            TEXT_SIZE,
+            TEXT,
+            self.y_label,
+        );
+    }
+
+    fn visible_marks(&self, horizontal: &Axis) -> impl Iterator<Item = &(f64, &str)> {
+        self.marks.iter().filter(|(at, _)| horizontal.contains(*at))
+    }
+
+    fn draw_legend(&self, canvas: &mut Canvas, baseline: f64, horizontal: &Axis, outside: bool) {
+        let mut x = LEFT;
+        let mut entry = |colour: &str, width: &str, dash: &str, label: &str| {
+            let y = baseline - 5.5;
+            canvas.line((x, y), (x + 30.0, y), colour, width, dash);
+            canvas.text((x + 38.0, baseline), Anchor::Start, TEXT_SIZE, TEXT, label);
+            x += 38.0 + canvas::text_width(label, TEXT_SIZE) + 26.0;
+        };
+        for series in &self.series {
+            entry(series.ink.code(), series.width(), "none", series.label);
+        }
+        if let Some((_, label)) = self.limit {
+            entry(FRAME, "1.2", LIMIT_DASH, label);
+        }
+        for (_, label) in self.visible_marks(horizontal) {
+            entry(TEXT, "1.5", MARK_DASH, label);
+        }
+        if outside {
+            let end = (WIDTH - RIGHT, baseline);
+            canvas.text(
+                end,
+                Anchor::End,
+                TEXT_SIZE,
+                TEXT,
+                "a curve leaves the frame",
+            );
+        }
+    }
+}
+
+fn with_ending(stem: &Path, ending: &str) -> PathBuf {
+    let mut name = stem.as_os_str().to_owned();
+    name.push(ending);
+    PathBuf::from(name)
+}
+
+fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), FigureError> {
+    whole_file::write(path, bytes)
+        .map_err(|source| FigureError::Write { path: path.to_owned(), source })
+}
+
+#[cfg(test)]
+mod tests;

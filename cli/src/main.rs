@@ -1,0 +1,62 @@
+//! `aso-ftc`: exports the fault-tolerant controller and the friction pendulum as FMUs, couples
+//! FMUs, repeats the experiment of Patton and Klinkhieo (2009).
+//!
+//! Exit status: 0 done, 1 a claim does not hold, 2 misuse or bad input.
+#![forbid(unsafe_code)]
+
+mod check;
+mod claims;
+mod design;
+mod figure;
+mod pack;
+mod paper_figures;
+mod recording;
+mod reproduce;
+mod run;
+mod scenario;
+mod summary;
+mod whole_file;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Fault-tolerant control with an augmented state observer, as FMUs.
+#[derive(Parser)]
+#[command(version)]
+struct Arguments {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    /// Build and pack both FMUs, run the paper's experiment, compare with its claims
+    Reproduce(reproduce::Options),
+    /// Build the FMUs of this workspace and pack them
+    Pack(pack::Options),
+    /// Couple a plant FMU and a controller FMU
+    Run(run::Options),
+    /// Design observer and feedback for the plant of a file
+    Design(design::Options),
+    /// Check the model description of an FMU against the rules of FMI 2.0.5
+    Check(check::Options),
+}
+
+fn main() -> ExitCode {
+    let done = match Arguments::parse().verb {
+        Verb::Reproduce(options) => reproduce::reproduce(&options),
+        Verb::Pack(options) => pack::pack(&options),
+        Verb::Run(options) => run::run(&options),
+        Verb::Design(options) => design::design(&options),
+        Verb::Check(options) => check::check(&options),
+    };
+    match done {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::from(1),
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}

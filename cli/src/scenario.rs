@@ -1,0 +1,70 @@
+//! The named scenarios: settings of the two FMUs by variable name.
+
+/// A scenario of `reproduce`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Scenario {
+    /// Nonlinear plant from x(0) = [0.1, -0.1, 0, 0], observer eigenvalues -1200 to -3000
+    Paper,
+    /// Linearised plant from the paper's x(0) = [1.1, -1.1, 0, 0], the same controller
+    PaperLiteral,
+    /// The paper's printed L with two signs repaired; it loses the nonlinear plant
+    PrintedGains,
+}
+
+/// The L printed after equation (21), in thousands, row by row, with the signs of L[3,2] and
+/// L[4,2] reversed: as printed it makes A_0 - L C_0 unstable.
+const PRINTED_L: [[f64; 2]; 5] = [
+    [0.0380, -0.0048],
+    [-0.0038, 0.0518],
+    [0.3792, 0.1690],
+    [-0.1297, 0.8841],
+    [-3.3432, 0.8941],
+];
+
+impl Scenario {
+    /// The name on the command line.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Scenario::Paper => "paper",
+            Scenario::PaperLiteral => "paper-literal",
+            Scenario::PrintedGains => "printed-gains",
+        }
+    }
+
+    /// What is known to come out where that is not what the paper claims.
+    pub(crate) fn expectation(self) -> Option<&'static str> {
+        (self == Scenario::PrintedGains).then_some(
+            "expected: the printed gains lose the nonlinear plant soon after the compensation starts",
+        )
+    }
+
+    /// `slave.variable` and value, over the start values of the FMUs.
+    pub(crate) fn settings(self) -> Vec<(String, String)> {
+        let pair = |name: &str, value: &str| (name.to_owned(), value.to_owned());
+        match self {
+            Scenario::Paper => Vec::new(),
+            Scenario::PaperLiteral => vec![
+                pair("plant.linearised", "true"),
+                pair("plant.x_p_0", "1.1"),
+                pair("plant.theta_0", "-1.1"),
+            ],
+            Scenario::PrintedGains => printed_gains(),
+        }
+    }
+}
+
+/// L = [L_x; -L_f] of (10), so the last row of L is -L_f.
+fn printed_gains() -> Vec<(String, String)> {
+    let mut settings = Vec::new();
+    for (row, entries) in PRINTED_L.iter().enumerate() {
+        for (column, entry) in entries.iter().enumerate() {
+            let (name, value) = if row < 4 {
+                (format!("controller.L_x[{},{}]", row + 1, column + 1), 1e3 * entry)
+            } else {
+                (format!("controller.L_f[1,{}]", column + 1), -1e3 * entry)
+            };
+            settings.push((name, value.to_string()));
+        }
+    }
+    settings
+}

@@ -1,0 +1,163 @@
+//! `summary.json`: the claims, and theorem 1 for the controller as it ran.
+
+use std::path::Path;
+
+use anyhow::{Context, bail};
+use control::aso::{FaultyPlant, Gains};
+use control::eigen::eigenvalues;
+use control::theorem1::{Certificate, certify};
+use fmi2::description::Kind;
+use master::{Probe, System};
+use nalgebra::DMatrix;
+use serde::Serialize;
+
+use crate::claims::Claim;
+use crate::whole_file;
+
+/// The design parameter alpha of (12); it cancels in delta.
+const ALPHA: f64 = 1.0;
+
+/// The content of `summary.json`.
+#[derive(Serialize)]
+pub(crate) struct Summary<'a> {
+    pub(crate) scenario: &'static str,
+    pub(crate) method: String,
+    /// In s.
+    pub(crate) communication_step: f64,
+    /// In s.
+    pub(crate) stop_time: f64,
+    /// Time reached in s, and why no further where that was not planned.
+    pub(crate) reached: f64,
+    pub(crate) lost: Option<&'a str>,
+    pub(crate) settings: Vec<String>,
+    pub(crate) claims: &'a [Claim],
+    pub(crate) design: &'a Certified,
+}
+
+/// The controller and what theorem 1 says about it.
+#[derive(Serialize)]
+pub(crate) struct Certified {
+    #[serde(rename = "K_x")]
+    k_x: Rows,
+    #[serde(rename = "K_f")]
+    k_f: Rows,
+    #[serde(rename = "L_x")]
+    l_x: Rows,
+    #[serde(rename = "L_f")]
+    l_f: Rows,
+    /// Of A + B K_x: real and imaginary parts.
+    controller_eigenvalues: Vec<[f64; 2]>,
+    /// Of A_0 - L C_0.
+    observer_eigenvalues: Vec<[f64; 2]>,
+    theorem_1: Theorem1,
+}
+
+/// Theorem 1, or why it says nothing.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Theorem1 {
+    Holds(Box<Numbers>),
+    Fails { reason: String },
+}
+
+#[derive(Serialize)]
+struct Numbers {
+    alpha: f64,
+    /// Bound of the fault in N: the static friction F_s of the plant.
+    beta: f64,
+    #[serde(rename = "P")]
+    p: Rows,
+    p_smallest_eigenvalue: f64,
+    p_largest_eigenvalue: f64,
+    /// Of (12), each entry relative to the terms it is made of.
+    residual: f64,
+    delta: f64,
+    note: &'static str,
+    controllability_rank: [usize; 2],
+    observability_rank: [usize; 2],
+}
+
+type Rows = Vec<Vec<f64>>;
+
+fn rows(matrix: &DMatrix<f64>) -> Rows {
+    matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
+}
+
+impl Certified {
+    /// Certifies the controller in `system`, its matrices read through its parameters; `beta` is
+    /// the bound of the fault in N.
+    pub(crate) fn of(system: &mut System, beta: f64) -> anyhow::Result<Self> {
+        let mut matrix = |name: &str| read_matrix(system, name);
+        let plant =
+            FaultyPlant { a: matrix("A")?, b: matrix("B")?, c: matrix("C")?, f_a: matrix("F_a")? };
+        let gains = Gains {
+            k_x: matrix("K_x")?,
+            k_f: matrix("K_f")?,
+            l_x: matrix("L_x")?,
+            l_f: matrix("L_f")?,
+        };
+        let pairs = |matrix: &DMatrix<f64>| -> anyhow::Result<Vec<[f64; 2]>> {
+            Ok(eigenvalues(matrix)?.iter().map(|value| [value.re, value.im]).collect())
+        };
+        Ok(Self {
+            controller_eigenvalues: pairs(&gains.controlled_dynamics(&plant))?,
+            observer_eigenvalues: pairs(&gains.error_dynamics(&plant))?,
+            theorem_1: match certify(&plant, &gains, ALPHA, beta) {
+                Ok(certificate) => Theorem1::Holds(Box::new(numbers(&certificate))),
+                Err(error) => Theorem1::Fails { reason: error.to_string() },
+            },
+            k_x: rows(&gains.k_x),
+            k_f: rows(&gains.k_f),
+            l_x: rows(&gains.l_x),
+            l_f: rows(&gains.l_f),
+        })
+    }
+}
+
+fn numbers(certificate: &Certificate) -> Numbers {
+    let rank = |rank: &control::rank::Rank| [rank.rank, rank.n];
+    Numbers {
+        alpha: certificate.alpha,
+        beta: certificate.beta,
+        p: rows(&certificate.p),
+        p_smallest_eigenvalue: certificate.p_range.0,
+        p_largest_eigenvalue: certificate.p_range.1,
+        residual: certificate.residual,
+        delta: certificate.delta,
+        note: "P grows in proportion to alpha, which therefore cancels in delta (16)",
+        controllability_rank: rank(&certificate.controllability),
+        observability_rank: rank(&certificate.observability),
+    }
+}
+
+/// The matrix parameter `name` of the controller, all elements `name[i,j]`.
+fn read_matrix(system: &mut System, name: &str) -> anyhow::Result<DMatrix<f64>> {
+    let slave = system.port(&format!("controller.{name}[1,1]"))?.slave;
+    let description = system.slaves[slave].1.description();
+    let position = |row: usize, column: usize| {
+        let element = format!("{name}[{row},{column}]");
+        description.variables.iter().position(|variable| {
+            variable.name == element && matches!(variable.kind, Kind::Real(_))
+        })
+    };
+    let row_count = (1..).take_while(|row| position(*row, 1).is_some()).count();
+    let column_count = (1..).take_while(|column| position(1, *column).is_some()).count();
+    let mut ports = Vec::new();
+    for row in 1..=row_count {
+        for column in 1..=column_count {
+            let Some(variable) = position(row, column) else {
+                bail!("the controller has no variable {name}[{row},{column}]");
+            };
+            ports.push(master::Port { slave, variable });
+        }
+    }
+    let mut values = vec![0.0; ports.len()];
+    Probe::new(system, &ports).read(system, 0.0, &mut values)?;
+    Ok(DMatrix::from_row_slice(row_count, column_count, &values))
+}
+
+/// Writes `value` as JSON to `path`: whole or not at all.
+pub(crate) fn write(value: &impl Serialize, path: &Path) -> anyhow::Result<()> {
+    let text = serde_json::to_vec_pretty(value)?;
+    whole_file::write(path, &text).with_context(|| format!("cannot write {}", path.display()))
+}

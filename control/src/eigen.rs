@@ -1,0 +1,117 @@
+//! Eigenvalues of a real square matrix.
+
+use crate::balance::Balance;
+use crate::{Error, check};
+use nalgebra::{Complex, ComplexField, DMatrix, DVector, Dyn, Schur};
+
+/// Iterations of the QR algorithm per row of the matrix; two or three are usual.
+const ITERATIONS_PER_ROW: usize = 100;
+
+/// The eigenvalues of A, ordered by real part, then by imaginary part.
+///
+/// `a`: n x n, finite. They always exist. Method: diagonal balancing (Parlett and Reinsch 1969),
+/// then the QR algorithm with a bounded number of iterations; about 10 n^3 multiplications. The
+/// answer is exact for a matrix that differs from the balanced A by a few rounding errors of its
+/// norm. Complex eigenvalues come as exact conjugates.
+///
+/// # Example
+///
+/// ```
+/// use nalgebra::DMatrix;
+/// let oscillator = DMatrix::from_row_slice(2, 2, &[0.0, 1.0, -25.0, -6.0]);
+/// let eigenvalues = control::eigen::eigenvalues(&oscillator)?;
+/// assert!((eigenvalues[0].re + 3.0).abs() < 1e-14);
+/// assert!((eigenvalues[0].im + 4.0).abs() < 1e-14);
+/// # Ok::<(), control::Error>(())
+/// ```
+///
+/// # Errors
+///
+/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad `a`; [`Error::NotConverged`]
+/// when the QR algorithm does not end within 100 iterations per row.
+pub fn eigenvalues(a: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, Error> {
+    check::square("A", a)?;
+    let balanced = Balance::of(a).matrix;
+    let (_, t) = schur(&balanced)
+        .or_else(|_| schur(&reflected(&balanced)))?
+        .unpack();
+    let mut found = diagonal_blocks(&t);
+    found.sort_by(|x, y| x.re.total_cmp(&y.re).then(x.im.total_cmp(&y.im)));
+    Ok(found)
+}
+
+/// The spectral abscissa of A: the largest real part of its eigenvalues; below zero A is Hurwitz.
+///
+/// `a`: n x n, finite. Method and precision as in [`eigenvalues`].
+///
+/// # Errors
+///
+/// Those of [`eigenvalues`].
+pub fn spectral_abscissa(a: &DMatrix<f64>) -> Result<f64, Error> {
+    Ok(eigenvalues(a)?
+        .iter()
+        .fold(f64::NEG_INFINITY, |largest, value| largest.max(value.re)))
+}
+
+/// Schur form with bounded iterations.
+pub(crate) fn schur<T>(m: &DMatrix<T>) -> Result<Schur<T, Dyn>, Error>
+where
+    T: ComplexField<RealField = f64>,
+{
+    let iterations = ITERATIONS_PER_ROW * m.nrows();
+    let what = "the QR algorithm for eigenvalues";
+    let found = Schur::try_new(m.clone(), f64::EPSILON, iterations);
+    found.ok_or(Error::NotConverged { what, iterations })
+}
+
+/// H M H with the reflection H = I - 2 v v' / (v'v), v = (1, 1/2, 1/3, ...).
+///
+/// The shifts of the QR algorithm stand still on some matrices with many symmetries, permutations
+/// for example. The reflection breaks the symmetry and changes no eigenvalue.
+fn reflected(m: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut divisor = 0.0;
+    let v = DVector::from_fn(m.nrows(), |_, _| {
+        divisor += 1.0;
+        1.0 / divisor
+    });
+    let h = DMatrix::identity(v.len(), v.len()) - &v * v.transpose() * (2.0 / v.norm_squared());
+    &h * m * &h
+}
+
+/// Eigenvalues of a real block triangular matrix with blocks of order one and two.
+fn diagonal_blocks(t: &DMatrix<f64>) -> Vec<Complex<f64>> {
+    let n = t.nrows();
+    let mut found = Vec::with_capacity(n);
+    let mut row = 0;
+    while row < n {
+        if row + 1 < n && t[(row + 1, row)] != 0.0 {
+            found.extend(pair(
+                t[(row, row)],
+                t[(row, row + 1)],
+                t[(row + 1, row)],
+                t[(row + 1, row + 1)],
+            ));
+            row += 2;
+        } else {
+            found.push(Complex::new(t[(row, row)], 0.0));
+            row += 1;
+        }
+    }
+    found
+}
+
+/// Eigenvalues of [a, b; c, d], without cancellation.
+fn pair(a: f64, b: f64, c: f64, d: f64) -> [Complex<f64>; 2] {
+    let half = 0.5 * (a - d);
+    let discriminant = half * half + b * c;
+    if discriminant < 0.0 {
+        let imaginary = (-discriminant).sqrt();
+        return [
+            Complex::new(d + half, -imaginary),
+            Complex::new(d + half, imaginary),
+        ];
+    }
+    let z = half + discriminant.sqrt().copysign(half);
+    let other = if z == 0.0 { d } else { d - b * c / z };
+    [Complex::new(d + z, 0.0), Complex::new(other, 0.0)]
+}

@@ -1,0 +1,159 @@
+//! The reasons for which a computation is refused.
+
+/// Why a computation was refused. Rows and columns count from 1, as in the literature.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// An entry is NaN or infinite.
+    #[error("{matrix}[{row},{col}] is {value}, expected a finite number")]
+    NotFinite {
+        /// Name of the matrix as in the documentation of the function.
+        matrix: &'static str,
+        /// Row of the first such entry, from 1.
+        row: usize,
+        /// Column of the first such entry, from 1.
+        col: usize,
+        /// The entry.
+        value: f64,
+    },
+    /// A matrix has the wrong number of rows or columns.
+    #[error("{matrix} is {}x{}, expected {}x{}", found.0, found.1, expected.0, expected.1)]
+    Shape {
+        /// Name of the matrix as in the documentation of the function.
+        matrix: &'static str,
+        /// Rows and columns it must have.
+        expected: (usize, usize),
+        /// Rows and columns it has.
+        found: (usize, usize),
+    },
+    /// A matrix has no rows or no columns.
+    #[error("{matrix} is {}x{}, expected at least one row and one column", found.0, found.1)]
+    Empty {
+        /// Name of the matrix.
+        matrix: &'static str,
+        /// Rows and columns it has.
+        found: (usize, usize),
+    },
+    /// A matrix that must be symmetric is not.
+    #[error("{matrix} differs from its transpose at [{row},{col}]")]
+    NotSymmetric {
+        /// Name of the matrix.
+        matrix: &'static str,
+        /// Row of the first differing entry, from 1.
+        row: usize,
+        /// Column of the first differing entry, from 1.
+        col: usize,
+    },
+    /// A number is outside of its range.
+    #[error("{name} is {value}, expected {rule}")]
+    OutOfRange {
+        /// Name of the argument.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// The rule it breaks.
+        rule: &'static str,
+    },
+    /// The pair (A, B) is not controllable.
+    #[error("the pair (A, B) is not controllable: {rank} of {n} states can be reached")]
+    NotControllable {
+        /// Dimension of the controllable subspace.
+        rank: usize,
+        /// Number of states.
+        n: usize,
+    },
+    /// The pair (A, C) is not observable.
+    #[error("the pair (A, C) is not observable: {rank} of {n} states can be seen")]
+    NotObservable {
+        /// Dimension of the observable quotient.
+        rank: usize,
+        /// Number of states.
+        n: usize,
+    },
+    /// More fault channels than measurements: no observer tells them apart.
+    #[error(
+        "{faults} fault channels need at least as many independent measurements, \
+         found {measurements}"
+    )]
+    TooManyFaults {
+        /// Columns of `F_a`.
+        faults: usize,
+        /// Rows of C.
+        measurements: usize,
+    },
+    /// A constant fault is hidden by a constant state.
+    #[error(
+        "a constant fault cannot be told from a constant state: \
+         rank [A, F_a; C, 0] is {rank}, expected {expected}"
+    )]
+    HiddenFault {
+        /// Rank of the matrix.
+        rank: usize,
+        /// Number of states plus number of fault channels.
+        expected: usize,
+    },
+    /// Not one eigenvalue per state.
+    #[error("{found} eigenvalues are given, expected {expected}, one per state")]
+    PoleCount {
+        /// Number of states.
+        expected: usize,
+        /// Number of eigenvalues given.
+        found: usize,
+    },
+    /// An eigenvalue is wanted more often than there are independent inputs.
+    #[error("the eigenvalue {pole} is wanted {times} times, at most {inputs} are possible")]
+    RepeatedPole {
+        /// The eigenvalue.
+        pole: f64,
+        /// How often it is wanted.
+        times: usize,
+        /// Rank of B.
+        inputs: usize,
+    },
+    /// The gain found does not give the wanted eigenvalues.
+    #[error("the wanted eigenvalues are missed by {relative:e} relative, allowed is {allowed:e}")]
+    PolesMissed {
+        /// Largest relative distance.
+        relative: f64,
+        /// Largest relative distance allowed.
+        allowed: f64,
+    },
+    /// An eigenvalue lies in the closed right half plane.
+    #[error("{matrix} is not Hurwitz: its largest real part is {abscissa}")]
+    NotHurwitz {
+        /// Name of the matrix.
+        matrix: &'static str,
+        /// Largest real part of the eigenvalues.
+        abscissa: f64,
+    },
+    /// A symmetric matrix is not positive definite.
+    #[error("{matrix} is not positive definite")]
+    NotPositiveDefinite {
+        /// Name of the matrix.
+        matrix: &'static str,
+    },
+    /// An iteration did not end within its bound.
+    #[error("{what} did not converge within {iterations} iterations")]
+    NotConverged {
+        /// What was iterated.
+        what: &'static str,
+        /// The bound.
+        iterations: usize,
+    },
+    /// A solution does not satisfy its equation well enough.
+    #[error("{equation} is satisfied to {residual:e} only, allowed is {allowed:e}")]
+    ResidualTooLarge {
+        /// The equation.
+        equation: &'static str,
+        /// Relative residual found.
+        residual: f64,
+        /// Relative residual allowed.
+        allowed: f64,
+    },
+    /// The result exceeds the range of double precision.
+    #[error("{what} exceeds the range of double precision")]
+    Overflow {
+        /// The quantity.
+        what: &'static str,
+    },
+}

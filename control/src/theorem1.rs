@@ -1,0 +1,110 @@
+//! The bound on the estimation error, theorem 1 of the paper named in [`crate::aso`].
+
+use crate::aso::{FaultyPlant, Gains};
+use crate::eigen::spectral_abscissa;
+use crate::lyapunov::{definite_range, lyapunov};
+use crate::rank::{Rank, observability, require_controllable};
+use crate::singular::Singular;
+use crate::{Error, check};
+use nalgebra::DMatrix;
+
+/// Everything theorem 1 says about a controller.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Certificate {
+    /// The design parameter alpha. It cancels in `delta`.
+    pub alpha: f64,
+    /// Bound of the fault, in its unit.
+    pub beta: f64,
+    /// P of (12), (n + q) x (n + q), symmetric positive definite.
+    pub p: DMatrix<f64>,
+    /// Smallest and largest eigenvalue of P.
+    pub p_range: (f64, f64),
+    /// Residual of (12), each entry relative to the absolute terms it is made of.
+    pub residual: f64,
+    /// Norm of the residual of (12) relative to that of alpha beta I. Below 1 / sqrt(n + q) the
+    /// computed P, rounding included, shows the error dynamics stable.
+    pub defect: f64,
+    /// Radius (16) of the region that the error [e; `f_hat`] ends in.
+    pub delta: f64,
+    /// Rank of (A, B); full.
+    pub controllability: Rank,
+    /// Rank of (`A_0`, `C_0`).
+    pub observability: Rank,
+    /// Largest real part of the eigenvalues of A + B `K_x`; below zero `x_hat` stays bounded too.
+    pub controller_abscissa: f64,
+    /// Largest real part of the eigenvalues of `A_0` - L `C_0`; below zero.
+    pub observer_abscissa: f64,
+}
+
+/// P of (12) and the radius delta of (16) for a plant and a controller.
+///
+/// ```text
+/// P (A_0 - L C_0) + (A_0 - L C_0)' P = -alpha beta I                 (12)
+/// delta = (2 / alpha) sqrt(lambda_max(P F_0 F_0' P))                 (16)
+/// ```
+///
+/// `alpha`: above zero; `beta`: above zero, the largest norm of the fault in its unit. P exists
+/// when `A_0` - L `C_0` is Hurwitz. P grows with alpha: with `P_1` the solution for alpha beta = 1,
+/// delta = 2 beta norm(`P_1` `F_0`) for every alpha, so that, other than the paper says, enlarging
+/// alpha does not shrink the region. Method, cost and tolerance: those of [`lyapunov`].
+///
+/// # Example
+///
+/// ```
+/// use control::{aso, theorem1};
+/// use nalgebra::DMatrix;
+/// let plant = aso::FaultyPlant {
+///     a: DMatrix::from_element(1, 1, 0.5),
+///     b: DMatrix::from_element(1, 1, 1.0),
+///     c: DMatrix::from_element(1, 1, 1.0),
+///     f_a: DMatrix::from_element(1, 1, -1.0),
+/// };
+/// let gains = aso::design(&plant, &[-1.0], &[-2.0, -3.0], None)?.gains;
+/// let small = theorem1::certify(&plant, &gains, 1.0, 30.0)?;
+/// let large = theorem1::certify(&plant, &gains, 1000.0, 30.0)?;
+/// assert!((small.delta / large.delta - 1.0).abs() < 1e-12);
+/// # Ok::<(), control::Error>(())
+/// ```
+///
+/// # Errors
+///
+/// Those of [`Gains::check`]; [`Error::OutOfRange`] for `alpha` or `beta`;
+/// [`Error::NotControllable`]; [`Error::NotHurwitz`] when the observer is unstable;
+/// [`Error::NotPositiveDefinite`] when rounding hides it; those of [`lyapunov`].
+pub fn certify(
+    plant: &FaultyPlant,
+    gains: &Gains,
+    alpha: f64,
+    beta: f64,
+) -> Result<Certificate, Error> {
+    gains.check(plant)?;
+    check::positive("alpha", alpha)?;
+    check::positive("beta", beta)?;
+    check::positive("alpha beta", alpha * beta)?;
+    let controllability = require_controllable(&plant.a, &plant.b)?;
+    let error_dynamics = gains.error_dynamics(plant);
+    let order = error_dynamics.nrows();
+    let observer_abscissa = spectral_abscissa(&error_dynamics)?;
+    if observer_abscissa >= 0.0 {
+        return Err(Error::NotHurwitz {
+            matrix: "A_0 - L C_0",
+            abscissa: observer_abscissa,
+        });
+    }
+    let right = DMatrix::from_diagonal_element(order, order, alpha * beta);
+    let solution = lyapunov(&error_dynamics, &right)?;
+    let effect = Singular::of(&(&solution.p * plant.augmented_fault()))?.values[0];
+    Ok(Certificate {
+        alpha,
+        beta,
+        p_range: definite_range(&solution.p)?,
+        p: solution.p,
+        residual: solution.residual,
+        defect: solution.defect,
+        delta: 2.0 / alpha * effect,
+        controllability,
+        observability: observability(&plant.augmented_dynamics(), &plant.augmented_output())?,
+        controller_abscissa: spectral_abscissa(&gains.controlled_dynamics(plant))?,
+        observer_abscissa,
+    })
+}

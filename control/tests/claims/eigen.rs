@@ -1,0 +1,49 @@
+use crate::matrix;
+use control::eigen::{eigenvalues, spectral_abscissa};
+use nalgebra::{Complex, DMatrix};
+
+/// The roots of unity; the unshifted QR algorithm stands still on these.
+#[test]
+fn cyclic_permutations_have_the_roots_of_unity() {
+    for n in 2..=9_u8 {
+        let size = usize::from(n);
+        let cycle = DMatrix::from_fn(size, size, |i, j| f64::from(u8::from((i + 1) % size == j)));
+        let found = eigenvalues(&cycle).unwrap();
+        for k in 0..n {
+            let root =
+                Complex::from_polar(1.0, std::f64::consts::TAU * f64::from(k) / f64::from(n));
+            let nearest = found
+                .iter()
+                .map(|x| (x - root).norm())
+                .fold(f64::INFINITY, f64::min);
+            assert!(nearest < 1e-13, "n = {n}, {root}: {nearest:e}");
+        }
+    }
+}
+
+#[test]
+fn complex_pairs_are_exact_conjugates_and_ordered() {
+    let found = eigenvalues(&matrix(3, 3, &[-1., 2., 0., -3., -1., 0., 5., 1., -4.])).unwrap();
+    assert!((found[0] - Complex::new(-4.0, 0.0)).norm() < 1e-14);
+    assert!((found[1] - Complex::new(-1.0, -6.0_f64.sqrt())).norm() < 1e-14);
+    assert_eq!(found[1], found[2].conj());
+}
+
+/// A companion matrix in units that differ by 1e8 from state to state.
+#[test]
+fn bad_units_cost_no_precision() {
+    let companion = matrix(3, 3, &[0., 1., 0., 0., 0., 1., -6., -11., -6.]);
+    let units = [1.0, 1e8, 1e-8];
+    let scaled = DMatrix::from_fn(3, 3, |i, j| companion[(i, j)] * units[i] / units[j]);
+    for (found, expected) in eigenvalues(&scaled).unwrap().iter().zip([-3.0, -2.0, -1.0]) {
+        assert!((found - expected).norm() < 1e-13, "{found}");
+    }
+}
+
+#[test]
+fn the_spectral_abscissa_is_the_largest_real_part() {
+    let saddle = matrix(2, 2, &[-7.0, 0.0, 3.0, 0.5]);
+    assert!((spectral_abscissa(&saddle).unwrap() - 0.5).abs() < 1e-15);
+    let turning = matrix(2, 2, &[0.25, 100.0, -100.0, 0.25]);
+    assert!((spectral_abscissa(&turning).unwrap() - 0.25).abs() < 1e-13);
+}

@@ -1,0 +1,127 @@
+use crate::reference::{
+    CONTROLLER, CONTROLLER_PICOSECOND, CONTROLLER_SECOND, CONTROLLER_TENTH_MILLISECOND,
+    MEASUREMENTS,
+};
+use crate::{integers, matrix};
+use control::Error;
+use control::hold::FirstOrderHold;
+use nalgebra::DMatrix;
+
+/// The natural units of the controller's states: its entries follow powers of 1800 / s.
+const UNITS: [f64; 5] = [1.0, 1.0, 1800.0, 1800.0, 3_240_000.0];
+
+fn controller(h: f64) -> FirstOrderHold {
+    FirstOrderHold::new(&matrix(5, 5, &CONTROLLER), &matrix(5, 2, &MEASUREMENTS), h)
+        .expect("the discretisation exists")
+}
+
+/// Largest distance in natural units, relative to the largest entry of the expected block.
+fn error_in_units(found: &DMatrix<f64>, expected: &DMatrix<f64>, inputs_are_states: bool) -> f64 {
+    let scaled = |m: &DMatrix<f64>| {
+        DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| {
+            m[(i, j)] / UNITS[i] * if inputs_are_states { UNITS[j] } else { 1.0 }
+        })
+    };
+    (scaled(found) - scaled(expected)).amax() / scaled(expected).amax()
+}
+
+fn assert_agrees(hold: &FirstOrderHold, expected: &DMatrix<f64>, allowed: f64) {
+    let block = |from: usize, cols: usize| expected.columns(from, cols).into();
+    let errors = [
+        error_in_units(&hold.phi, &block(0, 5), true),
+        error_in_units(&hold.gamma_0, &block(5, 2), false),
+        error_in_units(&hold.gamma_1, &block(7, 2), false),
+    ];
+    assert!(errors.iter().all(|&error| error < allowed), "{errors:?}");
+}
+
+#[test]
+fn the_controller_agrees_with_high_precision_at_a_picosecond() {
+    assert_agrees(
+        &controller(1e-12),
+        &matrix(5, 9, &CONTROLLER_PICOSECOND),
+        1e-15,
+    );
+}
+
+#[test]
+fn the_controller_agrees_with_high_precision_at_a_tenth_of_a_millisecond() {
+    assert_agrees(
+        &controller(1e-4),
+        &matrix(5, 9, &CONTROLLER_TENTH_MILLISECOND),
+        1e-14,
+    );
+}
+
+/// A second is thousands of time constants.
+#[test]
+fn the_controller_agrees_with_high_precision_at_a_second() {
+    assert_agrees(&controller(1.0), &matrix(5, 9, &CONTROLLER_SECOND), 1e-12);
+}
+
+#[test]
+fn two_half_steps_are_a_whole_one() {
+    for h in [1e-12, 1e-9, 1e-6, 1e-4, 1e-3, 1e-2, 0.1, 1.0] {
+        let (half, whole) = (controller(h / 2.0), controller(h));
+        let phi = &half.phi * &half.phi;
+        let gamma_0 = &half.phi * &half.gamma_0 + &half.gamma_0;
+        let late = &half.gamma_0 * (h / 2.0) + &half.gamma_1;
+        let gamma_1 = &half.phi * &half.gamma_1 + late;
+        let error = error_in_units(&phi, &whole.phi, true)
+            .max(error_in_units(&gamma_0, &whole.gamma_0, false))
+            .max(error_in_units(&gamma_1, &whole.gamma_1, false));
+        assert!(error < 1e-14, "h = {h}: {error:e}");
+    }
+}
+
+/// x'' = w with w = w0 + w1 t: position and velocity by hand.
+#[test]
+fn a_double_integrator_moves_by_powers_of_the_step() {
+    let h = 0.25;
+    let hold = FirstOrderHold::new(
+        &matrix(2, 2, &[0., 1., 0., 0.]),
+        &matrix(2, 1, &[0., 1.]),
+        h,
+    );
+    let hold = hold.unwrap();
+    let mut out = [0.0; 2];
+    hold.step_into(&[1.0, 2.0], &[3.0], &[4.0], &mut out)
+        .unwrap();
+    let position = 1.0 + 2.0 * h + 3.0 * h * h / 2.0 + 4.0 * h * h * h / 6.0;
+    let velocity = 2.0 + 3.0 * h + 4.0 * h * h / 2.0;
+    assert!(
+        (out[0] - position).abs() < 1e-15 && (out[1] - velocity).abs() < 1e-15,
+        "{out:?}"
+    );
+}
+
+/// x(t) = c + d t solves x' = A x + B w exactly when B w(t) = d - A c - A d t.
+#[test]
+fn a_straight_solution_is_followed_exactly() {
+    let a = integers(4, 4, |i, j| (3 * i * i + 2 * i * j + j) % 7 - 3);
+    let (c, d) = ([1.0, -2.0, 0.5, 3.0], [0.3, 0.1, -0.7, 2.0]);
+    let (c, d) = (matrix(4, 1, &c), matrix(4, 1, &d));
+    let (w0, w1) = (&d - &a * &c, -(&a * &d));
+    let hold = FirstOrderHold::new(&a, &DMatrix::identity(4, 4), 0.7).unwrap();
+    let mut out = [0.0; 4];
+    hold.step_into(c.as_slice(), w0.as_slice(), w1.as_slice(), &mut out)
+        .unwrap();
+    let error = (matrix(4, 1, &out) - (&c + &d * 0.7)).amax();
+    assert!(error < 1e-12 * hold.phi.amax().max(1.0), "{error:e}");
+}
+
+#[test]
+fn a_wrong_length_is_refused_and_leaves_the_output_untouched() {
+    let hold = controller(1e-3);
+    let mut out = [7.0; 5];
+    let wrong = hold.step_into(&[0.0; 5], &[0.0; 2], &[0.0; 3], &mut out);
+    assert_eq!(
+        wrong,
+        Err(Error::Shape {
+            matrix: "w1",
+            expected: (2, 1),
+            found: (3, 1)
+        })
+    );
+    assert_eq!(out.map(f64::to_bits), [7.0_f64.to_bits(); 5]);
+}

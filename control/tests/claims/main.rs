@@ -1,0 +1,47 @@
+//! What the crate claims, held against published numbers, other software and the equations
+//! themselves.
+
+mod aso;
+mod eigen;
+mod exponential;
+mod hold;
+mod lyapunov;
+mod paper;
+mod placement;
+mod rank;
+#[expect(
+    clippy::unreadable_literal,
+    reason = "the digits as the other software wrote them"
+)]
+mod reference;
+mod refusals;
+mod theorem1;
+
+use nalgebra::DMatrix;
+
+/// A matrix from its rows.
+fn matrix(rows: usize, cols: usize, entries: &[f64]) -> DMatrix<f64> {
+    DMatrix::from_row_slice(rows, cols, entries)
+}
+
+/// Largest distance of two matrices, each entry relative to the expected one.
+fn entry_error(found: &DMatrix<f64>, expected: &DMatrix<f64>) -> f64 {
+    assert_eq!(found.shape(), expected.shape());
+    let relative = |x: f64, y: f64| {
+        if (x - y).abs() > 0.0 {
+            (x - y).abs() / y.abs()
+        } else {
+            0.0
+        }
+    };
+    found.zip_map(expected, relative).amax()
+}
+
+/// Entries that follow no pattern, in -5 to 5, but are the same for everybody.
+fn integers(rows: usize, cols: usize, rule: impl Fn(i32, i32) -> i32) -> DMatrix<f64> {
+    let mut entries = Vec::with_capacity(rows * cols);
+    for i in (0..).take(rows) {
+        entries.extend((0..).take(cols).map(|j| f64::from(rule(i, j))));
+    }
+    matrix(rows, cols, &entries)
+}

@@ -1,0 +1,332 @@
+use super::*;
+use crate::description::{
+    Causality, DependencyKind, Initial, IntegerType, Kind, RealType, Variability,
+};
+
+mod files;
+
+/// A model description around `variables` and `structure`, with an enumeration and a real type.
+fn with(variables: &str, structure: &str) -> String {
+    format!(
+        r#"<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="M" guid="{{1}}">
+  <TypeDefinitions>
+    <SimpleType name="Length"><Real quantity="Length" unit="m" min="0" max="9"/></SimpleType>
+    <SimpleType name="Mode"><Enumeration><Item name="off" value="0"/></Enumeration></SimpleType>
+  </TypeDefinitions>
+  <ModelVariables>{variables}</ModelVariables>
+  <ModelStructure>{structure}</ModelStructure>
+</fmiModelDescription>"#
+    )
+}
+
+const X: &str = r#"<ScalarVariable name="x" valueReference="0"><Real/></ScalarVariable>"#;
+
+fn refused(variables: &str, structure: &str) -> String {
+    ModelDescription::parse(with(variables, structure))
+        .unwrap_err()
+        .to_string()
+}
+
+#[test]
+fn defaults_of_the_standard_are_filled_in() {
+    let description = ModelDescription::parse(with(X, "")).unwrap();
+    let x = description.variable("x").unwrap();
+    assert_eq!(
+        (x.causality, x.variability),
+        (Causality::Local, Variability::Continuous)
+    );
+    assert_eq!(x.initial, None);
+    assert_eq!(x.kind, Kind::Real(RealType::default()));
+    assert!(!description.structured_names);
+    assert_eq!(description.co_simulation, None);
+}
+
+#[test]
+fn each_kind_of_variable_is_read() {
+    let variables = r#"
+      <ScalarVariable name="r" valueReference="4294967295" description="a &lt; b" causality="output"
+          variability="discrete" initial="exact">
+        <Real start=" -1.5E-3 " nominal="2." unit="m" displayUnit="mm" derivative="1"/>
+        <Annotations><Tool name="t"><ScalarVariable name="not one"/></Tool></Annotations>
+      </ScalarVariable>
+      <ScalarVariable name="i" valueReference="0" variability="fixed" causality="parameter">
+        <Integer start="-2147483648" min="-2147483648" max="+7" quantity="q"/>
+      </ScalarVariable>
+      <ScalarVariable name="b" valueReference="0"><Boolean start="1"/></ScalarVariable>
+      <ScalarVariable name="s" valueReference="0"><String start="two&#10;lines &#x3b1;"/></ScalarVariable>
+      <ScalarVariable name="e" valueReference="1">
+        <Enumeration declaredType="Mode" start="0" unknown="ignored"/>
+      </ScalarVariable>"#;
+    let description = ModelDescription::parse(with(variables, "")).unwrap();
+    let kind = |name| description.variable(name).unwrap().kind.clone();
+    let real = RealType {
+        start: Some(-0.0015),
+        nominal: Some(2.0),
+        unit: Some("m".into()),
+        display_unit: Some("mm".into()),
+        derivative: Some(1),
+        ..RealType::default()
+    };
+    assert_eq!(kind("r"), Kind::Real(real));
+    let integer = IntegerType {
+        start: Some(i32::MIN),
+        min: Some(i32::MIN),
+        max: Some(7),
+        quantity: Some("q".into()),
+        declared_type: None,
+    };
+    assert_eq!(kind("i"), Kind::Integer(integer));
+    assert_eq!(kind("b"), Kind::Boolean(Some(true)));
+    assert_eq!(kind("s"), Kind::String(Some("two\nlines \u{3b1}".into())));
+    let enumeration = IntegerType {
+        declared_type: Some("Mode".into()),
+        start: Some(0),
+        ..IntegerType::default()
+    };
+    assert_eq!(kind("e"), Kind::Enumeration(enumeration));
+    assert_eq!(description.variables.len(), 5);
+    let r = description.variable("r").unwrap();
+    assert_eq!(r.description.as_deref(), Some("a < b"));
+    assert_eq!(
+        (r.value_reference, r.initial),
+        (u32::MAX, Some(Initial::Exact))
+    );
+}
+
+#[test]
+fn a_declared_type_gives_what_the_variable_does_not_state() {
+    let variables = r#"<ScalarVariable name="x" valueReference="0">
+        <Real declaredType="Length" min="1"/></ScalarVariable>"#;
+    let description = ModelDescription::parse(with(variables, "")).unwrap();
+    let Kind::Real(x) = &description.variables[0].kind else {
+        panic!("x is Real")
+    };
+    assert_eq!((x.min, x.max), (Some(1.0), Some(9.0)));
+    assert_eq!(
+        (x.unit.as_deref(), x.quantity.as_deref()),
+        (Some("m"), Some("Length"))
+    );
+}
+
+#[test]
+fn no_dependencies_and_unknown_dependencies_are_told_apart() {
+    let structure = r#"<Outputs><Unknown index="1"/><Unknown index="1" dependencies=""/>
+        <Unknown index="1" dependencies="1 &#9; 1" dependenciesKind="fixed constant"/></Outputs>"#;
+    let description = ModelDescription::parse(with(X, structure)).unwrap();
+    let outputs = &description.structure.outputs;
+    assert_eq!(outputs[0].dependencies, None);
+    assert_eq!(outputs[1].dependencies, Some(vec![]));
+    assert_eq!(outputs[2].dependencies, Some(vec![1, 1]));
+    let kinds = vec![DependencyKind::Fixed, DependencyKind::Constant];
+    assert_eq!(outputs[2].kinds, Some(kinds));
+}
+
+const CRANE: &str = r#"<fmiModelDescription fmiVersion="2.0" modelName="Crane" guid="{crane}"
+    variableNamingConvention="structured" numberOfEventIndicators="3">
+  <ModelExchange modelIdentifier="crane_me"><SourceFiles><File name="a.c"/></SourceFiles></ModelExchange>
+  <CoSimulation modelIdentifier="crane" canInterpolateInputs="1" canSerializeFMUstate="false"
+    canHandleVariableCommunicationStepSize=" true " maxOutputDerivativeOrder="2"/>
+  <UnitDefinitions>
+    <Unit name="rad"><BaseUnit rad="1"/><DisplayUnit name="deg" factor="57.3"/></Unit>
+    <Unit name="degC"><BaseUnit K="1" offset="273.15"/></Unit>
+    <Unit name="apples"/>
+  </UnitDefinitions>
+  <LogCategories><Category name="logEvents" description="jumps"/></LogCategories>
+  <DefaultExperiment stopTime="3.0" tolerance="1e-4"/>
+  <ModelVariables/>
+  <ModelStructure/>
+</fmiModelDescription>"#;
+
+#[test]
+fn both_interfaces_are_read() {
+    let description = ModelDescription::parse(CRANE).unwrap();
+    let co_simulation = CoSimulation {
+        model_identifier: "crane".into(),
+        can_interpolate_inputs: true,
+        can_handle_variable_communication_step_size: true,
+        max_output_derivative_order: 2,
+        ..CoSimulation::default()
+    };
+    assert_eq!(description.co_simulation, Some(co_simulation));
+    assert_eq!(description.model_exchange.as_deref(), Some("crane_me"));
+    assert_eq!(description.number_of_event_indicators, Some(3));
+    assert!(description.structured_names);
+}
+
+#[test]
+fn units_categories_and_experiment_are_read() {
+    let description = ModelDescription::parse(CRANE).unwrap();
+    let celsius = BaseUnit {
+        k: 1,
+        offset: 273.15,
+        ..BaseUnit::default()
+    };
+    assert_eq!(description.units[1].base, Some(celsius));
+    assert_eq!(description.units[2].base, None);
+    let degrees = DisplayUnit {
+        name: "deg".into(),
+        factor: 57.3,
+        offset: 0.0,
+    };
+    assert_eq!(description.units[0].display_units, [degrees]);
+    assert_eq!(
+        description.log_categories[0].description.as_deref(),
+        Some("jumps")
+    );
+    let experiment = DefaultExperiment {
+        stop_time: Some(3.0),
+        tolerance: Some(1e-4),
+        ..DefaultExperiment::default()
+    };
+    assert_eq!(description.default_experiment, Some(experiment));
+}
+
+#[test]
+fn other_versions_are_named() {
+    for version in ["1.0", "3.0", "2.0.1", ""] {
+        let xml = format!(r#"<fmiModelDescription fmiVersion="{version}"/>"#);
+        let error = ModelDescription::parse(xml).unwrap_err();
+        assert!(matches!(error, ParseError::Version { ref found, .. } if found == version));
+    }
+    let missing = ModelDescription::parse("<fmiModelDescription/>")
+        .unwrap_err()
+        .to_string();
+    assert!(missing.contains("fmiVersion"), "{missing}");
+    let other = ModelDescription::parse("<ssd/>").unwrap_err().to_string();
+    assert!(
+        other.contains("fmiModelDescription") && other.contains("<ssd>"),
+        "{other}"
+    );
+}
+
+#[test]
+fn numbers_that_are_none_are_refused() {
+    let number = |attribute: &str| {
+        refused(
+            &format!(
+                r#"<ScalarVariable name="x" valueReference="0"><Real {attribute}/></ScalarVariable>"#
+            ),
+            "",
+        )
+    };
+    for text in [
+        "NaN", "INF", "-INF", "+INF", "inf", "infinity", "1e999", "1,5", "", "0x10", "1_0",
+    ] {
+        let error = number(&format!("start=\"{text}\""));
+        assert!(error.contains("start: expected a finite number"), "{error}");
+        assert!(error.contains(&format!("found {text:?}")), "{error}");
+    }
+    for (kind, attribute, text) in [
+        ("Integer", "start", "2147483648"),
+        ("Integer", "min", "1.0"),
+        ("Boolean", "start", "True"),
+        ("Boolean", "start", ""),
+    ] {
+        let error = refused(
+            &format!(
+                r#"<ScalarVariable name="x" valueReference="0"><{kind} {attribute}="{text}"/></ScalarVariable>"#
+            ),
+            "",
+        );
+        assert!(
+            error.contains(&format!("<{kind}>, attribute {attribute}")),
+            "{error}"
+        );
+    }
+}
+
+/// An error of `variables` and `structure` that has a position and says `said`.
+fn assert_refused(variables: &str, structure: &str, said: &str) {
+    let error = refused(variables, structure);
+    assert!(
+        error.contains(said) && error.starts_with("line "),
+        "{said}: {error}"
+    );
+}
+
+#[test]
+fn a_variable_that_would_mislead_is_refused() {
+    for (attributes, content, said) in [
+        ("valueReference='0'", "<Real/>", "attribute name"),
+        ("name='x'", "<Real/>", "attribute valueReference"),
+        ("name='x' valueReference='-1'", "<Real/>", "0 to 4294967295"),
+        ("name='x' valueReference='0'", "", "expected one of Real"),
+        (
+            "name='x' valueReference='0'",
+            "<Real/><String/>",
+            "found more",
+        ),
+        (
+            "name='x' valueReference='0' causality='inout'",
+            "<Real/>",
+            "attribute causality",
+        ),
+        (
+            "name='x' valueReference='0' variability='often'",
+            "<Real/>",
+            "attribute variability",
+        ),
+        (
+            "name='x' valueReference='0' initial='first'",
+            "<Real/>",
+            "attribute initial",
+        ),
+        (
+            "name='x' valueReference='0'",
+            "<Real derivative='2'/>",
+            "1 to 1",
+        ),
+        (
+            "name='x' valueReference='0'",
+            "<Real declaredType='Mode'/>",
+            "attribute declaredType",
+        ),
+        (
+            "name='x' valueReference='0'",
+            "<Enumeration/>",
+            "attribute declaredType",
+        ),
+    ] {
+        let variable = format!("<ScalarVariable {attributes}>{content}</ScalarVariable>");
+        assert_refused(&variable, "", said);
+    }
+    assert_refused(&format!("{X}{X}"), "", "a name that is used once");
+}
+
+#[test]
+fn a_structure_that_would_mislead_is_refused() {
+    for (attributes, said) in [
+        ("", "attribute index"),
+        ("index='0'", "1 to 1"),
+        ("index='2'", "1 to 1"),
+        ("index='1' dependencies='1 2'", "1 to 1"),
+        ("index='1' dependencies='x'", "attribute dependencies"),
+        ("index='1' dependenciesKind='fixed'", "as dependencies"),
+        (
+            "index='1' dependencies='1' dependenciesKind=''",
+            "as dependencies",
+        ),
+        (
+            "index='1' dependencies='1' dependenciesKind='linear'",
+            "attribute dependenciesKind",
+        ),
+    ] {
+        assert_refused(
+            X,
+            &format!("<Outputs><Unknown {attributes}/></Outputs>"),
+            said,
+        );
+    }
+    assert_refused(X, "<Outputs/><Outputs/>", "one element Outputs");
+}
+
+#[test]
+fn aliases_share_a_value_reference() {
+    let alias = X.replace("\"x\"", "\"y\"");
+    let description = ModelDescription::parse(with(&format!("{X}{alias}"), "")).unwrap();
+    assert_eq!(
+        description.variables[1].value_reference,
+        description.variables[0].value_reference
+    );
+}

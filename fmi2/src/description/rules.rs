@@ -1,0 +1,237 @@
+//! The static rules of FMI 2.0.5 that a model description can break and still be read.
+
+mod definitions;
+mod names;
+mod structure;
+mod variables;
+
+use std::collections::HashSet;
+use std::fmt;
+
+use super::{DefaultExperiment, ModelDescription};
+
+/// A rule that a model description breaks.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Problem {
+    /// Section of FMI 2.0.5 with the rule.
+    pub section: &'static str,
+    /// What is wrong, naming the variable or element.
+    pub text: String,
+}
+
+impl fmt::Display for Problem {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{} (section {})", self.text, self.section)
+    }
+}
+
+/// What has been found so far.
+#[derive(Default)]
+struct Problems(Vec<Problem>);
+
+impl Problems {
+    fn add(&mut self, section: &'static str, text: String) {
+        self.0.push(Problem { section, text });
+    }
+
+    /// Adds a problem unless the rule `holds`.
+    fn demand(&mut self, holds: bool, section: &'static str, text: impl FnOnce() -> String) {
+        if !holds {
+            self.add(section, text());
+        }
+    }
+
+    /// Text that XML can hold.
+    fn text(&mut self, section: &'static str, what: &str, value: &str) {
+        self.demand(value.chars().all(super::render::is_xml), section, || {
+            format!("{what} {value:?} has characters that XML cannot hold")
+        });
+    }
+
+    /// Text of one line, the `xs:normalizedString` of the schema.
+    fn line(&mut self, section: &'static str, what: &str, value: &str) {
+        self.text(section, what, value);
+        self.demand(!value.contains(['\t', '\r', '\n']), section, || {
+            format!("{what} {value:?} has a line break or a tab")
+        });
+    }
+
+    fn finite(&mut self, section: &'static str, what: &str, value: Option<f64>) {
+        if let Some(value) = value.filter(|value| !value.is_finite()) {
+            self.add(
+                section,
+                format!("{what} is {value:?}, and FMI has finite numbers only"),
+            );
+        }
+    }
+
+    /// Each of `names` once.
+    fn unique<'a>(
+        &mut self,
+        section: &'static str,
+        what: &str,
+        names: impl Iterator<Item = &'a str>,
+    ) {
+        let mut seen = HashSet::new();
+        for name in names {
+            self.demand(seen.insert(name), section, || {
+                format!("{what} {name:?} is there twice")
+            });
+        }
+    }
+}
+
+impl ModelDescription {
+    /// Which static rules of FMI 2.0.5 this description breaks; none, if it is in order.
+    ///
+    /// Checked are the rules on the file itself: identifiers and flags, units, types, the tables
+    /// of causality, variability and initial, start values and limits, names, aliases, the lists
+    /// of `ModelStructure` with their dependencies, the default experiment. Whether the binary
+    /// behaves accordingly is another question.
+    ///
+    /// Cost: linear in the size of the description.
+    #[must_use]
+    pub fn problems(&self) -> Vec<Problem> {
+        let mut problems = Problems::default();
+        identity(self, &mut problems);
+        texts(self, &mut problems);
+        let categories = self
+            .log_categories
+            .iter()
+            .map(|category| category.name.as_str());
+        problems.unique("2.2.4", "log category", categories);
+        if let Some(own) = &self.default_experiment {
+            experiment(own, &mut problems);
+        }
+        definitions::check(self, &mut problems);
+        variables::check(self, &mut problems);
+        names::check(self, &mut problems);
+        structure::check(self, &mut problems);
+        problems.0
+    }
+}
+
+fn identity(description: &ModelDescription, problems: &mut Problems) {
+    let version = &description.fmi_version;
+    problems.demand(version == "2.0", "2.2.1", || {
+        format!("fmiVersion is {version:?}, it must be \"2.0\" for every 2.0.x")
+    });
+    problems.demand(!description.guid.is_empty(), "2.2.1", || {
+        "guid is empty".to_owned()
+    });
+    if let Some(date) = &description.generation_date_and_time {
+        problems.demand(is_date_and_time(date), "2.2.1", || {
+            format!("generationDateAndTime is {date:?}, not of the form YYYY-MM-DDThh:mm:ssZ")
+        });
+    }
+    let co_simulation = description.co_simulation.as_ref();
+    let identifiers = description
+        .model_exchange
+        .iter()
+        .map(|identifier| ("3.3.1", identifier))
+        .chain(co_simulation.map(|own| ("4.3.1", &own.model_identifier)));
+    let mut interfaces = 0;
+    for (section, identifier) in identifiers {
+        interfaces += 1;
+        problems.demand(is_c_identifier(identifier), section, || {
+            format!("modelIdentifier {identifier:?} is no C identifier")
+        });
+    }
+    problems.demand(interfaces > 0, "2.2.1", || {
+        "neither ModelExchange nor CoSimulation is there".to_owned()
+    });
+    if let Some(flags) = co_simulation {
+        let holds = flags.can_get_and_set_fmu_state || !flags.can_serialize_fmu_state;
+        problems.demand(holds, "4.3.1", || {
+            "canSerializeFMUstate is true without canGetAndSetFMUstate".to_owned()
+        });
+    }
+}
+
+fn texts(description: &ModelDescription, problems: &mut Problems) {
+    problems.text("2.2.1", "modelName", &description.model_name);
+    problems.line("2.2.1", "guid", &description.guid);
+    for (name, value) in [
+        ("description", &description.description),
+        ("author", &description.author),
+        ("copyright", &description.copyright),
+        ("license", &description.license),
+    ] {
+        problems.text("2.2.1", name, value.as_deref().unwrap_or_default());
+    }
+    for (name, value) in [
+        ("version", &description.version),
+        ("generationTool", &description.generation_tool),
+    ] {
+        problems.line("2.2.1", name, value.as_deref().unwrap_or_default());
+    }
+    for category in &description.log_categories {
+        problems.line("2.2.4", "log category", &category.name);
+        let text = category.description.as_deref().unwrap_or_default();
+        problems.text("2.2.4", "description of a log category", text);
+    }
+}
+
+fn experiment(own: &DefaultExperiment, problems: &mut Problems) {
+    for (name, value) in [
+        ("startTime", own.start_time),
+        ("stopTime", own.stop_time),
+        ("tolerance", own.tolerance),
+        ("stepSize", own.step_size),
+    ] {
+        problems.finite("2.2.5", name, value);
+    }
+    for (name, value) in [("tolerance", own.tolerance), ("stepSize", own.step_size)] {
+        if let Some(value) = value {
+            problems.demand(value > 0.0, "2.2.5", || {
+                format!("{name} is {value:?}, not positive")
+            });
+        }
+    }
+    let (Some(start), Some(stop)) = (own.start_time, own.stop_time) else {
+        return;
+    };
+    problems.demand(stop > start, "2.2.5", || {
+        format!("stopTime {stop:?} is not after startTime {start:?}")
+    });
+    if let Some(step) = own.step_size {
+        problems.demand(step < stop - start, "2.2.5", || {
+            format!("stepSize {step:?} is not shorter than the experiment")
+        });
+    }
+}
+
+fn is_c_identifier(text: &str) -> bool {
+    let starts = text.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_');
+    starts
+        && text
+            .chars()
+            .all(|other| other.is_ascii_alphanumeric() || other == '_')
+}
+
+/// `YYYY-MM-DDThh:mm:ssZ` with every number in its range.
+fn is_date_and_time(text: &str) -> bool {
+    let shape = "0000-00-00T00:00:00Z";
+    let fits = text.len() == shape.len()
+        && text
+            .bytes()
+            .zip(shape.bytes())
+            .all(|(found, wanted)| match wanted {
+                b'0' => found.is_ascii_digit(),
+                _ => found == wanted,
+            });
+    let inside = |from: usize, low: u32, high: u32| {
+        let number = text
+            .get(from..from + 2)
+            .and_then(|digits| digits.parse().ok());
+        number.is_some_and(|number: u32| (low..=high).contains(&number))
+    };
+    fits && inside(5, 1, 12)
+        && inside(8, 1, 31)
+        && inside(11, 0, 23)
+        && inside(14, 0, 59)
+        && inside(17, 0, 59)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,142 @@
+//! Rules on variable names (sections 2.2.7 and 2.2.9).
+
+use std::collections::HashSet;
+
+use super::Problems;
+use crate::description::{Kind, ModelDescription};
+
+const SECTION: &str = "2.2.9";
+
+pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
+    let names = || {
+        description
+            .variables
+            .iter()
+            .map(|variable| variable.name.as_str())
+    };
+    problems.unique("2.2.7", "variable", names());
+    for name in names() {
+        problems.demand(!name.is_empty(), SECTION, || {
+            "a variable has no name".to_owned()
+        });
+        problems.line(SECTION, "variable", name);
+    }
+    if !description.structured_names {
+        return;
+    }
+    for variable in &description.variables {
+        let name = &variable.name;
+        problems.demand(is_structured(name), SECTION, || {
+            format!("variable {name:?} is not a structured name")
+        });
+        let real = matches!(variable.kind, Kind::Real(_));
+        problems.demand(real || !name.starts_with("der("), SECTION, || {
+            format!("variable {name} is named as a derivative and is not Real")
+        });
+    }
+    check_arrays(names(), problems);
+}
+
+/// Elements of an array stand together, the last index running fastest. Looked at are arrays of
+/// scalars: names with indices at their end only.
+fn check_arrays<'a>(names: impl Iterator<Item = &'a str>, problems: &mut Problems) {
+    let mut seen = HashSet::new();
+    let mut last: Option<(&str, Vec<u32>)> = None;
+    for name in names {
+        let Some((array, indices)) = element(name) else {
+            last = None;
+            continue;
+        };
+        match &last {
+            Some((other, before)) if *other == array => {
+                problems.demand(*before < indices, SECTION, || {
+                    format!("variable {name} does not follow in row-major order")
+                });
+            }
+            _ => problems.demand(seen.insert(array), SECTION, || {
+                format!("variable {name} stands apart from the other elements of {array}")
+            }),
+        }
+        last = Some((array, indices));
+    }
+}
+
+/// Splits `a.b[1,2]` into `a.b` and its indices.
+fn element(name: &str) -> Option<(&str, Vec<u32>)> {
+    let (array, indices) = name.strip_suffix(']')?.split_once('[')?;
+    let indices = indices
+        .split(',')
+        .map(str::parse)
+        .collect::<Result<_, _>>()
+        .ok()?;
+    Some((array, indices))
+}
+
+/// `name = identifier | "der(" identifier [ "," unsignedInteger ] ")"`.
+fn is_structured(name: &str) -> bool {
+    let derivative = name
+        .strip_prefix("der(")
+        .and_then(|rest| rest.strip_suffix(')'));
+    let Some(inner) = derivative else {
+        return is_identifier(name);
+    };
+    let with_order = inner.rsplit_once(',').is_some_and(|(identifier, order)| {
+        is_unsigned(order.trim_start_matches(' ')) && is_identifier(identifier)
+    });
+    with_order || is_identifier(inner)
+}
+
+/// `identifier = B-name [ indices ] { "." B-name [ indices ] }`.
+fn is_identifier(text: &str) -> bool {
+    let mut rest = text;
+    loop {
+        let Some(after) = after_name(rest) else {
+            return false;
+        };
+        let Some(after) = after_indices(after) else {
+            return false;
+        };
+        match after.strip_prefix('.') {
+            Some(next) => rest = next,
+            None => return after.is_empty(),
+        }
+    }
+}
+
+/// What follows a `B-name`, which is plain or in apostrophes.
+fn after_name(text: &str) -> Option<&str> {
+    let Some(quoted) = text.strip_prefix('\'') else {
+        let is_letter = |own: char| own.is_ascii_alphanumeric() || own == '_';
+        let length = text.find(|own| !is_letter(own)).unwrap_or(text.len());
+        let starts = text.starts_with(|own: char| is_letter(own) && !own.is_ascii_digit());
+        return starts.then(|| &text[length..]);
+    };
+    let mut characters = quoted.char_indices();
+    while let Some((at, character)) = characters.next() {
+        match character {
+            '\'' => return (at > 0).then(|| &quoted[at + 1..]),
+            '\\' => {
+                characters
+                    .next()
+                    .filter(|(_, escaped)| "'\"?\\abfnrtv".contains(*escaped))?;
+            }
+            _ if character.is_ascii_alphanumeric() => {}
+            _ if "_!#$%&()*+,-./:;<>=?@[]^{}|~ ".contains(character) => {}
+            _ => return None,
+        }
+    }
+    None
+}
+
+/// What follows the optional `[ unsignedInteger { "," unsignedInteger } ]`.
+fn after_indices(text: &str) -> Option<&str> {
+    let Some(inner) = text.strip_prefix('[') else {
+        return Some(text);
+    };
+    let (indices, after) = inner.split_once(']')?;
+    indices.split(',').all(is_unsigned).then_some(after)
+}
+
+fn is_unsigned(text: &str) -> bool {
+    !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit())
+}

@@ -1,0 +1,221 @@
+//! Rules on `ModelStructure` (section 2.2.8).
+
+use std::collections::{BTreeSet, HashSet};
+
+use super::Problems;
+use crate::description::{
+    Causality, DependencyKind, Initial, Kind, ModelDescription, RealType, ScalarVariable, Unknown,
+    Variability,
+};
+
+const SECTION: &str = "2.2.8";
+
+impl ModelDescription {
+    /// The variable with a 1-based index.
+    pub(super) fn at(&self, index: u32) -> Option<&ScalarVariable> {
+        self.variables
+            .get(usize::try_from(index).ok()?.checked_sub(1)?)
+    }
+
+    /// The 1-based indices of the variables that `chosen` accepts.
+    fn indices_of(&self, chosen: impl Fn(&ScalarVariable) -> bool) -> BTreeSet<u32> {
+        let numbered = (1..).zip(&self.variables);
+        numbered
+            .filter(|(_, variable)| chosen(variable))
+            .map(|(index, _)| index)
+            .collect()
+    }
+
+    fn name_of(&self, index: u32) -> String {
+        self.at(index)
+            .map_or_else(|| format!("number {index}"), |own| own.name.clone())
+    }
+}
+
+pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
+    let structure = &description.structure;
+    let states = states(description, problems);
+    let outputs = description.indices_of(|own| own.causality == Causality::Output);
+    check_members(
+        "Outputs",
+        &structure.outputs,
+        &outputs,
+        description,
+        problems,
+    );
+    let unknowns = initial_unknowns(description, &states);
+    let rows = &structure.initial_unknowns;
+    check_members("InitialUnknowns", rows, &unknowns, description, problems);
+    let ascending = rows.windows(2).all(|pair| pair[0].index <= pair[1].index);
+    problems.demand(ascending, SECTION, || {
+        "InitialUnknowns are not in ascending order".to_owned()
+    });
+
+    let is_given =
+        |own: &ScalarVariable| matches!(own.causality, Causality::Input | Causality::Independent);
+    let known = |index: u32, own: &ScalarVariable| is_given(own) || states.contains(&index);
+    for (list, rows) in [
+        ("Outputs", &structure.outputs),
+        ("Derivatives", &structure.derivatives),
+    ] {
+        for row in rows {
+            check_dependencies(list, row, description, known, problems);
+        }
+    }
+    let known_at_start = |_: u32, own: &ScalarVariable| {
+        is_given(own) || own.initial_in_force() == Some(Initial::Exact)
+    };
+    for row in rows {
+        check_dependencies(
+            "InitialUnknowns",
+            row,
+            description,
+            known_at_start,
+            problems,
+        );
+        check_initial_kinds(row, description, problems);
+    }
+}
+
+/// At initialization, a dependency is general or has a constant factor.
+fn check_initial_kinds(row: &Unknown, description: &ModelDescription, problems: &mut Problems) {
+    let allowed = [DependencyKind::Dependent, DependencyKind::Constant];
+    let holds = row
+        .kinds
+        .iter()
+        .flatten()
+        .all(|kind| allowed.contains(kind));
+    problems.demand(holds, SECTION, || {
+        let name = description.name_of(row.index);
+        format!("InitialUnknowns, {name}: dependenciesKind may be dependent or constant only")
+    });
+}
+
+/// The continuous states: what the rows of `Derivatives` are derivatives of.
+fn states(description: &ModelDescription, problems: &mut Problems) -> HashSet<u32> {
+    let mut states = HashSet::new();
+    for row in &description.structure.derivatives {
+        let name = description.name_of(row.index);
+        let derivative = description.at(row.index).and_then(|own| match own.kind {
+            Kind::Real(RealType { derivative, .. }) => derivative,
+            _ => None,
+        });
+        let Some(state) = derivative else {
+            problems.add(
+                SECTION,
+                format!("Derivatives, {name}: it has no attribute derivative"),
+            );
+            continue;
+        };
+        problems.demand(states.insert(state), SECTION, || {
+            format!("Derivatives, {name}: its state has another derivative in the list")
+        });
+        let is_state = |own: &ScalarVariable| {
+            matches!(own.causality, Causality::Local | Causality::Output)
+                && own.variability == Variability::Continuous
+        };
+        problems.demand(description.at(state).is_some_and(is_state), SECTION, || {
+            let state = description.name_of(state);
+            format!("Derivatives, {name}: its state {state} is not a continuous local or output")
+        });
+    }
+    states
+}
+
+/// The indices that `InitialUnknowns` must have.
+fn initial_unknowns(description: &ModelDescription, states: &HashSet<u32>) -> BTreeSet<u32> {
+    let derivatives = description
+        .structure
+        .derivatives
+        .iter()
+        .map(|row| row.index);
+    let exposed: HashSet<u32> = states.iter().copied().chain(derivatives).collect();
+    let computed = |own: &ScalarVariable| {
+        matches!(
+            own.initial_in_force(),
+            Some(Initial::Approx | Initial::Calculated)
+        )
+    };
+    let mut indices = description.indices_of(|own| match own.causality {
+        Causality::CalculatedParameter => true,
+        Causality::Output => computed(own),
+        _ => false,
+    });
+    indices.extend(
+        exposed
+            .iter()
+            .filter(|index| description.at(**index).is_some_and(computed)),
+    );
+    indices
+}
+
+/// A list has exactly the wanted members, each once.
+fn check_members(
+    list: &str,
+    rows: &[Unknown],
+    wanted: &BTreeSet<u32>,
+    description: &ModelDescription,
+    problems: &mut Problems,
+) {
+    let mut found = BTreeSet::new();
+    for row in rows {
+        problems.demand(found.insert(row.index), SECTION, || {
+            format!(
+                "{list} has variable {} twice",
+                description.name_of(row.index)
+            )
+        });
+    }
+    for index in wanted.difference(&found) {
+        problems.add(
+            SECTION,
+            format!("{list} lacks variable {}", description.name_of(*index)),
+        );
+    }
+    for index in found.difference(wanted) {
+        let name = description.name_of(*index);
+        problems.add(
+            SECTION,
+            format!("{list} has variable {name}, which does not belong there"),
+        );
+    }
+}
+
+/// Dependencies ascend, are known quantities, and have as many kinds, of the allowed sort.
+fn check_dependencies(
+    list: &str,
+    row: &Unknown,
+    description: &ModelDescription,
+    is_known: impl Fn(u32, &ScalarVariable) -> bool,
+    problems: &mut Problems,
+) {
+    let name = description.name_of(row.index);
+    let dependencies = row.dependencies.as_deref().unwrap_or_default();
+    problems.demand(
+        dependencies.windows(2).all(|pair| pair[0] < pair[1]),
+        SECTION,
+        || format!("{list}, {name}: dependencies are not ascending and unique"),
+    );
+    for index in dependencies {
+        let known = description
+            .at(*index)
+            .is_some_and(|own| is_known(*index, own));
+        problems.demand(known, SECTION, || {
+            let other = description.name_of(*index);
+            format!("{list}, {name}: a dependency on {other} cannot be stated, it is no known")
+        });
+    }
+    let Some(kinds) = &row.kinds else { return };
+    problems.demand(
+        row.dependencies.is_some() && kinds.len() == dependencies.len(),
+        SECTION,
+        || format!("{list}, {name}: dependenciesKind is not as long as dependencies"),
+    );
+    let real = description
+        .at(row.index)
+        .is_some_and(|own| matches!(own.kind, Kind::Real(_)));
+    let plain = kinds.iter().all(|kind| *kind == DependencyKind::Dependent);
+    problems.demand(real || plain, SECTION, || {
+        format!("{list}, {name}: only for a Real may dependenciesKind be other than dependent")
+    });
+}

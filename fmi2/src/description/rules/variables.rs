@@ -1,0 +1,318 @@
+//! Rules on `ModelVariables` (section 2.2.7).
+
+use std::collections::{BTreeMap, HashMap};
+
+use super::Problems;
+use crate::description::{
+    Causality, Initial, IntegerType, Kind, ModelDescription, RealType, ScalarVariable, SimpleType,
+    Variability,
+};
+
+const SECTION: &str = "2.2.7";
+
+pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
+    problems.demand(!description.variables.is_empty(), SECTION, || {
+        "ModelVariables has no variable".to_owned()
+    });
+    let types = description
+        .types
+        .iter()
+        .map(|own| (own.name.as_str(), own))
+        .collect();
+    for variable in &description.variables {
+        check_table(variable, problems);
+        check_start(variable, problems);
+        check_declared_type(variable, &types, problems);
+        check_derivative(variable, description, problems);
+        let who = format!("variable {}", variable.name);
+        let text = variable.description.as_deref().unwrap_or_default();
+        problems.text(SECTION, &format!("description of {who}"), text);
+        match &variable.kind {
+            Kind::Real(real) => check_real(&who, real, problems),
+            Kind::Integer(own) | Kind::Enumeration(own) => check_integer(&who, own, problems),
+            Kind::String(start) => {
+                let start = start.as_deref().unwrap_or_default();
+                problems.text(SECTION, &format!("start of {who}"), start);
+            }
+            Kind::Boolean(_) => {}
+        }
+    }
+    let is_independent = |own: &&ScalarVariable| own.causality == Causality::Independent;
+    let independent = description.variables.iter().filter(is_independent).count();
+    problems.demand(independent <= 1, SECTION, || {
+        format!("{independent} variables are independent, at most one may be")
+    });
+    check_aliases(description, problems);
+}
+
+/// The tables of causality, variability and initial.
+fn check_table(variable: &ScalarVariable, problems: &mut Problems) {
+    use Causality::{CalculatedParameter, Independent, Input, Local, Output, Parameter};
+    use Variability::{Constant, Continuous, Discrete, Fixed, Tunable};
+    let name = &variable.name;
+    let allowed: &[Initial] = match (variable.causality, variable.variability) {
+        (Parameter, Fixed | Tunable) | (Output | Local, Constant) => &[Initial::Exact],
+        (CalculatedParameter | Local, Fixed | Tunable) => &[Initial::Calculated, Initial::Approx],
+        (Output | Local, Discrete | Continuous) => {
+            &[Initial::Calculated, Initial::Exact, Initial::Approx]
+        }
+        (Input, Discrete | Continuous) | (Independent, Continuous) => &[],
+        (causality, variability) => {
+            let (causality, variability) = (causality.as_str(), variability.as_str());
+            let text = format!("variable {name}: a {causality} cannot be {variability}");
+            return problems.add(SECTION, text);
+        }
+    };
+    if let Some(initial) = variable.initial {
+        problems.demand(allowed.contains(&initial), SECTION, || {
+            let (causality, variability) =
+                (variable.causality.as_str(), variable.variability.as_str());
+            let initial = initial.as_str();
+            format!(
+                "variable {name}: initial {initial} is not allowed for {variability} {causality}"
+            )
+        });
+    }
+    let real = matches!(variable.kind, Kind::Real(_));
+    problems.demand(real || variable.variability != Continuous, SECTION, || {
+        format!("variable {name}: only a Real can be continuous, which is the default")
+    });
+}
+
+pub(super) fn has_start(kind: &Kind) -> bool {
+    match kind {
+        Kind::Real(own) => own.start.is_some(),
+        Kind::Integer(own) | Kind::Enumeration(own) => own.start.is_some(),
+        Kind::Boolean(start) => start.is_some(),
+        Kind::String(start) => start.is_some(),
+    }
+}
+
+fn check_start(variable: &ScalarVariable, problems: &mut Problems) {
+    let name = &variable.name;
+    let needed = match (variable.causality, variable.initial_in_force()) {
+        (Causality::Independent, _) => false,
+        (Causality::Input, _) => true,
+        (_, initial) => initial != Some(Initial::Calculated),
+    };
+    match (needed, has_start(&variable.kind)) {
+        (true, false) => problems.add(SECTION, format!("variable {name} needs a start value")),
+        (false, true) => problems.add(
+            SECTION,
+            format!("variable {name} has a start value, which calculated and independent forbid"),
+        ),
+        _ => {}
+    }
+}
+
+/// Limits and start of a Real variable or type, called `who`.
+pub(super) fn check_real(who: &str, real: &RealType, problems: &mut Problems) {
+    for (name, value) in [
+        ("start", real.start),
+        ("min", real.min),
+        ("max", real.max),
+        ("nominal", real.nominal),
+    ] {
+        problems.finite(SECTION, &format!("{name} of {who}"), value);
+    }
+    if let Some(nominal) = real.nominal {
+        problems.demand(nominal > 0.0, SECTION, || {
+            format!("{who}: nominal is {nominal:?}, not positive")
+        });
+    }
+    check_order(who, real.min, real.start, real.max, problems);
+}
+
+/// Limits and start of an Integer or Enumeration variable or type, called `who`.
+pub(super) fn check_integer(who: &str, integer: &IntegerType, problems: &mut Problems) {
+    check_order(who, integer.min, integer.start, integer.max, problems);
+}
+
+fn check_order<T: Copy + PartialOrd + std::fmt::Debug>(
+    who: &str,
+    min: Option<T>,
+    start: Option<T>,
+    max: Option<T>,
+    problems: &mut Problems,
+) {
+    for ((low, lower), (high, upper)) in [
+        (("min", &min), ("max", &max)),
+        (("min", &min), ("start", &start)),
+        (("start", &start), ("max", &max)),
+    ] {
+        if let (Some(lower), Some(upper)) = (lower, upper) {
+            problems.demand(lower <= upper, SECTION, || {
+                format!("{who}: {low} {lower:?} is above {high} {upper:?}")
+            });
+        }
+    }
+}
+
+/// A declared type exists and is of the variable's kind; the variable keeps to its range.
+fn check_declared_type(
+    variable: &ScalarVariable,
+    types: &HashMap<&str, &SimpleType>,
+    problems: &mut Problems,
+) {
+    let name = &variable.name;
+    let declared = match &variable.kind {
+        Kind::Real(own) => own.declared_type.as_deref(),
+        Kind::Integer(own) | Kind::Enumeration(own) => own.declared_type.as_deref(),
+        Kind::Boolean(_) | Kind::String(_) => None,
+    };
+    let Some(declared) = declared else {
+        let needed = matches!(variable.kind, Kind::Enumeration(_));
+        return problems.demand(!needed, SECTION, || {
+            format!("variable {name} is an Enumeration and has no declared type")
+        });
+    };
+    let Some(own) = types.get(declared) else {
+        return problems.add(
+            SECTION,
+            format!("variable {name}: there is no type {declared:?}"),
+        );
+    };
+    let inside = match (&variable.kind, &own.kind) {
+        (Kind::Real(inner), Kind::Real(outer)) => {
+            within((inner.min, inner.max), (outer.min, outer.max))
+        }
+        (Kind::Integer(inner), Kind::Integer(outer)) => {
+            within((inner.min, inner.max), (outer.min, outer.max))
+        }
+        (Kind::Enumeration(inner), Kind::Enumeration(_)) => {
+            let is_item = |start| own.items.iter().any(|(_, value)| *value == start);
+            problems.demand(inner.start.is_none_or(is_item), SECTION, || {
+                format!("variable {name}: the start value is no item of type {declared}")
+            });
+            true
+        }
+        _ => {
+            let (kind, other) = (variable.kind.element(), own.kind.element());
+            return problems.add(
+                SECTION,
+                format!("variable {name} is {kind}, its declared type {declared} is {other}"),
+            );
+        }
+    };
+    problems.demand(inside, SECTION, || {
+        format!("variable {name}: min and max are not inside those of its type {declared}")
+    });
+}
+
+fn within<T: Copy + PartialOrd>(
+    inner: (Option<T>, Option<T>),
+    outer: (Option<T>, Option<T>),
+) -> bool {
+    let below = match (&inner.0, &outer.0) {
+        (Some(inner), Some(outer)) => inner < outer,
+        _ => false,
+    };
+    let above = match (&inner.1, &outer.1) {
+        (Some(inner), Some(outer)) => inner > outer,
+        _ => false,
+    };
+    !below && !above
+}
+
+/// `derivative` connects two different continuous Reals.
+fn check_derivative(
+    variable: &ScalarVariable,
+    description: &ModelDescription,
+    problems: &mut Problems,
+) {
+    let Kind::Real(RealType {
+        derivative: Some(index),
+        ..
+    }) = variable.kind
+    else {
+        return;
+    };
+    let name = &variable.name;
+    let is_continuous = |own: &ScalarVariable| {
+        matches!(own.kind, Kind::Real(_)) && own.variability == Variability::Continuous
+    };
+    let Some(state) = description.at(index) else {
+        let text = format!("variable {name}: derivative {index} is the index of no variable");
+        return problems.add(SECTION, text);
+    };
+    let sound = !std::ptr::eq(state, variable) && is_continuous(state) && is_continuous(variable);
+    problems.demand(sound, SECTION, || {
+        format!(
+            "variable {name}: derivative {index} must connect two different continuous Reals, \
+             it points at {}",
+            state.name
+        )
+    });
+}
+
+/// Variables of one base type with the same value reference.
+fn check_aliases(description: &ModelDescription, problems: &mut Problems) {
+    let mut sets: BTreeMap<(u8, u32), Vec<&ScalarVariable>> = BTreeMap::new();
+    for variable in &description.variables {
+        let base = match variable.kind {
+            Kind::Real(_) => 0,
+            Kind::Integer(_) | Kind::Enumeration(_) => 1,
+            Kind::Boolean(_) => 2,
+            Kind::String(_) => 3,
+        };
+        sets.entry((base, variable.value_reference))
+            .or_default()
+            .push(variable);
+    }
+    for set in sets.values().filter(|set| set.len() > 1) {
+        check_alias_set(set, problems);
+    }
+}
+
+fn check_alias_set(set: &[&ScalarVariable], problems: &mut Problems) {
+    let names = set
+        .iter()
+        .map(|own| own.name.as_str())
+        .collect::<Vec<_>>()
+        .join(", ");
+    let is_constant = |own: &&&ScalarVariable| own.variability == Variability::Constant;
+    let constants = set.iter().filter(is_constant).count();
+    problems.demand(constants == 0 || constants == set.len(), SECTION, || {
+        format!("aliases {names}: constants can only be aliases of constants")
+    });
+    let is_free = |own: &&&ScalarVariable| {
+        matches!(
+            own.causality,
+            Causality::Parameter | Causality::Input | Causality::Independent
+        )
+    };
+    problems.demand(set.iter().filter(is_free).count() <= 1, SECTION, || {
+        format!("aliases {names}: more than one can be set from outside")
+    });
+    let starts = set.iter().filter(|own| has_start(&own.kind)).count();
+    problems.demand(constants > 0 || starts <= 1, SECTION, || {
+        format!("aliases {names}: more than one has a start value")
+    });
+    let unit = |own: &ScalarVariable| match &own.kind {
+        Kind::Real(real) => real.unit.clone(),
+        _ => None,
+    };
+    let same_unit = set.windows(2).all(|pair| unit(pair[0]) == unit(pair[1]));
+    problems.demand(same_unit, SECTION, || {
+        format!("aliases {names}: their units differ")
+    });
+    if constants == set.len() {
+        let same = set
+            .windows(2)
+            .all(|pair| same_start(&pair[0].kind, &pair[1].kind));
+        problems.demand(same, SECTION, || {
+            format!("aliases {names}: the values of these constants differ")
+        });
+    }
+}
+
+fn same_start(left: &Kind, right: &Kind) -> bool {
+    match (left, right) {
+        (Kind::Real(left), Kind::Real(right)) => left.start == right.start,
+        (
+            Kind::Integer(left) | Kind::Enumeration(left),
+            Kind::Integer(right) | Kind::Enumeration(right),
+        ) => left.start == right.start,
+        (left, right) => left == right,
+    }
+}

@@ -1,0 +1,117 @@
+//! The export line of a model, and the C signatures behind it.
+
+/// Exports a [`Model`](crate::Model) as all functions of FMI 2.0 co-simulation: the last line of a
+/// model's library, which is a `cdylib`.
+///
+/// ```ignore
+/// fmi2::export!(Oscillator);
+/// ```
+///
+/// Beside the standard's functions the library gets
+/// [`fmuDescribe`](crate::abi::DESCRIBE), by which the packer asks for the model description.
+#[macro_export]
+macro_rules! export {
+    ($model:ty) => {
+        const _: () = assert!(
+            cfg!(panic = "unwind"),
+            "an FMU needs panic = \"unwind\": an aborting panic takes the importer down"
+        );
+
+        #[allow(non_snake_case, unused_imports, reason = "the C functions of the standard")]
+        mod fmi2_entry_points {
+            use super::*;
+            use $crate::abi::*;
+            use $crate::ffi::*;
+
+            $crate::entry_points! { $model;
+                fmi2GetTypesPlatform = types_platform() -> fmi2String;
+                fmi2GetVersion = version() -> fmi2String;
+                fmuDescribe = describe(resources: fmi2String, context: fmi2ComponentEnvironment,
+                    sink: DescribeSink) -> fmi2Integer;
+                fmi2Instantiate = instantiate(name: fmi2String, fmu_type: fmi2Type,
+                    guid: fmi2String, resource_location: fmi2String,
+                    functions: *const fmi2CallbackFunctions, visible: fmi2Boolean,
+                    logging_on: fmi2Boolean) -> fmi2Component;
+                fmi2FreeInstance = free_instance(c: fmi2Component) -> ();
+                fmi2SetDebugLogging = set_debug_logging(c: fmi2Component, on: fmi2Boolean,
+                    n: usize, categories: *const fmi2String) -> fmi2Status;
+                fmi2SetupExperiment = setup_experiment(c: fmi2Component,
+                    tolerance_defined: fmi2Boolean, tolerance: fmi2Real, start_time: fmi2Real,
+                    stop_time_defined: fmi2Boolean, stop_time: fmi2Real) -> fmi2Status;
+                fmi2EnterInitializationMode =
+                    enter_initialization_mode(c: fmi2Component) -> fmi2Status;
+                fmi2ExitInitializationMode =
+                    exit_initialization_mode(c: fmi2Component) -> fmi2Status;
+                fmi2Terminate = terminate(c: fmi2Component) -> fmi2Status;
+                fmi2Reset = reset(c: fmi2Component) -> fmi2Status;
+                fmi2GetReal = get_real(c: fmi2Component, vr: *const fmi2ValueReference, n: usize,
+                    value: *mut fmi2Real) -> fmi2Status;
+                fmi2GetInteger = get_integer(c: fmi2Component, vr: *const fmi2ValueReference,
+                    n: usize, value: *mut fmi2Integer) -> fmi2Status;
+                fmi2GetBoolean = get_boolean(c: fmi2Component, vr: *const fmi2ValueReference,
+                    n: usize, value: *mut fmi2Boolean) -> fmi2Status;
+                fmi2GetString = get_string(c: fmi2Component, vr: *const fmi2ValueReference,
+                    n: usize, value: *mut fmi2String) -> fmi2Status;
+                fmi2SetReal = set_real(c: fmi2Component, vr: *const fmi2ValueReference, n: usize,
+                    value: *const fmi2Real) -> fmi2Status;
+                fmi2SetInteger = set_integer(c: fmi2Component, vr: *const fmi2ValueReference,
+                    n: usize, value: *const fmi2Integer) -> fmi2Status;
+                fmi2SetBoolean = set_boolean(c: fmi2Component, vr: *const fmi2ValueReference,
+                    n: usize, value: *const fmi2Boolean) -> fmi2Status;
+                fmi2SetString = set_string(c: fmi2Component, vr: *const fmi2ValueReference,
+                    n: usize, value: *const fmi2String) -> fmi2Status;
+                fmi2GetFMUstate = get_fmu_state(c: fmi2Component, state: *mut fmi2FMUstate)
+                    -> fmi2Status;
+                fmi2SetFMUstate = set_fmu_state(c: fmi2Component, state: fmi2FMUstate)
+                    -> fmi2Status;
+                fmi2FreeFMUstate = free_fmu_state(c: fmi2Component, state: *mut fmi2FMUstate)
+                    -> fmi2Status;
+                fmi2SerializedFMUstateSize = serialized_fmu_state_size(c: fmi2Component,
+                    state: fmi2FMUstate, size: *mut usize) -> fmi2Status;
+                fmi2SerializeFMUstate = serialize_fmu_state(c: fmi2Component, state: fmi2FMUstate,
+                    bytes: *mut fmi2Byte, size: usize) -> fmi2Status;
+                fmi2DeSerializeFMUstate = de_serialize_fmu_state(c: fmi2Component,
+                    bytes: *const fmi2Byte, size: usize, state: *mut fmi2FMUstate) -> fmi2Status;
+                fmi2GetDirectionalDerivative = get_directional_derivative(c: fmi2Component,
+                    unknown: *const fmi2ValueReference, n_unknown: usize,
+                    known: *const fmi2ValueReference, n_known: usize,
+                    known_delta: *const fmi2Real, unknown_delta: *mut fmi2Real) -> fmi2Status;
+                fmi2SetRealInputDerivatives = set_real_input_derivatives(c: fmi2Component,
+                    vr: *const fmi2ValueReference, n: usize, order: *const fmi2Integer,
+                    value: *const fmi2Real) -> fmi2Status;
+                fmi2GetRealOutputDerivatives = get_real_output_derivatives(c: fmi2Component,
+                    vr: *const fmi2ValueReference, n: usize, order: *const fmi2Integer,
+                    value: *mut fmi2Real) -> fmi2Status;
+                fmi2DoStep = do_step(c: fmi2Component, start: fmi2Real, size: fmi2Real,
+                    no_set_fmu_state: fmi2Boolean) -> fmi2Status;
+                fmi2CancelStep = cancel_step(c: fmi2Component) -> fmi2Status;
+                fmi2GetStatus = get_status(c: fmi2Component, kind: fmi2StatusKind,
+                    value: *mut fmi2Status) -> fmi2Status;
+                fmi2GetRealStatus = get_real_status(c: fmi2Component, kind: fmi2StatusKind,
+                    value: *mut fmi2Real) -> fmi2Status;
+                fmi2GetIntegerStatus = get_integer_status(c: fmi2Component, kind: fmi2StatusKind,
+                    value: *mut fmi2Integer) -> fmi2Status;
+                fmi2GetBooleanStatus = get_boolean_status(c: fmi2Component, kind: fmi2StatusKind,
+                    value: *mut fmi2Boolean) -> fmi2Status;
+                fmi2GetStringStatus = get_string_status(c: fmi2Component, kind: fmi2StatusKind,
+                    value: *mut fmi2String) -> fmi2Status;
+            }
+        }
+    };
+}
+
+/// One exported C function for each line, each a call of the generic function for the model.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! entry_points {
+    ($model:ty; $($name:ident =
+        $function:ident($($argument:ident: $type:ty),*) -> $result:ty;)*) => {
+        $(
+            #[unsafe(no_mangle)]
+            unsafe extern "C" fn $name($($argument: $type),*) -> $result {
+                // SAFETY: the arguments are handed on as the importer gave them.
+                unsafe { $function::<$model>($($argument),*) }
+            }
+        )*
+    };
+}

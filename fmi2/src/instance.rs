@@ -1,0 +1,286 @@
+//! One instance of a model: the state machine behind the C ABI, in safe Rust.
+
+mod snapshot;
+#[cfg(test)]
+mod tests;
+mod values;
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::abi::Status;
+use crate::call_order::{Function, State, allowed};
+use crate::ffi::Callbacks;
+use crate::interface::Interface;
+use crate::model::{Experiment, Failure, Model, Step};
+
+pub(crate) use snapshot::Snapshot;
+
+/// What an FMU state consists of: everything that decides how the instance continues.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(bound = "")]
+pub(crate) struct Core<M: Model> {
+    model: M,
+    state: State,
+    experiment: Experiment,
+    time: f64,
+    /// Something was set since the model last computed its outputs.
+    stale: bool,
+    /// A parameter was set since [`Model::check`] last passed.
+    unchecked: bool,
+    /// An input derivative was set for the coming step.
+    sloped: bool,
+}
+
+/// An instance: the model with its state, and what does not belong to the FMU state.
+pub(crate) struct Instance<M: Model> {
+    core: Core<M>,
+    fresh: M,
+    interface: Interface<M>,
+    guid: String,
+    callbacks: Callbacks,
+    /// Log categories that `fmi2SetDebugLogging` chose; all of them when none.
+    categories: Option<Vec<String>>,
+    /// The strings that the last `fmi2GetString` handed out.
+    strings: Vec<std::ffi::CString>,
+}
+
+impl<M: Model> Core<M> {
+    fn new(model: M) -> Self {
+        Self {
+            model,
+            state: State::Instantiated,
+            experiment: Experiment::default(),
+            time: 0.0,
+            stale: true,
+            unchecked: true,
+            sloped: false,
+        }
+    }
+}
+
+impl<M: Model> Instance<M> {
+    /// `fmi2Instantiate`: reads the resources and compares the GUID.
+    pub(crate) fn new(resources: &Path, guid: &str, callbacks: Callbacks) -> Result<Self, Failure> {
+        guarded(|| {
+            let mut model = M::new(resources)?;
+            let (interface, description) = Interface::new(&mut model)?;
+            if guid != description.guid {
+                let (name, own) = (M::IDENTIFIER, description.guid);
+                return Err(Failure::Error(format!(
+                    "the GUID is {guid}, but this library of {name} with the resources in {} \
+                     describes itself with {own}",
+                    resources.display()
+                )));
+            }
+            Ok(Self {
+                core: Core::new(model.clone()),
+                fresh: model,
+                interface,
+                guid: guid.to_owned(),
+                callbacks,
+                categories: None,
+                strings: Vec::new(),
+            })
+        })
+    }
+
+    /// The way of every call: order, fence, state afterwards, message, status.
+    pub(crate) fn call(
+        &mut self,
+        function: Function,
+        body: impl FnOnce(&mut Self) -> Result<(), Failure>,
+    ) -> Status {
+        let state = self.core.state;
+        if state == State::Fatal {
+            return Status::Fatal;
+        }
+        let done = if allowed(function, state) {
+            guarded(|| body(self))
+        } else {
+            Err(Failure::Error(format!("may not be called in the state {state:?}")))
+        };
+        match done {
+            Ok(()) => Status::OK,
+            Err(failure) => self.fail(function, &failure),
+        }
+    }
+
+    #[cold]
+    fn fail(&mut self, function: Function, failure: &Failure) -> Status {
+        let (status, category) = match failure {
+            Failure::Discard(_) | Failure::Incomplete { .. } => {
+                (Status::Discard, "logStatusDiscard")
+            }
+            Failure::Error(_) => (Status::Error, "logStatusError"),
+            Failure::Fatal(_) => (Status::Fatal, "logStatusFatal"),
+        };
+        match failure {
+            Failure::Discard(_) => {}
+            Failure::Incomplete { time, .. } => {
+                self.core.time = *time;
+                self.core.state = State::StepFailed;
+            }
+            Failure::Error(_) => self.core.state = State::Error,
+            Failure::Fatal(_) => self.core.state = State::Fatal,
+        }
+        let chosen = self.categories.as_ref();
+        if chosen.is_none_or(|names| names.iter().any(|name| name == category)) {
+            self.callbacks.log(status, category, &format!("{}: {failure}", function.name()));
+        }
+        status
+    }
+
+    /// `fmi2SetDebugLogging`. Messages that belong to a status are sent whether debug logging is on
+    /// or off (section 2.1.3); naming categories restricts them to those.
+    pub(crate) fn set_debug_logging(&mut self, categories: Vec<String>) -> Result<(), Failure> {
+        const KNOWN: [&str; 3] = ["logStatusDiscard", "logStatusError", "logStatusFatal"];
+        if let Some(unknown) = categories.iter().find(|name| !KNOWN.contains(&name.as_str())) {
+            return Err(Failure::Error(format!(
+                "{unknown} is no log category of this FMU; it has {}",
+                KNOWN.join(", ")
+            )));
+        }
+        self.categories = (!categories.is_empty()).then_some(categories);
+        Ok(())
+    }
+
+    /// `fmi2SetupExperiment`.
+    pub(crate) fn setup_experiment(&mut self, experiment: Experiment) -> Result<(), Failure> {
+        let Experiment { start_time, stop_time, tolerance } = experiment;
+        if !start_time.is_finite() {
+            return Err(Failure::Error(format!("startTime is {start_time}, expected a time in s")));
+        }
+        if let Some(stop) = stop_time.filter(|stop| stop.is_nan() || *stop < start_time) {
+            return Err(Failure::Error(format!(
+                "stopTime is {stop}, expected at least startTime = {start_time}"
+            )));
+        }
+        if let Some(value) = tolerance.filter(|value| !(*value > 0.0 && value.is_finite())) {
+            return Err(Failure::Error(format!("tolerance is {value}, expected more than 0")));
+        }
+        self.core.experiment = experiment;
+        self.core.time = start_time;
+        Ok(())
+    }
+
+    /// `fmi2EnterInitializationMode`.
+    pub(crate) fn enter_initialization_mode(&mut self) -> Result<(), Failure> {
+        self.core.state = State::InitializationMode;
+        self.core.stale = true;
+        self.refresh()
+    }
+
+    /// `fmi2ExitInitializationMode`.
+    pub(crate) fn exit_initialization_mode(&mut self) -> Result<(), Failure> {
+        self.refresh()?;
+        self.core.state = State::StepComplete;
+        Ok(())
+    }
+
+    /// `fmi2Terminate`.
+    pub(crate) fn terminate(&mut self) {
+        self.core.state = State::Terminated;
+    }
+
+    /// `fmi2Reset`: as after `fmi2Instantiate`.
+    pub(crate) fn reset(&mut self) {
+        self.core = Core::new(self.fresh.clone());
+        self.strings.clear();
+    }
+
+    /// Brings the outputs up to date with what was set.
+    fn refresh(&mut self) -> Result<(), Failure> {
+        let core = &mut self.core;
+        if core.stale {
+            match core.state {
+                State::InitializationMode => {
+                    core.model.check()?;
+                    core.unchecked = false;
+                    core.model.initialize(&core.experiment)?;
+                }
+                State::StepComplete => core.model.update(),
+                _ => {}
+            }
+            core.stale = false;
+        }
+        Ok(())
+    }
+
+    /// `fmi2DoStep`.
+    pub(crate) fn do_step(&mut self, start: f64, size: f64) -> Result<(), Failure> {
+        let core = &mut self.core;
+        let step = communication_step(core.time, start, size)?;
+        let end = start + size;
+        if let Some(stop) = core.experiment.stop_time.filter(|stop| end > stop + slack(*stop)) {
+            return Err(Failure::Error(format!("the step ends at {end} s, past stopTime {stop} s")));
+        }
+        if core.unchecked {
+            core.model.check()?;
+            core.unchecked = false;
+        }
+        if step.size > 0.0 {
+            core.model.step(&step)?;
+        }
+        core.time = end;
+        core.stale = false;
+        if core.sloped {
+            core.sloped = false;
+            self.interface.clear_input_derivatives(&mut core.model);
+        }
+        Ok(())
+    }
+
+    /// `fmi2GetRealStatus(fmi2LastSuccessfulTime)`.
+    pub(crate) fn last_successful_time(&self) -> f64 {
+        self.core.time
+    }
+
+    /// The GUID of the description that this instance was made for.
+    pub(crate) fn guid(&self) -> &str {
+        &self.guid
+    }
+}
+
+/// Times closer than this (in s) are the same: importers add up their step size, with rounding.
+fn slack(time: f64) -> f64 {
+    1e-9 * time.abs().max(1.0)
+}
+
+/// The step from the instance's `time` to `start + size`.
+///
+/// Where `start` differs from `time` by rounding alone, the size is the one given, so that equal
+/// communication steps stay equal for the model.
+fn communication_step(time: f64, start: f64, size: f64) -> Result<Step, Failure> {
+    if !(size > 0.0 && size.is_finite()) {
+        return Err(Failure::Error(format!(
+            "communicationStepSize is {size} s, expected more than 0"
+        )));
+    }
+    let mismatch = start - time;
+    if !(mismatch.abs() <= slack(time)) {
+        return Err(Failure::Error(format!(
+            "currentCommunicationPoint is {start} s, but the instance is at {time} s"
+        )));
+    }
+    let rounding = 8.0 * f64::EPSILON * time.abs().max(start.abs());
+    if mismatch.abs() <= rounding {
+        Ok(Step { start, size })
+    } else {
+        Ok(Step { start: time, size: mismatch + size })
+    }
+}
+
+/// Runs `body`; a panic becomes [`Failure::Fatal`].
+pub(crate) fn guarded<T>(body: impl FnOnce() -> Result<T, Failure>) -> Result<T, Failure> {
+    catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|payload| {
+        let text = payload
+            .downcast_ref::<&str>()
+            .copied()
+            .or_else(|| payload.downcast_ref::<String>().map(String::as_str))
+            .unwrap_or("no message");
+        Err(Failure::Fatal(format!("the model panicked: {text}")))
+    })
+}

@@ -1,0 +1,58 @@
+//! Which paths an entry of an archive may have.
+
+/// Characters that Windows does not allow in a file name.
+const RESERVED: [char; 7] = ['<', '>', ':', '"', '|', '?', '*'];
+/// Devices of Windows, which no file may be called, whatever its extension.
+const DEVICES: [&str; 4] = ["con", "prn", "aux", "nul"];
+
+const FOLDERS: [&str; 6] = [
+    "documentation",
+    "sources",
+    "binaries",
+    "resources",
+    "extra",
+    "terminalsAndIcons",
+];
+
+/// What is wrong with `path` if it could lead out of the folder it is unpacked into: the rule.
+pub(super) fn unsafe_to_unpack(path: &str) -> Option<&'static str> {
+    if path.contains('\\') {
+        return Some("forward slashes between folders");
+    }
+    let inner = path.strip_suffix('/').unwrap_or(path);
+    let leads_out = |part: &str| matches!(part, "" | "." | "..");
+    if inner.split('/').any(leads_out) {
+        return Some("a relative path without . and ..");
+    }
+    if path.contains(|character: char| character == ':' || character.is_control()) {
+        return Some("a path without drive letter and control characters");
+    }
+    None
+}
+
+/// What is wrong with `path` as an entry of an FMU that is to be written: the rule.
+pub(super) fn unsuitable(path: &str) -> Option<&'static str> {
+    if let Some(rule) = unsafe_to_unpack(path) {
+        return Some(rule);
+    }
+    if !path.is_ascii() || path.contains(RESERVED) || path.ends_with('/') {
+        return Some("the path of a file in ASCII, without any of < > : \" | ? *");
+    }
+    let breaks_windows = |part: &str| {
+        let stem = part.split('.').next().unwrap_or(part).to_ascii_lowercase();
+        part.ends_with(['.', ' ']) || DEVICES.contains(&stem.as_str())
+    };
+    if path.split('/').any(breaks_windows) {
+        return Some("names that Windows allows: no trailing dot or blank, no device");
+    }
+    let inside = path
+        .split_once('/')
+        .is_some_and(|(folder, _)| FOLDERS.contains(&folder));
+    if !inside && path != "model.png" {
+        return Some(
+            "model.png, or a file in documentation, sources, binaries, resources, extra or \
+             terminalsAndIcons",
+        );
+    }
+    None
+}

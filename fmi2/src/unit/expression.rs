@@ -1,0 +1,218 @@
+//! Reads a unit expression.
+
+use super::names::{self, Named};
+use super::{BaseUnit, UnitError};
+
+/// What has been multiplied so far. Numerator and denominator are kept apart, and so are powers of
+/// ten: `mm3` is then 1e-9 exactly as a literal would be.
+struct Product {
+    exponents: [i32; 8],
+    numerator: f64,
+    denominator: f64,
+    ten: i32,
+}
+
+impl Product {
+    fn multiply(&mut self, unit: &Named, exponent: i32) {
+        for (sum, own) in self.exponents.iter_mut().zip(unit.exponents) {
+            *sum += own * exponent;
+        }
+        self.ten += unit.ten * exponent;
+        if exponent >= 0 {
+            self.numerator *= unit.factor.powi(exponent);
+        } else {
+            self.denominator *= unit.factor.powi(-exponent);
+        }
+    }
+
+    fn factor(&self) -> f64 {
+        let (mut numerator, mut denominator) = (self.numerator, self.denominator);
+        if self.ten >= 0 {
+            numerator *= 10f64.powi(self.ten);
+        } else {
+            denominator *= 10f64.powi(-self.ten);
+        }
+        numerator / denominator
+    }
+}
+
+/// A place in an expression.
+pub(super) struct Cursor<'a> {
+    expression: &'a str,
+    at: usize,
+}
+
+impl<'a> Cursor<'a> {
+    pub(super) fn new(expression: &'a str) -> Self {
+        Cursor { expression, at: 0 }
+    }
+
+    fn rest(&self) -> &'a str {
+        &self.expression[self.at..]
+    }
+
+    fn peek(&self) -> Option<char> {
+        self.rest().chars().next()
+    }
+
+    /// Takes the longest run of characters that `belongs` accepts.
+    fn take(&mut self, belongs: impl Fn(char) -> bool) -> &'a str {
+        let rest = self.rest();
+        let length = rest
+            .find(|character| !belongs(character))
+            .unwrap_or(rest.len());
+        self.at += length;
+        &rest[..length]
+    }
+
+    fn accept(&mut self, characters: &[char]) -> bool {
+        let found = self
+            .peek()
+            .filter(|character| characters.contains(character));
+        self.at += found.map_or(0, char::len_utf8);
+        found.is_some()
+    }
+
+    fn skip_blanks(&mut self) -> bool {
+        !self.take(|character| character == ' ').is_empty()
+    }
+
+    fn column(&self, at: usize) -> usize {
+        self.expression[..at].chars().count() + 1
+    }
+
+    fn syntax(&self, expected: &'static str) -> UnitError {
+        let found = self
+            .peek()
+            .map_or("the end".to_owned(), |character| format!("{character:?}"));
+        let column = self.column(self.at);
+        UnitError::Syntax {
+            expression: self.expression.to_owned(),
+            column,
+            expected,
+            found,
+        }
+    }
+
+    pub(super) fn unit(&mut self) -> Result<BaseUnit, UnitError> {
+        self.skip_blanks();
+        if let Some(scale) = names::scale(self.rest().trim_end()) {
+            return Ok(BaseUnit::from_exponents(
+                scale.exponents,
+                scale.factor,
+                scale.offset,
+            ));
+        }
+        let mut product = Product {
+            exponents: [0; 8],
+            numerator: 1.0,
+            denominator: 1.0,
+            ten: 0,
+        };
+        if self.peek().is_some() {
+            self.product(&mut product, 1)?;
+        }
+        self.denominators(&mut product)?;
+        let factor = product.factor();
+        if !(1e-300..=1e300).contains(&factor) {
+            let (expression, found) = (self.expression.to_owned(), format!("{factor:?}"));
+            return Err(UnitError::Magnitude { expression, found });
+        }
+        Ok(BaseUnit::from_exponents(product.exponents, factor, 0.0))
+    }
+
+    /// `{ "/" ( factor | "(" product ")" ) }` up to the end.
+    fn denominators(&mut self, product: &mut Product) -> Result<(), UnitError> {
+        loop {
+            self.skip_blanks();
+            if self.peek().is_none() {
+                return Ok(());
+            }
+            if !self.accept(&['/']) {
+                return Err(self.syntax(
+                    "'/' or the end (several units below the stroke stand in parentheses, as in \
+                     J/(kg.K))",
+                ));
+            }
+            self.skip_blanks();
+            if !self.accept(&['(']) {
+                self.factor(product, -1)?;
+                continue;
+            }
+            self.skip_blanks();
+            self.product(product, -1)?;
+            if !self.accept(&[')']) {
+                return Err(self.syntax("')' or a further unit"));
+            }
+        }
+    }
+
+    /// `factor { ( "." | "*" | blank ) factor }` with the blanks after it.
+    fn product(&mut self, product: &mut Product, sign: i32) -> Result<(), UnitError> {
+        self.factor(product, sign)?;
+        loop {
+            let blank = self.skip_blanks();
+            let separator = self.accept(&['.', '*']);
+            if separator {
+                self.skip_blanks();
+            } else if !(blank && self.peek().is_some_and(in_name)) {
+                return Ok(());
+            }
+            self.factor(product, sign)?;
+        }
+    }
+
+    /// `"1" | name [ exponent ]`.
+    fn factor(&mut self, product: &mut Product, sign: i32) -> Result<(), UnitError> {
+        if self.accept(&['1']) {
+            return Ok(());
+        }
+        let start = self.at;
+        let name = self.take(in_name);
+        if name.is_empty() {
+            return Err(self.syntax("a unit"));
+        }
+        let (expression, column) = (self.expression, self.column(start));
+        let Some(named) = names::find(name) else {
+            let (expression, name) = (expression.to_owned(), name.to_owned());
+            return Err(if names::scale(&name).is_some() {
+                UnitError::Offset {
+                    expression,
+                    column,
+                    name,
+                }
+            } else {
+                UnitError::UnknownName {
+                    expression,
+                    column,
+                    name,
+                }
+            });
+        };
+        product.multiply(&named, sign * self.exponent()?);
+        Ok(())
+    }
+
+    /// `[ "^" ] [ "+" | "-" ] digit [ digit ]`, or nothing for 1.
+    fn exponent(&mut self) -> Result<i32, UnitError> {
+        let caret = self.accept(&['^']);
+        let negative = self.peek() == Some('-');
+        let signed = self.accept(&['+', '-']);
+        let expected = "an integer exponent of one or two digits";
+        let digits = self.take(|character| character.is_ascii_digit());
+        let magnitude = match digits.len() {
+            0 if !caret && !signed => return Ok(1),
+            1 | 2 => digits.parse().unwrap_or(0),
+            0 => return Err(self.syntax(expected)),
+            length => {
+                self.at -= length;
+                return Err(self.syntax(expected));
+            }
+        };
+        Ok(if negative { -magnitude } else { magnitude })
+    }
+}
+
+fn in_name(character: char) -> bool {
+    character.is_alphabetic() || character == '%' || character == '_'
+}

@@ -1,0 +1,13 @@
+//! The ASO controller FMU: a fault-tolerant controller with an augmented state observer, its
+//! design read from `resources/design.toml`.
+#![forbid(unsafe_code)]
+
+mod controller;
+mod design;
+mod matrix;
+mod observer;
+mod variables;
+
+use controller::AsoController;
+
+fmi2::export!(AsoController);

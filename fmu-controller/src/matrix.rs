@@ -1,0 +1,47 @@
+//! A matrix as a list of rows: the form of the design file and of the FMI variables.
+
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+/// Rows times columns numbers, row by row.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Vec<Vec<f64>>", into = "Vec<Vec<f64>>")]
+pub(crate) struct Matrix {
+    pub(crate) rows: usize,
+    pub(crate) columns: usize,
+    pub(crate) values: Vec<f64>,
+}
+
+impl Matrix {
+    /// Name of the element at position `k` of `values`, as FMI writes it: `A[1,2]`.
+    pub(crate) fn element(&self, name: &str, k: usize) -> String {
+        format!("{name}[{},{}]", k / self.columns + 1, k % self.columns + 1)
+    }
+
+    /// The matrix for calculation.
+    pub(crate) fn dense(&self) -> DMatrix<f64> {
+        DMatrix::from_row_slice(self.rows, self.columns, &self.values)
+    }
+}
+
+impl TryFrom<Vec<Vec<f64>>> for Matrix {
+    type Error = String;
+
+    fn try_from(lines: Vec<Vec<f64>>) -> Result<Self, String> {
+        let columns = lines.first().map_or(0, Vec::len);
+        if let Some(row) = lines.iter().position(|line| line.len() != columns) {
+            let found = lines[row].len();
+            return Err(format!("row {} has {found} entries, row 1 has {columns}", row + 1));
+        }
+        if columns == 0 {
+            return Err("a matrix needs at least one row and one column".to_owned());
+        }
+        Ok(Self { rows: lines.len(), columns, values: lines.concat() })
+    }
+}
+
+impl From<Matrix> for Vec<Vec<f64>> {
+    fn from(matrix: Matrix) -> Self {
+        matrix.values.chunks(matrix.columns).map(<[f64]>::to_vec).collect()
+    }
+}

@@ -1,0 +1,190 @@
+//! The first point at which a margin becomes negative.
+
+/// Halvings of the unit interval down to which `Quartic::first_negative` looks.
+const DEPTH: u32 = 20;
+
+/// Width in s to which `locate` narrows a crossing.
+const WIDTH: f64 = 1e-15;
+
+/// Most evaluations in `locate`; bisection alone would need 50 for a step of 1 s.
+const EVALUATIONS: u32 = 100;
+
+/// A polynomial of degree 4 on `[0, 1]` by its Bernstein coefficients.
+///
+/// The coefficients bound the polynomial from both sides, so a sign change cannot hide between
+/// samples.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Quartic([f64; 5]);
+
+impl Quartic {
+    /// From value and rise (derivative times length) at both ends and the value half-way.
+    pub(crate) fn new(start: (f64, f64), middle: f64, end: (f64, f64)) -> Self {
+        let near_start = start.0 + start.1 / 4.0;
+        let near_end = end.0 - end.1 / 4.0;
+        let centre = (16.0 * middle - start.0 - 4.0 * (near_start + near_end) - end.0) / 6.0;
+        Self([start.0, near_start, centre, near_end, end.0])
+    }
+
+    /// `offset + factor * self`.
+    pub(crate) fn affine(&self, offset: f64, factor: f64) -> Self {
+        Self(self.0.map(|coefficient| offset + factor * coefficient))
+    }
+
+    pub(crate) fn is_finite(&self) -> bool {
+        self.0.iter().all(|coefficient| coefficient.is_finite())
+    }
+
+    /// The polynomial is nowhere negative; false is no proof of the contrary.
+    fn is_surely_not_negative(&self) -> bool {
+        self.0.iter().all(|&coefficient| coefficient >= 0.0)
+    }
+
+    /// A point with a negative value, at most `2^-20` behind the first crossing.
+    ///
+    /// `None` where the polynomial is nowhere negative, or only within less than `2^-20`.
+    /// Method: subdivision after de Casteljau.
+    pub(crate) fn first_negative(&self) -> Option<f64> {
+        self.search(0.0, 1.0, DEPTH)
+    }
+
+    fn search(&self, from: f64, width: f64, depth: u32) -> Option<f64> {
+        if self.is_surely_not_negative() {
+            return None;
+        }
+        if depth == 0 {
+            return (self.0[4] < 0.0).then_some(from + width);
+        }
+        let (left, right) = self.halves();
+        let half = width / 2.0;
+        let found = left.search(from, half, depth - 1);
+        found.or_else(|| right.search(from + half, half, depth - 1))
+    }
+
+    fn halves(&self) -> (Self, Self) {
+        let mut row = self.0;
+        let mut left = [0.0; 5];
+        let mut right = [0.0; 5];
+        for level in 0..5 {
+            left[level] = row[0];
+            right[4 - level] = row[4 - level];
+            for i in 0..4 - level {
+                row[i] = 0.5 * (row[i] + row[i + 1]);
+            }
+        }
+        (Self(left), Self(right))
+    }
+}
+
+/// Narrows a crossing of `margin` between `0`, where it is `at_start >= 0`, and `ceiling`, where
+/// it is `at_ceiling < 0`; returns the upper end of the last interval, where it is negative.
+///
+/// Method: regula falsi with the Illinois rule; the interval ends at `1e-15` s or narrower.
+pub(crate) fn locate(
+    at_start: f64,
+    ceiling: f64,
+    at_ceiling: f64,
+    margin: impl Fn(f64) -> f64,
+) -> f64 {
+    let (mut low, mut at_low) = (0.0, at_start);
+    let (mut high, mut at_high) = (ceiling, at_ceiling);
+    let mut moved_low = None;
+    for _ in 0..EVALUATIONS {
+        let width = high - low;
+        if width <= WIDTH {
+            break;
+        }
+        let guess = low + width * at_low / (at_low - at_high);
+        let guess = guess.max(low + WIDTH / 2.0).min(high - WIDTH / 2.0);
+        let value = margin(guess);
+        let moves_low = value >= 0.0;
+        let again = moved_low == Some(moves_low);
+        moved_low = Some(moves_low);
+        if moves_low {
+            (low, at_low) = (guess, value);
+            at_high *= if again { 0.5 } else { 1.0 };
+        } else {
+            (high, at_high) = (guess, value);
+            at_low *= if again { 0.5 } else { 1.0 };
+        }
+    }
+    high
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::Cell;
+
+    /// The quartic `scale * product(s - root)`, built from its values and derivatives.
+    fn with_roots(scale: f64, roots: [f64; 4]) -> Quartic {
+        let value = |s: f64| scale * roots.iter().map(|root| s - root).product::<f64>();
+        let without = |skip: usize, s: f64| -> f64 {
+            let others = roots.iter().enumerate().filter(|(i, _)| *i != skip);
+            others.map(|(_, root)| s - root).product()
+        };
+        let rise = |s: f64| scale * (0..4).map(|skip| without(skip, s)).sum::<f64>();
+        Quartic::new((value(0.0), rise(0.0)), value(0.5), (value(1.0), rise(1.0)))
+    }
+
+    #[test]
+    fn the_first_of_several_crossings_is_found() {
+        let found = with_roots(1.0, [0.2, 0.3, 0.6, 0.7])
+            .first_negative()
+            .unwrap();
+        assert!((found - 0.2).abs() < 2e-6 && found >= 0.2, "{found}");
+        let found = with_roots(-1.0, [-0.5, 0.35, 1.5, 2.0])
+            .first_negative()
+            .unwrap();
+        assert!((found - 0.35).abs() < 2e-6 && found >= 0.35, "{found}");
+    }
+
+    #[test]
+    fn a_narrow_dip_between_positive_ends_is_found() {
+        let found = with_roots(1.0, [0.4, 0.400_1, -1.0, -2.0])
+            .first_negative()
+            .unwrap();
+        assert!((0.4..0.400_1).contains(&found), "{found}");
+    }
+
+    #[test]
+    fn a_touching_or_positive_polynomial_has_no_crossing() {
+        assert!(
+            with_roots(1.0, [-0.1, -0.2, 1.1, 1.2])
+                .first_negative()
+                .is_none()
+        );
+        assert!(
+            with_roots(1.0, [0.0, 0.0, -1.0, -1.0])
+                .first_negative()
+                .is_none()
+        );
+        assert!(Quartic([0.0; 5]).first_negative().is_none());
+    }
+
+    #[test]
+    fn a_fall_from_zero_is_found_at_the_start() {
+        let found = Quartic([0.0, -0.1, -0.2, -0.3, -0.4])
+            .first_negative()
+            .unwrap();
+        assert!(found < 2e-6);
+    }
+
+    #[test]
+    fn a_crossing_is_located_to_the_last_digits_from_above() {
+        let count = Cell::new(0);
+        let margin = |s: f64| {
+            count.set(count.get() + 1);
+            (1.0 - s * s).exp_m1() - 0.9
+        };
+        let root = (1.0 - 1.9_f64.ln()).sqrt();
+        let found = locate(margin(0.0), 1.0, margin(1.0), margin);
+        assert!((found - root).abs() < 2e-15 && margin(found) < 0.0);
+        assert!(count.get() < 20, "{} evaluations", count.get());
+    }
+
+    #[test]
+    fn a_crossing_at_the_very_start_is_located_there() {
+        let found = locate(0.0, 1e-6, -1e-6, |s| -s);
+        assert!((0.0..=1e-14).contains(&found), "{found}");
+    }
+}

@@ -1,0 +1,315 @@
+//! The rigid body of equation (20) and the force on the cart.
+
+use crate::parameters::Parameters;
+
+/// `[x_p, theta, v_p, omega]` in m, rad, m/s, rad/s; also its derivative.
+pub type State = [f64; 4];
+
+/// The force on the cart without friction, `u + f_a`, as a polynomial of time:
+/// `value + slope (t - start) + curvature (t - start)² / 2`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Force {
+    /// Force at `start`, in N.
+    pub value: f64,
+    /// First derivative at `start`, in N/s.
+    pub slope: f64,
+    /// Second derivative, in N/s².
+    pub curvature: f64,
+    /// The time in s to which `value` and `slope` belong.
+    pub start: f64,
+}
+
+impl Force {
+    /// A force that does not change.
+    #[must_use]
+    pub fn constant(value: f64) -> Self {
+        Self {
+            value,
+            slope: 0.0,
+            curvature: 0.0,
+            start: 0.0,
+        }
+    }
+
+    /// The force at a time in s, in N.
+    #[must_use]
+    pub fn at(&self, time: f64) -> f64 {
+        let elapsed = time - self.start;
+        self.value + elapsed * (self.slope + 0.5 * elapsed * self.curvature)
+    }
+
+    /// The derivative of the force at a time in s, in N/s.
+    #[must_use]
+    pub fn rate_at(&self, time: f64) -> f64 {
+        self.slope + (time - self.start) * self.curvature
+    }
+
+    /// No coefficient is infinite or not a number.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        [self.value, self.slope, self.curvature, self.start]
+            .iter()
+            .all(|part| part.is_finite())
+    }
+
+    /// The same polynomial in the time elapsed since `origin`.
+    pub(crate) fn seen_from(&self, origin: f64) -> Self {
+        Self {
+            value: self.at(origin),
+            slope: self.rate_at(origin),
+            curvature: self.curvature,
+            start: 0.0,
+        }
+    }
+}
+
+/// Cart and pendulum, equation (20) with the missing `l` and dot restored:
+///
+/// `(M + m) x_p'' + F_x x_p' + m l (theta'' cos theta - theta'² sin theta) = u - f`
+///
+/// `J theta'' + F_theta theta' - m l g sin theta + m l x_p'' cos theta = 0`
+///
+/// The linearised body has `sin theta -> theta`, `cos theta -> 1`, `theta'² sin theta -> 0`; its
+/// state matrices are the paper's `A` and `B`.
+///
+/// Method: the 2 x 2 mass matrix is inverted in closed form; its determinant
+/// `(M + m) J - (m l cos theta)²` is positive for checked parameters.
+/// Source: Patton and Klinkhieo (2009), equation (20).
+#[derive(Clone, Debug, PartialEq)]
+pub struct RigidBody {
+    total_mass: f64,
+    coupling: f64,
+    inertia: f64,
+    inverse_inertia: f64,
+    weight: f64,
+    cart_damping: f64,
+    pendulum_damping: f64,
+    linearised: bool,
+}
+
+/// Sine, cosine and centrifugal term of a position, each as the body sees it.
+struct Position {
+    sine: f64,
+    cosine: f64,
+    centrifugal: f64,
+}
+
+impl RigidBody {
+    /// The body of checked parameters.
+    #[must_use]
+    pub fn new(parameters: &Parameters) -> Self {
+        let coupling = parameters.pendulum_mass * parameters.length;
+        Self {
+            total_mass: parameters.cart_mass + parameters.pendulum_mass,
+            coupling,
+            inertia: parameters.inertia,
+            inverse_inertia: 1.0 / parameters.inertia,
+            weight: coupling * parameters.gravity,
+            cart_damping: parameters.cart_damping,
+            pendulum_damping: parameters.pendulum_damping,
+            linearised: parameters.linearised,
+        }
+    }
+
+    #[inline]
+    fn position(&self, angle: f64, rate: f64) -> Position {
+        if self.linearised {
+            return Position {
+                sine: angle,
+                cosine: 1.0,
+                centrifugal: 0.0,
+            };
+        }
+        let (sine, cosine) = angle.sin_cos();
+        Position {
+            sine,
+            cosine,
+            centrifugal: rate * rate * sine,
+        }
+    }
+
+    /// Derivative of the state of a sliding cart under `net_force`, the force less the friction
+    /// in N.
+    #[must_use]
+    #[inline]
+    pub fn slide(&self, state: &State, net_force: f64) -> State {
+        let [_, angle, velocity, rate] = *state;
+        let at = self.position(angle, rate);
+        let push = net_force - self.cart_damping * velocity + self.coupling * at.centrifugal;
+        let torque = self.weight * at.sine - self.pendulum_damping * rate;
+        let lever = self.coupling * at.cosine;
+        let inverse = 1.0 / (self.total_mass * self.inertia - lever * lever);
+        let acceleration = (self.inertia * push - lever * torque) * inverse;
+        let turn = (self.total_mass * torque - lever * push) * inverse;
+        [velocity, rate, acceleration, turn]
+    }
+
+    /// Derivative of the state of a cart held at rest: `J theta'' = m l g sin theta - F_theta theta'`.
+    #[must_use]
+    #[inline]
+    pub fn stick(&self, state: &State) -> State {
+        let [_, angle, _, rate] = *state;
+        let sine = if self.linearised { angle } else { angle.sin() };
+        let torque = self.weight * sine - self.pendulum_damping * rate;
+        [0.0, rate, 0.0, torque * self.inverse_inertia]
+    }
+
+    /// The friction in N that keeps a cart at rest: (20) with `x_p' = x_p'' = 0`, solved for `f`,
+    ///
+    /// `f = u + m l theta'² sin theta - (m l / J) cos theta (m l g sin theta - F_theta theta')`.
+    #[must_use]
+    #[inline]
+    pub fn balancing_force(&self, state: &State, force: f64) -> f64 {
+        let [_, angle, _, rate] = *state;
+        let at = self.position(angle, rate);
+        let torque = self.weight * at.sine - self.pendulum_damping * rate;
+        force + self.coupling * (at.centrifugal - at.cosine * torque * self.inverse_inertia)
+    }
+
+    /// Time derivative in N/s of the balancing force while the cart is held and the force changes
+    /// at `force_rate` in N/s.
+    #[must_use]
+    #[inline]
+    pub fn balancing_rate(&self, state: &State, force_rate: f64) -> f64 {
+        let [_, angle, _, rate] = *state;
+        let at = self.position(angle, rate);
+        let torque = self.weight * at.sine - self.pendulum_damping * rate;
+        let turn = torque * self.inverse_inertia;
+        let sine_rate = at.cosine * rate;
+        let (cosine_rate, centrifugal_rate) = if self.linearised {
+            (0.0, 0.0)
+        } else {
+            (
+                -at.sine * rate,
+                2.0 * rate * turn * at.sine + rate * rate * sine_rate,
+            )
+        };
+        let torque_rate = self.weight * sine_rate - self.pendulum_damping * turn;
+        let lever_rate = cosine_rate * torque + at.cosine * torque_rate;
+        force_rate + self.coupling * (centrifugal_rate - lever_rate * self.inverse_inertia)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STATES: [State; 3] = [
+        [0.2, 0.4, 0.7, -1.3],
+        [0.0, -2.5, -1.1, 4.0],
+        [1.0, 7.0, 0.0, 0.3],
+    ];
+
+    fn bodies() -> [RigidBody; 2] {
+        let nonlinear = Parameters::default();
+        let linearised = Parameters {
+            linearised: true,
+            ..Parameters::default()
+        };
+        [RigidBody::new(&nonlinear), RigidBody::new(&linearised)]
+    }
+
+    #[test]
+    fn the_accelerations_of_the_sliding_body_satisfy_equation_20() {
+        let p = Parameters::default();
+        let moment = p.pendulum_mass * p.length;
+        for state in STATES {
+            let [_, angle, v, rate] = state;
+            let [_, _, a, turn] = bodies()[0].slide(&state, 12.0);
+            let cart = (p.cart_mass + p.pendulum_mass) * a
+                + p.cart_damping * v
+                + moment * (turn * angle.cos() - rate * rate * angle.sin())
+                - 12.0;
+            let pendulum = p.inertia * turn + p.pendulum_damping * rate
+                - moment * p.gravity * angle.sin()
+                + moment * a * angle.cos();
+            assert!(
+                cart.abs() < 1e-12 && pendulum.abs() < 1e-13,
+                "{cart} {pendulum}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_linearised_body_has_the_printed_matrices() {
+        let printed = [
+            ([0.0, 0.0, 0.0, 0.0], 0.0, [0.0, 0.0, 0.3205, -1.0095]),
+            ([1.0, 0.0, 0.0, 0.0], 1.0, [0.0, 0.0, 0.0, 0.0]),
+            ([0.0, 1.0, 0.0, 0.0], 1.0, [0.0, 0.0, -1.9333, 36.9771]),
+            ([0.0, 0.0, 1.0, 0.0], 1.0, [1.0, 0.0, -1.9872, 6.2589]),
+            ([0.0, 0.0, 0.0, 1.0], 1.0, [0.0, 1.0, 0.0091, -0.1738]),
+        ];
+        let body = &bodies()[1];
+        for (state, factor, column) in printed {
+            let derivative = body.slide(&state, 1.0 - factor);
+            for (computed, printed) in derivative.iter().zip(column) {
+                assert!((computed - printed).abs() < 6e-5, "{computed} {printed}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_linearised_body_is_the_tangent_of_the_nonlinear_one() {
+        let [nonlinear, linearised] = bodies();
+        let small = [0.0, 1e-4, 2e-4, -3e-4];
+        let difference =
+            |i: usize| nonlinear.slide(&small, 1e-3)[i] - linearised.slide(&small, 1e-3)[i];
+        assert!(difference(2).abs() < 1e-10 && difference(3).abs() < 1e-10);
+    }
+
+    #[test]
+    fn the_balancing_force_leaves_the_cart_without_acceleration() {
+        for body in bodies() {
+            for mut state in STATES {
+                state[2] = 0.0;
+                let friction = body.balancing_force(&state, 12.0);
+                let [_, _, acceleration, turn] = body.slide(&state, 12.0 - friction);
+                assert!(acceleration.abs() < 1e-12, "{acceleration}");
+                assert!((turn - body.stick(&state)[3]).abs() < 1e-10);
+            }
+        }
+    }
+
+    #[test]
+    fn the_balancing_rate_is_the_derivative_along_the_held_motion() {
+        for body in bodies() {
+            for mut state in STATES {
+                state[2] = 0.0;
+                let slope = body.stick(&state);
+                let along = |t: f64| {
+                    let turn_rate =
+                        (body.stick(&offset(&state, &slope, 1e-6))[3] - slope[3]) / 1e-6;
+                    let mut moved = offset(&state, &slope, t);
+                    moved[1] += 0.5 * t * t * slope[3];
+                    moved[3] += 0.5 * t * t * turn_rate;
+                    body.balancing_force(&moved, 5.0 + 3.0 * t)
+                };
+                let numeric = (along(1e-5) - along(-1e-5)) / 2e-5;
+                let rate = body.balancing_rate(&state, 3.0);
+                assert!(
+                    (numeric - rate).abs() < 1e-6 * rate.abs().max(1.0),
+                    "{numeric} {rate}"
+                );
+            }
+        }
+    }
+
+    fn offset(state: &State, slope: &State, time: f64) -> State {
+        std::array::from_fn(|i| state[i] + time * slope[i])
+    }
+
+    #[test]
+    fn a_force_seen_from_another_origin_is_the_same_force() {
+        let force = Force {
+            value: 3.0,
+            slope: -2.0,
+            curvature: 8.0,
+            start: 1.5,
+        };
+        let seen = force.seen_from(2.0);
+        assert_eq!(force.at(1.5).to_bits(), 3.0_f64.to_bits());
+        assert!((force.at(2.5) - (3.0 - 2.0 + 4.0)).abs() < 1e-14);
+        assert!((seen.at(0.5) - force.at(2.5)).abs() < 1e-14);
+        assert!((seen.rate_at(0.5) - 6.0).abs() < 1e-14);
+    }
+}

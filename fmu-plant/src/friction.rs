@@ -1,0 +1,155 @@
+//! Set-valued Stribeck friction between cart and rail, without regularisation.
+
+use crate::parameters::Parameters;
+use serde::{Deserialize, Serialize};
+
+/// What the cart does on its rail.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Regime {
+    /// The cart slides in the negative direction.
+    Backward,
+    /// The cart is held at rest.
+    Stick,
+    /// The cart slides in the positive direction.
+    Forward,
+}
+
+impl Regime {
+    /// -1, 0, +1: sliding backward, sticking, sliding forward.
+    #[must_use]
+    pub fn number(self) -> i32 {
+        match self {
+            Self::Backward => -1,
+            Self::Stick => 0,
+            Self::Forward => 1,
+        }
+    }
+
+    /// The same number for formulas.
+    #[must_use]
+    pub fn sign(self) -> f64 {
+        f64::from(self.number())
+    }
+}
+
+/// Equation (21) with the cart velocity `v`:
+/// `f = g(v) Sign(v)`, `g(v) = F_c + (F_s - F_c) exp(-(|v| / v_s)^delta)`,
+/// and `Sign(0) = [-F_s, F_s] / F_s`: at rest the friction balances the other forces.
+///
+/// Source: Patton and Klinkhieo (2009), equation (21); the exponent and the velocity are repaired.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StribeckLaw {
+    coulomb: f64,
+    excess: f64,
+    inverse_velocity: f64,
+    exponent: f64,
+    quadratic: bool,
+}
+
+impl StribeckLaw {
+    /// The law of checked parameters.
+    #[must_use]
+    pub fn new(parameters: &Parameters) -> Self {
+        Self {
+            coulomb: parameters.coulomb,
+            excess: parameters.static_friction - parameters.coulomb,
+            inverse_velocity: 1.0 / parameters.stribeck_velocity,
+            exponent: parameters.stribeck_exponent,
+            quadratic: (parameters.stribeck_exponent - 2.0).abs() < f64::EPSILON,
+        }
+    }
+
+    /// `g(v)` in N for a velocity in m/s of either sign.
+    #[must_use]
+    pub fn magnitude(&self, velocity: f64) -> f64 {
+        let ratio = velocity.abs() * self.inverse_velocity;
+        let power = if self.quadratic {
+            ratio * ratio
+        } else {
+            ratio.powf(self.exponent)
+        };
+        self.coulomb + self.excess * (-power).exp()
+    }
+
+    /// The largest friction at rest in N: `F_s`, rounded exactly as `magnitude(0.0)` is.
+    ///
+    /// The two being the same number, a cart that breaks away never starts backward by rounding.
+    #[must_use]
+    pub fn limit(&self) -> f64 {
+        self.coulomb + self.excess
+    }
+
+    /// The velocity in m/s over which the friction falls: `v_s`, infinite where `F_s = F_c`.
+    #[must_use]
+    pub fn width(&self) -> f64 {
+        if self.excess > 0.0 {
+            1.0 / self.inverse_velocity
+        } else {
+            f64::INFINITY
+        }
+    }
+
+    /// The regime of a cart at velocity zero under the force that would hold it there.
+    #[must_use]
+    pub fn regime_at_rest(&self, balancing: f64) -> Regime {
+        if balancing > self.limit() {
+            Regime::Forward
+        } else if balancing < -self.limit() {
+            Regime::Backward
+        } else {
+            Regime::Stick
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn law(change: impl Fn(&mut Parameters)) -> StribeckLaw {
+        let mut parameters = Parameters::default();
+        change(&mut parameters);
+        StribeckLaw::new(&parameters)
+    }
+
+    #[test]
+    fn friction_falls_from_static_at_rest_to_coulomb_at_speed() {
+        let law = law(|_| ());
+        assert_eq!(law.magnitude(0.0).to_bits(), 30.0_f64.to_bits());
+        assert_eq!(law.magnitude(-5.0).to_bits(), 25.0_f64.to_bits());
+        let at_stribeck_velocity = 25.0 + 5.0 / std::f64::consts::E;
+        assert!((law.magnitude(0.15) - at_stribeck_velocity).abs() < 1e-13);
+        assert!((law.magnitude(-0.15) - at_stribeck_velocity).abs() < 1e-13);
+    }
+
+    #[test]
+    fn the_exponent_shapes_the_fall() {
+        let linear = law(|p| p.stribeck_exponent = 1.0);
+        let cubic = law(|p| p.stribeck_exponent = 3.0);
+        assert!((linear.magnitude(0.3) - (25.0 + 5.0 * (-2.0_f64).exp())).abs() < 1e-13);
+        assert!((cubic.magnitude(0.3) - (25.0 + 5.0 * (-8.0_f64).exp())).abs() < 1e-13);
+    }
+
+    #[test]
+    fn the_limit_is_the_magnitude_at_rest_to_the_last_bit() {
+        for coulomb in [0.1, 0.3, 7.7, 24.999_999_999] {
+            let law = law(|p| p.coulomb = coulomb);
+            assert_eq!(law.limit().to_bits(), law.magnitude(0.0).to_bits());
+        }
+    }
+
+    #[test]
+    fn a_cart_at_rest_is_held_up_to_the_static_friction() {
+        let law = law(|_| ());
+        assert_eq!(law.regime_at_rest(30.0), Regime::Stick);
+        assert_eq!(law.regime_at_rest(-30.0), Regime::Stick);
+        assert_eq!(law.regime_at_rest(30.000_000_1), Regime::Forward);
+        assert_eq!(law.regime_at_rest(-30.000_000_1), Regime::Backward);
+    }
+
+    #[test]
+    fn the_regime_number_is_the_sign_of_the_sliding_direction() {
+        let numbers = [Regime::Backward, Regime::Stick, Regime::Forward].map(Regime::number);
+        assert_eq!(numbers, [-1, 0, 1]);
+    }
+}

@@ -1,0 +1,15 @@
+//! The friction pendulum: a pendulum on a cart whose rail has set-valued Stribeck friction.
+#![forbid(unsafe_code)]
+
+mod crossing;
+mod dormand_prince;
+pub mod dynamics;
+pub mod friction;
+pub mod motion;
+pub mod parameters;
+mod pendulum;
+mod plant;
+
+use pendulum::FrictionPendulum;
+
+fmi2::export!(FrictionPendulum);

@@ -1,0 +1,316 @@
+//! The motion of the friction pendulum: integration between events, and the events.
+//!
+//! While sliding the friction is a smooth function of the state; while sticking the cart is held
+//! and the pendulum moves alone. Each piece is integrated by Dormand-Prince steps of adaptive
+//! length. In every step the polynomial of the margin to the next event is searched for its first
+//! sign change, and the step is repeated with the length that ends at the event.
+
+use crate::crossing::locate;
+use crate::dynamics::{Force, RigidBody, State};
+use crate::friction::{Regime, StribeckLaw};
+use crate::parameters::{Parameters, Refusal, require};
+use crate::plant::{Crossing, NotFinite, Plant};
+use piece::Piece;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+pub use tolerance::Tolerance;
+
+mod piece;
+mod tolerance;
+
+/// Suggested length in s of the first integration step.
+const FIRST_STEP: f64 = 1e-3;
+
+/// Longest integration step in s.
+const LONGEST_STEP: f64 = 0.1;
+
+/// Shortest length in s to which a rejected integration step is reduced.
+const SHORTEST_STEP: f64 = 1e-13;
+
+/// Most integration steps, rejected ones included, in one call of `advance`.
+const STEP_LIMIT: u32 = 1_000_000;
+
+/// Most events in one call of `advance`.
+const EVENT_LIMIT: u32 = 10_000;
+
+/// Why the motion could not be followed to the end of the interval.
+///
+/// The motion is then at the time stated, the last one reached.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum Failure {
+    /// Start or duration is not finite, or the duration is negative.
+    #[error("interval from {start} s of {duration} s: must be finite and not negative")]
+    Interval {
+        /// Start of the interval in s.
+        start: f64,
+        /// Duration of the interval in s.
+        duration: f64,
+    },
+    /// The force or the state has grown beyond all numbers or is not a number.
+    #[error("force, state or its derivative is not finite after t = {time} s")]
+    NotFinite {
+        /// Time reached in s.
+        time: f64,
+    },
+    /// No step is short enough for the tolerance.
+    #[error("the integration step fell below {SHORTEST_STEP} s at t = {time} s")]
+    StepUnderflow {
+        /// Time reached in s.
+        time: f64,
+    },
+    /// The interval needs too many integration steps: the parameters make the motion too fast.
+    #[error("more than {STEP_LIMIT} integration steps in one communication step, at t = {time} s")]
+    TooManySteps {
+        /// Time reached in s.
+        time: f64,
+    },
+    /// The cart stops and starts too often.
+    #[error("more than {EVENT_LIMIT} stick-slip events in one communication step, at t = {time} s")]
+    TooManyEvents {
+        /// Time reached in s.
+        time: f64,
+    },
+}
+
+impl Failure {
+    /// The time in s to which the motion was followed.
+    #[must_use]
+    pub fn time(&self) -> f64 {
+        match self {
+            Self::Interval { start: time, .. }
+            | Self::NotFinite { time }
+            | Self::StepUnderflow { time }
+            | Self::TooManySteps { time }
+            | Self::TooManyEvents { time } => *time,
+        }
+    }
+}
+
+/// The whole memory of the plant: a copy continues with the same bits.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Motion {
+    state: State,
+    regime: Regime,
+    suggested_step: f64,
+}
+
+impl Motion {
+    /// The motion from an initial state `[x_p, theta, v_p, omega]` under the force at that time.
+    ///
+    /// The parameters must have passed their check.
+    ///
+    /// # Errors
+    /// An initial value that is not finite is refused.
+    pub fn start(parameters: &Parameters, initial: State, force: f64) -> Result<Self, Refusal> {
+        let names = ["x_p_0", "theta_0", "v_p_0", "omega_0"];
+        for (name, value) in names.into_iter().zip(initial) {
+            require(name, value, true, "finite")?;
+        }
+        let mut motion = Self {
+            state: initial,
+            regime: Regime::Stick,
+            suggested_step: FIRST_STEP,
+        };
+        motion.regime = Plant::new(parameters, Force::constant(force)).regime(0.0, &initial);
+        Ok(motion)
+    }
+
+    /// `[x_p, theta, v_p, omega]` in m, rad, m/s, rad/s.
+    #[must_use]
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// What the cart does.
+    #[must_use]
+    pub fn regime(&self) -> Regime {
+        self.regime
+    }
+
+    /// The friction in N, given the force `u + f_a` in N at this time: `g(v) sign(v)` of a
+    /// sliding cart, the balancing force of a held one.
+    ///
+    /// A force that has just jumped can exceed what holds the cart; the friction is then the
+    /// largest possible one, `F_s`.
+    #[must_use]
+    pub fn friction_force(&self, parameters: &Parameters, force: f64) -> f64 {
+        let law = StribeckLaw::new(parameters);
+        if self.regime == Regime::Stick {
+            let balancing = RigidBody::new(parameters).balancing_force(&self.state, force);
+            balancing.max(-law.limit()).min(law.limit())
+        } else {
+            self.regime.sign() * law.magnitude(self.state[2])
+        }
+    }
+
+    /// Follows the motion from the time `start` for `duration`, both in s, under the force given
+    /// as a polynomial of time.
+    ///
+    /// Force and parameters may have changed since the last call: a held cart is tested against
+    /// the new ones first. The parameters must have passed their check.
+    ///
+    /// Method: Dormand-Prince 5(4), the error of each step held below a tenth of the tolerance (2-norm
+    /// of the components, each relative to its own size); events are located to 1e-15 s. Cost: an
+    /// interval shorter than the suggested step takes one step, seven evaluations of the dynamics;
+    /// nothing is allocated.
+    ///
+    /// # Errors
+    /// The reason and the time reached; the state is the one at that time.
+    pub fn advance(
+        &mut self,
+        parameters: &Parameters,
+        force: &Force,
+        start: f64,
+        duration: f64,
+        tolerance: &Tolerance,
+    ) -> Result<(), Failure> {
+        if !(start.is_finite() && duration.is_finite() && duration >= 0.0) {
+            return Err(Failure::Interval { start, duration });
+        }
+        if !force.is_finite() {
+            return Err(Failure::NotFinite { time: start });
+        }
+        let plant = Plant::new(parameters, force.seen_from(start));
+        let mut elapsed = 0.0;
+        let mut events = 0;
+        self.regime = plant.regime(elapsed, &self.state);
+        for _ in 0..STEP_LIMIT {
+            if elapsed >= duration {
+                return Ok(());
+            }
+            let time = start + elapsed;
+            match self.proceed(&plant, elapsed, duration - elapsed, tolerance) {
+                Progress::Finished => elapsed = duration,
+                Progress::Advanced(length) => elapsed += length,
+                Progress::Event(length) => {
+                    elapsed += length;
+                    events += 1;
+                    if events > EVENT_LIMIT {
+                        return Err(Failure::TooManyEvents {
+                            time: start + elapsed,
+                        });
+                    }
+                }
+                Progress::Rejected => {}
+                Progress::Underflow => return Err(Failure::StepUnderflow { time }),
+                Progress::NotFinite => return Err(Failure::NotFinite { time }),
+            }
+        }
+        Err(Failure::TooManySteps {
+            time: start + elapsed,
+        })
+    }
+
+    /// One integration step, at most to the end of the interval and at most to the next event.
+    fn proceed(
+        &mut self,
+        plant: &Plant,
+        elapsed: f64,
+        remaining: f64,
+        tolerance: &Tolerance,
+    ) -> Progress {
+        let piece = Piece::new(plant, self, elapsed);
+        let limit = self.suggested_step.min(piece.resolving_length());
+        let lasts = remaining <= 1.01 * limit;
+        let length = if lasts { remaining } else { limit };
+        let step = piece.step(length);
+        let error = tolerance.squared_error(&step);
+        if error.is_nan() || error > 1.0 {
+            return self.reject(length, error);
+        }
+        if length >= self.suggested_step {
+            self.suggested_step = (length * growth(error)).min(LONGEST_STEP);
+        }
+        match plant.first_crossing(piece.regime, elapsed, &step) {
+            Err(NotFinite) => Progress::NotFinite,
+            Ok(Some(crossing)) => self.proceed_to(&crossing, &piece, length, tolerance),
+            Ok(None) => {
+                self.state = step.end;
+                if lasts {
+                    Progress::Finished
+                } else {
+                    Progress::Advanced(length)
+                }
+            }
+        }
+    }
+
+    fn reject(&mut self, length: f64, error: f64) -> Progress {
+        self.suggested_step = length * growth(error).min(0.9);
+        if self.suggested_step >= SHORTEST_STEP {
+            return Progress::Rejected;
+        }
+        self.suggested_step = FIRST_STEP;
+        if error.is_finite() {
+            Progress::Underflow
+        } else {
+            Progress::NotFinite
+        }
+    }
+
+    /// Repeats a step of `length` so that it ends where the margin becomes negative.
+    ///
+    /// A margin that the repeated step does not find negative behind the crossing only touched
+    /// zero in the continuous extension: there is no event so far. The repeated step sees the
+    /// friction at its end, which the longer one may have stepped over, so its error is tested.
+    fn proceed_to(
+        &mut self,
+        crossing: &Crossing,
+        piece: &Piece,
+        length: f64,
+        tolerance: &Tolerance,
+    ) -> Progress {
+        let direction = crossing.direction;
+        let margin = |length: f64| piece.margin(direction, &piece.step(length));
+        let ceiling = crossing.fraction * length;
+        let at_ceiling = margin(ceiling);
+        let happens = at_ceiling < 0.0;
+        let length = if happens {
+            locate(margin(0.0).max(0.0), ceiling, at_ceiling, margin)
+        } else {
+            ceiling
+        };
+        let step = piece.step(length);
+        let error = tolerance.squared_error(&step);
+        if error.is_nan() || error > 1.0 {
+            return self.reject(length, error);
+        }
+        self.state = step.end;
+        if !happens {
+            return Progress::Advanced(length);
+        }
+        if piece.regime == Regime::Stick {
+            self.regime = direction;
+        } else {
+            self.state[2] = 0.0;
+            self.regime = piece.plant.regime(piece.elapsed + length, &self.state);
+        }
+        Progress::Event(length)
+    }
+}
+
+/// What one integration step achieved; lengths are in s.
+enum Progress {
+    /// The end of the interval is reached.
+    Finished,
+    Advanced(f64),
+    /// The step ended in an event.
+    Event(f64),
+    /// The step was too long and will be repeated.
+    Rejected,
+    Underflow,
+    NotFinite,
+}
+
+/// Factor from the length of a step with this squared scaled error to the next one.
+fn growth(squared_error: f64) -> f64 {
+    if squared_error.is_finite() {
+        (0.9 * squared_error.powf(-0.1)).clamp(0.2, 5.0)
+    } else {
+        0.1
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,57 @@
+//! One piece of the motion, between two events.
+
+use super::Motion;
+use crate::dormand_prince::Step;
+use crate::dynamics::State;
+use crate::friction::Regime;
+use crate::plant::Plant;
+
+/// A piece of the motion in one regime: where it starts, and the steps from there.
+pub(super) struct Piece<'a> {
+    pub(super) plant: &'a Plant,
+    pub(super) regime: Regime,
+    /// Time in s since the begin of the communication step.
+    pub(super) elapsed: f64,
+    start: State,
+    slope: State,
+}
+
+impl<'a> Piece<'a> {
+    pub(super) fn new(plant: &'a Plant, motion: &Motion, elapsed: f64) -> Self {
+        let Motion {
+            state: start,
+            regime,
+            ..
+        } = *motion;
+        let slope = plant.derivative(regime, elapsed, &start);
+        Self {
+            plant,
+            regime,
+            elapsed,
+            start,
+            slope,
+        }
+    }
+
+    pub(super) fn step(&self, length: f64) -> Step {
+        let derivative = |time: f64, state: &State| self.plant.derivative(self.regime, time, state);
+        Step::take(derivative, self.elapsed, &self.start, &self.slope, length)
+    }
+
+    pub(super) fn margin(&self, direction: Regime, step: &Step) -> f64 {
+        self.plant.margin(
+            self.regime,
+            direction,
+            self.elapsed + step.length,
+            &step.end,
+        )
+    }
+
+    /// The longest step that cannot leap over the fall of the friction near zero velocity.
+    pub(super) fn resolving_length(&self) -> f64 {
+        if self.regime == Regime::Stick {
+            return f64::INFINITY;
+        }
+        self.plant.resolved_change(self.start[2]) / self.slope[2].abs()
+    }
+}

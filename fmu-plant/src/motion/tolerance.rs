@@ -1,0 +1,55 @@
+//! How large the error of one integration step may be.
+
+use crate::dormand_prince::Step;
+use crate::parameters::{Refusal, require};
+use serde::{Deserialize, Serialize};
+
+/// The error of a step is compared with this part of the tolerance.
+///
+/// The upright pendulum multiplies an early error by some 7e4 in 2 s.
+const SAFETY: f64 = 0.1;
+
+/// Bounds of the error of one integration step, per component of the state.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Tolerance {
+    relative: f64,
+    absolute: f64,
+}
+
+impl Default for Tolerance {
+    /// Relative 1e-9, absolute 1e-12.
+    fn default() -> Self {
+        Self {
+            relative: 1e-9,
+            absolute: 1e-12,
+        }
+    }
+}
+
+impl Tolerance {
+    /// The given relative tolerance and a thousandth of it as the absolute one.
+    ///
+    /// Values outside of 1e-12 to 1e-3 are taken as the nearest of these.
+    ///
+    /// # Errors
+    /// A tolerance that is not finite or not positive is refused.
+    pub fn new(relative: f64) -> Result<Self, Refusal> {
+        require("tolerance", relative, relative > 0.0, "finite and > 0")?;
+        let relative = relative.clamp(1e-12, 1e-3);
+        Ok(Self {
+            relative,
+            absolute: relative * 1e-3,
+        })
+    }
+
+    /// Sum of the squares of the errors of a step, each relative to its bound.
+    pub(super) fn squared_error(&self, step: &Step) -> f64 {
+        let mut sum = 0.0;
+        for ((error, start), end) in step.error().iter().zip(&step.start).zip(&step.end) {
+            let bound = self.absolute + self.relative * start.abs().max(end.abs());
+            let scaled = error / (SAFETY * bound);
+            sum += scaled * scaled;
+        }
+        sum
+    }
+}

@@ -1,0 +1,288 @@
+//! The friction pendulum as a model: variables, initialisation and steps.
+
+use std::path::Path;
+
+use fmi2::description::DefaultExperiment;
+use fmi2::{About, Experiment, Failure, Model, Step, Variable};
+use serde::{Deserialize, Serialize};
+
+use crate::dynamics::{Force, RigidBody};
+use crate::friction::Regime;
+use crate::motion::{Motion, Tolerance};
+use crate::parameters::{Parameters, Refusal};
+
+/// Inverted pendulum on a cart with Stribeck friction; fields carry the names of the variables.
+#[derive(Clone, Serialize, Deserialize)]
+pub(crate) struct FrictionPendulum {
+    parameters: Parameters,
+    /// `[x_p_0, theta_0, v_p_0, omega_0]`.
+    initial: [f64; 4],
+    u: f64,
+    /// First and second derivative of u at the begin of the step.
+    u_derivatives: [f64; 2],
+    f_a: f64,
+    /// `[x_p, theta, v_p, omega]` and its derivative.
+    state: [f64; 4],
+    slope: [f64; 4],
+    f_fric: f64,
+    regime: i32,
+    tolerance: Tolerance,
+    /// None before initialisation.
+    motion: Option<Motion>,
+}
+
+/// The force that `u` and `f_a` exert together, as a function of the time since `start`.
+fn force(model: &FrictionPendulum, start: f64) -> Force {
+    let [slope, curvature] = model.u_derivatives;
+    Force {
+        value: model.u + model.f_a,
+        slope,
+        curvature,
+        start,
+    }
+}
+
+fn refused(refusal: &Refusal) -> Failure {
+    Failure::Error(refusal.to_string())
+}
+
+impl FrictionPendulum {
+    /// Outputs and their derivatives from the motion, under `force` in N.
+    fn show(&mut self, force: f64) {
+        let Some(motion) = &self.motion else { return };
+        self.state = *motion.state();
+        self.f_fric = motion.friction_force(&self.parameters, force);
+        self.regime = motion.regime().number();
+        let body = RigidBody::new(&self.parameters);
+        self.slope = match motion.regime() {
+            Regime::Stick => body.stick(&self.state),
+            _ => body.slide(&self.state, force - self.f_fric),
+        };
+    }
+}
+
+/// A Real parameter: its name, meaning, unit and place.
+type Place = (
+    &'static str,
+    &'static str,
+    &'static str,
+    fn(&mut FrictionPendulum) -> &mut f64,
+);
+
+const FIXED: [Place; 7] = [
+    ("M", "Mass of the cart", "kg", |model| {
+        &mut model.parameters.cart_mass
+    }),
+    ("m", "Mass of the pendulum", "kg", |model| {
+        &mut model.parameters.pendulum_mass
+    }),
+    ("J", "Moment of inertia about the pivot", "kg.m2", |model| {
+        &mut model.parameters.inertia
+    }),
+    ("l", "Distance from pivot to centre of mass", "m", |model| {
+        &mut model.parameters.length
+    }),
+    ("F_x", "Viscous damping of the cart", "kg/s", |model| {
+        &mut model.parameters.cart_damping
+    }),
+    (
+        "F_theta",
+        "Viscous damping of the pivot",
+        "kg.m2/s",
+        |model| &mut model.parameters.pendulum_damping,
+    ),
+    ("g", "Gravity", "m/s2", |model| {
+        &mut model.parameters.gravity
+    }),
+];
+
+const TUNABLE: [Place; 4] = [
+    ("F_c", "Coulomb friction", "N", |model| {
+        &mut model.parameters.coulomb
+    }),
+    ("F_s", "Static friction", "N", |model| {
+        &mut model.parameters.static_friction
+    }),
+    ("v_s", "Stribeck velocity", "m/s", |model| {
+        &mut model.parameters.stribeck_velocity
+    }),
+    ("delta", "Stribeck exponent", "1", |model| {
+        &mut model.parameters.stribeck_exponent
+    }),
+];
+
+/// Name, meaning and unit of the four states.
+const STATES: [(&str, &str, &str); 4] = [
+    ("x_p", "Position of the cart", "m"),
+    (
+        "theta",
+        "Angle of the pendulum from the upright position",
+        "rad",
+    ),
+    ("v_p", "Velocity of the cart", "m/s"),
+    ("omega", "Angular velocity of the pendulum", "rad/s"),
+];
+
+/// What the initial friction force depends on.
+const INITIALLY: [&str; 18] = [
+    "u",
+    "f_a",
+    "M",
+    "m",
+    "J",
+    "l",
+    "F_x",
+    "F_theta",
+    "g",
+    "F_c",
+    "F_s",
+    "v_s",
+    "delta",
+    "x_p_0",
+    "theta_0",
+    "v_p_0",
+    "omega_0",
+    "linearised",
+];
+
+impl Model for FrictionPendulum {
+    const IDENTIFIER: &'static str = "FrictionPendulum";
+
+    fn about(&self) -> About {
+        About {
+            description: "Inverted pendulum on a cart with set-valued Stribeck friction".to_owned(),
+            author: String::new(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            license: env!("CARGO_PKG_LICENSE").to_owned(),
+            default_experiment: DefaultExperiment {
+                start_time: Some(0.0),
+                stop_time: Some(10.0),
+                tolerance: Some(1e-9),
+                step_size: Some(0.001),
+            },
+        }
+    }
+
+    fn new(_resources: &Path) -> Result<Self, Failure> {
+        Ok(Self {
+            parameters: Parameters::default(),
+            initial: [0.1, -0.1, 0.0, 0.0],
+            u: 0.0,
+            u_derivatives: [0.0; 2],
+            f_a: 0.0,
+            state: [0.0; 4],
+            slope: [0.0; 4],
+            f_fric: 0.0,
+            regime: 0,
+            tolerance: Tolerance::default(),
+            motion: None,
+        })
+    }
+
+    fn variables(&self) -> Vec<Variable<Self>> {
+        let mut all = vec![
+            Variable::real("u", "Actuator force on the cart", |model: &mut Self| {
+                &mut model.u
+            })
+            .input()
+            .unit("N")
+            .derivative(|model| &mut model.u_derivatives[0])
+            .derivative(|model| &mut model.u_derivatives[1]),
+            Variable::real("f_a", "Additive actuator fault", |model: &mut Self| {
+                &mut model.f_a
+            })
+            .input()
+            .unit("N"),
+        ];
+        for (k, (name, text, unit)) in STATES.into_iter().enumerate() {
+            let start = format!("{name}_0");
+            all.push(
+                Variable::real(name, text, move |model: &mut Self| &mut model.state[k])
+                    .output(&[])
+                    .unit(unit)
+                    .initially([start])
+                    .derivative(move |model| &mut model.slope[k]),
+            );
+        }
+        all.push(
+            Variable::real(
+                "f_fric",
+                "Friction force on the cart",
+                |model: &mut Self| &mut model.f_fric,
+            )
+            .output(&["u", "f_a"])
+            .unit("N")
+            .initially(INITIALLY),
+        );
+        let text = "Sliding backward (-1), sticking (0), sliding forward (1)";
+        all.push(Variable::integer("regime", text, |model: &mut Self| {
+            &mut model.regime
+        }));
+        for (name, text, unit, place) in FIXED {
+            all.push(Variable::real(name, text, place).unit(unit).parameter());
+        }
+        for (name, text, unit, place) in TUNABLE {
+            all.push(Variable::real(name, text, place).unit(unit).tunable());
+        }
+        for (k, (name, text, unit)) in STATES.into_iter().enumerate() {
+            let text = format!("Initial value: {text}");
+            all.push(
+                Variable::real(format!("{name}_0"), text, move |model: &mut Self| {
+                    &mut model.initial[k]
+                })
+                .unit(unit)
+                .parameter(),
+            );
+        }
+        let text = "Rigid body linearised about the upright position, friction as it is";
+        all.push(
+            Variable::boolean("linearised", text, |model: &mut Self| {
+                &mut model.parameters.linearised
+            })
+            .parameter(),
+        );
+        all
+    }
+
+    fn check(&self) -> Result<(), Failure> {
+        self.parameters.check().map_err(|refusal| refused(&refusal))
+    }
+
+    fn initialize(&mut self, experiment: &Experiment) -> Result<(), Failure> {
+        self.tolerance = match experiment.tolerance {
+            Some(relative) => Tolerance::new(relative).map_err(|refusal| refused(&refusal))?,
+            None => Tolerance::default(),
+        };
+        let force = self.u + self.f_a;
+        let motion = Motion::start(&self.parameters, self.initial, force);
+        self.motion = Some(motion.map_err(|refusal| refused(&refusal))?);
+        self.show(force);
+        Ok(())
+    }
+
+    fn step(&mut self, step: &Step) -> Result<(), Failure> {
+        let force = force(self, step.start);
+        let Some(motion) = &mut self.motion else {
+            return Err(Failure::Error("the model is not initialised".to_owned()));
+        };
+        let done = motion.advance(
+            &self.parameters,
+            &force,
+            step.start,
+            step.size,
+            &self.tolerance,
+        );
+        let reached = done
+            .as_ref()
+            .map_or_else(crate::motion::Failure::time, |()| step.end());
+        self.show(force.at(reached));
+        done.map_err(|failure| Failure::Incomplete {
+            time: reached,
+            message: failure.to_string(),
+        })
+    }
+
+    fn update(&mut self) {
+        self.show(self.u + self.f_a);
+    }
+}

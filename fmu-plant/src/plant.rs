@@ -1,0 +1,147 @@
+//! Body, friction law and force together, as they stand during one communication step.
+
+use crate::crossing::Quartic;
+use crate::dormand_prince::Step;
+use crate::dynamics::{Force, RigidBody, State};
+use crate::friction::{Regime, StribeckLaw};
+use crate::parameters::Parameters;
+
+pub(crate) struct Plant {
+    body: RigidBody,
+    law: StribeckLaw,
+    /// As a polynomial of the time elapsed in the communication step.
+    force: Force,
+}
+
+/// A part of an integration step at whose end an event has happened, as far as the continuous
+/// extension tells.
+pub(crate) struct Crossing {
+    /// Part of the step length.
+    pub(crate) fraction: f64,
+    /// The direction of sliding before a stop or after a break-away.
+    pub(crate) direction: Regime,
+}
+
+impl Plant {
+    pub(crate) fn new(parameters: &Parameters, force: Force) -> Self {
+        Self {
+            body: RigidBody::new(parameters),
+            law: StribeckLaw::new(parameters),
+            force,
+        }
+    }
+
+    #[inline]
+    pub(crate) fn derivative(&self, regime: Regime, elapsed: f64, state: &State) -> State {
+        if regime == Regime::Stick {
+            return self.body.stick(state);
+        }
+        let friction = regime.sign() * self.law.magnitude(state[2]);
+        self.body.slide(state, self.force.at(elapsed) - friction)
+    }
+
+    /// The change of velocity in m/s within which the friction is surely seen to change.
+    ///
+    /// The fall from static to Coulomb friction is `v_s` wide and lies at velocity zero.
+    pub(crate) fn resolved_change(&self, velocity: f64) -> f64 {
+        velocity.abs() + self.law.width()
+    }
+
+    /// What the cart does at this velocity and, at rest, under this balancing force.
+    pub(crate) fn regime(&self, elapsed: f64, state: &State) -> Regime {
+        let velocity = state[2];
+        if velocity > 0.0 {
+            Regime::Forward
+        } else if velocity < 0.0 {
+            Regime::Backward
+        } else {
+            self.law
+                .regime_at_rest(self.balancing_force(elapsed, state))
+        }
+    }
+
+    /// What is left before the event: the velocity in m/s before a stop of a cart that slides in
+    /// this direction, the friction in N before a held cart breaks away in this direction.
+    pub(crate) fn margin(
+        &self,
+        regime: Regime,
+        direction: Regime,
+        elapsed: f64,
+        state: &State,
+    ) -> f64 {
+        if regime == Regime::Stick {
+            self.law.limit() - direction.sign() * self.balancing_force(elapsed, state)
+        } else {
+            direction.sign() * state[2]
+        }
+    }
+
+    /// The first event inside a step. `Err` if the margin is not finite.
+    pub(crate) fn first_crossing(
+        &self,
+        regime: Regime,
+        elapsed: f64,
+        step: &Step,
+    ) -> Result<Option<Crossing>, NotFinite> {
+        if regime == Regime::Stick {
+            self.first_break(elapsed, step)
+        } else {
+            first_stop(regime, step)
+        }
+    }
+
+    fn first_break(&self, elapsed: f64, step: &Step) -> Result<Option<Crossing>, NotFinite> {
+        let end = elapsed + step.length;
+        let middle = self.balancing_force(elapsed + 0.5 * step.length, &step.middle());
+        let balancing = Quartic::new(
+            self.balancing(elapsed, &step.start, step.length),
+            middle,
+            self.balancing(end, &step.end, step.length),
+        );
+        if !balancing.is_finite() {
+            return Err(NotFinite);
+        }
+        let crossing = |direction: Regime| {
+            let margin = balancing.affine(self.law.limit(), -direction.sign());
+            margin.first_negative().map(|fraction| Crossing {
+                fraction,
+                direction,
+            })
+        };
+        let (forward, backward) = (crossing(Regime::Forward), crossing(Regime::Backward));
+        Ok(match (forward, backward) {
+            (Some(one), Some(other)) if one.fraction > other.fraction => Some(other),
+            (None, other) => other,
+            (one, _) => one,
+        })
+    }
+
+    /// The balancing force and its rise over a length in s at its present rate.
+    fn balancing(&self, elapsed: f64, state: &State, length: f64) -> (f64, f64) {
+        let rate = self.body.balancing_rate(state, self.force.rate_at(elapsed));
+        (self.balancing_force(elapsed, state), length * rate)
+    }
+
+    fn balancing_force(&self, elapsed: f64, state: &State) -> f64 {
+        self.body.balancing_force(state, self.force.at(elapsed))
+    }
+}
+
+/// The margin to an event could not be computed.
+pub(crate) struct NotFinite;
+
+fn first_stop(direction: Regime, step: &Step) -> Result<Option<Crossing>, NotFinite> {
+    let velocity = Quartic::new(
+        (step.start[2], step.length * step.first_slope()[2]),
+        step.middle()[2],
+        (step.end[2], step.length * step.last_slope()[2]),
+    );
+    if !velocity.is_finite() {
+        return Err(NotFinite);
+    }
+    let margin = velocity.affine(0.0, direction.sign());
+    Ok(margin.first_negative().map(|fraction| Crossing {
+        fraction,
+        direction,
+    }))
+}

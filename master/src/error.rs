@@ -1,0 +1,120 @@
+//! What can be wrong with a system or a run.
+
+use crate::slave::CallError;
+
+/// Why a system cannot be put together or advanced.
+#[derive(Debug, thiserror::Error)]
+pub enum SystemError {
+    /// A text of the form `slave.variable` was expected.
+    #[error("{text:?} names no variable, expected the form {form}")]
+    Syntax {
+        /// What was found.
+        text: String,
+        /// What was expected.
+        form: &'static str,
+    },
+    /// There is no slave of that name.
+    #[error("{name}: there is no FMU of the name {slave:?}, expected one of {known}")]
+    UnknownSlave {
+        /// The whole name.
+        name: String,
+        /// Its first part.
+        slave: String,
+        /// The slaves that there are.
+        known: String,
+    },
+    /// The slave has no variable of that name.
+    #[error("{name}: {model} has no variable {variable:?}{nearest}")]
+    UnknownVariable {
+        /// The whole name.
+        name: String,
+        /// `modelName` of the FMU.
+        model: String,
+        /// The variable.
+        variable: String,
+        /// Variables of a similar name, as part of a sentence.
+        nearest: String,
+    },
+    /// The variable cannot have this role.
+    #[error("{name} is {found}, expected {expected}")]
+    Role {
+        /// The variable.
+        name: String,
+        /// Its causality or type.
+        found: String,
+        /// What the role needs.
+        expected: String,
+    },
+    /// An input has two sources.
+    #[error("{input} is connected twice, to {first} and to {second}")]
+    Twice {
+        /// The input.
+        input: String,
+        /// One source.
+        first: String,
+        /// The other source.
+        second: String,
+    },
+    /// The two ends of a connection have different units.
+    #[error("{from} in {from_unit} cannot be connected to {to} in {to_unit}")]
+    Unit {
+        /// The output.
+        from: String,
+        /// Its unit.
+        from_unit: String,
+        /// The input.
+        to: String,
+        /// Its unit.
+        to_unit: String,
+    },
+    /// A value cannot be read as the variable's type.
+    #[error("{name} = {value:?}: expected {expected}")]
+    Value {
+        /// The variable.
+        name: String,
+        /// The text.
+        value: String,
+        /// The type.
+        expected: &'static str,
+    },
+    /// An FMU refused a setting.
+    #[error("{name} = {value:?}: {source}")]
+    Setting {
+        /// The variable.
+        name: String,
+        /// The text.
+        value: String,
+        /// Function, status and messages.
+        source: CallError,
+    },
+    /// A function of an FMU failed.
+    #[error("{slave} at t = {time} s: {source}")]
+    Call {
+        /// The slave.
+        slave: String,
+        /// Time of the master in s.
+        time: f64,
+        /// Function, status and messages.
+        source: CallError,
+    },
+    /// An output is not a number.
+    #[error("{name} is {value} at t = {time} s, expected a finite number")]
+    NotFinite {
+        /// The output.
+        name: String,
+        /// Its value.
+        value: f64,
+        /// Time of the master in s.
+        time: f64,
+    },
+    /// The step size or the span of the run makes no sense.
+    #[error("{what} is {value} s, expected {rule}")]
+    Time {
+        /// Which one.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it must be.
+        rule: &'static str,
+    },
+}

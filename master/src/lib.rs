@@ -1,0 +1,26 @@
+//! Couples co-simulation FMUs: loads them, connects their variables, advances them together.
+//!
+//! [`Fmu::open`] and [`Fmu::instantiate`] give a [`Slave`]; a [`System`] holds slaves and
+//! connections; a [`Simulation`] initialises and steps it; a [`Probe`] reads what is of interest.
+#![deny(unsafe_code)]
+
+mod error;
+mod exchange;
+#[cfg(feature = "fmi")]
+pub mod fmi_crate;
+mod fmu;
+mod library;
+mod order;
+mod probe;
+mod simulation;
+mod slave;
+mod system;
+
+pub use error::SystemError;
+pub use fmu::{Fmu, FmuError, Instance};
+pub use library::{LoadError, describe, preload};
+pub use order::{Order, by_direct_dependencies};
+pub use probe::Probe;
+pub use simulation::{Method, Simulation};
+pub use slave::{CallError, Slave};
+pub use system::{Connection, Port, System};

@@ -1,0 +1,144 @@
+//! What the tests share: the packed FMUs, the command, the coupled system.
+#![forbid(unsafe_code)]
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+
+use fmi2::Experiment;
+use master::{Fmu, Method, Probe, Simulation, System};
+
+/// The folder of the workspace.
+#[must_use]
+pub fn root() -> PathBuf {
+    let tests = Path::new(env!("CARGO_MANIFEST_DIR"));
+    tests.parent().unwrap_or(tests).to_owned()
+}
+
+/// The built command `aso-ftc`; builds it where that was not done yet.
+///
+/// # Panics
+///
+/// If it cannot be built.
+#[must_use]
+pub fn command() -> &'static Path {
+    static COMMAND: OnceLock<PathBuf> = OnceLock::new();
+    COMMAND.get_or_init(|| {
+        let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+        let status = Command::new(cargo)
+            .current_dir(root())
+            .args(["build", "--release", "--package", "aso-ftc", "--locked"])
+            .status();
+        assert!(status.is_ok_and(|status| status.success()), "aso-ftc cannot be built");
+        root().join("target/release").join(format!("aso-ftc{}", std::env::consts::EXE_SUFFIX))
+    })
+}
+
+/// What the command prints and returns, run in the workspace.
+///
+/// # Panics
+///
+/// If it cannot be started.
+#[must_use]
+pub fn run(arguments: &[&str]) -> Output {
+    let output = Command::new(command()).current_dir(root()).args(arguments).output();
+    output.unwrap_or_else(|error| panic!("aso-ftc cannot be started: {error}"))
+}
+
+/// The folder with the packed FMUs; packs them once.
+///
+/// # Panics
+///
+/// If they cannot be packed.
+#[must_use]
+pub fn dist() -> &'static Path {
+    static DIST: OnceLock<PathBuf> = OnceLock::new();
+    DIST.get_or_init(|| {
+        let folder = root().join("target/test-fmus").join(std::process::id().to_string());
+        let output = run(&["pack", "--out", &folder.display().to_string()]);
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "aso-ftc pack failed: {message}");
+        folder
+    })
+}
+
+/// The plant and the controller, connected, with `settings` (`slave.variable`, value) made.
+///
+/// # Panics
+///
+/// If the FMUs refuse.
+#[must_use]
+pub fn closed_loop(settings: &[(&str, &str)]) -> System {
+    let mut system = System::default();
+    for (name, file) in [("plant", "FrictionPendulum.fmu"), ("controller", "AsoController.fmu")] {
+        let instance = Fmu::open(&dist().join(file)).and_then(|fmu| fmu.instantiate(name));
+        system.add(name, Box::new(instance.unwrap_or_else(|error| panic!("{error}"))));
+    }
+    let connected = system.connect_equal_names();
+    assert_eq!(connected.ok(), Some(3), "x_p, theta and u are connected");
+    for (name, value) in settings {
+        system.set(name, value).unwrap_or_else(|error| panic!("{error}"));
+    }
+    system
+}
+
+/// A simulation of `system` from 0 s, and a probe for `names`.
+///
+/// # Panics
+///
+/// If the system cannot be initialised or a name does not exist.
+#[must_use]
+pub fn simulation(
+    system: System,
+    method: Method,
+    step: f64,
+    names: &[&str],
+) -> (Simulation, Probe) {
+    let port = |name: &&str| system.port(name).unwrap_or_else(|error| panic!("{error}"));
+    let ports: Vec<_> = names.iter().map(port).collect();
+    let probe = Probe::new(&system, &ports);
+    let simulation = Simulation::new(system, method, &Experiment::default(), step);
+    (simulation.unwrap_or_else(|error| panic!("{error}")), probe)
+}
+
+/// A table of numbers with named columns, as our CSV files hold them; lines from `#` are skipped.
+pub struct Table {
+    names: Vec<String>,
+    rows: Vec<Vec<f64>>,
+}
+
+impl Table {
+    /// Reads the file at `path`.
+    ///
+    /// # Panics
+    ///
+    /// If it cannot be read or an entry is no number.
+    #[must_use]
+    pub fn read(path: &Path) -> Self {
+        let text = std::fs::read_to_string(path)
+            .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        let mut reader =
+            csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(text.as_bytes());
+        let names = reader.headers().map(|names| names.iter().map(str::to_owned).collect());
+        let numbers = |record: Result<csv::StringRecord, csv::Error>| {
+            let record = record.unwrap_or_else(|error| panic!("{error}"));
+            let number = |entry: &str| {
+                entry.trim().parse().unwrap_or_else(|_| panic!("{entry:?} is no number"))
+            };
+            record.iter().map(number).collect()
+        };
+        Self { names: names.unwrap_or_default(), rows: reader.records().map(numbers).collect() }
+    }
+
+    /// The values of a column.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such column.
+    #[must_use]
+    pub fn column(&self, name: &str) -> Vec<f64> {
+        let position = self.names.iter().position(|known| known == name);
+        let position = position.unwrap_or_else(|| panic!("no column {name}"));
+        self.rows.iter().map(|row| row[position]).collect()
+    }
+}

@@ -1,0 +1,127 @@
+//! The packed FMUs and what is committed of them.
+#![forbid(unsafe_code)]
+
+use std::fs;
+
+use fmi2::description::{Causality, ModelDescription};
+use fmi2::package::Unpacked;
+use tests::{dist, root, run};
+
+const MODELS: [&str; 2] = ["FrictionPendulum", "AsoController"];
+
+fn unpacked(model: &str) -> Unpacked {
+    Unpacked::open(&dist().join(format!("{model}.fmu"))).unwrap()
+}
+
+#[test]
+fn the_committed_model_descriptions_are_those_of_the_libraries() {
+    for model in MODELS {
+        let packed =
+            fs::read_to_string(unpacked(model).folder().join("modelDescription.xml")).unwrap();
+        let committed =
+            fs::read_to_string(root().join(format!("modelDescription/{model}.xml"))).unwrap();
+        assert_eq!(packed, committed, "run: aso-ftc pack --update-descriptions");
+    }
+}
+
+#[test]
+fn the_model_descriptions_break_no_rule_of_the_standard() {
+    for model in MODELS {
+        assert_eq!(unpacked(model).description.problems(), [], "{model}");
+    }
+}
+
+#[test]
+fn every_variable_is_described_and_every_signal_of_the_plant_has_a_unit() {
+    for model in MODELS {
+        for variable in &unpacked(model).description.variables {
+            assert!(variable.description.as_ref().is_some_and(|text| !text.is_empty()));
+        }
+    }
+    let plant = unpacked("FrictionPendulum").description;
+    for variable in &plant.variables {
+        if let fmi2::description::Kind::Real(real) = &variable.kind {
+            assert!(real.unit.is_some(), "{}", variable.name);
+        }
+    }
+}
+
+/// Names of the variables of `causality`, in their order.
+fn names(description: &ModelDescription, causality: Causality) -> Vec<&str> {
+    let all = description.variables.iter();
+    all.filter(|variable| variable.causality == causality)
+        .map(|variable| variable.name.as_str())
+        .collect()
+}
+
+#[test]
+fn the_interfaces_are_those_of_the_documents() {
+    let plant = unpacked("FrictionPendulum").description;
+    assert_eq!(names(&plant, Causality::Input), ["u", "f_a"]);
+    assert_eq!(names(&plant, Causality::Output), ["x_p", "theta", "v_p", "omega", "f_fric"]);
+    assert_eq!(names(&plant, Causality::Local), ["regime"]);
+    let controller = unpacked("AsoController").description;
+    assert_eq!(names(&controller, Causality::Input), ["x_p", "theta", "compensate"]);
+    let outputs = ["u", "f_hat", "x_hat[1]", "x_hat[2]", "x_hat[3]", "x_hat[4]"];
+    assert_eq!(names(&controller, Causality::Output), outputs);
+    for (name, description) in [("plant", &plant), ("controller", &controller)] {
+        let readme = fs::read_to_string(root().join("README.md")).unwrap();
+        for causality in [Causality::Input, Causality::Output] {
+            for variable in names(description, causality) {
+                let family = variable.split('[').next().unwrap_or(variable);
+                assert!(readme.contains(&format!("`{family}")), "README: {name}.{variable}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_outputs_of_the_controller_depend_on_no_input_within_a_step() {
+    let controller = unpacked("AsoController").description;
+    assert_eq!(controller.structure.outputs.len(), 6);
+    for unknown in &controller.structure.outputs {
+        assert_eq!(unknown.dependencies, Some(vec![]));
+    }
+}
+
+#[test]
+fn packing_twice_gives_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = run(&["pack", "--out", &folder.path().display().to_string()]);
+    assert!(output.status.success());
+    for model in MODELS {
+        let file = format!("{model}.fmu");
+        let (first, second) = (fs::read(dist().join(&file)), fs::read(folder.path().join(&file)));
+        assert!(first.unwrap() == second.unwrap(), "{file}");
+    }
+}
+
+#[test]
+fn an_fmu_holds_library_resources_documentation_licences_and_picture() {
+    for (model, resource) in [("FrictionPendulum", None), ("AsoController", Some("design.toml"))] {
+        let fmu = unpacked(model);
+        let folder = fmu.folder();
+        assert!(fmu.library(model).unwrap().is_file());
+        let page = fs::read_to_string(folder.join("documentation/index.html")).unwrap();
+        for part in ["f_fric", "MIT", "Patton"] {
+            assert!(page.contains(part) || model == "AsoController", "{model}: {part}");
+        }
+        assert!(folder.join("documentation/licenses/LICENSE-MIT.txt").is_file());
+        assert!(fs::read(folder.join("model.png")).unwrap().starts_with(b"\x89PNG"));
+        if let Some(resource) = resource {
+            assert!(fmu.resources().join(resource).is_file());
+        }
+    }
+}
+
+#[test]
+fn no_path_of_the_building_machine_is_in_the_libraries() {
+    let home = std::env::var("HOME").unwrap_or_default();
+    for model in MODELS {
+        let library = fs::read(unpacked(model).library(model).unwrap()).unwrap();
+        for path in [root().display().to_string(), format!("{home}/.cargo")] {
+            let found = library.windows(path.len()).any(|bytes| bytes == path.as_bytes());
+            assert!(!found, "{model} contains {path}");
+        }
+    }
+}
