@@ -5,8 +5,8 @@ set-valued friction) and the augmented state observer controller are one ordinar
 equation between the transitions of the friction and the activation of the compensation. Nothing
 of the Rust code takes part: this is the independent integration the co-simulation is held against.
 
-The uncompensated cart creeps to rest exponentially and is down to rounding at about 7.7 s: the
-friction then chatters, and the integration refuses to go on.
+The cart creeps to rest exponentially, and rounding decides what it does once its velocity is down
+to some 1e-27 m/s (7.7 s without compensation, 10 s with it): the integration refuses to go on.
 
 Usage: python scripts/reference_closed_loop.py [--design FILE] [--out FOLDER]
 """
@@ -25,6 +25,7 @@ COLUMNS = "t x_p theta v_p omega f_fric u f_hat x_hat1 x_hat2 x_hat3 x_hat4".spl
 INITIAL_PLANT_STATE = [0.1, -0.1, 0.0, 0.0]
 ROW_INTERVAL = 0.01
 STICK, FORWARD, BACKWARD = 0, 1, -1
+UNDECIDED_FORCE = 1e-6  # N: closer to the static friction, rounding chooses slip or stick
 
 # file name: (activation time of the compensation in s, stop time in s)
 SCENARIOS = {"closed_loop_paper.csv": (40.0, 7.0), "closed_loop_compensated.csv": (1.0, 5.0)}
@@ -138,9 +139,12 @@ class ClosedLoop:
     def choose_regime(self, state):
         """Decides what a cart at rest does; `state` loses what is left of its velocity."""
         needed = self.plant.holding_friction(state[:4], self.force(state))
+        static = self.plant.static
         released = self.regime == STICK and self.margin(state) < 0.0
+        if not released and abs(abs(needed) - static) < UNDECIDED_FORCE:
+            raise RuntimeError(f"the cart creeps to rest: holding it takes {needed} N")
         state[2] = 0.0
-        if released or abs(needed) > self.plant.static:
+        if released or abs(needed) > static:
             self.regime = FORWARD if needed > 0.0 else BACKWARD
         else:
             self.regime = STICK

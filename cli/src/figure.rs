@@ -106,11 +106,7 @@ impl Series<'_> {
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum FigureError {
     #[error("curve {label:?}: {times} times, but {values} values")]
-    Lengths {
-        label: String,
-        times: usize,
-        values: usize,
-    },
+    Lengths { label: String, times: usize, values: usize },
     #[error("cannot write {}: {source}", path.display())]
     Write { path: PathBuf, source: io::Error },
     #[error("cannot turn the drawing into pixels: {0}")]
@@ -148,13 +144,7 @@ impl Figure<'_> {
         }
         let height = TITLE_HEIGHT + self.panels.iter().map(Panel::height).sum::<f64>();
         let mut canvas = Canvas::new(WIDTH, height, self.title);
-        canvas.text(
-            (WIDTH / 2.0, 30.0),
-            Anchor::Middle,
-            TITLE_SIZE,
-            TEXT,
-            self.title,
-        );
+        canvas.text((WIDTH / 2.0, 30.0), Anchor::Middle, TITLE_SIZE, TEXT, self.title);
         let mut top = TITLE_HEIGHT;
         for panel in &self.panels {
             panel.draw(&mut canvas, top + LEGEND_HEIGHT);
@@ -166,11 +156,7 @@ impl Figure<'_> {
 
 impl Panel<'_> {
     fn height(&self) -> f64 {
-        let label = if self.x_label.is_empty() {
-            0.0
-        } else {
-            LABEL_HEIGHT
-        };
+        let label = if self.x_label.is_empty() { 0.0 } else { LABEL_HEIGHT };
         LEGEND_HEIGHT + PLOT_HEIGHT + TICK_HEIGHT + label + GAP
     }
 
@@ -202,20 +188,14 @@ impl Panel<'_> {
         let outside = visible.clone().any(|value| !vertical.contains(value));
         self.draw_legend(canvas, top - 10.0, &horizontal, outside);
         if visible.count() == 0 {
-            let middle = (
-                f64::midpoint(LEFT, right),
-                f64::midpoint(top, bottom) - 20.0,
-            );
+            let middle = (f64::midpoint(LEFT, right), f64::midpoint(top, bottom) - 20.0);
             canvas.text(middle, Anchor::Middle, TEXT_SIZE, TEXT, "no finite data");
         }
     }
 
     fn times(&self) -> (f64, f64) {
-        let times = self
-            .series
-            .iter()
-            .flat_map(|series| series.time)
-            .filter(|time| time.is_finite());
+        let times =
+            self.series.iter().flat_map(|series| series.time).filter(|time| time.is_finite());
         times.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &time| {
             (low.min(time), high.max(time))
         })
@@ -242,17 +222,9 @@ impl Panel<'_> {
             canvas.line((left, y), (right, y), GRID, "1", "none");
             canvas.text((left - 8.0, y + 5.5), Anchor::End, TEXT_SIZE, TEXT, &label);
         }
-        let below = (
-            f64::midpoint(left, right),
-            bottom + TICK_HEIGHT + LABEL_HEIGHT - 8.0,
-        );
+        let below = (f64::midpoint(left, right), bottom + TICK_HEIGHT + LABEL_HEIGHT - 8.0);
         canvas.text(below, Anchor::Middle, TEXT_SIZE, TEXT, self.x_label);
-        canvas.upward_text(
-            (20.0, f64::midpoint(top, bottom)),
-            TEXT_SIZE,
-            TEXT,
-            self.y_label,
-        );
+        canvas.upward_text((20.0, f64::midpoint(top, bottom)), TEXT_SIZE, TEXT, self.y_label);
     }
 
     fn visible_marks(&self, horizontal: &Axis) -> impl Iterator<Item = &(f64, &str)> {
@@ -278,13 +250,7 @@ impl Panel<'_> {
         }
         if outside {
             let end = (WIDTH - RIGHT, baseline);
-            canvas.text(
-                end,
-                Anchor::End,
-                TEXT_SIZE,
-                TEXT,
-                "a curve leaves the frame",
-            );
+            canvas.text(end, Anchor::End, TEXT_SIZE, TEXT, "a curve leaves the frame");
         }
     }
 }

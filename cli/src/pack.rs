@@ -60,8 +60,11 @@ pub(crate) fn workspace() -> anyhow::Result<PathBuf> {
         .map(Path::to_path_buf)
         .with_context(|| {
             let here = here.display();
-            format!("{here} is not inside a clone of this project: expected a folder upwards that \
-                     has {}", MODELS.join(" and "))
+            format!(
+                "{here} is not inside a clone of this project: expected a folder upwards that \
+                     has {}",
+                MODELS.join(" and ")
+            )
         })
 }
 
@@ -70,14 +73,17 @@ pub(crate) fn workspace() -> anyhow::Result<PathBuf> {
 /// Paths of this machine are kept out of them, so that the same sources give the same bytes.
 fn build(root: &Path) -> anyhow::Result<PathBuf> {
     let target = root.join("target").join("libraries");
-    let cargo_home = std::env::var_os("CARGO_HOME").map(PathBuf::from).or_else(|| {
-        std::env::var_os("HOME").map(|home| PathBuf::from(home).join(".cargo"))
-    });
+    let cargo_home = std::env::var_os("CARGO_HOME")
+        .map(PathBuf::from)
+        .or_else(|| std::env::var_os("HOME").map(|home| PathBuf::from(home).join(".cargo")));
     let mut flags = vec![format!("--remap-path-prefix={}=.", root.display())];
     flags.extend(cargo_home.map(|home| format!("--remap-path-prefix={}=cargo", home.display())));
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(cargo);
-    command.current_dir(root).args(["build", "--profile", "fmu", "--locked", "--target-dir"]).arg(&target);
+    command
+        .current_dir(root)
+        .args(["build", "--profile", "fmu", "--locked", "--target-dir"])
+        .arg(&target);
     for model in MODELS {
         command.args(["--package", model]);
     }

@@ -20,11 +20,7 @@ pub(crate) enum PaperFigureError {
     #[error("the results have no column {0:?}, which the figures need")]
     MissingColumn(&'static str),
     #[error("column {name:?} has {found} values, column \"time\" has {expected}")]
-    UnequalLengths {
-        name: &'static str,
-        expected: usize,
-        found: usize,
-    },
+    UnequalLengths { name: &'static str, expected: usize, found: usize },
     #[error(transparent)]
     Figure(#[from] FigureError),
 }
@@ -74,11 +70,7 @@ impl<'a> Run<'a> {
             if expected == found {
                 Ok(values)
             } else {
-                Err(PaperFigureError::UnequalLengths {
-                    name,
-                    expected,
-                    found,
-                })
+                Err(PaperFigureError::UnequalLengths { name, expected, found })
             }
         };
         let (x_p, theta) = (column("plant.x_p")?, column("plant.theta")?);
@@ -91,15 +83,8 @@ impl<'a> Run<'a> {
             f_hat,
             millimetres: x_p.iter().map(|position| 1000.0 * position).collect(),
             milliradians: theta.iter().map(|angle| 1000.0 * angle).collect(),
-            difference: f_fric
-                .iter()
-                .zip(f_hat)
-                .map(|(force, guess)| force - guess)
-                .collect(),
-            activation: (
-                activation,
-                format!("compensation starts, t_on = {activation} s"),
-            ),
+            difference: f_fric.iter().zip(f_hat).map(|(force, guess)| force - guess).collect(),
+            activation: (activation, format!("compensation starts, t_on = {activation} s")),
         })
     }
 
@@ -127,18 +112,11 @@ impl<'a> Run<'a> {
             panels.push(Panel {
                 x_range: Some(range),
                 limit: Some((2.0, "claim: within ±2 mrad")),
-                ..panel(
-                    "theta in mrad",
-                    1000.0 * STEEPEST,
-                    angle(&self.milliradians),
-                )
+                ..panel("theta in mrad", 1000.0 * STEEPEST, angle(&self.milliradians))
             });
         }
         name_time_axes(&mut panels);
-        Figure {
-            title: "Cart position and pendulum angle, before and after compensation",
-            panels,
-        }
+        Figure { title: "Cart position and pendulum angle, before and after compensation", panels }
     }
 
     /// Figure 6.
@@ -150,18 +128,13 @@ impl<'a> Run<'a> {
             x_range,
             y_cap: Some(cap),
             series: vec![
-                Series {
-                    broad: true,
-                    ..self.curve("f_fric", self.f_fric, Ink::Sky)
-                },
+                Series { broad: true, ..self.curve("f_fric", self.f_fric, Ink::Sky) },
                 self.curve("f_hat", self.f_hat, Ink::Vermilion),
             ],
             marks: vec![(self.activation.0, &self.activation.1)],
             ..Panel::default()
         };
-        let close_up = self
-            .settled()
-            .map(|(start, end)| (start, end.min(start + CLOSE_UP)));
+        let close_up = self.settled().map(|(start, end)| (start, end.min(start + CLOSE_UP)));
         let mut panels = vec![forces(None)];
         panels.extend(close_up.map(|range| forces(Some(range))));
         panels.push(Panel {
@@ -170,20 +143,11 @@ impl<'a> Run<'a> {
             ..forces(close_up)
         });
         name_time_axes(&mut panels);
-        Figure {
-            title: "Friction force f_fric and its estimate f_hat",
-            panels,
-        }
+        Figure { title: "Friction force f_fric and its estimate f_hat", panels }
     }
 
     fn curve<'b>(&'b self, label: &'b str, values: &'b [f64], ink: Ink) -> Series<'b> {
-        Series {
-            label,
-            time: self.time,
-            values,
-            ink,
-            broad: false,
-        }
+        Series { label, time: self.time, values, ink, broad: false }
     }
 
     /// From the end of the transient, at most halfway through what follows the activation, to the
@@ -191,9 +155,7 @@ impl<'a> Run<'a> {
     fn settled(&self) -> Option<(f64, f64)> {
         let motion = || self.time.iter().zip(self.x_p.iter().zip(self.theta));
         let known = motion().filter(|(t, (x, a))| t.is_finite() && x.is_finite() && a.is_finite());
-        let end = known
-            .map(|(time, _)| *time)
-            .fold(f64::NEG_INFINITY, f64::max);
+        let end = known.map(|(time, _)| *time).fold(f64::NEG_INFINITY, f64::max);
         let start = self.activation.0 + SETTLING.min(0.5 * (end - self.activation.0));
         let lost = motion().any(|(time, (position, angle))| {
             (start..=end).contains(time) && (position.abs() > FARTHEST || angle.abs() > STEEPEST)

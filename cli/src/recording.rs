@@ -42,7 +42,10 @@ impl Recording {
     }
 
     /// Takes a sample where the next one is due at the time of `simulation`.
-    pub(crate) fn sample(&mut self, simulation: &mut Simulation) -> Result<(), master::SystemError> {
+    pub(crate) fn sample(
+        &mut self,
+        simulation: &mut Simulation,
+    ) -> Result<(), master::SystemError> {
         let time = simulation.time();
         let due = self.start + self.samples * self.every;
         if time < due - 1e-9 * self.every {
@@ -69,7 +72,9 @@ impl Recording {
     /// Writes all samples to `path`: whole or not at all.
     pub(crate) fn write(&self, path: &Path) -> anyhow::Result<()> {
         let mut writer = csv::Writer::from_writer(Vec::new());
-        writer.write_record(std::iter::once("time").chain(self.probe.names().iter().map(String::as_str)))?;
+        writer.write_record(
+            std::iter::once("time").chain(self.probe.names().iter().map(String::as_str)),
+        )?;
         for (row, time) in self.time.iter().enumerate() {
             let values = self.columns.iter().map(|column| column[row].to_string());
             writer.write_record(std::iter::once(time.to_string()).chain(values))?;

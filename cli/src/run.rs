@@ -151,8 +151,7 @@ pub(crate) fn simulate(
     let stop_time = Some(options.stop_time);
     let experiment = Experiment { start_time: 0.0, stop_time, tolerance: None };
     let mut recording = Recording::new(&system, 0.0, options.record_every);
-    let mut simulation =
-        Simulation::new(system, options.method.into(), &experiment, options.step)?;
+    let mut simulation = Simulation::new(system, options.method.into(), &experiment, options.step)?;
     let bar = progress(options.stop_time);
     let mut advance = || {
         watch(&mut simulation)?;

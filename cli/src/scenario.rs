@@ -13,13 +13,8 @@ pub(crate) enum Scenario {
 
 /// The L printed after equation (21), in thousands, row by row, with the signs of L[3,2] and
 /// L[4,2] reversed: as printed it makes A_0 - L C_0 unstable.
-const PRINTED_L: [[f64; 2]; 5] = [
-    [0.0380, -0.0048],
-    [-0.0038, 0.0518],
-    [0.3792, 0.1690],
-    [-0.1297, 0.8841],
-    [-3.3432, 0.8941],
-];
+const PRINTED_L: [[f64; 2]; 5] =
+    [[0.0380, -0.0048], [-0.0038, 0.0518], [0.3792, 0.1690], [-0.1297, 0.8841], [-3.3432, 0.8941]];
 
 impl Scenario {
     /// The name on the command line.

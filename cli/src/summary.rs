@@ -136,9 +136,10 @@ fn read_matrix(system: &mut System, name: &str) -> anyhow::Result<DMatrix<f64>> 
     let description = system.slaves[slave].1.description();
     let position = |row: usize, column: usize| {
         let element = format!("{name}[{row},{column}]");
-        description.variables.iter().position(|variable| {
-            variable.name == element && matches!(variable.kind, Kind::Real(_))
-        })
+        description
+            .variables
+            .iter()
+            .position(|variable| variable.name == element && matches!(variable.kind, Kind::Real(_)))
     };
     let row_count = (1..).take_while(|row| position(*row, 1).is_some()).count();
     let column_count = (1..).take_while(|column| position(1, *column).is_some()).count();

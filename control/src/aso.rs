@@ -18,8 +18,8 @@
 //! A_0 = [A, -F_a; 0, 0],  C_0 = [C, 0],  L = [L_x; -L_f],  F_0 = [-F_a; 0]
 //! ```
 
-use crate::balance::unit_columns;
-use crate::placement::{Quality, place};
+use crate::balance::{Balance, unit_columns};
+use crate::placement::{Placement, Quality, place};
 use crate::rank::require_observable;
 use crate::singular::Singular;
 use crate::{Error, check};
@@ -64,7 +64,7 @@ pub struct AsoDesign {
     pub cancellation_residual: f64,
     /// Quality of the eigenvalues of A + B `K_x`.
     pub controller: Quality,
-    /// Quality of the eigenvalues of `A_0` - L `C_0`, for its transpose.
+    /// Quality of the eigenvalues of `A_0` - L `C_0`, for its transpose in balanced coordinates.
     pub observer: Quality,
 }
 
@@ -121,10 +121,7 @@ impl FaultyPlant {
         require_observable(&self.a, &self.c)?;
         let ((n, q), p) = (self.f_a.shape(), self.c.nrows());
         if q > p {
-            return Err(Error::TooManyFaults {
-                faults: q,
-                measurements: p,
-            });
+            return Err(Error::TooManyFaults { faults: q, measurements: p });
         }
         let mut both = DMatrix::zeros(n + p, n + q);
         both.view_mut((0, 0), (n, n)).copy_from(&self.a);
@@ -132,10 +129,7 @@ impl FaultyPlant {
         both.view_mut((n, 0), (p, n)).copy_from(&self.c);
         let rank = Singular::of(&level(&both))?.rank(TOLERANCE);
         if rank < n + q {
-            return Err(Error::HiddenFault {
-                rank,
-                expected: n + q,
-            });
+            return Err(Error::HiddenFault { rank, expected: n + q });
         }
         require_observable(&self.augmented_dynamics(), &self.augmented_output())?;
         Ok(())
@@ -198,6 +192,22 @@ impl Gains {
     }
 }
 
+/// Places the eigenvalues of `A_0` - L `C_0`: first in the coordinates given, then in those that balance
+/// the outcome. The gain is -L'.
+fn place_observer(plant: &FaultyPlant, poles: &[f64]) -> Result<Placement, Error> {
+    let (a_0, c_0) = (plant.augmented_dynamics().transpose(), plant.augmented_output().transpose());
+    let first = place(&a_0, &c_0, poles)?;
+    let scale = Balance::of(&(&a_0 + &c_0 * &first.gain)).scale;
+    let scaled_a =
+        DMatrix::from_fn(a_0.nrows(), a_0.ncols(), |i, j| a_0[(i, j)] * (scale[j] / scale[i]));
+    let scaled_c = DMatrix::from_fn(c_0.nrows(), c_0.ncols(), |i, j| c_0[(i, j)] / scale[i]);
+    let mut second = place(&scaled_a, &scaled_c, poles)?;
+    for (mut column, factor) in second.gain.column_iter_mut().zip(&scale) {
+        column /= *factor;
+    }
+    Ok(second)
+}
+
 /// Designs the controller: A + B `K_x` and `A_0` - L `C_0` get the wanted eigenvalues.
 ///
 /// `controller_poles`: n, `observer_poles`: n + q, real, negative for a stable loop, in the unit of
@@ -244,17 +254,11 @@ pub fn design(
     let ((n, q), m) = (plant.f_a.shape(), plant.b.ncols());
     check::shape("K_f", &k_f, (m, q))?;
     let controller = place(&plant.a, &plant.b, controller_poles)?;
-    let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
-    let observer = place(&a_0.transpose(), &c_0.transpose(), observer_poles)?;
+    let observer = place_observer(plant, observer_poles)?;
     let l = -observer.gain.transpose();
     let cancellation_residual = (&plant.b * &k_f + &plant.f_a).norm() / plant.f_a.norm();
     Ok(AsoDesign {
-        gains: Gains {
-            k_x: controller.gain,
-            k_f,
-            l_x: l.rows(0, n).into(),
-            l_f: -l.rows(n, q),
-        },
+        gains: Gains { k_x: controller.gain, k_f, l_x: l.rows(0, n).into(), l_f: -l.rows(n, q) },
         cancellation_residual,
         controller: controller.quality,
         observer: observer.quality,

@@ -18,10 +18,7 @@ pub(crate) struct Balance {
 
 impl Balance {
     pub(crate) fn of(a: &DMatrix<f64>) -> Self {
-        let mut balance = Self {
-            matrix: a.clone(),
-            scale: DVector::from_element(a.nrows(), 1.0),
-        };
+        let mut balance = Self { matrix: a.clone(), scale: DVector::from_element(a.nrows(), 1.0) };
         for _ in 0..SWEEPS {
             let mut changed = false;
             for state in 0..a.nrows() {
@@ -50,9 +47,7 @@ impl Balance {
 
     /// S M S^-1: a function of the balanced matrix brought back to the given coordinates.
     pub(crate) fn restore(&self, m: &DMatrix<f64>) -> DMatrix<f64> {
-        DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| {
-            m[(i, j)] * (self.scale[i] / self.scale[j])
-        })
+        DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] * (self.scale[i] / self.scale[j]))
     }
 }
 
@@ -115,12 +110,6 @@ mod tests {
     fn entries_near_the_ends_of_the_range_do_not_break_the_scaling() {
         let a = DMatrix::from_row_slice(2, 2, &[0., 1e300, 1e-300, 0.]);
         let balance = Balance::of(&a);
-        assert!(
-            balance
-                .matrix
-                .iter()
-                .chain(balance.scale.iter())
-                .all(|x| x.is_finite())
-        );
+        assert!(balance.matrix.iter().chain(balance.scale.iter()).all(|x| x.is_finite()));
     }
 }

@@ -6,21 +6,13 @@ use nalgebra::DMatrix;
 /// Every entry is finite, and there is at least one.
 pub(crate) fn finite(matrix: &'static str, m: &DMatrix<f64>) -> Result<(), Error> {
     if m.is_empty() {
-        return Err(Error::Empty {
-            matrix,
-            found: m.shape(),
-        });
+        return Err(Error::Empty { matrix, found: m.shape() });
     }
     match m.iter().position(|value| !value.is_finite()) {
         None => Ok(()),
         Some(at) => {
             let (row, col) = (at % m.nrows() + 1, at / m.nrows() + 1);
-            Err(Error::NotFinite {
-                matrix,
-                row,
-                col,
-                value: m[at],
-            })
+            Err(Error::NotFinite { matrix, row, col, value: m[at] })
         }
     }
 }
@@ -32,11 +24,7 @@ pub(crate) fn shape(
     expected: (usize, usize),
 ) -> Result<(), Error> {
     if m.shape() != expected {
-        return Err(Error::Shape {
-            matrix,
-            expected,
-            found: m.shape(),
-        });
+        return Err(Error::Shape { matrix, expected, found: m.shape() });
     }
     finite(matrix, m)
 }
@@ -52,20 +40,12 @@ pub(crate) fn positive(name: &'static str, value: f64) -> Result<(), Error> {
     if value.is_finite() && value > 0.0 {
         return Ok(());
     }
-    Err(Error::OutOfRange {
-        name,
-        value,
-        rule: "a finite number above zero",
-    })
+    Err(Error::OutOfRange { name, value, rule: "a finite number above zero" })
 }
 
 /// A computed matrix that left the range of double precision is an error, not a result.
 pub(crate) fn in_range(what: &'static str, m: DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
-    if m.iter().all(|value| value.is_finite()) {
-        Ok(m)
-    } else {
-        Err(Error::Overflow { what })
-    }
+    if m.iter().all(|value| value.is_finite()) { Ok(m) } else { Err(Error::Overflow { what }) }
 }
 
 #[cfg(test)]
@@ -76,30 +56,19 @@ mod tests {
     fn the_first_entry_that_is_not_finite_is_named_by_row_and_column_from_one() {
         let mut m = DMatrix::zeros(2, 3);
         m[(1, 2)] = f64::INFINITY;
-        let expected = Error::NotFinite {
-            matrix: "B",
-            row: 2,
-            col: 3,
-            value: f64::INFINITY,
-        };
+        let expected = Error::NotFinite { matrix: "B", row: 2, col: 3, value: f64::INFINITY };
         assert_eq!(finite("B", &m), Err(expected));
     }
 
     #[test]
     fn an_empty_matrix_is_refused() {
-        assert!(matches!(
-            finite("B", &DMatrix::zeros(3, 0)),
-            Err(Error::Empty { .. })
-        ));
+        assert!(matches!(finite("B", &DMatrix::zeros(3, 0)), Err(Error::Empty { .. })));
     }
 
     #[test]
     fn a_number_that_is_not_positive_is_refused() {
         for value in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            assert!(matches!(
-                positive("h", value),
-                Err(Error::OutOfRange { .. })
-            ));
+            assert!(matches!(positive("h", value), Err(Error::OutOfRange { .. })));
         }
     }
 }

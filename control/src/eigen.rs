@@ -32,9 +32,7 @@ const ITERATIONS_PER_ROW: usize = 100;
 pub fn eigenvalues(a: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, Error> {
     check::square("A", a)?;
     let balanced = Balance::of(a).matrix;
-    let (_, t) = schur(&balanced)
-        .or_else(|_| schur(&reflected(&balanced)))?
-        .unpack();
+    let (_, t) = schur(&balanced).or_else(|_| schur(&reflected(&balanced)))?.unpack();
     let mut found = diagonal_blocks(&t);
     found.sort_by(|x, y| x.re.total_cmp(&y.re).then(x.im.total_cmp(&y.im)));
     Ok(found)
@@ -48,9 +46,7 @@ pub fn eigenvalues(a: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, Error> {
 ///
 /// Those of [`eigenvalues`].
 pub fn spectral_abscissa(a: &DMatrix<f64>) -> Result<f64, Error> {
-    Ok(eigenvalues(a)?
-        .iter()
-        .fold(f64::NEG_INFINITY, |largest, value| largest.max(value.re)))
+    Ok(eigenvalues(a)?.iter().fold(f64::NEG_INFINITY, |largest, value| largest.max(value.re)))
 }
 
 /// Schur form with bounded iterations.
@@ -106,10 +102,7 @@ fn pair(a: f64, b: f64, c: f64, d: f64) -> [Complex<f64>; 2] {
     let discriminant = half * half + b * c;
     if discriminant < 0.0 {
         let imaginary = (-discriminant).sqrt();
-        return [
-            Complex::new(d + half, -imaginary),
-            Complex::new(d + half, imaginary),
-        ];
+        return [Complex::new(d + half, -imaginary), Complex::new(d + half, imaginary)];
     }
     let z = half + discriminant.sqrt().copysign(half);
     let other = if z == 0.0 { d } else { d - b * c / z };

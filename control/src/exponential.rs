@@ -54,10 +54,7 @@ const REACH: f64 = 5.371_920_351_148_152;
 pub fn exponential(a: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
     check::square("A", a)?;
     let balance = Balance::of(a);
-    check::in_range(
-        "e^A",
-        balance.restore(&scaling_and_squaring(&balance.matrix)?),
-    )
+    check::in_range("e^A", balance.restore(&scaling_and_squaring(&balance.matrix)?))
 }
 
 /// e^A of a matrix that needs no balancing.
@@ -77,9 +74,7 @@ pub(crate) fn scaling_and_squaring(a: &DMatrix<f64>) -> Result<DMatrix<f64>, Err
 
 /// The largest column sum.
 fn one_norm(a: &DMatrix<f64>) -> f64 {
-    a.column_iter()
-        .map(|column| column.lp_norm(1))
-        .fold(0.0, f64::max)
+    a.column_iter().map(|column| column.lp_norm(1)).fold(0.0, f64::max)
 }
 
 /// (V - U)^-1 (V + U), with U the odd and V the even part of the numerator.
@@ -94,8 +89,5 @@ fn approximant(a: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
         &sixth * high + low + &identity * PADE[at]
     };
     let (even, odd) = (part(0), a * part(1));
-    (&even - &odd)
-        .lu()
-        .solve(&(even + odd))
-        .ok_or(Error::Overflow { what: "e^A" })
+    (&even - &odd).lu().solve(&(even + odd)).ok_or(Error::Overflow { what: "e^A" })
 }

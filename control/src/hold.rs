@@ -63,16 +63,12 @@ impl FirstOrderHold {
         let scaled_a = check::in_range("A h", &balance.matrix * h)?;
         block.view_mut((0, 0), (n, n)).copy_from(&scaled_a);
         for (input, unit) in units.iter().enumerate() {
-            block
-                .view_mut((0, n + input), (n, 1))
-                .copy_from(&(inputs.column(input) / *unit));
+            block.view_mut((0, n + input), (n, 1)).copy_from(&(inputs.column(input) / *unit));
             block[(n + input, n + m + input)] = 1.0;
         }
         let e = scaling_and_squaring(&block)?;
         let gamma = |from: usize, factor: f64| {
-            DMatrix::from_fn(n, m, |i, j| {
-                e[(i, from + j)] * balance.scale[i] * units[j] * factor
-            })
+            DMatrix::from_fn(n, m, |i, j| e[(i, from + j)] * balance.scale[i] * units[j] * factor)
         };
         Ok(Self {
             phi: check::in_range("Phi", balance.restore(&e.view((0, 0), (n, n)).into()))?,
@@ -119,11 +115,7 @@ fn length(name: &'static str, vector: &[f64], expected: usize) -> Result<(), Err
     if vector.len() == expected {
         return Ok(());
     }
-    Err(Error::Shape {
-        matrix: name,
-        expected: (expected, 1),
-        found: (vector.len(), 1),
-    })
+    Err(Error::Shape { matrix: name, expected: (expected, 1), found: (vector.len(), 1) })
 }
 
 /// out += M v, column by column.

@@ -55,10 +55,7 @@ pub fn lyapunov(a: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<Solution, Error> {
     symmetric("Q", q)?;
     let abscissa = spectral_abscissa(a)?;
     if abscissa >= 0.0 {
-        return Err(Error::NotHurwitz {
-            matrix: "A",
-            abscissa,
-        });
+        return Err(Error::NotHurwitz { matrix: "A", abscissa });
     }
     let Balance { matrix, scale } = Balance::of(a);
     let scaled_q = multiply_rows(&multiply_columns(q, &scale), &scale);
@@ -85,11 +82,7 @@ pub fn lyapunov(a: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<Solution, Error> {
 pub fn definite_range(p: &DMatrix<f64>) -> Result<(f64, f64), Error> {
     check::square("P", p)?;
     symmetric("P", p)?;
-    let factor = p
-        .clone()
-        .cholesky()
-        .ok_or(Error::NotPositiveDefinite { matrix: "P" })?
-        .l();
+    let factor = p.clone().cholesky().ok_or(Error::NotPositiveDefinite { matrix: "P" })?.l();
     let values = Singular::of(&factor.transpose())?.values;
     Ok((values[values.len() - 1].powi(2), values[0].powi(2)))
 }
@@ -99,11 +92,7 @@ fn symmetric(matrix: &'static str, m: &DMatrix<f64>) -> Result<(), Error> {
     for col in 0..m.ncols() {
         for row in 0..col {
             if (m[(row, col)] - m[(col, row)]).abs() > allowed {
-                return Err(Error::NotSymmetric {
-                    matrix,
-                    row: row + 1,
-                    col: col + 1,
-                });
+                return Err(Error::NotSymmetric { matrix, row: row + 1, col: col + 1 });
             }
         }
     }
@@ -122,23 +111,11 @@ fn verified(a: &DMatrix<f64>, p: DMatrix<f64>, q: &DMatrix<f64>) -> Result<Solut
     let residual = relative.amax();
     if residual > ALLOWED_RESIDUAL {
         let equation = "A' P + P A = -Q";
-        return Err(Error::ResidualTooLarge {
-            equation,
-            residual,
-            allowed: ALLOWED_RESIDUAL,
-        });
+        return Err(Error::ResidualTooLarge { equation, residual, allowed: ALLOWED_RESIDUAL });
     }
     let size = q.norm();
-    let defect = if size > 0.0 {
-        remainder.norm() / size
-    } else {
-        remainder.norm()
-    };
-    Ok(Solution {
-        p,
-        residual,
-        defect,
-    })
+    let defect = if size > 0.0 { remainder.norm() / size } else { remainder.norm() };
+    Ok(Solution { p, residual, defect })
 }
 
 /// A = U T U*, T upper triangular.

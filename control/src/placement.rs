@@ -87,10 +87,7 @@ pub fn place(a: &DMatrix<f64>, b: &DMatrix<f64>, poles: &[f64]) -> Result<Placem
         .solve(&problem.scaled_responses(&directions).transpose())
         .ok_or(Error::Overflow { what: "K" })?
         .transpose();
-    let gain = divide_columns(
-        &multiply_rows(&gain, &problem.response_scale),
-        &problem.scale,
-    );
+    let gain = divide_columns(&multiply_rows(&gain, &problem.response_scale), &problem.scale);
     let gain = check::in_range("K", basis * gain)?;
     let quality = Quality {
         condition: conditioning::condition(&problem, &directions)?,
@@ -106,26 +103,16 @@ pub fn place(a: &DMatrix<f64>, b: &DMatrix<f64>, poles: &[f64]) -> Result<Placem
 
 fn check_poles(poles: &[f64], n: usize) -> Result<(), Error> {
     if poles.len() != n {
-        return Err(Error::PoleCount {
-            expected: n,
-            found: poles.len(),
-        });
+        return Err(Error::PoleCount { expected: n, found: poles.len() });
     }
     check::finite("poles", &DMatrix::from_column_slice(n, 1, poles))
 }
 
 fn refuse_repetition(poles: &[f64], inputs: usize) -> Result<(), Error> {
     for &pole in poles {
-        let times = poles
-            .iter()
-            .filter(|&&other| (other - pole).abs() <= 0.0)
-            .count();
+        let times = poles.iter().filter(|&&other| (other - pole).abs() <= 0.0).count();
         if times > inputs {
-            return Err(Error::RepeatedPole {
-                pole,
-                times,
-                inputs,
-            });
+            return Err(Error::RepeatedPole { pole, times, inputs });
         }
     }
     Ok(())
@@ -136,35 +123,18 @@ fn input_basis(b: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
     let lengths = DVector::from_iterator(b.ncols(), b.column_iter().map(|column| column.norm()));
     let lengths = lengths.map(|length| if length > 0.0 { length } else { 1.0 });
     let unit = Singular::of(&divide_columns(b, &lengths))?;
-    Ok(divide_rows(
-        &unit.whitening(unit.rank(DEPENDENT_INPUTS)),
-        &lengths,
-    ))
+    Ok(divide_rows(&unit.whitening(unit.rank(DEPENDENT_INPUTS)), &lengths))
 }
 
 /// Largest distance between wanted and reached eigenvalues, both in ascending order.
 fn pole_error(closed_loop: &DMatrix<f64>, poles: &[f64]) -> Result<f64, Error> {
     let mut wanted = poles.to_vec();
     wanted.sort_by(f64::total_cmp);
-    let largest = poles
-        .iter()
-        .fold(0.0, |size: f64, pole| size.max(pole.abs()));
+    let largest = poles.iter().fold(0.0, |size: f64, pole| size.max(pole.abs()));
     let distance = |(reached, &pole): (Complex<f64>, &f64)| {
-        let reference = if pole.abs() > 0.0 {
-            pole.abs()
-        } else {
-            largest
-        };
+        let reference = if pole.abs() > 0.0 { pole.abs() } else { largest };
         let distance = (reached - pole).norm();
-        if distance > 0.0 {
-            distance / reference
-        } else {
-            0.0
-        }
+        if distance > 0.0 { distance / reference } else { 0.0 }
     };
-    Ok(eigenvalues(closed_loop)?
-        .into_iter()
-        .zip(&wanted)
-        .map(distance)
-        .fold(0.0, f64::max))
+    Ok(eigenvalues(closed_loop)?.into_iter().zip(&wanted).map(distance).fold(0.0, f64::max))
 }

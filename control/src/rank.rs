@@ -81,10 +81,7 @@ pub(crate) fn require_controllable(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result
     if found.is_full() {
         return Ok(found);
     }
-    Err(Error::NotControllable {
-        rank: found.rank,
-        n: found.n,
-    })
+    Err(Error::NotControllable { rank: found.rank, n: found.n })
 }
 
 /// Refuses a pair that is not observable.
@@ -93,10 +90,7 @@ pub(crate) fn require_observable(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<R
     if found.is_full() {
         return Ok(found);
     }
-    Err(Error::NotObservable {
-        rank: found.rank,
-        n: found.n,
-    })
+    Err(Error::NotObservable { rank: found.rank, n: found.n })
 }
 
 fn staircase(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Rank, Error> {
@@ -104,26 +98,14 @@ fn staircase(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Rank, Error> {
     let balance = Balance::of(a);
     let mut rest = balance.matrix;
     let mut link = unit_columns(&divide_rows(b, &balance.scale));
-    #[expect(
-        clippy::cast_precision_loss,
-        reason = "a matrix order is far below 2^52"
-    )]
+    #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
     let tolerance = TOLERANCE_PER_STATE * n as f64;
-    let mut answer = Rank {
-        rank: 0,
-        n,
-        tolerance,
-        margin: f64::INFINITY,
-    };
+    let mut answer = Rank { rank: 0, n, tolerance, margin: f64::INFINITY };
     let size = rest.norm();
     let mut reference = link.norm();
     while !rest.is_empty() {
         let step = Singular::of(&link.transpose())?;
-        let kept = step
-            .values
-            .iter()
-            .filter(|&&value| value > tolerance * reference)
-            .count();
+        let kept = step.values.iter().filter(|&&value| value > tolerance * reference).count();
         if kept == 0 {
             break;
         }

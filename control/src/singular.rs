@@ -49,18 +49,12 @@ impl Singular {
                 return Ok(sorted(&images, &right, unit));
             }
         }
-        Err(Error::NotConverged {
-            what: "the singular value iteration",
-            iterations: SWEEPS,
-        })
+        Err(Error::NotConverged { what: "the singular value iteration", iterations: SWEEPS })
     }
 
     /// Number of singular values above `tolerance` times the largest.
     pub(crate) fn rank(&self, tolerance: f64) -> usize {
-        self.values
-            .iter()
-            .filter(|&&value| value > tolerance * self.values[0])
-            .count()
+        self.values.iter().filter(|&&value| value > tolerance * self.values[0]).count()
     }
 
     /// Largest over smallest singular value.
@@ -70,9 +64,7 @@ impl Singular {
 
     /// V1 S1^-1 of the leading `rank` singular values: M times it has orthonormal columns.
     pub(crate) fn whitening(&self, rank: usize) -> DMatrix<f64> {
-        DMatrix::from_fn(self.right.nrows(), rank, |i, j| {
-            self.right[(i, j)] / self.values[j]
-        })
+        DMatrix::from_fn(self.right.nrows(), rank, |i, j| self.right[(i, j)] / self.values[j])
     }
 
     /// The shortest X with the least norm of M X - B, singular values from `rank` on taken as zero.
@@ -93,11 +85,7 @@ fn rotation(m: &DMatrix<f64>, first: usize, second: usize, nothing: f64) -> Opti
     }
     let cosine = a.dot(&b) / (long * short);
     if cosine.abs() <= f64::EPSILON * rounding_growth(m.nrows()) {
-        return if short > long {
-            Some((0.0, -1.0))
-        } else {
-            None
-        };
+        return if short > long { Some((0.0, -1.0)) } else { None };
     }
     let zeta = (short / long - long / short) / (2.0 * cosine);
     let tangent = zeta.signum() / (zeta.abs() + zeta.hypot(1.0));
@@ -125,11 +113,7 @@ fn sorted(images: &DMatrix<f64>, right: &DMatrix<f64>, unit: f64) -> Singular {
     order.sort_by(|&i, &j| norms[j].total_cmp(&norms[i]));
     let left = DMatrix::from_fn(images.nrows(), norms.len(), |i, j| {
         let norm = norms[order[j]];
-        if norm > 0.0 {
-            images[(i, order[j])] / norm
-        } else {
-            0.0
-        }
+        if norm > 0.0 { images[(i, order[j])] / norm } else { 0.0 }
     });
     Singular {
         left,

@@ -86,10 +86,7 @@ pub fn certify(
     let order = error_dynamics.nrows();
     let observer_abscissa = spectral_abscissa(&error_dynamics)?;
     if observer_abscissa >= 0.0 {
-        return Err(Error::NotHurwitz {
-            matrix: "A_0 - L C_0",
-            abscissa: observer_abscissa,
-        });
+        return Err(Error::NotHurwitz { matrix: "A_0 - L C_0", abscissa: observer_abscissa });
     }
     let right = DMatrix::from_diagonal_element(order, order, alpha * beta);
     let solution = lyapunov(&error_dynamics, &right)?;

@@ -68,10 +68,7 @@ impl ModelDescription {
 
 /// `CoSimulation`: identifier and capability flags (section 4.3.1).
 #[derive(Clone, Debug, Default, PartialEq)]
-#[expect(
-    clippy::struct_excessive_bools,
-    reason = "the flags of the standard, one for one"
-)]
+#[expect(clippy::struct_excessive_bools, reason = "the flags of the standard, one for one")]
 pub struct CoSimulation {
     /// `modelIdentifier`: file name of the library, without extension.
     pub model_identifier: String,

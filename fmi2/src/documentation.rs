@@ -77,15 +77,9 @@ fn table(header: &[&str], rows: &[Vec<String>]) -> String {
         let cells = row.iter().map(|cell| format!("<td>{cell}</td>"));
         format!("<tr>{}</tr>\n", cells.collect::<Vec<_>>().concat())
     };
-    let names: Vec<String> = header
-        .iter()
-        .map(|name| format!("<th>{name}</th>"))
-        .collect();
-    let head = if names.is_empty() {
-        String::new()
-    } else {
-        format!("<tr>{}</tr>\n", names.concat())
-    };
+    let names: Vec<String> = header.iter().map(|name| format!("<th>{name}</th>")).collect();
+    let head =
+        if names.is_empty() { String::new() } else { format!("<tr>{}</tr>\n", names.concat()) };
     let body: Vec<String> = rows.iter().map(cells).collect();
     format!("<table>\n{head}{}</table>\n", body.concat())
 }
@@ -97,10 +91,7 @@ fn facts(description: &ModelDescription) -> String {
         ("Copyright", description.copyright.as_deref()),
         ("Made by", description.generation_tool.as_deref()),
         ("Made at", description.generation_date_and_time.as_deref()),
-        (
-            "GUID",
-            Some(description.guid.as_str()).filter(|guid| !guid.is_empty()),
-        ),
+        ("GUID", Some(description.guid.as_str()).filter(|guid| !guid.is_empty())),
     ];
     let rows: Vec<Vec<String>> = facts
         .iter()
@@ -110,17 +101,8 @@ fn facts(description: &ModelDescription) -> String {
 }
 
 fn variables(description: &ModelDescription) -> String {
-    let header = [
-        "Name",
-        "Causality",
-        "Variability",
-        "Type",
-        "Unit",
-        "Start",
-        "Min",
-        "Max",
-        "Description",
-    ];
+    let header =
+        ["Name", "Causality", "Variability", "Type", "Unit", "Start", "Min", "Max", "Description"];
     let row = |variable: &ScalarVariable| {
         let (unit, [start, min, max]) = values(&variable.kind, &description.types);
         vec![
@@ -140,11 +122,7 @@ fn variables(description: &ModelDescription) -> String {
 }
 
 fn code(text: &str) -> String {
-    if text.is_empty() {
-        String::new()
-    } else {
-        format!("<code>{}</code>", escaped(text))
-    }
+    if text.is_empty() { String::new() } else { format!("<code>{}</code>", escaped(text)) }
 }
 
 fn type_name(kind: &Kind) -> String {
@@ -168,38 +146,24 @@ fn values(kind: &Kind, types: &[SimpleType]) -> (String, [String; 3]) {
         }
         Kind::Integer(own) => {
             let number = |value: Option<i32>| value.map_or_else(none, |value| value.to_string());
-            (
-                none(),
-                [number(own.start), number(own.min), number(own.max)],
-            )
+            (none(), [number(own.start), number(own.min), number(own.max)])
         }
         Kind::Enumeration(own) => {
-            let declared = types
-                .iter()
-                .find(|other| Some(&other.name) == own.declared_type.as_ref());
+            let declared =
+                types.iter().find(|other| Some(&other.name) == own.declared_type.as_ref());
             let items = declared.map_or(&[][..], |own| &own.items);
             let item = |value: Option<i32>| {
                 let Some(value) = value else { return none() };
                 let item = items.iter().find(|(_, own)| *own == value);
-                item.map_or_else(
-                    || value.to_string(),
-                    |(name, _)| format!("{value} ({name})"),
-                )
+                item.map_or_else(|| value.to_string(), |(name, _)| format!("{value} ({name})"))
             };
             (none(), [item(own.start), item(own.min), item(own.max)])
         }
-        Kind::Boolean(start) => (
-            none(),
-            [
-                start.map_or_else(none, |start| start.to_string()),
-                none(),
-                none(),
-            ],
-        ),
+        Kind::Boolean(start) => {
+            (none(), [start.map_or_else(none, |start| start.to_string()), none(), none()])
+        }
         Kind::String(start) => {
-            let text = start
-                .as_ref()
-                .map_or_else(none, |start| format!("\"{start}\""));
+            let text = start.as_ref().map_or_else(none, |start| format!("\"{start}\""));
             (none(), [text, none(), none()])
         }
     }
@@ -247,16 +211,10 @@ fn capabilities(own: &CoSimulation) -> String {
             "canBeInstantiatedOnlyOncePerProcess",
             flag(own.can_be_instantiated_only_once_per_process),
         ),
-        (
-            "canNotUseMemoryManagementFunctions",
-            flag(own.can_not_use_memory_management_functions),
-        ),
+        ("canNotUseMemoryManagementFunctions", flag(own.can_not_use_memory_management_functions)),
         ("canGetAndSetFMUstate", flag(own.can_get_and_set_fmu_state)),
         ("canSerializeFMUstate", flag(own.can_serialize_fmu_state)),
-        (
-            "providesDirectionalDerivative",
-            flag(own.provides_directional_derivative),
-        ),
+        ("providesDirectionalDerivative", flag(own.provides_directional_derivative)),
     ]
     .iter()
     .map(|(name, value)| vec![code(name), escaped(value).into_owned()])
@@ -349,9 +307,6 @@ mod tests {
     #[test]
     fn an_empty_description_gives_a_page_without_empty_sections() {
         let page = page(&ModelDescription::default(), "");
-        assert!(
-            !page.contains("<h2>") && !page.contains("<table>"),
-            "{page}"
-        );
+        assert!(!page.contains("<h2>") && !page.contains("<table>"), "{page}");
     }
 }

@@ -215,7 +215,9 @@ impl<M: Model> Instance<M> {
         let step = communication_step(core.time, start, size)?;
         let end = start + size;
         if let Some(stop) = core.experiment.stop_time.filter(|stop| end > stop + slack(*stop)) {
-            return Err(Failure::Error(format!("the step ends at {end} s, past stopTime {stop} s")));
+            return Err(Failure::Error(format!(
+                "the step ends at {end} s, past stopTime {stop} s"
+            )));
         }
         if core.unchecked {
             core.model.check()?;
@@ -260,7 +262,7 @@ fn communication_step(time: f64, start: f64, size: f64) -> Result<Step, Failure>
         )));
     }
     let mismatch = start - time;
-    if !(mismatch.abs() <= slack(time)) {
+    if mismatch.is_nan() || mismatch.abs() > slack(time) {
         return Err(Failure::Error(format!(
             "currentCommunicationPoint is {start} s, but the instance is at {time} s"
         )));

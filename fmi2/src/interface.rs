@@ -207,7 +207,8 @@ fn structure<M>(variables: &[Variable<M>]) -> Result<ModelStructure, Failure> {
             continue;
         }
         let unknown = |names: Option<&Vec<String>>| -> Result<Unknown, Failure> {
-            let dependencies = names.map(|names| indices(variables, variable, names)).transpose()?;
+            let dependencies =
+                names.map(|names| indices(variables, variable, names)).transpose()?;
             Ok(Unknown { index: index(position), dependencies, kinds: None })
         };
         structure.outputs.push(unknown(Some(&variable.direct))?);

@@ -6,12 +6,8 @@ use std::path::{Path, PathBuf};
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, percent_decode_str, percent_encode};
 
 /// What RFC 3986, section 2.3, leaves unencoded, and the separator.
-const ENCODED: AsciiSet = NON_ALPHANUMERIC
-    .remove(b'-')
-    .remove(b'.')
-    .remove(b'_')
-    .remove(b'~')
-    .remove(b'/');
+const ENCODED: AsciiSet =
+    NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~').remove(b'/');
 /// The same for a path with a drive letter.
 const ENCODED_AFTER_DRIVE: AsciiSet = ENCODED.remove(b':');
 
@@ -64,9 +60,7 @@ pub enum LocationError {
 /// ```
 pub fn file_uri(path: &Path) -> Result<String, LocationError> {
     if !path.is_absolute() {
-        return Err(LocationError::Relative {
-            path: path.to_owned(),
-        });
+        return Err(LocationError::Relative { path: path.to_owned() });
     }
     Ok(encode(&bytes_of(path)?, cfg!(windows)))
 }
@@ -90,9 +84,7 @@ pub fn file_uri(path: &Path) -> Result<String, LocationError> {
 /// ```
 pub fn path_from_uri(uri: &str) -> Result<PathBuf, LocationError> {
     let bytes = decode(uri, cfg!(windows))?;
-    path_of(bytes).ok_or_else(|| LocationError::NotAFile {
-        uri: uri.to_owned(),
-    })
+    path_of(bytes).ok_or_else(|| LocationError::NotAFile { uri: uri.to_owned() })
 }
 
 /// `drives`: the path is one of Windows, with drive letter and backslashes.
@@ -100,24 +92,16 @@ fn encode(path: &[u8], drives: bool) -> String {
     if !drives {
         return format!("file://{}", percent_encode(path, &ENCODED));
     }
-    let slashes: Vec<u8> = path
-        .iter()
-        .map(|byte| if *byte == b'\\' { b'/' } else { *byte })
-        .collect();
+    let slashes: Vec<u8> =
+        path.iter().map(|byte| if *byte == b'\\' { b'/' } else { *byte }).collect();
     // `\\?\` marks a long path and says nothing about the place.
     let plain = slashes.strip_prefix(b"//?/").unwrap_or(&slashes);
     let encoded = percent_encode(plain, &ENCODED_AFTER_DRIVE).to_string();
-    if encoded.starts_with("//") {
-        format!("file:{encoded}")
-    } else {
-        format!("file:///{encoded}")
-    }
+    if encoded.starts_with("//") { format!("file:{encoded}") } else { format!("file:///{encoded}") }
 }
 
 fn decode(uri: &str, drives: bool) -> Result<Vec<u8>, LocationError> {
-    let wrong = || LocationError::NotAFile {
-        uri: uri.to_owned(),
-    };
+    let wrong = || LocationError::NotAFile { uri: uri.to_owned() };
     let (scheme, rest) = uri.split_once(':').ok_or_else(wrong)?;
     if !scheme.eq_ignore_ascii_case("file") {
         return Err(wrong());
@@ -128,10 +112,7 @@ fn decode(uri: &str, drives: bool) -> Result<Vec<u8>, LocationError> {
             let slash = rest.find('/').ok_or_else(wrong)?;
             let host = &rest[..slash];
             if !host.is_empty() && !host.eq_ignore_ascii_case("localhost") {
-                return Err(LocationError::Host {
-                    host: host.to_owned(),
-                    uri: uri.to_owned(),
-                });
+                return Err(LocationError::Host { host: host.to_owned(), uri: uri.to_owned() });
             }
             &rest[slash..]
         }
@@ -154,10 +135,7 @@ fn decode(uri: &str, drives: bool) -> Result<Vec<u8>, LocationError> {
 }
 
 #[cfg(unix)]
-#[expect(
-    clippy::unnecessary_wraps,
-    reason = "paths of other platforms may not be text"
-)]
+#[expect(clippy::unnecessary_wraps, reason = "paths of other platforms may not be text")]
 fn bytes_of(path: &Path) -> Result<Cow<'_, [u8]>, LocationError> {
     use std::os::unix::ffi::OsStrExt as _;
     Ok(Cow::Borrowed(path.as_os_str().as_bytes()))
@@ -167,17 +145,12 @@ fn bytes_of(path: &Path) -> Result<Cow<'_, [u8]>, LocationError> {
 fn bytes_of(path: &Path) -> Result<Cow<'_, [u8]>, LocationError> {
     match path.to_str() {
         Some(text) => Ok(Cow::Borrowed(text.as_bytes())),
-        None => Err(LocationError::NotUnicode {
-            path: path.to_owned(),
-        }),
+        None => Err(LocationError::NotUnicode { path: path.to_owned() }),
     }
 }
 
 #[cfg(unix)]
-#[expect(
-    clippy::unnecessary_wraps,
-    reason = "paths of other platforms may not be text"
-)]
+#[expect(clippy::unnecessary_wraps, reason = "paths of other platforms may not be text")]
 fn path_of(bytes: Vec<u8>) -> Option<PathBuf> {
     use std::os::unix::ffi::OsStringExt as _;
     Some(PathBuf::from(std::ffi::OsString::from_vec(bytes)))
@@ -258,28 +231,14 @@ mod tests {
 
     #[test]
     fn other_uris_and_relative_paths_are_refused() {
-        for uri in [
-            "",
-            "/tmp",
-            "http://x/y",
-            "file",
-            "file:",
-            "file:tmp",
-            "file://",
-            "file://tmp",
-        ] {
-            assert!(
-                matches!(path_from_uri(uri), Err(LocationError::NotAFile { .. })),
-                "{uri}"
-            );
+        for uri in ["", "/tmp", "http://x/y", "file", "file:", "file:tmp", "file://", "file://tmp"]
+        {
+            assert!(matches!(path_from_uri(uri), Err(LocationError::NotAFile { .. })), "{uri}");
         }
         let nul = path_from_uri("file:///tmp/%00");
         assert!(matches!(nul, Err(LocationError::NotAFile { .. })));
         let host = path_from_uri("file://server/share");
         assert!(matches!(host, Err(LocationError::Host { host, .. }) if host == "server"));
-        assert!(matches!(
-            file_uri(Path::new("a/b")),
-            Err(LocationError::Relative { .. })
-        ));
+        assert!(matches!(file_uri(Path::new("a/b")), Err(LocationError::Relative { .. })));
     }
 }

@@ -78,11 +78,7 @@ fn file_error(
     path: impl Into<PathBuf>,
 ) -> impl FnOnce(io::Error) -> PackageError {
     let path = path.into();
-    move |source| PackageError::File {
-        action,
-        path,
-        source,
-    }
+    move |source| PackageError::File { action, path, source }
 }
 
 /// Folders of `binaries` that hold libraries for the platform of this program, the preferred one

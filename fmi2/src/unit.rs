@@ -54,18 +54,7 @@ impl Default for BaseUnit {
 impl BaseUnit {
     fn from_exponents(exponents: [i32; 8], factor: f64, offset: f64) -> Self {
         let [kg, m, s, a, k, mol, cd, rad] = exponents;
-        BaseUnit {
-            kg,
-            m,
-            s,
-            a,
-            k,
-            mol,
-            cd,
-            rad,
-            factor,
-            offset,
-        }
+        BaseUnit { kg, m, s, a, k, mol, cd, rad, factor, offset }
     }
 }
 
@@ -158,20 +147,13 @@ impl Unit {
     /// ```
     pub fn parse(expression: &str) -> Result<Unit, UnitError> {
         let base = Cursor::new(expression).unit()?;
-        Ok(Unit {
-            name: expression.to_owned(),
-            base: Some(base),
-            display_units: displays(&base),
-        })
+        Ok(Unit { name: expression.to_owned(), base: Some(base), display_units: displays(&base) })
     }
 }
 
 /// Degrees for angles and angular velocities in radians.
 fn displays(base: &BaseUnit) -> Vec<DisplayUnit> {
-    let radian = BaseUnit {
-        rad: 1,
-        ..BaseUnit::default()
-    };
+    let radian = BaseUnit { rad: 1, ..BaseUnit::default() };
     let name = if *base == radian {
         "deg"
     } else if *base == (BaseUnit { s: -1, ..radian }) {
@@ -179,11 +161,7 @@ fn displays(base: &BaseUnit) -> Vec<DisplayUnit> {
     } else {
         return Vec::new();
     };
-    vec![DisplayUnit {
-        name: name.to_owned(),
-        factor: DEGREES_PER_RADIAN,
-        offset: 0.0,
-    }]
+    vec![DisplayUnit { name: name.to_owned(), factor: DEGREES_PER_RADIAN, offset: 0.0 }]
 }
 
 #[cfg(test)]

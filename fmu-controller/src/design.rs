@@ -146,16 +146,7 @@ impl Design {
         let m = ("actuators", self.actuators.len());
         let p = ("measurements", self.measurements.len());
         let q = ("faults", self.faults.len());
-        let expected = [
-            (n, n),
-            (n, m),
-            (p, n),
-            (n, q),
-            (m, n),
-            (m, q),
-            (n, p),
-            (q, p),
-        ];
+        let expected = [(n, n), (n, m), (p, n), (n, q), (m, n), (m, q), (n, p), (q, p)];
         for ((matrix, found), (rows, columns)) in self.matrices().into_iter().zip(expected) {
             if (found.rows, found.columns) != (rows.1, columns.1) {
                 return Err(DesignError::Shape {

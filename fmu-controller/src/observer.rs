@@ -84,7 +84,9 @@ impl Matrices {
         let compensating = f64::from(mode.compensating);
         let estimating = f64::from(mode.estimating);
         let mut state = DMatrix::zeros(n + q, n + q);
-        state.view_mut((0, 0), (n, n)).copy_from(&(&self.a + &free * &self.k_x - &self.l_x * &self.c));
+        state
+            .view_mut((0, 0), (n, n))
+            .copy_from(&(&self.a + &free * &self.k_x - &self.l_x * &self.c));
         state.view_mut((0, n), (n, q)).copy_from(&(&self.f_a + &free * &self.k_f * compensating));
         state.view_mut((n, 0), (q, n)).copy_from(&(&self.l_f * &self.c * -estimating));
         let mut input = DMatrix::zeros(n + q, p + m);
@@ -234,13 +236,23 @@ impl Observer {
     }
 
     /// Propagates over `span` into `after`; whether the mode holds at its end.
-    fn stays(&mut self, mode: Mode, y: Measurement<'_>, span: Span) -> Result<bool, control::Error> {
+    fn stays(
+        &mut self,
+        mode: Mode,
+        y: Measurement<'_>,
+        span: Span,
+    ) -> Result<bool, control::Error> {
         self.propagate(mode, y, span)?;
         Ok(self.mode(&self.after, mode.compensating, mode.estimating) == mode)
     }
 
     /// From `before` to `after` over `span` in `mode`.
-    fn propagate(&mut self, mode: Mode, y: Measurement<'_>, span: Span) -> Result<(), control::Error> {
+    fn propagate(
+        &mut self,
+        mode: Mode,
+        y: Measurement<'_>,
+        span: Span,
+    ) -> Result<(), control::Error> {
         for (k, (value, slope)) in y.value.iter().zip(y.slope).enumerate() {
             self.input[k] = value + slope * span.offset;
             self.input_slope[k] = *slope;

@@ -50,10 +50,7 @@ pub(crate) fn limit_name(controller: &AsoController, side: usize, position: usiz
     channel(["u_min", "u_max"][side], position, controller.design.actuators.len())
 }
 
-fn with_unit(
-    variable: Variable<AsoController>,
-    unit: Option<&String>,
-) -> Variable<AsoController> {
+fn with_unit(variable: Variable<AsoController>, unit: Option<&String>) -> Variable<AsoController> {
     match unit {
         Some(unit) => variable.unit(unit.clone()),
         None => variable,
@@ -132,9 +129,10 @@ fn estimates(design: &Design) -> Vec<Variable<AsoController>> {
         let name = channel("f_hat", k, design.faults.len());
         (order + k, name, channel("f_hat_0", k, design.faults.len()), signal)
     });
-    let states = design.states.iter().enumerate().map(|(k, signal)| {
-        (k, channel("x_hat", k, order), channel("x_hat_0", k, order), signal)
-    });
+    let states =
+        design.states.iter().enumerate().map(|(k, signal)| {
+            (k, channel("x_hat", k, order), channel("x_hat_0", k, order), signal)
+        });
     faults
         .chain(states)
         .map(|(k, name, start, signal)| {

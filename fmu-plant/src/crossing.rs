@@ -128,44 +128,28 @@ mod tests {
 
     #[test]
     fn the_first_of_several_crossings_is_found() {
-        let found = with_roots(1.0, [0.2, 0.3, 0.6, 0.7])
-            .first_negative()
-            .unwrap();
+        let found = with_roots(1.0, [0.2, 0.3, 0.6, 0.7]).first_negative().unwrap();
         assert!((found - 0.2).abs() < 2e-6 && found >= 0.2, "{found}");
-        let found = with_roots(-1.0, [-0.5, 0.35, 1.5, 2.0])
-            .first_negative()
-            .unwrap();
+        let found = with_roots(-1.0, [-0.5, 0.35, 1.5, 2.0]).first_negative().unwrap();
         assert!((found - 0.35).abs() < 2e-6 && found >= 0.35, "{found}");
     }
 
     #[test]
     fn a_narrow_dip_between_positive_ends_is_found() {
-        let found = with_roots(1.0, [0.4, 0.400_1, -1.0, -2.0])
-            .first_negative()
-            .unwrap();
+        let found = with_roots(1.0, [0.4, 0.400_1, -1.0, -2.0]).first_negative().unwrap();
         assert!((0.4..0.400_1).contains(&found), "{found}");
     }
 
     #[test]
     fn a_touching_or_positive_polynomial_has_no_crossing() {
-        assert!(
-            with_roots(1.0, [-0.1, -0.2, 1.1, 1.2])
-                .first_negative()
-                .is_none()
-        );
-        assert!(
-            with_roots(1.0, [0.0, 0.0, -1.0, -1.0])
-                .first_negative()
-                .is_none()
-        );
+        assert!(with_roots(1.0, [-0.1, -0.2, 1.1, 1.2]).first_negative().is_none());
+        assert!(with_roots(1.0, [0.0, 0.0, -1.0, -1.0]).first_negative().is_none());
         assert!(Quartic([0.0; 5]).first_negative().is_none());
     }
 
     #[test]
     fn a_fall_from_zero_is_found_at_the_start() {
-        let found = Quartic([0.0, -0.1, -0.2, -0.3, -0.4])
-            .first_negative()
-            .unwrap();
+        let found = Quartic([0.0, -0.1, -0.2, -0.3, -0.4]).first_negative().unwrap();
         assert!(found < 2e-6);
     }
 

@@ -29,10 +29,7 @@ impl Step {
         let stage = |node: f64, state: &State| derivative(time + node * h, state);
         let k1 = *slope;
         let k2 = stage(0.2, &combine(start, h, [(0.2, &k1)]));
-        let k3 = stage(
-            0.3,
-            &combine(start, h, [(3.0 / 40.0, &k1), (9.0 / 40.0, &k2)]),
-        );
+        let k3 = stage(0.3, &combine(start, h, [(3.0 / 40.0, &k1), (9.0 / 40.0, &k2)]));
         let sum = [(44.0 / 45.0, &k1), (-56.0 / 15.0, &k2), (32.0 / 9.0, &k3)];
         let k4 = stage(0.8, &combine(start, h, sum));
         let sum = [
@@ -59,12 +56,7 @@ impl Step {
         ];
         let end = combine(start, h, sum);
         let k7 = stage(1.0, &end);
-        Self {
-            start: *start,
-            end,
-            length,
-            slopes: [k1, k2, k3, k4, k5, k6, k7],
-        }
+        Self { start: *start, end, length, slopes: [k1, k2, k3, k4, k5, k6, k7] }
     }
 
     /// The derivative at the start of the step.
@@ -131,12 +123,7 @@ mod tests {
     }
 
     fn exact(time: f64) -> State {
-        [
-            time.sin(),
-            time.cos(),
-            (2.0 * time).sin(),
-            (2.0 * time).cos(),
-        ]
+        [time.sin(), time.cos(), (2.0 * time).sin(), (2.0 * time).cos()]
     }
 
     fn step(length: f64) -> Step {
@@ -145,10 +132,7 @@ mod tests {
     }
 
     fn distance(a: &State, b: &State) -> f64 {
-        a.iter()
-            .zip(b)
-            .map(|(a, b)| (a - b).abs())
-            .fold(0.0, f64::max)
+        a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     }
 
     /// Exponent of the step length in a local error that is halved from step to step.
@@ -179,13 +163,7 @@ mod tests {
     fn a_polynomial_of_degree_four_in_time_is_integrated_without_error() {
         let derivative = |t: f64, _: &State| [1.0, 2.0 * t, 3.0 * t * t, 4.0 * t * t * t];
         let power = |t: f64| [t, t * t, t.powi(3), t.powi(4)];
-        let step = Step::take(
-            derivative,
-            0.5,
-            &power(0.5),
-            &derivative(0.5, &[0.0; 4]),
-            1.5,
-        );
+        let step = Step::take(derivative, 0.5, &power(0.5), &derivative(0.5, &[0.0; 4]), 1.5);
         assert!(distance(&step.end, &power(2.0)) < 1e-13);
         assert!(distance(&step.middle(), &power(1.25)) < 1e-13);
         assert!(distance(&step.error(), &[0.0; 4]) < 1e-13);

@@ -23,12 +23,7 @@ impl Force {
     /// A force that does not change.
     #[must_use]
     pub fn constant(value: f64) -> Self {
-        Self {
-            value,
-            slope: 0.0,
-            curvature: 0.0,
-            start: 0.0,
-        }
+        Self { value, slope: 0.0, curvature: 0.0, start: 0.0 }
     }
 
     /// The force at a time in s, in N.
@@ -47,9 +42,7 @@ impl Force {
     /// No coefficient is infinite or not a number.
     #[must_use]
     pub fn is_finite(&self) -> bool {
-        [self.value, self.slope, self.curvature, self.start]
-            .iter()
-            .all(|part| part.is_finite())
+        [self.value, self.slope, self.curvature, self.start].iter().all(|part| part.is_finite())
     }
 
     /// The same polynomial in the time elapsed since `origin`.
@@ -114,18 +107,10 @@ impl RigidBody {
     #[inline]
     fn position(&self, angle: f64, rate: f64) -> Position {
         if self.linearised {
-            return Position {
-                sine: angle,
-                cosine: 1.0,
-                centrifugal: 0.0,
-            };
+            return Position { sine: angle, cosine: 1.0, centrifugal: 0.0 };
         }
         let (sine, cosine) = angle.sin_cos();
-        Position {
-            sine,
-            cosine,
-            centrifugal: rate * rate * sine,
-        }
+        Position { sine, cosine, centrifugal: rate * rate * sine }
     }
 
     /// Derivative of the state of a sliding cart under `net_force`, the force less the friction
@@ -179,10 +164,7 @@ impl RigidBody {
         let (cosine_rate, centrifugal_rate) = if self.linearised {
             (0.0, 0.0)
         } else {
-            (
-                -at.sine * rate,
-                2.0 * rate * turn * at.sine + rate * rate * sine_rate,
-            )
+            (-at.sine * rate, 2.0 * rate * turn * at.sine + rate * rate * sine_rate)
         };
         let torque_rate = self.weight * sine_rate - self.pendulum_damping * turn;
         let lever_rate = cosine_rate * torque + at.cosine * torque_rate;
@@ -194,18 +176,12 @@ impl RigidBody {
 mod tests {
     use super::*;
 
-    const STATES: [State; 3] = [
-        [0.2, 0.4, 0.7, -1.3],
-        [0.0, -2.5, -1.1, 4.0],
-        [1.0, 7.0, 0.0, 0.3],
-    ];
+    const STATES: [State; 3] =
+        [[0.2, 0.4, 0.7, -1.3], [0.0, -2.5, -1.1, 4.0], [1.0, 7.0, 0.0, 0.3]];
 
     fn bodies() -> [RigidBody; 2] {
         let nonlinear = Parameters::default();
-        let linearised = Parameters {
-            linearised: true,
-            ..Parameters::default()
-        };
+        let linearised = Parameters { linearised: true, ..Parameters::default() };
         [RigidBody::new(&nonlinear), RigidBody::new(&linearised)]
     }
 
@@ -223,10 +199,7 @@ mod tests {
             let pendulum = p.inertia * turn + p.pendulum_damping * rate
                 - moment * p.gravity * angle.sin()
                 + moment * a * angle.cos();
-            assert!(
-                cart.abs() < 1e-12 && pendulum.abs() < 1e-13,
-                "{cart} {pendulum}"
-            );
+            assert!(cart.abs() < 1e-12 && pendulum.abs() < 1e-13, "{cart} {pendulum}");
         }
     }
 
@@ -286,10 +259,7 @@ mod tests {
                 };
                 let numeric = (along(1e-5) - along(-1e-5)) / 2e-5;
                 let rate = body.balancing_rate(&state, 3.0);
-                assert!(
-                    (numeric - rate).abs() < 1e-6 * rate.abs().max(1.0),
-                    "{numeric} {rate}"
-                );
+                assert!((numeric - rate).abs() < 1e-6 * rate.abs().max(1.0), "{numeric} {rate}");
             }
         }
     }
@@ -300,12 +270,7 @@ mod tests {
 
     #[test]
     fn a_force_seen_from_another_origin_is_the_same_force() {
-        let force = Force {
-            value: 3.0,
-            slope: -2.0,
-            curvature: 8.0,
-            start: 1.5,
-        };
+        let force = Force { value: 3.0, slope: -2.0, curvature: 8.0, start: 1.5 };
         let seen = force.seen_from(2.0);
         assert_eq!(force.at(1.5).to_bits(), 3.0_f64.to_bits());
         assert!((force.at(2.5) - (3.0 - 2.0 + 4.0)).abs() < 1e-14);

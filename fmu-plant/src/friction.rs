@@ -63,11 +63,7 @@ impl StribeckLaw {
     #[must_use]
     pub fn magnitude(&self, velocity: f64) -> f64 {
         let ratio = velocity.abs() * self.inverse_velocity;
-        let power = if self.quadratic {
-            ratio * ratio
-        } else {
-            ratio.powf(self.exponent)
-        };
+        let power = if self.quadratic { ratio * ratio } else { ratio.powf(self.exponent) };
         self.coulomb + self.excess * (-power).exp()
     }
 
@@ -82,11 +78,7 @@ impl StribeckLaw {
     /// The velocity in m/s over which the friction falls: `v_s`, infinite where `F_s = F_c`.
     #[must_use]
     pub fn width(&self) -> f64 {
-        if self.excess > 0.0 {
-            1.0 / self.inverse_velocity
-        } else {
-            f64::INFINITY
-        }
+        if self.excess > 0.0 { 1.0 / self.inverse_velocity } else { f64::INFINITY }
     }
 
     /// The regime of a cart at velocity zero under the force that would hold it there.

@@ -107,11 +107,7 @@ impl Motion {
         for (name, value) in names.into_iter().zip(initial) {
             require(name, value, true, "finite")?;
         }
-        let mut motion = Self {
-            state: initial,
-            regime: Regime::Stick,
-            suggested_step: FIRST_STEP,
-        };
+        let mut motion = Self { state: initial, regime: Regime::Stick, suggested_step: FIRST_STEP };
         motion.regime = Plant::new(parameters, Force::constant(force)).regime(0.0, &initial);
         Ok(motion)
     }
@@ -187,9 +183,7 @@ impl Motion {
                     elapsed += length;
                     events += 1;
                     if events > EVENT_LIMIT {
-                        return Err(Failure::TooManyEvents {
-                            time: start + elapsed,
-                        });
+                        return Err(Failure::TooManyEvents { time: start + elapsed });
                     }
                 }
                 Progress::Rejected => {}
@@ -197,9 +191,7 @@ impl Motion {
                 Progress::NotFinite => return Err(Failure::NotFinite { time }),
             }
         }
-        Err(Failure::TooManySteps {
-            time: start + elapsed,
-        })
+        Err(Failure::TooManySteps { time: start + elapsed })
     }
 
     /// One integration step, at most to the end of the interval and at most to the next event.
@@ -227,11 +219,7 @@ impl Motion {
             Ok(Some(crossing)) => self.proceed_to(&crossing, &piece, length, tolerance),
             Ok(None) => {
                 self.state = step.end;
-                if lasts {
-                    Progress::Finished
-                } else {
-                    Progress::Advanced(length)
-                }
+                if lasts { Progress::Finished } else { Progress::Advanced(length) }
             }
         }
     }
@@ -242,11 +230,7 @@ impl Motion {
             return Progress::Rejected;
         }
         self.suggested_step = FIRST_STEP;
-        if error.is_finite() {
-            Progress::Underflow
-        } else {
-            Progress::NotFinite
-        }
+        if error.is_finite() { Progress::Underflow } else { Progress::NotFinite }
     }
 
     /// Repeats a step of `length` so that it ends where the margin becomes negative.
@@ -305,11 +289,7 @@ enum Progress {
 
 /// Factor from the length of a step with this squared scaled error to the next one.
 fn growth(squared_error: f64) -> f64 {
-    if squared_error.is_finite() {
-        (0.9 * squared_error.powf(-0.1)).clamp(0.2, 5.0)
-    } else {
-        0.1
-    }
+    if squared_error.is_finite() { (0.9 * squared_error.powf(-0.1)).clamp(0.2, 5.0) } else { 0.1 }
 }
 
 #[cfg(test)]

@@ -83,35 +83,15 @@ impl Parameters {
         require("l", p.length, p.length >= 0.0, not_negative)?;
         let moment = p.pendulum_mass * p.length;
         let definite = (p.cart_mass + p.pendulum_mass) * p.inertia > moment * moment;
-        require(
-            "J",
-            p.inertia,
-            definite,
-            "finite and such that (M + m) J > (m l)^2",
-        )?;
+        require("J", p.inertia, definite, "finite and such that (M + m) J > (m l)^2")?;
         require("F_x", p.cart_damping, p.cart_damping >= 0.0, not_negative)?;
-        require(
-            "F_theta",
-            p.pendulum_damping,
-            p.pendulum_damping >= 0.0,
-            not_negative,
-        )?;
+        require("F_theta", p.pendulum_damping, p.pendulum_damping >= 0.0, not_negative)?;
         require("g", p.gravity, true, "finite")?;
         require("F_c", p.coulomb, p.coulomb >= 0.0, not_negative)?;
         let falling = p.static_friction >= p.coulomb;
         require("F_s", p.static_friction, falling, "finite and >= F_c")?;
-        require(
-            "v_s",
-            p.stribeck_velocity,
-            p.stribeck_velocity > 0.0,
-            positive,
-        )?;
-        require(
-            "delta",
-            p.stribeck_exponent,
-            p.stribeck_exponent > 0.0,
-            positive,
-        )
+        require("v_s", p.stribeck_velocity, p.stribeck_velocity > 0.0, positive)?;
+        require("delta", p.stribeck_exponent, p.stribeck_exponent > 0.0, positive)
     }
 }
 
@@ -122,11 +102,7 @@ pub(crate) fn require(
     holds: bool,
     rule: &'static str,
 ) -> Result<(), Refusal> {
-    if holds && value.is_finite() {
-        Ok(())
-    } else {
-        Err(Refusal { name, value, rule })
-    }
+    if holds && value.is_finite() { Ok(()) } else { Err(Refusal { name, value, rule }) }
 }
 
 #[cfg(test)]
@@ -188,10 +164,7 @@ mod tests {
 
     #[test]
     fn a_refusal_says_name_value_and_rule() {
-        let parameters = Parameters {
-            stribeck_velocity: -0.5,
-            ..Parameters::default()
-        };
+        let parameters = Parameters { stribeck_velocity: -0.5, ..Parameters::default() };
         let message = parameters.check().unwrap_err().to_string();
         assert_eq!(message, "v_s = -0.5: must be finite and > 0");
     }

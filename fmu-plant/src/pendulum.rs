@@ -34,12 +34,7 @@ pub(crate) struct FrictionPendulum {
 /// The force that `u` and `f_a` exert together, as a function of the time since `start`.
 fn force(model: &FrictionPendulum, start: f64) -> Force {
     let [slope, curvature] = model.u_derivatives;
-    Force {
-        value: model.u + model.f_a,
-        slope,
-        curvature,
-        start,
-    }
+    Force { value: model.u + model.f_a, slope, curvature, start }
 }
 
 fn refused(refusal: &Refusal) -> Failure {
@@ -62,63 +57,31 @@ impl FrictionPendulum {
 }
 
 /// A Real parameter: its name, meaning, unit and place.
-type Place = (
-    &'static str,
-    &'static str,
-    &'static str,
-    fn(&mut FrictionPendulum) -> &mut f64,
-);
+type Place = (&'static str, &'static str, &'static str, fn(&mut FrictionPendulum) -> &mut f64);
 
 const FIXED: [Place; 7] = [
-    ("M", "Mass of the cart", "kg", |model| {
-        &mut model.parameters.cart_mass
+    ("M", "Mass of the cart", "kg", |model| &mut model.parameters.cart_mass),
+    ("m", "Mass of the pendulum", "kg", |model| &mut model.parameters.pendulum_mass),
+    ("J", "Moment of inertia about the pivot", "kg.m2", |model| &mut model.parameters.inertia),
+    ("l", "Distance from pivot to centre of mass", "m", |model| &mut model.parameters.length),
+    ("F_x", "Viscous damping of the cart", "kg/s", |model| &mut model.parameters.cart_damping),
+    ("F_theta", "Viscous damping of the pivot", "kg.m2/s", |model| {
+        &mut model.parameters.pendulum_damping
     }),
-    ("m", "Mass of the pendulum", "kg", |model| {
-        &mut model.parameters.pendulum_mass
-    }),
-    ("J", "Moment of inertia about the pivot", "kg.m2", |model| {
-        &mut model.parameters.inertia
-    }),
-    ("l", "Distance from pivot to centre of mass", "m", |model| {
-        &mut model.parameters.length
-    }),
-    ("F_x", "Viscous damping of the cart", "kg/s", |model| {
-        &mut model.parameters.cart_damping
-    }),
-    (
-        "F_theta",
-        "Viscous damping of the pivot",
-        "kg.m2/s",
-        |model| &mut model.parameters.pendulum_damping,
-    ),
-    ("g", "Gravity", "m/s2", |model| {
-        &mut model.parameters.gravity
-    }),
+    ("g", "Gravity", "m/s2", |model| &mut model.parameters.gravity),
 ];
 
 const TUNABLE: [Place; 4] = [
-    ("F_c", "Coulomb friction", "N", |model| {
-        &mut model.parameters.coulomb
-    }),
-    ("F_s", "Static friction", "N", |model| {
-        &mut model.parameters.static_friction
-    }),
-    ("v_s", "Stribeck velocity", "m/s", |model| {
-        &mut model.parameters.stribeck_velocity
-    }),
-    ("delta", "Stribeck exponent", "1", |model| {
-        &mut model.parameters.stribeck_exponent
-    }),
+    ("F_c", "Coulomb friction", "N", |model| &mut model.parameters.coulomb),
+    ("F_s", "Static friction", "N", |model| &mut model.parameters.static_friction),
+    ("v_s", "Stribeck velocity", "m/s", |model| &mut model.parameters.stribeck_velocity),
+    ("delta", "Stribeck exponent", "1", |model| &mut model.parameters.stribeck_exponent),
 ];
 
 /// Name, meaning and unit of the four states.
 const STATES: [(&str, &str, &str); 4] = [
     ("x_p", "Position of the cart", "m"),
-    (
-        "theta",
-        "Angle of the pendulum from the upright position",
-        "rad",
-    ),
+    ("theta", "Angle of the pendulum from the upright position", "rad"),
     ("v_p", "Velocity of the cart", "m/s"),
     ("omega", "Angular velocity of the pendulum", "rad/s"),
 ];
@@ -181,18 +144,14 @@ impl Model for FrictionPendulum {
 
     fn variables(&self) -> Vec<Variable<Self>> {
         let mut all = vec![
-            Variable::real("u", "Actuator force on the cart", |model: &mut Self| {
-                &mut model.u
-            })
-            .input()
-            .unit("N")
-            .derivative(|model| &mut model.u_derivatives[0])
-            .derivative(|model| &mut model.u_derivatives[1]),
-            Variable::real("f_a", "Additive actuator fault", |model: &mut Self| {
-                &mut model.f_a
-            })
-            .input()
-            .unit("N"),
+            Variable::real("u", "Actuator force on the cart", |model: &mut Self| &mut model.u)
+                .input()
+                .unit("N")
+                .derivative(|model| &mut model.u_derivatives[0])
+                .derivative(|model| &mut model.u_derivatives[1]),
+            Variable::real("f_a", "Additive actuator fault", |model: &mut Self| &mut model.f_a)
+                .input()
+                .unit("N"),
         ];
         for (k, (name, text, unit)) in STATES.into_iter().enumerate() {
             let start = format!("{name}_0");
@@ -205,19 +164,15 @@ impl Model for FrictionPendulum {
             );
         }
         all.push(
-            Variable::real(
-                "f_fric",
-                "Friction force on the cart",
-                |model: &mut Self| &mut model.f_fric,
-            )
+            Variable::real("f_fric", "Friction force on the cart", |model: &mut Self| {
+                &mut model.f_fric
+            })
             .output(&["u", "f_a"])
             .unit("N")
             .initially(INITIALLY),
         );
         let text = "Sliding backward (-1), sticking (0), sliding forward (1)";
-        all.push(Variable::integer("regime", text, |model: &mut Self| {
-            &mut model.regime
-        }));
+        all.push(Variable::integer("regime", text, |model: &mut Self| &mut model.regime));
         for (name, text, unit, place) in FIXED {
             all.push(Variable::real(name, text, place).unit(unit).parameter());
         }
@@ -265,21 +220,10 @@ impl Model for FrictionPendulum {
         let Some(motion) = &mut self.motion else {
             return Err(Failure::Error("the model is not initialised".to_owned()));
         };
-        let done = motion.advance(
-            &self.parameters,
-            &force,
-            step.start,
-            step.size,
-            &self.tolerance,
-        );
-        let reached = done
-            .as_ref()
-            .map_or_else(crate::motion::Failure::time, |()| step.end());
+        let done = motion.advance(&self.parameters, &force, step.start, step.size, &self.tolerance);
+        let reached = done.as_ref().map_or_else(crate::motion::Failure::time, |()| step.end());
         self.show(force.at(reached));
-        done.map_err(|failure| Failure::Incomplete {
-            time: reached,
-            message: failure.to_string(),
-        })
+        done.map_err(|failure| Failure::Incomplete { time: reached, message: failure.to_string() })
     }
 
     fn update(&mut self) {

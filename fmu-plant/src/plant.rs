@@ -24,11 +24,7 @@ pub(crate) struct Crossing {
 
 impl Plant {
     pub(crate) fn new(parameters: &Parameters, force: Force) -> Self {
-        Self {
-            body: RigidBody::new(parameters),
-            law: StribeckLaw::new(parameters),
-            force,
-        }
+        Self { body: RigidBody::new(parameters), law: StribeckLaw::new(parameters), force }
     }
 
     #[inline]
@@ -55,8 +51,7 @@ impl Plant {
         } else if velocity < 0.0 {
             Regime::Backward
         } else {
-            self.law
-                .regime_at_rest(self.balancing_force(elapsed, state))
+            self.law.regime_at_rest(self.balancing_force(elapsed, state))
         }
     }
 
@@ -103,10 +98,7 @@ impl Plant {
         }
         let crossing = |direction: Regime| {
             let margin = balancing.affine(self.law.limit(), -direction.sign());
-            margin.first_negative().map(|fraction| Crossing {
-                fraction,
-                direction,
-            })
+            margin.first_negative().map(|fraction| Crossing { fraction, direction })
         };
         let (forward, backward) = (crossing(Regime::Forward), crossing(Regime::Backward));
         Ok(match (forward, backward) {
@@ -140,8 +132,5 @@ fn first_stop(direction: Regime, step: &Step) -> Result<Option<Crossing>, NotFin
         return Err(NotFinite);
     }
     let margin = velocity.affine(0.0, direction.sign());
-    Ok(margin.first_negative().map(|fraction| Crossing {
-        fraction,
-        direction,
-    }))
+    Ok(margin.first_negative().map(|fraction| Crossing { fraction, direction }))
 }

@@ -12,9 +12,9 @@ use std::ffi::CString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
-use fmi::fmi2::import::Fmi2Import;
-use fmi::fmi2::instance::{CoSimulation as _, Common as _, InstanceCS};
 use fmi::fmi2::Fmi2Error;
+use fmi::fmi2::import::Fmi2Import;
+use fmi::fmi2::instance::{CoSimulation as _, Common, InstanceCS};
 use fmi2::Experiment;
 use fmi2::abi::Status;
 use fmi2::description::ModelDescription;
@@ -130,15 +130,15 @@ impl Slave for FmiSlave {
     }
 
     fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
-        self.call("fmi2EnterInitializationMode", |instance| instance.enter_initialization_mode())
+        self.call("fmi2EnterInitializationMode", Common::enter_initialization_mode)
     }
 
     fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
-        self.call("fmi2ExitInitializationMode", |instance| instance.exit_initialization_mode())
+        self.call("fmi2ExitInitializationMode", Common::exit_initialization_mode)
     }
 
     fn terminate(&mut self) -> Result<(), CallError> {
-        self.call("fmi2Terminate", |instance| instance.terminate())
+        self.call("fmi2Terminate", Common::terminate)
     }
 
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {

@@ -16,7 +16,7 @@ use crate::slave::{CallError, Slave};
 pub enum FmuError {
     /// The archive or its model description.
     #[error(transparent)]
-    Package(#[from] PackageError),
+    Package(Box<PackageError>),
     /// The place it was unpacked to cannot be written as a URI.
     #[error(transparent)]
     Location(#[from] LocationError),
@@ -37,6 +37,12 @@ pub enum FmuError {
         /// `generationTool`, or a word for it.
         tool: String,
     },
+}
+
+impl From<PackageError> for FmuError {
+    fn from(error: PackageError) -> Self {
+        FmuError::Package(Box::new(error))
+    }
 }
 
 /// An opened FMU: unpacked for as long as it or an instance of it lives.

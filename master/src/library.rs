@@ -182,12 +182,11 @@ pub fn describe(path: &Path, resources: &Path) -> Result<String, LoadError> {
             (*context.cast::<Vec<u8>>()).extend_from_slice(text);
         }
     }
-    let handle = load(path)?;
     type Describe = unsafe extern "C" fn(*const c_char, *mut c_void, DescribeSink) -> c_int;
+    let handle = load(path)?;
     // SAFETY: `fmi2::export!` gives this name this signature.
-    let describe = unsafe { handle.get::<Describe>(DESCRIBE.as_bytes()) }.map_err(|_| {
-        LoadError::Missing { path: path.to_owned(), function: DESCRIBE.to_owned() }
-    })?;
+    let describe = unsafe { handle.get::<Describe>(DESCRIBE.as_bytes()) }
+        .map_err(|_| LoadError::Missing { path: path.to_owned(), function: DESCRIBE.to_owned() })?;
     let folder = c_string(&resources.display().to_string());
     let mut text = Vec::<u8>::new();
     // SAFETY: a terminated path, and a sink that fits its context.
@@ -217,7 +216,8 @@ impl Library {
         let handle = load(path)?;
         let functions = Functions::load(&handle, path)?;
         // SAFETY: takes no argument and returns a static string.
-        let version = unsafe { (functions.get_version)().as_ref().map(|text| CStr::from_ptr(text)) };
+        let version =
+            unsafe { (functions.get_version)().as_ref().map(|text| CStr::from_ptr(text)) };
         let found = version.map(CStr::to_string_lossy).unwrap_or_default();
         if found != "2.0" {
             let found = found.into_owned();
@@ -357,7 +357,12 @@ impl Component {
         // SAFETY: the instance is alive; one reference, one terminated string.
         let status = unsafe {
             let pointer = value.as_ptr();
-            (self.library.functions.set_string)(self.pointer, &raw const reference, 1, &raw const pointer)
+            (self.library.functions.set_string)(
+                self.pointer,
+                &raw const reference,
+                1,
+                &raw const pointer,
+            )
         };
         self.check("fmi2SetString", status)
     }
@@ -383,7 +388,13 @@ impl Component {
         let function = self.library.functions.get_real_output_derivatives;
         // SAFETY: the instance is alive; the arrays have `from.len()` elements.
         let status = unsafe {
-            function(self.pointer, from.as_ptr(), from.len(), self.ones.as_ptr(), slopes.as_mut_ptr())
+            function(
+                self.pointer,
+                from.as_ptr(),
+                from.len(),
+                self.ones.as_ptr(),
+                slopes.as_mut_ptr(),
+            )
         };
         self.check("fmi2GetRealOutputDerivatives", status)
     }

@@ -93,7 +93,18 @@ impl Simulation {
         for slave in 0..stepped.len() {
             exchange.read(&mut system, slave, method.course(), start)?;
         }
-        Ok(Self { system, method, exchange, order, start, stop, step, count: 0, time: start, stepped })
+        Ok(Self {
+            system,
+            method,
+            exchange,
+            order,
+            start,
+            stop,
+            step,
+            count: 0,
+            time: start,
+            stepped,
+        })
     }
 
     /// Time reached in s: start + k H, the last step ending at the stop time.

@@ -54,8 +54,11 @@ pub trait Slave {
     fn set_input_slopes(&mut self, references: &[u32], slopes: &[f64]) -> Result<(), CallError>;
 
     /// `fmi2GetRealOutputDerivatives`, all of first order.
-    fn get_output_slopes(&mut self, references: &[u32], slopes: &mut [f64])
-    -> Result<(), CallError>;
+    fn get_output_slopes(
+        &mut self,
+        references: &[u32],
+        slopes: &mut [f64],
+    ) -> Result<(), CallError>;
 
     /// `fmi2DoStep` from `time` over `size`, both in s.
     fn do_step(&mut self, time: f64, size: f64) -> Result<(), CallError>;

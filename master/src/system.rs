@@ -232,11 +232,8 @@ fn unknown(name: &str, variable: &str, description: &ModelDescription) -> System
         })
         .take(5)
         .collect();
-    let nearest = if similar.is_empty() {
-        String::new()
-    } else {
-        format!(", it has {}", similar.join(", "))
-    };
+    let nearest =
+        if similar.is_empty() { String::new() } else { format!(", it has {}", similar.join(", ")) };
     SystemError::UnknownVariable {
         name: name.to_owned(),
         model: description.model_name.clone(),

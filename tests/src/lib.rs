@@ -27,6 +27,7 @@ pub fn command() -> &'static Path {
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
         let status = Command::new(cargo)
             .current_dir(root())
+            .env_remove("CARGO_TARGET_DIR")
             .args(["build", "--release", "--package", "aso-ftc", "--locked"])
             .status();
         assert!(status.is_ok_and(|status| status.success()), "aso-ftc cannot be built");
@@ -117,8 +118,7 @@ impl Table {
     pub fn read(path: &Path) -> Self {
         let text = std::fs::read_to_string(path)
             .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-        let mut reader =
-            csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(text.as_bytes());
+        let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(text.as_bytes());
         let names = reader.headers().map(|names| names.iter().map(str::to_owned).collect());
         let numbers = |record: Result<csv::StringRecord, csv::Error>| {
             let record = record.unwrap_or_else(|error| panic!("{error}"));

@@ -114,8 +114,7 @@ fn gauss_seidel_with_held_inputs_is_of_first_order() {
 /// Half of peak to peak of `x_p` and theta and rms of `f_fric` - `f_hat` from 60 to 100 s.
 fn residual(step: f64) -> [f64; 3] {
     let names = ["plant.x_p", "plant.theta", "plant.f_fric", "controller.f_hat"];
-    let (mut simulation, mut probe) =
-        simulation(closed_loop(&[]), Method::default(), step, &names);
+    let (mut simulation, mut probe) = simulation(closed_loop(&[]), Method::default(), step, &names);
     let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     let (mut squares, mut count) = (0.0, 0.0);
     let mut values = [0.0; 4];

@@ -114,9 +114,8 @@ fn no_function_is_longer_than_50_lines() {
         let text = fs::read_to_string(&file).unwrap();
         for (function, length) in functions(&text) {
             let path = name(&file);
-            let excused = LONG_FUNCTIONS
-                .iter()
-                .any(|(known, name, _)| *known == path && *name == function);
+            let excused =
+                LONG_FUNCTIONS.iter().any(|(known, name, _)| *known == path && *name == function);
             let limit = MAX_FUNCTION;
             assert!(length <= limit || excused, "{path}: {function} has {length} lines");
         }

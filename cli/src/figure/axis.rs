@@ -29,12 +29,7 @@ impl Axis {
         } else {
             1.0
         };
-        Self {
-            low: low - widening,
-            high: high + widening,
-            pixels,
-            ticks,
-        }
+        Self { low: low - widening, high: high + widening, pixels, ticks }
     }
 
     /// An axis with some air around finite values, up to a cap of their magnitude.
@@ -51,11 +46,7 @@ impl Axis {
         });
         let tight = Self::exact(ends, pixels, ticks);
         let air = 0.06 * (tight.high - tight.low);
-        Self {
-            low: tight.low - air,
-            high: tight.high + air,
-            ..tight
-        }
+        Self { low: tight.low - air, high: tight.high + air, ..tight }
     }
 
     pub(super) fn range(&self) -> (f64, f64) {
@@ -86,12 +77,7 @@ impl Axis {
             .map(|count| count * step)
             .take_while(|value| *value <= self.high + 1e-9 * span)
             .take(2 * usize::from(self.ticks))
-            .map(|value| {
-                (
-                    value,
-                    label(value, step, self.low.abs().max(self.high.abs())),
-                )
-            })
+            .map(|value| (value, label(value, step, self.low.abs().max(self.high.abs()))))
             .collect()
     }
 }
@@ -99,9 +85,7 @@ impl Axis {
 /// The nearest of 1, 2, 5 times a power of ten, above or at `wanted`.
 fn round_step(wanted: f64) -> f64 {
     let power = 10_f64.powf(wanted.log10().floor());
-    let factor = [1.0, 2.0, 5.0]
-        .into_iter()
-        .find(|factor| factor * power >= 0.999 * wanted);
+    let factor = [1.0, 2.0, 5.0].into_iter().find(|factor| factor * power >= 0.999 * wanted);
     factor.unwrap_or(10.0) * power
 }
 
@@ -143,23 +127,12 @@ mod tests {
             let ticks = axis.ticks();
             assert!((2..=8).contains(&ticks.len()), "{low} to {high}: {ticks:?}");
             let step = ticks[1].0 - ticks[0].0;
-            let mantissa: f64 = format!("{step:.3e}")
-                .split('e')
-                .next()
-                .unwrap()
-                .parse()
-                .unwrap();
-            assert!(
-                [1.0, 2.0, 5.0].contains(&mantissa),
-                "{low} to {high}: step {step}"
-            );
+            let mantissa: f64 = format!("{step:.3e}").split('e').next().unwrap().parse().unwrap();
+            assert!([1.0, 2.0, 5.0].contains(&mantissa), "{low} to {high}: step {step}");
             for (value, label) in &ticks {
                 assert!(axis.contains(*value) || (value - low).abs() < 1e-6 * step);
                 let read: f64 = label.replace('\u{2212}', "-").parse().unwrap();
-                assert!(
-                    (read - value).abs() <= 1e-3 * step,
-                    "{label} stands at {value}"
-                );
+                assert!((read - value).abs() <= 1e-3 * step, "{label} stands at {value}");
             }
         }
     }
@@ -170,10 +143,7 @@ mod tests {
             let axis = Axis::exact((low, high), (0.0, 1.0), 5);
             axis.ticks().into_iter().map(|(_, label)| label).collect()
         };
-        assert_eq!(
-            labels(-0.2, 0.2),
-            ["\u{2212}0.2", "\u{2212}0.1", "0", "0.1", "0.2"]
-        );
+        assert_eq!(labels(-0.2, 0.2), ["\u{2212}0.2", "\u{2212}0.1", "0", "0.1", "0.2"]);
         assert_eq!(labels(0.0, 100.0), ["0", "20", "40", "60", "80", "100"]);
     }
 
@@ -182,10 +152,7 @@ mod tests {
         let values = [0.5, -1e300, 0.2];
         let axis = Axis::around(values.into_iter(), Some(2.0), (0.0, 1.0), 5);
         let (low, high) = axis.range();
-        assert!(
-            (-2.5..-2.0).contains(&low) && (0.5..1.0).contains(&high),
-            "{low} {high}"
-        );
+        assert!((-2.5..-2.0).contains(&low) && (0.5..1.0).contains(&high), "{low} {high}");
         assert!(!axis.contains(-1e300));
     }
 }

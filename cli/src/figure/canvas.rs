@@ -53,10 +53,7 @@ impl Canvas {
             format!("<title>{}</title>", escape(title)),
             format!(r##"<rect width="{width}" height="{height}" fill="#ffffff"/>"##),
         ];
-        Self {
-            elements,
-            windows: 0,
-        }
+        Self { elements, windows: 0 }
     }
 
     pub(super) fn finish(mut self) -> String {
@@ -159,22 +156,12 @@ pub(crate) fn rasterise(svg: &str) -> Result<Vec<u8>, FigureError> {
     // A font that is not known becomes the serif one.
     fonts.set_serif_family("DejaVu Sans");
     fonts.set_sans_serif_family("DejaVu Sans");
-    let options = Options {
-        fontdb: Arc::new(fonts),
-        ..Options::default()
-    };
+    let options = Options { fontdb: Arc::new(fonts), ..Options::default() };
     let tree = Tree::from_str(svg, &options).map_err(|reason| failed(&reason))?;
-    let size = tree
-        .size()
-        .to_int_size()
-        .scale_by(SCALE)
-        .ok_or_else(|| failed(&"the page has no area"))?;
+    let size =
+        tree.size().to_int_size().scale_by(SCALE).ok_or_else(|| failed(&"the page has no area"))?;
     let mut pixels =
         Pixmap::new(size.width(), size.height()).ok_or_else(|| failed(&"the page is too large"))?;
-    resvg::render(
-        &tree,
-        Transform::from_scale(SCALE, SCALE),
-        &mut pixels.as_mut(),
-    );
+    resvg::render(&tree, Transform::from_scale(SCALE, SCALE), &mut pixels.as_mut());
     pixels.encode_png().map_err(|reason| failed(&reason))
 }

@@ -7,42 +7,25 @@ const TIME: [f64; 4] = [0.0, 1.0, 2.0, 3.0];
 const VALUES: [f64; 4] = [0.5, -1.5, f64::NAN, 1.0];
 
 fn curve<'a>(label: &'a str, time: &'a [f64], values: &'a [f64]) -> Series<'a> {
-    Series {
-        label,
-        time,
-        values,
-        ink: Ink::Blue,
-        broad: false,
-    }
+    Series { label, time, values, ink: Ink::Blue, broad: false }
 }
 
 fn example<'a>(time: &'a [f64], values: &'a [f64]) -> Figure<'a> {
     let panel = || Panel {
         x_label: "time in s",
         y_label: "x_p in m",
-        series: vec![
-            curve("a < b & c", time, values),
-            curve("second", time, values),
-        ],
+        series: vec![curve("a < b & c", time, values), curve("second", time, values)],
         marks: vec![(1.5, "switched on"), (99.0, "never reached")],
         limit: Some((1.0, "claim")),
         ..Panel::default()
     };
-    Figure {
-        title: "Motion of the \"cart\" <2>",
-        panels: vec![panel(), panel()],
-    }
+    Figure { title: "Motion of the \"cart\" <2>", panels: vec![panel(), panel()] }
 }
 
 fn texts(svg: &str) -> Vec<String> {
     let document = Document::parse(svg).expect("well-formed XML");
-    let texts = document
-        .descendants()
-        .filter(|node| node.has_tag_name("text"));
-    texts
-        .filter_map(|node| node.text())
-        .map(str::to_owned)
-        .collect()
+    let texts = document.descendants().filter(|node| node.has_tag_name("text"));
+    texts.filter_map(|node| node.text()).map(str::to_owned).collect()
 }
 
 #[test]
@@ -51,22 +34,12 @@ fn the_svg_is_well_formed_and_says_title_axes_units_legend_and_marks() {
     let texts = texts(&svg);
     let count = |wanted: &str| texts.iter().filter(|text| *text == wanted).count();
     assert_eq!(count("Motion of the \"cart\" <2>"), 1);
-    for twice in [
-        "time in s",
-        "x_p in m",
-        "a < b & c",
-        "second",
-        "switched on",
-        "claim",
-    ] {
+    for twice in ["time in s", "x_p in m", "a < b & c", "second", "switched on", "claim"] {
         assert_eq!(count(twice), 2, "{twice} in {texts:?}");
     }
     assert_eq!(count("never reached"), 0);
     let document = Document::parse(&svg).unwrap();
-    let paths = document
-        .descendants()
-        .filter(|node| node.has_tag_name("path"))
-        .count();
+    let paths = document.descendants().filter(|node| node.has_tag_name("path")).count();
     assert_eq!(paths, 4);
 }
 
@@ -87,18 +60,8 @@ fn value_labels_stay_on_the_page_and_do_not_touch() {
         .map(|node| node.attribute("y").unwrap().parse().unwrap())
         .collect();
     heights.sort_by(f64::total_cmp);
-    assert!(
-        heights
-            .windows(2)
-            .all(|pair| pair[1] - pair[0] >= TEXT_SIZE),
-        "{heights:?}"
-    );
-    let page = document
-        .root_element()
-        .attribute("height")
-        .unwrap()
-        .parse::<f64>()
-        .unwrap();
+    assert!(heights.windows(2).all(|pair| pair[1] - pair[0] >= TEXT_SIZE), "{heights:?}");
+    let page = document.root_element().attribute("height").unwrap().parse::<f64>().unwrap();
     assert!(heights.iter().all(|height| (0.0..page).contains(height)));
 }
 
@@ -119,11 +82,7 @@ fn the_files_are_an_svg_and_a_png_of_2000_pixels_the_same_bytes_twice() {
     let panel = LEGEND_HEIGHT + PLOT_HEIGHT + TICK_HEIGHT + LABEL_HEIGHT + GAP;
     assert_eq!(pixels.width(), 2000);
     assert!((f64::from(pixels.height()) - 2.0 * (TITLE_HEIGHT + panel)).abs() < 0.5);
-    assert_eq!(
-        fs::read_dir(folder.path().join("new")).unwrap().count(),
-        4,
-        "no partial file"
-    );
+    assert_eq!(fs::read_dir(folder.path().join("new")).unwrap().count(), 4, "no partial file");
 }
 
 #[test]
@@ -133,9 +92,7 @@ fn the_png_shows_curve_and_title_on_white() {
     let pixels = Pixmap::decode_png(&rasterise(&figure.svg().unwrap()).unwrap()).unwrap();
     let count = |rows: std::ops::Range<usize>, wanted: [u8; 3]| {
         let part = &pixels.pixels()[2000 * rows.start..2000 * rows.end];
-        part.iter()
-            .filter(|pixel| [pixel.red(), pixel.green(), pixel.blue()] == wanted)
-            .count()
+        part.iter().filter(|pixel| [pixel.red(), pixel.green(), pixel.blue()] == wanted).count()
     };
     let (title, all) = (0..80, 0..pixels.pixels().len() / 2000);
     assert!(pixels.pixels().iter().all(|pixel| pixel.alpha() == 255));
@@ -154,11 +111,7 @@ fn a_font_that_is_not_linked_in_is_replaced() {
     };
     let seen = |text: &str| {
         let pixels = Pixmap::decode_png(&rasterise(&svg(text)).unwrap()).unwrap();
-        pixels
-            .pixels()
-            .iter()
-            .filter(|pixel| pixel.alpha() > 128)
-            .count()
+        pixels.pixels().iter().filter(|pixel| pixel.alpha() > 128).count()
     };
     assert_eq!(seen(""), 0);
     assert!(seen("theta θ") > 100);
@@ -166,10 +119,7 @@ fn a_font_that_is_not_linked_in_is_replaced() {
 
 #[test]
 fn what_is_not_an_svg_is_refused() {
-    assert!(matches!(
-        rasterise("no drawing"),
-        Err(FigureError::Pixels(_))
-    ));
+    assert!(matches!(rasterise("no drawing"), Err(FigureError::Pixels(_))));
 }
 
 #[test]
@@ -194,19 +144,9 @@ fn a_curve_beyond_the_cap_leaves_the_frame_and_the_legend_says_so() {
 
 #[test]
 fn nothing_to_draw_is_said_in_the_panel() {
-    for (time, values) in [
-        (&[][..], &[][..]),
-        (&TIME, &[f64::NAN; 4]),
-        (&[f64::NAN; 4], &TIME),
-    ] {
+    for (time, values) in [(&[][..], &[][..]), (&TIME, &[f64::NAN; 4]), (&[f64::NAN; 4], &TIME)] {
         let texts = texts(&example(time, values).svg().unwrap());
-        assert_eq!(
-            texts
-                .iter()
-                .filter(|text| *text == "no finite data")
-                .count(),
-            2
-        );
+        assert_eq!(texts.iter().filter(|text| *text == "no finite data").count(), 2);
     }
 }
 
@@ -221,12 +161,7 @@ fn a_file_that_cannot_be_written_is_named_and_leaves_nothing_behind() {
     let folder = tempfile::tempdir().unwrap();
     let taken = folder.path().join("plot.svg");
     fs::create_dir(&taken).unwrap();
-    let error = example(&TIME, &VALUES)
-        .write(&folder.path().join("plot"))
-        .unwrap_err();
-    assert!(
-        error.to_string().contains(&taken.display().to_string()),
-        "{error}"
-    );
+    let error = example(&TIME, &VALUES).write(&folder.path().join("plot")).unwrap_err();
+    assert!(error.to_string().contains(&taken.display().to_string()), "{error}");
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }

@@ -20,11 +20,7 @@ pub(super) fn path(time: &[f64], values: &[f64], horizontal: &Axis, vertical: &A
 }
 
 fn finite_place(axis: &Axis, value: f64) -> f64 {
-    if value.is_finite() {
-        axis.place(value)
-    } else {
-        f64::NAN
-    }
+    if value.is_finite() { axis.place(value) } else { f64::NAN }
 }
 
 /// The points that remain of an unbroken run.
@@ -57,27 +53,16 @@ mod tests {
     use super::*;
 
     fn axes() -> (Axis, Axis) {
-        (
-            Axis::exact((0.0, 100.0), (0.0, 900.0), 10),
-            Axis::exact((-10.0, 10.0), (200.0, 0.0), 5),
-        )
+        (Axis::exact((0.0, 100.0), (0.0, 900.0), 10), Axis::exact((-10.0, 10.0), (200.0, 0.0), 5))
     }
 
     fn points(path: &str) -> Vec<Vec<(f64, f64)>> {
         let numbers = |stroke: &str| -> Vec<f64> {
-            stroke
-                .split(' ')
-                .map(|number| number.parse().unwrap())
-                .collect()
+            stroke.split(' ').map(|number| number.parse().unwrap()).collect()
         };
         path.split('M')
             .skip(1)
-            .map(|stroke| {
-                numbers(stroke)
-                    .chunks(2)
-                    .map(|pair| (pair[0], pair[1]))
-                    .collect()
-            })
+            .map(|stroke| numbers(stroke).chunks(2).map(|pair| (pair[0], pair[1])).collect())
             .collect()
     }
 
@@ -96,9 +81,8 @@ mod tests {
         assert!(path.len() < 50_000, "{} bytes", path.len());
         for (index, height) in spikes {
             let (x, y) = (9.0 * time[index], 100.0 - 10.0 * height);
-            let seen = drawn
-                .iter()
-                .any(|point| (point.0 - x).abs() < 0.06 && (point.1 - y).abs() < 0.06);
+            let seen =
+                drawn.iter().any(|point| (point.0 - x).abs() < 0.06 && (point.1 - y).abs() < 0.06);
             assert!(seen, "spike {height} at {}", time[index]);
         }
         assert!(drawn.is_sorted_by(|a, b| a.0 <= b.0));
@@ -116,16 +100,10 @@ mod tests {
                 .fold(f64::INFINITY, |low, (_, y)| low.min(y))
         };
         for column in [0.0, 17.0, 450.0, 899.0] {
-            let mut all = time
-                .iter()
-                .zip(&values)
-                .map(|(t, v)| (9.0 * t, 100.0 - 10.0 * v));
+            let mut all = time.iter().zip(&values).map(|(t, v)| (9.0 * t, 100.0 - 10.0 * v));
             let expected = top(&mut all, column);
             let found = top(&mut drawn.iter().copied(), column);
-            assert!(
-                (found - expected).abs() < 0.5,
-                "column {column}: {found}, {expected}"
-            );
+            assert!((found - expected).abs() < 0.5, "column {column}: {found}, {expected}");
         }
     }
 
@@ -137,12 +115,7 @@ mod tests {
         let strokes = points(&path(&time, &values, &horizontal, &vertical));
         let shape: Vec<usize> = strokes.iter().map(Vec::len).collect();
         assert_eq!(shape, [3, 2, 2], "each stroke names its first point twice");
-        assert!(
-            strokes
-                .concat()
-                .iter()
-                .all(|point| (-200.0..=400.0).contains(&point.1))
-        );
+        assert!(strokes.concat().iter().all(|point| (-200.0..=400.0).contains(&point.1)));
     }
 
     #[test]

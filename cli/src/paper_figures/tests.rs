@@ -3,29 +3,17 @@ use std::fs;
 
 use super::*;
 
-const NAMES: [&str; 5] = [
-    "time",
-    "plant.x_p",
-    "plant.theta",
-    "plant.f_fric",
-    "controller.f_hat",
-];
+const NAMES: [&str; 5] = ["time", "plant.x_p", "plant.theta", "plant.f_fric", "controller.f_hat"];
 
 type Columns = BTreeMap<&'static str, Vec<f64>>;
 
 /// A square-wave limit cycle until 40 s, a thousandth of it afterwards.
 fn columns(end: f64) -> Columns {
-    let time: Vec<f64> = (0..=10_000)
-        .map(|i| f64::from(i) * 0.01)
-        .take_while(|time| *time <= end)
-        .collect();
+    let time: Vec<f64> =
+        (0..=10_000).map(|i| f64::from(i) * 0.01).take_while(|time| *time <= end).collect();
     let of_time = |law: &dyn Fn(f64) -> f64| time.iter().map(|time| law(*time)).collect();
     let wave = |time: f64| {
-        if time < 40.0 {
-            (0.25 * time).sin()
-        } else {
-            (5.0 * time).sin()
-        }
+        if time < 40.0 { (0.25 * time).sin() } else { (5.0 * time).sin() }
     };
     let size = |time: f64| if time < 40.0 { 1.0 } else { 3e-3 };
     let values: [Vec<f64>; 5] = [
@@ -34,11 +22,7 @@ fn columns(end: f64) -> Columns {
         of_time(&|time| 0.11 * size(time) * wave(time)),
         of_time(&|time| 30.0 * wave(time).signum()),
         of_time(&|time| {
-            if time < 40.0 {
-                0.0
-            } else {
-                30.0 * wave(time - 1e-3).signum()
-            }
+            if time < 40.0 { 0.0 } else { 30.0 * wave(time - 1e-3).signum() }
         }),
     ];
     NAMES.into_iter().zip(values).collect()
@@ -57,12 +41,7 @@ fn panels(svg: &str) -> usize {
 fn both_figures_are_written_as_svg_and_png() {
     let columns = columns(100.0);
     let folder = tempfile::tempdir().unwrap();
-    write(
-        &|name| columns.get(name).map(Vec::as_slice),
-        40.0,
-        folder.path(),
-    )
-    .unwrap();
+    write(&|name| columns.get(name).map(Vec::as_slice), 40.0, folder.path()).unwrap();
     let written = ["figure5", "figure6"].map(|name| {
         assert!(folder.path().join(name).with_extension("png").is_file());
         fs::read_to_string(folder.path().join(name).with_extension("svg")).unwrap()
@@ -91,13 +70,7 @@ fn figure_5_shows_the_run_and_the_claims_after_compensation() {
 #[test]
 fn figure_6_shows_force_estimate_and_difference() {
     let [_, friction] = drawn(&columns(100.0)).unwrap();
-    for text in [
-        ">force in N<",
-        ">difference in N<",
-        ">f_fric<",
-        ">f_hat<",
-        ">f_fric − f_hat<",
-    ] {
+    for text in [">force in N<", ">difference in N<", ">f_fric<", ">f_hat<", ">f_fric − f_hat<"] {
         assert!(friction.contains(text), "{text}");
     }
     assert_eq!(panels(&friction), 3);
@@ -113,13 +86,7 @@ fn a_run_without_a_settled_part_is_drawn_without_close_ups() {
         columns
     };
     let empty: Columns = NAMES.into_iter().map(|name| (name, Vec::new())).collect();
-    for columns in [
-        columns(30.0),
-        columns(40.0),
-        lost(1e300),
-        lost(-f64::MAX),
-        empty,
-    ] {
+    for columns in [columns(30.0), columns(40.0), lost(1e300), lost(-f64::MAX), empty] {
         let [motion, friction] = drawn(&columns).unwrap();
         assert_eq!((panels(&motion), panels(&friction)), (2, 2));
     }
@@ -137,10 +104,7 @@ fn a_lost_estimate_does_not_flatten_the_friction() {
     let mut columns = columns(100.0);
     columns.get_mut("controller.f_hat").unwrap()[9000] = -1e300;
     let [_, friction] = drawn(&columns).unwrap();
-    assert!(
-        friction.contains(">−100<"),
-        "the axis reaches four times the friction"
-    );
+    assert!(friction.contains(">−100<"), "the axis reaches four times the friction");
     assert!(friction.contains(">a curve leaves the frame<"));
 }
 
@@ -150,10 +114,7 @@ fn a_column_that_is_missing_is_named() {
         let mut columns = columns(10.0);
         columns.remove(name);
         let message = drawn(&columns).unwrap_err().to_string();
-        assert_eq!(
-            message,
-            format!("the results have no column {name:?}, which the figures need")
-        );
+        assert_eq!(message, format!("the results have no column {name:?}, which the figures need"));
     }
 }
 
@@ -162,8 +123,5 @@ fn a_column_of_another_length_is_named_with_both_lengths() {
     let mut columns = columns(10.0);
     columns.get_mut("plant.theta").unwrap().truncate(7);
     let message = drawn(&columns).unwrap_err().to_string();
-    assert_eq!(
-        message,
-        "column \"plant.theta\" has 7 values, column \"time\" has 1001"
-    );
+    assert_eq!(message, "column \"plant.theta\" has 7 values, column \"time\" has 1001");
 }

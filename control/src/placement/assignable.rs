@@ -95,11 +95,7 @@ fn null_spaces(
 ) -> Result<Vec<DMatrix<f64>>, Error> {
     let (n, r) = b.shape();
     let state_units: DVector<f64> = units.rows(0, n).into();
-    let both = DMatrix::from_fn(
-        n,
-        n + r,
-        |i, j| if j < n { a[(i, j)] } else { b[(i, j - n)] },
-    );
+    let both = DMatrix::from_fn(n, n + r, |i, j| if j < n { a[(i, j)] } else { b[(i, j - n)] });
     let scaled = divide_rows(&multiply_columns(&both, units), &state_units);
     let solve = |pole: &f64| {
         let mut shifted = scaled.clone();
@@ -116,14 +112,8 @@ fn row_sizes(solutions: &[DMatrix<f64>]) -> DVector<f64> {
     let (rows, _) = solutions[0].shape();
     let total: f64 = solutions.iter().map(DMatrix::norm_squared).sum();
     DVector::from_fn(rows, |row, _| {
-        let size: f64 = solutions
-            .iter()
-            .map(|solution| solution.row(row).norm_squared())
-            .sum();
-        #[expect(
-            clippy::cast_precision_loss,
-            reason = "a matrix order is far below 2^52"
-        )]
+        let size: f64 = solutions.iter().map(|solution| solution.row(row).norm_squared()).sum();
+        #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
         let factor = power_of_two((size * rows as f64 / total).sqrt());
         if factor.is_normal() { factor } else { 1.0 }
     })

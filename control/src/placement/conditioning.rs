@@ -21,15 +21,11 @@ pub(crate) fn best_directions(problem: &Assignable) -> Result<Vec<DVector<f64>>,
     for start in 0..starts {
         let directions = descend(problem, project(problem, spread(problem, start)));
         let value = condition(problem, &directions)?;
-        if best
-            .as_ref()
-            .is_none_or(|(least, _)| value < BETTER * least)
-        {
+        if best.as_ref().is_none_or(|(least, _)| value < BETTER * least) {
             best = Some((value, directions));
         }
     }
-    best.map(|(_, directions)| directions)
-        .ok_or(Error::Overflow { what: "K" })
+    best.map(|(_, directions)| directions).ok_or(Error::Overflow { what: "K" })
 }
 
 /// Condition number of the matrix of eigenvectors of length one, in the given coordinates.
@@ -48,11 +44,7 @@ fn spread(problem: &Assignable, start: usize) -> Vec<DVector<f64>> {
     let mut direction = |_| {
         let w = DVector::from_fn(inputs, |_, _| seed.next().unwrap_or(1.0));
         let length = w.norm();
-        if length > 0.0 {
-            w / length
-        } else {
-            DVector::from_element(inputs, 1.0).normalize()
-        }
+        if length > 0.0 { w / length } else { DVector::from_element(inputs, 1.0).normalize() }
     };
     (0..poles).map(&mut direction).collect()
 }

@@ -38,11 +38,7 @@ pub(crate) fn minimise(
     let Some((value, gradient)) = function(&start) else {
         return (start, f64::INFINITY);
     };
-    let mut here = Point {
-        at: start,
-        value,
-        gradient,
-    };
+    let mut here = Point { at: start, value, gradient };
     let mut inverse_hessian = DMatrix::identity(dimension, dimension);
     let mut mark = here.value;
     for iteration in 1..=ITERATIONS {
@@ -84,11 +80,7 @@ fn search(
         match function(&at) {
             Some((value, gradient)) if lowered(value, &gradient, length) => {
                 let flat_enough = direction.dot(&gradient) > FLATTER * slope;
-                lower = Some(Point {
-                    at,
-                    value,
-                    gradient,
-                });
+                lower = Some(Point { at, value, gradient });
                 if flat_enough {
                     break;
                 }
@@ -96,11 +88,7 @@ fn search(
             }
             _ => high = length,
         }
-        length = if high.is_finite() {
-            0.5 * (low + high)
-        } else {
-            2.0 * low
-        };
+        length = if high.is_finite() { 0.5 * (low + high) } else { 2.0 * low };
     }
     lower
 }

@@ -37,10 +37,7 @@ fn friction_on_the_cart_is_compensated_one_to_one() {
 /// 1]'.
 #[test]
 fn a_fault_beside_the_actuator_leaves_the_residual_of_the_projection() {
-    let plant = FaultyPlant {
-        f_a: matrix(4, 1, &[0., 0., 0., 1.]),
-        ..plant()
-    };
+    let plant = FaultyPlant { f_a: matrix(4, 1, &[0., 0., 0., 1.]), ..plant() };
     let design = design(&plant, &CONTROLLER_POLES, &OBSERVER_POLES, None).unwrap();
     let (b_3, b_4) = (plant.b[2], plant.b[3]);
     let sine = b_3 / b_3.hypot(b_4);
@@ -97,8 +94,7 @@ fn the_estimate_reaches_a_constant_fault_for_any_actuator_command() {
     let step = FirstOrderHold::new(&a, &b, 1e-3).unwrap();
     for _ in 0..50 {
         let mut next = [0.0; 9];
-        step.step_into(&x, &[command, fault], &[0.0; 2], &mut next)
-            .unwrap();
+        step.step_into(&x, &[command, fault], &[0.0; 2], &mut next).unwrap();
         x = next;
     }
     assert!((x[8] - fault).abs() < 1e-4 * fault, "{x:?}");
@@ -107,18 +103,9 @@ fn the_estimate_reaches_a_constant_fault_for_any_actuator_command() {
 /// Three faults, two measurements.
 #[test]
 fn more_faults_than_measurements_are_refused() {
-    let plant = FaultyPlant {
-        f_a: DMatrix::identity(4, 3),
-        ..plant()
-    };
+    let plant = FaultyPlant { f_a: DMatrix::identity(4, 3), ..plant() };
     let refused = plant.check_observer_exists();
-    assert_eq!(
-        refused,
-        Err(Error::TooManyFaults {
-            faults: 3,
-            measurements: 2
-        })
-    );
+    assert_eq!(refused, Err(Error::TooManyFaults { faults: 3, measurements: 2 }));
 }
 
 /// A constant error of the rate x' = v + f looks like another velocity when only x is measured.
@@ -131,21 +118,12 @@ fn a_fault_that_looks_like_a_state_is_refused() {
         f_a: matrix(2, 1, &[1., 0.]),
     };
     let refused = design(&plant, &[-1.0, -2.0], &[-3.0, -4.0, -5.0], None);
-    assert_eq!(
-        refused,
-        Err(Error::HiddenFault {
-            rank: 2,
-            expected: 3
-        })
-    );
+    assert_eq!(refused, Err(Error::HiddenFault { rank: 2, expected: 3 }));
 }
 
 #[test]
 fn an_unobservable_plant_is_refused() {
-    let plant = FaultyPlant {
-        c: matrix(1, 4, &[0., 0., 1., 0.]),
-        ..plant()
-    };
+    let plant = FaultyPlant { c: matrix(1, 4, &[0., 0., 1., 0.]), ..plant() };
     let refused = design(&plant, &CONTROLLER_POLES, &OBSERVER_POLES, None);
     assert_eq!(refused, Err(Error::NotObservable { rank: 3, n: 4 }));
 }
@@ -154,24 +132,15 @@ fn an_unobservable_plant_is_refused() {
 #[test]
 fn two_faults_with_three_measurements_are_designed() {
     let plant = FaultyPlant {
-        a: crate::integers(5, 5, |i, j| {
-            (7 * i * i + 3 * i * j + 5 * j + i * j * j) % 11 - 5
-        }),
+        a: crate::integers(5, 5, |i, j| (7 * i * i + 3 * i * j + 5 * j + i * j * j) % 11 - 5),
         b: crate::integers(5, 2, |i, j| (5 * i * i + 3 * j + 2 * i * j + i) % 7 - 3),
-        c: matrix(
-            3,
-            5,
-            &[1., 0., 0., 0., 0., 0., 1., 0., 0., 0., 0., 0., 1., 0., 0.],
-        ),
+        c: matrix(3, 5, &[1., 0., 0., 0., 0., 0., 1., 0., 0., 0., 0., 0., 1., 0., 0.]),
         f_a: crate::integers(5, 2, |i, j| (5 * i * i + 3 * j + 2 * i * j + i) % 7 - 3) * -0.5,
     };
     let observer_poles = [-10., -11., -12., -13., -14., -15., -16.];
     let design = design(&plant, &[-1., -2., -3., -4., -5.], &observer_poles, None).unwrap();
     let half = DMatrix::from_diagonal_element(2, 2, 0.5);
     assert!((&design.gains.k_f - half).amax() < 1e-13);
-    assert_eq!(
-        (design.gains.l_x.shape(), design.gains.l_f.shape()),
-        ((5, 3), (2, 3))
-    );
+    assert_eq!((design.gains.l_x.shape(), design.gains.l_f.shape()), ((5, 3), (2, 3)));
     assert!(design.observer.pole_error < 1e-9, "{:?}", design.observer);
 }

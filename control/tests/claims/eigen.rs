@@ -12,10 +12,7 @@ fn cyclic_permutations_have_the_roots_of_unity() {
         for k in 0..n {
             let root =
                 Complex::from_polar(1.0, std::f64::consts::TAU * f64::from(k) / f64::from(n));
-            let nearest = found
-                .iter()
-                .map(|x| (x - root).norm())
-                .fold(f64::INFINITY, f64::min);
+            let nearest = found.iter().map(|x| (x - root).norm()).fold(f64::INFINITY, f64::min);
             assert!(nearest < 1e-13, "n = {n}, {root}: {nearest:e}");
         }
     }

@@ -35,9 +35,8 @@ fn a_nilpotent_matrix_gives_its_finite_series() {
 
 #[test]
 fn the_exponential_of_the_negative_is_the_inverse() {
-    let a = crate::integers(6, 6, |i, j| {
-        (7 * i * i + 3 * i * j + 5 * j + i * j * j) % 11 - 5
-    }) * 0.2;
+    let a =
+        crate::integers(6, 6, |i, j| (7 * i * i + 3 * i * j + 5 * j + i * j * j) % 11 - 5) * 0.2;
     let product = exponential(&a).unwrap() * exponential(&-&a).unwrap();
     let error = (product - DMatrix::identity(6, 6)).amax();
     assert!(error < 1e-11, "{error:e}");

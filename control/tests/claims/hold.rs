@@ -37,20 +37,12 @@ fn assert_agrees(hold: &FirstOrderHold, expected: &DMatrix<f64>, allowed: f64) {
 
 #[test]
 fn the_controller_agrees_with_high_precision_at_a_picosecond() {
-    assert_agrees(
-        &controller(1e-12),
-        &matrix(5, 9, &CONTROLLER_PICOSECOND),
-        1e-15,
-    );
+    assert_agrees(&controller(1e-12), &matrix(5, 9, &CONTROLLER_PICOSECOND), 1e-15);
 }
 
 #[test]
 fn the_controller_agrees_with_high_precision_at_a_tenth_of_a_millisecond() {
-    assert_agrees(
-        &controller(1e-4),
-        &matrix(5, 9, &CONTROLLER_TENTH_MILLISECOND),
-        1e-14,
-    );
+    assert_agrees(&controller(1e-4), &matrix(5, 9, &CONTROLLER_TENTH_MILLISECOND), 1e-14);
 }
 
 /// A second is thousands of time constants.
@@ -78,21 +70,13 @@ fn two_half_steps_are_a_whole_one() {
 #[test]
 fn a_double_integrator_moves_by_powers_of_the_step() {
     let h = 0.25;
-    let hold = FirstOrderHold::new(
-        &matrix(2, 2, &[0., 1., 0., 0.]),
-        &matrix(2, 1, &[0., 1.]),
-        h,
-    );
+    let hold = FirstOrderHold::new(&matrix(2, 2, &[0., 1., 0., 0.]), &matrix(2, 1, &[0., 1.]), h);
     let hold = hold.unwrap();
     let mut out = [0.0; 2];
-    hold.step_into(&[1.0, 2.0], &[3.0], &[4.0], &mut out)
-        .unwrap();
+    hold.step_into(&[1.0, 2.0], &[3.0], &[4.0], &mut out).unwrap();
     let position = 1.0 + 2.0 * h + 3.0 * h * h / 2.0 + 4.0 * h * h * h / 6.0;
     let velocity = 2.0 + 3.0 * h + 4.0 * h * h / 2.0;
-    assert!(
-        (out[0] - position).abs() < 1e-15 && (out[1] - velocity).abs() < 1e-15,
-        "{out:?}"
-    );
+    assert!((out[0] - position).abs() < 1e-15 && (out[1] - velocity).abs() < 1e-15, "{out:?}");
 }
 
 /// x(t) = c + d t solves x' = A x + B w exactly when B w(t) = d - A c - A d t.
@@ -104,8 +88,7 @@ fn a_straight_solution_is_followed_exactly() {
     let (w0, w1) = (&d - &a * &c, -(&a * &d));
     let hold = FirstOrderHold::new(&a, &DMatrix::identity(4, 4), 0.7).unwrap();
     let mut out = [0.0; 4];
-    hold.step_into(c.as_slice(), w0.as_slice(), w1.as_slice(), &mut out)
-        .unwrap();
+    hold.step_into(c.as_slice(), w0.as_slice(), w1.as_slice(), &mut out).unwrap();
     let error = (matrix(4, 1, &out) - (&c + &d * 0.7)).amax();
     assert!(error < 1e-12 * hold.phi.amax().max(1.0), "{error:e}");
 }
@@ -115,13 +98,6 @@ fn a_wrong_length_is_refused_and_leaves_the_output_untouched() {
     let hold = controller(1e-3);
     let mut out = [7.0; 5];
     let wrong = hold.step_into(&[0.0; 5], &[0.0; 2], &[0.0; 3], &mut out);
-    assert_eq!(
-        wrong,
-        Err(Error::Shape {
-            matrix: "w1",
-            expected: (2, 1),
-            found: (3, 1)
-        })
-    );
+    assert_eq!(wrong, Err(Error::Shape { matrix: "w1", expected: (2, 1), found: (3, 1) }));
     assert_eq!(out.map(f64::to_bits), [7.0_f64.to_bits(); 5]);
 }

@@ -9,18 +9,14 @@ fn the_observer_of_the_pendulum_agrees_with_high_precision_in_every_entry() {
     let solution = lyapunov(&matrix(5, 5, &UNCOMPENSATED), &DMatrix::identity(5, 5)).unwrap();
     let error = entry_error(&solution.p, &matrix(5, 5, &LYAPUNOV));
     assert!(error < 1e-10, "{error:e}");
-    assert!(
-        solution.residual < 1e-14 && solution.defect < 1e-2,
-        "{solution:?}"
-    );
+    assert!(solution.residual < 1e-14 && solution.defect < 1e-2, "{solution:?}");
 }
 
 /// The definition once more, with other roundings: Q is made from a known P.
 #[test]
 fn a_known_solution_with_complex_eigenvalues_is_found() {
-    let a = integers(6, 6, |i, j| {
-        (7 * i * i + 3 * i * j + 5 * j + i * j * j) % 11 - 5
-    }) - DMatrix::from_diagonal_element(6, 6, 15.0);
+    let a = integers(6, 6, |i, j| (7 * i * i + 3 * i * j + 5 * j + i * j * j) % 11 - 5)
+        - DMatrix::from_diagonal_element(6, 6, 15.0);
     let root = integers(6, 6, |i, j| (i * j + 2 * i + j) % 5 - 2);
     let p = root.transpose() * &root;
     let q = -(a.transpose() * &p + &p * &a);
@@ -33,13 +29,7 @@ fn an_unstable_matrix_is_refused() {
     let a = matrix(2, 2, &[-1.0, 0.0, 0.0, 0.5]);
     let refused = lyapunov(&a, &DMatrix::identity(2, 2));
     assert!(
-        matches!(
-            refused,
-            Err(Error::NotHurwitz {
-                matrix: "A",
-                abscissa: 0.5
-            })
-        ),
+        matches!(refused, Err(Error::NotHurwitz { matrix: "A", abscissa: 0.5 })),
         "{refused:?}"
     );
 }
@@ -48,24 +38,14 @@ fn an_unstable_matrix_is_refused() {
 fn an_unsymmetric_right_side_is_refused() {
     let q = matrix(2, 2, &[1.0, 2.0, 3.0, 1.0]);
     let refused = lyapunov(&-DMatrix::identity(2, 2), &q);
-    assert_eq!(
-        refused,
-        Err(Error::NotSymmetric {
-            matrix: "Q",
-            row: 1,
-            col: 2
-        })
-    );
+    assert_eq!(refused, Err(Error::NotSymmetric { matrix: "Q", row: 1, col: 2 }));
 }
 
 #[test]
 fn the_smallest_eigenvalue_is_right_far_below_the_rounding_of_the_largest_entry() {
     let (least, largest) = definite_range(&matrix(5, 5, &LYAPUNOV)).unwrap();
     assert!((least / LYAPUNOV_RANGE.0 - 1.0).abs() < 1e-3, "{least:e}");
-    assert!(
-        (largest / LYAPUNOV_RANGE.1 - 1.0).abs() < 1e-13,
-        "{largest:e}"
-    );
+    assert!((largest / LYAPUNOV_RANGE.1 - 1.0).abs() < 1e-13, "{largest:e}");
 }
 
 #[test]

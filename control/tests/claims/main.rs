@@ -9,10 +9,7 @@ mod lyapunov;
 mod paper;
 mod placement;
 mod rank;
-#[expect(
-    clippy::unreadable_literal,
-    reason = "the digits as the other software wrote them"
-)]
+#[expect(clippy::unreadable_literal, reason = "the digits as the other software wrote them")]
 mod reference;
 mod refusals;
 mod theorem1;
@@ -28,11 +25,7 @@ fn matrix(rows: usize, cols: usize, entries: &[f64]) -> DMatrix<f64> {
 fn entry_error(found: &DMatrix<f64>, expected: &DMatrix<f64>) -> f64 {
     assert_eq!(found.shape(), expected.shape());
     let relative = |x: f64, y: f64| {
-        if (x - y).abs() > 0.0 {
-            (x - y).abs() / y.abs()
-        } else {
-            0.0
-        }
+        if (x - y).abs() > 0.0 { (x - y).abs() / y.abs() } else { 0.0 }
     };
     found.zip_map(expected, relative).amax()
 }

@@ -32,10 +32,7 @@ pub(crate) fn plant() -> FaultyPlant {
         [0., -ml * ml * g / d, -f_x * j / d, ml * f_theta / d],
         [0., total * ml * g / d, ml * f_x / d, -total * f_theta / d],
     ];
-    pendulum(
-        matrix(4, 4, &a.concat()),
-        matrix(4, 1, &[0., 0., j / d, -ml / d]),
-    )
+    pendulum(matrix(4, 4, &a.concat()), matrix(4, 1, &[0., 0., j / d, -ml / d]))
 }
 
 /// The printed L with the signs of L[3,2] and L[4,2] reversed, L = [`L_x`; -`L_f`].

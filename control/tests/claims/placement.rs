@@ -8,15 +8,10 @@ use nalgebra::DMatrix;
 fn assert_assigned(a: &DMatrix<f64>, b: &DMatrix<f64>, placement: &Placement, poles: &[f64]) {
     let mut wanted = poles.to_vec();
     wanted.sort_by(f64::total_cmp);
-    for (found, wanted) in eigenvalues(&(a + b * &placement.gain))
-        .expect("eigenvalues exist")
-        .iter()
-        .zip(wanted)
+    for (found, wanted) in
+        eigenvalues(&(a + b * &placement.gain)).expect("eigenvalues exist").iter().zip(wanted)
     {
-        assert!(
-            (found - wanted).norm() < 1e-6 * wanted.abs(),
-            "{found} {wanted}"
-        );
+        assert!((found - wanted).norm() < 1e-6 * wanted.abs(), "{found} {wanted}");
     }
 }
 
@@ -25,11 +20,7 @@ fn assert_assigned(a: &DMatrix<f64>, b: &DMatrix<f64>, placement: &Placement, po
 fn one_input_gives_the_published_gain() {
     let placement = place(&printed().a, &printed().b, &CONTROLLER_POLES).unwrap();
     let published = matrix(1, 4, &[184.10, 365.71, 123.66, 63.86]);
-    assert!(
-        (&placement.gain - published).amax() < 5.1e-3,
-        "{}",
-        placement.gain
-    );
+    assert!((&placement.gain - published).amax() < 5.1e-3, "{}", placement.gain);
 }
 
 /// `-place_poles(A, B, [-4.5, -6, -7.5, -9]).gain_matrix` of scipy 1.17.1, A and B from the
@@ -37,12 +28,7 @@ fn one_input_gives_the_published_gain() {
 #[test]
 fn one_input_gives_the_gain_of_scipy() {
     let placement = place(&plant().a, &plant().b, &CONTROLLER_POLES).unwrap();
-    let scipy = [
-        184.088_126_31,
-        365.721_398_02,
-        123.654_284_82,
-        63.865_665_69,
-    ];
+    let scipy = [184.088_126_31, 365.721_398_02, 123.654_284_82, 63.865_665_69];
     assert!(entry_error(&placement.gain, &matrix(1, 4, &scipy)) < 1e-9);
 }
 
@@ -55,11 +41,7 @@ fn the_observer_of_the_pendulum_is_better_conditioned_than_scipy_makes_it() {
     let a = plant.augmented_dynamics().transpose();
     let c = plant.augmented_output().transpose();
     let placement = place(&a, &c, &OBSERVER_POLES).unwrap();
-    assert!(
-        placement.quality.condition < 3.24746e7,
-        "{:?}",
-        placement.quality
-    );
+    assert!(placement.quality.condition < 3.24746e7, "{:?}", placement.quality);
     assert!((placement.quality.condition / 3.198_767e7 - 1.0).abs() < 1e-6);
     assert!(placement.quality.pole_error < 1e-9);
     assert_assigned(&a, &c, &placement, &OBSERVER_POLES);
@@ -77,11 +59,7 @@ fn the_chemical_reactor_is_at_least_as_well_conditioned_as_scipy_makes_it() {
     let b = matrix(4, 2, &[0.0, 0.0, 5.679, 0.0, 1.136, -3.146, 1.136, 0.0]);
     let poles = [-0.2, -0.5, -5.0566, -8.6659];
     let placement = place(&a, &b, &poles).unwrap();
-    assert!(
-        placement.quality.condition <= 4.272_162,
-        "{:?}",
-        placement.quality
-    );
+    assert!(placement.quality.condition <= 4.272_162, "{:?}", placement.quality);
     assert_assigned(&a, &b, &placement, &poles);
 }
 
@@ -89,26 +67,13 @@ fn the_chemical_reactor_is_at_least_as_well_conditioned_as_scipy_makes_it() {
 /// rtol 1e-14, for poles -1, ..., -n.
 #[test]
 fn several_inputs_are_at_least_as_well_conditioned_as_scipy_makes_them() {
-    let cases = [
-        (4, 2, 19.564_951),
-        (5, 3, 9.307_912),
-        (6, 2, 48.289_836),
-        (8, 3, 107.817_401),
-    ];
+    let cases = [(4, 2, 19.564_951), (5, 3, 9.307_912), (6, 2, 48.289_836), (8, 3, 107.817_401)];
     for (n, m, scipy) in cases {
-        let a = integers(n, n, |i, j| {
-            (7 * i * i + 3 * i * j + 5 * j + i * j * j) % 11 - 5
-        });
+        let a = integers(n, n, |i, j| (7 * i * i + 3 * i * j + 5 * j + i * j * j) % 11 - 5);
         let b = integers(n, m, |i, j| (5 * i * i + 3 * j + 2 * i * j + i) % 7 - 3);
-        let poles: Vec<f64> = (1..=n)
-            .map(|k| -f64::from(u8::try_from(k).unwrap()))
-            .collect();
+        let poles: Vec<f64> = (1..=n).map(|k| -f64::from(u8::try_from(k).unwrap())).collect();
         let placement = place(&a, &b, &poles).unwrap();
-        assert!(
-            placement.quality.condition <= scipy,
-            "{n}, {m}: {:?}",
-            placement.quality
-        );
+        assert!(placement.quality.condition <= scipy, "{n}, {m}: {:?}", placement.quality);
         assert_assigned(&a, &b, &placement, &poles);
     }
 }
@@ -119,30 +84,17 @@ fn as_many_inputs_as_states_give_orthogonal_eigenvectors() {
     let a = integers(3, 3, |i, j| (3 * i * i + 2 * i * j + j) % 7 - 3);
     let b = matrix(3, 3, &[1., 2., 0., 0., 1., 3., 1., 0., 1.]);
     let placement = place(&a, &b, &[-1.0, -2.0, -3.0]).unwrap();
-    assert!(
-        placement.quality.condition < 1.0 + 1e-7,
-        "{:?}",
-        placement.quality
-    );
+    assert!(placement.quality.condition < 1.0 + 1e-7, "{:?}", placement.quality);
 }
 
 #[test]
 fn an_eigenvalue_may_come_as_often_as_there_are_inputs() {
-    let a = integers(4, 4, |i, j| {
-        (7 * i * i + 3 * i * j + 5 * j + i * j * j) % 11 - 5
-    });
+    let a = integers(4, 4, |i, j| (7 * i * i + 3 * i * j + 5 * j + i * j * j) % 11 - 5);
     let b = integers(4, 2, |i, j| (5 * i * i + 3 * j + 2 * i * j + i) % 7 - 3);
     let poles = [-2.0, -1.0, -2.0, -1.0];
     assert_assigned(&a, &b, &place(&a, &b, &poles).unwrap(), &poles);
     let refused = place(&a, &b, &[-2.0, -1.0, -2.0, -2.0]);
-    assert_eq!(
-        refused,
-        Err(Error::RepeatedPole {
-            pole: -2.0,
-            times: 3,
-            inputs: 2
-        })
-    );
+    assert_eq!(refused, Err(Error::RepeatedPole { pole: -2.0, times: 3, inputs: 2 }));
 }
 
 /// Two equal motors share the work of one.

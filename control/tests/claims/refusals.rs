@@ -26,16 +26,8 @@ fn name_of<T: std::fmt::Debug>(result: Result<T, Error>) -> &'static str {
 fn an_entry_that_is_not_a_number_is_named_in_every_matrix() {
     let bad = matrix(2, 2, &[0.0, 1.0, f64::NAN, 0.0]);
     let good = -DMatrix::identity(2, 2);
-    let place_of = Error::NotFinite {
-        matrix: "A",
-        row: 2,
-        col: 1,
-        value: f64::INFINITY,
-    };
-    assert_eq!(
-        place_of.to_string(),
-        "A[2,1] is inf, expected a finite number"
-    );
+    let place_of = Error::NotFinite { matrix: "A", row: 2, col: 1, value: f64::INFINITY };
+    assert_eq!(place_of.to_string(), "A[2,1] is inf, expected a finite number");
     assert_eq!(name_of(eigenvalues(&bad)), "A");
     assert_eq!(name_of(exponential(&bad)), "A");
     assert_eq!(name_of(lyapunov(&bad, &good)), "A");
@@ -52,37 +44,17 @@ fn an_entry_that_is_not_a_number_is_named_in_every_matrix() {
 
 #[test]
 fn a_wrong_shape_is_named_with_what_was_expected() {
-    let (wide, tall, good) = (
-        DMatrix::zeros(2, 3),
-        DMatrix::zeros(3, 1),
-        DMatrix::identity(2, 2),
-    );
+    let (wide, tall, good) = (DMatrix::zeros(2, 3), DMatrix::zeros(3, 1), DMatrix::identity(2, 2));
     assert_eq!(name_of(eigenvalues(&wide)), "A");
     assert_eq!(name_of(exponential(&wide)), "A");
     assert_eq!(name_of(lyapunov(&good, &wide)), "Q");
     assert_eq!(name_of(controllability(&good, &tall)), "B");
     assert_eq!(name_of(observability(&good, &wide)), "C");
     let refused = FirstOrderHold::new(&good, &tall, 1.0);
-    assert_eq!(
-        refused,
-        Err(Error::Shape {
-            matrix: "B",
-            expected: (2, 1),
-            found: (3, 1)
-        })
-    );
-    assert_eq!(
-        name_of(place(&good, &DMatrix::zeros(2, 0), &[-1.0, -2.0])),
-        "B"
-    );
+    assert_eq!(refused, Err(Error::Shape { matrix: "B", expected: (2, 1), found: (3, 1) }));
+    assert_eq!(name_of(place(&good, &DMatrix::zeros(2, 0), &[-1.0, -2.0])), "B");
     let refused = place(&good, &good, &[-1.0]);
-    assert_eq!(
-        refused,
-        Err(Error::PoleCount {
-            expected: 2,
-            found: 1
-        })
-    );
+    assert_eq!(refused, Err(Error::PoleCount { expected: 2, found: 1 }));
 }
 
 #[test]
@@ -90,42 +62,13 @@ fn each_matrix_of_the_plant_and_of_the_gains_is_checked() {
     let zeros = DMatrix::zeros(3, 3);
     let of_plant =
         |plant: FaultyPlant| name_of(design(&plant, &CONTROLLER_POLES, &OBSERVER_POLES, None));
-    assert_eq!(
-        of_plant(FaultyPlant {
-            a: DMatrix::zeros(4, 3),
-            ..plant()
-        }),
-        "A"
-    );
-    assert_eq!(
-        of_plant(FaultyPlant {
-            b: zeros.clone(),
-            ..plant()
-        }),
-        "B"
-    );
-    assert_eq!(
-        of_plant(FaultyPlant {
-            c: zeros.clone(),
-            ..plant()
-        }),
-        "C"
-    );
-    assert_eq!(
-        of_plant(FaultyPlant {
-            f_a: zeros.clone(),
-            ..plant()
-        }),
-        "F_a"
-    );
+    assert_eq!(of_plant(FaultyPlant { a: DMatrix::zeros(4, 3), ..plant() }), "A");
+    assert_eq!(of_plant(FaultyPlant { b: zeros.clone(), ..plant() }), "B");
+    assert_eq!(of_plant(FaultyPlant { c: zeros.clone(), ..plant() }), "C");
+    assert_eq!(of_plant(FaultyPlant { f_a: zeros.clone(), ..plant() }), "F_a");
     let refused = design(&plant(), &CONTROLLER_POLES, &OBSERVER_POLES, Some(&zeros));
     assert_eq!(name_of(refused), "K_f");
-    let mut gains = [
-        repaired_gains(),
-        repaired_gains(),
-        repaired_gains(),
-        repaired_gains(),
-    ];
+    let mut gains = [repaired_gains(), repaired_gains(), repaired_gains(), repaired_gains()];
     gains[0].k_x = zeros.clone();
     gains[1].k_f = zeros.clone();
     gains[2].l_x = zeros.clone();
@@ -140,21 +83,12 @@ fn numbers_out_of_range_are_refused_with_the_rule() {
     let a = DMatrix::identity(2, 2);
     for h in [0.0, -1e-3, f64::NAN, f64::INFINITY] {
         let refused = FirstOrderHold::new(&a, &a, h);
-        assert!(
-            matches!(refused, Err(Error::OutOfRange { name: "h", .. })),
-            "{refused:?}"
-        );
+        assert!(matches!(refused, Err(Error::OutOfRange { name: "h", .. })), "{refused:?}");
     }
     let refused = certify(&plant(), &repaired_gains(), -1.0, 30.0).unwrap_err();
-    assert_eq!(
-        refused.to_string(),
-        "alpha is -1, expected a finite number above zero"
-    );
+    assert_eq!(refused.to_string(), "alpha is -1, expected a finite number above zero");
     let refused = certify(&plant(), &repaired_gains(), 1.0, 0.0).unwrap_err();
-    assert_eq!(
-        refused.to_string(),
-        "beta is 0, expected a finite number above zero"
-    );
+    assert_eq!(refused.to_string(), "beta is 0, expected a finite number above zero");
 }
 
 /// Entries from 1e-150 to 1e150: an answer or an error, never a panic or a run without end.
@@ -176,12 +110,7 @@ fn entries_near_the_ends_of_the_range_end_in_an_answer_or_an_error() {
         let _ = FirstOrderHold::new(&a, &b, 0.1).map(|hold| finite(hold.gamma_1));
         let _ = lyapunov(&a, &identity).map(|solution| finite(solution.p));
         let _ = place(&a, &b, &CONTROLLER_POLES).map(|placement| finite(placement.gain));
-        let plant = FaultyPlant {
-            a,
-            b,
-            c: wild(2, 4, 3),
-            f_a,
-        };
+        let plant = FaultyPlant { a, b, c: wild(2, 4, 3), f_a };
         let designed = design(&plant, &CONTROLLER_POLES, &OBSERVER_POLES, None);
         let _ = designed.map(|design| finite(design.gains.l_x));
     }

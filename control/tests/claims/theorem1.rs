@@ -31,10 +31,7 @@ fn alpha_does_not_shrink_the_region() {
     let reference = certify(&plant, &gains, 1.0, 30.0).unwrap();
     for alpha in [1e-3, 7.0, 1e6] {
         let other = certify(&plant, &gains, alpha, 30.0).unwrap();
-        assert!(
-            (other.delta / reference.delta - 1.0).abs() < 1e-10,
-            "alpha = {alpha}"
-        );
+        assert!((other.delta / reference.delta - 1.0).abs() < 1e-10, "alpha = {alpha}");
         assert!((other.p.norm() / (alpha * reference.p.norm()) - 1.0).abs() < 1e-10);
     }
 }
@@ -43,29 +40,15 @@ fn alpha_does_not_shrink_the_region() {
 #[test]
 fn a_plant_of_one_state_gives_the_region_found_by_hand() {
     let one = |value| DMatrix::from_element(1, 1, value);
-    let plant = control::aso::FaultyPlant {
-        a: one(1.0),
-        b: one(2.0),
-        c: one(1.0),
-        f_a: one(-2.0),
-    };
-    let gains = Gains {
-        k_x: one(-1.0),
-        k_f: one(1.0),
-        l_x: one(6.0),
-        l_f: one(-3.0),
-    };
+    let plant = control::aso::FaultyPlant { a: one(1.0), b: one(2.0), c: one(1.0), f_a: one(-2.0) };
+    let gains = Gains { k_x: one(-1.0), k_f: one(1.0), l_x: one(6.0), l_f: one(-3.0) };
     let (a, k, b, beta) = (5.0, 2.0, 3.0, 4.0);
     let p_12 = -1.0 / (2.0 * k);
     let p_11 = (1.0 - 2.0 * b * p_12) / (2.0 * a);
     let p_22 = (a * p_12 - k * p_11) / -b;
     let certificate = certify(&plant, &gains, 1.0, beta).unwrap();
     let expected = crate::matrix(2, 2, &[p_11, p_12, p_12, p_22]) * beta;
-    assert!(
-        (&certificate.p - expected).amax() < 1e-13,
-        "{}",
-        certificate.p
-    );
+    assert!((&certificate.p - expected).amax() < 1e-13, "{}", certificate.p);
     let by_hand = 2.0 * beta * k * p_11.hypot(p_12);
     assert!((certificate.delta / by_hand - 1.0).abs() < 1e-13);
 }
@@ -78,11 +61,7 @@ fn the_error_under_a_constant_fault_ends_inside_of_the_region() {
     let certificate = certify(&plant, &gains, 1.0, beta).unwrap();
     let f = gains.error_dynamics(&plant);
     let end = f.lu().solve(&(plant.augmented_fault() * beta)).unwrap();
-    assert!(
-        end.norm() <= certificate.delta && end.norm() > 0.9 * beta,
-        "{}",
-        end.norm()
-    );
+    assert!(end.norm() <= certificate.delta && end.norm() > 0.9 * beta, "{}", end.norm());
 }
 
 #[test]
@@ -90,14 +69,5 @@ fn an_unstable_observer_has_no_certificate() {
     let mut gains = repaired_gains();
     gains.l_f = -gains.l_f;
     let refused = certify(&printed(), &gains, 1.0, 30.0);
-    assert!(
-        matches!(
-            refused,
-            Err(Error::NotHurwitz {
-                matrix: "A_0 - L C_0",
-                ..
-            })
-        ),
-        "{refused:?}"
-    );
+    assert!(matches!(refused, Err(Error::NotHurwitz { matrix: "A_0 - L C_0", .. })), "{refused:?}");
 }

@@ -130,10 +130,7 @@ impl ModelDescription {
         }
         let version = root.required("fmiVersion")?;
         if version != "2.0" {
-            return Err(ParseError::Version {
-                at: root.at,
-                found: version.to_owned(),
-            });
+            return Err(ParseError::Version { at: root.at, found: version.to_owned() });
         }
         let variables = root.child("ModelVariables")?;
         let structure = root.child("ModelStructure")?;
@@ -155,10 +152,7 @@ impl ModelDescription {
             structured_names: structured_names(&root)?,
             number_of_event_indicators: root.unsigned("numberOfEventIndicators")?,
             model_exchange: model_exchange.map(Element::identifier).transpose()?,
-            co_simulation: root
-                .optional_child("CoSimulation")?
-                .map(co_simulation)
-                .transpose()?,
+            co_simulation: root.optional_child("CoSimulation")?.map(co_simulation).transpose()?,
             units: root.list("UnitDefinitions", "Unit", unit)?,
             types,
             log_categories: root.list("LogCategories", "Category", category)?,
@@ -216,10 +210,7 @@ fn unit(element: &Element) -> Result<Unit, ParseError> {
     Ok(Unit {
         name: element.required("name")?.to_owned(),
         display_units: display_units.collect::<Result<_, ParseError>>()?,
-        base: element
-            .optional_child("BaseUnit")?
-            .map(base_unit)
-            .transpose()?,
+        base: element.optional_child("BaseUnit")?.map(base_unit).transpose()?,
     })
 }
 
@@ -241,10 +232,7 @@ fn base_unit(element: &Element) -> Result<BaseUnit, ParseError> {
 
 fn category(element: &Element) -> Result<LogCategory, ParseError> {
     let name = element.required("name")?.to_owned();
-    Ok(LogCategory {
-        name,
-        description: element.text("description"),
-    })
+    Ok(LogCategory { name, description: element.text("description") })
 }
 
 fn experiment(element: &Element) -> Result<DefaultExperiment, ParseError> {
@@ -267,13 +255,11 @@ fn model_structure(element: &Element, variables: usize) -> Result<ModelStructure
 
 fn unknown(element: &Element, variables: usize) -> Result<Unknown, ParseError> {
     let index = element.index("index", element.required("index")?, variables)?;
-    let dependencies = element.items("dependencies", |text| {
-        element.index("dependencies", text, variables)
-    })?;
+    let dependencies =
+        element.items("dependencies", |text| element.index("dependencies", text, variables))?;
     let kinds = element.items("dependenciesKind", |text| {
         let expected = "dependent, constant, fixed, tunable or discrete";
-        text.parse()
-            .map_err(|()| element.wrong("dependenciesKind", expected, text))
+        text.parse().map_err(|()| element.wrong("dependenciesKind", expected, text))
     })?;
     if let Some(kinds) = &kinds {
         let count = dependencies.as_ref().map_or(0, Vec::len);
@@ -282,11 +268,7 @@ fn unknown(element: &Element, variables: usize) -> Result<Unknown, ParseError> {
             return Err(element.wrong("dependenciesKind", &expected, &kinds.len().to_string()));
         }
     }
-    Ok(Unknown {
-        index,
-        dependencies,
-        kinds,
-    })
+    Ok(Unknown { index, dependencies, kinds })
 }
 
 #[cfg(test)]

@@ -38,9 +38,7 @@ impl ModelDescription {
     /// ```
     #[must_use]
     pub fn to_xml(&self) -> String {
-        let mut output = Output {
-            writer: Writer::new_with_indent(Vec::new(), b' ', 2),
-        };
+        let mut output = Output { writer: Writer::new_with_indent(Vec::new(), b' ', 2) };
         output.event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)));
         output.root(self);
         let mut bytes = output.writer.into_inner();
@@ -54,10 +52,7 @@ impl ModelDescription {
     /// Two descriptions that differ in anything but `guid` have different results.
     #[must_use]
     pub fn content_guid(&self) -> String {
-        let nameless = ModelDescription {
-            guid: String::new(),
-            ..self.clone()
-        };
+        let nameless = ModelDescription { guid: String::new(), ..self.clone() };
         let hash = Sha256::digest(nameless.to_xml());
         let mut guid = String::from("{");
         for (index, byte) in hash.iter().take(16).enumerate() {
@@ -78,9 +73,7 @@ struct Output {
 
 impl Output {
     fn event(&mut self, event: Event<'_>) {
-        self.writer
-            .write_event(event)
-            .expect("a vector takes all bytes");
+        self.writer.write_event(event).expect("a vector takes all bytes");
     }
 
     fn empty(&mut self, tag: Tag<'_>) {
@@ -120,10 +113,7 @@ impl Output {
             .maybe("generationTool", description.generation_tool.as_ref())
             .maybe("generationDateAndTime", date)
             .maybe("variableNamingConvention", naming)
-            .maybe(
-                "numberOfEventIndicators",
-                description.number_of_event_indicators.as_ref(),
-            );
+            .maybe("numberOfEventIndicators", description.number_of_event_indicators.as_ref());
         self.around(tag, |output| {
             if let Some(identifier) = &description.model_exchange {
                 output.empty(Tag::new("ModelExchange").with("modelIdentifier", identifier));
@@ -138,10 +128,7 @@ impl Output {
                 output.experiment(experiment);
             }
             output.around(Tag::new("ModelVariables"), |output| {
-                description
-                    .variables
-                    .iter()
-                    .for_each(|variable| output.variable(variable));
+                description.variables.iter().for_each(|variable| output.variable(variable));
             });
             output.structure(&description.structure);
         });
@@ -157,10 +144,7 @@ impl Output {
                 .unless_default("needsExecutionTool", &flags.needs_execution_tool)
                 .unless_default("canHandleVariableCommunicationStepSize", variable_step)
                 .unless_default("canInterpolateInputs", &flags.can_interpolate_inputs)
-                .unless_default(
-                    "maxOutputDerivativeOrder",
-                    &flags.max_output_derivative_order,
-                )
+                .unless_default("maxOutputDerivativeOrder", &flags.max_output_derivative_order)
                 .unless_default("canRunAsynchronuously", &flags.can_run_asynchronuously)
                 .unless_default("canBeInstantiatedOnlyOncePerProcess", only_once)
                 .unless_default("canNotUseMemoryManagementFunctions", own_memory)
@@ -276,29 +260,19 @@ impl Output {
         self.around(Tag::new("ModelStructure"), |output| {
             output.list("Outputs", &structure.outputs, Self::unknown);
             output.list("Derivatives", &structure.derivatives, Self::unknown);
-            output.list(
-                "InitialUnknowns",
-                &structure.initial_unknowns,
-                Self::unknown,
-            );
+            output.list("InitialUnknowns", &structure.initial_unknowns, Self::unknown);
         });
     }
 
     fn unknown(&mut self, unknown: &Unknown) {
-        let dependencies = unknown.dependencies.as_ref().map(|indices| {
-            indices
-                .iter()
-                .map(u32::to_string)
-                .collect::<Vec<_>>()
-                .join(" ")
-        });
-        let kinds = unknown.kinds.as_ref().map(|kinds| {
-            kinds
-                .iter()
-                .map(|kind| kind.as_str())
-                .collect::<Vec<_>>()
-                .join(" ")
-        });
+        let dependencies = unknown
+            .dependencies
+            .as_ref()
+            .map(|indices| indices.iter().map(u32::to_string).collect::<Vec<_>>().join(" "));
+        let kinds = unknown
+            .kinds
+            .as_ref()
+            .map(|kinds| kinds.iter().map(|kind| kind.as_str()).collect::<Vec<_>>().join(" "));
         self.empty(
             Tag::new("Unknown")
                 .with("index", &unknown.index)

@@ -58,10 +58,7 @@ impl Problems {
 
     fn finite(&mut self, section: &'static str, what: &str, value: Option<f64>) {
         if let Some(value) = value.filter(|value| !value.is_finite()) {
-            self.add(
-                section,
-                format!("{what} is {value:?}, and FMI has finite numbers only"),
-            );
+            self.add(section, format!("{what} is {value:?}, and FMI has finite numbers only"));
         }
     }
 
@@ -74,9 +71,7 @@ impl Problems {
     ) {
         let mut seen = HashSet::new();
         for name in names {
-            self.demand(seen.insert(name), section, || {
-                format!("{what} {name:?} is there twice")
-            });
+            self.demand(seen.insert(name), section, || format!("{what} {name:?} is there twice"));
         }
     }
 }
@@ -95,10 +90,7 @@ impl ModelDescription {
         let mut problems = Problems::default();
         identity(self, &mut problems);
         texts(self, &mut problems);
-        let categories = self
-            .log_categories
-            .iter()
-            .map(|category| category.name.as_str());
+        let categories = self.log_categories.iter().map(|category| category.name.as_str());
         problems.unique("2.2.4", "log category", categories);
         if let Some(own) = &self.default_experiment {
             experiment(own, &mut problems);
@@ -116,9 +108,7 @@ fn identity(description: &ModelDescription, problems: &mut Problems) {
     problems.demand(version == "2.0", "2.2.1", || {
         format!("fmiVersion is {version:?}, it must be \"2.0\" for every 2.0.x")
     });
-    problems.demand(!description.guid.is_empty(), "2.2.1", || {
-        "guid is empty".to_owned()
-    });
+    problems.demand(!description.guid.is_empty(), "2.2.1", || "guid is empty".to_owned());
     if let Some(date) = &description.generation_date_and_time {
         problems.demand(is_date_and_time(date), "2.2.1", || {
             format!("generationDateAndTime is {date:?}, not of the form YYYY-MM-DDThh:mm:ssZ")
@@ -159,10 +149,9 @@ fn texts(description: &ModelDescription, problems: &mut Problems) {
     ] {
         problems.text("2.2.1", name, value.as_deref().unwrap_or_default());
     }
-    for (name, value) in [
-        ("version", &description.version),
-        ("generationTool", &description.generation_tool),
-    ] {
+    for (name, value) in
+        [("version", &description.version), ("generationTool", &description.generation_tool)]
+    {
         problems.line("2.2.1", name, value.as_deref().unwrap_or_default());
     }
     for category in &description.log_categories {
@@ -183,9 +172,7 @@ fn experiment(own: &DefaultExperiment, problems: &mut Problems) {
     }
     for (name, value) in [("tolerance", own.tolerance), ("stepSize", own.step_size)] {
         if let Some(value) = value {
-            problems.demand(value > 0.0, "2.2.5", || {
-                format!("{name} is {value:?}, not positive")
-            });
+            problems.demand(value > 0.0, "2.2.5", || format!("{name} is {value:?}, not positive"));
         }
     }
     let (Some(start), Some(stop)) = (own.start_time, own.stop_time) else {
@@ -203,27 +190,19 @@ fn experiment(own: &DefaultExperiment, problems: &mut Problems) {
 
 fn is_c_identifier(text: &str) -> bool {
     let starts = text.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_');
-    starts
-        && text
-            .chars()
-            .all(|other| other.is_ascii_alphanumeric() || other == '_')
+    starts && text.chars().all(|other| other.is_ascii_alphanumeric() || other == '_')
 }
 
 /// `YYYY-MM-DDThh:mm:ssZ` with every number in its range.
 fn is_date_and_time(text: &str) -> bool {
     let shape = "0000-00-00T00:00:00Z";
     let fits = text.len() == shape.len()
-        && text
-            .bytes()
-            .zip(shape.bytes())
-            .all(|(found, wanted)| match wanted {
-                b'0' => found.is_ascii_digit(),
-                _ => found == wanted,
-            });
+        && text.bytes().zip(shape.bytes()).all(|(found, wanted)| match wanted {
+            b'0' => found.is_ascii_digit(),
+            _ => found == wanted,
+        });
     let inside = |from: usize, low: u32, high: u32| {
-        let number = text
-            .get(from..from + 2)
-            .and_then(|digits| digits.parse().ok());
+        let number = text.get(from..from + 2).and_then(|digits| digits.parse().ok());
         number.is_some_and(|number: u32| (low..=high).contains(&number))
     };
     fits && inside(5, 1, 12)

@@ -29,14 +29,8 @@ pub(crate) fn complete() -> ModelDescription {
             .to_vec(),
         types: types(),
         log_categories: vec![
-            LogCategory {
-                name: "logStatusError".to_owned(),
-                description: text("errors"),
-            },
-            LogCategory {
-                name: "logEvents".to_owned(),
-                description: None,
-            },
+            LogCategory { name: "logStatusError".to_owned(), description: text("errors") },
+            LogCategory { name: "logEvents".to_owned(), description: None },
         ],
         default_experiment: Some(DefaultExperiment {
             start_time: Some(-1.0),
@@ -81,15 +75,8 @@ fn types() -> Vec<SimpleType> {
         nominal: Some(0.1),
         ..RealType::default()
     };
-    let count = IntegerType {
-        min: Some(0),
-        max: Some(i32::MAX),
-        ..IntegerType::default()
-    };
-    let mode = IntegerType {
-        quantity: Some("Mode".to_owned()),
-        ..IntegerType::default()
-    };
+    let count = IntegerType { min: Some(0), max: Some(i32::MAX), ..IntegerType::default() };
+    let mode = IntegerType { quantity: Some("Mode".to_owned()), ..IntegerType::default() };
     vec![
         SimpleType {
             description: Some("an angle".to_owned()),
@@ -111,10 +98,7 @@ pub(crate) fn real(
     (causality, variability): (Causality, Variability),
     start: Option<f64>,
 ) -> ScalarVariable {
-    let kind = Kind::Real(RealType {
-        start,
-        ..RealType::default()
-    });
+    let kind = Kind::Real(RealType { start, ..RealType::default() });
     other(name, (causality, variability), kind)
 }
 
@@ -169,10 +153,7 @@ fn variables() -> Vec<ScalarVariable> {
         start: Some(-1),
         ..IntegerType::default()
     };
-    let speed = Kind::Real(RealType {
-        derivative: Some(7),
-        ..RealType::default()
-    });
+    let speed = Kind::Real(RealType { derivative: Some(7), ..RealType::default() });
     let label = Kind::String(Some("two\nlines <&> \"'\r\t".to_owned()));
     let mut variables = vec![
         real("time", (Independent, Continuous), None),
@@ -206,34 +187,17 @@ fn structure() -> ModelStructure {
     let constant = Some(vec![DependencyKind::Constant, DependencyKind::Dependent]);
     ModelStructure {
         outputs: vec![
-            Unknown {
-                kinds: Some(vec![DependencyKind::Tunable]),
-                ..row(7, &[7])
-            },
+            Unknown { kinds: Some(vec![DependencyKind::Tunable]), ..row(7, &[7]) },
             row(9, &[]),
-            Unknown {
-                index: 10,
-                dependencies: None,
-                kinds: None,
-            },
+            Unknown { index: 10, dependencies: None, kinds: None },
             row(12, &[1, 6]),
         ],
-        derivatives: vec![Unknown {
-            kinds: constant.clone(),
-            ..row(8, &[5, 7])
-        }],
+        derivatives: vec![Unknown { kinds: constant.clone(), ..row(8, &[5, 7]) }],
         initial_unknowns: vec![
             row(4, &[2, 3]),
-            Unknown {
-                kinds: constant,
-                ..row(8, &[5, 7])
-            },
+            Unknown { kinds: constant, ..row(8, &[5, 7]) },
             row(9, &[]),
-            Unknown {
-                index: 10,
-                dependencies: None,
-                kinds: None,
-            },
+            Unknown { index: 10, dependencies: None, kinds: None },
             row(12, &[11]),
         ],
     }

@@ -52,7 +52,8 @@ impl<M: Model> Snapshot<M> {
     /// The state in `bytes`; refused unless it is whole and of the FMU `guid`.
     pub(crate) fn from_bytes(bytes: &[u8], guid: &str) -> Result<Self, Failure> {
         let refused = |reason: &str| Failure::Error(format!("serialized state: {reason}"));
-        let rest = bytes.strip_prefix(&MAGIC[..6]).ok_or_else(|| refused("not of this exporter"))?;
+        let rest =
+            bytes.strip_prefix(&MAGIC[..6]).ok_or_else(|| refused("not of this exporter"))?;
         let rest = rest.strip_prefix(&MAGIC[6..]).ok_or_else(|| refused("unknown version"))?;
         let whole = bytes
             .len()

@@ -155,8 +155,7 @@ fn a_panic_of_the_model_is_fatal_and_stays_inside() {
 #[test]
 fn setting_several_values_is_all_or_nothing() {
     let mut instance = fresh();
-    let status =
-        instance.call(Function::SetReal, |i| i.set_real(&[DRIVE, RATE], &[5.0, f64::NAN]));
+    let status = instance.call(Function::SetReal, |i| i.set_real(&[DRIVE, RATE], &[5.0, f64::NAN]));
     assert_eq!(status, Status::Discard);
     let status = instance.call(Function::SetReal, |i| i.set_real(&[DRIVE, RATE], &[5.0, 11.0]));
     assert_eq!(status, Status::Discard);

@@ -243,10 +243,7 @@ impl<M: Model> Instance<M> {
 }
 
 /// The field of the derivative of that order, where the model has one.
-fn of_order<M>(
-    slot: &Slot<M, f64>,
-    order: i32,
-) -> Option<&crate::variable::Field<M, f64>> {
+fn of_order<M>(slot: &Slot<M, f64>, order: i32) -> Option<&crate::variable::Field<M, f64>> {
     let position = usize::try_from(order).ok()?.checked_sub(1)?;
     slot.derivatives.get(position)
 }

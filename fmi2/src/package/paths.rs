@@ -5,14 +5,8 @@ const RESERVED: [char; 7] = ['<', '>', ':', '"', '|', '?', '*'];
 /// Devices of Windows, which no file may be called, whatever its extension.
 const DEVICES: [&str; 4] = ["con", "prn", "aux", "nul"];
 
-const FOLDERS: [&str; 6] = [
-    "documentation",
-    "sources",
-    "binaries",
-    "resources",
-    "extra",
-    "terminalsAndIcons",
-];
+const FOLDERS: [&str; 6] =
+    ["documentation", "sources", "binaries", "resources", "extra", "terminalsAndIcons"];
 
 /// What is wrong with `path` if it could lead out of the folder it is unpacked into: the rule.
 pub(super) fn unsafe_to_unpack(path: &str) -> Option<&'static str> {
@@ -45,9 +39,7 @@ pub(super) fn unsuitable(path: &str) -> Option<&'static str> {
     if path.split('/').any(breaks_windows) {
         return Some("names that Windows allows: no trailing dot or blank, no device");
     }
-    let inside = path
-        .split_once('/')
-        .is_some_and(|(folder, _)| FOLDERS.contains(&folder));
+    let inside = path.split_once('/').is_some_and(|(folder, _)| FOLDERS.contains(&folder));
     if !inside && path != "model.png" {
         return Some(
             "model.png, or a file in documentation, sources, binaries, resources, extra or \

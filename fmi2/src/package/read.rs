@@ -41,21 +41,14 @@ impl Unpacked {
     /// readable `modelDescription.xml` at its root.
     pub fn open(path: &Path) -> Result<Self, PackageError> {
         let file = File::open(path).map_err(file_error("open", path))?;
-        let wrong = |source| PackageError::Archive {
-            path: path.to_owned(),
-            source,
-        };
+        let wrong = |source| PackageError::Archive { path: path.to_owned(), source };
         let mut archive = ZipArchive::new(BufReader::new(file)).map_err(wrong)?;
         let folder = tempfile::Builder::new().prefix("fmu-").tempdir();
         let folder = folder.map_err(file_error("create a folder in", std::env::temp_dir()))?;
         let folder_path = folder.path().to_owned();
         unpack(&mut archive, path, &folder_path, CAPACITY)?;
         let description = describe(&folder_path, path)?;
-        Ok(Unpacked {
-            folder: folder_path,
-            temporary: Some(folder),
-            description,
-        })
+        Ok(Unpacked { folder: folder_path, temporary: Some(folder), description })
     }
 
     /// Uses the FMU that is already unpacked in `folder`.
@@ -66,11 +59,7 @@ impl Unpacked {
     pub fn in_folder(folder: &Path) -> Result<Self, PackageError> {
         let folder = folder.canonicalize().map_err(file_error("open", folder))?;
         let description = describe(&folder, &folder)?;
-        Ok(Unpacked {
-            folder,
-            temporary: None,
-            description,
-        })
+        Ok(Unpacked { folder, temporary: None, description })
     }
 
     /// The folder with `modelDescription.xml`; an absolute path.
@@ -93,27 +82,16 @@ impl Unpacked {
     pub fn library(&self, model_identifier: &str) -> Result<PathBuf, PackageError> {
         let name = format!("{model_identifier}{}", std::env::consts::DLL_SUFFIX);
         let binaries = self.folder().join("binaries");
-        let candidates = platforms()
-            .iter()
-            .map(|platform| binaries.join(platform).join(&name));
-        candidates
-            .into_iter()
-            .find(|path| path.is_file())
-            .ok_or_else(|| {
-                let wanted: Vec<String> = platforms()
-                    .iter()
-                    .map(|platform| format!("binaries/{platform}/{name}"))
-                    .collect();
-                let found = libraries(&binaries);
-                PackageError::Missing {
-                    expected: format!("the library {}", wanted.join(" or ")),
-                    found: if found.is_empty() {
-                        "no library".to_owned()
-                    } else {
-                        found.join(", ")
-                    },
-                }
-            })
+        let candidates = platforms().iter().map(|platform| binaries.join(platform).join(&name));
+        candidates.into_iter().find(|path| path.is_file()).ok_or_else(|| {
+            let wanted: Vec<String> =
+                platforms().iter().map(|platform| format!("binaries/{platform}/{name}")).collect();
+            let found = libraries(&binaries);
+            PackageError::Missing {
+                expected: format!("the library {}", wanted.join(" or ")),
+                found: if found.is_empty() { "no library".to_owned() } else { found.join(", ") },
+            }
+        })
     }
 }
 
@@ -122,14 +100,7 @@ fn libraries(binaries: &Path) -> Vec<String> {
     let children = |folder: &Path| fs::read_dir(folder).into_iter().flatten().flatten();
     let mut found: Vec<String> = children(binaries)
         .flat_map(|platform| children(&platform.path()))
-        .filter_map(|file| {
-            Some(
-                file.path()
-                    .strip_prefix(binaries.parent()?)
-                    .ok()?
-                    .to_owned(),
-            )
-        })
+        .filter_map(|file| Some(file.path().strip_prefix(binaries.parent()?).ok()?.to_owned()))
         .map(|path| path.display().to_string())
         .collect();
     found.sort();
@@ -143,25 +114,18 @@ fn describe(folder: &Path, path: &Path) -> Result<ModelDescription, PackageError
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Err(missing(folder)),
         Err(error) => return Err(file_error("read", file)(error)),
     };
-    ModelDescription::parse(xml).map_err(|source| PackageError::Description {
-        path: path.to_owned(),
-        source,
-    })
+    ModelDescription::parse(xml)
+        .map_err(|source| PackageError::Description { path: path.to_owned(), source })
 }
 
 fn missing(folder: &Path) -> PackageError {
     let names = fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut names: Vec<String> = names
-        .map(|entry| entry.file_name().to_string_lossy().into_owned())
-        .collect();
+    let mut names: Vec<String> =
+        names.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
     names.sort();
     names.truncate(10);
     let expected = format!("{DESCRIPTION} at the root of the FMU");
-    let found = if names.is_empty() {
-        "nothing".to_owned()
-    } else {
-        names.join(", ")
-    };
+    let found = if names.is_empty() { "nothing".to_owned() } else { names.join(", ") };
     PackageError::Missing { expected, found }
 }
 
@@ -171,15 +135,8 @@ pub(super) fn unpack(
     folder: &Path,
     capacity: u64,
 ) -> Result<(), PackageError> {
-    let wrong = |source| PackageError::Archive {
-        path: path.to_owned(),
-        source,
-    };
-    let limit = |limit, unit| PackageError::Limit {
-        path: path.to_owned(),
-        limit,
-        unit,
-    };
+    let wrong = |source| PackageError::Archive { path: path.to_owned(), source };
+    let limit = |limit, unit| PackageError::Limit { path: path.to_owned(), limit, unit };
     if archive.len() > ENTRIES {
         return Err(limit(ENTRIES as u64, "entries"));
     }
@@ -191,14 +148,9 @@ pub(super) fn unpack(
         let entry = archive.by_index(index).map_err(wrong)?;
         let name = entry.name().map_err(wrong)?.into_owned();
         let rule = paths::unsafe_to_unpack(&name);
-        let rule = rule.or(entry
-            .is_symlink()
-            .then_some("a file or a folder, not a link"));
+        let rule = rule.or(entry.is_symlink().then_some("a file or a folder, not a link"));
         if let Some(expected) = rule {
-            return Err(PackageError::Entry {
-                entry: name,
-                expected,
-            });
+            return Err(PackageError::Entry { entry: name, expected });
         }
         let target = folder.join(&name);
         if entry.is_dir() {
@@ -209,9 +161,7 @@ pub(super) fn unpack(
             return Err(limit(capacity, "bytes"));
         }
         let written = write_entry(entry, &target, left)?;
-        left = left
-            .checked_sub(written)
-            .ok_or_else(|| limit(capacity, "bytes"))?;
+        left = left.checked_sub(written).ok_or_else(|| limit(capacity, "bytes"))?;
     }
     Ok(())
 }

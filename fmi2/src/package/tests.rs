@@ -15,11 +15,7 @@ fn folder() -> TempDir {
 }
 
 fn library_entry() -> String {
-    format!(
-        "binaries/{}/M{}",
-        platforms()[0],
-        std::env::consts::DLL_SUFFIX
-    )
+    format!("binaries/{}/M{}", platforms()[0], std::env::consts::DLL_SUFFIX)
 }
 
 fn package() -> Package {
@@ -57,28 +53,15 @@ fn every_header_is_as_section_2_3_demands() {
     let library = library_entry();
     assert_eq!(
         names,
-        [
-            DESCRIPTION,
-            &library,
-            "documentation/index.html",
-            "model.png",
-            "resources/z.bin"
-        ]
+        [DESCRIPTION, &library, "documentation/index.html", "model.png", "resources/z.bin"]
     );
     for entry in &entries {
         assert_eq!(entry.version_needed, 20, "{}", entry.name);
-        assert_eq!(
-            entry.flags, 0,
-            "no data descriptor, encryption or non-ASCII name"
-        );
+        assert_eq!(entry.flags, 0, "no data descriptor, encryption or non-ASCII name");
         assert_eq!(entry.method, 8, "deflate");
         assert_eq!((entry.time, entry.date), (0, 0x21), "1980-01-01 00:00");
         assert_eq!(entry.extra_length, 0, "no Zip64");
-        let mode = if entry.name.starts_with("binaries") {
-            0o100_755
-        } else {
-            0o100_644
-        };
+        let mode = if entry.name.starts_with("binaries") { 0o100_755 } else { 0o100_644 };
         assert_eq!(entry.external_attributes >> 16, mode, "{}", entry.name);
         assert_eq!(entry.made_by_system, 3, "UNIX");
         assert!(raw::local_header_agrees(&bytes, entry), "{}", entry.name);
@@ -92,10 +75,7 @@ fn what_was_packed_is_unpacked() {
     package().write(&target).unwrap();
     let unpacked = Unpacked::open(&target).unwrap();
     assert_eq!(unpacked.description.model_name, "M");
-    assert_eq!(
-        fs::read(unpacked.resources().join("z.bin")).unwrap(),
-        vec![0; 100_000]
-    );
+    assert_eq!(fs::read(unpacked.resources().join("z.bin")).unwrap(), vec![0; 100_000]);
     let library = unpacked.library("M").unwrap();
     assert_eq!(library, unpacked.folder().join(library_entry()));
     assert!(library.is_absolute());
@@ -117,21 +97,13 @@ fn an_unpacked_fmu_can_be_used_changed_and_packed_again() {
     fs::write(in_place.resources().join("deep/er/table.csv"), "1").unwrap();
     let mut again = Package::new(XML.to_owned());
     for part in ["resources", "binaries"] {
-        again
-            .add_folder(part, &unpacked.folder().join(part))
-            .unwrap();
+        again.add_folder(part, &unpacked.folder().join(part)).unwrap();
     }
     drop(in_place);
-    assert!(
-        unpacked.folder().exists(),
-        "a folder that was given is kept"
-    );
+    assert!(unpacked.folder().exists(), "a folder that was given is kept");
     again.write(&second).unwrap();
     let unpacked = Unpacked::open(&second).unwrap();
-    assert_eq!(
-        fs::read(unpacked.resources().join("deep/er/table.csv")).unwrap(),
-        b"1"
-    );
+    assert_eq!(fs::read(unpacked.resources().join("deep/er/table.csv")).unwrap(), b"1");
     assert!(unpacked.library("M").is_ok());
 }
 
@@ -143,16 +115,9 @@ fn a_missing_library_is_answered_with_those_that_are_there() {
     package.add("binaries/vax-vms/M.exe", "");
     package.add("binaries/vax-vms/other.exe", "");
     package.write(&target).unwrap();
-    let error = Unpacked::open(&target)
-        .unwrap()
-        .library("M")
-        .unwrap_err()
-        .to_string();
+    let error = Unpacked::open(&target).unwrap().library("M").unwrap_err().to_string();
     assert!(error.contains(&library_entry()), "{error}");
-    assert!(
-        error.contains("M.exe, ") && error.contains("other.exe"),
-        "{error}"
-    );
+    assert!(error.contains("M.exe, ") && error.contains("other.exe"), "{error}");
 }
 
 #[test]
@@ -215,10 +180,7 @@ fn an_incomplete_fmu_is_not_written() {
         (without_index, "M.fmu", "index.html"),
         (package(), "M.zip", ".fmu"),
     ] {
-        let error = package
-            .write(&folder.path().join(target))
-            .unwrap_err()
-            .to_string();
+        let error = package.write(&folder.path().join(target)).unwrap_err().to_string();
         assert!(error.contains(said), "{error}");
     }
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
@@ -230,10 +192,7 @@ fn a_failed_write_leaves_nothing_behind() {
     let target = folder.path().join("M.fmu");
     fs::create_dir(&target).unwrap();
     fs::write(target.join("in the way"), "").unwrap();
-    assert!(matches!(
-        package().write(&target),
-        Err(PackageError::File { .. })
-    ));
+    assert!(matches!(package().write(&target), Err(PackageError::File { .. })));
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
@@ -259,18 +218,9 @@ fn opened(bytes: &[u8]) -> Result<Unpacked, PackageError> {
 
 #[test]
 fn archives_that_lead_out_of_their_folder_are_refused() {
-    for name in [
-        "../x",
-        "/x",
-        "a/../../x",
-        "a\\..\\x",
-        "a\\x",
-        "C:/x",
-        "./x",
-        "a//x",
-        "..",
-        "a\u{0}b",
-    ] {
+    for name in
+        ["../x", "/x", "a/../../x", "a\\..\\x", "a\\x", "C:/x", "./x", "a//x", "..", "a\u{0}b"]
+    {
         let bytes = raw::archive(&[(DESCRIPTION, XML, 0o100_644), (name, "", 0o100_644)]);
         let error = opened(&bytes).unwrap_err();
         assert!(
@@ -278,10 +228,7 @@ fn archives_that_lead_out_of_their_folder_are_refused() {
             "{name}: {error}"
         );
     }
-    let link = raw::archive(&[
-        (DESCRIPTION, XML, 0o100_644),
-        ("resources", "/etc", 0o120_777),
-    ]);
+    let link = raw::archive(&[(DESCRIPTION, XML, 0o100_644), ("resources", "/etc", 0o120_777)]);
     let error = opened(&link).unwrap_err();
     assert!(error.to_string().contains("not a link"), "{error}");
 }
@@ -298,22 +245,13 @@ fn a_plain_archive_is_accepted_and_one_with_duplicates_is_not() {
 #[test]
 fn what_is_no_fmu_is_refused_with_the_reason() {
     let absent = Unpacked::open(Path::new("/nowhere/M.fmu")).unwrap_err();
-    assert!(
-        matches!(absent, PackageError::File { action: "open", .. }),
-        "{absent}"
-    );
+    assert!(matches!(absent, PackageError::File { action: "open", .. }), "{absent}");
     let text = opened(b"just text").unwrap_err();
     assert!(matches!(text, PackageError::Archive { .. }), "{text}");
     let nested = opened(&raw::archive(&[("M/modelDescription.xml", XML, 0o100_644)])).unwrap_err();
-    assert_eq!(
-        nested.to_string(),
-        "expected modelDescription.xml at the root of the FMU, found M"
-    );
+    assert_eq!(nested.to_string(), "expected modelDescription.xml at the root of the FMU, found M");
     let broken = opened(&raw::archive(&[(DESCRIPTION, "<a", 0o100_644)])).unwrap_err();
-    assert!(
-        matches!(broken, PackageError::Description { .. }),
-        "{broken}"
-    );
+    assert!(matches!(broken, PackageError::Description { .. }), "{broken}");
     let whole = written(&package());
     for length in [whole.len() - 1, whole.len() / 2, 10] {
         assert!(opened(&whole[..length]).is_err());
@@ -325,13 +263,7 @@ fn a_damaged_file_is_noticed_by_its_checksum() {
     let mut bytes = raw::archive(&[(DESCRIPTION, XML, 0o100_644)]);
     let at = bytes.windows(3).position(|part| part == b"\"M\"").unwrap() + 1;
     bytes[at] = b'N';
-    assert!(matches!(
-        opened(&bytes),
-        Err(PackageError::File {
-            action: "unpack",
-            ..
-        })
-    ));
+    assert!(matches!(opened(&bytes), Err(PackageError::File { action: "unpack", .. })));
 }
 
 #[test]
@@ -346,8 +278,5 @@ fn no_more_is_unpacked_than_the_limit() {
     read::unpack(&mut open(), &path, &target, total).unwrap();
     let target = folder.path().join("less");
     let error = read::unpack(&mut open(), &path, &target, total - 1).unwrap_err();
-    assert!(
-        matches!(error, PackageError::Limit { unit: "bytes", .. }),
-        "{error}"
-    );
+    assert!(matches!(error, PackageError::Limit { unit: "bytes", .. }), "{error}");
 }

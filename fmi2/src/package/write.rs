@@ -38,10 +38,7 @@ impl Package {
     /// An FMU with `description_xml` as its `modelDescription.xml` and nothing else yet.
     #[must_use]
     pub fn new(description_xml: String) -> Self {
-        Package {
-            description: description_xml,
-            entries: Vec::new(),
-        }
+        Package { description: description_xml, entries: Vec::new() }
     }
 
     /// Adds a file; `path` is relative to the root, with forward slashes.
@@ -58,24 +55,16 @@ impl Package {
     pub fn add_folder(&mut self, path: &str, folder: &Path) -> Result<(), PackageError> {
         for entry in fs::read_dir(folder).map_err(file_error("read", folder))? {
             let entry = entry.map_err(file_error("read", folder))?;
-            let file_type = entry
-                .file_type()
-                .map_err(file_error("read", entry.path()))?;
+            let file_type = entry.file_type().map_err(file_error("read", entry.path()))?;
             let inner = format!("{path}/{}", entry.file_name().to_string_lossy());
             if entry.file_name().to_str().is_none() || file_type.is_symlink() {
                 let expected = "a file with a Unicode name, not a link";
-                return Err(PackageError::Entry {
-                    entry: inner,
-                    expected,
-                });
+                return Err(PackageError::Entry { entry: inner, expected });
             }
             if file_type.is_dir() {
                 self.add_folder(&inner, &entry.path())?;
             } else {
-                self.add(
-                    inner,
-                    fs::read(entry.path()).map_err(file_error("read", entry.path()))?,
-                );
+                self.add(inner, fs::read(entry.path()).map_err(file_error("read", entry.path()))?);
             }
         }
         Ok(())
@@ -90,10 +79,7 @@ impl Package {
     /// neither `binaries` nor `sources`, `documentation` without `index.html`), is too large, or
     /// the file cannot be written.
     pub fn write(&self, target: &Path) -> Result<(), PackageError> {
-        if target
-            .extension()
-            .is_none_or(|extension| extension != "fmu")
-        {
+        if target.extension().is_none_or(|extension| extension != "fmu") {
             let found = target.display().to_string();
             return Err(PackageError::Missing {
                 expected: "a file name ending in .fmu".into(),
@@ -101,10 +87,9 @@ impl Package {
             });
         }
         self.check(target)?;
-        let bytes = self.archive().map_err(|source| PackageError::Archive {
-            path: target.to_owned(),
-            source,
-        })?;
+        let bytes = self
+            .archive()
+            .map_err(|source| PackageError::Archive { path: target.to_owned(), source })?;
         let folder = match target.parent() {
             Some(parent) if parent != Path::new("") => parent,
             _ => Path::new("."),
@@ -117,11 +102,9 @@ impl Package {
             use std::os::unix::fs::PermissionsExt as _;
             builder.permissions(fs::Permissions::from_mode(0o666));
         }
-        let mut file = builder
-            .tempfile_in(folder)
-            .map_err(file_error("create a file in", folder))?;
-        file.write_all(&bytes)
-            .map_err(file_error("write", file.path()))?;
+        let mut file =
+            builder.tempfile_in(folder).map_err(file_error("create a file in", folder))?;
+        file.write_all(&bytes).map_err(file_error("write", file.path()))?;
         let persisted = file.persist(target);
         persisted.map_err(|failure| file_error("write", target)(failure.error))?;
         Ok(())
@@ -141,11 +124,7 @@ impl Package {
         }
         let has_folder = |name: &str| self.entries.iter().any(|(path, _)| path.starts_with(name));
         for (holds, expected, found) in [
-            (
-                has_folder("binaries/") || has_folder("sources/"),
-                "binaries or sources",
-                "neither",
-            ),
+            (has_folder("binaries/") || has_folder("sources/"), "binaries or sources", "neither"),
             (
                 !has_folder("documentation/") || seen.contains("documentation/index.html"),
                 "documentation/index.html",
@@ -163,31 +142,20 @@ impl Package {
         let count = u64::try_from(self.entries.len()).unwrap_or(u64::MAX);
         for (found, limit, unit) in [(total, CAPACITY, "bytes"), (count, ENTRIES, "files")] {
             if found > limit {
-                return Err(PackageError::Limit {
-                    path: target.to_owned(),
-                    limit,
-                    unit,
-                });
+                return Err(PackageError::Limit { path: target.to_owned(), limit, unit });
             }
         }
         Ok(())
     }
 
     fn archive(&self) -> zip::result::ZipResult<Vec<u8>> {
-        let mut entries: Vec<(&str, &[u8])> = self
-            .entries
-            .iter()
-            .map(|(path, bytes)| (path.as_str(), bytes.as_slice()))
-            .collect();
+        let mut entries: Vec<(&str, &[u8])> =
+            self.entries.iter().map(|(path, bytes)| (path.as_str(), bytes.as_slice())).collect();
         entries.sort_unstable();
         entries.insert(0, (DESCRIPTION, self.description.as_bytes()));
         let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
         for (path, bytes) in entries {
-            let mode = if path.starts_with("binaries/") {
-                0o755
-            } else {
-                0o644
-            };
+            let mode = if path.starts_with("binaries/") { 0o755 } else { 0o644 };
             let options = SimpleFileOptions::default()
                 .compression_method(CompressionMethod::Deflated)
                 .last_modified_time(DateTime::default())

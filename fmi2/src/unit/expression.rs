@@ -58,17 +58,13 @@ impl<'a> Cursor<'a> {
     /// Takes the longest run of characters that `belongs` accepts.
     fn take(&mut self, belongs: impl Fn(char) -> bool) -> &'a str {
         let rest = self.rest();
-        let length = rest
-            .find(|character| !belongs(character))
-            .unwrap_or(rest.len());
+        let length = rest.find(|character| !belongs(character)).unwrap_or(rest.len());
         self.at += length;
         &rest[..length]
     }
 
     fn accept(&mut self, characters: &[char]) -> bool {
-        let found = self
-            .peek()
-            .filter(|character| characters.contains(character));
+        let found = self.peek().filter(|character| characters.contains(character));
         self.at += found.map_or(0, char::len_utf8);
         found.is_some()
     }
@@ -82,33 +78,17 @@ impl<'a> Cursor<'a> {
     }
 
     fn syntax(&self, expected: &'static str) -> UnitError {
-        let found = self
-            .peek()
-            .map_or("the end".to_owned(), |character| format!("{character:?}"));
+        let found = self.peek().map_or("the end".to_owned(), |character| format!("{character:?}"));
         let column = self.column(self.at);
-        UnitError::Syntax {
-            expression: self.expression.to_owned(),
-            column,
-            expected,
-            found,
-        }
+        UnitError::Syntax { expression: self.expression.to_owned(), column, expected, found }
     }
 
     pub(super) fn unit(&mut self) -> Result<BaseUnit, UnitError> {
         self.skip_blanks();
         if let Some(scale) = names::scale(self.rest().trim_end()) {
-            return Ok(BaseUnit::from_exponents(
-                scale.exponents,
-                scale.factor,
-                scale.offset,
-            ));
+            return Ok(BaseUnit::from_exponents(scale.exponents, scale.factor, scale.offset));
         }
-        let mut product = Product {
-            exponents: [0; 8],
-            numerator: 1.0,
-            denominator: 1.0,
-            ten: 0,
-        };
+        let mut product = Product { exponents: [0; 8], numerator: 1.0, denominator: 1.0, ten: 0 };
         if self.peek().is_some() {
             self.product(&mut product, 1)?;
         }
@@ -176,17 +156,9 @@ impl<'a> Cursor<'a> {
         let Some(named) = names::find(name) else {
             let (expression, name) = (expression.to_owned(), name.to_owned());
             return Err(if names::scale(&name).is_some() {
-                UnitError::Offset {
-                    expression,
-                    column,
-                    name,
-                }
+                UnitError::Offset { expression, column, name }
             } else {
-                UnitError::UnknownName {
-                    expression,
-                    column,
-                    name,
-                }
+                UnitError::UnknownName { expression, column, name }
             });
         };
         product.multiply(&named, sign * self.exponent()?);

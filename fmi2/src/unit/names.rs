@@ -22,23 +22,11 @@ pub(super) struct Scale {
 }
 
 const fn metric(name: &'static str, exponents: [i32; 8], ten: i32) -> Named {
-    Named {
-        name,
-        exponents,
-        factor: 1.0,
-        ten,
-        prefixes: true,
-    }
+    Named { name, exponents, factor: 1.0, ten, prefixes: true }
 }
 
 const fn plain(name: &'static str, exponents: [i32; 8], factor: f64, ten: i32) -> Named {
-    Named {
-        name,
-        exponents,
-        factor,
-        ten,
-        prefixes: false,
-    }
+    Named { name, exponents, factor, ten, prefixes: false }
 }
 
 /// SI units (the SI brochure, 9th edition, tables 2, 4, 8) and a few others in daily use.
@@ -67,10 +55,7 @@ const UNITS: [Named; 37] = [
     metric("bar", [1, -1, -2, 0, 0, 0, 0, 0], 5),
     metric("l", [0, 3, 0, 0, 0, 0, 0, 0], -3),
     metric("L", [0, 3, 0, 0, 0, 0, 0, 0], -3),
-    Named {
-        prefixes: true,
-        ..plain("Hz", [0, 0, -1, 0, 0, 0, 0, 1], 2.0 * PI, 0)
-    },
+    Named { prefixes: true, ..plain("Hz", [0, 0, -1, 0, 0, 0, 0, 1], 2.0 * PI, 0) },
     plain("t", [1, 0, 0, 0, 0, 0, 0, 0], 1.0, 3),
     plain("min", [0, 0, 1, 0, 0, 0, 0, 0], 60.0, 0),
     plain("h", [0, 0, 1, 0, 0, 0, 0, 0], 3600.0, 0),
@@ -86,12 +71,7 @@ const UNITS: [Named; 37] = [
 ];
 
 const SCALES: [Scale; 2] = [
-    Scale {
-        name: "degC",
-        exponents: [0, 0, 0, 0, 1, 0, 0, 0],
-        factor: 1.0,
-        offset: 273.15,
-    },
+    Scale { name: "degC", exponents: [0, 0, 0, 0, 1, 0, 0, 0], factor: 1.0, offset: 273.15 },
     Scale {
         name: "degF",
         exponents: [0, 0, 0, 0, 1, 0, 0, 0],
@@ -120,13 +100,8 @@ pub(super) fn find(name: &str) -> Option<Named> {
     own.or_else(|| {
         PREFIXES.iter().find_map(|(prefix, ten)| {
             let rest = name.strip_prefix(prefix)?;
-            let unit = UNITS
-                .iter()
-                .find(|unit| unit.prefixes && unit.name == rest)?;
-            Some(Named {
-                ten: unit.ten + ten,
-                ..*unit
-            })
+            let unit = UNITS.iter().find(|unit| unit.prefixes && unit.name == rest)?;
+            Some(Named { ten: unit.ten + ten, ..*unit })
         })
     })
 }

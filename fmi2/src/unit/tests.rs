@@ -5,39 +5,16 @@ fn base(expression: &str) -> BaseUnit {
 }
 
 fn exponents(expression: &str) -> [i32; 8] {
-    let BaseUnit {
-        kg,
-        m,
-        s,
-        a,
-        k,
-        mol,
-        cd,
-        rad,
-        ..
-    } = base(expression);
+    let BaseUnit { kg, m, s, a, k, mol, cd, rad, .. } = base(expression);
     [kg, m, s, a, k, mol, cd, rad]
 }
 
 #[test]
 fn all_ways_to_write_a_product_mean_the_same() {
-    for expression in [
-        "kg.m2/s2",
-        "kg*m^2/s^2",
-        "kg m2/s2",
-        "kg . m^2 . s-2",
-        "N.m",
-        "kg.m.m/s/s",
-    ] {
-        assert_eq!(
-            exponents(expression),
-            [1, 2, -2, 0, 0, 0, 0, 0],
-            "{expression}"
-        );
-        assert!(
-            (base(expression).factor - 1.0).abs() < f64::EPSILON,
-            "{expression}"
-        );
+    for expression in ["kg.m2/s2", "kg*m^2/s^2", "kg m2/s2", "kg . m^2 . s-2", "N.m", "kg.m.m/s/s"]
+    {
+        assert_eq!(exponents(expression), [1, 2, -2, 0, 0, 0, 0, 0], "{expression}");
+        assert!((base(expression).factor - 1.0).abs() < f64::EPSILON, "{expression}");
     }
     assert_eq!(exponents("1/s"), [0, 0, -1, 0, 0, 0, 0, 0]);
     assert_eq!(exponents("J/(kg.K)"), [0, 2, -2, 0, -1, 0, 0, 0]);
@@ -108,28 +85,19 @@ fn conversions_have_the_published_factors() {
         ("g/cm3", 1000.0),
     ] {
         let found = base(expression).factor;
-        assert!(
-            (found - factor).abs() <= 3e-16 * factor,
-            "{expression}: {found} {factor}"
-        );
+        assert!((found - factor).abs() <= 3e-16 * factor, "{expression}: {found} {factor}");
     }
 }
 
 #[test]
 fn temperatures_have_an_offset_and_stand_alone() {
     let celsius = base("degC");
-    assert_eq!(
-        (celsius.k, celsius.factor, celsius.offset),
-        (1, 1.0, 273.15)
-    );
+    assert_eq!((celsius.k, celsius.factor, celsius.offset), (1, 1.0, 273.15));
     let fahrenheit = base("degF");
     assert!((fahrenheit.factor - 0.555_555_555_555_555_6).abs() < 1e-16);
     assert!((fahrenheit.offset - 255.372_222_222_222_2).abs() < 1e-13);
     let error = Unit::parse("W/degC").unwrap_err();
-    assert!(
-        matches!(error, UnitError::Offset { column: 3, .. }),
-        "{error}"
-    );
+    assert!(matches!(error, UnitError::Offset { column: 3, .. }), "{error}");
 }
 
 #[test]
@@ -164,13 +132,9 @@ fn a_units_own_name_goes_before_prefix_and_unit() {
 
 #[test]
 fn what_is_no_unit_is_refused_with_its_place() {
-    for (expression, column) in [
-        ("kg.furlong", 4),
-        ("kmin", 1),
-        ("kkg", 1),
-        ("m/Q", 3),
-        ("\u{b5}m.x", 1),
-    ] {
+    for (expression, column) in
+        [("kg.furlong", 4), ("kmin", 1), ("kkg", 1), ("m/Q", 3), ("\u{b5}m.x", 1)]
+    {
         let error = Unit::parse(expression).unwrap_err();
         assert!(
             matches!(error, UnitError::UnknownName { column: found, .. } if found == column),
@@ -200,8 +164,5 @@ fn what_is_no_unit_is_refused_with_its_place() {
             "{expression}: {error}"
         );
     }
-    assert!(matches!(
-        Unit::parse("Tm99"),
-        Err(UnitError::Magnitude { .. })
-    ));
+    assert!(matches!(Unit::parse("Tm99"), Err(UnitError::Magnitude { .. })));
 }

@@ -18,19 +18,9 @@ pub(super) struct Piece<'a> {
 
 impl<'a> Piece<'a> {
     pub(super) fn new(plant: &'a Plant, motion: &Motion, elapsed: f64) -> Self {
-        let Motion {
-            state: start,
-            regime,
-            ..
-        } = *motion;
+        let Motion { state: start, regime, .. } = *motion;
         let slope = plant.derivative(regime, elapsed, &start);
-        Self {
-            plant,
-            regime,
-            elapsed,
-            start,
-            slope,
-        }
+        Self { plant, regime, elapsed, start, slope }
     }
 
     pub(super) fn step(&self, length: f64) -> Step {
@@ -39,12 +29,7 @@ impl<'a> Piece<'a> {
     }
 
     pub(super) fn margin(&self, direction: Regime, step: &Step) -> f64 {
-        self.plant.margin(
-            self.regime,
-            direction,
-            self.elapsed + step.length,
-            &step.end,
-        )
+        self.plant.margin(self.regime, direction, self.elapsed + step.length, &step.end)
     }
 
     /// The longest step that cannot leap over the fall of the friction near zero velocity.

@@ -35,9 +35,7 @@ fn follow(
     for k in 0.. {
         let next = (time + cut(k)).min(end);
         let duration = next - time;
-        motion
-            .advance(parameters, force, time, duration, &Tolerance::default())
-            .unwrap();
+        motion.advance(parameters, force, time, duration, &Tolerance::default()).unwrap();
         time = next;
         if time >= end {
             break;
@@ -65,18 +63,10 @@ fn power(p: &Parameters, [_, _, v, rate]: State, force: f64) -> f64 {
 
 #[test]
 fn the_energy_changes_by_the_work_of_force_dampers_and_friction() {
-    let force = Force {
-        value: 10.0,
-        slope: 80.0,
-        curvature: -90.0,
-        start: 0.0,
-    };
+    let force = Force { value: 10.0, slope: 80.0, curvature: -90.0, start: 0.0 };
     let (half, pairs) = (1e-4, 15_000);
     for exponent in [0.5, 1.0, 2.0, 3.7] {
-        let p = Parameters {
-            stribeck_exponent: exponent,
-            ..Parameters::default()
-        };
+        let p = Parameters { stribeck_exponent: exponent, ..Parameters::default() };
         let mut motion = start(&p, [0.1, 0.6, 0.4, -0.2], &force);
         let before = energy(&p, *motion.state());
         let mut work = 0.0;
@@ -84,19 +74,14 @@ fn the_energy_changes_by_the_work_of_force_dampers_and_friction() {
             let time = 2.0 * half * f64::from(k);
             let mut powers = [power(&p, *motion.state(), force.at(time)), 0.0, 0.0];
             for (i, from) in [(1, time), (2, time + half)] {
-                motion
-                    .advance(&p, &force, from, half, &Tolerance::default())
-                    .unwrap();
+                motion.advance(&p, &force, from, half, &Tolerance::default()).unwrap();
                 powers[i] = power(&p, *motion.state(), force.at(from + half));
             }
             work += half / 3.0 * (powers[0] + 4.0 * powers[1] + powers[2]);
         }
         let change = energy(&p, *motion.state()) - before;
         assert!(change.abs() > 1.0, "{change} J tell nothing");
-        assert!(
-            (change - work).abs() < 1e-6 * change.abs(),
-            "{exponent}: {change} {work}"
-        );
+        assert!((change - work).abs() < 1e-6 * change.abs(), "{exponent}: {change} {work}");
     }
 }
 
@@ -114,10 +99,7 @@ fn without_friction_and_dampers_the_energy_is_kept() {
     let motion = follow(&p, initial, &force, 5.0, |_| 0.3);
     let change = energy(&p, *motion.state()) - energy(&p, initial);
     assert!(change.abs() < 1e-7 * energy(&p, initial), "{change}");
-    assert!(
-        motion.state()[2].abs() > 1e-3,
-        "the cart is driven by the pendulum"
-    );
+    assert!(motion.state()[2].abs() > 1e-3, "the cart is driven by the pendulum");
 }
 
 #[test]
@@ -134,42 +116,19 @@ fn friction_opposes_the_motion_with_the_magnitude_of_the_law() {
 #[test]
 fn the_upright_rest_is_an_equilibrium() {
     for linearised in [false, true] {
-        let p = Parameters {
-            linearised,
-            ..Parameters::default()
-        };
-        let motion = follow(&p, [0.3, 0.0, 0.0, 0.0], &Force::constant(0.0), 5.0, |_| {
-            1.0
-        });
-        assert_eq!(
-            motion.state().map(f64::to_bits),
-            [0.3, 0.0, 0.0, 0.0].map(f64::to_bits)
-        );
+        let p = Parameters { linearised, ..Parameters::default() };
+        let motion = follow(&p, [0.3, 0.0, 0.0, 0.0], &Force::constant(0.0), 5.0, |_| 1.0);
+        assert_eq!(motion.state().map(f64::to_bits), [0.3, 0.0, 0.0, 0.0].map(f64::to_bits));
         assert_eq!(motion.regime(), Regime::Stick);
     }
 }
 
 #[test]
 fn the_linearised_pendulum_on_a_held_cart_falls_like_a_hyperbolic_cosine() {
-    let p = Parameters {
-        linearised: true,
-        pendulum_damping: 0.0,
-        ..Parameters::default()
-    };
-    let motion = follow(
-        &p,
-        [0.0, 1e-3, 0.0, 0.0],
-        &Force::constant(0.0),
-        0.8,
-        |_| 0.17,
-    );
+    let p = Parameters { linearised: true, pendulum_damping: 0.0, ..Parameters::default() };
+    let motion = follow(&p, [0.0, 1e-3, 0.0, 0.0], &Force::constant(0.0), 0.8, |_| 0.17);
     let rate = (p.pendulum_mass * p.length * p.gravity / p.inertia).sqrt();
-    let exact = [
-        0.0,
-        1e-3 * (rate * 0.8).cosh(),
-        0.0,
-        1e-3 * rate * (rate * 0.8).sinh(),
-    ];
+    let exact = [0.0, 1e-3 * (rate * 0.8).cosh(), 0.0, 1e-3 * rate * (rate * 0.8).sinh()];
     for (value, exact) in motion.state().iter().zip(exact) {
         assert!((value - exact).abs() <= 1e-9 * exact, "{value} {exact}");
     }
@@ -177,18 +136,10 @@ fn the_linearised_pendulum_on_a_held_cart_falls_like_a_hyperbolic_cosine() {
 
 #[test]
 fn the_result_does_not_depend_on_how_the_interval_is_cut() {
-    let force = Force {
-        value: 0.0,
-        slope: 60.0,
-        curvature: -90.0,
-        start: 0.0,
-    };
+    let force = Force { value: 0.0, slope: 60.0, curvature: -90.0, start: 0.0 };
     let initial = [0.1, -0.1, 0.2, 0.0];
     for linearised in [false, true] {
-        let p = Parameters {
-            linearised,
-            ..Parameters::default()
-        };
+        let p = Parameters { linearised, ..Parameters::default() };
         let by = |cut: &dyn Fn(u32) -> f64| *follow(&p, initial, &force, 2.0, cut).state();
         let milli = by(&|_| 1e-3);
         let uneven = by(&|k| 7e-3 * (1.0 + 0.9 * f64::from(k).sin()));
@@ -216,14 +167,9 @@ fn a_copy_continues_with_the_same_bits() {
             copy = motion.clone();
         }
         let time = 0.01 * f64::from(k);
-        motion
-            .advance(&p, &force(k), time, 0.01, &tolerance)
-            .unwrap();
+        motion.advance(&p, &force(k), time, 0.01, &tolerance).unwrap();
         copy.advance(&p, &force(k), time, 0.01, &tolerance).unwrap();
-        assert_eq!(
-            motion.state().map(f64::to_bits),
-            copy.state().map(f64::to_bits)
-        );
+        assert_eq!(motion.state().map(f64::to_bits), copy.state().map(f64::to_bits));
         assert_eq!(motion, copy);
     }
 }
@@ -239,17 +185,8 @@ fn bad_input_is_refused_and_leaves_the_motion_as_it_was() {
     let failure = motion.advance(&p, &Force::constant(1e308), 3.0, 0.1, &tolerance);
     assert_eq!(failure, Err(Failure::NotFinite { time: 3.0 }));
     let failure = motion.advance(&p, &Force::constant(0.0), 3.0, -0.1, &tolerance);
-    assert_eq!(
-        failure,
-        Err(Failure::Interval {
-            start: 3.0,
-            duration: -0.1
-        })
-    );
-    assert_eq!(
-        motion.state().map(f64::to_bits),
-        before.state().map(f64::to_bits)
-    );
+    assert_eq!(failure, Err(Failure::Interval { start: 3.0, duration: -0.1 }));
+    assert_eq!(motion.state().map(f64::to_bits), before.state().map(f64::to_bits));
     let mut wild = start(&p, [0.0, 0.0, 0.0, 1e160], &Force::constant(0.0));
     let failure = wild.advance(&p, &Force::constant(0.0), 3.0, 0.1, &tolerance);
     assert_eq!(failure, Err(Failure::NotFinite { time: 3.0 }));

@@ -19,10 +19,7 @@ pub struct Tolerance {
 impl Default for Tolerance {
     /// Relative 1e-9, absolute 1e-12.
     fn default() -> Self {
-        Self {
-            relative: 1e-9,
-            absolute: 1e-12,
-        }
+        Self { relative: 1e-9, absolute: 1e-12 }
     }
 }
 
@@ -36,10 +33,7 @@ impl Tolerance {
     pub fn new(relative: f64) -> Result<Self, Refusal> {
         require("tolerance", relative, relative > 0.0, "finite and > 0")?;
         let relative = relative.clamp(1e-12, 1e-3);
-        Ok(Self {
-            relative,
-            absolute: relative * 1e-3,
-        })
+        Ok(Self { relative, absolute: relative * 1e-3 })
     }
 
     /// Sum of the squares of the errors of a step, each relative to its bound.

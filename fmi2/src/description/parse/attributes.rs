@@ -12,12 +12,7 @@ impl Element {
     /// The error for a missing or surplus child.
     pub(super) fn misses(&self, expected: impl Into<String>, found: String) -> ParseError {
         let (at, element, expected) = (self.at, self.name.clone(), expected.into());
-        ParseError::Element {
-            at,
-            element,
-            expected,
-            found,
-        }
+        ParseError::Element { at, element, expected, found }
     }
 
     /// The error for the value `found` of an attribute.
@@ -27,13 +22,7 @@ impl Element {
 
     fn fault(&self, attribute: &'static str, expected: &str, found: String) -> ParseError {
         let (at, element, expected) = (self.at, self.name.clone(), expected.to_owned());
-        ParseError::Attribute {
-            at,
-            element,
-            attribute,
-            expected,
-            found,
-        }
+        ParseError::Attribute { at, element, attribute, expected, found }
     }
 
     pub(super) fn attribute(&self, name: &str) -> Option<&str> {
@@ -52,9 +41,7 @@ impl Element {
 
     /// A finite `xs:double`.
     pub(super) fn number(&self, name: &'static str) -> Result<Option<f64>, ParseError> {
-        let finite = self
-            .parsed::<f64>(name, "a finite number")?
-            .filter(|value| value.is_finite());
+        let finite = self.parsed::<f64>(name, "a finite number")?.filter(|value| value.is_finite());
         match self.attribute(name) {
             Some(text) if finite.is_none() => Err(self.wrong(name, "a finite number", text)),
             _ => Ok(finite),
@@ -90,9 +77,7 @@ impl Element {
         expected: &str,
     ) -> Result<Option<T>, ParseError> {
         let value = self.attribute(name);
-        value
-            .map(|text| text.parse().map_err(|_| self.wrong(name, expected, text)))
-            .transpose()
+        value.map(|text| text.parse().map_err(|_| self.wrong(name, expected, text))).transpose()
     }
 
     fn parsed<T: FromStr>(
@@ -104,9 +89,7 @@ impl Element {
         value
             .map(|text| {
                 let trimmed = text.trim_matches(WHITE_SPACE);
-                trimmed
-                    .parse()
-                    .map_err(|_| self.wrong(name, expected, text))
+                trimmed.parse().map_err(|_| self.wrong(name, expected, text))
             })
             .transpose()
     }
@@ -120,12 +103,10 @@ impl Element {
     ) -> Result<u32, ParseError> {
         let index = text.trim_matches(WHITE_SPACE).parse::<u32>().ok();
         let inside = |index: &u32| usize::try_from(*index).is_ok_and(|own| own <= count);
-        index
-            .filter(|index| *index > 0 && inside(index))
-            .ok_or_else(|| {
-                let expected = format!("the index of a variable, 1 to {count}");
-                self.wrong(name, &expected, text)
-            })
+        index.filter(|index| *index > 0 && inside(index)).ok_or_else(|| {
+            let expected = format!("the index of a variable, 1 to {count}");
+            self.wrong(name, &expected, text)
+        })
     }
 
     /// An attribute that is a list separated by white space.
@@ -173,8 +154,6 @@ impl Element {
         read: impl Fn(&Element) -> Result<T, ParseError>,
     ) -> Result<Vec<T>, ParseError> {
         let list = self.optional_child(name)?;
-        list.map_or(Ok(Vec::new()), |list| {
-            list.children_named(item).map(read).collect()
-        })
+        list.map_or(Ok(Vec::new()), |list| list.children_named(item).map(read).collect())
     }
 }

@@ -23,19 +23,14 @@ fn with(variables: &str, structure: &str) -> String {
 const X: &str = r#"<ScalarVariable name="x" valueReference="0"><Real/></ScalarVariable>"#;
 
 fn refused(variables: &str, structure: &str) -> String {
-    ModelDescription::parse(with(variables, structure))
-        .unwrap_err()
-        .to_string()
+    ModelDescription::parse(with(variables, structure)).unwrap_err().to_string()
 }
 
 #[test]
 fn defaults_of_the_standard_are_filled_in() {
     let description = ModelDescription::parse(with(X, "")).unwrap();
     let x = description.variable("x").unwrap();
-    assert_eq!(
-        (x.causality, x.variability),
-        (Causality::Local, Variability::Continuous)
-    );
+    assert_eq!((x.causality, x.variability), (Causality::Local, Variability::Continuous));
     assert_eq!(x.initial, None);
     assert_eq!(x.kind, Kind::Real(RealType::default()));
     assert!(!description.structured_names);
@@ -88,10 +83,7 @@ fn each_kind_of_variable_is_read() {
     assert_eq!(description.variables.len(), 5);
     let r = description.variable("r").unwrap();
     assert_eq!(r.description.as_deref(), Some("a < b"));
-    assert_eq!(
-        (r.value_reference, r.initial),
-        (u32::MAX, Some(Initial::Exact))
-    );
+    assert_eq!((r.value_reference, r.initial), (u32::MAX, Some(Initial::Exact)));
 }
 
 #[test]
@@ -99,14 +91,9 @@ fn a_declared_type_gives_what_the_variable_does_not_state() {
     let variables = r#"<ScalarVariable name="x" valueReference="0">
         <Real declaredType="Length" min="1"/></ScalarVariable>"#;
     let description = ModelDescription::parse(with(variables, "")).unwrap();
-    let Kind::Real(x) = &description.variables[0].kind else {
-        panic!("x is Real")
-    };
+    let Kind::Real(x) = &description.variables[0].kind else { panic!("x is Real") };
     assert_eq!((x.min, x.max), (Some(1.0), Some(9.0)));
-    assert_eq!(
-        (x.unit.as_deref(), x.quantity.as_deref()),
-        (Some("m"), Some("Length"))
-    );
+    assert_eq!((x.unit.as_deref(), x.quantity.as_deref()), (Some("m"), Some("Length")));
 }
 
 #[test]
@@ -157,23 +144,12 @@ fn both_interfaces_are_read() {
 #[test]
 fn units_categories_and_experiment_are_read() {
     let description = ModelDescription::parse(CRANE).unwrap();
-    let celsius = BaseUnit {
-        k: 1,
-        offset: 273.15,
-        ..BaseUnit::default()
-    };
+    let celsius = BaseUnit { k: 1, offset: 273.15, ..BaseUnit::default() };
     assert_eq!(description.units[1].base, Some(celsius));
     assert_eq!(description.units[2].base, None);
-    let degrees = DisplayUnit {
-        name: "deg".into(),
-        factor: 57.3,
-        offset: 0.0,
-    };
+    let degrees = DisplayUnit { name: "deg".into(), factor: 57.3, offset: 0.0 };
     assert_eq!(description.units[0].display_units, [degrees]);
-    assert_eq!(
-        description.log_categories[0].description.as_deref(),
-        Some("jumps")
-    );
+    assert_eq!(description.log_categories[0].description.as_deref(), Some("jumps"));
     let experiment = DefaultExperiment {
         stop_time: Some(3.0),
         tolerance: Some(1e-4),
@@ -189,15 +165,10 @@ fn other_versions_are_named() {
         let error = ModelDescription::parse(xml).unwrap_err();
         assert!(matches!(error, ParseError::Version { ref found, .. } if found == version));
     }
-    let missing = ModelDescription::parse("<fmiModelDescription/>")
-        .unwrap_err()
-        .to_string();
+    let missing = ModelDescription::parse("<fmiModelDescription/>").unwrap_err().to_string();
     assert!(missing.contains("fmiVersion"), "{missing}");
     let other = ModelDescription::parse("<ssd/>").unwrap_err().to_string();
-    assert!(
-        other.contains("fmiModelDescription") && other.contains("<ssd>"),
-        "{other}"
-    );
+    assert!(other.contains("fmiModelDescription") && other.contains("<ssd>"), "{other}");
 }
 
 #[test]
@@ -210,9 +181,8 @@ fn numbers_that_are_none_are_refused() {
             "",
         )
     };
-    for text in [
-        "NaN", "INF", "-INF", "+INF", "inf", "infinity", "1e999", "1,5", "", "0x10", "1_0",
-    ] {
+    for text in ["NaN", "INF", "-INF", "+INF", "inf", "infinity", "1e999", "1,5", "", "0x10", "1_0"]
+    {
         let error = number(&format!("start=\"{text}\""));
         assert!(error.contains("start: expected a finite number"), "{error}");
         assert!(error.contains(&format!("found {text:?}")), "{error}");
@@ -229,20 +199,14 @@ fn numbers_that_are_none_are_refused() {
             ),
             "",
         );
-        assert!(
-            error.contains(&format!("<{kind}>, attribute {attribute}")),
-            "{error}"
-        );
+        assert!(error.contains(&format!("<{kind}>, attribute {attribute}")), "{error}");
     }
 }
 
 /// An error of `variables` and `structure` that has a position and says `said`.
 fn assert_refused(variables: &str, structure: &str, said: &str) {
     let error = refused(variables, structure);
-    assert!(
-        error.contains(said) && error.starts_with("line "),
-        "{said}: {error}"
-    );
+    assert!(error.contains(said) && error.starts_with("line "), "{said}: {error}");
 }
 
 #[test]
@@ -252,41 +216,13 @@ fn a_variable_that_would_mislead_is_refused() {
         ("name='x'", "<Real/>", "attribute valueReference"),
         ("name='x' valueReference='-1'", "<Real/>", "0 to 4294967295"),
         ("name='x' valueReference='0'", "", "expected one of Real"),
-        (
-            "name='x' valueReference='0'",
-            "<Real/><String/>",
-            "found more",
-        ),
-        (
-            "name='x' valueReference='0' causality='inout'",
-            "<Real/>",
-            "attribute causality",
-        ),
-        (
-            "name='x' valueReference='0' variability='often'",
-            "<Real/>",
-            "attribute variability",
-        ),
-        (
-            "name='x' valueReference='0' initial='first'",
-            "<Real/>",
-            "attribute initial",
-        ),
-        (
-            "name='x' valueReference='0'",
-            "<Real derivative='2'/>",
-            "1 to 1",
-        ),
-        (
-            "name='x' valueReference='0'",
-            "<Real declaredType='Mode'/>",
-            "attribute declaredType",
-        ),
-        (
-            "name='x' valueReference='0'",
-            "<Enumeration/>",
-            "attribute declaredType",
-        ),
+        ("name='x' valueReference='0'", "<Real/><String/>", "found more"),
+        ("name='x' valueReference='0' causality='inout'", "<Real/>", "attribute causality"),
+        ("name='x' valueReference='0' variability='often'", "<Real/>", "attribute variability"),
+        ("name='x' valueReference='0' initial='first'", "<Real/>", "attribute initial"),
+        ("name='x' valueReference='0'", "<Real derivative='2'/>", "1 to 1"),
+        ("name='x' valueReference='0'", "<Real declaredType='Mode'/>", "attribute declaredType"),
+        ("name='x' valueReference='0'", "<Enumeration/>", "attribute declaredType"),
     ] {
         let variable = format!("<ScalarVariable {attributes}>{content}</ScalarVariable>");
         assert_refused(&variable, "", said);
@@ -303,20 +239,10 @@ fn a_structure_that_would_mislead_is_refused() {
         ("index='1' dependencies='1 2'", "1 to 1"),
         ("index='1' dependencies='x'", "attribute dependencies"),
         ("index='1' dependenciesKind='fixed'", "as dependencies"),
-        (
-            "index='1' dependencies='1' dependenciesKind=''",
-            "as dependencies",
-        ),
-        (
-            "index='1' dependencies='1' dependenciesKind='linear'",
-            "attribute dependenciesKind",
-        ),
+        ("index='1' dependencies='1' dependenciesKind=''", "as dependencies"),
+        ("index='1' dependencies='1' dependenciesKind='linear'", "attribute dependenciesKind"),
     ] {
-        assert_refused(
-            X,
-            &format!("<Outputs><Unknown {attributes}/></Outputs>"),
-            said,
-        );
+        assert_refused(X, &format!("<Outputs><Unknown {attributes}/></Outputs>"), said);
     }
     assert_refused(X, "<Outputs/><Outputs/>", "one element Outputs");
 }
@@ -325,8 +251,5 @@ fn a_structure_that_would_mislead_is_refused() {
 fn aliases_share_a_value_reference() {
     let alias = X.replace("\"x\"", "\"y\"");
     let description = ModelDescription::parse(with(&format!("{X}{alias}"), "")).unwrap();
-    assert_eq!(
-        description.variables[1].value_reference,
-        description.variables[0].value_reference
-    );
+    assert_eq!(description.variables[1].value_reference, description.variables[0].value_reference);
 }

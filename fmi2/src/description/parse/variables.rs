@@ -26,22 +26,14 @@ pub(super) fn types(root: &Element) -> Result<Vec<SimpleType>, ParseError> {
                 "String" => Kind::String(None),
                 _ => Kind::Enumeration(integer_limits(typed, &IntegerType::default())?),
             },
-            items: typed
-                .children_named("Item")
-                .map(item)
-                .collect::<Result<_, _>>()?,
+            items: typed.children_named("Item").map(item).collect::<Result<_, _>>()?,
         })
     })
 }
 
 fn item(element: &Element) -> Result<(String, i32), ParseError> {
-    let value = element
-        .required("value")
-        .and_then(|_| element.integer("value"))?;
-    Ok((
-        element.required("name")?.to_owned(),
-        value.unwrap_or_default(),
-    ))
+    let value = element.required("value").and_then(|_| element.integer("value"))?;
+    Ok((element.required("name")?.to_owned(), value.unwrap_or_default()))
 }
 
 pub(super) fn variables(
@@ -68,14 +60,10 @@ fn variable(
     count: usize,
 ) -> Result<ScalarVariable, ParseError> {
     element.required("valueReference")?;
-    let causality = element.word(
-        "causality",
-        "parameter, calculatedParameter, input, output, local or independent",
-    )?;
-    let variability = element.word(
-        "variability",
-        "constant, fixed, tunable, discrete or continuous",
-    )?;
+    let causality = element
+        .word("causality", "parameter, calculatedParameter, input, output, local or independent")?;
+    let variability =
+        element.word("variability", "constant, fixed, tunable, discrete or continuous")?;
     Ok(ScalarVariable {
         name: element.required("name")?.to_owned(),
         value_reference: element.unsigned("valueReference")?.unwrap_or_default(),
@@ -131,11 +119,7 @@ fn kind(element: &Element, types: &Types<'_>, count: usize) -> Result<Kind, Pars
                 start: element.integer("start")?,
                 ..integer_limits(element, &defaults)?
             };
-            if name == "Integer" {
-                Kind::Integer(own)
-            } else {
-                Kind::Enumeration(own)
-            }
+            if name == "Integer" { Kind::Integer(own) } else { Kind::Enumeration(own) }
         }
     })
 }
@@ -163,9 +147,7 @@ fn real_limits(element: &Element, defaults: &RealType) -> Result<RealType, Parse
     Ok(RealType {
         quantity: element.text("quantity").or(defaults.quantity.clone()),
         unit: element.text("unit").or(defaults.unit.clone()),
-        display_unit: element
-            .text("displayUnit")
-            .or(defaults.display_unit.clone()),
+        display_unit: element.text("displayUnit").or(defaults.display_unit.clone()),
         min: element.number("min")?.or(defaults.min),
         max: element.number("max")?.or(defaults.max),
         nominal: element.number("nominal")?.or(defaults.nominal),

@@ -30,17 +30,10 @@ struct Place<'a> {
 
 impl Place<'_> {
     fn advance(&mut self, offset: u64) -> Position {
-        let end = usize::try_from(offset)
-            .unwrap_or(usize::MAX)
-            .min(self.text.len());
+        let end = usize::try_from(offset).unwrap_or(usize::MAX).min(self.text.len());
         for byte in self.text.get(self.offset..end).unwrap_or_default() {
             match byte {
-                b'\n' => {
-                    self.at = Position {
-                        line: self.at.line.saturating_add(1),
-                        column: 1,
-                    }
-                }
+                b'\n' => self.at = Position { line: self.at.line.saturating_add(1), column: 1 },
                 // Continuation bytes of UTF-8 are no characters of their own.
                 0x80..=0xbf => {}
                 _ => self.at.column = self.at.column.saturating_add(1),
@@ -62,11 +55,7 @@ impl Tree {
     fn start(&mut self, element: Element) -> Result<(), ParseError> {
         if self.open.len() == DEPTH {
             let what = "levels of nested elements";
-            return Err(ParseError::Limit {
-                at: element.at,
-                what,
-                limit: DEPTH,
-            });
+            return Err(ParseError::Limit { at: element.at, what, limit: DEPTH });
         }
         self.open.push(element);
         Ok(())
@@ -84,10 +73,7 @@ impl Tree {
             self.root = Some(element);
         } else {
             let found = format!("a second root element <{}>", element.name);
-            return Err(ParseError::Xml {
-                at: element.at,
-                found,
-            });
+            return Err(ParseError::Xml { at: element.at, found });
         }
         Ok(())
     }
@@ -95,15 +81,9 @@ impl Tree {
     fn finish(self, at: Position) -> Result<Element, ParseError> {
         if let Some(element) = self.open.last() {
             let found = format!("the end of the file inside <{}>", element.name);
-            return Err(ParseError::Xml {
-                at: element.at,
-                found,
-            });
+            return Err(ParseError::Xml { at: element.at, found });
         }
-        let none = || ParseError::Xml {
-            at,
-            found: "a file without an element".to_owned(),
-        };
+        let none = || ParseError::Xml { at, found: "a file without an element".to_owned() };
         self.root.ok_or_else(none)
     }
 }
@@ -112,29 +92,19 @@ impl Tree {
 pub(super) fn read(text: &str) -> Result<Element, ParseError> {
     let mut reader = Reader::from_str(text);
     let start = Position { line: 1, column: 1 };
-    let mut place = Place {
-        text: text.as_bytes(),
-        offset: 0,
-        at: start,
-    };
+    let mut place = Place { text: text.as_bytes(), offset: 0, at: start };
     let mut tree = Tree::default();
     loop {
         let at = place.advance(reader.buffer_position());
         match reader.read_event() {
             Err(error) => {
                 let at = place.advance(reader.error_position());
-                return Err(ParseError::Xml {
-                    at,
-                    found: error.to_string(),
-                });
+                return Err(ParseError::Xml { at, found: error.to_string() });
             }
             Ok(Event::DocType(_)) => return Err(ParseError::Doctype { at }),
             Ok(Event::Start(tag)) if is_annotation(&tag) => {
                 let skipped = reader.read_to_end(tag.name());
-                skipped.map_err(|error| ParseError::Xml {
-                    at,
-                    found: error.to_string(),
-                })?;
+                skipped.map_err(|error| ParseError::Xml { at, found: error.to_string() })?;
             }
             Ok(Event::Start(tag)) => tree.start(element(&tag, at)?)?,
             Ok(Event::Empty(tag)) => tree.add(element(&tag, at)?)?,
@@ -153,18 +123,11 @@ fn element(tag: &BytesStart<'_>, at: Position) -> Result<Element, ParseError> {
     let mut attributes = Vec::new();
     for attribute in tag.attributes() {
         if attributes.len() == ATTRIBUTES {
-            return Err(ParseError::Limit {
-                at,
-                what: "attributes",
-                limit: ATTRIBUTES,
-            });
+            return Err(ParseError::Limit { at, what: "attributes", limit: ATTRIBUTES });
         }
         let wrong = |found: String| {
             let element = tag.name().as_ref().to_owned();
-            ParseError::Xml {
-                at,
-                found: format!("in <{element}>: {found}"),
-            }
+            ParseError::Xml { at, found: format!("in <{element}>: {found}") }
         };
         let attribute = attribute.map_err(|error| wrong(error.to_string()))?;
         let value = attribute
@@ -173,10 +136,5 @@ fn element(tag: &BytesStart<'_>, at: Position) -> Result<Element, ParseError> {
         attributes.push((attribute.key.as_ref().to_owned(), value.into_owned()));
     }
     let name = tag.name().as_ref().to_owned();
-    Ok(Element {
-        name,
-        attributes,
-        children: Vec::new(),
-        at,
-    })
+    Ok(Element { name, attributes, children: Vec::new(), at })
 }

@@ -15,11 +15,7 @@ impl Value for str {
             return Cow::Borrowed(self);
         }
         let replace = |character| {
-            if is_xml(character) {
-                character
-            } else {
-                '\u{fffd}'
-            }
+            if is_xml(character) { character } else { '\u{fffd}' }
         };
         Cow::Owned(self.chars().map(replace).collect())
     }
@@ -75,11 +71,7 @@ impl<'a> Tag<'a> {
         name: &str,
         value: &T,
     ) -> Self {
-        if *value == T::default() {
-            self
-        } else {
-            self.with(name, value)
-        }
+        if *value == T::default() { self } else { self.with(name, value) }
     }
 }
 

@@ -5,19 +5,13 @@ use crate::description::sample;
 #[test]
 fn a_description_with_everything_reads_back_equal() {
     let description = sample::complete();
-    assert_eq!(
-        ModelDescription::parse(description.to_xml()).unwrap(),
-        description
-    );
+    assert_eq!(ModelDescription::parse(description.to_xml()).unwrap(), description);
 }
 
 #[test]
 fn an_empty_description_has_no_empty_list() {
-    let xml = ModelDescription {
-        fmi_version: "2.0".into(),
-        ..ModelDescription::default()
-    }
-    .to_xml();
+    let xml =
+        ModelDescription { fmi_version: "2.0".into(), ..ModelDescription::default() }.to_xml();
     let expected = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
         <fmiModelDescription fmiVersion=\"2.0\" modelName=\"\" guid=\"\">\n  \
         <ModelVariables>\n  </ModelVariables>\n  <ModelStructure/>\n</fmiModelDescription>\n";
@@ -39,11 +33,7 @@ fn numbers_read_back_to_the_same_bits() {
         2f64.powi(60) + 256.0,
     ] {
         let text = value.text();
-        assert_eq!(
-            text.parse::<f64>().unwrap().to_bits(),
-            value.to_bits(),
-            "{text}"
-        );
+        assert_eq!(text.parse::<f64>().unwrap().to_bits(), value.to_bits(), "{text}");
         assert!(text.len() <= 25, "{text}");
     }
 }
@@ -54,10 +44,7 @@ fn text_is_escaped_and_what_xml_cannot_hold_is_replaced() {
     description.model_name = "a\u{0}b\u{1b}c\u{ffff}d".to_owned();
     description.author = Some("<&>\"'\n\r\t".to_owned());
     let xml = description.to_xml();
-    assert!(
-        xml.contains("author=\"&lt;&amp;&gt;&quot;&apos;&#10;&#13;&#9;\""),
-        "{xml}"
-    );
+    assert!(xml.contains("author=\"&lt;&amp;&gt;&quot;&apos;&#10;&#13;&#9;\""), "{xml}");
     let parsed = ModelDescription::parse(xml).unwrap();
     assert_eq!(parsed.model_name, "a\u{fffd}b\u{fffd}c\u{fffd}d");
     assert_eq!(parsed.author, description.author);
@@ -67,16 +54,9 @@ fn text_is_escaped_and_what_xml_cannot_hold_is_replaced() {
 fn the_content_guid_depends_on_everything_but_the_guid() {
     let description = sample::complete();
     let guid = description.content_guid();
-    let digits: Vec<usize> = guid
-        .trim_matches(['{', '}'])
-        .split('-')
-        .map(str::len)
-        .collect();
+    let digits: Vec<usize> = guid.trim_matches(['{', '}']).split('-').map(str::len).collect();
     assert_eq!(digits, [8, 4, 4, 4, 12]);
-    let renamed = ModelDescription {
-        guid: guid.clone(),
-        ..description.clone()
-    };
+    let renamed = ModelDescription { guid: guid.clone(), ..description.clone() };
     assert_eq!(renamed.content_guid(), guid);
     let mut changed = description.clone();
     changed.variables[0].value_reference += 1;
@@ -89,12 +69,6 @@ fn the_content_guid_depends_on_everything_but_the_guid() {
 /// The hash of a known text, computed with `hashlib.sha256` of Python.
 #[test]
 fn the_content_guid_is_the_sha_256_of_the_xml() {
-    let description = ModelDescription {
-        fmi_version: "2.0".into(),
-        ..ModelDescription::default()
-    };
-    assert_eq!(
-        description.content_guid(),
-        "{f5e52335-2da5-379f-fa57-74a571354958}"
-    );
+    let description = ModelDescription { fmi_version: "2.0".into(), ..ModelDescription::default() };
+    assert_eq!(description.content_guid(), "{f5e52335-2da5-379f-fa57-74a571354958}");
 }

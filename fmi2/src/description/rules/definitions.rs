@@ -10,36 +10,20 @@ const UNITS: &str = "2.2.2";
 const TYPES: &str = "2.2.3";
 
 pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
-    problems.unique(
-        UNITS,
-        "unit",
-        description.units.iter().map(|unit| unit.name.as_str()),
-    );
+    problems.unique(UNITS, "unit", description.units.iter().map(|unit| unit.name.as_str()));
     for unit in &description.units {
         check_unit(unit, problems);
     }
-    let units = description
-        .units
-        .iter()
-        .map(|unit| (unit.name.as_str(), unit))
-        .collect();
+    let units = description.units.iter().map(|unit| (unit.name.as_str(), unit)).collect();
     for variable in &description.variables {
         if let Kind::Real(real) = &variable.kind {
-            check_use(
-                &format!("variable {}", variable.name),
-                real,
-                &units,
-                problems,
-            );
+            check_use(&format!("variable {}", variable.name), real, &units, problems);
         }
     }
     let names = description.types.iter().map(|own| own.name.as_str());
     problems.unique(TYPES, "type", names);
-    let variables: HashSet<_> = description
-        .variables
-        .iter()
-        .map(|variable| variable.name.as_str())
-        .collect();
+    let variables: HashSet<_> =
+        description.variables.iter().map(|variable| variable.name.as_str()).collect();
     for own in &description.types {
         problems.demand(!variables.contains(own.name.as_str()), TYPES, || {
             format!("type {} has the name of a variable", own.name)
@@ -54,15 +38,9 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
 fn check_unit(unit: &Unit, problems: &mut Problems) {
     let name = &unit.name;
     problems.line(UNITS, "unit", name);
-    let displays = unit
-        .display_units
-        .iter()
-        .map(|display| display.name.as_str());
+    let displays = unit.display_units.iter().map(|display| display.name.as_str());
     problems.unique(UNITS, &format!("in unit {name:?}, display unit"), displays);
-    let base = unit
-        .base
-        .iter()
-        .map(|base| ("its base unit", base.factor, base.offset));
+    let base = unit.base.iter().map(|base| ("its base unit", base.factor, base.offset));
     let displays = unit
         .display_units
         .iter()
@@ -103,11 +81,7 @@ fn check_type(own: &SimpleType, problems: &mut Problems) {
     let name = &own.name;
     problems.demand(!name.is_empty(), TYPES, || "a type has no name".to_owned());
     problems.line(TYPES, "type", name);
-    problems.text(
-        TYPES,
-        "description of a type",
-        own.description.as_deref().unwrap_or_default(),
-    );
+    problems.text(TYPES, "description of a type", own.description.as_deref().unwrap_or_default());
     match &own.kind {
         Kind::Real(real) => super::variables::check_real(&format!("type {name}"), real, problems),
         Kind::Integer(integer) => {

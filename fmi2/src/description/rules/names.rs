@@ -8,17 +8,10 @@ use crate::description::{Kind, ModelDescription};
 const SECTION: &str = "2.2.9";
 
 pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
-    let names = || {
-        description
-            .variables
-            .iter()
-            .map(|variable| variable.name.as_str())
-    };
+    let names = || description.variables.iter().map(|variable| variable.name.as_str());
     problems.unique("2.2.7", "variable", names());
     for name in names() {
-        problems.demand(!name.is_empty(), SECTION, || {
-            "a variable has no name".to_owned()
-        });
+        problems.demand(!name.is_empty(), SECTION, || "a variable has no name".to_owned());
         problems.line(SECTION, "variable", name);
     }
     if !description.structured_names {
@@ -64,19 +57,13 @@ fn check_arrays<'a>(names: impl Iterator<Item = &'a str>, problems: &mut Problem
 /// Splits `a.b[1,2]` into `a.b` and its indices.
 fn element(name: &str) -> Option<(&str, Vec<u32>)> {
     let (array, indices) = name.strip_suffix(']')?.split_once('[')?;
-    let indices = indices
-        .split(',')
-        .map(str::parse)
-        .collect::<Result<_, _>>()
-        .ok()?;
+    let indices = indices.split(',').map(str::parse).collect::<Result<_, _>>().ok()?;
     Some((array, indices))
 }
 
 /// `name = identifier | "der(" identifier [ "," unsignedInteger ] ")"`.
 fn is_structured(name: &str) -> bool {
-    let derivative = name
-        .strip_prefix("der(")
-        .and_then(|rest| rest.strip_suffix(')'));
+    let derivative = name.strip_prefix("der(").and_then(|rest| rest.strip_suffix(')'));
     let Some(inner) = derivative else {
         return is_identifier(name);
     };
@@ -116,9 +103,7 @@ fn after_name(text: &str) -> Option<&str> {
         match character {
             '\'' => return (at > 0).then(|| &quoted[at + 1..]),
             '\\' => {
-                characters
-                    .next()
-                    .filter(|(_, escaped)| "'\"?\\abfnrtv".contains(*escaped))?;
+                characters.next().filter(|(_, escaped)| "'\"?\\abfnrtv".contains(*escaped))?;
             }
             _ if character.is_ascii_alphanumeric() => {}
             _ if "_!#$%&()*+,-./:;<>=?@[]^{}|~ ".contains(character) => {}

@@ -13,22 +13,17 @@ const SECTION: &str = "2.2.8";
 impl ModelDescription {
     /// The variable with a 1-based index.
     pub(super) fn at(&self, index: u32) -> Option<&ScalarVariable> {
-        self.variables
-            .get(usize::try_from(index).ok()?.checked_sub(1)?)
+        self.variables.get(usize::try_from(index).ok()?.checked_sub(1)?)
     }
 
     /// The 1-based indices of the variables that `chosen` accepts.
     fn indices_of(&self, chosen: impl Fn(&ScalarVariable) -> bool) -> BTreeSet<u32> {
         let numbered = (1..).zip(&self.variables);
-        numbered
-            .filter(|(_, variable)| chosen(variable))
-            .map(|(index, _)| index)
-            .collect()
+        numbered.filter(|(_, variable)| chosen(variable)).map(|(index, _)| index).collect()
     }
 
     fn name_of(&self, index: u32) -> String {
-        self.at(index)
-            .map_or_else(|| format!("number {index}"), |own| own.name.clone())
+        self.at(index).map_or_else(|| format!("number {index}"), |own| own.name.clone())
     }
 }
 
@@ -36,28 +31,17 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
     let structure = &description.structure;
     let states = states(description, problems);
     let outputs = description.indices_of(|own| own.causality == Causality::Output);
-    check_members(
-        "Outputs",
-        &structure.outputs,
-        &outputs,
-        description,
-        problems,
-    );
+    check_members("Outputs", &structure.outputs, &outputs, description, problems);
     let unknowns = initial_unknowns(description, &states);
     let rows = &structure.initial_unknowns;
     check_members("InitialUnknowns", rows, &unknowns, description, problems);
     let ascending = rows.windows(2).all(|pair| pair[0].index <= pair[1].index);
-    problems.demand(ascending, SECTION, || {
-        "InitialUnknowns are not in ascending order".to_owned()
-    });
+    problems.demand(ascending, SECTION, || "InitialUnknowns are not in ascending order".to_owned());
 
     let is_given =
         |own: &ScalarVariable| matches!(own.causality, Causality::Input | Causality::Independent);
     let known = |index: u32, own: &ScalarVariable| is_given(own) || states.contains(&index);
-    for (list, rows) in [
-        ("Outputs", &structure.outputs),
-        ("Derivatives", &structure.derivatives),
-    ] {
+    for (list, rows) in [("Outputs", &structure.outputs), ("Derivatives", &structure.derivatives)] {
         for row in rows {
             check_dependencies(list, row, description, known, problems);
         }
@@ -66,13 +50,7 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
         is_given(own) || own.initial_in_force() == Some(Initial::Exact)
     };
     for row in rows {
-        check_dependencies(
-            "InitialUnknowns",
-            row,
-            description,
-            known_at_start,
-            problems,
-        );
+        check_dependencies("InitialUnknowns", row, description, known_at_start, problems);
         check_initial_kinds(row, description, problems);
     }
 }
@@ -80,11 +58,7 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
 /// At initialization, a dependency is general or has a constant factor.
 fn check_initial_kinds(row: &Unknown, description: &ModelDescription, problems: &mut Problems) {
     let allowed = [DependencyKind::Dependent, DependencyKind::Constant];
-    let holds = row
-        .kinds
-        .iter()
-        .flatten()
-        .all(|kind| allowed.contains(kind));
+    let holds = row.kinds.iter().flatten().all(|kind| allowed.contains(kind));
     problems.demand(holds, SECTION, || {
         let name = description.name_of(row.index);
         format!("InitialUnknowns, {name}: dependenciesKind may be dependent or constant only")
@@ -101,10 +75,7 @@ fn states(description: &ModelDescription, problems: &mut Problems) -> HashSet<u3
             _ => None,
         });
         let Some(state) = derivative else {
-            problems.add(
-                SECTION,
-                format!("Derivatives, {name}: it has no attribute derivative"),
-            );
+            problems.add(SECTION, format!("Derivatives, {name}: it has no attribute derivative"));
             continue;
         };
         problems.demand(states.insert(state), SECTION, || {
@@ -124,28 +95,17 @@ fn states(description: &ModelDescription, problems: &mut Problems) -> HashSet<u3
 
 /// The indices that `InitialUnknowns` must have.
 fn initial_unknowns(description: &ModelDescription, states: &HashSet<u32>) -> BTreeSet<u32> {
-    let derivatives = description
-        .structure
-        .derivatives
-        .iter()
-        .map(|row| row.index);
+    let derivatives = description.structure.derivatives.iter().map(|row| row.index);
     let exposed: HashSet<u32> = states.iter().copied().chain(derivatives).collect();
     let computed = |own: &ScalarVariable| {
-        matches!(
-            own.initial_in_force(),
-            Some(Initial::Approx | Initial::Calculated)
-        )
+        matches!(own.initial_in_force(), Some(Initial::Approx | Initial::Calculated))
     };
     let mut indices = description.indices_of(|own| match own.causality {
         Causality::CalculatedParameter => true,
         Causality::Output => computed(own),
         _ => false,
     });
-    indices.extend(
-        exposed
-            .iter()
-            .filter(|index| description.at(**index).is_some_and(computed)),
-    );
+    indices.extend(exposed.iter().filter(|index| description.at(**index).is_some_and(computed)));
     indices
 }
 
@@ -160,24 +120,15 @@ fn check_members(
     let mut found = BTreeSet::new();
     for row in rows {
         problems.demand(found.insert(row.index), SECTION, || {
-            format!(
-                "{list} has variable {} twice",
-                description.name_of(row.index)
-            )
+            format!("{list} has variable {} twice", description.name_of(row.index))
         });
     }
     for index in wanted.difference(&found) {
-        problems.add(
-            SECTION,
-            format!("{list} lacks variable {}", description.name_of(*index)),
-        );
+        problems.add(SECTION, format!("{list} lacks variable {}", description.name_of(*index)));
     }
     for index in found.difference(wanted) {
         let name = description.name_of(*index);
-        problems.add(
-            SECTION,
-            format!("{list} has variable {name}, which does not belong there"),
-        );
+        problems.add(SECTION, format!("{list} has variable {name}, which does not belong there"));
     }
 }
 
@@ -191,15 +142,11 @@ fn check_dependencies(
 ) {
     let name = description.name_of(row.index);
     let dependencies = row.dependencies.as_deref().unwrap_or_default();
-    problems.demand(
-        dependencies.windows(2).all(|pair| pair[0] < pair[1]),
-        SECTION,
-        || format!("{list}, {name}: dependencies are not ascending and unique"),
-    );
+    problems.demand(dependencies.windows(2).all(|pair| pair[0] < pair[1]), SECTION, || {
+        format!("{list}, {name}: dependencies are not ascending and unique")
+    });
     for index in dependencies {
-        let known = description
-            .at(*index)
-            .is_some_and(|own| is_known(*index, own));
+        let known = description.at(*index).is_some_and(|own| is_known(*index, own));
         problems.demand(known, SECTION, || {
             let other = description.name_of(*index);
             format!("{list}, {name}: a dependency on {other} cannot be stated, it is no known")
@@ -211,9 +158,7 @@ fn check_dependencies(
         SECTION,
         || format!("{list}, {name}: dependenciesKind is not as long as dependencies"),
     );
-    let real = description
-        .at(row.index)
-        .is_some_and(|own| matches!(own.kind, Kind::Real(_)));
+    let real = description.at(row.index).is_some_and(|own| matches!(own.kind, Kind::Real(_)));
     let plain = kinds.iter().all(|kind| *kind == DependencyKind::Dependent);
     problems.demand(real || plain, SECTION, || {
         format!("{list}, {name}: only for a Real may dependenciesKind be other than dependent")

@@ -17,11 +17,7 @@ fn only_problem(section: &str, change: impl FnOnce(&mut ModelDescription)) -> St
 }
 
 fn variable<'a>(description: &'a mut ModelDescription, name: &str) -> &'a mut ScalarVariable {
-    description
-        .variables
-        .iter_mut()
-        .find(|own| own.name == name)
-        .unwrap()
+    description.variables.iter_mut().find(|own| own.name == name).unwrap()
 }
 
 fn real_of<'a>(description: &'a mut ModelDescription, name: &str) -> &'a mut RealType {
@@ -43,10 +39,7 @@ fn identity_and_flags_are_checked() {
     only_problem("2.2.1", |own| own.model_name = "a\u{1}".into());
     only_problem("2.2.1", |own| own.version = Some("1\n2".into()));
     only_problem("4.3.1", |own| {
-        own.co_simulation
-            .as_mut()
-            .unwrap()
-            .can_get_and_set_fmu_state = false;
+        own.co_simulation.as_mut().unwrap().can_get_and_set_fmu_state = false;
     });
     only_problem("3.3.1", |own| own.model_exchange = Some("a-b".into()));
     only_problem("2.2.1", |own| {
@@ -84,11 +77,7 @@ fn the_default_experiment_is_checked() {
     only_problem("2.2.5", |own| change(own).step_size = Some(-0.1));
     only_problem("2.2.5", |own| change(own).step_size = Some(1000.0));
     only_problem("2.2.5", |own| {
-        *change(own) = DefaultExperiment {
-            step_size: None,
-            stop_time: Some(-1.0),
-            ..*change(own)
-        };
+        *change(own) = DefaultExperiment { step_size: None, stop_time: Some(-1.0), ..*change(own) };
     });
     only_problem("2.2.5", |own| {
         change(own).start_time = None;
@@ -112,10 +101,7 @@ fn units_and_types_are_checked() {
     let text = only_problem("2.2.2", |own| {
         real_of(own, "u").unit = Some("furlong".into());
     });
-    assert!(
-        text.contains("variable u") && text.contains("furlong"),
-        "{text}"
-    );
+    assert!(text.contains("variable u") && text.contains("furlong"), "{text}");
     only_problem("2.2.2", |own| real_of(own, "u").unit = Some(String::new()));
     only_problem("2.2.3", |own| {
         real_of(own, "u").display_unit = Some("deg".into());
@@ -150,14 +136,7 @@ fn causality_and_variability_follow_the_table() {
         (Local, Continuous),
         (Independent, Continuous),
     ];
-    for causality in [
-        Parameter,
-        CalculatedParameter,
-        Input,
-        Output,
-        Local,
-        Independent,
-    ] {
+    for causality in [Parameter, CalculatedParameter, Input, Output, Local, Independent] {
         for variability in [Constant, Fixed, Tunable, Discrete, Continuous] {
             let pair = (causality, variability);
             let mut problems = Problems::default();
@@ -169,12 +148,7 @@ fn causality_and_variability_follow_the_table() {
                 ..ModelDescription::default()
             };
             variables::check(&description, &mut problems);
-            assert_eq!(
-                problems.0.is_empty(),
-                allowed.contains(&pair),
-                "{pair:?} {:?}",
-                problems.0
-            );
+            assert_eq!(problems.0.is_empty(), allowed.contains(&pair), "{pair:?} {:?}", problems.0);
         }
     }
 }
@@ -202,10 +176,7 @@ fn initial_and_start_follow_the_table() {
     let text = only_problem("2.2.7", |own| {
         variable(own, "enable").variability = Variability::Continuous;
     });
-    assert!(
-        text.contains("enable") && text.contains("only a Real"),
-        "{text}"
-    );
+    assert!(text.contains("enable") && text.contains("only a Real"), "{text}");
     only_problem("2.2.7", |own| {
         let mut second = own.variables[0].clone();
         (second.name, second.value_reference) = ("clock".into(), 99);
@@ -223,9 +194,7 @@ fn limits_are_checked() {
         (real_of(own, "body.m").min, real_of(own, "body.m").max) = (Some(0.2), Some(f64::INFINITY));
     });
     only_problem("2.2.7", |own| {
-        let Kind::Enumeration(mode) = &mut variable(own, "mode").kind else {
-            panic!()
-        };
+        let Kind::Enumeration(mode) = &mut variable(own, "mode").kind else { panic!() };
         mode.start = Some(0);
     });
     only_problem("2.2.7", |own| {
@@ -235,10 +204,8 @@ fn limits_are_checked() {
         real_of(own, "x").declared_type = Some("Nothing".into());
     });
     only_problem("2.2.7", |own| {
-        variable(own, "mode").kind = Kind::Enumeration(IntegerType {
-            start: Some(1),
-            ..IntegerType::default()
-        });
+        variable(own, "mode").kind =
+            Kind::Enumeration(IntegerType { start: Some(1), ..IntegerType::default() });
     });
 }
 
@@ -248,19 +215,11 @@ fn names_are_checked() {
     only_problem("2.2.9", |own| {
         variable(own, "enable").name = "der(enable)".into();
     });
-    for name in [
-        "a b", "a-b", "1a", "a.", "a[", "a[x]", "a[]", "'a", "''", "der(a", "a\u{e9}",
-    ] {
+    for name in ["a b", "a-b", "1a", "a.", "a[", "a[x]", "a[]", "'a", "''", "der(a", "a\u{e9}"] {
         let text = only_problem("2.2.9", |own| variable(own, "c").name = name.into());
         assert!(text.contains(&format!("{name:?}")), "{text}");
     }
-    for name in [
-        "_a9",
-        "a.b[1,2].'q name'",
-        "'it\\'s'",
-        "der(a[3].b,2)",
-        "der(a)",
-    ] {
+    for name in ["_a9", "a.b[1,2].'q name'", "'it\\'s'", "der(a[3].b,2)", "der(a)"] {
         let mut description = sample::complete();
         variable(&mut description, "c").name = name.into();
         assert_eq!(description.problems(), [], "{name}");
@@ -289,37 +248,21 @@ fn aliases_are_checked() {
     assert_eq!(description.problems(), [], "aliases as such are allowed");
     variable(&mut description, "body.m").value_reference = 77;
     variable(&mut description, "u").value_reference = 77;
-    assert_eq!(
-        description.problems().len(),
-        2,
-        "both can be set, both have a start"
-    );
+    assert_eq!(description.problems().len(), 2, "both can be set, both have a start");
     let mut description = sample::complete();
-    let kind = |start| {
-        Kind::Integer(IntegerType {
-            start,
-            ..IntegerType::default()
-        })
-    };
+    let kind = |start| Kind::Integer(IntegerType { start, ..IntegerType::default() });
     for (name, start) in [("one", 1), ("two", 2)] {
         let constant = (Causality::Local, Variability::Constant);
         let value_reference = 500;
         let variable = other(name, constant, kind(Some(start)));
-        description.variables.push(ScalarVariable {
-            value_reference,
-            ..variable
-        });
+        description.variables.push(ScalarVariable { value_reference, ..variable });
     }
     assert_eq!(description.problems().len(), 1, "constants with two values");
 }
 
 #[test]
 fn the_lists_of_the_model_structure_are_exact() {
-    let row = |index| Unknown {
-        index,
-        dependencies: Some(vec![]),
-        kinds: None,
-    };
+    let row = |index| Unknown { index, dependencies: Some(vec![]), kinds: None };
     let text = only_problem("2.2.8", |own| drop(own.structure.outputs.remove(0)));
     assert!(text.contains("lacks variable x"), "{text}");
     only_problem("2.2.8", |own| own.structure.outputs.push(row(9)));

@@ -14,11 +14,7 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
     problems.demand(!description.variables.is_empty(), SECTION, || {
         "ModelVariables has no variable".to_owned()
     });
-    let types = description
-        .types
-        .iter()
-        .map(|own| (own.name.as_str(), own))
-        .collect();
+    let types = description.types.iter().map(|own| (own.name.as_str(), own)).collect();
     for variable in &description.variables {
         check_table(variable, problems);
         check_start(variable, problems);
@@ -107,12 +103,9 @@ fn check_start(variable: &ScalarVariable, problems: &mut Problems) {
 
 /// Limits and start of a Real variable or type, called `who`.
 pub(super) fn check_real(who: &str, real: &RealType, problems: &mut Problems) {
-    for (name, value) in [
-        ("start", real.start),
-        ("min", real.min),
-        ("max", real.max),
-        ("nominal", real.nominal),
-    ] {
+    for (name, value) in
+        [("start", real.start), ("min", real.min), ("max", real.max), ("nominal", real.nominal)]
+    {
         problems.finite(SECTION, &format!("{name} of {who}"), value);
     }
     if let Some(nominal) = real.nominal {
@@ -167,10 +160,7 @@ fn check_declared_type(
         });
     };
     let Some(own) = types.get(declared) else {
-        return problems.add(
-            SECTION,
-            format!("variable {name}: there is no type {declared:?}"),
-        );
+        return problems.add(SECTION, format!("variable {name}: there is no type {declared:?}"));
     };
     let inside = match (&variable.kind, &own.kind) {
         (Kind::Real(inner), Kind::Real(outer)) => {
@@ -220,11 +210,7 @@ fn check_derivative(
     description: &ModelDescription,
     problems: &mut Problems,
 ) {
-    let Kind::Real(RealType {
-        derivative: Some(index),
-        ..
-    }) = variable.kind
-    else {
+    let Kind::Real(RealType { derivative: Some(index), .. }) = variable.kind else {
         return;
     };
     let name = &variable.name;
@@ -255,9 +241,7 @@ fn check_aliases(description: &ModelDescription, problems: &mut Problems) {
             Kind::Boolean(_) => 2,
             Kind::String(_) => 3,
         };
-        sets.entry((base, variable.value_reference))
-            .or_default()
-            .push(variable);
+        sets.entry((base, variable.value_reference)).or_default().push(variable);
     }
     for set in sets.values().filter(|set| set.len() > 1) {
         check_alias_set(set, problems);
@@ -265,21 +249,14 @@ fn check_aliases(description: &ModelDescription, problems: &mut Problems) {
 }
 
 fn check_alias_set(set: &[&ScalarVariable], problems: &mut Problems) {
-    let names = set
-        .iter()
-        .map(|own| own.name.as_str())
-        .collect::<Vec<_>>()
-        .join(", ");
+    let names = set.iter().map(|own| own.name.as_str()).collect::<Vec<_>>().join(", ");
     let is_constant = |own: &&&ScalarVariable| own.variability == Variability::Constant;
     let constants = set.iter().filter(is_constant).count();
     problems.demand(constants == 0 || constants == set.len(), SECTION, || {
         format!("aliases {names}: constants can only be aliases of constants")
     });
     let is_free = |own: &&&ScalarVariable| {
-        matches!(
-            own.causality,
-            Causality::Parameter | Causality::Input | Causality::Independent
-        )
+        matches!(own.causality, Causality::Parameter | Causality::Input | Causality::Independent)
     };
     problems.demand(set.iter().filter(is_free).count() <= 1, SECTION, || {
         format!("aliases {names}: more than one can be set from outside")
@@ -293,13 +270,9 @@ fn check_alias_set(set: &[&ScalarVariable], problems: &mut Problems) {
         _ => None,
     };
     let same_unit = set.windows(2).all(|pair| unit(pair[0]) == unit(pair[1]));
-    problems.demand(same_unit, SECTION, || {
-        format!("aliases {names}: their units differ")
-    });
+    problems.demand(same_unit, SECTION, || format!("aliases {names}: their units differ"));
     if constants == set.len() {
-        let same = set
-            .windows(2)
-            .all(|pair| same_start(&pair[0].kind, &pair[1].kind));
+        let same = set.windows(2).all(|pair| same_start(&pair[0].kind, &pair[1].kind));
         problems.demand(same, SECTION, || {
             format!("aliases {names}: the values of these constants differ")
         });

@@ -3,10 +3,7 @@
 use super::*;
 
 fn close(value: f64, exact: f64) {
-    assert!(
-        (value - exact).abs() < 1e-11 * exact.abs().max(1.0),
-        "{value} {exact}"
-    );
+    assert!((value - exact).abs() < 1e-11 * exact.abs().max(1.0), "{value} {exact}");
 }
 
 #[test]
@@ -19,24 +16,16 @@ fn a_sliding_block_stops_at_the_time_and_place_of_constant_deceleration() {
     assert_eq!(just_before.regime(), Regime::Backward);
     let after = follow(&p, [0.3, 0.0, velocity, 0.0], &force, stop + 1e-9, |_| 1.0);
     assert_eq!(after.regime(), Regime::Stick);
-    close(
-        after.state()[0],
-        0.3 - velocity * velocity * mass / (2.0 * level),
-    );
+    close(after.state()[0], 0.3 - velocity * velocity * mass / (2.0 * level));
     assert_eq!(after.state()[2].to_bits(), 0);
 }
 
 #[test]
 fn the_rise_of_the_friction_just_before_a_stop_is_not_stepped_over() {
     let narrow = 1e-3;
-    let p = Parameters {
-        static_friction: 20.0,
-        stribeck_velocity: narrow,
-        ..sliding_block(2.0, 5.0)
-    };
-    let motion = follow(&p, [0.0, 0.0, 0.8, 0.0], &Force::constant(0.0), 1.0, |_| {
-        1.0
-    });
+    let p =
+        Parameters { static_friction: 20.0, stribeck_velocity: narrow, ..sliding_block(2.0, 5.0) };
+    let motion = follow(&p, [0.0, 0.0, 0.8, 0.0], &Force::constant(0.0), 1.0, |_| 1.0);
     // Distance: the integral of M v / g(v) dv, by Simpson's rule where g varies.
     let (edge, pairs) = (10.0 * narrow, 5_000);
     let half = edge / (2.0 * f64::from(pairs));
@@ -54,17 +43,9 @@ fn the_rise_of_the_friction_just_before_a_stop_is_not_stepped_over() {
 #[test]
 fn a_slide_that_nearly_stops_feels_the_rise_of_the_friction() {
     // Without the rise the velocity would be 3e-5 + 2 (t - 0.3)² and three times v_s at least.
-    let p = Parameters {
-        static_friction: 20.0,
-        stribeck_velocity: 1e-5,
-        ..sliding_block(2.0, 5.0)
-    };
-    let force = Force {
-        value: 5.0,
-        slope: 8.0,
-        curvature: 0.0,
-        start: 0.3,
-    };
+    let p =
+        Parameters { static_friction: 20.0, stribeck_velocity: 1e-5, ..sliding_block(2.0, 5.0) };
+    let force = Force { value: 5.0, slope: 8.0, curvature: 0.0, start: 0.3 };
     let motion = follow(&p, [0.0, 0.0, 0.180_03, 0.0], &force, 0.6, |_| 1.0);
     let slope = |t: f64, v: f64| {
         let rise = 15.0 * (-(v / 1e-5) * (v / 1e-5)).exp();
@@ -81,11 +62,7 @@ fn a_slide_that_nearly_stops_feels_the_rise_of_the_friction() {
         v += h / 6.0 * (first + 2.0 * (second + third) + fourth);
     }
     assert!((v - 0.180_03).abs() > 1e-7, "the rise does not show");
-    assert!(
-        (motion.state()[2] - v).abs() < 1e-9,
-        "{} {v}",
-        motion.state()[2]
-    );
+    assert!((motion.state()[2] - v).abs() < 1e-9, "{} {v}", motion.state()[2]);
 }
 
 #[test]
@@ -103,12 +80,7 @@ fn a_cart_stays_exactly_at_rest_below_the_static_friction() {
 fn a_ramp_breaks_the_cart_away_when_it_reaches_the_static_friction() {
     let p = Parameters::default();
     for (slope, moving) in [(20.0, Regime::Forward), (-20.0, Regime::Backward)] {
-        let force = Force {
-            value: 0.0,
-            slope,
-            curvature: 0.0,
-            start: 0.0,
-        };
+        let force = Force { value: 0.0, slope, curvature: 0.0, start: 0.0 };
         let breaks = 1.5;
         let before = follow(&p, [0.0; 4], &force, breaks - 1e-10, |_| 1.0);
         assert_eq!(before.regime(), Regime::Stick);
@@ -120,12 +92,7 @@ fn a_ramp_breaks_the_cart_away_when_it_reaches_the_static_friction() {
 #[test]
 fn a_cart_broken_away_by_a_ramp_moves_with_the_cube_of_time() {
     let (mass, level, slope) = (2.0, 5.0, 4.0);
-    let force = Force {
-        value: 0.0,
-        slope,
-        curvature: 0.0,
-        start: 0.0,
-    };
+    let force = Force { value: 0.0, slope, curvature: 0.0, start: 0.0 };
     let motion = follow(&sliding_block(mass, level), [0.0; 4], &force, 2.0, |_| 1.0);
     let since = 2.0_f64 - level / slope;
     close(motion.state()[2], slope * since * since / (2.0 * mass));
@@ -137,13 +104,7 @@ fn a_moving_cart_pushed_back_harder_than_static_friction_turns_without_sticking(
     let (mass, level, push) = (2.0, 5.0, -9.0);
     let p = sliding_block(mass, level);
     let turn = 0.6 * mass / (level - push);
-    let motion = follow(
-        &p,
-        [0.0, 0.0, 0.6, 0.0],
-        &Force::constant(push),
-        turn + 0.5,
-        |_| 1.0,
-    );
+    let motion = follow(&p, [0.0, 0.0, 0.6, 0.0], &Force::constant(push), turn + 0.5, |_| 1.0);
     assert_eq!(motion.regime(), Regime::Backward);
     close(motion.state()[2], (push + level) / mass * 0.5);
 }
@@ -154,18 +115,12 @@ fn a_jump_of_the_force_frees_a_held_cart_at_once() {
     let p = sliding_block(mass, level);
     let tolerance = Tolerance::default();
     let mut motion = start(&p, [0.0; 4], &Force::constant(0.0));
-    motion
-        .advance(&p, &Force::constant(4.9), 0.0, 0.01, &tolerance)
-        .unwrap();
+    motion.advance(&p, &Force::constant(4.9), 0.0, 0.01, &tolerance).unwrap();
     assert_eq!(motion.regime(), Regime::Stick);
     close(motion.friction_force(&p, 8.0), level);
-    motion
-        .advance(&p, &Force::constant(8.0), 0.01, 0.0, &tolerance)
-        .unwrap();
+    motion.advance(&p, &Force::constant(8.0), 0.01, 0.0, &tolerance).unwrap();
     assert_eq!(motion.regime(), Regime::Forward);
-    motion
-        .advance(&p, &Force::constant(8.0), 0.01, 0.01, &tolerance)
-        .unwrap();
+    motion.advance(&p, &Force::constant(8.0), 0.01, 0.01, &tolerance).unwrap();
     close(motion.state()[2], 0.01 * (8.0 - level) / mass);
 }
 
@@ -174,13 +129,9 @@ fn a_drop_of_the_friction_frees_a_held_cart_at_once() {
     let (dry, oiled) = (sliding_block(2.0, 5.0), sliding_block(2.0, 3.0));
     let force = Force::constant(-4.0);
     let mut motion = start(&dry, [0.0; 4], &force);
-    motion
-        .advance(&dry, &force, 0.0, 0.5, &Tolerance::default())
-        .unwrap();
+    motion.advance(&dry, &force, 0.0, 0.5, &Tolerance::default()).unwrap();
     assert_eq!(motion.state()[2].to_bits(), 0);
-    motion
-        .advance(&oiled, &force, 0.5, 0.5, &Tolerance::default())
-        .unwrap();
+    motion.advance(&oiled, &force, 0.5, 0.5, &Tolerance::default()).unwrap();
     close(motion.state()[2], -0.5 * (4.0 - 3.0) / 2.0);
 }
 
@@ -188,17 +139,10 @@ fn a_drop_of_the_friction_frees_a_held_cart_at_once() {
 fn a_peak_of_the_force_inside_one_step_frees_the_cart() {
     // u - F_s = 1e-4 - 50 s² with s = t - 0.55: positive for 2.8 ms inside a step of up to 100 ms.
     let (mass, level) = (2.0, 5.0);
-    let force = Force {
-        value: level + 1e-4,
-        slope: 0.0,
-        curvature: -100.0,
-        start: 0.55,
-    };
+    let force = Force { value: level + 1e-4, slope: 0.0, curvature: -100.0, start: 0.55 };
     let p = sliding_block(mass, level);
     let mut motion = start(&p, [0.0; 4], &force);
-    motion
-        .advance(&p, &force, 0.25, 0.5, &Tolerance::default())
-        .unwrap();
+    motion.advance(&p, &force, 0.25, 0.5, &Tolerance::default()).unwrap();
     // From s = -half the cart gains speed; at s = 2 half it has lost it again.
     let half = (1e-4_f64 / 50.0).sqrt();
     let integral = |s: f64| 1e-4 * s * s / 2.0 - 50.0 * s.powi(4) / 12.0;
@@ -206,10 +150,7 @@ fn a_peak_of_the_force_inside_one_step_frees_the_cart() {
     let distance = (integral(2.0 * half) - integral(-half) + gained * 3.0 * half) / mass;
     assert_eq!(motion.regime(), Regime::Stick);
     let moved = motion.state()[0];
-    assert!(
-        (moved - distance).abs() < 1e-7 * distance,
-        "{moved} {distance}"
-    );
+    assert!((moved - distance).abs() < 1e-7 * distance, "{moved} {distance}");
 }
 
 #[test]
@@ -217,12 +158,7 @@ fn a_short_rest_inside_one_step_is_not_missed() {
     // u - F_c = 400 s² - 2 with s = t - 0.1: a cart that did not rest would go back at up to
     // 0.011 m/s, and forward again before the end.
     let p = sliding_block(1.0, 1.0);
-    let force = Force {
-        value: -1.0,
-        slope: 0.0,
-        curvature: 800.0,
-        start: 0.1,
-    };
+    let force = Force { value: -1.0, slope: 0.0, curvature: 800.0, start: 0.1 };
     let motion = follow(&p, [0.0, 0.0, 0.15, 0.0], &force, 0.2, |_| 0.2);
     let free = 2.0_f64.sqrt() / 20.0;
     let gained = 400.0 * (0.001 - free.powi(3)) / 3.0 - 2.0 * (0.1 - free);
@@ -235,17 +171,10 @@ fn of_two_break_aways_inside_one_step_the_earlier_one_happens() {
     // it forward, all in less than the longest integration step.
     let (mass, level) = (2.0, 5.0);
     let p = sliding_block(mass, level);
-    let force = Force {
-        value: -6.0,
-        slope: 0.0,
-        curvature: 30_000.0,
-        start: 1.02,
-    };
+    let force = Force { value: -6.0, slope: 0.0, curvature: 30_000.0, start: 1.02 };
     let tolerance = Tolerance::default();
     let mut motion = start(&p, [0.0; 4], &Force::constant(0.0));
-    motion
-        .advance(&p, &Force::constant(0.0), 0.0, 1.0, &tolerance)
-        .unwrap();
+    motion.advance(&p, &Force::constant(0.0), 0.0, 1.0, &tolerance).unwrap();
     motion.advance(&p, &force, 1.0, 0.1, &tolerance).unwrap();
     // Distance of a slide from `from` to `to` under a net force of 15000 w² - deficit.
     let slide = |deficit: f64, from: f64, to: f64| {
@@ -254,26 +183,16 @@ fn of_two_break_aways_inside_one_step_the_earlier_one_happens() {
         (integral(to) - integral(from) - rate * (to - from)) / mass
     };
     let (back, forth) = ((1.0_f64 / 15e3).sqrt(), (11.0_f64 / 15e3).sqrt());
-    close(
-        motion.state()[0],
-        slide(1.0, -back, 2.0 * back) + slide(11.0, forth, 0.08),
-    );
+    close(motion.state()[0], slide(1.0, -back, 2.0 * back) + slide(11.0, forth, 0.08));
     assert!(slide(1.0, -back, 2.0 * back) < -1e-6);
 }
 
 #[test]
 fn a_force_that_only_touches_the_static_friction_does_not_move_the_cart() {
     let p = sliding_block(2.0, 5.0);
-    let force = Force {
-        value: 5.0,
-        slope: 0.0,
-        curvature: -100.0,
-        start: 0.55,
-    };
+    let force = Force { value: 5.0, slope: 0.0, curvature: -100.0, start: 0.55 };
     let mut motion = start(&p, [0.0; 4], &Force::constant(0.0));
-    motion
-        .advance(&p, &force, 0.25, 0.6, &Tolerance::default())
-        .unwrap();
+    motion.advance(&p, &force, 0.25, 0.6, &Tolerance::default()).unwrap();
     assert!(motion.state()[0].abs() < 1e-15, "{motion:?}");
     assert_eq!(motion.regime(), Regime::Stick);
 }

@@ -14,17 +14,9 @@ fn node(k: u32) -> f64 {
 
 #[test]
 fn the_motion_through_fourteen_events_is_the_one_scipy_finds() {
-    let lines = REFERENCE
-        .lines()
-        .filter(|line| !line.starts_with('#'))
-        .skip(1);
-    let rows: Vec<Vec<f64>> = lines
-        .map(|line| {
-            line.split(',')
-                .map(|value| value.parse().unwrap())
-                .collect()
-        })
-        .collect();
+    let lines = REFERENCE.lines().filter(|line| !line.starts_with('#')).skip(1);
+    let rows: Vec<Vec<f64>> =
+        lines.map(|line| line.split(',').map(|value| value.parse().unwrap()).collect()).collect();
     assert_eq!(rows.len(), 50);
     let p = Parameters::default();
     let mut motion = start(&p, [0.1, 1.0, 0.0, 0.0], &Force::constant(0.0));
@@ -34,15 +26,8 @@ fn the_motion_through_fourteen_events_is_the_one_scipy_finds() {
         for _ in 0..HOLDS_PER_ROW {
             let time = f64::from(k) * HOLD;
             let slope = (node(k + 1) - node(k)) / HOLD;
-            let force = Force {
-                value: node(k),
-                slope,
-                curvature: 0.0,
-                start: time,
-            };
-            motion
-                .advance(&p, &force, time, HOLD, &Tolerance::default())
-                .unwrap();
+            let force = Force { value: node(k), slope, curvature: 0.0, start: time };
+            motion.advance(&p, &force, time, HOLD, &Tolerance::default()).unwrap();
             k += 1;
         }
         assert!((row[0] - f64::from(k) * HOLD).abs() < 1e-12);
@@ -52,10 +37,6 @@ fn the_motion_through_fourteen_events_is_the_one_scipy_finds() {
             let difference = (computed - expected).abs() / range;
             assert!(difference < 1e-7, "t = {}: {computed} {expected}", row[0]);
         }
-        assert!(
-            (motion.regime().sign() - row[6]).abs() < 0.5,
-            "t = {}",
-            row[0]
-        );
+        assert!((motion.regime().sign() - row[6]).abs() < 0.5, "t = {}", row[0]);
     }
 }
