@@ -1,5 +1,7 @@
 //! The claims of the paper beside what a run shows.
 
+use std::f64::consts::FRAC_PI_2;
+
 use serde::Serialize;
 
 /// The variables that the claims are about, in the order of the values given to
@@ -11,10 +13,12 @@ pub(crate) const WATCHED: [&str; 5] =
 /// t > 60 s for an activation at 40 s.
 const SETTLING: f64 = 20.0;
 /// The limit cycle is measured over this last part of the time before the activation.
-const CYCLE: f64 = 0.5;
+const CYCLE: f64 = 0.75;
 /// A slide counts from this distance on, in m: near the end of a creep, rounding alone makes the
 /// cart stick and slip.
 const SLIDE: f64 = 1e-3;
+/// What happens within this time in s of a transition happens at it.
+const NEAR: f64 = 0.01;
 
 /// Smallest and largest value seen.
 #[derive(Clone, Copy)]
@@ -45,11 +49,17 @@ struct Window {
     theta: Extremes,
     /// Of f_fric - f_hat.
     squares: f64,
+    /// The largest |f_fric - f_hat|, when it was, and whether that is a stick-slip transition.
     largest: f64,
+    largest_at: f64,
+    at_transition: bool,
     count: f64,
     /// Slides of more than [`SLIDE`] that begin and end at rest, and where the last rest was.
     slides: u32,
     rest: Option<f64>,
+    /// The regime last seen, and when it last changed between rest and sliding.
+    regime: f64,
+    changed_at: f64,
 }
 
 impl Window {
@@ -61,9 +71,13 @@ impl Window {
             theta: Extremes::NONE,
             squares: 0.0,
             largest: 0.0,
+            largest_at: f64::NAN,
+            at_transition: false,
             count: 0.0,
             slides: 0,
             rest: None,
+            regime: f64::NAN,
+            changed_at: f64::NAN,
         }
     }
 
@@ -75,8 +89,17 @@ impl Window {
         self.theta.add(theta);
         let difference = f_fric - f_hat;
         self.squares += difference * difference;
-        self.largest = self.largest.max(difference.abs());
         self.count += 1.0;
+        if (self.regime == 0.0) != (regime == 0.0) && !self.regime.is_nan() {
+            self.changed_at = time;
+            self.at_transition |= time - self.largest_at < NEAR;
+        }
+        self.regime = regime;
+        if difference.abs() > self.largest {
+            self.largest = difference.abs();
+            self.largest_at = time;
+            self.at_transition = time - self.changed_at < NEAR;
+        }
         if regime == 0.0 {
             let slid = self.rest.is_some_and(|rest| (x_p - rest).abs() > SLIDE);
             self.slides += u32::from(slid);
@@ -93,6 +116,7 @@ impl Window {
 pub(crate) struct Measurement {
     before: Window,
     after: Window,
+    fell: Option<f64>,
 }
 
 /// One line of the table.
@@ -112,6 +136,7 @@ impl Measurement {
         Self {
             before: Window::new((1.0 - CYCLE) * t_on, t_on),
             after: Window::new(t_on + SETTLING, f64::INFINITY),
+            fell: None,
         }
     }
 
@@ -119,6 +144,14 @@ impl Measurement {
     pub(crate) fn add(&mut self, time: f64, values: [f64; 5]) {
         self.before.add(time, values);
         self.after.add(time, values);
+        if self.fell.is_none() && values[1].abs() > FRAC_PI_2 {
+            self.fell = Some(time);
+        }
+    }
+
+    /// When the pendulum was first below the horizontal, in s.
+    pub(crate) fn fell(&self) -> Option<f64> {
+        self.fell
     }
 
     /// The claims; `end` is the time reached, `lost` whether that is not the one planned.
@@ -126,6 +159,7 @@ impl Measurement {
         let Self { before, after } = self;
         let whole = before.count > 0.0 && end >= before.to;
         let settled = after.count > 1.0;
+        let lost = lost || self.fell.is_some();
         let early = |claim: &str, paper, measured, unit, holds: bool| Claim {
             claim: format!("{claim}, {} to {} s", before.from, before.to),
             paper,
@@ -157,7 +191,7 @@ impl Measurement {
                 rest_angle < 2e-3,
             ),
             late("rms of f_fric - f_hat", "accurate, Figure 6", rms, "N", rms < 0.2 * LEVEL),
-            late("largest |f_fric - f_hat|", "spikes, Figure 6", spike, "N", spike > 3.0 * rms),
+            late("spikes at transitions", "spikes, Figure 6", spike, "N", after.at_transition),
         ]
     }
 }

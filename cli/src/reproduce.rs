@@ -52,12 +52,13 @@ pub(crate) fn reproduce(options: &Options) -> anyhow::Result<bool> {
         stop_time: options.run.stop_time,
         reached: finished.simulation.time(),
         lost: finished.lost.as_deref(),
+        fell: watch.fell(),
         settings: settings.iter().map(|(name, value)| format!("{name}={value}")).collect(),
         claims: &claims,
         design: &certified,
     };
     write(&options.out, &finished, t_on, &written)?;
-    report(options, &finished, &claims);
+    report(options, &written);
     Ok(claims.iter().all(|claim| claim.holds != Some(false)))
 }
 
@@ -76,11 +77,14 @@ fn write(out: &Path, finished: &Finished, t_on: f64, written: &Summary) -> anyho
     summary::write(written, &out.join("summary.json"))
 }
 
-fn report(options: &Options, finished: &Finished, claims: &[Claim]) {
-    println!("scenario {}", options.scenario.name());
-    println!("{}", table(claims));
-    if let Some(reason) = &finished.lost {
-        println!("the run was lost: {reason}");
+fn report(options: &Options, written: &Summary) {
+    println!("scenario {}", written.scenario);
+    println!("{}", table(written.claims));
+    if let Some(time) = written.fell {
+        println!("the pendulum fell over at t = {time:.3} s");
+    }
+    if let Some(reason) = written.lost {
+        println!("the run ended at t = {:.3} s: {reason}", written.reached);
     }
     if let Some(expectation) = options.scenario.expectation() {
         println!("{expectation}");
@@ -122,6 +126,10 @@ impl Watch {
             measurement.add(time, values);
         }
         Ok(())
+    }
+
+    fn fell(&self) -> Option<f64> {
+        self.measurement.as_ref().and_then(Measurement::fell)
     }
 
     fn t_on(&self) -> f64 {

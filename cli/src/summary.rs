@@ -29,6 +29,8 @@ pub(crate) struct Summary<'a> {
     /// Time reached in s, and why no further where that was not planned.
     pub(crate) reached: f64,
     pub(crate) lost: Option<&'a str>,
+    /// When the pendulum fell below the horizontal, in s.
+    pub(crate) fell: Option<f64>,
     pub(crate) settings: Vec<String>,
     pub(crate) claims: &'a [Claim],
     pub(crate) design: &'a Certified,

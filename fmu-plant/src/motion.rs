@@ -235,9 +235,10 @@ impl Motion {
 
     /// Repeats a step of `length` so that it ends where the margin becomes negative.
     ///
-    /// A margin that the repeated step does not find negative behind the crossing only touched
-    /// zero in the continuous extension: there is no event so far. The repeated step sees the
-    /// friction at its end, which the longer one may have stepped over, so its error is tested.
+    /// A margin that the repeated step does not find negative at the crossing only touched zero in
+    /// the continuous extension, or by rounding. It is looked for at doubled lengths, up to the
+    /// whole step, so that each step gets on. The repeated step sees the friction at its end, which
+    /// the longer one may have stepped over, so its error is tested.
     fn proceed_to(
         &mut self,
         crossing: &Crossing,
@@ -247,8 +248,12 @@ impl Motion {
     ) -> Progress {
         let direction = crossing.direction;
         let margin = |length: f64| piece.margin(direction, &piece.step(length));
-        let ceiling = crossing.fraction * length;
-        let at_ceiling = margin(ceiling);
+        let mut ceiling = crossing.fraction * length;
+        let mut at_ceiling = margin(ceiling);
+        while at_ceiling >= 0.0 && ceiling < length {
+            ceiling = (2.0 * ceiling).min(length);
+            at_ceiling = margin(ceiling);
+        }
         let happens = at_ceiling < 0.0;
         let length = if happens {
             locate(margin(0.0).max(0.0), ceiling, at_ceiling, margin)

@@ -196,3 +196,18 @@ fn a_force_that_only_touches_the_static_friction_does_not_move_the_cart() {
     assert!(motion.state()[0].abs() < 1e-15, "{motion:?}");
     assert_eq!(motion.regime(), Regime::Stick);
 }
+
+#[test]
+fn a_force_that_equals_the_static_friction_to_rounding_does_not_stall_the_integration() {
+    let parameters = Parameters::default();
+    let mut angle = 3.6e-17;
+    for k in 0..2000_u32 {
+        let below = f64::from(k % 7) * 3.6e-15;
+        let slope = (f64::from(k % 11) - 3.0) * 1e-11;
+        let force = Force { value: 30.0 - below, slope, curvature: 0.0, start: 0.0 };
+        let mut motion = start(&parameters, [0.0, -angle, 0.0, 0.7 * angle], &force);
+        motion.advance(&parameters, &force, 0.0, 2e-4, &Tolerance::default()).unwrap();
+        assert!(motion.state()[2].abs() < 1e-12, "{:?}", motion.state());
+        angle = 1e-18 + (angle * 1.37) % 9e-17;
+    }
+}
