@@ -156,7 +156,7 @@ impl Measurement {
 
     /// The claims; `end` is the time reached, `lost` whether that is not the one planned.
     pub(crate) fn claims(&self, end: f64, lost: bool) -> Vec<Claim> {
-        let Self { before, after } = self;
+        let Self { before, after, .. } = self;
         let whole = before.count > 0.0 && end >= before.to;
         let settled = after.count > 1.0;
         let lost = lost || self.fell.is_some();
