@@ -177,7 +177,7 @@ impl Measurement {
         let (cart, angle) = (before.x_p.amplitude(), before.theta.amplitude());
         let (rest, rest_angle) = (after.x_p.amplitude(), after.theta.amplitude());
         let slides = f64::from(before.slides);
-        let (rms, spike) = (after.rms(), after.largest);
+        let (rms, spike) = (after.rms(), if settled { after.largest } else { f64::NAN });
         vec![
             early("limit cycle of the cart", "a limit cycle", cart, "m", cart > 0.01),
             early("limit cycle of the pendulum", "a limit cycle", angle, "rad", angle > 0.01),

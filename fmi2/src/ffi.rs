@@ -326,6 +326,17 @@ fn unavailable(kind: fmi2StatusKind) -> Failure {
     Failure::Discard(format!("no step is pending, the status kind {kind} cannot be given"))
 }
 
+/// The description of `M`, which must break no rule of the standard.
+fn description_of<M: Model>(resources: &Path) -> Result<String, Failure> {
+    let (_, description) = Interface::new(&mut M::new(resources)?)?;
+    let problems = description.problems();
+    if problems.is_empty() {
+        return Ok(description.to_xml());
+    }
+    let list: Vec<_> = problems.iter().map(ToString::to_string).collect();
+    Err(Failure::Error(format!("the model's variables break rules: {}", list.join("; "))))
+}
+
 /// [`abi::DESCRIBE`]: gives the model description, or why there is none, to `sink`.
 pub unsafe fn describe<M: Model>(
     resources: *const c_char,
@@ -333,9 +344,8 @@ pub unsafe fn describe<M: Model>(
     sink: DescribeSink,
 ) -> fmi2Integer {
     // SAFETY: the caller gives a zero-terminated path.
-    let described = unsafe { text(resources, "resources") }.and_then(|folder| {
-        guarded(|| Interface::new(&mut M::new(Path::new(&folder))?)).map(|(_, xml)| xml.to_xml())
-    });
+    let described = unsafe { text(resources, "resources") }
+        .and_then(|folder| guarded(|| description_of::<M>(Path::new(&folder))));
     let (status, answer) = match described {
         Ok(xml) => (0, xml),
         Err(failure) => (1, failure.to_string()),

@@ -176,3 +176,6 @@ impl Model for AsoController {
         self.observer = Some(observer);
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -230,3 +230,26 @@ impl Model for FrictionPendulum {
         self.show(self.u + self.f_a);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_allocates_nothing_events_included() {
+        let mut model = FrictionPendulum::new(Path::new("")).unwrap();
+        model.initialize(&Experiment::default()).unwrap();
+        let mut regimes = [false; 3];
+        let allocations = allocation_counter::measure(|| {
+            for k in 0..2000_u32 {
+                let start = f64::from(k) * 1e-3;
+                model.u = 45.0 * (9.0 * start).sin();
+                model.update();
+                model.step(&Step { start, size: 1e-3 }).unwrap();
+                regimes[usize::try_from(model.regime + 1).unwrap()] = true;
+            }
+        });
+        assert_eq!(regimes, [true; 3]);
+        assert_eq!(allocations.count_total, 0);
+    }
+}

@@ -1,0 +1,176 @@
+//! The controller against its own equations, integrated here by small Runge-Kutta steps.
+
+use std::path::PathBuf;
+
+use super::*;
+
+/// The folder with the shipped design.
+fn shipped() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("resources")
+}
+
+/// A slow design of two states, one actuator, one measurement and one fault, with `limits`.
+fn small(limits: &str) -> String {
+    format!(
+        "description = \"a mass\"\nt_on = 0.35\nA = [[0.0, 1.0], [0.0, -0.2]]\nB = [[0.0], [2.0]]\n\
+         C = [[1.0, 0.0]]\nF_a = [[0.0], [-2.0]]\nK_x = [[-3.0, -2.0]]\nK_f = [[1.0]]\n\
+         L_x = [[9.0], [24.0]]\nL_f = [[-12.0]]\n[experiment]\nstop_time = 10.0\nstep_size = 0.01\n\
+         [[states]]\nname = \"x\"\n[[states]]\nname = \"v\"\n[[actuators]]\nname = \"u\"\n{limits}\n\
+         [[measurements]]\nname = \"x\"\n[[faults]]\nname = \"f\"\n"
+    )
+}
+
+fn with_design(text: &str) -> Result<AsoController, Failure> {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("design.toml"), text).unwrap();
+    AsoController::new(folder.path())
+}
+
+fn ready(mut controller: AsoController) -> AsoController {
+    controller.initialize(&Experiment::default()).unwrap();
+    controller
+}
+
+fn step(controller: &mut AsoController, start: f64, size: f64, y: &[f64], slope: &[f64]) {
+    controller.measurements.copy_from_slice(y);
+    controller.measurement_slopes.copy_from_slice(slope);
+    controller.step(&Step { start, size }).unwrap();
+}
+
+/// Right-hand side for the small design at time t and y(t), by the equations of the doc comment.
+fn small_rates(z: [f64; 3], t: f64, y: f64, limits: [f64; 2]) -> [f64; 3] {
+    let on = t >= 0.35;
+    let u = (-3.0 * z[0] - 2.0 * z[1] + if on { z[2] } else { 0.0 }).clamp(limits[0], limits[1]);
+    let innovation = y - z[0];
+    [
+        z[1] + 9.0 * innovation,
+        -0.2 * z[1] + 2.0 * u - 2.0 * z[2] + 24.0 * innovation,
+        if on { -12.0 * innovation } else { 0.0 },
+    ]
+}
+
+/// Classic Runge-Kutta steps of 10 us from zero with y(t) = 0.4 + 0.5 t.
+fn small_reference(end: f64, limits: [f64; 2]) -> [f64; 3] {
+    let y = |t: f64| 0.4 + 0.5 * t;
+    let h = 1e-5;
+    let mut z = [0.0; 3];
+    let mut t = 0.0;
+    while t < end - 0.5 * h {
+        let along = |k: [f64; 3], f: f64| std::array::from_fn(|i| z[i] + f * h * k[i]);
+        let k1 = small_rates(z, t, y(t), limits);
+        let k2 = small_rates(along(k1, 0.5), t + 0.5 * h, y(t + 0.5 * h), limits);
+        let k3 = small_rates(along(k2, 0.5), t + 0.5 * h, y(t + 0.5 * h), limits);
+        let k4 = small_rates(along(k3, 1.0), t + h, y(t + h), limits);
+        z = std::array::from_fn(|i| z[i] + h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]));
+        t += h;
+    }
+    z
+}
+
+/// Follows the small design to 1 s in steps of `size`, y given with its slope.
+fn follow_small(limits: &str, size: f64) -> AsoController {
+    let mut controller = ready(with_design(&small(limits)).unwrap());
+    let mut start = 0.0;
+    while start < 1.0 - 1e-9 {
+        step(&mut controller, start, size, &[0.4 + 0.5 * start], &[0.5]);
+        start += size;
+    }
+    controller
+}
+
+#[test]
+fn any_step_follows_the_equations_with_the_activation_inside_a_step() {
+    let reference = small_reference(1.0, [f64::NEG_INFINITY, f64::INFINITY]);
+    for size in [1.0, 0.25, 0.1, 0.001] {
+        let controller = follow_small("", size);
+        for (estimate, exact) in controller.estimate.iter().zip(reference) {
+            assert!((estimate - exact).abs() < 1e-5, "{size}: {estimate} {exact}");
+        }
+    }
+}
+
+#[test]
+fn a_saturated_command_is_the_one_that_the_observer_uses() {
+    let reference = small_reference(1.0, [-1.5, 0.3]);
+    for size in [0.5, 0.1, 0.001] {
+        let controller = follow_small("limits = [-1.5, 0.3]", size);
+        for (estimate, exact) in controller.estimate.iter().zip(reference) {
+            assert!((estimate - exact).abs() < 2e-5, "{size}: {estimate} {exact}");
+        }
+        assert!((-1.5..=0.3).contains(&controller.u[0]));
+    }
+    let free = small_reference(1.0, [f64::NEG_INFINITY, f64::INFINITY]);
+    assert!((free[1] - reference[1]).abs() > 1e-2, "the limits are reached in this test");
+}
+
+#[test]
+fn the_slopes_of_the_outputs_are_the_limits_of_their_differences() {
+    let mut controller = ready(AsoController::new(&shipped()).unwrap());
+    step(&mut controller, 41.0, 1e-3, &[1e-3, -2e-3], &[0.1, 0.2]);
+    let (u, f_hat) = (controller.u[0], controller.estimate[4]);
+    let (u_slope, f_slope) = (controller.u_slopes[0], controller.estimate_slopes[4]);
+    let h = 1e-9;
+    step(&mut controller, 41.001, h, &[1e-3 + 1e-4, -2e-3 + 2e-4], &[0.1, 0.2]);
+    assert!(((controller.u[0] - u) / h / u_slope - 1.0).abs() < 1e-4);
+    assert!(((controller.estimate[4] - f_hat) / h / f_slope - 1.0).abs() < 1e-4);
+}
+
+#[test]
+fn the_estimate_is_held_before_the_activation_unless_it_is_monitored() {
+    for monitor in [false, true] {
+        let mut controller = AsoController::new(&shipped()).unwrap();
+        controller.design.monitor = monitor;
+        let mut controller = ready(controller);
+        step(&mut controller, 0.0, 1e-3, &[0.1, 0.0], &[0.0, 0.0]);
+        assert_eq!(controller.estimate[4] != 0.0, monitor);
+    }
+}
+
+#[test]
+fn a_copy_through_bytes_continues_with_the_same_bits() {
+    let mut controller = ready(AsoController::new(&shipped()).unwrap());
+    step(&mut controller, 39.9995, 1e-3, &[0.1, -0.1], &[1.0, 2.0]);
+    let bytes = postcard::to_stdvec(&controller).unwrap();
+    let mut copy: AsoController = postcard::from_bytes(&bytes).unwrap();
+    for controller in [&mut controller, &mut copy] {
+        step(controller, 40.0005, 1e-3, &[0.1, -0.1], &[1.0, 2.0]);
+    }
+    let bits =
+        |model: &AsoController| model.estimate.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+    assert_eq!(bits(&controller), bits(&copy));
+}
+
+#[test]
+fn steps_of_a_known_size_allocate_nothing() {
+    let mut controller = ready(AsoController::new(&shipped()).unwrap());
+    step(&mut controller, 50.0, 1e-3, &[0.0, 0.0], &[0.0, 0.0]);
+    let allocations = allocation_counter::measure(|| {
+        for k in 1..100_u32 {
+            step(&mut controller, 50.0 + f64::from(k) * 1e-3, 1e-3, &[1e-3, 0.0], &[0.1, 0.0]);
+        }
+    });
+    assert_eq!(allocations.count_total, 0);
+}
+
+#[test]
+fn a_design_that_does_not_fit_is_refused_by_matrix_and_shape() {
+    let wrong = [
+        ("L_f = [[-12.0]]", "L_f = [[-12.0, 1.0]]", "L_f is 1 x 2, expected 1 x 1"),
+        ("B = [[0.0], [2.0]]", "B = [[0.0]]", "B is 1 x 1, expected 2 x 1"),
+        ("A = [[0.0, 1.0], [0.0, -0.2]]", "A = [[0.0, 1.0], [0.0]]", "row 2 has 1 entries"),
+        ("K_f = [[1.0]]", "K_f = [[nan]]", "K_f[1,1] = NaN"),
+        ("K_f = [[1.0]]", "", "K_f"),
+        ("t_on = 0.35", "t_on = 0.35\nt_off = 2.0", "t_off"),
+        ("t_on = 0.35", "t_on = inf", "t_on = inf"),
+        ("step_size = 0.01", "step_size = 0.0", "step_size = 0"),
+        ("A = [[", "A = [", "TOML"),
+    ];
+    for (from, to, expected) in wrong {
+        let text = small("").replace(from, to);
+        let message = with_design(&text).err().map(|failure| failure.to_string()).unwrap();
+        assert!(message.contains(expected), "{message:?} has no {expected:?}");
+        assert!(message.contains("design.toml"), "{message}");
+    }
+    let message = with_design(&small("limits = [2.0, 1.0]")).err().unwrap().to_string();
+    assert!(message.contains("limits"), "{message}");
+}

@@ -1,0 +1,73 @@
+"""What the tests share: the packed FMUs, unpacked, and the command. `aso-ftc pack` comes first."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from fmpy import extract
+
+from c_abi import Fmu
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKED = {
+    "plant": ROOT / "dist" / "FrictionPendulum.fmu",
+    "controller": ROOT / "dist" / "AsoController.fmu",
+}
+
+
+@pytest.fixture(scope="session")
+def root():
+    """Folder of the workspace."""
+    return ROOT
+
+
+@pytest.fixture(scope="session")
+def packed():
+    """The FMUs of `aso-ftc pack`, by role."""
+    for path in PACKED.values():
+        assert path.is_file(), f"{path} is missing: run aso-ftc pack first"
+    return PACKED
+
+
+@pytest.fixture(scope="session")
+def unpacked(packed, tmp_path_factory):
+    """The FMUs of this workspace, unpacked once, by role."""
+    folder = tmp_path_factory.mktemp("unpacked")
+    return {role: Fmu(extract(str(fmu), str(folder / role))) for role, fmu in packed.items()}
+
+
+@pytest.fixture(scope="session")
+def plant(unpacked):
+    """FrictionPendulum."""
+    return unpacked["plant"]
+
+
+@pytest.fixture(scope="session")
+def controller(unpacked):
+    """AsoController."""
+    return unpacked["controller"]
+
+
+@pytest.fixture(params=["plant", "controller"])
+def fmu(request, unpacked):
+    """Each FMU of this workspace."""
+    return unpacked[request.param]
+
+
+@pytest.fixture(scope="session")
+def aso_ftc():
+    """Runs the command; exit status and output come back."""
+    def run(*arguments, **options):
+        command = [ROOT / "target" / "release" / "aso-ftc", *map(str, arguments)]
+        return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, **options)
+    return run
+
+
+@pytest.fixture(scope="session")
+def python():
+    """Runs this interpreter with arguments; exit status and output come back."""
+    def run(*arguments, **options):
+        command = [sys.executable, *map(str, arguments)]
+        return subprocess.run(command, capture_output=True, text=True, **options)
+    return run

@@ -1,0 +1,66 @@
+"""The two FMUs coupled by FMPy: the same end and the same residual as by the Rust master."""
+
+import json
+
+import numpy as np
+import pytest
+
+SETTLING_TIME = 20.0  # s after the activation, as in scripts/couple_with_fmpy.py
+PAPER = {"step": "0.001", "stop": "100", "settings": []}
+EARLY = {"step": "0.0001", "stop": "2", "settings": ["controller.t_on=0.5"]}
+STEEP = {
+    "step": "0.001", "stop": "32",
+    "settings": ["controller.t_on=8", "plant.F_c=20", "plant.theta_0=0.05", "controller.f_hat_0=3"],
+}
+
+
+def by_fmpy(scenario, python, root, packed):
+    """Summary of the FMPy script."""
+    settings = [part for setting in scenario["settings"] for part in ("--set", setting)]
+    done = python(
+        root / "scripts" / "couple_with_fmpy.py", "--step", scenario["step"],
+        "--stop-time", scenario["stop"], "--plant", packed["plant"],
+        "--controller", packed["controller"], *settings,
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def by_rust(scenario, aso_ftc, packed, folder):
+    """Every communication point of the Rust master, as a table with named columns."""
+    settings = [part for setting in scenario["settings"] for part in ("--set", setting)]
+    done = aso_ftc(
+        "run", "--step", scenario["step"], "--stop-time", scenario["stop"],
+        "--record-every", scenario["step"], "--plant", packed["plant"],
+        "--controller", packed["controller"], "--out", folder, *settings,
+    )
+    assert done.returncode == 0, done.stderr
+    path = folder / "results.csv"
+    names = path.read_text(encoding="utf-8").split("\n", 1)[0].split(",")
+    table = np.loadtxt(path, delimiter=",", skiprows=1)
+    return dict(zip(names, table.T))
+
+
+def residual(table, t_on):
+    """Half of peak to peak of position and angle, and the rms of the estimation error."""
+    settled = table["time"] > t_on + SETTLING_TIME
+    x_p, theta = table["plant.x_p"][settled], table["plant.theta"][settled]
+    error = table["plant.f_fric"][settled] - table["controller.f_hat"][settled]
+    return np.ptp(x_p) / 2, np.ptp(theta) / 2, np.sqrt(np.mean(error**2))
+
+
+@pytest.mark.parametrize(
+    ("scenario", "t_on"), [(PAPER, 40.0), (EARLY, 0.5), (STEEP, 8.0)], ids=["paper", "early", "steep"]
+)
+def test_fmpy_and_the_rust_master_agree_in_final_state_and_residual(
+    scenario, t_on, python, root, packed, aso_ftc, tmp_path
+):
+    mine = by_fmpy(scenario, python, root, packed)
+    table = by_rust(scenario, aso_ftc, packed, tmp_path)
+    assert len(table["time"]) == round(float(scenario["stop"]) / float(scenario["step"])) + 1
+    for name, value in mine["final"].items():
+        assert table[name][-1] == pytest.approx(value, rel=1e-9, abs=0), name
+    assert ("residual" in mine) == (float(scenario["stop"]) > t_on + SETTLING_TIME)
+    if "residual" in mine:
+        found = [*mine["residual"].values(), mine["rms_f_fric_minus_f_hat"]]
+        assert residual(table, t_on) == pytest.approx(found, rel=1e-9, abs=0)
