@@ -37,16 +37,16 @@ impl From<MethodName> for Method {
 #[derive(clap::Args)]
 pub(crate) struct RunOptions {
     /// Communication step in s
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.001)]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, default_value_t = 0.001)]
     pub(crate) step: f64,
     /// Stop time in s
-    #[arg(long, value_name = "SECONDS", default_value_t = 100.0)]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, default_value_t = 100.0)]
     pub(crate) stop_time: f64,
     /// Master algorithm
     #[arg(long, value_enum, default_value_t = MethodName::GaussSeidel)]
     pub(crate) method: MethodName,
     /// Interval between the rows of results.csv in s
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.01)]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, default_value_t = 0.01)]
     pub(crate) record_every: f64,
     /// Set a variable before the run, for example plant.F_c=20; may be repeated
     #[arg(long = "set", value_name = "FMU.VARIABLE=VALUE", value_parser = setting)]

@@ -48,17 +48,17 @@ impl Scenario {
     }
 }
 
-/// L = [L_x; -L_f] of (10), so the last row of L is -L_f.
+/// Printed is col(L_x, L_f), so the last row is L_f as in (5).
 fn printed_gains() -> Vec<(String, String)> {
     let mut settings = Vec::new();
     for (row, entries) in PRINTED_L.iter().enumerate() {
         for (column, entry) in entries.iter().enumerate() {
-            let (name, value) = if row < 4 {
-                (format!("controller.L_x[{},{}]", row + 1, column + 1), 1e3 * entry)
+            let name = if row < 4 {
+                format!("controller.L_x[{},{}]", row + 1, column + 1)
             } else {
-                (format!("controller.L_f[1,{}]", column + 1), -1e3 * entry)
+                format!("controller.L_f[1,{}]", column + 1)
             };
-            settings.push((name, value.to_string()));
+            settings.push((name, (1e3 * entry).to_string()));
         }
     }
     settings

@@ -64,19 +64,17 @@ impl<M: Model> Interface<M> {
         Ok((interface, description))
     }
 
+    /// Files the variable under the next value reference of its type and describes it.
     fn add(&mut self, model: &mut M, variable: Variable<M>) -> ScalarVariable {
         let start_given = variable.initial != Some(Initial::Calculated);
-        let mut described = ScalarVariable {
-            name: variable.name.clone(),
-            value_reference: 0,
-            description: Some(variable.description),
-            causality: variable.causality,
-            variability: variable.variability,
-            initial: variable.initial,
-            kind: Kind::Boolean(None),
+        let real = RealType {
+            unit: variable.unit,
+            min: variable.min,
+            max: variable.max,
+            ..RealType::default()
         };
-        let slot = Blank {
-            name: variable.name,
+        let blank = Blank {
+            name: variable.name.clone(),
             causality: variable.causality,
             variability: variable.variability,
             range: (
@@ -85,38 +83,51 @@ impl<M: Model> Interface<M> {
             ),
             derivatives: variable.derivatives,
         };
-        if slot.causality == Causality::Output {
-            let order = u32::try_from(slot.derivatives.len()).unwrap_or(u32::MAX);
+        if blank.causality == Causality::Output {
+            let order = u32::try_from(blank.derivatives.len()).unwrap_or(u32::MAX);
             self.max_output_derivative_order = self.max_output_derivative_order.max(order);
         }
-        let (kind, reference) = match variable.access {
+        let (kind, value_reference) = self.file(model, variable.access, blank, real, start_given);
+        ScalarVariable {
+            name: variable.name,
+            value_reference,
+            description: Some(variable.description),
+            causality: variable.causality,
+            variability: variable.variability,
+            initial: variable.initial,
+            kind,
+        }
+    }
+
+    /// The type as described, with the field's value as start where one is given, and the value
+    /// reference.
+    fn file(
+        &mut self,
+        model: &mut M,
+        access: Access<M>,
+        blank: Blank<M>,
+        real: RealType,
+        start_given: bool,
+    ) -> (Kind, u32) {
+        match access {
             Access::Real(field) => {
-                let real = RealType {
-                    unit: variable.unit,
-                    min: variable.min,
-                    max: variable.max,
-                    start: start_given.then(|| *field(model)),
-                    ..RealType::default()
-                };
-                (Kind::Real(real), slot.fill(&mut self.reals, field) + 1)
+                let start = start_given.then(|| *field(model));
+                (Kind::Real(RealType { start, ..real }), blank.fill(&mut self.reals, field) + 1)
             }
             Access::Integer(field) => {
                 let start = start_given.then(|| *field(model));
                 let integer = IntegerType { start, ..IntegerType::default() };
-                (Kind::Integer(integer), slot.fill(&mut self.integers, field))
+                (Kind::Integer(integer), blank.fill(&mut self.integers, field))
             }
             Access::Boolean(field) => {
                 let start = start_given.then(|| *field(model));
-                (Kind::Boolean(start), slot.fill(&mut self.booleans, field))
+                (Kind::Boolean(start), blank.fill(&mut self.booleans, field))
             }
             Access::String(field) => {
                 let start = start_given.then(|| field(model).clone());
-                (Kind::String(start), slot.fill(&mut self.strings, field))
+                (Kind::String(start), blank.fill(&mut self.strings, field))
             }
-        };
-        described.kind = kind;
-        described.value_reference = reference;
-        described
+        }
     }
 }
 

@@ -8,7 +8,8 @@ use fmi2::description::ModelDescription;
 use fmi2::location::{LocationError, file_uri};
 use fmi2::package::{PackageError, Unpacked};
 
-use crate::library::{Component, Library, LoadError};
+use crate::error::LoadError;
+use crate::library::{Component, Library};
 use crate::slave::{CallError, Slave};
 
 /// Why an FMU could not be opened or instantiated.

@@ -16,9 +16,9 @@ mod simulation;
 mod slave;
 mod system;
 
-pub use error::SystemError;
+pub use error::{LoadError, SystemError};
 pub use fmu::{Fmu, FmuError, Instance};
-pub use library::{LoadError, describe, preload};
+pub use library::{describe, preload};
 pub use order::{Order, by_direct_dependencies};
 pub use probe::Probe;
 pub use simulation::{Method, Simulation};

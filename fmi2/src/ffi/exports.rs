@@ -3,8 +3,59 @@
 /// Exports a [`Model`](crate::Model) as all functions of FMI 2.0 co-simulation: the last line of a
 /// model's library, which is a `cdylib`.
 ///
-/// ```ignore
-/// fmi2::export!(Oscillator);
+/// ```
+/// use std::path::Path;
+///
+/// use fmi2::{About, Experiment, Failure, Model, Step, Variable};
+/// use serde::{Deserialize, Serialize};
+///
+/// /// A tank that drains through a hole: `level' = inflow - level / time_constant`.
+/// #[derive(Clone, Serialize, Deserialize)]
+/// struct Tank {
+///     inflow: f64,
+///     level: f64,
+///     time_constant: f64,
+/// }
+///
+/// impl Model for Tank {
+///     const IDENTIFIER: &'static str = "Tank";
+///
+///     fn about(&self) -> About {
+///         About { description: "A tank that drains".to_owned(), ..About::default() }
+///     }
+///
+///     fn new(_resources: &Path) -> Result<Self, Failure> {
+///         Ok(Self { inflow: 0.0, level: 0.0, time_constant: 10.0 })
+///     }
+///
+///     fn variables(&self) -> Vec<Variable<Self>> {
+///         vec![
+///             Variable::real("inflow", "Inflow", |tank: &mut Self| &mut tank.inflow)
+///                 .input()
+///                 .unit("m/s"),
+///             Variable::real("level", "Level", |tank: &mut Self| &mut tank.level)
+///                 .output(&[])
+///                 .unit("m"),
+///             Variable::real("T", "Time constant", |tank: &mut Self| &mut tank.time_constant)
+///                 .parameter()
+///                 .unit("s"),
+///         ]
+///     }
+///
+///     fn initialize(&mut self, _experiment: &Experiment) -> Result<(), Failure> {
+///         self.level = 1.0;
+///         Ok(())
+///     }
+///
+///     fn step(&mut self, step: &Step) -> Result<(), Failure> {
+///         let rest = self.inflow * self.time_constant;
+///         self.level = rest + (self.level - rest) * (-step.size / self.time_constant).exp();
+///         Ok(())
+///     }
+/// }
+///
+/// fmi2::export!(Tank);
+/// # fn main() {}
 /// ```
 ///
 /// Beside the standard's functions the library gets

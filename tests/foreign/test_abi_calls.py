@@ -1,0 +1,234 @@
+"""Calls in the wrong order, without an instance, or with arrays that are not there."""
+
+import ctypes
+from ctypes import byref, c_char_p, c_int, c_size_t, c_void_p
+
+import pytest
+
+from c_abi import (
+    DISCARD, ERROR, FUNCTIONS, LAST_SUCCESSFUL_TIME, OK, Instance, integers, reals, references,
+    texts,
+)
+
+STATES = ["instantiated", "initialization mode", "step complete", "step failed", "terminated", "error"]
+
+# Table of section 4.2.4 of FMI 2.0.5. A step is never in progress or canceled when DoStep has
+# returned, and fatal cannot be reached from outside, so these columns are left out; a number that
+# stands for a condition on the variable is an x here.
+TABLE = """
+SetDebugLogging          x x x x x x
+SetupExperiment          x . . . . .
+EnterInitializationMode  x . . . . .
+ExitInitializationMode   . x . . . .
+Terminate                . . x x . .
+Reset                    x x x x x x
+GetReal                  . x x x x x
+GetInteger               . x x x x x
+GetBoolean               . x x x x x
+GetString                . x x x x x
+SetReal                  x x x . . .
+SetInteger               x x x . . .
+SetBoolean               x x x . . .
+SetString                x x x . . .
+GetFMUstate              x x x x x x
+SetFMUstate              x x x x x x
+FreeFMUstate             x x x x x x
+SerializedFMUstateSize   x x x x x x
+SerializeFMUstate        x x x x x x
+DeSerializeFMUstate      x x x x x x
+GetDirectionalDerivative . x x x x x
+SetRealInputDerivatives  x x x . . .
+GetRealOutputDerivatives . . x x x x
+DoStep                   . . x . . .
+CancelStep               . . . . . .
+GetStatus                . . x x x .
+GetRealStatus            . . x x x .
+GetIntegerStatus         . . x x x .
+GetBooleanStatus         . . x x x .
+GetStringStatus          . . x x x .
+"""
+ALLOWED = {line.split()[0]: line.split()[1:] for line in TABLE.strip().splitlines()}
+CASES = [(name, state) for name in ALLOWED for state in STATES]
+
+
+def arguments(name):
+    """Arguments with which the function does something that is right where it may be called."""
+    none = (None, 0, None)
+    if name[3:] in ("Real", "Integer", "Boolean", "String"):
+        return none
+    return {
+        "SetDebugLogging": (0, 0, None),
+        "SetupExperiment": (0, 0.0, 0.0, 0, 0.0),
+        "GetDirectionalDerivative": (None, 0, None, 0, None, None),
+        "SetRealInputDerivatives": (None, 0, None, None),
+        "GetRealOutputDerivatives": (None, 0, None, None),
+        "DoStep": (0.0, 0.001, 1),
+        "GetStatus": (0, integers(0)),
+        "GetRealStatus": (LAST_SUCCESSFUL_TIME, reals(0)),
+        "GetIntegerStatus": (0, integers(0)),
+        "GetBooleanStatus": (3, integers(0)),
+        "GetStringStatus": (1, texts(None)),
+    }.get(name, ())
+
+
+def bring(instance, state):
+    """Brings a new instance of the plant to a state of the table."""
+    if state == "initialization mode":
+        instance.enter()
+    if state in ("step complete", "step failed", "terminated", "error"):
+        instance.start()
+    if state == "step failed":
+        instance.set({"u": 1e308})
+        assert instance.call("DoStep", 0.0, 0.1, 1) == DISCARD
+    if state == "terminated":
+        instance.must("Terminate")
+    if state == "error":
+        assert instance.call("DoStep", 0.0, -1.0, 1) == ERROR
+    instance.messages.clear()
+
+
+def call_with_states(instance, name):
+    """Calls one of the functions on FMU states, with a state and its bytes at hand."""
+    state, copy, size = c_void_p(), c_void_p(), c_size_t()
+    before = Instance(instance.fmu)
+    before.must("GetFMUstate", byref(state))
+    before.must("SerializedFMUstateSize", state, byref(size))
+    data = ctypes.create_string_buffer(size.value)
+    before.must("SerializeFMUstate", state, data, size)
+    chosen = {
+        "GetFMUstate": (byref(copy),),
+        "SetFMUstate": (state,),
+        "FreeFMUstate": (byref(copy),),
+        "SerializedFMUstateSize": (state, byref(size)),
+        "SerializeFMUstate": (state, data, size),
+        "DeSerializeFMUstate": (data, size, byref(copy)),
+    }[name]
+    status = instance.call(name, *chosen)
+    for place in (state, copy):
+        before.must("FreeFMUstate", byref(place))
+        assert place.value is None
+    before.free()
+    return status
+
+
+def call(instance, name):
+    """Calls the function with arguments that are right."""
+    if "FMUstate" in name:
+        return call_with_states(instance, name)
+    return instance.call(name, *arguments(name))
+
+
+def test_the_table_has_every_function_that_works_on_an_instance():
+    assert {*ALLOWED, "FreeInstance"} == set(FUNCTIONS)
+
+
+@pytest.mark.parametrize(("name", "state"), CASES, ids=lambda part: part.replace(" ", "-"))
+def test_calls_pass_and_fail_as_the_table_of_the_standard_says(plant, name, state):
+    with Instance(plant) as instance:
+        bring(instance, state)
+        status = call(instance, name)
+        texts_ = [message.text for message in instance.messages]
+        if ALLOWED[name][STATES.index(state)] == "x":
+            if name == "GetDirectionalDerivative":  # providesDirectionalDerivative is false
+                assert status == ERROR and "providesDirectionalDerivative" in texts_[0]
+            else:
+                pending = name in ("GetStatus", "GetIntegerStatus", "GetStringStatus")
+                assert status == (DISCARD if pending else OK), texts_
+                assert len(texts_) == (1 if pending else 0)
+        else:
+            assert status == ERROR and len(texts_) == 1
+            assert f"fmi2{name}" in texts_[0]
+            assert state.replace(" ", "") in texts_[0].lower().replace(" ", "")
+            assert instance.messages[0].category == "logStatusError"
+
+
+@pytest.mark.parametrize("state", STATES)
+def test_an_instance_can_be_freed_in_every_state(fmu, state):
+    if state == "step failed" and "u" not in fmu.names(causality="input"):
+        state = "step complete"
+    with Instance(fmu) as instance:
+        bring(instance, state)
+    assert instance.component is None and not instance.messages
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_a_null_instance_is_an_error_and_no_crash(fmu, name):
+    function = getattr(fmu.library, f"fmi2{name}")
+    zeros = [argument(0) if argument in (c_int, c_size_t) else None for argument in FUNCTIONS[name]]
+    numbers = [0.0 if argument is ctypes.c_double else zero
+               for argument, zero in zip(FUNCTIONS[name], zeros)]
+    if name == "FreeInstance":
+        function(None)
+    else:
+        assert function(None, *numbers) == ERROR
+
+
+KINDS = ["Real", "Integer", "Boolean", "String"]
+
+
+@pytest.mark.parametrize("way", ["Get", "Set"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_null_arrays_are_fine_when_empty_and_an_error_when_not(fmu, way, kind):
+    with Instance(fmu) as instance:
+        instance.start()
+        function = f"{way}{kind}"
+        assert instance.call(function, None, 0, None) == OK
+        assert instance.call(function, None, 2, None) == ERROR
+        assert f"fmi2{function}" in instance.last_message() and "null" in instance.last_message()
+        assert instance.call("Reset") == OK
+        instance.start()
+        assert instance.call(function, references(1), 1, None) == ERROR
+        assert "null" in instance.last_message()
+
+
+@pytest.mark.parametrize("function", ["SetRealInputDerivatives", "GetRealOutputDerivatives"])
+def test_derivatives_with_null_arrays_are_an_error_when_not_empty(plant, function):
+    name = "u" if function.startswith("Set") else "x_p"
+    whole = (plant.references(name), 1, integers(1), reals(0))
+    for missing in (0, 2, 3):
+        given = [None if position == missing else part for position, part in enumerate(whole)]
+        with Instance(plant) as instance:
+            instance.start()
+            assert instance.call(function, None, 0, None, None) == OK
+            assert instance.call(function, *given) == ERROR
+            assert f"fmi2{function}" in instance.last_message()
+            assert "null" in instance.last_message()
+
+
+def test_null_states_and_null_places_are_an_error(fmu):
+    size = c_size_t()
+    calls = [
+        ("GetFMUstate", None), ("SetFMUstate", None), ("FreeFMUstate", None),
+        ("SerializedFMUstateSize", None, byref(size)), ("SerializeFMUstate", None, None, 0),
+        ("DeSerializeFMUstate", None, 0, None), ("DeSerializeFMUstate", None, 9, byref(c_void_p())),
+        ("GetRealStatus", LAST_SUCCESSFUL_TIME, None), ("GetBooleanStatus", 3, None),
+    ]
+    for name, *given in calls:
+        with Instance(fmu) as instance:
+            instance.start()
+            assert instance.call(name, *given) == ERROR, name
+            assert f"fmi2{name}" in instance.last_message()
+
+
+def test_freeing_no_state_is_fine(fmu):
+    with Instance(fmu) as instance:
+        nothing = c_void_p()
+        assert instance.call("FreeFMUstate", byref(nothing)) == OK and not instance.messages
+
+
+@pytest.mark.parametrize("way", ["Get", "Set"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_unknown_value_references_are_an_error_that_names_them(fmu, way, kind):
+    place = {"Real": reals(0), "String": texts(b"")}.get(kind, integers(0))
+    for reference in (4711, 2**32 - 1):
+        with Instance(fmu) as instance:
+            instance.start()
+            assert instance.call(f"{way}{kind}", references(reference), 1, place) == ERROR
+            assert str(reference) in instance.last_message() and kind in instance.last_message()
+
+
+def test_null_strings_are_an_error(fmu):
+    for given in ((1, 1, texts(None)), (1, 2, (c_char_p * 2)(b"logStatusError", None))):
+        with Instance(fmu) as instance:
+            assert instance.call("SetDebugLogging", *given) == ERROR
+            assert "null" in instance.last_message()
