@@ -122,7 +122,7 @@ pub(crate) struct Measurement {
 /// One line of the table.
 #[derive(Debug, Serialize)]
 pub(crate) struct Claim {
-    pub(crate) claim: String,
+    pub(crate) statement: String,
     pub(crate) paper: &'static str,
     pub(crate) measured: f64,
     pub(crate) unit: &'static str,
@@ -160,15 +160,15 @@ impl Measurement {
         let whole = before.count > 0.0 && end >= before.to;
         let settled = after.count > 1.0;
         let lost = lost || self.fell.is_some();
-        let early = |claim: &str, paper, measured, unit, holds: bool| Claim {
-            claim: format!("{claim}, {} to {} s", before.from, before.to),
+        let early = |statement: &str, paper, measured, unit, holds: bool| Claim {
+            statement: format!("{statement}, {} to {} s", before.from, before.to),
             paper,
             measured,
             unit,
             holds: if whole { Some(holds) } else { lost.then_some(false) },
         };
-        let late = |claim: &str, paper, measured, unit, holds: bool| Claim {
-            claim: format!("{claim}, t > {} s", after.from),
+        let late = |statement: &str, paper, measured, unit, holds: bool| Claim {
+            statement: format!("{statement}, t > {} s", after.from),
             paper,
             measured,
             unit,
@@ -214,7 +214,8 @@ pub(crate) fn table(claims: &[Claim]) -> String {
         } else {
             "-".to_owned()
         };
-        lines.push(format!("{:<44} {:<20} {:>14}  {holds}", claim.claim, claim.paper, measured));
+        lines
+            .push(format!("{:<44} {:<20} {:>14}  {holds}", claim.statement, claim.paper, measured));
     }
     lines.join("\n")
 }

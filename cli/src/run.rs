@@ -48,7 +48,7 @@ pub(crate) struct RunOptions {
     /// Interval between the rows of results.csv in s
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, default_value_t = 0.01)]
     pub(crate) record_every: f64,
-    /// Set a variable before the run, for example plant.F_c=20; may be repeated
+    /// Set a variable before the run, for example `plant.F_c=20`; may be repeated
     #[arg(long = "set", value_name = "FMU.VARIABLE=VALUE", value_parser = setting)]
     pub(crate) settings: Vec<(String, String)>,
 }

@@ -143,8 +143,9 @@ fn read_matrix(system: &mut System, name: &str) -> anyhow::Result<DMatrix<f64>> 
             .iter()
             .position(|variable| variable.name == element && matches!(variable.kind, Kind::Real(_)))
     };
-    let row_count = (1..).take_while(|row| position(*row, 1).is_some()).count();
-    let column_count = (1..).take_while(|column| position(1, *column).is_some()).count();
+    let count = description.variables.len();
+    let row_count = (1..=count).take_while(|row| position(*row, 1).is_some()).count();
+    let column_count = (1..=count).take_while(|column| position(1, *column).is_some()).count();
     let mut ports = Vec::new();
     for row in 1..=row_count {
         for column in 1..=column_count {

@@ -2,7 +2,6 @@
 //!
 //! Every entry point that has an instance goes through [`door`]; what stands behind it is safe.
 #![expect(unsafe_code, reason = "the boundary to C")]
-#![expect(clippy::missing_safety_doc, reason = "all of them: arguments as FMI 2.0 demands them")]
 
 mod exports;
 
@@ -125,10 +124,12 @@ unsafe fn put<T>(target: *mut T, value: T) -> Result<(), Failure> {
     Ok(())
 }
 
+#[must_use]
 pub fn types_platform<M: Model>() -> fmi2String {
     abi::TYPES_PLATFORM.as_ptr()
 }
 
+#[must_use]
 pub fn version<M: Model>() -> fmi2String {
     abi::VERSION.as_ptr()
 }
@@ -146,6 +147,7 @@ unsafe fn resources(location: fmi2String) -> Result<PathBuf, Failure> {
     path_from_uri(&uri).map_err(|error| Failure::Error(format!("fmuResourceLocation: {error}")))
 }
 
+#[must_use]
 pub unsafe fn instantiate<M: Model>(
     instance_name: fmi2String,
     fmu_type: fmi2Type,

@@ -10,8 +10,8 @@
 //! ```
 //!
 //! and every channel of u kept within its limits. As long as no channel enters or leaves a limit
-//! this is z' = M z + N [y; w], w being the commands of the channels at a limit, so one step is
-//! exact for y = y_0 + y_1 t: the hold of [`FirstOrderHold`].
+//! this is `z' = M z + N [y; w]`, w being the commands of the channels at a limit, so one step is
+//! exact for `y = y_0 + y_1 t`: the hold of [`FirstOrderHold`].
 
 use std::sync::Arc;
 

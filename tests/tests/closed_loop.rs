@@ -1,5 +1,6 @@
 //! The closed loop of plant and controller, one test for each claim.
 #![forbid(unsafe_code)]
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 use master::Method;
 use tests::{Table, closed_loop, root, simulation};

@@ -1,5 +1,6 @@
 //! The command line, driven from outside.
 #![forbid(unsafe_code)]
+#![expect(clippy::unwrap_used, clippy::float_cmp, reason = "tests; numbers as written")]
 
 use std::fs;
 use std::process::Output;

@@ -1,5 +1,6 @@
 //! The invariants of ARCHITECTURE.md.
 #![forbid(unsafe_code)]
+#![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,6 @@
 use resvg::tiny_skia::Pixmap;
 use resvg::usvg::roxmltree::Document;
+use std::fs;
 
 use super::*;
 

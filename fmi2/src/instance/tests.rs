@@ -1,4 +1,5 @@
 //! The state machine with a small model: x' = -rate x + drive, stepped exactly for a held drive.
+#![expect(clippy::float_cmp, reason = "values that are set and read back")]
 
 use std::path::Path;
 

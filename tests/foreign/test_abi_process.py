@@ -1,0 +1,173 @@
+"""Instances and their process: second runs, many at once, loading and unloading, no side effects."""
+
+import _ctypes
+import ctypes
+import json
+import locale
+import os
+import signal
+from concurrent.futures import ThreadPoolExecutor
+from math import nan
+from pathlib import Path
+
+import pytest
+
+from c_abi import ERROR, Fmu, Instance
+from excitation import START, begun, drive, serialized
+
+HERE = Path(__file__).parent
+MISHAPS = [
+    "nothing", "values set", "initialization mode", "a run", "the end", "an error", "a waiting slope"
+]
+INSTANCES, ROUNDS, STEPS = 200, 5, 12
+
+
+def happen(instance, what):
+    """Brings a new instance into the situation from which it will be reset."""
+    name = instance.fmu.names(causality="parameter", variability="fixed", type="Real")[0]
+    if what == "values set":
+        instance.set({name: 7.0})
+    if what == "initialization mode":
+        instance.enter({name: 7.0})
+    if what == "a run":
+        instance.start(START[instance.fmu.identifier], stop=9.0)
+        drive(instance, 0, 90)
+    if what in ("the end", "an error", "a waiting slope"):
+        instance.start()
+    if what == "the end":
+        instance.must("Terminate")
+    if what == "an error":
+        assert instance.call("DoStep", nan, nan, 1) == ERROR
+    if what == "a waiting slope":
+        instance.set_slopes(**{instance.fmu.names(causality="input")[0]: 9.0})
+
+
+@pytest.mark.parametrize("before", MISHAPS)
+def test_a_run_after_a_reset_has_the_same_bits_as_the_first(fmu, before):
+    with begun(fmu, 0) as fresh, Instance(fmu) as instance:
+        blank = serialized(instance)
+        wanted = drive(fresh, 0, 200)
+        happen(instance, before)
+        instance.must("Reset")
+        assert serialized(instance) == blank
+        instance.start(START[fmu.identifier])
+        assert drive(instance, 0, 200) == wanted
+
+
+def test_two_hundred_instances_in_threads_do_what_each_does_alone(fmu):
+    alone = []
+    for k in range(INSTANCES):
+        with begun(fmu, 0) as instance:
+            alone.append(drive(instance, 0, ROUNDS * STEPS, shift=0.01 * k))
+    together = [[] for _ in range(INSTANCES)]
+    with ThreadPoolExecutor(8) as pool:
+        begin = lambda k: Instance(fmu, name=b"%d" % k).start(START[fmu.identifier])
+        instances = list(pool.map(begin, range(INSTANCES)))
+        for turn in range(ROUNDS):
+            advance = lambda k: drive(instances[k], turn * STEPS, STEPS, shift=0.01 * k)
+            order = sorted(range(INSTANCES), key=lambda k: (k * 7919 + turn) % INSTANCES)
+            for k, rows in zip(order, pool.map(advance, order)):
+                together[k] += rows
+        list(pool.map(Instance.free, instances))
+    assert together == alone
+
+
+def in_own_process(python, function, *arguments):
+    """What a function of this module prints when it is called in a process of its own."""
+    code = f"import sys, test_abi_process as t; t.{function}(*sys.argv[1:])"
+    return python("-c", code, *arguments, cwd=HERE)
+
+
+def load_and_unload(folder):
+    """Prints the results of twelve rounds of loading, running and unloading."""
+    results = []
+    for turn in range(12):
+        fmu = Fmu(folder)
+        def work(_):
+            with begun(fmu, 60) as instance:
+                return instance.outputs()
+        if turn % 2:
+            with ThreadPoolExecutor(2) as pool:
+                results += list(pool.map(work, range(2)))
+        else:
+            results.append(work(0))
+        Instance(fmu, guid=b"wrong")
+        _ctypes.dlclose(fmu.library._handle)
+    print(json.dumps(results))
+
+
+def test_libraries_can_be_loaded_and_unloaded_again_and_again(fmu, python):
+    done = in_own_process(python, "load_and_unload", fmu.folder)
+    assert done.returncode == 0, done.stderr
+    results = json.loads(done.stdout)
+    with begun(fmu, 60) as instance:
+        assert results == [instance.outputs()] * 18
+
+
+def err_and_succeed(folder):
+    """Makes all kinds of calls, right and wrong, and prints nothing."""
+    fmu = Fmu(folder)
+    for log in (True, False):
+        Instance(fmu, guid=b"%s%n", log=log)
+        Instance(fmu, resources="file:///nowhere", log=log).free()
+        with begun(fmu, 30, log=log) as instance:
+            instance.must("SetDebugLogging", 1, 0, None)
+            serialized(instance)
+            name = fmu.names(causality="input", type="Real")[0]
+            instance.set_one(name, nan)
+            instance.call("DeSerializeFMUstate", b"x", 1, ctypes.byref(ctypes.c_void_p()))
+            instance.must("Reset")
+            instance.start()
+            instance.set_one(name, 1e308)
+            instance.call("DoStep", 0.0, 0.1, 1)
+            instance.call("CancelStep")
+
+
+def test_nothing_is_ever_printed(fmu, python):
+    done = in_own_process(python, "err_and_succeed", fmu.folder)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def settings_of_the_process():
+    """What an FMU has to leave as it was."""
+    libm = ctypes.CDLL("libm.so.6")
+    mask = os.umask(0)
+    os.umask(mask)
+    handlers = [str(signal.getsignal(number)) for number in signal.valid_signals()]
+    blocked = sorted(map(int, signal.pthread_sigmask(signal.SIG_BLOCK, [])))
+    status = Path("/proc/self/status").read_text(encoding="utf-8").splitlines()
+    caught = [line for line in status if line.startswith(("SigIgn", "SigCgt", "Threads"))]
+    return {
+        "locale": locale.setlocale(locale.LC_ALL), "folder": os.getcwd(), "umask": mask,
+        "environment": dict(os.environ), "rounding": libm.fegetround(),
+        "exceptions": libm.fegetexcept(), "handlers": handlers, "blocked": blocked, "caught": caught,
+        "files": sorted(os.listdir(".")), "open": len(os.listdir("/proc/self/fd")),
+    }
+
+
+def leave_the_process_alone(folder, place):
+    """Prints the settings that an FMU has changed."""
+    locale.setlocale(locale.LC_ALL, "C.UTF-8")
+    os.chdir(place)
+    fmu = Fmu(folder)
+    before = settings_of_the_process()
+    err_and_succeed(folder)
+    _ctypes.dlclose(fmu.library._handle)
+    after = settings_of_the_process()
+    print([(key, before[key], after[key]) for key in before if before[key] != after[key]])
+
+
+def test_locale_folder_signals_and_rounding_stay_as_they_were(fmu, python, tmp_path):
+    done = in_own_process(python, "leave_the_process_alone", fmu.folder, tmp_path)
+    assert (done.returncode, done.stdout.strip(), done.stderr) == (0, "[]", "")
+
+
+def test_instances_of_one_library_do_not_touch_each_other(fmu):
+    with begun(fmu, 0) as calm, begun(fmu, 0) as wild, begun(fmu, 0) as alone:
+        for k in range(60):
+            if k == 20:
+                assert wild.call("DoStep", -1.0, 1.0, 1) == ERROR
+                wild.must("Reset")
+            if k == 40:
+                wild.free()
+            assert drive(calm, k, 1) == drive(alone, k, 1)
