@@ -1,5 +1,8 @@
 """Couples the two FMUs with FMPy: Gauss-Seidel, slopes given as first input derivatives.
 
+u, which is not yet known at the end of the step, is continued with the smaller one of its output
+derivative and its last difference quotient, as the Rust master does.
+
 A second master, none of it in Rust, to compare with; its summary goes to stdout as JSON.
 """
 
@@ -48,13 +51,22 @@ class Slave:
         self.fmu.doStep(time, step)
 
 
-def exchange_step(plant, controller, time, step):
-    """One Gauss-Seidel step: the plant with the slope of u, then the controller with that of y."""
-    before = plant.get(MEASURED)
-    slope = controller.fmu.getRealOutputDerivatives([controller.reference["u"]], [1])
-    plant.step(["u"], controller.get(["u"]), slope, time, step)
+def limited(slope, quotient):
+    """The smaller one of both, zero where their signs differ (minmod)."""
+    return 0.0 if slope * quotient <= 0.0 else min(slope, quotient, key=abs)
+
+
+def exchange_step(plant, controller, time, step, last_u):
+    """One Gauss-Seidel step: the plant with the slope of u, then the controller with that of y.
+
+    `last_u` is u one step ago; the u of this step is returned.
+    """
+    before, (u,) = plant.get(MEASURED), controller.get(["u"])
+    (slope,) = controller.fmu.getRealOutputDerivatives([controller.reference["u"]], [1])
+    plant.step(["u"], [u], [limited(slope, (u - last_u) / step)], time, step)
     slopes = [(new - old) / step for old, new in zip(before, plant.get(MEASURED))]
     controller.step(MEASURED, before, slopes, time, step)
+    return u
 
 
 def record(time, slaves):
@@ -71,8 +83,9 @@ def run(plant, controller, step, stop_time):
     controller.fmu.exitInitializationMode()
     settled_from = controller.get(["t_on"])[0] + SETTLING_TIME
     rows, settled = [record(0.0, (plant, controller))], []
+    (u,) = controller.get(["u"])
     for k in range(1, round(stop_time / step) + 1):
-        exchange_step(plant, controller, (k - 1) * step, step)
+        u = exchange_step(plant, controller, (k - 1) * step, step, u)
         if k * step > settled_from:
             settled.append(plant.get([*MEASURED, "f_fric"]) + controller.get(["f_hat"]))
         if k % max(1, round(ROW_INTERVAL / step)) == 0:

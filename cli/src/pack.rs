@@ -115,10 +115,10 @@ fn pack_model(root: &Path, libraries: &Path, model: &str, out: &Path) -> anyhow:
         read(&library)?,
     );
     package.add("documentation/index.html", page(&description, &String::from_utf8_lossy(&text)));
-    for license in ["LICENSE-MIT", "LICENSE-APACHE"] {
-        let name = format!("documentation/licenses/{license}.txt");
-        package.add(name, read(&root.join(license))?);
-    }
+    let licenses = [read(&root.join("LICENSE-MIT"))?, read(&root.join("LICENSE-APACHE"))?];
+    let heading = b"At your choice, the MIT License or the Apache License 2.0.\n\n".to_vec();
+    let text = [heading, licenses.join(&b"\n\n"[..])].concat();
+    package.add("documentation/licenses/license.txt", text);
     package.add("model.png", rasterise(&String::from_utf8_lossy(&drawing))?);
     if resources.is_dir() {
         package.add_folder("resources", &resources)?;

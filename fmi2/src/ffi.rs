@@ -1,6 +1,6 @@
 //! The C ABI of an exported model: the one place of the crate where pointers are followed.
 //!
-//! Every entry point that has an instance goes through [`door`]; what stands behind it is safe.
+//! Every entry point that has an instance goes through `door`; what stands behind it is safe.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
 mod exports;

@@ -11,7 +11,8 @@ use crate::system::{Port, System};
 struct Outputs {
     ports: Vec<Port>,
     references: Vec<u32>,
-    /// Values at the begin of the current step and at the last time read.
+    /// Values at the begin of the last step, of the current one, and at the last time read.
+    before: Vec<f64>,
     begin: Vec<f64>,
     latest: Vec<f64>,
     /// Slopes at the last time read; zero where the slave gives none.
@@ -43,7 +44,7 @@ pub(crate) enum Course {
     /// The value at the begin of the step, held.
     Held,
     /// Value and slope at the begin of the step: the line through the source's values at begin and
-    /// end where the source has been stepped, else its output derivative.
+    /// end where the source has been stepped, else the source's limited extrapolation.
     Sloped,
 }
 
@@ -52,6 +53,9 @@ pub(crate) struct Exchange {
     outputs: Vec<Outputs>,
     inputs: Vec<Inputs>,
     discrete: Vec<Discrete>,
+    /// Sizes of the last step and of the current one, in s.
+    last_size: f64,
+    size: f64,
 }
 
 impl Exchange {
@@ -60,6 +64,8 @@ impl Exchange {
             outputs: system.slaves.iter().map(|_| Outputs::default()).collect(),
             inputs: system.slaves.iter().map(|_| Inputs::default()).collect(),
             discrete: Vec::new(),
+            last_size: 1.0,
+            size: 1.0,
         };
         for (slave, (_, instance)) in system.slaves.iter().enumerate() {
             if let Some(flags) = &instance.description().co_simulation {
@@ -84,9 +90,11 @@ impl Exchange {
         exchange
     }
 
-    /// Makes the values last read from `slave` those of the begin of a step.
-    pub(crate) fn begin_step(&mut self) {
+    /// Makes the values last read those of the begin of a step of `size` s.
+    pub(crate) fn begin_step(&mut self, size: f64) {
+        (self.last_size, self.size) = (self.size, size);
         for outputs in &mut self.outputs {
+            outputs.before.copy_from_slice(&outputs.begin);
             outputs.begin.copy_from_slice(&outputs.latest);
         }
     }
@@ -138,7 +146,7 @@ impl Exchange {
             let (begin, latest) = (outputs.begin[position], outputs.latest[position]);
             (inputs.values[k], inputs.slopes[k]) = match (stepped[source], sloped) {
                 (true, true) => (begin, (latest - begin) / size),
-                (false, true) => (begin, outputs.slopes[position]),
+                (false, true) => (begin, outputs.extrapolation(position, self.last_size)),
                 (_, false) => (latest, 0.0),
             };
         }
@@ -201,6 +209,23 @@ impl Exchange {
 }
 
 impl Outputs {
+    /// The slope with which an output is continued after a step of `last_size` s: of its derivative
+    /// and its last difference quotient the smaller one, zero where their signs differ.
+    fn extrapolation(&self, position: usize, last_size: f64) -> f64 {
+        let quotient = (self.begin[position] - self.before[position]) / last_size;
+        if !self.gives_slopes {
+            return quotient;
+        }
+        let slope = self.slopes[position];
+        if slope * quotient <= 0.0 {
+            0.0
+        } else if slope.abs() < quotient.abs() {
+            slope
+        } else {
+            quotient
+        }
+    }
+
     /// Position of the output, added when it is new.
     fn add(&mut self, port: Port, reference: u32) -> usize {
         if let Some(position) = self.ports.iter().position(|known| *known == port) {
@@ -208,7 +233,7 @@ impl Outputs {
         }
         self.ports.push(port);
         self.references.push(reference);
-        for values in [&mut self.begin, &mut self.latest, &mut self.slopes] {
+        for values in [&mut self.before, &mut self.begin, &mut self.latest, &mut self.slopes] {
             values.push(0.0);
         }
         self.ports.len() - 1

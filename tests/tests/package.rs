@@ -107,7 +107,9 @@ fn an_fmu_holds_library_resources_documentation_licences_and_picture() {
         for part in ["f_fric", "MIT", "Patton"] {
             assert!(page.contains(part) || model == "AsoController", "{model}: {part}");
         }
-        assert!(folder.join("documentation/licenses/LICENSE-MIT.txt").is_file());
+        let license =
+            fs::read_to_string(folder.join("documentation/licenses/license.txt")).unwrap();
+        assert!(license.contains("MIT License") && license.contains("Apache License"));
         assert!(fs::read(folder.join("model.png")).unwrap().starts_with(b"\x89PNG"));
         if let Some(resource) = resource {
             assert!(fmu.resources().join(resource).is_file());

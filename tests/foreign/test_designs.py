@@ -1,0 +1,183 @@
+"""Controllers of other sizes, and controllers whose actuators have limits."""
+
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.validation import validate_fmu
+from lxml import etree
+
+from c_abi import DISCARD, ERROR, OK, Instance
+from design_file import MATRICES, design_text, redesigned, shipped_design
+from observer_oracle import command, propagated, read_matrices, saturated
+
+SCHEMA = Path(fmpy.__file__).parent / "schema" / "fmi2" / "fmi2ModelDescription.xsd"
+SIZES = [(1, 1, 1, 1), (2, 2, 2, 2), (3, 2, 1, 1), (2, 1, 2, 3), (5, 3, 4, 2)]
+
+
+def random_design(sizes, limits=None):
+    """A stable design of n states, m actuators, p measurements, q faults."""
+    n, m, p, q = sizes
+    chance = np.random.default_rng([7, *sizes])
+    shapes = [(n, n), (n, m), (p, n), (n, q), (m, n), (m, q), (n, p), (q, p)]
+    design = {name: chance.normal(size=shape) for name, shape in zip(MATRICES, shapes)}
+    design["A"] -= 6 * np.eye(n)
+    signals = lambda letter, count: [{"name": f"{letter}{k + 1}", "unit": "m"} for k in range(count)]
+    design |= {
+        "description": 'A "random" design < of any size', "t_on": 0.0, "monitor": False,
+        "states": signals("s", n), "actuators": signals("act", m), "measurements": signals("y", p),
+        "faults": signals("f", q), "experiment": {"stop_time": 2.0, "step_size": 0.01},
+    }
+    for actuator, pair in zip(design["actuators"], limits or []):
+        if pair:
+            actuator["limits"] = pair
+    return design
+
+
+def made(controller, design, folder):
+    """The FMU of a design."""
+    return redesigned(controller, design_text(design), folder / "fmu")
+
+
+def vector(name, count):
+    """Names of a signal with so many channels."""
+    return [name] if count == 1 else [f"{name}[{k + 1}]" for k in range(count)]
+
+
+def begun(fmu, sizes, z, y, values=None):
+    """An instance after initialization at the estimate `z` with the measurements `y`."""
+    n, _, p, q = sizes
+    starts = dict(zip(vector("x_hat_0", n) + vector("f_hat_0", q), z))
+    inputs = {f"y{k + 1}": y[k] for k in range(p)}
+    return Instance(fmu).start({**starts, **inputs, **(values or {})})
+
+
+@pytest.mark.parametrize("sizes", SIZES, ids=str)
+def test_a_design_of_any_size_has_the_variables_of_that_size(controller, tmp_path, sizes):
+    n, m, p, q = sizes
+    fmu = made(controller, random_design(sizes), tmp_path)
+    shapes = [(n, n), (n, m), (p, n), (n, q), (m, n), (m, q), (n, p), (q, p)]
+    elements = {
+        f"{name}[{i + 1},{j + 1}]"
+        for name, (rows, columns) in zip(MATRICES, shapes) for i in range(rows) for j in range(columns)
+    }
+    starts = {*vector("x_hat_0", n), *vector("f_hat_0", q), "t_on", "monitor"}
+    assert set(fmu.names(causality="parameter")) == elements | starts
+    assert fmu.names(causality="input") == [f"y{k + 1}" for k in range(p)] + ["compensate"]
+    outputs = [*vector("u", m), *vector("f_hat", q), *vector("x_hat", n)]
+    assert set(fmu.names(causality="output")) == set(outputs)
+
+
+@pytest.mark.parametrize("limited", [False, True])
+@pytest.mark.parametrize("sizes", SIZES, ids=str)
+def test_a_design_of_any_size_describes_itself_validly(controller, tmp_path, sizes, limited):
+    design = random_design(sizes, [[-1.0, 2.0]] * sizes[1] if limited else None)
+    fmu = made(controller, design, tmp_path)
+    etree.XMLSchema(etree.parse(SCHEMA)).assertValid(etree.parse(fmu.folder / "modelDescription.xml"))
+    assert validate_fmu(str(fmu.folder)) == []
+    assert fmu.description.description == design["description"]
+    assert {"u_min", "u_max"} <= {name.split("[")[0] for name in fmu.variables} or not limited
+
+
+@pytest.mark.parametrize("sizes", SIZES, ids=str)
+def test_a_step_of_a_design_of_any_size_is_the_matrix_exponential(controller, tmp_path, sizes):
+    n, m, p, q = sizes
+    design = random_design(sizes)
+    fmu = made(controller, design, tmp_path)
+    z, y, slope = np.linspace(-1, 1.5, n + q), np.linspace(0.5, -0.7, p), np.linspace(2, -3, p)
+    with begun(fmu, sizes, z, y) as instance:
+        read = read_matrices(instance)
+        assert all((read[name] == design[name]).all() for name in MATRICES)
+        instance.set_slopes(**{f"y{k + 1}": slope[k] for k in range(p)})
+        instance.step(0.0, 0.05)
+        found = instance.get(*vector("x_hat", n), *vector("f_hat", q))
+        wanted = propagated(design, z, y, slope, 0.05, True, True)
+        assert found == pytest.approx(wanted, rel=1e-9, abs=1e-12)
+        assert instance.get(*vector("u", m)) == pytest.approx(command(design, found, True), rel=1e-9)
+
+
+# Limits that some channel reaches and leaves within the first second.
+LIMITED = [
+    ((1, 1, 1, 1), [[-0.3, 1.2]]),
+    ((2, 2, 2, 2), [[-1.0, 1.0], [-0.2, 4.0]]),
+    ((3, 2, 1, 1), [[-0.5, 1.0], None]),
+    ((3, 2, 1, 1), [None, [-3.0, 0.5]]),
+]
+
+
+@pytest.mark.parametrize("size", [0.005, 0.05, 0.25])
+@pytest.mark.parametrize(("sizes", "limits"), LIMITED, ids=str)
+def test_with_limited_actuators_the_observer_is_the_one_scipy_integrates(
+    controller, tmp_path, sizes, limits, size
+):
+    n, m, p, q = sizes
+    design = random_design(sizes, limits)
+    fmu = made(controller, design, tmp_path)
+    pairs = [pair or [-np.inf, np.inf] for pair in limits]
+    z, y, slope = np.linspace(-1, 1.5, n + q), np.linspace(0.5, -0.7, p), np.linspace(2, -3, p)
+    times = np.linspace(0, 1, round(1 / size) + 1)
+    wanted = saturated(design, z, y, slope, times, pairs)
+    commands = np.array([command(design, z, True, pairs) for z in wanted])
+    at_limit = (commands == np.transpose(pairs)[0]) | (commands == np.transpose(pairs)[1])
+    assert (np.diff(at_limit, axis=0)).any(), "a limit is reached or left"
+    with begun(fmu, sizes, z, y) as instance:
+        for time, estimate, u in zip(times, wanted[1:], commands[1:]):
+            instance.set({f"y{j + 1}": y[j] + time * slope[j] for j in range(p)})
+            instance.set_slopes(**{f"y{j + 1}": slope[j] for j in range(p)})
+            instance.step(time, size)
+            found = instance.get(*vector("x_hat", n), *vector("f_hat", q))
+            assert found == pytest.approx(estimate, rel=1e-6, abs=1e-7)
+            assert instance.get(*vector("u", m)) == pytest.approx(u, rel=1e-6, abs=1e-6)
+
+
+@pytest.mark.parametrize("size", [1e-4, 1e-3, 5e-3])
+def test_the_shipped_controller_with_limits_is_the_one_scipy_integrates(controller, tmp_path, size):
+    design = shipped_design(controller)
+    limits = [-40.0, 30.0]
+    design["actuators"][0]["limits"], design["t_on"] = limits, 0.0
+    fmu = redesigned(controller, design_text(design), tmp_path / "fmu")
+    y, slope, times = np.array([0.001, -0.002]), np.array([0.3, -0.2]), np.linspace(0, 0.01, 101)
+    wanted = saturated(design, np.zeros(5), y, slope, times, [limits])
+    commands = {float(command(design, z, True, [limits])[0]) for z in wanted}
+    assert set(limits) <= commands, "the command goes from one limit to the other"
+    with Instance(fmu) as instance:
+        instance.start()
+        for k in range(round(0.01 / size)):
+            at = y + k * size * slope
+            instance.set({"x_p": at[0], "theta": at[1]})
+            instance.set_slopes(x_p=slope[0], theta=slope[1])
+            instance.step(k * size, size)
+            assert -40 <= instance.get("u")[0] <= 30
+        found = instance.get("x_hat[1]", "x_hat[2]", "x_hat[3]", "x_hat[4]", "f_hat")
+    assert found == pytest.approx(list(wanted[-1]), rel=1e-6)
+
+
+def test_limits_can_be_changed_while_the_run_goes_and_only_in_order(controller, tmp_path):
+    sizes = (1, 1, 1, 1)
+    fmu = made(controller, random_design(sizes, [[-0.3, 0.4]]), tmp_path)
+    with begun(fmu, sizes, [9.0, 9.0], [0.0]) as instance:
+        instance.step(0.0, 0.01)
+        side = "u_min" if instance.get("u") == [-0.3] else "u_max"
+        instance.set({side: instance.get(side)[0] * 2})
+        instance.step(0.01, 0.01)
+        assert instance.get("u") == instance.get(side)
+        assert instance.set_one("u_max", np.inf) == DISCARD
+        instance.set({"u_min": 0.9, "u_max": 0.8})
+        assert instance.call("DoStep", 0.02, 0.01, 1) == ERROR
+        assert all(part in instance.last_message() for part in ("u_min", "0.9", "u_max", "0.8"))
+
+
+def test_the_initial_command_of_a_limited_actuator_depends_on_its_limits_too(controller, tmp_path):
+    sizes = (2, 2, 2, 2)
+    fmu = made(controller, random_design(sizes, [[-0.5, 0.6], [-0.2, 1.5]]), tmp_path)
+    for unknown in fmu.description.initialUnknowns:
+        names = {variable.name for variable in unknown.dependencies}
+        for j, name in enumerate(vector("u", 2)):
+            own = {f"u_min[{j + 1}]", f"u_max[{j + 1}]"}
+            if unknown.variable.name == name:
+                assert own <= names and f"K_x[{j + 1},1]" in names
+                assert not any(other.startswith(f"K_x[{2 - j},") for other in names)
+    with begun(fmu, sizes, [9.0, 9.0, 9.0, 9.0], [0.0, 0.0]) as instance:
+        assert {tuple(instance.get("u[1]", "u[2]"))} <= {(a, b) for a in (-0.5, 0.6) for b in (-0.2, 1.5)}
+        assert instance.call("Terminate") == OK
