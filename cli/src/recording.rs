@@ -76,10 +76,19 @@ impl Recording {
             std::iter::once("time").chain(self.probe.names().iter().map(String::as_str)),
         )?;
         for (row, time) in self.time.iter().enumerate() {
-            let values = self.columns.iter().map(|column| column[row].to_string());
-            writer.write_record(std::iter::once(time.to_string()).chain(values))?;
+            let values = self.columns.iter().map(|column| number(column[row]));
+            writer.write_record(std::iter::once(number(*time)).chain(values))?;
         }
         let text = writer.into_inner().map_err(|error| anyhow::anyhow!("{error}"))?;
         whole_file::write(path, &text).with_context(|| format!("cannot write {}", path.display()))
+    }
+}
+
+/// The shortest text that reads back as the same number; whole numbers without a point.
+fn number(value: f64) -> String {
+    if value.fract() == 0.0 && value.abs() < 1e15 {
+        format!("{value}")
+    } else {
+        format!("{value:?}")
     }
 }

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use fmi2::Experiment;
 use indicatif::{ProgressBar, ProgressStyle};
-use master::{Fmu, Method, Simulation, System};
+use master::{Fmu, Method, Simulation, System, by_direct_dependencies};
 
 use crate::recording::Recording;
 
@@ -107,6 +107,12 @@ pub(crate) fn run(options: &Options) -> anyhow::Result<bool> {
     println!("{}", names.join("\n"));
     std::fs::create_dir_all(&options.out)
         .with_context(|| format!("cannot make the folder {}", options.out.display()))?;
+    let order = by_direct_dependencies(&system);
+    if !order.looped.is_empty() {
+        let names: Vec<_> =
+            order.looped.iter().map(|slave| system.slaves[*slave].0.as_str()).collect();
+        eprintln!("note: direct dependencies form a loop through {}", names.join(", "));
+    }
     let finished = simulate(system, &options.run, |_| Ok(()))?;
     let results = options.out.join("results.csv");
     finished.recording.write(&results)?;

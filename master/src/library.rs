@@ -99,16 +99,23 @@ fn load(path: &Path) -> Result<Handle, LoadError> {
     })
 }
 
-/// Loads `library` for the rest of the process, its symbols visible to all that come later.
+/// Loads `library` for the rest of the process, on Unix with its symbols visible to all that come
+/// later.
 ///
 /// # Errors
 ///
 /// [`LoadError::Refused`] where the operating system does not find or accept it.
-#[cfg(unix)]
 pub fn preload(library: &OsStr) -> Result<(), LoadError> {
-    use libloading::os::unix::{Library, RTLD_GLOBAL, RTLD_NOW};
+    #[cfg(unix)]
     // SAFETY: runs the initialisers of the library, which is what the user asked for.
-    match unsafe { Library::open(Some(library), RTLD_NOW | RTLD_GLOBAL) } {
+    let opened = unsafe {
+        use libloading::os::unix::{Library, RTLD_GLOBAL, RTLD_NOW};
+        Library::open(Some(library), RTLD_NOW | RTLD_GLOBAL)
+    };
+    #[cfg(not(unix))]
+    // SAFETY: runs the initialisers of the library, which is what the user asked for.
+    let opened = unsafe { Handle::new(library) };
+    match opened {
         Ok(handle) => {
             std::mem::forget(handle);
             Ok(())

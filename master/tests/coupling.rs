@@ -1,0 +1,226 @@
+//! The master algorithms on slaves of a few lines, against answers computed by hand.
+#![expect(clippy::unwrap_used, clippy::float_cmp, reason = "tests; exact by construction")]
+
+use fmi2::Experiment;
+use fmi2::abi::Status;
+use fmi2::description::ModelDescription;
+use master::{CallError, Method, Simulation, Slave, System, by_direct_dependencies};
+
+/// x' = gain u, stepped exactly for a line u + slope t; with `direct` the output is y = u instead.
+struct Integrator {
+    description: ModelDescription,
+    gain: f64,
+    x: f64,
+    u: f64,
+    slope: f64,
+    direct: bool,
+    fails_at: f64,
+}
+
+impl Integrator {
+    fn boxed(gain: f64, x: f64, direct: bool) -> Box<Self> {
+        let dependencies = if direct { "1" } else { "" };
+        let xml = format!(
+            r#"<fmiModelDescription fmiVersion="2.0" modelName="Integrator" guid="g">
+            <CoSimulation modelIdentifier="I" canInterpolateInputs="true" maxOutputDerivativeOrder="1"/>
+            <ModelVariables>
+            <ScalarVariable name="u" valueReference="1" causality="input"><Real start="0"/></ScalarVariable>
+            <ScalarVariable name="y" valueReference="2" causality="output"><Real/></ScalarVariable>
+            </ModelVariables><ModelStructure><Outputs>
+            <Unknown index="2" dependencies="{dependencies}"/></Outputs></ModelStructure>
+            </fmiModelDescription>"#
+        );
+        let description = ModelDescription::parse(xml).unwrap();
+        let fails_at = f64::INFINITY;
+        Box::new(Self { description, gain, x, u: 0.0, slope: 0.0, direct, fails_at })
+    }
+}
+
+impl Slave for Integrator {
+    fn description(&self) -> &ModelDescription {
+        &self.description
+    }
+    fn setup_experiment(&mut self, _: &Experiment) -> Result<(), CallError> {
+        Ok(())
+    }
+    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
+    fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
+    fn terminate(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
+    fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
+        assert_eq!(references, [2]);
+        values[0] = if self.direct { self.u } else { self.x };
+        Ok(())
+    }
+    fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), CallError> {
+        assert_eq!(references, [1]);
+        self.u = values[0];
+        Ok(())
+    }
+    fn get_integer(&mut self, _: &[u32], _: &mut [i32]) -> Result<(), CallError> {
+        unreachable!("no such variables")
+    }
+    fn set_integer(&mut self, _: &[u32], _: &[i32]) -> Result<(), CallError> {
+        unreachable!("no such variables")
+    }
+    fn get_boolean(&mut self, _: &[u32], _: &mut [i32]) -> Result<(), CallError> {
+        unreachable!("no such variables")
+    }
+    fn set_boolean(&mut self, _: &[u32], _: &[i32]) -> Result<(), CallError> {
+        unreachable!("no such variables")
+    }
+    fn set_string(&mut self, _: u32, _: &str) -> Result<(), CallError> {
+        unreachable!("no such variables")
+    }
+    fn set_input_slopes(&mut self, _: &[u32], slopes: &[f64]) -> Result<(), CallError> {
+        self.slope = slopes[0];
+        Ok(())
+    }
+    fn get_output_slopes(&mut self, _: &[u32], slopes: &mut [f64]) -> Result<(), CallError> {
+        slopes[0] = self.gain * self.u;
+        Ok(())
+    }
+    fn do_step(&mut self, time: f64, size: f64) -> Result<(), CallError> {
+        if time >= self.fails_at {
+            let messages = vec!["out of paper".to_owned()];
+            return Err(CallError {
+                function: "fmi2DoStep",
+                status: Some(Status::Error),
+                messages,
+            });
+        }
+        self.x += self.gain * (self.u * size + 0.5 * self.slope * size * size);
+        self.u += self.slope * size;
+        self.slope = 0.0;
+        Ok(())
+    }
+}
+
+/// x' = v, v' = -x: two integrators in a ring, from x = 1, v = 0.5.
+fn ring() -> System {
+    let mut system = System::default();
+    system.add("a", Integrator::boxed(1.0, 1.0, false));
+    system.add("b", Integrator::boxed(-1.0, 0.5, false));
+    system.connect("a.y", "b.u").unwrap();
+    system.connect("b.y", "a.u").unwrap();
+    system
+}
+
+fn start(system: System, method: Method, stop_time: Option<f64>) -> Simulation {
+    let experiment = Experiment { stop_time, ..Experiment::default() };
+    Simulation::new(system, method, &experiment, 0.5).unwrap()
+}
+
+fn outputs(simulation: &mut Simulation) -> [f64; 2] {
+    let mut read = |slave: usize| {
+        let mut value = [0.0];
+        simulation.system().slaves[slave].1.get_real(&[2], &mut value).unwrap();
+        value[0]
+    };
+    [read(0), read(1)]
+}
+
+#[test]
+fn jacobi_steps_all_slaves_from_the_same_values() {
+    let mut simulation = start(ring(), Method::Jacobi, None);
+    simulation.step().unwrap();
+    assert_eq!(outputs(&mut simulation), [1.0 + 0.5 * 0.5, 0.5 - 0.5 * 1.0]);
+}
+
+#[test]
+fn gauss_seidel_with_held_inputs_gives_the_later_slave_the_new_value() {
+    let mut simulation = start(ring(), Method::GaussSeidelHold, None);
+    simulation.step().unwrap();
+    assert_eq!(outputs(&mut simulation), [1.25, 0.5 - 0.5 * 1.25]);
+}
+
+#[test]
+fn gauss_seidel_gives_the_later_slave_the_line_between_both_values() {
+    let mut simulation = start(ring(), Method::GaussSeidel, None);
+    simulation.step().unwrap();
+    let v = 0.5 - 0.5 * 0.5 * (1.0 + 1.25);
+    assert_eq!(outputs(&mut simulation), [1.25, v]);
+    // Second step: v fell by 0.5625 over 0.5 s, its derivative is -1.25: the quotient is smaller.
+    simulation.step().unwrap();
+    let x = 1.25 + 0.5 * v + 0.125 * ((v - 0.5) / 0.5);
+    assert_eq!(outputs(&mut simulation), [x, v - 0.25 * (1.25 + x)]);
+}
+
+#[test]
+fn the_last_step_ends_at_the_stop_time() {
+    let mut simulation = start(ring(), Method::Jacobi, Some(1.2));
+    let mut times = Vec::new();
+    while !simulation.is_finished() {
+        simulation.step().unwrap();
+        times.push(simulation.time());
+    }
+    assert_eq!(times, [0.5, 1.0, 1.2]);
+}
+
+#[test]
+fn a_slave_whose_output_passes_its_input_through_comes_after_its_source() {
+    let mut system = System::default();
+    system.add("through", Integrator::boxed(1.0, 0.0, true));
+    system.add("source", Integrator::boxed(1.0, 2.0, false));
+    system.connect("source.y", "through.u").unwrap();
+    system.connect("through.y", "source.u").unwrap();
+    let order = by_direct_dependencies(&system);
+    assert_eq!((order.sequence, order.looped), (vec![1, 0], vec![]));
+}
+
+#[test]
+fn slaves_that_pass_through_in_a_circle_are_reported_as_a_loop() {
+    let mut system = System::default();
+    for name in ["one", "other"] {
+        system.add(name, Integrator::boxed(1.0, 0.0, true));
+    }
+    system.connect("one.y", "other.u").unwrap();
+    system.connect("other.y", "one.u").unwrap();
+    let order = by_direct_dependencies(&system);
+    assert_eq!((order.sequence, order.looped), (vec![0, 1], vec![0]));
+}
+
+#[test]
+fn initial_values_pass_through_a_chain_of_direct_dependencies() {
+    let mut system = System::default();
+    system.add("last", Integrator::boxed(1.0, 0.0, true));
+    system.add("middle", Integrator::boxed(1.0, 0.0, true));
+    system.add("first", Integrator::boxed(1.0, 7.0, false));
+    system.connect("first.y", "middle.u").unwrap();
+    system.connect("middle.y", "last.u").unwrap();
+    let mut simulation = start(system, Method::default(), None);
+    assert_eq!(outputs(&mut simulation), [7.0, 7.0]);
+}
+
+#[test]
+fn an_output_that_is_not_a_number_stops_the_run_with_its_name_and_time() {
+    let mut system = ring();
+    system.slaves[0].1 = Integrator::boxed(f64::INFINITY, 1.0, false);
+    let mut simulation = start(system, Method::Jacobi, None);
+    let message = simulation.step().unwrap_err().to_string();
+    assert_eq!(message, "a.y is inf at t = 0.5 s, expected a finite number");
+}
+
+#[test]
+fn a_failing_slave_is_named_with_time_function_and_message() {
+    let mut broken = Integrator::boxed(1.0, 1.0, false);
+    broken.fails_at = 0.5;
+    let mut system = ring();
+    system.slaves[1].1 = broken;
+    let mut simulation = start(system, Method::Jacobi, None);
+    simulation.step().unwrap();
+    let message = simulation.step().unwrap_err().to_string();
+    assert_eq!(message, "b at t = 0.5 s: fmi2DoStep returned fmi2Error: out of paper");
+}
+
+#[test]
+fn an_input_takes_one_source_only() {
+    let mut system = ring();
+    let message = system.connect("a.y", "a.u").unwrap_err().to_string();
+    assert_eq!(message, "a.u is connected twice, to b.y and to a.y");
+}
