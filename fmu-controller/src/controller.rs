@@ -25,7 +25,8 @@ pub(crate) struct AsoController {
     pub(crate) estimate_slopes: Vec<f64>,
     pub(crate) u: Vec<f64>,
     pub(crate) u_slopes: Vec<f64>,
-    time: f64,
+    /// Whether f_hat is part of the command u: decided at the begin and at each end of a step.
+    active: bool,
     /// Follows from `design`; made anew where an instance starts or is read from bytes.
     #[serde(skip)]
     observer: Option<Observer>,
@@ -70,10 +71,9 @@ impl AsoController {
 
     /// u, u' and z' for the state and time reached, `offset` s after the measurements were set.
     fn evaluate(&mut self, observer: &Observer, offset: f64) {
-        let compensating = self.compensating(self.time);
-        let estimating = compensating || self.design.monitor;
-        observer.command(&self.estimate, compensating, &mut self.u);
-        let mode = observer.mode(&self.estimate, compensating, estimating);
+        let estimating = self.active || self.design.monitor;
+        observer.command(&self.estimate, self.active, &mut self.u);
+        let mode = observer.mode(&self.estimate, self.active, estimating);
         let y = Measurement { value: &self.measurements, slope: &self.measurement_slopes };
         let slopes = (&mut self.estimate_slopes[..], &mut self.u_slopes[..]);
         observer.slopes(mode, &self.estimate, (y, offset), &self.u, slopes);
@@ -118,7 +118,7 @@ impl Model for AsoController {
             estimate_slopes: vec![0.0; n + q],
             u: vec![0.0; m],
             u_slopes: vec![0.0; m],
-            time: 0.0,
+            active: false,
             observer: None,
         })
     }
@@ -143,7 +143,7 @@ impl Model for AsoController {
     }
 
     fn initialize(&mut self, experiment: &Experiment) -> Result<(), Failure> {
-        self.time = experiment.start_time;
+        self.active = self.compensating(experiment.start_time);
         let (x_hat, f_hat) = self.estimate.split_at_mut(self.x_hat_0.len());
         x_hat.copy_from_slice(&self.x_hat_0);
         f_hat.copy_from_slice(&self.f_hat_0);
@@ -164,7 +164,7 @@ impl Model for AsoController {
             let compensating = self.compensating(step.start);
             self.advance(&mut observer, compensating, (0.0, step.size), resolution)?;
         }
-        self.time = step.end();
+        self.active = self.compensating(step.end());
         self.evaluate(&observer, step.size);
         self.observer = Some(observer);
         Ok(())

@@ -117,7 +117,12 @@ impl Design {
     pub(crate) fn parse(text: &str, path: String) -> Result<Self, DesignError> {
         let design: Self = match toml::from_str(text) {
             Ok(design) => design,
-            Err(error) => return Err(DesignError::Malformed { path, message: error.to_string() }),
+            Err(error) => {
+                return Err(DesignError::Malformed {
+                    path,
+                    message: error.to_string().trim_end().to_owned(),
+                });
+            }
         };
         design.check_counts(&path)?;
         design.check_shapes(&path)?;

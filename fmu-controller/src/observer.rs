@@ -32,8 +32,23 @@ pub(crate) struct Mode {
     pub(crate) compensating: bool,
     /// f_hat follows the observer.
     pub(crate) estimating: bool,
+    /// Bit j: channel j is at its lower limit.
+    lower: u64,
+    /// Bit j: channel j is at its upper limit.
+    upper: u64,
+}
+
+impl Mode {
     /// Bit j: channel j is at a limit.
-    limited: u64,
+    fn limited(self) -> u64 {
+        self.lower | self.upper
+    }
+
+    /// Whether both have the same matrices.
+    fn has_the_system_of(self, other: Self) -> bool {
+        (self.compensating, self.estimating, self.limited())
+            == (other.compensating, other.estimating, other.limited())
+    }
 }
 
 /// The measurements over a step: y(t) = `value` + `slope` t.
@@ -78,7 +93,7 @@ impl Matrices {
         let mut free = self.b.clone();
         let mut held = self.b.clone();
         for j in 0..m {
-            let one = if mode.limited & (1 << j) == 0 { &mut held } else { &mut free };
+            let one = if mode.limited() & (1 << j) == 0 { &mut held } else { &mut free };
             one.column_mut(j).fill(0.0);
         }
         let compensating = f64::from(mode.compensating);
@@ -146,12 +161,13 @@ impl Observer {
 
     /// The mode in which z evolves from here.
     pub(crate) fn mode(&self, z: &[f64], compensating: bool, estimating: bool) -> Mode {
-        let mut limited = 0;
+        let (mut lower, mut upper) = (0, 0);
         for (j, [low, high]) in self.limits.iter().enumerate() {
             let command = self.matrices.free_command(z, compensating, j);
-            limited |= u64::from(command < *low || command > *high) << j;
+            lower |= u64::from(command < *low) << j;
+            upper |= u64::from(command > *high) << j;
         }
-        Mode { compensating, estimating, limited }
+        Mode { compensating, estimating, lower, upper }
     }
 
     /// The command u applied at z.
@@ -187,7 +203,7 @@ impl Observer {
             }
         }
         for (j, slope) in u_slope.iter_mut().enumerate() {
-            let free = mode.limited & (1 << j) == 0;
+            let free = mode.limited() & (1 << j) == 0;
             let fault = if mode.compensating { dot(k_f, j, f_slope) } else { 0.0 };
             *slope = if free { dot(k_x, j, x_slope) + fault } else { 0.0 };
         }
@@ -196,7 +212,8 @@ impl Observer {
     /// Advances `z` by `size` s, from `offset` s after the instant to which `y` belongs.
     ///
     /// Where a channel reaches or leaves a limit on the way, the step is halved until that instant
-    /// is known to 2^-20 of the step. `resolution` is the rounding of the importer's clock, in s:
+    /// is known to 2^-20 of the step; a channel that leaves its mode and is back in it both at the
+    /// middle and at the end of a part is not noticed. `resolution` is the rounding of the importer's clock, in s:
     /// step sizes closer than that count as equal.
     pub(crate) fn advance(
         &mut self,
@@ -258,7 +275,7 @@ impl Observer {
             self.input_slope[k] = *slope;
         }
         for (j, [low, high]) in self.limits.iter().enumerate() {
-            let at_limit = if mode.limited & (1 << j) == 0 {
+            let at_limit = if mode.limited() & (1 << j) == 0 {
                 0.0
             } else {
                 let before = &self.before;
@@ -274,7 +291,8 @@ impl Observer {
     /// Position of the propagator for `mode` and the size of `span`, computed when it is new.
     fn propagator(&mut self, mode: Mode, span: Span) -> Result<usize, control::Error> {
         let known = self.kept.iter().position(|(kept, size, _)| {
-            *kept == mode && (size - span.size).abs() <= span.resolution.min(1e-9 * size)
+            kept.has_the_system_of(mode)
+                && (size - span.size).abs() <= span.resolution.min(1e-9 * size)
         });
         if let Some(position) = known {
             return Ok(position);

@@ -183,18 +183,15 @@ fn switches(controller: &AsoController) -> Vec<Variable<AsoController>> {
 
 fn limits(controller: &AsoController) -> Vec<Variable<AsoController>> {
     let mut all = Vec::new();
-    for (j, actuator) in controller.design.actuators.iter().enumerate() {
-        if actuator.limits.is_none() {
-            continue;
-        }
-        for (side, text) in ["Smallest command", "Largest command"].into_iter().enumerate() {
-            let variable = Variable::real(
-                limit_name(controller, side, j),
-                text,
-                move |model: &mut AsoController| {
-                    &mut model.design.actuators[j].limits.get_or_insert([0.0; 2])[side]
-                },
-            );
+    for (side, text) in ["Smallest command", "Largest command"].into_iter().enumerate() {
+        for (j, actuator) in controller.design.actuators.iter().enumerate() {
+            if actuator.limits.is_none() {
+                continue;
+            }
+            let name = limit_name(controller, side, j);
+            let variable = Variable::real(name, text, move |model: &mut AsoController| {
+                &mut model.design.actuators[j].limits.get_or_insert([0.0; 2])[side]
+            });
             all.push(with_unit(variable, actuator.unit.as_ref()).tunable());
         }
     }

@@ -29,7 +29,7 @@ const LONGEST_STEP: f64 = 0.1;
 const SHORTEST_STEP: f64 = 1e-13;
 
 /// Most integration steps, rejected ones included, in one call of `advance`.
-const STEP_LIMIT: u32 = 1_000_000;
+const STEP_LIMIT: u32 = 200_000;
 
 /// Most events in one call of `advance`.
 const EVENT_LIMIT: u32 = 10_000;

@@ -86,22 +86,20 @@ const STATES: [(&str, &str, &str); 4] = [
     ("omega", "Angular velocity of the pendulum", "rad/s"),
 ];
 
-/// What the initial friction force depends on.
-const INITIALLY: [&str; 18] = [
+/// What the initial friction force depends on: at rest all but the mass and the damping of the cart,
+/// in motion the friction law and the velocity.
+const INITIALLY: [&str; 15] = [
     "u",
     "f_a",
-    "M",
     "m",
     "J",
     "l",
-    "F_x",
     "F_theta",
     "g",
     "F_c",
     "F_s",
     "v_s",
     "delta",
-    "x_p_0",
     "theta_0",
     "v_p_0",
     "omega_0",

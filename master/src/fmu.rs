@@ -30,13 +30,13 @@ pub enum FmuError {
         /// The FMU.
         path: PathBuf,
     },
-    /// It needs the tool that made it.
-    #[error("{path}: needsExecutionTool is true: the FMU runs only beside {tool}")]
+    /// The library fails, and `needsExecutionTool` may be why.
+    #[error("{source}\nneedsExecutionTool is true: the FMU may run only beside {tool}")]
     NeedsTool {
-        /// The FMU.
-        path: PathBuf,
         /// `generationTool`, or a word for it.
         tool: String,
+        /// What failed.
+        source: LoadError,
     },
 }
 
@@ -70,13 +70,9 @@ impl Fmu {
         let Some(co_simulation) = &description.co_simulation else {
             return Err(FmuError::NoCoSimulation { path: path.to_owned() });
         };
-        if co_simulation.needs_execution_tool {
-            let tool = description.generation_tool.clone();
-            let tool = tool.unwrap_or_else(|| "the tool that exported it".to_owned());
-            return Err(FmuError::NeedsTool { path: path.to_owned(), tool });
-        }
         let library = unpacked.library(&co_simulation.model_identifier)?;
-        let library = Arc::new(Library::open(&library)?);
+        let library = Library::open(&library).map_err(|error| explained(description, error))?;
+        let library = Arc::new(library);
         Ok(Self { content: Arc::new(Content { unpacked, library }) })
     }
 
@@ -94,9 +90,20 @@ impl Fmu {
     pub fn instantiate(&self, name: &str) -> Result<Instance, FmuError> {
         let resources = file_uri(&self.content.unpacked.resources())?;
         let guid = &self.description().guid;
-        let component = self.content.library.instantiate(name, guid, &resources)?;
+        let made = self.content.library.instantiate(name, guid, &resources);
+        let component = made.map_err(|error| explained(self.description(), error))?;
         Ok(Instance { component, fmu: self.clone() })
     }
+}
+
+/// `error`, with the tool that the FMU says it needs.
+fn explained(description: &ModelDescription, error: LoadError) -> FmuError {
+    if !description.co_simulation.as_ref().is_some_and(|flags| flags.needs_execution_tool) {
+        return FmuError::Load(error);
+    }
+    let tool = description.generation_tool.clone();
+    let tool = tool.unwrap_or_else(|| "the tool that exported it".to_owned());
+    FmuError::NeedsTool { tool, source: error }
 }
 
 /// An instance of an FMU, by its C functions.

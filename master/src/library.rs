@@ -90,11 +90,20 @@ extern "C" fn receive(sink: *mut Sink, _: c_int, _: *const c_char, text: *const 
     }
 }
 
+/// What the operating system says.
+fn reason(error: &libloading::Error) -> String {
+    std::error::Error::source(error).map_or_else(|| error.to_string(), ToString::to_string)
+}
+
 fn load(path: &Path) -> Result<Handle, LoadError> {
     // SAFETY: runs the initialisers of the library, which is what the user asked for.
     unsafe { Handle::new(path) }.map_err(|error| {
-        let message = error.to_string();
-        let hint = if message.contains("undefined symbol: Py") { PYTHON } else { "" };
+        let message = reason(&error);
+        let python = message
+            .split("undefined symbol: ")
+            .nth(1)
+            .is_some_and(|symbol| symbol.trim_start_matches('_').starts_with("Py"));
+        let hint = if python { PYTHON } else { "" };
         LoadError::Refused { path: path.to_owned(), message, hint }
     })
 }
@@ -122,7 +131,7 @@ pub fn preload(library: &OsStr) -> Result<(), LoadError> {
         }
         Err(error) => Err(LoadError::Refused {
             path: PathBuf::from(library),
-            message: error.to_string(),
+            message: reason(&error),
             hint: "",
         }),
     }

@@ -41,8 +41,11 @@ FUNCTIONS = {
     "ExitInitializationMode": [],
     "Terminate": [],
     "Reset": [],
-    **{f"{way}{kind}": [REFERENCES, c_size_t, POINTER(c_type)]
-       for way in ("Get", "Set") for kind, c_type in C_TYPES.items()},
+    **{
+        f"{way}{kind}": [REFERENCES, c_size_t, POINTER(c_type)]
+        for way in ("Get", "Set")
+        for kind, c_type in C_TYPES.items()
+    },
     "GetFMUstate": [STATE],
     "SetFMUstate": [c_void_p],
     "FreeFMUstate": [STATE],

@@ -58,16 +58,20 @@ def fmu(request, unpacked):
 @pytest.fixture(scope="session")
 def aso_ftc():
     """Runs the command; exit status and output come back."""
+
     def run(*arguments, **options):
         command = [ROOT / "target" / "release" / "aso-ftc", *map(str, arguments)]
         return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, **options)
+
     return run
 
 
 @pytest.fixture(scope="session")
 def python():
     """Runs this interpreter with arguments; exit status and output come back."""
+
     def run(*arguments, **options):
         command = [sys.executable, *map(str, arguments)]
         return subprocess.run(command, capture_output=True, text=True, **options)
+
     return run

@@ -1,8 +1,8 @@
 """The controller's equations in the general form, by numpy, mpmath and scipy: what must come out.
 
-    x_hat' = A x_hat + B u + F_a f_hat + L_x (y - C x_hat)
-    f_hat' = L_f (y - C x_hat)              while estimating, else 0
-    u      = K_x x_hat + K_f f_hat          while compensating, else K_x x_hat; within its limits
+x_hat' = A x_hat + B u + F_a f_hat + L_x (y - C x_hat)
+f_hat' = L_f (y - C x_hat)              while estimating, else 0
+u      = K_x x_hat + K_f f_hat          while compensating, else K_x x_hat; within its limits
 """
 
 import numpy as np
@@ -36,15 +36,17 @@ def linear_system(design, compensating, estimating):
     """M and N of [x_hat; f_hat]' = M [x_hat; f_hat] + N y, no channel at a limit."""
     A, B, C, F_a, K_x, K_f, L_x, L_f = (np.asarray(design[name], float) for name in MATRICES)
     q = F_a.shape[1]
-    M = np.block([
-        [A + B @ K_x - L_x @ C, F_a + compensating * (B @ K_f)],
-        [-estimating * (L_f @ C), np.zeros((q, q))],
-    ])
+    M = np.block(
+        [
+            [A + B @ K_x - L_x @ C, F_a + compensating * (B @ K_f)],
+            [-estimating * (L_f @ C), np.zeros((q, q))],
+        ]
+    )
     return M, np.vstack([L_x, estimating * L_f])
 
 
 def propagated(design, z, y, slope, size, compensating, estimating):
-    """[x_hat; f_hat] after `size` s of y + slope t: the exponential of [M N 0; 0 0 I; 0 0 0] size."""
+    """[x_hat; f_hat] after `size` s of y + slope t: exp of [M N 0; 0 0 I; 0 0 0] times `size`."""
     M, N = linear_system(design, compensating, estimating)
     order, inputs = N.shape
     augmented = np.zeros((order + 2 * inputs,) * 2)
@@ -63,7 +65,7 @@ def command(design, z, compensating, limits=None):
 
 
 def saturated(design, z, y, slope, times, limits):
-    """[x_hat; f_hat] at each of `times`, from 0 s on with limited commands, compensating, by scipy."""
+    """[x_hat; f_hat] at each of `times`, from 0 s on, with limited commands, compensating."""
     A, B, C, F_a, K_x, K_f, L_x, L_f = (np.asarray(design[name], float) for name in MATRICES)
     y, slope = np.asarray(y), np.asarray(slope)
 
@@ -71,7 +73,9 @@ def saturated(design, z, y, slope, times, limits):
         x_hat, f_hat = np.split(z, [len(A)])
         innovation = y + slope * time - C @ x_hat
         u = command(design, z, True, limits)
-        return np.concatenate([A @ x_hat + B @ u + F_a @ f_hat + L_x @ innovation, L_f @ innovation])
+        return np.concatenate(
+            [A @ x_hat + B @ u + F_a @ f_hat + L_x @ innovation, L_f @ innovation]
+        )
 
     end = times[-1]
     options = {"method": "DOP853", "rtol": 1e-11, "atol": 1e-13, "max_step": end / 500}

@@ -6,11 +6,26 @@ from ctypes import byref, c_char_p, c_int, c_size_t, c_void_p
 import pytest
 
 from c_abi import (
-    DISCARD, ERROR, FUNCTIONS, LAST_SUCCESSFUL_TIME, OK, Instance, integers, reals, references,
+    DISCARD,
+    ERROR,
+    FUNCTIONS,
+    LAST_SUCCESSFUL_TIME,
+    OK,
+    Instance,
+    integers,
+    reals,
+    references,
     texts,
 )
 
-STATES = ["instantiated", "initialization mode", "step complete", "step failed", "terminated", "error"]
+STATES = [
+    "instantiated",
+    "initialization mode",
+    "step complete",
+    "step failed",
+    "terminated",
+    "error",
+]
 
 # Table of section 4.2.4 of FMI 2.0.5. A step is never in progress or canceled when DoStep has
 # returned, and fatal cannot be reached from outside, so these columns are left out; a number that
@@ -155,8 +170,10 @@ def test_an_instance_can_be_freed_in_every_state(fmu, state):
 def test_a_null_instance_is_an_error_and_no_crash(fmu, name):
     function = getattr(fmu.library, f"fmi2{name}")
     zeros = [argument(0) if argument in (c_int, c_size_t) else None for argument in FUNCTIONS[name]]
-    numbers = [0.0 if argument is ctypes.c_double else zero
-               for argument, zero in zip(FUNCTIONS[name], zeros)]
+    numbers = [
+        0.0 if argument is ctypes.c_double else zero
+        for argument, zero in zip(FUNCTIONS[name], zeros)
+    ]
     if name == "FreeInstance":
         function(None)
     else:
@@ -198,10 +215,15 @@ def test_derivatives_with_null_arrays_are_an_error_when_not_empty(plant, functio
 def test_null_states_and_null_places_are_an_error(fmu):
     size = c_size_t()
     calls = [
-        ("GetFMUstate", None), ("SetFMUstate", None), ("FreeFMUstate", None),
-        ("SerializedFMUstateSize", None, byref(size)), ("SerializeFMUstate", None, None, 0),
-        ("DeSerializeFMUstate", None, 0, None), ("DeSerializeFMUstate", None, 9, byref(c_void_p())),
-        ("GetRealStatus", LAST_SUCCESSFUL_TIME, None), ("GetBooleanStatus", 3, None),
+        ("GetFMUstate", None),
+        ("SetFMUstate", None),
+        ("FreeFMUstate", None),
+        ("SerializedFMUstateSize", None, byref(size)),
+        ("SerializeFMUstate", None, None, 0),
+        ("DeSerializeFMUstate", None, 0, None),
+        ("DeSerializeFMUstate", None, 9, byref(c_void_p())),
+        ("GetRealStatus", LAST_SUCCESSFUL_TIME, None),
+        ("GetBooleanStatus", 3, None),
     ]
     for name, *given in calls:
         with Instance(fmu) as instance:

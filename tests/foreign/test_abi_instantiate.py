@@ -91,8 +91,14 @@ def test_every_form_of_a_resource_location_is_understood(controller, tmp_path):
     shutil.copytree(controller.folder / "resources", folder)
     path, plain = quote(str(folder)), str(folder)
     for uri in (
-        f"file://{path}", f"file:{path}", f"file://localhost{path}", f"file://{path}/",
-        f"file:{path}/", f"FILE://{path}", folder.as_uri(), f"file://{path}//",
+        f"file://{path}",
+        f"file:{path}",
+        f"file://localhost{path}",
+        f"file://{path}/",
+        f"file:{path}/",
+        f"FILE://{path}",
+        folder.as_uri(),
+        f"file://{path}//",
     ):
         assert starts(controller, uri), uri
     unencoded = plain.replace("%", "%25")
@@ -100,7 +106,15 @@ def test_every_form_of_a_resource_location_is_understood(controller, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "uri", ["", "http://example.com/resources", "/tmp", "file://server/share", "file:resources", "nonsense"]
+    "uri",
+    [
+        "",
+        "http://example.com/resources",
+        "/tmp",
+        "file://server/share",
+        "file:resources",
+        "nonsense",
+    ],
 )
 def test_a_location_that_is_no_local_file_is_refused(controller, uri):
     message = refusal(controller, resources=uri)
@@ -133,10 +147,14 @@ DAMAGE = [
     (lambda text: text.replace("0.3205166739122713", "nan", 1), ["B[3,1]", "NaN", "finite"]),
     (lambda text: text.replace("0.3205166739122713", "inf", 1), ["B[3,1]", "inf", "finite"]),
     (lambda text: text.replace("0.3205166739122713", "1.0, 2.0", 1), ["row 3"]),
-    (lambda text: re.sub(r"K_f = \[\n.*?\n\]", "K_f = [[1.0, 2.0]]", text, flags=re.S),
-     ["K_f", "1 x 2", "1 x 1"]),
-    (lambda text: re.sub(r"L_f = \[\n.*?\n\]", "L_f = [[1.0], [2.0]]", text, flags=re.S),
-     ["L_f", "2 x 1", "1 x 2"]),
+    (
+        lambda text: re.sub(r"K_f = \[\n.*?\n\]", "K_f = [[1.0, 2.0]]", text, flags=re.S),
+        ["K_f", "1 x 2", "1 x 1"],
+    ),
+    (
+        lambda text: re.sub(r"L_f = \[\n.*?\n\]", "L_f = [[1.0], [2.0]]", text, flags=re.S),
+        ["L_f", "2 x 1", "1 x 2"],
+    ),
     (lambda text: re.sub(r"C = \[\n.*?\n\]", "C = []", text, flags=re.S), ["matrix"]),
     (lambda text: text.replace("step_size = 0.001", "step_size = -0.001"), ["step_size", "-0.001"]),
     (lambda text: text.replace('unit = "N"', 'unit = "furlong"', 1), ["furlong"]),

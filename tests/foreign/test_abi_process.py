@@ -1,4 +1,4 @@
-"""Instances and their process: second runs, many at once, loading and unloading, no side effects."""
+"""Instances and their process: second runs, many at once, loading, unloading, side effects."""
 
 import _ctypes
 import ctypes
@@ -17,7 +17,13 @@ from excitation import START, begun, drive, serialized
 
 HERE = Path(__file__).parent
 MISHAPS = [
-    "nothing", "values set", "initialization mode", "a run", "the end", "an error", "a waiting slope"
+    "nothing",
+    "values set",
+    "initialization mode",
+    "a run",
+    "the end",
+    "an error",
+    "a waiting slope",
 ]
 INSTANCES, ROUNDS, STEPS = 200, 5, 12
 
@@ -83,9 +89,11 @@ def load_and_unload(folder):
     results = []
     for turn in range(12):
         fmu = Fmu(folder)
+
         def work(_):
             with begun(fmu, 60) as instance:
                 return instance.outputs()
+
         if turn % 2:
             with ThreadPoolExecutor(2) as pool:
                 results += list(pool.map(work, range(2)))
@@ -138,10 +146,17 @@ def settings_of_the_process():
     status = Path("/proc/self/status").read_text(encoding="utf-8").splitlines()
     caught = [line for line in status if line.startswith(("SigIgn", "SigCgt", "Threads"))]
     return {
-        "locale": locale.setlocale(locale.LC_ALL), "folder": os.getcwd(), "umask": mask,
-        "environment": dict(os.environ), "rounding": libm.fegetround(),
-        "exceptions": libm.fegetexcept(), "handlers": handlers, "blocked": blocked, "caught": caught,
-        "files": sorted(os.listdir(".")), "open": len(os.listdir("/proc/self/fd")),
+        "locale": locale.setlocale(locale.LC_ALL),
+        "folder": os.getcwd(),
+        "umask": mask,
+        "environment": dict(os.environ),
+        "rounding": libm.fegetround(),
+        "exceptions": libm.fegetexcept(),
+        "handlers": handlers,
+        "blocked": blocked,
+        "caught": caught,
+        "files": sorted(os.listdir(".")),
+        "open": len(os.listdir("/proc/self/fd")),
     }
 
 

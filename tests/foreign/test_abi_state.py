@@ -23,7 +23,9 @@ def taken(instance):
 def refused(instance, data, size=None):
     """The message with which serialized bytes are refused."""
     state = c_void_p()
-    status = instance.call("DeSerializeFMUstate", data, len(data) if size is None else size, byref(state))
+    status = instance.call(
+        "DeSerializeFMUstate", data, len(data) if size is None else size, byref(state)
+    )
     assert status == ERROR and state.value is None
     message = instance.last_message()
     assert message.startswith("fmi2DeSerializeFMUstate: ")
@@ -32,7 +34,9 @@ def refused(instance, data, size=None):
 
 def test_the_excitation_leads_through_all_that_matters(plant, controller):
     with begun(plant, 0) as instance:
-        regimes = [drive(instance, k, 1) and instance.get("regime")[0] for k in range(BEFORE + AFTER)]
+        regimes = [
+            drive(instance, k, 1) and instance.get("regime")[0] for k in range(BEFORE + AFTER)
+        ]
     for part in (regimes[:BEFORE], regimes[BEFORE:]):
         assert {-1, 0, 1} == set(part)
     with begun(controller, 0) as instance:

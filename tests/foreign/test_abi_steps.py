@@ -5,7 +5,17 @@ from math import inf, nan
 
 import pytest
 
-from c_abi import DISCARD, ERROR, LAST_SUCCESSFUL_TIME, OK, TERMINATED, Instance, integers, reals, texts
+from c_abi import (
+    DISCARD,
+    ERROR,
+    LAST_SUCCESSFUL_TIME,
+    OK,
+    TERMINATED,
+    Instance,
+    integers,
+    reals,
+    texts,
+)
 
 
 def last_successful_time(instance):
@@ -50,7 +60,11 @@ def test_time_is_what_the_steps_add_up_to(fmu):
     with Instance(fmu) as instance:
         instance.start(start=-2.5)
         assert instance.get("time") == [-2.5] and last_successful_time(instance) == -2.5
-        for start, size, end in ((-2.5, 0.25, -2.25), (-2.25, 1e-6, -2.249999), (-2.249999, 1.0, -1.249999)):
+        for start, size, end in (
+            (-2.5, 0.25, -2.25),
+            (-2.25, 1e-6, -2.249999),
+            (-2.249999, 1.0, -1.249999),
+        ):
             instance.step(start, size)
             assert instance.get("time") == [pytest.approx(end, abs=1e-15)]
             assert last_successful_time(instance) == instance.get("time")[0]
@@ -72,10 +86,14 @@ def test_a_step_past_the_stop_time_is_an_error(fmu):
 @pytest.mark.parametrize(
     ("experiment", "word"),
     [
-        ((0, 0.0, nan, 0, 0.0), "startTime"), ((0, 0.0, inf, 0, 0.0), "startTime"),
-        ((0, 0.0, 1.0, 1, 0.5), "stopTime"), ((0, 0.0, 1.0, 1, nan), "stopTime"),
-        ((1, 0.0, 0.0, 0, 0.0), "tolerance"), ((1, -1e-6, 0.0, 0, 0.0), "tolerance"),
-        ((1, nan, 0.0, 0, 0.0), "tolerance"), ((1, inf, 0.0, 0, 0.0), "tolerance"),
+        ((0, 0.0, nan, 0, 0.0), "startTime"),
+        ((0, 0.0, inf, 0, 0.0), "startTime"),
+        ((0, 0.0, 1.0, 1, 0.5), "stopTime"),
+        ((0, 0.0, 1.0, 1, nan), "stopTime"),
+        ((1, 0.0, 0.0, 0, 0.0), "tolerance"),
+        ((1, -1e-6, 0.0, 0, 0.0), "tolerance"),
+        ((1, nan, 0.0, 0, 0.0), "tolerance"),
+        ((1, inf, 0.0, 0, 0.0), "tolerance"),
     ],
 )
 def test_experiments_that_make_no_sense_are_refused(fmu, experiment, word):

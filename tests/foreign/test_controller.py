@@ -56,7 +56,9 @@ def test_the_shipped_matrices_are_those_of_the_paper(design):
 
 
 @pytest.mark.parametrize("monitor", [False, True])
-@pytest.mark.parametrize("switch", [ON, OFF, {**ON, "compensate": False}], ids=["on", "before", "off"])
+@pytest.mark.parametrize(
+    "switch", [ON, OFF, {**ON, "compensate": False}], ids=["on", "before", "off"]
+)
 @pytest.mark.parametrize("slope", [np.zeros(2), SLOPE], ids=["held", "sloped"])
 @pytest.mark.parametrize("size", [1e-5, 1e-3, 0.1])
 def test_one_step_of_any_size_is_the_matrix_exponential(
@@ -108,7 +110,9 @@ def test_the_compensation_is_on_from_t_on_itself_and_off_just_before(controller,
         with begun(controller, {"t_on": t_on}) as instance:
             for k in range(3):
                 found = advance(instance, k * 0.001, 0.001, slope=np.zeros(2))
-            assert instance.get("u") == pytest.approx(command(design, found, compensating), rel=1e-12)
+            assert instance.get("u") == pytest.approx(
+                command(design, found, compensating), rel=1e-12
+            )
             assert found[4] == Z_0[4]
 
 
@@ -139,7 +143,9 @@ def test_slopes_of_the_measurements_hold_for_one_step_only(controller, design):
     with begun(controller, ON) as instance:
         z = advance(instance, 0.0, 1e-3)
         found = advance(instance, 1e-3, 1e-3, slope=np.zeros(2))
-        assert found == pytest.approx(propagated(design, z, Y, np.zeros(2), 1e-3, True, True), rel=1e-9)
+        assert found == pytest.approx(
+            propagated(design, z, Y, np.zeros(2), 1e-3, True, True), rel=1e-9
+        )
 
 
 @pytest.mark.parametrize("changed", [{"x_p": 5.0}, {"theta": -3.0}, {"compensate": False}])
@@ -154,7 +160,12 @@ def test_outputs_do_not_follow_inputs_that_are_set_between_steps(controller, cha
 
 
 BASE = {
-    **dict(zip(STARTS, Z_0)), "t_on": 0.5, "x_p": 0.1, "theta": 0.2, "compensate": True, "monitor": False,
+    **dict(zip(STARTS, Z_0)),
+    "t_on": 0.5,
+    "x_p": 0.1,
+    "theta": 0.2,
+    "compensate": True,
+    "monitor": False,
 }
 
 
@@ -190,4 +201,6 @@ def test_parameters_act_on_the_steps(controller, design):
     values |= {f"L_f[1,{k}]": changed["L_f"][0, k - 1] for k in (1, 2)}
     with begun(controller, {**ON, **values}) as instance:
         found = advance(instance, 0.0, 1e-3)
-        assert found == pytest.approx(propagated(changed, Z_0, Y, SLOPE, 1e-3, True, True), rel=1e-9)
+        assert found == pytest.approx(
+            propagated(changed, Z_0, Y, SLOPE, 1e-3, True, True), rel=1e-9
+        )

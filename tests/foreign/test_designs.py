@@ -23,11 +23,18 @@ def random_design(sizes, limits=None):
     shapes = [(n, n), (n, m), (p, n), (n, q), (m, n), (m, q), (n, p), (q, p)]
     design = {name: chance.normal(size=shape) for name, shape in zip(MATRICES, shapes)}
     design["A"] -= 6 * np.eye(n)
-    signals = lambda letter, count: [{"name": f"{letter}{k + 1}", "unit": "m"} for k in range(count)]
+    signals = lambda letter, count: [
+        {"name": f"{letter}{k + 1}", "unit": "m"} for k in range(count)
+    ]
     design |= {
-        "description": 'A "random" design < of any size', "t_on": 0.0, "monitor": False,
-        "states": signals("s", n), "actuators": signals("act", m), "measurements": signals("y", p),
-        "faults": signals("f", q), "experiment": {"stop_time": 2.0, "step_size": 0.01},
+        "description": 'A "random" design < of any size',
+        "t_on": 0.0,
+        "monitor": False,
+        "states": signals("s", n),
+        "actuators": signals("act", m),
+        "measurements": signals("y", p),
+        "faults": signals("f", q),
+        "experiment": {"stop_time": 2.0, "step_size": 0.01},
     }
     for actuator, pair in zip(design["actuators"], limits or []):
         if pair:
@@ -60,7 +67,9 @@ def test_a_design_of_any_size_has_the_variables_of_that_size(controller, tmp_pat
     shapes = [(n, n), (n, m), (p, n), (n, q), (m, n), (m, q), (n, p), (q, p)]
     elements = {
         f"{name}[{i + 1},{j + 1}]"
-        for name, (rows, columns) in zip(MATRICES, shapes) for i in range(rows) for j in range(columns)
+        for name, (rows, columns) in zip(MATRICES, shapes)
+        for i in range(rows)
+        for j in range(columns)
     }
     starts = {*vector("x_hat_0", n), *vector("f_hat_0", q), "t_on", "monitor"}
     assert set(fmu.names(causality="parameter")) == elements | starts
@@ -74,7 +83,9 @@ def test_a_design_of_any_size_has_the_variables_of_that_size(controller, tmp_pat
 def test_a_design_of_any_size_describes_itself_validly(controller, tmp_path, sizes, limited):
     design = random_design(sizes, [[-1.0, 2.0]] * sizes[1] if limited else None)
     fmu = made(controller, design, tmp_path)
-    etree.XMLSchema(etree.parse(SCHEMA)).assertValid(etree.parse(fmu.folder / "modelDescription.xml"))
+    etree.XMLSchema(etree.parse(SCHEMA)).assertValid(
+        etree.parse(fmu.folder / "modelDescription.xml")
+    )
     assert validate_fmu(str(fmu.folder)) == []
     assert fmu.description.description == design["description"]
     assert {"u_min", "u_max"} <= {name.split("[")[0] for name in fmu.variables} or not limited
@@ -94,7 +105,9 @@ def test_a_step_of_a_design_of_any_size_is_the_matrix_exponential(controller, tm
         found = instance.get(*vector("x_hat", n), *vector("f_hat", q))
         wanted = propagated(design, z, y, slope, 0.05, True, True)
         assert found == pytest.approx(wanted, rel=1e-9, abs=1e-12)
-        assert instance.get(*vector("u", m)) == pytest.approx(command(design, found, True), rel=1e-9)
+        assert instance.get(*vector("u", m)) == pytest.approx(
+            command(design, found, True), rel=1e-9
+        )
 
 
 # Limits that some channel reaches and leaves within the first second.
@@ -179,5 +192,7 @@ def test_the_initial_command_of_a_limited_actuator_depends_on_its_limits_too(con
                 assert own <= names and f"K_x[{j + 1},1]" in names
                 assert not any(other.startswith(f"K_x[{2 - j},") for other in names)
     with begun(fmu, sizes, [9.0, 9.0, 9.0, 9.0], [0.0, 0.0]) as instance:
-        assert {tuple(instance.get("u[1]", "u[2]"))} <= {(a, b) for a in (-0.5, 0.6) for b in (-0.2, 1.5)}
+        assert {tuple(instance.get("u[1]", "u[2]"))} <= {
+            (a, b) for a in (-0.5, 0.6) for b in (-0.2, 1.5)
+        }
         assert instance.call("Terminate") == OK

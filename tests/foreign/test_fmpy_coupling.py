@@ -9,7 +9,8 @@ SETTLING_TIME = 20.0  # s after the activation, as in scripts/couple_with_fmpy.p
 PAPER = {"step": "0.001", "stop": "100", "settings": []}
 EARLY = {"step": "0.0001", "stop": "2", "settings": ["controller.t_on=0.5"]}
 OTHER = {
-    "step": "0.001", "stop": "32",
+    "step": "0.001",
+    "stop": "32",
     "settings": ["controller.t_on=8", "plant.F_c=20", "controller.f_hat_0=3"],
 }
 
@@ -18,9 +19,16 @@ def by_fmpy(scenario, python, root, packed):
     """Summary of the FMPy script."""
     settings = [part for setting in scenario["settings"] for part in ("--set", setting)]
     done = python(
-        root / "scripts" / "couple_with_fmpy.py", "--step", scenario["step"],
-        "--stop-time", scenario["stop"], "--plant", packed["plant"],
-        "--controller", packed["controller"], *settings,
+        root / "scripts" / "couple_with_fmpy.py",
+        "--step",
+        scenario["step"],
+        "--stop-time",
+        scenario["stop"],
+        "--plant",
+        packed["plant"],
+        "--controller",
+        packed["controller"],
+        *settings,
     )
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
@@ -30,9 +38,20 @@ def by_rust(scenario, aso_ftc, packed, folder):
     """Every communication point of the Rust master, as a table with named columns."""
     settings = [part for setting in scenario["settings"] for part in ("--set", setting)]
     done = aso_ftc(
-        "run", "--step", scenario["step"], "--stop-time", scenario["stop"],
-        "--record-every", scenario["step"], "--plant", packed["plant"],
-        "--controller", packed["controller"], "--out", folder, *settings,
+        "run",
+        "--step",
+        scenario["step"],
+        "--stop-time",
+        scenario["stop"],
+        "--record-every",
+        scenario["step"],
+        "--plant",
+        packed["plant"],
+        "--controller",
+        packed["controller"],
+        "--out",
+        folder,
+        *settings,
     )
     assert done.returncode == 0, done.stderr
     path = folder / "results.csv"
@@ -50,7 +69,9 @@ def residual(table, t_on):
 
 
 @pytest.mark.parametrize(
-    ("scenario", "t_on"), [(PAPER, 40.0), (EARLY, 0.5), (OTHER, 8.0)], ids=["paper", "early", "other"]
+    ("scenario", "t_on"),
+    [(PAPER, 40.0), (EARLY, 0.5), (OTHER, 8.0)],
+    ids=["paper", "early", "other"],
 )
 def test_fmpy_and_the_rust_master_agree_in_final_state_and_residual(
     scenario, t_on, python, root, packed, aso_ftc, tmp_path

@@ -19,7 +19,10 @@ def derivative(state, force):
     """Equation (20) as a linear system for the two accelerations, `force` less the friction."""
     _, theta, v, omega = state
     matrix = [[M + m, m * l * cos(theta)], [m * l * cos(theta), J]]
-    right = [force - F_x * v + m * l * omega**2 * sin(theta), m * l * g * sin(theta) - F_theta * omega]
+    right = [
+        force - F_x * v + m * l * omega**2 * sin(theta),
+        m * l * g * sin(theta) - F_theta * omega,
+    ]
     return [v, omega, *np.linalg.solve(matrix, right)]
 
 
@@ -116,7 +119,10 @@ def test_slopes_hold_for_one_step_only(plant):
         sloped.step(0.0, 0.01)
         plain.step(0.0, 0.01)
         assert sloped.get("v_p") != plain.get("v_p")
-        slopes = sloped.slopes_of("v_p"), [derivative(sloped.get(*STATES), 5.0 - sloped.get("f_fric")[0])[2]]
+        slopes = (
+            sloped.slopes_of("v_p"),
+            [derivative(sloped.get(*STATES), 5.0 - sloped.get("f_fric")[0])[2]],
+        )
         sloped.set({"u": 5.0})
         sloped.step(0.01, 1e-9)
         change = derivative(sloped.get(*STATES), 5.0 - sloped.get("f_fric")[0])[2]
@@ -125,7 +131,11 @@ def test_slopes_hold_for_one_step_only(plant):
 
 
 def test_friction_at_rest_is_what_balances_the_other_forces(plant):
-    for theta, omega, u, f_a in ((0.1, 0.3, 12.0, 4.0), (-0.2, -1.0, -3.0, 0.0), (0.0, 0.0, 29.99, 0.0)):
+    for theta, omega, u, f_a in (
+        (0.1, 0.3, 12.0, 4.0),
+        (-0.2, -1.0, -3.0, 0.0),
+        (0.0, 0.0, 29.99, 0.0),
+    ):
         with Instance(plant) as instance:
             instance.start({**start_values((0.3, theta, 0.0, omega)), "u": u, "f_a": f_a})
             for k in range(20):
@@ -178,26 +188,32 @@ def test_a_sliding_cart_stops_when_and_where_scipy_says(plant):
         right, (0, 1), state, method="DOP853", rtol=1e-12, atol=1e-13, events=stops
     )
     end, there = reference.t_events[0][0], reference.y_events[0][0]
-    before, after = (run(plant, end + shift, (end + shift) / 7, start_values(state)) for shift in (-1e-7, 1e-7))
+    before, after = (
+        run(plant, end + shift, (end + shift) / 7, start_values(state)) for shift in (-1e-7, 1e-7)
+    )
     assert 0 < before[2] < 1e-5 and after[2] == 0
     assert after[[0, 1, 3]] == pytest.approx(there[[0, 1, 3]], rel=1e-5)
 
 
 def test_the_linearised_body_follows_the_matrix_exponential(plant):
     D = (M + m) * J - (m * l) ** 2
-    A = np.array([
-        [0, 0, 1, 0],
-        [0, 0, 0, 1],
-        [0, -((m * l) ** 2) * g / D, -F_x * J / D, m * l * F_theta / D],
-        [0, (M + m) * m * l * g / D, m * l * F_x / D, -(M + m) * F_theta / D],
-    ])
+    A = np.array(
+        [
+            [0, 0, 1, 0],
+            [0, 0, 0, 1],
+            [0, -((m * l) ** 2) * g / D, -F_x * J / D, m * l * F_theta / D],
+            [0, (M + m) * m * l * g / D, m * l * F_x / D, -(M + m) * F_theta / D],
+        ]
+    )
     B = np.array([[0], [0], [J / D], [-m * l / D]])
     augmented = np.block([[A, B], [np.zeros((1, 5))]])
     state = np.array([1.1, -1.1, 0.2, 0.4])
     for end in (0.1, 1.5):
         wanted = (expm(augmented * end) @ [*state, 13.0])[:4]
         values = {**start_values(state), **FREE, "linearised": True}
-        assert run(plant, end, end / 10, values, lambda _: (13.0,)) == pytest.approx(wanted, rel=1e-7)
+        assert run(plant, end, end / 10, values, lambda _: (13.0,)) == pytest.approx(
+            wanted, rel=1e-7
+        )
     friction = {**start_values(state), "linearised": True, "u": 13.0}
     with Instance(plant) as instance:
         instance.start(friction)
@@ -219,7 +235,9 @@ def test_a_run_may_begin_at_any_time(plant):
 
 def test_each_initial_output_depends_on_the_listed_variables_and_no_other(plant):
     order = plant.description.modelVariables
-    listed = {u.variable.name: {v.name for v in u.dependencies} for u in plant.description.initialUnknowns}
+    listed = {
+        u.variable.name: {v.name for v in u.dependencies} for u in plant.description.initialUnknowns
+    }
     base = {"theta_0": 0.2, "omega_0": 0.4, "u": 3.0}
     sliding = {**base, "v_p_0": 0.2}
     found = {name: set() for name in listed}
@@ -228,7 +246,9 @@ def test_each_initial_output_depends_on_the_listed_variables_and_no_other(plant)
         with Instance(plant) as instance:
             before = dict(zip(listed, instance.enter(point).get(*listed)))
         for variable in changeable:
-            start = point.get(variable.name, None if variable.type == "Boolean" else float(variable.start))
+            start = point.get(
+                variable.name, None if variable.type == "Boolean" else float(variable.start)
+            )
             value = 1 if variable.type == "Boolean" else start * 1.0625 + 0.001
             with Instance(plant) as instance:
                 after = instance.enter({**point, variable.name: value}).get(*listed)

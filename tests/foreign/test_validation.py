@@ -58,9 +58,11 @@ def test_exactly_the_required_initial_unknowns_are_listed_in_ascending_order(pac
     model = etree.fromstring(zipfile.ZipFile(packed[role]).read("modelDescription.xml"))
     variables = model.find("ModelVariables")
     wanted = {
-        index for index, variable in enumerate(variables, start=1)
+        index
+        for index, variable in enumerate(variables, start=1)
         if variable.get("causality") == "calculatedParameter"
-        or variable.get("causality") == "output" and variable.get("initial") != "exact"
+        or variable.get("causality") == "output"
+        and variable.get("initial") != "exact"
     }
     listed = [int(unknown.get("index")) for unknown in model.find("ModelStructure/InitialUnknowns")]
     assert listed == sorted(wanted)
@@ -133,8 +135,13 @@ def test_fmpy_runs_the_plant_with_start_values_and_inputs(packed):
     force = np.array([(0.0, 0.0), (0.4, 0.0), (0.4, 60.0), (1.0, 60.0)], dtype=dtype)
     start_values = {"x_p_0": -0.7, "theta_0": 0.0, "F_s": 50.0, "F_c": 45.0, "M": 4.0}
     result = fmpy.simulate_fmu(
-        str(packed["plant"]), stop_time=1.0, step_size=0.01, output_interval=0.1,
-        start_values=start_values, input=force, output=["x_p", "v_p", "f_fric", "regime"],
+        str(packed["plant"]),
+        stop_time=1.0,
+        step_size=0.01,
+        output_interval=0.1,
+        start_values=start_values,
+        input=force,
+        output=["x_p", "v_p", "f_fric", "regime"],
     )
     held = result["time"] < 0.401
     assert (result["x_p"][held] == -0.7).all() and (result["regime"][held] == 0).all()
@@ -145,7 +152,9 @@ def test_fmpy_runs_the_plant_with_start_values_and_inputs(packed):
 
 def test_fmpy_runs_the_controller_with_start_values_and_inputs(packed, controller):
     n, p = 4, 2
-    start = {name: float(v.start) for name, v in controller.variables.items() if "[" in name and v.start}
+    start = {
+        name: float(v.start) for name, v in controller.variables.items() if "[" in name and v.start
+    }
     block = lambda name, rows, columns: np.array(
         [[start[f"{name}[{i},{j}]"] for j in range(1, columns + 1)] for i in range(1, rows + 1)]
     )
@@ -155,7 +164,11 @@ def test_fmpy_runs_the_controller_with_start_values_and_inputs(packed, controlle
     held = np.array([(0.0, *y)], dtype=[("time", float), ("x_p", float), ("theta", float)])
     gains = {f"K_x[1,{j + 1}]": gain for j, gain in enumerate(k_x[0])}
     result = fmpy.simulate_fmu(
-        str(packed["controller"]), stop_time=0.5, step_size=0.01, output_interval=0.1, input=held,
+        str(packed["controller"]),
+        stop_time=0.5,
+        step_size=0.01,
+        output_interval=0.1,
+        input=held,
         start_values={"t_on": 9.0, "compensate": True, **gains},
     )
     settled = np.linalg.solve(a + b @ k_x - l_x @ c, -l_x @ y)
