@@ -166,6 +166,6 @@ pub enum SystemError {
         /// Its value.
         value: f64,
         /// What it must be.
-        rule: &'static str,
+        rule: String,
     },
 }

@@ -52,9 +52,10 @@ pub struct Fmu {
     content: Arc<Content>,
 }
 
+/// The library is unloaded before its file is removed: the fields are dropped in this order.
 struct Content {
-    unpacked: Unpacked,
     library: Arc<Library>,
+    unpacked: Unpacked,
 }
 
 impl Fmu {

@@ -4,7 +4,7 @@
 
 use std::ffi::{CStr, CString, OsStr, c_char, c_int, c_void};
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use fmi2::abi::{
     CO_SIMULATION, DESCRIBE, DescribeSink, Status, fmi2Boolean, fmi2CallbackFunctions,
@@ -196,22 +196,22 @@ impl Library {
 
     /// `fmi2Instantiate` for co-simulation.
     pub(crate) fn instantiate(
-        self: &std::sync::Arc<Self>,
+        self: &Arc<Self>,
         name: &str,
         guid: &str,
         resources: &str,
     ) -> Result<Component, LoadError> {
-        let sink = Box::new(Sink { receive, messages: Mutex::default() });
+        let sink = Arc::new(Sink { receive, messages: Mutex::default() });
         // SAFETY: both are pointers to functions; C calls it with the logger's signature.
         let logger = unsafe {
             std::mem::transmute::<unsafe extern "C" fn(), fmi2CallbackLogger>(master_logger)
         };
-        let callbacks = Box::new(fmi2CallbackFunctions {
+        let callbacks = Arc::new(fmi2CallbackFunctions {
             logger: Some(logger),
             allocate_memory: Some(calloc),
             free_memory: Some(free),
             step_finished: None,
-            component_environment: (&raw const *sink).cast_mut().cast(),
+            component_environment: Arc::as_ptr(&sink).cast_mut().cast(),
         });
         let (c_name, c_guid, c_resources) = (c_string(name), c_string(guid), c_string(resources));
         // SAFETY: terminated strings, callbacks that outlive the instance.
@@ -221,7 +221,7 @@ impl Library {
                 CO_SIMULATION,
                 c_guid.as_ptr(),
                 c_resources.as_ptr(),
-                &raw const *callbacks,
+                Arc::as_ptr(&callbacks),
                 0,
                 0,
             )
@@ -245,9 +245,10 @@ unsafe extern "C" {
 /// An instance, freed with its last use; the library stays loaded as long.
 pub(crate) struct Component {
     pointer: fmi2Component,
-    library: std::sync::Arc<Library>,
-    sink: Box<Sink>,
-    _callbacks: Box<fmi2CallbackFunctions>,
+    library: Arc<Library>,
+    /// Shared with the FMU, which has their addresses.
+    sink: Arc<Sink>,
+    _callbacks: Arc<fmi2CallbackFunctions>,
     /// First order, as often as needed.
     ones: Vec<fmi2Integer>,
 }

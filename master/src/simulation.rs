@@ -67,16 +67,7 @@ impl Simulation {
         experiment: &Experiment,
         step: f64,
     ) -> Result<Self, SystemError> {
-        if !(step > 0.0 && step.is_finite()) {
-            let (what, rule) = ("the communication step", "more than 0");
-            return Err(SystemError::Time { what, value: step, rule });
-        }
-        if let Some(stop) = experiment.stop_time
-            && !(stop > experiment.start_time && stop.is_finite())
-        {
-            let (what, rule) = ("the stop time", "more than the start time");
-            return Err(SystemError::Time { what, value: stop, rule });
-        }
+        check_times(&system, experiment, step)?;
         let (start, stop) = (experiment.start_time, experiment.stop_time);
         let mut exchange = Exchange::new(&system);
         let order = by_direct_dependencies(&system);
@@ -199,5 +190,33 @@ impl Simulation {
             first = first.and(done);
         }
         first
+    }
+}
+
+/// Whether the run can be made in steps of `step` s, the last one shorter if need be.
+fn check_times(system: &System, experiment: &Experiment, step: f64) -> Result<(), SystemError> {
+    if !(step > 0.0 && step.is_finite()) {
+        let (what, rule) = ("the communication step", "more than 0".to_owned());
+        return Err(SystemError::Time { what, value: step, rule });
+    }
+    let Some(stop) = experiment.stop_time else { return Ok(()) };
+    if !(stop > experiment.start_time && stop.is_finite()) {
+        let (what, rule) = ("the stop time", "more than the start time".to_owned());
+        return Err(SystemError::Time { what, value: stop, rule });
+    }
+    let steps = (stop - experiment.start_time) / step;
+    let shortened = (steps - steps.round()).abs() > 1e-6;
+    let rigid = system.slaves.iter().find(|(_, slave)| {
+        let flags = slave.description().co_simulation.as_ref();
+        flags.is_some_and(|flags| !flags.can_handle_variable_communication_step_size)
+    });
+    match rigid {
+        Some((name, _)) if shortened => {
+            let rule = format!(
+                "a multiple of the communication step {step} s, as {name} takes equal steps only"
+            );
+            Err(SystemError::Time { what: "the stop time", value: stop, rule })
+        }
+        _ => Ok(()),
     }
 }

@@ -22,7 +22,8 @@ impl Integrator {
         let dependencies = if direct { "1" } else { "" };
         let xml = format!(
             r#"<fmiModelDescription fmiVersion="2.0" modelName="Integrator" guid="g">
-            <CoSimulation modelIdentifier="I" canInterpolateInputs="true" maxOutputDerivativeOrder="1"/>
+            <CoSimulation modelIdentifier="I" canInterpolateInputs="true"
+            canHandleVariableCommunicationStepSize="true" maxOutputDerivativeOrder="1"/>
             <ModelVariables>
             <ScalarVariable name="u" valueReference="1" causality="input"><Real start="0"/></ScalarVariable>
             <ScalarVariable name="y" valueReference="2" causality="output"><Real/></ScalarVariable>
@@ -160,6 +161,20 @@ fn the_last_step_ends_at_the_stop_time() {
         times.push(simulation.time());
     }
     assert_eq!(times, [0.5, 1.0, 1.2]);
+}
+
+#[test]
+fn a_slave_that_takes_equal_steps_only_is_not_given_a_shorter_one() {
+    let mut rigid = Integrator::boxed(1.0, 1.0, false);
+    let flags = rigid.description.co_simulation.as_mut().unwrap();
+    flags.can_handle_variable_communication_step_size = false;
+    let mut system = ring();
+    system.slaves[0].1 = rigid;
+    let experiment = Experiment { stop_time: Some(1.2), ..Experiment::default() };
+    let refused = Simulation::new(system, Method::Jacobi, &experiment, 0.5).err().unwrap();
+    let message = "the stop time is 1.2 s, expected a multiple of the communication step 0.5 s, \
+                   as a takes equal steps only";
+    assert_eq!(refused.to_string(), message);
 }
 
 #[test]
