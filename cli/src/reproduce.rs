@@ -95,9 +95,9 @@ fn report(options: &Options, written: &Summary) {
 /// What is watched at every communication point.
 struct Watch {
     probe: Probe,
-    /// `controller.t_on` and `plant.F_s`, read at the start.
+    /// `controller.t_on`, `plant.F_s` and `plant.linearised`, read at the start.
     parameters: Probe,
-    parameter_values: [f64; 2],
+    parameter_values: [f64; 3],
     measurement: Option<Measurement>,
 }
 
@@ -106,10 +106,11 @@ impl Watch {
         let ports = |names: &[&str]| {
             names.iter().map(|name| system.port(name)).collect::<Result<Vec<_>, _>>()
         };
+        let parameters = ["controller.t_on", "plant.F_s", "plant.linearised"];
         Ok(Self {
             probe: Probe::new(system, &ports(&WATCHED)?),
-            parameters: Probe::new(system, &ports(&["controller.t_on", "plant.F_s"])?),
-            parameter_values: [0.0; 2],
+            parameters: Probe::new(system, &ports(&parameters)?),
+            parameter_values: [0.0; 3],
             measurement: None,
         })
     }
@@ -118,7 +119,7 @@ impl Watch {
         let time = simulation.time();
         if self.measurement.is_none() {
             self.parameters.read(simulation.system(), time, &mut self.parameter_values)?;
-            self.measurement = Some(Measurement::new(self.t_on()));
+            self.measurement = Some(Measurement::new(self.t_on(), self.parameter_values[2] != 0.0));
         }
         let mut values = [0.0; WATCHED.len()];
         self.probe.read(simulation.system(), time, &mut values)?;
