@@ -60,12 +60,11 @@ impl AsoController {
         observer: &mut Observer,
         compensating: bool,
         part: (f64, f64),
-        resolution: f64,
     ) -> Result<(), Failure> {
         let y = Measurement { value: &self.measurements, slope: &self.measurement_slopes };
         let switches = (compensating, compensating || self.design.monitor);
         observer
-            .advance(&mut self.estimate, switches, y, part, resolution)
+            .advance(&mut self.estimate, switches, y, part)
             .map_err(|error| Failure::Error(format!("the observer cannot be stepped: {error}")))
     }
 
@@ -158,11 +157,11 @@ impl Model for AsoController {
         let until_on = self.design.t_on - step.start;
         let inside = self.compensate && until_on > resolution && step.size - until_on > resolution;
         if inside {
-            self.advance(&mut observer, false, (0.0, until_on), resolution)?;
-            self.advance(&mut observer, true, (until_on, step.size - until_on), resolution)?;
+            self.advance(&mut observer, false, (0.0, until_on))?;
+            self.advance(&mut observer, true, (until_on, step.size - until_on))?;
         } else {
             let compensating = self.compensating(step.start);
-            self.advance(&mut observer, compensating, (0.0, step.size), resolution)?;
+            self.advance(&mut observer, compensating, (0.0, step.size))?;
         }
         self.active = self.compensating(step.end());
         self.evaluate(&observer, step.size);

@@ -213,18 +213,16 @@ impl Observer {
     ///
     /// Where a channel reaches or leaves a limit on the way, the step is halved until that instant
     /// is known to 2^-20 of the step; a channel that leaves its mode and is back in it both at the
-    /// middle and at the end of a part is not noticed. `resolution` is the rounding of the importer's clock, in s:
-    /// step sizes closer than that count as equal.
+    /// middle and at the end of a part is not noticed.
     pub(crate) fn advance(
         &mut self,
         z: &mut [f64],
         (compensating, estimating): (bool, bool),
         y: Measurement<'_>,
         (offset, size): (f64, f64),
-        resolution: f64,
     ) -> Result<(), control::Error> {
         self.before.copy_from_slice(z);
-        let span = Span { offset, size, resolution, halvings: HALVINGS };
+        let span = Span { offset, size, halvings: HALVINGS };
         self.advance_part(compensating, estimating, y, span)?;
         z.copy_from_slice(&self.before);
         Ok(())
@@ -289,10 +287,12 @@ impl Observer {
     }
 
     /// Position of the propagator for `mode` and the size of `span`, computed when it is new.
+    ///
+    /// Only the same size counts: what is kept must not decide what comes out, so that a restored
+    /// instance, which has kept nothing, continues with the same bits.
     fn propagator(&mut self, mode: Mode, span: Span) -> Result<usize, control::Error> {
         let known = self.kept.iter().position(|(kept, size, _)| {
-            kept.has_the_system_of(mode)
-                && (size - span.size).abs() <= span.resolution.min(1e-9 * size)
+            kept.has_the_system_of(mode) && size.to_bits() == span.size.to_bits()
         });
         if let Some(position) = known {
             return Ok(position);
@@ -314,7 +314,6 @@ impl Observer {
 struct Span {
     offset: f64,
     size: f64,
-    resolution: f64,
     halvings: u32,
 }
 
@@ -323,7 +322,6 @@ impl Span {
     fn half(self, which: u32) -> Self {
         let size = 0.5 * self.size;
         let offset = self.offset + f64::from(which) * size;
-        let resolution = 0.5 * self.resolution;
-        Self { offset, size, resolution, halvings: self.halvings - 1 }
+        Self { offset, size, halvings: self.halvings - 1 }
     }
 }

@@ -74,7 +74,7 @@ impl Fmu {
         let library = unpacked.library(&co_simulation.model_identifier)?;
         let library = Library::open(&library).map_err(|error| explained(description, error))?;
         let library = Arc::new(library);
-        Ok(Self { content: Arc::new(Content { unpacked, library }) })
+        Ok(Self { content: Arc::new(Content { library, unpacked }) })
     }
 
     /// The model description.

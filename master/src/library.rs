@@ -4,6 +4,7 @@
 
 use std::ffi::{CStr, CString, OsStr, c_char, c_int, c_void};
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 use std::sync::{Arc, Mutex};
 
 use fmi2::abi::{
@@ -206,7 +207,7 @@ impl Library {
         let logger = unsafe {
             std::mem::transmute::<unsafe extern "C" fn(), fmi2CallbackLogger>(master_logger)
         };
-        let callbacks = Arc::new(fmi2CallbackFunctions {
+        let callbacks = Rc::new(fmi2CallbackFunctions {
             logger: Some(logger),
             allocate_memory: Some(calloc),
             free_memory: Some(free),
@@ -221,7 +222,7 @@ impl Library {
                 CO_SIMULATION,
                 c_guid.as_ptr(),
                 c_resources.as_ptr(),
-                Arc::as_ptr(&callbacks),
+                Rc::as_ptr(&callbacks),
                 0,
                 0,
             )
@@ -248,7 +249,7 @@ pub(crate) struct Component {
     library: Arc<Library>,
     /// Shared with the FMU, which has their addresses.
     sink: Arc<Sink>,
-    _callbacks: Arc<fmi2CallbackFunctions>,
+    _callbacks: Rc<fmi2CallbackFunctions>,
     /// First order, as often as needed.
     ones: Vec<fmi2Integer>,
 }
