@@ -18,9 +18,10 @@ pub(crate) struct FrictionPendulum {
     /// `[x_p_0, theta_0, v_p_0, omega_0]`.
     initial: [f64; 4],
     u: f64,
-    /// First and second derivative of u at the begin of the step.
-    u_derivatives: [f64; 2],
     f_a: f64,
+    /// First and second derivatives of u and f_a at the begin of the step.
+    u_derivatives: [f64; 2],
+    f_a_derivatives: [f64; 2],
     /// `[x_p, theta, v_p, omega]` and its derivative.
     state: [f64; 4],
     slope: [f64; 4],
@@ -33,7 +34,8 @@ pub(crate) struct FrictionPendulum {
 
 /// The force that `u` and `f_a` exert together, as a function of the time since `start`.
 fn force(model: &FrictionPendulum, start: f64) -> Force {
-    let [slope, curvature] = model.u_derivatives;
+    let [slope, curvature] =
+        [0, 1].map(|order| model.u_derivatives[order] + model.f_a_derivatives[order]);
     Force { value: model.u + model.f_a, slope, curvature, start }
 }
 
@@ -106,6 +108,75 @@ const INITIALLY: [&str; 15] = [
     "linearised",
 ];
 
+/// Inputs, outputs and the local variable.
+fn signals() -> Vec<Variable<FrictionPendulum>> {
+    let mut all = vec![
+        Variable::real("u", "Actuator force on the cart", |model: &mut FrictionPendulum| {
+            &mut model.u
+        })
+        .input()
+        .unit("N")
+        .derivative(|model| &mut model.u_derivatives[0])
+        .derivative(|model| &mut model.u_derivatives[1]),
+        Variable::real("f_a", "Additive actuator fault", |model: &mut FrictionPendulum| {
+            &mut model.f_a
+        })
+        .input()
+        .unit("N")
+        .derivative(|model| &mut model.f_a_derivatives[0])
+        .derivative(|model| &mut model.f_a_derivatives[1]),
+    ];
+    for (k, (name, text, unit)) in STATES.into_iter().enumerate() {
+        let start = format!("{name}_0");
+        all.push(
+            Variable::real(name, text, move |model: &mut FrictionPendulum| &mut model.state[k])
+                .output(&[])
+                .unit(unit)
+                .initially([start])
+                .derivative(move |model| &mut model.slope[k]),
+        );
+    }
+    all.push(
+        Variable::real("f_fric", "Friction force on the cart", |model: &mut FrictionPendulum| {
+            &mut model.f_fric
+        })
+        .output(&["u", "f_a"])
+        .unit("N")
+        .initially(INITIALLY),
+    );
+    let text = "Sliding backward (-1), sticking (0), sliding forward (1)";
+    all.push(Variable::integer("regime", text, |model: &mut FrictionPendulum| &mut model.regime));
+    all
+}
+
+fn parameters() -> Vec<Variable<FrictionPendulum>> {
+    let mut all = Vec::new();
+    for (name, text, unit, place) in FIXED {
+        all.push(Variable::real(name, text, place).unit(unit).parameter());
+    }
+    for (name, text, unit, place) in TUNABLE {
+        all.push(Variable::real(name, text, place).unit(unit).tunable());
+    }
+    for (k, (name, text, unit)) in STATES.into_iter().enumerate() {
+        let text = format!("Initial value: {text}");
+        all.push(
+            Variable::real(format!("{name}_0"), text, move |model: &mut FrictionPendulum| {
+                &mut model.initial[k]
+            })
+            .unit(unit)
+            .parameter(),
+        );
+    }
+    let text = "Rigid body linearised about the upright position, friction as it is";
+    all.push(
+        Variable::boolean("linearised", text, |model: &mut FrictionPendulum| {
+            &mut model.parameters.linearised
+        })
+        .parameter(),
+    );
+    all
+}
+
 impl Model for FrictionPendulum {
     const IDENTIFIER: &'static str = "FrictionPendulum";
 
@@ -129,8 +200,9 @@ impl Model for FrictionPendulum {
             parameters: Parameters::default(),
             initial: [0.1, -0.1, 0.0, 0.0],
             u: 0.0,
-            u_derivatives: [0.0; 2],
             f_a: 0.0,
+            u_derivatives: [0.0; 2],
+            f_a_derivatives: [0.0; 2],
             state: [0.0; 4],
             slope: [0.0; 4],
             f_fric: 0.0,
@@ -141,59 +213,8 @@ impl Model for FrictionPendulum {
     }
 
     fn variables(&self) -> Vec<Variable<Self>> {
-        let mut all = vec![
-            Variable::real("u", "Actuator force on the cart", |model: &mut Self| &mut model.u)
-                .input()
-                .unit("N")
-                .derivative(|model| &mut model.u_derivatives[0])
-                .derivative(|model| &mut model.u_derivatives[1]),
-            Variable::real("f_a", "Additive actuator fault", |model: &mut Self| &mut model.f_a)
-                .input()
-                .unit("N"),
-        ];
-        for (k, (name, text, unit)) in STATES.into_iter().enumerate() {
-            let start = format!("{name}_0");
-            all.push(
-                Variable::real(name, text, move |model: &mut Self| &mut model.state[k])
-                    .output(&[])
-                    .unit(unit)
-                    .initially([start])
-                    .derivative(move |model| &mut model.slope[k]),
-            );
-        }
-        all.push(
-            Variable::real("f_fric", "Friction force on the cart", |model: &mut Self| {
-                &mut model.f_fric
-            })
-            .output(&["u", "f_a"])
-            .unit("N")
-            .initially(INITIALLY),
-        );
-        let text = "Sliding backward (-1), sticking (0), sliding forward (1)";
-        all.push(Variable::integer("regime", text, |model: &mut Self| &mut model.regime));
-        for (name, text, unit, place) in FIXED {
-            all.push(Variable::real(name, text, place).unit(unit).parameter());
-        }
-        for (name, text, unit, place) in TUNABLE {
-            all.push(Variable::real(name, text, place).unit(unit).tunable());
-        }
-        for (k, (name, text, unit)) in STATES.into_iter().enumerate() {
-            let text = format!("Initial value: {text}");
-            all.push(
-                Variable::real(format!("{name}_0"), text, move |model: &mut Self| {
-                    &mut model.initial[k]
-                })
-                .unit(unit)
-                .parameter(),
-            );
-        }
-        let text = "Rigid body linearised about the upright position, friction as it is";
-        all.push(
-            Variable::boolean("linearised", text, |model: &mut Self| {
-                &mut model.parameters.linearised
-            })
-            .parameter(),
-        );
+        let mut all = signals();
+        all.extend(parameters());
         all
     }
 
@@ -232,6 +253,24 @@ impl Model for FrictionPendulum {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn u_and_f_a_act_alike_derivatives_included() {
+        let mut states = [[0.0; 4]; 2];
+        for (which, state) in states.iter_mut().enumerate() {
+            let mut model = FrictionPendulum::new(Path::new("")).unwrap();
+            model.initialize(&Experiment::default()).unwrap();
+            if which == 0 {
+                (model.u, model.u_derivatives) = (40.0, [100.0, -3000.0]);
+            } else {
+                (model.f_a, model.f_a_derivatives) = (40.0, [100.0, -3000.0]);
+            }
+            model.step(&Step { start: 0.0, size: 0.1 }).unwrap();
+            *state = model.state;
+        }
+        assert_eq!(states[0], states[1]);
+        assert!(states[0][2] > 0.0, "the cart moves");
+    }
 
     #[test]
     fn a_step_allocates_nothing_events_included() {
