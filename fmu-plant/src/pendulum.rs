@@ -19,7 +19,7 @@ pub(crate) struct FrictionPendulum {
     initial: [f64; 4],
     u: f64,
     f_a: f64,
-    /// First and second derivatives of u and f_a at the begin of the step.
+    /// First and second derivatives of `u` and `f_a` at the begin of the step.
     u_derivatives: [f64; 2],
     f_a_derivatives: [f64; 2],
     /// `[x_p, theta, v_p, omega]` and its derivative.
