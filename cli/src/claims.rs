@@ -84,6 +84,11 @@ impl Window {
     }
 
     fn add(&mut self, time: f64, [x_p, theta, f_fric, f_hat, regime]: [f64; 5]) {
+        if (self.regime == 0.0) != (regime == 0.0) && !self.regime.is_nan() {
+            self.changed_at = time;
+            self.at_transition |= time - self.largest_at < NEAR;
+        }
+        self.regime = regime;
         if time < self.from || time > self.to {
             return;
         }
@@ -92,11 +97,6 @@ impl Window {
         let difference = f_fric - f_hat;
         self.squares += difference * difference;
         self.count += 1.0;
-        if (self.regime == 0.0) != (regime == 0.0) && !self.regime.is_nan() {
-            self.changed_at = time;
-            self.at_transition |= time - self.largest_at < NEAR;
-        }
-        self.regime = regime;
         if difference.abs() > self.largest {
             self.largest = difference.abs();
             self.largest_at = time;
@@ -220,3 +220,6 @@ pub(crate) fn table(claims: &[Claim]) -> String {
     }
     lines.join("\n")
 }
+
+#[cfg(test)]
+mod tests;

@@ -107,6 +107,9 @@ pub(crate) fn run(options: &Options) -> anyhow::Result<bool> {
     println!("{}", names.join("\n"));
     std::fs::create_dir_all(&options.out)
         .with_context(|| format!("cannot make the folder {}", options.out.display()))?;
+    for (name, value) in &options.run.settings {
+        system.set(name, value)?;
+    }
     let order = by_direct_dependencies(&system);
     if !order.looped.is_empty() {
         let names: Vec<_> =
@@ -144,15 +147,12 @@ pub(crate) struct Finished {
 ///
 /// An FMU that fails on the way ends the run: what was recorded until then is kept.
 pub(crate) fn simulate(
-    mut system: System,
+    system: System,
     options: &RunOptions,
     mut watch: impl FnMut(&mut Simulation) -> Result<(), master::SystemError>,
 ) -> anyhow::Result<Finished> {
     if !(options.record_every > 0.0 && options.record_every.is_finite()) {
         bail!("--record-every is {} s, expected more than 0", options.record_every);
-    }
-    for (name, value) in &options.settings {
-        system.set(name, value)?;
     }
     let stop_time = Some(options.stop_time);
     let experiment = Experiment { start_time: 0.0, stop_time, tolerance: None };

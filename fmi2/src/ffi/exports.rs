@@ -68,7 +68,6 @@ macro_rules! export {
             "an FMU needs panic = \"unwind\": an aborting panic takes the importer down"
         );
 
-        #[allow(non_snake_case, unused_imports, reason = "the C functions of the standard")]
         mod fmi2_entry_points {
             use super::*;
             use $crate::abi::*;
