@@ -28,6 +28,8 @@ pub type fmi2Type = c_int;
 /// `fmi2StatusKind`; see [`StatusKind`].
 pub type fmi2StatusKind = c_int;
 
+/// `fmi2ModelExchange`.
+pub const MODEL_EXCHANGE: fmi2Type = 0;
 /// `fmi2CoSimulation`.
 pub const CO_SIMULATION: fmi2Type = 1;
 /// `fmi2GetTypesPlatform` of a FMU with the default types.
@@ -89,6 +91,24 @@ pub enum StatusKind {
     LastSuccessfulTime = 2,
     /// `fmi2Terminated`.
     Terminated = 3,
+}
+
+/// `fmi2EventInfo`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C)]
+pub struct fmi2EventInfo {
+    /// `newDiscreteStatesNeeded`.
+    pub new_discrete_states_needed: fmi2Boolean,
+    /// `terminateSimulation`.
+    pub terminate_simulation: fmi2Boolean,
+    /// `nominalsOfContinuousStatesChanged`.
+    pub nominals_of_continuous_states_changed: fmi2Boolean,
+    /// `valuesOfContinuousStatesChanged`.
+    pub values_of_continuous_states_changed: fmi2Boolean,
+    /// `nextEventTimeDefined`.
+    pub next_event_time_defined: fmi2Boolean,
+    /// `nextEventTime` in s.
+    pub next_event_time: fmi2Real,
 }
 
 /// `fmi2CallbackLogger`: variadic, `printf` style.

@@ -40,8 +40,8 @@ pub struct ModelDescription {
     pub structured_names: bool,
     /// `numberOfEventIndicators`, of model exchange.
     pub number_of_event_indicators: Option<u32>,
-    /// `ModelExchange`, when the FMU has that interface: its `modelIdentifier`.
-    pub model_exchange: Option<String>,
+    /// `ModelExchange`, when the FMU has that interface.
+    pub model_exchange: Option<ModelExchange>,
     /// `CoSimulation`, when the FMU has that interface.
     pub co_simulation: Option<CoSimulation>,
     /// `UnitDefinitions` (section 2.2.2).
@@ -64,6 +64,28 @@ impl ModelDescription {
     pub fn variable(&self, name: &str) -> Option<&ScalarVariable> {
         self.variables.iter().find(|variable| variable.name == name)
     }
+}
+
+/// `ModelExchange`: identifier and capability flags (section 3.3.1).
+#[derive(Clone, Debug, Default, PartialEq)]
+#[expect(clippy::struct_excessive_bools, reason = "the flags of the standard, one for one")]
+pub struct ModelExchange {
+    /// `modelIdentifier`: file name of the library, without extension.
+    pub model_identifier: String,
+    /// `needsExecutionTool`.
+    pub needs_execution_tool: bool,
+    /// `completedIntegratorStepNotNeeded`.
+    pub completed_integrator_step_not_needed: bool,
+    /// `canBeInstantiatedOnlyOncePerProcess`.
+    pub can_be_instantiated_only_once_per_process: bool,
+    /// `canNotUseMemoryManagementFunctions`.
+    pub can_not_use_memory_management_functions: bool,
+    /// `canGetAndSetFMUstate`.
+    pub can_get_and_set_fmu_state: bool,
+    /// `canSerializeFMUstate`.
+    pub can_serialize_fmu_state: bool,
+    /// `providesDirectionalDerivative`.
+    pub provides_directional_derivative: bool,
 }
 
 /// `CoSimulation`: identifier and capability flags (section 4.3.1).
@@ -211,6 +233,8 @@ pub struct RealType {
     pub start: Option<f64>,
     /// `derivative`: 1-based index of the variable that this one is the derivative of.
     pub derivative: Option<u32>,
+    /// `reinit`: an event may change this continuous state.
+    pub reinit: bool,
 }
 
 /// Attributes of an `Integer` or an `Enumeration`.

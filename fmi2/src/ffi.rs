@@ -3,21 +3,26 @@
 //! Every entry point that has an instance goes through `door`; what stands behind it is safe.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
+mod entry;
 mod exports;
 
+use std::cell::UnsafeCell;
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::abi::{
-    self, DescribeSink, Status, StatusKind, fmi2Boolean, fmi2Byte, fmi2CallbackFunctions,
-    fmi2Component, fmi2FMUstate, fmi2Integer, fmi2Real, fmi2Status, fmi2StatusKind, fmi2String,
-    fmi2Type, fmi2ValueReference,
+    self, DescribeSink, Status, fmi2Boolean, fmi2CallbackFunctions, fmi2Component, fmi2Integer,
+    fmi2Status, fmi2String, fmi2Type,
 };
-use crate::call_order::Function;
-use crate::instance::{Instance, Snapshot, guarded};
+
+pub use entry::*;
+
+use crate::call_order::{Function, InterfaceType};
+use crate::instance::{Instance, guarded};
 use crate::interface::Interface;
 use crate::location::path_from_uri;
-use crate::model::{Experiment, Failure, Model};
+use crate::model::{Failure, Model};
 
 /// What an instance keeps of the importer's callbacks.
 #[derive(Clone)]
@@ -64,15 +69,33 @@ impl Callbacks {
     }
 }
 
-/// Null check, call order, panic fence, error to message and status: see [`Instance::call`].
+/// What `fmi2Component` points to: an instance that one call at a time may use.
+struct Component<M: Model> {
+    busy: AtomicBool,
+    instance: UnsafeCell<Instance<M>>,
+}
+
+/// Null check, one call at a time, then call order, panic fence, error to message and status: see
+/// [`Instance::call`].
+///
+/// A call of an instance during another one (from a callback or a second thread) is answered by
+/// `fmi2Error` and nothing else happens: to a synchronous slave that is the state stepInProgress.
 unsafe fn door<M: Model>(
     component: fmi2Component,
     function: Function,
     body: impl FnOnce(&mut Instance<M>) -> Result<(), Failure>,
 ) -> fmi2Status {
-    // SAFETY: a component that is not null is an instance that `instantiate` made for this `M`.
-    let instance = unsafe { component.cast::<Instance<M>>().as_mut() };
-    instance.map_or(Status::Error, |instance| instance.call(function, body)) as fmi2Status
+    // SAFETY: a component that is not null is one that `instantiate` made for this `M`.
+    let Some(component) = (unsafe { component.cast::<Component<M>>().as_ref() }) else {
+        return Status::Error as fmi2Status;
+    };
+    if component.busy.swap(true, Ordering::Acquire) {
+        return Status::Error as fmi2Status;
+    }
+    // SAFETY: `busy` was not set, so that no other reference to the instance is in use.
+    let status = unsafe { &mut *component.instance.get() }.call(function, body);
+    component.busy.store(false, Ordering::Release);
+    status as fmi2Status
 }
 
 fn missing(what: &str) -> Failure {
@@ -167,16 +190,20 @@ pub unsafe fn instantiate<M: Model>(
         if callbacks.instance_name.is_empty() {
             return Err(Failure::Error("instanceName is empty".to_owned()));
         }
-        if fmu_type != abi::CO_SIMULATION {
-            let message = "fmuType is not fmi2CoSimulation, which is all this FMU offers";
-            return Err(Failure::Error(message.to_owned()));
-        }
+        let interface_type = match fmu_type {
+            abi::MODEL_EXCHANGE => InterfaceType::ModelExchange,
+            abi::CO_SIMULATION => InterfaceType::CoSimulation,
+            _ => return Err(Failure::Error(format!("fmuType is {fmu_type}, expected 0 or 1"))),
+        };
         // SAFETY: strings as the standard demands them.
         let (guid, folder) = unsafe { (text(guid, "fmuGUID")?, resources(resource_location)?) };
-        Instance::<M>::new(&folder, &guid, callbacks.clone())
+        Instance::<M>::new(interface_type, &folder, &guid, callbacks.clone())
     });
     match made {
-        Ok(instance) => Box::into_raw(Box::new(instance)).cast(),
+        Ok(instance) => {
+            let instance = UnsafeCell::new(instance);
+            Box::into_raw(Box::new(Component { busy: AtomicBool::new(false), instance })).cast()
+        }
         Err(failure) => {
             let message = format!("fmi2Instantiate: {failure}");
             callbacks.log(Status::Error, "logStatusError", &message);
@@ -185,147 +212,19 @@ pub unsafe fn instantiate<M: Model>(
     }
 }
 
+/// Frees the instance; during another call of it (stepInProgress) nothing.
 pub unsafe fn free_instance<M: Model>(component: fmi2Component) {
-    if !component.is_null() {
-        // SAFETY: made by `instantiate` for this `M` and, by the standard, freed once.
-        let instance = unsafe { Box::from_raw(component.cast::<Instance<M>>()) };
+    let component = component.cast::<Component<M>>();
+    // SAFETY: a component that is not null is one that `instantiate` made for this `M`.
+    let Some(shared) = (unsafe { component.as_ref() }) else { return };
+    if !shared.busy.swap(true, Ordering::Acquire) {
+        // SAFETY: not in use and, by the standard, freed once.
+        let owned = unsafe { Box::from_raw(component) };
         drop(guarded(|| {
-            drop(instance);
+            drop(owned);
             Ok(())
         }));
     }
-}
-
-/// Defines functions that pass through the door: C arguments, then what happens behind it.
-macro_rules! behind_the_door {
-    ($($name:ident = $function:ident($($argument:ident: $type:ty),*), $instance:ident => $body:expr;)*) => {
-        $(pub unsafe fn $name<M: Model>(component: fmi2Component, $($argument: $type),*) -> fmi2Status {
-            // SAFETY: pointers and lengths are as the standard demands them; null is handled.
-            unsafe { door::<M>(component, Function::$function, |$instance| $body) }
-        })*
-    };
-}
-
-behind_the_door! {
-    set_debug_logging = SetDebugLogging(_on: fmi2Boolean, n: usize, categories: *const fmi2String),
-        instance => instance.set_debug_logging(texts(categories, n)?);
-    setup_experiment = SetupExperiment(
-        tolerance_defined: fmi2Boolean, tolerance: fmi2Real, start_time: fmi2Real,
-        stop_time_defined: fmi2Boolean, stop_time: fmi2Real
-    ), instance => instance.setup_experiment(Experiment {
-        start_time,
-        stop_time: (stop_time_defined != 0).then_some(stop_time),
-        tolerance: (tolerance_defined != 0).then_some(tolerance),
-    });
-    enter_initialization_mode = EnterInitializationMode(),
-        instance => instance.enter_initialization_mode();
-    exit_initialization_mode = ExitInitializationMode(),
-        instance => instance.exit_initialization_mode();
-    terminate = Terminate(), instance => { instance.terminate(); Ok(()) };
-    reset = Reset(), instance => { instance.reset(); Ok(()) };
-    get_real = GetReal(vr: *const fmi2ValueReference, n: usize, value: *mut fmi2Real),
-        instance => instance.get_real(read(vr, n)?, write(value, n)?);
-    get_integer = GetInteger(vr: *const fmi2ValueReference, n: usize, value: *mut fmi2Integer),
-        instance => instance.get_integer(read(vr, n)?, write(value, n)?);
-    get_boolean = GetBoolean(vr: *const fmi2ValueReference, n: usize, value: *mut fmi2Boolean),
-        instance => instance.get_boolean(read(vr, n)?, write(value, n)?);
-    get_string = GetString(vr: *const fmi2ValueReference, n: usize, value: *mut fmi2String),
-        instance => instance.get_string(read(vr, n)?, write(value, n)?);
-    set_real = SetReal(vr: *const fmi2ValueReference, n: usize, value: *const fmi2Real),
-        instance => instance.set_real(read(vr, n)?, read(value, n)?);
-    set_integer = SetInteger(vr: *const fmi2ValueReference, n: usize, value: *const fmi2Integer),
-        instance => instance.set_integer(read(vr, n)?, read(value, n)?);
-    set_boolean = SetBoolean(vr: *const fmi2ValueReference, n: usize, value: *const fmi2Boolean),
-        instance => instance.set_boolean(read(vr, n)?, read(value, n)?);
-    set_string = SetString(vr: *const fmi2ValueReference, n: usize, value: *const fmi2String),
-        instance => instance.set_string(read(vr, n)?, &texts(value, n)?);
-    set_real_input_derivatives = SetRealInputDerivatives(
-        vr: *const fmi2ValueReference, n: usize, order: *const fmi2Integer, value: *const fmi2Real
-    ), instance => instance.set_real_input_derivatives(read(vr, n)?, read(order, n)?, read(value, n)?);
-    get_real_output_derivatives = GetRealOutputDerivatives(
-        vr: *const fmi2ValueReference, n: usize, order: *const fmi2Integer, value: *mut fmi2Real
-    ), instance => instance.get_real_output_derivatives(read(vr, n)?, read(order, n)?, write(value, n)?);
-    do_step = DoStep(start: fmi2Real, size: fmi2Real, _no_set_fmu_state: fmi2Boolean),
-        instance => instance.do_step(start, size);
-    cancel_step = CancelStep(), _instance => Ok(());
-    get_directional_derivative = GetDirectionalDerivative(
-        _unknown: *const fmi2ValueReference, _n_unknown: usize,
-        _known: *const fmi2ValueReference, _n_known: usize,
-        _known_delta: *const fmi2Real, _unknown_delta: *mut fmi2Real
-    ), _instance => Err(Failure::Error(
-        "not offered: providesDirectionalDerivative is false".to_owned()
-    ));
-    get_fmu_state = GetFMUstate(state: *mut fmi2FMUstate), instance => {
-        let [place] = write(state, 1)? else { return Err(missing("FMUstate")) };
-        if let Some(snapshot) = place.cast::<Snapshot<M>>().as_mut() {
-            *snapshot = instance.snapshot();
-        } else {
-            *place = Box::into_raw(Box::new(instance.snapshot())).cast();
-        }
-        Ok(())
-    };
-    set_fmu_state = SetFMUstate(state: fmi2FMUstate), instance =>
-        instance.restore(state.cast::<Snapshot<M>>().as_ref().ok_or_else(|| missing("FMUstate"))?);
-    free_fmu_state = FreeFMUstate(state: *mut fmi2FMUstate), _instance => {
-        let [place] = write(state, 1)? else { return Err(missing("FMUstate")) };
-        if !place.is_null() {
-            drop(Box::from_raw(place.cast::<Snapshot<M>>()));
-            *place = std::ptr::null_mut();
-        }
-        Ok(())
-    };
-    serialized_fmu_state_size = SerializedFMUstateSize(state: fmi2FMUstate, size: *mut usize),
-        _instance => {
-            let state = state.cast::<Snapshot<M>>().as_ref().ok_or_else(|| missing("FMUstate"))?;
-            put(size, state.to_bytes()?.len())
-        };
-    serialize_fmu_state = SerializeFMUstate(state: fmi2FMUstate, bytes: *mut fmi2Byte, size: usize),
-        _instance => {
-            let state = state.cast::<Snapshot<M>>().as_ref().ok_or_else(|| missing("FMUstate"))?;
-            let serialized = state.to_bytes()?;
-            write(bytes.cast::<u8>(), size)?
-                .get_mut(..serialized.len())
-                .ok_or_else(|| Failure::Error(format!(
-                    "{size} bytes given, {} needed", serialized.len()
-                )))?
-                .copy_from_slice(&serialized);
-            Ok(())
-        };
-    de_serialize_fmu_state = DeSerializeFMUstate(
-        bytes: *const fmi2Byte, size: usize, state: *mut fmi2FMUstate
-    ), instance => {
-        let snapshot = Snapshot::<M>::from_bytes(read(bytes.cast::<u8>(), size)?, instance.guid())?;
-        let [place] = write(state, 1)? else { return Err(missing("FMUstate")) };
-        if let Some(old) = place.cast::<Snapshot<M>>().as_mut() {
-            *old = snapshot;
-        } else {
-            *place = Box::into_raw(Box::new(snapshot)).cast();
-        }
-        Ok(())
-    };
-    get_status = GetStatus(kind: fmi2StatusKind, _value: *mut fmi2Status),
-        _instance => Err(unavailable(kind));
-    get_real_status = GetRealStatus(kind: fmi2StatusKind, value: *mut fmi2Real), instance =>
-        if kind == StatusKind::LastSuccessfulTime as fmi2StatusKind {
-            put(value, instance.last_successful_time())
-        } else {
-            Err(unavailable(kind))
-        };
-    get_integer_status = GetIntegerStatus(kind: fmi2StatusKind, _value: *mut fmi2Integer),
-        _instance => Err(unavailable(kind));
-    get_boolean_status = GetBooleanStatus(kind: fmi2StatusKind, value: *mut fmi2Boolean),
-        _instance => if kind == StatusKind::Terminated as fmi2StatusKind {
-            put(value, 0)
-        } else {
-            Err(unavailable(kind))
-        };
-    get_string_status = GetStringStatus(kind: fmi2StatusKind, _value: *mut fmi2String),
-        _instance => Err(unavailable(kind));
-}
-
-/// A status that a synchronous slave cannot give is answered by `fmi2Discard` (section 4.2.3).
-fn unavailable(kind: fmi2StatusKind) -> Failure {
-    Failure::Discard(format!("no step is pending, the status kind {kind} cannot be given"))
 }
 
 /// The description of `M`, which must break no rule of the standard.

@@ -1,5 +1,7 @@
 //! One instance of a model: the state machine behind the C ABI, in safe Rust.
 
+mod derivatives;
+mod exchange;
 mod snapshot;
 #[cfg(test)]
 mod tests;
@@ -11,9 +13,9 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::abi::Status;
-use crate::call_order::{Function, State, allowed};
+use crate::call_order::{Function, InterfaceType, State, allowed};
 use crate::ffi::Callbacks;
-use crate::interface::Interface;
+use crate::interface::{CATEGORIES, Interface};
 use crate::model::{Experiment, Failure, Model, Step};
 
 pub(crate) use snapshot::Snapshot;
@@ -21,9 +23,13 @@ pub(crate) use snapshot::Snapshot;
 /// What an FMU state consists of: everything that decides how the instance continues.
 #[derive(Clone, Serialize, Deserialize)]
 #[serde(bound = "")]
+#[expect(clippy::struct_excessive_bools, reason = "four facts that are independent")]
 pub(crate) struct Core<M: Model> {
     model: M,
+    interface_type: InterfaceType,
     state: State,
+    /// The last step ended because the model wants the simulation to end.
+    terminated: bool,
     experiment: Experiment,
     time: f64,
     /// Something was set since the model last computed its outputs.
@@ -45,13 +51,17 @@ pub(crate) struct Instance<M: Model> {
     categories: Option<Vec<String>>,
     /// The strings that the last `fmi2GetString` handed out.
     strings: Vec<std::ffi::CString>,
+    /// Space for `fmi2GetDirectionalDerivative`, once it was called.
+    direction: Option<M>,
 }
 
 impl<M: Model> Core<M> {
-    fn new(model: M) -> Self {
+    fn new(model: M, interface_type: InterfaceType) -> Self {
         Self {
             model,
+            interface_type,
             state: State::Instantiated,
+            terminated: false,
             experiment: Experiment::default(),
             time: 0.0,
             stale: true,
@@ -61,12 +71,42 @@ impl<M: Model> Core<M> {
     }
 }
 
+impl<M: Model> Core<M> {
+    /// Refuses a time past `stopTime`, where that is defined (section 2.1.6).
+    fn before_stop(&self, time: f64) -> Result<(), Failure> {
+        match self.experiment.stop_time.filter(|stop| time > stop + slack(*stop)) {
+            Some(stop) => Err(Failure::Error(format!("{time} s is past stopTime {stop} s"))),
+            None => Ok(()),
+        }
+    }
+
+    /// Has the model check its parameters, where one was set since.
+    fn check(&mut self) -> Result<(), Failure> {
+        if self.unchecked {
+            self.model.check()?;
+            self.unchecked = false;
+        }
+        Ok(())
+    }
+}
+
 impl<M: Model> Instance<M> {
     /// `fmi2Instantiate`: reads the resources and compares the GUID.
-    pub(crate) fn new(resources: &Path, guid: &str, callbacks: Callbacks) -> Result<Self, Failure> {
+    pub(crate) fn new(
+        interface_type: InterfaceType,
+        resources: &Path,
+        guid: &str,
+        callbacks: Callbacks,
+    ) -> Result<Self, Failure> {
         guarded(|| {
             let mut model = M::new(resources)?;
             let (interface, description) = Interface::new(&mut model)?;
+            let offers_exchange = interface.event_indicators.is_some();
+            if interface_type == InterfaceType::ModelExchange && !offers_exchange {
+                let message =
+                    "fmuType is fmi2ModelExchange, and this FMU offers co-simulation only";
+                return Err(Failure::Error(message.to_owned()));
+            }
             if guid != description.guid {
                 let (name, own) = (M::IDENTIFIER, description.guid);
                 return Err(Failure::Error(format!(
@@ -76,13 +116,14 @@ impl<M: Model> Instance<M> {
                 )));
             }
             Ok(Self {
-                core: Core::new(model.clone()),
+                core: Core::new(model.clone(), interface_type),
                 fresh: model,
                 interface,
                 guid: guid.to_owned(),
                 callbacks,
                 categories: None,
                 strings: Vec::new(),
+                direction: None,
             })
         })
     }
@@ -97,7 +138,7 @@ impl<M: Model> Instance<M> {
         if state == State::Fatal {
             return Status::Fatal;
         }
-        let done = if allowed(function, state) {
+        let done = if allowed(self.core.interface_type, function, state) {
             guarded(|| body(self))
         } else {
             Err(Failure::Error(format!("may not be called in the state {state:?}")))
@@ -111,36 +152,45 @@ impl<M: Model> Instance<M> {
     #[cold]
     fn fail(&mut self, function: Function, failure: &Failure) -> Status {
         let (status, category) = match failure {
-            Failure::Discard(_) | Failure::Incomplete { .. } => {
+            Failure::Discard(_) | Failure::Incomplete { .. } | Failure::Terminated { .. } => {
                 (Status::Discard, "logStatusDiscard")
             }
             Failure::Error(_) => (Status::Error, "logStatusError"),
             Failure::Fatal(_) => (Status::Fatal, "logStatusFatal"),
         };
         match failure {
+            Failure::Discard(_) if function == Function::DoStep => {
+                self.core.state = State::StepFailed;
+            }
             Failure::Discard(_) => {}
-            Failure::Incomplete { time, .. } => {
+            Failure::Incomplete { time, .. } | Failure::Terminated { time, .. } => {
                 self.core.time = *time;
+                self.core.terminated = matches!(failure, Failure::Terminated { .. });
                 self.core.state = State::StepFailed;
             }
             Failure::Error(_) => self.core.state = State::Error,
             Failure::Fatal(_) => self.core.state = State::Fatal,
         }
+        self.log(status, category, &format!("{}: {failure}", function.name()));
+        status
+    }
+
+    /// Sends a message of a category that the importer wants to see.
+    fn log(&self, status: Status, category: &str, message: &str) {
         let chosen = self.categories.as_ref();
         if chosen.is_none_or(|names| names.iter().any(|name| name == category)) {
-            self.callbacks.log(status, category, &format!("{}: {failure}", function.name()));
+            self.callbacks.log(status, category, message);
         }
-        status
     }
 
     /// `fmi2SetDebugLogging`. Messages that belong to a status are sent whether debug logging is on
     /// or off (section 2.1.3); naming categories restricts them to those.
     pub(crate) fn set_debug_logging(&mut self, categories: Vec<String>) -> Result<(), Failure> {
-        const KNOWN: [&str; 3] = ["logStatusDiscard", "logStatusError", "logStatusFatal"];
-        if let Some(unknown) = categories.iter().find(|name| !KNOWN.contains(&name.as_str())) {
+        let known = CATEGORIES.map(|(name, _)| name);
+        if let Some(unknown) = categories.iter().find(|name| !known.contains(&name.as_str())) {
             return Err(Failure::Error(format!(
                 "{unknown} is no log category of this FMU; it has {}",
-                KNOWN.join(", ")
+                known.join(", ")
             )));
         }
         self.categories = (!categories.is_empty()).then_some(categories);
@@ -176,7 +226,10 @@ impl<M: Model> Instance<M> {
     /// `fmi2ExitInitializationMode`.
     pub(crate) fn exit_initialization_mode(&mut self) -> Result<(), Failure> {
         self.refresh()?;
-        self.core.state = State::StepComplete;
+        self.core.state = match self.core.interface_type {
+            InterfaceType::ModelExchange => State::EventMode,
+            InterfaceType::CoSimulation => State::StepComplete,
+        };
         Ok(())
     }
 
@@ -187,7 +240,7 @@ impl<M: Model> Instance<M> {
 
     /// `fmi2Reset`: as after `fmi2Instantiate`.
     pub(crate) fn reset(&mut self) {
-        self.core = Core::new(self.fresh.clone());
+        self.core = Core::new(self.fresh.clone(), self.core.interface_type);
         self.strings.clear();
     }
 
@@ -197,11 +250,12 @@ impl<M: Model> Instance<M> {
         if core.stale {
             match core.state {
                 State::InitializationMode => {
-                    core.model.check()?;
-                    core.unchecked = false;
+                    core.check()?;
                     core.model.initialize(&core.experiment)?;
                 }
-                State::StepComplete => core.model.update(),
+                State::StepComplete | State::EventMode | State::ContinuousTimeMode => {
+                    core.model.update(core.time)?;
+                }
                 _ => {}
             }
             core.stale = false;
@@ -214,15 +268,8 @@ impl<M: Model> Instance<M> {
         let core = &mut self.core;
         let step = communication_step(core.time, start, size)?;
         let end = start + size;
-        if let Some(stop) = core.experiment.stop_time.filter(|stop| end > stop + slack(*stop)) {
-            return Err(Failure::Error(format!(
-                "the step ends at {end} s, past stopTime {stop} s"
-            )));
-        }
-        if core.unchecked {
-            core.model.check()?;
-            core.unchecked = false;
-        }
+        core.before_stop(end)?;
+        core.check()?;
         if step.size > 0.0 {
             core.model.step(&step)?;
         }
@@ -238,6 +285,11 @@ impl<M: Model> Instance<M> {
     /// `fmi2GetRealStatus(fmi2LastSuccessfulTime)`.
     pub(crate) fn last_successful_time(&self) -> f64 {
         self.core.time
+    }
+
+    /// `fmi2GetBooleanStatus(fmi2Terminated)`.
+    pub(crate) fn wants_to_end(&self) -> bool {
+        self.core.terminated
     }
 
     /// The GUID of the description that this instance was made for.

@@ -1,28 +1,42 @@
 //! The variables of one model by value reference, and the description rendered from them.
 
+mod general;
+mod structure;
+
 use crate::description::{
-    Causality, CoSimulation, Initial, IntegerType, Kind, LogCategory, ModelDescription,
-    ModelStructure, RealType, ScalarVariable, Unknown, Variability,
+    Causality, Initial, IntegerType, Kind, ModelDescription, Problem, RealType, ScalarVariable,
+    SimpleType, Unknown, Variability,
 };
 use crate::model::{Failure, Model};
 use crate::unit::Unit;
-use crate::variable::{Access, Field, Variable};
+use crate::variable::{Access, Enumeration, Field, Number, Variable};
 
-/// Log categories of every exported FMU: the standardized names of section 2.2.4.
-const CATEGORIES: [(&str, &str); 3] = [
-    ("logStatusDiscard", "Calls that were refused without harm"),
-    ("logStatusError", "Calls that failed; the instance has to be reset or restored"),
-    ("logStatusFatal", "Calls after which the instance is lost"),
-];
+pub(crate) use general::CATEGORIES;
 
 /// One variable of base type `T`; its position in [`Interface`] is its value reference.
 pub(crate) struct Slot<M, T> {
     pub(crate) name: String,
     pub(crate) causality: Causality,
     pub(crate) variability: Variability,
+    pub(crate) initial: Option<Initial>,
+    pub(crate) is_state: bool,
+    /// Listed under `Outputs` or `Derivatives`, by this name or an alias.
+    pub(crate) is_unknown: bool,
+    /// Listed under `InitialUnknowns`, by this name or an alias.
+    pub(crate) is_initial_unknown: bool,
+    /// Smallest and largest value of a Real or Integer.
     pub(crate) range: (f64, f64),
+    /// The values of an enumeration; empty for all other types.
+    pub(crate) items: Vec<i32>,
     pub(crate) field: Field<M, T>,
     pub(crate) derivatives: Vec<Field<M, f64>>,
+}
+
+/// A continuous state: positions among the Reals, and the scale of its error.
+pub(crate) struct ContinuousState {
+    pub(crate) state: usize,
+    pub(crate) derivative: usize,
+    pub(crate) nominal: f64,
 }
 
 /// The variables of a model, by base type and value reference.
@@ -32,27 +46,43 @@ pub(crate) struct Interface<M> {
     pub(crate) integers: Vec<Slot<M, i32>>,
     pub(crate) booleans: Vec<Slot<M, bool>>,
     pub(crate) strings: Vec<Slot<M, String>>,
+    pub(crate) states: Vec<ContinuousState>,
+    /// None without `fmi2ModelExchange`.
+    pub(crate) event_indicators: Option<usize>,
     pub(crate) max_output_derivative_order: u32,
 }
+
+/// Type and value reference of a variable.
+type Filed = (Kind, u32);
 
 impl<M: Model> Interface<M> {
     /// Sorts the variables of `model` by type and describes them, start values included.
     pub(crate) fn new(model: &mut M) -> Result<(Self, ModelDescription), Failure> {
         let variables = model.variables();
-        let mut description = general::<M>(model);
-        description.structure = structure(&variables)?;
+        let mut description = general::general::<M>(model);
+        description.structure = structure::structure(&variables)?;
         let mut interface = Self {
             reals: Vec::new(),
             integers: Vec::new(),
             booleans: Vec::new(),
             strings: Vec::new(),
+            states: Vec::new(),
+            event_indicators: model.model_exchange().map(|own| own.event_indicators),
             max_output_derivative_order: 0,
         };
         description.variables.push(time());
-        for variable in variables {
-            define_unit(&mut description.units, &variable)?;
-            description.variables.push(interface.add(model, variable));
+        for variable in &variables {
+            define_unit(&mut description.units, variable)?;
+            define_type(&mut description.types, variable)?;
+            description.variables.push(described(&variables, variable)?);
         }
+        let states = structure::states(&variables)?;
+        interface.file_all(model, variables, &mut description)?;
+        interface.states = states
+            .into_iter()
+            .map(|(state, derivative)| continuous_state(&description, state, derivative))
+            .collect::<Result<_, _>>()?;
+        interface.mark(&description);
         if let Some(co_simulation) = &mut description.co_simulation {
             co_simulation.max_output_derivative_order = interface.max_output_derivative_order;
             co_simulation.can_interpolate_inputs = interface
@@ -64,60 +94,85 @@ impl<M: Model> Interface<M> {
         Ok((interface, description))
     }
 
-    /// Files the variable under the next value reference of its type and describes it.
-    fn add(&mut self, model: &mut M, variable: Variable<M>) -> ScalarVariable {
-        let start_given = variable.initial != Some(Initial::Calculated);
-        let real = RealType {
-            unit: variable.unit,
-            min: variable.min,
-            max: variable.max,
-            ..RealType::default()
-        };
-        let blank = Blank {
-            name: variable.name.clone(),
-            causality: variable.causality,
-            variability: variable.variability,
-            range: (
-                variable.min.unwrap_or(f64::NEG_INFINITY),
-                variable.max.unwrap_or(f64::INFINITY),
-            ),
-            derivatives: variable.derivatives,
-        };
-        if blank.causality == Causality::Output {
-            let order = u32::try_from(blank.derivatives.len()).unwrap_or(u32::MAX);
-            self.max_output_derivative_order = self.max_output_derivative_order.max(order);
+    /// Marks the states and the unknowns of `ModelStructure`.
+    fn mark(&mut self, description: &ModelDescription) {
+        for state in &self.states {
+            self.reals[state.state].is_state = true;
         }
-        let (kind, value_reference) = self.file(model, variable.access, blank, real, start_given);
-        ScalarVariable {
-            name: variable.name,
-            value_reference,
-            description: Some(variable.description),
-            causality: variable.causality,
-            variability: variable.variability,
-            initial: variable.initial,
-            kind,
+        let real = |row: &Unknown| {
+            let own = &description.variables[row.index as usize - 1];
+            matches!(own.kind, Kind::Real(_)).then(|| own.value_reference as usize - 1)
+        };
+        let structure = &description.structure;
+        for position in structure.outputs.iter().chain(&structure.derivatives).filter_map(real) {
+            self.reals[position].is_unknown = true;
+        }
+        for position in structure.initial_unknowns.iter().filter_map(real) {
+            self.reals[position].is_initial_unknown = true;
         }
     }
 
-    /// The type as described, with the field's value as start where one is given, and the value
-    /// reference.
-    fn file(
+    /// Gives each variable its slot, value reference and type; aliases get those of their variable.
+    fn file_all(
         &mut self,
         model: &mut M,
-        access: Access<M>,
-        blank: Blank<M>,
-        real: RealType,
-        start_given: bool,
-    ) -> (Kind, u32) {
-        match access {
+        variables: Vec<Variable<M>>,
+        description: &mut ModelDescription,
+    ) -> Result<(), Failure> {
+        let mut aliases = Vec::new();
+        for (position, variable) in variables.into_iter().enumerate() {
+            let name = variable.name.clone();
+            if let Access::Alias(of) = variable.access {
+                aliases.push((position + 1, of));
+                continue;
+            }
+            let (kind, value_reference) = self
+                .file(model, variable)
+                .map_err(|reason| Failure::Error(format!("variable {name}: {reason}")))?;
+            let own = &mut description.variables[position + 1];
+            keep_derivative(&mut own.kind, kind);
+            own.value_reference = value_reference;
+        }
+        for (index, of) in aliases {
+            let target =
+                description.variable(&of).map(|own| (own.kind.clone(), own.value_reference));
+            let Some((kind, value_reference)) = target else { continue };
+            let own = &mut description.variables[index];
+            let constant = own.variability == Variability::Constant;
+            keep_derivative(&mut own.kind, if constant { kind } else { without_start(kind) });
+            own.value_reference = value_reference;
+        }
+        Ok(())
+    }
+
+    /// Files the variable under the next value reference of its type; its type, with the field's
+    /// value as start where one is given.
+    fn file(&mut self, model: &mut M, variable: Variable<M>) -> Result<Filed, String> {
+        let start_given = variable.initial != Some(Initial::Calculated);
+        if variable.causality == Causality::Output {
+            let order = u32::try_from(variable.derivatives.len()).unwrap_or(u32::MAX);
+            self.max_output_derivative_order = self.max_output_derivative_order.max(order);
+        }
+        let (number, reinit) = (variable.number.clone(), variable.reinit);
+        let enumeration = variable.enumeration.clone();
+        let (blank, access) = Blank::of(variable);
+        Ok(match access {
             Access::Real(field) => {
                 let start = start_given.then(|| *field(model));
-                (Kind::Real(RealType { start, ..real }), blank.fill(&mut self.reals, field) + 1)
+                let real = RealType { start, reinit, ..real(number) };
+                (Kind::Real(real), blank.fill(&mut self.reals, field) + 1)
             }
             Access::Integer(field) => {
                 let start = start_given.then(|| *field(model));
-                let integer = IntegerType { start, ..IntegerType::default() };
-                (Kind::Integer(integer), blank.fill(&mut self.integers, field))
+                let kind = match enumeration {
+                    Some(Enumeration { name, .. }) => Kind::Enumeration(IntegerType {
+                        declared_type: Some(name),
+                        start,
+                        ..IntegerType::default()
+                    }),
+                    None => Kind::Integer(IntegerType { start, ..integer(number)? }),
+                };
+                (kind, blank.fill(&mut self.integers, field))
             }
             Access::Boolean(field) => {
                 let start = start_given.then(|| *field(model));
@@ -127,7 +182,8 @@ impl<M: Model> Interface<M> {
                 let start = start_given.then(|| field(model).clone());
                 (Kind::String(start), blank.fill(&mut self.strings, field))
             }
-        }
+            Access::Alias(of) => return Err(format!("it is an alias of {of}")),
+        })
     }
 }
 
@@ -136,23 +192,143 @@ struct Blank<M> {
     name: String,
     causality: Causality,
     variability: Variability,
+    initial: Option<Initial>,
     range: (f64, f64),
+    items: Vec<i32>,
     derivatives: Vec<Field<M, f64>>,
 }
 
 impl<M> Blank<M> {
+    fn of(variable: Variable<M>) -> (Self, Access<M>) {
+        let (min, max) = (variable.number.min, variable.number.max);
+        let blank = Self {
+            name: variable.name,
+            causality: variable.causality,
+            variability: variable.variability,
+            initial: variable.initial,
+            range: (min.unwrap_or(f64::NEG_INFINITY), max.unwrap_or(f64::INFINITY)),
+            items: variable
+                .enumeration
+                .map(|own| own.items.iter().map(|(_, value)| *value).collect())
+                .unwrap_or_default(),
+            derivatives: variable.derivatives,
+        };
+        (blank, variable.access)
+    }
+
     /// Appends the slot and returns its position.
     fn fill<T>(self, slots: &mut Vec<Slot<M, T>>, field: Field<M, T>) -> u32 {
         slots.push(Slot {
             name: self.name,
             causality: self.causality,
             variability: self.variability,
+            initial: self.initial,
+            is_state: false,
+            is_unknown: false,
+            is_initial_unknown: false,
             range: self.range,
+            items: self.items,
             field,
             derivatives: self.derivatives,
         });
         u32::try_from(slots.len() - 1).unwrap_or(u32::MAX)
     }
+}
+
+fn real(number: Number) -> RealType {
+    RealType {
+        quantity: number.quantity,
+        unit: number.unit,
+        display_unit: number.display_unit,
+        min: number.min,
+        max: number.max,
+        nominal: number.nominal,
+        ..RealType::default()
+    }
+}
+
+fn integer(number: Number) -> Result<IntegerType, String> {
+    let bound = |value: Option<f64>| match value {
+        None => Ok(None),
+        #[expect(clippy::cast_possible_truncation, reason = "tested before")]
+        Some(value) if value.fract() == 0.0 && value.abs() <= f64::from(i32::MAX) => {
+            Ok(Some(value as i32))
+        }
+        Some(value) => Err(format!("limit {value}, expected a 32-bit integer")),
+    };
+    let (min, max) = (bound(number.min)?, bound(number.max)?);
+    Ok(IntegerType { quantity: number.quantity, min, max, ..IntegerType::default() })
+}
+
+/// The state at position `state` of the variables, with its derivative.
+fn continuous_state(
+    description: &ModelDescription,
+    state: usize,
+    derivative: usize,
+) -> Result<ContinuousState, Failure> {
+    let slot = |position: usize| {
+        let own = &description.variables[position + 1];
+        match &own.kind {
+            Kind::Real(real) => Ok((own.value_reference as usize - 1, real.nominal)),
+            _ => Err(Failure::Error(format!(
+                "{} is no Real, but a state or its derivative",
+                own.name
+            ))),
+        }
+    };
+    let ((state, nominal), (derivative, _)) = (slot(state)?, slot(derivative)?);
+    Ok(ContinuousState { state, derivative, nominal: nominal.unwrap_or(1.0) })
+}
+
+/// Replaces the type but for the attribute `derivative`, which is known before the type.
+fn keep_derivative(place: &mut Kind, mut kind: Kind) {
+    if let (Kind::Real(RealType { derivative, .. }), Kind::Real(new)) = (&*place, &mut kind) {
+        new.derivative = *derivative;
+    }
+    *place = kind;
+}
+
+fn without_start(kind: Kind) -> Kind {
+    match kind {
+        Kind::Real(own) => Kind::Real(RealType { start: None, reinit: false, ..own }),
+        Kind::Integer(own) => Kind::Integer(IntegerType { start: None, ..own }),
+        Kind::Enumeration(own) => Kind::Enumeration(IntegerType { start: None, ..own }),
+        Kind::Boolean(_) => Kind::Boolean(None),
+        Kind::String(_) => Kind::String(None),
+    }
+}
+
+/// The variable without type and value reference.
+fn described<M>(
+    variables: &[Variable<M>],
+    variable: &Variable<M>,
+) -> Result<ScalarVariable, Failure> {
+    let (mut variability, mut initial) = (variable.variability, variable.initial);
+    if let Access::Alias(of) = &variable.access {
+        let target = structure::find(variables, &variable.name, of)?;
+        if let Access::Alias(_) = variables[target].access {
+            let name = &variable.name;
+            return Err(Failure::Error(format!("{name} is an alias of {of}, itself an alias")));
+        }
+        variability = variables[target].variability;
+        if variability == Variability::Constant {
+            initial = Some(Initial::Exact);
+        }
+    }
+    let state = variable.derivative_of.as_ref();
+    let state = state.map(|of| structure::find(variables, &variable.name, of)).transpose()?;
+    Ok(ScalarVariable {
+        name: variable.name.clone(),
+        value_reference: 0,
+        description: Some(variable.description.clone()),
+        causality: variable.causality,
+        variability,
+        initial,
+        kind: Kind::Real(RealType {
+            derivative: state.map(structure::index),
+            ..RealType::default()
+        }),
+    })
 }
 
 /// The independent variable, value reference 0 of the Reals.
@@ -168,40 +344,8 @@ fn time() -> ScalarVariable {
     }
 }
 
-fn general<M: Model>(model: &M) -> ModelDescription {
-    let about = model.about();
-    let text = |text: String| (!text.is_empty()).then_some(text);
-    ModelDescription {
-        fmi_version: "2.0".to_owned(),
-        model_name: M::IDENTIFIER.to_owned(),
-        description: text(about.description),
-        author: text(about.author),
-        version: text(about.version),
-        license: text(about.license),
-        generation_tool: Some(concat!("fmi2 ", env!("CARGO_PKG_VERSION")).to_owned()),
-        structured_names: true,
-        co_simulation: Some(CoSimulation {
-            model_identifier: M::IDENTIFIER.to_owned(),
-            can_handle_variable_communication_step_size: true,
-            can_not_use_memory_management_functions: true,
-            can_get_and_set_fmu_state: true,
-            can_serialize_fmu_state: true,
-            ..CoSimulation::default()
-        }),
-        log_categories: CATEGORIES
-            .map(|(name, description)| LogCategory {
-                name: name.to_owned(),
-                description: Some(description.to_owned()),
-            })
-            .to_vec(),
-        units: Unit::parse("s").into_iter().collect(),
-        default_experiment: Some(about.default_experiment),
-        ..ModelDescription::default()
-    }
-}
-
 fn define_unit<M>(units: &mut Vec<Unit>, variable: &Variable<M>) -> Result<(), Failure> {
-    let Some(name) = &variable.unit else { return Ok(()) };
+    let Some(name) = &variable.number.unit else { return Ok(()) };
     if units.iter().all(|unit| unit.name != *name) {
         let unit = Unit::parse(name)
             .map_err(|error| Failure::Error(format!("variable {}: {error}", variable.name)))?;
@@ -210,49 +354,36 @@ fn define_unit<M>(units: &mut Vec<Unit>, variable: &Variable<M>) -> Result<(), F
     Ok(())
 }
 
-/// `ModelStructure`: `Outputs`, and as `InitialUnknowns` the outputs that are calculated.
-fn structure<M>(variables: &[Variable<M>]) -> Result<ModelStructure, Failure> {
-    let mut structure = ModelStructure::default();
-    for (position, variable) in variables.iter().enumerate() {
-        if variable.causality != Causality::Output {
-            continue;
+fn define_type<M>(types: &mut Vec<SimpleType>, variable: &Variable<M>) -> Result<(), Failure> {
+    let Some(Enumeration { name, items }) = &variable.enumeration else { return Ok(()) };
+    match types.iter().find(|known| known.name == *name) {
+        Some(known) if known.items == *items => {}
+        Some(_) => {
+            return Err(Failure::Error(format!(
+                "variable {}: its enumeration {name} has other items elsewhere",
+                variable.name
+            )));
         }
-        let unknown = |names: Option<&Vec<String>>| -> Result<Unknown, Failure> {
-            let dependencies =
-                names.map(|names| indices(variables, variable, names)).transpose()?;
-            Ok(Unknown { index: index(position), dependencies, kinds: None })
-        };
-        structure.outputs.push(unknown(Some(&variable.direct))?);
-        structure.initial_unknowns.push(unknown(variable.initially.as_ref())?);
+        None => types.push(SimpleType {
+            name: name.clone(),
+            description: None,
+            kind: Kind::Enumeration(IntegerType::default()),
+            items: items.clone(),
+        }),
     }
-    Ok(structure)
+    Ok(())
 }
 
-/// The 1-based index of the variable at `position`: `time` is the first.
-fn index(position: usize) -> u32 {
-    u32::try_from(position + 2).unwrap_or(u32::MAX)
-}
-
-/// Ascending indices of the variables called `names`, on which `of` depends.
-fn indices<M>(
-    variables: &[Variable<M>],
-    of: &Variable<M>,
-    names: &[String],
-) -> Result<Vec<u32>, Failure> {
-    let mut found = Vec::with_capacity(names.len());
-    for name in names {
-        if name == "time" {
-            found.push(1);
-            continue;
-        }
-        let position =
-            variables.iter().position(|variable| variable.name == *name).ok_or_else(|| {
-                let of = &of.name;
-                Failure::Error(format!("{of} depends on {name}, which is no variable"))
-            })?;
-        found.push(index(position));
-    }
-    found.sort_unstable();
-    found.dedup();
-    Ok(found)
+/// Which static rules of FMI 2.0.5 the variables of `M` break; none, if they are in order.
+///
+/// `resources` is the folder that becomes the FMU's `resources`. The first test of a model:
+/// a description with problems is not packed either.
+///
+/// # Errors
+///
+/// What keeps the model from being made or described at all: [`Model::new`] failed, a unit that
+/// cannot be read, a reference to a variable that does not exist.
+pub fn problems<M: Model>(resources: &std::path::Path) -> Result<Vec<Problem>, Failure> {
+    let (_, description) = Interface::new(&mut M::new(resources)?)?;
+    Ok(description.problems())
 }

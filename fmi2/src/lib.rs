@@ -20,5 +20,6 @@ pub mod package;
 pub mod unit;
 mod variable;
 
-pub use model::{About, Experiment, Failure, Model, Step};
-pub use variable::Variable;
+pub use interface::problems;
+pub use model::{About, At, Event, Experiment, Failure, Model, ModelExchange, Step};
+pub use variable::{Enumeration, Variable};

@@ -147,8 +147,7 @@ impl Model for AsoController {
         x_hat.copy_from_slice(&self.x_hat_0);
         f_hat.copy_from_slice(&self.f_hat_0);
         self.observer = None;
-        self.update();
-        Ok(())
+        self.update(experiment.start_time)
     }
 
     fn step(&mut self, step: &Step) -> Result<(), Failure> {
@@ -169,10 +168,11 @@ impl Model for AsoController {
         Ok(())
     }
 
-    fn update(&mut self) {
+    fn update(&mut self, _time: f64) -> Result<(), Failure> {
         let observer = self.ready_observer();
         self.evaluate(&observer, 0.0);
         self.observer = Some(observer);
+        Ok(())
     }
 }
 

@@ -245,8 +245,9 @@ impl Model for FrictionPendulum {
         done.map_err(|failure| Failure::Incomplete { time: reached, message: failure.to_string() })
     }
 
-    fn update(&mut self) {
+    fn update(&mut self, _time: f64) -> Result<(), Failure> {
         self.show(self.u + self.f_a);
+        Ok(())
     }
 }
 
@@ -281,7 +282,7 @@ mod tests {
             for k in 0..2000_u32 {
                 let start = f64::from(k) * 1e-3;
                 model.u = 45.0 * (9.0 * start).sin();
-                model.update();
+                model.update(start).unwrap();
                 model.step(&Step { start, size: 1e-3 }).unwrap();
                 regimes[usize::try_from(model.regime + 1).unwrap()] = true;
             }

@@ -8,7 +8,8 @@ mod xml;
 use std::fmt;
 
 use super::{
-    CoSimulation, DefaultExperiment, LogCategory, ModelDescription, ModelStructure, Unknown,
+    CoSimulation, DefaultExperiment, LogCategory, ModelDescription, ModelExchange, ModelStructure,
+    Unknown,
 };
 use crate::unit::{BaseUnit, DisplayUnit, Unit};
 use xml::Element;
@@ -137,7 +138,6 @@ impl ModelDescription {
         let types = variables::types(&root)?;
         let variables = variables::variables(variables, &types)?;
         let structure = model_structure(structure, variables.len())?;
-        let model_exchange = root.optional_child("ModelExchange")?;
         Ok(ModelDescription {
             fmi_version: version.to_owned(),
             model_name: root.required("modelName")?.to_owned(),
@@ -151,7 +151,10 @@ impl ModelDescription {
             generation_date_and_time: root.text("generationDateAndTime"),
             structured_names: structured_names(&root)?,
             number_of_event_indicators: root.unsigned("numberOfEventIndicators")?,
-            model_exchange: model_exchange.map(Element::identifier).transpose()?,
+            model_exchange: root
+                .optional_child("ModelExchange")?
+                .map(model_exchange)
+                .transpose()?,
             co_simulation: root.optional_child("CoSimulation")?.map(co_simulation).transpose()?,
             units: root.list("UnitDefinitions", "Unit", unit)?,
             types,
@@ -178,6 +181,20 @@ fn structured_names(root: &Element) -> Result<bool, ParseError> {
         Some("structured") => Ok(true),
         Some(other) => Err(root.wrong("variableNamingConvention", "flat or structured", other)),
     }
+}
+
+fn model_exchange(element: &Element) -> Result<ModelExchange, ParseError> {
+    let flag = |name| Ok(element.boolean(name)?.unwrap_or(false));
+    Ok(ModelExchange {
+        model_identifier: element.identifier()?,
+        needs_execution_tool: flag("needsExecutionTool")?,
+        completed_integrator_step_not_needed: flag("completedIntegratorStepNotNeeded")?,
+        can_be_instantiated_only_once_per_process: flag("canBeInstantiatedOnlyOncePerProcess")?,
+        can_not_use_memory_management_functions: flag("canNotUseMemoryManagementFunctions")?,
+        can_get_and_set_fmu_state: flag("canGetAndSetFMUstate")?,
+        can_serialize_fmu_state: flag("canSerializeFMUstate")?,
+        provides_directional_derivative: flag("providesDirectionalDerivative")?,
+    })
 }
 
 fn co_simulation(element: &Element) -> Result<CoSimulation, ParseError> {

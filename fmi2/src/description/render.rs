@@ -10,7 +10,7 @@ use sha2::{Digest, Sha256};
 
 use super::{
     CoSimulation, DefaultExperiment, IntegerType, Kind, LogCategory, ModelDescription,
-    ModelStructure, RealType, ScalarVariable, SimpleType, Unknown,
+    ModelExchange, ModelStructure, RealType, ScalarVariable, SimpleType, Unknown,
 };
 use crate::unit::{BaseUnit, Unit};
 use tag::Tag;
@@ -115,8 +115,8 @@ impl Output {
             .maybe("variableNamingConvention", naming)
             .maybe("numberOfEventIndicators", description.number_of_event_indicators.as_ref());
         self.around(tag, |output| {
-            if let Some(identifier) = &description.model_exchange {
-                output.empty(Tag::new("ModelExchange").with("modelIdentifier", identifier));
+            if let Some(model_exchange) = &description.model_exchange {
+                output.model_exchange(model_exchange);
             }
             if let Some(co_simulation) = &description.co_simulation {
                 output.co_simulation(co_simulation);
@@ -132,6 +132,24 @@ impl Output {
             });
             output.structure(&description.structure);
         });
+    }
+
+    fn model_exchange(&mut self, flags: &ModelExchange) {
+        let no_completed_step = &flags.completed_integrator_step_not_needed;
+        let only_once = &flags.can_be_instantiated_only_once_per_process;
+        let own_memory = &flags.can_not_use_memory_management_functions;
+        let derivatives = &flags.provides_directional_derivative;
+        self.empty(
+            Tag::new("ModelExchange")
+                .with("modelIdentifier", &flags.model_identifier)
+                .unless_default("needsExecutionTool", &flags.needs_execution_tool)
+                .unless_default("completedIntegratorStepNotNeeded", no_completed_step)
+                .unless_default("canBeInstantiatedOnlyOncePerProcess", only_once)
+                .unless_default("canNotUseMemoryManagementFunctions", own_memory)
+                .unless_default("canGetAndSetFMUstate", &flags.can_get_and_set_fmu_state)
+                .unless_default("canSerializeFMUstate", &flags.can_serialize_fmu_state)
+                .unless_default("providesDirectionalDerivative", derivatives),
+        );
     }
 
     fn co_simulation(&mut self, flags: &CoSimulation) {
@@ -242,6 +260,7 @@ impl Output {
                     real_limits(element, real)
                         .maybe("start", real.start.as_ref())
                         .maybe("derivative", real.derivative.as_ref())
+                        .unless_default("reinit", &real.reinit)
                 }
                 Kind::Integer(integer) | Kind::Enumeration(integer) => {
                     let element = element.maybe("declaredType", integer.declared_type.as_ref());

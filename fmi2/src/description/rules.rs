@@ -118,7 +118,7 @@ fn identity(description: &ModelDescription, problems: &mut Problems) {
     let identifiers = description
         .model_exchange
         .iter()
-        .map(|identifier| ("3.3.1", identifier))
+        .map(|own| ("3.3.1", &own.model_identifier))
         .chain(co_simulation.map(|own| ("4.3.1", &own.model_identifier)));
     let mut interfaces = 0;
     for (section, identifier) in identifiers {
@@ -130,9 +130,16 @@ fn identity(description: &ModelDescription, problems: &mut Problems) {
     problems.demand(interfaces > 0, "2.2.1", || {
         "neither ModelExchange nor CoSimulation is there".to_owned()
     });
-    if let Some(flags) = co_simulation {
-        let holds = flags.can_get_and_set_fmu_state || !flags.can_serialize_fmu_state;
-        problems.demand(holds, "4.3.1", || {
+    let exchange = description.model_exchange.as_ref();
+    for (section, serializes, keeps) in [
+        exchange.map(|own| ("3.3.1", own.can_serialize_fmu_state, own.can_get_and_set_fmu_state)),
+        co_simulation
+            .map(|own| ("4.3.1", own.can_serialize_fmu_state, own.can_get_and_set_fmu_state)),
+    ]
+    .into_iter()
+    .flatten()
+    {
+        problems.demand(keeps || !serializes, section, || {
             "canSerializeFMUstate is true without canGetAndSetFMUstate".to_owned()
         });
     }

@@ -2,8 +2,8 @@
 
 use super::{
     Causality, CoSimulation, DefaultExperiment, DependencyKind, Initial, IntegerType, Kind,
-    LogCategory, ModelDescription, ModelStructure, RealType, ScalarVariable, SimpleType, Unknown,
-    Variability,
+    LogCategory, ModelDescription, ModelExchange, ModelStructure, RealType, ScalarVariable,
+    SimpleType, Unknown, Variability,
 };
 use crate::unit::Unit;
 
@@ -22,7 +22,7 @@ pub(crate) fn complete() -> ModelDescription {
         generation_date_and_time: text("2026-11-20T23:59:59Z"),
         structured_names: true,
         number_of_event_indicators: Some(2),
-        model_exchange: text("sample_me"),
+        model_exchange: Some(all_exchange_capabilities()),
         co_simulation: Some(all_capabilities()),
         units: ["kg", "N", "rad", "rad/s", "degC", "1"]
             .map(|name| Unit::parse(name).unwrap())
@@ -40,6 +40,19 @@ pub(crate) fn complete() -> ModelDescription {
         }),
         variables: variables(),
         structure: structure(),
+    }
+}
+
+fn all_exchange_capabilities() -> ModelExchange {
+    ModelExchange {
+        model_identifier: "sample_me".to_owned(),
+        needs_execution_tool: true,
+        completed_integrator_step_not_needed: true,
+        can_be_instantiated_only_once_per_process: true,
+        can_not_use_memory_management_functions: true,
+        can_get_and_set_fmu_state: true,
+        can_serialize_fmu_state: true,
+        provides_directional_derivative: true,
     }
 }
 
@@ -130,6 +143,7 @@ fn state() -> ScalarVariable {
         nominal: Some(0.1),
         start: Some(0.25),
         derivative: None,
+        reinit: true,
     });
     ScalarVariable {
         initial: Some(Initial::Exact),

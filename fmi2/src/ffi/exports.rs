@@ -1,7 +1,8 @@
 //! The export line of a model, and the C signatures behind it.
 
-/// Exports a [`Model`](crate::Model) as all functions of FMI 2.0 co-simulation: the last line of a
-/// model's library, which is a `cdylib`.
+/// Exports a [`Model`](crate::Model) as all functions of FMI 2.0: the last line of a model's
+/// library, which is a `cdylib`. The functions of model exchange are there in any case; a model
+/// without that interface is not instantiated for it.
 ///
 /// ```
 /// use std::path::Path;
@@ -126,6 +127,25 @@ macro_rules! export {
                     unknown: *const fmi2ValueReference, n_unknown: usize,
                     known: *const fmi2ValueReference, n_known: usize,
                     known_delta: *const fmi2Real, unknown_delta: *mut fmi2Real) -> fmi2Status;
+                fmi2EnterEventMode = enter_event_mode(c: fmi2Component) -> fmi2Status;
+                fmi2NewDiscreteStates = new_discrete_states(c: fmi2Component,
+                    info: *mut fmi2EventInfo) -> fmi2Status;
+                fmi2EnterContinuousTimeMode =
+                    enter_continuous_time_mode(c: fmi2Component) -> fmi2Status;
+                fmi2CompletedIntegratorStep = completed_integrator_step(c: fmi2Component,
+                    no_set_fmu_state: fmi2Boolean, enter_event_mode: *mut fmi2Boolean,
+                    terminate_simulation: *mut fmi2Boolean) -> fmi2Status;
+                fmi2SetTime = set_time(c: fmi2Component, time: fmi2Real) -> fmi2Status;
+                fmi2SetContinuousStates = set_continuous_states(c: fmi2Component,
+                    x: *const fmi2Real, n: usize) -> fmi2Status;
+                fmi2GetEventIndicators = get_event_indicators(c: fmi2Component,
+                    z: *mut fmi2Real, n: usize) -> fmi2Status;
+                fmi2GetContinuousStates = get_continuous_states(c: fmi2Component,
+                    x: *mut fmi2Real, n: usize) -> fmi2Status;
+                fmi2GetDerivatives = get_derivatives(c: fmi2Component,
+                    derivatives: *mut fmi2Real, n: usize) -> fmi2Status;
+                fmi2GetNominalsOfContinuousStates = get_nominals(c: fmi2Component,
+                    nominals: *mut fmi2Real, n: usize) -> fmi2Status;
                 fmi2SetRealInputDerivatives = set_real_input_derivatives(c: fmi2Component,
                     vr: *const fmi2ValueReference, n: usize, order: *const fmi2Integer,
                     value: *const fmi2Real) -> fmi2Status;

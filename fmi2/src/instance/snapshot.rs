@@ -6,7 +6,7 @@ use super::{Core, Instance};
 use crate::model::{Failure, Model};
 
 /// First bytes of a serialised state; the last two digits are the version of the layout.
-const MAGIC: &[u8; 8] = b"FMI2ST01";
+const MAGIC: &[u8; 8] = b"FMI2ST02";
 /// Length of the SHA-256 digest at the end.
 const DIGEST: usize = 32;
 
@@ -28,6 +28,12 @@ impl<M: Model> Instance<M> {
             return Err(Failure::Error(format!(
                 "the state belongs to the FMU {}, this one is {}",
                 snapshot.guid, self.guid
+            )));
+        }
+        let (of, own) = (snapshot.core.interface_type, self.core.interface_type);
+        if of != own {
+            return Err(Failure::Error(format!(
+                "the state is one of {of:?}, this instance is {own:?}"
             )));
         }
         self.core = snapshot.core.clone();

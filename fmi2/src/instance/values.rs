@@ -4,7 +4,7 @@ use std::ffi::CString;
 
 use super::{Core, Instance};
 use crate::call_order::State;
-use crate::description::{Causality, Variability};
+use crate::description::{Causality, Initial, Variability};
 use crate::interface::{Interface, Slot};
 use crate::model::{Failure, Model};
 
@@ -21,7 +21,7 @@ fn slot<'a, M, T>(
 
 impl<M> Interface<M> {
     /// The Real with value reference `reference`; `None` for time.
-    fn real(&self, reference: u32) -> Result<Option<&Slot<M, f64>>, Failure> {
+    pub(super) fn real(&self, reference: u32) -> Result<Option<&Slot<M, f64>>, Failure> {
         match reference.checked_sub(1) {
             None => Ok(None),
             Some(position) => self.reals.get(position as usize).map(Some).ok_or_else(|| {
@@ -40,15 +40,27 @@ impl<M> Interface<M> {
     }
 }
 
-/// Whether the variable may be set now (section 4.2.4, conditions 1, 3 and 6; inputs also before
-/// initialization mode, as importers do).
+/// Whether the variable may be set now: conditions 1, 3 and 6 of section 4.2.4, 4 and 5 of 3.2.3;
+/// inputs also before initialization mode, as importers do.
 fn settable<M, T>(slot: &Slot<M, T>, state: State) -> Result<(), Failure> {
-    let allowed = match slot.causality {
-        Causality::Input => true,
-        Causality::Parameter => {
-            state != State::StepComplete || slot.variability == Variability::Tunable
+    let is_input = slot.causality == Causality::Input;
+    let is_constant = slot.variability == Variability::Constant;
+    let allowed = match state {
+        State::Instantiated => {
+            is_input
+                || !is_constant && matches!(slot.initial, Some(Initial::Exact | Initial::Approx))
         }
-        _ => false,
+        State::InitializationMode => {
+            is_input || !is_constant && slot.initial == Some(Initial::Exact)
+        }
+        State::ContinuousTimeMode => {
+            slot.is_state || is_input && slot.variability == Variability::Continuous
+        }
+        _ => {
+            is_input
+                || slot.causality == Causality::Parameter
+                    && slot.variability == Variability::Tunable
+        }
     };
     if allowed {
         return Ok(());
@@ -73,6 +85,20 @@ fn acceptable<M>(slot: &Slot<M, f64>, value: f64) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Whether the Integer or Enumeration can take `value`.
+fn acceptable_integer<M>(slot: &Slot<M, i32>, value: i32) -> Result<(), Failure> {
+    let (min, max) = slot.range;
+    let name = &slot.name;
+    if f64::from(value) < min || f64::from(value) > max {
+        return Err(Failure::Discard(format!("{name} = {value}, expected {min} to {max}")));
+    }
+    if !slot.items.is_empty() && !slot.items.contains(&value) {
+        let items = &slot.items;
+        return Err(Failure::Discard(format!("{name} = {value}, expected one of {items:?}")));
+    }
+    Ok(())
+}
+
 impl<M: Model> Core<M> {
     fn touched<T>(&mut self, slot: &Slot<M, T>) {
         self.stale = true;
@@ -86,10 +112,13 @@ impl<M: Model> Core<M> {
         references: &[u32],
         values: &[V],
         assign: impl Fn(&mut T, &V),
+        accept: impl Fn(&Slot<M, T>, &V) -> Result<(), Failure>,
         kind: &str,
     ) -> Result<(), Failure> {
-        for &reference in references {
-            settable(slot(slots, reference, kind)?, self.state)?;
+        for (&reference, value) in references.iter().zip(values) {
+            let slot = slot(slots, reference, kind)?;
+            settable(slot, self.state)?;
+            accept(slot, value)?;
         }
         for (&reference, value) in references.iter().zip(values) {
             let slot = slot(slots, reference, kind)?;
@@ -170,18 +199,20 @@ impl<M: Model> Instance<M> {
 
     /// `fmi2SetInteger`: all values or none.
     pub(crate) fn set_integer(&mut self, to: &[u32], values: &[i32]) -> Result<(), Failure> {
-        self.core.set(&self.interface.integers, to, values, i32::clone_from, "Integer")
+        let accept = |slot: &Slot<M, i32>, value: &i32| acceptable_integer(slot, *value);
+        self.core.set(&self.interface.integers, to, values, i32::clone_from, accept, "Integer")
     }
 
     /// `fmi2SetBoolean`: all values or none.
     pub(crate) fn set_boolean(&mut self, to: &[u32], values: &[i32]) -> Result<(), Failure> {
         let assign = |field: &mut bool, value: &i32| *field = *value != 0;
-        self.core.set(&self.interface.booleans, to, values, assign, "Boolean")
+        self.core.set(&self.interface.booleans, to, values, assign, |_, _| Ok(()), "Boolean")
     }
 
     /// `fmi2SetString`: all values or none.
     pub(crate) fn set_string(&mut self, to: &[u32], values: &[String]) -> Result<(), Failure> {
-        self.core.set(&self.interface.strings, to, values, String::clone_from, "String")
+        let accept = |_: &Slot<M, String>, _: &String| Ok(());
+        self.core.set(&self.interface.strings, to, values, String::clone_from, accept, "String")
     }
 
     /// `fmi2SetRealInputDerivatives`. Orders above those that the model uses have no effect.

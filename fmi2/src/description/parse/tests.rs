@@ -136,7 +136,8 @@ fn both_interfaces_are_read() {
         ..CoSimulation::default()
     };
     assert_eq!(description.co_simulation, Some(co_simulation));
-    assert_eq!(description.model_exchange.as_deref(), Some("crane_me"));
+    let model_exchange = description.model_exchange.as_ref().unwrap();
+    assert_eq!(model_exchange.model_identifier, "crane_me");
     assert_eq!(description.number_of_event_indicators, Some(3));
     assert!(description.structured_names);
 }

@@ -104,6 +104,7 @@ fn kind(element: &Element, types: &Types<'_>, count: usize) -> Result<Kind, Pars
                 derivative: derivative
                     .map(|text| element.index("derivative", text, count))
                     .transpose()?,
+                reinit: element.boolean("reinit")?.unwrap_or(false),
                 ..real_limits(element, &defaults)?
             })
         }

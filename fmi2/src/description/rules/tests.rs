@@ -41,7 +41,9 @@ fn identity_and_flags_are_checked() {
     only_problem("4.3.1", |own| {
         own.co_simulation.as_mut().unwrap().can_get_and_set_fmu_state = false;
     });
-    only_problem("3.3.1", |own| own.model_exchange = Some("a-b".into()));
+    only_problem("3.3.1", |own| {
+        own.model_exchange.as_mut().unwrap().model_identifier = "a-b".into();
+    });
     only_problem("2.2.1", |own| {
         (own.model_exchange, own.co_simulation) = (None, None);
     });
