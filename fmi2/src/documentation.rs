@@ -3,7 +3,8 @@
 use std::borrow::Cow;
 
 use crate::description::{
-    CoSimulation, DefaultExperiment, Kind, ModelDescription, ScalarVariable, SimpleType,
+    CoSimulation, DefaultExperiment, Kind, ModelDescription, ModelExchange, ScalarVariable,
+    SimpleType,
 };
 
 const STYLE: &str = "body { font: 16px/1.5 sans-serif; max-width: 72rem; margin: 2rem auto; \
@@ -29,7 +30,9 @@ th { background: #f2f2f2; } code { font-family: monospace; white-space: pre-wrap
 pub fn page(description: &ModelDescription, model_html: &str) -> String {
     let title = escaped(&description.model_name);
     let experiment = description.default_experiment.as_ref().map(experiment);
-    let capabilities = description.co_simulation.as_ref().map(capabilities);
+    let simulation = description.co_simulation.as_ref().map(co_simulation);
+    let exchange = description.model_exchange.as_ref();
+    let exchange = exchange.map(|own| model_exchange(own, description));
     let sections = [
         format!("<h1>{title}</h1>\n"),
         paragraph(description.description.as_deref()),
@@ -38,7 +41,8 @@ pub fn page(description: &ModelDescription, model_html: &str) -> String {
         section("Variables", &variables(description)),
         section("Log categories", &log_categories(description)),
         section("Default experiment", &experiment.unwrap_or_default()),
-        section("Co-simulation interface", &capabilities.unwrap_or_default()),
+        section("Co-simulation interface", &simulation.unwrap_or_default()),
+        section("Model-exchange interface", &exchange.unwrap_or_default()),
         section("Licence", &paragraph(description.license.as_deref())),
     ];
     format!(
@@ -194,10 +198,18 @@ fn experiment(own: &DefaultExperiment) -> String {
     table(&[], &rows)
 }
 
-fn capabilities(own: &CoSimulation) -> String {
+fn flag(value: bool) -> &'static str {
+    if value { "yes" } else { "no" }
+}
+
+fn attributes(rows: &[(&str, &str)]) -> String {
+    let row = |(name, value): &(&str, &str)| vec![code(name), escaped(value).into_owned()];
+    table(&[], &rows.iter().map(row).collect::<Vec<_>>())
+}
+
+fn co_simulation(own: &CoSimulation) -> String {
     let order = own.max_output_derivative_order.to_string();
-    let flag = |value: bool| if value { "yes" } else { "no" };
-    let rows: Vec<Vec<String>> = [
+    attributes(&[
         ("modelIdentifier", own.model_identifier.as_str()),
         ("needsExecutionTool", flag(own.needs_execution_tool)),
         (
@@ -215,11 +227,27 @@ fn capabilities(own: &CoSimulation) -> String {
         ("canGetAndSetFMUstate", flag(own.can_get_and_set_fmu_state)),
         ("canSerializeFMUstate", flag(own.can_serialize_fmu_state)),
         ("providesDirectionalDerivative", flag(own.provides_directional_derivative)),
-    ]
-    .iter()
-    .map(|(name, value)| vec![code(name), escaped(value).into_owned()])
-    .collect();
-    table(&[], &rows)
+    ])
+}
+
+fn model_exchange(own: &ModelExchange, description: &ModelDescription) -> String {
+    let states = description.structure.derivatives.len().to_string();
+    let indicators = description.number_of_event_indicators.unwrap_or_default().to_string();
+    attributes(&[
+        ("modelIdentifier", own.model_identifier.as_str()),
+        ("continuous states", &states),
+        ("numberOfEventIndicators", &indicators),
+        ("needsExecutionTool", flag(own.needs_execution_tool)),
+        ("completedIntegratorStepNotNeeded", flag(own.completed_integrator_step_not_needed)),
+        (
+            "canBeInstantiatedOnlyOncePerProcess",
+            flag(own.can_be_instantiated_only_once_per_process),
+        ),
+        ("canNotUseMemoryManagementFunctions", flag(own.can_not_use_memory_management_functions)),
+        ("canGetAndSetFMUstate", flag(own.can_get_and_set_fmu_state)),
+        ("canSerializeFMUstate", flag(own.can_serialize_fmu_state)),
+        ("providesDirectionalDerivative", flag(own.provides_directional_derivative)),
+    ])
 }
 
 #[cfg(test)]
@@ -279,6 +307,8 @@ mod tests {
             "-1 (off)",
             "\"two\nlines <&> \"'\r\t\"",
             "canInterpolateInputs",
+            "completedIntegratorStepNotNeeded",
+            "sample_me",
             "yes",
             "logStatusError",
             "1e-9",

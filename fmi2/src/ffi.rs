@@ -193,7 +193,11 @@ pub unsafe fn instantiate<M: Model>(
         let interface_type = match fmu_type {
             abi::MODEL_EXCHANGE => InterfaceType::ModelExchange,
             abi::CO_SIMULATION => InterfaceType::CoSimulation,
-            _ => return Err(Failure::Error(format!("fmuType is {fmu_type}, expected 0 or 1"))),
+            other => {
+                return Err(Failure::Error(format!(
+                    "fmuType is {other}, expected fmi2ModelExchange (0) or fmi2CoSimulation (1)"
+                )));
+            }
         };
         // SAFETY: strings as the standard demands them.
         let (guid, folder) = unsafe { (text(guid, "fmuGUID")?, resources(resource_location)?) };
