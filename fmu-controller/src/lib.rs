@@ -3,8 +3,11 @@
 #![forbid(unsafe_code)]
 
 mod controller;
+mod dependencies;
 mod design;
+mod equations;
 mod matrix;
+mod names;
 mod observer;
 mod variables;
 

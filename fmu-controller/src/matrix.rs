@@ -18,7 +18,18 @@ impl Matrix {
         format!("{name}[{},{}]", k / self.columns + 1, k % self.columns + 1)
     }
 
-    /// The matrix for calculation.
+    /// The element in `row` and `column`, both from 0.
+    pub(crate) fn entry(&self, row: usize, column: usize) -> f64 {
+        self.values[row * self.columns + column]
+    }
+
+    /// Row `row` times `vector`.
+    pub(crate) fn row_times(&self, row: usize, vector: &[f64]) -> f64 {
+        let row = &self.values[row * self.columns..][..self.columns];
+        row.iter().zip(vector).map(|(element, value)| element * value).sum()
+    }
+
+    /// The matrix for linear algebra.
     pub(crate) fn dense(&self) -> DMatrix<f64> {
         DMatrix::from_row_slice(self.rows, self.columns, &self.values)
     }

@@ -1,10 +1,14 @@
 //! The variables of the controller: they follow from the dimensions and names of the design.
 
 use fmi2::Variable;
+use fmi2::description::DependencyKind;
+use fmi2::unit::Unit;
 
 use crate::controller::AsoController;
 use crate::design::{Design, Signal};
 use crate::matrix::Matrix;
+use crate::names::channel;
+use crate::{dependencies, names};
 
 /// Reaches one matrix of the design.
 type Place = fn(&mut Design) -> &mut Matrix;
@@ -25,9 +29,10 @@ const MATRICES: [(&str, &str, Place); 8] = [
 pub(crate) fn of(controller: &AsoController) -> Vec<Variable<AsoController>> {
     let design = &controller.design;
     let mut all = inputs(design);
-    all.extend(commands(controller));
+    all.extend(commands(design));
     all.extend(estimates(design));
-    all.extend(switches(controller));
+    all.extend(slopes(design));
+    all.extend(switches(design));
     for (name, meaning, place) in MATRICES {
         let matrix = place(&mut design.clone()).clone();
         all.extend((0..matrix.values.len()).map(|k| {
@@ -40,21 +45,26 @@ pub(crate) fn of(controller: &AsoController) -> Vec<Variable<AsoController>> {
     all
 }
 
-/// `name` for the only channel, `name[k]` for channel k of several.
-fn channel(name: &str, position: usize, count: usize) -> String {
-    if count == 1 { name.to_owned() } else { format!("{name}[{}]", position + 1) }
-}
-
-/// Name of the lower (0) or upper (1) limit of actuator `position`.
-pub(crate) fn limit_name(controller: &AsoController, side: usize, position: usize) -> String {
-    channel(["u_min", "u_max"][side], position, controller.design.actuators.len())
-}
-
 fn with_unit(variable: Variable<AsoController>, unit: Option<&String>) -> Variable<AsoController> {
     match unit {
         Some(unit) => variable.unit(unit.clone()),
         None => variable,
     }
+}
+
+/// The unit per second, where it can be written: `m` gives `m/s`, `m/s` gives `m/s2`.
+fn per_second(unit: Option<&String>) -> Option<String> {
+    let unit = unit?;
+    let slope = if unit.ends_with("/s") { format!("{unit}2") } else { format!("{unit}/s") };
+    Unit::parse(&slope).is_ok().then_some(slope)
+}
+
+/// States what the variable depends on.
+fn depending<const GROUPS: usize>(
+    variable: Variable<AsoController>,
+    groups: [(DependencyKind, Vec<String>); GROUPS],
+) -> Variable<AsoController> {
+    groups.into_iter().fold(variable, |variable, (kind, names)| variable.depends(kind, names))
 }
 
 /// What a signal is: its description, or its name where it has none.
@@ -85,8 +95,7 @@ fn inputs(design: &Design) -> Vec<Variable<AsoController>> {
     inputs
 }
 
-fn commands(controller: &AsoController) -> Vec<Variable<AsoController>> {
-    let design = &controller.design;
+fn commands(design: &Design) -> Vec<Variable<AsoController>> {
     let actuators = &design.actuators;
     actuators
         .iter()
@@ -99,28 +108,13 @@ fn commands(controller: &AsoController) -> Vec<Variable<AsoController>> {
             };
             let variable =
                 Variable::real(name, text, move |model: &mut AsoController| &mut model.u[j]);
-            with_unit(variable, actuator.unit.as_ref())
+            let variable = with_unit(variable, actuator.unit.as_ref())
                 .output(&[])
-                .initially(on_which_commands_depend(controller, j))
-                .derivative(move |model| &mut model.u_slopes[j])
+                .initially(dependencies::of_initial_command(design, j))
+                .derivative(move |model| &mut model.u_slopes[j]);
+            depending(variable, dependencies::of_command(design, j))
         })
         .collect()
-}
-
-/// What decides the initial value of command `j`.
-fn on_which_commands_depend(controller: &AsoController, j: usize) -> Vec<String> {
-    let design = &controller.design;
-    let mut names = vec!["time".to_owned(), "compensate".to_owned(), "t_on".to_owned()];
-    let starts = |name, count| (0..count).map(move |k| channel(name, k, count));
-    names.extend(starts("x_hat_0", design.states.len()));
-    names.extend(starts("f_hat_0", design.faults.len()));
-    for (name, gain) in [("K_x", &design.k_x), ("K_f", &design.k_f)] {
-        names.extend((0..gain.columns).map(|k| gain.element(name, j * gain.columns + k)));
-    }
-    if design.actuators[j].limits.is_some() {
-        names.extend([0, 1].map(|side| limit_name(controller, side, j)));
-    }
-    names
 }
 
 fn estimates(design: &Design) -> Vec<Variable<AsoController>> {
@@ -147,9 +141,34 @@ fn estimates(design: &Design) -> Vec<Variable<AsoController>> {
         .collect()
 }
 
+/// The derivatives of the estimates, which are the continuous states.
+fn slopes(design: &Design) -> Vec<Variable<AsoController>> {
+    let order = design.states.len();
+    let signals = design.states.iter().chain(&design.faults);
+    names::estimates(design)
+        .zip(signals)
+        .enumerate()
+        .map(|(k, (state, signal))| {
+            let text = format!("Derivative of the estimate of {}", meaning(signal));
+            let variable =
+                Variable::real(format!("der({state})"), text, move |model: &mut AsoController| {
+                    &mut model.estimate_slopes[k]
+                });
+            let variable =
+                with_unit(variable, per_second(signal.unit.as_ref()).as_ref()).derivative_of(state);
+            if k < order {
+                depending(variable, dependencies::of_state_slope(design))
+                    .initially(dependencies::of_initial_state_slope(design, k))
+            } else {
+                depending(variable, dependencies::of_fault_slope(design))
+                    .initially(dependencies::of_initial_fault_slope(design, k - order))
+            }
+        })
+        .collect()
+}
+
 /// Activation, initial estimates and, where the design states them, the limits.
-fn switches(controller: &AsoController) -> Vec<Variable<AsoController>> {
-    let design = &controller.design;
+fn switches(design: &Design) -> Vec<Variable<AsoController>> {
     let (order, faults) = (design.states.len(), design.faults.len());
     let text = "Compensation starts at this time";
     let mut all = vec![
@@ -177,18 +196,18 @@ fn switches(controller: &AsoController) -> Vec<Variable<AsoController>> {
             Variable::real(name, text, move |model: &mut AsoController| &mut model.f_hat_0[k]);
         all.push(with_unit(variable, signal.unit.as_ref()).parameter());
     }
-    all.extend(limits(controller));
+    all.extend(limits(design));
     all
 }
 
-fn limits(controller: &AsoController) -> Vec<Variable<AsoController>> {
+fn limits(design: &Design) -> Vec<Variable<AsoController>> {
     let mut all = Vec::new();
     for (side, text) in ["Smallest command", "Largest command"].into_iter().enumerate() {
-        for (j, actuator) in controller.design.actuators.iter().enumerate() {
+        for (j, actuator) in design.actuators.iter().enumerate() {
             if actuator.limits.is_none() {
                 continue;
             }
-            let name = limit_name(controller, side, j);
+            let name = names::limit(design, side, j);
             let variable = Variable::real(name, text, move |model: &mut AsoController| {
                 &mut model.design.actuators[j].limits.get_or_insert([0.0; 2])[side]
             });
@@ -196,4 +215,34 @@ fn limits(controller: &AsoController) -> Vec<Variable<AsoController>> {
         }
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_derivative_has_the_unit_of_its_state_per_second() {
+        for (unit, wanted) in [
+            ("m", "m/s"),
+            ("rad/s", "rad/s2"),
+            ("N", "N/s"),
+            ("J/(kg.K)", "J/(kg.K)/s"),
+            ("km/h", "km/h/s"),
+            ("s-1", "s-1/s"),
+            ("%", "%/s"),
+        ] {
+            let slope = per_second(Some(&unit.to_owned())).unwrap();
+            assert_eq!(slope, wanted);
+            let [of, per] = [unit, &slope].map(|unit| Unit::parse(unit).unwrap().base.unwrap());
+            assert_eq!(fmi2::unit::BaseUnit { s: of.s - 1, ..of }, per);
+        }
+    }
+
+    #[test]
+    fn a_derivative_has_no_unit_where_none_can_be_written() {
+        for unit in [None, Some(String::new()), Some("degC".to_owned())] {
+            assert_eq!(per_second(unit.as_ref()), None);
+        }
+    }
 }

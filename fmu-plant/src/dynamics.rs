@@ -1,9 +1,10 @@
 //! The rigid body of equation (20) and the force on the cart.
 
+use crate::number::Number;
 use crate::parameters::Parameters;
 
 /// `[x_p, theta, v_p, omega]` in m, rad, m/s, rad/s; also its derivative.
-pub type State = [f64; 4];
+pub type State<D = f64> = [D; 4];
 
 /// The force on the cart without friction, `u + f_a`, as a polynomial of time:
 /// `value + slope (t - start) + curvature (t - start)² / 2`.
@@ -69,34 +70,34 @@ impl Force {
 /// `(M + m) J - (m l cos theta)²` is positive for checked parameters.
 /// Source: Patton and Klinkhieo (2009), equation (20).
 #[derive(Clone, Debug, PartialEq)]
-pub struct RigidBody {
-    total_mass: f64,
-    coupling: f64,
-    inertia: f64,
-    inverse_inertia: f64,
-    weight: f64,
-    cart_damping: f64,
-    pendulum_damping: f64,
+pub struct RigidBody<D = f64> {
+    total_mass: D,
+    coupling: D,
+    inertia: D,
+    inverse_inertia: D,
+    weight: D,
+    cart_damping: D,
+    pendulum_damping: D,
     linearised: bool,
 }
 
 /// Sine, cosine and centrifugal term of a position, each as the body sees it.
-struct Position {
-    sine: f64,
-    cosine: f64,
-    centrifugal: f64,
+struct Position<D> {
+    sine: D,
+    cosine: D,
+    centrifugal: D,
 }
 
-impl RigidBody {
+impl<D: Number> RigidBody<D> {
     /// The body of checked parameters.
     #[must_use]
-    pub fn new(parameters: &Parameters) -> Self {
+    pub fn new(parameters: &Parameters<D>) -> Self {
         let coupling = parameters.pendulum_mass * parameters.length;
         Self {
             total_mass: parameters.cart_mass + parameters.pendulum_mass,
             coupling,
             inertia: parameters.inertia,
-            inverse_inertia: 1.0 / parameters.inertia,
+            inverse_inertia: parameters.inertia.recip(),
             weight: coupling * parameters.gravity,
             cart_damping: parameters.cart_damping,
             pendulum_damping: parameters.pendulum_damping,
@@ -105,9 +106,9 @@ impl RigidBody {
     }
 
     #[inline]
-    fn position(&self, angle: f64, rate: f64) -> Position {
+    fn position(&self, angle: D, rate: D) -> Position<D> {
         if self.linearised {
-            return Position { sine: angle, cosine: 1.0, centrifugal: 0.0 };
+            return Position { sine: angle, cosine: D::one(), centrifugal: D::zero() };
         }
         let (sine, cosine) = angle.sin_cos();
         Position { sine, cosine, centrifugal: rate * rate * sine }
@@ -117,13 +118,13 @@ impl RigidBody {
     /// in N.
     #[must_use]
     #[inline]
-    pub fn slide(&self, state: &State, net_force: f64) -> State {
+    pub fn slide(&self, state: &State<D>, net_force: D) -> State<D> {
         let [_, angle, velocity, rate] = *state;
         let at = self.position(angle, rate);
         let push = net_force - self.cart_damping * velocity + self.coupling * at.centrifugal;
         let torque = self.weight * at.sine - self.pendulum_damping * rate;
         let lever = self.coupling * at.cosine;
-        let inverse = 1.0 / (self.total_mass * self.inertia - lever * lever);
+        let inverse = (self.total_mass * self.inertia - lever * lever).recip();
         let acceleration = (self.inertia * push - lever * torque) * inverse;
         let turn = (self.total_mass * torque - lever * push) * inverse;
         [velocity, rate, acceleration, turn]
@@ -132,11 +133,11 @@ impl RigidBody {
     /// Derivative of the state of a cart held at rest: `J theta'' = m l g sin theta - F_theta theta'`.
     #[must_use]
     #[inline]
-    pub fn stick(&self, state: &State) -> State {
+    pub fn stick(&self, state: &State<D>) -> State<D> {
         let [_, angle, _, rate] = *state;
         let sine = if self.linearised { angle } else { angle.sin() };
         let torque = self.weight * sine - self.pendulum_damping * rate;
-        [0.0, rate, 0.0, torque * self.inverse_inertia]
+        [D::zero(), rate, D::zero(), torque * self.inverse_inertia]
     }
 
     /// The friction in N that keeps a cart at rest: (20) with `x_p' = x_p'' = 0`, solved for `f`,
@@ -144,13 +145,15 @@ impl RigidBody {
     /// `f = u + m l theta'² sin theta - (m l / J) cos theta (m l g sin theta - F_theta theta')`.
     #[must_use]
     #[inline]
-    pub fn balancing_force(&self, state: &State, force: f64) -> f64 {
+    pub fn balancing_force(&self, state: &State<D>, force: D) -> D {
         let [_, angle, _, rate] = *state;
         let at = self.position(angle, rate);
         let torque = self.weight * at.sine - self.pendulum_damping * rate;
         force + self.coupling * (at.centrifugal - at.cosine * torque * self.inverse_inertia)
     }
+}
 
+impl RigidBody {
     /// Time derivative in N/s of the balancing force while the cart is held and the force changes
     /// at `force_rate` in N/s.
     #[must_use]

@@ -1,5 +1,6 @@
 //! Set-valued Stribeck friction between cart and rail, without regularisation.
 
+use crate::number::Number;
 use crate::parameters::Parameters;
 use serde::{Deserialize, Serialize};
 
@@ -38,43 +39,71 @@ impl Regime {
 ///
 /// Source: Patton and Klinkhieo (2009), equation (21); the exponent and the velocity are repaired.
 #[derive(Clone, Debug, PartialEq)]
-pub struct StribeckLaw {
-    coulomb: f64,
-    excess: f64,
-    inverse_velocity: f64,
-    exponent: f64,
-    quadratic: bool,
+pub struct StribeckLaw<D = f64> {
+    coulomb: D,
+    excess: D,
+    inverse_velocity: D,
+    exponent: D,
 }
 
-impl StribeckLaw {
+impl<D: Number> StribeckLaw<D> {
     /// The law of checked parameters.
     #[must_use]
-    pub fn new(parameters: &Parameters) -> Self {
+    pub fn new(parameters: &Parameters<D>) -> Self {
         Self {
             coulomb: parameters.coulomb,
             excess: parameters.static_friction - parameters.coulomb,
-            inverse_velocity: 1.0 / parameters.stribeck_velocity,
+            inverse_velocity: parameters.stribeck_velocity.recip(),
             exponent: parameters.stribeck_exponent,
-            quadratic: (parameters.stribeck_exponent - 2.0).abs() < f64::EPSILON,
         }
     }
 
-    /// `g(v)` in N for a velocity in m/s of either sign.
+    /// `g(v)` in N for a velocity in m/s of either sign; at zero its derivative is the one from
+    /// the right.
     #[must_use]
-    pub fn magnitude(&self, velocity: f64) -> f64 {
-        let ratio = velocity.abs() * self.inverse_velocity;
-        let power = if self.quadratic { ratio * ratio } else { ratio.powf(self.exponent) };
+    #[inline]
+    pub fn magnitude(&self, velocity: D) -> D {
+        let power = (velocity.absolute() * self.inverse_velocity).power(self.exponent);
         self.coulomb + self.excess * (-power).exp()
+    }
+
+    /// The friction in N of a cart that slides in the given direction at this velocity in m/s.
+    #[must_use]
+    #[inline]
+    pub fn sliding(&self, direction: Regime, velocity: D) -> D {
+        let (speed, sign) = match direction {
+            Regime::Backward => (-velocity, -1.0),
+            _ => (velocity, 1.0),
+        };
+        self.magnitude(speed) * sign
+    }
+
+    /// The friction in N of a cart at rest: the balancing force, at most `F_s` to either side.
+    ///
+    /// Where the balancing force is `F_s` or less, its derivative is that of the balancing force,
+    /// beyond that of `F_s`.
+    #[must_use]
+    pub fn holding(&self, balancing: D) -> D {
+        let limit = self.limit();
+        if balancing > limit {
+            limit
+        } else if balancing >= -limit {
+            balancing
+        } else {
+            -limit
+        }
     }
 
     /// The largest friction at rest in N: `F_s`, rounded exactly as `magnitude(0.0)` is.
     ///
     /// The two being the same number, a cart that breaks away never starts backward by rounding.
     #[must_use]
-    pub fn limit(&self) -> f64 {
+    pub fn limit(&self) -> D {
         self.coulomb + self.excess
     }
+}
 
+impl StribeckLaw {
     /// The velocity in m/s over which the friction falls: `v_s`, infinite where `F_s = F_c`.
     #[must_use]
     pub fn width(&self) -> f64 {

@@ -6,9 +6,11 @@ mod dormand_prince;
 pub mod dynamics;
 pub mod friction;
 pub mod motion;
+pub mod number;
 pub mod parameters;
 mod pendulum;
 mod plant;
+pub mod response;
 
 use pendulum::FrictionPendulum;
 

@@ -6,16 +6,18 @@
 //! sign change, and the step is repeated with the length that ends at the event.
 
 use crate::crossing::locate;
-use crate::dynamics::{Force, RigidBody, State};
-use crate::friction::{Regime, StribeckLaw};
+use crate::dynamics::{Force, State};
+use crate::friction::Regime;
 use crate::parameters::{Parameters, Refusal, require};
 use crate::plant::{Crossing, NotFinite, Plant};
+use crate::response::Response;
 use piece::Piece;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 pub use tolerance::Tolerance;
 
+pub(crate) mod exchange;
 mod piece;
 mod tolerance;
 
@@ -95,6 +97,13 @@ pub struct Motion {
     suggested_step: f64,
 }
 
+impl Default for Motion {
+    /// At rest at the origin.
+    fn default() -> Self {
+        Self { state: [0.0; 4], regime: Regime::Stick, suggested_step: FIRST_STEP }
+    }
+}
+
 impl Motion {
     /// The motion from an initial state `[x_p, theta, v_p, omega]` under the force at that time.
     ///
@@ -107,7 +116,7 @@ impl Motion {
         for (name, value) in names.into_iter().zip(initial) {
             require(name, value, true, "finite")?;
         }
-        let mut motion = Self { state: initial, regime: Regime::Stick, suggested_step: FIRST_STEP };
+        let mut motion = Self { state: initial, ..Self::default() };
         motion.regime = Plant::new(parameters, Force::constant(force)).regime(0.0, &initial);
         Ok(motion)
     }
@@ -118,26 +127,21 @@ impl Motion {
         &self.state
     }
 
+    /// The same place, for an importer that integrates the state itself.
+    pub fn state_mut(&mut self) -> &mut State {
+        &mut self.state
+    }
+
     /// What the cart does.
     #[must_use]
     pub fn regime(&self) -> Regime {
         self.regime
     }
 
-    /// The friction in N, given the force `u + f_a` in N at this time: `g(v) sign(v)` of a
-    /// sliding cart, the balancing force of a held one.
-    ///
-    /// A force that has just jumped can exceed what holds the cart; the friction is then the
-    /// largest possible one, `F_s`.
+    /// Friction and derivative of the state under the force `u + f_a` in N at this time.
     #[must_use]
-    pub fn friction_force(&self, parameters: &Parameters, force: f64) -> f64 {
-        let law = StribeckLaw::new(parameters);
-        if self.regime == Regime::Stick {
-            let balancing = RigidBody::new(parameters).balancing_force(&self.state, force);
-            balancing.max(-law.limit()).min(law.limit())
-        } else {
-            self.regime.sign() * law.magnitude(self.state[2])
-        }
+    pub fn response(&self, parameters: &Parameters, force: f64) -> Response {
+        Response::new(parameters, self.regime, &self.state, force)
     }
 
     /// Follows the motion from the time `start` for `duration`, both in s, under the force given

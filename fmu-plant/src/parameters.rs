@@ -1,36 +1,37 @@
 //! The parameters of the friction pendulum and the rules they must obey.
 
+use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// All parameters of the plant, in SI units.
+/// All parameters of the plant, in SI units, as numbers `D`.
 ///
 /// The defaults are the parameters that reproduce the printed `A` and `B` of R. J. Patton and
 /// S. Klinkhieo, "An Adaptive Approach to Active Fault-Tolerant Control" (2009), section 4.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Parameters {
+pub struct Parameters<D = f64> {
     /// Mass of the cart, `M` in kg.
-    pub cart_mass: f64,
+    pub cart_mass: D,
     /// Mass of the pendulum, `m` in kg.
-    pub pendulum_mass: f64,
+    pub pendulum_mass: D,
     /// Moment of inertia of the pendulum about its pivot, `J` in kg m².
-    pub inertia: f64,
+    pub inertia: D,
     /// Distance from the pivot to the centre of mass of the pendulum, `l` in m.
-    pub length: f64,
+    pub length: D,
     /// Viscous damping of the cart, `F_x` in kg/s.
-    pub cart_damping: f64,
+    pub cart_damping: D,
     /// Viscous damping of the pivot, `F_theta` in kg m²/s.
-    pub pendulum_damping: f64,
+    pub pendulum_damping: D,
     /// Gravity, `g` in m/s²; a negative value makes `theta = 0` the hanging position.
-    pub gravity: f64,
+    pub gravity: D,
     /// Coulomb friction of the cart, `F_c` in N.
-    pub coulomb: f64,
+    pub coulomb: D,
     /// Static friction of the cart, `F_s` in N.
-    pub static_friction: f64,
+    pub static_friction: D,
     /// Stribeck velocity, `v_s` in m/s.
-    pub stribeck_velocity: f64,
+    pub stribeck_velocity: D,
     /// Exponent of the Stribeck law, `delta`.
-    pub stribeck_exponent: f64,
+    pub stribeck_exponent: D,
     /// True: the rigid body is linearised about the upright position; the friction is the same.
     pub linearised: bool,
 }
@@ -92,6 +93,25 @@ impl Parameters {
         require("F_s", p.static_friction, falling, "finite and >= F_c")?;
         require("v_s", p.stribeck_velocity, p.stribeck_velocity > 0.0, positive)?;
         require("delta", p.stribeck_exponent, p.stribeck_exponent > 0.0, positive)
+    }
+
+    /// The same parameters, each with its component of a direction.
+    pub(crate) fn along(&self, direction: &Self) -> Parameters<Dual64> {
+        let dual = |part: fn(&Self) -> f64| Dual64::new(part(self), part(direction));
+        Parameters {
+            cart_mass: dual(|p| p.cart_mass),
+            pendulum_mass: dual(|p| p.pendulum_mass),
+            inertia: dual(|p| p.inertia),
+            length: dual(|p| p.length),
+            cart_damping: dual(|p| p.cart_damping),
+            pendulum_damping: dual(|p| p.pendulum_damping),
+            gravity: dual(|p| p.gravity),
+            coulomb: dual(|p| p.coulomb),
+            static_friction: dual(|p| p.static_friction),
+            stribeck_velocity: dual(|p| p.stribeck_velocity),
+            stribeck_exponent: dual(|p| p.stribeck_exponent),
+            linearised: self.linearised,
+        }
     }
 }
 

@@ -32,8 +32,7 @@ impl Plant {
         if regime == Regime::Stick {
             return self.body.stick(state);
         }
-        let friction = regime.sign() * self.law.magnitude(state[2]);
-        self.body.slide(state, self.force.at(elapsed) - friction)
+        self.body.slide(state, self.force.at(elapsed) - self.law.sliding(regime, state[2]))
     }
 
     /// The change of velocity in m/s within which the friction is surely seen to change.

@@ -1,4 +1,4 @@
-"""The C interface of FMI 2.0 co-simulation by ctypes: an importer that may also make mistakes."""
+"""The C interface of FMI 2.0 by ctypes: an importer that may also make mistakes."""
 
 import ctypes
 from ctypes import CFUNCTYPE, POINTER, byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
@@ -24,6 +24,19 @@ class Callbacks(ctypes.Structure):
         ("free_memory", c_void_p),
         ("step_finished", c_void_p),
         ("environment", c_void_p),
+    ]
+
+
+class EventInfo(ctypes.Structure):
+    """`fmi2EventInfo`."""
+
+    _fields_ = [
+        ("new_discrete_states_needed", c_int),
+        ("terminate_simulation", c_int),
+        ("nominals_of_continuous_states_changed", c_int),
+        ("values_of_continuous_states_changed", c_int),
+        ("next_event_time_defined", c_int),
+        ("next_event_time", c_double),
     ]
 
 
@@ -62,7 +75,18 @@ FUNCTIONS = {
     "GetIntegerStatus": [c_int, INTEGERS],
     "GetBooleanStatus": [c_int, INTEGERS],
     "GetStringStatus": [c_int, STRINGS],
+    "EnterEventMode": [],
+    "NewDiscreteStates": [POINTER(EventInfo)],
+    "EnterContinuousTimeMode": [],
+    "CompletedIntegratorStep": [c_int, INTEGERS, INTEGERS],
+    "SetTime": [c_double],
+    "SetContinuousStates": [REALS, c_size_t],
+    "GetEventIndicators": [REALS, c_size_t],
+    "GetContinuousStates": [REALS, c_size_t],
+    "GetDerivatives": [REALS, c_size_t],
+    "GetNominalsOfContinuousStates": [REALS, c_size_t],
 }
+MODEL_EXCHANGE, CO_SIMULATION = 0, 1
 INSTANTIATE = [c_char_p, c_int, c_char_p, c_char_p, POINTER(Callbacks), c_int, c_int]
 WITHOUT_INSTANCE = ["fmi2GetTypesPlatform", "fmi2GetVersion", "fmi2Instantiate"]
 STANDARD_FUNCTIONS = {*WITHOUT_INSTANCE, *(f"fmi2{name}" for name in FUNCTIONS)}
@@ -108,6 +132,8 @@ class Fmu:
         self.folder = Path(folder)
         self.description = read_model_description(str(folder))
         self.variables = {v.name: v for v in self.description.modelVariables}
+        self.states = len(self.description.derivatives)
+        self.indicators = self.description.numberOfEventIndicators
         self.identifier = self.description.coSimulation.modelIdentifier
         self.path = self.folder / "binaries" / "linux64" / f"{self.identifier}.so"
         self.library = library or load(self.path)
@@ -137,8 +163,8 @@ class Message(NamedTuple):
 class Instance:
     """One instance; every call by the name of the C function, checked only where said so."""
 
-    def __init__(self, fmu, name=b"one", guid=None, resources=None, kind=1, log=True):
-        self.fmu, self.messages = fmu, []
+    def __init__(self, fmu, name=b"one", guid=None, resources=None, kind=CO_SIMULATION, log=True):
+        self.fmu, self.kind, self.messages = fmu, kind, []
         self.logger = LOGGER(self.receive) if log else LOGGER()
         self.callbacks = Callbacks(self.logger, None, None, None, 0x5EED)
         guid = fmu.description.guid.encode() if guid is None else guid
@@ -217,6 +243,15 @@ class Instance:
         """Goes through initialization."""
         self.enter(values, **experiment)
         self.must("ExitInitializationMode")
+        return self
+
+    def start_exchange(self, values=None, **experiment):
+        """Goes through initialization and the first event to continuous-time mode."""
+        self.start(values, **experiment)
+        info = EventInfo(new_discrete_states_needed=1)
+        while info.new_discrete_states_needed:
+            self.must("NewDiscreteStates", byref(info))
+        self.must("EnterContinuousTimeMode")
         return self
 
     def set_slopes(self, order=1, **slopes):

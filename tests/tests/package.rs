@@ -2,7 +2,9 @@
 #![forbid(unsafe_code)]
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+use std::collections::BTreeSet;
 use std::fs;
+use std::process::Command;
 
 use fmi2::description::{Causality, ModelDescription};
 use fmi2::package::Unpacked;
@@ -113,6 +115,43 @@ fn an_fmu_holds_library_resources_documentation_licences_and_picture() {
         assert!(fs::read(folder.join("model.png")).unwrap().starts_with(b"\x89PNG"));
         if let Some(resource) = resource {
             assert!(fmu.resources().join(resource).is_file());
+        }
+    }
+}
+
+#[test]
+fn the_licences_of_exactly_what_is_linked_are_in_the_fmu() {
+    for (member, model) in [("fmu-plant", "FrictionPendulum"), ("fmu-controller", "AsoController")]
+    {
+        let tree = ["tree", "--locked", "--package", member, "--edges", "normal,no-proc-macro"];
+        let output = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+            .current_dir(root())
+            .args(tree)
+            .args(["--prefix", "none", "--format", "{p}"])
+            .output()
+            .unwrap();
+        let named = |line: &str| {
+            let mut words = line.split([' ', ':']);
+            let name = words.next().unwrap_or_default().to_owned();
+            let version = words.next().unwrap_or_default().trim_start_matches('v').to_owned();
+            (name, version)
+        };
+        let linked = String::from_utf8(output.stdout).unwrap();
+        let linked: BTreeSet<_> =
+            linked.lines().map(named).filter(|(name, _)| name != member).collect();
+        let fmu = unpacked(model);
+        let licenses = fmu.folder().join("documentation/licenses");
+        let entry = fs::read_to_string(licenses.join("license.txt")).unwrap();
+        let (_, list) = entry.split_once("The library contains the packages below.").unwrap();
+        let (_, list) = list.split_once("\n\n").unwrap();
+        let listed: Vec<_> = list.lines().map(named).collect();
+        let (standard_library, packages) = listed.split_last().unwrap();
+        assert_eq!(standard_library.0, "rust");
+        assert!(packages.is_sorted());
+        assert_eq!(packages.iter().cloned().collect::<BTreeSet<_>>(), linked, "{model}");
+        for (name, version) in packages {
+            let texts = fs::read_dir(licenses.join(format!("{name}-{version}")));
+            assert!(texts.is_ok_and(|mut texts| texts.next().is_some()), "{model}: {name}");
         }
     }
 }

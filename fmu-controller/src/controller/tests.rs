@@ -4,6 +4,11 @@ use std::path::PathBuf;
 
 use super::*;
 
+mod dependencies;
+mod derivatives;
+mod exchange;
+mod sized;
+
 /// The folder with the shipped design.
 fn shipped() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("resources")
@@ -101,6 +106,19 @@ fn a_saturated_command_is_the_one_that_the_observer_uses() {
     }
     let free = small_reference(1.0, [f64::NEG_INFINITY, f64::INFINITY]);
     assert!((free[1] - reference[1]).abs() > 1e-2, "the limits are reached in this test");
+}
+
+#[test]
+fn limits_in_the_wrong_order_stop_the_next_step_and_no_reading_before() {
+    let mut controller = ready(with_design(&small("limits = [-1.5, 0.3]")).unwrap());
+    controller.design.actuators[0].limits = Some([0.9, 0.8]);
+    controller.update(0.0).unwrap();
+    let message = controller.check().unwrap_err().to_string();
+    assert!(message.contains("u_min = 0.9") && message.contains("u_max = 0.8"), "{message}");
+    controller.design.actuators[0].limits = Some([0.1, 0.8]);
+    controller.check().unwrap();
+    controller.update(0.0).unwrap();
+    assert!((controller.u[0] - 0.1).abs() < 1e-15);
 }
 
 #[test]

@@ -107,7 +107,7 @@ fn friction_opposes_the_motion_with_the_magnitude_of_the_law() {
     let p = Parameters::default();
     for velocity in [1.0, 0.05, -0.05, -1.0_f64] {
         let motion = start(&p, [0.0, 0.2, velocity, 0.0], &Force::constant(0.0));
-        let friction = motion.friction_force(&p, 0.0);
+        let friction = motion.response(&p, 0.0).friction;
         let magnitude = 25.0 + 5.0 * (-(velocity / 0.15) * (velocity / 0.15)).exp();
         assert!((friction - magnitude * velocity.signum()).abs() < 1e-12);
     }

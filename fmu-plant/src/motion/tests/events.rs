@@ -72,7 +72,7 @@ fn a_cart_stays_exactly_at_rest_below_the_static_friction() {
     for level in [29.999_999, -29.999_999] {
         let motion = follow(&p, initial, &Force::constant(level), 3.0, |_| 0.4);
         assert_eq!((motion.state(), motion.regime()), (&initial, Regime::Stick));
-        close(motion.friction_force(&p, level), level);
+        close(motion.response(&p, level).friction, level);
     }
 }
 
@@ -117,7 +117,7 @@ fn a_jump_of_the_force_frees_a_held_cart_at_once() {
     let mut motion = start(&p, [0.0; 4], &Force::constant(0.0));
     motion.advance(&p, &Force::constant(4.9), 0.0, 0.01, &tolerance).unwrap();
     assert_eq!(motion.regime(), Regime::Stick);
-    close(motion.friction_force(&p, 8.0), level);
+    close(motion.response(&p, 8.0).friction, level);
     motion.advance(&p, &Force::constant(8.0), 0.01, 0.0, &tolerance).unwrap();
     assert_eq!(motion.regime(), Regime::Forward);
     motion.advance(&p, &Force::constant(8.0), 0.01, 0.01, &tolerance).unwrap();

@@ -32,7 +32,7 @@ fn the_motion_through_fourteen_events_is_the_one_scipy_finds() {
         }
         assert!((row[0] - f64::from(k) * HOLD).abs() < 1e-12);
         let [x, angle, v, rate] = *motion.state();
-        let computed = [x, angle, v, rate, motion.friction_force(&p, node(k))];
+        let computed = [x, angle, v, rate, motion.response(&p, node(k)).friction];
         for ((computed, expected), range) in computed.iter().zip(&row[1..6]).zip(range) {
             let difference = (computed - expected).abs() / range;
             assert!(difference < 1e-7, "t = {}: {computed} {expected}", row[0]);

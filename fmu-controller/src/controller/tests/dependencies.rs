@@ -1,0 +1,184 @@
+//! The lists of `ModelStructure` against what really changes, by perturbation.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use fmi2::description::DependencyKind::{self, Constant, Dependent, Discrete, Fixed};
+
+use super::sized::{FREE, LIMITED, Sizes, initial_knowns, inputs, sized, states, unknowns, values};
+use super::*;
+use crate::dependencies;
+
+/// Time (`t_on` is 0.5), compensate, monitor, distance of the limits from their places.
+type Situation = (f64, bool, bool, f64);
+
+const SITUATIONS: [Situation; 8] = [
+    (0.0, true, false, 0.0),
+    (0.0, true, true, 0.0),
+    (1.0, true, false, 0.0),
+    (1.0, false, true, 0.0),
+    (1.0, true, false, -20.0),
+    (1.0, true, false, 20.0),
+    (0.0, true, false, -20.0),
+    (0.0, true, false, 20.0),
+];
+
+fn in_situation(
+    (sizes, limits): (Sizes, &str),
+    (_, compensate, monitor, distance): Situation,
+) -> AsoController {
+    let mut model = sized(sizes, limits);
+    model.compensate = compensate;
+    model.design.monitor = monitor;
+    for actuator in &mut model.design.actuators {
+        actuator.limits = actuator.limits.map(|[low, high]| [low + distance, high + distance]);
+    }
+    model
+}
+
+fn begin(model: &mut AsoController, time: f64) -> Vec<f64> {
+    model.initialize(&Experiment { start_time: time, ..Experiment::default() }).unwrap();
+    values(model, &unknowns(model))
+}
+
+/// All unknowns, each with the knowns that changed its initial value in some situation.
+fn initial_influences(design: (Sizes, &str)) -> BTreeMap<String, BTreeSet<String>> {
+    let model = sized(design.0, design.1);
+    let names: Vec<_> = unknowns(&model).into_iter().map(|unknown| unknown.name).collect();
+    let mut found: BTreeMap<_, _> =
+        names.iter().map(|name| (name.clone(), BTreeSet::new())).collect();
+    for situation in SITUATIONS {
+        let model = in_situation(design, situation);
+        let before = begin(&mut model.clone(), situation.0);
+        let mut compare = |known: &str, mut moved: AsoController, time: f64| {
+            let after = begin(&mut moved, time);
+            for ((name, before), after) in names.iter().zip(&before).zip(after) {
+                if before.to_bits() != after.to_bits() {
+                    found.get_mut(name).unwrap().insert(known.to_owned());
+                }
+            }
+        };
+        for known in initial_knowns(&model) {
+            let mut moved = model.clone();
+            *(known.field)(&mut moved) += if known.name == "t_on" { 0.8 } else { 0.03 };
+            compare(&known.name, moved, situation.0);
+        }
+        let mut switched = model.clone();
+        switched.compensate = !model.compensate;
+        compare("compensate", switched, situation.0);
+        let mut switched = model.clone();
+        switched.design.monitor = !model.design.monitor;
+        compare("monitor", switched, situation.0);
+        compare("time", model.clone(), 1.0 - situation.0);
+    }
+    found
+}
+
+#[test]
+fn initial_values_depend_on_what_is_listed_and_on_nothing_else() {
+    for of in [FREE, LIMITED].concat() {
+        let found = initial_influences(of);
+        let controller = sized(of.0, of.1);
+        let design = &controller.design;
+        let [n, m, _, q] = of.0;
+        let listed = (0..m)
+            .map(|j| (names::channel("u", j, m), dependencies::of_initial_command(design, j)))
+            .chain(names::estimates(design).zip(names::starts(design).map(|start| vec![start])))
+            .chain((0..n).map(|i| {
+                let name = format!("der({})", names::channel("x_hat", i, n));
+                (name, dependencies::of_initial_state_slope(design, i))
+            }))
+            .chain((0..q).map(|i| {
+                let name = format!("der({})", names::channel("f_hat", i, q));
+                (name, dependencies::of_initial_fault_slope(design, i))
+            }));
+        let listed: BTreeMap<_, BTreeSet<_>> =
+            listed.map(|(name, on)| (name, on.into_iter().collect())).collect();
+        assert_eq!(found, listed);
+    }
+}
+
+/// How each unknown changed by each known in every situation: the factors.
+fn factors(of: (Sizes, &str)) -> BTreeMap<(String, String), Vec<f64>> {
+    let mut all: BTreeMap<_, Vec<f64>> = BTreeMap::new();
+    for situation in SITUATIONS {
+        let mut model = in_situation(of, situation);
+        begin(&mut model, situation.0);
+        model.event(situation.0).unwrap();
+        model.update(situation.0).unwrap();
+        let unknowns = unknowns(&model);
+        let before = values(&model, &unknowns);
+        for known in inputs(&model).into_iter().chain(states(&model)) {
+            let mut moved = model.clone();
+            *(known.field)(&mut moved) += 0.25;
+            moved.update(situation.0).unwrap();
+            for ((unknown, before), after) in
+                unknowns.iter().zip(&before).zip(values(&moved, &unknowns))
+            {
+                let factor = (after - before) / 0.25;
+                all.entry((unknown.name.clone(), known.name.clone())).or_default().push(factor);
+            }
+        }
+    }
+    all
+}
+
+/// The kind that factors show; none where they are all zero.
+fn kind(factors: &[f64], limited: bool) -> Option<DependencyKind> {
+    let same = factors.iter().all(|factor| (factor - factors[0]).abs() < 1e-12);
+    if factors.iter().all(|factor| factor.abs() < 1e-12) {
+        None
+    } else if same && (factors[0] - 1.0).abs() < 1e-12 {
+        Some(Constant)
+    } else if same {
+        Some(Fixed)
+    } else if limited {
+        Some(Dependent)
+    } else {
+        Some(Discrete)
+    }
+}
+
+#[test]
+fn at_a_point_outputs_and_derivatives_depend_on_what_is_listed_in_the_way_listed() {
+    for of in [FREE, LIMITED].concat() {
+        let controller = sized(of.0, of.1);
+        let design = &controller.design;
+        let mut listed: BTreeMap<(String, String), DependencyKind> = BTreeMap::new();
+        let mut list = |unknown: &str, groups: &[(DependencyKind, Vec<String>)]| {
+            for (kind, known) in
+                groups.iter().flat_map(|(kind, on)| on.iter().map(|on| (*kind, on)))
+            {
+                listed.insert((unknown.to_owned(), known.clone()), kind);
+            }
+        };
+        for j in 0..of.0[1] {
+            let name = names::channel("u", j, of.0[1]);
+            list(&name, &dependencies::of_command(design, j));
+        }
+        for (k, state) in names::estimates(design).enumerate() {
+            list(&state, &[(Constant, vec![state.clone()])]);
+            let slope = format!("der({state})");
+            if k < of.0[0] {
+                list(&slope, &dependencies::of_state_slope(design));
+            } else {
+                list(&slope, &dependencies::of_fault_slope(design));
+            }
+        }
+        let limited = |unknown: &str| match unknown.strip_prefix('u') {
+            Some("") => of.1.contains('l'),
+            Some(index) => {
+                let j: usize = index.trim_matches(['[', ']']).parse().unwrap();
+                of.1.as_bytes()[j - 1] == b'l'
+            }
+            None => of.1.contains('l') && unknown.starts_with("der(x_hat"),
+        };
+        let found: BTreeMap<_, _> = factors(of)
+            .into_iter()
+            .filter_map(|(pair, factors)| {
+                let kind = kind(&factors, limited(&pair.0))?;
+                Some((pair, kind))
+            })
+            .collect();
+        assert_eq!(found, listed);
+    }
+}

@@ -1,0 +1,162 @@
+//! Directional derivatives against difference quotients, and where there is none.
+
+use super::knowns::{
+    AT_A_POINT, UNKNOWNS, at_initialization, field, moved_at_a_point, moved_at_initialization,
+    unknowns,
+};
+use super::*;
+
+const NOW: At = At::Point { time: 0.0, delta_time: 0.0 };
+
+/// Derivatives of the unknowns in the direction with these components.
+fn along(
+    model: &FrictionPendulum,
+    at: &At,
+    components: &[(&str, f64)],
+) -> Result<[f64; 7], Failure> {
+    let mut direction = model.clone();
+    let knowns = at_initialization();
+    for known in knowns.iter().map(String::as_str).chain(AT_A_POINT) {
+        *field(&mut direction, known) = 0.0;
+    }
+    (direction.f_fric, direction.slope) = (0.0, [0.0; 4]);
+    for (known, component) in components {
+        *field(&mut direction, known) = *component;
+    }
+    model.differentiate(at, &mut direction)?;
+    Ok(unknowns(&direction))
+}
+
+fn column(model: &FrictionPendulum, at: &At, known: &str) -> [f64; 7] {
+    along(model, at, &[(known, 1.0)]).unwrap()
+}
+
+/// The difference quotient of fourth order, from four values about the present one.
+fn quotient(size: f64, moved: impl Fn(f64) -> [f64; 7]) -> [f64; 7] {
+    let step = 1e-4 * size.abs().max(0.1);
+    let [before, back, ahead, beyond] = [-2.0, -1.0, 1.0, 2.0].map(|k| moved(k * step));
+    std::array::from_fn(|k| (8.0 * (ahead[k] - back[k]) - (beyond[k] - before[k])) / (12.0 * step))
+}
+
+fn assert_close(found: &[f64; 7], expected: &[f64; 7], known: &str) {
+    for ((name, found), expected) in UNKNOWNS.iter().zip(found).zip(expected) {
+        let bound = 1e-7 * expected.abs().max(1.0);
+        assert!((found - expected).abs() < bound, "d {name} / d {known}: {found} {expected}");
+    }
+}
+
+#[test]
+fn at_a_point_they_are_the_difference_quotients_in_all_regimes() {
+    for model in everywhere() {
+        for known in AT_A_POINT {
+            if known == "v_p" && model.motion.state()[2].abs() < 1e-3 && model.regime != 0 {
+                continue; // The friction has two branches here: see the test of the right side.
+            }
+            let size = *field(&mut model.clone(), known);
+            let expected = quotient(size, |shift| moved_at_a_point(&model, known, shift));
+            assert_close(&column(&model, &NOW, known), &expected, known);
+        }
+    }
+}
+
+#[test]
+fn at_initialization_they_are_the_difference_quotients_in_every_known() {
+    for exponent in [2.0, 1.4] {
+        for mut model in everywhere() {
+            model.parameters.stribeck_exponent = exponent;
+            model.initialize(&Experiment::default()).unwrap();
+            for known in at_initialization() {
+                if known == "v_p_0" && model.initial[2] == 0.0 {
+                    continue; // The start is at rest or not: the regime would change.
+                }
+                let size = *field(&mut model.clone(), &known);
+                let moved = |shift| moved_at_initialization(&model, &known, shift);
+                let found = column(&model, &At::Initialization, &known);
+                assert_close(&found, &quotient(size, moved), &known);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_direction_of_several_knowns_gives_the_sum_of_their_columns() {
+    let direction = [("u", 0.3), ("theta", -1.2), ("v_p", 0.7), ("omega", 2.0)];
+    for model in everywhere() {
+        let mut sum = [0.0; 7];
+        for (known, component) in direction {
+            let own = column(&model, &NOW, known);
+            sum = std::array::from_fn(|k| sum[k] + component * own[k]);
+        }
+        let found = along(&model, &NOW, &direction).unwrap();
+        for (found, sum) in found.iter().zip(sum) {
+            assert!((found - sum).abs() < 1e-13 * sum.abs().max(1.0), "{found} {sum}");
+        }
+    }
+}
+
+#[test]
+fn with_respect_to_time_all_are_zero() {
+    for model in everywhere() {
+        let found = along(&model, &At::Point { time: 0.0, delta_time: 1.0 }, &[]).unwrap();
+        assert!(found.iter().all(|part| *part == 0.0), "{found:?}");
+    }
+}
+
+#[test]
+fn a_held_cart_hands_the_force_to_the_friction_up_to_the_static_one_and_no_further() {
+    let mut model = started(|model| model.initial = [0.0; 4]);
+    for (u, slope) in [(29.0, 1.0), (30.0, 1.0), (30.5, 0.0), (-30.0, 1.0), (-31.0, 0.0)] {
+        model.u = u;
+        model.update(0.0).unwrap();
+        assert_eq!(model.motion.regime(), Regime::Stick);
+        let [friction, others @ ..] = column(&model, &NOW, "u");
+        assert!((friction - slope).abs() < f64::EPSILON, "{u} N: {friction}");
+        assert!(others.iter().all(|part| *part == 0.0), "{u} N: {others:?}");
+    }
+}
+
+#[test]
+fn after_a_step_they_belong_to_the_force_at_its_end() {
+    // The force falls from 40 N, more than F_s, to zero; the cart slides and stops again.
+    let mut model = started(|model| model.initial = [0.0; 4]);
+    (model.u, model.u_derivatives) = (40.0, [-400.0, 0.0]);
+    model.step(&Step { start: 0.0, size: 0.1 }).unwrap();
+    assert_eq!(model.motion.regime(), Regime::Stick);
+    assert!(model.motion.state()[0] > 0.0 && model.f_fric.abs() < 1.0);
+    assert_eq!(column(&model, &NOW, "u")[0].to_bits(), 1.0_f64.to_bits());
+}
+
+#[test]
+fn of_a_cart_that_breaks_away_they_are_those_of_the_side_it_slides_to() {
+    for (u, exponent, slope) in
+        [(40.0, 1.0, -5.0 / 0.15), (-40.0, 1.0, -5.0 / 0.15), (40.0, 1.5, 0.0)]
+    {
+        let model = started(|model| {
+            (model.initial, model.u) = ([0.0; 4], u);
+            model.parameters.stribeck_exponent = exponent;
+        });
+        assert_eq!(model.motion.regime().sign().to_bits(), u.signum().to_bits());
+        let found = column(&model, &NOW, "v_p")[0];
+        assert!((found - slope).abs() < 1e-12, "{found} {slope}");
+        let step = 1e-9 * u.signum();
+        let ahead = (moved_at_a_point(&model, "v_p", step)[0] - model.f_fric) / step;
+        assert!((ahead - slope).abs() < 0.02, "{ahead} {slope}");
+    }
+}
+
+#[test]
+fn where_the_friction_is_infinitely_steep_there_is_none() {
+    let model = started(|model| {
+        (model.initial, model.u) = ([0.0; 4], 40.0);
+        model.parameters.stribeck_exponent = 0.5;
+    });
+    let refused = along(&model, &NOW, &[("v_p", 1.0)]).unwrap_err();
+    assert!(
+        matches!(&refused, Failure::Discard(text) if text.contains("delta = 0.5")),
+        "{refused}"
+    );
+    assert_eq!(column(&model, &NOW, "u")[0].to_bits(), 0);
+    for known in ["delta", "v_s", "F_s"] {
+        assert!(along(&model, &At::Initialization, &[(known, 1.0)]).is_ok(), "{known}");
+    }
+}

@@ -1,0 +1,34 @@
+//! What follows at once from state, force and regime: the friction and the derivative of the state.
+
+use crate::dynamics::{RigidBody, State};
+use crate::friction::{Regime, StribeckLaw};
+use crate::number::Number;
+use crate::parameters::Parameters;
+
+/// Friction and motion at one instant, as numbers `D`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Response<D = f64> {
+    /// The friction on the cart in N.
+    pub friction: D,
+    /// The derivative of the state.
+    pub slope: State<D>,
+}
+
+impl<D: Number> Response<D> {
+    /// The response of checked parameters in a regime, under the force `u + f_a` in N: friction
+    /// `g(v) sign(v)` of a sliding cart, the balancing force of a held one.
+    ///
+    /// A force that has just jumped can exceed what holds the cart; the friction is then the
+    /// largest possible one, `F_s`.
+    #[must_use]
+    pub fn new(parameters: &Parameters<D>, regime: Regime, state: &State<D>, force: D) -> Self {
+        let body = RigidBody::new(parameters);
+        let law = StribeckLaw::new(parameters);
+        if regime == Regime::Stick {
+            let friction = law.holding(body.balancing_force(state, force));
+            return Self { friction, slope: body.stick(state) };
+        }
+        let friction = law.sliding(regime, state[2]);
+        Self { friction, slope: body.slide(state, force - friction) }
+    }
+}

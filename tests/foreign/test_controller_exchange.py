@@ -1,0 +1,275 @@
+"""The controller as model exchange, integrated by FMPy's CVODE.
+
+FMPy sets inputs between integrator steps only, never inside one; so the measurements are held here
+between the instants at which they jump. CVODE evaluates the model past the end of its last step,
+so no stop time is defined (section 2.1.6).
+"""
+
+from ctypes import byref
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from fmpy import instantiate_fmu, simulate_fmu
+from scipy.integrate import solve_ivp
+
+from c_abi import MODEL_EXCHANGE, EventInfo, Fmu, Instance, reals
+from design_file import design_text, redesigned, shipped_design
+from observer_oracle import command
+from test_designs import LIMITED, SIZES, made, random_design, vector
+
+T_ON = 0.3037  # s, inside a communication step
+STOP = 1.0  # s
+JUMPS = [0.0, 0.15, 0.4, 0.75]  # s
+TOLERANCE = 1e-10  # of CVODE, relative
+FRACTION = 1e-7  # of a signal's range: how far results may be apart
+
+
+class Run(NamedTuple):
+    """A controller with its measurements after each of `JUMPS`; results are `step` s apart."""
+
+    fmu: Fmu
+    design: dict
+    estimate: np.ndarray
+    levels: np.ndarray
+    step: float = 0.01
+    compensate: tuple = ((0.0, True),)
+
+    @property
+    def inputs(self):
+        """Names of the measurements."""
+        return [signal["name"] for signal in self.design["measurements"]]
+
+    @property
+    def states(self):
+        """Names of the continuous states."""
+        n, q = len(self.design["states"]), len(self.design["faults"])
+        return vector("x_hat", n) + vector("f_hat", q)
+
+    @property
+    def signals(self):
+        """Names of states and commands."""
+        return self.states + vector("u", len(self.design["actuators"]))
+
+    @property
+    def start_values(self):
+        """The initial estimates."""
+        names = [name.replace("hat", "hat_0") for name in self.states]
+        return dict(zip(names, self.estimate))
+
+    @property
+    def times(self):
+        """The instants of the results."""
+        return np.arange(round(STOP / self.step) + 1) * self.step
+
+    @property
+    def limits(self):
+        """Limits of all commands."""
+        return [a.get("limits", [-np.inf, np.inf]) for a in self.design["actuators"]]
+
+    def level(self, time):
+        """The measurements from `time` on."""
+        return self.levels[np.searchsorted(JUMPS, time + 1e-9) - 1]
+
+    def compensating(self, time):
+        """Whether f_hat is part of the command from `time` on."""
+        wanted = [on for since, on in self.compensate if time >= since][-1]
+        return wanted and time >= self.design["t_on"]
+
+
+def input_signals(run):
+    """The inputs for FMPy: two rows at each jump. `compensate` only where it switches."""
+    instants = sorted({*JUMPS, *(since for since, _ in run.compensate), STOP})
+    names, rows = [("time", float), *((name, float) for name in run.inputs)], []
+    for begin, end in zip(instants, instants[1:]):
+        rows += [(time, *run.level(begin)) for time in (begin, end)]
+    if len(run.compensate) > 1:
+        names.append(("compensate", bool))
+        on = [run._replace(design={"t_on": 0.0}).compensating(time) for time in instants]
+        rows = [(*row, on[k // 2]) for k, row in enumerate(rows)]
+    return np.array(rows, dtype=names)
+
+
+def integrated(run, **options):
+    """FMPy's result for model exchange, a row for each instant."""
+    result = simulate_fmu(
+        str(run.fmu.folder),
+        fmi_type="ModelExchange",
+        solver="CVode",
+        stop_time=STOP,
+        set_stop_time=False,
+        output_interval=run.step,
+        relative_tolerance=TOLERANCE,
+        record_events=False,
+        input=input_signals(run),
+        output=run.signals,
+        start_values=run.start_values,
+        **options,
+    )
+    assert result["time"] == pytest.approx(run.times, abs=1e-9)
+    return np.array([result[name] for name in run.signals]).T
+
+
+def stepped(run):
+    """The result of co-simulation."""
+    with Instance(run.fmu) as instance:
+        instance.start(run.start_values)
+        rows = [instance.get(*run.signals)]
+        for time in run.times[:-1]:
+            instance.set(dict(zip(run.inputs, run.level(time))))
+            instance.set({"compensate": [on for t, on in run.compensate if time > t - 1e-9][-1]})
+            instance.step(time, run.step)
+            rows.append(instance.get(*run.signals))
+    return np.array(rows)
+
+
+def solved(run):
+    """scipy's solution of the equations, between the instants at which something switches."""
+    design = run.design
+    A, B, C, F_a, L_x, L_f = (np.asarray(design[n]) for n in ("A", "B", "C", "F_a", "L_x", "L_f"))
+
+    def right(_, z, y, on):
+        x_hat, f_hat = np.split(z, [len(A)])
+        u = command(design, z, on, run.limits)
+        slope = A @ x_hat + B @ u + F_a @ f_hat + L_x @ (y - C @ x_hat)
+        return np.concatenate([slope, (on or design["monitor"]) * (L_f @ (y - C @ x_hat))])
+
+    z, rows = np.array(run.estimate), []
+    instants = sorted({*JUMPS, *(since for since, _ in run.compensate), design["t_on"], STOP})
+    for begin, end in zip(instants, instants[1:]):
+        here = run.times[(run.times >= begin - 1e-9) & (run.times < end - 1e-9)].clip(begin)
+        arguments = (run.level(begin), run.compensating(begin))
+        options = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13, "max_step": run.step}
+        part = solve_ivp(right, (begin, end), z, t_eval=[*here, end], args=arguments, **options)
+        assert part.success
+        z = part.y[:, -1]
+        rows += [
+            (*row, *command(design, row, arguments[1], run.limits))
+            for row in part.y.T[: len(here)]
+        ]
+    return np.array([*rows, (*z, *command(design, z, arguments[1], run.limits))])
+
+
+def check(run):
+    """Model exchange, co-simulation and scipy agree; what came out.
+
+    Where `compensate` switches, co-simulation follows with the next step: no comparison there.
+    """
+    found, oracle, co_simulated = integrated(run), solved(run), stepped(run)
+    allowed = FRACTION * np.ptp(oracle, axis=0)
+    assert (allowed > 0).all()
+    assert (abs(found - oracle) <= allowed).all()
+    stays = ~np.isclose(run.times[:, None], [time for time, _ in run.compensate[1:]]).any(axis=1)
+    assert (abs(co_simulated - oracle)[stays] <= allowed).all()
+    assert (abs(found - co_simulated)[stays] <= allowed).all()
+    return oracle
+
+
+# Limits that some command reaches or leaves.
+CASES = [(sizes, None) for sizes in SIZES] + [((1, 1, 1, 1), [[-0.3, 0.6]]), *LIMITED[1:]]
+
+
+def random_run(controller, folder, sizes, limits, **general):
+    """A run of a random design."""
+    n, _, p, q = sizes
+    design = random_design(sizes, limits) | {"t_on": T_ON, **general}
+    levels = np.random.default_rng(17).normal(size=(len(JUMPS), p))
+    return Run(made(controller, design, folder), design, np.linspace(-1, 1.5, n + q), levels)
+
+
+def shipped_run(controller, folder, limits=None, **options):
+    """A run of the shipped controller, activated early, with limits or without."""
+    design = shipped_design(controller) | {"t_on": T_ON}
+    if limits:
+        design["actuators"][0]["limits"] = limits
+    fmu = redesigned(controller, design_text(design), folder / "fmu")
+    levels = 1e-3 * np.random.default_rng(17).normal(size=(len(JUMPS), 2))
+    return Run(fmu, design, np.zeros(5), levels, step=1e-3, **options)
+
+
+def leaves_and_reaches(run, table):
+    """Whether a command is at a limit at some instants and between its limits at others."""
+    commands = table[:, len(run.states) :]
+    at_limit = (commands == np.transpose(run.limits)[0]) | (commands == np.transpose(run.limits)[1])
+    return np.diff(at_limit, axis=0).any()
+
+
+@pytest.mark.parametrize("monitor", [False, True])
+@pytest.mark.parametrize(("sizes", "limits"), CASES, ids=str)
+def test_integrated_by_cvode_it_is_its_co_simulation_and_what_scipy_integrates(
+    controller, tmp_path, sizes, limits, monitor
+):
+    run = random_run(controller, tmp_path, sizes, limits, monitor=monitor)
+    assert leaves_and_reaches(run, check(run)) == bool(limits)
+
+
+def test_the_shipped_controller_is_integrated_by_cvode_too(controller, tmp_path):
+    check(shipped_run(controller, tmp_path))
+
+
+def test_the_shipped_controller_with_limits_is_integrated_by_cvode_too(controller, tmp_path):
+    run = shipped_run(controller, tmp_path, limits=[-0.4, 0.3])
+    assert leaves_and_reaches(run, check(run))
+
+
+def test_compensate_takes_effect_at_the_events_at_which_it_changes(controller, tmp_path):
+    switches = ((0.0, True), (0.55, False), (0.75, True))
+    for sizes in SIZES[:3]:
+        (tmp_path / str(sizes)).mkdir()
+        run = random_run(controller, tmp_path / str(sizes), sizes, None)
+        check(run._replace(compensate=switches))
+
+
+@pytest.mark.parametrize("limits", [None, [[-1.0, 1.0], [-0.2, 4.0]]], ids=str)
+def test_after_a_reset_the_same_comes_out_to_the_bit(controller, tmp_path, limits):
+    run = random_run(controller, tmp_path, (2, 2, 2, 2), limits)
+    instance = instantiate_fmu(str(run.fmu.folder), run.fmu.description, "ModelExchange")
+    first = integrated(run, fmu_instance=instance)
+    instance.reset()
+    assert (integrated(run, fmu_instance=instance) == first).all()
+    instance.freeInstance()
+
+
+def new_discrete_states(instance):
+    """What the event says."""
+    info = EventInfo()
+    instance.must("NewDiscreteStates", byref(info))
+    return info
+
+
+def test_the_activation_is_a_time_event_while_it_is_to_come_and_wanted(controller):
+    with Instance(controller, kind=MODEL_EXCHANGE) as instance:
+        instance.start({"t_on": T_ON})
+        info = new_discrete_states(instance)
+        assert (info.next_event_time_defined, info.next_event_time) == (1, T_ON)
+        instance.set({"compensate": False})
+        assert not new_discrete_states(instance).next_event_time_defined
+        instance.set({"compensate": True})
+        instance.must("EnterContinuousTimeMode")
+        instance.must("SetTime", T_ON)
+        instance.must("EnterEventMode")
+        info = new_discrete_states(instance)
+        unchanged = info.values_of_continuous_states_changed, info.new_discrete_states_needed
+        assert (info.next_event_time_defined, *unchanged) == (0, 0, 0)
+
+
+@pytest.mark.parametrize(("sizes", "limits"), LIMITED, ids=str)
+def test_each_limited_command_has_two_indicators_that_are_never_zero_after_an_event(
+    controller, tmp_path, sizes, limits
+):
+    run = random_run(controller, tmp_path, sizes, limits)
+    count = 2 * sum(map(bool, limits))
+    assert run.fmu.indicators == count
+    values, states = reals(*[0.0] * count), len(run.states)
+    with Instance(run.fmu, kind=MODEL_EXCHANGE) as instance:
+        instance.start_exchange(run.start_values)
+        for scale in np.linspace(-2, 2, 41):
+            instance.must("SetContinuousStates", reals(*scale * run.estimate), states)
+            instance.must("EnterEventMode")
+            new_discrete_states(instance)
+            instance.must("GetEventIndicators", values, count)
+            commands = zip(instance.get(*run.signals)[states:], limits)
+            wanted = [[u > pair[0], u < pair[1]] for u, pair in commands if pair]
+            assert [value > 0 for value in values] == list(np.ravel(wanted))
+            assert 0 not in list(values)
+            instance.must("EnterContinuousTimeMode")
