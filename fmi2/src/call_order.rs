@@ -148,6 +148,27 @@ functions! {
     GetStringStatus: 0, C | P | F | T;
 }
 
+/// Whether `function` may return `fmi2Discard`: section 2.1.3 lists them.
+#[must_use]
+pub fn may_discard(interface: InterfaceType, function: Function) -> bool {
+    use Function as F;
+    match function {
+        F::SetReal | F::SetInteger | F::SetBoolean | F::SetString => true,
+        F::SetContinuousStates
+        | F::GetReal
+        | F::GetDerivatives
+        | F::GetContinuousStates
+        | F::GetEventIndicators => interface == InterfaceType::ModelExchange,
+        F::DoStep
+        | F::GetStatus
+        | F::GetRealStatus
+        | F::GetIntegerStatus
+        | F::GetBooleanStatus
+        | F::GetStringStatus => interface == InterfaceType::CoSimulation,
+        _ => false,
+    }
+}
+
 /// Whether `function` may be called in `state` of an instance made for `interface`.
 ///
 /// Conditions on single variables (the numbers in the cells) are tested where values are set.

@@ -20,7 +20,6 @@ pub use entry::*;
 
 use crate::call_order::{Function, InterfaceType};
 use crate::instance::{Instance, guarded};
-use crate::interface::Interface;
 use crate::location::path_from_uri;
 use crate::model::{Failure, Model};
 
@@ -224,16 +223,13 @@ pub unsafe fn free_instance<M: Model>(component: fmi2Component) {
     if !shared.busy.swap(true, Ordering::Acquire) {
         // SAFETY: not in use and, by the standard, freed once.
         let owned = unsafe { Box::from_raw(component) };
-        drop(guarded(|| {
-            drop(owned);
-            Ok(())
-        }));
+        owned.instance.into_inner().free();
     }
 }
 
 /// The description of `M`, which must break no rule of the standard.
 fn description_of<M: Model>(resources: &Path) -> Result<String, Failure> {
-    let (_, description) = Interface::new(&mut M::new(resources)?)?;
+    let description = crate::interface::describe::<M>(resources)?;
     let problems = description.problems();
     if problems.is_empty() {
         return Ok(description.to_xml());

@@ -13,7 +13,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::abi::Status;
-use crate::call_order::{Function, InterfaceType, State, allowed};
+use crate::call_order::{Function, InterfaceType, State, allowed, may_discard};
 use crate::ffi::Callbacks;
 use crate::interface::{CATEGORIES, Interface};
 use crate::model::{Experiment, Failure, Model, Step};
@@ -152,35 +152,49 @@ impl<M: Model> Instance<M> {
     #[cold]
     fn fail(&mut self, function: Function, failure: &Failure) -> Status {
         let (status, category) = match failure {
-            Failure::Discard(_) | Failure::Incomplete { .. } | Failure::Terminated { .. } => {
+            Failure::Fatal(_) => (Status::Fatal, "logStatusFatal"),
+            Failure::Discard(_) | Failure::Incomplete { .. } | Failure::Terminated { .. }
+                if may_discard(self.core.interface_type, function) =>
+            {
                 (Status::Discard, "logStatusDiscard")
             }
-            Failure::Error(_) => (Status::Error, "logStatusError"),
-            Failure::Fatal(_) => (Status::Fatal, "logStatusFatal"),
+            _ => (Status::Error, "logStatusError"),
         };
-        match failure {
-            Failure::Discard(_) if function == Function::DoStep => {
-                self.core.state = State::StepFailed;
-            }
-            Failure::Discard(_) => {}
-            Failure::Incomplete { time, .. } | Failure::Terminated { time, .. } => {
-                self.core.time = *time;
-                self.core.terminated = matches!(failure, Failure::Terminated { .. });
-                self.core.state = State::StepFailed;
-            }
-            Failure::Error(_) => self.core.state = State::Error,
-            Failure::Fatal(_) => self.core.state = State::Fatal,
+        match status {
+            Status::Discard if function == Function::DoStep => self.stop_half_way(failure),
+            Status::Error => self.core.state = State::Error,
+            Status::Fatal => self.core.state = State::Fatal,
+            _ => {}
         }
         self.log(status, category, &format!("{}: {failure}", function.name()));
         status
     }
 
+    /// The step ended before its end: at the time that the model says, if it can be.
+    fn stop_half_way(&mut self, failure: &Failure) {
+        self.core.state = State::StepFailed;
+        self.core.terminated = matches!(failure, Failure::Terminated { .. });
+        if let Failure::Incomplete { time, .. } | Failure::Terminated { time, .. } = failure
+            && time.is_finite()
+        {
+            self.core.time = self.core.time.max(*time);
+        }
+    }
+
+    /// Frees the instance. The models are dropped one by one, so that a destructor that panics
+    /// meets no other one.
+    pub(crate) fn free(self) {
+        let Self { core, fresh, direction, callbacks, categories, .. } = self;
+        let dropped = [dropped(core), dropped(fresh), dropped(direction)];
+        if let Some(failure) = dropped.into_iter().find_map(Result::err) {
+            let message = format!("fmi2FreeInstance: {failure}");
+            log(&callbacks, categories.as_deref(), Status::Fatal, "logStatusFatal", &message);
+        }
+    }
+
     /// Sends a message of a category that the importer wants to see.
     fn log(&self, status: Status, category: &str, message: &str) {
-        let chosen = self.categories.as_ref();
-        if chosen.is_none_or(|names| names.iter().any(|name| name == category)) {
-            self.callbacks.log(status, category, message);
-        }
+        log(&self.callbacks, self.categories.as_deref(), status, category, message);
     }
 
     /// `fmi2SetDebugLogging`. Messages that belong to a status are sent whether debug logging is on
@@ -295,6 +309,26 @@ impl<M: Model> Instance<M> {
     /// The GUID of the description that this instance was made for.
     pub(crate) fn guid(&self) -> &str {
         &self.guid
+    }
+}
+
+/// Drops `value`; its destructor may panic.
+fn dropped<T>(value: T) -> Result<(), Failure> {
+    guarded(|| {
+        drop(value);
+        Ok(())
+    })
+}
+
+fn log(
+    callbacks: &Callbacks,
+    chosen: Option<&[String]>,
+    status: Status,
+    category: &str,
+    message: &str,
+) {
+    if chosen.is_none_or(|names| names.iter().any(|name| name == category)) {
+        callbacks.log(status, category, message);
     }
 }
 

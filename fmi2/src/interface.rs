@@ -374,16 +374,24 @@ fn define_type<M>(types: &mut Vec<SimpleType>, variable: &Variable<M>) -> Result
     Ok(())
 }
 
-/// Which static rules of FMI 2.0.5 the variables of `M` break; none, if they are in order.
-///
-/// `resources` is the folder that becomes the FMU's `resources`. The first test of a model:
-/// a description with problems is not packed either.
+/// The model description of `M` with the resources in a folder: what packing writes as
+/// `modelDescription.xml`.
 ///
 /// # Errors
 ///
 /// What keeps the model from being made or described at all: [`Model::new`] failed, a unit that
 /// cannot be read, a reference to a variable that does not exist.
+pub fn describe<M: Model>(resources: &std::path::Path) -> Result<ModelDescription, Failure> {
+    Interface::new(&mut M::new(resources)?).map(|(_, description)| description)
+}
+
+/// Which static rules of FMI 2.0.5 the variables of `M` break; none, if they are in order.
+///
+/// The first test of a model: a description with problems is not packed either.
+///
+/// # Errors
+///
+/// As [`describe`].
 pub fn problems<M: Model>(resources: &std::path::Path) -> Result<Vec<Problem>, Failure> {
-    let (_, description) = Interface::new(&mut M::new(resources)?)?;
-    Ok(description.problems())
+    describe::<M>(resources).map(|description| description.problems())
 }

@@ -51,6 +51,6 @@ pub mod package;
 pub mod unit;
 mod variable;
 
-pub use interface::problems;
+pub use interface::{describe, problems};
 pub use model::{About, At, Event, Experiment, Failure, Model, ModelExchange, Step};
 pub use variable::{Enumeration, Variable};

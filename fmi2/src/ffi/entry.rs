@@ -71,7 +71,7 @@ behind_the_door! {
         (read(known, n_known)?, read(known_delta, n_known)?),
         write(unknown_delta, n_unknown)?,
     );
-    enter_event_mode = EnterEventMode(), instance => { instance.enter_event_mode(); Ok(()) };
+    enter_event_mode = EnterEventMode(), instance => instance.enter_event_mode();
     new_discrete_states = NewDiscreteStates(info: *mut fmi2EventInfo), instance => {
         let [place] = write(info, 1)? else { return Err(missing("fmi2eventInfo")) };
         *place = instance.new_discrete_states()?;
@@ -83,7 +83,8 @@ behind_the_door! {
     };
     completed_integrator_step = CompletedIntegratorStep(
         _no_set_fmu_state: fmi2Boolean, enter: *mut fmi2Boolean, terminate: *mut fmi2Boolean
-    ), _instance => {
+    ), instance => {
+        instance.completed_integrator_step()?;
         put(enter, 0)?;
         put(terminate, 0)
     };
@@ -112,8 +113,8 @@ behind_the_door! {
     free_fmu_state = FreeFMUstate(state: *mut fmi2FMUstate), _instance => {
         let [place] = write(state, 1)? else { return Err(missing("FMUstate")) };
         if !place.is_null() {
-            drop(Box::from_raw(place.cast::<Snapshot<M>>()));
-            *place = std::ptr::null_mut();
+            let state = std::mem::replace(place, std::ptr::null_mut());
+            drop(Box::from_raw(state.cast::<Snapshot<M>>()));
         }
         Ok(())
     };

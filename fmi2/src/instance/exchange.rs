@@ -15,9 +15,16 @@ fn length(what: &str, found: usize, expected: usize) -> Result<(), Failure> {
 
 impl<M: Model> Instance<M> {
     /// `fmi2EnterEventMode`.
-    pub(crate) fn enter_event_mode(&mut self) {
+    pub(crate) fn enter_event_mode(&mut self) -> Result<(), Failure> {
+        self.core.before_stop(self.core.time)?;
         self.core.state = State::EventMode;
         self.core.stale = true;
+        Ok(())
+    }
+
+    /// `fmi2CompletedIntegratorStep`.
+    pub(crate) fn completed_integrator_step(&self) -> Result<(), Failure> {
+        self.core.before_stop(self.core.time)
     }
 
     /// `fmi2NewDiscreteStates`.
@@ -47,6 +54,8 @@ impl<M: Model> Instance<M> {
     }
 
     /// `fmi2SetTime`. In event mode only where there is no continuous state (condition 8).
+    ///
+    /// An integrator may look past `stopTime` on its way; a step or an event there is refused.
     pub(crate) fn set_time(&mut self, time: f64) -> Result<(), Failure> {
         if self.core.state == State::EventMode && !self.interface.states.is_empty() {
             let message = "in EventMode only an FMU without continuous states may be given a time";
@@ -59,7 +68,6 @@ impl<M: Model> Instance<M> {
         if time < start - slack(start) {
             return Err(Failure::Error(format!("{time} s is before startTime {start} s")));
         }
-        self.core.before_stop(time)?;
         self.core.time = time;
         self.core.stale = true;
         Ok(())

@@ -3,6 +3,7 @@
 use sha2::{Digest, Sha256};
 
 use super::{Core, Instance};
+use crate::call_order::{InterfaceType, State};
 use crate::model::{Failure, Model};
 
 /// First bytes of a serialised state; the last two digits are the version of the layout.
@@ -74,8 +75,30 @@ impl<M: Model> Snapshot<M> {
             .filter(|(found, _)| *found == guid.as_bytes())
             .map(|(_, core)| core)
             .ok_or_else(|| refused("of another FMU, its GUID differs"))?;
-        let core = postcard::from_bytes(&core[..core.len() - DIGEST])
+        let core: Core<M> = postcard::from_bytes(&core[..core.len() - DIGEST])
             .map_err(|error| refused(&error.to_string()))?;
+        if !core.is_possible() {
+            return Err(refused("no instance can be in that state"));
+        }
         Ok(Self { guid: guid.to_owned(), core })
+    }
+}
+
+impl<M: Model> Core<M> {
+    /// Whether an instance can be like that when its state is read.
+    fn is_possible(&self) -> bool {
+        let reached = match self.state {
+            State::Instantiated | State::InitializationMode | State::Terminated | State::Error => {
+                true
+            }
+            State::EventMode | State::ContinuousTimeMode => {
+                self.interface_type == InterfaceType::ModelExchange
+            }
+            State::StepComplete | State::StepFailed => {
+                self.interface_type == InterfaceType::CoSimulation
+            }
+            State::StepInProgress | State::StepCanceled | State::Fatal => false,
+        };
+        reached && self.time.is_finite() && self.experiment.start_time.is_finite()
     }
 }

@@ -19,21 +19,35 @@ impl Product {
         }
         self.ten += unit.ten * exponent;
         if exponent >= 0 {
-            self.numerator *= unit.factor.powi(exponent);
+            self.numerator *= power(unit.factor, exponent.unsigned_abs());
         } else {
-            self.denominator *= unit.factor.powi(-exponent);
+            self.denominator *= power(unit.factor, exponent.unsigned_abs());
         }
     }
 
     fn factor(&self) -> f64 {
         let (mut numerator, mut denominator) = (self.numerator, self.denominator);
         if self.ten >= 0 {
-            numerator *= 10f64.powi(self.ten);
+            numerator *= power(10.0, self.ten.unsigned_abs());
         } else {
-            denominator *= 10f64.powi(-self.ten);
+            denominator *= power(10.0, self.ten.unsigned_abs());
         }
         numerator / denominator
     }
+}
+
+/// `base` to the power `exponent`, with roundings that are the same everywhere: the GUID of a
+/// description follows from them, and those of `powi` are left open.
+fn power(mut base: f64, mut exponent: u32) -> f64 {
+    let mut result = 1.0;
+    while exponent > 0 {
+        if exponent & 1 == 1 {
+            result *= base;
+        }
+        base *= base;
+        exponent >>= 1;
+    }
+    result
 }
 
 /// A place in an expression.

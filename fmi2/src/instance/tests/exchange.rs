@@ -109,7 +109,7 @@ fn an_event_may_change_states_announce_the_next_one_and_end_the_simulation() {
     ok(&mut instance, Function::SetContinuousStates, |own| {
         own.set_continuous_states(&[1.0, 4.0]).unwrap();
     });
-    ok(&mut instance, Function::EnterEventMode, Instance::enter_event_mode);
+    ok(&mut instance, Function::EnterEventMode, |own| own.enter_event_mode().unwrap());
     ok(&mut instance, Function::NewDiscreteStates, |own| {
         let info = own.new_discrete_states().unwrap();
         assert_eq!((info.values_of_continuous_states_changed, info.terminate_simulation), (1, 0));
@@ -122,7 +122,7 @@ fn an_event_may_change_states_announce_the_next_one_and_end_the_simulation() {
     assert_eq!(x, [1.0, -4.0]);
     ok(&mut instance, Function::EnterContinuousTimeMode, Instance::enter_continuous_time_mode);
     ok(&mut instance, Function::SetTime, |own| own.set_time(9.5).unwrap());
-    ok(&mut instance, Function::EnterEventMode, Instance::enter_event_mode);
+    ok(&mut instance, Function::EnterEventMode, |own| own.enter_event_mode().unwrap());
     ok(&mut instance, Function::NewDiscreteStates, |own| {
         let info = own.new_discrete_states().unwrap();
         assert_eq!((info.values_of_continuous_states_changed, info.terminate_simulation), (0, 1));
@@ -260,4 +260,24 @@ fn the_loop_of_an_integrator_does_not_allocate() {
         assert_eq!(slopes[0], 9.5);
     });
     assert_eq!(allocations.count_total, 0);
+}
+
+#[test]
+fn an_integrator_may_look_past_stop_time_but_complete_no_step_there() {
+    type Body = fn(&mut Instance<Pendulum>) -> Result<(), Failure>;
+    let completed: Body = |own| own.completed_integrator_step();
+    for (function, body) in [
+        (Function::CompletedIntegratorStep, completed),
+        (Function::EnterEventMode, |own| own.enter_event_mode()),
+    ] {
+        for (time, expected) in [(2.0, Status::OK), (2.5, Status::Error)] {
+            let mut instance = continuous();
+            instance.core.experiment.stop_time = Some(2.0);
+            ok(&mut instance, Function::SetTime, |own| own.set_time(time).unwrap());
+            ok(&mut instance, Function::GetDerivatives, |own| {
+                own.get_derivatives(&mut [0.0; 2]).unwrap();
+            });
+            assert_eq!(instance.call(function, body), expected, "{function:?} at {time}");
+        }
+    }
 }
