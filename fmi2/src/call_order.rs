@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::description::{Causality, Initial, Variability};
+
 /// `fmi2Type`: for which of the two interfaces an instance was made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum InterfaceType {
@@ -39,6 +41,11 @@ pub enum State {
 }
 
 impl State {
+    /// The state as a set of states.
+    pub(crate) const fn bit(self) -> u16 {
+        1 << self as u16
+    }
+
     /// Every state, in the order of the tables.
     pub const EVERY: [State; 11] = {
         use State::{
@@ -61,16 +68,16 @@ impl State {
     };
 }
 
-const I: u16 = 1 << State::Instantiated as u16;
-const M: u16 = 1 << State::InitializationMode as u16;
-const V: u16 = 1 << State::EventMode as u16;
-const N: u16 = 1 << State::ContinuousTimeMode as u16;
-const C: u16 = 1 << State::StepComplete as u16;
-const P: u16 = 1 << State::StepInProgress as u16;
-const F: u16 = 1 << State::StepFailed as u16;
-const K: u16 = 1 << State::StepCanceled as u16;
-const T: u16 = 1 << State::Terminated as u16;
-const E: u16 = 1 << State::Error as u16;
+const I: u16 = State::Instantiated.bit();
+const M: u16 = State::InitializationMode.bit();
+const V: u16 = State::EventMode.bit();
+const N: u16 = State::ContinuousTimeMode.bit();
+const C: u16 = State::StepComplete.bit();
+const P: u16 = State::StepInProgress.bit();
+const F: u16 = State::StepFailed.bit();
+const K: u16 = State::StepCanceled.bit();
+const T: u16 = State::Terminated.bit();
+const E: u16 = State::Error.bit();
 /// Every state in which an instance is at rest.
 const ALL: u16 = I | M | V | N | C | F | K | T | E;
 /// The states in which values can be read.
@@ -174,5 +181,26 @@ pub fn may_discard(interface: InterfaceType, function: Function) -> bool {
 /// Conditions on single variables (the numbers in the cells) are tested where values are set.
 #[must_use]
 pub fn allowed(interface: InterfaceType, function: Function, state: State) -> bool {
-    function.states(interface) & (1 << state as u16) != 0
+    function.states(interface) & state.bit() != 0
+}
+
+/// The states in which a variable may be set: conditions 1, 3 and 6 of section 4.2.4, 4 and 5 of
+/// 3.2.3; inputs also before initialization mode, as importers do.
+pub(crate) fn settable(
+    (causality, variability): (Causality, Variability),
+    initial: Option<Initial>,
+    is_state: bool,
+) -> u16 {
+    let at_the_start = match initial {
+        Some(Initial::Exact) if variability != Variability::Constant => I | M,
+        Some(Initial::Approx) => I,
+        _ => 0,
+    };
+    let at_points = match (causality, variability) {
+        (Causality::Input, Variability::Continuous) => I | M | V | N | C,
+        (Causality::Input, _) => I | M | V | C,
+        (Causality::Parameter, Variability::Tunable) => V | C,
+        _ => 0,
+    };
+    at_the_start | at_points | if is_state { N } else { 0 }
 }

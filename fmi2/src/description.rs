@@ -2,25 +2,31 @@
 //!
 //! The same types are rendered by an exporter and parsed by an importer.
 
+mod guid;
 mod parse;
 mod render;
 mod rules;
 #[cfg(test)]
 pub(crate) mod sample;
 
+pub(crate) use guid::Guid;
 pub use parse::{ParseError, Position};
 pub use rules::Problem;
+
+use serde::Serialize;
 
 use crate::unit::Unit;
 
 /// `fmiModelDescription`, the root element (section 2.2.1).
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ModelDescription {
     /// `fmiVersion`, `"2.0"` for every 2.0.x.
     pub fmi_version: String,
     /// `modelName`.
     pub model_name: String,
-    /// `guid`: the string that pairs this XML with its binary.
+    /// `guid`: the string that pairs this XML with its binary. Not part of the serialized form, of
+    /// which it is a hash.
+    #[serde(skip)]
     pub guid: String,
     /// `description`.
     pub description: Option<String>,
@@ -67,7 +73,7 @@ impl ModelDescription {
 }
 
 /// `ModelExchange`: identifier and capability flags (section 3.3.1).
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[expect(clippy::struct_excessive_bools, reason = "the flags of the standard, one for one")]
 pub struct ModelExchange {
     /// `modelIdentifier`: file name of the library, without extension.
@@ -89,7 +95,7 @@ pub struct ModelExchange {
 }
 
 /// `CoSimulation`: identifier and capability flags (section 4.3.1).
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[expect(clippy::struct_excessive_bools, reason = "the flags of the standard, one for one")]
 pub struct CoSimulation {
     /// `modelIdentifier`: file name of the library, without extension.
@@ -117,7 +123,7 @@ pub struct CoSimulation {
 }
 
 /// `SimpleType` of `TypeDefinitions`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SimpleType {
     /// `name`, unique, different from every variable's.
     pub name: String,
@@ -130,7 +136,7 @@ pub struct SimpleType {
 }
 
 /// `Category` of `LogCategories`.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct LogCategory {
     /// `name`.
     pub name: String,
@@ -139,7 +145,7 @@ pub struct LogCategory {
 }
 
 /// `DefaultExperiment`.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct DefaultExperiment {
     /// `startTime` in s.
     pub start_time: Option<f64>,
@@ -152,7 +158,7 @@ pub struct DefaultExperiment {
 }
 
 /// `ScalarVariable`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ScalarVariable {
     /// `name`, unique.
     pub name: String,
@@ -184,7 +190,7 @@ impl ScalarVariable {
 }
 
 /// The type of a variable with the attributes that depend on it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub enum Kind {
     /// `Real`.
     Real(RealType),
@@ -213,7 +219,7 @@ impl Kind {
 }
 
 /// Attributes of a `Real`.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct RealType {
     /// `declaredType`.
     pub declared_type: Option<String>,
@@ -238,7 +244,7 @@ pub struct RealType {
 }
 
 /// Attributes of an `Integer` or an `Enumeration`.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct IntegerType {
     /// `declaredType`.
     pub declared_type: Option<String>,
@@ -256,7 +262,7 @@ pub struct IntegerType {
 macro_rules! spelt {
     ($(#[$meta:meta])* $name:ident { $($(#[$doc:meta])* $variant:ident = $text:literal,)* }) => {
         $(#[$meta])*
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
         pub enum $name { $($(#[$doc])* $variant,)* }
 
         impl $name {
@@ -340,7 +346,7 @@ spelt! {
 }
 
 /// `ModelStructure`: indices are 1-based positions in `ModelDescription::variables`.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ModelStructure {
     /// `Outputs`.
     pub outputs: Vec<Unknown>,
@@ -351,7 +357,7 @@ pub struct ModelStructure {
 }
 
 /// `Unknown`: one row of `ModelStructure`.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Unknown {
     /// `index`, 1-based.
     pub index: u32,

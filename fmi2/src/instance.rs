@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::abi::Status;
 use crate::call_order::{Function, InterfaceType, State, allowed, may_discard};
+use crate::description::Guid;
 use crate::ffi::Callbacks;
 use crate::interface::{CATEGORIES, Interface};
 use crate::model::{Experiment, Failure, Model, Step};
@@ -45,7 +46,6 @@ pub(crate) struct Instance<M: Model> {
     core: Core<M>,
     fresh: M,
     interface: Interface<M>,
-    guid: String,
     callbacks: Callbacks,
     /// Log categories that `fmi2SetDebugLogging` chose; all of them when none.
     categories: Option<Vec<String>>,
@@ -119,7 +119,6 @@ impl<M: Model> Instance<M> {
                 core: Core::new(model.clone(), interface_type),
                 fresh: model,
                 interface,
-                guid: guid.to_owned(),
                 callbacks,
                 categories: None,
                 strings: Vec::new(),
@@ -307,8 +306,8 @@ impl<M: Model> Instance<M> {
     }
 
     /// The GUID of the description that this instance was made for.
-    pub(crate) fn guid(&self) -> &str {
-        &self.guid
+    pub(crate) fn guid(&self) -> Guid {
+        self.interface.guid
     }
 }
 

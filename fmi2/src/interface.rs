@@ -3,9 +3,10 @@
 mod general;
 mod structure;
 
+use crate::call_order::settable;
 use crate::description::{
-    Causality, Initial, IntegerType, Kind, ModelDescription, Problem, RealType, ScalarVariable,
-    SimpleType, Unknown, Variability,
+    Causality, Guid, Initial, IntegerType, Kind, ModelDescription, Problem, RealType,
+    ScalarVariable, SimpleType, Unknown, Variability,
 };
 use crate::model::{Failure, Model};
 use crate::unit::Unit;
@@ -24,8 +25,10 @@ pub(crate) struct Slot<M, T> {
     pub(crate) is_unknown: bool,
     /// Listed under `InitialUnknowns`, by this name or an alias.
     pub(crate) is_initial_unknown: bool,
-    /// Smallest and largest value of a Real or Integer.
+    /// Smallest and largest value of a Real or Integer; finite.
     pub(crate) range: (f64, f64),
+    /// The states in which it may be set, as a set of [`State::bit`](crate::call_order::State).
+    pub(crate) settable: u16,
     /// The values of an enumeration; empty for all other types.
     pub(crate) items: Vec<i32>,
     pub(crate) field: Field<M, T>,
@@ -50,6 +53,7 @@ pub(crate) struct Interface<M> {
     /// None without `fmi2ModelExchange`.
     pub(crate) event_indicators: Option<usize>,
     pub(crate) max_output_derivative_order: u32,
+    pub(crate) guid: Guid,
 }
 
 /// Type and value reference of a variable.
@@ -69,6 +73,7 @@ impl<M: Model> Interface<M> {
             states: Vec::new(),
             event_indicators: model.model_exchange().map(|own| own.event_indicators),
             max_output_derivative_order: 0,
+            guid: Guid([0; 16]),
         };
         description.variables.push(time());
         for variable in &variables {
@@ -90,14 +95,17 @@ impl<M: Model> Interface<M> {
                 .iter()
                 .any(|slot| slot.causality == Causality::Input && !slot.derivatives.is_empty());
         }
-        description.guid = description.content_guid();
+        interface.guid = Guid::of(&description);
+        description.guid = interface.guid.to_string();
         Ok((interface, description))
     }
 
     /// Marks the states and the unknowns of `ModelStructure`.
     fn mark(&mut self, description: &ModelDescription) {
         for state in &self.states {
-            self.reals[state.state].is_state = true;
+            let slot = &mut self.reals[state.state];
+            slot.is_state = true;
+            slot.settable = settable((slot.causality, slot.variability), slot.initial, true);
         }
         let real = |row: &Unknown| {
             let own = &description.variables[row.index as usize - 1];
@@ -206,7 +214,7 @@ impl<M> Blank<M> {
             causality: variable.causality,
             variability: variable.variability,
             initial: variable.initial,
-            range: (min.unwrap_or(f64::NEG_INFINITY), max.unwrap_or(f64::INFINITY)),
+            range: (min.unwrap_or(f64::MIN), max.unwrap_or(f64::MAX)),
             items: variable
                 .enumeration
                 .map(|own| own.items.iter().map(|(_, value)| *value).collect())
@@ -227,6 +235,7 @@ impl<M> Blank<M> {
             is_unknown: false,
             is_initial_unknown: false,
             range: self.range,
+            settable: settable((self.causality, self.variability), self.initial, false),
             items: self.items,
             field,
             derivatives: self.derivatives,

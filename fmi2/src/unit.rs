@@ -3,13 +3,15 @@
 mod expression;
 mod names;
 
+use serde::Serialize;
+
 use expression::Cursor;
 
 /// Degrees in a radian, 180 / pi.
 const DEGREES_PER_RADIAN: f64 = 57.295_779_513_082_32;
 
 /// `Unit`: a name, its conversion to SI base units and the units to display it in.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Unit {
     /// `name`, unique in `UnitDefinitions`.
     pub name: String,
@@ -20,7 +22,7 @@ pub struct Unit {
 }
 
 /// `BaseUnit`: exponents of the base units, and `base = factor * unit + offset`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BaseUnit {
     /// Exponent of the kilogram.
     pub kg: i32,
@@ -59,7 +61,7 @@ impl BaseUnit {
 }
 
 /// `DisplayUnit`: `display = factor * unit + offset`, the other way round than in [`BaseUnit`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DisplayUnit {
     /// `name`, unique within its unit.
     pub name: String,

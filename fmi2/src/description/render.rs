@@ -2,11 +2,8 @@
 
 mod tag;
 
-use std::fmt::Write as _;
-
 use quick_xml::events::{BytesDecl, BytesEnd, Event};
 use quick_xml::writer::Writer;
-use sha2::{Digest, Sha256};
 
 use super::{
     CoSimulation, DefaultExperiment, IntegerType, Kind, LogCategory, ModelDescription,
@@ -44,26 +41,6 @@ impl ModelDescription {
         let mut bytes = output.writer.into_inner();
         bytes.push(b'\n');
         String::from_utf8_lossy(&bytes).into_owned()
-    }
-
-    /// A `guid` that follows from everything else in the description: the first 128 bits of the
-    /// SHA-256 of the XML with an empty `guid`, as `{xxxxxxxx-xxxx-xxxx-xxxx-xxxxxxxxxxxx}`.
-    ///
-    /// Two descriptions that differ in anything but `guid` have different results.
-    #[must_use]
-    pub fn content_guid(&self) -> String {
-        let nameless = ModelDescription { guid: String::new(), ..self.clone() };
-        let hash = Sha256::digest(nameless.to_xml());
-        let mut guid = String::from("{");
-        for (index, byte) in hash.iter().take(16).enumerate() {
-            if matches!(index, 4 | 6 | 8 | 10) {
-                guid.push('-');
-            }
-            // Writing to a string cannot fail.
-            let _ = write!(guid, "{byte:02x}");
-        }
-        guid.push('}');
-        guid
     }
 }
 

@@ -121,19 +121,12 @@ behind_the_door! {
     serialized_fmu_state_size = SerializedFMUstateSize(state: fmi2FMUstate, size: *mut usize),
         _instance => {
             let state = state.cast::<Snapshot<M>>().as_ref().ok_or_else(|| missing("FMUstate"))?;
-            put(size, state.to_bytes()?.len())
+            put(size, state.size()?)
         };
     serialize_fmu_state = SerializeFMUstate(state: fmi2FMUstate, bytes: *mut fmi2Byte, size: usize),
         _instance => {
             let state = state.cast::<Snapshot<M>>().as_ref().ok_or_else(|| missing("FMUstate"))?;
-            let serialized = state.to_bytes()?;
-            write(bytes.cast::<u8>(), size)?
-                .get_mut(..serialized.len())
-                .ok_or_else(|| Failure::Error(format!(
-                    "{size} bytes given, {} needed", serialized.len()
-                )))?
-                .copy_from_slice(&serialized);
-            Ok(())
+            state.write(write(bytes.cast::<u8>(), size)?)
         };
     de_serialize_fmu_state = DeSerializeFMUstate(
         bytes: *const fmi2Byte, size: usize, state: *mut fmi2FMUstate

@@ -1,34 +1,40 @@
 //! FMU states: copies of an instance's core, and their form as bytes.
 
-use sha2::{Digest, Sha256};
-
 use super::{Core, Instance};
 use crate::call_order::{InterfaceType, State};
+use crate::description::Guid;
 use crate::model::{Failure, Model};
 
 /// First bytes of a serialised state; the last two digits are the version of the layout.
 const MAGIC: &[u8; 8] = b"FMI2ST02";
-/// Length of the SHA-256 digest at the end.
-const DIGEST: usize = 32;
+/// Length of magic and GUID.
+const HEAD: usize = 24;
+/// Length of the checksum at the end.
+const CHECKSUM: usize = 4;
 
 /// What `fmi2FMUstate` points to.
+///
+/// Some importers hand the state itself to `fmi2FreeFMUstate`, where section 2.1.8 wants its
+/// address. They find the pointer `none`: there is nothing to free.
+#[repr(C)]
 pub(crate) struct Snapshot<M: Model> {
-    guid: String,
+    none: usize,
+    guid: Guid,
     core: Core<M>,
 }
 
 impl<M: Model> Instance<M> {
     /// `fmi2GetFMUstate`.
     pub(crate) fn snapshot(&self) -> Snapshot<M> {
-        Snapshot { guid: self.guid.clone(), core: self.core.clone() }
+        Snapshot { none: 0, guid: self.guid(), core: self.core.clone() }
     }
 
     /// `fmi2SetFMUstate`.
     pub(crate) fn restore(&mut self, snapshot: &Snapshot<M>) -> Result<(), Failure> {
-        if snapshot.guid != self.guid {
+        if snapshot.guid != self.guid() {
+            let (of, own) = (snapshot.guid, self.guid());
             return Err(Failure::Error(format!(
-                "the state belongs to the FMU {}, this one is {}",
-                snapshot.guid, self.guid
+                "the state belongs to the FMU {of}, this one is {own}"
             )));
         }
         let (of, own) = (snapshot.core.interface_type, self.core.interface_type);
@@ -37,50 +43,59 @@ impl<M: Model> Instance<M> {
                 "the state is one of {of:?}, this instance is {own:?}"
             )));
         }
-        self.core = snapshot.core.clone();
+        self.core.clone_from(&snapshot.core);
         Ok(())
     }
 }
 
+fn failed(error: &postcard::Error) -> Failure {
+    Failure::Error(format!("cannot serialize: {error}"))
+}
+
 impl<M: Model> Snapshot<M> {
-    /// The bytes: magic, length of the GUID (one byte), GUID, core in postcard's little-endian
-    /// form, SHA-256 of all that.
-    pub(crate) fn to_bytes(&self) -> Result<Vec<u8>, Failure> {
-        let failed = |reason: String| Failure::Error(format!("cannot serialize: {reason}"));
-        let mut bytes = MAGIC.to_vec();
-        bytes.push(u8::try_from(self.guid.len()).map_err(|error| failed(error.to_string()))?);
-        bytes.extend_from_slice(self.guid.as_bytes());
-        let core = postcard::to_stdvec(&self.core).map_err(|error| failed(error.to_string()))?;
-        bytes.extend_from_slice(&core);
-        bytes.extend_from_slice(&Sha256::digest(&bytes));
-        Ok(bytes)
+    /// How many bytes [`Snapshot::write`] needs.
+    pub(crate) fn size(&self) -> Result<usize, Failure> {
+        let core = postcard::experimental::serialized_size(&self.core);
+        core.map(|core| HEAD + core + CHECKSUM).map_err(|error| failed(&error))
+    }
+
+    /// Writes the state to the begin of `bytes`: magic, GUID, core in postcard's little-endian
+    /// form, CRC-32 of all that.
+    pub(crate) fn write(&self, bytes: &mut [u8]) -> Result<(), Failure> {
+        let (found, needed) = (bytes.len(), self.size()?);
+        let Some(bytes) = bytes.get_mut(..needed) else {
+            return Err(Failure::Error(format!("{found} bytes given, {needed} needed")));
+        };
+        let (content, sum) = bytes.split_at_mut(needed - CHECKSUM);
+        content[..MAGIC.len()].copy_from_slice(MAGIC);
+        content[MAGIC.len()..HEAD].copy_from_slice(&self.guid.0);
+        postcard::to_slice(&self.core, &mut content[HEAD..]).map_err(|error| failed(&error))?;
+        sum.copy_from_slice(&crc32fast::hash(content).to_le_bytes());
+        Ok(())
     }
 
     /// The state in `bytes`; refused unless it is whole and of the FMU `guid`.
-    pub(crate) fn from_bytes(bytes: &[u8], guid: &str) -> Result<Self, Failure> {
+    pub(crate) fn from_bytes(bytes: &[u8], guid: Guid) -> Result<Self, Failure> {
         let refused = |reason: &str| Failure::Error(format!("serialized state: {reason}"));
-        let rest =
-            bytes.strip_prefix(&MAGIC[..6]).ok_or_else(|| refused("not of this exporter"))?;
-        let rest = rest.strip_prefix(&MAGIC[6..]).ok_or_else(|| refused("unknown version"))?;
-        let whole = bytes
-            .len()
-            .checked_sub(DIGEST)
-            .is_some_and(|end| Sha256::digest(&bytes[..end])[..] == bytes[end..]);
-        if !whole {
-            return Err(refused("truncated or altered, its checksum does not hold"));
+        if !bytes.starts_with(&MAGIC[..6]) {
+            return Err(refused("not of this exporter"));
         }
-        let core = rest
-            .split_first()
-            .and_then(|(&length, rest)| rest.split_at_checked(usize::from(length)))
-            .filter(|(found, _)| *found == guid.as_bytes())
-            .map(|(_, core)| core)
+        if !bytes.starts_with(MAGIC) {
+            return Err(refused("unknown version"));
+        }
+        let (content, _) = bytes
+            .split_last_chunk::<CHECKSUM>()
+            .filter(|(content, sum)| crc32fast::hash(content).to_le_bytes() == **sum)
+            .ok_or_else(|| refused("truncated or altered, its checksum does not hold"))?;
+        let core = content[MAGIC.len()..]
+            .strip_prefix(&guid.0)
             .ok_or_else(|| refused("of another FMU, its GUID differs"))?;
-        let core: Core<M> = postcard::from_bytes(&core[..core.len() - DIGEST])
+        let (core, rest) = postcard::take_from_bytes::<Core<M>>(core)
             .map_err(|error| refused(&error.to_string()))?;
-        if !core.is_possible() {
+        if !rest.is_empty() || !core.is_possible() {
             return Err(refused("no instance can be in that state"));
         }
-        Ok(Self { guid: guid.to_owned(), core })
+        Ok(Self { none: 0, guid, core })
     }
 }
 

@@ -4,7 +4,7 @@ use std::ffi::CString;
 
 use super::{Core, Instance};
 use crate::call_order::State;
-use crate::description::{Causality, Initial, Variability};
+use crate::description::Causality;
 use crate::interface::{Interface, Slot};
 use crate::model::{Failure, Model};
 
@@ -40,29 +40,9 @@ impl<M> Interface<M> {
     }
 }
 
-/// Whether the variable may be set now: conditions 1, 3 and 6 of section 4.2.4, 4 and 5 of 3.2.3;
-/// inputs also before initialization mode, as importers do.
+/// Whether the variable may be set now.
 fn settable<M, T>(slot: &Slot<M, T>, state: State) -> Result<(), Failure> {
-    let is_input = slot.causality == Causality::Input;
-    let is_constant = slot.variability == Variability::Constant;
-    let allowed = match state {
-        State::Instantiated => {
-            is_input
-                || !is_constant && matches!(slot.initial, Some(Initial::Exact | Initial::Approx))
-        }
-        State::InitializationMode => {
-            is_input || !is_constant && slot.initial == Some(Initial::Exact)
-        }
-        State::ContinuousTimeMode => {
-            slot.is_state || is_input && slot.variability == Variability::Continuous
-        }
-        _ => {
-            is_input
-                || slot.causality == Causality::Parameter
-                    && slot.variability == Variability::Tunable
-        }
-    };
-    if allowed {
+    if slot.settable & state.bit() != 0 {
         return Ok(());
     }
     let (name, variability) = (&slot.name, slot.variability.as_str());
@@ -72,17 +52,17 @@ fn settable<M, T>(slot: &Slot<M, T>, state: State) -> Result<(), Failure> {
     )))
 }
 
-/// Whether `value` is one that the variable can take.
+/// Whether `value` is one that the variable can take: its range is finite.
 fn acceptable<M>(slot: &Slot<M, f64>, value: f64) -> Result<(), Failure> {
     let (min, max) = slot.range;
+    if min <= value && value <= max {
+        return Ok(());
+    }
     let name = &slot.name;
     if !value.is_finite() {
         return Err(Failure::Discard(format!("{name} = {value}, expected a finite number")));
     }
-    if value < min || value > max {
-        return Err(Failure::Discard(format!("{name} = {value}, expected {min} to {max}")));
-    }
-    Ok(())
+    Err(Failure::Discard(format!("{name} = {value}, expected {min} to {max}")))
 }
 
 /// Whether the Integer or Enumeration can take `value`.
@@ -183,15 +163,16 @@ impl<M: Model> Instance<M> {
 
     /// `fmi2SetReal`: all values or none.
     pub(crate) fn set_real(&mut self, to: &[u32], values: &[f64]) -> Result<(), Failure> {
+        let Self { core, interface, .. } = self;
         for (&reference, &value) in to.iter().zip(values) {
-            let slot = self.interface.real(reference)?.ok_or_else(time_is_given)?;
-            settable(slot, self.core.state)?;
+            let slot = interface.real(reference)?.ok_or_else(time_is_given)?;
+            settable(slot, core.state)?;
             acceptable(slot, value)?;
         }
         for (&reference, &value) in to.iter().zip(values) {
-            if let Some(slot) = self.interface.real(reference)? {
-                *(slot.field)(&mut self.core.model) = value;
-                self.core.touched(slot);
+            if let Some(slot) = interface.real(reference)? {
+                *(slot.field)(&mut core.model) = value;
+                core.touched(slot);
             }
         }
         Ok(())
