@@ -8,6 +8,7 @@ mod check;
 mod claims;
 mod design;
 mod figure;
+mod new;
 mod pack;
 mod paper_figures;
 mod recording;
@@ -33,8 +34,10 @@ struct Arguments {
 enum Verb {
     /// Build and pack both FMUs, run the paper's experiment, compare with its claims
     Reproduce(reproduce::Options),
-    /// Build the FMUs of this workspace and pack them
+    /// Build crates that use fmi2, or those of this workspace, and pack them into FMUs
     Pack(pack::Options),
+    /// Write a crate with a small model, to begin with
+    New(new::Options),
     /// Couple a plant FMU and a controller FMU
     Run(run::Options),
     /// Design observer and feedback for the plant of a file
@@ -47,6 +50,7 @@ fn main() -> ExitCode {
     let done = match Arguments::parse().verb {
         Verb::Reproduce(options) => reproduce::reproduce(&options),
         Verb::Pack(options) => pack::pack(&options),
+        Verb::New(options) => new::new(&options),
         Verb::Run(options) => run::run(&options),
         Verb::Design(options) => design::design(&options),
         Verb::Check(options) => check::check(&options),

@@ -1,8 +1,11 @@
-//! `aso-ftc pack`: builds the libraries of the models and packs each into an FMU.
+//! `aso-ftc pack`: builds the library of a crate that uses `fmi2` and packs it into an FMU.
 #![expect(clippy::print_stdout, reason = "the result of the command")]
 
+mod library;
+mod licenses;
+
+use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use anyhow::{Context, bail};
 use fmi2::description::ModelDescription;
@@ -11,27 +14,47 @@ use fmi2::package::Package;
 
 use crate::figure::rasterise;
 
-/// The crates that end in an export line.
+/// The models of this workspace.
 const MODELS: [&str; 2] = ["fmu-plant", "fmu-controller"];
+
+/// The equations of a model and its picture; the packer makes index.html and model.png of them.
+const FRAGMENT: &str = "model.html";
+const DRAWING: &str = "model.svg";
 
 #[derive(clap::Args)]
 pub(crate) struct Options {
+    /// Folders of crates that end in `fmi2::export!`, in or outside of this workspace [default:
+    /// the plant and the controller of this workspace]
+    ///
+    /// Into the FMU go, beside the library: `resources`; `documentation`, with an index.html made
+    /// of the description and `documentation/model.html` unless there is one; `model.png`, or one
+    /// drawn from `documentation/model.svg`; the licences of the crate and of its dependencies.
+    #[arg(value_name = "PATH")]
+    crates: Vec<PathBuf>,
     /// Folder for the FMUs
     #[arg(long, value_name = "FOLDER", default_value = "dist")]
     out: PathBuf,
     /// Also write the model descriptions into the folder modelDescription of the workspace
-    #[arg(long)]
+    #[arg(long, conflicts_with = "crates")]
     update_descriptions: bool,
 }
 
-/// Builds and packs all models.
+/// Builds and packs the given crates or all models of the workspace.
 pub(crate) fn pack(options: &Options) -> anyhow::Result<bool> {
+    for folder in &options.crates {
+        let fmu = pack_crate(folder, &options.out, false)
+            .with_context(|| format!("cannot pack {}", folder.display()))?;
+        println!("{}", fmu.path.display());
+    }
+    if !options.crates.is_empty() {
+        return Ok(true);
+    }
     let root = workspace()?;
     for fmu in pack_into(&root, &options.out)? {
         if options.update_descriptions {
             let name = format!("{}.xml", fmu.description.model_name);
             let target = root.join("modelDescription").join(name);
-            std::fs::write(&target, &fmu.xml)
+            fs::write(&target, &fmu.xml)
                 .with_context(|| format!("cannot write {}", target.display()))?;
         }
         println!("{}", fmu.path.display());
@@ -48,8 +71,7 @@ pub(crate) struct Packed {
 
 /// Builds all models of the workspace `root` and packs each into the folder `out`.
 pub(crate) fn pack_into(root: &Path, out: &Path) -> anyhow::Result<Vec<Packed>> {
-    let libraries = build(root)?;
-    MODELS.iter().map(|model| pack_model(root, &libraries, model, out)).collect()
+    MODELS.iter().map(|model| pack_crate(&root.join(model), out, true)).collect()
 }
 
 /// The folder of this workspace: the nearest one upwards that has the models.
@@ -68,62 +90,92 @@ pub(crate) fn workspace() -> anyhow::Result<PathBuf> {
         })
 }
 
-/// Builds the libraries in the profile `fmu`; the folder they are in.
-///
-/// Paths of this machine are kept out of them, so that the same sources give the same bytes.
-fn build(root: &Path) -> anyhow::Result<PathBuf> {
-    let target = root.join("target").join("libraries");
-    let cargo_home = std::env::var_os("CARGO_HOME")
-        .map(PathBuf::from)
-        .or_else(|| std::env::var_os("HOME").map(|home| PathBuf::from(home).join(".cargo")));
-    let mut flags = vec![format!("--remap-path-prefix={}=.", root.display())];
-    flags.extend(cargo_home.map(|home| format!("--remap-path-prefix={}=cargo", home.display())));
-    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let mut command = Command::new(cargo);
-    command
-        .current_dir(root)
-        .args(["build", "--profile", "fmu", "--locked", "--target-dir"])
-        .arg(&target);
-    for model in MODELS {
-        command.args(["--package", model]);
-    }
-    command.env("CARGO_ENCODED_RUSTFLAGS", flags.join("\u{1f}"));
-    let status = command.status().context("cannot run cargo, which builds the FMUs")?;
-    if !status.success() {
-        bail!("cargo could not build {}: {status}", MODELS.join(" and "));
-    }
-    Ok(target.join("fmu"))
-}
-
-fn pack_model(root: &Path, libraries: &Path, model: &str, out: &Path) -> anyhow::Result<Packed> {
-    let (prefix, suffix) = (std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
-    let library = libraries.join(format!("{prefix}{}{suffix}", model.replace('-', "_")));
-    let folder = root.join(model);
-    let resources = folder.join("resources");
-    let xml = master::describe(&library, &resources)?;
+fn pack_crate(folder: &Path, out: &Path, locked: bool) -> anyhow::Result<Packed> {
+    let library = library::build(folder, locked)?;
+    let xml = master::describe(&library.file, &folder.join("resources")).with_context(|| {
+        format!("the library of {} does not describe itself", library.package.name)
+    })?;
     let description = ModelDescription::parse(xml.as_bytes())
-        .with_context(|| format!("the model description of {model}"))?;
-    let read = |path: &Path| {
-        std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))
-    };
-    let text = read(&folder.join("documentation").join("model.html"))?;
-    let drawing = read(&folder.join("documentation").join("model.svg"))?;
-    let identifier = &description.model_name;
-    let mut package = Package::new(xml.clone());
-    package.add(
-        format!("binaries/{}/{identifier}{suffix}", fmi2::package::platforms()[0]),
-        read(&library)?,
-    );
-    package.add("documentation/index.html", page(&description, &String::from_utf8_lossy(&text)));
-    let licenses = [read(&root.join("LICENSE-MIT"))?, read(&root.join("LICENSE-APACHE"))?];
-    let heading = b"At your choice, the MIT License or the Apache License 2.0.\n\n".to_vec();
-    let text = [heading, licenses.join(&b"\n\n"[..])].concat();
-    package.add("documentation/licenses/license.txt", text);
-    package.add("model.png", rasterise(&String::from_utf8_lossy(&drawing))?);
-    if resources.is_dir() {
-        package.add_folder("resources", &resources)?;
+        .with_context(|| format!("the model description of {}", library.package.name))?;
+    let problems: Vec<String> = description.problems().iter().map(ToString::to_string).collect();
+    if !problems.is_empty() {
+        let name = &library.package.name;
+        bail!("the variables of {name} break rules of FMI 2.0.5:\n{}", problems.join("\n"));
     }
+    let mut package = Package::new(xml.clone());
+    let identifier = &description.model_name;
+    let (platform, suffix) = (fmi2::package::platforms(), std::env::consts::DLL_SUFFIX);
+    let platform = platform.first().context("FMI has no name for this platform")?;
+    package.add(format!("binaries/{platform}/{identifier}{suffix}"), read(&library.file)?);
+    add_resources(&mut package, folder)?;
+    add_documentation(&mut package, folder, &description)?;
+    add_picture(&mut package, folder)?;
+    licenses::add(&mut package, &library)?;
     let path = out.join(format!("{identifier}.fmu"));
     package.write(&path)?;
     Ok(Packed { path, xml, description })
+}
+
+fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
+    fs::read(path).with_context(|| format!("cannot read {}", path.display()))
+}
+
+fn add_resources(package: &mut Package, folder: &Path) -> anyhow::Result<()> {
+    let resources = folder.join("resources");
+    if resources.is_dir() {
+        package.add_folder("resources", &resources)?;
+    }
+    Ok(())
+}
+
+/// The author's files, and an entry page where there is none among them.
+fn add_documentation(
+    package: &mut Package,
+    folder: &Path,
+    description: &ModelDescription,
+) -> anyhow::Result<()> {
+    let folder = folder.join("documentation");
+    let mut fragment = Vec::new();
+    let mut has_page = false;
+    if folder.is_dir() {
+        for item in fs::read_dir(&folder)? {
+            let path = item?.path();
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            match name.as_str() {
+                FRAGMENT => fragment = read(&path)?,
+                DRAWING => {}
+                _ if path.is_dir() => {
+                    package.add_folder(&format!("documentation/{name}"), &path)?;
+                }
+                _ => {
+                    has_page |= name == "index.html";
+                    package.add(format!("documentation/{name}"), read(&path)?);
+                }
+            }
+        }
+    }
+    if !has_page {
+        let page = page(description, &String::from_utf8_lossy(&fragment));
+        package.add("documentation/index.html", page);
+    }
+    Ok(())
+}
+
+/// `model.png`, as it is or from the drawing.
+fn add_picture(package: &mut Package, folder: &Path) -> anyhow::Result<()> {
+    let picture = folder.join("model.png");
+    let drawing = folder.join("documentation").join(DRAWING);
+    if picture.is_file() {
+        let bytes = read(&picture)?;
+        if !bytes.starts_with(b"\x89PNG\r\n\x1a\n") {
+            bail!("{}: expected a PNG file", picture.display());
+        }
+        package.add("model.png", bytes);
+    } else if drawing.is_file() {
+        let svg = read(&drawing)?;
+        let bytes = rasterise(&String::from_utf8_lossy(&svg))
+            .with_context(|| format!("{}", drawing.display()))?;
+        package.add("model.png", bytes);
+    }
+    Ok(())
 }

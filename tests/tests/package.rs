@@ -62,11 +62,14 @@ fn the_interfaces_are_those_of_the_documents() {
     let plant = unpacked("FrictionPendulum").description;
     assert_eq!(names(&plant, Causality::Input), ["u", "f_a"]);
     assert_eq!(names(&plant, Causality::Output), ["x_p", "theta", "v_p", "omega", "f_fric"]);
-    assert_eq!(names(&plant, Causality::Local), ["regime"]);
+    let local = ["regime", "der(x_p)", "der(theta)", "der(v_p)", "der(omega)"];
+    assert_eq!(names(&plant, Causality::Local), local);
     let controller = unpacked("AsoController").description;
     assert_eq!(names(&controller, Causality::Input), ["x_p", "theta", "compensate"]);
     let outputs = ["u", "f_hat", "x_hat[1]", "x_hat[2]", "x_hat[3]", "x_hat[4]"];
     assert_eq!(names(&controller, Causality::Output), outputs);
+    let states = ["x_hat[1]", "x_hat[2]", "x_hat[3]", "x_hat[4]", "f_hat"];
+    assert_eq!(names(&controller, Causality::Local), states.map(|name| format!("der({name})")));
     for (name, description) in [("plant", &plant), ("controller", &controller)] {
         let readme = fs::read_to_string(root().join("README.md")).unwrap();
         for causality in [Causality::Input, Causality::Output] {
@@ -83,7 +86,11 @@ fn the_outputs_of_the_controller_depend_on_no_input_within_a_step() {
     let controller = unpacked("AsoController").description;
     assert_eq!(controller.structure.outputs.len(), 6);
     for unknown in &controller.structure.outputs {
-        assert_eq!(unknown.dependencies, Some(vec![]));
+        for known in unknown.dependencies.iter().flatten() {
+            let known = &controller.variables[*known as usize - 1];
+            assert_ne!(known.causality, Causality::Input, "{}", known.name);
+        }
+        assert!(unknown.dependencies.is_some());
     }
 }
 

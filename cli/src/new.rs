@@ -1,0 +1,125 @@
+//! `aso-ftc new`: writes a crate with a small model, which is packed as it is.
+#![expect(clippy::print_stdout, reason = "the result of the command")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+
+const MANIFEST: &str = include_str!("new/manifest.toml");
+const README: &str = include_str!("new/readme.md");
+const MODEL: &str = include_str!("new/model.rs");
+
+/// Names that Rust, the template, cargo or Windows have for something else.
+const TAKEN: &str = "about alloc aux clone con core default deserialize err experiment failure fmi2 \
+    into model none nul ok option path prn result self send serde serialize some std step string \
+    test variable vec";
+
+#[derive(clap::Args)]
+pub(crate) struct Options {
+    /// Name of the crate, such as heat-pump; the model is then called `HeatPump`
+    name: String,
+    /// Folder to be made for it [default: ./NAME]
+    #[arg(long, value_name = "FOLDER")]
+    path: Option<PathBuf>,
+    /// The crate fmi2: its folder, or the URL of a git repository [default: the one in the clone
+    /// that this program was built in or is called in]
+    #[arg(long, value_name = "SOURCE")]
+    fmi2: Option<String>,
+}
+
+/// Writes the crate, all of it or nothing.
+pub(crate) fn new(options: &Options) -> anyhow::Result<bool> {
+    let model = identifier(&options.name)?;
+    let folder = options.path.clone().unwrap_or_else(|| PathBuf::from(&options.name));
+    if folder.symlink_metadata().is_ok() {
+        bail!("{} exists already: expected a folder that is still to be made", folder.display());
+    }
+    let manifest = MANIFEST
+        .replace("@crate@", &options.name)
+        .replace("@model@", &model)
+        .replace("@fmi2@", &dependency(options.fmi2.as_deref())?);
+    let files = [
+        ("Cargo.toml", manifest),
+        ("src/lib.rs", MODEL.replace("NewModel", &model)),
+        ("README.md", README.replace("@model@", &model)),
+        (".gitignore", "/target\n/dist\n".to_owned()),
+    ];
+    write(&folder, &files).with_context(|| format!("cannot write {}", folder.display()))?;
+    println!("{}", folder.display());
+    Ok(true)
+}
+
+/// The name of the model: that of the crate in camel case, a C identifier.
+fn identifier(name: &str) -> anyhow::Result<String> {
+    let expected = "expected lower-case letters and digits in words joined by - or _, a letter \
+                    first, such as heat-pump";
+    let words: Vec<&str> = name.split(['-', '_']).collect();
+    let letters = |word: &&str| {
+        !word.is_empty() && word.chars().all(|own| own.is_ascii_lowercase() || own.is_ascii_digit())
+    };
+    if !words.iter().all(letters) || !name.starts_with(|first: char| first.is_ascii_lowercase()) {
+        bail!("the name {name:?} gives no identifier: {expected}");
+    }
+    if name.len() > 64 {
+        bail!("the name {name:?} has {} characters, expected at most 64", name.len());
+    }
+    let camel = |word: &str| word[..1].to_ascii_uppercase() + &word[1..];
+    let identifier: String = words.into_iter().map(camel).collect();
+    if TAKEN.split(' ').any(|taken| identifier.eq_ignore_ascii_case(taken)) {
+        bail!("the name {name:?} is taken: Rust or the template use it for something else");
+    }
+    Ok(identifier)
+}
+
+/// What stands behind `fmi2 =` in the manifest.
+fn dependency(source: Option<&str>) -> anyhow::Result<String> {
+    if let Some(url) = source.filter(|source| source.contains("://") || source.contains('@')) {
+        return Ok(format!("{{ git = {} }}", quoted(url)));
+    }
+    let folder = match source {
+        Some(folder) => std::path::absolute(folder)?,
+        None => clone().context(
+            "expected --fmi2 SOURCE: this program is neither in a clone that has fmi2 nor called \
+             in one",
+        )?,
+    };
+    if !is_fmi2(&folder) {
+        bail!("{} is not the folder of the crate fmi2", folder.display());
+    }
+    Ok(format!("{{ path = {} }}", quoted(&folder.display().to_string())))
+}
+
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.to_owned()).to_string()
+}
+
+/// The folder of fmi2 in the clone with this program, or else in that with the current folder.
+fn clone() -> Option<PathBuf> {
+    let places = [std::env::current_exe().ok(), std::env::current_dir().ok()];
+    let folders = places.iter().flatten().flat_map(|place| place.ancestors());
+    folders.map(|folder| folder.join("fmi2")).find(|folder| is_fmi2(folder))
+}
+
+fn is_fmi2(folder: &Path) -> bool {
+    let manifest = fs::read_to_string(folder.join("Cargo.toml")).unwrap_or_default();
+    let name =
+        |manifest: toml::Table| Some(manifest.get("package")?.get("name")? == &"fmi2".into());
+    manifest.parse().ok().and_then(name).unwrap_or(false)
+}
+
+/// Writes the files into a folder beside `target`, which then takes its name.
+fn write(target: &Path, files: &[(&str, String)]) -> std::io::Result<()> {
+    let target = std::path::absolute(target)?;
+    let mut partial = target.clone().into_os_string();
+    partial.push(format!(".{}.partial", std::process::id()));
+    let partial = PathBuf::from(partial);
+    let written = fs::create_dir_all(partial.join("src")).and_then(|()| {
+        files.iter().try_for_each(|(name, text)| fs::write(partial.join(name), text))?;
+        fs::rename(&partial, &target)
+    });
+    written.inspect_err(|_| {
+        // The write has failed already; that its remains cannot be removed adds nothing.
+        let _ = fs::remove_dir_all(&partial);
+    })
+}

@@ -1,0 +1,119 @@
+//! A room that is heated: T' = (T_outside + R power - T) / tau.
+#![forbid(unsafe_code)]
+
+use std::path::Path;
+
+use fmi2::{About, Experiment, Failure, Model, Step, Variable};
+use serde::{Deserialize, Serialize};
+
+/// Everything that decides how the model goes on is a field: the state of the FMU is a copy of it.
+#[derive(Clone, Serialize, Deserialize)]
+struct NewModel {
+    power: f64,
+    temperature: f64,
+    outside: f64,
+    resistance: f64,
+    time_constant: f64,
+}
+
+impl Model for NewModel {
+    /// The name of the FMU and of the library in it.
+    const IDENTIFIER: &'static str = "NewModel";
+
+    fn about(&self) -> About {
+        About {
+            description: "A room that is heated".to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            license: env!("CARGO_PKG_LICENSE").to_owned(),
+            ..About::default()
+        }
+    }
+
+    /// The values given here are the start values in the description.
+    fn new(_resources: &Path) -> Result<Self, Failure> {
+        Ok(Self {
+            power: 0.0,
+            temperature: 293.15,
+            outside: 273.15,
+            resistance: 0.01,
+            time_constant: 3600.0,
+        })
+    }
+
+    /// What importers see, each with the field that holds it.
+    fn variables(&self) -> Vec<Variable<Self>> {
+        vec![
+            Variable::real("power", "Heating", |room: &mut Self| &mut room.power)
+                .input()
+                .unit("W"),
+            // An output names the inputs that it depends on without a step in between: none here.
+            Variable::real("T", "Temperature of the room", |room: &mut Self| {
+                &mut room.temperature
+            })
+            .output(&[])
+            .exact()
+            .unit("K"),
+            Variable::real("T_outside", "Temperature outside", |room: &mut Self| {
+                &mut room.outside
+            })
+            .tunable()
+            .unit("K"),
+            Variable::real("R", "Thermal resistance", |room: &mut Self| {
+                &mut room.resistance
+            })
+            .parameter()
+            .range(1e-9, 1e9)
+            .unit("K/W"),
+            Variable::real("tau", "Time constant", |room: &mut Self| {
+                &mut room.time_constant
+            })
+            .parameter()
+            .range(1e-9, 1e9)
+            .unit("s"),
+        ]
+    }
+
+    /// Called when parameters and inputs are set, before the first step.
+    fn initialize(&mut self, _experiment: &Experiment) -> Result<(), Failure> {
+        Ok(())
+    }
+
+    /// Advances from `step.start` by `step.size`; here with the exact solution.
+    fn step(&mut self, step: &Step) -> Result<(), Failure> {
+        let rest = self.outside + self.resistance * self.power;
+        let decay = (-step.size / self.time_constant).exp();
+        self.temperature = rest + (self.temperature - rest) * decay;
+        Ok(())
+    }
+}
+
+fmi2::export!(NewModel);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_variables_keep_the_rules_of_the_standard() {
+        assert_eq!(
+            fmi2::problems::<NewModel>(Path::new("resources")),
+            Ok(vec![])
+        );
+    }
+
+    #[test]
+    fn a_heated_room_ends_at_the_temperature_outside_plus_resistance_times_power() {
+        let mut room = NewModel::new(Path::new("resources")).unwrap();
+        room.power = 2000.0;
+        room.step(&Step {
+            start: 0.0,
+            size: 100.0 * room.time_constant,
+        })
+        .unwrap();
+        assert!(
+            (room.temperature - 293.15).abs() < 1e-9,
+            "{}",
+            room.temperature
+        );
+    }
+}

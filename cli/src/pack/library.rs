@@ -1,0 +1,201 @@
+//! Cargo builds the library of a crate and says what is in it.
+
+use std::collections::HashSet;
+use std::ffi::OsString;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, bail};
+use cargo_metadata::{
+    Artifact, CrateType, DependencyKind, Message, Metadata, MetadataCommand, Package, PackageId,
+    TargetKind,
+};
+
+/// The profile `fmu` for workspaces that have none of this name.
+const PROFILE: [&str; 5] = [
+    "profile.fmu.inherits = 'release'",
+    "profile.fmu.panic = 'unwind'",
+    "profile.fmu.lto = 'thin'",
+    "profile.fmu.codegen-units = 1",
+    "profile.fmu.strip = 'symbols'",
+];
+
+/// The library of a crate, and what was compiled into it.
+pub(super) struct Library {
+    pub(super) file: PathBuf,
+    pub(super) package: Package,
+    /// The packages in the library, by name and version.
+    pub(super) dependencies: Vec<Package>,
+    pub(super) toolchain: Toolchain,
+}
+
+/// The compiler whose standard library is in the library.
+pub(super) struct Toolchain {
+    pub(super) release: String,
+    pub(super) sysroot: PathBuf,
+    host: String,
+}
+
+/// Builds the library of the crate in `folder`; `locked` as in cargo.
+///
+/// # Errors
+///
+/// Where there is no such crate, it is no `cdylib`, or it does not compile.
+pub(super) fn build(folder: &Path, locked: bool) -> anyhow::Result<Library> {
+    let folder = std::path::absolute(folder)?;
+    let manifest = folder.join("Cargo.toml");
+    let manifest = manifest.display();
+    if !folder.join("Cargo.toml").is_file() {
+        bail!("there is no {manifest}: expected the folder of a crate that uses fmi2");
+    }
+    let toolchain = Toolchain::of(&folder)?;
+    let metadata = metadata(&folder, &toolchain.host, locked)?;
+    let Some(package) = metadata.root_package() else {
+        bail!("{manifest} is a workspace: expected the folder of one of its crates");
+    };
+    if !package.targets.iter().any(|target| target.crate_types.contains(&CrateType::CDyLib)) {
+        bail!("{manifest}: expected a library with crate-type = [\"cdylib\"] under [lib]");
+    }
+    let artifacts = compile(&folder, &metadata, locked)?;
+    let file = artifacts
+        .iter()
+        .filter(|artifact| artifact.package_id == package.id)
+        .flat_map(|artifact| &artifact.filenames)
+        .find(|file| file.extension() == Some(std::env::consts::DLL_EXTENSION))
+        .with_context(|| format!("{manifest}: cargo made no library for this platform"))?;
+    Ok(Library {
+        file: file.into(),
+        package: package.clone(),
+        dependencies: dependencies(&metadata, package, &artifacts),
+        toolchain,
+    })
+}
+
+impl Toolchain {
+    fn of(folder: &Path) -> anyhow::Result<Self> {
+        let answer = |arguments: &[&str]| {
+            let output = Command::new(program("RUSTC", "rustc"))
+                .current_dir(folder)
+                .args(arguments)
+                .output()
+                .context("cannot run rustc")?;
+            if !output.status.success() {
+                bail!("rustc: {}", String::from_utf8_lossy(&output.stderr));
+            }
+            Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
+        };
+        let version = answer(&["-vV"])?;
+        let field = |name: &str| {
+            let line = version.lines().find_map(|line| line.strip_prefix(name));
+            line.map(str::to_owned).with_context(|| format!("rustc -vV shows no {name:?}"))
+        };
+        Ok(Self {
+            release: field("release: ")?,
+            host: field("host: ")?,
+            sysroot: answer(&["--print", "sysroot"])?.into(),
+        })
+    }
+}
+
+/// The program that the environment names, as cargo does for what it runs.
+fn program(variable: &str, name: &str) -> OsString {
+    std::env::var_os(variable).unwrap_or_else(|| name.into())
+}
+
+fn metadata(folder: &Path, host: &str, locked: bool) -> anyhow::Result<Metadata> {
+    let mut options = vec!["--filter-platform".to_owned(), host.to_owned()];
+    options.extend(locked.then(|| "--locked".to_owned()));
+    let mut command = MetadataCommand::new();
+    command.cargo_path(program("CARGO", "cargo")).current_dir(folder).other_options(options);
+    command.exec().map_err(|error| match error {
+        cargo_metadata::Error::CargoMetadata { stderr } => anyhow::anyhow!("{}", stderr.trim()),
+        other => other.into(),
+    })
+}
+
+/// Builds the library in the profile `fmu` and returns all that it is made of.
+fn compile(folder: &Path, metadata: &Metadata, locked: bool) -> anyhow::Result<Vec<Artifact>> {
+    let root = &metadata.workspace_root;
+    let target = metadata.target_directory.join("libraries");
+    let mut command = Command::new(program("CARGO", "cargo"));
+    command.current_dir(folder).args(["rustc", "--lib", "--profile", "fmu", "--target-dir"]);
+    command.arg(&target).args(["--message-format", "json-render-diagnostics"]);
+    command.args(locked.then_some("--locked"));
+    if !has_profile(root.as_std_path())? {
+        command.args(PROFILE.iter().flat_map(|setting| ["--config", setting]));
+    }
+    // Cargo gives rustc paths relative to the workspace; with absolute ones, a macro may have it.
+    command.args(["--", &format!("--remap-path-prefix={root}=.")]);
+    command.env("CARGO_ENCODED_RUSTFLAGS", remappings(metadata).join("\u{1f}"));
+    let mut cargo = command
+        .stdout(Stdio::piped())
+        .spawn()
+        .context("cannot run cargo, which builds the FMUs")?;
+    let mut artifacts = Vec::new();
+    if let Some(output) = cargo.stdout.take() {
+        for message in Message::parse_stream(BufReader::new(output)) {
+            if let Message::CompilerArtifact(artifact) = message? {
+                artifacts.push(artifact);
+            }
+        }
+    }
+    let status = cargo.wait()?;
+    if !status.success() {
+        bail!("cargo could not build it: {status}");
+    }
+    Ok(artifacts)
+}
+
+/// Flags that keep paths of this machine out of the library, so that the same sources give the same
+/// bytes.
+fn remappings(metadata: &Metadata) -> Vec<String> {
+    let cargo_home = std::env::var_os("CARGO_HOME")
+        .map(PathBuf::from)
+        .or_else(|| std::env::home_dir().map(|home| home.join(".cargo")));
+    let remap = |path: &dyn std::fmt::Display, to: &str| format!("--remap-path-prefix={path}={to}");
+    let mut flags = vec![remap(&metadata.target_directory, "target")];
+    flags.extend(cargo_home.map(|home| remap(&home.display(), "cargo")));
+    for package in &metadata.packages {
+        let folder = package.manifest_path.parent();
+        let elsewhere = folder.filter(|folder| !folder.starts_with(&metadata.workspace_root));
+        if package.source.is_none() {
+            flags.extend(elsewhere.map(|folder| remap(&folder, &package.name)));
+        }
+    }
+    flags
+}
+
+/// Whether the manifest of the workspace states the profile `fmu`.
+fn has_profile(root: &Path) -> anyhow::Result<bool> {
+    let manifest = root.join("Cargo.toml");
+    let manifest: toml::Table = std::fs::read_to_string(manifest)?.parse()?;
+    Ok(manifest.get("profile").is_some_and(|profiles| profiles.get("fmu").is_some()))
+}
+
+/// The packages that are in the library: reached without build scripts, tests and procedural
+/// macros, and built.
+fn dependencies(metadata: &Metadata, root: &Package, artifacts: &[Artifact]) -> Vec<Package> {
+    let built: HashSet<&PackageId> = artifacts.iter().map(|own| &own.package_id).collect();
+    let nodes = metadata.resolve.iter().flat_map(|resolve| &resolve.nodes);
+    let nodes: Vec<_> = nodes.collect();
+    let (mut open, mut found) = (vec![&root.id], Vec::<Package>::new());
+    while let Some(id) = open.pop() {
+        let own = nodes.iter().filter(|node| node.id == *id).flat_map(|node| &node.deps);
+        for dependency in own {
+            let normal = dependency.dep_kinds.iter().any(|own| own.kind == DependencyKind::Normal);
+            let package = &metadata[&dependency.pkg];
+            let known = found.iter().any(|known| known.id == package.id);
+            if normal && !known && built.contains(&package.id) && !is_macro(package) {
+                open.push(&dependency.pkg);
+                found.push(package.clone());
+            }
+        }
+    }
+    found.sort_by(|one, other| (&one.name, &one.version).cmp(&(&other.name, &other.version)));
+    found
+}
+
+fn is_macro(package: &Package) -> bool {
+    package.targets.iter().any(|target| target.kind.contains(&TargetKind::ProcMacro))
+}

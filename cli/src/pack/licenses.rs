@@ -1,0 +1,91 @@
+//! `documentation/licenses` of an FMU: the texts that come with the crate and its dependencies.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use cargo_metadata::Package as Crate;
+use fmi2::package::Package;
+
+use super::library::Library;
+use super::read;
+
+/// How the names of files with licences and copyright notices begin, in lower case.
+const NAMES: [&str; 6] = ["license", "licence", "unlicense", "copying", "copyright", "notice"];
+/// Where the compiler keeps the notices of the standard library.
+const STANDARD_LIBRARY: &str = "share/doc/rust/COPYRIGHT-library.html";
+
+/// Adds `license.txt` with the licence of the crate and a list of what else is in the library, and a
+/// folder with the texts of each package in that list.
+pub(super) fn add(package: &mut Package, library: &Library) -> anyhow::Result<()> {
+    let mut entry = line(&library.package).into_bytes();
+    for path in texts(&library.package)? {
+        entry.push(b'\n');
+        entry.extend(read(&path)?);
+    }
+    let head = "\nThe library contains the packages below. The texts that come with a package are in \
+                the folder of its name.\n\n";
+    entry.extend(head.bytes());
+    for dependency in &library.dependencies {
+        entry.extend(line(dependency).bytes());
+        let folder = format!("{}-{}", dependency.name, dependency.version);
+        for path in texts(dependency)? {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            package.add(format!("documentation/licenses/{folder}/{name}"), read(&path)?);
+        }
+    }
+    let release = &library.toolchain.release;
+    entry.extend(format!("rust {release} (standard library): MIT OR Apache-2.0\n").bytes());
+    let notices = library.toolchain.sysroot.join(STANDARD_LIBRARY);
+    if notices.is_file() {
+        let path = format!("documentation/licenses/rust-{release}/COPYRIGHT-library.html");
+        package.add(path, read(&notices)?);
+    }
+    package.add("documentation/licenses/license.txt", entry);
+    Ok(())
+}
+
+fn line(package: &Crate) -> String {
+    let license = match (&package.license, &package.license_file) {
+        (Some(license), _) => license,
+        (None, Some(_)) => "see its text",
+        (None, None) => "no licence is stated",
+    };
+    format!("{} {}: {license}\n", package.name, package.version)
+}
+
+/// Files with texts of licences: in the folder of the package, or else upwards to its workspace.
+fn texts(package: &Crate) -> anyhow::Result<Vec<PathBuf>> {
+    let stated = package.license_file().map(PathBuf::from).filter(|path| path.is_file());
+    for folder in package.manifest_path.as_std_path().ancestors().skip(1) {
+        let Ok(manifest) = fs::read_to_string(folder.join("Cargo.toml")) else { continue };
+        let mut found = named(folder)?;
+        found.extend(stated.clone());
+        found.sort();
+        found.dedup();
+        let manifest: toml::Table = manifest.parse()?;
+        if !found.is_empty() || manifest.contains_key("workspace") {
+            return Ok(found);
+        }
+    }
+    Ok(Vec::new())
+}
+
+/// The files in `folder` whose names say that they are licences, and those in a folder `LICENSES`.
+fn named(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let mut found = Vec::new();
+    let failed = || format!("cannot read {}", folder.display());
+    for item in fs::read_dir(folder).with_context(failed)? {
+        let path = item.with_context(failed)?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
+        if path.is_dir() && name == "licenses" {
+            for item in fs::read_dir(&path).with_context(failed)? {
+                found.push(item.with_context(failed)?.path());
+            }
+            found.retain(|path| path.is_file());
+        } else if path.is_file() && NAMES.iter().any(|start| name.starts_with(start)) {
+            found.push(path);
+        }
+    }
+    Ok(found)
+}

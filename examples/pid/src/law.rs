@@ -1,0 +1,74 @@
+//! The control law, without FMI.
+
+use serde::{Deserialize, Serialize};
+
+/// Every `T_s`: `u = K (e - T_d y') + sum of K e T_s / T_i`, at most `u_max` in size; `e = w - y`.
+#[derive(Clone, Default, Serialize, Deserialize)]
+pub(crate) struct Law {
+    pub(crate) mode: i32,
+    pub(crate) hold: bool,
+    pub(crate) sample_time: f64,
+    pub(crate) u: f64,
+    setpoint: f64,
+    measurement: f64,
+    manual: f64,
+    gain: f64,
+    integral_time: f64,
+    derivative_time: f64,
+    limit: f64,
+    integral: f64,
+    last_measurement: f64,
+}
+
+/// Name, description, unit, limits and field of a number.
+pub(crate) type Real = (&'static str, &'static str, &'static str, [f64; 2], Field);
+type Field = fn(&mut Law) -> &mut f64;
+
+pub(crate) const INPUTS: [Real; 3] = [
+    ("w", "Setpoint", "1", [-1e9, 1e9], |law| &mut law.setpoint),
+    ("y", "Measurement", "1", [-1e9, 1e9], |law| &mut law.measurement),
+    ("u_manual", "Command in manual mode", "1", [-1e9, 1e9], |law| &mut law.manual),
+];
+
+pub(crate) const PARAMETERS: [Real; 5] = [
+    ("K", "Gain", "1", [-1e9, 1e9], |law| &mut law.gain),
+    ("T_i", "Integral time", "s", [1e-6, 1e9], |law| &mut law.integral_time),
+    ("T_d", "Derivative time", "s", [0.0, 1e9], |law| &mut law.derivative_time),
+    ("T_s", "Sample time", "s", [1e-6, 1e9], |law| &mut law.sample_time),
+    ("u_max", "Limit of u in either direction", "1", [0.0, 1e9], |law| &mut law.limit),
+];
+
+impl Law {
+    pub(crate) fn new() -> Self {
+        let (gain, integral_time, sample_time, limit) = (1.0, 1.0, 0.1, 10.0);
+        Self { gain, integral_time, sample_time, limit, hold: true, ..Self::default() }
+    }
+
+    /// Before the first sample.
+    pub(crate) fn start(&mut self) -> String {
+        (self.u, self.integral, self.last_measurement) = (0.0, 0.0, self.measurement);
+        "no sample yet".to_owned()
+    }
+
+    /// Takes a sample and says what decided u.
+    ///
+    /// Outside of the automatic mode the integral is the one that would give u, so that a change of
+    /// the mode makes no bump; with anti-windup the same holds at a limit.
+    pub(crate) fn sample(&mut self) -> String {
+        let error = self.setpoint - self.measurement;
+        let slope = (self.measurement - self.last_measurement) / self.sample_time;
+        let rest = self.gain * (error - self.derivative_time * slope);
+        let integral = self.integral + self.gain * error * self.sample_time / self.integral_time;
+        let (wanted, mode) = match self.mode {
+            1 => (self.manual, "manual"),
+            2 => (rest + integral, "automatic"),
+            _ => (0.0, "off"),
+        };
+        self.u = wanted.clamp(-self.limit, self.limit);
+        let limited = wanted.abs() > self.limit;
+        let follow = self.mode != 2 || limited && self.hold;
+        self.integral = if follow { self.u - rest } else { integral };
+        self.last_measurement = self.measurement;
+        if limited { format!("{mode}, limited") } else { mode.to_owned() }
+    }
+}

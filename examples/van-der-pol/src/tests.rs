@@ -1,0 +1,10 @@
+//! The first test of a model.
+
+use std::path::Path;
+
+use super::VanDerPol;
+
+#[test]
+fn the_variables_keep_the_rules_of_the_standard() {
+    assert_eq!(fmi2::problems::<VanDerPol>(Path::new("resources")), Ok(vec![]));
+}

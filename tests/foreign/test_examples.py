@@ -1,0 +1,244 @@
+"""The examples of `fmi2` and a new crate, packed, judged and simulated by FMPy.
+
+Oracles: the published output of the Reference-FMUs, closed forms, and numpy.
+"""
+
+import os
+import shutil
+import subprocess
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+from fmpy import extract, read_model_description, simulate_fmu
+from fmpy.fmi2 import FMU2Slave
+from fmpy.validation import validate_fmu
+
+EXAMPLES = {
+    "van-der-pol": "VanDerPol",
+    "bouncing-ball": "BouncingBall",
+    "pid": "Pid",
+    "lookup-table": "LookupTable",
+}
+
+
+@pytest.fixture(scope="module")
+def examples(aso_ftc, root, tmp_path_factory):
+    """The packed examples, by name of the model."""
+    out = tmp_path_factory.mktemp("examples")
+    done = aso_ftc("pack", *(root / "examples" / name for name in EXAMPLES), "--out", out)
+    assert done.returncode == 0, done.stderr
+    return {model: out / f"{model}.fmu" for model in EXAMPLES.values()}
+
+
+def published(root, name):
+    """A table of the published output of the Reference-FMUs."""
+    return np.genfromtxt(root / "tests" / "data" / name, delimiter=",", names=True, skip_header=1)
+
+
+@contextmanager
+def slave(fmu, folder, start=None):
+    """An instance by FMPy after initialization, and its value references by name."""
+    description = read_model_description(str(fmu))
+    names = {variable.name: variable.valueReference for variable in description.modelVariables}
+    instance = FMU2Slave(
+        guid=description.guid,
+        unzipDirectory=extract(str(fmu), str(folder)),
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        instanceName="own",
+    )
+    instance.instantiate()
+    instance.setupExperiment(startTime=0.0)
+    for name, value in (start or {}).items():
+        instance.setReal([names[name]], [value])
+    instance.enterInitializationMode()
+    instance.exitInitializationMode()
+    yield instance, names
+    instance.terminate()
+    instance.freeInstance()
+
+
+@pytest.mark.parametrize("model", EXAMPLES.values())
+def test_fmpy_finds_no_problem(examples, model, python):
+    assert validate_fmu(str(examples[model])) == []
+    done = python("-m", "fmpy", "validate", examples[model])
+    assert done.returncode == 0 and "no problems found" in done.stdout.lower(), done
+
+
+@pytest.mark.parametrize("model", EXAMPLES.values())
+def test_fmpy_simulates_it_without_being_told_anything(examples, model):
+    result = simulate_fmu(str(examples[model]))
+    assert len(result) > 1
+
+
+def test_the_van_der_pol_oscillator_gives_the_published_output_to_rounding(examples, root):
+    table = published(root, "published_van_der_pol.csv")
+    result = simulate_fmu(str(examples["VanDerPol"]), stop_time=20.0, output_interval=0.01)
+    assert result["time"][::100] == pytest.approx(table["time"])
+    for name in ("x0", "x1"):
+        assert result[name][::100] == pytest.approx(table[name], rel=1e-12, abs=1e-12)
+
+
+def euler_ball(size, e=0.7, v_min=0.1):
+    """The bouncing ball by forward Euler steps, each impact at the first step below the ground."""
+    height, velocity, gravity, heights = 1.0, 0.0, -9.81, [1.0]
+    for _ in range(round(3 / size)):
+        height, velocity = height + size * velocity, velocity + size * gravity
+        if height <= 0 and velocity < 0:
+            height, velocity = np.finfo(float).tiny, -velocity * e
+            if velocity < v_min:
+                velocity = gravity = 0.0
+        heights.append(height)
+    return np.array(heights)
+
+
+def test_the_ball_is_the_limit_of_the_published_output_for_small_steps(examples, root):
+    table = published(root, "published_bouncing_ball.csv")
+    result = simulate_fmu(str(examples["BouncingBall"]), stop_time=3.0, output_interval=0.1)
+    assert result["time"] == pytest.approx(table["time"])
+    assert euler_ball(1e-3)[::100] == pytest.approx(table["h"], rel=1e-12, abs=1e-12)
+    errors = [
+        abs(euler_ball(size)[:: round(0.1 / size)] - result["h"]).max()
+        for size in (1e-3, 1e-4, 1e-5)
+    ]
+    assert errors[0] < 0.03
+    assert all(small < large / 5 for large, small in zip(errors, errors[1:]))
+
+
+def closed_form_ball(time, e, v_min=0.1, g=9.81):
+    """Height and velocity: the times of the impacts are a geometric sum."""
+    impact, speed = np.sqrt(2 / g), np.sqrt(2 * g)
+    if time < impact:
+        return 1.0 - g * time**2 / 2, -g * time
+    while (speed := e * speed) >= v_min:
+        if time < impact + 2 * speed / g:
+            flown = time - impact
+            return flown * (speed - g * flown / 2), speed - g * flown
+        impact += 2 * speed / g
+    return 0.0, 0.0
+
+
+@pytest.mark.parametrize("size", [3.0, 0.5, 0.01])
+@pytest.mark.parametrize("e", [0.5, 0.7, 0.9])
+def test_the_ball_is_where_the_closed_form_has_it_whatever_the_step(examples, tmp_path, e, size):
+    with slave(examples["BouncingBall"], tmp_path, {"e": e}) as (ball, names):
+        for k in range(round(3.0 / size)):
+            ball.doStep(k * size, size)
+            found = ball.getReal([names["h"], names["v"]])
+            assert found == pytest.approx(closed_form_ball((k + 1) * size, e), abs=1e-9)
+
+
+def limited(signal, limit):
+    return np.clip(signal, -limit, limit)
+
+
+class VelocityForm:
+    """The same controller written with increments of u."""
+
+    def __init__(self, gain, integral_time, derivative_time, sample_time, limit):
+        self.gain, self.limit = gain, limit
+        self.integral = sample_time / integral_time
+        self.derivative = derivative_time / sample_time
+        self.before = None
+
+    def sample(self, mode, setpoint, measurement, manual):
+        """u and whether it is at a limit."""
+        error = setpoint - measurement
+        last = self.before or (0.0, None, measurement)
+        rest = self.gain * (error - self.derivative * (measurement - last[2]))
+        last_rest = 0.0 if last[1] is None else last[1]
+        automatic = last[0] + rest - last_rest + self.gain * self.integral * error
+        wanted = {0: 0.0, 1: manual, 2: automatic}[mode]
+        command = limited(wanted, self.limit)
+        self.before = (command, rest, measurement)
+        return command, abs(wanted) > self.limit
+
+
+PARAMETERS = {"K": 2.0, "T_i": 0.7, "T_d": 0.05, "T_s": 0.1, "u_max": 3.0}
+WORDS = {0: "off", 1: "manual", 2: "automatic"}
+
+
+def drive(fmu, folder, steps, size, inputs, anti_windup=True):
+    """u, samples and status after each step; `inputs(k)` gives w, y, u_manual and the mode."""
+    rows = []
+    with slave(fmu, folder, PARAMETERS) as (pid, names):
+        reals = [names[name] for name in ("w", "y", "u_manual")]
+        for k in range(steps):
+            *values, mode = inputs(k)
+            pid.setReal(reals, values)
+            pid.setInteger([names["mode"]], [mode])
+            pid.doStep(k * size, size)
+            [status] = pid.getString([names["status"]])
+            [samples] = pid.getInteger([names["samples"]])
+            rows.append((pid.getReal([names["u"]])[0], samples, status.decode()))
+    return rows
+
+
+def test_the_pid_agrees_with_its_velocity_form_in_all_modes_and_at_the_limits(examples, tmp_path):
+    random = np.random.default_rng(1)
+    signals = random.normal(scale=1.5, size=(400, 3))
+    modes = [[0, 1, 2][(k // 23) % 3] for k in range(400)]
+    rows = drive(examples["Pid"], tmp_path, 400, 0.1, lambda k: (*signals[k], modes[k]))
+    oracle = VelocityForm(*PARAMETERS.values())
+    seen = set()
+    for k, (command, samples, status) in enumerate(rows):
+        expected, at_limit = oracle.sample(modes[k], *signals[k])
+        assert command == pytest.approx(expected, abs=1e-9)
+        assert samples == k + 1
+        assert status == WORDS[modes[k]] + (", limited" if at_limit else "")
+        seen.add(status)
+    assert seen == {"off", "manual", "automatic", "manual, limited", "automatic, limited"}
+
+
+def test_the_pid_in_automatic_mode_is_the_sum_of_its_three_terms(examples, tmp_path):
+    time = 0.1 * np.arange(60)
+    setpoint, measurement = 0.1 * np.ones(60), 0.1 * np.sin(time)
+    rows = drive(
+        examples["Pid"], tmp_path, 60, 0.1, lambda k: (setpoint[k], measurement[k], 0.0, 2)
+    )
+    error = setpoint - measurement
+    slope = np.diff(measurement, prepend=measurement[0]) / 0.1
+    expected = 2.0 * (error + np.cumsum(error) * 0.1 / 0.7 - 0.05 * slope)
+    assert (abs(expected) < 3.0).all()
+    assert [row[0] for row in rows] == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize(("size", "samples"), [(0.025, [1, 1, 1, 1, 2]), (0.25, [3, 5, 8, 10])])
+def test_the_pid_samples_at_multiples_of_its_sample_time(examples, tmp_path, size, samples):
+    rows = drive(examples["Pid"], tmp_path, len(samples), size, lambda _: (1.0, 0.0, 0.0, 2))
+    assert [row[1] for row in rows] == samples
+
+
+def test_the_table_agrees_with_numpy_between_at_and_beyond_its_rows(examples, root, tmp_path):
+    path = root / "examples/lookup-table/resources/table.csv"
+    table = np.genfromtxt(path, delimiter=",", names=True)
+    x, *outputs = table.dtype.names
+    points = np.concatenate([np.linspace(-100.0, 900.0, 777), table[x]])
+    with slave(examples["LookupTable"], tmp_path) as (lookup, names):
+        for point in points:
+            lookup.setReal([names[x]], [point])
+            for name in outputs:
+                [found] = lookup.getReal([names[name]])
+                expected = np.interp(point, table[x], table[name])
+                assert found == pytest.approx(expected, rel=1e-14)
+
+
+def test_a_new_crate_is_tested_packed_and_simulated_outside_of_the_workspace(
+    aso_ftc, root, tmp_path
+):
+    crate = tmp_path / "heat-pump"
+    done = aso_ftc("new", "heat-pump", "--path", crate)
+    assert done.returncode == 0, done.stderr
+    # The versions of this workspace: nothing has to be fetched.
+    shutil.copy(root / "Cargo.lock", crate)
+    shared = {**os.environ, "CARGO_TARGET_DIR": str(root / "target" / "author")}
+    done = subprocess.run(["cargo", "test"], cwd=crate, env=shared, capture_output=True, text=True)
+    assert done.returncode == 0 and "2 passed" in done.stdout, done.stdout + done.stderr
+    done = aso_ftc("pack", crate, "--out", tmp_path, env=shared)
+    assert done.returncode == 0, done.stderr
+    fmu = str(tmp_path / "HeatPump.fmu")
+    assert validate_fmu(fmu) == []
+    power = np.array([(0.0, 1500.0), (7200.0, 1500.0)], dtype=[("time", float), ("power", float)])
+    result = simulate_fmu(fmu, stop_time=7200.0, output_interval=60.0, input=power)
+    expected = 288.15 + 5.0 * np.exp(-result["time"] / 3600.0)
+    assert result["T"] == pytest.approx(expected, rel=1e-12)
