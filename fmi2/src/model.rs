@@ -66,12 +66,14 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
     ///
     /// In initialization mode the importer may set and read in turn, so this may be called several
     /// times and must not depend on the result of an earlier call. Variables with a start value
-    /// ([`Variable::exact`]) are left as they are.
+    /// ([`Variable::exact`]) are left as they are. As it is, it calls [`Model::update`].
     ///
     /// # Errors
     ///
     /// When the model cannot start from these values.
-    fn initialize(&mut self, experiment: &Experiment) -> Result<(), Failure>;
+    fn initialize(&mut self, experiment: &Experiment) -> Result<(), Failure> {
+        self.update(experiment.start_time)
+    }
 
     /// Advances from `step.start` to `step.end()` (co-simulation).
     ///

@@ -13,6 +13,7 @@ import pytest
 from fmpy import extract, read_model_description, simulate_fmu
 from fmpy.fmi2 import FMU2Slave
 from fmpy.validation import validate_fmu
+from scipy.integrate import solve_ivp
 
 EXAMPLES = {
     "van-der-pol": "VanDerPol",
@@ -77,6 +78,39 @@ def test_the_van_der_pol_oscillator_gives_the_published_output_to_rounding(examp
     assert result["time"][::100] == pytest.approx(table["time"])
     for name in ("x0", "x1"):
         assert result[name][::100] == pytest.approx(table[name], rel=1e-12, abs=1e-12)
+
+
+def van_der_pol(_, x):
+    return [x[1], (1 - x[0] ** 2) * x[1] - x[0]]
+
+
+def test_the_van_der_pol_oscillator_integrated_by_cvode_solves_its_equation(examples):
+    result = simulate_fmu(
+        str(examples["VanDerPol"]),
+        fmi_type="ModelExchange",
+        solver="CVode",
+        relative_tolerance=1e-9,
+        stop_time=20.0,
+        output_interval=0.1,
+        output=["x0", "x1", "der(x0)", "der(x1)"],
+    )
+    solution = solve_ivp(
+        van_der_pol, (0, 20), [2, 0], "DOP853", result["time"], rtol=1e-12, atol=1e-12
+    )
+    found = np.array([result["x0"], result["x1"]])
+    assert abs(found - solution.y).max() < 1e-5
+    slopes = np.array([result["der(x0)"], result["der(x1)"]])
+    assert slopes == pytest.approx(np.array(van_der_pol(0, found)), abs=1e-12)
+
+
+def test_the_directional_derivatives_of_the_van_der_pol_oscillator_are_its_jacobian(
+    examples, tmp_path
+):
+    with slave(examples["VanDerPol"], tmp_path, {"x0": 0.7, "x1": -1.3}) as (instance, names):
+        for known, column in {"x0": [0, 2 * 0.7 * 1.3 - 1], "x1": [1, 1 - 0.7**2]}.items():
+            slopes = [names["der(x0)"], names["der(x1)"]]
+            found = instance.getDirectionalDerivative(slopes, [names[known]], [1.0])
+            assert found == pytest.approx(column, rel=1e-15)
 
 
 def euler_ball(size, e=0.7, v_min=0.1):

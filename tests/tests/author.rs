@@ -52,7 +52,8 @@ fn edit(path: &Path, old: &str, new: &str) {
 
 #[test]
 fn a_model_is_one_file_of_fewer_than_60_lines() {
-    for example in EXAMPLES {
+    // The van der Pol oscillator has both interfaces and directional derivatives.
+    for example in EXAMPLES.into_iter().filter(|example| *example != "van-der-pol") {
         let path = root().join("examples").join(example).join("src/lib.rs");
         let text = fs::read_to_string(&path).unwrap();
         let export = text.lines().position(|line| line.starts_with("fmi2::export!")).unwrap();

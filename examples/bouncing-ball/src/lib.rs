@@ -1,7 +1,7 @@
 //! A ball that bounces: h' = v, v' = g; where it hits the ground, v becomes -e v.
 #![forbid(unsafe_code)]
 
-use fmi2::{About, Experiment, Failure, Model, Step, Variable};
+use fmi2::{About, Failure, Model, Step, Variable};
 
 #[derive(Clone, serde::Serialize, serde::Deserialize)]
 struct BouncingBall {
@@ -32,10 +32,6 @@ impl Model for BouncingBall {
             real("e", "Coefficient of restitution", |m| &mut m.e).range(0.5, 1.0).tunable(),
             real("v_min", "A slower ball stays down", |m| &mut m.v_min).unit("m/s").constant(),
         ]
-    }
-
-    fn initialize(&mut self, _experiment: &Experiment) -> Result<(), Failure> {
-        Ok(())
     }
 
     fn step(&mut self, step: &Step) -> Result<(), Failure> {

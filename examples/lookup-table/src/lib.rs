@@ -1,7 +1,7 @@
 //! Linear interpolation in `resources/table.csv`: an input, and outputs as many as it has columns.
 #![forbid(unsafe_code)]
 
-use fmi2::{About, Experiment, Failure, Model, Step, Variable as V};
+use fmi2::{About, Failure, Model, Step, Variable as V};
 
 #[derive(Clone, serde::Serialize, serde::Deserialize)]
 struct LookupTable {
@@ -33,10 +33,6 @@ impl Model for LookupTable {
         let column = |k| V::real(&self.names[k], "A column", move |m: &mut Self| &mut m.values[k]);
         let outputs = (1..self.names.len()).map(|k| column(k).output(&[&self.names[0]]));
         std::iter::once(column(0).input()).chain(outputs).collect()
-    }
-
-    fn initialize(&mut self, experiment: &Experiment) -> Result<(), Failure> {
-        self.update(experiment.start_time)
     }
 
     fn step(&mut self, step: &Step) -> Result<(), Failure> {
