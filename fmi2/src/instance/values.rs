@@ -164,16 +164,37 @@ impl<M: Model> Instance<M> {
     /// `fmi2SetReal`: all values or none.
     pub(crate) fn set_real(&mut self, to: &[u32], values: &[f64]) -> Result<(), Failure> {
         let Self { core, interface, .. } = self;
+        let reals = interface.reals.as_slice();
+        let slot = |reference: u32| reals.get((reference as usize).wrapping_sub(1));
+        let now = core.state.bit();
+        let mut parameters = false;
         for (&reference, &value) in to.iter().zip(values) {
-            let slot = interface.real(reference)?.ok_or_else(time_is_given)?;
-            settable(slot, core.state)?;
-            acceptable(slot, value)?;
+            let takes = |slot: &&Slot<M, f64>| {
+                slot.settable & now != 0 && slot.range.0 <= value && value <= slot.range.1
+            };
+            let Some(slot) = slot(reference).filter(takes) else {
+                return self.refuse(to, values);
+            };
+            parameters |= slot.causality == Causality::Parameter;
         }
-        for (&reference, &value) in to.iter().zip(values) {
-            if let Some(slot) = interface.real(reference)? {
-                *(slot.field)(&mut core.model) = value;
-                core.touched(slot);
+        core.stale = true;
+        core.unchecked |= parameters;
+        for (&reference, value) in to.iter().zip(values) {
+            if let Some(slot) = slot(reference) {
+                let field = (slot.field)(&mut core.model);
+                *field = *value;
             }
+        }
+        Ok(())
+    }
+
+    /// Says why `values` cannot be set.
+    #[cold]
+    fn refuse(&self, to: &[u32], values: &[f64]) -> Result<(), Failure> {
+        for (&reference, &value) in to.iter().zip(values) {
+            let slot = self.interface.real(reference)?.ok_or_else(time_is_given)?;
+            settable(slot, self.core.state)?;
+            acceptable(slot, value)?;
         }
         Ok(())
     }
