@@ -8,6 +8,7 @@ mod exports;
 
 use std::cell::UnsafeCell;
 use std::ffi::{CStr, CString, c_char, c_void};
+use std::mem::MaybeUninit;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -225,9 +226,13 @@ pub unsafe fn free_instance<M: Model>(component: fmi2Component) {
     // SAFETY: a component that is not null is one that `instantiate` made for this `M`.
     let Some(shared) = (unsafe { component.as_ref() }) else { return };
     if !shared.busy.load(Ordering::Relaxed) {
-        // SAFETY: not in use and, by the standard, freed once.
-        let owned = unsafe { Box::from_raw(component) };
-        owned.instance.into_inner().free();
+        shared.busy.store(true, Ordering::Relaxed);
+        // SAFETY: not in use and, by the standard, freed once. `busy` lasts until the message about
+        // a destructor that panics is out, in case the logger calls the instance.
+        unsafe {
+            shared.instance.get().read().free();
+            drop(Box::from_raw(component.cast::<MaybeUninit<Component<M>>>()));
+        }
     }
 }
 

@@ -97,7 +97,6 @@ def integrated(run, **options):
         fmi_type="ModelExchange",
         solver="CVode",
         stop_time=STOP,
-        set_stop_time=False,
         output_interval=run.step,
         relative_tolerance=TOLERANCE,
         record_events=False,

@@ -52,7 +52,6 @@ def integrated(plant, signal, stop, interval, start_values):
         input=signal,
         output=[*OUTPUTS, "regime"],
         start_values=start_values,
-        set_stop_time=False,
         record_events=False,
     )
 
