@@ -1,0 +1,114 @@
+//! FMU states: of this instance or another one, null, freed, serialised, damaged.
+
+use super::{Call, Kept, Outcome, Record};
+use crate::array::{Array, Shape};
+use crate::choice::{Choice, usable};
+use crate::prediction::{Core, ERROR, OK};
+
+fn slot(choice: &mut Choice) -> usize {
+    usize::from(choice.byte() % 3)
+}
+
+/// A place whose state fits, or any other.
+fn filled(call: &mut Call, fits: impl Fn(&Core) -> bool) -> usize {
+    let every: Vec<_> = (0..3).collect();
+    let is_fine = |own: &usize| call.stores.kept[*own].of.as_ref().is_some_and(&fits);
+    let fine: Vec<_> = every.iter().copied().filter(is_fine).collect();
+    call.choice.either(if fine.is_empty() { &every } else { &fine }, &every)
+}
+
+/// Bytes are never misaligned.
+fn bytes(items: Vec<u8>, shape: Shape) -> Array<u8> {
+    Array { items, shape: if shape == Shape::Misaligned { Shape::Null } else { shape } }
+}
+
+pub(super) fn get(call: &mut Call) -> Outcome {
+    let (slot, nowhere) = (slot(&mut call.choice), call.choice.rarely());
+    let place = (!nowhere).then_some(&mut call.stores.kept[slot].saved);
+    let status = call.importer.get_fmu_state(place);
+    Outcome::if_fine(status, !nowhere)
+        .with(move |core, stores| stores.kept[slot].of = Some(core.clone()))
+}
+
+pub(super) fn set(call: &mut Call) -> Outcome {
+    let exchange = call.core.exchange;
+    let slot = filled(call, |own| own.exchange == exchange);
+    let Kept { saved, of } = &call.stores.kept[slot];
+    let status = call.importer.set_fmu_state(saved);
+    let fine = of.as_ref().is_some_and(|own| own.exchange == call.core.exchange);
+    Outcome::if_fine(status, fine).with(move |core, stores| {
+        if let Some(own) = &stores.kept[slot].of {
+            *core = own.clone();
+        }
+    })
+}
+
+pub(super) fn free(call: &mut Call) -> Outcome {
+    let (slot, nowhere) = (slot(&mut call.choice), call.choice.rarely());
+    if nowhere {
+        // "If a null pointer is provided, the call is ignored" (section 2.1.8), of which pointer
+        // is open.
+        return Outcome::new(call.importer.free_fmu_state(None), OK | ERROR);
+    }
+    let Kept { saved, .. } = &mut call.stores.kept[slot];
+    let status = call.importer.free_fmu_state(Some(saved));
+    let is_null = saved.is_null();
+    Outcome::new(status, OK)
+        .claim(is_null, || "a freed state is not null".to_owned())
+        .with(move |_, stores| stores.kept[slot].of = None)
+}
+
+pub(super) fn size(call: &mut Call) -> Outcome {
+    let Kept { saved, of } = &call.stores.kept[filled(call, |_| true)];
+    let mut size = call.choice.place(0);
+    let status = call.importer.serialized_fmu_state_size(saved, &mut size);
+    Outcome::if_fine(status, of.is_some() && usable(&size))
+        .claim(size.items[0] > 0, || "no bytes".to_owned())
+}
+
+/// More bytes than any state of the machine has.
+const ROOM: usize = 20_000;
+
+pub(super) fn serialize(call: &mut Call) -> Outcome {
+    let Kept { saved, of } = &call.stores.kept[filled(call, |_| true)];
+    let room = call.choice.either(&[ROOM], &[0, 8, 60]);
+    let mut place = bytes(vec![0xee; room], call.choice.shape());
+    let status = call.importer.serialize_fmu_state(saved, &mut place);
+    let record = usize::from(call.choice.byte() % 2);
+    let fine = of.is_some() && place.shape == Shape::Right && room == ROOM;
+    let mut again = Array::right(vec![0x11; room]);
+    let same = status == 0 && call.importer.serialize_fmu_state(saved, &mut again) == 0;
+    // What was not written is as it was filled.
+    let unwritten = |(one, other): &(&u8, &u8)| **one == 0xee && **other == 0x11;
+    let rest = place.items.iter().zip(&again.items).rev().take_while(unwritten).count();
+    place.items.truncate(room - rest);
+    again.items.truncate(room - rest);
+    let same = same && place.items == again.items;
+    let written = of.clone().map(|of| Record { bytes: place.items, of });
+    Outcome::if_fine(status, fine)
+        .claim(same, || "twice serialised is not the same".to_owned())
+        .with(move |_, stores| stores.records[record] = written)
+}
+
+pub(super) fn de_serialize(call: &mut Call) -> Outcome {
+    let choice = &mut call.choice;
+    let record = call.stores.records[usize::from(choice.byte() % 2)].clone();
+    let (slot, nowhere) = (slot(choice), choice.rarely());
+    let shape = choice.shape();
+    let damage = if choice.hostile { choice.byte() } else { 0 };
+    let at = usize::from(choice.byte()) * 7;
+    let mut given = record.as_ref().map(|own| own.bytes.clone()).unwrap_or_default();
+    let at = at % given.len().max(1);
+    let whole = damage < 200 && record.is_some();
+    match damage {
+        0..=199 => {}
+        200..=219 => given.truncate(at),
+        220..=239 if !given.is_empty() => given[at] ^= damage,
+        _ => given.push(damage),
+    }
+    let given = bytes(given, shape);
+    let place = (!nowhere).then_some(&mut call.stores.kept[slot].saved);
+    let status = call.importer.de_serialize_fmu_state(&given, place);
+    Outcome::if_fine(status, whole && !nowhere && given.shape == Shape::Right)
+        .with(move |_, stores| stores.kept[slot].of = record.map(|own| own.of))
+}

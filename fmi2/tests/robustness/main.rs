@@ -1,0 +1,15 @@
+//! Nothing from outside can crash an exported model.
+#![expect(clippy::float_cmp, reason = "values that are set and read back")]
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+mod array;
+mod calls;
+mod choice;
+mod importer;
+mod machine;
+mod prediction;
+mod replay;
+mod sequence;
+mod sequences;
+mod targets;
+mod threads;

@@ -1,0 +1,36 @@
+"""Lives of many instances in a host of C: nothing is left over after loading and unloading.
+
+The same host runs under valgrind, see docs/robustness.md.
+"""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROUNDS, THREADS = 200, 4
+
+
+@pytest.fixture(scope="module")
+def host(tmp_path_factory):
+    """The program of host.c."""
+    compiler = shutil.which(os.environ.get("CC", "cc"))
+    program = tmp_path_factory.mktemp("host") / "host"
+    source = Path(__file__).with_name("host.c")
+    options = ["-Wall", "-Wextra", "-Werror", "-O1", "-g"]
+    libraries = ["-ldl", "-lpthread", "-lm"]
+    subprocess.run([compiler, *options, source, "-o", program, *libraries], check=True)
+    return program
+
+
+def test_loading_living_and_unloading_leaves_no_memory_no_files_and_no_threads(fmu, host):
+    arguments = [fmu.path, fmu.description.guid, fmu.resources, str(ROUNDS), str(THREADS)]
+    environment = {**os.environ, "GLIBC_TUNABLES": "glibc.malloc.tcache_count=0"}
+    done = subprocess.run([host, *arguments], capture_output=True, text=True, env=environment)
+    assert (done.returncode, done.stdout, done.stderr) == (
+        0,
+        "0 bytes, 0 descriptors, 0 threads\n",
+        "",
+    )
