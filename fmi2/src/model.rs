@@ -108,7 +108,7 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
     ///
     /// # Errors
     ///
-    /// [`Failure::Discard`] where there is no derivative.
+    /// [`Failure::Error`] where there is no derivative: the function may not discard.
     fn differentiate(&self, at: &At, direction: &mut Self) -> Result<(), Failure> {
         let _ = (at, direction);
         Err(Failure::Error("providesDirectionalDerivative is false".to_owned()))
@@ -222,7 +222,8 @@ impl Step {
 /// Why a call did not do what it was asked; the message reaches the importer's logger.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Failure {
-    /// `fmi2Discard`: refused, the instance is as before.
+    /// `fmi2Discard`: refused, the instance is as before. From functions that may not discard
+    /// (section 2.1.3: initialization, events, directional derivatives) `fmi2Error`.
     #[error("{0}")]
     Discard(String),
     /// `fmi2Discard` of `fmi2DoStep`: the model reached `time` (in s) and no further.

@@ -144,7 +144,7 @@ impl Model for FrictionPendulum {
             return Ok(());
         }
         let (delta, velocity) = (self.parameters.stribeck_exponent, state[2]);
-        Err(Failure::Discard(format!(
+        Err(Failure::Error(format!(
             "no derivative at v_p = {velocity} m/s: the friction with delta = {delta} is too steep"
         )))
     }

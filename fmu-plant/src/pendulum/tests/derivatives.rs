@@ -152,7 +152,7 @@ fn where_the_friction_is_infinitely_steep_there_is_none() {
     });
     let refused = along(&model, &NOW, &[("v_p", 1.0)]).unwrap_err();
     assert!(
-        matches!(&refused, Failure::Discard(text) if text.contains("delta = 0.5")),
+        matches!(&refused, Failure::Error(text) if text.contains("delta = 0.5")),
         "{refused}"
     );
     assert_eq!(column(&model, &NOW, "u")[0].to_bits(), 0);
