@@ -151,10 +151,7 @@ fn where_the_friction_is_infinitely_steep_there_is_none() {
         model.parameters.stribeck_exponent = 0.5;
     });
     let refused = along(&model, &NOW, &[("v_p", 1.0)]).unwrap_err();
-    assert!(
-        matches!(&refused, Failure::Error(text) if text.contains("delta = 0.5")),
-        "{refused}"
-    );
+    assert!(matches!(&refused, Failure::Error(text) if text.contains("delta = 0.5")), "{refused}");
     assert_eq!(column(&model, &NOW, "u")[0].to_bits(), 0);
     for known in ["delta", "v_s", "F_s"] {
         assert!(along(&model, &At::Initialization, &[(known, 1.0)]).is_ok(), "{known}");
