@@ -221,5 +221,7 @@ int main(int count, char **arguments) {
     long growth = (long)(mallinfo2().uordblks - heap);
     int more_files = entries("/proc/self/fd") - files, more_tasks = entries("/proc/self/task") - tasks;
     printf("%ld bytes, %d descriptors, %d threads\n", growth, more_files, more_tasks);
-    return growth > 0 || more_files != 0 || more_tasks != 0;
+    /* glibc makes a block 16 bytes longer where the rest would be too short to keep; a leak leaves at
+     * least 32 bytes in each round. */
+    return growth >= rounds || more_files != 0 || more_tasks != 0;
 }
