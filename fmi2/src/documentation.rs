@@ -209,21 +209,18 @@ fn attributes(rows: &[(&str, &str)]) -> String {
 
 fn co_simulation(own: &CoSimulation) -> String {
     let order = own.max_output_derivative_order.to_string();
+    let variable_step = flag(own.can_handle_variable_communication_step_size);
+    let only_once = flag(own.can_be_instantiated_only_once_per_process);
+    let own_memory = flag(own.can_not_use_memory_management_functions);
     attributes(&[
         ("modelIdentifier", own.model_identifier.as_str()),
         ("needsExecutionTool", flag(own.needs_execution_tool)),
-        (
-            "canHandleVariableCommunicationStepSize",
-            flag(own.can_handle_variable_communication_step_size),
-        ),
+        ("canHandleVariableCommunicationStepSize", variable_step),
         ("canInterpolateInputs", flag(own.can_interpolate_inputs)),
         ("maxOutputDerivativeOrder", &order),
         ("canRunAsynchronuously", flag(own.can_run_asynchronuously)),
-        (
-            "canBeInstantiatedOnlyOncePerProcess",
-            flag(own.can_be_instantiated_only_once_per_process),
-        ),
-        ("canNotUseMemoryManagementFunctions", flag(own.can_not_use_memory_management_functions)),
+        ("canBeInstantiatedOnlyOncePerProcess", only_once),
+        ("canNotUseMemoryManagementFunctions", own_memory),
         ("canGetAndSetFMUstate", flag(own.can_get_and_set_fmu_state)),
         ("canSerializeFMUstate", flag(own.can_serialize_fmu_state)),
         ("providesDirectionalDerivative", flag(own.provides_directional_derivative)),
@@ -233,17 +230,16 @@ fn co_simulation(own: &CoSimulation) -> String {
 fn model_exchange(own: &ModelExchange, description: &ModelDescription) -> String {
     let states = description.structure.derivatives.len().to_string();
     let indicators = description.number_of_event_indicators.unwrap_or_default().to_string();
+    let only_once = flag(own.can_be_instantiated_only_once_per_process);
+    let own_memory = flag(own.can_not_use_memory_management_functions);
     attributes(&[
         ("modelIdentifier", own.model_identifier.as_str()),
         ("continuous states", &states),
         ("numberOfEventIndicators", &indicators),
         ("needsExecutionTool", flag(own.needs_execution_tool)),
         ("completedIntegratorStepNotNeeded", flag(own.completed_integrator_step_not_needed)),
-        (
-            "canBeInstantiatedOnlyOncePerProcess",
-            flag(own.can_be_instantiated_only_once_per_process),
-        ),
-        ("canNotUseMemoryManagementFunctions", flag(own.can_not_use_memory_management_functions)),
+        ("canBeInstantiatedOnlyOncePerProcess", only_once),
+        ("canNotUseMemoryManagementFunctions", own_memory),
         ("canGetAndSetFMUstate", flag(own.can_get_and_set_fmu_state)),
         ("canSerializeFMUstate", flag(own.can_serialize_fmu_state)),
         ("providesDirectionalDerivative", flag(own.provides_directional_derivative)),
