@@ -13,9 +13,25 @@ pub enum InterfaceType {
     CoSimulation,
 }
 
-/// State of an instance.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum State {
+macro_rules! states {
+    ($($(#[$doc:meta])* $name:ident,)*) => {
+        /// State of an instance.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+        pub enum State { $($(#[$doc])* $name,)* }
+
+        impl State {
+            /// Every state, in the order of the tables.
+            pub const EVERY: [State; [$(stringify!($name)),*].len()] = [$(State::$name),*];
+
+            /// The state as a set of states.
+            pub(crate) const fn bit(self) -> u16 {
+                1 << self as u16
+            }
+        }
+    };
+}
+
+states! {
     /// After `fmi2Instantiate` or `fmi2Reset`.
     Instantiated,
     /// After `fmi2EnterInitializationMode`.
@@ -38,34 +54,6 @@ pub enum State {
     Error,
     /// After a function returned `fmi2Fatal`.
     Fatal,
-}
-
-impl State {
-    /// The state as a set of states.
-    pub(crate) const fn bit(self) -> u16 {
-        1 << self as u16
-    }
-
-    /// Every state, in the order of the tables.
-    pub const EVERY: [State; 11] = {
-        use State::{
-            ContinuousTimeMode, Error, EventMode, Fatal, InitializationMode, Instantiated,
-            StepCanceled, StepComplete, StepFailed, StepInProgress, Terminated,
-        };
-        [
-            Instantiated,
-            InitializationMode,
-            EventMode,
-            ContinuousTimeMode,
-            StepComplete,
-            StepInProgress,
-            StepFailed,
-            StepCanceled,
-            Terminated,
-            Error,
-            Fatal,
-        ]
-    };
 }
 
 const I: u16 = State::Instantiated.bit();

@@ -1,6 +1,7 @@
 """The C interface of FMI 2.0 by ctypes: an importer that may also make mistakes."""
 
 import ctypes
+import math
 from ctypes import CFUNCTYPE, POINTER, byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from pathlib import Path
 from typing import NamedTuple
@@ -267,6 +268,21 @@ class Instance:
         where = self.fmu.references(*names)
         self.must("GetRealOutputDerivatives", where, len(names), orders, values)
         return list(values)
+
+    def try_directional(self, unknowns, direction):
+        """Status of `fmi2GetDirectionalDerivative` and its result, by name."""
+        to, of = self.fmu.references(*unknowns), self.fmu.references(*direction)
+        seed, result = reals(*direction.values()), reals(*[math.nan] * len(unknowns))
+        status = self.call(
+            "GetDirectionalDerivative", to, len(unknowns), of, len(direction), seed, result
+        )
+        return status, dict(zip(unknowns, result))
+
+    def directional(self, unknowns, direction):
+        """Directional derivatives that have to be there, by name."""
+        status, result = self.try_directional(unknowns, direction)
+        assert status == OK, self.messages[-1:]
+        return result
 
     def step(self, time, size):
         """A communication step that has to succeed."""

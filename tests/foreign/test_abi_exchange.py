@@ -169,29 +169,17 @@ def test_reset_gives_the_same_start_again(fmu):
         assert run(instance) == first
 
 
-def directional(instance, unknowns, knowns, delta):
-    """Status and result of `fmi2GetDirectionalDerivative`."""
-    result = reals(*[math.nan] * len(unknowns))
-    unknowns = instance.fmu.references(*unknowns)
-    knowns = instance.fmu.references(*knowns)
-    status = instance.call(
-        "GetDirectionalDerivative", unknowns, len(unknowns), knowns, len(knowns), delta, result
-    )
-    return status, list(result)
-
-
 @pytest.mark.parametrize("kind", [MODEL_EXCHANGE, CO_SIMULATION])
 def test_directional_derivatives_are_linear_in_the_seed(fmu, kind):
     with Instance(fmu, kind=kind) as instance:
         instance.start()
         unknowns = [unknown.variable.name for unknown in fmu.description.derivatives]
         states = [unknown.variable.derivative.name for unknown in fmu.description.derivatives]
-        columns = [directional(instance, unknowns, [state], reals(1.0))[1] for state in states]
+        columns = [instance.directional(unknowns, {state: 1.0}) for state in states]
         seed = [0.5 - k for k in range(len(states))]
-        status, together = directional(instance, unknowns, states, reals(*seed))
-        assert status == OK
-        for row, value in enumerate(together):
-            parts = [factor * column[row] for factor, column in zip(seed, columns)]
+        together = instance.directional(unknowns, dict(zip(states, seed)))
+        for name, value in together.items():
+            parts = [factor * column[name] for factor, column in zip(seed, columns)]
             scale = sum(map(abs, parts)) or 1.0
             assert abs(value - sum(parts)) <= 1e-13 * scale
 
@@ -207,7 +195,7 @@ def test_directional_derivatives_of_wrong_variables_are_an_error_that_names_them
     ]:
         with Instance(fmu) as instance:
             instance.start()
-            assert directional(instance, [unknown], [known], reals(1.0))[0] == ERROR
+            assert instance.try_directional([unknown], {known: 1.0})[0] == ERROR
             assert named in instance.last_message()
 
 

@@ -7,7 +7,7 @@ imaginary part of f(x + 1e-30 i v) / 1e-30 is the derivative along v to the last
 import numpy as np
 import pytest
 
-from c_abi import CO_SIMULATION, MODEL_EXCHANGE, Instance, reals
+from c_abi import CO_SIMULATION, MODEL_EXCHANGE, Instance
 from observer_oracle import element_name
 from test_designs import LIMITED, SIZES, made, random_design, vector
 
@@ -69,17 +69,8 @@ def check(instance, unknowns, direction, sizes, switches, start=False):
     moved = {name: values[name] + 1j * STEP * along for name, along in direction.items()}
     wanted = evaluated({**values, **moved}, sizes, switches, start)
     allowed = rounding(values, direction, sizes, start)
-    for name, value in directional(instance, unknowns, direction).items():
+    for name, value in instance.directional(unknowns, direction).items():
         assert abs(value - np.imag(wanted[name]) / STEP) <= allowed[name], name
-
-
-def directional(instance, unknowns, direction):
-    """`fmi2GetDirectionalDerivative`, by name."""
-    seed, result = reals(*direction.values()), reals(*[np.nan] * len(unknowns))
-    to, of = instance.fmu.references(*unknowns), instance.fmu.references(*direction)
-    counts = len(unknowns), len(direction)
-    instance.must("GetDirectionalDerivative", to, counts[0], of, counts[1], seed, result)
-    return dict(zip(unknowns, result))
 
 
 def real_names(fmu, **attributes):
@@ -158,7 +149,7 @@ def test_during_the_run_they_are_exact_by_every_input_and_state(fmus, switches, 
             point = at_a_point(instance, fmu, sizes, switches)
             for along in [{name: 1.0} for name in knowns] + [dict(zip(knowns, seed))]:
                 check(instance, unknowns, along, sizes, point)
-            time = directional(instance, unknowns, {"time": 1.0})
+            time = instance.directional(unknowns, {"time": 1.0})
             assert set(time.values()) == {0.0}
 
 
@@ -183,7 +174,7 @@ def jacobian(instance, fmu):
     return {
         (unknown, known): value
         for known in states + real_names(fmu, causality="input")
-        for unknown, value in directional(instance, unknowns, {known: 1.0}).items()
+        for unknown, value in instance.directional(unknowns, {known: 1.0}).items()
     }
 
 

@@ -42,15 +42,6 @@ def values_of(instance):
     return {**dict(zip(names, instance.get(*names))), "linearised": instance.get("linearised")[0]}
 
 
-def directional(instance, unknowns, direction):
-    """`fmi2GetDirectionalDerivative`, by name."""
-    seed, result = reals(*direction.values()), reals(*[np.nan] * len(unknowns))
-    to, of = instance.fmu.references(*unknowns), instance.fmu.references(*direction)
-    counts = len(unknowns), len(direction)
-    instance.must("GetDirectionalDerivative", to, counts[0], of, counts[1], seed, result)
-    return dict(zip(unknowns, result))
-
-
 def errors(instance, unknowns, knowns, start=False, rise=0.0):
     """How far the derivatives along each known, and along all at once, are from complex steps.
 
@@ -62,7 +53,7 @@ def errors(instance, unknowns, knowns, start=False, rise=0.0):
     for direction in [{name: 1.0} for name in knowns] + [dict(zip(knowns, seed))]:
         moved = {name: values[name] + 1j * STEP * part for name, part in direction.items()}
         wanted = evaluated({**values, **moved}, regime, start)
-        for name, found in directional(instance, unknowns, direction).items():
+        for name, found in instance.directional(unknowns, direction).items():
             expected = np.imag(wanted[name]) / STEP
             yield abs(found - expected) / max(abs(expected), 1.0)
 
@@ -108,7 +99,7 @@ def test_during_the_run_they_are_exact_by_every_input_and_state(plant, kind):
             rise, unknowns = at_a_point(instance, *case), unknowns_of(plant)
             assert instance.get("regime") == [case[0][0]]
             assert max(errors(instance, unknowns, STATES + INPUTS, rise=rise)) < ALMOST_EXACT
-            along_time = directional(instance, unknowns, {"time": 1.0})
+            along_time = instance.directional(unknowns, {"time": 1.0})
             assert set(along_time.values()) == {0.0}
 
 
@@ -119,7 +110,7 @@ def test_more_force_than_can_be_held_does_not_change_the_friction_before_the_eve
             instance.set({"u": u, "f_a": 0.0})
             assert instance.get("regime") == [0]
             assert instance.get("f_fric") == [pytest.approx(np.clip(u, -30, 30), rel=1e-12)]
-            found = directional(instance, ["f_fric", "der(v_p)"], {"u": 1.0})
+            found = instance.directional(["f_fric", "der(v_p)"], {"u": 1.0})
             assert found == {"f_fric": slope, "der(v_p)": 0.0}
 
 
@@ -147,7 +138,7 @@ def factors(plant):
             instance.set({"u": point[5] + jump})  # A held cart is not free before the event.
             case = linearised, bool(parameters), point[0]
             for known in STATES + INPUTS:
-                for name, factor in directional(instance, unknowns_of(plant), {known: 1.0}).items():
+                for name, factor in instance.directional(unknowns_of(plant), {known: 1.0}).items():
                     found.setdefault((name, known), {}).setdefault(case, set()).add(factor)
     return found
 
