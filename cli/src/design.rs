@@ -1,6 +1,15 @@
 //! `aso-ftc design`: from a plant file to the design file of the controller FMU.
 #![expect(clippy::print_stdout, reason = "the result of the command")]
 
+mod controller_fmu;
+mod document;
+mod plant_file;
+mod report;
+mod signals;
+#[cfg(test)]
+mod tests;
+mod wanted;
+
 use std::fmt::Write as _;
 use std::path::PathBuf;
 

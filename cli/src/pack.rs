@@ -17,8 +17,9 @@ use crate::figure::rasterise;
 /// The models of this workspace.
 const MODELS: [&str; 2] = ["fmu-plant", "fmu-controller"];
 
-/// The equations of a model and its picture; the packer makes index.html and model.png of them.
-const FRAGMENT: &str = "model.html";
+/// The equations of a model and its picture; the packer makes index.html and model.png of them. The
+/// equations stay in the FMU, so that index.html can be made anew for another design.
+pub(crate) const FRAGMENT: &str = "model.html";
 const DRAWING: &str = "model.svg";
 
 #[derive(clap::Args)]
@@ -92,16 +93,8 @@ pub(crate) fn workspace() -> anyhow::Result<PathBuf> {
 
 fn pack_crate(folder: &Path, out: &Path, locked: bool) -> anyhow::Result<Packed> {
     let library = library::build(folder, locked)?;
-    let xml = master::describe(&library.file, &folder.join("resources")).with_context(|| {
-        format!("the library of {} does not describe itself", library.package.name)
-    })?;
-    let description = ModelDescription::parse(xml.as_bytes())
-        .with_context(|| format!("the model description of {}", library.package.name))?;
-    let problems: Vec<String> = description.problems().iter().map(ToString::to_string).collect();
-    if !problems.is_empty() {
-        let name = &library.package.name;
-        bail!("the variables of {name} break rules of FMI 2.0.5:\n{}", problems.join("\n"));
-    }
+    let resources = folder.join("resources");
+    let (xml, description) = describe(&library.file, &resources, &library.package.name)?;
     let mut package = Package::new(xml.clone());
     let identifier = &description.model_name;
     let (platform, suffix) = (fmi2::package::platforms(), std::env::consts::DLL_SUFFIX);
@@ -114,6 +107,23 @@ fn pack_crate(folder: &Path, out: &Path, locked: bool) -> anyhow::Result<Packed>
     let path = out.join(format!("{identifier}.fmu"));
     package.write(&path)?;
     Ok(Packed { path, xml, description })
+}
+
+/// What the library at `file` says of itself with `resources`; `name` is for messages.
+pub(crate) fn describe(
+    file: &Path,
+    resources: &Path,
+    name: &dyn std::fmt::Display,
+) -> anyhow::Result<(String, ModelDescription)> {
+    let xml = master::describe(file, resources)
+        .with_context(|| format!("the library of {name} does not describe itself"))?;
+    let description = ModelDescription::parse(xml.as_bytes())
+        .with_context(|| format!("the model description of {name}"))?;
+    let problems: Vec<String> = description.problems().iter().map(ToString::to_string).collect();
+    if !problems.is_empty() {
+        bail!("the variables of {name} break rules of FMI 2.0.5:\n{}", problems.join("\n"));
+    }
+    Ok((xml, description))
 }
 
 fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
@@ -142,7 +152,10 @@ fn add_documentation(
             let path = item?.path();
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
             match name.as_str() {
-                FRAGMENT => fragment = read(&path)?,
+                FRAGMENT => {
+                    fragment = read(&path)?;
+                    package.add(format!("documentation/{name}"), fragment.clone());
+                }
                 DRAWING => {}
                 _ if path.is_dir() => {
                     package.add_folder(&format!("documentation/{name}"), &path)?;

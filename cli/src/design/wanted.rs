@@ -1,0 +1,177 @@
+//! What a plant file wants of feedback and observer.
+
+use nalgebra::{Complex, DMatrix};
+
+use super::document::{Entry, Place, PlaceError, Table};
+
+/// What is wanted of a gain.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Wanted {
+    /// These eigenvalues of the continuous loop, 1/s; a sampled one gets e^(p T).
+    Eigenvalues(Vec<Complex<f64>>),
+    /// These eigenvalues of the sampled loop.
+    SampledEigenvalues(Vec<Complex<f64>>),
+    /// Eigenvalues in a region.
+    Region(Region),
+    /// The least integral of x'Q x + u'R u, or the least variance for noise of intensity W and V.
+    Weights { states: DMatrix<f64>, channels: DMatrix<f64> },
+    /// The least H-infinity norm, or one below a bound; eigenvalues in a region as well.
+    HInfinity { bound: Option<f64>, region: Region },
+}
+
+/// A region of the left half plane; the intersection of what is stated.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Region {
+    /// Real parts below minus this, 1/s.
+    pub(crate) decay: Option<f64>,
+    /// Centre and radius, 1/s.
+    pub(crate) disc: Option<(f64, f64)>,
+    /// Largest angle from the negative real axis, in degrees.
+    pub(crate) sector: Option<f64>,
+}
+
+/// What is wanted, and where the file says so.
+#[derive(Clone, Debug)]
+pub(crate) struct Request {
+    pub(crate) wanted: Wanted,
+    pub(crate) place: Place,
+}
+
+const KEYS: [&str; 4] = ["eigenvalues", "sampled_eigenvalues", "region", "h_infinity"];
+
+/// Reads `[feedback]` (weights Q, R) or `[observer]` (weights W, V).
+pub(crate) fn request(
+    table: &Table<'_>,
+    weights: [&str; 2],
+    sampled: bool,
+) -> Result<Request, PlaceError> {
+    let mut known = KEYS.to_vec();
+    known.extend(weights);
+    table.allow(&known)?;
+    let region = table.get("region");
+    let Some(one) = only_one(table, weights[0])? else {
+        let Some(entry) = region else {
+            let message = format!("expected one of {}", known.join(", "));
+            return Err(table.source.error(&table.place, message));
+        };
+        let wanted = Wanted::Region(self::region(&entry)?);
+        return Ok(Request { wanted, place: entry.place });
+    };
+    let norm = one.name.ends_with(".h_infinity");
+    let wanted = match region {
+        Some(entry) if !norm => {
+            return Err(entry.error("a region goes alone or with `h_infinity`"));
+        }
+        Some(entry) => Wanted::HInfinity { bound: bound(&one)?, region: self::region(&entry)? },
+        None if norm => Wanted::HInfinity { bound: bound(&one)?, region: Region::default() },
+        None if one.name.ends_with(".eigenvalues") => Wanted::Eigenvalues(eigenvalues(&one)?),
+        None if one.name.ends_with(".sampled_eigenvalues") => {
+            if !sampled {
+                return Err(one.error("the design has no `sample_time`"));
+            }
+            Wanted::SampledEigenvalues(eigenvalues(&one)?)
+        }
+        None => {
+            let other = table.require(weights[1], "the weight of the other signals")?;
+            Wanted::Weights { states: weight(&one)?, channels: weight(&other)? }
+        }
+    };
+    Ok(Request { wanted, place: one.place })
+}
+
+/// The one method that the table states beside a region.
+fn only_one<'a>(table: &Table<'a>, weight: &str) -> Result<Option<Entry<'a>>, PlaceError> {
+    let keys = ["eigenvalues", "sampled_eigenvalues", "h_infinity", weight];
+    let mut stated = keys.iter().filter_map(|key| table.get(key));
+    let first = stated.next();
+    match stated.next() {
+        Some(second) => {
+            let keys = keys.join(", ");
+            Err(second.error(format!("only one of {keys} can be wanted")))
+        }
+        None => Ok(first),
+    }
+}
+
+/// Numbers, or `{ re = -3.0, im = 4.0 }` for a pair of complex conjugates.
+fn eigenvalues(entry: &Entry<'_>) -> Result<Vec<Complex<f64>>, PlaceError> {
+    let mut found = Vec::new();
+    for member in entry.list()? {
+        if !member.is_table() {
+            found.push(Complex::new(member.number()?, 0.0));
+            continue;
+        }
+        let table = member.table()?;
+        table.allow(&["re", "im"])?;
+        let re = table.require("re", "the real part")?.number()?;
+        let im = table.require("im", "the imaginary part")?.positive()?;
+        found.extend([Complex::new(re, im), Complex::new(re, -im)]);
+    }
+    Ok(found)
+}
+
+fn region(entry: &Entry<'_>) -> Result<Region, PlaceError> {
+    let table = entry.table()?;
+    table.allow(&["decay", "disc", "sector"])?;
+    let decay = table.get("decay").map(|entry| entry.positive()).transpose()?;
+    let sector = table.get("sector").map(|entry| angle(&entry)).transpose()?;
+    let disc = table.get("disc").map(|entry| disc(&entry)).transpose()?;
+    if decay.is_none() && sector.is_none() && disc.is_none() {
+        return Err(entry.error("expected at least one of decay, disc, sector"));
+    }
+    Ok(Region { decay, disc, sector })
+}
+
+/// An angle between 0 and 90 degrees.
+fn angle(entry: &Entry<'_>) -> Result<f64, PlaceError> {
+    match entry.positive()? {
+        degrees if degrees < 90.0 => Ok(degrees),
+        degrees => Err(entry.error(format!("expected less than 90 degrees, found {degrees}"))),
+    }
+}
+
+fn disc(entry: &Entry<'_>) -> Result<(f64, f64), PlaceError> {
+    let table = entry.table()?;
+    table.allow(&["center", "radius"])?;
+    let center = table.require("center", "a point of the real axis, 1/s")?;
+    let radius = table.require("radius", "in 1/s")?.positive()?;
+    match center.number()? {
+        number if number < radius => Ok((number, radius)),
+        number => Err(center.error(format!(
+            "the disc from {} to {} does not reach the left half plane",
+            number - radius,
+            number + radius
+        ))),
+    }
+}
+
+/// A bound, or the text "least".
+fn bound(entry: &Entry<'_>) -> Result<Option<f64>, PlaceError> {
+    if !entry.is_text() {
+        return entry.positive().map(Some);
+    }
+    match entry.text()? {
+        "least" => Ok(None),
+        other => Err(entry.error(format!("expected a number or \"least\", found {other:?}"))),
+    }
+}
+
+/// A symmetric matrix, or a list of numbers for a diagonal one.
+fn weight(entry: &Entry<'_>) -> Result<DMatrix<f64>, PlaceError> {
+    let members = entry.list()?;
+    if members.iter().any(Entry::is_list) {
+        let matrix = entry.matrix()?;
+        if matrix.is_square() && matrix == matrix.transpose() {
+            return Ok(matrix);
+        }
+        return Err(entry.error("expected a symmetric matrix"));
+    }
+    let mut diagonal = Vec::with_capacity(members.len());
+    for member in &members {
+        match member.number()? {
+            number if number >= 0.0 => diagonal.push(number),
+            number => return Err(member.error(format!("expected no less than 0, found {number}"))),
+        }
+    }
+    Ok(DMatrix::from_diagonal(&diagonal.into()))
+}
