@@ -18,8 +18,8 @@
 //! A_0 = [A, -F_a; 0, 0],  C_0 = [C, 0],  L = [L_x; -L_f],  F_0 = [-F_a; 0]
 //! ```
 
-use crate::balance::{Balance, unit_columns};
-use crate::placement::{Placement, Quality, place};
+use crate::balance::unit_columns;
+use crate::placement::{Quality, place, place_balanced, real};
 use crate::rank::require_observable;
 use crate::singular::Singular;
 use crate::{Error, check};
@@ -64,7 +64,7 @@ pub struct AsoDesign {
     pub cancellation_residual: f64,
     /// Quality of the eigenvalues of A + B `K_x`.
     pub controller: Quality,
-    /// Quality of the eigenvalues of `A_0` - L `C_0`, for its transpose in balanced coordinates.
+    /// Quality of the eigenvalues of `A_0` - L `C_0`, for its transpose.
     pub observer: Quality,
 }
 
@@ -192,28 +192,12 @@ impl Gains {
     }
 }
 
-/// Places the eigenvalues of `A_0` - L `C_0`: first in the coordinates given, then in those that balance
-/// the outcome. The gain is -L'.
-fn place_observer(plant: &FaultyPlant, poles: &[f64]) -> Result<Placement, Error> {
-    let (a_0, c_0) = (plant.augmented_dynamics().transpose(), plant.augmented_output().transpose());
-    let first = place(&a_0, &c_0, poles)?;
-    let scale = Balance::of(&(&a_0 + &c_0 * &first.gain)).scale;
-    let scaled_a =
-        DMatrix::from_fn(a_0.nrows(), a_0.ncols(), |i, j| a_0[(i, j)] * (scale[j] / scale[i]));
-    let scaled_c = DMatrix::from_fn(c_0.nrows(), c_0.ncols(), |i, j| c_0[(i, j)] / scale[i]);
-    let mut second = place(&scaled_a, &scaled_c, poles)?;
-    for (mut column, factor) in second.gain.column_iter_mut().zip(&scale) {
-        column /= *factor;
-    }
-    Ok(second)
-}
-
 /// Designs the controller: A + B `K_x` and `A_0` - L `C_0` get the wanted eigenvalues.
 ///
 /// `controller_poles`: n, `observer_poles`: n + q, real, negative for a stable loop, in the unit of
 /// A; `k_f`: m x q, or None for [`FaultyPlant::compensation_gain`]. The design exists when (A, B)
 /// is controllable and [`FaultyPlant::check_observer_exists`] holds. Method, cost and tolerance:
-/// those of [`place`] on (A, B) and on (`A_0`', `C_0`').
+/// those of [`place`] on (A, B) and of [`place_balanced`] on (`A_0`', `C_0`').
 ///
 /// # Example
 ///
@@ -253,8 +237,9 @@ pub fn design(
     };
     let ((n, q), m) = (plant.f_a.shape(), plant.b.ncols());
     check::shape("K_f", &k_f, (m, q))?;
-    let controller = place(&plant.a, &plant.b, controller_poles)?;
-    let observer = place_observer(plant, observer_poles)?;
+    let controller = place(&plant.a, &plant.b, &real(controller_poles))?;
+    let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
+    let observer = place_balanced(&a_0.transpose(), &c_0.transpose(), &real(observer_poles))?;
     let l = -observer.gain.transpose();
     let cancellation_residual = (&plant.b * &k_f + &plant.f_a).norm() / plant.f_a.norm();
     Ok(AsoDesign {

@@ -7,6 +7,10 @@ use nalgebra::{Complex, ComplexField, DMatrix, DVector, Dyn, Schur};
 /// Iterations of the QR algorithm per row of the matrix; two or three are usual.
 const ITERATIONS_PER_ROW: usize = 100;
 
+/// An entry below the diagonal is zero when it is smaller than this times its neighbours on the
+/// diagonal. Near multiple eigenvalues rounding may keep it above the first number for ever.
+const ZERO: [f64; 2] = [f64::EPSILON, 16.0 * f64::EPSILON];
+
 /// The eigenvalues of A, ordered by real part, then by imaginary part.
 ///
 /// `a`: n x n, finite. They always exist. Method: diagonal balancing (Parlett and Reinsch 1969),
@@ -56,7 +60,7 @@ where
 {
     let iterations = ITERATIONS_PER_ROW * m.nrows();
     let what = "the QR algorithm for eigenvalues";
-    let found = Schur::try_new(m.clone(), f64::EPSILON, iterations);
+    let found = ZERO.iter().find_map(|&zero| Schur::try_new(m.clone(), zero, iterations));
     found.ok_or(Error::NotConverged { what, iterations })
 }
 

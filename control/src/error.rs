@@ -1,5 +1,7 @@
 //! The reasons for which a computation is refused.
 
+use nalgebra::Complex;
+
 /// Why a computation was refused. Rows and columns count from 1, as in the literature.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -101,14 +103,22 @@ pub enum Error {
         found: usize,
     },
     /// An eigenvalue is wanted more often than there are independent inputs.
-    #[error("the eigenvalue {pole} is wanted {times} times, at most {inputs} are possible")]
+    #[error(
+        "the eigenvalue {} is wanted {times} times, at most {inputs} are possible", shown(*.pole)
+    )]
     RepeatedPole {
         /// The eigenvalue.
-        pole: f64,
+        pole: Complex<f64>,
         /// How often it is wanted.
         times: usize,
         /// Rank of B.
         inputs: usize,
+    },
+    /// A complex eigenvalue is wanted more often than its conjugate.
+    #[error("the eigenvalue {} is wanted without its conjugate {}", shown(*.pole), shown(.pole.conj()))]
+    UnpairedPole {
+        /// The eigenvalue.
+        pole: Complex<f64>,
     },
     /// The gain found does not give the wanted eigenvalues.
     #[error("the wanted eigenvalues are missed by {relative:e} relative, allowed is {allowed:e}")]
@@ -156,4 +166,8 @@ pub enum Error {
         /// The quantity.
         what: &'static str,
     },
+}
+
+fn shown(value: Complex<f64>) -> String {
+    if value.im == 0.0 { value.re.to_string() } else { value.to_string() }
 }

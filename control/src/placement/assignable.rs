@@ -1,5 +1,6 @@
 //! The eigenvectors a feedback can give to each wanted eigenvalue.
 
+use super::wanted::Wanted;
 use crate::Error;
 use crate::balance::power_of_two;
 use crate::balance::{Balance, divide_columns, divide_rows, multiply_columns, multiply_rows};
@@ -8,50 +9,60 @@ use nalgebra::{DMatrix, DVector};
 
 const SCALING_PASSES: usize = 20;
 
-/// For each pole p all (v, g) with (A - p I) v + B g = 0: with g = K v, v is an eigenvector of A +
-/// B K.
+/// For each wanted eigenvalue all (V, G) with A V + B G = V M: with G = K V the columns of V span
+/// the eigenvectors of A + B K.
 ///
-/// B has r independent columns, so the solutions for one pole are v = X w, g = Y w with w of length
-/// r.
+/// V and G have one column for a real eigenvalue, two for a pair; a direction w gives all of them:
+/// the columns of V, one below the other, are X w, those of G are Y w. B has r independent columns,
+/// so w has r entries for each column of V.
 pub(crate) struct Assignable {
-    /// X for each pole, n x r, orthonormal in the given coordinates.
-    pub(crate) states: Vec<DMatrix<f64>>,
-    /// Y for each pole, r x r, in units of `response_scale`.
-    responses: Vec<DMatrix<f64>>,
+    /// One for each wanted eigenvalue or pair.
+    pub(crate) spaces: Vec<Space>,
     /// Units of the states that give eigenvectors entries of similar size; powers of two.
     pub(crate) scale: DVector<f64>,
-    /// Units of the responses g.
+    /// Units of the responses G.
     pub(crate) response_scale: DVector<f64>,
+}
+
+/// What one eigenvalue, or one pair, can have.
+pub(crate) struct Space {
+    pub(crate) wanted: Wanted,
+    /// X, its columns orthonormal in the given coordinates, times the root of the count: a w of
+    /// length one gives eigenvectors of length one.
+    pub(crate) states: DMatrix<f64>,
+    /// Y, in units of `response_scale`.
+    responses: DMatrix<f64>,
 }
 
 impl Assignable {
     /// `a`: n x n, `b`: n x r of rank r, the pair controllable.
-    pub(crate) fn new(a: &DMatrix<f64>, b: &DMatrix<f64>, poles: &[f64]) -> Result<Self, Error> {
+    pub(crate) fn new(
+        a: &DMatrix<f64>,
+        b: &DMatrix<f64>,
+        wanted: &[Wanted],
+    ) -> Result<Self, Error> {
         let (n, r) = b.shape();
         let mut units = DVector::from_element(n + r, 1.0);
         units.rows_mut(0, n).copy_from(&Balance::of(a).scale);
-        let mut solutions = null_spaces(a, b, poles, &units)?;
+        let mut solutions = in_units(a, b, wanted, &units)?;
         for _ in 0..SCALING_PASSES {
-            let factors = row_sizes(&solutions);
+            let factors = row_sizes(&solutions, wanted, n);
             if factors.iter().all(|factor| (factor - 1.0).abs() <= 0.0) {
                 break;
             }
             units.component_mul_assign(&factors);
-            solutions = null_spaces(a, b, poles, &units)?;
+            solutions = in_units(a, b, wanted, &units)?;
         }
-        let mut found = Self {
-            states: Vec::with_capacity(poles.len()),
-            responses: Vec::with_capacity(poles.len()),
-            scale: units.rows(0, n).into(),
-            response_scale: units.rows(n, r).into(),
+        let scale: DVector<f64> = units.rows(0, n).into();
+        let space = |(solution, &wanted): (&DMatrix<f64>, &Wanted)| {
+            let count = wanted.count();
+            let (top, bottom) = (solution.rows(0, count * n), solution.rows(count * n, count * r));
+            let given = multiply_rows(&top.into(), &repeated(&scale, count));
+            let whitening = Singular::of(&given)?.whitening(count * r) * root(count);
+            Ok(Space { wanted, states: given * &whitening, responses: bottom * whitening })
         };
-        for solution in &solutions {
-            let given = multiply_rows(&solution.rows(0, n).into(), &found.scale);
-            let whitening = Singular::of(&given)?.whitening(r);
-            found.states.push(given * &whitening);
-            found.responses.push(solution.rows(n, r) * whitening);
-        }
-        Ok(found)
+        let spaces = solutions.iter().zip(wanted).map(space).collect::<Result<_, Error>>()?;
+        Ok(Self { spaces, scale, response_scale: units.rows(n, r).into() })
     }
 
     /// Number of free parameters w per eigenvector.
@@ -59,19 +70,35 @@ impl Assignable {
         self.response_scale.len()
     }
 
-    /// Eigenvectors as columns, in the given coordinates.
+    /// The columns of all V side by side, in the given coordinates.
     pub(crate) fn eigenvectors(&self, directions: &[DVector<f64>]) -> DMatrix<f64> {
-        columns(&self.states, directions)
+        let columns = self.spaces.iter().zip(directions).map(|(space, w)| &space.states * w);
+        side_by_side(self.scale.len(), columns)
     }
 
-    /// Eigenvectors as columns, in units of `scale`.
+    /// The columns of all V side by side, in units of `scale`.
     pub(crate) fn scaled_eigenvectors(&self, directions: &[DVector<f64>]) -> DMatrix<f64> {
         divide_rows(&self.eigenvectors(directions), &self.scale)
     }
 
-    /// K times the scaled eigenvectors, as columns in units of `response_scale`.
+    /// The columns of all G = K V side by side, in units of `response_scale`.
     pub(crate) fn scaled_responses(&self, directions: &[DVector<f64>]) -> DMatrix<f64> {
-        columns(&self.responses, directions)
+        let columns = self.spaces.iter().zip(directions).map(|(space, w)| &space.responses * w);
+        side_by_side(self.inputs(), columns)
+    }
+
+    /// The same with the states divided by `units`, eigenvectors of length one.
+    pub(crate) fn unit_eigenvectors(
+        &self,
+        directions: &[DVector<f64>],
+        units: &DVector<f64>,
+    ) -> DMatrix<f64> {
+        let columns = self.spaces.iter().zip(directions).map(|(space, w)| {
+            let count = space.wanted.count();
+            let v = (&space.states * w).component_div(&repeated(units, count));
+            v.normalize() * root(count)
+        });
+        side_by_side(units.len(), columns)
     }
 
     /// Inverse of the matrix of eigenvectors, in the given coordinates; None if singular.
@@ -81,40 +108,63 @@ impl Assignable {
     }
 }
 
-fn columns(bases: &[DMatrix<f64>], directions: &[DVector<f64>]) -> DMatrix<f64> {
-    let columns: Vec<DVector<f64>> = bases.iter().zip(directions).map(|(x, w)| x * w).collect();
-    DMatrix::from_columns(&columns)
+/// Stacked columns of that many rows, laid out side by side.
+fn side_by_side(rows: usize, stacked: impl Iterator<Item = DVector<f64>>) -> DMatrix<f64> {
+    let entries: Vec<f64> = stacked.flat_map(|column| column.data.as_vec().clone()).collect();
+    DMatrix::from_vec(rows, entries.len() / rows, entries)
 }
 
-/// Orthonormal solutions (v; g) in the given units, one (n + r) x r matrix per pole.
-fn null_spaces(
+/// Length of the columns of V together for eigenvectors of length one.
+fn root(count: usize) -> f64 {
+    if count == 2 { std::f64::consts::SQRT_2 } else { 1.0 }
+}
+
+fn repeated(v: &DVector<f64>, times: usize) -> DVector<f64> {
+    DVector::from_fn(times * v.len(), |i, _| v[i % v.len()])
+}
+
+/// Solutions with A, B and the answer in the given units of states and responses.
+fn in_units(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
-    poles: &[f64],
+    wanted: &[Wanted],
     units: &DVector<f64>,
 ) -> Result<Vec<DMatrix<f64>>, Error> {
     let (n, r) = b.shape();
-    let state_units: DVector<f64> = units.rows(0, n).into();
-    let both = DMatrix::from_fn(n, n + r, |i, j| if j < n { a[(i, j)] } else { b[(i, j - n)] });
-    let scaled = divide_rows(&multiply_columns(&both, units), &state_units);
-    let solve = |pole: &f64| {
-        let mut shifted = scaled.clone();
-        for state in 0..n {
-            shifted[(state, state)] -= pole;
-        }
-        Ok(Singular::of(&shifted)?.right.columns(n, r).into())
-    };
-    poles.iter().map(solve).collect()
+    let (of_states, of_responses) = (units.rows(0, n).into(), units.rows(n, r).into());
+    let a = divide_rows(&multiply_columns(a, &of_states), &of_states);
+    let b = divide_rows(&multiply_columns(b, &of_responses), &of_states);
+    wanted.iter().map(|&wanted| solutions(&a, &b, wanted)).collect()
 }
 
-/// Size of each row over all solutions, as powers of two around one.
-fn row_sizes(solutions: &[DMatrix<f64>]) -> DVector<f64> {
-    let (rows, _) = solutions[0].shape();
-    let total: f64 = solutions.iter().map(DMatrix::norm_squared).sum();
-    DVector::from_fn(rows, |row, _| {
-        let size: f64 = solutions.iter().map(|solution| solution.row(row).norm_squared()).sum();
-        #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
-        let factor = power_of_two((size * rows as f64 / total).sqrt());
-        if factor.is_normal() { factor } else { 1.0 }
-    })
+/// Orthonormal basis of the solutions (V; G) of A V - V M + B G = 0, columns stacked.
+pub(crate) fn solutions(
+    a: &DMatrix<f64>,
+    b: &DMatrix<f64>,
+    wanted: Wanted,
+) -> Result<DMatrix<f64>, Error> {
+    let ((n, r), count) = (b.shape(), wanted.count());
+    let one = DMatrix::identity(count, count);
+    let shifted = one.kronecker(a) - wanted.block().transpose().kronecker(&DMatrix::identity(n, n));
+    let mut equations = shifted.resize_horizontally(count * (n + r), 0.0);
+    equations.columns_mut(count * n, count * r).copy_from(&one.kronecker(b));
+    Ok(Singular::of(&equations)?.right.columns(count * n, count * r).into())
+}
+
+/// Size of each state and each response over all solutions, as powers of two around one.
+fn row_sizes(solutions: &[DMatrix<f64>], wanted: &[Wanted], n: usize) -> DVector<f64> {
+    let rows = solutions[0].nrows() / wanted[0].count();
+    let mut sizes = DVector::<f64>::zeros(rows);
+    for (solution, wanted) in solutions.iter().zip(wanted) {
+        let count = wanted.count();
+        for (row, entries) in solution.row_iter().enumerate() {
+            let states = count * n;
+            let of = if row < states { row % n } else { n + (row - states) % (rows - n) };
+            sizes[of] += entries.norm_squared();
+        }
+    }
+    let total = sizes.sum();
+    #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
+    let factors = sizes.map(|size| power_of_two((size * rows as f64 / total).sqrt()));
+    factors.map(|factor| if factor.is_normal() { factor } else { 1.0 })
 }

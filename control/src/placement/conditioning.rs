@@ -1,10 +1,10 @@
 //! The choice of eigenvectors with the best condition number.
 
-use super::assignable::Assignable;
+use super::assignable::{Assignable, Space};
 use super::descent::minimise;
 use crate::Error;
 use crate::singular::Singular;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, RowDVector};
 
 const STARTS: usize = 3;
 /// A later start must be better by more than rounding, or else the earliest wins.
@@ -19,8 +19,8 @@ pub(crate) fn best_directions(problem: &Assignable) -> Result<Vec<DVector<f64>>,
     let mut best: Option<(f64, Vec<DVector<f64>>)> = None;
     let starts = if problem.inputs() == 1 { 1 } else { STARTS };
     for start in 0..starts {
-        let directions = descend(problem, project(problem, spread(problem, start)));
-        let value = condition(problem, &directions)?;
+        let directions = descend(problem, project(problem, spread(problem, start))?)?;
+        let value = condition(&problem.eigenvectors(&directions))?;
         if best.as_ref().is_none_or(|(least, _)| value < BETTER * least) {
             best = Some((value, directions));
         }
@@ -28,50 +28,86 @@ pub(crate) fn best_directions(problem: &Assignable) -> Result<Vec<DVector<f64>>,
     best.map(|(_, directions)| directions).ok_or(Error::Overflow { what: "K" })
 }
 
-/// Condition number of the matrix of eigenvectors of length one, in the given coordinates.
-pub(crate) fn condition(problem: &Assignable, directions: &[DVector<f64>]) -> Result<f64, Error> {
-    Ok(Singular::of(&problem.eigenvectors(directions).transpose())?.condition())
+/// Largest over smallest singular value, precise for rows of very different size.
+pub(crate) fn condition(eigenvectors: &DMatrix<f64>) -> Result<f64, Error> {
+    Ok(Singular::of(&eigenvectors.transpose())?.condition())
 }
 
 /// Directions spread without pattern: the fractional parts of multiples of square roots.
 fn spread(problem: &Assignable, start: usize) -> Vec<DVector<f64>> {
-    let (poles, inputs) = (problem.states.len(), problem.inputs());
-    let mut seed = (2 + start * poles * inputs..).map(|k| {
+    let count = problem.scale.len() * problem.inputs();
+    let mut seed = (2 + start * count..).map(|k| {
         #[expect(clippy::cast_precision_loss, reason = "the count is far below 2^52")]
         let root = (k as f64).sqrt();
         (1000.0 * root).fract() - 0.5
     });
-    let mut direction = |_| {
-        let w = DVector::from_fn(inputs, |_, _| seed.next().unwrap_or(1.0));
+    let mut direction = |space: &Space| {
+        let w = DVector::from_fn(space.states.ncols(), |_, _| seed.next().unwrap_or(1.0));
         let length = w.norm();
-        if length > 0.0 { w / length } else { DVector::from_element(inputs, 1.0).normalize() }
+        if length > 0.0 { w / length } else { DVector::from_element(w.len(), 1.0).normalize() }
     };
-    (0..poles).map(&mut direction).collect()
+    problem.spaces.iter().map(&mut direction).collect()
 }
 
-/// Method 0 of Kautsky, Nichols and Van Dooren: each eigenvector in turn becomes the projection,
-/// onto its subspace, of the normal of the plane that the others span.
-fn project(problem: &Assignable, mut directions: Vec<DVector<f64>>) -> Vec<DVector<f64>> {
+/// Sweeps in which each eigenvector, or pair, in turn becomes the one that spans the largest volume
+/// with the others.
+///
+/// For a real eigenvalue that is the projection, onto its subspace, of the normal of the plane that
+/// the others span: method 0 of Kautsky, Nichols and Van Dooren. A pair V = [v1, v2] spans with the
+/// others a volume in proportion to v1' (p q' - q p') v2 with two vectors p, q normal to them,
+/// greatest at an eigenvector of a symmetric matrix: A. L. Tits and Y. Yang, Globally convergent
+/// algorithms for robust pole assignment by state feedback, IEEE Trans. Autom. Control 41 (1996).
+fn project(
+    problem: &Assignable,
+    mut directions: Vec<DVector<f64>>,
+) -> Result<Vec<DVector<f64>>, Error> {
     for _ in 0..SWEEPS {
-        for pole in 0..directions.len() {
+        let mut column = 0;
+        for (number, space) in problem.spaces.iter().enumerate() {
             let Some(inverse) = problem.inverse(&directions) else {
-                return directions;
+                return Ok(directions);
             };
-            let projection = problem.states[pole].tr_mul(&inverse.row(pole).transpose());
-            let length = projection.norm();
-            if length.is_normal() {
-                directions[pole] = projection / length;
+            let count = space.wanted.count();
+            let normals = inverse.rows(column, count).transpose();
+            if normals.norm().is_normal() {
+                let best = widest(space, &(&normals / normals.norm()))?;
+                let length = best.norm();
+                if length.is_normal() {
+                    directions[number] = best / length;
+                }
             }
+            column += count;
         }
     }
-    directions
+    Ok(directions)
+}
+
+/// The w that spans the largest volume, `normals` spanning what is normal to the other vectors.
+fn widest(space: &Space, normals: &DMatrix<f64>) -> Result<DVector<f64>, Error> {
+    let n = normals.nrows();
+    if space.wanted.count() == 1 {
+        return Ok(space.states.tr_mul(&normals.column(0)));
+    }
+    let first = space.states.rows(0, n).tr_mul(normals);
+    let second = space.states.rows(n, n).tr_mul(normals);
+    let half = first.column(0) * second.column(1).transpose()
+        - first.column(1) * second.column(0).transpose();
+    let form = &half + half.transpose();
+    let shift = DMatrix::from_diagonal_element(form.nrows(), form.nrows(), form.norm());
+    let highest = Singular::of(&(&shift + &form))?.right.column(0).into_owned();
+    let lowest = Singular::of(&(&shift - &form))?.right.column(0).into_owned();
+    let size = |w: &DVector<f64>| w.dot(&(&form * w)).abs();
+    Ok(if size(&highest) >= size(&lowest) { highest } else { lowest })
 }
 
 /// Descent on ln(condition) in local coordinates that are centred anew in each round.
-fn descend(problem: &Assignable, mut directions: Vec<DVector<f64>>) -> Vec<DVector<f64>> {
+fn descend(
+    problem: &Assignable,
+    mut directions: Vec<DVector<f64>>,
+) -> Result<Vec<DVector<f64>>, Error> {
     let mut value = f64::INFINITY;
     for _ in 0..ROUNDS {
-        let chart = Chart::around(directions);
+        let chart = Chart::around(problem, directions)?;
         let (at, lowest) = minimise(&|t| chart.objective(problem, t), chart.dimension());
         directions = chart.directions(&at);
         if value <= lowest + WORTHWHILE {
@@ -79,20 +115,23 @@ fn descend(problem: &Assignable, mut directions: Vec<DVector<f64>>) -> Vec<DVect
         }
         value = lowest;
     }
-    directions
+    Ok(directions)
 }
 
-/// Directions near given ones: w = (w0 + N t) / |w0 + N t|, the columns of N orthonormal and normal
-/// to w0.
+/// Directions near given ones: w = (w0 + N t) / |w0 + N t|.
+///
+/// The columns of N are orthonormal and normal to w0. For a pair they are also normal to the
+/// direction of i v, because the factor of a complex eigenvector changes nothing.
 struct Chart {
     centres: Vec<DVector<f64>>,
     normals: Vec<DMatrix<f64>>,
 }
 
 impl Chart {
-    fn around(centres: Vec<DVector<f64>>) -> Self {
-        let normals = centres.iter().map(normals).collect();
-        Self { centres, normals }
+    fn around(problem: &Assignable, centres: Vec<DVector<f64>>) -> Result<Self, Error> {
+        let pairs = problem.spaces.iter().zip(&centres);
+        let normals = pairs.map(|(space, w)| normals(space, w)).collect::<Result<_, _>>()?;
+        Ok(Self { centres, normals })
     }
 
     fn dimension(&self) -> usize {
@@ -100,11 +139,13 @@ impl Chart {
     }
 
     fn directions(&self, t: &DVector<f64>) -> Vec<DVector<f64>> {
-        let each = self.normals[0].ncols();
-        let direction = |(pole, centre): (usize, &DVector<f64>)| {
-            (centre + &self.normals[pole] * t.rows(pole * each, each)).normalize()
+        let mut first = 0;
+        let direction = |(centre, normals): (&DVector<f64>, &DMatrix<f64>)| {
+            let part = t.rows(first, normals.ncols());
+            first += normals.ncols();
+            (centre + normals * part).normalize()
         };
-        self.centres.iter().enumerate().map(direction).collect()
+        self.centres.iter().zip(&self.normals).map(direction).collect()
     }
 
     /// ln(s1 / sn) of the eigenvector matrix V = sum of s x u', and its gradient: ds = x' dV u.
@@ -113,29 +154,41 @@ impl Chart {
         let v = Singular::of(&problem.eigenvectors(&directions).transpose()).ok()?;
         let last = v.values.len() - 1;
         let value = v.condition().ln();
+        let of_columns = v.right.column(0) * (v.left.column(0) / v.values[0]).transpose()
+            - v.right.column(last) * (v.left.column(last) / v.values[last]).transpose();
         let mut gradient = DVector::zeros(t.len());
-        let each = self.normals[0].ncols();
-        for (pole, w) in directions.iter().enumerate() {
-            let slope = v.right.column(0) * (v.left[(pole, 0)] / v.values[0])
-                - v.right.column(last) * (v.left[(pole, last)] / v.values[last]);
-            let slope = problem.states[pole].tr_mul(&slope);
+        let (mut column, mut first) = (0, 0);
+        for ((space, normals), w) in problem.spaces.iter().zip(&self.normals).zip(&directions) {
+            let (count, free) = (space.wanted.count(), normals.ncols());
+            let own = of_columns.columns(column, count).into_owned();
+            let slope = space.states.tr_mul(
+                &own.reshape_generic(nalgebra::Dyn(space.states.nrows()), nalgebra::Const::<1>),
+            );
             let tangential = &slope - w * w.dot(&slope);
-            let length = (1.0 + t.rows(pole * each, each).norm_squared()).sqrt();
-            let part = self.normals[pole].tr_mul(&tangential) / length;
-            gradient.rows_mut(pole * each, each).copy_from(&part);
+            let length = (1.0 + t.rows(first, free).norm_squared()).sqrt();
+            gradient.rows_mut(first, free).copy_from(&(normals.tr_mul(&tangential) / length));
+            column += count;
+            first += free;
         }
         value.is_finite().then_some((value, gradient))
     }
 }
 
-/// Orthonormal columns normal to w: the reflection that takes w to an axis, without its first
-/// column.
-fn normals(w: &DVector<f64>) -> DMatrix<f64> {
-    let mut mirror = w.clone();
-    mirror[0] += 1.0_f64.copysign(w[0]);
-    let factor = 2.0 / mirror.norm_squared();
-    DMatrix::from_fn(w.len(), w.len() - 1, |i, j| {
-        let unit = if i == j + 1 { 1.0 } else { 0.0 };
-        unit - factor * mirror[i] * mirror[j + 1]
-    })
+/// Orthonormal columns normal to w and, for a pair, to the w of i v.
+fn normals(space: &Space, w: &DVector<f64>) -> Result<DMatrix<f64>, Error> {
+    let count = space.wanted.count();
+    let mut fixed = vec![w.transpose()];
+    if count == 2 {
+        fixed.push(quarter_turn(space, w));
+    }
+    let across = Singular::of(&DMatrix::from_rows(&fixed))?.right;
+    Ok(across.columns(count, w.len() - count).into())
+}
+
+/// The w of i v as a row: v1 + i v2 becomes -v2 + i v1.
+fn quarter_turn(space: &Space, w: &DVector<f64>) -> RowDVector<f64> {
+    let v = &space.states * w;
+    let n = v.len() / 2;
+    let turned = DVector::from_fn(2 * n, |i, _| if i < n { -v[n + i] } else { v[i - n] });
+    (space.states.tr_mul(&turned) / 2.0).transpose()
 }

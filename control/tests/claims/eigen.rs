@@ -44,3 +44,28 @@ fn the_spectral_abscissa_is_the_largest_real_part() {
     let turning = matrix(2, 2, &[0.25, 100.0, -100.0, 0.25]);
     assert!((spectral_abscissa(&turning).unwrap() - 0.25).abs() < 1e-13);
 }
+
+/// Three equal pairs -1.5 +- 2i and four others, in fifty bases: rounding keeps the entries
+/// between equal pairs from vanishing.
+#[test]
+fn pairs_that_come_several_times_are_found() {
+    let mut blocks = DMatrix::from_diagonal_element(10, 10, -1.5);
+    for first in [0, 2, 4] {
+        blocks[(first, first + 1)] = 2.0;
+        blocks[(first + 1, first)] = -2.0;
+    }
+    for (state, value) in [-3.0, -3.0, -3.0, -4.0].into_iter().enumerate() {
+        blocks[(6 + state, 6 + state)] = value;
+    }
+    let fraction = |k: usize| (1000.0 * f64::from(u32::try_from(k).unwrap()).sqrt()).fract() - 0.5;
+    for case in 0..50 {
+        let t = DMatrix::from_fn(10, 10, |i, j| fraction(131 * case + 17 * i + j + 2));
+        let inverse = t.clone().try_inverse().unwrap();
+        let found = eigenvalues(&(&t * &blocks * inverse)).unwrap();
+        let pair = Complex::new(-1.5, 2.0);
+        for (value, times) in [(pair, 3), (pair.conj(), 3), (Complex::from(-3.0), 3)] {
+            let near = found.iter().filter(|found| (*found - value).norm() < 1e-8).count();
+            assert_eq!(near, times, "{case}: {found:?}");
+        }
+    }
+}

@@ -8,7 +8,7 @@ use control::eigen::eigenvalues;
 use control::exponential::exponential;
 use control::hold::FirstOrderHold;
 use control::lyapunov::lyapunov;
-use control::placement::place;
+use control::placement::{place, real};
 use control::rank::{controllability, observability};
 use control::theorem1::certify;
 use nalgebra::DMatrix;
@@ -37,9 +37,9 @@ fn an_entry_that_is_not_a_number_is_named_in_every_matrix() {
     assert_eq!(name_of(observability(&good, &bad)), "C");
     assert_eq!(name_of(FirstOrderHold::new(&bad, &good, 1.0)), "A");
     assert_eq!(name_of(FirstOrderHold::new(&good, &bad, 1.0)), "B");
-    assert_eq!(name_of(place(&bad, &good, &[-1.0, -2.0])), "A");
-    assert_eq!(name_of(place(&good, &bad, &[-1.0, -2.0])), "B");
-    assert_eq!(name_of(place(&good, &good, &[-1.0, f64::NAN])), "poles");
+    assert_eq!(name_of(place(&bad, &good, &real(&[-1.0, -2.0]))), "A");
+    assert_eq!(name_of(place(&good, &bad, &real(&[-1.0, -2.0]))), "B");
+    assert_eq!(name_of(place(&good, &good, &real(&[-1.0, f64::NAN]))), "poles");
 }
 
 #[test]
@@ -52,8 +52,8 @@ fn a_wrong_shape_is_named_with_what_was_expected() {
     assert_eq!(name_of(observability(&good, &wide)), "C");
     let refused = FirstOrderHold::new(&good, &tall, 1.0);
     assert_eq!(refused, Err(Error::Shape { matrix: "B", expected: (2, 1), found: (3, 1) }));
-    assert_eq!(name_of(place(&good, &DMatrix::zeros(2, 0), &[-1.0, -2.0])), "B");
-    let refused = place(&good, &good, &[-1.0]);
+    assert_eq!(name_of(place(&good, &DMatrix::zeros(2, 0), &real(&[-1.0, -2.0]))), "B");
+    let refused = place(&good, &good, &real(&[-1.0]));
     assert_eq!(refused, Err(Error::PoleCount { expected: 2, found: 1 }));
 }
 
@@ -109,7 +109,7 @@ fn entries_near_the_ends_of_the_range_end_in_an_answer_or_an_error() {
         let _ = exponential(&a).map(finite);
         let _ = FirstOrderHold::new(&a, &b, 0.1).map(|hold| finite(hold.gamma_1));
         let _ = lyapunov(&a, &identity).map(|solution| finite(solution.p));
-        let _ = place(&a, &b, &CONTROLLER_POLES).map(|placement| finite(placement.gain));
+        let _ = place(&a, &b, &real(&CONTROLLER_POLES)).map(|placement| finite(placement.gain));
         let plant = FaultyPlant { a, b, c: wild(2, 4, 3), f_a };
         let designed = design(&plant, &CONTROLLER_POLES, &OBSERVER_POLES, None);
         let _ = designed.map(|design| finite(design.gains.l_x));

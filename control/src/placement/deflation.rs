@@ -1,0 +1,76 @@
+//! The gain that belongs to chosen eigenvectors.
+
+use super::assignable::{Assignable, solutions};
+use super::wanted::Wanted;
+use crate::Error;
+use crate::balance::{divide_columns, divide_rows, multiply_columns, multiply_rows};
+use crate::singular::Singular;
+use nalgebra::{DMatrix, DVector};
+
+/// Eigenvectors whose part normal to those before is below this part of them are dependent.
+const DEPENDENT: f64 = 1e-14;
+
+/// K such that A + B K has the wanted eigenvalues, with eigenvectors as near to the chosen ones as
+/// rounding allows.
+///
+/// K V = G alone loses as many digits of the eigenvalues as the condition number of V has. Here one
+/// eigenvalue, or pair, after the other is assigned in the part of the state space that is normal
+/// to the eigenvectors before it, so that in the orthonormal basis found the matrix A + B K is
+/// block triangular to a few rounding errors of its norm: the deflation of G. S. Miminis and C. C.
+/// Paige, A direct algorithm for pole assignment of time-invariant multi-input linear systems using
+/// state feedback, Automatica 24 (1988).
+pub(crate) fn gain(
+    a: &DMatrix<f64>,
+    b: &DMatrix<f64>,
+    problem: &Assignable,
+    directions: &[DVector<f64>],
+) -> Result<DMatrix<f64>, Error> {
+    let (scale, response_scale) = (&problem.scale, &problem.response_scale);
+    let a = divide_rows(&multiply_columns(a, scale), scale);
+    let b = divide_rows(&multiply_columns(b, response_scale), scale);
+    let vectors = problem.scaled_eigenvectors(directions);
+    let responses = problem.scaled_responses(directions);
+    let (n, r) = b.shape();
+    let mut k = DMatrix::zeros(r, n);
+    let mut rest = DMatrix::identity(n, n);
+    let mut column = 0;
+    for space in &problem.spaces {
+        let count = space.wanted.count();
+        let v = vectors.columns(column, count);
+        let inside = rest.tr_mul(&v);
+        let g = responses.columns(column, count) - &k * v;
+        let chosen = (inside.norm() > DEPENDENT * v.norm()).then_some((&inside, &g));
+        let (v, g) = nearest_solution(&rest, &a, &b, space.wanted, chosen)?;
+        let basis = Singular::of(&v)?;
+        let q = &rest * &basis.left;
+        k += g * basis.whitening(count) * q.transpose();
+        let across = Singular::of(&basis.left.transpose())?.right;
+        rest = &rest * across.columns(count, across.ncols() - count);
+        column += count;
+    }
+    Ok(divide_columns(&multiply_rows(&k, response_scale), scale))
+}
+
+/// The solution (V; G) nearest to a chosen one, in the part of the state space that `rest` spans;
+/// without a choice the one with the largest V for its length.
+fn nearest_solution(
+    rest: &DMatrix<f64>,
+    a: &DMatrix<f64>,
+    b: &DMatrix<f64>,
+    wanted: Wanted,
+    chosen: Option<(&DMatrix<f64>, &DMatrix<f64>)>,
+) -> Result<(DMatrix<f64>, DMatrix<f64>), Error> {
+    let basis = solutions(&(rest.tr_mul(a) * rest), &rest.tr_mul(b), wanted)?;
+    let (count, states) = (wanted.count(), wanted.count() * rest.ncols());
+    let weights = if let Some((v, g)) = chosen {
+        let size = v.norm();
+        let entries = v.iter().chain(g).map(|entry| entry / size);
+        basis.tr_mul(&DVector::from_iterator(basis.nrows(), entries))
+    } else {
+        Singular::of(&basis.rows(0, states).into())?.right.column(0).into()
+    };
+    let nearest = basis * weights;
+    let part = |entries: &[f64]| DMatrix::from_column_slice(entries.len() / count, count, entries);
+    let (v, g) = nearest.as_slice().split_at(states);
+    Ok((part(v), part(g)))
+}
