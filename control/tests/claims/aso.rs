@@ -103,7 +103,8 @@ fn the_estimate_reaches_a_constant_fault_for_any_actuator_command() {
 /// Three faults, two measurements.
 #[test]
 fn more_faults_than_measurements_are_refused() {
-    let plant = FaultyPlant { f_a: DMatrix::identity(4, 3), ..plant() };
+    let FaultyPlant { a, b, c, .. } = plant();
+    let plant = FaultyPlant::with_constant_faults(a, b, c, DMatrix::identity(4, 3));
     let refused = plant.check_observer_exists();
     assert_eq!(refused, Err(Error::TooManyFaults { faults: 3, measurements: 2 }));
 }
@@ -111,14 +112,20 @@ fn more_faults_than_measurements_are_refused() {
 /// A constant error of the rate x' = v + f looks like another velocity when only x is measured.
 #[test]
 fn a_fault_that_looks_like_a_state_is_refused() {
-    let plant = FaultyPlant {
-        a: matrix(2, 2, &[0., 1., 0., 0.]),
-        b: matrix(2, 1, &[0., 1.]),
-        c: matrix(1, 2, &[1., 0.]),
-        f_a: matrix(2, 1, &[1., 0.]),
-    };
+    let plant = FaultyPlant::with_constant_faults(
+        matrix(2, 2, &[0., 1., 0., 0.]),
+        matrix(2, 1, &[0., 1.]),
+        matrix(1, 2, &[1., 0.]),
+        matrix(2, 1, &[1., 0.]),
+    );
     let refused = design(&plant, &[-1.0, -2.0], &[-3.0, -4.0, -5.0], None);
-    assert_eq!(refused, Err(Error::HiddenFault { rank: 2, expected: 3 }));
+    let at = Complex::new(0.0, 0.0);
+    assert_eq!(refused, Err(Error::HiddenFault { at, rank: 2, expected: 3, faults: vec![1] }));
+    assert_eq!(
+        refused.unwrap_err().to_string(),
+        "a fault that develops with s = 0 cannot be told from a state: rank [A - s I, F_a; C, 0] \
+         is 2, expected 3; it hides in the columns [1] of F_a"
+    );
 }
 
 #[test]
@@ -131,12 +138,12 @@ fn an_unobservable_plant_is_refused() {
 /// Two actuators, two faults, three measurements: the general sizes.
 #[test]
 fn two_faults_with_three_measurements_are_designed() {
-    let plant = FaultyPlant {
-        a: crate::integers(5, 5, |i, j| (7 * i * i + 3 * i * j + 5 * j + i * j * j) % 11 - 5),
-        b: crate::integers(5, 2, |i, j| (5 * i * i + 3 * j + 2 * i * j + i) % 7 - 3),
-        c: matrix(3, 5, &[1., 0., 0., 0., 0., 0., 1., 0., 0., 0., 0., 0., 1., 0., 0.]),
-        f_a: crate::integers(5, 2, |i, j| (5 * i * i + 3 * j + 2 * i * j + i) % 7 - 3) * -0.5,
-    };
+    let plant = FaultyPlant::with_constant_faults(
+        crate::integers(5, 5, |i, j| (7 * i * i + 3 * i * j + 5 * j + i * j * j) % 11 - 5),
+        crate::integers(5, 2, |i, j| (5 * i * i + 3 * j + 2 * i * j + i) % 7 - 3),
+        matrix(3, 5, &[1., 0., 0., 0., 0., 0., 1., 0., 0., 0., 0., 0., 1., 0., 0.]),
+        crate::integers(5, 2, |i, j| (5 * i * i + 3 * j + 2 * i * j + i) % 7 - 3) * -0.5,
+    );
     let observer_poles = [-10., -11., -12., -13., -14., -15., -16.];
     let design = design(&plant, &[-1., -2., -3., -4., -5.], &observer_poles, None).unwrap();
     let half = DMatrix::from_diagonal_element(2, 2, 0.5);
