@@ -64,12 +64,12 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
     let text =
         std::fs::read_to_string(&options.plant).with_context(|| format!("cannot read {path}"))?;
     let file: PlantFile = toml::from_str(&text).with_context(|| format!("{path}"))?;
-    let plant = FaultyPlant {
-        a: matrix("A", &file.a)?,
-        b: matrix("B", &file.b)?,
-        c: matrix("C", &file.c)?,
-        f_a: matrix("F_a", &file.f_a)?,
-    };
+    let plant = FaultyPlant::with_constant_faults(
+        matrix("A", &file.a)?,
+        matrix("B", &file.b)?,
+        matrix("C", &file.c)?,
+        matrix("F_a", &file.f_a)?,
+    );
     let (controller, observer) = (&file.controller_eigenvalues, &file.observer_eigenvalues);
     let designed = design_controller(&plant, controller, observer, None)
         .with_context(|| format!("no controller for {path}"))?;

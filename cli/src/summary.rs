@@ -90,8 +90,8 @@ impl Certified {
     /// the bound of the fault in N.
     pub(crate) fn of(system: &mut System, beta: f64) -> anyhow::Result<Self> {
         let mut matrix = |name: &str| read_matrix(system, name);
-        let plant =
-            FaultyPlant { a: matrix("A")?, b: matrix("B")?, c: matrix("C")?, f_a: matrix("F_a")? };
+        let (a, b, c) = (matrix("A")?, matrix("B")?, matrix("C")?);
+        let plant = FaultyPlant::with_constant_faults(a, b, c, matrix("F_a")?);
         let gains = Gains {
             k_x: matrix("K_x")?,
             k_f: matrix("K_f")?,

@@ -83,16 +83,20 @@ pub enum Error {
         /// Rows of C.
         measurements: usize,
     },
-    /// A constant fault is hidden by a constant state.
+    /// A fault is hidden by a state that develops like it.
     #[error(
-        "a constant fault cannot be told from a constant state: \
-         rank [A, F_a; C, 0] is {rank}, expected {expected}"
+        "a fault that develops with {} cannot be told from a state: rank [A - s I, F_a; C, 0] is \
+         {rank}, expected {expected}; it hides in the columns {faults:?} of F_a", development(*at)
     )]
     HiddenFault {
-        /// Rank of the matrix.
+        /// s, an eigenvalue of the fault model: 0 for a constant fault, 1 when sampled.
+        at: Complex<f64>,
+        /// Rank of the matrix, `F_a` taken times the eigenvectors of the fault model.
         rank: usize,
-        /// Number of states plus number of fault channels.
+        /// Number of its columns.
         expected: usize,
+        /// Columns of `F_a` that take part in one hidden combination, from 1.
+        faults: Vec<usize>,
     },
     /// Not one eigenvalue per state.
     #[error("{found} eigenvalues are given, expected {expected}, one per state")]
@@ -170,4 +174,9 @@ pub enum Error {
 
 fn shown(value: Complex<f64>) -> String {
     if value.im == 0.0 { value.re.to_string() } else { value.to_string() }
+}
+
+/// The eigenvalue s of a fault model.
+fn development(s: Complex<f64>) -> String {
+    format!("s = {}", shown(s))
 }

@@ -2,10 +2,13 @@
 //!
 //! * [`eigen`]: eigenvalues. [`exponential`]: e^A. [`lyapunov`]: A' P + P A = -Q.
 //! * [`hold`]: the exact discretisation of x' = A x + B w with w constant or linear over a step.
-//! * [`rank`]: controllability and observability.
+//! * [`rank`]: controllability and observability; [`distance`]: how far they are from being lost;
+//!   [`zeros`]: invariant zeros.
 //! * [`placement`]: state feedback with wanted eigenvalues.
 //! * [`aso`]: the augmented state observer that estimates and compensates actuator faults, and
 //!   [`theorem1`]: the bound that belongs to it.
+//! * [`faults`]: fault models beyond the constant fault; [`detectability`]: which faults can be seen.
+//! * [`sampled`]: the controller designed for its sample time; [`controller`]: its equations.
 //!
 //! Matrices have any size; bad arguments and singular problems are an [`Error`], never a panic.
 //! Feedback gains and Lyapunov solutions are put back into their equations before they are
@@ -15,14 +18,22 @@
 pub mod aso;
 mod balance;
 mod check;
+pub mod controller;
+pub mod detectability;
+pub mod distance;
+mod domain;
 pub mod eigen;
 mod error;
 pub mod exponential;
+pub mod faults;
 pub mod hold;
 pub mod lyapunov;
 pub mod placement;
 pub mod rank;
+pub mod sampled;
 mod singular;
 pub mod theorem1;
+pub mod zeros;
 
+pub use domain::Domain;
 pub use error::Error;

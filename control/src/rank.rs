@@ -1,12 +1,18 @@
-//! Controllability and observability.
+//! Controllability and observability: yes or no, and the modes that make it no.
+//!
+//! How far a pair is from losing the property is measured in [`crate::distance`].
 
-use crate::balance::{Balance, divide_rows, unit_columns};
-use crate::singular::Singular;
+mod staircase;
+
+pub(crate) use staircase::Staircase;
+
+use crate::eigen::eigenvalues;
+use crate::singular::smallest;
 use crate::{Error, check};
-use nalgebra::DMatrix;
+use nalgebra::{Complex, DMatrix, DVector};
 
-/// What is zero in a rank decision, relative to the norm of the scaled matrix, per state.
-const TOLERANCE_PER_STATE: f64 = 100.0 * f64::EPSILON;
+/// Entries of a mode's vector above this part of the largest make their states dominant.
+const DOMINANT: f64 = 0.5;
 
 /// The answer of a rank decision.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,6 +26,20 @@ pub struct Rank {
     /// The smallest relative singular value that counted as not zero: how near the rank is to
     /// being lower. Zero when the rank is zero.
     pub margin: f64,
+}
+
+/// A mode of x' = A x that the inputs do not reach or the measurements do not show.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mode {
+    /// Its eigenvalue.
+    pub eigenvalue: Complex<f64>,
+    /// An eigenvector of length one in the given coordinates, its largest entry real and positive:
+    /// v with A v = s v, C v = 0 for an unobservable mode, the motion that is not seen; w with w' A
+    /// = s w', w' B = 0 for an uncontrollable one, the combination w' x that nothing moves.
+    pub vector: DVector<Complex<f64>>,
+    /// The states with the large entries of the vector in balanced coordinates, largest first, from
+    /// zero: those of at least half of the largest entry.
+    pub dominant: Vec<usize>,
 }
 
 impl Rank {
@@ -57,7 +77,7 @@ impl Rank {
 pub fn controllability(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Rank, Error> {
     let n = check::square("A", a)?;
     check::shape("B", b, (n, b.ncols()))?;
-    staircase(a, b)
+    Ok(Staircase::of(a, b)?.answer)
 }
 
 /// Rank of the observability matrix [C; C A; ...; C A^(n-1)] of x' = A x, y = C x.
@@ -72,7 +92,7 @@ pub fn controllability(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Rank, Error
 pub fn observability(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Rank, Error> {
     let n = check::square("A", a)?;
     check::shape("C", c, (c.nrows(), n))?;
-    staircase(&a.transpose(), &c.transpose())
+    Ok(Staircase::of(&a.transpose(), &c.transpose())?.answer)
 }
 
 /// Refuses a pair that is not controllable.
@@ -93,32 +113,91 @@ pub(crate) fn require_observable(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<R
     Err(Error::NotObservable { rank: found.rank, n: found.n })
 }
 
-fn staircase(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Rank, Error> {
-    let n = a.nrows();
-    let balance = Balance::of(a);
-    let mut rest = balance.matrix;
-    let mut link = unit_columns(&divide_rows(b, &balance.scale));
-    #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
-    let tolerance = TOLERANCE_PER_STATE * n as f64;
-    let mut answer = Rank { rank: 0, n, tolerance, margin: f64::INFINITY };
-    let size = rest.norm();
-    let mut reference = link.norm();
-    while !rest.is_empty() {
-        let step = Singular::of(&link.transpose())?;
-        let kept = step.values.iter().filter(|&&value| value > tolerance * reference).count();
-        if kept == 0 {
-            break;
-        }
-        answer.rank += kept;
-        answer.margin = answer.margin.min(step.values[kept - 1] / reference);
-        let turned = step.right.transpose() * &rest * &step.right;
-        let left = turned.nrows() - kept;
-        link = turned.view((kept, 0), (left, kept)).into();
-        rest = turned.view((kept, kept), (left, left)).into();
-        reference = size;
+/// The uncontrollable modes of x' = A x + B u: one for each state that the rank lacks.
+///
+/// `a`: n x n; `b`: n x m. They are the eigenvalues of the block that the staircase algorithm leaves
+/// over, so that their number agrees with [`controllability`]; a multiple eigenvalue with one
+/// eigenvector gives that eigenvector more than once. Method and tolerance: those of
+/// [`controllability`] and [`eigenvalues`].
+///
+/// # Errors
+///
+/// Those of [`controllability`] and [`eigenvalues`].
+pub fn uncontrollable_modes(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Vec<Mode>, Error> {
+    let n = check::square("A", a)?;
+    check::shape("B", b, (n, b.ncols()))?;
+    left_over(a, b)
+}
+
+/// The unobservable modes of x' = A x, y = C x: one for each state that the rank lacks.
+///
+/// `a`: n x n; `c`: p x n. Computed as the uncontrollable modes of (A', C'), see
+/// [`uncontrollable_modes`].
+///
+/// # Example
+///
+/// A cart of which only the velocity is measured: its position is not seen.
+///
+/// ```
+/// use nalgebra::DMatrix;
+/// let a = DMatrix::from_row_slice(2, 2, &[0.0, 1.0, 0.0, -3.0]);
+/// let velocity = DMatrix::from_row_slice(1, 2, &[0.0, 1.0]);
+/// let modes = control::rank::unobservable_modes(&a, &velocity)?;
+/// assert_eq!(modes.len(), 1);
+/// assert_eq!(modes[0].dominant, [0]);
+/// assert!(modes[0].eigenvalue.norm() < 1e-15);
+/// # Ok::<(), control::Error>(())
+/// ```
+///
+/// # Errors
+///
+/// Those of [`observability`] and [`eigenvalues`].
+pub fn unobservable_modes(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Vec<Mode>, Error> {
+    let n = check::square("A", a)?;
+    check::shape("C", c, (c.nrows(), n))?;
+    left_over(&a.transpose(), &c.transpose())
+}
+
+fn left_over(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Vec<Mode>, Error> {
+    let staircase = Staircase::of(a, b)?;
+    if staircase.answer.is_full() {
+        return Ok(Vec::new());
     }
-    if answer.rank == 0 {
-        answer.margin = 0.0;
-    }
-    Ok(answer)
+    let rest = staircase.rest.transpose().map(|entry| Complex::new(entry, 0.0));
+    let found = eigenvalues(&staircase.rest)?;
+    let same = staircase.answer.tolerance.sqrt() * (1.0 + staircase.rest.norm());
+    let mode = |(at, &eigenvalue): (usize, &Complex<f64>)| {
+        let earlier = found[..at].iter().filter(|other| (*other - eigenvalue).norm() <= same);
+        let shifted = &rest - DMatrix::identity(rest.nrows(), rest.nrows()) * eigenvalue;
+        let (value, vector) = smallest(&shifted, earlier.count())?;
+        let vector = if value <= same { vector } else { smallest(&shifted, 0)?.1 };
+        Ok(named(eigenvalue, &staircase, &vector))
+    };
+    found.iter().enumerate().map(mode).collect()
+}
+
+/// The mode with the left eigenvector that has these coordinates in the basis of the rest.
+fn named(
+    eigenvalue: Complex<f64>,
+    staircase: &Staircase,
+    coordinates: &DVector<Complex<f64>>,
+) -> Mode {
+    let basis = staircase.rest_basis.map(|entry| Complex::new(entry, 0.0));
+    let balanced = basis * coordinates;
+    let size = |state: usize| balanced[state].norm();
+    let mut dominant: Vec<usize> = (0..balanced.len()).collect();
+    dominant.sort_by(|&i, &j| size(j).total_cmp(&size(i)));
+    let largest = size(dominant[0]);
+    dominant.retain(|&state| size(state) >= DOMINANT * largest);
+    let given = balanced.zip_map(&staircase.scale, |entry, scale| entry / scale);
+    Mode { eigenvalue, vector: turned(&given), dominant }
+}
+
+/// Length one, the largest entry real and positive.
+fn turned(v: &DVector<Complex<f64>>) -> DVector<Complex<f64>> {
+    let largest = v.iter().fold(Complex::new(0.0, 0.0), |most: Complex<f64>, entry| {
+        if entry.norm() > most.norm() { *entry } else { most }
+    });
+    let factor = largest.conj() / (largest.norm() * v.norm());
+    v.map(|entry| entry * factor)
 }

@@ -6,7 +6,7 @@
 
 use crate::Error;
 use crate::balance::power_of_two;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Complex, DMatrix, DVector};
 
 const SWEEPS: usize = 60;
 /// Columns below this part of the largest are zero.
@@ -71,6 +71,36 @@ impl Singular {
     pub(crate) fn least_squares(&self, b: &DMatrix<f64>, rank: usize) -> DMatrix<f64> {
         self.whitening(rank) * self.left.columns(0, rank).transpose() * b
     }
+}
+
+/// One of the smallest singular values of a complex matrix and its right singular vector.
+///
+/// `index` 0 is the smallest, 1 the one before it, and so on. A matrix M = R + i J is decomposed as
+/// the real [R, -J; J, R], which has each singular value twice.
+pub(crate) fn smallest(
+    m: &DMatrix<Complex<f64>>,
+    index: usize,
+) -> Result<(f64, DVector<Complex<f64>>), Error> {
+    let (rows, cols) = m.shape();
+    if m.iter().all(|entry| entry.im.abs() <= 0.0) {
+        let real = Singular::of(&m.map(|entry| entry.re))?;
+        let at = cols - 1 - index;
+        return Ok((real.values[at], real.right.column(at).map(|x| Complex::new(x, 0.0))));
+    }
+    let real = DMatrix::from_fn(2 * rows, 2 * cols, |i, j| {
+        let entry = m[(i % rows, j % cols)];
+        match (i < rows, j < cols) {
+            (true, true) | (false, false) => entry.re,
+            (true, false) => -entry.im,
+            (false, true) => entry.im,
+        }
+    });
+    let both = Singular::of(&real)?;
+    let at = 2 * (cols - 1 - index);
+    let vector = DVector::from_fn(cols, |i, _| {
+        Complex::new(both.right[(i, at)], both.right[(i + cols, at)])
+    });
+    Ok((both.values[at], vector))
 }
 
 /// Cosine and sine that make two columns orthogonal and put the longer one first; None if they are.

@@ -53,12 +53,9 @@ pub struct Certificate {
 /// ```
 /// use control::{aso, theorem1};
 /// use nalgebra::DMatrix;
-/// let plant = aso::FaultyPlant {
-///     a: DMatrix::from_element(1, 1, 0.5),
-///     b: DMatrix::from_element(1, 1, 1.0),
-///     c: DMatrix::from_element(1, 1, 1.0),
-///     f_a: DMatrix::from_element(1, 1, -1.0),
-/// };
+/// let one = |value| DMatrix::from_element(1, 1, value);
+/// let plant =
+///     aso::FaultyPlant::with_constant_faults(one(0.5), one(1.0), one(1.0), one(-1.0));
 /// let gains = aso::design(&plant, &[-1.0], &[-2.0, -3.0], None)?.gains;
 /// let small = theorem1::certify(&plant, &gains, 1.0, 30.0)?;
 /// let large = theorem1::certify(&plant, &gains, 1000.0, 30.0)?;

@@ -4,10 +4,11 @@ use control::Error;
 use control::aso::{AsoDesign, FaultyPlant, design};
 use control::eigen::eigenvalues;
 use control::hold::FirstOrderHold;
+use control::placement::real;
 use nalgebra::{Complex, DMatrix};
 
 fn designed() -> AsoDesign {
-    design(&plant(), &CONTROLLER_POLES, &OBSERVER_POLES, None).expect("the design exists")
+    design(&plant(), &real(&CONTROLLER_POLES), &real(&OBSERVER_POLES), None).expect("the design exists")
 }
 
 #[test]
@@ -38,7 +39,7 @@ fn friction_on_the_cart_is_compensated_one_to_one() {
 #[test]
 fn a_fault_beside_the_actuator_leaves_the_residual_of_the_projection() {
     let plant = FaultyPlant { f_a: matrix(4, 1, &[0., 0., 0., 1.]), ..plant() };
-    let design = design(&plant, &CONTROLLER_POLES, &OBSERVER_POLES, None).unwrap();
+    let design = design(&plant, &real(&CONTROLLER_POLES), &real(&OBSERVER_POLES), None).unwrap();
     let (b_3, b_4) = (plant.b[2], plant.b[3]);
     let sine = b_3 / b_3.hypot(b_4);
     assert!((design.cancellation_residual - sine).abs() < 1e-12);
@@ -103,7 +104,8 @@ fn the_estimate_reaches_a_constant_fault_for_any_actuator_command() {
 /// Three faults, two measurements.
 #[test]
 fn more_faults_than_measurements_are_refused() {
-    let plant = FaultyPlant { f_a: DMatrix::identity(4, 3), ..plant() };
+    let FaultyPlant { a, b, c, .. } = plant();
+    let plant = FaultyPlant::with_constant_faults(a, b, c, DMatrix::identity(4, 3));
     let refused = plant.check_observer_exists();
     assert_eq!(refused, Err(Error::TooManyFaults { faults: 3, measurements: 2 }));
 }
@@ -111,34 +113,40 @@ fn more_faults_than_measurements_are_refused() {
 /// A constant error of the rate x' = v + f looks like another velocity when only x is measured.
 #[test]
 fn a_fault_that_looks_like_a_state_is_refused() {
-    let plant = FaultyPlant {
-        a: matrix(2, 2, &[0., 1., 0., 0.]),
-        b: matrix(2, 1, &[0., 1.]),
-        c: matrix(1, 2, &[1., 0.]),
-        f_a: matrix(2, 1, &[1., 0.]),
-    };
-    let refused = design(&plant, &[-1.0, -2.0], &[-3.0, -4.0, -5.0], None);
-    assert_eq!(refused, Err(Error::HiddenFault { rank: 2, expected: 3 }));
+    let plant = FaultyPlant::with_constant_faults(
+        matrix(2, 2, &[0., 1., 0., 0.]),
+        matrix(2, 1, &[0., 1.]),
+        matrix(1, 2, &[1., 0.]),
+        matrix(2, 1, &[1., 0.]),
+    );
+    let refused = design(&plant, &real(&[-1.0, -2.0]), &real(&[-3.0, -4.0, -5.0]), None);
+    let at = Complex::new(0.0, 0.0);
+    assert_eq!(refused, Err(Error::HiddenFault { at, rank: 2, expected: 3, faults: vec![1] }));
+    assert_eq!(
+        refused.unwrap_err().to_string(),
+        "a fault that develops with s = 0 cannot be told from a state: rank [A - s I, F_a; C, 0] \
+         is 2, expected 3; it hides in the columns [1] of F_a"
+    );
 }
 
 #[test]
 fn an_unobservable_plant_is_refused() {
     let plant = FaultyPlant { c: matrix(1, 4, &[0., 0., 1., 0.]), ..plant() };
-    let refused = design(&plant, &CONTROLLER_POLES, &OBSERVER_POLES, None);
+    let refused = design(&plant, &real(&CONTROLLER_POLES), &real(&OBSERVER_POLES), None);
     assert_eq!(refused, Err(Error::NotObservable { rank: 3, n: 4 }));
 }
 
 /// Two actuators, two faults, three measurements: the general sizes.
 #[test]
 fn two_faults_with_three_measurements_are_designed() {
-    let plant = FaultyPlant {
-        a: crate::integers(5, 5, |i, j| (7 * i * i + 3 * i * j + 5 * j + i * j * j) % 11 - 5),
-        b: crate::integers(5, 2, |i, j| (5 * i * i + 3 * j + 2 * i * j + i) % 7 - 3),
-        c: matrix(3, 5, &[1., 0., 0., 0., 0., 0., 1., 0., 0., 0., 0., 0., 1., 0., 0.]),
-        f_a: crate::integers(5, 2, |i, j| (5 * i * i + 3 * j + 2 * i * j + i) % 7 - 3) * -0.5,
-    };
+    let plant = FaultyPlant::with_constant_faults(
+        crate::integers(5, 5, |i, j| (7 * i * i + 3 * i * j + 5 * j + i * j * j) % 11 - 5),
+        crate::integers(5, 2, |i, j| (5 * i * i + 3 * j + 2 * i * j + i) % 7 - 3),
+        matrix(3, 5, &[1., 0., 0., 0., 0., 0., 1., 0., 0., 0., 0., 0., 1., 0., 0.]),
+        crate::integers(5, 2, |i, j| (5 * i * i + 3 * j + 2 * i * j + i) % 7 - 3) * -0.5,
+    );
     let observer_poles = [-10., -11., -12., -13., -14., -15., -16.];
-    let design = design(&plant, &[-1., -2., -3., -4., -5.], &observer_poles, None).unwrap();
+    let design = design(&plant, &real(&[-1., -2., -3., -4., -5.]), &real(&observer_poles), None).unwrap();
     let half = DMatrix::from_diagonal_element(2, 2, 0.5);
     assert!((&design.gains.k_f - half).amax() < 1e-13);
     assert_eq!((design.gains.l_x.shape(), design.gains.l_f.shape()), ((5, 3), (2, 3)));

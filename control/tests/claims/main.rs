@@ -2,8 +2,12 @@
 //! themselves.
 
 mod aso;
+mod data;
+mod detectability;
+mod distance;
 mod eigen;
 mod exponential;
+mod faults;
 mod hold;
 mod lyapunov;
 mod paper;
@@ -12,7 +16,9 @@ mod rank;
 #[expect(clippy::unreadable_literal, reason = "the digits as the other software wrote them")]
 mod reference;
 mod refusals;
+mod sampled;
 mod theorem1;
+mod zeros;
 
 use nalgebra::DMatrix;
 

@@ -9,7 +9,8 @@ pub(crate) const OBSERVER_POLES: [f64; 5] = [-1200.0, -1500.0, -1800.0, -2100.0,
 
 fn pendulum(a: DMatrix<f64>, b: DMatrix<f64>) -> FaultyPlant {
     let c = matrix(2, 4, &[1., 0., 0., 0., 0., 1., 0., 0.]);
-    FaultyPlant { f_a: -&b, a, b, c }
+    let f_a = -&b;
+    FaultyPlant::with_constant_faults(a, b, c, f_a)
 }
 
 /// A and B as printed.

@@ -1,7 +1,7 @@
 use crate::paper::plant;
 use crate::{integers, matrix};
-use control::rank::{controllability, observability};
-use nalgebra::DMatrix;
+use control::rank::{controllability, observability, uncontrollable_modes, unobservable_modes};
+use nalgebra::{Complex, DMatrix};
 
 #[test]
 fn the_pendulum_is_controllable_and_its_augmented_pair_observable() {
@@ -56,4 +56,45 @@ fn a_long_chain_is_controllable_from_its_end_only() {
 fn without_an_effective_input_nothing_is_reached() {
     let found = controllability(&DMatrix::identity(3, 3), &DMatrix::zeros(3, 2)).unwrap();
     assert_eq!((found.rank, found.margin.to_bits()), (0, 0));
+}
+
+/// The input and output decoupling zeros of the example of `AB08ND` in SLICOT 5.
+#[test]
+fn the_modes_that_a_rank_lacks_are_those_of_slicot() {
+    let (a, b, c) = crate::zeros::slicot();
+    let modes = uncontrollable_modes(&a, &b).unwrap();
+    assert_eq!((modes.len(), modes[0].dominant.clone()), (1, vec![3]));
+    assert!((modes[0].eigenvalue + 4.0).norm() < 1e-13, "{modes:?}");
+    let modes = unobservable_modes(&a, &c).unwrap();
+    assert_eq!((modes.len(), modes[0].dominant.clone()), (1, vec![4]));
+    assert!((modes[0].eigenvalue + 1.0).norm() < 1e-13, "{modes:?}");
+}
+
+/// Two cascades in other coordinates: each vector satisfies A v = s v, C v = 0, in its own residual.
+#[test]
+fn the_vectors_of_unobservable_modes_are_eigenvectors_that_the_measurements_do_not_show() {
+    let mut a = integers(6, 6, |i, j| (3 * i * i + 2 * i * j + 5 * j) % 9 - 4);
+    a.view_mut((0, 3), (3, 3)).fill(0.0);
+    let seen = matrix(1, 6, &[1., -2., 0., 0., 0., 0.]);
+    let lower = DMatrix::from_fn(6, 6, |i, j| if i >= j { 1.0 } else { 0.0 });
+    let inverse = lower.clone().try_inverse().unwrap();
+    let (a, c) = (&lower * &a * &inverse, seen * &inverse);
+    let modes = unobservable_modes(&a, &c).unwrap();
+    assert_eq!(modes.len(), 3);
+    let complex = |m: &DMatrix<f64>| m.map(|entry| Complex::new(entry, 0.0));
+    for mode in modes {
+        let residual = complex(&a) * &mode.vector - &mode.vector * mode.eigenvalue;
+        assert!(residual.norm() < 1e-12 * a.norm(), "{mode:?}");
+        assert!((complex(&c) * &mode.vector).norm() < 1e-12 * c.norm(), "{mode:?}");
+        assert!((mode.vector.norm() - 1.0).abs() < 1e-14);
+    }
+}
+
+/// A double eigenvalue with two eigenvectors gives both.
+#[test]
+fn two_states_at_rest_that_nothing_shows_are_two_modes() {
+    let modes = unobservable_modes(&DMatrix::zeros(3, 3), &matrix(1, 3, &[0., 1., 0.])).unwrap();
+    let mut states: Vec<_> = modes.iter().flat_map(|mode| mode.dominant.clone()).collect();
+    states.sort_unstable();
+    assert_eq!(states, [0, 2]);
 }

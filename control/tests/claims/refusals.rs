@@ -61,12 +61,13 @@ fn a_wrong_shape_is_named_with_what_was_expected() {
 fn each_matrix_of_the_plant_and_of_the_gains_is_checked() {
     let zeros = DMatrix::zeros(3, 3);
     let of_plant =
-        |plant: FaultyPlant| name_of(design(&plant, &CONTROLLER_POLES, &OBSERVER_POLES, None));
+        |plant: FaultyPlant| name_of(design(&plant, &real(&CONTROLLER_POLES), &real(&OBSERVER_POLES), None));
     assert_eq!(of_plant(FaultyPlant { a: DMatrix::zeros(4, 3), ..plant() }), "A");
     assert_eq!(of_plant(FaultyPlant { b: zeros.clone(), ..plant() }), "B");
     assert_eq!(of_plant(FaultyPlant { c: zeros.clone(), ..plant() }), "C");
     assert_eq!(of_plant(FaultyPlant { f_a: zeros.clone(), ..plant() }), "F_a");
-    let refused = design(&plant(), &CONTROLLER_POLES, &OBSERVER_POLES, Some(&zeros));
+    assert_eq!(of_plant(FaultyPlant { a_f: zeros.clone(), ..plant() }), "A_f");
+    let refused = design(&plant(), &real(&CONTROLLER_POLES), &real(&OBSERVER_POLES), Some(&zeros));
     assert_eq!(name_of(refused), "K_f");
     let mut gains = [repaired_gains(), repaired_gains(), repaired_gains(), repaired_gains()];
     gains[0].k_x = zeros.clone();
@@ -110,8 +111,8 @@ fn entries_near_the_ends_of_the_range_end_in_an_answer_or_an_error() {
         let _ = FirstOrderHold::new(&a, &b, 0.1).map(|hold| finite(hold.gamma_1));
         let _ = lyapunov(&a, &identity).map(|solution| finite(solution.p));
         let _ = place(&a, &b, &real(&CONTROLLER_POLES)).map(|placement| finite(placement.gain));
-        let plant = FaultyPlant { a, b, c: wild(2, 4, 3), f_a };
-        let designed = design(&plant, &CONTROLLER_POLES, &OBSERVER_POLES, None);
+        let plant = FaultyPlant::with_constant_faults(a, b, wild(2, 4, 3), f_a);
+        let designed = design(&plant, &real(&CONTROLLER_POLES), &real(&OBSERVER_POLES), None);
         let _ = designed.map(|design| finite(design.gains.l_x));
     }
 }

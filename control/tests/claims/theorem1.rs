@@ -1,11 +1,12 @@
 use crate::paper::{CONTROLLER_POLES, OBSERVER_POLES, plant, printed, repaired_gains};
 use control::Error;
-use control::aso::{Gains, design};
+use control::aso::{FaultyPlant, Gains, design};
+use control::placement::real;
 use control::theorem1::certify;
 use nalgebra::DMatrix;
 
 fn gains() -> Gains {
-    let designed = design(&plant(), &CONTROLLER_POLES, &OBSERVER_POLES, None);
+    let designed = design(&plant(), &real(&CONTROLLER_POLES), &real(&OBSERVER_POLES), None);
     designed.expect("the design exists").gains
 }
 
@@ -40,7 +41,7 @@ fn alpha_does_not_shrink_the_region() {
 #[test]
 fn a_plant_of_one_state_gives_the_region_found_by_hand() {
     let one = |value| DMatrix::from_element(1, 1, value);
-    let plant = control::aso::FaultyPlant { a: one(1.0), b: one(2.0), c: one(1.0), f_a: one(-2.0) };
+    let plant = FaultyPlant::with_constant_faults(one(1.0), one(2.0), one(1.0), one(-2.0));
     let gains = Gains { k_x: one(-1.0), k_f: one(1.0), l_x: one(6.0), l_f: one(-3.0) };
     let (a, k, b, beta) = (5.0, 2.0, 3.0, 4.0);
     let p_12 = -1.0 / (2.0 * k);

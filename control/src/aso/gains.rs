@@ -1,0 +1,56 @@
+//! The gains of the controller.
+
+use super::FaultyPlant;
+use crate::{Error, check};
+use nalgebra::DMatrix;
+
+/// The gains of the controller.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gains {
+    /// `K_x`, m x n.
+    pub k_x: DMatrix<f64>,
+    /// `K_f`, m x q.
+    pub k_f: DMatrix<f64>,
+    /// `L_x`, n x p.
+    pub l_x: DMatrix<f64>,
+    /// `L_f`, q x p.
+    pub l_f: DMatrix<f64>,
+}
+
+impl Gains {
+    /// L = [`L_x`; -`L_f`], (n + q) x p, as in (10).
+    #[must_use]
+    pub fn observer_gain(&self) -> DMatrix<f64> {
+        let (n, q) = (self.l_x.nrows(), self.l_f.nrows());
+        let mut l = self.l_x.clone().resize_vertically(n + q, 0.0);
+        l.rows_mut(n, q).copy_from(&-&self.l_f);
+        l
+    }
+
+    /// A + B `K_x`, n x n: the plant under exact state feedback.
+    #[must_use]
+    pub fn controlled_dynamics(&self, plant: &FaultyPlant) -> DMatrix<f64> {
+        &plant.a + &plant.b * &self.k_x
+    }
+
+    /// `A_0` - L `C_0`, (n + q) x (n + q): the dynamics of the estimation error (11).
+    #[must_use]
+    pub fn error_dynamics(&self, plant: &FaultyPlant) -> DMatrix<f64> {
+        plant.augmented_dynamics() - self.observer_gain() * plant.augmented_output()
+    }
+
+    /// Shapes and finiteness of the gains for a plant.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`], naming the matrix; those of
+    /// [`FaultyPlant::check`].
+    pub fn check(&self, plant: &FaultyPlant) -> Result<(), Error> {
+        plant.check()?;
+        let ((n, m), p, q) = (plant.b.shape(), plant.c.nrows(), plant.f_a.ncols());
+        check::shape("K_x", &self.k_x, (m, n))?;
+        check::shape("K_f", &self.k_f, (m, q))?;
+        check::shape("L_x", &self.l_x, (n, p))?;
+        check::shape("L_f", &self.l_f, (q, p))
+    }
+}

@@ -1,0 +1,134 @@
+//! The plant with faults.
+
+use crate::detectability::{Hidden, hidden_faults};
+use crate::rank::require_observable;
+use crate::singular::Singular;
+use crate::{Error, check};
+use nalgebra::DMatrix;
+
+/// Singular values of B below this part of the largest count as zero.
+const TOLERANCE: f64 = 1e-12;
+
+/// x' = A x + B u + `F_a` f, f' = `A_f` f, y = C x: the plant with faults (1) and their model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FaultyPlant {
+    /// A, n x n.
+    pub a: DMatrix<f64>,
+    /// B, n x m.
+    pub b: DMatrix<f64>,
+    /// C, p x n.
+    pub c: DMatrix<f64>,
+    /// `F_a`, n x q: how the faults act. A force against the actuator has `F_a` = -B.
+    pub f_a: DMatrix<f64>,
+    /// `A_f`, q x q: how the faults are taken to develop. Zero for constant faults; I when sampled.
+    pub a_f: DMatrix<f64>,
+}
+
+impl FaultyPlant {
+    /// The plant of the paper: faults that stay constant, `A_f` = 0.
+    ///
+    /// `a`: n x n; `b`: n x m; `c`: p x n; `f_a`: n x q. Shapes are checked where the plant is used.
+    #[must_use]
+    pub fn with_constant_faults(
+        a: DMatrix<f64>,
+        b: DMatrix<f64>,
+        c: DMatrix<f64>,
+        f_a: DMatrix<f64>,
+    ) -> Self {
+        let a_f = DMatrix::zeros(f_a.ncols(), f_a.ncols());
+        Self { a, b, c, f_a, a_f }
+    }
+
+    /// Shapes and finiteness of the five matrices.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`], naming the matrix.
+    pub fn check(&self) -> Result<(), Error> {
+        let n = check::square("A", &self.a)?;
+        check::shape("B", &self.b, (n, self.b.ncols()))?;
+        check::shape("C", &self.c, (self.c.nrows(), n))?;
+        check::shape("F_a", &self.f_a, (n, self.f_a.ncols()))?;
+        check::shape("A_f", &self.a_f, (self.f_a.ncols(), self.f_a.ncols()))
+    }
+
+    /// `A_0` = [A, -`F_a`; 0, `A_f`], (n + q) x (n + q); with B `K_f` = -`F_a` and `A_f` = 0 that of
+    /// (10).
+    #[must_use]
+    pub fn augmented_dynamics(&self) -> DMatrix<f64> {
+        let (n, q) = self.f_a.shape();
+        let mut a_0 = DMatrix::zeros(n + q, n + q);
+        a_0.view_mut((0, 0), (n, n)).copy_from(&self.a);
+        a_0.view_mut((0, n), (n, q)).copy_from(&-&self.f_a);
+        a_0.view_mut((n, n), (q, q)).copy_from(&self.a_f);
+        a_0
+    }
+
+    /// `C_0` = [C, 0], p x (n + q).
+    #[must_use]
+    pub fn augmented_output(&self) -> DMatrix<f64> {
+        let (n, q) = self.f_a.shape();
+        self.c.clone().resize_horizontally(n + q, 0.0)
+    }
+
+    /// `F_0` = [-`F_a`; 0], (n + q) x q: the fault enters (11) as -`F_0` `f_a`.
+    #[must_use]
+    pub fn augmented_fault(&self) -> DMatrix<f64> {
+        let (n, q) = self.f_a.shape();
+        (-&self.f_a).resize_vertically(n + q, 0.0)
+    }
+
+    /// Whether an augmented observer with any wanted eigenvalues exists.
+    ///
+    /// It does when (`A_0`, `C_0`) is observable. That is: (A, C) is observable, and at every
+    /// eigenvalue s of `A_f`, whose eigenvectors are the columns of N, the matrix [A - s I, `F_a` N;
+    /// C, 0] has full column rank: no fault that develops as e^(s t) is hidden by a state that does.
+    /// For constant and ramp faults s = 0, or 1 when sampled. It needs as many measurements as N
+    /// has columns. Singular values below 1e-12 of the largest count as zero, rows and columns of
+    /// the matrix scaled to length one. [`crate::detectability`] tells which fault is hidden.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::NotObservable`], [`Error::TooManyFaults`], [`Error::HiddenFault`] with the
+    /// condition that fails; those of [`FaultyPlant::check`].
+    pub fn check_observer_exists(&self) -> Result<(), Error> {
+        self.check()?;
+        require_observable(&self.a, &self.c)?;
+        let hidden = hidden_faults(self)?;
+        if let Some(first) = hidden.first() {
+            return Err(refusal(first, self.c.nrows()));
+        }
+        require_observable(&self.augmented_dynamics(), &self.augmented_output())?;
+        Ok(())
+    }
+
+    /// `K_f` with the least norm of B `K_f` + `F_a`, m x q; the smallest one if there are several.
+    ///
+    /// It always exists; full compensation needs `F_a` in the range of B, which
+    /// [`AsoDesign::cancellation_residual`] tells. Singular values of B below 1e-12 of the largest
+    /// count as zero.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`FaultyPlant::check`]; [`Error::NotConverged`].
+    pub fn compensation_gain(&self) -> Result<DMatrix<f64>, Error> {
+        self.check()?;
+        let b = Singular::of(&self.b)?;
+        let rank = b.rank(TOLERANCE);
+        let gain = b.least_squares(&-&self.f_a, rank);
+        let correction = b.least_squares(&(&self.b * &gain + &self.f_a), rank);
+        Ok(gain - correction)
+    }
+}
+
+fn refusal(hidden: &Hidden, measurements: usize) -> Error {
+    if hidden.channels > measurements {
+        return Error::TooManyFaults { faults: hidden.channels, measurements };
+    }
+    Error::HiddenFault {
+        at: hidden.at,
+        rank: hidden.rank,
+        expected: hidden.expected,
+        faults: hidden.faults().iter().map(|fault| fault + 1).collect(),
+    }
+}

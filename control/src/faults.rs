@@ -1,0 +1,245 @@
+//! Fault models: from a user's faults to a plant with a fault model.
+//!
+//! | fault | enters | `F_a` | `A_f` |
+//! |---|---|---|---|
+//! | constant | x' = A x + B u + `F_a` f | `F_a` | 0 |
+//! | ramp, f' = g, g' = 0 | the same | [`F_a`, 0] | [0, I; 0, 0] |
+//! | sensor | y = C x + `F_s` f | [0; W `F_s`] | by its kind |
+//! | loss of effectiveness | x' = A x + B (I - E) u | columns of B, f = -E u | by its kind |
+//!
+//! Sensor faults enter through the usual filter of the measurements, which is part of the controller
+//! and becomes part of the plant that the observer sees:
+//!
+//! ```text
+//! y_f' = W (y - y_f)
+//! A -> [A, 0; W C, -W],  B -> [B; 0],  C -> [0, I],  F_a -> [F_a, 0; 0, W F_s]
+//! ```
+
+mod loss;
+
+pub use loss::{LossTolerance, estimated_loss, loss_tolerance};
+
+use crate::aso::{AsoDesign, FaultyPlant, design_feedback};
+use crate::{Error, check};
+use nalgebra::{Complex, DMatrix, DVector};
+
+/// How a fault is taken to develop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FaultKind {
+    /// f' = 0.
+    Constant,
+    /// f' = g, g' = 0: the estimate follows a ramp without a lag.
+    Ramp,
+}
+
+/// Where a fault enters.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Entry {
+    /// x' = A x + B u + column f; n entries.
+    Actuator(DVector<f64>),
+    /// y = C x + column f; p entries.
+    Sensor(DVector<f64>),
+    /// The input with this index, from zero, acts with the part 1 - E: f = -E u.
+    LossOfEffectiveness(usize),
+}
+
+/// A fault.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fault {
+    /// Where it enters.
+    pub enters: Entry,
+    /// How it is taken to develop.
+    pub kind: FaultKind,
+}
+
+/// Where the estimates of a fault stand in `f_hat`, from zero.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Channel {
+    /// The fault.
+    pub estimate: usize,
+    /// The rate of a ramp.
+    pub rate: Option<usize>,
+}
+
+/// A plant in the form that the observer needs, and the way back to the user's.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExtendedPlant {
+    /// The plant, in continuous time, with the filter's states after its own.
+    pub plant: FaultyPlant,
+    /// Diagonal of W, in 1/s, p of them; None without sensor faults: then y is used as it is.
+    pub filter: Option<Vec<f64>>,
+    /// Number of states of the plant itself.
+    pub states: usize,
+    /// For each of the user's faults its place in `f_hat`.
+    pub channels: Vec<Channel>,
+}
+
+impl ExtendedPlant {
+    /// A plant whose faults all enter its states by a fault model of their own; no filter.
+    #[must_use]
+    pub fn without_filter(plant: FaultyPlant) -> Self {
+        let channel = |estimate| Channel { estimate, rate: None };
+        let channels = (0..plant.f_a.ncols()).map(channel).collect();
+        Self { states: plant.a.nrows(), plant, filter: None, channels }
+    }
+
+    /// Builds the plant that has these faults.
+    ///
+    /// `a`: n x n; `b`: n x m; `c`: p x n; `faults`: at least one; `filter`: the diagonal of W, p
+    /// rates above zero in 1/s, used when there is a sensor fault. The estimates stand in `f_hat` in
+    /// the order of the faults, the rates of the ramps after them. Whether an observer exists is
+    /// examined by [`FaultyPlant::check_observer_exists`] and [`crate::detectability`]: a sensor
+    /// fault, for example, needs other measurements or a plant that show the same state.
+    ///
+    /// # Example
+    ///
+    /// A motor whose torque is lost in part and whose speed sensor has a drift:
+    ///
+    /// ```
+    /// use control::faults::{Entry, ExtendedPlant, Fault, FaultKind};
+    /// use nalgebra::{DMatrix, DVector};
+    /// let a = DMatrix::from_row_slice(2, 2, &[0.0, 1.0, 0.0, -2.0]);
+    /// let b = DMatrix::from_row_slice(2, 1, &[0.0, 5.0]);
+    /// let loss = Fault { enters: Entry::LossOfEffectiveness(0), kind: FaultKind::Constant };
+    /// let drift = Entry::Sensor(DVector::from_vec(vec![0.0, 1.0]));
+    /// let drift = Fault { enters: drift, kind: FaultKind::Ramp };
+    /// let c = DMatrix::identity(2, 2);
+    /// let extended = ExtendedPlant::new(&a, &b, &c, &[loss, drift], &[50.0, 50.0])?;
+    /// assert_eq!(extended.plant.f_a.shape(), (4, 3));
+    /// assert_eq!(extended.channels[1].rate, Some(2));
+    /// assert!(extended.plant.check_observer_exists().is_ok());
+    /// # Ok::<(), control::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix, a column of the
+    /// wrong length or a missing filter W; [`Error::OutOfRange`] for an input that does not exist or
+    /// a rate that is not positive.
+    pub fn new(
+        a: &DMatrix<f64>,
+        b: &DMatrix<f64>,
+        c: &DMatrix<f64>,
+        faults: &[Fault],
+        filter: &[f64],
+    ) -> Result<Self, Error> {
+        let n = check::square("A", a)?;
+        check::shape("B", b, (n, b.ncols()))?;
+        check::shape("C", c, (c.nrows(), n))?;
+        let (f_a, f_s) = columns(b, c.nrows(), faults)?;
+        let (a_f, channels) = models(faults);
+        let width = a_f.nrows();
+        let sensors = faults.iter().any(|fault| matches!(fault.enters, Entry::Sensor(_)));
+        let f_a = f_a.resize_horizontally(width, 0.0);
+        if !sensors {
+            let plant = FaultyPlant { a: a.clone(), b: b.clone(), c: c.clone(), f_a, a_f };
+            return Ok(Self { plant, filter: None, states: n, channels });
+        }
+        let rates = checked_filter(filter, c.nrows())?;
+        let f_s = f_s.resize_horizontally(width, 0.0);
+        let plant = FaultyPlant {
+            a: filtered(a, &(&rates * c), &-&rates),
+            b: b.clone().resize_vertically(n + c.nrows(), 0.0),
+            c: DMatrix::identity(c.nrows(), c.nrows()).insert_columns(0, n, 0.0),
+            f_a: stacked(&f_a, &(&rates * f_s)),
+            a_f,
+        };
+        Ok(Self { plant, filter: Some(filter.to_vec()), states: n, channels })
+    }
+
+    /// Designs the controller as [`crate::aso::design`] does.
+    ///
+    /// `controller_poles`: one per state of the plant itself, the filter's states are not fed back;
+    /// `observer_poles`: one per state of the extended plant and per entry of `f_hat`; `k_f`: m x q,
+    /// or None for [`FaultyPlant::compensation_gain`], whose columns for sensor faults and for rates
+    /// are zero and which is -1 for an effectiveness that is lost.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`crate::aso::design`].
+    pub fn design(
+        &self,
+        controller_poles: &[Complex<f64>],
+        observer_poles: &[Complex<f64>],
+        k_f: Option<&DMatrix<f64>>,
+    ) -> Result<AsoDesign, Error> {
+        design_feedback(&self.plant, self.states, controller_poles, observer_poles, k_f)
+    }
+}
+
+/// `F_a` and `F_s`, one column per fault.
+fn columns(
+    b: &DMatrix<f64>,
+    p: usize,
+    faults: &[Fault],
+) -> Result<(DMatrix<f64>, DMatrix<f64>), Error> {
+    let (n, m) = b.shape();
+    let (mut f_a, mut f_s) = (DMatrix::zeros(n, faults.len()), DMatrix::zeros(p, faults.len()));
+    for (at, fault) in faults.iter().enumerate() {
+        let (name, into, column) = match &fault.enters {
+            Entry::Actuator(column) => ("a column of F_a", &mut f_a, column.clone()),
+            Entry::Sensor(column) => ("a column of F_s", &mut f_s, column.clone()),
+            Entry::LossOfEffectiveness(input) if *input < m => {
+                ("B", &mut f_a, b.column(*input).into())
+            }
+            Entry::LossOfEffectiveness(input) => {
+                #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
+                let value = *input as f64;
+                let rule = "the index of an input, from zero";
+                return Err(Error::OutOfRange { name: "the input of a loss", value, rule });
+            }
+        };
+        let given = DMatrix::from_column_slice(column.len(), 1, column.as_slice());
+        check::shape(name, &given, (into.nrows(), 1))?;
+        into.set_column(at, &column);
+    }
+    Ok((f_a, f_s))
+}
+
+/// `A_f`, and where each fault and its rate stand.
+fn models(faults: &[Fault]) -> (DMatrix<f64>, Vec<Channel>) {
+    let mut next = faults.len();
+    let mut channels = Vec::with_capacity(faults.len());
+    for (estimate, fault) in faults.iter().enumerate() {
+        let rate = (fault.kind == FaultKind::Ramp).then_some(next);
+        next += usize::from(rate.is_some());
+        channels.push(Channel { estimate, rate });
+    }
+    let mut a_f = DMatrix::zeros(next, next);
+    for channel in &channels {
+        if let Some(rate) = channel.rate {
+            a_f[(channel.estimate, rate)] = 1.0;
+        }
+    }
+    (a_f, channels)
+}
+
+/// W as a matrix.
+fn checked_filter(filter: &[f64], p: usize) -> Result<DMatrix<f64>, Error> {
+    let rates = DVector::from_column_slice(filter);
+    check::shape("W", &DMatrix::from_column_slice(filter.len(), 1, filter), (p, 1))?;
+    for &rate in filter {
+        check::positive("a rate of the filter W", rate)?;
+    }
+    Ok(DMatrix::from_diagonal(&rates))
+}
+
+/// [A, 0; below, corner].
+pub(crate) fn filtered(
+    a: &DMatrix<f64>,
+    below: &DMatrix<f64>,
+    corner: &DMatrix<f64>,
+) -> DMatrix<f64> {
+    let (n, p) = (a.nrows(), corner.nrows());
+    let mut whole = a.clone().resize(n + p, n + p, 0.0);
+    whole.view_mut((n, 0), (p, n)).copy_from(below);
+    whole.view_mut((n, n), (p, p)).copy_from(corner);
+    whole
+}
+
+/// [above; below].
+pub(crate) fn stacked(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut both = above.clone().resize_vertically(above.nrows() + below.nrows(), 0.0);
+    both.rows_mut(above.nrows(), below.nrows()).copy_from(below);
+    both
+}

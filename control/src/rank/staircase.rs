@@ -1,0 +1,77 @@
+//! The staircase algorithm: the states that inputs reach, and those that are left over.
+
+use super::Rank;
+use crate::Error;
+use crate::balance::{Balance, divide_rows, multiply_rows, unit_columns};
+use crate::singular::Singular;
+use nalgebra::{DMatrix, DVector};
+
+/// What is zero in a rank decision, relative to the norm of the scaled matrix, per state.
+const TOLERANCE_PER_STATE: f64 = 100.0 * f64::EPSILON;
+
+/// With x = S z: S^-1 A S [Q1, Q2] = [Q1, Q2] [A1, *; 0, R], Q2' S^-1 B = 0.
+pub(crate) struct Staircase {
+    pub(crate) answer: Rank,
+    /// Q1, n x rank, orthonormal: the states that are reached.
+    reached_basis: DMatrix<f64>,
+    /// Q2, n x (n - rank), orthonormal: the rest, Q2' S^-1 A S = R Q2'.
+    pub(crate) rest_basis: DMatrix<f64>,
+    /// R.
+    pub(crate) rest: DMatrix<f64>,
+    /// Diagonal of S, powers of two.
+    pub(crate) scale: DVector<f64>,
+    balanced: DMatrix<f64>,
+}
+
+impl Staircase {
+    pub(crate) fn of(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Self, Error> {
+        let n = a.nrows();
+        let Balance { matrix: balanced, scale } = Balance::of(a);
+        let (mut rest, mut rest_basis) = (balanced.clone(), DMatrix::identity(n, n));
+        let mut reached = Vec::with_capacity(n);
+        let mut link = unit_columns(&divide_rows(b, &scale));
+        #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
+        let tolerance = TOLERANCE_PER_STATE * n as f64;
+        let mut margin = f64::INFINITY;
+        let size = rest.norm();
+        let mut reference = link.norm();
+        while !rest.is_empty() {
+            let step = Singular::of(&link.transpose())?;
+            let kept = step.values.iter().filter(|&&value| value > tolerance * reference).count();
+            if kept == 0 {
+                break;
+            }
+            margin = margin.min(step.values[kept - 1] / reference);
+            let turned = step.right.transpose() * &rest * &step.right;
+            let left = turned.nrows() - kept;
+            link = turned.view((kept, 0), (left, kept)).into();
+            rest = turned.view((kept, kept), (left, left)).into();
+            let turned_basis: DMatrix<f64> = rest_basis * step.right;
+            reached.extend((0..kept).map(|column| turned_basis.column(column).into_owned()));
+            rest_basis = turned_basis.columns(kept, left).into();
+            reference = size;
+        }
+        let rank = reached.len();
+        let margin = if rank == 0 { 0.0 } else { margin };
+        let reached_basis = DMatrix::from_fn(n, rank, |i, j| reached[j][i]);
+        let answer = Rank { rank, n, tolerance, margin };
+        Ok(Self { answer, reached_basis, rest_basis, rest, scale, balanced })
+    }
+
+    /// Q1' S^-1 A S Q1: the dynamics of the states that are reached.
+    pub(crate) fn reached_dynamics(&self) -> DMatrix<f64> {
+        self.reached_basis.tr_mul(&self.balanced) * &self.reached_basis
+    }
+
+    /// Q1' S^-1 B for a B whose columns lie in the states that are reached.
+    pub(crate) fn reached_input(&self, b: &DMatrix<f64>) -> DMatrix<f64> {
+        self.reached_basis.tr_mul(&divide_rows(b, &self.scale))
+    }
+
+    /// Q1' S C': what an output sees of the states that are reached, transposed, for C transposed;
+    /// beside it the norm of S C'.
+    pub(crate) fn reached_output(&self, c_transposed: &DMatrix<f64>) -> (DMatrix<f64>, f64) {
+        let scaled = multiply_rows(c_transposed, &self.scale);
+        (self.reached_basis.tr_mul(&scaled), scaled.norm())
+    }
+}

@@ -1,0 +1,152 @@
+//! Invariant zeros: the frequencies that a system blocks.
+
+use crate::balance::{Balance, divide_rows, multiply_columns, unit_columns};
+use crate::eigen::eigenvalues;
+use crate::singular::Singular;
+use crate::{Error, check};
+use nalgebra::{Complex, DMatrix};
+
+/// Singular values below this part of the scaled matrices' norm count as zero, per row.
+const TOLERANCE_PER_STATE: f64 = 100.0 * f64::EPSILON;
+
+/// The invariant zeros of a system, and the rank of its transfer function.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Zeros {
+    /// Where the system matrix has a lower rank than elsewhere, with multiplicity, ordered by real
+    /// part, then by imaginary part.
+    pub finite: Vec<Complex<f64>>,
+    /// Rank of C (s I - A)^-1 B for almost every s. Below the number of inputs some combination of
+    /// the inputs never shows in y.
+    pub rank: usize,
+}
+
+/// The invariant zeros of x' = A x + B u, y = C x.
+///
+/// ```text
+/// s with rank [A - s I, B; C, 0] below its rank for almost every s
+/// ```
+///
+/// `a`: n x n; `b`: n x m; `c`: p x n; also with more inputs than outputs or the reverse, and with
+/// modes that are not controllable or not observable: these are zeros when they block. They always
+/// exist as a set, possibly empty. Method: states balanced, columns of B and rows of C scaled to the
+/// norm of A; orthogonal transformations take away the states that y = 0 fixes until the part that
+/// is left has a square invertible D; the zeros are the eigenvalues of A - B D^-1 C there. Some 20 n
+/// (n + m) (n + p) min(n, m + p) multiplications. Tolerance of the ranks: 100 (n + m + p) eps,
+/// relative to the norm of the scaled matrices.
+///
+/// Source: A. Emami-Naeini and P. Van Dooren, Computation of zeros of linear multivariable systems,
+/// Automatica 18 (1982), the algorithm of section 3.
+///
+/// # Example
+///
+/// (s - 3) / (s^2 + 2 s + 5) has the zero 3:
+///
+/// ```
+/// use nalgebra::DMatrix;
+/// let a = DMatrix::from_row_slice(2, 2, &[0.0, 1.0, -5.0, -2.0]);
+/// let b = DMatrix::from_row_slice(2, 1, &[0.0, 1.0]);
+/// let c = DMatrix::from_row_slice(1, 2, &[-3.0, 1.0]);
+/// let zeros = control::zeros::zeros(&a, &b, &c)?;
+/// assert_eq!((zeros.finite.len(), zeros.rank), (1, 1));
+/// assert!((zeros.finite[0] - 3.0).norm() < 1e-13);
+/// # Ok::<(), control::Error>(())
+/// ```
+///
+/// # Errors
+///
+/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix;
+/// [`Error::NotConverged`] when an inner iteration does not end; [`Error::Overflow`].
+pub fn zeros(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Zeros, Error> {
+    let n = check::square("A", a)?;
+    check::shape("B", b, (n, b.ncols()))?;
+    check::shape("C", c, (c.nrows(), n))?;
+    let system = System::scaled(a, b, c);
+    let all = n + b.ncols() + c.nrows();
+    #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
+    let zero = TOLERANCE_PER_STATE * all as f64 * system.norm();
+    let square = system.reduced(zero)?.dual().reduced(zero)?.dual();
+    let rank = square.d.nrows();
+    if square.a.is_empty() {
+        return Ok(Zeros { finite: Vec::new(), rank });
+    }
+    if rank == 0 {
+        return Ok(Zeros { finite: eigenvalues(&square.a)?, rank });
+    }
+    let through = square.d.lu().solve(&square.c).ok_or(Error::Overflow { what: "D^-1 C" })?;
+    let dynamics = check::in_range("A - B D^-1 C", square.a - square.b * through)?;
+    Ok(Zeros { finite: eigenvalues(&dynamics)?, rank })
+}
+
+/// x' = A x + B u, y = C x + D u.
+struct System {
+    a: DMatrix<f64>,
+    b: DMatrix<f64>,
+    c: DMatrix<f64>,
+    d: DMatrix<f64>,
+}
+
+impl System {
+    /// Balanced states, inputs and outputs of the size of A. The zeros are the same.
+    fn scaled(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> Self {
+        let Balance { matrix, scale } = Balance::of(a);
+        let size = if matrix.norm().is_normal() { matrix.norm() } else { 1.0 };
+        let c = multiply_columns(c, &scale).transpose();
+        Self {
+            b: unit_columns(&divide_rows(b, &scale)) * size,
+            c: unit_columns(&c).transpose() * size,
+            d: DMatrix::zeros(c.ncols(), b.ncols()),
+            a: matrix,
+        }
+    }
+
+    fn norm(&self) -> f64 {
+        self.a.norm().hypot(self.b.norm()).hypot(self.c.norm())
+    }
+
+    /// (A', C', B', D').
+    fn dual(&self) -> Self {
+        Self {
+            a: self.a.transpose(),
+            b: self.c.transpose(),
+            c: self.b.transpose(),
+            d: self.d.transpose(),
+        }
+    }
+
+    /// The part with the same zeros and with D of full row rank.
+    ///
+    /// Outputs that D does not reach are turned to the end; as they must be zero, they fix as many
+    /// states as their rows of C are independent. The equations of these states become outputs.
+    fn reduced(mut self, zero: f64) -> Result<Self, Error> {
+        loop {
+            let turn = Singular::of(&self.d.transpose())?;
+            let reached = turn.values.iter().filter(|&&value| value > zero).count();
+            let (d, c) = (turn.right.tr_mul(&self.d), turn.right.tr_mul(&self.c));
+            let silent = Singular::of(&c.rows(reached, c.nrows() - reached).into_owned())?;
+            let fixed = silent.values.iter().filter(|&&value| value > zero).count();
+            let (c, d) = (c.rows(0, reached).into_owned(), d.rows(0, reached).into_owned());
+            if fixed == 0 {
+                return Ok(Self { c, d, ..self });
+            }
+            let free = self.a.nrows() - fixed;
+            let v = &silent.right;
+            let (a, b, c) = (v.tr_mul(&self.a) * v, v.tr_mul(&self.b), c * v);
+            self = Self {
+                c: stacked(
+                    &c.columns(fixed, free).into(),
+                    &a.view((0, fixed), (fixed, free)).into(),
+                ),
+                d: stacked(&d, &b.rows(0, fixed).into()),
+                a: a.view((fixed, fixed), (free, free)).into(),
+                b: b.rows(fixed, free).into(),
+            };
+        }
+    }
+}
+
+/// [above; below].
+fn stacked(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut both = above.clone().resize_vertically(above.nrows() + below.nrows(), 0.0);
+    both.rows_mut(above.nrows(), below.nrows()).copy_from(below);
+    both
+}

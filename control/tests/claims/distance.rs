@@ -1,0 +1,52 @@
+use crate::data::reference;
+use crate::matrix;
+use crate::paper::plant;
+use control::distance::{from_uncontrollable, from_unobservable};
+use nalgebra::{DMatrix, DVector};
+
+/// Grid and Nelder-Mead in the script.
+#[test]
+fn the_bounds_enclose_the_distance_that_a_search_in_scipy_finds() {
+    for case in 0..5 {
+        let of = |part: &str| reference(&format!("distance_{case}{part}"));
+        let found = from_uncontrollable(&of("_a"), &of("_b")).unwrap();
+        let expected = of("");
+        assert!((found.upper / expected[0] - 1.0).abs() < 1e-2, "{found:?} {expected}");
+        assert!(found.lower <= expected[0] && found.lower > 0.85 * expected[0], "{found:?}");
+        assert!((found.at.re - expected[1]).hypot(found.at.im - expected[2]) < 0.1, "{found:?}");
+    }
+}
+
+/// The change that removes the small entry of B takes one mode away, and nothing smaller can be much
+/// smaller: the other entries are one.
+#[test]
+fn a_mode_that_is_nearly_lost_is_found_where_it_is() {
+    let a = DMatrix::from_diagonal(&DVector::from_vec(vec![-1.0, -0.5, 0.25]));
+    for weak in [1e-3, 1e-8] {
+        let found = from_uncontrollable(&a, &matrix(3, 1, &[1.0, weak, 1.0])).unwrap();
+        assert!(found.upper < weak && found.upper > 0.3 * weak, "{found:?}");
+        assert!((found.at + 0.5).norm() < 2.0 * weak.max(1e-9), "{found:?}");
+        assert!(found.lower <= found.upper);
+    }
+}
+
+#[test]
+fn a_lost_mode_has_the_distance_zero() {
+    let a = DMatrix::from_diagonal(&DVector::from_vec(vec![-3.0, -1.0]));
+    let found = from_uncontrollable(&a, &matrix(2, 1, &[1.0, 0.0])).unwrap();
+    assert!(found.upper < 1e-15 && (found.at + 1.0).norm() < 1e-12, "{found:?}");
+}
+
+/// States in other units, time in ms, other units of the measurements: balancing leaves a few per
+/// cent.
+#[test]
+fn units_hardly_change_the_distance() {
+    let plant = plant();
+    let before = from_unobservable(&plant.a, &plant.c).unwrap();
+    let units = [1.0, 1024.0, 0.125, 4096.0];
+    let a = DMatrix::from_fn(4, 4, |i, j| plant.a[(i, j)] * units[i] / units[j] / 1000.0);
+    let c = DMatrix::from_fn(2, 4, |i, j| plant.c[(i, j)] / units[j] * 17.0);
+    let after = from_unobservable(&a, &c).unwrap();
+    assert!((after.upper / before.upper - 1.0).abs() < 0.1, "{before:?} {after:?}");
+    assert!((after.at * 1000.0 - before.at).norm() < 1e-2 * plant.a.norm(), "{before:?} {after:?}");
+}
