@@ -15,14 +15,18 @@
 pub mod aso;
 mod balance;
 mod check;
+mod domain;
 pub mod eigen;
 mod error;
 pub mod exponential;
 pub mod hold;
+#[cfg(feature = "lmi")]
+pub mod lmi;
 pub mod lyapunov;
 pub mod placement;
 pub mod rank;
 mod singular;
 pub mod theorem1;
 
+pub use domain::Domain;
 pub use error::Error;

@@ -5,6 +5,8 @@ mod aso;
 mod eigen;
 mod exponential;
 mod hold;
+#[cfg(feature = "lmi")]
+mod lmi;
 mod lyapunov;
 mod paper;
 mod placement;
