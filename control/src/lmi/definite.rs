@@ -14,7 +14,7 @@ const ROUNDING: f64 = 16.0 * f64::EPSILON;
 /// D S D is positive definite when S is (Sylvester), and scaling by powers of two rounds nothing.
 /// The entries of S count as right to a few roundings of their own. A value is returned as above
 /// zero only if it exceeds 16 roundings per row.
-pub(super) fn margin(s: &DMatrix<f64>) -> Result<f64, Error> {
+pub(crate) fn margin(s: &DMatrix<f64>) -> Result<f64, Error> {
     let scale: Vec<f64> =
         s.diagonal().iter().map(|&entry| 1.0 / power_of_two(entry.sqrt())).collect();
     if !scale.iter().all(|factor| factor.is_normal()) || s.iter().any(|entry| !entry.is_finite()) {

@@ -176,7 +176,7 @@ impl Problem {
 
     /// The smallest value of the objective and where it is found, as far as the solver came: for a
     /// first look, nothing is checked.
-    pub(super) fn smallest(&self) -> Option<(f64, DVector<f64>)> {
+    pub(crate) fn smallest(&self) -> Option<(f64, DVector<f64>)> {
         let objective = self.objective.as_ref()?;
         let mut costs = DVector::zeros(self.unknowns);
         for (at, cost) in &objective.terms {
