@@ -27,6 +27,8 @@ mod error;
 pub mod exponential;
 pub mod faults;
 pub mod hold;
+#[cfg(feature = "lmi")]
+pub mod lmi;
 pub mod lyapunov;
 pub mod placement;
 pub mod rank;

@@ -1,5 +1,10 @@
 //! The bound on the estimation error, theorem 1 of the paper named in [`crate::aso`].
 
+#[cfg(feature = "lmi")]
+mod free;
+#[cfg(feature = "lmi")]
+pub use free::*;
+
 use crate::aso::{FaultyPlant, Gains};
 use crate::eigen::spectral_abscissa;
 use crate::lyapunov::{definite_range, lyapunov};

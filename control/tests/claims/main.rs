@@ -9,6 +9,8 @@ mod eigen;
 mod exponential;
 mod faults;
 mod hold;
+#[cfg(feature = "lmi")]
+mod lmi;
 mod lyapunov;
 mod paper;
 mod placement;

@@ -1,0 +1,241 @@
+//! Problems with linear matrix inequalities.
+
+use super::affine::Affine;
+use super::definite::smallest_eigenvalue;
+use super::solver::{End, minimise};
+use super::{Outcome, Solution};
+use crate::Error;
+use crate::balance::power_of_two;
+use nalgebra::{DMatrix, DVector};
+
+/// Requirements missed by less than this part of their largest entry are neither met nor in
+/// conflict.
+const UNDECIDED: f64 = 1e-7;
+
+/// Unknown matrices, requirements on them, and something to minimise.
+///
+/// ```text
+/// minimise c(x) such that S_i(x) - m_i I is positive semidefinite for every i
+/// ```
+///
+/// Method: the interior point method of Clarabel (Goulart and Chen, 2024) on data in which the
+/// largest entry of each requirement is about one. What it finds is taken only if the eigenvalues
+/// of every `S_i`(x) say that at least half of the margin `m_i` is kept. Otherwise the largest
+/// common t with `S_i`(x) - `m_i` I - t I semidefinite is sought, which always exists. If it is
+/// below zero some requirements contradict each other, and those that can be left out with the
+/// others still in conflict are left out, in the order in which they were stated: what remains
+/// is a conflict of which each part is needed.
+///
+/// Cost: some 20 iterations of about u^3 + u^2 k^2 multiplications, u unknowns, k the order of the
+/// largest requirement; a conflict costs that once more for each named requirement.
+///
+/// # Example
+///
+/// The smallest x with [x, 1; 1, x] positive definite:
+///
+/// ```
+/// use control::lmi::{Affine, Outcome, Problem};
+/// use nalgebra::DMatrix;
+/// let mut problem = Problem::new();
+/// let x = problem.scalar();
+/// let one = DMatrix::from_row_slice(2, 2, &[0.0, 1.0, 1.0, 0.0]);
+/// let matrix = &x.times(&DMatrix::identity(2, 2)) + &Affine::constant(&one);
+/// problem.require("definite", &matrix, 1e-7);
+/// problem.minimise(&x);
+/// let Outcome::Optimal(solution) = problem.solve()? else { panic!() };
+/// assert!((solution.value(&x)[(0, 0)] - 1.0).abs() < 1e-6);
+/// # Ok::<(), control::Error>(())
+/// ```
+#[derive(Debug, Clone, Default)]
+pub struct Problem {
+    unknowns: usize,
+    requirements: Vec<Requirement>,
+    objective: Option<Affine>,
+}
+
+#[derive(Debug, Clone)]
+struct Requirement {
+    /// None: what makes the problem one, never given up.
+    name: Option<&'static str>,
+    matrix: Affine,
+    margin: f64,
+}
+
+impl Requirement {
+    /// S(x) - (m + slack) I, both relative to the largest entry if a slack is given.
+    fn semidefinite(&self, slack: Option<&Affine>) -> Affine {
+        let size = power_of_two(self.matrix.size());
+        let order = self.matrix.shape().0;
+        let scaled = &self.matrix * (1.0 / if size.is_normal() { size } else { 1.0 });
+        let kept = Affine::identity(order, self.margin / size);
+        let matrix = &scaled - &kept;
+        match slack {
+            None => matrix,
+            Some(slack) => &matrix - &slack.times(&DMatrix::identity(order, order)),
+        }
+    }
+}
+
+impl Problem {
+    /// No unknowns, no requirements.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// An unknown symmetric matrix.
+    pub fn symmetric(&mut self, order: usize) -> Affine {
+        let mut matrix = Affine::zeros(order, order);
+        for col in 0..order {
+            for row in 0..=col {
+                let mut unit = DMatrix::zeros(order, order);
+                (unit[(row, col)], unit[(col, row)]) = (1.0, 1.0);
+                matrix.terms.insert(self.unknown(), unit);
+            }
+        }
+        matrix
+    }
+
+    /// An unknown matrix.
+    pub fn rectangular(&mut self, rows: usize, cols: usize) -> Affine {
+        let mut matrix = Affine::zeros(rows, cols);
+        for at in 0..rows * cols {
+            let mut unit = DMatrix::zeros(rows, cols);
+            unit[at] = 1.0;
+            matrix.terms.insert(self.unknown(), unit);
+        }
+        matrix
+    }
+
+    /// An unknown number, as a matrix of one row and column.
+    pub fn scalar(&mut self) -> Affine {
+        self.rectangular(1, 1)
+    }
+
+    fn unknown(&mut self) -> usize {
+        self.unknowns += 1;
+        self.unknowns - 1
+    }
+
+    /// `matrix` - `margin` I is positive semidefinite. `name` is what a conflict calls it; several
+    /// requirements of one name stand and fall together.
+    ///
+    /// # Panics
+    ///
+    /// When the matrix is not square.
+    pub fn require(&mut self, name: &'static str, matrix: &Affine, margin: f64) {
+        self.push(Some(name), matrix, margin);
+    }
+
+    /// The same for what is no wish but belongs to the problem, such as P > 0.
+    ///
+    /// # Panics
+    ///
+    /// When the matrix is not square.
+    pub fn always(&mut self, matrix: &Affine, margin: f64) {
+        self.push(None, matrix, margin);
+    }
+
+    fn push(&mut self, name: Option<&'static str>, matrix: &Affine, margin: f64) {
+        let (rows, cols) = matrix.shape();
+        assert_eq!(rows, cols, "a requirement is a square matrix");
+        self.requirements.push(Requirement { name, matrix: matrix.clone(), margin });
+    }
+
+    /// What is to be made small: an expression of one row and column.
+    pub fn minimise(&mut self, objective: &Affine) {
+        self.objective = Some(objective.clone());
+    }
+
+    /// Solves the problem; without an objective any x far inside of the requirements will do.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::NotConverged`] when eigenvalues are not found.
+    pub fn solve(&self) -> Result<Outcome<Solution>, Error> {
+        if self.objective.is_some()
+            && let Some(solution) = self.verified(self.smallest().map(|found| found.1))?
+        {
+            return Ok(Outcome::Optimal(solution));
+        }
+        let all: Vec<_> = self.requirements.iter().collect();
+        let Some((slack, found)) = self.most_inside(&all) else {
+            return Ok(Outcome::Trouble("the interior point method did not end"));
+        };
+        if slack < -UNDECIDED {
+            return Ok(Outcome::Infeasible { conflict: self.conflict() });
+        }
+        match self.verified(Some(found))? {
+            None => Ok(Outcome::Trouble("the requirements are met or missed by a rounding error")),
+            Some(_) if self.objective.is_some() => Ok(Outcome::Trouble(
+                "the requirements can be met, but the smallest value is not found",
+            )),
+            Some(solution) => Ok(Outcome::Optimal(solution)),
+        }
+    }
+
+    /// The smallest value of the objective and where it is found, as far as the solver came: for a
+    /// first look, nothing is checked.
+    pub(crate) fn smallest(&self) -> Option<(f64, DVector<f64>)> {
+        let objective = self.objective.as_ref()?;
+        let mut costs = DVector::zeros(self.unknowns);
+        for (at, cost) in &objective.terms {
+            costs[*at] = cost[(0, 0)];
+        }
+        let matrices: Vec<_> =
+            self.requirements.iter().map(|each| each.semidefinite(None)).collect();
+        let (unknowns, _) = minimise(&costs, &matrices)?;
+        Some((objective.at(&unknowns)[(0, 0)], unknowns))
+    }
+
+    /// The largest common slack, at most one, and where it is found.
+    fn most_inside(&self, requirements: &[&Requirement]) -> Option<(f64, DVector<f64>)> {
+        let mut extended = self.clone();
+        let slack = extended.scalar();
+        let mut matrices: Vec<_> =
+            requirements.iter().map(|each| each.semidefinite(Some(&slack))).collect();
+        matrices.push(&Affine::identity(1, 1.0) - &slack);
+        let mut costs = DVector::zeros(extended.unknowns);
+        costs[self.unknowns] = -1.0;
+        let (found, end) = minimise(&costs, &matrices)?;
+        if end == End::Stalled {
+            return None;
+        }
+        Some((found[self.unknowns], found.rows(0, self.unknowns).into_owned()))
+    }
+
+    fn conflict(&self) -> Vec<&'static str> {
+        let mut names: Vec<&'static str> = Vec::new();
+        for name in self.requirements.iter().filter_map(|each| each.name) {
+            if !names.contains(&name) {
+                names.push(name);
+            }
+        }
+        for candidate in names.clone() {
+            let rest: Vec<_> = names.iter().copied().filter(|name| *name != candidate).collect();
+            let kept: Vec<_> = self
+                .requirements
+                .iter()
+                .filter(|each| each.name.is_none_or(|name| rest.contains(&name)))
+                .collect();
+            if self.most_inside(&kept).is_some_and(|(slack, _)| slack < -UNDECIDED) {
+                names = rest;
+            }
+        }
+        names
+    }
+
+    /// The solution if each requirement keeps at least half of its margin.
+    fn verified(&self, unknowns: Option<DVector<f64>>) -> Result<Option<Solution>, Error> {
+        let Some(unknowns) = unknowns else { return Ok(None) };
+        let mut margins = Vec::with_capacity(self.requirements.len());
+        for each in &self.requirements {
+            let matrix = each.matrix.at(&unknowns);
+            let half =
+                DMatrix::from_diagonal_element(matrix.nrows(), matrix.nrows(), each.margin * 0.5);
+            let Some(above) = smallest_eigenvalue(&(matrix - half))? else { return Ok(None) };
+            margins.push((each.name, above + 0.5 * each.margin));
+        }
+        Ok(Some(Solution { unknowns, margins }))
+    }
+}

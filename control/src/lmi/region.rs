@@ -1,0 +1,253 @@
+//! Regions of the complex plane for eigenvalues.
+
+use super::affine::Affine;
+use super::coordinates::Coordinates;
+use super::definite::{Product, margin};
+use super::{Outcome, Problem};
+use crate::domain::Domain;
+use crate::eigen::eigenvalues;
+use crate::{Error, check};
+use nalgebra::{Complex, DMatrix};
+
+/// Part of the data by which inequalities are kept in the solver's coordinates.
+pub(super) const MARGIN: f64 = 2e-7;
+
+/// A disc around a real number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Disc {
+    /// Its centre on the real axis.
+    pub center: f64,
+    /// Its radius, above zero.
+    pub radius: f64,
+}
+
+/// Where eigenvalues shall lie: in all of the parts that are given; with none, in the region of
+/// stability.
+///
+/// Continuous time: eigenvalues s. Sampled time: eigenvalues z of the sampled system.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Region {
+    /// Decay rate alpha above zero in 1/s: Re s < -alpha, or |z| < exp(-alpha period).
+    pub decay: Option<f64>,
+    /// A disc, of s or of z.
+    pub disc: Option<Disc>,
+    /// Half angle in rad, above 0 and below pi/2, of the sector |Im s| < tan(angle) (-Re s):
+    /// damping above cos(angle). In continuous time only.
+    pub sector: Option<f64>,
+}
+
+/// A proof that all eigenvalues of A lie in a region.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RegionCertificate {
+    /// P, n x n, symmetric positive definite.
+    pub p: DMatrix<f64>,
+    /// Smallest eigenvalue of all the inequalities, each scaled to a diagonal of about one; above
+    /// the rounding errors.
+    pub margin: f64,
+}
+
+/// How far inside a disc an eigenvalue is, as in "outside of".
+struct Part {
+    name: &'static str,
+    shape: Shape,
+}
+
+enum Shape {
+    HalfPlane(f64),
+    Disc(Disc),
+    Sector(f64),
+}
+
+impl Region {
+    pub(super) fn check(&self, domain: Domain) -> Result<(), Error> {
+        if let Some(decay) = self.decay {
+            check::positive("decay", decay)?;
+        }
+        if let Some(Disc { center, radius }) = self.disc {
+            check::positive("disc radius", radius)?;
+            if !center.is_finite() {
+                let rule = "a finite number";
+                return Err(Error::OutOfRange { name: "disc center", value: center, rule });
+            }
+        }
+        if let Domain::Sampled { period } = domain {
+            check::positive("period", period)?;
+        }
+        let Some(value) = self.sector else { return Ok(()) };
+        let rule = match domain {
+            Domain::Continuous => "an angle between 0 and pi/2",
+            Domain::Sampled { .. } => "no sector in sampled time, but a disc",
+        };
+        let sensible = value > 0.0 && value < std::f64::consts::FRAC_PI_2;
+        if sensible && domain == Domain::Continuous {
+            return Ok(());
+        }
+        Err(Error::OutOfRange { name: "sector", value, rule })
+    }
+
+    /// The parts with their names, time scaled by `unit`.
+    fn parts(&self, domain: Domain, unit: f64) -> Vec<Part> {
+        let mut parts = Vec::new();
+        let around_zero = |radius| Shape::Disc(Disc { center: 0.0, radius });
+        if let Some(decay) = self.decay {
+            let shape = match domain {
+                Domain::Continuous => Shape::HalfPlane(decay / unit),
+                Domain::Sampled { period } => around_zero((-decay * period).exp() / unit),
+            };
+            parts.push(Part { name: "decay", shape });
+        }
+        if let Some(Disc { center, radius }) = self.disc {
+            let disc = Disc { center: center / unit, radius: radius / unit };
+            parts.push(Part { name: "disc", shape: Shape::Disc(disc) });
+        }
+        if let Some(angle) = self.sector {
+            parts.push(Part { name: "sector", shape: Shape::Sector(angle) });
+        }
+        if parts.is_empty() {
+            let shape = match domain {
+                Domain::Continuous => Shape::HalfPlane(0.0),
+                Domain::Sampled { .. } => around_zero(1.0 / unit),
+            };
+            parts.push(Part { name: "stability", shape });
+        }
+        parts
+    }
+
+    /// The matrices that are positive definite if P and the product P A, `product`, prove that the
+    /// eigenvalues of A lie in the region.
+    pub(super) fn requirements(
+        &self,
+        p: &Affine,
+        product: &Affine,
+        domain: Domain,
+        unit: f64,
+    ) -> Vec<(&'static str, Affine)> {
+        let parts = self.parts(domain, unit);
+        parts.iter().map(|part| (part.name, part.shape.requirement(p, product))).collect()
+    }
+
+    /// Names of the parts that an eigenvalue is outside of.
+    fn missed(&self, values: &[Complex<f64>], domain: Domain) -> Vec<&'static str> {
+        let parts = self.parts(domain, 1.0);
+        let outside = |part: &&Part| values.iter().any(|value| !part.shape.holds(value));
+        parts.iter().filter(outside).map(|part| part.name).collect()
+    }
+}
+
+impl Shape {
+    fn holds(&self, value: &Complex<f64>) -> bool {
+        match self {
+            Self::HalfPlane(decay) => value.re < -decay,
+            Self::Disc(Disc { center, radius }) => (value - center).norm() < *radius,
+            Self::Sector(angle) => value.im.abs() < angle.tan() * -value.re,
+        }
+    }
+
+    fn requirement(&self, p: &Affine, product: &Affine) -> Affine {
+        let sum = product.plus_transpose();
+        match self {
+            Self::HalfPlane(decay) => -&(&sum + &(p * (2.0 * decay))),
+            Self::Disc(Disc { center, radius }) => {
+                let (size, moved) = (p * *radius, product - &(p * *center));
+                Affine::blocks(&[&[&size, &moved], &[&moved.transpose(), &size]])
+            }
+            Self::Sector(angle) => {
+                let (s, c) = angle.sin_cos();
+                let (even, odd) = (&sum * -s, &(product - &product.transpose()) * -c);
+                Affine::blocks(&[&[&even, &odd], &[&odd.transpose(), &even]])
+            }
+        }
+    }
+}
+
+/// Proves that all eigenvalues of A lie in a region.
+///
+/// ```text
+/// P > 0 and, for each part of the region,
+/// Re s < -alpha:         A' P + P A + 2 alpha P < 0
+/// |s - c| < r:           [r P, P (A - c I); (A - c I)' P, r P] > 0
+/// |Im s| < tan(t) -Re s: [sin(t) (P A + A' P), cos(t) (P A - A' P);
+///                         cos(t) (A' P - P A), sin(t) (P A + A' P)] < 0
+/// ```
+///
+/// `a`: n x n. P exists if and only if the eigenvalues lie in the region. Of all P <= I the one
+/// farthest inside of all inequalities is taken, in coordinates in which A is a multiple of the
+/// identity plus a matrix of about the size of its eigenvalues' spread. An eigenvalue outside is a
+/// conflict of the parts concerned; eigenvalues inside by less than 1e-7 of the spectrum's size may
+/// end in trouble. The inequalities of the answer are checked in the data as given, the products
+/// computed in twice the precision.
+///
+/// Source: M. Chilali and P. Gahinet, H-infinity design with pole placement constraints: an LMI
+/// approach, IEEE Trans. Autom. Control 41 (1996), theorem 2.2 and section II.C.
+///
+/// # Example
+///
+/// ```
+/// use control::Domain;
+/// use control::lmi::{Disc, Outcome, Region, certify_region};
+/// use nalgebra::DMatrix;
+/// let a = DMatrix::from_row_slice(2, 2, &[0.0, 1.0, -25.0, -6.0]);
+/// let region = |decay| Region { decay: Some(decay), ..Region::default() };
+/// assert!(certify_region(&a, &region(2.9), Domain::Continuous)?.optimal().is_some());
+/// let Outcome::Infeasible { conflict } = certify_region(&a, &region(3.1), Domain::Continuous)?
+/// else { panic!() };
+/// assert_eq!(conflict, ["decay"]);
+/// # Ok::<(), control::Error>(())
+/// ```
+///
+/// # Errors
+///
+/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad `a`, [`Error::OutOfRange`]
+/// for a bad region; [`Error::NotConverged`].
+pub fn certify_region(
+    a: &DMatrix<f64>,
+    region: &Region,
+    domain: Domain,
+) -> Result<Outcome<RegionCertificate>, Error> {
+    let n = check::square("A", a)?;
+    region.check(domain)?;
+    let conflict = region.missed(&eigenvalues(a)?, domain);
+    if !conflict.is_empty() {
+        return Ok(Outcome::Infeasible { conflict });
+    }
+    let coordinates = Coordinates::of_dynamics(a)?;
+    let mut problem = Problem::new();
+    let p = problem.symmetric(n);
+    problem.always(&p, MARGIN);
+    problem.always(&(&Affine::identity(n, 1.0) - &p), MARGIN);
+    let product = &p * &coordinates.dynamics(a);
+    for (_, matrix) in region.requirements(&p, &product, domain, coordinates.unit) {
+        problem.always(&matrix, MARGIN);
+    }
+    match problem.solve()? {
+        Outcome::Optimal(solution) => {
+            verify(a, region, domain, coordinates.certificate(&solution.value(&p)))
+        }
+        _ => Ok(Outcome::Trouble("no P shows in double precision that the region is kept")),
+    }
+}
+
+/// Checks P in the data as given.
+fn verify(
+    a: &DMatrix<f64>,
+    region: &Region,
+    domain: Domain,
+    p: DMatrix<f64>,
+) -> Result<Outcome<RegionCertificate>, Error> {
+    let product = Product::of(&p, a);
+    let matrices = |p: &DMatrix<f64>, product: &DMatrix<f64>| {
+        let (p, product) = (Affine::constant(p), Affine::constant(product));
+        region.requirements(&p, &product, domain, 1.0)
+    };
+    let zero = DMatrix::zeros(p.nrows(), p.nrows());
+    let rounded = matrices(&p, &product.high);
+    let lost = matrices(&zero, &product.low);
+    let mut smallest = margin(&p)?;
+    for ((_, matrix), (_, correction)) in rounded.iter().zip(&lost) {
+        smallest = smallest.min(margin(&(&matrix.constant + &correction.constant))?);
+    }
+    if smallest > 0.0 {
+        return Ok(Outcome::Optimal(RegionCertificate { p, margin: smallest }));
+    }
+    Ok(Outcome::Trouble("the certificate of the region is lost in rounding errors"))
+}

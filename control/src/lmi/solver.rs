@@ -1,0 +1,86 @@
+//! The call of Clarabel.
+
+use super::affine::Affine;
+use clarabel::algebra::CscMatrix;
+use clarabel::solver::{
+    DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT as Cone,
+};
+use nalgebra::{DMatrix, DVector};
+use std::f64::consts::SQRT_2;
+
+/// How far the solver came.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum End {
+    Solved,
+    /// It stopped on the way.
+    Stalled,
+}
+
+/// The unknowns that minimise `objective`' x while every matrix is positive semidefinite; None when
+/// there are none or the solver failed. Not to be trusted.
+///
+/// The cone of a matrix of order k takes its upper triangle column by column, entries beside the
+/// diagonal times sqrt(2).
+pub(super) fn minimise(
+    objective: &DVector<f64>,
+    matrices: &[Affine],
+) -> Option<(DVector<f64>, End)> {
+    let unknowns = objective.len();
+    let mut cones = Vec::with_capacity(matrices.len());
+    let mut right = Vec::new();
+    let mut columns = vec![Vec::new(); unknowns];
+    for matrix in matrices {
+        let order = matrix.shape().0;
+        cones.push(if order == 1 {
+            Cone::NonnegativeConeT(1)
+        } else {
+            Cone::PSDTriangleConeT(order)
+        });
+        for (unknown, m) in &matrix.terms {
+            let entries = triangle(m).into_iter().enumerate().filter(|(_, value)| *value != 0.0);
+            columns[*unknown].extend(entries.map(|(row, value)| (right.len() + row, -value)));
+        }
+        right.extend(triangle(&matrix.constant));
+    }
+    let (mut starts, mut rows, mut values) = (vec![0], Vec::new(), Vec::new());
+    for column in columns {
+        for (row, value) in column {
+            rows.push(row);
+            values.push(value);
+        }
+        starts.push(rows.len());
+    }
+    let left = CscMatrix::new(right.len(), unknowns, starts, rows, values);
+    let quadratic = CscMatrix::zeros((unknowns, unknowns));
+    let costs = objective.as_slice();
+    let mut solver =
+        DefaultSolver::new(&quadratic, costs, &left, &right, &cones, settings()).ok()?;
+    solver.solve();
+    let found = &solver.solution;
+    let end = match found.status {
+        SolverStatus::Solved | SolverStatus::AlmostSolved => End::Solved,
+        SolverStatus::InsufficientProgress | SolverStatus::MaxIterations => End::Stalled,
+        _ => return None,
+    };
+    let finite = found.x.iter().all(|value| value.is_finite());
+    finite.then(|| (DVector::from_column_slice(&found.x), end))
+}
+
+fn settings() -> DefaultSettings<f64> {
+    DefaultSettings {
+        verbose: false,
+        max_threads: 1,
+        direct_solve_method: "qdldl".to_owned(),
+        chordal_decomposition_enable: false,
+        ..DefaultSettings::default()
+    }
+}
+
+fn triangle(m: &DMatrix<f64>) -> Vec<f64> {
+    let mut entries = Vec::with_capacity(m.nrows() * (m.nrows() + 1) / 2);
+    for col in 0..m.ncols() {
+        entries.extend((0..col).map(|row| (m[(row, col)] + m[(col, row)]) / SQRT_2));
+        entries.push(m[(col, col)]);
+    }
+    entries
+}

@@ -1,0 +1,97 @@
+//! Triangular factors and their use.
+
+use nalgebra::DMatrix;
+
+/// The lower triangular L with L L' = A, A given by its lower triangle.
+///
+/// The error is the order, from 1, of the first leading minor that is not positive.
+pub(crate) fn cholesky(a: &DMatrix<f64>) -> Result<DMatrix<f64>, usize> {
+    let n = a.nrows();
+    let mut l = DMatrix::zeros(n, n);
+    for col in 0..n {
+        for row in col..n {
+            let done: f64 = (0..col).map(|k| l[(row, k)] * l[(col, k)]).sum();
+            let rest = a[(row, col)] - done;
+            if row > col {
+                l[(row, col)] = rest / l[(col, col)];
+            } else if rest > 0.0 {
+                l[(col, col)] = rest.sqrt();
+            } else {
+                return Err(col + 1);
+            }
+        }
+    }
+    Ok(l)
+}
+
+/// X with L X = B.
+pub(crate) fn forward(l: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut x = b.clone();
+    for col in 0..x.ncols() {
+        for row in 0..x.nrows() {
+            let done: f64 = (0..row).map(|k| l[(row, k)] * x[(k, col)]).sum();
+            x[(row, col)] = (x[(row, col)] - done) / l[(row, row)];
+        }
+    }
+    x
+}
+
+/// X with U X = B.
+pub(crate) fn backward(u: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut x = b.clone();
+    for col in 0..x.ncols() {
+        for row in (0..x.nrows()).rev() {
+            let done: f64 = (row + 1..x.nrows()).map(|k| u[(row, k)] * x[(k, col)]).sum();
+            x[(row, col)] = (x[(row, col)] - done) / u[(row, row)];
+        }
+    }
+    x
+}
+
+/// P A = L U with partial pivoting.
+pub(crate) struct Elimination {
+    /// L below the diagonal, where its ones are left out, U on and above it.
+    pub(crate) factors: DMatrix<f64>,
+    /// In step k row k was swapped with this one.
+    pub(crate) swaps: Vec<usize>,
+    /// The first pivot that is zero, from 1.
+    pub(crate) singular: Option<usize>,
+}
+
+impl Elimination {
+    pub(crate) fn of(a: &DMatrix<f64>) -> Self {
+        let n = a.nrows();
+        let mut found = Self { factors: a.clone(), swaps: Vec::with_capacity(n), singular: None };
+        let m = &mut found.factors;
+        for step in 0..n {
+            let pivot =
+                (step..n).rev().max_by(|&i, &j| m[(i, step)].abs().total_cmp(&m[(j, step)].abs()));
+            let pivot = pivot.unwrap_or(step);
+            found.swaps.push(pivot);
+            m.swap_rows(step, pivot);
+            if m[(step, step)] == 0.0 {
+                found.singular = found.singular.or(Some(step + 1));
+                continue;
+            }
+            for row in step + 1..n {
+                let factor = m[(row, step)] / m[(step, step)];
+                m[(row, step)] = factor;
+                for col in step + 1..n {
+                    m[(row, col)] -= factor * m[(step, col)];
+                }
+            }
+        }
+        found
+    }
+
+    /// X with A X = B.
+    pub(crate) fn solve(&self, b: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut right = b.clone();
+        for (step, &pivot) in self.swaps.iter().enumerate() {
+            right.swap_rows(step, pivot);
+        }
+        let mut l = self.factors.clone();
+        l.fill_diagonal(1.0);
+        backward(&self.factors, &forward(&l, &right))
+    }
+}

@@ -1,0 +1,156 @@
+//! Arrays as Fortran lays them out, read into matrices and written from them.
+#![expect(unsafe_code, reason = "the boundary to callers in C and Fortran")]
+
+use nalgebra::DMatrix;
+
+/// The two precisions; all arithmetic is done in the wider one.
+pub(crate) trait Number: Copy {
+    fn wide(self) -> f64;
+    fn narrow(value: f64) -> Self;
+}
+
+impl Number for f64 {
+    fn wide(self) -> f64 {
+        self
+    }
+
+    fn narrow(value: f64) -> Self {
+        value
+    }
+}
+
+impl Number for f32 {
+    fn wide(self) -> f64 {
+        f64::from(self)
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "the answer in single precision")]
+    fn narrow(value: f64) -> Self {
+        value as Self
+    }
+}
+
+/// Which entries of a square array are meant.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Part {
+    All,
+    Upper,
+    Lower,
+}
+
+impl Part {
+    /// The argument UPLO.
+    pub(crate) fn triangle(letter: u8) -> Option<Self> {
+        match letter.to_ascii_uppercase() {
+            b'U' => Some(Self::Upper),
+            b'L' => Some(Self::Lower),
+            _ => None,
+        }
+    }
+
+    fn holds(self, row: usize, col: usize) -> bool {
+        match self {
+            Self::All => true,
+            Self::Upper => row <= col,
+            Self::Lower => row >= col,
+        }
+    }
+}
+
+/// An array of `rows` x `cols` entries, column by column, `step` entries from one to the next.
+#[derive(Clone, Copy)]
+pub(crate) struct Layout {
+    pub(crate) rows: usize,
+    pub(crate) cols: usize,
+    step: usize,
+}
+
+impl Layout {
+    /// None when a size is negative or the leading dimension is shorter than a column.
+    pub(crate) fn new(rows: i32, cols: i32, leading: i32) -> Option<Self> {
+        let (rows, cols) = (usize::try_from(rows).ok()?, usize::try_from(cols).ok()?);
+        let step = usize::try_from(leading).ok()?;
+        (step >= rows.max(1)).then_some(Self { rows, cols, step })
+    }
+
+    /// The matrix in the array; entries outside of `part` are not read, but zero.
+    ///
+    /// # Safety
+    ///
+    /// `from` is valid for reads of the entries of `part`.
+    pub(crate) unsafe fn read<T: Number>(self, from: *const T, part: Part) -> DMatrix<f64> {
+        DMatrix::from_fn(self.rows, self.cols, |row, col| {
+            if part.holds(row, col) {
+                // SAFETY: the entry lies inside of the array, see above.
+                unsafe { from.add(row + col * self.step).read() }.wide()
+            } else {
+                0.0
+            }
+        })
+    }
+
+    /// Writes the entries of `part`.
+    ///
+    /// # Safety
+    ///
+    /// `to` is valid for writes of the entries of `part`; `m` has the size of the layout.
+    pub(crate) unsafe fn write<T: Number>(self, to: *mut T, m: &DMatrix<f64>, part: Part) {
+        debug_assert_eq!(m.shape(), (self.rows, self.cols));
+        for (at, value) in m.iter().enumerate() {
+            let (row, col) = (at % self.rows, at / self.rows);
+            if part.holds(row, col) {
+                // SAFETY: the entry lies inside of the array, see above.
+                unsafe { to.add(row + col * self.step).write(T::narrow(*value)) }
+            }
+        }
+    }
+}
+
+/// A vector of `length` entries at distances of `increment`; a negative one runs backwards.
+#[derive(Clone, Copy)]
+pub(crate) struct Vector {
+    length: usize,
+    increment: i32,
+}
+
+impl Vector {
+    /// None when the length is negative or the increment zero.
+    pub(crate) fn new(length: i32, increment: i32) -> Option<Self> {
+        let length = usize::try_from(length).ok()?;
+        (increment != 0).then_some(Self { length, increment })
+    }
+
+    fn place(self, at: usize) -> usize {
+        let step = self.increment.unsigned_abs() as usize;
+        if self.increment < 0 { (self.length - 1 - at) * step } else { at * step }
+    }
+
+    /// The vector as a column.
+    ///
+    /// # Safety
+    ///
+    /// `from` is valid for reads of the entries.
+    pub(crate) unsafe fn read<T: Number>(self, from: *const T) -> DMatrix<f64> {
+        DMatrix::from_fn(self.length, 1, |at, _| {
+            // SAFETY: the entry belongs to the vector, see above.
+            unsafe { from.add(self.place(at)).read() }.wide()
+        })
+    }
+
+    /// y := `product` + beta y; with beta = 0 y is not read.
+    ///
+    /// # Safety
+    ///
+    /// `y` is valid for reads and writes of the entries; `product` is a column of them.
+    pub(crate) unsafe fn update<T: Number>(self, y: *mut T, product: &DMatrix<f64>, beta: T) {
+        for (at, &value) in product.iter().enumerate() {
+            // SAFETY: the entry belongs to the vector, see above.
+            unsafe {
+                let entry = y.add(self.place(at));
+                let before =
+                    if beta.wide() == 0.0 { 0.0 } else { beta.wide() * entry.read().wide() };
+                entry.write(T::narrow(value + before));
+            }
+        }
+    }
+}

@@ -1,0 +1,122 @@
+//! Singular values and vectors by one-sided rotations, for any rank.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Five to ten sweeps are usual.
+const SWEEPS: usize = 60;
+/// Columns below this part of the largest are zero.
+const NOTHING: f64 = 1e-100;
+
+/// A = U S V', U and V square and orthogonal, S descending.
+pub(crate) struct Decomposition {
+    pub(crate) u: DMatrix<f64>,
+    /// min(rows, columns) values.
+    pub(crate) values: DVector<f64>,
+    pub(crate) v: DMatrix<f64>,
+}
+
+impl Decomposition {
+    /// None when the rotations do not end, as with entries that are not finite.
+    pub(crate) fn of(a: &DMatrix<f64>) -> Option<Self> {
+        if a.nrows() >= a.ncols() {
+            return Self::of_tall(a);
+        }
+        let turned = Self::of_tall(&a.transpose())?;
+        Some(Self { u: turned.v, values: turned.values, v: turned.u })
+    }
+
+    fn of_tall(a: &DMatrix<f64>) -> Option<Self> {
+        let size = a.amax();
+        if size == 0.0 || a.is_empty() {
+            let (rows, cols) = a.shape();
+            let u = DMatrix::identity(rows, rows);
+            return Some(Self {
+                u,
+                values: DVector::zeros(cols),
+                v: DMatrix::identity(cols, cols),
+            });
+        }
+        if !size.is_finite() || a.iter().any(|entry| entry.is_nan()) {
+            return None;
+        }
+        let (images, v) = orthogonal_images(a / size)?;
+        let norms: Vec<f64> = images.column_iter().map(|column| column.norm()).collect();
+        let mut order: Vec<usize> = (0..norms.len()).collect();
+        order.sort_by(|&i, &j| norms[j].total_cmp(&norms[i]));
+        let mut u = DMatrix::zeros(a.nrows(), a.nrows());
+        let rank = order.iter().filter(|&&k| norms[k] > NOTHING).count();
+        for (at, &k) in order.iter().take(rank).enumerate() {
+            u.set_column(at, &(images.column(k) / norms[k]));
+        }
+        complete(&mut u, rank);
+        let value = |at: usize| if at < rank { norms[order[at]] * size } else { 0.0 };
+        let values = DVector::from_fn(order.len(), |at, _| value(at));
+        Some(Self { u, values, v: v.select_columns(&order) })
+    }
+}
+
+/// A V with orthogonal columns, and V.
+fn orthogonal_images(mut images: DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
+    let cols = images.ncols();
+    let mut v = DMatrix::identity(cols, cols);
+    for _ in 0..SWEEPS {
+        let mut rotated = false;
+        for p in 0..cols {
+            for q in p + 1..cols {
+                if let Some((c, s)) = rotation(&images, p, q) {
+                    rotate(&mut images, p, q, c, s);
+                    rotate(&mut v, p, q, c, s);
+                    rotated = true;
+                }
+            }
+        }
+        if !rotated {
+            return Some((images, v));
+        }
+    }
+    None
+}
+
+/// Cosine and sine that make columns p and q orthogonal; None if they are.
+fn rotation(m: &DMatrix<f64>, p: usize, q: usize) -> Option<(f64, f64)> {
+    let (a, b) = (m.column(p), m.column(q));
+    let (first, second) = (a.norm(), b.norm());
+    if first <= NOTHING || second <= NOTHING {
+        return None;
+    }
+    let cosine = (a / first).dot(&(b / second));
+    let rounding = f64::from(u32::try_from(m.nrows().max(4)).unwrap_or(u32::MAX)) * f64::EPSILON;
+    if cosine.abs() <= rounding {
+        return None;
+    }
+    let zeta = (second / first - first / second) / (2.0 * cosine);
+    let tangent = 1.0_f64.copysign(zeta) / (zeta.abs() + zeta.hypot(1.0));
+    let c = 1.0 / tangent.hypot(1.0);
+    Some((c, c * tangent))
+}
+
+/// Columns a, b become c a - s b, s a + c b.
+fn rotate(m: &mut DMatrix<f64>, p: usize, q: usize, c: f64, s: f64) {
+    for row in 0..m.nrows() {
+        let (a, b) = (m[(row, p)], m[(row, q)]);
+        (m[(row, p)], m[(row, q)]) = (c * a - s * b, s * a + c * b);
+    }
+}
+
+/// Orthonormal columns from `done` on: of the unit vectors the one farthest from the columns
+/// before, made orthogonal to them twice.
+fn complete(u: &mut DMatrix<f64>, done: usize) {
+    let n = u.nrows();
+    for at in done..n {
+        let before = u.columns(0, at).into_owned();
+        let distance = |k: usize| 1.0 - before.row(k).norm_squared();
+        let farthest = (0..n).max_by(|&i, &j| distance(i).total_cmp(&distance(j)));
+        let mut column = DVector::zeros(n);
+        column[farthest.unwrap_or(0)] = 1.0;
+        for _ in 0..2 {
+            column -= &before * before.tr_mul(&column);
+            column.normalize_mut();
+        }
+        u.set_column(at, &column);
+    }
+}

@@ -1,0 +1,62 @@
+//! Eigenvalues and eigenvectors of a symmetric matrix by plane rotations.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Six to ten sweeps are usual.
+const SWEEPS: usize = 60;
+
+/// A V = V diag(values), V orthogonal, values ascending; A is given by its upper triangle.
+///
+/// None when the rotations do not end. An entry that is not finite makes all answers NaN.
+pub(crate) fn eigen(a: &DMatrix<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    let n = a.nrows();
+    let mut m = DMatrix::from_fn(n, n, |row, col| a[(row.min(col), row.max(col))]);
+    if m.iter().any(|entry| !entry.is_finite()) {
+        return Some((DVector::repeat(n, f64::NAN), DMatrix::repeat(n, n, f64::NAN)));
+    }
+    let mut v = DMatrix::identity(n, n);
+    for _ in 0..SWEEPS {
+        let mut rotated = false;
+        for p in 0..n {
+            for q in p + 1..n {
+                rotated |= annihilate(&mut m, &mut v, p, q);
+            }
+        }
+        if !rotated {
+            return Some(ascending(&m, &v));
+        }
+    }
+    None
+}
+
+/// Rotates the plane of p and q so that m[p, q] becomes zero; false if it is nothing already.
+fn annihilate(m: &mut DMatrix<f64>, v: &mut DMatrix<f64>, p: usize, q: usize) -> bool {
+    let coupling = m[(p, q)];
+    let scale = m[(p, p)].abs() + m[(q, q)].abs();
+    if coupling.abs() <= f64::EPSILON * scale {
+        (m[(p, q)], m[(q, p)]) = (0.0, 0.0);
+        return false;
+    }
+    let theta = (m[(q, q)] - m[(p, p)]) / (2.0 * coupling);
+    let tangent = 1.0_f64.copysign(theta) / (theta.abs() + theta.hypot(1.0));
+    let c = 1.0 / tangent.hypot(1.0);
+    let s = c * tangent;
+    for k in 0..m.nrows() {
+        let (x, y) = (m[(k, p)], m[(k, q)]);
+        (m[(k, p)], m[(k, q)]) = (c * x - s * y, s * x + c * y);
+        let (x, y) = (v[(k, p)], v[(k, q)]);
+        (v[(k, p)], v[(k, q)]) = (c * x - s * y, s * x + c * y);
+    }
+    for k in 0..m.nrows() {
+        let (x, y) = (m[(p, k)], m[(q, k)]);
+        (m[(p, k)], m[(q, k)]) = (c * x - s * y, s * x + c * y);
+    }
+    (m[(p, q)], m[(q, p)]) = (0.0, 0.0);
+    true
+}
+
+fn ascending(m: &DMatrix<f64>, v: &DMatrix<f64>) -> (DVector<f64>, DMatrix<f64>) {
+    let mut order: Vec<usize> = (0..m.nrows()).collect();
+    order.sort_by(|&i, &j| m[(i, i)].total_cmp(&m[(j, j)]));
+    (DVector::from_fn(order.len(), |k, _| m[(order[k], order[k])]), v.select_columns(&order))
+}

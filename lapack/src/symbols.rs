@@ -1,0 +1,392 @@
+//! The C side: names, arguments and failure codes of the reference implementation.
+//!
+//! A reference in a signature is a pointer that must not be null. The workspaces are not used: one
+//! entry is the size that the routines ask for.
+#![expect(unsafe_code, reason = "the boundary to callers in C and Fortran")]
+
+use crate::memory::{Number, Part};
+use crate::products::{
+    Operand, Target, general, mixed_square, on_vector, square, symmetric_on_vector,
+};
+use crate::routines::{Array, Factors, Spectrum, gesv, potrf, potrs, singular_values, syevr};
+
+/// INFO of an answer.
+fn code(answer: Result<(), i32>) -> i32 {
+    answer.err().unwrap_or(0)
+}
+
+macro_rules! gemm {
+    ($symbol:ident, $number:ty) => {
+        /// C := alpha op(A) op(B) + beta C.
+        ///
+        /// # Safety
+        ///
+        /// The arrays are as large as the reference implementation wants them.
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $symbol(
+            transa: &u8,
+            transb: &u8,
+            m: &i32,
+            n: &i32,
+            k: &i32,
+            alpha: &$number,
+            a: *const $number,
+            lda: &i32,
+            b: *const $number,
+            ldb: &i32,
+            beta: &$number,
+            c: *mut $number,
+            ldc: &i32,
+        ) {
+            let left = Operand { at: a, leading: *lda, turned: *transa };
+            let right = Operand { at: b, leading: *ldb, turned: *transb };
+            let part = Some(Part::All);
+            let target = Target { at: c, leading: *ldc, part, alpha: *alpha, beta: *beta };
+            // SAFETY: as the caller promises.
+            unsafe { general((*m, *n, *k), &left, &right, &target) };
+        }
+    };
+}
+
+macro_rules! gemv {
+    ($symbol:ident, $number:ty) => {
+        /// y := alpha op(A) x + beta y.
+        ///
+        /// # Safety
+        ///
+        /// The arrays are as large as the reference implementation wants them.
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $symbol(
+            trans: &u8,
+            m: &i32,
+            n: &i32,
+            alpha: &$number,
+            a: *const $number,
+            lda: &i32,
+            x: *const $number,
+            incx: &i32,
+            beta: &$number,
+            y: *mut $number,
+            incy: &i32,
+        ) {
+            let matrix = Operand { at: a, leading: *lda, turned: *trans };
+            // SAFETY: as the caller promises.
+            unsafe { on_vector((*m, *n), &matrix, (x, *incx), (*alpha, *beta), (y, *incy)) };
+        }
+    };
+}
+
+macro_rules! symv {
+    ($symbol:ident, $number:ty) => {
+        /// y := alpha A x + beta y with A symmetric.
+        ///
+        /// # Safety
+        ///
+        /// The arrays are as large as the reference implementation wants them.
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $symbol(
+            uplo: &u8,
+            n: &i32,
+            alpha: &$number,
+            a: *const $number,
+            lda: &i32,
+            x: *const $number,
+            incx: &i32,
+            beta: &$number,
+            y: *mut $number,
+            incy: &i32,
+        ) {
+            let factors = (*alpha, *beta);
+            // SAFETY: as the caller promises.
+            unsafe { symmetric_on_vector((*uplo, *n), (a, *lda), (x, *incx), factors, (y, *incy)) };
+        }
+    };
+}
+
+macro_rules! syrk {
+    ($symbol:ident, $number:ty) => {
+        /// A triangle of C := alpha op(A) op(A)' + beta C.
+        ///
+        /// # Safety
+        ///
+        /// The arrays are as large as the reference implementation wants them.
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $symbol(
+            uplo: &u8,
+            trans: &u8,
+            n: &i32,
+            k: &i32,
+            alpha: &$number,
+            a: *const $number,
+            lda: &i32,
+            beta: &$number,
+            c: *mut $number,
+            ldc: &i32,
+        ) {
+            let left = Operand { at: a, leading: *lda, turned: *trans };
+            let part = Part::triangle(*uplo);
+            let target = Target { at: c, leading: *ldc, part, alpha: *alpha, beta: *beta };
+            // SAFETY: as the caller promises.
+            unsafe { square((*n, *k), &left, &target) };
+        }
+    };
+}
+
+macro_rules! syr2k {
+    ($symbol:ident, $number:ty) => {
+        /// A triangle of C := alpha (op(A) op(B)' + op(B) op(A)') + beta C.
+        ///
+        /// # Safety
+        ///
+        /// The arrays are as large as the reference implementation wants them.
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $symbol(
+            uplo: &u8,
+            trans: &u8,
+            n: &i32,
+            k: &i32,
+            alpha: &$number,
+            a: *const $number,
+            lda: &i32,
+            b: *const $number,
+            ldb: &i32,
+            beta: &$number,
+            c: *mut $number,
+            ldc: &i32,
+        ) {
+            let left = Operand { at: a, leading: *lda, turned: *trans };
+            let right = Operand { at: b, leading: *ldb, turned: *trans };
+            let part = Part::triangle(*uplo);
+            let target = Target { at: c, leading: *ldc, part, alpha: *alpha, beta: *beta };
+            // SAFETY: as the caller promises.
+            unsafe { mixed_square((*n, *k), &left, &right, &target) };
+        }
+    };
+}
+
+macro_rules! potrf {
+    ($symbol:ident, $number:ty) => {
+        /// The Cholesky factor of A.
+        ///
+        /// # Safety
+        ///
+        /// The arrays are as large as the reference implementation wants them.
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $symbol(
+            uplo: &u8,
+            n: &i32,
+            a: *mut $number,
+            lda: &i32,
+            info: &mut i32,
+        ) {
+            // SAFETY: as the caller promises.
+            let answer = unsafe { potrf(*uplo, *n, Array { at: a, leading: *lda }) };
+            *info = code(answer);
+        }
+    };
+}
+
+macro_rules! potrs {
+    ($symbol:ident, $number:ty) => {
+        /// A X = B with the Cholesky factor of A.
+        ///
+        /// # Safety
+        ///
+        /// The arrays are as large as the reference implementation wants them.
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $symbol(
+            uplo: &u8,
+            n: &i32,
+            nrhs: &i32,
+            a: *const $number,
+            lda: &i32,
+            b: *mut $number,
+            ldb: &i32,
+            info: &mut i32,
+        ) {
+            let factor = Array { at: a.cast_mut(), leading: *lda };
+            let right = Array { at: b, leading: *ldb };
+            // SAFETY: as the caller promises; the factor is only read.
+            let answer = unsafe { potrs(*uplo, (*n, *nrhs), factor, right) };
+            *info = code(answer);
+        }
+    };
+}
+
+macro_rules! gesv {
+    ($symbol:ident, $number:ty) => {
+        /// A X = B by elimination.
+        ///
+        /// # Safety
+        ///
+        /// The arrays are as large as the reference implementation wants them.
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $symbol(
+            n: &i32,
+            nrhs: &i32,
+            a: *mut $number,
+            lda: &i32,
+            ipiv: *mut i32,
+            b: *mut $number,
+            ldb: &i32,
+            info: &mut i32,
+        ) {
+            let (matrix, right) = (Array { at: a, leading: *lda }, Array { at: b, leading: *ldb });
+            // SAFETY: as the caller promises.
+            let answer = unsafe { gesv((*n, *nrhs), matrix, ipiv, right) };
+            *info = code(answer);
+        }
+    };
+}
+
+macro_rules! syevr {
+    ($symbol:ident, $number:ty) => {
+        /// Eigenvalues and eigenvectors of a symmetric A.
+        ///
+        /// # Safety
+        ///
+        /// The arrays are as large as the reference implementation wants them.
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $symbol(
+            jobz: &u8,
+            range: &u8,
+            uplo: &u8,
+            n: &i32,
+            a: *mut $number,
+            lda: &i32,
+            _vl: &$number,
+            _vu: &$number,
+            _il: &i32,
+            _iu: &i32,
+            _abstol: &$number,
+            m: *mut i32,
+            w: *mut $number,
+            z: *mut $number,
+            ldz: &i32,
+            isuppz: *mut i32,
+            work: *mut $number,
+            lwork: &i32,
+            iwork: *mut i32,
+            liwork: &i32,
+            info: &mut i32,
+        ) {
+            if *lwork == -1 || *liwork == -1 {
+                // SAFETY: the two workspaces have at least one entry.
+                unsafe { (work.write(Number::narrow(1.0)), iwork.write(1)) };
+                *info = 0;
+                return;
+            }
+            let vectors = Array { at: z, leading: *ldz };
+            let matrix = Array { at: a, leading: *lda };
+            let to = Spectrum { count: m, values: w, vectors, support: isuppz };
+            // SAFETY: as the caller promises.
+            let answer = unsafe { syevr((*jobz, *range, *uplo), *n, matrix, &to) };
+            *info = code(answer);
+        }
+    };
+}
+
+macro_rules! gesdd {
+    ($symbol:ident, $number:ty) => {
+        /// The singular value decomposition of A, one option for both sides.
+        ///
+        /// # Safety
+        ///
+        /// The arrays are as large as the reference implementation wants them.
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $symbol(
+            jobz: &u8,
+            m: &i32,
+            n: &i32,
+            a: *mut $number,
+            lda: &i32,
+            s: *mut $number,
+            u: *mut $number,
+            ldu: &i32,
+            vt: *mut $number,
+            ldvt: &i32,
+            work: *mut $number,
+            lwork: &i32,
+            _iwork: *mut i32,
+            info: &mut i32,
+        ) {
+            if *lwork == -1 {
+                // SAFETY: the workspace has at least one entry.
+                unsafe { work.write(Number::narrow(1.0)) };
+                *info = 0;
+                return;
+            }
+            let left = (*jobz, Array { at: u, leading: *ldu });
+            let right = (*jobz, Array { at: vt, leading: *ldvt });
+            let matrix = Array { at: a, leading: *lda };
+            let to = Factors { values: s, left, right };
+            // SAFETY: as the caller promises.
+            let answer = unsafe { singular_values((*m, *n), matrix, &to, 2) };
+            *info = code(answer);
+        }
+    };
+}
+
+macro_rules! gesvd {
+    ($symbol:ident, $number:ty) => {
+        /// The singular value decomposition of A, one option for each side.
+        ///
+        /// # Safety
+        ///
+        /// The arrays are as large as the reference implementation wants them.
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $symbol(
+            jobu: &u8,
+            jobvt: &u8,
+            m: &i32,
+            n: &i32,
+            a: *mut $number,
+            lda: &i32,
+            s: *mut $number,
+            u: *mut $number,
+            ldu: &i32,
+            vt: *mut $number,
+            ldvt: &i32,
+            work: *mut $number,
+            lwork: &i32,
+            info: &mut i32,
+        ) {
+            if *lwork == -1 {
+                // SAFETY: the workspace has at least one entry.
+                unsafe { work.write(Number::narrow(1.0)) };
+                *info = 0;
+                return;
+            }
+            let left = (*jobu, Array { at: u, leading: *ldu });
+            let right = (*jobvt, Array { at: vt, leading: *ldvt });
+            let matrix = Array { at: a, leading: *lda };
+            let to = Factors { values: s, left, right };
+            // SAFETY: as the caller promises.
+            let answer = unsafe { singular_values((*m, *n), matrix, &to, 3) };
+            *info = code(answer);
+        }
+    };
+}
+
+gemm!(dgemm_, f64);
+gemm!(sgemm_, f32);
+gemv!(dgemv_, f64);
+gemv!(sgemv_, f32);
+symv!(dsymv_, f64);
+symv!(ssymv_, f32);
+syrk!(dsyrk_, f64);
+syrk!(ssyrk_, f32);
+syr2k!(dsyr2k_, f64);
+syr2k!(ssyr2k_, f32);
+potrf!(dpotrf_, f64);
+potrf!(spotrf_, f32);
+potrs!(dpotrs_, f64);
+potrs!(spotrs_, f32);
+gesv!(dgesv_, f64);
+gesv!(sgesv_, f32);
+syevr!(dsyevr_, f64);
+syevr!(ssyevr_, f32);
+gesdd!(dgesdd_, f64);
+gesdd!(sgesdd_, f32);
+gesvd!(dgesvd_, f64);
+gesvd!(sgesvd_, f32);
