@@ -48,7 +48,7 @@ impl Loss {
         all
     }
 
-    /// u / (u^2 + u_e^2) and its derivative with respect to u.
+    /// The factor of -f_hat in E_hat, and its derivative with respect to u.
     fn inverse(&self, u: &[f64]) -> (f64, f64) {
         let u = u[self.actuator];
         let scale = 1.0 / (u * u + self.least_command * self.least_command);

@@ -7,6 +7,10 @@ use super::*;
 mod dependencies;
 mod derivatives;
 mod exchange;
+mod extended;
+mod oracle;
+mod refusals;
+mod sampled;
 mod sized;
 
 /// The folder with the shipped design.
@@ -168,27 +172,4 @@ fn steps_of_a_known_size_allocate_nothing() {
         }
     });
     assert_eq!(allocations.count_total, 0);
-}
-
-#[test]
-fn a_design_that_does_not_fit_is_refused_by_matrix_and_shape() {
-    let wrong = [
-        ("L_f = [[-12.0]]", "L_f = [[-12.0, 1.0]]", "L_f is 1 x 2, expected 1 x 1"),
-        ("B = [[0.0], [2.0]]", "B = [[0.0]]", "B is 1 x 1, expected 2 x 1"),
-        ("A = [[0.0, 1.0], [0.0, -0.2]]", "A = [[0.0, 1.0], [0.0]]", "row 2 has 1 entries"),
-        ("K_f = [[1.0]]", "K_f = [[nan]]", "K_f[1,1] = NaN"),
-        ("K_f = [[1.0]]", "", "K_f"),
-        ("t_on = 0.35", "t_on = 0.35\nt_off = 2.0", "t_off"),
-        ("t_on = 0.35", "t_on = inf", "t_on = inf"),
-        ("step_size = 0.01", "step_size = 0.0", "step_size = 0"),
-        ("A = [[", "A = [", "TOML"),
-    ];
-    for (from, to, expected) in wrong {
-        let text = small("").replace(from, to);
-        let message = with_design(&text).err().map(|failure| failure.to_string()).unwrap();
-        assert!(message.contains(expected), "{message:?} has no {expected:?}");
-        assert!(message.contains("design.toml"), "{message}");
-    }
-    let message = with_design(&small("limits = [2.0, 1.0]")).err().unwrap().to_string();
-    assert!(message.contains("limits"), "{message}");
 }
