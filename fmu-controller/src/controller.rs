@@ -7,8 +7,11 @@ use fmi2::{About, At, Event, Experiment, Failure, Model, ModelExchange, Step, Va
 use serde::{Deserialize, Serialize};
 
 use crate::design::Design;
-use crate::equations::{Knowns, Measurement, Mode};
+use crate::equations::{Knowns, Mode};
+use crate::loss::Loss;
 use crate::observer::{Conditions, Observer};
+use crate::sampled::{Sample, Sampler};
+use crate::signals::Signals;
 use crate::{names, variables};
 
 /// How far a free command passes a limit before that is an event, as part of the range of the
@@ -17,25 +20,30 @@ const HYSTERESIS: f64 = 1e-9;
 
 /// A fault-tolerant controller with an augmented state observer; any linear plant, any sizes.
 ///
-/// z = [x_hat; f_hat] is `estimate`, z' is `estimate_slopes`; everything else carries the name of
-/// its FMI variable.
+/// Everything but what is said here carries the name of its FMI variable.
 #[derive(Clone, Serialize, Deserialize)]
 pub(crate) struct AsoController {
     pub(crate) design: Design,
     pub(crate) x_hat_0: Vec<f64>,
     pub(crate) f_hat_0: Vec<f64>,
-    pub(crate) measurements: Vec<f64>,
-    pub(crate) measurement_slopes: Vec<f64>,
-    pub(crate) compensate: bool,
-    pub(crate) estimate: Vec<f64>,
-    pub(crate) estimate_slopes: Vec<f64>,
-    pub(crate) u: Vec<f64>,
+    /// Estimates, measurements, commands.
+    pub(crate) values: Signals,
+    /// y' as the importer gives it; z' and u'.
+    pub(crate) y_slopes: Vec<f64>,
+    pub(crate) z_slopes: Vec<f64>,
     pub(crate) u_slopes: Vec<f64>,
+    pub(crate) compensate: bool,
+    /// E_hat with its derivative.
+    pub(crate) losses: Vec<Loss>,
+    /// What the equations take in place of `values`, in a design with an operating point.
+    deviations: Option<Signals>,
     /// The mode that u and z' are those of. Whether it compensates is decided at the start, at each
-    /// end of a step and at events.
+    /// end of a step and at events; in a sampled controller at each sample.
     mode: Mode,
     /// Model exchange: a channel reaches or leaves a limit at events only.
     frozen: bool,
+    /// Of a sampled controller.
+    sampler: Option<Sampler>,
     /// Follows from `design`; made anew where an instance starts or is read from bytes.
     #[serde(skip)]
     observer: Option<Observer>,
@@ -53,17 +61,30 @@ impl AsoController {
         self.mode.estimating = self.mode.compensating || self.design.monitor;
     }
 
+    /// Finds the deviations of estimates and measurements.
+    fn deviate(&mut self) {
+        if let Some(deviations) = &mut self.deviations {
+            deviations.deviate(&self.design, &self.values);
+        }
+    }
+
+    /// What the equations take.
+    fn signals(&self) -> &Signals {
+        self.deviations.as_ref().unwrap_or(&self.values)
+    }
+
     /// Finds the channels at a limit.
     fn limit(&mut self) {
         let Mode { compensating, estimating, .. } = self.mode;
-        self.mode = Mode::of(&self.design, &self.estimate, compensating, estimating);
+        self.mode = Mode::of(&self.design, &self.signals().z, compensating, estimating);
     }
 
     /// The estimate as it starts.
     fn begin(&mut self) {
-        let (x_hat, f_hat) = self.estimate.split_at_mut(self.x_hat_0.len());
+        let [x_hat, f_hat, y_f] = self.design.parts_mut(&mut self.values.z);
         x_hat.copy_from_slice(&self.x_hat_0);
         f_hat.copy_from_slice(&self.f_hat_0);
+        y_f.iter_mut().zip(&self.values.y).for_each(|(y_f, y)| *y_f = *y);
     }
 
     /// Advances the estimate by the part of a step between `offset` and `offset + size`.
@@ -73,26 +94,86 @@ impl AsoController {
         compensating: bool,
         part: (f64, f64),
     ) -> Result<(), Failure> {
+        let Signals { z, y, .. } = self.deviations.as_mut().unwrap_or(&mut self.values);
         let conditions = Conditions {
             design: &self.design,
-            y: Measurement { value: &self.measurements, slope: &self.measurement_slopes },
+            y: [y, &self.y_slopes],
             compensating,
             estimating: compensating || self.design.monitor,
         };
         observer
-            .advance(&mut self.estimate, conditions, part)
+            .advance(z, conditions, part)
             .map_err(|error| Failure::Error(format!("the observer cannot be stepped: {error}")))
+    }
+
+    /// A step of the observer that is integrated.
+    fn integrate(&mut self, step: &Step) -> Result<(), Failure> {
+        let mut observer = self.observer.take().unwrap_or_else(|| Observer::new(&self.design));
+        let resolution = clock_rounding(step.end());
+        let until_on = self.design.t_on - step.start;
+        let inside = self.compensate && until_on > resolution && step.size - until_on > resolution;
+        self.deviate();
+        if inside {
+            self.advance(&mut observer, false, (0.0, until_on))?;
+            self.advance(&mut observer, true, (until_on, step.size - until_on))?;
+        } else {
+            let compensating = self.compensating(step.start);
+            self.advance(&mut observer, compensating, (0.0, step.size))?;
+        }
+        if let Some(deviations) = &self.deviations {
+            deviations.state_into(&self.design, &mut self.values.z);
+        }
+        self.observer = Some(observer);
+        self.switch(step.end());
+        self.evaluate(step.size);
+        Ok(())
     }
 
     /// u, u' and z' for the state and time reached, `offset` s after the measurements were set.
     fn evaluate(&mut self, offset: f64) {
+        self.deviate();
         if !self.frozen {
             self.limit();
         }
-        self.mode.command(&self.design, &self.estimate, &mut self.u);
-        let y = Measurement { value: &self.measurements, slope: &self.measurement_slopes };
-        let slopes = (&mut self.estimate_slopes[..], &mut self.u_slopes[..]);
-        self.mode.slopes(&self.design, &self.estimate, (y, offset), &self.u, slopes);
+        let Self { design, mode, z_slopes, u_slopes, .. } = self;
+        let own = self.deviations.as_mut().unwrap_or(&mut self.values);
+        mode.command(design, &own.z, &mut own.u);
+        let point = Knowns { design, signals: own };
+        mode.slopes(point, (&self.y_slopes, offset), (&mut *z_slopes, u_slopes));
+        if let Some(deviations) = &self.deviations {
+            deviations.command_into(design, *mode, &mut self.values.u);
+        }
+        let [_, f_hat, _] = design.parts(&self.values.z);
+        let [_, f_slopes, _] = design.parts(z_slopes);
+        for loss in &mut self.losses {
+            loss.estimate = loss.at(&self.values.u, f_hat);
+            loss.slope = loss.along([&self.values.u, u_slopes], [f_hat, f_slopes]);
+        }
+    }
+
+    /// Takes the samples that are due until `end`, with the measurements given at `begin`, in s.
+    fn sample(&mut self, begin: f64, end: f64) -> Result<(), Failure> {
+        let Some(mut sampler) = self.sampler.take_if(|sampler| !sampler.is_flooded(end)) else {
+            return Err(Failure::Error(format!(
+                "too many samples are due from {begin} to {end} s"
+            )));
+        };
+        while let Some(offset) = sampler.due(begin, end) {
+            self.switch(sampler.next_instant());
+            let sample = Sample {
+                design: &self.design,
+                slopes: (&self.y_slopes, offset),
+                compensating: self.mode.compensating,
+                estimating: self.mode.estimating,
+            };
+            self.mode = sampler.sample(sample, &mut self.values, &mut self.deviations);
+        }
+        let [_, f_hat, _] = self.design.parts(&self.values.z);
+        for loss in &mut self.losses {
+            loss.estimate = loss.at(&self.values.u, f_hat);
+        }
+        self.sampler = Some(sampler);
+        Ok(())
     }
 }
 
@@ -116,29 +197,30 @@ impl Model for AsoController {
                 start_time: Some(0.0),
                 stop_time: Some(self.design.experiment.stop_time),
                 tolerance: Some(1e-9),
-                step_size: Some(self.design.experiment.step_size),
+                step_size: Some(self.design.step_size()),
             },
         }
     }
 
     fn new(resources: &Path) -> Result<Self, Failure> {
         let design = Design::read(resources).map_err(|error| Failure::Error(error.to_string()))?;
-        let (n, q) = (design.states.len(), design.faults.len());
-        let (m, p) = (design.actuators.len(), design.measurements.len());
+        let operating = design.states.iter().map(|state| state.operating.unwrap_or_default());
+        let values = Signals::zero(&design);
         Ok(Self {
-            design,
-            x_hat_0: vec![0.0; n],
-            f_hat_0: vec![0.0; q],
-            measurements: vec![0.0; p],
-            measurement_slopes: vec![0.0; p],
+            x_hat_0: operating.collect(),
+            f_hat_0: vec![0.0; design.faults.len()],
+            y_slopes: vec![0.0; values.y.len()],
+            z_slopes: vec![0.0; values.z.len()],
+            u_slopes: vec![0.0; values.u.len()],
             compensate: true,
-            estimate: vec![0.0; n + q],
-            estimate_slopes: vec![0.0; n + q],
-            u: vec![0.0; m],
-            u_slopes: vec![0.0; m],
+            losses: Loss::all(&design),
+            deviations: design.has_operating_point().then(|| values.clone()),
             mode: Mode::default(),
             frozen: false,
+            sampler: Sampler::of(&design),
             observer: None,
+            values,
+            design,
         })
     }
 
@@ -157,65 +239,84 @@ impl Model for AsoController {
                 )));
             }
         }
-        Ok(())
+        match self.design.refused_filter() {
+            Some((name, value, rule)) => {
+                Err(Failure::Error(format!("{name} = {value}, expected {rule}")))
+            }
+            None => Ok(()),
+        }
     }
 
     fn initialize(&mut self, experiment: &Experiment) -> Result<(), Failure> {
+        let time = experiment.start_time;
         self.begin();
         self.observer = None;
         self.frozen = false;
-        self.switch(experiment.start_time);
-        self.update(experiment.start_time)
-    }
-
-    fn step(&mut self, step: &Step) -> Result<(), Failure> {
-        let mut observer = self.observer.take().unwrap_or_else(|| Observer::new(&self.design));
-        let resolution = clock_rounding(step.end());
-        let until_on = self.design.t_on - step.start;
-        let inside = self.compensate && until_on > resolution && step.size - until_on > resolution;
-        if inside {
-            self.advance(&mut observer, false, (0.0, until_on))?;
-            self.advance(&mut observer, true, (until_on, step.size - until_on))?;
-        } else {
-            let compensating = self.compensating(step.start);
-            self.advance(&mut observer, compensating, (0.0, step.size))?;
+        if let Some(sampler) = &mut self.sampler {
+            sampler.begin(time, &self.values.z);
+            return self.sample(time, time);
         }
-        self.observer = Some(observer);
-        self.switch(step.end());
-        self.evaluate(step.size);
-        Ok(())
-    }
-
-    fn update(&mut self, _time: f64) -> Result<(), Failure> {
+        self.switch(time);
         self.evaluate(0.0);
         Ok(())
     }
 
+    fn step(&mut self, step: &Step) -> Result<(), Failure> {
+        if self.sampler.is_some() {
+            return self.sample(step.start, step.end());
+        }
+        self.integrate(step)
+    }
+
+    fn update(&mut self, _time: f64) -> Result<(), Failure> {
+        if self.sampler.is_none() {
+            self.evaluate(0.0);
+        }
+        Ok(())
+    }
+
     fn differentiate(&self, at: &At, direction: &mut Self) -> Result<(), Failure> {
-        if *at == At::Initialization {
+        let starts = *at == At::Initialization;
+        if !starts && self.sampler.is_some() {
+            // Between samples nothing changes.
+            return Ok(());
+        }
+        if starts {
             direction.begin();
         }
-        let point = Knowns { design: &self.design, z: &self.estimate, y: &self.measurements };
-        let along = Knowns {
-            design: &direction.design,
-            z: &direction.estimate,
-            y: &direction.measurements,
-        };
-        let unknowns = (&mut direction.u[..], &mut direction.estimate_slopes[..]);
-        self.mode.differentiate(&point, &self.u, &along, unknowns);
+        direction.deviate();
+        let point = Knowns { design: &self.design, signals: self.signals() };
+        let Self { design, values, deviations, z_slopes, .. } = direction;
+        let along = deviations.as_mut().unwrap_or(values);
+        if let (Some(own), Some(sampler)) = (&self.sampler, &mut direction.sampler) {
+            own.first_sample_along(self.mode, point, design, (along, sampler.changes()));
+        } else {
+            self.mode.command_along(point, design, along);
+            self.mode.slopes_along(point, Knowns { design, signals: along }, z_slopes);
+        }
+        if let Some(deviations) = deviations {
+            deviations.state_into(design, &mut values.z);
+            deviations.command_into(design, self.mode, &mut values.u);
+        }
+        let [_, f_hat, _] = design.parts(&self.values.z);
+        let [_, df_hat, _] = design.parts(&values.z);
+        for (loss, own) in direction.losses.iter_mut().zip(&self.losses) {
+            loss.estimate = own.along([&self.values.u, &values.u], [f_hat, df_hat]);
+        }
         Ok(())
     }
 
     fn model_exchange(&self) -> Option<ModelExchange> {
         let limited = self.design.actuators.iter().filter(|actuator| actuator.limits.is_some());
-        Some(ModelExchange { event_indicators: 2 * limited.count() })
+        let event_indicators = if self.sampler.is_some() { 0 } else { 2 * limited.count() };
+        Some(ModelExchange { event_indicators })
     }
 
     fn event_indicators(&self, _time: f64, indicators: &mut [f64]) {
         let mut pairs = indicators.chunks_exact_mut(2);
         for (j, actuator) in self.design.actuators.iter().enumerate() {
-            let Some([low, high]) = actuator.limits else { continue };
-            let command = self.mode.free_command(&self.design, &self.estimate, j);
+            let Some([low, high]) = actuator.range() else { continue };
+            let command = self.mode.free_command(&self.design, &self.signals().z, j);
             let distances = [command - low, high - command];
             for (side, indicator) in pairs.next().into_iter().flatten().enumerate() {
                 let beyond = if self.mode.is_at(side, j) { -HYSTERESIS } else { HYSTERESIS };
@@ -225,8 +326,14 @@ impl Model for AsoController {
     }
 
     fn event(&mut self, time: f64) -> Result<Event, Failure> {
+        if self.sampler.is_some() {
+            self.sample(time, time)?;
+            let next_event_time = self.sampler.as_ref().map(Sampler::next_instant);
+            return Ok(Event { next_event_time, ..Event::default() });
+        }
         self.frozen = true;
         self.switch(time);
+        self.deviate();
         self.limit();
         let waiting = self.compensate && !self.mode.compensating;
         Ok(Event { next_event_time: waiting.then_some(self.design.t_on), ..Event::default() })

@@ -1,18 +1,22 @@
-//! What commands and derivatives depend on: `ModelStructure` of the controller.
+//! What commands, estimates and derivatives depend on: `ModelStructure` of the controller.
 //!
 //! All matrices are parameters, so an element that is zero in the design counts like any other.
 //! Whether the fault is compensated, and whether it is estimated, changes at events (in
 //! co-simulation: in steps); so `compensate` and `time` are on none of the lists for a point in
 //! time. A channel that reaches a limit switches by its own value: no linear relationship.
+//!
+//! A sampled controller changes its outputs at samples only (`fmi2DoStep`, `fmi2NewDiscreteStates`),
+//! so at a point in time they depend on nothing. Its initial values are those of sample 0.
 
 use fmi2::description::DependencyKind::{self, Dependent, Discrete, Fixed};
 
-use crate::design::Design;
+use crate::design::{Design, Estimator};
+use crate::loss::Loss;
 use crate::matrix::Matrix;
 use crate::names;
 
 /// Knowns that enter with the same kind of factor.
-type Group = (DependencyKind, Vec<String>);
+pub(crate) type Group = (DependencyKind, Vec<String>);
 
 fn x_hat(design: &Design) -> Vec<String> {
     names::channels("x_hat", design.states.len()).collect()
@@ -26,27 +30,46 @@ fn measurements(design: &Design) -> Vec<String> {
     design.measurements.iter().map(|signal| signal.name.clone()).collect()
 }
 
+/// What the innovation follows: the filtered measurements, or the measurements.
+fn observed(design: &Design) -> Vec<String> {
+    match design.filter {
+        Some(_) => names::filtered(design).collect(),
+        None => measurements(design),
+    }
+}
+
 /// The kinds of K_x and of K_f while it compensates: factors of u, where no limit cuts it off.
 fn kinds_of_feedback(limited: bool) -> [DependencyKind; 2] {
     if limited { [Dependent, Dependent] } else { [Fixed, Discrete] }
 }
 
 /// Of command `j`.
-pub(crate) fn of_command(design: &Design, j: usize) -> [Group; 2] {
+pub(crate) fn of_command(design: &Design, j: usize) -> Vec<Group> {
     let [state, fault] = kinds_of_feedback(design.actuators[j].limits.is_some());
-    [(state, x_hat(design)), (fault, f_hat(design))]
+    vec![(state, x_hat(design)), (fault, f_hat(design))]
 }
 
-/// Of each element of x_hat'.
-pub(crate) fn of_state_slope(design: &Design) -> [Group; 3] {
-    let limited = design.actuators.iter().any(|actuator| actuator.limits.is_some());
-    let [state, fault] = kinds_of_feedback(limited);
-    [(Fixed, measurements(design)), (state, x_hat(design)), (fault, f_hat(design))]
+/// Of each loss of effectiveness.
+pub(crate) fn of_loss(design: &Design) -> Vec<Group> {
+    vec![(Dependent, x_hat(design)), (Dependent, f_hat(design))]
 }
 
-/// Of each element of f_hat'.
-pub(crate) fn of_fault_slope(design: &Design) -> [Group; 2] {
-    [(Discrete, measurements(design)), (Discrete, x_hat(design))]
+/// Of element `i` of z'.
+pub(crate) fn of_slope(design: &Design, i: usize) -> Vec<Group> {
+    let (n, q) = (design.states.len(), design.faults.len());
+    if i < n {
+        let limited = design.actuators.iter().any(|actuator| actuator.limits.is_some());
+        let [state, fault] = kinds_of_feedback(limited);
+        vec![(Fixed, observed(design)), (state, x_hat(design)), (fault, f_hat(design))]
+    } else if i < n + q {
+        let mut groups = vec![(Discrete, observed(design)), (Discrete, x_hat(design))];
+        groups.extend(design.a_f.as_ref().map(|_| (Discrete, f_hat(design))));
+        groups
+    } else {
+        let k = i - n - q;
+        let own = [design.measurements[k].name.clone()].into_iter();
+        vec![(Fixed, own.chain(names::filtered(design).nth(k)).collect())]
+    }
 }
 
 fn row<'a>(name: &'a str, matrix: &'a Matrix, row: usize) -> impl Iterator<Item = String> + 'a {
@@ -61,38 +84,114 @@ fn switches() -> Vec<String> {
     ["time", "compensate", "t_on"].map(str::to_owned).to_vec()
 }
 
-/// Of the initial value of command `j`.
-pub(crate) fn of_initial_command(design: &Design, j: usize) -> Vec<String> {
+/// `x_op` and `y_op`, where there are any.
+fn operating_states(design: &Design) -> impl Iterator<Item = String> {
+    names::operating(design, "x_op", design.states.len())
+}
+
+fn operating_command(design: &Design, j: usize) -> Option<String> {
+    names::operating(design, "u_op", design.actuators.len()).nth(j)
+}
+
+/// Of the initial innovations.
+fn of_innovations(design: &Design) -> Vec<String> {
+    let mut names = measurements(design);
+    names.extend(names::channels("x_hat_0", design.states.len()));
+    names.extend(whole("C", &design.c));
+    names.extend(operating_states(design));
+    names.extend(names::operating(design, "y_op", design.measurements.len()));
+    names
+}
+
+fn is_current(design: &Design) -> bool {
+    design.estimator == Some(Estimator::Current)
+}
+
+/// Of the initial value of the deviation of command `j` from the operating point.
+fn of_initial_deviation(design: &Design, j: usize) -> Vec<String> {
     let mut names = switches();
     names.extend(names::starts(design));
     names.extend(row("K_x", &design.k_x, j));
     names.extend(row("K_f", &design.k_f, j));
+    names.extend(operating_states(design));
     if design.actuators[j].limits.is_some() {
         names.extend([0, 1].map(|side| names::limit(design, side, j)));
+        names.extend(operating_command(design, j));
+    }
+    if is_current(design) {
+        names.extend(of_innovations(design));
+        names.extend(whole("L_x", &design.l_x));
+        names.extend(whole("L_f", &design.l_f));
     }
     names
 }
 
-/// Of the initial value of element `i` of x_hat'.
-pub(crate) fn of_initial_state_slope(design: &Design, i: usize) -> Vec<String> {
-    let mut names = measurements(design);
-    names.extend((0..design.actuators.len()).flat_map(|j| of_initial_command(design, j)));
+/// Of the initial value of command `j`.
+pub(crate) fn of_initial_command(design: &Design, j: usize) -> Vec<String> {
+    let mut names = of_initial_deviation(design, j);
+    names.extend(operating_command(design, j));
+    names
+}
+
+/// Of the initial value of a loss of effectiveness.
+pub(crate) fn of_initial_loss(design: &Design, loss: &Loss) -> Vec<String> {
+    let mut names = of_initial_command(design, loss.actuator);
+    names.extend(of_initial_estimate(design, design.states.len() + loss.fault));
+    names
+}
+
+/// Of the initial value of element `i` of z.
+pub(crate) fn of_initial_estimate(design: &Design, i: usize) -> Vec<String> {
+    let (n, q) = (design.states.len(), design.faults.len());
+    if i >= n + q {
+        return vec![design.measurements[i - n - q].name.clone()];
+    }
+    let mut names: Vec<_> = names::starts(design).nth(i).into_iter().collect();
+    if is_current(design) {
+        names.extend(of_innovations(design));
+        if i < n {
+            names.extend(row("L_x", &design.l_x, i));
+        } else {
+            names.extend(switches());
+            names.push("monitor".to_owned());
+            names.extend(row("L_f", &design.l_f, i - n));
+        }
+    }
+    names
+}
+
+/// Of the initial value of element `i` of z'.
+pub(crate) fn of_initial_slope(design: &Design, i: usize) -> Vec<String> {
+    let (n, q) = (design.states.len(), design.faults.len());
+    if i < n {
+        of_initial_state_slope(design, i)
+    } else if i < n + q {
+        of_initial_fault_slope(design, i - n)
+    } else {
+        // y_f starts at y.
+        Vec::new()
+    }
+}
+
+fn of_initial_state_slope(design: &Design, i: usize) -> Vec<String> {
+    let mut names = of_innovations(design);
+    names.extend((0..design.actuators.len()).flat_map(|j| of_initial_deviation(design, j)));
     for (name, matrix) in
         [("A", &design.a), ("B", &design.b), ("F_a", &design.f_a), ("L_x", &design.l_x)]
     {
         names.extend(row(name, matrix, i));
     }
-    names.extend(whole("C", &design.c));
     names
 }
 
-/// Of the initial value of element `i` of f_hat'.
-pub(crate) fn of_initial_fault_slope(design: &Design, i: usize) -> Vec<String> {
+fn of_initial_fault_slope(design: &Design, i: usize) -> Vec<String> {
     let mut names = switches();
     names.push("monitor".to_owned());
-    names.extend(measurements(design));
-    names.extend(names::channels("x_hat_0", design.states.len()));
+    names.extend(of_innovations(design));
     names.extend(row("L_f", &design.l_f, i));
-    names.extend(whole("C", &design.c));
+    if let Some(a_f) = &design.a_f {
+        names.extend(row("A_f", a_f, i));
+        names.extend(names::channels("f_hat_0", design.faults.len()));
+    }
     names
 }

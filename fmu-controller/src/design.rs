@@ -1,13 +1,16 @@
 //! The design file `resources/design.toml`: the matrices of plant, gains and observer, and the
 //! names and units of the signals.
 
+mod checks;
+
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
 use crate::matrix::Matrix;
 
-/// A design as the file states it. Shapes: n states, m actuators, p measurements, q faults.
+/// A design as the file states it. Shapes: n states, m actuators, p measurements, q states of the
+/// fault model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Design {
@@ -18,6 +21,15 @@ pub(crate) struct Design {
     /// Whether the fault is estimated while it is not compensated.
     #[serde(default)]
     pub(crate) monitor: bool,
+    /// A sampled controller: its sample time in s. The matrices are then those of the sampled plant.
+    #[serde(default)]
+    pub(crate) sample_time: Option<f64>,
+    /// What a sampled controller computes its command from.
+    #[serde(default)]
+    pub(crate) estimator: Option<Estimator>,
+    /// The diagonal of W, p numbers, in 1/s; of a sampled controller without unit.
+    #[serde(default)]
+    pub(crate) filter: Option<Vec<f64>>,
     /// A, n x n.
     #[serde(rename = "A")]
     pub(crate) a: Matrix,
@@ -30,6 +42,9 @@ pub(crate) struct Design {
     /// F_a, n x q.
     #[serde(rename = "F_a")]
     pub(crate) f_a: Matrix,
+    /// A_f, q x q; without it the fault is constant.
+    #[serde(rename = "A_f", default)]
+    pub(crate) a_f: Option<Matrix>,
     /// K_x, m x n.
     #[serde(rename = "K_x")]
     pub(crate) k_x: Matrix,
@@ -48,13 +63,23 @@ pub(crate) struct Design {
     pub(crate) actuators: Vec<Actuator>,
     /// The p measurements; their names are those of the inputs.
     pub(crate) measurements: Vec<Signal>,
-    /// The q fault channels.
-    pub(crate) faults: Vec<Signal>,
+    /// The q states of the fault model.
+    pub(crate) faults: Vec<Fault>,
     /// The experiment that importers run by default.
     pub(crate) experiment: Defaults,
 }
 
-/// Name and unit of a signal.
+/// What the command of a sampled controller is computed from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Estimator {
+    /// From all measurements, those of the sample itself included.
+    Current,
+    /// From the measurements before the sample.
+    Prediction,
+}
+
+/// A state or a measurement.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Signal {
@@ -63,6 +88,9 @@ pub(crate) struct Signal {
     pub(crate) unit: Option<String>,
     #[serde(default)]
     pub(crate) description: String,
+    /// Value at the operating point.
+    #[serde(default)]
+    pub(crate) operating: Option<f64>,
 }
 
 /// An actuator, with its limits where it has any.
@@ -74,9 +102,29 @@ pub(crate) struct Actuator {
     pub(crate) unit: Option<String>,
     #[serde(default)]
     pub(crate) description: String,
+    /// Command at the operating point.
+    #[serde(default)]
+    pub(crate) operating: Option<f64>,
     /// The smallest and the largest command.
     #[serde(default)]
     pub(crate) limits: Option<[f64; 2]>,
+}
+
+/// A state of the fault model: a fault, or the rate of one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Fault {
+    pub(crate) name: String,
+    #[serde(default)]
+    pub(crate) unit: Option<String>,
+    #[serde(default)]
+    pub(crate) description: String,
+    /// The actuator whose loss of effectiveness this fault is.
+    #[serde(default)]
+    pub(crate) loss_of: Option<String>,
+    /// Commands of this size are large enough to tell the loss from.
+    #[serde(default)]
+    pub(crate) least_command: Option<f64>,
 }
 
 /// `DefaultExperiment`, times in s.
@@ -84,7 +132,9 @@ pub(crate) struct Actuator {
 #[serde(deny_unknown_fields)]
 pub(crate) struct Defaults {
     pub(crate) stop_time: f64,
-    pub(crate) step_size: f64,
+    /// Of a sampled controller the sample time, where it is not stated.
+    #[serde(default)]
+    pub(crate) step_size: Option<f64>,
 }
 
 /// Why a design file cannot be used.
@@ -94,12 +144,43 @@ pub(crate) enum DesignError {
     Unreadable { path: String, source: std::io::Error },
     #[error("{path}: {message}")]
     Malformed { path: String, message: String },
-    #[error("{path}: {matrix} is {found}, expected {expected} ({meaning})")]
-    Shape { path: String, matrix: &'static str, found: String, expected: String, meaning: String },
+    #[error("{path}: {what} is {found}, expected {expected} ({meaning})")]
+    Shape { path: String, what: &'static str, found: String, expected: String, meaning: String },
     #[error("{path}: {what} = {value}, expected {rule}")]
     Value { path: String, what: String, value: f64, rule: &'static str },
     #[error("{path}: {what}")]
-    Empty { path: String, what: &'static str },
+    Entry { path: String, what: String },
+}
+
+/// How a signal is called and measured.
+#[derive(Clone, Copy)]
+pub(crate) struct Label<'a> {
+    pub(crate) unit: Option<&'a String>,
+    /// Its description, or its name where it has none.
+    pub(crate) meaning: &'a str,
+}
+
+macro_rules! labelled {
+    ($($signal:ty),*) => {
+        $(impl $signal {
+            pub(crate) fn label(&self) -> Label<'_> {
+                let text = if self.description.is_empty() { &self.name } else { &self.description };
+                Label { unit: self.unit.as_ref(), meaning: text }
+            }
+        })*
+    };
+}
+
+labelled!(Signal, Actuator, Fault);
+
+impl Actuator {
+    /// The limits as deviations from the operating point.
+    pub(crate) fn range(&self) -> Option<[f64; 2]> {
+        match self.operating {
+            None => self.limits,
+            Some(operating) => self.limits.map(|limits| limits.map(|limit| limit - operating)),
+        }
+    }
 }
 
 impl Design {
@@ -115,7 +196,7 @@ impl Design {
 
     /// Reads a design from `text`; `path` is for messages.
     pub(crate) fn parse(text: &str, path: String) -> Result<Self, DesignError> {
-        let design: Self = match toml::from_str(text) {
+        let mut design: Self = match toml::from_str(text) {
             Ok(design) => design,
             Err(error) => {
                 return Err(DesignError::Malformed {
@@ -124,83 +205,56 @@ impl Design {
                 });
             }
         };
-        design.check_counts(&path)?;
-        design.check_shapes(&path)?;
-        design.check_values(&path)?;
+        design.complete_the_operating_point();
+        design.check(&path)?;
         Ok(design)
     }
 
-    fn check_counts(&self, path: &str) -> Result<(), DesignError> {
-        let counts = [
-            (self.states.len(), "at least one state is needed"),
-            (self.actuators.len(), "at least one actuator is needed"),
-            (self.measurements.len(), "at least one measurement is needed"),
-            (self.faults.len(), "at least one fault is needed"),
-        ];
-        match counts.iter().find(|(count, _)| *count == 0) {
-            Some(&(_, what)) => Err(DesignError::Empty { path: path.to_owned(), what }),
-            None if self.actuators.len() > 64 => {
-                Err(DesignError::Empty { path: path.to_owned(), what: "more than 64 actuators" })
+    /// Where one value of the operating point is stated, all others are 0.
+    fn complete_the_operating_point(&mut self) {
+        let signals = self.states.iter_mut().chain(&mut self.measurements);
+        let mut values: Vec<_> = signals.map(|signal| &mut signal.operating).collect();
+        values.extend(self.actuators.iter_mut().map(|actuator| &mut actuator.operating));
+        if values.iter().any(|value| value.is_some()) {
+            for value in values {
+                *value = value.or(Some(0.0));
             }
-            None => Ok(()),
         }
     }
 
-    fn check_shapes(&self, path: &str) -> Result<(), DesignError> {
-        let n = ("states", self.states.len());
-        let m = ("actuators", self.actuators.len());
-        let p = ("measurements", self.measurements.len());
-        let q = ("faults", self.faults.len());
-        let expected = [(n, n), (n, m), (p, n), (n, q), (m, n), (m, q), (n, p), (q, p)];
-        for ((matrix, found), (rows, columns)) in self.matrices().into_iter().zip(expected) {
-            if (found.rows, found.columns) != (rows.1, columns.1) {
-                return Err(DesignError::Shape {
-                    path: path.to_owned(),
-                    matrix,
-                    found: format!("{} x {}", found.rows, found.columns),
-                    expected: format!("{} x {}", rows.1, columns.1),
-                    meaning: format!("{} x {}", rows.0, columns.0),
-                });
-            }
-        }
-        Ok(())
+    /// Whether signals are deviations from an operating point.
+    pub(crate) fn has_operating_point(&self) -> bool {
+        self.actuators.iter().any(|actuator| actuator.operating.is_some())
     }
 
-    fn check_values(&self, path: &str) -> Result<(), DesignError> {
-        let refuse = |what: String, value: f64, rule: &'static str| {
-            Err(DesignError::Value { path: path.to_owned(), what, value, rule })
-        };
-        for (name, matrix) in self.matrices() {
-            for (k, &value) in matrix.values.iter().enumerate() {
-                if !value.is_finite() {
-                    return refuse(matrix.element(name, k), value, "a finite number");
-                }
-            }
-        }
-        if !self.t_on.is_finite() {
-            return refuse("t_on".to_owned(), self.t_on, "a time in s");
-        }
-        for actuator in &self.actuators {
-            if let Some([low, high]) = actuator.limits
-                && !(low.is_finite() && high.is_finite() && low < high)
-            {
-                let what = format!("limits of {} from {low} to", actuator.name);
-                return refuse(what, high, "two finite numbers, the smaller one first");
-            }
-        }
-        let Defaults { stop_time, step_size } = self.experiment;
-        if !(step_size > 0.0 && step_size.is_finite()) {
-            return refuse("step_size".to_owned(), step_size, "more than 0 s");
-        }
-        if !(stop_time > step_size && stop_time.is_finite()) {
-            return refuse("stop_time".to_owned(), stop_time, "more than step_size");
-        }
-        Ok(())
+    /// Where in z the filtered measurement `k` is.
+    pub(crate) fn filtered_at(&self, k: usize) -> usize {
+        self.states.len() + self.faults.len() + k
     }
 
-    /// The eight matrices by the name that the file and the variables have.
-    pub(crate) fn matrices(&self) -> [(&'static str, &Matrix); 8] {
-        [
+    /// The length of z.
+    pub(crate) fn order(&self) -> usize {
+        self.filtered_at(self.filter.as_ref().map_or(0, Vec::len))
+    }
+
+    /// x_hat, f_hat and y_f of z.
+    pub(crate) fn parts<'a>(&self, z: &'a [f64]) -> [&'a [f64]; 3] {
+        let (x_hat, rest) = z.split_at(self.states.len());
+        let (f_hat, y_f) = rest.split_at(self.faults.len());
+        [x_hat, f_hat, y_f]
+    }
+
+    /// x_hat, f_hat and y_f of z.
+    pub(crate) fn parts_mut<'a>(&self, z: &'a mut [f64]) -> [&'a mut [f64]; 3] {
+        let (x_hat, rest) = z.split_at_mut(self.states.len());
+        let (f_hat, y_f) = rest.split_at_mut(self.faults.len());
+        [x_hat, f_hat, y_f]
+    }
+
+    /// The matrices by the name that the file and the variables have; the last one is A_f, where it
+    /// is stated.
+    pub(crate) fn matrices(&self) -> impl Iterator<Item = (&'static str, &Matrix)> {
+        let always = [
             ("A", &self.a),
             ("B", &self.b),
             ("C", &self.c),
@@ -209,6 +263,7 @@ impl Design {
             ("K_f", &self.k_f),
             ("L_x", &self.l_x),
             ("L_f", &self.l_f),
-        ]
+        ];
+        always.into_iter().chain(self.a_f.as_ref().map(|matrix| ("A_f", matrix)))
     }
 }

@@ -1,33 +1,35 @@
 //! The equations of the controller, and their derivative along a direction.
 //!
-//! With z = [x_hat; f_hat], measurements y and the command u that is really applied (equations
+//! With z = [x_hat; f_hat; y_f], measurements y and the command u that is really applied (equations
 //! (1), (2), (4), (5), (18) of Patton and Klinkhieo (2009) in the general form)
 //!
 //! ```text
 //! x_hat' = A x_hat + B u + F_a f_hat + L_x (y - C x_hat)
-//! f_hat' = L_f (y - C x_hat)                    while estimating, else 0
+//! f_hat' = A_f f_hat + L_f (y - C x_hat)        while estimating, else 0
 //! u      = K_x x_hat + K_f f_hat                while compensating, else K_x x_hat
 //! ```
 //!
-//! and every channel of u kept within its limits.
+//! and every channel of u kept within its limits. A design without A_f has A_f = 0. In a design with
+//! a filter, y_f takes the place of y, and
+//!
+//! ```text
+//! y_f' = W (y - y_f)
+//! ```
+//!
+//! else z has no y_f. In a design with an operating point all signals, limits included, are
+//! deviations from it. A sampled controller has the same terms (`sampled.rs`).
 
 use serde::{Deserialize, Serialize};
 
 use crate::design::Design;
 use crate::matrix::Matrix;
+use crate::signals::Signals;
 
 /// What the equations start from, or a direction in all of it.
+#[derive(Clone, Copy)]
 pub(crate) struct Knowns<'a> {
     pub(crate) design: &'a Design,
-    pub(crate) z: &'a [f64],
-    pub(crate) y: &'a [f64],
-}
-
-/// The measurements over a step: y(t) = `value` + `slope` t.
-#[derive(Clone, Copy)]
-pub(crate) struct Measurement<'a> {
-    pub(crate) value: &'a [f64],
-    pub(crate) slope: &'a [f64],
+    pub(crate) signals: &'a Signals,
 }
 
 /// Which of the linear systems is in force: as long as the mode stays, all equations are linear.
@@ -44,11 +46,16 @@ pub(crate) struct Mode {
 }
 
 impl Mode {
+    /// With no channel at a limit.
+    pub(crate) fn free(compensating: bool, estimating: bool) -> Self {
+        Self { compensating, estimating, lower: 0, upper: 0 }
+    }
+
     /// The mode in which z evolves from here.
     pub(crate) fn of(design: &Design, z: &[f64], compensating: bool, estimating: bool) -> Self {
-        let mut mode = Self { compensating, estimating, lower: 0, upper: 0 };
+        let mut mode = Self::free(compensating, estimating);
         for (j, actuator) in design.actuators.iter().enumerate() {
-            if let Some([low, high]) = actuator.limits {
+            if let Some([low, high]) = actuator.range() {
                 let command = mode.free_command(design, z, j);
                 mode.lower |= u64::from(command < low) << j;
                 mode.upper |= u64::from(command > high) << j;
@@ -73,15 +80,20 @@ impl Mode {
             == (other.compensating, other.estimating, other.lower | other.upper)
     }
 
+    /// The one of a pair of limits that channel `j` is at.
+    pub(crate) fn side(self, limits: Option<[f64; 2]>, j: usize) -> Option<f64> {
+        let side = [0, 1].into_iter().find(|side| self.is_at(*side, j))?;
+        limits.map(|limits| limits[side])
+    }
+
     /// The limit that channel `j` is at.
     pub(crate) fn limit(self, design: &Design, j: usize) -> Option<f64> {
-        let side = [0, 1].into_iter().find(|side| self.is_at(*side, j))?;
-        design.actuators[j].limits.map(|limits| limits[side])
+        self.side(design.actuators[j].range(), j)
     }
 
     /// Channel `j` of K_x x_hat + K_f f_hat, the second part while compensating.
     pub(crate) fn free_command(self, design: &Design, z: &[f64], j: usize) -> f64 {
-        let (x_hat, f_hat) = z.split_at(design.states.len());
+        let [x_hat, f_hat, _] = design.parts(z);
         let mut command = design.k_x.row_times(j, x_hat);
         if self.compensating {
             command += design.k_f.row_times(j, f_hat);
@@ -96,77 +108,143 @@ impl Mode {
         }
     }
 
-    /// z' and u' at z under the command `u`, `offset` s after the begin of `y`.
-    pub(crate) fn slopes(
-        self,
-        design: &Design,
-        z: &[f64],
-        (y, offset): (Measurement<'_>, f64),
-        u: &[f64],
-        (z_slope, u_slope): (&mut [f64], &mut [f64]),
-    ) {
-        let Design { a, b, c, f_a, k_x, k_f, l_x, l_f, .. } = design;
-        let (x_hat, f_hat) = z.split_at(design.states.len());
-        z_slope.fill(0.0);
-        let (x_slope, f_slope) = z_slope.split_at_mut(design.states.len());
-        for (i, slope) in x_slope.iter_mut().enumerate() {
-            *slope = a.row_times(i, x_hat) + b.row_times(i, u) + f_a.row_times(i, f_hat);
+    /// A x_hat + B u + F_a f_hat and, while estimating, A_f f_hat; zero for y_f.
+    pub(crate) fn free_rates(self, design: &Design, z: &[f64], u: &[f64], rates: &mut [f64]) {
+        let [x_hat, f_hat, _] = design.parts(z);
+        rates.fill(0.0);
+        let [x_rates, f_rates, _] = design.parts_mut(rates);
+        for (i, rate) in x_rates.iter_mut().enumerate() {
+            *rate = design.a.row_times(i, x_hat)
+                + design.b.row_times(i, u)
+                + design.f_a.row_times(i, f_hat);
         }
-        for (k, (value, slope)) in y.value.iter().zip(y.slope).enumerate() {
-            let innovation = value + slope * offset - c.row_times(k, x_hat);
-            for (i, slope) in x_slope.iter_mut().enumerate() {
-                *slope += l_x.entry(i, k) * innovation;
+        for a_f in design.a_f.iter().filter(|_| self.estimating) {
+            for (i, rate) in f_rates.iter_mut().enumerate() {
+                *rate = a_f.row_times(i, f_hat);
             }
-            for (i, slope) in f_slope.iter_mut().enumerate().filter(|_| self.estimating) {
-                *slope += l_f.entry(i, k) * innovation;
-            }
-        }
-        for (j, slope) in u_slope.iter_mut().enumerate() {
-            let fault = if self.compensating { k_f.row_times(j, f_slope) } else { 0.0 };
-            *slope = if self.is_limited(j) { 0.0 } else { k_x.row_times(j, x_slope) + fault };
         }
     }
 
-    /// [`Mode::command`] and [`Mode::slopes`] differentiated: du and dz' at `point` along `along`,
-    /// by the product rule in every term. Exact.
-    pub(crate) fn differentiate(
+    /// Adds column `k` of L_x and, while estimating, of L_f times `innovation` to x and f of `to`.
+    pub(crate) fn correct(self, design: &Design, k: usize, innovation: f64, to: &mut [f64]) {
+        let [x, f, _] = design.parts_mut(to);
+        for (i, x) in x.iter_mut().enumerate() {
+            *x += design.l_x.entry(i, k) * innovation;
+        }
+        for (i, f) in f.iter_mut().enumerate().filter(|_| self.estimating) {
+            *f += design.l_f.entry(i, k) * innovation;
+        }
+    }
+
+    /// z' and u' of a point, `offset` s after the instant of its measurements, which have slopes.
+    pub(crate) fn slopes(
         self,
-        point: &Knowns<'_>,
-        u: &[f64],
-        along: &Knowns<'_>,
-        (du, dz_slope): (&mut [f64], &mut [f64]),
+        Knowns { design, signals: Signals { z, y, u } }: Knowns<'_>,
+        (y_slopes, offset): (&[f64], f64),
+        (z_slopes, u_slopes): (&mut [f64], &mut [f64]),
     ) {
-        let n = point.design.states.len();
-        let both = |matrix: fn(&Design) -> &Matrix| [matrix(point.design), matrix(along.design)];
-        let [x_hat, f_hat] = [[&point.z[..n], &along.z[..n]], [&point.z[n..], &along.z[n..]]];
-        for (j, du) in du.iter_mut().enumerate() {
-            *du = self.limit(along.design, j).unwrap_or_else(|| {
-                let fault = product(both(|design| &design.k_f), j, f_hat);
-                let state = product(both(|design| &design.k_x), j, x_hat);
+        self.free_rates(design, z, u, z_slopes);
+        for (k, (value, slope)) in y.iter().zip(y_slopes).enumerate() {
+            let y = value + slope * offset;
+            self.correct(design, k, innovation(design, z, k, y), z_slopes);
+            if let Some(w) = &design.filter {
+                let at = design.filtered_at(k);
+                z_slopes[at] = w[k] * (y - z[at]);
+            }
+        }
+        let [x_slopes, f_slopes, _] = design.parts(z_slopes);
+        for (j, slope) in u_slopes.iter_mut().enumerate() {
+            let fault = if self.compensating { design.k_f.row_times(j, f_slopes) } else { 0.0 };
+            let free = design.k_x.row_times(j, x_slopes) + fault;
+            *slope = if self.is_limited(j) { 0.0 } else { free };
+        }
+    }
+}
+
+/// y - C x_hat of measurement `k`; with a filter, y_f - C x_hat.
+pub(crate) fn innovation(design: &Design, z: &[f64], k: usize, y: f64) -> f64 {
+    let [x_hat, _, y_f] = design.parts(z);
+    y_f.get(k).unwrap_or(&y) - design.c.row_times(k, x_hat)
+}
+
+/// The derivatives of all that along a direction, by the product rule in every term. Exact.
+impl Mode {
+    /// Of the command: du for dz, both in `along`.
+    pub(crate) fn command_along(self, point: Knowns<'_>, design: &Design, along: &mut Signals) {
+        let Signals { z, u, .. } = along;
+        let [x_hat, f_hat] = states_and_faults(point.design, &point.signals.z, z);
+        for (j, du) in u.iter_mut().enumerate() {
+            *du = self.limit(design, j).unwrap_or_else(|| {
+                let fault = product([&point.design.k_f, &design.k_f], j, f_hat);
+                let state = product([&point.design.k_x, &design.k_x], j, x_hat);
                 if self.compensating { state + fault } else { state }
             });
         }
-        let (dx_slope, df_slope) = dz_slope.split_at_mut(n);
-        for (i, slope) in dx_slope.iter_mut().enumerate() {
-            *slope = product(both(|design| &design.a), i, x_hat)
-                + product(both(|design| &design.b), i, [u, du])
-                + product(both(|design| &design.f_a), i, f_hat);
-        }
-        df_slope.fill(0.0);
-        for (k, (y, dy)) in point.y.iter().zip(along.y).enumerate() {
-            let innovation = y - point.design.c.row_times(k, x_hat[0]);
-            let change = dy - product(both(|design| &design.c), k, x_hat);
-            let term = |[gain, dgain]: [&Matrix; 2], i| {
-                gain.entry(i, k) * change + dgain.entry(i, k) * innovation
-            };
-            for (i, slope) in dx_slope.iter_mut().enumerate() {
-                *slope += term(both(|design| &design.l_x), i);
-            }
-            for (i, slope) in df_slope.iter_mut().enumerate().filter(|_| self.estimating) {
-                *slope += term(both(|design| &design.l_f), i);
+    }
+
+    /// Of [`Mode::correct`]: adds to `to`, for the innovation with its own derivative.
+    pub(crate) fn correct_along(
+        self,
+        [point, along]: [&Design; 2],
+        k: usize,
+        [innovation, change]: [f64; 2],
+        to: &mut [f64],
+    ) {
+        self.correct(point, k, change, to);
+        self.correct(along, k, innovation, to);
+    }
+
+    /// Of z', for dz, dy and du in `along`.
+    pub(crate) fn slopes_along(self, point: Knowns<'_>, along: Knowns<'_>, slopes: &mut [f64]) {
+        let both = [point.design, along.design];
+        let (z, dz) = (&point.signals.z, &along.signals.z);
+        self.free_rates_along(point, along, slopes);
+        for (k, (y, dy)) in point.signals.y.iter().zip(&along.signals.y).enumerate() {
+            let change = innovation_along(both, [z, dz], k, *dy);
+            self.correct_along(both, k, [innovation(point.design, z, k, *y), change], slopes);
+            if let (Some(w), Some(dw)) = (&point.design.filter, &along.design.filter) {
+                let at = point.design.filtered_at(k);
+                slopes[at] = w[k] * (dy - dz[at]) + dw[k] * (y - z[at]);
             }
         }
     }
+
+    fn free_rates_along(self, point: Knowns<'_>, along: Knowns<'_>, rates: &mut [f64]) {
+        let [x_hat, f_hat] = states_and_faults(point.design, &point.signals.z, &along.signals.z);
+        let u = [&point.signals.u[..], &along.signals.u[..]];
+        let both = |matrix: fn(&Design) -> &Matrix| [matrix(point.design), matrix(along.design)];
+        rates.fill(0.0);
+        let [x_rates, f_rates, _] = point.design.parts_mut(rates);
+        for (i, rate) in x_rates.iter_mut().enumerate() {
+            *rate = product(both(|design| &design.a), i, x_hat)
+                + product(both(|design| &design.b), i, u)
+                + product(both(|design| &design.f_a), i, f_hat);
+        }
+        let fault_models = point.design.a_f.iter().zip(&along.design.a_f);
+        for (a_f, da_f) in fault_models.filter(|_| self.estimating) {
+            for (i, rate) in f_rates.iter_mut().enumerate() {
+                *rate = product([a_f, da_f], i, f_hat);
+            }
+        }
+    }
+}
+
+/// Of [`innovation`], for dz and dy.
+pub(crate) fn innovation_along(
+    [point, along]: [&Design; 2],
+    [z, dz]: [&[f64]; 2],
+    k: usize,
+    dy: f64,
+) -> f64 {
+    let [x_hat, _] = states_and_faults(point, z, dz);
+    let [_, _, dy_f] = point.parts(dz);
+    dy_f.get(k).unwrap_or(&dy) - product([&point.c, &along.c], k, x_hat)
+}
+
+/// x_hat and f_hat, each with its direction.
+fn states_and_faults<'a>(design: &Design, z: &'a [f64], dz: &'a [f64]) -> [[&'a [f64]; 2]; 2] {
+    let ([x_hat, f_hat, _], [dx_hat, df_hat, _]) = (design.parts(z), design.parts(dz));
+    [[x_hat, dx_hat], [f_hat, df_hat]]
 }
 
 /// M dv + dM v in row `row`, of a matrix M and a vector v with their directions.

@@ -6,9 +6,12 @@ mod controller;
 mod dependencies;
 mod design;
 mod equations;
+mod loss;
 mod matrix;
 mod names;
 mod observer;
+mod sampled;
+mod signals;
 mod variables;
 
 use controller::AsoController;

@@ -12,9 +12,16 @@ pub(crate) fn channels(name: &str, count: usize) -> impl Iterator<Item = String>
     (0..count).map(move |position| channel(name, position, count))
 }
 
-/// `x_hat` and `f_hat`: the continuous states, in the order of the estimate.
+/// `y_f`, the filtered measurements, where the design has a filter.
+pub(crate) fn filtered(design: &Design) -> impl Iterator<Item = String> {
+    let count = design.filter.as_ref().map_or(0, Vec::len);
+    channels("y_f", count)
+}
+
+/// `x_hat`, `f_hat` and `y_f`: the continuous states, in the order of z.
 pub(crate) fn estimates(design: &Design) -> impl Iterator<Item = String> {
-    channels("x_hat", design.states.len()).chain(channels("f_hat", design.faults.len()))
+    let x_hat = channels("x_hat", design.states.len());
+    x_hat.chain(channels("f_hat", design.faults.len())).chain(filtered(design))
 }
 
 /// `x_hat_0` and `f_hat_0`, in the same order.
@@ -25,4 +32,14 @@ pub(crate) fn starts(design: &Design) -> impl Iterator<Item = String> {
 /// The lower (0) or upper (1) limit of actuator `position`.
 pub(crate) fn limit(design: &Design, side: usize, position: usize) -> String {
     channel(["u_min", "u_max"][side], position, design.actuators.len())
+}
+
+/// `x_op`, `u_op` or `y_op`, where the design has an operating point.
+pub(crate) fn operating(
+    design: &Design,
+    name: &'static str,
+    count: usize,
+) -> impl Iterator<Item = String> {
+    let stated = if design.has_operating_point() { count } else { 0 };
+    (0..stated).map(move |position| channel(name, position, count))
 }

@@ -10,7 +10,8 @@ use control::hold::FirstOrderHold;
 use nalgebra::DMatrix;
 
 use crate::design::Design;
-use crate::equations::{Measurement, Mode};
+use crate::equations::Mode;
+use crate::matrix::Matrix;
 
 /// Halvings of a step until the instant at which a channel reaches its limit is accepted.
 const HALVINGS: u32 = 20;
@@ -33,7 +34,8 @@ pub(crate) struct Observer {
 #[derive(Clone, Copy)]
 pub(crate) struct Conditions<'a> {
     pub(crate) design: &'a Design,
-    pub(crate) y: Measurement<'a>,
+    /// The measurements at the begin of the step, and their slopes.
+    pub(crate) y: [&'a [f64]; 2],
     pub(crate) compensating: bool,
     pub(crate) estimating: bool,
 }
@@ -47,25 +49,36 @@ impl Conditions<'_> {
 
 /// M and N of `mode`.
 fn system(design: &Design, mode: Mode) -> (DMatrix<f64>, DMatrix<f64>) {
-    let [a, b, c, f_a, k_x, k_f, l_x, l_f] = design.matrices().map(|(_, matrix)| matrix.dense());
-    let (n, q) = (a.nrows(), f_a.ncols());
-    let (p, m) = (c.nrows(), b.ncols());
-    let mut free = b.clone();
-    let mut held = b;
+    let dense = |matrix: fn(&Design) -> &Matrix| matrix(design).dense();
+    let (c, l_x, l_f) = (dense(|own| &own.c), dense(|own| &own.l_x), dense(|own| &own.l_f));
+    let (f_a, mut free) = (dense(|own| &own.f_a), dense(|own| &own.b));
+    let ((n, q), (p, m)) = (f_a.shape(), (c.nrows(), free.ncols()));
+    let mut held = free.clone();
     for j in 0..m {
         let one = if mode.is_limited(j) { &mut free } else { &mut held };
         one.column_mut(j).fill(0.0);
     }
     let compensating = f64::from(mode.compensating);
     let estimating = f64::from(mode.estimating);
-    let mut state = DMatrix::zeros(n + q, n + q);
+    let (a, k_x, k_f) = (dense(|own| &own.a), dense(|own| &own.k_x), dense(|own| &own.k_f));
+    let mut state = DMatrix::zeros(design.order(), design.order());
     state.view_mut((0, 0), (n, n)).copy_from(&(&a + &free * &k_x - &l_x * &c));
     state.view_mut((0, n), (n, q)).copy_from(&(&f_a + &free * &k_f * compensating));
     state.view_mut((n, 0), (q, n)).copy_from(&(&l_f * &c * -estimating));
-    let mut input = DMatrix::zeros(n + q, p + m);
-    input.view_mut((0, 0), (n, p)).copy_from(&l_x);
+    if let Some(a_f) = &design.a_f {
+        state.view_mut((n, n), (q, q)).copy_from(&(a_f.dense() * estimating));
+    }
+    let mut input = DMatrix::zeros(design.order(), p + m);
     input.view_mut((0, p), (n, m)).copy_from(&held);
-    input.view_mut((n, 0), (q, p)).copy_from(&(&l_f * estimating));
+    // The innovation follows y, or y_f, which is part of z.
+    let source = if design.filter.is_some() { &mut state } else { &mut input };
+    let column = if design.filter.is_some() { n + q } else { 0 };
+    source.view_mut((0, column), (n, p)).copy_from(&l_x);
+    source.view_mut((n, column), (q, p)).copy_from(&(&l_f * estimating));
+    for (k, w) in design.filter.iter().flatten().enumerate() {
+        let at = design.filtered_at(k);
+        (state[(at, at)], input[(at, k)]) = (-w, *w);
+    }
     (state, input)
 }
 
@@ -73,7 +86,7 @@ impl Observer {
     /// The observer of `design`, which has not stepped yet.
     pub(crate) fn new(design: &Design) -> Self {
         let inputs = design.measurements.len() + design.actuators.len();
-        let states = design.states.len() + design.faults.len();
+        let states = design.order();
         Self {
             kept: Vec::with_capacity(KEPT),
             next: 0,
@@ -140,8 +153,9 @@ impl Observer {
         Conditions { design, y, .. }: Conditions<'_>,
         span: Span,
     ) -> Result<(), control::Error> {
-        let (measured, held) = self.input.split_at_mut(y.value.len());
-        for (k, (value, slope)) in y.value.iter().zip(y.slope).enumerate() {
+        let [values, slopes] = y;
+        let (measured, held) = self.input.split_at_mut(values.len());
+        for (k, (value, slope)) in values.iter().zip(slopes).enumerate() {
             measured[k] = value + slope * span.offset;
             self.input_slope[k] = *slope;
         }

@@ -1,29 +1,15 @@
 //! The variables of the controller: they follow from the dimensions and names of the design.
 
+mod parameters;
+
 use fmi2::Variable;
-use fmi2::description::DependencyKind;
 use fmi2::unit::Unit;
 
 use crate::controller::AsoController;
-use crate::design::{Design, Signal};
-use crate::matrix::Matrix;
+use crate::dependencies::Group;
+use crate::design::{Design, Fault, Label, Signal};
 use crate::names::channel;
 use crate::{dependencies, names};
-
-/// Reaches one matrix of the design.
-type Place = fn(&mut Design) -> &mut Matrix;
-
-/// Name, meaning and place of the eight matrices.
-const MATRICES: [(&str, &str, Place); 8] = [
-    ("A", "system matrix A of (1)", |design| &mut design.a),
-    ("B", "input matrix B of (1)", |design| &mut design.b),
-    ("C", "measurement matrix C of (1)", |design| &mut design.c),
-    ("F_a", "fault distribution matrix F_a of (1)", |design| &mut design.f_a),
-    ("K_x", "state feedback gain K_x of (2)", |design| &mut design.k_x),
-    ("K_f", "fault compensation gain K_f of (2)", |design| &mut design.k_f),
-    ("L_x", "observer gain L_x of (4)", |design| &mut design.l_x),
-    ("L_f", "fault observer gain L_f of (5)", |design| &mut design.l_f),
-];
 
 /// All variables of `controller`, in the order of the description.
 pub(crate) fn of(controller: &AsoController) -> Vec<Variable<AsoController>> {
@@ -31,17 +17,11 @@ pub(crate) fn of(controller: &AsoController) -> Vec<Variable<AsoController>> {
     let mut all = inputs(design);
     all.extend(commands(design));
     all.extend(estimates(design));
-    all.extend(slopes(design));
-    all.extend(switches(design));
-    for (name, meaning, place) in MATRICES {
-        let matrix = place(&mut design.clone()).clone();
-        all.extend((0..matrix.values.len()).map(|k| {
-            Variable::real(matrix.element(name, k), meaning, move |model: &mut AsoController| {
-                &mut place(&mut model.design).values[k]
-            })
-            .parameter()
-        }));
+    all.extend(losses(controller));
+    if design.sample_time.is_none() {
+        all.extend(slopes(design));
     }
+    all.extend(parameters::of(design));
     all
 }
 
@@ -60,16 +40,20 @@ fn per_second(unit: Option<&String>) -> Option<String> {
 }
 
 /// States what the variable depends on.
-fn depending<const GROUPS: usize>(
-    variable: Variable<AsoController>,
-    groups: [(DependencyKind, Vec<String>); GROUPS],
-) -> Variable<AsoController> {
+fn depending(variable: Variable<AsoController>, groups: Vec<Group>) -> Variable<AsoController> {
     groups.into_iter().fold(variable, |variable, (kind, names)| variable.depends(kind, names))
 }
 
-/// What a signal is: its description, or its name where it has none.
-fn meaning(signal: &Signal) -> &str {
-    if signal.description.is_empty() { &signal.name } else { &signal.description }
+/// An output with what it depends on; of a sampled controller it is discrete, and nothing.
+fn output(
+    design: &Design,
+    variable: Variable<AsoController>,
+    groups: Vec<Group>,
+) -> Variable<AsoController> {
+    match design.sample_time {
+        None => depending(variable.output(&[]), groups),
+        Some(_) => variable.output(&[]).discrete(),
+    }
 }
 
 fn inputs(design: &Design) -> Vec<Variable<AsoController>> {
@@ -78,13 +62,12 @@ fn inputs(design: &Design) -> Vec<Variable<AsoController>> {
         .iter()
         .enumerate()
         .map(|(k, signal)| {
-            let text = format!("Measurement: {}", meaning(signal));
+            let Label { unit, meaning } = signal.label();
+            let text = format!("Measurement: {meaning}");
             let variable = Variable::real(&signal.name, text, move |model: &mut AsoController| {
-                &mut model.measurements[k]
+                &mut model.values.y[k]
             });
-            with_unit(variable, signal.unit.as_ref())
-                .input()
-                .derivative(move |model| &mut model.measurement_slopes[k])
+            with_unit(variable, unit).input().derivative(move |model| &mut model.y_slopes[k])
         })
         .collect();
     let text = "Whether the estimated fault is compensated from t_on on";
@@ -102,119 +85,92 @@ fn commands(design: &Design) -> Vec<Variable<AsoController>> {
         .enumerate()
         .map(|(j, actuator)| {
             let name = channel("u", j, actuators.len());
-            let text = match actuator.description.as_str() {
-                "" => format!("Command: {}", actuator.name),
-                description => format!("Command: {description}"),
-            };
+            let Label { unit, meaning } = actuator.label();
+            let text = format!("Command: {meaning}");
             let variable =
-                Variable::real(name, text, move |model: &mut AsoController| &mut model.u[j]);
-            let variable = with_unit(variable, actuator.unit.as_ref())
-                .output(&[])
+                Variable::real(name, text, move |model: &mut AsoController| &mut model.values.u[j]);
+            output(design, with_unit(variable, unit), dependencies::of_command(design, j))
                 .initially(dependencies::of_initial_command(design, j))
-                .derivative(move |model| &mut model.u_slopes[j]);
-            depending(variable, dependencies::of_command(design, j))
+                .derivative(move |model| &mut model.u_slopes[j])
+        })
+        .collect()
+}
+
+/// An element of z.
+struct State<'a> {
+    position: usize,
+    name: String,
+    /// What it is, and what its derivative is.
+    texts: [String; 2],
+    unit: Option<&'a String>,
+}
+
+fn states(design: &Design) -> Vec<State<'_>> {
+    let estimates = design.states.iter().map(Signal::label);
+    let estimates = estimates.chain(design.faults.iter().map(Fault::label));
+    let estimates = estimates.map(|label| (["Estimate", "Derivative of the estimate"], label));
+    let filtered = design.measurements.iter().map(Signal::label);
+    let filtered =
+        filtered.map(|label| (["Filtered value", "Derivative of the filtered value"], label));
+    names::estimates(design)
+        .zip(estimates.chain(filtered))
+        .enumerate()
+        .map(|(position, (name, (texts, Label { unit, meaning })))| {
+            let texts = texts.map(|text| format!("{text} of {meaning}"));
+            State { position, name, texts, unit }
         })
         .collect()
 }
 
 fn estimates(design: &Design) -> Vec<Variable<AsoController>> {
-    let order = design.states.len();
-    let faults = design.faults.iter().enumerate().map(|(k, signal)| {
-        let name = channel("f_hat", k, design.faults.len());
-        (order + k, name, channel("f_hat_0", k, design.faults.len()), signal)
-    });
-    let states =
-        design.states.iter().enumerate().map(|(k, signal)| {
-            (k, channel("x_hat", k, order), channel("x_hat_0", k, order), signal)
-        });
+    let mut states = states(design);
+    let faults = states.split_off(design.states.len());
     faults
+        .into_iter()
         .chain(states)
-        .map(|(k, name, start, signal)| {
-            let text = format!("Estimate of {}", meaning(signal));
+        .map(|State { position: k, name, texts: [text, _], unit }| {
             let variable =
-                Variable::real(name, text, move |model: &mut AsoController| &mut model.estimate[k]);
-            with_unit(variable, signal.unit.as_ref())
-                .output(&[])
-                .initially([start])
-                .derivative(move |model| &mut model.estimate_slopes[k])
+                Variable::real(name, text, move |model: &mut AsoController| &mut model.values.z[k]);
+            output(design, with_unit(variable, unit), Vec::new())
+                .initially(dependencies::of_initial_estimate(design, k))
+                .derivative(move |model| &mut model.z_slopes[k])
         })
         .collect()
 }
 
-/// The derivatives of the estimates, which are the continuous states.
+/// The loss of effectiveness, for each fault that is one.
+fn losses(controller: &AsoController) -> Vec<Variable<AsoController>> {
+    let design = &controller.design;
+    let losses = controller.losses.iter().enumerate();
+    losses
+        .map(|(position, loss)| {
+            let name = channel("E_hat", loss.fault, design.faults.len());
+            let meaning = design.actuators[loss.actuator].label().meaning;
+            let text = format!("Estimated loss of effectiveness: {meaning}");
+            let variable = Variable::real(name, text, move |model: &mut AsoController| {
+                &mut model.losses[position].estimate
+            });
+            output(design, variable.unit("1"), dependencies::of_loss(design))
+                .initially(dependencies::of_initial_loss(design, loss))
+                .derivative(move |model| &mut model.losses[position].slope)
+        })
+        .collect()
+}
+
+/// The derivatives of z, the continuous states.
 fn slopes(design: &Design) -> Vec<Variable<AsoController>> {
-    let order = design.states.len();
-    let signals = design.states.iter().chain(&design.faults);
-    names::estimates(design)
-        .zip(signals)
-        .enumerate()
-        .map(|(k, (state, signal))| {
-            let text = format!("Derivative of the estimate of {}", meaning(signal));
+    states(design)
+        .into_iter()
+        .map(|State { position: k, name: state, texts: [_, text], unit }| {
             let variable =
                 Variable::real(format!("der({state})"), text, move |model: &mut AsoController| {
-                    &mut model.estimate_slopes[k]
+                    &mut model.z_slopes[k]
                 });
-            let variable =
-                with_unit(variable, per_second(signal.unit.as_ref()).as_ref()).derivative_of(state);
-            if k < order {
-                depending(variable, dependencies::of_state_slope(design))
-                    .initially(dependencies::of_initial_state_slope(design, k))
-            } else {
-                depending(variable, dependencies::of_fault_slope(design))
-                    .initially(dependencies::of_initial_fault_slope(design, k - order))
-            }
+            let variable = with_unit(variable, per_second(unit).as_ref()).derivative_of(state);
+            depending(variable, dependencies::of_slope(design, k))
+                .initially(dependencies::of_initial_slope(design, k))
         })
         .collect()
-}
-
-/// Activation, initial estimates and, where the design states them, the limits.
-fn switches(design: &Design) -> Vec<Variable<AsoController>> {
-    let (order, faults) = (design.states.len(), design.faults.len());
-    let text = "Compensation starts at this time";
-    let mut all = vec![
-        Variable::real("t_on", text, |model: &mut AsoController| &mut model.design.t_on)
-            .unit("s")
-            .parameter(),
-        Variable::boolean(
-            "monitor",
-            "Whether the fault is estimated while it is not compensated",
-            |model: &mut AsoController| &mut model.design.monitor,
-        )
-        .parameter(),
-    ];
-    for (k, signal) in design.states.iter().enumerate() {
-        let text = format!("Initial estimate of {}", meaning(signal));
-        let name = channel("x_hat_0", k, order);
-        let variable =
-            Variable::real(name, text, move |model: &mut AsoController| &mut model.x_hat_0[k]);
-        all.push(with_unit(variable, signal.unit.as_ref()).parameter());
-    }
-    for (k, signal) in design.faults.iter().enumerate() {
-        let text = format!("Initial estimate of {}", meaning(signal));
-        let name = channel("f_hat_0", k, faults);
-        let variable =
-            Variable::real(name, text, move |model: &mut AsoController| &mut model.f_hat_0[k]);
-        all.push(with_unit(variable, signal.unit.as_ref()).parameter());
-    }
-    all.extend(limits(design));
-    all
-}
-
-fn limits(design: &Design) -> Vec<Variable<AsoController>> {
-    let mut all = Vec::new();
-    for (side, text) in ["Smallest command", "Largest command"].into_iter().enumerate() {
-        for (j, actuator) in design.actuators.iter().enumerate() {
-            if actuator.limits.is_none() {
-                continue;
-            }
-            let name = names::limit(design, side, j);
-            let variable = Variable::real(name, text, move |model: &mut AsoController| {
-                &mut model.design.actuators[j].limits.get_or_insert([0.0; 2])[side]
-            });
-            all.push(with_unit(variable, actuator.unit.as_ref()).tunable());
-        }
-    }
-    all
 }
 
 #[cfg(test)]

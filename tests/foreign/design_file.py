@@ -8,6 +8,13 @@ from c_abi import Fmu, describe
 
 MATRICES = ["A", "B", "C", "F_a", "K_x", "K_f", "L_x", "L_f"]
 LISTS = ["states", "actuators", "measurements", "faults"]
+# What a design need not state.
+OPTIONAL = ["filter", "sample_time", "estimator"]
+
+
+def vector(name, count):
+    """Names of a signal with so many channels."""
+    return [name] if count == 1 else [f"{name}[{k + 1}]" for k in range(count)]
 
 
 def shipped_design(controller):
@@ -23,9 +30,11 @@ def table(entries):
 
 def design_text(design):
     """A design in TOML; a matrix may be an array of numpy."""
-    rows = {name: [list(map(float, row)) for row in design[name]] for name in MATRICES}
-    lines = [f"{name} = {rows[name]!r}" for name in MATRICES]
+    stated = [name for name in [*MATRICES, "A_f"] if name in design]
+    rows = {name: [list(map(float, row)) for row in design[name]] for name in stated}
+    lines = [f"{name} = {row!r}" for name, row in rows.items()]
     general = {key: design[key] for key in ("description", "t_on", "monitor")}
+    general |= {key: design[key] for key in OPTIONAL if key in design}
     lines = [*table(general), *lines, "[experiment]", *table(design["experiment"])]
     for name in LISTS:
         for entry in design[name]:

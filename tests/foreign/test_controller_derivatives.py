@@ -1,74 +1,45 @@
-"""Directional derivatives and ModelStructure of the controller, against complex steps.
-
-The equations stand here once more, by the names of the variables, for complex numbers: the
-imaginary part of f(x + 1e-30 i v) / 1e-30 is the derivative along v to the last digit.
-"""
+"""Directional derivatives and ModelStructure of the controller, against complex steps."""
 
 import numpy as np
 import pytest
 
 from c_abi import CO_SIMULATION, MODEL_EXCHANGE, Instance
-from observer_oracle import element_name
-from test_designs import LIMITED, SIZES, made, random_design, vector
+from design_file import shipped_design, vector
+from named_equations import evaluated, losses, rounding, size_of, state_names
+from test_designs import LIMITED, SIZES, made, random_design
 
 STEP = 1e-30
 T_ON = 0.25
-SHIPPED = (4, 1, 2, 1)
 KINDS = {"co-simulation": CO_SIMULATION, "model exchange": MODEL_EXCHANGE}
 # Time, compensate, monitor: what decides which equations are in force.
 SWITCHES = [(0.0, True, False), (0.5, True, False), (0.0, True, True), (0.5, False, False)]
+WIDE = [-9.0, 9.0]
+# Sizes, limits and extras of `random_design`.
+EXTENDED = [
+    ((2, 1, 2, 2), None, "a"),
+    ((2, 2, 2, 1), None, "w"),
+    ((3, 1, 1, 2), None, "o"),
+    ((2, 2, 1, 2), None, "e"),
+    ((3, 2, 2, 3), [None, [-1.0, 1.5]], "awoe"),
+    ((2, 2, 2, 2), [WIDE, WIDE], "coe"),
+    ((3, 2, 1, 2), [WIDE, None], "cawe"),
+    ((1, 1, 1, 1), None, "pawoe"),
+    ((2, 2, 2, 1), [None, WIDE], "po"),
+]
 
 
-def limited(values, j, command, count):
-    """The command of channel j within its limits, where it has any."""
-    low, high = (values.get(vector(name, count)[j]) for name in ("u_min", "u_max"))
-    if low is None:
-        return command
-    below, above = command.real < low.real, command.real > high.real
-    return low if below else high if above else command
-
-
-def evaluated(values, sizes, switches, start=False):
-    """All unknowns by name, from the values of all knowns by name."""
-    n, m, p, q = sizes
+def check(instance, unknowns, direction, switches, start=False):
+    """The directional derivative is the complex step along that direction."""
+    design, values = instance.fmu.design, present_values(instance)
     time, compensate, monitor = switches
     compensating = compensate and time >= T_ON
-    estimating = compensating or monitor
-    take = lambda names: np.array([values[name] for name in names])
-    block = lambda name, rows, columns: take(
-        [element_name(name, i, j) for i in range(rows) for j in range(columns)]
-    ).reshape(rows, columns)
-    x_hat = take(vector("x_hat_0" if start else "x_hat", n))
-    f_hat = take(vector("f_hat_0" if start else "f_hat", q))
-    free = block("K_x", m, n) @ x_hat + compensating * (block("K_f", m, q) @ f_hat)
-    u = np.array([limited(values, j, command, m) for j, command in enumerate(free)])
-    innovation = take(values["inputs"]) - block("C", p, n) @ x_hat
-    slopes = block("A", n, n) @ x_hat + block("B", n, m) @ u + block("F_a", n, q) @ f_hat
-    slopes = slopes + block("L_x", n, p) @ innovation
-    fault_slopes = estimating * (block("L_f", q, p) @ innovation)
-    estimates = vector("x_hat", n) + vector("f_hat", q)
-    derivatives = [f"der({name})" for name in estimates]
-    names = [*vector("u", m), *estimates, *derivatives]
-    return dict(zip(names, [*u, *x_hat, *f_hat, *slopes, *fault_slopes]))
-
-
-def rounding(values, direction, sizes, start):
-    """What rounding may do to the derivatives, by name: 1e-13 of all terms, each taken positive."""
-    size = {"inputs": values["inputs"]}
-    for name, value in values.items():
-        if name != "inputs" and not name.startswith(("u_min", "u_max")):
-            sign = -1 if name.startswith("C[") else 1
-            size[name] = sign * (abs(value) + abs(direction.get(name, 0.0)))
-    terms = evaluated(size, sizes, (1.0, True, True), start)
-    return {name: 1e-13 * (1 + value) for name, value in terms.items()}
-
-
-def check(instance, unknowns, direction, sizes, switches, start=False):
-    """The directional derivative is the complex step along that direction."""
-    values = present_values(instance)
-    moved = {name: values[name] + 1j * STEP * along for name, along in direction.items()}
-    wanted = evaluated({**values, **moved}, sizes, switches, start)
-    allowed = rounding(values, direction, sizes, start)
+    on = (compensating, compensating or monitor)
+    allowed = rounding(values, direction, design, start)
+    if "sample_time" in design and not start:
+        wanted = dict.fromkeys(unknowns, 0.0)
+    else:
+        moved = {name: values[name] + 1j * STEP * along for name, along in direction.items()}
+        wanted = evaluated({**values, **moved}, design, on, start)
     for name, value in instance.directional(unknowns, direction).items():
         assert abs(value - np.imag(wanted[name]) / STEP) <= allowed[name], name
 
@@ -86,23 +57,24 @@ def present_values(instance):
 
 
 def designs(controller, folder):
-    """FMUs of many sizes with their sizes: the shipped one, others without and with limits."""
-    yield controller, SHIPPED
-    cases = [(sizes, None) for sizes in SIZES] + LIMITED + [((2, 2, 2, 2), [[-9.0, 9.0]] * 2)]
-    for k, (sizes, limits) in enumerate(cases):
+    """FMUs of many designs: the shipped one, others without and with limits and extras."""
+    controller.design = shipped_design(controller)
+    yield controller
+    cases = [(sizes, None) for sizes in SIZES] + LIMITED + [((2, 2, 2, 2), [WIDE] * 2)]
+    for k, case in enumerate(cases + EXTENDED):
         (folder / str(k)).mkdir()
-        yield made(controller, random_design(sizes, limits), folder / str(k)), sizes
+        yield made(controller, random_design(*case), folder / str(k))
 
 
 @pytest.fixture(scope="module")
 def fmus(controller, tmp_path_factory):
-    """All FMUs of these tests with their sizes."""
+    """All FMUs of these tests."""
     return list(designs(controller, tmp_path_factory.mktemp("designs")))
 
 
-def starts(fmu, sizes, switches):
+def starts(fmu, switches):
     """Values to start with."""
-    n, _, p, q = sizes
+    n, _, p, q = size_of(fmu.design)
     _, compensate, monitor = switches
     names = vector("x_hat_0", n) + vector("f_hat_0", q) + real_names(fmu, causality="input")
     values = np.random.default_rng(11).normal(size=n + q + p)
@@ -113,26 +85,27 @@ def starts(fmu, sizes, switches):
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("switches", SWITCHES, ids=str)
 def test_at_initialization_they_are_exact_by_every_known(fmus, switches, kind):
-    for fmu, sizes in fmus:
-        knowns = real_names(fmu, initial="exact") + real_names(fmu, causality="input")
+    for fmu in fmus:
+        knowns = real_names(fmu, causality="parameter") + real_names(fmu, causality="input")
         unknowns = [unknown.variable.name for unknown in fmu.description.initialUnknowns]
         seed = np.random.default_rng(3).normal(size=len(knowns))
         with Instance(fmu, kind=KINDS[kind]) as instance:
-            instance.enter(starts(fmu, sizes, switches), start=switches[0])
-            assert "t_on" in knowns and len(unknowns) == sizes[1] + 2 * (sizes[0] + sizes[3])
+            instance.enter(starts(fmu, switches), start=switches[0])
+            outputs = len(fmu.description.outputs)
+            assert "t_on" in knowns and len(unknowns) == outputs + fmu.states
             for along in [{name: 1.0} for name in knowns] + [dict(zip(knowns, seed))]:
-                check(instance, unknowns, along, sizes, switches, start=True)
+                check(instance, unknowns, along, switches, start=True)
 
 
-def at_a_point(instance, fmu, sizes, switches):
+def at_a_point(instance, fmu, switches):
     """Takes the instance to a point of its run; the equations that are in force there."""
     time, compensate, monitor = switches
     if instance.kind == CO_SIMULATION:
-        instance.start(starts(fmu, sizes, switches), start=time)
+        instance.start(starts(fmu, switches), start=time)
         instance.step(time, 2e-4)
         instance.set({name: 0.3 - k for k, name in enumerate(real_names(fmu, causality="input"))})
         return time + 2e-4, compensate, monitor
-    instance.start_exchange(starts(fmu, sizes, switches), start=time)
+    instance.start_exchange(starts(fmu, switches), start=time)
     instance.must("SetTime", time + 0.01)
     return time + 0.01, compensate, monitor
 
@@ -140,28 +113,28 @@ def at_a_point(instance, fmu, sizes, switches):
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("switches", SWITCHES, ids=str)
 def test_during_the_run_they_are_exact_by_every_input_and_state(fmus, switches, kind):
-    for fmu, sizes in fmus:
+    for fmu in fmus:
         states = [unknown.variable.derivative.name for unknown in fmu.description.derivatives]
         unknowns = [u.variable.name for u in fmu.description.outputs + fmu.description.derivatives]
         knowns = states + real_names(fmu, causality="input")
         seed = np.random.default_rng(3).normal(size=len(knowns))
         with Instance(fmu, kind=KINDS[kind]) as instance:
-            point = at_a_point(instance, fmu, sizes, switches)
+            point = at_a_point(instance, fmu, switches)
             for along in [{name: 1.0} for name in knowns] + [dict(zip(knowns, seed))]:
-                check(instance, unknowns, along, sizes, point)
+                check(instance, unknowns, along, point)
             time = instance.directional(unknowns, {"time": 1.0})
             assert set(time.values()) == {0.0}
 
 
 def test_these_tests_meet_commands_at_both_limits_and_between(fmus):
     met = set()
-    for fmu, sizes in fmus:
+    for fmu in fmus:
         for switches in SWITCHES:
             with Instance(fmu, kind=MODEL_EXCHANGE) as instance:
-                at_a_point(instance, fmu, sizes, switches)
+                at_a_point(instance, fmu, switches)
                 values = present_values(instance)
-            for j, name in enumerate(vector("u", sizes[1])):
-                low, high = (vector(side, sizes[1])[j] for side in ("u_min", "u_max"))
+            for j, name in enumerate(vector("u", size_of(fmu.design)[1])):
+                low, high = (vector(side, size_of(fmu.design)[1])[j] for side in ("u_min", "u_max"))
                 if low in values:
                     met.add((values[name] > values[low]) + (values[name] >= values[high]))
     assert met == {0, 1, 2}
@@ -178,7 +151,7 @@ def jacobian(instance, fmu):
     }
 
 
-def factors(fmu, sizes, parameters):
+def factors(fmu, parameters):
     """Each entry of the Jacobian in one situation after the other."""
     found = []
     for time, compensate, monitor in SWITCHES:
@@ -187,7 +160,7 @@ def factors(fmu, sizes, parameters):
                 name: limit + (name.startswith("u_max") or -1) * 5e5
                 for name in fmu.names(variability="tunable")
             }
-            values = starts(fmu, sizes, (time, compensate, monitor)) | limits | parameters
+            values = starts(fmu, (time, compensate, monitor)) | limits | parameters
             with Instance(fmu, kind=MODEL_EXCHANGE) as instance:
                 instance.start_exchange(values, start=time)
                 found.append(jacobian(instance, fmu))
@@ -215,12 +188,13 @@ def listed_kinds(fmu):
 
 
 def test_outputs_and_derivatives_depend_on_what_is_listed_in_the_way_listed(fmus):
-    for fmu, sizes in fmus:
-        n, m, _, _ = sizes
-        matrices = {name: "," in name and 0.5 + k for k, name in enumerate(fmu.variables)}
-        first = {name: value for name, value in matrices.items() if value}
+    for fmu in fmus:
+        n, m, _, _ = size_of(fmu.design)
+        matrices = {name: 0.5 + k for k, name in enumerate(fmu.variables) if "," in name}
+        filters = {name: 0.5 for name in fmu.variables if name.startswith("filter")}
+        first = matrices | filters
         second = {name: value + 0.125 for name, value in first.items()}
-        own, other = factors(fmu, sizes, first), factors(fmu, sizes, second)
+        own, other = factors(fmu, first), factors(fmu, second)
         cut_off = {
             unknown
             for name, unknown in zip(vector("u_min", m), vector("u", m))
@@ -228,18 +202,21 @@ def test_outputs_and_derivatives_depend_on_what_is_listed_in_the_way_listed(fmus
         }
         if cut_off:
             cut_off |= {f"der({name})" for name in vector("x_hat", n)}
+        cut_off |= {name for name, *_ in losses(fmu.design)}
         found = {pair: kind_of(own[pair], other[pair], pair[0] in cut_off) for pair in own}
         assert {pair: kind for pair, kind in found.items() if kind} == listed_kinds(fmu)
 
 
 def test_each_initial_value_depends_on_the_listed_variables_and_on_no_other(fmus):
-    for fmu, sizes in fmus:
+    for fmu in fmus:
         unknowns = [unknown.variable.name for unknown in fmu.description.initialUnknowns]
         full = {name: 0.5 + k / 64 for k, name in enumerate(fmu.variables) if "," in name}
+        free = ("filter", "x_op", "u_op", "y_op")
+        full |= {name: 0.4 for name in fmu.variables if name.startswith(free)}
         found = {unknown: set() for unknown in unknowns}
         for switches in SWITCHES:
             for limit in (-1e4, 0.0, 1e4):
-                for unknown, known in initial_influences(fmu, sizes, switches, limit, full):
+                for unknown, known in initial_influences(fmu, switches, limit, full):
                     found[unknown].add(known)
         listed = {
             unknown.variable.name: {variable.name for variable in unknown.dependencies}
@@ -248,7 +225,7 @@ def test_each_initial_value_depends_on_the_listed_variables_and_on_no_other(fmus
         assert found == listed
 
 
-def initial_influences(fmu, sizes, switches, limit, parameters):
+def initial_influences(fmu, switches, limit, parameters):
     """Pairs of an initial unknown and a known that changes it."""
     unknowns = [unknown.variable.name for unknown in fmu.description.initialUnknowns]
     limits = {
@@ -256,12 +233,12 @@ def initial_influences(fmu, sizes, switches, limit, parameters):
         for name in fmu.names(variability="tunable")
     }
     with Instance(fmu) as instance:
-        base = starts(fmu, sizes, switches) | limits | parameters
+        base = starts(fmu, switches) | limits | parameters
         instance.enter(base, start=switches[0])
         before = instance.get(*unknowns)
         for known, value in base.items():
             change = not value if isinstance(value, bool) else value + 1.0
-            change = 1.0 - value if known == "t_on" else change
+            change = 1.0 - value if known == "t_on" or known.startswith("filter") else change
             instance.set({known: change})
             after = instance.get(*unknowns)
             instance.set({known: value})

@@ -14,9 +14,9 @@ from fmpy import instantiate_fmu, simulate_fmu
 from scipy.integrate import solve_ivp
 
 from c_abi import MODEL_EXCHANGE, EventInfo, Fmu, Instance, reals
-from design_file import design_text, redesigned, shipped_design
-from observer_oracle import command
-from test_designs import LIMITED, SIZES, made, random_design, vector
+from design_file import design_text, redesigned, shipped_design, vector
+from named_equations import evaluated, losses, state_names
+from test_designs import LIMITED, SIZES, made, random_design
 
 T_ON = 0.3037  # s, inside a communication step
 STOP = 1.0  # s
@@ -43,19 +43,19 @@ class Run(NamedTuple):
     @property
     def states(self):
         """Names of the continuous states."""
-        n, q = len(self.design["states"]), len(self.design["faults"])
-        return vector("x_hat", n) + vector("f_hat", q)
+        return state_names(self.design)
 
     @property
     def signals(self):
-        """Names of states and commands."""
-        return self.states + vector("u", len(self.design["actuators"]))
+        """Names of states, commands and losses of effectiveness."""
+        outputs = [name for name, *_ in losses(self.design)]
+        return self.states + vector("u", len(self.design["actuators"])) + outputs
 
     @property
     def start_values(self):
-        """The initial estimates."""
-        names = [name.replace("hat", "hat_0") for name in self.states]
-        return dict(zip(names, self.estimate))
+        """The initial estimates and measurements."""
+        names = [name.replace("hat", "hat_0") for name in self.states if "hat" in name]
+        return dict(zip([*names, *self.inputs], [*self.estimate, *self.levels[0]]))
 
     @property
     def times(self):
@@ -124,17 +124,19 @@ def stepped(run):
 
 def solved(run):
     """scipy's solution of the equations, between the instants at which something switches."""
-    design = run.design
-    A, B, C, F_a, L_x, L_f = (np.asarray(design[n]) for n in ("A", "B", "C", "F_a", "L_x", "L_f"))
+    given, states = constants(run), run.states
+
+    def at(z, y, on):
+        values = given | dict(zip([*run.inputs, *states], [*y, *z]))
+        return evaluated(values, run.design, (on, on or run.design["monitor"]))
 
     def right(_, z, y, on):
-        x_hat, f_hat = np.split(z, [len(A)])
-        u = command(design, z, on, run.limits)
-        slope = A @ x_hat + B @ u + F_a @ f_hat + L_x @ (y - C @ x_hat)
-        return np.concatenate([slope, (on or design["monitor"]) * (L_f @ (y - C @ x_hat))])
+        found = at(z, y, on)
+        return [found[f"der({name})"] for name in states]
 
-    z, rows = np.array(run.estimate), []
-    instants = sorted({*JUMPS, *(since for since, _ in run.compensate), design["t_on"], STOP})
+    filtered = run.levels[0] if "filter" in run.design else []
+    z, rows = np.array([*run.estimate, *filtered]), []
+    instants = sorted({*JUMPS, *(since for since, _ in run.compensate), run.design["t_on"], STOP})
     for begin, end in zip(instants, instants[1:]):
         here = run.times[(run.times >= begin - 1e-9) & (run.times < end - 1e-9)].clip(begin)
         arguments = (run.level(begin), run.compensating(begin))
@@ -142,11 +144,16 @@ def solved(run):
         part = solve_ivp(right, (begin, end), z, t_eval=[*here, end], args=arguments, **options)
         assert part.success
         z = part.y[:, -1]
-        rows += [
-            (*row, *command(design, row, arguments[1], run.limits))
-            for row in part.y.T[: len(here)]
-        ]
-    return np.array([*rows, (*z, *command(design, z, arguments[1], run.limits))])
+        rows += [at(row, *arguments) for row in part.y.T[: len(here)]]
+    return np.array([[row[name] for name in run.signals] for row in [*rows, at(z, *arguments)]])
+
+
+def constants(run):
+    """Values of all parameters, and the names of the measurements under `inputs`."""
+    names = run.fmu.names(type="Real", causality="parameter")
+    with Instance(run.fmu) as instance:
+        values = dict(zip(names, instance.start().get(*names)))
+    return values | {"inputs": run.inputs}
 
 
 def check(run):
@@ -164,14 +171,22 @@ def check(run):
     return oracle
 
 
-# Limits that some command reaches or leaves.
-CASES = [(sizes, None) for sizes in SIZES] + [((1, 1, 1, 1), [[-0.3, 0.6]]), *LIMITED[1:]]
+# Sizes, limits that some command reaches or leaves, extras of `random_design`.
+CASES = [
+    *((sizes, None, "") for sizes in SIZES),
+    *((*case, "") for case in [((1, 1, 1, 1), [[-0.3, 0.6]]), *LIMITED[1:]]),
+    ((2, 1, 2, 2), None, "a"),
+    ((2, 2, 2, 1), None, "w"),
+    ((3, 1, 1, 2), None, "o"),
+    ((2, 2, 1, 2), None, "e"),
+    ((3, 2, 1, 1), [None, [-1.5, 1.0]], "awoe"),
+]
 
 
-def random_run(controller, folder, sizes, limits, **general):
+def random_run(controller, folder, sizes, limits, extras="", **general):
     """A run of a random design."""
     n, _, p, q = sizes
-    design = random_design(sizes, limits) | {"t_on": T_ON, **general}
+    design = random_design(sizes, limits, extras) | {"t_on": T_ON, **general}
     levels = np.random.default_rng(17).normal(size=(len(JUMPS), p))
     return Run(made(controller, design, folder), design, np.linspace(-1, 1.5, n + q), levels)
 
@@ -188,17 +203,17 @@ def shipped_run(controller, folder, limits=None, **options):
 
 def leaves_and_reaches(run, table):
     """Whether a command is at a limit at some instants and between its limits at others."""
-    commands = table[:, len(run.states) :]
+    commands = table[:, len(run.states) :][:, : len(run.limits)]
     at_limit = (commands == np.transpose(run.limits)[0]) | (commands == np.transpose(run.limits)[1])
     return np.diff(at_limit, axis=0).any()
 
 
 @pytest.mark.parametrize("monitor", [False, True])
-@pytest.mark.parametrize(("sizes", "limits"), CASES, ids=str)
+@pytest.mark.parametrize(("sizes", "limits", "extras"), CASES, ids=str)
 def test_integrated_by_cvode_it_is_its_co_simulation_and_what_scipy_integrates(
-    controller, tmp_path, sizes, limits, monitor
+    controller, tmp_path, sizes, limits, extras, monitor
 ):
-    run = random_run(controller, tmp_path, sizes, limits, monitor=monitor)
+    run = random_run(controller, tmp_path, sizes, limits, extras, monitor=monitor)
     assert leaves_and_reaches(run, check(run)) == bool(limits)
 
 

@@ -9,15 +9,19 @@ from fmpy.validation import validate_fmu
 from lxml import etree
 
 from c_abi import DISCARD, ERROR, OK, Instance
-from design_file import MATRICES, design_text, redesigned, shipped_design
+from design_file import LISTS, MATRICES, design_text, redesigned, shipped_design, vector
 from observer_oracle import command, propagated, read_matrices, saturated
 
 SCHEMA = Path(fmpy.__file__).parent / "schema" / "fmi2" / "fmi2ModelDescription.xsd"
 SIZES = [(1, 1, 1, 1), (2, 2, 2, 2), (3, 2, 1, 1), (2, 1, 2, 3), (5, 3, 4, 2)]
 
 
-def random_design(sizes, limits=None):
-    """A stable design of n states, m actuators, p measurements, q faults."""
+def random_design(sizes, limits=None, extras=""):
+    """A stable design of n states, m actuators, p measurements, q faults.
+
+    `extras` has an `a` for a fault model, `w` for a filter, `o` for an operating point, `e` for a
+    loss of effectiveness, `c` or `p` for samples with a current or a prediction estimator.
+    """
     n, m, p, q = sizes
     chance = np.random.default_rng([7, *sizes])
     shapes = [(n, n), (n, m), (p, n), (n, q), (m, n), (m, q), (n, p), (q, p)]
@@ -39,17 +43,38 @@ def random_design(sizes, limits=None):
     for actuator, pair in zip(design["actuators"], limits or []):
         if pair:
             actuator["limits"] = pair
+    return extended(design, extras, chance)
+
+
+SAMPLE_TIME = 0.05  # s
+ESTIMATORS = {"c": "current", "p": "prediction"}
+
+
+def extended(design, extras, chance):
+    """The design with what `extras` say."""
+    n, _, p, q = (len(design[name]) for name in LISTS)
+    if "a" in extras:
+        design["A_f"] = chance.normal(size=(q, q)) - 2 * np.eye(q)
+    if "w" in extras:
+        design["filter"] = list(map(float, chance.uniform(0.3, 0.9, size=p)))
+    if "o" in extras:
+        for name in LISTS[:3]:
+            for signal in design[name]:
+                signal["operating"] = chance.normal()
+    if "e" in extras:
+        design["faults"][0] |= {"loss_of": design["actuators"][-1]["name"], "least_command": 0.7}
+    for estimator in (ESTIMATORS[letter] for letter in extras if letter in ESTIMATORS):
+        design |= {"sample_time": SAMPLE_TIME, "estimator": estimator}
+        small = ["A", "A_f", "L_x", "L_f"]
+        design |= {name: 0.3 * chance.normal(size=np.shape(design[name])) for name in small if name in design}
     return design
 
 
 def made(controller, design, folder):
-    """The FMU of a design."""
-    return redesigned(controller, design_text(design), folder / "fmu")
-
-
-def vector(name, count):
-    """Names of a signal with so many channels."""
-    return [name] if count == 1 else [f"{name}[{k + 1}]" for k in range(count)]
+    """The FMU of a design, which it carries along."""
+    fmu = redesigned(controller, design_text(design), folder / "fmu")
+    fmu.design = design
+    return fmu
 
 
 def begun(fmu, sizes, z, y, values=None):

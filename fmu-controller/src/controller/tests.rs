@@ -7,6 +7,10 @@ use super::*;
 mod dependencies;
 mod derivatives;
 mod exchange;
+mod extended;
+mod oracle;
+mod refusals;
+mod sampled;
 mod sized;
 
 /// The folder with the shipped design.
@@ -37,8 +41,8 @@ fn ready(mut controller: AsoController) -> AsoController {
 }
 
 fn step(controller: &mut AsoController, start: f64, size: f64, y: &[f64], slope: &[f64]) {
-    controller.measurements.copy_from_slice(y);
-    controller.measurement_slopes.copy_from_slice(slope);
+    controller.values.y.copy_from_slice(y);
+    controller.y_slopes.copy_from_slice(slope);
     controller.step(&Step { start, size }).unwrap();
 }
 
@@ -88,7 +92,7 @@ fn any_step_follows_the_equations_with_the_activation_inside_a_step() {
     let reference = small_reference(1.0, [f64::NEG_INFINITY, f64::INFINITY]);
     for size in [1.0, 0.25, 0.1, 0.001] {
         let controller = follow_small("", size);
-        for (estimate, exact) in controller.estimate.iter().zip(reference) {
+        for (estimate, exact) in controller.values.z.iter().zip(reference) {
             assert!((estimate - exact).abs() < 1e-5, "{size}: {estimate} {exact}");
         }
     }
@@ -99,10 +103,10 @@ fn a_saturated_command_is_the_one_that_the_observer_uses() {
     let reference = small_reference(1.0, [-1.5, 0.3]);
     for size in [0.5, 0.1, 0.001] {
         let controller = follow_small("limits = [-1.5, 0.3]", size);
-        for (estimate, exact) in controller.estimate.iter().zip(reference) {
+        for (estimate, exact) in controller.values.z.iter().zip(reference) {
             assert!((estimate - exact).abs() < 2e-5, "{size}: {estimate} {exact}");
         }
-        assert!((-1.5..=0.3).contains(&controller.u[0]));
+        assert!((-1.5..=0.3).contains(&controller.values.u[0]));
     }
     let free = small_reference(1.0, [f64::NEG_INFINITY, f64::INFINITY]);
     assert!((free[1] - reference[1]).abs() > 1e-2, "the limits are reached in this test");
@@ -118,19 +122,19 @@ fn limits_in_the_wrong_order_stop_the_next_step_and_no_reading_before() {
     controller.design.actuators[0].limits = Some([0.1, 0.8]);
     controller.check().unwrap();
     controller.update(0.0).unwrap();
-    assert!((controller.u[0] - 0.1).abs() < 1e-15);
+    assert!((controller.values.u[0] - 0.1).abs() < 1e-15);
 }
 
 #[test]
 fn the_slopes_of_the_outputs_are_the_limits_of_their_differences() {
     let mut controller = ready(AsoController::new(&shipped()).unwrap());
     step(&mut controller, 41.0, 1e-3, &[1e-3, -2e-3], &[0.1, 0.2]);
-    let (u, f_hat) = (controller.u[0], controller.estimate[4]);
-    let (u_slope, f_slope) = (controller.u_slopes[0], controller.estimate_slopes[4]);
+    let (u, f_hat) = (controller.values.u[0], controller.values.z[4]);
+    let (u_slope, f_slope) = (controller.u_slopes[0], controller.z_slopes[4]);
     let h = 1e-9;
     step(&mut controller, 41.001, h, &[1e-3 + 1e-4, -2e-3 + 2e-4], &[0.1, 0.2]);
-    assert!(((controller.u[0] - u) / h / u_slope - 1.0).abs() < 1e-4);
-    assert!(((controller.estimate[4] - f_hat) / h / f_slope - 1.0).abs() < 1e-4);
+    assert!(((controller.values.u[0] - u) / h / u_slope - 1.0).abs() < 1e-4);
+    assert!(((controller.values.z[4] - f_hat) / h / f_slope - 1.0).abs() < 1e-4);
 }
 
 #[test]
@@ -140,7 +144,7 @@ fn the_estimate_is_held_before_the_activation_unless_it_is_monitored() {
         controller.design.monitor = monitor;
         let mut controller = ready(controller);
         step(&mut controller, 0.0, 1e-3, &[0.1, 0.0], &[0.0, 0.0]);
-        assert_eq!(controller.estimate[4] != 0.0, monitor);
+        assert_eq!(controller.values.z[4] != 0.0, monitor);
     }
 }
 
@@ -154,7 +158,7 @@ fn a_copy_through_bytes_continues_with_the_same_bits() {
         step(controller, 40.0005, 1e-3, &[0.1, -0.1], &[1.0, 2.0]);
     }
     let bits =
-        |model: &AsoController| model.estimate.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+        |model: &AsoController| model.values.z.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
     assert_eq!(bits(&controller), bits(&copy));
 }
 
@@ -168,27 +172,4 @@ fn steps_of_a_known_size_allocate_nothing() {
         }
     });
     assert_eq!(allocations.count_total, 0);
-}
-
-#[test]
-fn a_design_that_does_not_fit_is_refused_by_matrix_and_shape() {
-    let wrong = [
-        ("L_f = [[-12.0]]", "L_f = [[-12.0, 1.0]]", "L_f is 1 x 2, expected 1 x 1"),
-        ("B = [[0.0], [2.0]]", "B = [[0.0]]", "B is 1 x 1, expected 2 x 1"),
-        ("A = [[0.0, 1.0], [0.0, -0.2]]", "A = [[0.0, 1.0], [0.0]]", "row 2 has 1 entries"),
-        ("K_f = [[1.0]]", "K_f = [[nan]]", "K_f[1,1] = NaN"),
-        ("K_f = [[1.0]]", "", "K_f"),
-        ("t_on = 0.35", "t_on = 0.35\nt_off = 2.0", "t_off"),
-        ("t_on = 0.35", "t_on = inf", "t_on = inf"),
-        ("step_size = 0.01", "step_size = 0.0", "step_size = 0"),
-        ("A = [[", "A = [", "TOML"),
-    ];
-    for (from, to, expected) in wrong {
-        let text = small("").replace(from, to);
-        let message = with_design(&text).err().map(|failure| failure.to_string()).unwrap();
-        assert!(message.contains(expected), "{message:?} has no {expected:?}");
-        assert!(message.contains("design.toml"), "{message}");
-    }
-    let message = with_design(&small("limits = [2.0, 1.0]")).err().unwrap().to_string();
-    assert!(message.contains("limits"), "{message}");
 }

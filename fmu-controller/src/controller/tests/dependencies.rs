@@ -4,7 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use fmi2::description::DependencyKind::{self, Constant, Dependent, Discrete, Fixed};
 
-use super::sized::{FREE, LIMITED, Sizes, initial_knowns, inputs, sized, states, unknowns, values};
+use super::sized::{
+    FREE, LIMITED, SAMPLED, Shape, initial_knowns, inputs, sized, states, unknowns, values,
+};
 use super::*;
 use crate::dependencies;
 
@@ -22,11 +24,8 @@ const SITUATIONS: [Situation; 8] = [
     (0.0, true, false, 20.0),
 ];
 
-fn in_situation(
-    (sizes, limits): (Sizes, &str),
-    (_, compensate, monitor, distance): Situation,
-) -> AsoController {
-    let mut model = sized(sizes, limits);
+fn in_situation(of: Shape, (_, compensate, monitor, distance): Situation) -> AsoController {
+    let mut model = sized(of);
     model.compensate = compensate;
     model.design.monitor = monitor;
     for actuator in &mut model.design.actuators {
@@ -41,8 +40,8 @@ fn begin(model: &mut AsoController, time: f64) -> Vec<f64> {
 }
 
 /// All unknowns, each with the knowns that changed its initial value in some situation.
-fn initial_influences(design: (Sizes, &str)) -> BTreeMap<String, BTreeSet<String>> {
-    let model = sized(design.0, design.1);
+fn initial_influences(design: Shape) -> BTreeMap<String, BTreeSet<String>> {
+    let model = sized(design);
     let names: Vec<_> = unknowns(&model).into_iter().map(|unknown| unknown.name).collect();
     let mut found: BTreeMap<_, _> =
         names.iter().map(|name| (name.clone(), BTreeSet::new())).collect();
@@ -75,30 +74,34 @@ fn initial_influences(design: (Sizes, &str)) -> BTreeMap<String, BTreeSet<String
 
 #[test]
 fn initial_values_depend_on_what_is_listed_and_on_nothing_else() {
-    for of in [FREE, LIMITED].concat() {
+    for of in [&FREE[..], &LIMITED, &SAMPLED].concat() {
         let found = initial_influences(of);
-        let controller = sized(of.0, of.1);
+        let controller = sized(of);
         let design = &controller.design;
-        let [n, m, _, q] = of.0;
-        let listed = (0..m)
-            .map(|j| (names::channel("u", j, m), dependencies::of_initial_command(design, j)))
-            .chain(names::estimates(design).zip(names::starts(design).map(|start| vec![start])))
-            .chain((0..n).map(|i| {
-                let name = format!("der({})", names::channel("x_hat", i, n));
-                (name, dependencies::of_initial_state_slope(design, i))
-            }))
-            .chain((0..q).map(|i| {
-                let name = format!("der({})", names::channel("f_hat", i, q));
-                (name, dependencies::of_initial_fault_slope(design, i))
-            }));
-        let listed: BTreeMap<_, BTreeSet<_>> =
-            listed.map(|(name, on)| (name, on.into_iter().collect())).collect();
-        assert_eq!(found, listed);
+        let [_, m, _, q] = of.0;
+        let mut listed: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+        let mut list = |name: String, on: Vec<String>| {
+            listed.insert(name, on.into_iter().collect());
+        };
+        for j in 0..m {
+            list(names::channel("u", j, m), dependencies::of_initial_command(design, j));
+        }
+        for (k, name) in names::estimates(design).enumerate() {
+            if controller.sampler.is_none() {
+                list(format!("der({name})"), dependencies::of_initial_slope(design, k));
+            }
+            list(name, dependencies::of_initial_estimate(design, k));
+        }
+        for loss in &controller.losses {
+            let name = names::channel("E_hat", loss.fault, q);
+            list(name, dependencies::of_initial_loss(design, loss));
+        }
+        assert_eq!(found, listed, "{of:?}");
     }
 }
 
 /// How each unknown changed by each known in every situation: the factors.
-fn factors(of: (Sizes, &str)) -> BTreeMap<(String, String), Vec<f64>> {
+fn factors(of: Shape) -> BTreeMap<(String, String), Vec<f64>> {
     let mut all: BTreeMap<_, Vec<f64>> = BTreeMap::new();
     for situation in SITUATIONS {
         let mut model = in_situation(of, situation);
@@ -138,10 +141,23 @@ fn kind(factors: &[f64], limited: bool) -> Option<DependencyKind> {
     }
 }
 
+/// Whether the row of this unknown has factors that are not constant, or cut off by a limit.
+fn is_bent((sizes, limits, _): Shape, unknown: &str) -> bool {
+    match unknown.strip_prefix('u') {
+        Some("") => limits.contains('l'),
+        Some(index) => {
+            let j: usize = index.trim_matches(['[', ']']).parse().unwrap();
+            limits.as_bytes()[j - 1] == b'l'
+        }
+        None if unknown.starts_with("E_hat") => true,
+        None => limits.contains('l') && sizes[0] > 0 && unknown.starts_with("der(x_hat"),
+    }
+}
+
 #[test]
 fn at_a_point_outputs_and_derivatives_depend_on_what_is_listed_in_the_way_listed() {
-    for of in [FREE, LIMITED].concat() {
-        let controller = sized(of.0, of.1);
+    for of in [&FREE[..], &LIMITED].concat() {
+        let controller = sized(of);
         let design = &controller.design;
         let mut listed: BTreeMap<(String, String), DependencyKind> = BTreeMap::new();
         let mut list = |unknown: &str, groups: &[(DependencyKind, Vec<String>)]| {
@@ -157,28 +173,28 @@ fn at_a_point_outputs_and_derivatives_depend_on_what_is_listed_in_the_way_listed
         }
         for (k, state) in names::estimates(design).enumerate() {
             list(&state, &[(Constant, vec![state.clone()])]);
-            let slope = format!("der({state})");
-            if k < of.0[0] {
-                list(&slope, &dependencies::of_state_slope(design));
-            } else {
-                list(&slope, &dependencies::of_fault_slope(design));
-            }
+            list(&format!("der({state})"), &dependencies::of_slope(design, k));
         }
-        let limited = |unknown: &str| match unknown.strip_prefix('u') {
-            Some("") => of.1.contains('l'),
-            Some(index) => {
-                let j: usize = index.trim_matches(['[', ']']).parse().unwrap();
-                of.1.as_bytes()[j - 1] == b'l'
-            }
-            None => of.1.contains('l') && unknown.starts_with("der(x_hat"),
-        };
+        for loss in &controller.losses {
+            let name = names::channel("E_hat", loss.fault, of.0[3]);
+            list(&name, &dependencies::of_loss(design));
+        }
         let found: BTreeMap<_, _> = factors(of)
             .into_iter()
             .filter_map(|(pair, factors)| {
-                let kind = kind(&factors, limited(&pair.0))?;
+                let kind = kind(&factors, is_bent(of, &pair.0))?;
                 Some((pair, kind))
             })
             .collect();
-        assert_eq!(found, listed);
+        assert_eq!(found, listed, "{of:?}");
+    }
+}
+
+#[test]
+fn a_sampled_controller_changes_nothing_between_samples() {
+    for of in SAMPLED {
+        for (pair, factors) in factors(of) {
+            assert!(factors.iter().all(|factor| *factor == 0.0), "{of:?}: {pair:?}");
+        }
     }
 }

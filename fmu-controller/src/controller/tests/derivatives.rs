@@ -4,8 +4,8 @@
 //! along a direction in all knowns they are of third order.
 
 use super::sized::{
-    FREE, LIMITED, Real, Sizes, initial_knowns, inputs, no_direction, number, sized, states,
-    unknowns, values,
+    FREE, LIMITED, Real, SAMPLED, Shape, initial_knowns, inputs, no_direction, number, sized,
+    states, unknowns, values,
 };
 use super::*;
 
@@ -18,15 +18,18 @@ fn begin(model: &mut AsoController, time: f64) {
 
 /// All controllers of this test, initialised at each of `STARTS`; with limits, each command stands
 /// at its lower limit, at its upper one, or between them, from one variant to the other.
-fn each_mode(designs: &[(Sizes, &str)], check: impl Fn(&AsoController, f64)) {
-    for &(sizes, limits) in designs {
+fn each_mode(designs: &[Shape], check: impl Fn(&AsoController, f64)) {
+    for &of in designs {
         for (time, monitor) in STARTS {
-            for shift in if limits.contains('l') { vec![-0.7, 0.0, 0.7] } else { vec![0.0] } {
-                let mut model = sized(sizes, limits);
+            for shift in if of.1.contains('l') { vec![-0.7, 0.0, 0.7] } else { vec![0.0] } {
+                let mut model = sized(of);
                 model.design.monitor = monitor;
                 begin(&mut model, time);
-                let free = |j| model.mode.free_command(&model.design, &model.estimate, j);
-                let middle: Vec<_> = (0..model.u.len()).map(free).collect();
+                let free = |j: usize| {
+                    let operating = model.design.actuators[j].operating.unwrap_or_default();
+                    model.mode.free_command(&model.design, &model.signals().z, j) + operating
+                };
+                let middle: Vec<_> = (0..model.values.u.len()).map(free).collect();
                 for (actuator, middle) in model.design.actuators.iter_mut().zip(middle) {
                     let around = [middle + shift - 0.4, middle + shift + 0.5];
                     actuator.limits = actuator.limits.map(|_| around);
@@ -66,7 +69,10 @@ fn is_the_quotient(
         let quotient = (ahead[k] - behind[k]) / (2.0 * step);
         let size = 1.0 + ahead[k].abs().max(quotient.abs());
         let name = &unknown.name;
-        assert!((found[k] - quotient).abs() < tolerance * size, "{name}: {} {quotient}", found[k]);
+        // A loss is no linear function of its command: the quotient has an error of second order.
+        let bent = if name.starts_with("E_hat") { 1e2 * step * step } else { 0.0 };
+        let allowed = (tolerance + bent) * size;
+        assert!((found[k] - quotient).abs() < allowed, "{name}: {} {quotient}", found[k]);
     }
 }
 
@@ -87,8 +93,8 @@ fn is_the_quotient_everywhere(
 
 #[test]
 fn initial_values_have_the_derivatives_of_their_difference_quotients_by_every_known() {
-    for designs in [FREE, LIMITED] {
-        each_mode(&designs, |model, time| {
+    for designs in [&FREE[..], &LIMITED, &SAMPLED] {
+        each_mode(designs, |model, time| {
             let knowns = initial_knowns(model);
             is_the_quotient_everywhere(model, &At::Initialization, &knowns, |moved| {
                 begin(moved, time);
@@ -99,8 +105,8 @@ fn initial_values_have_the_derivatives_of_their_difference_quotients_by_every_kn
 
 #[test]
 fn at_a_point_outputs_and_derivatives_have_those_by_every_input_and_state() {
-    for designs in [FREE, LIMITED] {
-        each_mode(&designs, |model, time| {
+    for designs in [&FREE[..], &LIMITED, &SAMPLED] {
+        each_mode(designs, |model, time| {
             let mut event = model.clone();
             event.event(time).unwrap();
             for model in [model, &event] {
@@ -116,16 +122,15 @@ fn at_a_point_outputs_and_derivatives_have_those_by_every_input_and_state() {
 
 #[test]
 fn every_channel_was_at_each_of_its_limits_in_these_tests() {
-    let seen = std::cell::RefCell::new(std::collections::BTreeSet::new());
-    each_mode(&LIMITED, |model, _| {
-        for j in 0..model.u.len() {
-            let sides = [0, 1].map(|side| model.mode.is_at(side, j));
-            seen.borrow_mut().insert((model.x_hat_0.len(), j, sides));
-        }
-    });
-    for (sizes, limits) in LIMITED {
-        for (j, limited) in limits.bytes().enumerate().map(|(j, letter)| (j, letter == b'l')) {
-            let has = |sides| seen.borrow().contains(&(sizes[0], j, sides));
+    for of in [&LIMITED[..], &SAMPLED].concat() {
+        let seen = std::cell::RefCell::new(std::collections::BTreeSet::new());
+        each_mode(&[of], |model, _| {
+            for j in 0..model.values.u.len() {
+                seen.borrow_mut().insert((j, [0, 1].map(|side| model.mode.is_at(side, j))));
+            }
+        });
+        for (j, limited) in of.1.bytes().enumerate().map(|(j, letter)| (j, letter == b'l')) {
+            let has = |sides| seen.borrow().contains(&(j, sides));
             assert!(has([false, false]));
             assert_eq!([has([true, false]), has([false, true])], [limited, limited]);
         }
@@ -134,7 +139,7 @@ fn every_channel_was_at_each_of_its_limits_in_these_tests() {
 
 #[test]
 fn time_itself_changes_nothing_between_events() {
-    let mut model = sized([3, 2, 1, 1], "l-");
+    let mut model = sized(([3, 2, 1, 1], "l-", ""));
     begin(&mut model, 0.0);
     let mut direction = no_direction(&model);
     model.differentiate(&At::Point { time: 0.2, delta_time: 1.0 }, &mut direction).unwrap();
@@ -143,13 +148,15 @@ fn time_itself_changes_nothing_between_events() {
 
 #[test]
 fn derivatives_allocate_nothing() {
-    let mut model = sized([4, 3, 2, 3], "-l-");
-    begin(&mut model, 1.0);
-    let mut direction = no_direction(&model);
-    let allocations = allocation_counter::measure(|| {
-        for at in [At::Initialization, At::Point { time: 1.0, delta_time: 0.0 }] {
-            model.differentiate(&at, &mut direction).unwrap();
-        }
-    });
-    assert_eq!(allocations.count_total, 0);
+    for of in [&LIMITED[..], &SAMPLED].concat() {
+        let mut model = sized(of);
+        begin(&mut model, 1.0);
+        let mut direction = no_direction(&model);
+        let allocations = allocation_counter::measure(|| {
+            for at in [At::Initialization, At::Point { time: 1.0, delta_time: 0.0 }] {
+                model.differentiate(&at, &mut direction).unwrap();
+            }
+        });
+        assert_eq!(allocations.count_total, 0, "{of:?}");
+    }
 }

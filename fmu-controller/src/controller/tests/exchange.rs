@@ -19,10 +19,10 @@ fn indicators(controller: &AsoController) -> Vec<f64> {
 
 /// The derivatives at t and z with y(t) = 0.4 + 0.5 t.
 fn rates(controller: &mut AsoController, t: f64, z: [f64; 3]) -> [f64; 3] {
-    controller.measurements[0] = 0.4 + 0.5 * t;
-    controller.estimate.copy_from_slice(&z);
+    controller.values.y[0] = 0.4 + 0.5 * t;
+    controller.values.z.copy_from_slice(&z);
     controller.update(t).unwrap();
-    std::array::from_fn(|i| controller.estimate_slopes[i])
+    std::array::from_fn(|i| controller.z_slopes[i])
 }
 
 /// Integrates to 1 s by classic Runge-Kutta steps of 50 us, with events at t_on and after each
@@ -73,13 +73,13 @@ fn a_limit_is_reached_and_left_at_events_only_and_each_shows_in_one_indicator() 
     let (mut controller, _) = exchanged("limits = [-1.5, 0.3]");
     let mut at = |command: f64| {
         rates(&mut controller, 0.0, [-command / 3.0, 0.0, 0.0]);
-        let u = controller.u[0];
+        let u = controller.values.u[0];
         let signs: Vec<bool> = indicators(&controller).iter().map(|value| *value > 0.0).collect();
         controller.event(0.0).unwrap();
         controller.update(0.0).unwrap();
         let restarted: Vec<bool> =
             indicators(&controller).iter().map(|value| *value > 0.0).collect();
-        (u, signs, controller.u[0], restarted)
+        (u, signs, controller.values.u[0], restarted)
     };
     let (inside, above, below) = (vec![true, true], vec![true, false], vec![false, true]);
     let close = |u: f64, wanted: f64| assert!((u - wanted).abs() < 1e-12, "{u} {wanted}");
@@ -159,8 +159,8 @@ fn a_copy_through_bytes_stays_in_its_mode() {
     let z = [-0.8 / 3.0, 0.1, 0.2];
     let bits = |model: &mut AsoController| rates(model, 0.1, z).map(f64::to_bits);
     assert_eq!(bits(&mut copy), bits(&mut controller));
-    assert_eq!(copy.u, controller.u);
-    assert!(copy.u[0] > 0.3, "no event has limited it");
+    assert_eq!(copy.values.u, controller.values.u);
+    assert!(copy.values.u[0] > 0.3, "no event has limited it");
     assert_eq!(indicators(&copy), indicators(&controller));
 }
 

@@ -1,0 +1,185 @@
+//! The equations once more, as matrices and vectors: what must come out.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::sized::{Shape, sized};
+use super::*;
+
+type Vector = DVector<f64>;
+
+/// A design as matrices; signals are values, not deviations.
+pub(super) struct Oracle {
+    a: DMatrix<f64>,
+    b: DMatrix<f64>,
+    c: DMatrix<f64>,
+    f_a: DMatrix<f64>,
+    a_f: Option<DMatrix<f64>>,
+    k_x: DMatrix<f64>,
+    k_f: DMatrix<f64>,
+    l_x: DMatrix<f64>,
+    l_f: DMatrix<f64>,
+    filter: Option<Vector>,
+    x_op: Vector,
+    u_op: Vector,
+    y_op: Vector,
+    limits: Vec<[f64; 2]>,
+}
+
+/// x_hat, f_hat, y_f.
+#[derive(Clone)]
+pub(super) struct Estimate {
+    pub(super) x: Vector,
+    pub(super) f: Vector,
+    pub(super) y_f: Vector,
+}
+
+impl Estimate {
+    /// All numbers.
+    pub(super) fn all(&self) -> Vec<f64> {
+        [self.x.as_slice(), self.f.as_slice(), self.y_f.as_slice()].concat()
+    }
+
+    fn along(&self, slope: &Self, h: f64) -> Self {
+        Self {
+            x: &self.x + &slope.x * h,
+            f: &self.f + &slope.f * h,
+            y_f: &self.y_f + &slope.y_f * h,
+        }
+    }
+}
+
+impl Oracle {
+    pub(super) fn of(design: &Design) -> Self {
+        let operating = |value: Option<f64>| value.unwrap_or(0.0);
+        let all = |values: Vec<f64>| Vector::from_vec(values);
+        Self {
+            a: design.a.dense(),
+            b: design.b.dense(),
+            c: design.c.dense(),
+            f_a: design.f_a.dense(),
+            a_f: design.a_f.as_ref().map(crate::matrix::Matrix::dense),
+            k_x: design.k_x.dense(),
+            k_f: design.k_f.dense(),
+            l_x: design.l_x.dense(),
+            l_f: design.l_f.dense(),
+            filter: design.filter.clone().map(all),
+            x_op: all(design.states.iter().map(|own| operating(own.operating)).collect()),
+            u_op: all(design.actuators.iter().map(|own| operating(own.operating)).collect()),
+            y_op: all(design.measurements.iter().map(|own| operating(own.operating)).collect()),
+            limits: design
+                .actuators
+                .iter()
+                .map(|own| own.limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]))
+                .collect(),
+        }
+    }
+
+    /// The estimate that a controller starts from, and its measurements.
+    pub(super) fn start(&self, controller: &AsoController) -> (Estimate, Vector) {
+        let y = Vector::from_column_slice(&controller.values.y);
+        let filtered = if self.filter.is_some() { y.clone() } else { Vector::zeros(0) };
+        let [x, f] = [&controller.x_hat_0, &controller.f_hat_0];
+        let [x, f] = [x, f].map(|values| Vector::from_column_slice(values));
+        (Estimate { x, f, y_f: filtered }, y)
+    }
+
+    pub(super) fn command(&self, z: &Estimate, on: bool) -> Vector {
+        let fault = &self.k_f * &z.f * f64::from(u8::from(on));
+        let mut u = &self.u_op + &self.k_x * (&z.x - &self.x_op) + fault;
+        for (u, [low, high]) in u.iter_mut().zip(&self.limits) {
+            *u = u.clamp(*low, *high);
+        }
+        u
+    }
+
+    fn innovation(&self, z: &Estimate, y: &Vector) -> Vector {
+        let source = if self.filter.is_some() { &z.y_f } else { y };
+        source - &self.y_op - &self.c * (&z.x - &self.x_op)
+    }
+
+    /// z' at the measurements `y`.
+    fn rate(&self, z: &Estimate, y: &Vector, on: bool) -> Estimate {
+        let (u, e) = (self.command(z, on), self.innovation(z, y));
+        let fault = self.a_f.as_ref().map_or_else(|| &z.f * 0.0, |a_f| a_f * &z.f);
+        Estimate {
+            x: &self.a * (&z.x - &self.x_op)
+                + &self.b * (u - &self.u_op)
+                + &self.f_a * &z.f
+                + &self.l_x * &e,
+            f: (fault + &self.l_f * e) * f64::from(u8::from(on)),
+            y_f: self.filter.as_ref().map_or(z.y_f.clone(), |w| w.component_mul(&(y - &z.y_f))),
+        }
+    }
+
+    /// A classic Runge-Kutta step of `h` from measurements `y` with slopes.
+    pub(super) fn runge_kutta(
+        &self,
+        z: &Estimate,
+        (y, slope): (&Vector, &Vector),
+        h: f64,
+        on: bool,
+    ) -> Estimate {
+        let middle = y + slope * (0.5 * h);
+        let k1 = self.rate(z, y, on);
+        let k2 = self.rate(&z.along(&k1, 0.5 * h), &middle, on);
+        let k3 = self.rate(&z.along(&k2, 0.5 * h), &middle, on);
+        let k4 = self.rate(&z.along(&k3, h), &(y + slope * h), on);
+        z.along(&k1, h / 6.0).along(&k2, h / 3.0).along(&k3, h / 3.0).along(&k4, h / 6.0)
+    }
+
+    /// A sample at z[k|k-1] with the measurements `y`: the estimate that is used, u, z[k+1|k].
+    pub(super) fn sample(
+        &self,
+        z: &Estimate,
+        y: &Vector,
+        (current, on): (bool, bool),
+    ) -> (Estimate, Vector, Estimate) {
+        let e = self.innovation(z, y);
+        let gain = |wanted: bool| if wanted { &e * 1.0 } else { &e * 0.0 };
+        let (before, after) = (gain(current), gain(!current));
+        let on_number = f64::from(u8::from(on));
+        let used = Estimate {
+            x: &z.x + &self.l_x * &before,
+            f: &z.f + &self.l_f * before * on_number,
+            y_f: z.y_f.clone(),
+        };
+        let u = self.command(&used, on);
+        let x = &self.a * (&used.x - &self.x_op)
+            + &self.b * (&u - &self.u_op)
+            + &self.f_a * &used.f
+            + &self.l_x * &after
+            + &self.x_op;
+        let kept = match &self.a_f {
+            Some(a_f) if on => a_f * &used.f,
+            _ => used.f.clone(),
+        };
+        let f = kept + &self.l_f * after * on_number;
+        let moved = |w: &Vector| &z.y_f + w.component_mul(&(y - &z.y_f));
+        let y_f = self.filter.as_ref().map_or(z.y_f.clone(), moved);
+        (used, u, Estimate { x, f, y_f })
+    }
+}
+
+/// A controller whose A is stable, its limits close to its first commands, and its oracle.
+pub(super) fn tamed(of: Shape) -> (AsoController, Oracle) {
+    let mut model = sized(of);
+    let n = model.design.states.len();
+    for i in 0..n {
+        model.design.a.values[i * (n + 1)] -= if model.sampler.is_some() { 0.3 } else { 3.0 };
+    }
+    if model.sampler.is_none() {
+        model.design.t_on = 0.0;
+    }
+    model.initialize(&Experiment::default()).unwrap();
+    for (actuator, u) in model.design.actuators.iter_mut().zip(&model.values.u) {
+        actuator.limits = actuator.limits.map(|_| [u - 0.05, u + 0.05]);
+    }
+    let oracle = Oracle::of(&model.design);
+    (model, oracle)
+}
+
+/// Whether all numbers agree to `tolerance`, relative to the larger of the number and 1.
+pub(super) fn agree(found: &[f64], wanted: &[f64], tolerance: f64) -> bool {
+    found.len() == wanted.len()
+        && found.iter().zip(wanted).all(|(a, b)| (a - b).abs() <= tolerance * b.abs().max(1.0))
+}

@@ -1,0 +1,100 @@
+//! Design files that cannot be used, each with its message.
+
+use super::*;
+
+/// The message about the small design in which `from` is replaced.
+fn message(limits: &str, from: &str, to: &str) -> String {
+    let text = small(limits);
+    assert!(text.contains(from), "{from}");
+    let failure = with_design(&text.replacen(from, to, 1)).err();
+    let message = failure.unwrap_or_else(|| panic!("{to:?} is accepted")).to_string();
+    assert!(message.contains("design.toml"), "{message}");
+    message
+}
+
+#[test]
+fn a_design_that_does_not_fit_is_refused_by_matrix_and_shape() {
+    let wrong = [
+        ("L_f = [[-12.0]]", "L_f = [[-12.0, 1.0]]", "L_f is 1 x 2, expected 1 x 1"),
+        ("B = [[0.0], [2.0]]", "B = [[0.0]]", "B is 1 x 1, expected 2 x 1"),
+        ("A = [[0.0, 1.0], [0.0, -0.2]]", "A = [[0.0, 1.0], [0.0]]", "row 2 has 1 entries"),
+        ("K_f = [[1.0]]", "K_f = [[nan]]", "K_f[1,1] = NaN"),
+        ("K_f = [[1.0]]", "", "K_f"),
+        ("t_on = 0.35", "t_on = 0.35\nt_off = 2.0", "t_off"),
+        ("t_on = 0.35", "t_on = inf", "t_on = inf"),
+        ("step_size = 0.01", "step_size = 0.0", "step_size = 0"),
+        ("step_size = 0.01", "", "step_size is missing"),
+        (
+            "stop_time = 10.0",
+            "stop_time = 0.001",
+            "stop_time = 0.001, expected more than step_size",
+        ),
+        ("[[faults]]\nname = \"f\"", "", "faults"),
+        ("A = [[", "A = [", "TOML"),
+    ];
+    for (from, to, expected) in wrong {
+        let message = message("", from, to);
+        assert!(message.contains(expected), "{message:?} has no {expected:?}");
+    }
+    let message = message("limits = [2.0, 1.0]", "u", "u");
+    assert!(message.contains("limits"), "{message}");
+}
+
+#[test]
+fn each_optional_entry_is_refused_where_it_does_not_fit() {
+    let first = "t_on = 0.35";
+    let wrong = [
+        (first, "A_f = [[0.0, 1.0]]", "A_f is 1 x 2, expected 1 x 1 (faults x faults)"),
+        (first, "A_f = [[inf]]", "A_f[1,1] = inf, expected a finite number"),
+        (first, "filter = [1.0, 2.0]", "filter is 2 numbers, expected 1 numbers (measurements)"),
+        (first, "filter = [0.0]", "filter = 0, expected more than 0 1/s"),
+        (first, "filter = [nan]", "filter = NaN"),
+        (first, "filter = [inf]", "filter = inf"),
+        (first, "sample_time = 0.1", "estimator is not"),
+        (first, "estimator = \"current\"", "sample_time is not"),
+        (first, "sample_time = 0.1\nestimator = \"fast\"", "fast"),
+        (first, "sample_time = 0.0\nestimator = \"current\"", "sample_time = 0, expected more"),
+        (first, "sample_time = inf\nestimator = \"current\"", "sample_time = inf"),
+        (first, "sample_time = 1e-9\nestimator = \"current\"", "at most 1e6 times sample_time"),
+        (
+            first,
+            "sample_time = 0.1\nestimator = \"current\"\nfilter = [1.5]",
+            "filter = 1.5, expected more than 0 and at most 1",
+        ),
+        ("name = \"v\"", "operating = nan", "operating of v = NaN, expected a finite number"),
+        ("name = \"f\"", "operating = 1.0", "operating"),
+        ("name = \"f\"", "loss_of = \"u\"", "fault f: loss_of is stated and least_command is not"),
+        (
+            "name = \"f\"",
+            "least_command = 1.0",
+            "fault f: least_command is stated and loss_of is not",
+        ),
+        (
+            "name = \"f\"",
+            "loss_of = \"w\"\nleast_command = 1.0",
+            "\"w\" is the name of 0 actuators",
+        ),
+        ("name = \"f\"", "loss_of = \"u\"\nleast_command = 0.0", "least_command of f = 0"),
+        ("name = \"f\"", "loss_of = \"u\"\nleast_command = -1.0", "least_command of f = -1"),
+        ("name = \"v\"", "loss_of = \"u\"", "loss_of"),
+    ];
+    for (after, entry, expected) in wrong {
+        let message = message("", after, &format!("{after}\n{entry}"));
+        assert!(message.contains(expected), "{message:?} has no {expected:?}");
+    }
+    let limits = "limits = [1.0, 2.0]";
+    let message = message(limits, "name = \"v\"", "name = \"v\"\noperating = 1.0");
+    assert!(
+        message.contains("operating of u = 0, expected a command within its limits"),
+        "{message}"
+    );
+}
+
+#[test]
+fn the_communication_step_of_a_sampled_design_is_its_sample_time_unless_stated() {
+    let sampled = "t_on = 0.35\nsample_time = 0.02\nestimator = \"prediction\"";
+    let text = small("").replace("t_on = 0.35", sampled);
+    let step_size = |text: &str| with_design(text).unwrap().about().default_experiment.step_size;
+    assert_eq!(step_size(&text), Some(0.01));
+    assert_eq!(step_size(&text.replace("step_size = 0.01", "")), Some(0.02));
+}

@@ -1,0 +1,183 @@
+//! What a design file must keep to: counts, shapes, ranges, entries that belong together.
+
+use super::{Defaults, Design, DesignError, Fault};
+use crate::names;
+
+/// Limits of `least_command`: its square and the inverse of that are numbers.
+const COMMANDS: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
+/// The most samples in a step of the default experiment.
+const MOST_SAMPLES: f64 = 1e6;
+
+/// A value, what it is and the rule that it breaks.
+pub(crate) type Refusal = (String, f64, &'static str);
+
+impl Design {
+    /// Refuses a design that does not fit together.
+    pub(super) fn check(&self, path: &str) -> Result<(), DesignError> {
+        if let Some(what) = self.contradiction() {
+            return Err(DesignError::Entry { path: path.to_owned(), what });
+        }
+        self.check_shapes(path)?;
+        let refused = self.refused_number().or_else(|| self.refused_signal());
+        match refused.or_else(|| self.refused_time()) {
+            Some((what, value, rule)) => {
+                Err(DesignError::Value { path: path.to_owned(), what, value, rule })
+            }
+            None => Ok(()),
+        }
+    }
+
+    fn check_shapes(&self, path: &str) -> Result<(), DesignError> {
+        let n = ("states", self.states.len());
+        let m = ("actuators", self.actuators.len());
+        let p = ("measurements", self.measurements.len());
+        let q = ("faults", self.faults.len());
+        let expected = [(n, n), (n, m), (p, n), (n, q), (m, n), (m, q), (n, p), (q, p), (q, q)];
+        for ((what, found), (rows, columns)) in self.matrices().zip(expected) {
+            if (found.rows, found.columns) != (rows.1, columns.1) {
+                return Err(DesignError::Shape {
+                    path: path.to_owned(),
+                    what,
+                    found: format!("{} x {}", found.rows, found.columns),
+                    expected: format!("{} x {}", rows.1, columns.1),
+                    meaning: format!("{} x {}", rows.0, columns.0),
+                });
+            }
+        }
+        match &self.filter {
+            Some(filter) if filter.len() != p.1 => Err(DesignError::Shape {
+                path: path.to_owned(),
+                what: "filter",
+                found: format!("{} numbers", filter.len()),
+                expected: format!("{} numbers", p.1),
+                meaning: p.0.to_owned(),
+            }),
+            _ => Ok(()),
+        }
+    }
+
+    /// What is missing, too much, or without its counterpart.
+    fn contradiction(&self) -> Option<String> {
+        let lists = [
+            (self.states.len(), "state"),
+            (self.actuators.len(), "actuator"),
+            (self.measurements.len(), "measurement"),
+            (self.faults.len(), "fault"),
+        ];
+        if let Some((_, name)) = lists.iter().find(|(count, _)| *count == 0) {
+            return Some(format!("at least one {name} is needed"));
+        }
+        if self.actuators.len() > 64 {
+            return Some("more than 64 actuators".to_owned());
+        }
+        match (self.sample_time, self.estimator, self.experiment.step_size) {
+            (Some(_), None, _) => {
+                let text = "sample_time is stated and estimator is not, \
+                            expected estimator = \"current\" or \"prediction\"";
+                return Some(text.to_owned());
+            }
+            (None, Some(_), _) => {
+                return Some("estimator is stated and sample_time is not".to_owned());
+            }
+            (None, None, None) => return Some("step_size is missing in experiment".to_owned()),
+            _ => {}
+        }
+        self.faults.iter().find_map(|fault| self.contradiction_of(fault))
+    }
+
+    fn contradiction_of(&self, fault: &Fault) -> Option<String> {
+        let name = &fault.name;
+        let Some(actuator) = &fault.loss_of else {
+            let text = format!("fault {name}: least_command is stated and loss_of is not");
+            return fault.least_command.map(|_| text);
+        };
+        if fault.least_command.is_none() {
+            return Some(format!("fault {name}: loss_of is stated and least_command is not"));
+        }
+        let names: Vec<_> = self.actuators.iter().map(|own| own.name.as_str()).collect();
+        match names.iter().filter(|own| *own == actuator).count() {
+            1 => None,
+            count => Some(format!(
+                "fault {name}: loss_of = {actuator:?} is the name of {count} actuators, expected \
+                 one of {}",
+                names.join(", ")
+            )),
+        }
+    }
+
+    fn refused_number(&self) -> Option<Refusal> {
+        for (name, matrix) in self.matrices() {
+            if let Some(k) = matrix.values.iter().position(|value| !value.is_finite()) {
+                return Some((matrix.element(name, k), matrix.values[k], "a finite number"));
+            }
+        }
+        self.refused_filter()
+    }
+
+    /// The element of `filter` that breaks its rule.
+    pub(crate) fn refused_filter(&self) -> Option<Refusal> {
+        let (most, rule) = match self.sample_time {
+            None => (f64::MAX, "more than 0 1/s"),
+            Some(_) => (1.0, "more than 0 and at most 1"),
+        };
+        let filter = self.filter.as_ref()?;
+        let k = filter.iter().position(|value| !(*value > 0.0 && *value <= most))?;
+        Some((names::channel("filter", k, filter.len()), filter[k], rule))
+    }
+
+    fn refused_signal(&self) -> Option<Refusal> {
+        let signals = self.states.iter().chain(&self.measurements);
+        let values = signals.map(|signal| (&signal.name, signal.operating));
+        let commands = self.actuators.iter().map(|actuator| (&actuator.name, actuator.operating));
+        for (name, value) in values.chain(commands) {
+            if let Some(value) = value.filter(|value| !value.is_finite()) {
+                return Some((format!("operating of {name}"), value, "a finite number"));
+            }
+        }
+        for actuator in &self.actuators {
+            let Some([low, high]) = actuator.limits else { continue };
+            if !(low.is_finite() && high.is_finite() && low < high) {
+                let what = format!("limits of {} from {low} to", actuator.name);
+                return Some((what, high, "two finite numbers, the smaller one first"));
+            }
+            if let Some(value) = actuator.operating.filter(|value| *value < low || *value > high) {
+                let what = format!("operating of {}", actuator.name);
+                return Some((what, value, "a command within its limits"));
+            }
+        }
+        let least =
+            self.faults.iter().filter_map(|fault| Some((&fault.name, fault.least_command?)));
+        least
+            .filter(|(_, value)| !COMMANDS.contains(value))
+            .map(|(name, value)| (format!("least_command of {name}"), value, "1e-100 to 1e100"))
+            .next()
+    }
+
+    fn refused_time(&self) -> Option<Refusal> {
+        let refuse = |what: &str, value, rule| Some((what.to_owned(), value, rule));
+        if !self.t_on.is_finite() {
+            return refuse("t_on", self.t_on, "a time in s");
+        }
+        let positive = |value: &f64| *value > 0.0 && value.is_finite();
+        if let Some(value) = self.sample_time.filter(|value| !positive(value)) {
+            return refuse("sample_time", value, "more than 0 s");
+        }
+        let Defaults { stop_time, step_size } = self.experiment;
+        if let Some(value) = step_size.filter(|value| !positive(value)) {
+            return refuse("step_size", value, "more than 0 s");
+        }
+        let step_size = self.step_size();
+        if self.sample_time.is_some_and(|sample_time| step_size / sample_time > MOST_SAMPLES) {
+            return refuse("step_size", step_size, "at most 1e6 times sample_time");
+        }
+        if !(stop_time > step_size && stop_time.is_finite()) {
+            return refuse("stop_time", stop_time, "more than step_size");
+        }
+        None
+    }
+
+    /// The communication step of the default experiment, in s.
+    pub(crate) fn step_size(&self) -> f64 {
+        self.experiment.step_size.or(self.sample_time).unwrap_or_default()
+    }
+}

@@ -1,0 +1,69 @@
+//! Loss of effectiveness: the part of a command that its actuator does not carry out.
+//!
+//! An actuator that carries out (1 - E) u of its command u acts like one with the additive fault f =
+//! -E u. From the estimate of that fault
+//!
+//! ```text
+//! E_hat = -u f_hat / (u^2 + u_e^2)
+//! ```
+//!
+//! which is near -f_hat / u where the command is well above `least_command`, u_e, and near 0 where it
+//! is well below, for there the loss does not show.
+
+use serde::{Deserialize, Serialize};
+
+use crate::design::Design;
+
+/// One fault that is a loss of effectiveness.
+#[derive(Clone, Serialize, Deserialize)]
+pub(crate) struct Loss {
+    /// Position of the fault.
+    pub(crate) fault: usize,
+    /// Position of the actuator.
+    pub(crate) actuator: usize,
+    /// u_e.
+    least_command: f64,
+    /// E_hat, and its derivative with respect to time.
+    pub(crate) estimate: f64,
+    pub(crate) slope: f64,
+}
+
+impl Loss {
+    /// Those of `design`, in the order of its faults.
+    pub(crate) fn all(design: &Design) -> Vec<Self> {
+        let mut all = Vec::new();
+        for (fault, own) in design.faults.iter().enumerate() {
+            let (Some(name), Some(least_command)) = (&own.loss_of, own.least_command) else {
+                continue;
+            };
+            let actuator = design.actuators.iter().position(|actuator| actuator.name == *name);
+            all.extend(actuator.map(|actuator| Self {
+                fault,
+                actuator,
+                least_command,
+                estimate: 0.0,
+                slope: 0.0,
+            }));
+        }
+        all
+    }
+
+    /// The factor of -f_hat in E_hat, and its derivative with respect to u.
+    fn inverse(&self, u: &[f64]) -> (f64, f64) {
+        let u = u[self.actuator];
+        let scale = 1.0 / (u * u + self.least_command * self.least_command);
+        let inverse = u * scale;
+        (inverse, scale - 2.0 * inverse * inverse)
+    }
+
+    /// E_hat of commands and faults.
+    pub(crate) fn at(&self, u: &[f64], f_hat: &[f64]) -> f64 {
+        -self.inverse(u).0 * f_hat[self.fault]
+    }
+
+    /// The derivative of E_hat along a direction in commands and faults.
+    pub(crate) fn along(&self, [u, du]: [&[f64]; 2], [f_hat, df_hat]: [&[f64]; 2]) -> f64 {
+        let (inverse, slope) = self.inverse(u);
+        -inverse * df_hat[self.fault] - slope * du[self.actuator] * f_hat[self.fault]
+    }
+}
