@@ -111,6 +111,8 @@ fn the_models_forbid_unsafe_code() {
         "examples/bouncing-ball",
         "examples/pid",
         "examples/lookup-table",
+        "examples/three-tank",
+        "examples/dc-servo",
     ] {
         let entry = if model == "cli" { "src/main.rs" } else { "src/lib.rs" };
         let text = fs::read_to_string(root().join(model).join(entry)).unwrap();

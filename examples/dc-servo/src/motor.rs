@@ -1,0 +1,62 @@
+//! The equations of the servo at one instant.
+
+use num_dual::DualNum;
+
+/// `f64`, or a dual number that carries a derivative through the same equations.
+pub(crate) trait Number: DualNum<Primitive = f64> + Copy {}
+impl<D: DualNum<Primitive = f64> + Copy> Number for D {}
+
+/// Number of parameters, and the places of those that more than these equations depend on.
+pub(crate) const COUNT: usize = 12;
+pub(crate) const ONSET: usize = 9;
+pub(crate) const BIAS: usize = 11;
+
+/// What stays as it is between events.
+pub(crate) struct Motor<D> {
+    pub(crate) parameters: [D; COUNT],
+    pub(crate) faulty: bool,
+    /// Whether there is dry friction.
+    pub(crate) friction: bool,
+}
+
+/// What follows at once from velocity, voltage and regime.
+pub(crate) struct Response<D> {
+    /// In rad/s2.
+    pub(crate) acceleration: D,
+    /// Dry friction in N m.
+    pub(crate) friction: D,
+    /// In A.
+    pub(crate) current: D,
+}
+
+impl<D: Number> Motor<D> {
+    /// The voltage at the armature: `u`, of a faulty drive `(1 - E) u + f_u + r_u (t - t_fault)`.
+    pub(crate) fn voltage(&self, u: D, time: D) -> D {
+        let [.., loss, fault, rate, onset, _, _] = self.parameters;
+        if self.faulty { (D::one() - loss) * u + fault + rate * (time - onset) } else { u }
+    }
+
+    /// The derivative of the voltage with respect to time, from that of `u`.
+    pub(crate) fn voltage_rise(&self, u_slope: D) -> D {
+        let [.., loss, _, rate, _, _, _] = self.parameters;
+        if self.faulty { (D::one() - loss) * u_slope + rate } else { u_slope }
+    }
+
+    /// `J w' = k i - F_v w - T_f` with the current `R i = v - k w` and the dry friction `T_f`:
+    /// `T_c sign(w)` while the load slides, at rest what holds it, at most `T_s`.
+    pub(crate) fn response(&self, regime: i32, omega: D, voltage: D) -> Response<D> {
+        let [resistance, k, inertia, viscous, coulomb, holding, ..] = self.parameters;
+        let current = (voltage - k * omega) / resistance;
+        let torque = k * current - viscous * omega;
+        let friction = match regime {
+            _ if !self.friction => D::zero(),
+            0 if torque > holding => holding,
+            0 if torque < -holding => -holding,
+            0 => torque,
+            direction => coulomb * f64::from(direction),
+        };
+        let held = self.friction && regime == 0;
+        let acceleration = if held { D::zero() } else { (torque - friction) / inertia };
+        Response { acceleration, friction, current }
+    }
+}
