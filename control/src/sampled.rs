@@ -216,7 +216,7 @@ pub fn design(
     plant.check_observer_exists()?;
     let k_f = match k_f {
         Some(given) => given.clone(),
-        None => extended.plant.compensation_gain()? * mean_development(&extended.plant, period)?,
+        None => compensation_gain(extended, Domain::Sampled { period })?,
     };
     let ((n, q), m) = (plant.f_a.shape(), plant.b.ncols());
     check::shape("K_f", &k_f, (m, q))?;
@@ -229,12 +229,11 @@ pub fn design(
     let (l, observer) = place_observer((&a_0, &output), observer_poles, place_discrete)?;
     let gains = Gains { k_x: controller.gain, k_f, l_x: l.rows(0, n).into(), l_f: -l.rows(n, q) };
     let whole = equations(estimator, &plant, &gains)?.closed_loop(&plant, &vec![1.0; m])?;
-    let filter = extended.filter.as_ref();
     Ok(SampledDesign {
         period,
         estimator,
         plant,
-        filter: filter.map(|rates| rates.iter().map(|&rate| part(rate, period)).collect()),
+        filter: filter(extended, Domain::Sampled { period }),
         gains,
         controller: controller.quality,
         observer,
@@ -242,9 +241,29 @@ pub fn design(
     })
 }
 
-/// The mean of f over the interval is this times its value at the start.
-fn mean_development(plant: &FaultyPlant, period: f64) -> Result<DMatrix<f64>, Error> {
-    let q = plant.a_f.nrows();
-    let hold = FirstOrderHold::new(&plant.a_f, &DMatrix::identity(q, q), period)?;
-    Ok(hold.gamma_0 / period)
+/// W of the measurement filter as the controller runs it in `domain`: the rates w, or when sampled
+/// the parts 1 - e^(-w T) of y - `y_f` by which it moves from sample to sample.
+#[must_use]
+pub fn filter(extended: &ExtendedPlant, domain: Domain) -> Option<Vec<f64>> {
+    let rates = extended.filter.as_ref()?.iter();
+    Some(match domain {
+        Domain::Continuous => rates.copied().collect(),
+        Domain::Sampled { period } => rates.map(|&rate| part(rate, period)).collect(),
+    })
+}
+
+/// `K_f` in `domain`: [`FaultyPlant::compensation_gain`] of the continuous plant, when sampled times
+/// the mean over the interval of the fault as modelled.
+///
+/// # Errors
+///
+/// Those of [`FaultyPlant::compensation_gain`] and [`FirstOrderHold::new`].
+pub fn compensation_gain(extended: &ExtendedPlant, domain: Domain) -> Result<DMatrix<f64>, Error> {
+    let gain = extended.plant.compensation_gain()?;
+    let Domain::Sampled { period } = domain else {
+        return Ok(gain);
+    };
+    let q = extended.plant.a_f.nrows();
+    let hold = FirstOrderHold::new(&extended.plant.a_f, &DMatrix::identity(q, q), period)?;
+    Ok(gain * hold.gamma_0 / period)
 }

@@ -1,20 +1,14 @@
 //! What is known of a design: the numbers of the report.
 
-use control::aso::{FaultyPlant, Gains};
-use control::eigen::eigenvalues;
-use control::faults::{Entry, loss_tolerance};
+use control::Error;
 use control::response::{
-    self, Reversal, System, Transient, energy, fault_rate_system, fault_system, frequency_grid,
-    frequency_response, h_infinity, peak_gain, reversal,
+    System, energy, fault_rate_system, fault_system, frequency_grid, frequency_response,
+    h_infinity, peak_gain, step_response,
 };
-use control::sampled::Estimator;
-use control::{Domain, Error};
 use nalgebra::DMatrix;
 
-use super::designed::{Designed, fault_names};
-use super::plant_file::PlantFile;
-use super::report::{Bound, Curve, Effectiveness, Frequency, Loop, Matrix, Norm, StepResponse};
-use super::report::{pairs, rows};
+use super::designed::Designed;
+use super::report::{Bound, Curve, Frequency, Norm, StepResponse};
 use super::signals::Fault;
 
 /// Relative width of the brackets of peak gains and norms.
@@ -112,14 +106,13 @@ impl<'a> Loops<'a> {
             let mut curves = Vec::new();
             let trace = step_response(&self.of_faults, column)?;
             for (at, &row) in self.outputs.positions.iter().enumerate() {
-                let Transient { peak, peak_time, settling_time, .. } =
-                    trace.transient(row, SETTLED);
+                let found = trace.transient(row, SETTLED);
                 curves.push(Curve {
                     name: self.outputs.names[at].clone(),
                     unit: self.outputs.units[at].clone(),
-                    peak: size * peak,
-                    peak_time,
-                    settling_time,
+                    peak: size * found.peak,
+                    peak_time: found.peak_time,
+                    settling_time: found.settling_time,
                     times: trace.time.clone(),
                     values: trace.output.row(row).iter().map(|value| size * value).collect(),
                 });
@@ -130,16 +123,28 @@ impl<'a> Loops<'a> {
         self.faults().map(response).collect()
     }
 
+    /// From the faults as `system` has them to the errors of their estimates.
+    fn to_fault_errors(&self, system: &System) -> System {
+        let channels = &self.designed.extended.channels;
+        let columns: Vec<_> = channels.iter().map(|channel| channel.estimate).collect();
+        let all = self.designed.plant.a.nrows();
+        let rows: Vec<_> = columns.iter().map(|column| 2 * all + column).collect();
+        System {
+            a: system.a.clone(),
+            b: system.b.select_columns(&columns),
+            c: system.c.select_rows(&rows),
+            d: system.d.select_rows(&rows).select_columns(&columns),
+            domain: system.domain,
+        }
+    }
+
     /// Singular values from the faults to their estimates and to the errors.
     pub(crate) fn frequency(&self) -> Result<Vec<Frequency>, Error> {
-        let q = self.designed.plant.f_a.ncols();
-        let columns: Vec<_> = self.faults().map(|(column, _)| column).collect();
-        let errors = self.outputs.of(&self.of_faults, &columns, self.designed);
-        let mut estimates = errors.clone();
-        // f_hat = eps + f.
-        estimates.d += DMatrix::identity(columns.len(), columns.len());
-        let rates = self.outputs.of(&self.of_rates, &columns, self.designed);
-        debug_assert!(q >= columns.len());
+        let errors = self.to_fault_errors(&self.of_faults);
+        let count = errors.d.ncols();
+        let identity = DMatrix::identity(count, count);
+        let estimates = System { d: &errors.d + identity, ..errors.clone() };
+        let rates = self.to_fault_errors(&self.of_rates);
         let grid = frequency_grid(&self.of_faults, POINTS_PER_DECADE)?;
         let curve = |name: &str, system: &System| {
             let points = frequency_response(system, &grid)?;
@@ -147,15 +152,32 @@ impl<'a> Loops<'a> {
             Ok(Frequency {
                 name: name.to_owned(),
                 frequencies: grid.clone(),
-                singular_values: (0..columns.len()).map(values).collect(),
+                singular_values: (0..count).map(values).collect(),
             })
         };
-        [
-            curve("faults to their estimates", &estimates),
-            curve("faults to the errors of their estimates", &errors),
-            curve("rates of the faults to the errors of their estimates", &rates),
-        ]
-        .into_iter()
-        .collect()
+        Ok(vec![
+            curve("faults to their estimates", &estimates)?,
+            curve("faults to the errors of their estimates", &errors)?,
+            curve("rates of the faults to the errors of their estimates", &rates)?,
+        ])
+    }
+
+    /// Norms from the rates of the faults to the errors of their estimates.
+    pub(crate) fn norms(&self) -> Result<Vec<Norm>, Error> {
+        let rates = self.to_fault_errors(&self.of_rates);
+        let norm = |name: &str, value: f64, method: &str| Norm {
+            name: name.to_owned(),
+            from: "rates of the faults".to_owned(),
+            to: "errors of their estimates".to_owned(),
+            value,
+            method: method.to_owned(),
+        };
+        let largest = h_infinity(&rates, WIDTH)?.upper;
+        let energies = energy(&rates)?;
+        Ok(vec![
+            norm("H-infinity", largest, "largest singular value over all frequencies (level sets)"),
+            norm("generalised H2", energies.peak, "peak for a rate of unit energy (Lyapunov)"),
+            norm("H2", energies.h2, "covariance under white noise (Lyapunov)"),
+        ])
     }
 }

@@ -91,9 +91,10 @@ pub(crate) struct Loop {
     pub(crate) wanted: Vec<[f64; 2]>,
     /// Eigenvalues [re, im] as reached.
     pub(crate) eigenvalues: Vec<[f64; 2]>,
-    /// Condition number of the eigenvectors, and in which coordinates.
-    pub(crate) condition: f64,
-    pub(crate) scaled_condition: f64,
+    /// Condition number of the eigenvectors in the units of the plant file, where they were chosen.
+    pub(crate) condition: Option<f64>,
+    /// The same in balanced coordinates.
+    pub(crate) balanced_condition: Option<f64>,
     /// Largest distance of an eigenvalue from the wanted one, relative.
     pub(crate) pole_error: Option<f64>,
     /// Boundary of the wanted region, where one was wanted.
@@ -125,6 +126,8 @@ pub(crate) struct Certificate {
     pub(crate) printed: Result<Theorem1, String>,
     /// The same with P chosen by linear matrix inequalities, or why there is none.
     pub(crate) free: Result<FreeP, String>,
+    /// Where the error ends for bounded rates of the faults, or why nothing is said.
+    pub(crate) ultimate: Result<Ultimate, String>,
     /// Norms from the faults' rates to the errors: name, value and how it was verified.
     pub(crate) norms: Vec<Norm>,
 }
@@ -145,11 +148,24 @@ pub(crate) struct Theorem1 {
 /// P by linear matrix inequalities.
 #[derive(Serialize)]
 pub(crate) struct FreeP {
-    /// Largest certified decay rate, 1/s.
+    /// Largest certified decay rate, 1/s, and the margin of its inequality.
     pub(crate) decay: f64,
+    pub(crate) decay_margin: f64,
     /// Smallest certified delta.
     pub(crate) delta: f64,
     pub(crate) p: Vec<Vec<f64>>,
+    /// Smallest eigenvalue by which the inequalities hold, relative.
+    pub(crate) margin: f64,
+}
+
+/// The ball in which [e; eps] ends, eps = f_hat - f.
+#[derive(Serialize)]
+pub(crate) struct Ultimate {
+    /// Bound of the norm of the faults' rates, per s.
+    pub(crate) rate: f64,
+    pub(crate) radius: f64,
+    /// Largest value of each component.
+    pub(crate) peaks: Vec<f64>,
     /// Smallest eigenvalue by which the inequalities hold, relative.
     pub(crate) margin: f64,
 }

@@ -8,7 +8,8 @@ use control::placement::real;
 use nalgebra::{Complex, DMatrix};
 
 fn designed() -> AsoDesign {
-    design(&plant(), &real(&CONTROLLER_POLES), &real(&OBSERVER_POLES), None).expect("the design exists")
+    design(&plant(), &real(&CONTROLLER_POLES), &real(&OBSERVER_POLES), None)
+        .expect("the design exists")
 }
 
 #[test]
@@ -146,7 +147,8 @@ fn two_faults_with_three_measurements_are_designed() {
         crate::integers(5, 2, |i, j| (5 * i * i + 3 * j + 2 * i * j + i) % 7 - 3) * -0.5,
     );
     let observer_poles = [-10., -11., -12., -13., -14., -15., -16.];
-    let design = design(&plant, &real(&[-1., -2., -3., -4., -5.]), &real(&observer_poles), None).unwrap();
+    let design =
+        design(&plant, &real(&[-1., -2., -3., -4., -5.]), &real(&observer_poles), None).unwrap();
     let half = DMatrix::from_diagonal_element(2, 2, 0.5);
     assert!((&design.gains.k_f - half).amax() < 1e-13);
     assert_eq!((design.gains.l_x.shape(), design.gains.l_f.shape()), ((5, 3), (2, 3)));

@@ -7,7 +7,7 @@ fn explore() {
     let p = plant();
     for gains in [
         repaired_gains(),
-        control::aso::design(&p, &CONTROLLER_POLES, &OBSERVER_POLES, None).unwrap().gains,
+        control::aso::design(&p, &real(&CONTROLLER_POLES), &real(&OBSERVER_POLES), None).unwrap().gains,
     ] {
         let f = gains.error_dynamics(&p);
         let c = certify(&p, &gains, 1.0, 30.0).unwrap();

@@ -60,8 +60,9 @@ fn a_wrong_shape_is_named_with_what_was_expected() {
 #[test]
 fn each_matrix_of_the_plant_and_of_the_gains_is_checked() {
     let zeros = DMatrix::zeros(3, 3);
-    let of_plant =
-        |plant: FaultyPlant| name_of(design(&plant, &real(&CONTROLLER_POLES), &real(&OBSERVER_POLES), None));
+    let of_plant = |plant: FaultyPlant| {
+        name_of(design(&plant, &real(&CONTROLLER_POLES), &real(&OBSERVER_POLES), None))
+    };
     assert_eq!(of_plant(FaultyPlant { a: DMatrix::zeros(4, 3), ..plant() }), "A");
     assert_eq!(of_plant(FaultyPlant { b: zeros.clone(), ..plant() }), "B");
     assert_eq!(of_plant(FaultyPlant { c: zeros.clone(), ..plant() }), "C");

@@ -83,7 +83,7 @@ fn the_pendulum_is_stable_at_every_sample_time() {
             let found = pendulum(period, estimator);
             let slowest = (-4.5 * period).exp();
             assert!((found.radius - slowest).abs() < 1e-6 * (1.0 - slowest) + 1e-9, "{found:?}");
-            assert!(found.observer.pole_error < 1e-6 && found.observer.scaled_condition < 1e6);
+            assert!(found.observer.pole_error < 1e-6 && found.observer.balanced_condition < 1e6);
         }
     }
 }

@@ -1,0 +1,97 @@
+//! Theorem 1 for a design: as printed, and with P chosen by linear matrix inequalities.
+
+use control::Domain;
+use control::lmi::Outcome;
+use control::theorem1::{certify, largest_decay, smallest_region, ultimate_bound};
+
+use super::designed::Designed;
+use super::report::{Certificate, FreeP, Norm, Theorem1, Ultimate, rows};
+
+/// The design parameter alpha of (12); it cancels in delta.
+const ALPHA: f64 = 1.0;
+
+/// Everything that is certified of `designed`; `norms` were computed before.
+pub(crate) fn certificate(designed: &Designed, norms: Vec<Norm>) -> Certificate {
+    Certificate {
+        printed: printed(designed),
+        free: free(designed),
+        ultimate: ultimate(designed),
+        norms,
+    }
+}
+
+/// The largest norm of the vector of faults, from the bounds of the plant file.
+fn largest(bounds: impl Iterator<Item = Option<f64>>) -> Option<f64> {
+    let squares = bounds.map(|bound| bound.map(|bound| bound * bound));
+    squares.sum::<Option<f64>>().map(f64::sqrt)
+}
+
+fn fault_bound(designed: &Designed) -> Result<f64, String> {
+    let bounds = designed.linear.faults.iter().map(|fault| fault.bound);
+    largest(bounds).ok_or_else(|| "it needs `bound` for every fault".to_owned())
+}
+
+/// The theorem is about a continuous observer of constant faults.
+fn applies(designed: &Designed) -> Result<(), String> {
+    if designed.domain != Domain::Continuous {
+        return Err("the theorem is about a controller in continuous time".to_owned());
+    }
+    if designed.plant.a_f.amax() > 0.0 {
+        return Err("the theorem is about constant faults".to_owned());
+    }
+    Ok(())
+}
+
+fn printed(designed: &Designed) -> Result<Theorem1, String> {
+    applies(designed)?;
+    let beta = fault_bound(designed)?;
+    let found = certify(&designed.plant, &designed.gains, ALPHA, beta);
+    let found = found.map_err(|error| error.to_string())?;
+    Ok(Theorem1 {
+        alpha: found.alpha,
+        beta: found.beta,
+        p: rows(&found.p),
+        smallest_eigenvalue: found.p_range.0,
+        largest_eigenvalue: found.p_range.1,
+        residual: found.residual,
+        delta: found.delta,
+    })
+}
+
+fn verified<T>(outcome: Result<Outcome<T>, control::Error>) -> Result<T, String> {
+    match outcome {
+        Ok(Outcome::Optimal(found)) => Ok(found),
+        Ok(Outcome::Infeasible { conflict }) => Err(format!("infeasible: {}", conflict.join("; "))),
+        Ok(Outcome::Trouble(reason)) => Err(format!("numerical trouble: {reason}")),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+fn free(designed: &Designed) -> Result<FreeP, String> {
+    applies(designed)?;
+    let dynamics = designed.gains.error_dynamics(&designed.plant);
+    let decay = verified(largest_decay(&dynamics))?;
+    let beta = fault_bound(designed)?;
+    let region = verified(smallest_region(&dynamics, &designed.plant.augmented_fault(), beta))?;
+    Ok(FreeP {
+        decay: decay.alpha,
+        decay_margin: decay.certificate.margin,
+        delta: region.delta,
+        p: rows(&region.p),
+        margin: region.margin,
+    })
+}
+
+/// The ball that the error ends in for bounded rates of the faults.
+fn ultimate(designed: &Designed) -> Result<Ultimate, String> {
+    applies(designed)?;
+    let rates = designed.linear.faults.iter().map(|fault| fault.rate_bound);
+    let rate = largest(rates).ok_or_else(|| "it needs `rate_bound` for every fault".to_owned())?;
+    let dynamics = designed.gains.error_dynamics(&designed.plant);
+    let (order, q) = (dynamics.nrows(), designed.plant.f_a.ncols());
+    let mut enters = nalgebra::DMatrix::zeros(order, q);
+    enters.view_mut((order - q, 0), (q, q)).fill_with_identity();
+    let found = verified(ultimate_bound(&dynamics, &enters, rate))?;
+    let peaks = found.peaks.iter().copied().collect();
+    Ok(Ultimate { rate, radius: found.radius, peaks, margin: found.margin })
+}

@@ -1,0 +1,370 @@
+//! Puts the numbers of a design into the report.
+
+use control::eigen::eigenvalues;
+use control::faults::{Entry, loss_tolerance};
+use control::placement::Quality;
+use control::sampled::Estimator;
+use control::{Domain, Error};
+use fmi2::description::ModelDescription;
+use nalgebra::{Complex, DMatrix};
+
+use super::analysis::Loops;
+use super::certificate::certificate;
+use super::designed::{Designed, fault_names};
+use super::gains::Found;
+use super::plant_file::PlantFile;
+use super::report::{
+    Check, Effectiveness, Loop, Matrix, Plant, Region, Report, Sampled, Signal, pairs, rows,
+};
+use super::signals::{self, Course, Entrance, Fault};
+use super::wanted::{self, Wanted};
+
+/// Below this part of a fault's effect the compensation counts as complete.
+const CANCELLED: f64 = 1e-9;
+/// An operating point nearer to an equilibrium than this counts as one.
+const AT_REST: f64 = 1e-6;
+
+/// Everything that is known of `designed`.
+pub(crate) fn report(
+    file: &PlantFile<'_>,
+    designed: &Designed,
+    description: String,
+) -> Result<Report, Error> {
+    let loops = Loops::of(designed)?;
+    let Designed { plant, gains, linear, .. } = designed;
+    let n = designed.extended.states;
+    let inner = plant.a.view((0, 0), (n, n)) + plant.b.rows(0, n) * gains.k_x.columns(0, n);
+    let names = Names::of(designed);
+    Ok(Report {
+        description,
+        plant_file: file.name(),
+        plant: self::plant(designed, &names)?,
+        checks: checks(designed),
+        gains: names.gains(designed),
+        feedback: closed("A + B K_x", &inner, &designed.feedback, &file.feedback.wanted)?,
+        observer: closed(
+            "A_0 - L C_0",
+            &gains.error_dynamics(plant, designed.estimator),
+            &designed.observer,
+            &file.observer.wanted,
+        )?,
+        sampling: match designed.domain {
+            Domain::Continuous => None,
+            Domain::Sampled { period } => Some(Sampled {
+                sample_time: period,
+                estimator: estimator(designed.estimator).to_owned(),
+            }),
+        },
+        certificate: certificate(designed, loops.norms()?),
+        bounds: loops.bounds()?,
+        steps: loops.steps()?,
+        frequency: loops.frequency()?,
+        effectiveness: effectiveness(designed)?,
+        assumptions: assumptions(designed, &linear.faults),
+        interface: Vec::new(),
+    })
+}
+
+/// The name of an estimator, as the design file has it.
+pub(crate) fn estimator(estimator: Estimator) -> &'static str {
+    match estimator {
+        Estimator::Current => "current",
+        Estimator::Prediction => "prediction",
+    }
+}
+
+/// Names of rows and columns.
+struct Names {
+    states: Vec<String>,
+    extended: Vec<String>,
+    actuators: Vec<String>,
+    measurements: Vec<String>,
+    faults: Vec<String>,
+}
+
+impl Names {
+    fn of(designed: &Designed) -> Self {
+        let linear = &designed.linear;
+        let names = |signals: &[signals::Signal]| {
+            signals.iter().map(|signal| signal.name.clone()).collect::<Vec<_>>()
+        };
+        let (states, measurements) = (names(&linear.states), names(&linear.measurements));
+        let mut extended = states.clone();
+        if designed.filter.is_some() {
+            extended.extend(measurements.iter().map(|name| format!("filtered {name}")));
+        }
+        Self {
+            actuators: names(&linear.actuators),
+            faults: fault_names(linear, &designed.extended),
+            states,
+            extended,
+            measurements,
+        }
+    }
+
+    fn gains(&self, designed: &Designed) -> Vec<Matrix> {
+        let gains = &designed.gains;
+        let Self { extended, actuators, measurements, faults, .. } = self;
+        let mut all = vec![
+            matrix("K_x", "state feedback", &gains.k_x, actuators, extended),
+            matrix("K_f", "fault compensation", &gains.k_f, actuators, faults),
+            matrix("L_x", "correction of the states", &gains.l_x, extended, measurements),
+            matrix("L_f", "correction of the faults", &gains.l_f, faults, measurements),
+        ];
+        if let Some(filter) = &designed.filter {
+            let diagonal = DMatrix::from_diagonal(&filter.clone().into());
+            all.push(matrix("W", "measurement filter", &diagonal, measurements, measurements));
+        }
+        all
+    }
+}
+
+fn matrix(
+    name: &str,
+    meaning: &str,
+    values: &DMatrix<f64>,
+    rows: &[String],
+    columns: &[String],
+) -> Matrix {
+    Matrix {
+        name: name.to_owned(),
+        meaning: meaning.to_owned(),
+        rows: rows.to_vec(),
+        columns: columns.to_vec(),
+        values: self::rows(values),
+    }
+}
+
+fn plant(designed: &Designed, names: &Names) -> Result<Plant, Error> {
+    let linear = &designed.linear;
+    let signal = |signal: &signals::Signal| Signal {
+        name: signal.name.clone(),
+        unit: signal.unit.clone(),
+        description: signal.description.clone(),
+        operating: signal.operating.unwrap_or(0.0),
+        notes: signal.limits.map_or(String::new(), |[low, high]| format!("from {low} to {high}")),
+    };
+    let fault = |fault: &Fault| Signal {
+        name: fault.name.clone(),
+        unit: fault.unit.clone(),
+        description: fault.description.clone(),
+        operating: 0.0,
+        notes: notes(fault, designed),
+    };
+    let Names { states, extended, actuators, measurements, faults } = names;
+    let mut matrices = vec![
+        matrix("A", "states", &linear.a, states, states),
+        matrix("B", "commands", &linear.b, states, actuators),
+        matrix("C", "measurements", &linear.c, measurements, states),
+    ];
+    let own = &designed.plant;
+    if own.a == linear.a {
+        matrices.push(matrix("F_a", "faults", &own.f_a, states, faults));
+    } else {
+        let kind = match designed.domain {
+            Domain::Continuous => "extended",
+            Domain::Sampled { .. } => "sampled",
+        };
+        for (name, values, rows, columns) in [
+            ("A", &own.a, extended, extended),
+            ("B", &own.b, extended, actuators),
+            ("C", &own.c, measurements, extended),
+            ("F_a", &own.f_a, extended, faults),
+        ] {
+            matrices.push(matrix(name, &format!("{kind} plant"), values, rows, columns));
+        }
+    }
+    if own.a_f.amax() > 0.0 {
+        matrices.push(matrix("A_f", "fault model", &own.a_f, faults, faults));
+    }
+    Ok(Plant {
+        origin: linear.origin.clone(),
+        states: linear.states.iter().map(signal).collect(),
+        actuators: linear.actuators.iter().map(signal).collect(),
+        measurements: linear.measurements.iter().map(signal).collect(),
+        faults: linear.faults.iter().map(fault).collect(),
+        matrices,
+        eigenvalues: pairs(&eigenvalues(&linear.a)?),
+    })
+}
+
+/// How a fault enters and what is known of it, in words.
+fn notes(fault: &Fault, designed: &Designed) -> String {
+    let linear = &designed.linear;
+    let mut parts = vec![match &fault.entrance {
+        Entrance::Column(at) => format!("column {} of F_a", at + 1),
+        Entrance::Actuator(at) => format!("adds to {}", linear.actuators[*at].name),
+        Entrance::Sensor(at) => format!("adds to the measurement {}", linear.measurements[*at].name),
+        Entrance::Loss { actuator, .. } => {
+            format!("{} loses a part of its effect", linear.actuators[*actuator].name)
+        }
+        Entrance::Input(name) => format!("input {name} of the FMU"),
+    }];
+    parts.push(match fault.course {
+        Course::Constant => "taken as constant".to_owned(),
+        Course::Ramp => "taken as a ramp".to_owned(),
+    });
+    let numbers = [("at most", fault.bound), ("rate at most", fault.rate_bound)];
+    for (text, value) in numbers.into_iter().chain([("jumps by", fault.step)]) {
+        parts.extend(value.map(|value| format!("{text} {value}")));
+    }
+    parts.join(", ")
+}
+
+fn check(condition: &str, holds: bool, value: Option<f64>, explanation: String) -> Check {
+    Check { condition: condition.to_owned(), holds, value, explanation }
+}
+
+fn checks(designed: &Designed) -> Vec<Check> {
+    let Designed { controllability, distance, detectability, .. } = designed;
+    let away = |what: &str, lower: f64| {
+        format!("{what}; distance from losing it, relative: {lower:.2e}")
+    };
+    let mut all = vec![
+        check(
+            "(A, B) is controllable",
+            controllability.is_full(),
+            Some(distance.lower),
+            away(&format!("rank {} of {}", controllability.rank, controllability.n), distance.lower),
+        ),
+        check(
+            "(A, C) is observable",
+            detectability.observability.is_full(),
+            None,
+            format!("rank {} of {}", detectability.observability.rank, detectability.observability.n),
+        ),
+        check(
+            "the augmented observer exists",
+            detectability.is_full(),
+            Some(detectability.distance.lower),
+            away(
+                "no invariant zero of (A, F_a, C) at an eigenvalue of the fault model",
+                detectability.distance.lower,
+            ),
+        ),
+        check(
+            "the compensation cancels the faults of the actuators",
+            designed.cancellation_residual < CANCELLED,
+            Some(designed.cancellation_residual),
+            "norm of B K_f + F_a relative to F_a; what is left acts on the plant".to_owned(),
+        ),
+        check(
+            "plant and controller are stable together",
+            designed.instability < 0.0,
+            Some(designed.instability),
+            match designed.domain {
+                Domain::Continuous => "largest real part of the eigenvalues, 1/s",
+                Domain::Sampled { .. } => "largest modulus of the eigenvalues, less 1",
+            }
+            .to_owned(),
+        ),
+    ];
+    if let Some(residual) = designed.linear.residual {
+        all.push(check(
+            "the operating point is an equilibrium",
+            residual < AT_REST,
+            Some(residual),
+            "derivatives of the states relative to what typical changes contribute".to_owned(),
+        ));
+    }
+    all
+}
+
+fn closed(
+    name: &str,
+    dynamics: &DMatrix<f64>,
+    found: &Found,
+    wanted: &Wanted,
+) -> Result<Loop, Error> {
+    let quality = found.quality;
+    let region = match wanted {
+        Wanted::Region(region) | Wanted::HInfinity { region, .. } => Some(*region),
+        _ => None,
+    };
+    let number = |number: fn(&Quality) -> f64| quality.as_ref().map(number);
+    Ok(Loop {
+        matrix: name.to_owned(),
+        method: found.method.clone(),
+        wanted: pairs(&sorted(&found.wanted)),
+        eigenvalues: pairs(&eigenvalues(dynamics)?),
+        condition: number(|quality| quality.condition),
+        balanced_condition: number(|quality| quality.balanced_condition),
+        pole_error: number(|quality| quality.pole_error),
+        region: region.filter(|region| *region != wanted::Region::default()).map(|region| Region {
+            decay: region.decay,
+            disc_center: region.disc.map(|disc| disc.0),
+            disc_radius: region.disc.map(|disc| disc.1),
+            sector: region.sector,
+        }),
+    })
+}
+
+fn sorted(eigenvalues: &[Complex<f64>]) -> Vec<Complex<f64>> {
+    let mut all = eigenvalues.to_vec();
+    all.sort_by(|x, y| x.re.total_cmp(&y.re).then(x.im.total_cmp(&y.im)));
+    all
+}
+
+/// How much of its effect each actuator may lose.
+fn effectiveness(designed: &Designed) -> Result<Vec<Effectiveness>, Error> {
+    let lossy = |model: &control::faults::Fault| match model.enters {
+        Entry::LossOfEffectiveness(input) => Some(input),
+        _ => None,
+    };
+    let inputs: Vec<_> = designed.linear.models.iter().filter_map(lossy).collect();
+    if inputs.is_empty() {
+        return Ok(Vec::new());
+    }
+    let Designed { plant, controller, domain, .. } = designed;
+    let found = loss_tolerance(plant, controller, &inputs, 1.0, *domain)?;
+    let one = |(input, loss): (&usize, &f64)| Effectiveness {
+        actuator: designed.linear.actuators[*input].name.clone(),
+        largest_stable_loss: *loss,
+    };
+    Ok(inputs.iter().zip(&found.single).map(one).collect())
+}
+
+fn assumptions(designed: &Designed, faults: &[Fault]) -> Vec<String> {
+    let mut all = vec![
+        "The plant is linear, as stated under Plant; what the linearisation leaves out acts as a \
+         fault."
+            .to_owned(),
+        "Commands are within the limits of the actuators; the observer is told the command that \
+         was really applied."
+            .to_owned(),
+        "Bounds and responses begin from rest, with the compensation on.".to_owned(),
+    ];
+    if faults.iter().any(|fault| fault.course == Course::Constant) {
+        all.push(
+            "A fault taken as constant is followed with the lag of the observer; its rate is what \
+             causes the errors."
+                .to_owned(),
+        );
+    }
+    if let Domain::Sampled { period } = designed.domain {
+        all.push(format!(
+            "Between samples, {period} s, commands are held; the responses are those at samples."
+        ));
+    }
+    if designed.linear.models.iter().any(|m| matches!(m.enters, Entry::LossOfEffectiveness(_))) {
+        all.push(
+            "The loss of effectiveness is constant; it is seen only while the command is well \
+             above its threshold."
+                .to_owned(),
+        );
+    }
+    all
+}
+
+/// The variables of the controller FMU.
+pub(crate) fn interface(description: &ModelDescription) -> Vec<super::report::Variable> {
+    let variable = |variable: &fmi2::description::ScalarVariable| super::report::Variable {
+        name: variable.name.clone(),
+        causality: variable.causality.to_string(),
+        variability: variable.variability.to_string(),
+        unit: variable.unit().map(str::to_owned),
+        start: variable.start_text(),
+        description: variable.description.clone().unwrap_or_default(),
+    };
+    description.variables.iter().map(variable).collect()
+}
