@@ -1,7 +1,9 @@
 //! Mathematics of linear control on matrices: no input or output, no FMI.
 //!
-//! * [`eigen`]: eigenvalues. [`exponential`]: e^A. [`lyapunov`]: A' P + P A = -Q.
+//! * [`eigen`]: eigenvalues. [`exponential`]: e^A. [`lyapunov`]: A' P + P A = -Q and
+//!   A' P A - P = -Q. [`riccati`]: linear-quadratic regulators and Kalman filters.
 //! * [`hold`]: the exact discretisation of x' = A x + B w with w constant or linear over a step.
+//! * [`response`]: gains, norms, step and frequency responses, and what a fault does to the loop.
 //! * [`rank`]: controllability and observability.
 //! * [`placement`]: state feedback with wanted eigenvalues.
 //! * [`aso`]: the augmented state observer that estimates and compensates actuator faults, and
@@ -15,6 +17,7 @@
 pub mod aso;
 mod balance;
 mod check;
+mod domain;
 pub mod eigen;
 mod error;
 pub mod exponential;
@@ -22,7 +25,11 @@ pub mod hold;
 pub mod lyapunov;
 pub mod placement;
 pub mod rank;
+pub mod response;
+pub mod riccati;
 mod singular;
+mod stability;
 pub mod theorem1;
 
+pub use domain::Domain;
 pub use error::Error;

@@ -9,9 +9,12 @@ mod lyapunov;
 mod paper;
 mod placement;
 mod rank;
+mod recorded;
 #[expect(clippy::unreadable_literal, reason = "the digits as the other software wrote them")]
 mod reference;
 mod refusals;
+mod response;
+mod riccati;
 mod theorem1;
 
 use nalgebra::DMatrix;
