@@ -140,6 +140,49 @@ pub enum Error {
         /// Largest real part of the eigenvalues.
         abscissa: f64,
     },
+    /// An eigenvalue lies on the unit circle or outside.
+    #[error("{matrix} is not Schur stable: its spectral radius is {radius}")]
+    NotSchur {
+        /// Name of the matrix.
+        matrix: &'static str,
+        /// Largest absolute value of the eigenvalues.
+        radius: f64,
+    },
+    /// No feedback moves an eigenvalue that has to be moved.
+    #[error(
+        "the pair (A, B) is not stabilisable: no feedback moves the eigenvalue {:.6}{:+.6}i",
+        eigenvalue.re, eigenvalue.im
+    )]
+    NotStabilisable {
+        /// The eigenvalue of A.
+        eigenvalue: Complex<f64>,
+    },
+    /// No observer moves an eigenvalue that has to be moved.
+    #[error(
+        "the pair (A, C) is not detectable: no observer moves the eigenvalue {:.6}{:+.6}i",
+        eigenvalue.re, eigenvalue.im
+    )]
+    NotDetectable {
+        /// The eigenvalue of A.
+        eigenvalue: Complex<f64>,
+    },
+    /// An eigenvalue on the limit of stability that the weight does not reach stays there.
+    #[error(
+        "{weight} does not reach the eigenvalue {:.6}{:+.6}i on the limit of stability",
+        eigenvalue.re, eigenvalue.im
+    )]
+    Unweighted {
+        /// Name of the weight.
+        weight: &'static str,
+        /// The eigenvalue.
+        eigenvalue: Complex<f64>,
+    },
+    /// A symmetric matrix has a negative eigenvalue.
+    #[error("{matrix} is not positive semidefinite")]
+    NotPositiveSemidefinite {
+        /// Name of the matrix.
+        matrix: &'static str,
+    },
     /// A symmetric matrix is not positive definite.
     #[error("{matrix} is not positive definite")]
     NotPositiveDefinite {

@@ -1,4 +1,4 @@
-//! Exact discretisation of a linear system whose input is a straight line over the step.
+//! Exact discretisation of a linear system whose input is constant or a straight line over the step.
 
 use crate::balance::{Balance, divide_rows, power_of_two};
 use crate::exponential::scaling_and_squaring;
@@ -8,8 +8,8 @@ use nalgebra::{DMatrix, DVector};
 /// x(h) = Phi x0 + `Gamma_0` w0 + `Gamma_1` w1, the exact solution of x' = A x + B (w0 + w1 t).
 ///
 /// Phi = e^(A h), `Gamma_0` = integral of e^(A s) B, `Gamma_1` = integral of e^(A s) (h - s) B,
-/// both over s from 0 to h. With w1 = 0 the input is held constant. No step size makes a stable
-/// system unstable.
+/// both over s from 0 to h. With w1 = 0 the input is held constant: [`zero_order_hold`] gives that
+/// case alone. No step size makes a stable system unstable.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FirstOrderHold {
     /// Phi, n x n.
@@ -52,29 +52,8 @@ impl FirstOrderHold {
     /// [`Error::OutOfRange`] for a bad `h`, [`Error::Overflow`] when the result leaves the range of
     /// double precision.
     pub fn new(a: &DMatrix<f64>, b: &DMatrix<f64>, h: f64) -> Result<Self, Error> {
-        let n = check::square("A", a)?;
-        check::shape("B", b, (n, b.ncols()))?;
-        check::positive("h", h)?;
-        let m = b.ncols();
-        let balance = Balance::of(a);
-        let inputs = check::in_range("B h", divide_rows(b, &balance.scale) * h)?;
-        let units = DVector::from_iterator(m, inputs.column_iter().map(|c| unit(c.norm())));
-        let mut block = DMatrix::zeros(n + 2 * m, n + 2 * m);
-        let scaled_a = check::in_range("A h", &balance.matrix * h)?;
-        block.view_mut((0, 0), (n, n)).copy_from(&scaled_a);
-        for (input, unit) in units.iter().enumerate() {
-            block.view_mut((0, n + input), (n, 1)).copy_from(&(inputs.column(input) / *unit));
-            block[(n + input, n + m + input)] = 1.0;
-        }
-        let e = scaling_and_squaring(&block)?;
-        let gamma = |from: usize, factor: f64| {
-            DMatrix::from_fn(n, m, |i, j| e[(i, from + j)] * balance.scale[i] * units[j] * factor)
-        };
-        Ok(Self {
-            phi: check::in_range("Phi", balance.restore(&e.view((0, 0), (n, n)).into()))?,
-            gamma_0: check::in_range("Gamma_0", gamma(n, 1.0))?,
-            gamma_1: check::in_range("Gamma_1", gamma(n + m, h))?,
-        })
+        let [phi, gamma_0, gamma_1] = integrals(a, b, h, Degree::Linear)?;
+        Ok(Self { phi, gamma_0, gamma_1 })
     }
 
     /// out = Phi x + `Gamma_0` w0 + `Gamma_1` w1, without allocation.
@@ -103,6 +82,82 @@ impl FirstOrderHold {
         add_product(&self.gamma_1, w1, out);
         Ok(())
     }
+}
+
+/// x(h) = Phi x0 + Gamma w: the exact solution of x' = A x + B w with w constant over the step.
+///
+/// `a`: n x n; `b`: n x m; `h`: the step in the unit of time of A, above zero. The answer is (Phi,
+/// Gamma), n x n and n x m: Phi = e^(A h), Gamma = integral of e^(A s) B over s from 0 to h. It is the
+/// plant that a sampled controller sees which holds its output from sample to sample. Method, cost
+/// and tolerance as in [`FirstOrderHold::new`], with a block matrix of order n + m.
+///
+/// Source: C. F. Van Loan (1978), as there.
+///
+/// # Example
+///
+/// ```
+/// use control::hold::zero_order_hold;
+/// use nalgebra::DMatrix;
+/// let a = DMatrix::from_element(1, 1, -2.0);
+/// let (phi, gamma) = zero_order_hold(&a, &DMatrix::from_element(1, 1, 4.0), 0.5)?;
+/// assert!((phi[(0, 0)] - (-1.0_f64).exp()).abs() < 1e-15);
+/// assert!((gamma[(0, 0)] - 2.0 * (1.0 - (-1.0_f64).exp())).abs() < 1e-15);
+/// # Ok::<(), control::Error>(())
+/// ```
+///
+/// # Errors
+///
+/// Those of [`FirstOrderHold::new`].
+pub fn zero_order_hold(
+    a: &DMatrix<f64>,
+    b: &DMatrix<f64>,
+    h: f64,
+) -> Result<(DMatrix<f64>, DMatrix<f64>), Error> {
+    let [phi, gamma, _] = integrals(a, b, h, Degree::Constant)?;
+    Ok((phi, gamma))
+}
+
+/// The input over a step.
+#[derive(Clone, Copy, PartialEq)]
+enum Degree {
+    Constant,
+    Linear,
+}
+
+/// Phi, `Gamma_0` and `Gamma_1`; `Gamma_1` has no columns for a constant input.
+fn integrals(
+    a: &DMatrix<f64>,
+    b: &DMatrix<f64>,
+    h: f64,
+    degree: Degree,
+) -> Result<[DMatrix<f64>; 3], Error> {
+    let n = check::square("A", a)?;
+    check::shape("B", b, (n, b.ncols()))?;
+    check::positive("h", h)?;
+    let m = b.ncols();
+    let slopes = if degree == Degree::Linear { m } else { 0 };
+    let balance = Balance::of(a);
+    let inputs = check::in_range("B h", divide_rows(b, &balance.scale) * h)?;
+    let units = DVector::from_iterator(m, inputs.column_iter().map(|c| unit(c.norm())));
+    let mut block = DMatrix::zeros(n + m + slopes, n + m + slopes);
+    let scaled_a = check::in_range("A h", &balance.matrix * h)?;
+    block.view_mut((0, 0), (n, n)).copy_from(&scaled_a);
+    for (input, unit) in units.iter().enumerate() {
+        block.view_mut((0, n + input), (n, 1)).copy_from(&(inputs.column(input) / *unit));
+    }
+    for slope in 0..slopes {
+        block[(n + slope, n + m + slope)] = 1.0;
+    }
+    let e = scaling_and_squaring(&block)?;
+    let gamma = |from: usize, columns: usize, factor: f64| {
+        let entry = |i: usize, j: usize| e[(i, from + j)] * balance.scale[i] * units[j] * factor;
+        DMatrix::from_fn(n, columns, entry)
+    };
+    Ok([
+        check::in_range("Phi", balance.restore(&e.view((0, 0), (n, n)).into()))?,
+        check::in_range("Gamma_0", gamma(n, m, 1.0))?,
+        check::in_range("Gamma_1", gamma(n + m, slopes, h))?,
+    ])
 }
 
 /// A power of two near the size of an input's column; one for an input without effect.

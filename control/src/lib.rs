@@ -1,9 +1,11 @@
 //! Mathematics of linear control on matrices: no input or output, no FMI.
 //!
-//! * [`eigen`]: eigenvalues. [`exponential`]: e^A. [`lyapunov`]: A' P + P A = -Q.
+//! * [`eigen`]: eigenvalues. [`exponential`]: e^A. [`lyapunov`]: A' P + P A = -Q and
+//!   A' P A - P = -Q. [`riccati`]: linear-quadratic regulators and Kalman filters.
 //! * [`hold`]: the exact discretisation of x' = A x + B w with w constant or linear over a step.
 //! * [`rank`]: controllability and observability; [`distance`]: how far they are from being lost;
 //!   [`zeros`]: invariant zeros.
+//! * [`response`]: gains, norms, step and frequency responses, and what a fault does to the loop.
 //! * [`placement`]: state feedback with wanted eigenvalues.
 //! * [`aso`]: the augmented state observer that estimates and compensates actuator faults, and
 //!   [`theorem1`]: the bound that belongs to it.
@@ -32,8 +34,11 @@ pub mod lmi;
 pub mod lyapunov;
 pub mod placement;
 pub mod rank;
+pub mod response;
+pub mod riccati;
 pub mod sampled;
 mod singular;
+mod stability;
 pub mod theorem1;
 pub mod zeros;
 

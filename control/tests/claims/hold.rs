@@ -1,10 +1,11 @@
+use crate::recorded::cases;
 use crate::reference::{
     CONTROLLER, CONTROLLER_PICOSECOND, CONTROLLER_SECOND, CONTROLLER_TENTH_MILLISECOND,
     MEASUREMENTS,
 };
 use crate::{integers, matrix};
 use control::Error;
-use control::hold::FirstOrderHold;
+use control::hold::{FirstOrderHold, zero_order_hold};
 use nalgebra::DMatrix;
 
 /// The natural units of the controller's states: its entries follow powers of 1800 / s.
@@ -100,4 +101,34 @@ fn a_wrong_length_is_refused_and_leaves_the_output_untouched() {
     let wrong = hold.step_into(&[0.0; 5], &[0.0; 2], &[0.0; 3], &mut out);
     assert_eq!(wrong, Err(Error::Shape { matrix: "w1", expected: (2, 1), found: (3, 1) }));
     assert_eq!(out.map(f64::to_bits), [7.0_f64.to_bits(); 5]);
+}
+
+/// `SciPy` writes its first-order hold for the state x - `Gamma_1` w / h.
+#[test]
+fn holds_agree_with_scipy() {
+    for case in cases(include_str!("../data/riccati.txt"), "hold") {
+        let (a, b, c, h) = (case.get("A"), case.get("B"), case.get("C"), case.number("h"));
+        let near = |found: &DMatrix<f64>, name: &str| {
+            let error = (found - case.get(name)).amax() / case.get(name).amax();
+            assert!(error < 1e-12, "{} {name}: {error:e}", case.name);
+        };
+        let (phi, gamma) = zero_order_hold(a, b, h).unwrap();
+        near(&phi, "phi");
+        near(&gamma, "gamma");
+        let first = FirstOrderHold::new(a, b, h).unwrap();
+        let ramp = &first.gamma_1 / h;
+        near(&(&first.gamma_0 - &ramp + &first.phi * &ramp), "foh_b");
+        near(&(c * ramp), "foh_d");
+    }
+}
+
+#[test]
+fn the_zero_order_hold_is_the_first_order_hold_without_slope() {
+    let (a, b) = (matrix(5, 5, &CONTROLLER), matrix(5, 2, &MEASUREMENTS));
+    for h in [1e-12, 1e-6, 1e-3, 1.0] {
+        let (phi, gamma) = zero_order_hold(&a, &b, h).unwrap();
+        let first = controller(h);
+        assert!(error_in_units(&phi, &first.phi, true) < 1e-14);
+        assert!(error_in_units(&gamma, &first.gamma_0, false) < 1e-14);
+    }
 }

@@ -1,7 +1,9 @@
+use crate::recorded::cases;
 use crate::reference::{LYAPUNOV, LYAPUNOV_RANGE, UNCOMPENSATED};
+use crate::riccati::distance;
 use crate::{entry_error, integers, matrix};
 use control::Error;
-use control::lyapunov::{definite_range, lyapunov};
+use control::lyapunov::{definite_range, discrete_lyapunov, lyapunov};
 use nalgebra::DMatrix;
 
 #[test]
@@ -52,4 +54,36 @@ fn the_smallest_eigenvalue_is_right_far_below_the_rounding_of_the_largest_entry(
 fn an_indefinite_matrix_is_refused() {
     let refused = definite_range(&matrix(2, 2, &[1.0, 2.0, 2.0, 1.0]));
     assert_eq!(refused, Err(Error::NotPositiveDefinite { matrix: "P" }));
+}
+
+#[test]
+fn discrete_equations_agree_with_high_precision_as_well_as_scipy() {
+    for case in cases(include_str!("../data/riccati.txt"), "lyapunov") {
+        let found = discrete_lyapunov(case.get("A"), case.get("Q")).unwrap();
+        let error = distance(&found.p, case.get("P"));
+        let allowed = (2.0 * case.number("scipy")).max(1e-12);
+        assert!(error < allowed, "{}: {error:e}", case.name);
+        assert!(found.residual < 1e-13, "{}: {:e}", case.name, found.residual);
+    }
+}
+
+/// P is the sum of A'^k Q A^k.
+#[test]
+fn the_discrete_solution_is_the_sum_of_its_series() {
+    let a = matrix(3, 3, &[0.5, -0.6, 0.1, 0.7, 0.2, 0.0, 3.0, 1.0, -0.4]);
+    let q = matrix(3, 3, &[2.0, 1.0, 0.0, 1.0, 0.0, -1.0, 0.0, -1.0, 5.0]);
+    let (mut sum, mut term) = (q.clone(), q.clone());
+    for _ in 0..400 {
+        term = a.transpose() * term * &a;
+        sum += &term;
+    }
+    let error = (discrete_lyapunov(&a, &q).unwrap().p - &sum).amax() / sum.amax();
+    assert!(error < 1e-14, "{error:e}");
+}
+
+#[test]
+fn a_matrix_with_an_eigenvalue_on_the_unit_circle_is_refused() {
+    let turn = matrix(2, 2, &[0.0, 1.0, -1.0, 0.0]);
+    let refused = discrete_lyapunov(&turn, &DMatrix::identity(2, 2));
+    assert!(matches!(refused, Err(Error::NotSchur { matrix: "A", .. })), "{refused:?}");
 }

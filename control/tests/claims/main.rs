@@ -15,10 +15,13 @@ mod lyapunov;
 mod paper;
 mod placement;
 mod rank;
+mod recorded;
 #[expect(clippy::unreadable_literal, reason = "the digits as the other software wrote them")]
 mod reference;
 mod refusals;
 mod sampled;
+mod response;
+mod riccati;
 mod theorem1;
 mod zeros;
 

@@ -1,0 +1,65 @@
+//! Lyapunov equations by substitution in Schur form.
+
+use crate::Error;
+use crate::eigen::schur;
+use nalgebra::{Complex, DMatrix};
+
+/// A = U T U*, T upper triangular.
+pub(super) struct Triangular {
+    u: DMatrix<Complex<f64>>,
+    t: DMatrix<Complex<f64>>,
+}
+
+impl Triangular {
+    pub(super) fn of(a: &DMatrix<f64>) -> Result<Self, Error> {
+        let (u, t) = schur(&a.map(|entry| Complex::new(entry, 0.0)))?.unpack();
+        Ok(Self { u, t })
+    }
+
+    /// A' P + P A = -Q: T* Y + Y T = -U* Q U column by column, forward in the rows; P = Re(U Y U*).
+    pub(super) fn continuous(&self, q: &DMatrix<f64>) -> DMatrix<f64> {
+        let (t, n) = (&self.t, self.t.nrows());
+        let mut y = self.turned(q);
+        for col in 0..n {
+            for row in 0..n {
+                let mut sum = -y[(row, col)];
+                for k in 0..col {
+                    sum -= y[(row, k)] * t[(k, col)];
+                }
+                for k in 0..row {
+                    sum -= t[(k, row)].conj() * y[(k, col)];
+                }
+                y[(row, col)] = sum / (t[(row, row)].conj() + t[(col, col)]);
+            }
+        }
+        self.turned_back(&y)
+    }
+
+    /// A' P A - P = -Q: T* Y T - Y = -U* Q U column by column, forward in the rows.
+    pub(super) fn discrete(&self, q: &DMatrix<f64>) -> DMatrix<f64> {
+        let (t, n) = (&self.t, self.t.nrows());
+        let mut y = self.turned(q);
+        for col in 0..n {
+            // Column `col` of Y T, as far as it is known.
+            let mut product = y.columns(0, col) * t.view((0, col), (col, 1));
+            for row in 0..n {
+                let mut sum = -y[(row, col)];
+                for k in 0..row {
+                    sum -= t[(k, row)].conj() * product[k];
+                }
+                sum -= t[(row, row)].conj() * product[row];
+                y[(row, col)] = sum / (t[(row, row)].conj() * t[(col, col)] - 1.0);
+                product[row] += y[(row, col)] * t[(col, col)];
+            }
+        }
+        self.turned_back(&y)
+    }
+
+    fn turned(&self, q: &DMatrix<f64>) -> DMatrix<Complex<f64>> {
+        self.u.adjoint() * q.map(|entry| Complex::new(entry, 0.0)) * &self.u
+    }
+
+    fn turned_back(&self, y: &DMatrix<Complex<f64>>) -> DMatrix<f64> {
+        (&self.u * y * self.u.adjoint()).map(|entry| entry.re)
+    }
+}

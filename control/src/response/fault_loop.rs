@@ -1,0 +1,76 @@
+//! Plant and controller of [`crate::aso`] as one system driven by the fault.
+
+use super::System;
+use crate::aso::{FaultyPlant, Gains};
+use crate::{Domain, Error};
+use nalgebra::DMatrix;
+
+/// From the fault f to [x; e; eps].
+///
+/// ```text
+/// x' = (A + B K_x) x - B K_x e + B K_f f_hat + F_a f
+/// [e; f_hat]' = (A_0 - L C_0) [e; f_hat] + [F_a; 0] f
+/// z = [x; e; f_hat - f]
+/// ```
+///
+/// e = x - `x_hat`, eps = `f_hat` - f; state [x; e; `f_hat`], 2 n + q; in sampled time the left sides are
+/// those of the next sample (prediction estimator). The commands are within the limits of the actuators.
+/// It describes every f, jumps included, and is stable when the loop is.
+///
+/// Source: (1) to (11) of the paper named in [`crate::aso`].
+///
+/// # Errors
+///
+/// Those of [`Gains::check`].
+pub fn fault_system(plant: &FaultyPlant, gains: &Gains, domain: Domain) -> Result<System, Error> {
+    gains.check(plant)?;
+    let (n, q) = plant.f_a.shape();
+    let mut b = DMatrix::zeros(2 * n + q, q);
+    b.view_mut((0, 0), (n, q)).copy_from(&plant.f_a);
+    b.view_mut((n, 0), (n, q)).copy_from(&plant.f_a);
+    let mut d = DMatrix::zeros(2 * n + q, q);
+    d.view_mut((2 * n, 0), (q, q)).copy_from(&-DMatrix::identity(q, q));
+    let c = DMatrix::identity(2 * n + q, 2 * n + q);
+    Ok(System { a: loop_dynamics(plant, gains), b, c, d, domain })
+}
+
+/// From [r; f] to [x; e; eps], with r = f' - `A_f` f the part of the fault's rate that the fault model
+/// does not foresee; r = f' for the constant fault.
+///
+/// ```text
+/// x' = (A + B K_x) x - B K_x e + B K_f eps + (F_a + B K_f) f
+/// [e; eps]' = (A_0 - L C_0) [e; eps] - [0; r]
+/// z = [x; e; eps]
+/// ```
+///
+/// In sampled time r[k] = f[k+1] - `A_f` f[k]. f acts through what the compensation cannot cancel only.
+/// For an f without jumps it is the same loop as [`fault_system`] in other coordinates.
+///
+/// # Errors
+///
+/// Those of [`Gains::check`].
+pub fn fault_rate_system(
+    plant: &FaultyPlant,
+    gains: &Gains,
+    domain: Domain,
+) -> Result<System, Error> {
+    gains.check(plant)?;
+    let (n, q) = plant.f_a.shape();
+    let order = 2 * n + q;
+    let mut b = DMatrix::zeros(order, 2 * q);
+    b.view_mut((2 * n, 0), (q, q)).copy_from(&-DMatrix::identity(q, q));
+    b.view_mut((0, q), (n, q)).copy_from(&(&plant.f_a + &plant.b * &gains.k_f));
+    let (c, d) = (DMatrix::identity(order, order), DMatrix::zeros(order, 2 * q));
+    Ok(System { a: loop_dynamics(plant, gains), b, c, d, domain })
+}
+
+/// The matrix of both: [A + B `K_x`, [-B `K_x`, B `K_f`]; 0, `A_0` - L `C_0`].
+fn loop_dynamics(plant: &FaultyPlant, gains: &Gains) -> DMatrix<f64> {
+    let (n, q) = plant.f_a.shape();
+    let mut a = DMatrix::zeros(2 * n + q, 2 * n + q);
+    a.view_mut((0, 0), (n, n)).copy_from(&gains.controlled_dynamics(plant));
+    a.view_mut((0, n), (n, n)).copy_from(&-(&plant.b * &gains.k_x));
+    a.view_mut((0, 2 * n), (n, q)).copy_from(&(&plant.b * &gains.k_f));
+    a.view_mut((n, n), (n + q, n + q)).copy_from(&gains.error_dynamics(plant));
+    a
+}

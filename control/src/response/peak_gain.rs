@@ -1,0 +1,136 @@
+//! The peak-to-peak gain.
+
+use super::System;
+use super::interval::{Intervals, Length};
+use crate::{Error, check};
+use nalgebra::{DMatrix, DVector};
+
+/// Rounds of halving; each round halves the intervals that leave most open.
+const ROUNDS: usize = 200;
+const MOST_INTERVALS: usize = 1 << 22;
+
+/// Numbers that are known to lie between two others.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bracket {
+    /// p x m.
+    pub lower: DMatrix<f64>,
+    /// p x m.
+    pub upper: DMatrix<f64>,
+}
+
+/// The peak-to-peak gain from each input to each output.
+///
+/// ```text
+/// gain[i,j] = |D[i,j]| + integral of |h_ij(t)|,  h(t) = C e^(A t) B       continuous
+/// gain[i,j] = |D[i,j]| + sum of |h_ij[k]|,       h[k] = C A^k B           sampled
+/// ```
+///
+/// The largest |`z_i`| that an input `w_j` with |`w_j`| <= 1 can cause from rest, and no less: inputs
+/// exist that come as near as one likes. With several inputs, |`z_i`| <= sum over j of gain[i,j] times the
+/// bound of |`w_j`|. `width`: relative width of the bracket wanted, 1e-3 for example. The gain is
+/// finite when A is stable. Method: over an interval the integral of |h| lies between |integral of
+/// h| and the root of its length times the integral of h^2, both exact from matrix exponentials;
+/// intervals of dyadic length are halved where the two differ most, so that fast and slow modes get
+/// the steps they need; behind the last interval a bound from the contraction of the state. So the
+/// bracket is a proof up to rounding, and it is not narrowed below the rounding error of the
+/// integral of h^2. Cost: for each channel about 100 n^3, and for each time constant or oscillation some
+/// 50 intervals of 3 n^2 multiplications.
+///
+/// Source: M. A. Dahleh and J. B. Pearson, L1-optimal compensators for continuous-time systems, IEEE
+/// Trans. Autom. Control 32 (1987), equation (3), for the gain; the bracket is elementary.
+///
+/// # Example
+///
+/// ```
+/// use control::Domain;
+/// use control::response::{System, peak_gain};
+/// use nalgebra::DMatrix;
+/// // 1 / (s^2 + 0.2 s + 1): the impulse response changes its sign at multiples of pi / w.
+/// let system = System {
+///     a: DMatrix::from_row_slice(2, 2, &[0.0, 1.0, -1.0, -0.2]),
+///     b: DMatrix::from_row_slice(2, 1, &[0.0, 1.0]),
+///     c: DMatrix::from_row_slice(1, 2, &[1.0, 0.0]),
+///     d: DMatrix::zeros(1, 1),
+///     domain: Domain::Continuous,
+/// };
+/// let gain = peak_gain(&system, 1e-3)?;
+/// let exact = 1.0 / (0.1 * std::f64::consts::PI / 0.99_f64.sqrt() / 2.0).tanh();
+/// assert!(gain.lower[(0, 0)] <= exact && exact <= gain.upper[(0, 0)]);
+/// assert!(gain.upper[(0, 0)] / gain.lower[(0, 0)] < 1.0011);
+/// # Ok::<(), control::Error>(())
+/// ```
+///
+/// # Errors
+///
+/// Those of [`System::check`]; [`Error::OutOfRange`] for `width`; [`Error::NotHurwitz`],
+/// [`Error::NotSchur`]; [`Error::NotConverged`] when a lightly damped system needs more than 4
+/// million intervals.
+pub fn peak_gain(system: &System, width: f64) -> Result<Bracket, Error> {
+    system.stable_eigenvalues()?;
+    check::positive("width", width)?;
+    let intervals = Intervals::of(system)?;
+    let mut lower = system.d.abs();
+    let mut upper = lower.clone();
+    for output in 0..system.c.nrows() {
+        for input in 0..system.b.ncols() {
+            let lengths = intervals.lengths(output, input, 0.25 * width)?;
+            let start = intervals.starts.column(input).into();
+            let (least, most) = integral(&lengths, start, 0.5 * width)?;
+            lower[(output, input)] += least;
+            upper[(output, input)] += most;
+        }
+    }
+    Ok(Bracket { lower, upper })
+}
+
+/// A part of the time axis: its length as an index, the state at its start, [`Length::bounds`].
+struct Piece {
+    length: usize,
+    state: DVector<f64>,
+    lower: f64,
+    upper: f64,
+    rounding: f64,
+}
+
+impl Piece {
+    fn new(lengths: &[Length], length: usize, state: DVector<f64>) -> Self {
+        let [lower, upper, rounding] = lengths[length].bounds(&state);
+        Self { length, state, lower, upper, rounding }
+    }
+
+    fn open(&self) -> f64 {
+        self.upper - self.lower
+    }
+}
+
+/// Bounds of the integral of |h| over all time.
+fn integral(lengths: &[Length], start: DVector<f64>, width: f64) -> Result<(f64, f64), Error> {
+    let longest = lengths.len() - 1;
+    let tail = lengths[longest].tail(&(&lengths[longest].phi * &start));
+    let mut pieces = vec![Piece::new(lengths, longest, start)];
+    for _ in 0..ROUNDS {
+        let lower: f64 = pieces.iter().map(|piece| piece.lower).sum();
+        let upper: f64 = pieces.iter().map(|piece| piece.upper).sum();
+        let allowed = width * lower + pieces.iter().map(|piece| piece.rounding).sum::<f64>();
+        #[expect(clippy::cast_precision_loss, reason = "at most 2^23 pieces")]
+        let share = allowed / pieces.len() as f64;
+        let wanted = |piece: &Piece| piece.length > 0 && piece.open() > share;
+        if upper - lower <= allowed || !pieces.iter().any(wanted) {
+            return Ok((lower, upper + tail));
+        }
+        if pieces.len() > MOST_INTERVALS {
+            break;
+        }
+        pieces = pieces
+            .into_iter()
+            .flat_map(|piece| if wanted(&piece) { halves(lengths, piece) } else { vec![piece] })
+            .collect();
+    }
+    Err(Error::NotConverged { what: "the peak-to-peak gain", iterations: ROUNDS })
+}
+
+fn halves(lengths: &[Length], piece: Piece) -> Vec<Piece> {
+    let half = piece.length - 1;
+    let middle = &lengths[half].phi * &piece.state;
+    vec![Piece::new(lengths, half, piece.state), Piece::new(lengths, half, middle)]
+}

@@ -1,0 +1,112 @@
+//! Riccati equations: linear-quadratic regulators and Kalman filters.
+//!
+//! ```text
+//! A' P + P A - (P B + N) R^-1 (B' P + N') + Q = 0                        continuous
+//! A' P A - P - (A' P B + N) (R + B' P B)^-1 (B' P A + N') + Q = 0        sampled
+//! ```
+//!
+//! Their stabilising solution P gives the feedback u = K x that minimises the integral, or the sum,
+//! of x' Q x + 2 x' N u + u' R u. The filter is the same problem for A' and C'.
+
+mod doubling;
+mod existence;
+mod form;
+mod kalman;
+mod problem;
+
+pub use kalman::{Filter, kalman};
+
+use crate::{Domain, Error, check, stability};
+use nalgebra::{Complex, DMatrix};
+use problem::Problem;
+
+/// Largest residual of a solution that is returned, see [`Regulator::residual`].
+const ALLOWED_RESIDUAL: f64 = 1e-9;
+
+/// The weights of the cost x' Q x + 2 x' N u + u' R u.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Weights {
+    /// Q, n x n, symmetric, with [Q, N; N', R] positive semidefinite.
+    pub q: DMatrix<f64>,
+    /// R, m x m, symmetric positive definite.
+    pub r: DMatrix<f64>,
+    /// N, n x m; None for zero.
+    pub n: Option<DMatrix<f64>>,
+}
+
+/// The stabilising solution of a Riccati equation and its feedback u = K x.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Regulator {
+    /// P, n x n, symmetric, positive semidefinite: x' P x is the cost of the way from x to rest.
+    pub p: DMatrix<f64>,
+    /// K, m x n: -R^-1 (B' P + N'), sampled -(R + B' P B)^-1 (B' P A + N').
+    pub gain: DMatrix<f64>,
+    /// Eigenvalues of A + B K.
+    pub eigenvalues: Vec<Complex<f64>>,
+    /// Largest entry of the left side of the equation relative to the same entry of the sum of the
+    /// absolute terms it is made of, products included.
+    pub residual: f64,
+}
+
+/// The linear-quadratic regulator u = K x for x' = A x + B u, or for x[k+1] = A x[k] + B u[k].
+///
+/// `a`: n x n; `b`: n x m; the weights as in [`Weights`], for a sampled system those of one sample.
+/// It solves the Riccati equation of the domain, printed in [`crate::riccati`]. The stabilising
+/// solution exists and is unique when (A, B) is stabilisable and the weight sees every eigenvalue
+/// of A - B R^-1 N' on the limit of stability; both are decided by the smallest singular value of
+/// [A - lambda I, B], or of [A - lambda I; Q], in balanced coordinates, zero below 1e-13 n of the
+/// largest. Method: balancing of the Hamiltonian, structured doubling (after a Cayley transform for
+/// continuous time), then Newton's method, each step a Lyapunov equation for the remainder. About
+/// (20 + 15 s) n^3 multiplications for s doublings and 300 n^3 for a step of Newton; usually 5 to
+/// 15 doublings and 2 steps. The solution is returned only if A + B K is stable and every entry of
+/// the residual is below 1e-9 of the absolute terms it is made of.
+///
+/// Source: E. K.-W. Chu, H.-Y. Fan and W.-W. Lin, A structure-preserving doubling algorithm for
+/// continuous-time algebraic Riccati equations, Linear Algebra Appl. 396 (2005); sampled: with T.-M.
+/// Hwang and C.-S. Wang, Int. J. Control 77 (2004). Newton: D. L. Kleinman, IEEE Trans. Autom. Control
+/// 13 (1968); G. A. Hewer, 16 (1971). Balancing: P. Benner, Symplectic balancing of Hamiltonian
+/// matrices, SIAM J. Sci. Comput. 22 (2001).
+///
+/// # Example
+///
+/// ```
+/// use control::Domain;
+/// use control::riccati::{Weights, lqr};
+/// use nalgebra::DMatrix;
+/// let a = DMatrix::from_row_slice(2, 2, &[0.0, 1.0, 0.0, 0.0]);
+/// let b = DMatrix::from_row_slice(2, 1, &[0.0, 1.0]);
+/// let weights = Weights { q: DMatrix::identity(2, 2), r: DMatrix::identity(1, 1), n: None };
+/// let regulator = lqr(&a, &b, &weights, Domain::Continuous)?;
+/// let expected = DMatrix::from_row_slice(1, 2, &[-1.0, -3.0_f64.sqrt()]);
+/// assert!((regulator.gain - expected).amax() < 1e-14);
+/// # Ok::<(), control::Error>(())
+/// ```
+///
+/// # Errors
+///
+/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`], [`Error::NotSymmetric`] for a bad
+/// matrix, [`Error::OutOfRange`] for a bad period; [`Error::NotPositiveDefinite`] for R;
+/// [`Error::NotPositiveSemidefinite`] for Q - N R^-1 N'; [`Error::NotStabilisable`];
+/// [`Error::Unweighted`]; [`Error::NotConverged`], [`Error::ResidualTooLarge`],
+/// [`Error::NotHurwitz`], [`Error::NotSchur`], [`Error::Overflow`] when rounding prevents a solution.
+pub fn lqr(
+    a: &DMatrix<f64>,
+    b: &DMatrix<f64>,
+    weights: &Weights,
+    domain: Domain,
+) -> Result<Regulator, Error> {
+    if let Domain::Sampled { period } = domain {
+        check::positive("period", period)?;
+    }
+    let problem = Problem::of(a, b, weights, domain)?;
+    existence::require(&problem)?;
+    let p = problem.refined(&problem.start()?)?;
+    let (p, gain) = (problem.restored(&p)?, problem.restored_gain(&p)?);
+    let eigenvalues = stability::require("A + B K", &(a + b * &gain), domain)?;
+    let residual = problem.residual(&problem.scaled_solution(&p));
+    if residual > ALLOWED_RESIDUAL {
+        let (equation, allowed) = ("the Riccati equation", ALLOWED_RESIDUAL);
+        return Err(Error::ResidualTooLarge { equation, residual, allowed });
+    }
+    Ok(Regulator { p, gain, eigenvalues, residual })
+}

@@ -1,0 +1,76 @@
+//! Structured doubling: P as the limit of a sequence whose error is squared in each step.
+
+use super::form::{identity, symmetric};
+use crate::Error;
+use crate::eigen::eigenvalues;
+use nalgebra::DMatrix;
+
+const DOUBLINGS: usize = 60;
+const WHAT: &str = "structured doubling";
+
+/// A' P (I + G P)^-1 A - P + Q = 0, for G and Q positive semidefinite: the least such P.
+///
+/// After k steps `h` is the solution over 2^k samples of the finite horizon.
+pub(super) fn sampled(
+    a: &DMatrix<f64>,
+    g: &DMatrix<f64>,
+    q: &DMatrix<f64>,
+) -> Result<DMatrix<f64>, Error> {
+    let (mut a, mut g, mut h) = (a.clone(), g.clone(), q.clone());
+    let failed = Error::NotConverged { what: WHAT, iterations: DOUBLINGS };
+    for _ in 0..DOUBLINGS {
+        let inverse = (identity(a.nrows()) + &g * &h).lu();
+        let (Some(moved), Some(spread)) = (inverse.solve(&a), inverse.solve(&g)) else {
+            return Err(failed);
+        };
+        let growth = symmetric(a.tr_mul(&h) * &moved);
+        g += symmetric(&a * spread * a.transpose());
+        h += &growth;
+        a = &a * moved;
+        if !(growth.amax().is_finite() && g.amax().is_finite() && a.amax().is_finite()) {
+            return Err(failed);
+        }
+        if growth.amax() <= f64::EPSILON * h.amax() {
+            return Ok(h);
+        }
+    }
+    Err(failed)
+}
+
+/// A' P + P A - P G P + Q = 0, for G and Q positive semidefinite: the least such P.
+///
+/// The Cayley transform with gamma takes an eigenvalue s of the Hamiltonian matrix to (s + gamma) /
+/// (s - gamma). The smallest and the largest converge alike when gamma is their geometric mean.
+pub(super) fn continuous(
+    a: &DMatrix<f64>,
+    g: &DMatrix<f64>,
+    q: &DMatrix<f64>,
+) -> Result<DMatrix<f64>, Error> {
+    let n = a.nrows();
+    let blocks = |upper_left: &DMatrix<f64>, lower_right: &DMatrix<f64>| {
+        let mut all = DMatrix::zeros(2 * n, 2 * n);
+        all.view_mut((0, 0), (n, n)).copy_from(upper_left);
+        all.view_mut((0, n), (n, n)).copy_from(&-g);
+        all.view_mut((n, 0), (n, n)).copy_from(&-q);
+        all.view_mut((n, n), (n, n)).copy_from(lower_right);
+        all
+    };
+    let sizes: Vec<f64> = eigenvalues(&blocks(a, &-a.transpose()))?
+        .iter()
+        .map(|value| value.norm())
+        .filter(|&size| size > 0.0)
+        .collect();
+    let least = sizes.iter().copied().fold(f64::INFINITY, f64::min);
+    let largest = sizes.iter().copied().fold(0.0, f64::max);
+    let gamma = if largest > 0.0 { (least * largest).sqrt() } else { 1.0 };
+    let (minus, plus) = (a - identity(n) * gamma, a + identity(n) * gamma);
+    // [A - gamma I, -G; -Q, -(A - gamma I)'] takes the pencil to its symplectic form.
+    let left = blocks(&minus, &-minus.transpose());
+    let right = blocks(&plus, &-plus.transpose());
+    let solved =
+        left.lu().solve(&right).ok_or(Error::NotConverged { what: WHAT, iterations: 0 })?;
+    let start = solved.view((0, 0), (n, n)).into();
+    let g = symmetric(solved.view((0, n), (n, n)).into());
+    let h = symmetric(-solved.view((n, 0), (n, n)).into_owned());
+    sampled(&start, &g, &h)
+}

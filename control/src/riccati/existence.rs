@@ -1,0 +1,93 @@
+//! When a stabilising solution exists.
+
+use super::problem::Problem;
+use crate::eigen::eigenvalues;
+use crate::singular::Singular;
+use crate::{Domain, Error};
+use nalgebra::{Complex, DMatrix, DVector, SymmetricEigen};
+
+/// Relative size of a singular value that counts as zero, per state.
+const TOLERANCE_PER_STATE: f64 = 1e-13;
+/// An eigenvalue this near to the limit of stability, relative to the norm of A, is not stable.
+const NEAR: f64 = 1e-12;
+/// Negative eigenvalues of a weight down to this part of its scale are rounding, per state.
+const SEMIDEFINITE: f64 = 1e-13;
+
+/// (A, B) is stabilisable, and Q sees every eigenvalue on the limit of stability.
+pub(super) fn require(problem: &Problem) -> Result<(), Error> {
+    let (a, b, domain) = (&problem.free, &problem.form.b, problem.form.domain);
+    for eigenvalue in eigenvalues(a)? {
+        if !stable(eigenvalue, a.norm(), domain)
+            && deficient(&a.transpose(), &b.transpose(), eigenvalue)?
+        {
+            return Err(Error::NotStabilisable { eigenvalue });
+        }
+        let limit = on_limit(eigenvalue, domain);
+        if deficient(a, &problem.free_q, limit)? {
+            return Err(Error::Unweighted { weight: "Q", eigenvalue: limit });
+        }
+    }
+    Ok(())
+}
+
+fn stable(eigenvalue: Complex<f64>, size: f64, domain: Domain) -> bool {
+    match domain {
+        Domain::Continuous => eigenvalue.re < -NEAR * size,
+        Domain::Sampled { .. } => eigenvalue.norm() < 1.0 - NEAR * size,
+    }
+}
+
+/// The point of the imaginary axis, or of the unit circle, nearest to the eigenvalue.
+fn on_limit(eigenvalue: Complex<f64>, domain: Domain) -> Complex<f64> {
+    match domain {
+        Domain::Continuous => Complex::new(0.0, eigenvalue.im),
+        Domain::Sampled { .. } => Complex::from_polar(1.0, eigenvalue.arg()),
+    }
+}
+
+/// Whether [A - lambda I; C] has less than full column rank.
+///
+/// C is scaled to the size of A. The complex matrix is taken as a real one of twice the order,
+/// whose singular values are the same, each twice.
+fn deficient(a: &DMatrix<f64>, c: &DMatrix<f64>, lambda: Complex<f64>) -> Result<bool, Error> {
+    let (n, p) = (a.nrows(), c.nrows());
+    let size = if a.norm() > 0.0 { a.norm() } else { 1.0 };
+    let unit = if c.norm() > 0.0 { size / c.norm() } else { 1.0 };
+    let (scaled, shifted) = (c * unit, a - DMatrix::from_diagonal_element(n, n, lambda.re));
+    let mut all = DMatrix::zeros(2 * (n + p), 2 * n);
+    for half in 0..2 {
+        all.view_mut((half * n, half * n), (n, n)).copy_from(&shifted);
+        all.view_mut((2 * n + half * p, half * n), (p, n)).copy_from(&scaled);
+    }
+    for i in 0..n {
+        all[(i, n + i)] = lambda.im;
+        all[(n + i, i)] = -lambda.im;
+    }
+    #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
+    let tolerance = TOLERANCE_PER_STATE * n as f64;
+    Ok(Singular::of(&all)?.rank(tolerance) < 2 * n)
+}
+
+/// `m` is positive semidefinite to rounding. `before` is what it was computed of, and says how large
+/// that rounding is; both are scaled by its diagonal.
+pub(super) fn require_semidefinite(m: &DMatrix<f64>, before: &DMatrix<f64>) -> Result<(), Error> {
+    let n = m.nrows();
+    let refused = Error::NotPositiveSemidefinite { matrix: "Q - N R^-1 N'" };
+    let scale = DVector::from_fn(n, |i, _| before[(i, i)].abs().sqrt());
+    let largest = scale.amax();
+    if largest == 0.0 {
+        return if m.amax() > 0.0 { Err(refused) } else { Ok(()) };
+    }
+    let scale = scale.map(|entry| if entry > 0.0 { entry } else { f64::EPSILON * largest });
+    let scaled = DMatrix::from_fn(n, n, |i, j| m[(i, j)] / scale[i] / scale[j]);
+    if scaled.iter().any(|entry| !entry.is_finite()) {
+        return Err(refused);
+    }
+    let iterations = 100 * n;
+    let found = SymmetricEigen::try_new(scaled, f64::EPSILON, iterations);
+    let what = "the eigenvalue iteration of a weight";
+    let values = found.ok_or(Error::NotConverged { what, iterations })?.eigenvalues;
+    #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
+    let allowed = SEMIDEFINITE * n as f64;
+    if values.min() < -allowed { Err(refused) } else { Ok(()) }
+}

@@ -1,0 +1,143 @@
+//! A Riccati equation in balanced coordinates, with R = I.
+
+use super::doubling;
+use super::form::{Form, symmetric};
+use super::{Weights, existence};
+use crate::balance::{
+    Balance, divide_columns, divide_rows, multiply_columns, multiply_rows, power_of_two,
+};
+use crate::lyapunov;
+use crate::{Domain, Error, check};
+use nalgebra::{DMatrix, DVector};
+
+const NEWTON_STEPS: usize = 60;
+
+/// x = S `x_s` with a positive diagonal S, u = L^-T `u_s` with R = L L'.
+pub(super) struct Problem {
+    pub(super) form: Form,
+    /// A - B N', with which the cost has no product of x and u.
+    pub(super) free: DMatrix<f64>,
+    /// Q - N N'.
+    pub(super) free_q: DMatrix<f64>,
+    /// Diagonal of S, powers of two.
+    scale: DVector<f64>,
+    /// L.
+    factor: DMatrix<f64>,
+}
+
+impl Problem {
+    pub(super) fn of(
+        a: &DMatrix<f64>,
+        b: &DMatrix<f64>,
+        weights: &Weights,
+        domain: Domain,
+    ) -> Result<Self, Error> {
+        let (order, inputs) = (check::square("A", a)?, b.ncols());
+        check::shape("B", b, (order, inputs))?;
+        check::shape("Q", &weights.q, (order, order))?;
+        check::shape("R", &weights.r, (inputs, inputs))?;
+        lyapunov::symmetric("Q", &weights.q)?;
+        lyapunov::symmetric("R", &weights.r)?;
+        let n = weights.n.clone().unwrap_or_else(|| DMatrix::zeros(order, inputs));
+        check::shape("N", &n, (order, inputs))?;
+        let indefinite = Error::NotPositiveDefinite { matrix: "R" };
+        let factor = weights.r.clone().cholesky().ok_or(indefinite)?.l();
+        let b = check::in_range("B R^-1 B'", per_unit(b, &factor))?;
+        let n = check::in_range("N R^-1 N'", per_unit(&n, &factor))?;
+        let free = check::in_range("A - B R^-1 N'", a - &b * n.transpose())?;
+        let free_q = check::in_range("Q - N R^-1 N'", &weights.q - symmetric(&n * n.transpose()))?;
+        existence::require_semidefinite(&free_q, &weights.q)?;
+        let scale = balancing(&free, &check::in_range("B R^-1 B'", &b * b.transpose())?, &free_q);
+        let both = |m: &DMatrix<f64>| multiply_rows(&multiply_columns(m, &scale), &scale);
+        let similar = |m: &DMatrix<f64>| divide_rows(&multiply_columns(m, &scale), &scale);
+        let (a, b, n) = (similar(a), divide_rows(&b, &scale), multiply_rows(&n, &scale));
+        Ok(Self {
+            free: similar(&free),
+            free_q: both(&free_q),
+            form: Form { a, b, q: both(&weights.q), n, domain },
+            scale,
+            factor,
+        })
+    }
+
+    /// A stabilising P near the solution.
+    ///
+    /// Doubling finds the least semidefinite solution, which leaves an unstable eigenvalue alone
+    /// that Q does not see. With Q + d I it sees all, and Newton's method falls from there to the
+    /// stabilising solution.
+    pub(super) fn start(&self) -> Result<DMatrix<f64>, Error> {
+        let effect = symmetric(&self.form.b * self.form.b.transpose());
+        let solve = |q: &DMatrix<f64>| match self.form.domain {
+            Domain::Continuous => doubling::continuous(&self.free, &effect, q),
+            Domain::Sampled { .. } => doubling::sampled(&self.free, &effect, q),
+        };
+        if let Ok(p) = solve(&self.free_q)
+            && self.form.newton(&p).is_some()
+        {
+            return Ok(p);
+        }
+        let order = self.free.nrows();
+        let size = self.free_q.amax().max(self.free.amax());
+        solve(&(&self.free_q + DMatrix::from_diagonal_element(order, order, size)))
+    }
+
+    /// Newton's method until the residual does not fall any more.
+    pub(super) fn refined(&self, start: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
+        let (mut best, mut residual) = (start.clone(), self.form.residual(start));
+        let mut p = start.clone();
+        for _ in 0..NEWTON_STEPS {
+            let Some(next) = self.form.newton(&p) else { break };
+            let (moved, found) = ((&next - &p).amax(), self.form.residual(&next));
+            if found < residual {
+                (best, residual) = (next.clone(), found);
+            }
+            if moved <= 10.0 * f64::EPSILON * next.amax() || residual <= f64::EPSILON {
+                return Ok(best);
+            }
+            p = next;
+        }
+        if residual <= super::ALLOWED_RESIDUAL {
+            return Ok(best);
+        }
+        let what = "Newton's method for the Riccati equation";
+        Err(Error::NotConverged { what, iterations: NEWTON_STEPS })
+    }
+
+    pub(super) fn residual(&self, scaled_p: &DMatrix<f64>) -> f64 {
+        self.form.residual(scaled_p)
+    }
+
+    /// S^-1 P S^-1, and back.
+    pub(super) fn restored(&self, p: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
+        check::in_range("P", divide_rows(&divide_columns(p, &self.scale), &self.scale))
+    }
+
+    pub(super) fn scaled_solution(&self, p: &DMatrix<f64>) -> DMatrix<f64> {
+        multiply_rows(&multiply_columns(p, &self.scale), &self.scale)
+    }
+
+    /// L^-T K S^-1.
+    pub(super) fn restored_gain(&self, p: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
+        let gain = self.form.gain(p).and_then(|gain| self.factor.tr_solve_lower_triangular(&gain));
+        let gain = gain.ok_or(Error::Overflow { what: "K" })?;
+        check::in_range("K", divide_columns(&gain, &self.scale))
+    }
+}
+
+/// M L^-T.
+fn per_unit(m: &DMatrix<f64>, factor: &DMatrix<f64>) -> DMatrix<f64> {
+    let solved = factor.solve_lower_triangular(&m.transpose());
+    solved.map_or_else(|| DMatrix::from_element(m.nrows(), m.ncols(), f64::NAN), |x| x.transpose())
+}
+
+/// Diagonal S that balances the Hamiltonian matrix [A, -G; -Q, -A'] by diag(S, S^-1).
+fn balancing(a: &DMatrix<f64>, g: &DMatrix<f64>, q: &DMatrix<f64>) -> DVector<f64> {
+    let order = a.nrows();
+    let mut hamiltonian = DMatrix::zeros(2 * order, 2 * order);
+    hamiltonian.view_mut((0, 0), (order, order)).copy_from(&a.abs());
+    hamiltonian.view_mut((0, order), (order, order)).copy_from(&g.abs());
+    hamiltonian.view_mut((order, 0), (order, order)).copy_from(&q.abs());
+    hamiltonian.view_mut((order, order), (order, order)).copy_from(&a.abs().transpose());
+    let scale = Balance::of(&hamiltonian).scale;
+    DVector::from_fn(order, |i, _| power_of_two((scale[i] / scale[order + i]).sqrt()))
+}

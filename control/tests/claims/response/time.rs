@@ -1,0 +1,110 @@
+//! Step and ramp responses.
+
+use super::{CONTINUOUS, oscillator, single};
+use crate::matrix;
+use control::response::{System, Trace, ramp_response, step_response};
+use control::{Domain, Error};
+use nalgebra::DMatrix;
+
+fn largest_step(trace: &Trace) -> f64 {
+    let range = trace.output.max() - trace.output.min();
+    let change = |k: usize| (trace.output[(0, k + 1)] - trace.output[(0, k)]).abs();
+    (0..trace.time.len() - 1).map(change).fold(0.0, f64::max) / range
+}
+
+#[test]
+fn an_oscillator_overshoots_as_the_textbook_says() {
+    for zeta in [0.1, 0.5, 0.8] {
+        let w = 300.0;
+        let trace = step_response(&oscillator(w, zeta), 0).unwrap();
+        let damped = w * f64::sqrt(1.0 - zeta * zeta);
+        let overshoot = (-zeta * w * std::f64::consts::PI / damped).exp();
+        let found = trace.transient(0, 0.02);
+        assert!((found.peak - 1.0 - overshoot).abs() < 1e-6, "{zeta}: {found:?}");
+        assert!((found.peak_time * damped / std::f64::consts::PI - 1.0).abs() < 1e-3);
+        assert!((found.settled - 1.0).abs() < 1e-14);
+        for (k, &t) in trace.time.iter().enumerate() {
+            let (cosine, sine) = ((damped * t).cos(), (damped * t).sin());
+            let exact = 1.0 - (-zeta * w * t).exp() * (cosine + zeta * w / damped * sine);
+            assert!((trace.output[(0, k)] - exact).abs() < 1e-12, "{t}");
+        }
+    }
+}
+
+#[test]
+fn a_lag_settles_after_the_logarithm_of_the_band() {
+    let lag = single(matrix(1, 1, &[-5.0]), &[10.0], &[1.0], CONTINUOUS);
+    let found = step_response(&lag, 0).unwrap().transient(0, 0.02);
+    assert!((found.settling_time - 50.0_f64.ln() / 5.0).abs() < 2e-4, "{found:?}");
+    assert!((found.settled - 2.0).abs() < 1e-15);
+}
+
+/// 1 - e^-t + 1 - e^(-1e5 t): both parts are resolved, with a few hundred points.
+#[test]
+fn fast_and_slow_parts_are_both_resolved() {
+    let modes = DMatrix::from_diagonal(&nalgebra::DVector::from_vec(vec![-1.0, -1e5]));
+    let stiff = single(modes, &[1.0, 1e5], &[1.0, 1.0], CONTINUOUS);
+    let trace = step_response(&stiff, 0).unwrap();
+    assert!(largest_step(&trace) < 0.06, "{}", largest_step(&trace));
+    assert!(trace.time.len() < 1000, "{}", trace.time.len());
+    assert!(trace.time.windows(2).all(|pair| pair[1] > pair[0]));
+    for (k, &t) in trace.time.iter().enumerate() {
+        let exact = -(-t).exp_m1() - (-1e5 * t).exp_m1();
+        assert!((trace.output[(0, k)] - exact).abs() < 1e-12, "{t}");
+    }
+}
+
+/// 1 / (s + 1) with an input that rises over T: t - 1 + e^-t over T, then the difference of two.
+#[test]
+fn a_ramp_is_the_difference_of_two_integrals_of_the_step() {
+    let lag = single(matrix(1, 1, &[-1.0]), &[1.0], &[1.0], CONTINUOUS);
+    let rise = 0.37;
+    let trace = ramp_response(&lag, 0, rise).unwrap();
+    let integral = |t: f64| if t > 0.0 { t + (-t).exp_m1() } else { 0.0 };
+    for (k, &t) in trace.time.iter().enumerate() {
+        let exact = (integral(t) - integral(t - rise)) / rise;
+        assert!((trace.output[(0, k)] - exact).abs() < 1e-13, "{t}");
+    }
+    assert!(trace.time.iter().any(|&t| (t - rise).abs() < 1e-15));
+}
+
+/// The recursion, sample by sample, for a slow and a fast mode, one of them alternating.
+#[test]
+fn sampled_responses_are_those_of_the_recursion() {
+    let a = matrix(3, 3, &[0.99, 0.1, 0.0, 0.0, -0.6, 0.5, 0.0, 0.0, 0.0]);
+    let period = 0.01;
+    let system = single(a, &[1.0, 0.5, 1.0], &[1.0, 2.0, -1.0], Domain::Sampled { period });
+    for rise in [0_i32, 7] {
+        let trace = match rise {
+            0 => step_response(&system, 0).unwrap(),
+            _ => ramp_response(&system, 0, f64::from(rise) * period).unwrap(),
+        };
+        let mut state = matrix(3, 1, &[0.0; 3]);
+        let mut seen = 0;
+        for k in 0..4000_i32 {
+            let time = f64::from(k) * period;
+            if seen < trace.time.len() && (trace.time[seen] - time).abs() < 1e-9 {
+                let exact = (&system.c * &state)[0];
+                assert!((trace.output[(0, seen)] - exact).abs() < 1e-11, "{rise} {k}");
+                seen += 1;
+            }
+            let input = if rise > 0 { f64::from(k.min(rise)) / f64::from(rise) } else { 1.0 };
+            state = &system.a * state + &system.b * input;
+        }
+        assert_eq!(seen, trace.time.len());
+        assert!((trace.settled[0] - (&system.c * &state)[0]).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn bad_arguments_are_named() {
+    let good = oscillator(1.0, 0.5);
+    let refused = step_response(&good, 1);
+    assert!(matches!(refused, Err(Error::OutOfRange { name: "input", .. })), "{refused:?}");
+    let refused = ramp_response(&good, 0, 0.0);
+    assert!(matches!(refused, Err(Error::OutOfRange { name: "duration", .. })), "{refused:?}");
+    let unstable = System { a: -good.a.clone(), ..good };
+    assert!(matches!(step_response(&unstable, 0), Err(Error::NotHurwitz { .. })));
+    let light = oscillator(1.0, 1e-6);
+    assert!(matches!(step_response(&light, 0), Err(Error::NotConverged { .. })));
+}
