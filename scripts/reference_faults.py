@@ -4,7 +4,8 @@
 * distances: the smallest singular value of [A - s I, B] minimised over a grid of the plane, then by Nelder and Mead,
   A balanced and of norm one, B of norm one;
 * sampled plants: scipy.signal.cont2discrete, zero-order hold, with the fault model as part of the states;
-* loss of effectiveness: gains by scipy.signal.place_poles, the loss at which the spectral abscissa is zero by brentq.
+* loss of effectiveness: gains by scipy.signal.place_poles, the loss at which the spectral abscissa is zero, or
+  the spectral radius of the sampled loop one, by brentq.
 
 Each matrix stands below a line with its name, rows and columns. Needs Python with numpy and scipy; writes to the path
 given as the first argument, or to the committed file.
@@ -98,12 +99,41 @@ def loss(data):
         loop = np.vstack([np.hstack([a, left @ k_x, left @ k_f]), x_hat, f_hat])
         return np.linalg.eigvals(loop).real.max()
 
-    def limit(direction):
-        ends = next(t for t in np.linspace(0.01, 1.0, 100) if abscissa(t * np.array(direction)) > 0.0)
-        return brentq(lambda t: abscissa(t * np.array(direction)), ends - 0.01, ends, xtol=1e-14)
+    data.update(loss_a=a, loss_b=b, loss_k_x=k_x, loss_l_x=l_x, loss_l_f=l_f, loss_limits=limits(abscissa))
+    sampled_loss(data, a, b, c)
 
-    limits = [limit(direction) for direction in ([1.0, 1.0], [1.0, 0.0], [0.0, 1.0])]
-    data.update(loss_a=a, loss_b=b, loss_k_x=k_x, loss_l_x=l_x, loss_l_f=l_f, loss_limits=np.array([limits]))
+
+def limits(instability):
+    """The loss up to which the loop is stable: both inputs alike, the first alone, the second alone."""
+    def limit(direction):
+        end = next(t for t in np.linspace(0.01, 1.0, 100) if instability(t * np.array(direction)) > 0.0)
+        return brentq(lambda t: instability(t * np.array(direction)), end - 0.01, end, xtol=1e-14)
+
+    return np.array([[limit(direction) for direction in ([1.0, 1.0], [1.0, 0.0], [0.0, 1.0])]])
+
+
+def sampled_loss(data, a, b, c):
+    """The same with a current estimator at 0.1 s: the loop is written as one step of the algorithm."""
+    phi, gamma, *_ = cont2discrete((a, b, c, np.zeros((2, 2))), 0.1, method="zoh")
+    k_x = -place_poles(phi, gamma, np.exp([-0.1, -0.15, -0.2, -0.25])).gain_matrix
+    a_0 = np.block([[phi, -gamma], [np.zeros((2, 4)), np.eye(2)]])
+    c_0 = np.hstack([c, np.zeros((2, 2))])
+    poles = np.exp([-0.6, -0.7, -0.8, -0.9, -1.0, -1.1])
+    m_0 = place_poles(a_0.T, (c_0 @ a_0).T, poles).gain_matrix.T
+    m_x, m_f = m_0[:4], -m_0[4:]
+
+    def step(state, e):
+        x, x_hat, f_hat = state[:4], state[4:8], state[8:]
+        residual = c @ (x - x_hat)
+        x_hat, f_hat = x_hat + m_x @ residual, f_hat + m_f @ residual
+        u = k_x @ x_hat - f_hat
+        return np.concatenate([phi @ x + gamma @ ((1.0 - e) * u), phi @ x_hat + gamma @ (u + f_hat), f_hat])
+
+    def radius(e):
+        return np.abs(np.linalg.eigvals(np.array([step(unit, e) for unit in np.eye(10)]).T)).max() - 1.0
+
+    data.update(sampled_loss_a=phi, sampled_loss_b=gamma, sampled_loss_k_x=k_x, sampled_loss_m_x=m_x)
+    data.update(sampled_loss_m_f=m_f, sampled_loss_limits=limits(radius))
 
 
 def main():

@@ -104,10 +104,13 @@ fn equations(
 pub fn poles(continuous: &[Complex<f64>], period: f64) -> Result<Vec<Complex<f64>>, Error> {
     check::positive("the sample time", period)?;
     for pole in continuous {
-        let value = pole.im * period;
-        if !(value.abs() <= std::f64::consts::PI && pole.re.is_finite()) {
-            let rule = "finite, and at most pi: it must turn less than half a turn per sample";
-            return Err(Error::OutOfRange { name: "Im(p) T", value, rule });
+        let (decay, angle) = (pole.re * period, pole.im * period);
+        if !decay.is_finite() {
+            return Err(Error::OutOfRange { name: "Re(p) T", value: decay, rule: "finite" });
+        }
+        if angle.is_nan() || angle.abs() > std::f64::consts::PI {
+            let rule = "at most pi in size: half a turn from sample to sample";
+            return Err(Error::OutOfRange { name: "Im(p) T", value: angle, rule });
         }
     }
     let fastest = continuous.iter().map(|pole| -pole.re * period).fold(0.0, f64::max);
@@ -194,8 +197,8 @@ fn part(rate: f64, period: f64) -> f64 {
 /// estimator with the output `C_0` `A_0`: `A_0` must not lose rank, which very fast filters do.
 /// Method, cost and tolerance: those of [`crate::placement::place`].
 ///
-/// For the pendulum of the paper, sampled at 0.1 to 10 ms, the current estimator leaves a residual
-/// motion that is down to half of that with the prediction estimator.
+/// For the friction pendulum of the paper the current estimator leaves less residual motion than the
+/// prediction estimator: 6 % less at 0.1 ms, 34 % at 1 ms, 44 % at 10 ms.
 ///
 /// Source: G. F. Franklin, J. D. Powell and M. Workman, Digital control of dynamic systems, 3rd
 /// edition (1998), section 8.2.

@@ -231,6 +231,28 @@ fn the_loss_that_a_loop_survives_is_that_of_scipy() {
     assert!(small.worst_instability < 0.0 && (small.common - 0.3).abs() < 1e-15, "{small:?}");
 }
 
+/// The same, the loop written in Python as one step of the algorithm.
+#[test]
+fn the_loss_that_a_sampled_loop_survives_is_that_of_scipy() {
+    let of = |part: &str| reference(&format!("sampled_loss_{part}"));
+    let plant = FaultyPlant {
+        a: of("a"),
+        b: of("b"),
+        c: DMatrix::identity(2, 4),
+        f_a: of("b"),
+        a_f: DMatrix::identity(2, 2),
+    };
+    let gains =
+        Gains { k_x: of("k_x"), k_f: -DMatrix::identity(2, 2), l_x: of("m_x"), l_f: of("m_f") };
+    let controller = Controller::with_current_estimate(&plant, &gains).unwrap();
+    let domain = Domain::Sampled { period: 0.1 };
+    let found = loss_tolerance(&plant, &controller, &[0, 1], 1.0, domain).unwrap();
+    let limits = [found.common, found.single[0], found.single[1]];
+    for (limit, expected) in limits.iter().zip(of("limits").iter()) {
+        assert!((limit - expected).abs() < 1e-9, "{found:?} {expected}");
+    }
+}
+
 /// A position that is measured only once, and the only one: its bias is the same as another
 /// position, because the cart at rest may stand anywhere.
 #[test]

@@ -2,15 +2,21 @@
 
 use crate::paper::{CONTROLLER_POLES, OBSERVER_POLES, plant, repaired_gains};
 use crate::{integers, matrix};
-use control::Error;
 use control::aso::{FaultyPlant, design};
+use control::controller::Controller;
+use control::detectability::detectability;
+use control::distance::{from_uncontrollable, from_unobservable};
 use control::eigen::eigenvalues;
 use control::exponential::exponential;
+use control::faults::{ExtendedPlant, loss_tolerance};
 use control::hold::FirstOrderHold;
 use control::lyapunov::lyapunov;
 use control::placement::{place, real};
-use control::rank::{controllability, observability};
+use control::rank::{controllability, observability, uncontrollable_modes, unobservable_modes};
+use control::sampled::sample;
 use control::theorem1::certify;
+use control::zeros::zeros;
+use control::{Domain, Error};
 use nalgebra::DMatrix;
 
 fn name_of<T: std::fmt::Debug>(result: Result<T, Error>) -> &'static str {
@@ -35,6 +41,13 @@ fn an_entry_that_is_not_a_number_is_named_in_every_matrix() {
     assert_eq!(name_of(controllability(&bad, &good)), "A");
     assert_eq!(name_of(controllability(&good, &bad)), "B");
     assert_eq!(name_of(observability(&good, &bad)), "C");
+    assert_eq!(name_of(uncontrollable_modes(&bad, &good)), "A");
+    assert_eq!(name_of(unobservable_modes(&good, &bad)), "C");
+    assert_eq!(name_of(from_uncontrollable(&good, &bad)), "B");
+    assert_eq!(name_of(from_unobservable(&good, &bad)), "C");
+    assert_eq!(name_of(zeros(&bad, &good, &good)), "A");
+    assert_eq!(name_of(zeros(&good, &bad, &good)), "B");
+    assert_eq!(name_of(zeros(&good, &good, &bad)), "C");
     assert_eq!(name_of(FirstOrderHold::new(&bad, &good, 1.0)), "A");
     assert_eq!(name_of(FirstOrderHold::new(&good, &bad, 1.0)), "B");
     assert_eq!(name_of(place(&bad, &good, &real(&[-1.0, -2.0]))), "A");
@@ -93,6 +106,22 @@ fn numbers_out_of_range_are_refused_with_the_rule() {
     assert_eq!(refused.to_string(), "beta is 0, expected a finite number above zero");
 }
 
+#[test]
+fn a_controller_or_a_loss_that_does_not_fit_is_refused() {
+    let plant = plant();
+    let controller = Controller::of(&plant, &repaired_gains()).unwrap();
+    let tolerance = |controller: &Controller, inputs: &[usize], largest: f64| {
+        loss_tolerance(&plant, controller, inputs, largest, Domain::Continuous)
+    };
+    let wrong = Controller { d: DMatrix::zeros(2, 2), ..controller.clone() };
+    assert_eq!(name_of(tolerance(&wrong, &[0], 0.5)), "the controller's D");
+    assert_eq!(name_of(controller.closed_loop(&plant, &[1.0, 1.0])), "effect");
+    for (inputs, largest) in [(&[1][..], 0.5), (&[][..], 0.5), (&[0][..], 0.0), (&[0][..], 1.5)] {
+        let refused = tolerance(&controller, inputs, largest);
+        assert!(matches!(refused, Err(Error::OutOfRange { .. })), "{refused:?}");
+    }
+}
+
 /// Entries from 1e-150 to 1e150: an answer or an error, never a panic or a run without end.
 #[test]
 fn entries_near_the_ends_of_the_range_end_in_an_answer_or_an_error() {
@@ -115,5 +144,10 @@ fn entries_near_the_ends_of_the_range_end_in_an_answer_or_an_error() {
         let plant = FaultyPlant::with_constant_faults(a, b, wild(2, 4, 3), f_a);
         let designed = design(&plant, &real(&CONTROLLER_POLES), &real(&OBSERVER_POLES), None);
         let _ = designed.map(|design| finite(design.gains.l_x));
+        let _ = detectability(&plant, Domain::Continuous)
+            .map(|found| assert!(found.zeros.finite.iter().all(|zero| zero.re.is_finite())));
+        let _ = from_uncontrollable(&plant.a, &plant.b)
+            .map(|found| assert!(found.lower <= found.upper, "{found:?}"));
+        let _ = sample(&ExtendedPlant::without_filter(plant), 0.1).map(|plant| finite(plant.b));
     }
 }
