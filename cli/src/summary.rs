@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use control::aso::{FaultyPlant, Gains};
+use control::aso::{Estimator, FaultyPlant, Gains};
 use control::eigen::eigenvalues;
 use control::theorem1::{Certificate, certify};
 use fmi2::description::Kind;
@@ -93,6 +93,7 @@ impl Certified {
         let (a, b, c) = (matrix("A")?, matrix("B")?, matrix("C")?);
         let plant = FaultyPlant::with_constant_faults(a, b, c, matrix("F_a")?);
         let gains = Gains {
+            estimator: Estimator::Prediction,
             k_x: matrix("K_x")?,
             k_f: matrix("K_f")?,
             l_x: matrix("L_x")?,

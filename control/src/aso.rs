@@ -32,7 +32,7 @@
 mod gains;
 mod plant;
 
-pub use gains::Gains;
+pub use gains::{Estimator, Gains};
 pub use plant::FaultyPlant;
 
 use crate::placement::{Placement, Quality, place, place_balanced};
@@ -142,7 +142,13 @@ pub(crate) fn design_feedback(
     let (l, observer) = place_observer((&a_0, &c_0), observer_poles, place_balanced)?;
     Ok(AsoDesign {
         cancellation_residual: cancellation_residual(plant, states, &k_f),
-        gains: Gains { k_x: controller.gain, k_f, l_x: l.rows(0, n).into(), l_f: -l.rows(n, q) },
+        gains: Gains {
+            estimator: Estimator::Prediction,
+            k_x: controller.gain,
+            k_f,
+            l_x: l.rows(0, n).into(),
+            l_f: -l.rows(n, q),
+        },
         controller: controller.quality,
         observer,
     })

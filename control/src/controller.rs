@@ -1,6 +1,6 @@
 //! A linear controller and the loop that it closes.
 
-use crate::aso::{FaultyPlant, Gains};
+use crate::aso::{Estimator, FaultyPlant, Gains};
 use crate::eigen::eigenvalues;
 use crate::{Domain, Error, check};
 use nalgebra::DMatrix;
@@ -19,45 +19,41 @@ pub struct Controller {
 }
 
 impl Controller {
-    /// The observer and feedback of [`crate::aso`] with z = [`x_hat`; `f_hat`]:
+    /// The observer and feedback of [`crate::aso`].
     ///
     /// ```text
-    /// A = [A + B K_x - L_x C, F_a + B K_f; -L_f C, A_f],  B = [L_x; L_f],  C = [K_x, K_f],  D = 0
+    /// G = [A + B K_x, F_a + B K_f; 0, A_f],  M = [L_x; L_f],  W = I - M [C, 0]
+    /// prediction:  A = G - M [C, 0],  B = M,    C = [K_x, K_f],    D = 0
+    /// current:     A = G W,           B = G M,  C = [K_x, K_f] W,  D = [K_x, K_f] M
     /// ```
+    ///
+    /// z = [`x_hat`; `f_hat`]. A current estimator, for sampled plants, first corrects z by M times the
+    /// new residual, then feeds it back, then predicts; its z is the prediction.
     ///
     /// # Errors
     ///
     /// Those of [`Gains::check`].
     pub fn of(plant: &FaultyPlant, gains: &Gains) -> Result<Self, Error> {
         gains.check(plant)?;
-        let model = Model::of(plant, gains);
-        let a = &model.driven - &model.correction * &model.output;
-        let d = DMatrix::zeros(gains.k_x.nrows(), plant.c.nrows());
-        Ok(Self { a, b: model.correction, c: model.feedback, d })
-    }
-
-    /// The same for a sampled plant and a current estimator: [`x_hat`; `f_hat`] is first corrected
-    /// by M = [`L_x`; `L_f`] times the new residual, then fed back, then predicted; z is the
-    /// prediction.
-    ///
-    /// ```text
-    /// W = I - M [C, 0],  G = [A + B K_x, F_a + B K_f; 0, A_f]
-    /// A = G W,  B = G M,  C = [K_x, K_f] W,  D = [K_x, K_f] M
-    /// ```
-    ///
-    /// # Errors
-    ///
-    /// Those of [`Gains::check`].
-    pub fn with_current_estimate(plant: &FaultyPlant, gains: &Gains) -> Result<Self, Error> {
-        gains.check(plant)?;
         let Model { driven, output, correction, feedback } = Model::of(plant, gains);
+        let taken = &correction * output;
         let order = driven.nrows();
-        let kept = DMatrix::identity(order, order) - &correction * output;
-        Ok(Self {
-            a: &driven * &kept,
-            b: driven * &correction,
-            c: &feedback * kept,
-            d: feedback * correction,
+        Ok(match gains.estimator {
+            Estimator::Prediction => Self {
+                a: driven - taken,
+                d: DMatrix::zeros(feedback.nrows(), correction.ncols()),
+                b: correction,
+                c: feedback,
+            },
+            Estimator::Current => {
+                let kept = DMatrix::identity(order, order) - taken;
+                Self {
+                    a: &driven * &kept,
+                    b: driven * &correction,
+                    c: &feedback * kept,
+                    d: feedback * correction,
+                }
+            }
         })
     }
 
@@ -92,7 +88,7 @@ impl Controller {
 
 /// The blocks that both kinds of estimator are made of.
 struct Model {
-    /// G of [`Controller::with_current_estimate`].
+    /// G of [`Controller::of`].
     driven: DMatrix<f64>,
     output: DMatrix<f64>,
     correction: DMatrix<f64>,

@@ -4,7 +4,7 @@
 //! its model inside the interval. All gains are then those of the sampled plant, so that the loop is
 //! stable at any sample time at which the sampled plant stays controllable and observable.
 
-use crate::aso::{FaultyPlant, Gains, place_controller, place_observer};
+use crate::aso::{Estimator, FaultyPlant, Gains, place_controller, place_observer};
 use crate::controller::{Controller, instability};
 use crate::faults::{ExtendedPlant, filtered, stacked};
 use crate::hold::FirstOrderHold;
@@ -15,23 +15,11 @@ use nalgebra::{Complex, DMatrix, DVector};
 /// The largest decay exponent per sample that [`poles`] gives out.
 const FASTEST: f64 = 6.0;
 
-/// How a sampled observer uses the newest measurement.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Estimator {
-    /// `x_hat`[k+1] follows from y[k]: u has the whole interval for its computation, and acts one
-    /// sample late.
-    Prediction,
-    /// `x_hat`[k] is corrected by y[k] before u[k] is formed, which must take no time to speak of.
-    Current,
-}
-
 /// A sampled controller.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SampledDesign {
     /// The sample time in s.
     pub period: f64,
-    /// Which of the two equations the observer has.
-    pub estimator: Estimator,
     /// The sampled plant.
     pub plant: FaultyPlant,
     /// The part 1 - e^(-w period) of y - `y_f` by which the filter of each measurement moves.
@@ -45,28 +33,6 @@ pub struct SampledDesign {
     pub observer: Quality,
     /// Largest modulus of the eigenvalues of the closed loop; below one it is stable.
     pub radius: f64,
-}
-
-impl SampledDesign {
-    /// The controller's equations; y is the measurement, or with a filter its output `y_f`.
-    ///
-    /// # Errors
-    ///
-    /// Those of [`Gains::check`].
-    pub fn equations(&self) -> Result<Controller, Error> {
-        equations(self.estimator, &self.plant, &self.gains)
-    }
-}
-
-fn equations(
-    estimator: Estimator,
-    plant: &FaultyPlant,
-    gains: &Gains,
-) -> Result<Controller, Error> {
-    match estimator {
-        Estimator::Prediction => Controller::of(plant, gains),
-        Estimator::Current => Controller::with_current_estimate(plant, gains),
-    }
 }
 
 /// The poles of a sampled loop that belong to those of a continuous one: e^(p T), the fast slowed.
@@ -225,16 +191,13 @@ pub fn design(
     check::shape("K_f", &k_f, (m, q))?;
     let controller = place_controller((&plant, extended.states), controller_poles, place_discrete)?;
     let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
-    let output = match estimator {
-        Estimator::Prediction => c_0,
-        Estimator::Current => c_0 * &a_0,
-    };
-    let (l, observer) = place_observer((&a_0, &output), observer_poles, place_discrete)?;
-    let gains = Gains { k_x: controller.gain, k_f, l_x: l.rows(0, n).into(), l_f: -l.rows(n, q) };
-    let whole = equations(estimator, &plant, &gains)?.closed_loop(&plant, &vec![1.0; m])?;
+    let seen = estimator.seen(&a_0, &c_0);
+    let (l, observer) = place_observer((&a_0, &seen), observer_poles, place_discrete)?;
+    let (l_x, l_f) = (l.rows(0, n).into(), -l.rows(n, q));
+    let gains = Gains { estimator, k_x: controller.gain, k_f, l_x, l_f };
+    let whole = Controller::of(&plant, &gains)?.closed_loop(&plant, &vec![1.0; m])?;
     Ok(SampledDesign {
         period,
-        estimator,
         plant,
         filter: filter(extended, Domain::Sampled { period }),
         gains,

@@ -92,7 +92,7 @@ impl<'a> Loops<'a> {
                     unit: self.outputs.units[at].clone(),
                     gain_of_fault: of_fault,
                     gain_of_rate: of_rate,
-                    bound: by_rate.into_iter().chain(by_size).reduce(f64::min),
+                    largest: by_rate.into_iter().chain(by_size).reduce(f64::min),
                 });
             }
         }

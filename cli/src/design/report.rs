@@ -190,7 +190,7 @@ pub(crate) struct Bound {
     pub(crate) gain_of_fault: f64,
     pub(crate) gain_of_rate: f64,
     /// The smaller of gain times bound, where the file states bounds.
-    pub(crate) bound: Option<f64>,
+    pub(crate) largest: Option<f64>,
 }
 
 /// What a sudden change of a fault does to the compensated loop.

@@ -166,10 +166,10 @@ fn plant(designed: &Designed, names: &Names) -> Result<Plant, Error> {
             Domain::Sampled { .. } => "sampled",
         };
         for (name, values, rows, columns) in [
-            ("A", &own.a, extended, extended),
-            ("B", &own.b, extended, actuators),
-            ("C", &own.c, measurements, extended),
-            ("F_a", &own.f_a, extended, faults),
+            ("A_e", &own.a, extended, extended),
+            ("B_e", &own.b, extended, actuators),
+            ("C_e", &own.c, measurements, extended),
+            ("F_e", &own.f_a, extended, faults),
         ] {
             matrices.push(matrix(name, &format!("{kind} plant"), values, rows, columns));
         }

@@ -4,9 +4,22 @@ use super::FaultyPlant;
 use crate::{Error, check};
 use nalgebra::DMatrix;
 
+/// How the observer uses the newest measurement.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Estimator {
+    /// The measurement corrects the derivative of the estimate or, when sampled, the next estimate:
+    /// u has the whole interval for its computation, and acts one sample late.
+    Prediction,
+    /// Sampled only: `x_hat`[k] is corrected by y[k] before u[k] is formed, which must take no time
+    /// to speak of.
+    Current,
+}
+
 /// The gains of the controller.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gains {
+    /// What `L_x` and `L_f` correct.
+    pub estimator: Estimator,
     /// `K_x`, m x n.
     pub k_x: DMatrix<f64>,
     /// `K_f`, m x q.
@@ -15,6 +28,18 @@ pub struct Gains {
     pub l_x: DMatrix<f64>,
     /// `L_f`, q x p.
     pub l_f: DMatrix<f64>,
+}
+
+impl Estimator {
+    /// The output whose deviation L takes back: `C_0`, or `C_0` `A_0` for a current estimator, which
+    /// sees the measurement after the step of `A_0`.
+    #[must_use]
+    pub fn seen(self, a_0: &DMatrix<f64>, c_0: &DMatrix<f64>) -> DMatrix<f64> {
+        match self {
+            Self::Prediction => c_0.clone(),
+            Self::Current => c_0 * a_0,
+        }
+    }
 }
 
 impl Gains {
@@ -33,10 +58,12 @@ impl Gains {
         &plant.a + &plant.b * &self.k_x
     }
 
-    /// `A_0` - L `C_0`, (n + q) x (n + q): the dynamics of the estimation error (11).
+    /// `A_0` - L `C_0`, (n + q) x (n + q): the dynamics of the estimation error (11); `A_0` - L
+    /// `C_0` `A_0` for a current estimator, after the correction.
     #[must_use]
     pub fn error_dynamics(&self, plant: &FaultyPlant) -> DMatrix<f64> {
-        plant.augmented_dynamics() - self.observer_gain() * plant.augmented_output()
+        let a_0 = plant.augmented_dynamics();
+        &a_0 - self.observer_gain() * self.estimator.seen(&a_0, &plant.augmented_output())
     }
 
     /// Shapes and finiteness of the gains for a plant.

@@ -125,15 +125,12 @@ pub struct Reversal {
 /// # Example
 ///
 /// ```
+/// use control::placement::real;
 /// use control::{Domain, aso, response};
 /// use nalgebra::DMatrix;
-/// let plant = aso::FaultyPlant {
-///     a: DMatrix::from_element(1, 1, 0.5),
-///     b: DMatrix::from_element(1, 1, 1.0),
-///     c: DMatrix::from_element(1, 1, 1.0),
-///     f_a: DMatrix::from_element(1, 1, -1.0),
-/// };
-/// let gains = aso::design(&plant, &[-1.0], &[-20.0, -30.0], None)?.gains;
+/// let one = |value| DMatrix::from_element(1, 1, value);
+/// let plant = aso::FaultyPlant::with_constant_faults(one(0.5), one(1.0), one(1.0), one(-1.0));
+/// let gains = aso::design(&plant, &real(&[-1.0]), &real(&[-20.0, -30.0]), None)?.gains;
 /// let turn = response::reversal(&plant, &gains, Domain::Continuous, 0, 2.0, None, 0.02)?;
 /// assert!((turn.fault_errors[0].peak + 2.0).abs() < 1e-12);
 /// assert!(turn.states[0].settled.abs() < 1e-12);

@@ -1,7 +1,7 @@
 //! Plant and controller of [`crate::aso`] as one system driven by the fault.
 
 use super::System;
-use crate::aso::{FaultyPlant, Gains};
+use crate::aso::{Estimator, FaultyPlant, Gains};
 use crate::{Domain, Error};
 use nalgebra::DMatrix;
 
@@ -14,7 +14,8 @@ use nalgebra::DMatrix;
 /// ```
 ///
 /// e = x - `x_hat`, eps = `f_hat` - f; state [x; e; `f_hat`], 2 n + q; in sampled time the left sides are
-/// those of the next sample (prediction estimator). The commands are within the limits of the actuators.
+/// those of the next sample. With a current estimator the matrix of the second line is `A_0` - L `C_0`
+/// `A_0` and f enters by (I - L `C_0`) [`F_a`; 0]; the estimates are those after the correction. The commands are within the limits of the actuators.
 /// It describes every f, jumps included, and is stable when the loop is.
 ///
 /// Source: (1) to (11) of the paper named in [`crate::aso`].
@@ -27,7 +28,11 @@ pub fn fault_system(plant: &FaultyPlant, gains: &Gains, domain: Domain) -> Resul
     let (n, q) = plant.f_a.shape();
     let mut b = DMatrix::zeros(2 * n + q, q);
     b.view_mut((0, 0), (n, q)).copy_from(&plant.f_a);
-    b.view_mut((n, 0), (n, q)).copy_from(&plant.f_a);
+    let mut seen = plant.f_a.clone().resize_vertically(n + q, 0.0);
+    if gains.estimator == Estimator::Current {
+        seen -= gains.observer_gain() * &plant.c * &plant.f_a;
+    }
+    b.view_mut((n, 0), (n + q, q)).copy_from(&seen);
     let mut d = DMatrix::zeros(2 * n + q, q);
     d.view_mut((2 * n, 0), (q, q)).copy_from(&-DMatrix::identity(q, q));
     let c = DMatrix::identity(2 * n + q, 2 * n + q);

@@ -4,7 +4,7 @@
 use crate::data::reference;
 use crate::matrix;
 use crate::paper::{CONTROLLER_POLES, plant};
-use control::aso::{AsoDesign, FaultyPlant, Gains};
+use control::aso::{AsoDesign, Estimator, FaultyPlant, Gains};
 use control::controller::Controller;
 use control::faults::{Entry, ExtendedPlant, Fault, FaultKind, estimated_loss, loss_tolerance};
 use control::hold::FirstOrderHold;
@@ -214,6 +214,7 @@ fn the_loss_that_a_loop_survives_is_that_of_scipy() {
     let Carts { a, b, c } = carts();
     let plant = FaultyPlant::with_constant_faults(a, b.clone(), c, b);
     let gains = Gains {
+        estimator: Estimator::Prediction,
         k_x: reference("loss_k_x"),
         k_f: -DMatrix::identity(2, 2),
         l_x: reference("loss_l_x"),
@@ -242,9 +243,14 @@ fn the_loss_that_a_sampled_loop_survives_is_that_of_scipy() {
         f_a: of("b"),
         a_f: DMatrix::identity(2, 2),
     };
-    let gains =
-        Gains { k_x: of("k_x"), k_f: -DMatrix::identity(2, 2), l_x: of("m_x"), l_f: of("m_f") };
-    let controller = Controller::with_current_estimate(&plant, &gains).unwrap();
+    let gains = Gains {
+        estimator: Estimator::Current,
+        k_x: of("k_x"),
+        k_f: -DMatrix::identity(2, 2),
+        l_x: of("m_x"),
+        l_f: of("m_f"),
+    };
+    let controller = Controller::of(&plant, &gains).unwrap();
     let domain = Domain::Sampled { period: 0.1 };
     let found = loss_tolerance(&plant, &controller, &[0, 1], 1.0, domain).unwrap();
     let limits = [found.common, found.single[0], found.single[1]];

@@ -1,4 +1,5 @@
 use crate::paper::*;
+use control::placement::real;
 use control::theorem1::*;
 use nalgebra::DMatrix;
 
@@ -7,7 +8,9 @@ fn explore() {
     let p = plant();
     for gains in [
         repaired_gains(),
-        control::aso::design(&p, &real(&CONTROLLER_POLES), &real(&OBSERVER_POLES), None).unwrap().gains,
+        control::aso::design(&p, &real(&CONTROLLER_POLES), &real(&OBSERVER_POLES), None)
+            .unwrap()
+            .gains,
     ] {
         let f = gains.error_dynamics(&p);
         let c = certify(&p, &gains, 1.0, 30.0).unwrap();

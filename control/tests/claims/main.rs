@@ -19,9 +19,9 @@ mod recorded;
 #[expect(clippy::unreadable_literal, reason = "the digits as the other software wrote them")]
 mod reference;
 mod refusals;
-mod sampled;
 mod response;
 mod riccati;
+mod sampled;
 mod theorem1;
 mod zeros;
 

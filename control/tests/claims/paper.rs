@@ -1,7 +1,7 @@
 //! The example of Patton and Klinkhieo (2009): an inverted pendulum on a cart.
 
 use crate::matrix;
-use control::aso::{FaultyPlant, Gains};
+use control::aso::{Estimator, FaultyPlant, Gains};
 use nalgebra::DMatrix;
 
 pub(crate) const CONTROLLER_POLES: [f64; 4] = [-4.5, -6.0, -7.5, -9.0];
@@ -40,6 +40,7 @@ pub(crate) fn plant() -> FaultyPlant {
 pub(crate) fn repaired_gains() -> Gains {
     let l_x = [38.0, -4.8, -3.8, 51.8, 379.2, 169.0, -129.7, 884.1];
     Gains {
+        estimator: Estimator::Prediction,
         k_x: matrix(1, 4, &[184.10, 365.71, 123.66, 63.86]),
         k_f: matrix(1, 1, &[1.0]),
         l_x: matrix(4, 2, &l_x),

@@ -2,12 +2,14 @@ use crate::data::reference;
 use crate::paper::{CONTROLLER_POLES, OBSERVER_POLES, plant};
 use crate::{entry_error, matrix};
 use control::Error;
+use control::aso::Estimator;
 use control::aso::FaultyPlant;
+use control::controller::Controller;
 use control::eigen::eigenvalues;
 use control::faults::{Entry, ExtendedPlant, Fault, FaultKind};
 use control::hold::FirstOrderHold;
 use control::placement::real;
-use control::sampled::{Estimator, SampledDesign, design, poles, sample};
+use control::sampled::{SampledDesign, design, poles, sample};
 use nalgebra::{Complex, DMatrix, DVector};
 
 /// From a tenth of a millisecond to ten.
@@ -114,7 +116,7 @@ fn run(
     samples: u32,
 ) -> (f64, f64) {
     let n = extended.states;
-    let equations = design.equations().expect("gains that fit");
+    let equations = Controller::of(&design.plant, &design.gains).expect("gains that fit");
     let inputs = DMatrix::from_columns(&[b.column(0), f_a.column(0)]);
     let a: DMatrix<f64> = extended.plant.a.view((0, 0), (n, n)).into();
     let hold = FirstOrderHold::new(&a, &inputs, design.period).expect("a hold");

@@ -1,6 +1,6 @@
 use crate::paper::{CONTROLLER_POLES, OBSERVER_POLES, plant, printed, repaired_gains};
 use control::Error;
-use control::aso::{FaultyPlant, Gains, design};
+use control::aso::{Estimator, FaultyPlant, Gains, design};
 use control::placement::real;
 use control::theorem1::certify;
 use nalgebra::DMatrix;
@@ -42,7 +42,13 @@ fn alpha_does_not_shrink_the_region() {
 fn a_plant_of_one_state_gives_the_region_found_by_hand() {
     let one = |value| DMatrix::from_element(1, 1, value);
     let plant = FaultyPlant::with_constant_faults(one(1.0), one(2.0), one(1.0), one(-2.0));
-    let gains = Gains { k_x: one(-1.0), k_f: one(1.0), l_x: one(6.0), l_f: one(-3.0) };
+    let gains = Gains {
+        estimator: Estimator::Prediction,
+        k_x: one(-1.0),
+        k_f: one(1.0),
+        l_x: one(6.0),
+        l_f: one(-3.0),
+    };
     let (a, k, b, beta) = (5.0, 2.0, 3.0, 4.0);
     let p_12 = -1.0 / (2.0 * k);
     let p_11 = (1.0 - 2.0 * b * p_12) / (2.0 * a);

@@ -1,14 +1,19 @@
 //! The loop of the paper under its friction, against other software and against the simulation.
 
 use super::{CONTINUOUS, RECORDED};
+use crate::paper::CONTROLLER_POLES;
 use crate::recorded::{Case, cases};
-use control::aso::{FaultyPlant, Gains};
+use control::aso::{Estimator, FaultyPlant, Gains};
+use control::controller::Controller;
+use control::faults::ExtendedPlant;
 use control::hold::zero_order_hold;
+use control::placement::real;
 use control::response::{
     fault_bounds, fault_rate_system, fault_system, peak_gain, reversal, step_response,
 };
+use control::sampled::{design, poles};
 use control::{Domain, Error};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// Static friction of the paper in N.
 const STATIC: f64 = 30.0;
@@ -28,9 +33,9 @@ fn ratios(found: impl Iterator<Item = f64>, simulated: &[f64]) -> Vec<f64> {
 fn paper() -> (FaultyPlant, Gains, Case) {
     let case = cases(RECORDED, "loop").remove(0);
     let get = |name| case.get(name).clone();
-    let plant = FaultyPlant { a: get("A"), b: get("B"), c: get("C"), f_a: get("F_a") };
+    let plant = FaultyPlant::with_constant_faults(get("A"), get("B"), get("C"), get("F_a"));
     let (k_x, k_f, l_x, l_f) = (get("K_x"), get("K_f"), get("L_x"), get("L_f"));
-    (plant, Gains { k_x, k_f, l_x, l_f }, case)
+    (plant, Gains { estimator: Estimator::Prediction, k_x, k_f, l_x, l_f }, case)
 }
 
 #[test]
@@ -131,13 +136,10 @@ fn the_bound_of_the_cart_is_reached_by_the_worst_friction() {
 /// The same loop, sampled fast: constant fault, prediction estimator with the exact error dynamics.
 #[test]
 fn a_fast_sampled_loop_tends_to_the_continuous_one() {
-    let plant = |a: f64, b: f64| FaultyPlant {
-        a: DMatrix::from_element(1, 1, a),
-        b: DMatrix::from_element(1, 1, b),
-        c: DMatrix::identity(1, 1),
-        f_a: DMatrix::from_element(1, 1, -b),
-    };
+    let one = |value| DMatrix::from_element(1, 1, value);
+    let plant = |a, b: f64| FaultyPlant::with_constant_faults(one(a), one(b), one(1.0), one(-b));
     let gains = |l_x: f64, l_f: f64| Gains {
+        estimator: Estimator::Prediction,
         k_x: DMatrix::from_element(1, 1, -2.0),
         k_f: DMatrix::identity(1, 1),
         l_x: DMatrix::from_element(1, 1, l_x),
@@ -159,6 +161,35 @@ fn a_fast_sampled_loop_tends_to_the_continuous_one() {
         let exact = [slow.states[0], slow.state_errors[0], slow.fault_errors[0]][output];
         assert!((found.peak * 2.0 / exact.peak - 1.0).abs() < 2e-3, "{found:?} {exact:?}");
         assert!((found.settling_time / exact.settling_time - 1.0).abs() < 5e-2);
+    }
+}
+
+/// The loop of errors against the plant and the controller's own equations, sample by sample.
+#[test]
+fn the_sampled_loop_of_either_estimator_is_that_of_plant_and_controller() {
+    let extended = ExtendedPlant::without_filter(crate::paper::plant());
+    let period = 2e-3;
+    let in_z = |wanted: &[f64]| poles(&real(wanted), period).unwrap();
+    for estimator in [Estimator::Prediction, Estimator::Current] {
+        let (k, l) = (in_z(&CONTROLLER_POLES), in_z(&[-50., -60., -70., -80., -90.]));
+        let found = design(&extended, period, estimator, &k, &l, None).unwrap();
+        let (plant, gains) = (&found.plant, &found.gains);
+        let controller = Controller::of(plant, gains).unwrap();
+        let whole = controller.closed_loop(plant, &[1.0]).unwrap();
+        let system = fault_system(plant, gains, Domain::Sampled { period }).unwrap();
+        let (mut both, mut state) = (DVector::zeros(9), DVector::zeros(9));
+        let (mut largest, mut difference) = (0.0_f64, 0.0_f64);
+        for _ in 0..2000 {
+            both = &whole * both;
+            let mut x = both.rows_mut(0, 4);
+            x += &plant.f_a;
+            state = &system.a * state + &system.b;
+            largest = largest.max(both.rows(0, 4).amax());
+            difference = difference.max((both.rows(0, 4) - state.rows(0, 4)).amax());
+        }
+        assert!(difference < 1e-9 * largest, "{estimator:?}: {difference:e} of {largest:e}");
+        // The estimate ends at the fault.
+        assert!((state[8] - 1.0).abs() < 1e-9, "{}", state[8]);
     }
 }
 
