@@ -5,7 +5,7 @@
 pub enum Domain {
     /// x' = A x + B w.
     Continuous,
-    /// x[k+1] = A x[k] + B w[k].
+    /// `x[k+1] = A x[k] + B w[k]`.
     Sampled {
         /// Time from sample to sample, above zero.
         period: f64,

@@ -6,6 +6,8 @@
 //! * [`placement`]: state feedback with wanted eigenvalues.
 //! * [`aso`]: the augmented state observer that estimates and compensates actuator faults, and
 //!   [`theorem1`]: the bound that belongs to it.
+//! * `lmi`, behind the feature of that name: linear matrix inequalities by Clarabel, for pole
+//!   regions, H-infinity and generalised H2 bounds, and theorem 1 with free P.
 //!
 //! Matrices have any size; bad arguments and singular problems are an [`Error`], never a panic.
 //! Feedback gains and Lyapunov solutions are put back into their equations before they are

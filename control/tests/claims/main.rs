@@ -11,6 +11,8 @@ mod lyapunov;
 mod paper;
 mod placement;
 mod rank;
+#[cfg(feature = "lmi")]
+mod recorded;
 #[expect(clippy::unreadable_literal, reason = "the digits as the other software wrote them")]
 mod reference;
 mod refusals;
