@@ -11,6 +11,8 @@
 //!   [`theorem1`]: the bound that belongs to it.
 //! * [`faults`]: fault models beyond the constant fault; [`detectability`]: which faults can be seen.
 //! * [`sampled`]: the controller designed for its sample time; [`controller`]: its equations.
+//! * `lmi`, behind the feature of that name: linear matrix inequalities by Clarabel, for pole
+//!   regions, H-infinity and generalised H2 bounds, and theorem 1 with free P.
 //!
 //! Matrices have any size; bad arguments and singular problems are an [`Error`], never a panic.
 //! Feedback gains and Lyapunov solutions are put back into their equations before they are

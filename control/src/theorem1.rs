@@ -3,7 +3,7 @@
 #[cfg(feature = "lmi")]
 mod free;
 #[cfg(feature = "lmi")]
-pub use free::*;
+pub use free::{Decay, FreeRegion, UltimateBound, largest_decay, smallest_region, ultimate_bound};
 
 use crate::aso::{FaultyPlant, Gains};
 use crate::eigen::spectral_abscissa;

@@ -78,3 +78,96 @@ fn an_unstable_observer_has_no_certificate() {
     let refused = certify(&printed(), &gains, 1.0, 30.0);
     assert!(matches!(refused, Err(Error::NotHurwitz { matrix: "A_0 - L C_0", .. })), "{refused:?}");
 }
+
+#[cfg(feature = "lmi")]
+mod free {
+    use super::gains;
+    use crate::matrix;
+    use crate::paper::{plant, repaired_gains};
+    use crate::recorded::cases;
+    use control::lmi::Outcome;
+    use control::theorem1::{certify, largest_decay, smallest_region, ultimate_bound};
+    use nalgebra::DMatrix;
+
+    const DATA: &str = include_str!("../data/lmi.txt");
+
+    #[test]
+    fn the_smallest_radius_is_that_of_a_semidefinite_program_stated_elsewhere() {
+        for case in cases(DATA, "radius") {
+            let found = smallest_region(case.get("F"), case.get("G"), 1.0).unwrap();
+            let delta = found.optimal().unwrap().delta;
+            let ratio = delta / case.number("free");
+            assert!(ratio > 1.0 - 1e-6 && ratio < 1.001, "{}: {ratio}", case.name);
+            assert!(delta < case.number("printed") * 1.000_01);
+        }
+    }
+
+    /// On the paper's example the radius shrinks by a factor of 6, with the repaired printed gains by 3.
+    #[test]
+    fn the_best_p_shrinks_the_region_of_the_paper() {
+        let plant = plant();
+        for (gains, factor) in [(gains(), 6.0), (repaired_gains(), 3.0)] {
+            let printed = certify(&plant, &gains, 1.0, 30.0).unwrap().delta;
+            let f = gains.error_dynamics(&plant);
+            let found = smallest_region(&f, &plant.augmented_fault(), 30.0).unwrap();
+            let found = found.optimal().unwrap();
+            assert!(found.delta * factor < printed, "{} {printed}", found.delta);
+            let left = &found.p * &f + f.transpose() * &found.p + DMatrix::identity(5, 5);
+            let root = left.diagonal().map(|entry| (-entry).sqrt());
+            let scaled = DMatrix::from_fn(5, 5, |i, j| -left[(i, j)] / (root[i] * root[j]));
+            assert!(scaled.symmetric_eigenvalues().min() > 0.0 && found.margin > 0.0);
+        }
+    }
+
+    /// Its eigenvalues end at -1200.
+    #[test]
+    fn the_decay_rate_of_the_paper_is_certified_to_a_thousandth() {
+        let decay = largest_decay(&gains().error_dynamics(&plant())).unwrap().optimal().unwrap();
+        assert!(decay.alpha > 1198.8 && decay.alpha < 1200.0, "{}", decay.alpha);
+        assert!(decay.certificate.margin > 0.0);
+    }
+
+    /// A defective eigenvalue at -1 has a certificate for every smaller rate only.
+    #[test]
+    fn the_decay_rate_of_a_defective_eigenvalue_is_approached() {
+        let jordan = matrix(2, 2, &[-1., 1., 0., -1.]);
+        let decay = largest_decay(&jordan).unwrap().optimal().unwrap();
+        assert!(decay.alpha > 0.99 && decay.alpha < 1.0);
+    }
+
+    /// The error under the fault that switches with its own response stays in the ellipsoid; the
+    /// constant fault ends in it.
+    #[test]
+    fn the_ultimate_bound_holds_for_constant_and_for_switching_faults() {
+        let plant = plant();
+        let gains = repaired_gains();
+        let (f, g) = (gains.error_dynamics(&plant), plant.augmented_fault());
+        let bound = ultimate_bound(&f, &g, 30.0).unwrap().optimal().unwrap();
+        let end = f.clone().lu().solve(&(&g * 30.0)).unwrap();
+        assert!(end.norm() < bound.radius && end.norm() > 0.5 * bound.radius);
+        for state in 0..5 {
+            assert!(end[state].abs() < bound.peaks[state]);
+        }
+        let step = control::hold::FirstOrderHold::new(&f, &g, 1e-3).unwrap();
+        let inverse = bound.shape.clone().try_inverse().unwrap();
+        let mut z = DMatrix::zeros(5, 1);
+        for _ in 0..5000 {
+            let worst = 30.0 * (g.transpose() * &inverse * &z)[(0, 0)].signum();
+            z = &step.phi * z + &step.gamma_0 * worst;
+            for state in 0..5 {
+                assert!(z[state].abs() < bound.peaks[state]);
+            }
+        }
+        assert!(z.norm() > 0.3 * bound.radius, "{} {}", z.norm(), bound.radius);
+    }
+
+    #[test]
+    fn an_unstable_observer_conflicts_with_stability() {
+        let (f, g) = (matrix(1, 1, &[0.5]), matrix(1, 1, &[1.0]));
+        let expected = vec!["stability"];
+        assert_eq!(largest_decay(&f), Ok(Outcome::Infeasible { conflict: expected.clone() }));
+        let found = smallest_region(&f, &g, 1.0);
+        assert_eq!(found, Ok(Outcome::Infeasible { conflict: expected.clone() }));
+        assert_eq!(ultimate_bound(&f, &g, 1.0), Ok(Outcome::Infeasible { conflict: expected }));
+    }
+}
