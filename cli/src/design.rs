@@ -1,6 +1,9 @@
 //! `aso-ftc design`: from a plant file to the design file of the controller FMU.
 #![expect(clippy::print_stdout, reason = "the result of the command")]
 
+mod page;
+mod report;
+
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
