@@ -33,14 +33,7 @@ pub(crate) fn page(report: &Report) -> String {
     let document = html! {
         (DOCTYPE)
         html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta name="color-scheme" content="light dark";
-                meta http-equiv="Content-Security-Policy" content=(POLICY);
-                title { (title) ", design report" }
-                style { (PreEscaped(STYLE)) }
-            }
+            (head(title))
             body {
                 header {
                     p.kind { "Design report" }
@@ -73,6 +66,19 @@ pub(crate) fn page(report: &Report) -> String {
     document.into_string().replace(|sign: char| sign.is_control() && sign != '\n', " ")
 }
 
+fn head(title: &str) -> Markup {
+    html! {
+        head {
+            meta charset="utf-8";
+            meta name="viewport" content="width=device-width, initial-scale=1";
+            meta name="color-scheme" content="light dark";
+            meta http-equiv="Content-Security-Policy" content=(POLICY);
+            title { (title) ", design report" }
+            style { (PreEscaped(STYLE)) }
+        }
+    }
+}
+
 struct Section {
     id: &'static str,
     title: &'static str,
@@ -81,42 +87,34 @@ struct Section {
 
 /// Everything that there is something to say about, in the order of reading.
 fn sections(report: &Report) -> Vec<Section> {
-    let section = |id, title, content| Section { id, title, content };
-    let some = |shown: bool, section| shown.then_some(section);
-    let plant = plant::plant(&report.plant);
     let all = [
-        Some(section("plant", "Plant", plant)),
-        some(!report.checks.is_empty(), section("checks", "Checks", plant::checks(report))),
-        some(!report.gains.is_empty(), section("gains", "Gains", plant::gains(report))),
-        Some(section("poles", "Eigenvalues", loops::poles(report))),
-        Some(section("conditioning", "Condition and pole errors", loops::conditioning(report))),
-        some(
-            !report.frequency.is_empty(),
-            section("frequency", "Singular values", curves::frequencies(report)),
-        ),
-        some(
-            !report.steps.is_empty(),
-            section("steps", "Sudden faults", curves::responses(report)),
-        ),
-        some(
-            !report.bounds.is_empty(),
-            section("bounds", "Bounds of the errors", certificate::bounds(report)),
-        ),
-        Some(section("certificate", "Certificate", certificate::certificate(report))),
-        some(
-            !report.assumptions.is_empty(),
-            section("assumptions", "Assumptions", plant::assumptions(&report.assumptions)),
-        ),
-        some(
+        (true, "plant", "Plant", plant::plant(&report.plant)),
+        (!report.checks.is_empty(), "checks", "Checks", plant::checks(report)),
+        (!report.gains.is_empty(), "gains", "Gains", plant::gains(report)),
+        (true, "poles", "Eigenvalues", loops::poles(report)),
+        (true, "conditioning", "Condition and pole errors", loops::conditioning(report)),
+        (!report.frequency.is_empty(), "frequency", "Singular values", curves::frequencies(report)),
+        (!report.steps.is_empty(), "steps", "Sudden faults", curves::responses(report)),
+        (!report.bounds.is_empty(), "bounds", "Bounds of the errors", certificate::bounds(report)),
+        (true, "certificate", "Certificate", certificate::certificate(report)),
+        (!report.assumptions.is_empty(), "assumptions", "Assumptions", plant::assumptions(report)),
+        (
             !report.effectiveness.is_empty(),
-            section("effectiveness", "Loss of effectiveness", plant::effectiveness(report)),
+            "effectiveness",
+            "Loss of effectiveness",
+            plant::effectiveness(report),
         ),
-        some(
+        (
             !report.interface.is_empty(),
-            section("interface", "Interface of the FMU", plant::interface(report)),
+            "interface",
+            "Interface of the FMU",
+            plant::interface(report),
         ),
     ];
-    all.into_iter().flatten().collect()
+    all.into_iter()
+        .filter(|(shown, ..)| *shown)
+        .map(|(_, id, title, content)| Section { id, title, content })
+        .collect()
 }
 
 fn contents(sections: &[Section]) -> Markup {

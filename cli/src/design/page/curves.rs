@@ -77,20 +77,17 @@ fn frequency(id: &str, response: &Frequency, limit: Option<f64>) -> Markup {
 
 /// The course of the largest singular value in words.
 fn describe(response: &Frequency) -> String {
-    let Some(values) = response.singular_values.first() else { return String::new() };
-    let points: Vec<_> = response.frequencies.iter().zip(values).collect();
-    let highest = points.iter().max_by(|a, b| a.1.total_cmp(b.1));
-    let (Some(first), Some(last), Some(highest)) = (points.first(), points.last(), highest) else {
+    let (frequencies, all) = (&response.frequencies, &response.singular_values);
+    let values =
+        all.first().map_or(&[][..], |values| &values[..values.len().min(frequencies.len())]);
+    let Some(peak) = (0..values.len()).max_by(|a, b| values[*a].total_cmp(&values[*b])) else {
         return String::new();
     };
-    let say =
-        |(at, value): &(&f64, &f64)| format!("{} at {} rad/s", rounded(**value), rounded(**at));
-    let peak = if highest.0 == first.0 || highest.0 == last.0 {
-        String::new()
-    } else {
-        format!(", largest {}", say(highest))
-    };
-    format!("From {} to {}{peak}.", say(first), say(last))
+    let say = |k: usize| format!("{} at {} rad/s", rounded(values[k]), rounded(frequencies[k]));
+    let last = values.len() - 1;
+    let largest =
+        if [0, last].contains(&peak) { String::new() } else { format!(", largest {}", say(peak)) };
+    format!("From {} to {}{largest}.", say(0), say(last))
 }
 
 /// What a sudden change of each fault does, the time in decades.
@@ -127,6 +124,10 @@ fn response(id: &str, response: &StepResponse) -> Markup {
         .collect();
     let caption = format!("Peaks and settling after a change of {}", response.fault);
     let heads = ["signal", "unit", "largest magnitude", "at time (s)", "settled after (s)"];
+    let mut entries = vec![(line_sample("mark"), "settled, within 2 %".to_owned())];
+    if response.curves.iter().any(|curve| curve.unit == response.unit) {
+        entries.push((line_sample("size"), "size of the change, in the same unit".to_owned()));
+    }
     html! {
         h3 id=(id) { (title) }
         div.figures.small {
@@ -134,10 +135,7 @@ fn response(id: &str, response: &StepResponse) -> Markup {
                 (self::curve(&format!("{id}-{}", index + 1), curve, response))
             }
         }
-        (legend(&[
-            (line_sample("size"), "size of the change, where the unit is the same".to_owned()),
-            (line_sample("mark"), "settled, within 2 %".to_owned()),
-        ]))
+        (legend(&entries))
         (table(&caption, &heads, &rows))
     }
 }

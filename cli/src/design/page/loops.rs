@@ -3,53 +3,57 @@
 use maud::{Markup, html};
 
 use super::number::{number, rounded};
-use super::plane::Plane;
+use super::plane::{Plane, Pole};
 use super::pole_map::{Group, Map, Sign};
 use super::table::{Cell, table};
 use crate::design::report::{Loop, Region, Report};
 
+/// The wanted and the reached eigenvalues of a loop, shown where `place` says.
+fn groups(system: &Loop, place: impl Fn(Pole) -> Pole) -> Vec<Group> {
+    [("wanted", Sign::Ring, &system.wanted), ("reached", Sign::Cross, &system.eigenvalues)]
+        .into_iter()
+        .map(|(name, sign, poles)| group(name, sign, poles, &place))
+        .filter(|group| !group.poles.is_empty())
+        .collect()
+}
+
+fn group(name: &'static str, sign: Sign, poles: &[Pole], place: impl Fn(Pole) -> Pole) -> Group {
+    let places = poles.iter().map(|pole| place(*pole)).filter(|place| place[0].is_finite());
+    Group { name, sign, poles: places.collect() }
+}
+
 /// The maps in 1/s; of a sampled loop, those of the z-plane as well.
 fn maps(report: &Report, plane: Plane) -> Markup {
     let (feedback, observer) = (&report.feedback, &report.observer);
-    let open = &report.plant.eigenvalues;
-    let rates = |poles: &[[f64; 2]]| -> Vec<[f64; 2]> {
-        let rates = poles.iter().map(|pole| plane.rate(*pole));
-        rates.filter(|rate| rate[0].is_finite()).collect()
+    let (slow, fast) = (feedback.region.as_ref(), observer.region.as_ref());
+    let rate = |pole| plane.rate(pole);
+    let open = |place: fn(Plane, Pole) -> Pole| {
+        group("open loop", Sign::Diamond, &report.plant.eigenvalues, |pole| place(plane, pole))
     };
-    let places = |poles: &[[f64; 2]]| poles.iter().map(|pole| plane.place(*pole)).collect();
-    let both = |system: &Loop, show: &dyn Fn(&[[f64; 2]]) -> Vec<[f64; 2]>| {
-        [("wanted", Sign::Ring, &system.wanted), ("reached", Sign::Cross, &system.eigenvalues)]
-            .map(|(name, sign, poles)| Group { name, sign, poles: show(poles) })
-            .into_iter()
-            .filter(|group| !group.poles.is_empty())
-            .collect::<Vec<_>>()
-    };
-    let open_loop = |poles| Group { name: "open loop", sign: Sign::Diamond, poles };
-    let group = |name, sign, poles| Group { name, sign, poles: rates(poles) };
-    let all = vec![
-        open_loop(open.clone()),
-        group("feedback loop", Sign::Cross, &feedback.eigenvalues),
-        group("observer", Sign::Square, &observer.eigenvalues),
-    ];
-    let with_open = |mut groups: Vec<Group>, poles| {
-        groups.insert(0, open_loop(poles));
+    let with_open = |open, mut groups: Vec<Group>| {
+        groups.insert(0, open);
         groups
     };
-    let map = |id, title, plane, groups: Vec<Group>, region: Option<&Region>| {
-        Map { id, title, plane, groups: &groups, region }.figure()
+    let both = with_open(open(|_, pole| pole), groups(feedback, rate));
+    let all = [
+        open(|_, pole| pole),
+        group("feedback loop", Sign::Cross, &feedback.eigenvalues, rate),
+        group("observer", Sign::Square, &observer.eigenvalues, rate),
+    ];
+    let map = |id, title, plane, groups: &[Group], region| {
+        Map { id, title, plane, groups, region }.figure()
     };
-    let (slow, fast) = (feedback.region.as_ref(), observer.region.as_ref());
     let s = Plane::Continuous;
     html! {
         div.figures {
-            (map("map-feedback", "Feedback loop and open loop", s, with_open(both(feedback, &rates), open.clone()), slow))
-            (map("map-observer", "Observer", s, both(observer, &rates), fast))
-            (map("map-all", "All eigenvalues", s, all, None))
+            (map("map-feedback", "Feedback loop and open loop", s, &both, slow))
+            (map("map-observer", "Observer", s, &groups(observer, rate), fast))
+            (map("map-all", "All eigenvalues", s, &all, None))
             @if let Plane::Sampled(_) = plane {
-                @let reached = |system: &Loop| both(system, &|poles| poles.to_vec());
-                (map("map-feedback-z", "Feedback loop and open loop, z-plane", plane,
-                    with_open(reached(feedback), places(open)), slow))
-                (map("map-observer-z", "Observer, z-plane", plane, reached(observer), fast))
+                @let both = with_open(open(Plane::place), groups(feedback, |pole| pole));
+                (map("map-feedback-z", "Feedback loop and open loop, z-plane", plane, &both, slow))
+                @let only = groups(observer, |pole| pole);
+                (map("map-observer-z", "Observer, z-plane", plane, &only, fast))
             }
         }
     }
@@ -133,8 +137,8 @@ fn eigenvalues(name: &str, system: &Loop, plane: Plane) -> Markup {
     table(&format!("{name}, {}", system.matrix), &heads, &rows)
 }
 
-fn open_loop(eigenvalues: &[[f64; 2]]) -> Markup {
-    let row = |(index, pole): (usize, &[f64; 2])| {
+fn open_loop(eigenvalues: &[Pole]) -> Markup {
+    let row = |(index, pole): (usize, &Pole)| {
         let stable = if pole[0] < 0.0 { "stable" } else { "not stable" };
         vec![Cell::Text((index + 1).to_string()), Some(*pole).into(), stable.into()]
     };

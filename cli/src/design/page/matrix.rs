@@ -53,12 +53,14 @@ pub(super) fn matrix(id: &str, matrix: &Matrix) -> Markup {
 
 /// What can be copied in one go: the same matrices in three languages.
 pub(super) fn literals(id: &str, name: &str, matrices: &[&Matrix]) -> Markup {
-    let forms: [(&str, fn(&Matrix) -> String); 3] =
-        [("TOML", toml), ("numpy", numpy), ("MATLAB", matlab)];
+    let text = |write: fn(&Matrix) -> String| -> String {
+        matrices.iter().map(|matrix| write(matrix)).collect()
+    };
+    let forms = [("TOML", text(toml)), ("numpy", text(numpy)), ("MATLAB", text(matlab))];
     html! {
         details {
             summary { (name) " in full precision: TOML, numpy, MATLAB" }
-            @for (form, write) in forms {
+            @for (form, text) in forms {
                 @let target = format!("{id}-{}", form.to_lowercase());
                 div.literal {
                     p {
@@ -67,7 +69,7 @@ pub(super) fn literals(id: &str, name: &str, matrices: &[&Matrix]) -> Markup {
                             aria-label={ "Copy " (name) " for " (form) } { "Copy" }
                     }
                     pre id=(target) data-form=(form) tabindex="0" {
-                        code { @for matrix in matrices { (write(matrix)) } }
+                        code { (text) }
                     }
                 }
             }

@@ -62,8 +62,8 @@ pub(super) fn gains(report: &Report) -> Markup {
     }
 }
 
-pub(super) fn assumptions(assumptions: &[String]) -> Markup {
-    html! { ul { @for assumption in assumptions { li { (assumption) } } } }
+pub(super) fn assumptions(report: &Report) -> Markup {
+    html! { ul { @for assumption in &report.assumptions { li { (assumption) } } } }
 }
 
 pub(super) fn effectiveness(report: &Report) -> Markup {

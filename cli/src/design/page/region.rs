@@ -54,3 +54,34 @@ fn along(plane: Plane, point: impl Fn(f64) -> [f64; 2]) -> Vec<(f64, f64)> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn boundaries_have_the_decay_the_distance_and_the_angle_wanted_in_both_planes() {
+        let region = Region {
+            decay: Some(3.0),
+            disc_center: Some(-40.0),
+            disc_radius: Some(30.0),
+            sector: Some(60.0),
+        };
+        for plane in [Plane::Continuous, Plane::Sampled(0.01)] {
+            let parts = boundary(&region, plane);
+            assert_eq!(parts.len(), 4);
+            for (index, points) in parts.iter().enumerate() {
+                let drawn = points.iter().filter(|point| point.0.is_finite());
+                assert!(drawn.clone().count() > 300);
+                for [re, im] in drawn.map(|(x, y)| plane.rate([*x, *y])) {
+                    let error = match index {
+                        0 => re + 3.0,
+                        1 => (re + 40.0).hypot(im) / 30.0 - 1.0,
+                        _ => (im.abs() + 3.0_f64.sqrt() * re) / (re.hypot(im) + 1e-3),
+                    };
+                    assert!(error.abs() < 1e-6, "part {index}: {re} {im}");
+                }
+            }
+        }
+    }
+}

@@ -18,7 +18,7 @@ fn xml(html: &str) -> String {
     let mut text = parts.next().unwrap().to_owned();
     for part in parts {
         let (tag, rest) = part.split_once('>').unwrap();
-        text += &format!("<meta{tag}/>{rest}");
+        text.extend(["<meta", tag, "/>", rest]);
     }
     text.replace(" hidden ", " hidden=\"\" ")
 }

@@ -118,11 +118,60 @@ fn region() -> Region {
     }
 }
 
+fn interface() -> Vec<Variable> {
+    (1..=40)
+        .map(|k| Variable {
+            name: format!("L_x[{k},1] {QUOTES}"),
+            causality: "parameter".to_owned(),
+            variability: "tunable".to_owned(),
+            unit: (k == 1).then(|| "N·m".to_owned()),
+            start: Some(format!("{MARKUP} {k}")),
+            description: QUOTES.to_owned(),
+        })
+        .collect()
+}
+
+fn plant(numbers: &mut Numbers) -> Plant {
+    let mut extremes = numbers.matrix(MARKUP, 2, 3);
+    extremes.values = vec![vec![-0.0, f64::MAX, 5e-324], vec![0.1 + 0.2, -1e16, f64::MIN_POSITIVE]];
+    Plant {
+        origin: format!("Linearised from Plant.fmu {MARKUP}"),
+        states: numbers.signals("x", 10),
+        actuators: numbers.signals("u", 3),
+        measurements: numbers.signals("y", 8),
+        faults: numbers.signals("f", 3),
+        matrices: vec![
+            numbers.matrix("A", 10, 10),
+            numbers.matrix("C'", 10, 8),
+            numbers.matrix("1x1", 1, 1),
+            extremes,
+        ],
+        eigenvalues: vec![[1e-17, 0.0], [0.5, 2.0], [0.5, -2.0], [-3.0, 0.0]],
+    }
+}
+
+fn bare_plant() -> Plant {
+    let signal = |name: &str| Signal {
+        name: name.to_owned(),
+        unit: None,
+        description: String::new(),
+        operating: 0.0,
+        notes: String::new(),
+    };
+    Plant {
+        origin: String::new(),
+        states: vec![signal("x1")],
+        actuators: vec![signal("u1")],
+        measurements: vec![signal("y1")],
+        faults: vec![signal("f1")],
+        matrices: Vec::new(),
+        eigenvalues: vec![[0.0, 0.0]],
+    }
+}
+
 /// A sampled design with everything in it.
 pub(super) fn hostile() -> Report {
     let mut numbers = Numbers(7);
-    let mut extremes = numbers.matrix(MARKUP, 2, 3);
-    extremes.values = vec![vec![-0.0, f64::MAX, 5e-324], vec![0.1 + 0.2, -1e16, f64::MIN_POSITIVE]];
     let rates = [[-4.0, 3.0], [-4.0, -3.0], [-60.0, 0.0], [-300.0, 200.0], [-300.0, -200.0]];
     let check = |condition: &str, holds, value| Check {
         condition: format!("{condition} {QUOTES}"),
@@ -133,20 +182,7 @@ pub(super) fn hostile() -> Report {
     Report {
         description: format!("Tanks «Überlauf» {MARKUP}"),
         plant_file: format!("C:\\plants\\{QUOTES}.toml"),
-        plant: Plant {
-            origin: format!("Linearised from Plant.fmu {MARKUP}"),
-            states: numbers.signals("x", 10),
-            actuators: numbers.signals("u", 3),
-            measurements: numbers.signals("y", 8),
-            faults: numbers.signals("f", 3),
-            matrices: vec![
-                numbers.matrix("A", 10, 10),
-                numbers.matrix("C'", 10, 8),
-                numbers.matrix("1x1", 1, 1),
-                extremes,
-            ],
-            eigenvalues: vec![[1e-17, 0.0], [0.5, 2.0], [0.5, -2.0], [-3.0, 0.0]],
-        },
+        plant: plant(&mut numbers),
         checks: vec![check("observable", true, None), check("detectable", false, Some(2.75e-13))],
         gains: vec![numbers.matrix("L_x", 10, 8), numbers.matrix("L_f", 3, 8)],
         feedback: sampled_loop("Φ + Γ K_x", &rates, Some(region())),
@@ -177,28 +213,12 @@ pub(super) fn hostile() -> Report {
             largest_stable_loss: 0.625_125,
         }],
         assumptions: vec![format!("linear {MARKUP}"), "bell \u{7} and nul \0".to_owned()],
-        interface: (1..=40)
-            .map(|k| Variable {
-                name: format!("L_x[{k},1] {QUOTES}"),
-                causality: "parameter".to_owned(),
-                variability: "tunable".to_owned(),
-                unit: (k == 1).then(|| "N·m".to_owned()),
-                start: Some(format!("{MARKUP} {k}")),
-                description: QUOTES.to_owned(),
-            })
-            .collect(),
+        interface: interface(),
     }
 }
 
 /// A scalar plant of which next to nothing is known.
 pub(super) fn bare() -> Report {
-    let signal = |name: &str| Signal {
-        name: name.to_owned(),
-        unit: None,
-        description: String::new(),
-        operating: 0.0,
-        notes: String::new(),
-    };
     let system = |pole: f64| Loop {
         matrix: "a".to_owned(),
         method: "given".to_owned(),
@@ -212,15 +232,7 @@ pub(super) fn bare() -> Report {
     Report {
         description: String::new(),
         plant_file: "plant.toml".to_owned(),
-        plant: Plant {
-            origin: String::new(),
-            states: vec![signal("x1")],
-            actuators: vec![signal("u1")],
-            measurements: vec![signal("y1")],
-            faults: vec![signal("f1")],
-            matrices: Vec::new(),
-            eigenvalues: vec![[0.0, 0.0]],
-        },
+        plant: bare_plant(),
         checks: Vec::new(),
         gains: Vec::new(),
         feedback: system(-1.5),

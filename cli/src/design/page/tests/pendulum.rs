@@ -109,7 +109,7 @@ impl Design {
             frequency("fault to its estimate", estimate.collect()),
             frequency(
                 "rate of the fault to all errors",
-                solutions.iter().map(|solution| solution.norm()).collect(),
+                solutions.iter().map(nalgebra::Matrix::norm).collect(),
             ),
         ]
     }
@@ -233,6 +233,21 @@ fn system(matrix: &str, wanted: &[f64], reached: &DMatrix<f64>, conditions: [f64
     }
 }
 
+fn plant(design: &Design, matrices: Vec<Matrix>) -> Plant {
+    Plant {
+        origin: "The plant file states the matrices.".to_owned(),
+        states: STATES.map(|state| signal(state, "")).into(),
+        actuators: vec![signal(("u", "N", "actuator force"), "no limits")],
+        measurements: STATES[..2].iter().map(|state| signal(*state, "")).collect(),
+        faults: vec![signal(
+            ("f_fric", "N", "friction force on the cart"),
+            "constant; enters by F_a; at most 30 N",
+        )],
+        eigenvalues: pairs(&control::eigen::eigenvalues(&design.plant.a).unwrap()),
+        matrices,
+    }
+}
+
 /// The continuous design of the paper.
 pub(super) fn pendulum() -> Report {
     let design = Design::read();
@@ -240,18 +255,7 @@ pub(super) fn pendulum() -> Report {
     Report {
         description: "Fault-tolerant controller of the inverted pendulum".to_owned(),
         plant_file: "pendulum.toml".to_owned(),
-        plant: Plant {
-            origin: "The plant file states the matrices.".to_owned(),
-            states: STATES.map(|state| signal(state, "")).into(),
-            actuators: vec![signal(("u", "N", "actuator force"), "no limits")],
-            measurements: STATES[..2].iter().map(|state| signal(*state, "")).collect(),
-            faults: vec![signal(
-                ("f_fric", "N", "friction force on the cart"),
-                "constant; enters by F_a; at most 30 N",
-            )],
-            eigenvalues: pairs(&control::eigen::eigenvalues(&design.plant.a).unwrap()),
-            matrices,
-        },
+        plant: plant(&design, matrices),
         checks: checks(),
         gains,
         feedback: system(
