@@ -1,122 +1,115 @@
-//! `aso-ftc design`: from a plant file to the design file of the controller FMU.
+//! `aso-ftc design`: from a plant file to a designed controller, its report and its FMU.
 #![expect(clippy::print_stdout, reason = "the result of the command")]
 
+mod analysis;
+mod certificate;
 mod controller_fmu;
+mod design_file;
+mod designed;
 mod document;
+mod gains;
+mod linear_plant;
+mod page;
 mod plant_file;
 mod report;
+mod reporting;
 mod signals;
 #[cfg(test)]
 mod tests;
 mod wanted;
 
-use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use control::aso::{FaultyPlant, design as design_controller};
-use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
 
 use crate::whole_file;
+use controller_fmu::{Content, ControllerFmu};
+use designed::Designed;
+use document::{Source, Table};
+use plant_file::PlantFile;
+use report::Report;
 
 #[derive(clap::Args)]
 pub(crate) struct Options {
-    /// The plant file: A, B, C, F_a, signals and wanted eigenvalues
+    /// The plant file: plant, faults and what is wanted of the controller (docs/plant-file.md)
     plant: PathBuf,
-    /// The design file to write
+    /// The design file to write; the report goes beside it
     #[arg(long, value_name = "FILE", default_value = "design.toml")]
     out: PathBuf,
+    /// The report to write [default: report.html beside the design file]
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+    /// Also make the controller FMU
+    #[arg(long, value_name = "FMU")]
+    fmu: Option<PathBuf>,
+    /// The packed controller FMU that it is made from
+    #[arg(long, value_name = "FMU", default_value = "dist/AsoController.fmu", requires = "fmu")]
+    from: PathBuf,
+    /// Print the numbers of the report as JSON
+    #[arg(long)]
+    json: bool,
 }
 
-/// The plant file; what is serialised passes into the design file as it is.
-#[derive(Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-struct PlantFile {
-    description: String,
-    t_on: f64,
-    #[serde(default)]
-    monitor: bool,
-    #[serde(rename = "A", skip_serializing)]
-    a: Vec<Vec<f64>>,
-    #[serde(rename = "B", skip_serializing)]
-    b: Vec<Vec<f64>>,
-    #[serde(rename = "C", skip_serializing)]
-    c: Vec<Vec<f64>>,
-    #[serde(rename = "F_a", skip_serializing)]
-    f_a: Vec<Vec<f64>>,
-    /// Wanted eigenvalues of A + B K_x, n of them.
-    #[serde(skip_serializing)]
-    controller_eigenvalues: Vec<f64>,
-    /// Wanted eigenvalues of A_0 - L C_0, n + q of them.
-    #[serde(skip_serializing)]
-    observer_eigenvalues: Vec<f64>,
-    experiment: toml::Table,
-    states: Vec<toml::Table>,
-    actuators: Vec<toml::Table>,
-    measurements: Vec<toml::Table>,
-    faults: Vec<toml::Table>,
-}
-
-/// Designs the controller and writes the design file.
+/// Designs the controller and writes what was asked for; whether all checks hold.
 pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
-    let path = options.plant.display();
-    let text =
-        std::fs::read_to_string(&options.plant).with_context(|| format!("cannot read {path}"))?;
-    let file: PlantFile = toml::from_str(&text).with_context(|| format!("{path}"))?;
-    let plant = FaultyPlant::with_constant_faults(
-        matrix("A", &file.a)?,
-        matrix("B", &file.b)?,
-        matrix("C", &file.c)?,
-        matrix("F_a", &file.f_a)?,
-    );
-    let (controller, observer) = (&file.controller_eigenvalues, &file.observer_eigenvalues);
-    let designed = design_controller(&plant, controller, observer, None)
-        .with_context(|| format!("no controller for {path}"))?;
-    let gains = &designed.gains;
-    let matrices = [
-        ("A", &plant.a),
-        ("B", &plant.b),
-        ("C", &plant.c),
-        ("F_a", &plant.f_a),
-        ("K_x", &gains.k_x),
-        ("K_f", &gains.k_f),
-        ("L_x", &gains.l_x),
-        ("L_f", &gains.l_f),
-    ];
-    whole_file::write(&options.out, render(&file, &matrices)?.as_bytes())
-        .with_context(|| format!("cannot write {}", options.out.display()))?;
-    println!("K_x: condition {:.3e}", designed.controller.condition);
-    println!("L: condition {:.3e}", designed.observer.condition);
-    println!("{}", options.out.display());
-    Ok(true)
-}
-
-fn matrix(name: &str, rows: &[Vec<f64>]) -> anyhow::Result<DMatrix<f64>> {
-    let columns = rows.first().map_or(0, Vec::len);
-    if let Some(row) = rows.iter().position(|row| row.len() != columns) {
-        let found = rows[row].len();
-        bail!("{name}: row {} has {found} entries, row 1 has {columns}", row + 1);
-    }
-    Ok(DMatrix::from_row_iterator(rows.len(), columns, rows.iter().flatten().copied()))
-}
-
-/// The design file: scalars, matrices with a row on each line, tables.
-fn render(file: &PlantFile, matrices: &[(&str, &DMatrix<f64>)]) -> anyhow::Result<String> {
-    let all = toml::Table::try_from(file)?;
-    let (tables, scalars): (toml::Table, toml::Table) =
-        all.into_iter().partition(|(_, value)| value.is_table() || value.is_array());
-    let mut text = "# Written by aso-ftc design.\n\n".to_owned();
-    text += &toml::to_string(&scalars)?;
-    for (name, matrix) in matrices {
-        write!(text, "\n{name} = [\n")?;
-        for row in matrix.row_iter() {
-            let entries: Vec<_> = row.iter().map(|entry| format!("{:?}", entry + 0.0)).collect();
-            writeln!(text, "    [{}],", entries.join(", "))?;
+    let source = Source::read(&options.plant)?;
+    let parsed = source.parse()?;
+    let file = PlantFile::read(&source, &Table::whole(&source, &parsed))?;
+    let designed = designed::design(&file)?;
+    let description = description(&file, &designed);
+    let design = designed.file(&file, &description)?;
+    let mut report = reporting::report(&file, &designed, description)
+        .with_context(|| format!("the design for {} cannot be examined", file.name()))?;
+    let fmu = match &options.fmu {
+        None => None,
+        Some(_) => {
+            let content = Content { design: &design, plant: source.text() };
+            let fmu = ControllerFmu::new(&options.from, &content)?;
+            report.interface = reporting::interface(&fmu.description);
+            Some(fmu)
         }
-        text += "]\n";
+    };
+    let page = page::page(&report);
+    let beside = options.out.parent().unwrap_or(Path::new("")).join("report.html");
+    let page_path = options.report.clone().unwrap_or(beside);
+    let mut written = vec![&options.out, &page_path];
+    if let (Some(fmu), Some(path)) = (fmu, &options.fmu) {
+        fmu.write(path, &page)?;
+        written.push(path);
     }
-    text += "\n";
-    text += &toml::to_string(&tables)?;
-    Ok(text)
+    write(&options.out, &design)?;
+    write(&page_path, &page)?;
+    if options.json {
+        println!("{}", serde_json::to_string_pretty(&report)?);
+    } else {
+        summarise(&report);
+        written.iter().for_each(|path| println!("{}", path.display()));
+    }
+    Ok(report.checks.iter().all(|check| check.holds))
+}
+
+fn write(path: &Path, text: &str) -> anyhow::Result<()> {
+    whole_file::write(path, text.as_bytes())
+        .with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// The user's sentence, or one that names the plant.
+fn description(file: &PlantFile<'_>, designed: &Designed) -> String {
+    let faults: Vec<_> = designed.linear.faults.iter().map(|fault| fault.name.as_str()).collect();
+    file.description.clone().unwrap_or_else(|| {
+        format!("Fault-tolerant controller that estimates and compensates {}", faults.join(", "))
+    })
+}
+
+/// What a reader wants to know first.
+fn summarise(report: &Report) {
+    for own in [&report.feedback, &report.observer] {
+        println!("{}: {}", own.matrix, own.method);
+        if let Some(condition) = own.condition {
+            println!("    condition of the eigenvectors {condition:.3e}");
+        }
+    }
+    for check in report.checks.iter().filter(|check| !check.holds) {
+        println!("does not hold: {} ({})", check.condition, check.explanation);
+    }
 }

@@ -3,9 +3,9 @@
 //! The text of the PNG is set in a font that is linked into the program, so a figure looks the
 //! same on a machine without fonts.
 
-mod axis;
+pub(crate) mod axis;
 mod canvas;
-mod trace;
+pub(crate) mod trace;
 
 use std::io;
 use std::path::{Path, PathBuf};

@@ -55,12 +55,12 @@ pub(crate) struct Loops<'a> {
 
 impl<'a> Loops<'a> {
     pub(crate) fn of(designed: &'a Designed) -> Result<Self, Error> {
-        let Designed { plant, gains, domain, estimator, .. } = designed;
+        let Designed { plant, gains, domain, .. } = designed;
         Ok(Self {
             designed,
             outputs: Outputs::of(designed),
-            of_faults: fault_system(plant, gains, *domain, *estimator)?,
-            of_rates: fault_rate_system(plant, gains, *domain, *estimator)?,
+            of_faults: fault_system(plant, gains, *domain)?,
+            of_rates: fault_rate_system(plant, gains, *domain)?,
         })
     }
 

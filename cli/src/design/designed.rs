@@ -1,15 +1,14 @@
 //! From the plant file to the gains.
 
-use control::aso::{FaultyPlant, Gains};
+use control::aso::{Estimator, FaultyPlant, Gains};
 use control::controller::{Controller, instability};
 use control::detectability::{Detectability, detectability};
 use control::distance::{Distance, from_uncontrollable};
 use control::faults::ExtendedPlant;
 use control::rank::{Rank, controllability};
-use control::sampled::{self, Estimator};
+use control::sampled;
 use control::{Domain, Error};
 use nalgebra::DMatrix;
-
 use super::document::PlaceError;
 use super::gains::{FeedbackProblem, Found, Refusal, feedback, observer};
 use super::linear_plant::LinearPlant;
@@ -25,7 +24,6 @@ pub(crate) struct Designed {
     /// With fault models and measurement filter, in continuous time.
     pub(crate) extended: ExtendedPlant,
     pub(crate) domain: Domain,
-    pub(crate) estimator: Estimator,
     /// What the observer runs: the extended plant, sampled for a sampled design.
     pub(crate) plant: FaultyPlant,
     /// The measurement filter as the controller runs it.
@@ -90,11 +88,14 @@ pub(crate) fn design(file: &PlantFile<'_>) -> anyhow::Result<Designed> {
         let meaning = "states, filters, faults and rates of ramps";
         refused(file, &file.observer, refusal, order, meaning)
     })?;
-    let gains = gains(&extended, &plant, domain, (&feedback.gain, &observer.gain))?;
-    let controller = match estimator {
-        Estimator::Prediction => Controller::of(&plant, &gains)?,
-        Estimator::Current => Controller::with_current_estimate(&plant, &gains)?,
+    let gains = Gains {
+        estimator,
+        k_x: feedback.gain.clone().resize_horizontally(plant.a.ncols(), 0.0),
+        k_f: sampled::compensation_gain(&extended, domain)?,
+        l_x: observer.gain.rows(0, plant.a.nrows()).into(),
+        l_f: -observer.gain.rows(plant.a.nrows(), plant.f_a.ncols()),
     };
+    let controller = Controller::of(&plant, &gains)?;
     let whole = controller.closed_loop(&plant, &vec![1.0; plant.b.ncols()])?;
     let cancelled = &extended.plant.b * extended.plant.compensation_gain()? + &extended.plant.f_a;
     let n = extended.states;
@@ -106,7 +107,6 @@ pub(crate) fn design(file: &PlantFile<'_>) -> anyhow::Result<Designed> {
         linear,
         extended,
         domain,
-        estimator,
         plant,
         gains,
         feedback,
@@ -115,22 +115,6 @@ pub(crate) fn design(file: &PlantFile<'_>) -> anyhow::Result<Designed> {
         distance,
         detectability,
         controller,
-    })
-}
-
-/// The four gains of the observer and its feedback.
-fn gains(
-    extended: &ExtendedPlant,
-    plant: &FaultyPlant,
-    domain: Domain,
-    (k, l): (&DMatrix<f64>, &DMatrix<f64>),
-) -> Result<Gains, Error> {
-    let (n, q) = plant.f_a.shape();
-    Ok(Gains {
-        k_x: k.clone().resize_horizontally(n, 0.0),
-        k_f: sampled::compensation_gain(extended, domain)?,
-        l_x: l.rows(0, n).into(),
-        l_f: -l.rows(n, q),
     })
 }
 
@@ -248,4 +232,21 @@ fn refused(
         Refusal::Control(error) => error.to_string(),
     };
     file.error_at(&request.place, message)
+}
+
+impl Designed {
+    /// The dynamics of the plant under exact state feedback, n x n.
+    pub(crate) fn fed_back(&self) -> DMatrix<f64> {
+        let n = self.extended.states;
+        self.plant.a.view((0, 0), (n, n)) + self.plant.b.rows(0, n) * self.gains.k_x.columns(0, n)
+    }
+
+    /// The decay rate of its slowest eigenvalue, 1/s.
+    pub(crate) fn slowest(&self) -> Result<f64, Error> {
+        let rate = -instability(&self.fed_back(), self.domain)?;
+        Ok(match self.domain {
+            Domain::Continuous => rate,
+            Domain::Sampled { period } => -(-rate).ln_1p() / period,
+        })
+    }
 }

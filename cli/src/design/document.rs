@@ -49,6 +49,11 @@ impl Source {
         Ok(Self::new(path, text))
     }
 
+    /// The whole text.
+    pub(crate) fn text(&self) -> &str {
+        &self.text
+    }
+
     /// A file of this text.
     pub(crate) fn new(path: &Path, text: String) -> Self {
         Self { path: path.to_owned(), text }

@@ -3,7 +3,8 @@
 use control::lmi::{self, Norm, Outcome, Performance, Synthesis};
 use control::placement::{Placement, Quality, place, place_balanced, place_discrete};
 use control::riccati::{Weights, kalman, lqr};
-use control::sampled::{Estimator, poles};
+use control::aso::Estimator;
+use control::sampled::poles;
 use control::{Domain, Error};
 use nalgebra::{Complex, DMatrix};
 
@@ -93,8 +94,7 @@ pub(crate) fn observer(
     domain: Domain,
     estimator: Estimator,
 ) -> Result<Found, Refusal> {
-    let current = estimator == Estimator::Current;
-    let seen = if current { c_0 * a_0 } else { c_0.clone() };
+    let seen = estimator.seen(a_0, c_0);
     let (a, b) = (a_0.transpose(), seen.transpose());
     let dual = |mut found: Found| {
         found.gain = -found.gain.transpose();
@@ -117,7 +117,7 @@ pub(crate) fn observer(
         ))),
         Wanted::Weights { states, channels } => {
             let found = kalman(a_0, c_0, states, channels, domain)?;
-            let gain = found.current_gain.filter(|_| current).unwrap_or(found.gain);
+            let gain = found.current_gain.filter(|_| estimator == Estimator::Current).unwrap_or(found.gain);
             Ok(weighted(gain, "Kalman filter", found.residual))
         }
         Wanted::Region(region) => {

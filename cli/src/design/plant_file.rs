@@ -150,6 +150,11 @@ impl<'a> PlantFile<'a> {
         Ok(found)
     }
 
+    /// The name of the file, without its folder.
+    pub(crate) fn name(&self) -> String {
+        self.source.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+    }
+
     /// An error that points at the first of `keys` that the file has, else at its beginning.
     pub(crate) fn error(&self, keys: &[&str], message: impl Into<String>) -> PlaceError {
         let place = keys.iter().find_map(|key| self.places.get(key)).cloned().unwrap_or(0..0);

@@ -3,7 +3,7 @@
 use control::eigen::eigenvalues;
 use control::faults::{Entry, loss_tolerance};
 use control::placement::Quality;
-use control::sampled::Estimator;
+use control::aso::Estimator;
 use control::{Domain, Error};
 use fmi2::description::ModelDescription;
 use nalgebra::{Complex, DMatrix};
@@ -32,8 +32,6 @@ pub(crate) fn report(
 ) -> Result<Report, Error> {
     let loops = Loops::of(designed)?;
     let Designed { plant, gains, linear, .. } = designed;
-    let n = designed.extended.states;
-    let inner = plant.a.view((0, 0), (n, n)) + plant.b.rows(0, n) * gains.k_x.columns(0, n);
     let names = Names::of(designed);
     Ok(Report {
         description,
@@ -41,10 +39,10 @@ pub(crate) fn report(
         plant: self::plant(designed, &names)?,
         checks: checks(designed),
         gains: names.gains(designed),
-        feedback: closed("A + B K_x", &inner, &designed.feedback, &file.feedback.wanted)?,
+        feedback: closed("A + B K_x", &designed.fed_back(), &designed.feedback, &file.feedback.wanted)?,
         observer: closed(
             "A_0 - L C_0",
-            &gains.error_dynamics(plant, designed.estimator),
+            &gains.error_dynamics(plant),
             &designed.observer,
             &file.observer.wanted,
         )?,
@@ -52,7 +50,7 @@ pub(crate) fn report(
             Domain::Continuous => None,
             Domain::Sampled { period } => Some(Sampled {
                 sample_time: period,
-                estimator: estimator(designed.estimator).to_owned(),
+                estimator: estimator(designed.gains.estimator).to_owned(),
             }),
         },
         certificate: certificate(designed, loops.norms()?),

@@ -3,9 +3,33 @@
 /// Beyond this magnitude a value is only "very large": sums of two such values stay finite.
 const HUGE: f64 = 1e300;
 
-/// A linear axis from an interval of values to an interval of the page.
+/// How values are spread along an axis.
+#[derive(Debug, Clone, Copy)]
+enum Scale {
+    Linear,
+    /// All decades are equally long; only values above zero have a place.
+    Logarithmic,
+    /// Linear up to this magnitude; beyond it, on both sides, decades of that length.
+    Symmetric(f64),
+}
+
+impl Scale {
+    fn stretch(self, value: f64) -> f64 {
+        match self {
+            Self::Linear => value,
+            Self::Logarithmic => value.log10(),
+            Self::Symmetric(knee) => {
+                let size = (value / knee).abs();
+                value.signum() * if size <= 1.0 { size } else { 1.0 + size.log10() }
+            }
+        }
+    }
+}
+
+/// An axis from an interval of values to an interval of the page.
 #[derive(Debug)]
-pub(super) struct Axis {
+pub(crate) struct Axis {
+    scale: Scale,
     low: f64,
     high: f64,
     pixels: (f64, f64),
@@ -15,7 +39,7 @@ pub(super) struct Axis {
 
 impl Axis {
     /// The axis ends where the interval ends; one that is empty or not finite becomes usable.
-    pub(super) fn exact((low, high): (f64, f64), pixels: (f64, f64), ticks: u8) -> Self {
+    pub(crate) fn exact((low, high): (f64, f64), pixels: (f64, f64), ticks: u8) -> Self {
         let (low, high) = if low <= high && low.is_finite() && high.is_finite() {
             (low.clamp(-HUGE, HUGE), high.clamp(-HUGE, HUGE))
         } else {
@@ -29,11 +53,24 @@ impl Axis {
         } else {
             1.0
         };
-        Self { low: low - widening, high: high + widening, pixels, ticks }
+        let (low, high) = (low - widening, high + widening);
+        Self { scale: Scale::Linear, low, high, pixels, ticks }
+    }
+
+    /// An axis of decades between two values above zero; others become usable.
+    pub(crate) fn logarithmic((low, high): (f64, f64), pixels: (f64, f64), ticks: u8) -> Self {
+        let usable = low > 0.0 && low < high && high < HUGE;
+        let (low, high) = if usable { (low, high) } else { (0.1, 10.0) };
+        Self { scale: Scale::Logarithmic, low, high, pixels, ticks }
+    }
+
+    /// An axis that is linear between minus and plus `knee`, with decades beyond.
+    pub(crate) fn symmetric(ends: (f64, f64), knee: f64, pixels: (f64, f64), ticks: u8) -> Self {
+        Self { scale: Scale::Symmetric(knee), ..Self::exact(ends, pixels, ticks) }
     }
 
     /// An axis with some air around finite values, up to a cap of their magnitude.
-    pub(super) fn around(
+    pub(crate) fn around(
         values: impl Iterator<Item = f64>,
         cap: Option<f64>,
         pixels: (f64, f64),
@@ -49,27 +86,58 @@ impl Axis {
         Self { low: tight.low - air, high: tight.high + air, ..tight }
     }
 
-    pub(super) fn range(&self) -> (f64, f64) {
+    pub(crate) fn range(&self) -> (f64, f64) {
         (self.low, self.high)
     }
 
-    pub(super) fn pixels(&self) -> (f64, f64) {
+    pub(crate) fn pixels(&self) -> (f64, f64) {
         self.pixels
     }
 
-    pub(super) fn contains(&self, value: f64) -> bool {
+    pub(crate) fn contains(&self, value: f64) -> bool {
         (self.low..=self.high).contains(&value)
     }
 
     /// The place of a value on the page; a value far outside stops one axis length outside.
-    pub(super) fn place(&self, value: f64) -> f64 {
-        let share = (value - self.low) / (self.high - self.low);
+    pub(crate) fn place(&self, value: f64) -> f64 {
+        let [low, high, value] = [self.low, self.high, value].map(|end| self.scale.stretch(end));
+        let share = (value - low) / (high - low);
         let (first, last) = self.pixels;
         first + share.clamp(-1.0, 2.0) * (last - first)
     }
 
-    /// Multiples of 1, 2 or 5 times a power of ten inside the axis, with their labels.
-    pub(super) fn ticks(&self) -> Vec<(f64, String)> {
+    /// Round values inside the axis, with their labels.
+    pub(crate) fn ticks(&self) -> Vec<(f64, String)> {
+        match self.scale {
+            Scale::Linear => self.multiples(),
+            Scale::Logarithmic => {
+                let decades = (self.high / self.low).log10();
+                let factors: &[f64] = if decades < 2.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+                powers((self.low, self.high), factors, self.stride(decades))
+            }
+            Scale::Symmetric(knee) => {
+                let decades = |end: f64| (end / knee).max(1.0).log10();
+                let stride = self.stride(decades(-self.low) + decades(self.high));
+                let negative = powers((knee.max(-self.high), -self.low), &[1.0], stride);
+                negative
+                    .into_iter()
+                    .rev()
+                    .map(|(value, label)| (-value, format!("\u{2212}{label}")))
+                    .chain(self.contains(0.0).then(|| (0.0, "0".to_owned())))
+                    .chain(powers((knee.max(self.low), self.high), &[1.0], stride))
+                    .collect()
+            }
+        }
+    }
+
+    /// How many decades from one tick to the next.
+    fn stride(&self, decades: f64) -> i32 {
+        let most = f64::from(self.ticks);
+        (1..=300).find(|stride| decades <= most * f64::from(*stride)).unwrap_or(300)
+    }
+
+    /// Multiples of 1, 2 or 5 times a power of ten.
+    fn multiples(&self) -> Vec<(f64, String)> {
         let span = self.high - self.low;
         let step = round_step(span / f64::from(self.ticks));
         let first = ((self.low - 1e-9 * span) / step).ceil();
@@ -80,6 +148,34 @@ impl Axis {
             .map(|value| (value, label(value, step, self.low.abs().max(self.high.abs()))))
             .collect()
     }
+}
+
+/// The factors times each power of ten whose exponent is a multiple of `stride`, from `low` to
+/// `high`, with their labels.
+fn powers((low, high): (f64, f64), factors: &[f64], stride: i32) -> Vec<(f64, String)> {
+    (-300..=300)
+        .filter(|power| power % stride == 0)
+        .flat_map(|power| factors.iter().map(move |factor| (*factor, power)))
+        .map(|(factor, power)| (factor * 10_f64.powi(power), power_label(factor, power)))
+        .filter(|(value, _)| (0.999 * low..=1.001 * high).contains(value))
+        .collect()
+}
+
+/// A factor times a power of ten, as in 0.02, 500 or 2·10⁻⁵.
+fn power_label(factor: f64, power: i32) -> String {
+    if (-3..=3).contains(&power) {
+        let decimals = usize::try_from(-power).unwrap_or(0);
+        return format!("{:.decimals$}", factor * 10_f64.powi(power));
+    }
+    let raise = |sign| match sign {
+        '-' => '⁻',
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        digit => char::from_u32(digit as u32 - '0' as u32 + '⁰' as u32).unwrap_or(digit),
+    };
+    let raised: String = power.to_string().chars().map(raise).collect();
+    if factor > 1.0 { format!("{factor}·10{raised}") } else { format!("10{raised}") }
 }
 
 /// The nearest of 1, 2, 5 times a power of ten, above or at `wanted`.
@@ -94,7 +190,7 @@ fn label(value: f64, step: f64, largest: f64) -> String {
     if value.abs() < 0.5 * step {
         return "0".to_owned();
     }
-    let text = if largest >= 1e6 || step < 1e-6 {
+    let text = if largest >= 1e6 || step < 1e-4 {
         format!("{value:.1e}")
     } else {
         let decimals = (0_u8..6).find(|decimals| {
@@ -145,6 +241,36 @@ mod tests {
         };
         assert_eq!(labels(-0.2, 0.2), ["\u{2212}0.2", "\u{2212}0.1", "0", "0.1", "0.2"]);
         assert_eq!(labels(0.0, 100.0), ["0", "20", "40", "60", "80", "100"]);
+    }
+
+    fn texts(axis: &Axis) -> Vec<String> {
+        axis.ticks().into_iter().map(|(_, label)| label.replace('\u{2212}', "-")).collect()
+    }
+
+    #[test]
+    fn decades_are_equally_long_and_carry_powers_of_ten() {
+        let axis = Axis::logarithmic((1e-4, 1e2), (0.0, 600.0), 7);
+        for power in -4..=2 {
+            let place = axis.place(10_f64.powi(power));
+            assert!((place - 100.0 * f64::from(power + 4)).abs() < 1e-9, "{power}: {place}");
+        }
+        assert_eq!(texts(&axis), ["10⁻⁴", "0.001", "0.01", "0.1", "1", "10", "100"]);
+        let many = Axis::logarithmic((1e-12, 1e4), (0.0, 1.0), 7);
+        assert_eq!(texts(&many), ["10⁻¹²", "10⁻⁹", "10⁻⁶", "0.001", "1", "1000"]);
+        let few = Axis::logarithmic((3.0, 60.0), (0.0, 1.0), 7);
+        assert_eq!(texts(&few), ["5", "10", "20", "50"]);
+        assert!(axis.place(f64::NAN).is_nan() && axis.place(-1.0).is_nan());
+    }
+
+    #[test]
+    fn a_symmetric_axis_is_linear_near_zero_with_decades_on_both_sides() {
+        let axis = Axis::symmetric((-1e4, 10.0), 1.0, (0.0, 700.0), 9);
+        for (value, place) in
+            [(-1e4, 0.0), (-10.0, 300.0), (-0.5, 450.0), (0.0, 500.0), (10.0, 700.0)]
+        {
+            assert!((axis.place(value) - place).abs() < 1e-9, "{value}");
+        }
+        assert_eq!(texts(&axis), ["-10⁴", "-1000", "-100", "-10", "-1", "0", "1", "10"]);
     }
 
     #[test]

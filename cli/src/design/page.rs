@@ -1,0 +1,133 @@
+//! `report.html`: the design as one page that needs nothing else.
+
+mod certificate;
+mod chart;
+mod curves;
+mod loops;
+mod matrix;
+mod number;
+mod plane;
+mod plant;
+mod pole_map;
+mod region;
+mod table;
+mod verdict;
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+use super::report::Report;
+
+const STYLE: &str = include_str!("page/page.css");
+const SCRIPT: &str = include_str!("page/copy.js");
+/// The page loads nothing, whatever the texts in it say.
+const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
+
+/// The page of a design: a whole HTML document. The same report gives the same bytes.
+///
+/// `plant.eigenvalues` are those of the continuous plant in 1/s; the eigenvalues of the loops are
+/// those of the z-plane when the design is sampled.
+pub(crate) fn page(report: &Report) -> String {
+    let title =
+        if report.description.is_empty() { &report.plant_file } else { &report.description };
+    let sections = sections(report);
+    let document = html! {
+        (DOCTYPE)
+        html lang="en" {
+            (head(title))
+            body {
+                header {
+                    p.kind { "Design report" }
+                    h1 { (title) }
+                    p.file { "Plant file " code { (report.plant_file) } }
+                    (verdict::verdict(report))
+                    (contents(&sections))
+                }
+                main {
+                    @for (index, section) in sections.iter().enumerate() {
+                        section aria-labelledby=(section.id) {
+                            h2 id=(section.id) { (index + 1) ". " (section.title) }
+                            (section.content)
+                        }
+                    }
+                }
+                footer {
+                    p {
+                        "Written by aso-ftc " (env!("CARGO_PKG_VERSION")) ". Numbers are shown with \
+                         five digits, the pointer shows all. The same numbers, and the points of \
+                         the curves, come from "
+                        code { "aso-ftc design --json" } "."
+                    }
+                    p role="status" #copied {}
+                }
+                script { (PreEscaped(SCRIPT)) }
+            }
+        }
+    };
+    document.into_string().replace(|sign: char| sign.is_control() && sign != '\n', " ")
+}
+
+fn head(title: &str) -> Markup {
+    html! {
+        head {
+            meta charset="utf-8";
+            meta name="viewport" content="width=device-width, initial-scale=1";
+            meta name="color-scheme" content="light dark";
+            meta http-equiv="Content-Security-Policy" content=(POLICY);
+            title { (title) ", design report" }
+            style { (PreEscaped(STYLE)) }
+        }
+    }
+}
+
+struct Section {
+    id: &'static str,
+    title: &'static str,
+    content: Markup,
+}
+
+/// Everything that there is something to say about, in the order of reading.
+fn sections(report: &Report) -> Vec<Section> {
+    let all = [
+        (true, "plant", "Plant", plant::plant(&report.plant)),
+        (!report.checks.is_empty(), "checks", "Checks", plant::checks(report)),
+        (!report.gains.is_empty(), "gains", "Gains", plant::gains(report)),
+        (true, "poles", "Eigenvalues", loops::poles(report)),
+        (true, "conditioning", "Condition and pole errors", loops::conditioning(report)),
+        (!report.frequency.is_empty(), "frequency", "Singular values", curves::frequencies(report)),
+        (!report.steps.is_empty(), "steps", "Sudden faults", curves::responses(report)),
+        (!report.bounds.is_empty(), "bounds", "Bounds of the errors", certificate::bounds(report)),
+        (true, "certificate", "Certificate", certificate::certificate(report)),
+        (!report.assumptions.is_empty(), "assumptions", "Assumptions", plant::assumptions(report)),
+        (
+            !report.effectiveness.is_empty(),
+            "effectiveness",
+            "Loss of effectiveness",
+            plant::effectiveness(report),
+        ),
+        (
+            !report.interface.is_empty(),
+            "interface",
+            "Interface of the FMU",
+            plant::interface(report),
+        ),
+    ];
+    all.into_iter()
+        .filter(|(shown, ..)| *shown)
+        .map(|(_, id, title, content)| Section { id, title, content })
+        .collect()
+}
+
+fn contents(sections: &[Section]) -> Markup {
+    html! {
+        nav aria-label="Contents" {
+            ul {
+                @for (index, section) in sections.iter().enumerate() {
+                    li { (index + 1) ". " a href={ "#" (section.id) } { (section.title) } }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
