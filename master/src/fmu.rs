@@ -9,7 +9,7 @@ use fmi2::location::{LocationError, file_uri};
 use fmi2::package::{PackageError, Unpacked};
 
 use crate::error::LoadError;
-use crate::library::{Component, Library};
+use crate::library::{Component, Interface, Library};
 use crate::slave::{CallError, Slave};
 
 /// Why an FMU could not be opened or instantiated.
@@ -27,6 +27,14 @@ pub enum FmuError {
     /// There is no co-simulation in it.
     #[error("{path}: the FMU offers no co-simulation, expected the element CoSimulation")]
     NoCoSimulation {
+        /// The FMU.
+        path: PathBuf,
+    },
+    /// There is no interface in it, or not the one wanted.
+    #[error(
+        "{path}: the FMU lacks an interface, expected the element CoSimulation or ModelExchange"
+    )]
+    NoInterface {
         /// The FMU.
         path: PathBuf,
     },
@@ -54,26 +62,42 @@ pub struct Fmu {
 
 /// The library is unloaded before its file is removed: the fields are dropped in this order.
 struct Content {
-    library: Arc<Library>,
+    /// For co-simulation; none where the FMU has model exchange only.
+    library: Option<Arc<Library>>,
     unpacked: Unpacked,
 }
 
 impl Fmu {
-    /// Unpacks the FMU at `path`, reads its description and loads its library.
+    /// Unpacks the FMU at `path`, reads its description and loads its library for co-simulation.
     ///
     /// # Errors
     ///
     /// [`FmuError`]: not an FMU of version 2.0, no co-simulation, no library for this platform, or
     /// a library that does not load.
     pub fn open(path: &Path) -> Result<Self, FmuError> {
+        let fmu = Self::open_any(path)?;
+        if fmu.content.library.is_none() {
+            return Err(FmuError::NoCoSimulation { path: path.to_owned() });
+        }
+        Ok(fmu)
+    }
+
+    /// As [`Fmu::open`] for an FMU to [`crate::linearise()`], where model exchange alone will do.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Fmu::open`]; [`FmuError::NoInterface`] where the FMU has neither interface.
+    pub fn open_any(path: &Path) -> Result<Self, FmuError> {
         let unpacked = Unpacked::open(path)?;
         let description = &unpacked.description;
-        let Some(co_simulation) = &description.co_simulation else {
-            return Err(FmuError::NoCoSimulation { path: path.to_owned() });
-        };
-        let library = unpacked.library(&co_simulation.model_identifier)?;
-        let library = Library::open(&library).map_err(|error| explained(description, error))?;
-        let library = Arc::new(library);
+        if description.co_simulation.is_none() && description.model_exchange.is_none() {
+            return Err(FmuError::NoInterface { path: path.to_owned() });
+        }
+        let library = description.co_simulation.as_ref().map(|flags| {
+            let library = unpacked.library(&flags.model_identifier)?;
+            open_library(description, &library, Interface::CoSimulation)
+        });
+        let library = library.transpose()?;
         Ok(Self { content: Arc::new(Content { library, unpacked }) })
     }
 
@@ -89,17 +113,46 @@ impl Fmu {
     ///
     /// [`LoadError::Instantiate`] with what the FMU said.
     pub fn instantiate(&self, name: &str) -> Result<Instance, FmuError> {
-        let resources = file_uri(&self.content.unpacked.resources())?;
-        let guid = &self.description().guid;
-        let made = self.content.library.instantiate(name, guid, &resources);
-        let component = made.map_err(|error| explained(self.description(), error))?;
+        let component = self.component(Interface::CoSimulation, name)?;
         Ok(Instance { component, fmu: self.clone() })
     }
+
+    /// An instance for `interface`, by its C functions.
+    pub(crate) fn component(
+        &self,
+        interface: Interface,
+        name: &str,
+    ) -> Result<Component, FmuError> {
+        let unpacked = &self.content.unpacked;
+        let description = &unpacked.description;
+        let library = match (interface, &self.content.library, &description.model_exchange) {
+            (Interface::CoSimulation, Some(library), _) => library.clone(),
+            (Interface::ModelExchange, _, Some(flags)) => {
+                let library = unpacked.library(&flags.model_identifier)?;
+                open_library(description, &library, interface)?
+            }
+            _ => return Err(FmuError::NoInterface { path: unpacked.folder().to_owned() }),
+        };
+        let resources = file_uri(&unpacked.resources())?;
+        let made = library.instantiate(interface, name, &description.guid, &resources);
+        made.map_err(|error| explained(description, error))
+    }
+}
+
+fn open_library(
+    description: &ModelDescription,
+    path: &Path,
+    interface: Interface,
+) -> Result<Arc<Library>, FmuError> {
+    let library = Library::open(path, interface);
+    Ok(Arc::new(library.map_err(|error| explained(description, error))?))
 }
 
 /// `error`, with the tool that the FMU says it needs.
 fn explained(description: &ModelDescription, error: LoadError) -> FmuError {
-    if !description.co_simulation.as_ref().is_some_and(|flags| flags.needs_execution_tool) {
+    let simulation = description.co_simulation.as_ref().map(|flags| flags.needs_execution_tool);
+    let exchange = description.model_exchange.as_ref().map(|flags| flags.needs_execution_tool);
+    if simulation != Some(true) && exchange != Some(true) {
         return FmuError::Load(error);
     }
     let tool = description.generation_tool.clone();
@@ -175,6 +228,6 @@ impl Slave for Instance {
     }
 
     fn do_step(&mut self, time: f64, size: f64) -> Result<(), CallError> {
-        self.component.do_step(time, size)
+        self.component.do_step(time, size, 1)
     }
 }

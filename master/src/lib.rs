@@ -2,6 +2,7 @@
 //!
 //! [`Fmu::open`] and [`Fmu::instantiate`] give a [`Slave`]; a [`System`] holds slaves and
 //! connections; a [`Simulation`] initialises and steps it; a [`Probe`] reads what is of interest.
+//! [`linearise()`] gives the matrices of an FMU about an operating point.
 #![deny(unsafe_code)]
 
 mod error;
@@ -10,15 +11,19 @@ mod exchange;
 pub mod fmi_crate;
 mod fmu;
 mod library;
+pub mod linearise;
+mod nearest;
 mod order;
 mod probe;
 mod simulation;
 mod slave;
 mod system;
+mod value;
 
 pub use error::{LoadError, SystemError};
 pub use fmu::{Fmu, FmuError, Instance};
-pub use library::{describe, preload};
+pub use library::{Interface, describe, preload};
+pub use linearise::{Linearisation, Linearise, LineariseError, linearise};
 pub use order::{Order, by_direct_dependencies};
 pub use probe::Probe;
 pub use simulation::{Method, Simulation};

@@ -1,6 +1,9 @@
-//! The shared library of an FMU: loading, symbols, calls. The one place of the crate where C is
-//! called and pointers are handed out.
+//! The shared library of an FMU: loading, symbols, calls. This file and its folder are the one place
+//! of the crate where C is called and pointers are handed out.
 #![expect(unsafe_code, reason = "the boundary to C")]
+
+mod calls;
+mod functions;
 
 use std::ffi::{CStr, CString, OsStr, c_char, c_int, c_void};
 use std::path::{Path, PathBuf};
@@ -8,69 +11,17 @@ use std::rc::Rc;
 use std::sync::{Arc, Mutex};
 
 use fmi2::abi::{
-    CO_SIMULATION, DESCRIBE, DescribeSink, Status, fmi2Boolean, fmi2CallbackFunctions,
-    fmi2CallbackLogger, fmi2Component, fmi2Integer, fmi2Real, fmi2Status, fmi2String, fmi2Type,
-    fmi2ValueReference,
+    CO_SIMULATION, DESCRIBE, DescribeSink, MODEL_EXCHANGE, Status, fmi2CallbackFunctions,
+    fmi2CallbackLogger, fmi2Component, fmi2FMUstate, fmi2Integer, fmi2Status,
 };
 use libloading::Library as Handle;
 
 use crate::error::LoadError;
 use crate::slave::CallError;
+use functions::{CoSimulation, Common, Directional, ModelExchange, Snapshot};
 
 const PYTHON: &str = "\nThe library expects Python to be in the process already, as those that \
     PythonFMU exports do: load it first with --preload, for example --preload libpython3.11.so.1.0";
-
-/// Declares the table of functions and its loading.
-macro_rules! functions {
-    ($($field:ident = $name:literal: fn($($argument:ty),*) $(-> $result:ty)?;)*) => {
-        #[derive(Clone, Copy)]
-        struct Functions { $($field: unsafe extern "C" fn($($argument),*) $(-> $result)?,)* }
-
-        impl Functions {
-            fn load(handle: &Handle, path: &Path) -> Result<Self, LoadError> {
-                Ok(Self { $($field: {
-                    // SAFETY: the standard gives this name this signature.
-                    let symbol = unsafe { handle.get(concat!($name, "\0").as_bytes()) };
-                    *symbol.map_err(|_| LoadError::Missing {
-                        path: path.to_owned(),
-                        function: $name.to_owned(),
-                    })?
-                },)* })
-            }
-        }
-    };
-}
-
-type References = *const fmi2ValueReference;
-
-functions! {
-    get_version = "fmi2GetVersion": fn() -> fmi2String;
-    instantiate = "fmi2Instantiate": fn(fmi2String, fmi2Type, fmi2String, fmi2String,
-        *const fmi2CallbackFunctions, fmi2Boolean, fmi2Boolean) -> fmi2Component;
-    free_instance = "fmi2FreeInstance": fn(fmi2Component);
-    setup_experiment = "fmi2SetupExperiment": fn(fmi2Component, fmi2Boolean, fmi2Real, fmi2Real,
-        fmi2Boolean, fmi2Real) -> fmi2Status;
-    enter_initialization_mode = "fmi2EnterInitializationMode": fn(fmi2Component) -> fmi2Status;
-    exit_initialization_mode = "fmi2ExitInitializationMode": fn(fmi2Component) -> fmi2Status;
-    terminate = "fmi2Terminate": fn(fmi2Component) -> fmi2Status;
-    get_real = "fmi2GetReal": fn(fmi2Component, References, usize, *mut fmi2Real) -> fmi2Status;
-    get_integer = "fmi2GetInteger":
-        fn(fmi2Component, References, usize, *mut fmi2Integer) -> fmi2Status;
-    get_boolean = "fmi2GetBoolean":
-        fn(fmi2Component, References, usize, *mut fmi2Boolean) -> fmi2Status;
-    set_real = "fmi2SetReal": fn(fmi2Component, References, usize, *const fmi2Real) -> fmi2Status;
-    set_integer = "fmi2SetInteger":
-        fn(fmi2Component, References, usize, *const fmi2Integer) -> fmi2Status;
-    set_boolean = "fmi2SetBoolean":
-        fn(fmi2Component, References, usize, *const fmi2Boolean) -> fmi2Status;
-    set_string = "fmi2SetString":
-        fn(fmi2Component, References, usize, *const fmi2String) -> fmi2Status;
-    set_real_input_derivatives = "fmi2SetRealInputDerivatives": fn(fmi2Component, References,
-        usize, *const fmi2Integer, *const fmi2Real) -> fmi2Status;
-    get_real_output_derivatives = "fmi2GetRealOutputDerivatives": fn(fmi2Component, References,
-        usize, *const fmi2Integer, *mut fmi2Real) -> fmi2Status;
-    do_step = "fmi2DoStep": fn(fmi2Component, fmi2Real, fmi2Real, fmi2Boolean) -> fmi2Status;
-}
 
 unsafe extern "C" {
     fn master_logger();
@@ -172,32 +123,59 @@ fn c_string(text: &str) -> CString {
     CString::new(text.replace('\0', "")).unwrap_or_default()
 }
 
-/// A loaded library with the functions of FMI 2.0 co-simulation.
+/// `fmi2Type`: what an instance is made for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Interface {
+    /// `fmi2ModelExchange`: the master integrates the states.
+    ModelExchange,
+    /// `fmi2CoSimulation`: the FMU integrates its states.
+    CoSimulation,
+}
+
+/// A loaded library with the functions of FMI 2.0.
 pub(crate) struct Library {
-    functions: Functions,
+    common: Common,
+    simulation: Option<CoSimulation>,
+    exchange: Option<ModelExchange>,
+    snapshot: Option<Snapshot>,
+    directional: Option<Directional>,
     path: PathBuf,
     _handle: Handle,
 }
 
 impl Library {
-    /// Loads the library and resolves its functions.
-    pub(crate) fn open(path: &Path) -> Result<Self, LoadError> {
+    /// Loads the library and resolves the functions: those of `interface` must be there.
+    pub(crate) fn open(path: &Path, interface: Interface) -> Result<Self, LoadError> {
         let handle = load(path)?;
-        let functions = Functions::load(&handle, path)?;
+        let common = Common::load(&handle, path)?;
         // SAFETY: takes no argument and returns a static string.
-        let version =
-            unsafe { (functions.get_version)().as_ref().map(|text| CStr::from_ptr(text)) };
+        let version = unsafe { (common.get_version)().as_ref().map(|text| CStr::from_ptr(text)) };
         let found = version.map(CStr::to_string_lossy).unwrap_or_default();
         if found != "2.0" {
             let found = found.into_owned();
             return Err(LoadError::Version { path: path.to_owned(), found });
         }
-        Ok(Self { functions, path: path.to_owned(), _handle: handle })
+        let simulation = CoSimulation::load(&handle, path);
+        let exchange = ModelExchange::load(&handle, path);
+        let (simulation, exchange) = match interface {
+            Interface::CoSimulation => (Some(simulation?), exchange.ok()),
+            Interface::ModelExchange => (simulation.ok(), Some(exchange?)),
+        };
+        Ok(Self {
+            common,
+            simulation,
+            exchange,
+            snapshot: Snapshot::load(&handle, path).ok(),
+            directional: Directional::load(&handle, path).ok(),
+            path: path.to_owned(),
+            _handle: handle,
+        })
     }
 
-    /// `fmi2Instantiate` for co-simulation.
+    /// `fmi2Instantiate` for `interface`.
     pub(crate) fn instantiate(
         self: &Arc<Self>,
+        interface: Interface,
         name: &str,
         guid: &str,
         resources: &str,
@@ -215,11 +193,15 @@ impl Library {
             component_environment: Arc::as_ptr(&sink).cast_mut().cast(),
         });
         let (c_name, c_guid, c_resources) = (c_string(name), c_string(guid), c_string(resources));
+        let kind = match interface {
+            Interface::ModelExchange => MODEL_EXCHANGE,
+            Interface::CoSimulation => CO_SIMULATION,
+        };
         // SAFETY: terminated strings, callbacks that outlive the instance.
         let pointer = unsafe {
-            (self.functions.instantiate)(
+            (self.common.instantiate)(
                 c_name.as_ptr(),
-                CO_SIMULATION,
+                kind,
                 c_guid.as_ptr(),
                 c_resources.as_ptr(),
                 Rc::as_ptr(&callbacks),
@@ -227,8 +209,14 @@ impl Library {
                 0,
             )
         };
-        let component =
-            Component { pointer, library: self.clone(), sink, _callbacks: callbacks, ones: vec![] };
+        let component = Component {
+            pointer,
+            library: self.clone(),
+            sink,
+            _callbacks: callbacks,
+            ones: vec![],
+            saved: std::ptr::null_mut(),
+        };
         if pointer.is_null() {
             let reason = component.messages().join("; ");
             let (path, instance) = (self.path.clone(), name.to_owned());
@@ -252,123 +240,25 @@ pub(crate) struct Component {
     _callbacks: Rc<fmi2CallbackFunctions>,
     /// First order, as often as needed.
     ones: Vec<fmi2Integer>,
+    /// The FMU state that `save` keeps; null before.
+    saved: fmi2FMUstate,
 }
 
 impl Drop for Component {
     fn drop(&mut self) {
-        if !self.pointer.is_null() {
-            // SAFETY: the instance is alive and not used again.
-            unsafe { (self.library.functions.free_instance)(self.pointer) };
+        if self.pointer.is_null() {
+            return;
         }
+        if let (Some(snapshot), false) = (&self.library.snapshot, self.saved.is_null()) {
+            // SAFETY: the instance is alive, the state is its own.
+            unsafe { (snapshot.free_fmu_state)(self.pointer, &raw mut self.saved) };
+        }
+        // SAFETY: the instance is alive and not used again.
+        unsafe { (self.library.common.free_instance)(self.pointer) };
     }
-}
-
-/// Defines a method for each function: its arguments, and the C arguments made of them.
-macro_rules! calls {
-    ($($method:ident($($argument:ident: $type:ty),*) = $name:literal($($c:expr),*);)*) => {
-        impl Component {
-            $(pub(crate) fn $method(&mut self, $($argument: $type),*) -> Result<(), CallError> {
-                // SAFETY: the instance is alive; slices that belong together are equally long.
-                let status = unsafe { (self.library.functions.$method)(self.pointer, $($c),*) };
-                self.check($name, status)
-            })*
-        }
-    };
-}
-
-calls! {
-    enter_initialization_mode() = "fmi2EnterInitializationMode"();
-    exit_initialization_mode() = "fmi2ExitInitializationMode"();
-    terminate() = "fmi2Terminate"();
-    get_real(references: &[u32], values: &mut [f64]) =
-        "fmi2GetReal"(references.as_ptr(), same_length(references, values), values.as_mut_ptr());
-    set_real(references: &[u32], values: &[f64]) =
-        "fmi2SetReal"(references.as_ptr(), same_length(references, values), values.as_ptr());
-    get_integer(references: &[u32], values: &mut [i32]) =
-        "fmi2GetInteger"(references.as_ptr(), same_length(references, values), values.as_mut_ptr());
-    set_integer(references: &[u32], values: &[i32]) =
-        "fmi2SetInteger"(references.as_ptr(), same_length(references, values), values.as_ptr());
-    get_boolean(references: &[u32], values: &mut [i32]) =
-        "fmi2GetBoolean"(references.as_ptr(), same_length(references, values), values.as_mut_ptr());
-    set_boolean(references: &[u32], values: &[i32]) =
-        "fmi2SetBoolean"(references.as_ptr(), same_length(references, values), values.as_ptr());
-    do_step(time: f64, size: f64) = "fmi2DoStep"(time, size, 1);
-}
-
-/// The length that both slices have.
-fn same_length<A, B>(references: &[A], values: &[B]) -> usize {
-    assert_eq!(references.len(), values.len(), "references and values are equally many");
-    references.len()
 }
 
 impl Component {
-    /// `fmi2SetupExperiment`.
-    pub(crate) fn setup_experiment(&mut self, e: &fmi2::Experiment) -> Result<(), CallError> {
-        let (tolerance, stop) = (e.tolerance.unwrap_or(0.0), e.stop_time.unwrap_or(0.0));
-        let (has_tolerance, has_stop) =
-            (fmi2Boolean::from(e.tolerance.is_some()), fmi2Boolean::from(e.stop_time.is_some()));
-        // SAFETY: the instance is alive.
-        let status = unsafe {
-            (self.library.functions.setup_experiment)(
-                self.pointer,
-                has_tolerance,
-                tolerance,
-                e.start_time,
-                has_stop,
-                stop,
-            )
-        };
-        self.check("fmi2SetupExperiment", status)
-    }
-
-    /// `fmi2SetString` of one variable.
-    pub(crate) fn set_string(&mut self, reference: u32, value: &str) -> Result<(), CallError> {
-        let value = c_string(value);
-        // SAFETY: the instance is alive; one reference, one terminated string.
-        let status = unsafe {
-            let pointer = value.as_ptr();
-            (self.library.functions.set_string)(
-                self.pointer,
-                &raw const reference,
-                1,
-                &raw const pointer,
-            )
-        };
-        self.check("fmi2SetString", status)
-    }
-
-    /// `fmi2SetRealInputDerivatives` of first order.
-    pub(crate) fn set_input_slopes(&mut self, to: &[u32], slopes: &[f64]) -> Result<(), CallError> {
-        self.ones.resize(self.ones.len().max(same_length(to, slopes)), 1);
-        let function = self.library.functions.set_real_input_derivatives;
-        // SAFETY: the instance is alive; the arrays have `to.len()` elements.
-        let status = unsafe {
-            function(self.pointer, to.as_ptr(), to.len(), self.ones.as_ptr(), slopes.as_ptr())
-        };
-        self.check("fmi2SetRealInputDerivatives", status)
-    }
-
-    /// `fmi2GetRealOutputDerivatives` of first order.
-    pub(crate) fn get_output_slopes(
-        &mut self,
-        from: &[u32],
-        slopes: &mut [f64],
-    ) -> Result<(), CallError> {
-        self.ones.resize(self.ones.len().max(same_length(from, slopes)), 1);
-        let function = self.library.functions.get_real_output_derivatives;
-        // SAFETY: the instance is alive; the arrays have `from.len()` elements.
-        let status = unsafe {
-            function(
-                self.pointer,
-                from.as_ptr(),
-                from.len(),
-                self.ones.as_ptr(),
-                slopes.as_mut_ptr(),
-            )
-        };
-        self.check("fmi2GetRealOutputDerivatives", status)
-    }
-
     /// The messages since this was last asked.
     fn messages(&self) -> Vec<String> {
         self.sink.messages.lock().map(|mut list| std::mem::take(&mut *list)).unwrap_or_default()

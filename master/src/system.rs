@@ -3,7 +3,9 @@
 use fmi2::description::{Causality, Kind, ModelDescription, ScalarVariable};
 
 use crate::error::SystemError;
+use crate::nearest::nearest;
 use crate::slave::Slave;
+use crate::value::Value;
 
 /// One end of a connection: slave by position, variable by position in its description.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -189,55 +191,29 @@ impl System {
             let variable = self.variable(port);
             (variable.value_reference, variable.kind.clone())
         };
-        let wrong = |expected| SystemError::Value {
+        let value = Value::parse(&kind, text).map_err(|expected| SystemError::Value {
             name: name.to_owned(),
             value: text.to_owned(),
             expected,
-        };
+        })?;
         let (_, instance) = &mut self.slaves[port.slave];
-        let done = match kind {
-            Kind::Real(_) => {
-                let value = text.trim().parse().map_err(|_| wrong("a number"))?;
-                instance.set_real(&[reference], &[value])
-            }
-            Kind::Integer(_) | Kind::Enumeration(_) => {
-                let value = text.trim().parse().map_err(|_| wrong("an integer"))?;
-                instance.set_integer(&[reference], &[value])
-            }
-            Kind::Boolean(_) => {
-                let value = match text.trim() {
-                    "true" | "1" => 1,
-                    "false" | "0" => 0,
-                    _ => return Err(wrong("true or false")),
-                };
-                instance.set_boolean(&[reference], &[value])
-            }
-            Kind::String(_) => instance.set_string(reference, text),
+        let done = match value {
+            Value::Real(value) => instance.set_real(&[reference], &[value]),
+            Value::Integer(value) => instance.set_integer(&[reference], &[value]),
+            Value::Boolean(value) => instance.set_boolean(&[reference], &[value.into()]),
+            Value::String(value) => instance.set_string(reference, &value),
         };
         let (name, value) = (name.to_owned(), text.to_owned());
         done.map_err(|source| SystemError::Setting { name, value, source })
     }
 }
 
-/// The error for a missing variable, with names that differ in case or contain the text.
+/// The error for a missing variable, with similar names.
 fn unknown(name: &str, variable: &str, description: &ModelDescription) -> SystemError {
-    let wanted = variable.to_lowercase();
-    let similar: Vec<_> = description
-        .variables
-        .iter()
-        .map(|known| known.name.as_str())
-        .filter(|known| {
-            let known = known.to_lowercase();
-            known.contains(&wanted) || wanted.contains(&known)
-        })
-        .take(5)
-        .collect();
-    let nearest =
-        if similar.is_empty() { String::new() } else { format!(", it has {}", similar.join(", ")) };
     SystemError::UnknownVariable {
         name: name.to_owned(),
         model: description.model_name.clone(),
         variable: variable.to_owned(),
-        nearest,
+        nearest: nearest(description, variable),
     }
 }

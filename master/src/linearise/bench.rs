@@ -1,0 +1,212 @@
+//! A co-simulation instance that is stepped again and again from the operating point.
+
+use nalgebra::DMatrix;
+
+use super::differences::{Side, extrapolate, reach};
+use super::parts::{Part, Parts};
+use super::point::{initialised, read};
+use super::{Linearise, LineariseError};
+use crate::fmu::Fmu;
+use crate::library::{Component, Interface};
+
+/// The response of a state to a pulse as a part of its typical size: what is aimed at.
+const RESPONSE: f64 = 1e-2;
+/// A pulse as a part of the input's typical size: the first trial, and the limits.
+const TRIAL: f64 = 1e-2;
+const SMALLEST: f64 = 1e-6;
+const LARGEST: f64 = 0.1;
+/// Heights of the pulses whose responses are extrapolated to the height zero, each half of the last.
+const HEIGHTS: usize = 3;
+
+/// The instance, its saved state, and what is set and read.
+pub(super) struct Bench<'p> {
+    component: Component,
+    parts: &'p Parts<'p>,
+    states: &'p [Part],
+    inputs: Vec<u32>,
+    /// States, then outputs.
+    readings: Vec<u32>,
+    pub(super) x: Vec<f64>,
+    pub(super) u: Vec<f64>,
+    pub(super) y: Vec<f64>,
+    start: f64,
+    pub(super) step: f64,
+    /// The course of the readings with the inputs of the operating point.
+    rest: DMatrix<f64>,
+}
+
+/// A pulse of an input: to which side, how high.
+pub(super) type Pulse = (Side, f64);
+
+impl<'p> Bench<'p> {
+    pub(super) fn new(
+        fmu: &Fmu,
+        parts: &'p Parts<'p>,
+        states: &'p [Part],
+        request: &Linearise,
+        step: f64,
+    ) -> Result<Self, LineariseError> {
+        let mut component = initialised(fmu, Interface::CoSimulation, parts, request)?;
+        component.save()?;
+        let x = read(&mut component, states.iter())?;
+        let u = read(&mut component, parts.inputs.iter())?;
+        let y = read(&mut component, parts.outputs.iter())?;
+        let inputs = parts.inputs.iter().map(|part| part.reference).collect();
+        let readings = states.iter().chain(&parts.outputs).map(|part| part.reference).collect();
+        let (start, rest) = (request.start_time, DMatrix::zeros(0, 0));
+        Ok(Self { component, parts, states, inputs, readings, x, u, y, start, step, rest })
+    }
+
+    /// The typical size of a change of reading `k`: states, then outputs.
+    pub(super) fn scale(&self, k: usize) -> f64 {
+        match k.checked_sub(self.states.len()) {
+            None => self.states[k].scale(self.x[k]),
+            Some(output) => self.parts.outputs[output].scale(self.y[output]),
+        }
+    }
+
+    /// The readings at `count` + 1 communication points, one row each, with the inputs
+    /// `deviation`(step, input) off the operating point.
+    fn run(
+        &mut self,
+        count: usize,
+        deviation: impl Fn(usize, usize) -> f64,
+    ) -> Result<DMatrix<f64>, LineariseError> {
+        self.component.restore()?;
+        let mut course = DMatrix::zeros(count + 1, self.readings.len());
+        let mut row = vec![0.0; self.readings.len()];
+        for step in 0..=count {
+            self.component.get_real(&self.readings, &mut row)?;
+            for (column, &value) in row.iter().enumerate() {
+                if !value.is_finite() {
+                    let part = self.states.iter().chain(&self.parts.outputs).nth(column);
+                    let name = part.map_or_else(String::new, |part| part.name.clone());
+                    return Err(LineariseError::NotFinite { name, value });
+                }
+                course[(step, column)] = value;
+            }
+            if step < count {
+                let value = |(input, u): (usize, &f64)| u + deviation(step, input);
+                let values: Vec<f64> = self.u.iter().enumerate().map(value).collect();
+                self.component.set_real(&self.inputs, &values)?;
+                let time = self.start + index(step) * self.step;
+                self.component.do_step(time, self.step, 0)?;
+            }
+        }
+        Ok(course)
+    }
+
+    /// The change of the readings for a small `shape`(step, input), per unit of the shape, as height
+    /// times shape goes to zero from `height` on through `heights` halvings.
+    pub(super) fn response(
+        &mut self,
+        count: usize,
+        heights: usize,
+        (side, height): Pulse,
+        shape: impl Fn(usize, usize) -> f64,
+    ) -> Result<DMatrix<f64>, LineariseError> {
+        if self.rest.nrows() != count + 1 {
+            self.rest = self.run(count, |_, _| 0.0)?;
+        }
+        let mut levels = Vec::with_capacity(heights);
+        let mut height = if side == Side::Below { -height } else { height };
+        for _ in 0..heights {
+            let there = self.run(count, |step, input| height * shape(step, input))?;
+            levels.push(if side == Side::Both {
+                let back = self.run(count, |step, input| -height * shape(step, input))?;
+                (there - back) / (2.0 * height)
+            } else {
+                (there - &self.rest) / height
+            });
+            height *= 0.5;
+        }
+        Ok(DMatrix::from_fn(count + 1, self.readings.len(), |row, column| {
+            let values: Vec<f64> = levels.iter().map(|level| level[(row, column)]).collect();
+            let noise = |level: usize| {
+                let size = f64::EPSILON * self.rest[(row, column)].abs() / height.abs();
+                size * 0.5_f64.powi(i32::try_from(heights - level).unwrap_or(0))
+            };
+            extrapolate(&values, noise, 2.0, |order| side.exponent(order)).0
+        }))
+    }
+
+    /// The drift of the states over the first step.
+    pub(super) fn drift(&self) -> Vec<f64> {
+        (0..self.states.len()).map(|k| self.rest[(1, k)] - self.rest[(0, k)]).collect()
+    }
+
+    /// A pulse of `input` over the first half of `count` steps, small enough for all states, and
+    /// its response per unit, of which `heights` are extrapolated.
+    pub(super) fn pulse(
+        &mut self,
+        input: usize,
+        count: usize,
+        heights: usize,
+    ) -> Result<(Pulse, DMatrix<f64>), LineariseError> {
+        let (part, value) = (&self.parts.inputs[input], self.u[input]);
+        let scale = part.scale(value);
+        let shape =
+            |step: usize, other: usize| f64::from(u8::from(other == input && step < count / 2));
+        let trial = reach(part, value, TRIAL * scale)?;
+        let response = self.response(count, 1, trial, shape)?;
+        let largest = (0..self.states.len())
+            .map(|k| response.column(k).amax() / self.scale(k))
+            .fold(0.0, f64::max);
+        let fitting = (RESPONSE / largest).clamp(SMALLEST * scale, LARGEST * scale);
+        let pulse = reach(part, value, fitting)?;
+        let response = self.response(count, heights, pulse, shape)?;
+        Ok((pulse, response))
+    }
+
+    /// The responses to a pulse of each input over `count` steps.
+    pub(super) fn record(&mut self, count: usize, fine: bool) -> Result<Record, LineariseError> {
+        let (n, m) = (self.states.len(), self.inputs.len());
+        let heights = if fine { HEIGHTS } else { 1 };
+        let rows = m * count;
+        let mut record = Record {
+            before: DMatrix::zeros(rows, n + m),
+            after: DMatrix::zeros(rows, n + m),
+            change: DMatrix::zeros(rows, n),
+            outputs: DMatrix::zeros(rows, self.parts.outputs.len()),
+            pulses: Vec::with_capacity(m),
+        };
+        for input in 0..m {
+            let (pulse, response) = self.pulse(input, count, heights)?;
+            let response = response * pulse.1;
+            for step in 0..count {
+                let row = input * count + step;
+                for k in 0..n {
+                    record.before[(row, k)] = response[(step, k)];
+                    record.after[(row, k)] = response[(step + 1, k)];
+                    record.change[(row, k)] = response[(step + 1, k)] - response[(step, k)];
+                }
+                for k in 0..self.parts.outputs.len() {
+                    record.outputs[(row, k)] = response[(step + 1, n + k)];
+                }
+                let held = if step < count / 2 { pulse.1 } else { 0.0 };
+                record.before[(row, n + input)] = held;
+                record.after[(row, n + input)] = held;
+            }
+            record.pulses.push(pulse);
+        }
+        Ok(record)
+    }
+}
+
+/// What the pulses did: one row for each step after each pulse.
+pub(super) struct Record {
+    /// States at the begin of the step, and inputs during it.
+    pub(super) before: DMatrix<f64>,
+    /// States at the end of the step, and inputs during it.
+    pub(super) after: DMatrix<f64>,
+    /// Change of the states over the step.
+    pub(super) change: DMatrix<f64>,
+    /// Outputs at the end of the step.
+    pub(super) outputs: DMatrix<f64>,
+    pub(super) pulses: Vec<Pulse>,
+}
+
+/// A count as a number.
+fn index(count: usize) -> f64 {
+    f64::from(u32::try_from(count).unwrap_or(u32::MAX))
+}

@@ -1,0 +1,221 @@
+//! Derivatives by differences: ladders of steps, extrapolated to the step zero.
+
+use nalgebra::DMatrix;
+
+use super::LineariseError;
+use super::parts::Part;
+use super::point::{Equations, Known};
+
+/// Steps of a ladder, and the ratio of each to the next.
+const LEVELS: usize = 8;
+const RATIO: f64 = 4.0;
+/// The first step as a part of the typical size of a change.
+const FIRST: f64 = 1e-2;
+
+/// To which side of the operating point a variable can be changed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Side {
+    Both,
+    Above,
+    Below,
+}
+
+impl Side {
+    /// The errors of a difference quotient go with these powers of the step.
+    pub(super) fn exponent(self, order: i32) -> i32 {
+        if self == Side::Both { 2 * order } else { order }
+    }
+}
+
+/// How far `part` can be changed about `value`, up to `size`, and to which side. At a limit it is
+/// one side.
+///
+/// # Errors
+///
+/// [`LineariseError::Role`] where `min` and `max` leave no room.
+pub(super) fn reach(part: &Part, value: f64, size: f64) -> Result<(Side, f64), LineariseError> {
+    let (below, above) = (value - part.min, part.max - value);
+    if below.max(above) <= 0.0 {
+        return Err(LineariseError::Role {
+            name: part.name.clone(),
+            found: format!("{value} between min = {} and max = {}", part.min, part.max),
+            expected: "room for a change",
+        });
+    }
+    Ok(if below >= size && above >= size {
+        (Side::Both, size)
+    } else if above >= below {
+        (Side::Above, above.min(size))
+    } else {
+        (Side::Below, below.min(size))
+    })
+}
+
+/// A number and the estimate of its error.
+pub(super) type Estimate = (f64, f64);
+
+/// The limit of a sequence whose k-th value belongs to the step h / ratio^k, for errors that go
+/// with h to the powers `exponent`(1), `exponent`(2), ...; of all entries of the extrapolation table
+/// the one with the smallest error. `noise`(k) is the rounding error of the k-th value.
+///
+/// C. J. F. Ridders, Accurate computation of F'(x) and F'(x) F''(x), Adv. Eng. Softw. 4 (1982).
+pub(super) fn extrapolate(
+    values: &[f64],
+    noise: impl Fn(usize) -> f64,
+    ratio: f64,
+    exponent: impl Fn(i32) -> i32,
+) -> Estimate {
+    let mut best = (values.last().copied().unwrap_or(f64::NAN), f64::INFINITY);
+    let mut previous: Vec<f64> = Vec::new();
+    for (level, &value) in values.iter().enumerate() {
+        let mut row = vec![value];
+        for (order, &coarser) in (1..).zip(&previous) {
+            let finer = row[row.len() - 1];
+            let better = finer + (finer - coarser) / (ratio.powi(exponent(order)) - 1.0);
+            let error = (better - finer).abs().max((better - coarser).abs()) + noise(level);
+            if error < best.1 {
+                best = (better, error);
+            }
+            row.push(better);
+        }
+        previous = row;
+    }
+    best
+}
+
+/// Derivatives with respect to one variable of all components of a function, by differences about
+/// `value` with steps from `reach` down.
+///
+/// Where both sides can be reached, half of the difference between the slopes to the right and to
+/// the left counts as an error: at a kink there is no derivative.
+pub(super) fn derivatives(
+    mut function: impl FnMut(f64) -> Result<Vec<f64>, LineariseError>,
+    value: f64,
+    (side, first): (Side, f64),
+) -> Result<Vec<Estimate>, LineariseError> {
+    let middle = function(value)?;
+    let mut slopes = vec![Vec::with_capacity(LEVELS); middle.len()];
+    let mut kinks = slopes.clone();
+    let mut noises = slopes.clone();
+    let mut step = first;
+    for _ in 0..LEVELS {
+        let (from, to) = match side {
+            Side::Both => (value - step, value + step),
+            Side::Above => (value, value + step),
+            Side::Below => (value - step, value),
+        };
+        let (low, high) = (function(from)?, function(to)?);
+        let width = to - from;
+        for (row, &centre) in middle.iter().enumerate() {
+            slopes[row].push((high[row] - low[row]) / width);
+            kinks[row].push((high[row] - centre - (centre - low[row])) / (0.5 * width));
+            noises[row].push(f64::EPSILON * high[row].abs().max(low[row].abs()) / width);
+        }
+        step /= RATIO;
+    }
+    let estimate = |row: usize| {
+        let noise = |level: usize| noises[row][level];
+        let (slope, error) = extrapolate(&slopes[row], noise, RATIO, |order| side.exponent(order));
+        if side != Side::Both {
+            return (slope, error);
+        }
+        let noise = |level: usize| 4.0 * noises[row][level];
+        let (kink, uncertain) = extrapolate(&kinks[row], noise, RATIO, |order| 2 * order - 1);
+        (slope, if kink.abs() > 4.0 * uncertain { error + 0.5 * kink.abs() } else { error })
+    };
+    Ok((0..middle.len()).map(estimate).collect())
+}
+
+/// The Jacobian of derivatives and outputs with respect to states and inputs, its errors, and the
+/// first step of each column.
+pub(super) struct Differences {
+    pub(super) jacobian: DMatrix<f64>,
+    pub(super) errors: DMatrix<f64>,
+    pub(super) steps: Vec<f64>,
+}
+
+/// Differences of `fmi2GetDerivatives` and of the outputs; `scales` are those of the columns.
+pub(super) fn of_equations(
+    equations: &mut Equations,
+    scales: &[f64],
+) -> Result<Differences, LineariseError> {
+    let (n, m) = (equations.states.len(), equations.parts.inputs.len());
+    let rows = n + equations.parts.outputs.len();
+    let mut found = Differences {
+        jacobian: DMatrix::zeros(rows, n + m),
+        errors: DMatrix::zeros(rows, n + m),
+        steps: Vec::with_capacity(n + m),
+    };
+    for column in 0..n + m {
+        let (known, value, part) = if column < n {
+            (Known::State(column), equations.x[column], &equations.states[column].part)
+        } else {
+            let input = column - n;
+            (Known::Input(input), equations.u[input], &equations.parts.inputs[input])
+        };
+        let reach = reach(part, value, FIRST * scales[column])?;
+        let function = |at: f64| equations.evaluate(Some((known, at)));
+        let estimates = derivatives(function, value, reach)?;
+        for (row, (slope, error)) in estimates.into_iter().enumerate() {
+            found.jacobian[(row, column)] = slope;
+            found.errors[(row, column)] = error;
+        }
+        found.steps.push(reach.1);
+    }
+    Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn slope_at(value: f64, side: Side, function: impl Fn(f64) -> f64) -> Estimate {
+        derivatives(|at| Ok(vec![function(at)]), value, (side, 1e-2)).unwrap()[0]
+    }
+
+    #[test]
+    fn slopes_of_smooth_functions_are_within_their_small_error_estimates() {
+        let functions: [(fn(f64) -> f64, fn(f64) -> f64); 3] =
+            [(f64::exp, f64::exp), (f64::sin, f64::cos), (|x| x.powi(5), |x| 5.0 * x.powi(4))];
+        for (function, derivative) in functions {
+            for side in [Side::Both, Side::Above, Side::Below] {
+                let (slope, error) = slope_at(0.7, side, function);
+                assert!((slope - derivative(0.7)).abs() <= error, "{side:?} {slope} {error:e}");
+                assert!(error < 1e-9, "{side:?} {error:e}");
+            }
+        }
+    }
+
+    #[test]
+    fn at_a_kink_half_of_the_jump_of_the_slope_is_the_error() {
+        let (slope, error) = slope_at(0.0, Side::Both, |x| x.abs() + x.sin());
+        assert!((slope - 1.0).abs() < 1e-9);
+        assert!((error - 1.0).abs() < 1e-6, "{error}");
+        let (slope, error) = slope_at(0.0, Side::Above, |x| x.abs() + x.sin());
+        assert!((slope - 2.0).abs() <= error && error < 1e-9, "{slope} {error:e}");
+    }
+
+    #[test]
+    fn a_step_that_is_a_thousand_times_too_large_is_seen_in_the_error() {
+        let (slope, error) = slope_at(0.0, Side::Both, |x| (x * 1e4).sin());
+        assert!((slope - 1e4).abs() <= error && error < 10.0, "{slope} {error}");
+    }
+
+    #[test]
+    fn at_a_limit_the_step_goes_to_the_other_side() {
+        let part = |min, max| Part {
+            name: String::new(),
+            reference: 0,
+            unit: None,
+            min,
+            max,
+            typical: None,
+        };
+        let reach = |min, max, value| reach(&part(min, max), value, 0.1).ok();
+        assert_eq!(reach(0.0, 1.0, 0.0), Some((Side::Above, 0.1)));
+        assert_eq!(reach(0.0, 1.0, 1.0), Some((Side::Below, 0.1)));
+        assert_eq!(reach(0.0, 1.0, 0.5), Some((Side::Both, 0.1)));
+        assert_eq!(reach(0.0, 0.05, 0.04), Some((Side::Below, 0.04)));
+        assert_eq!(reach(2.0, 2.0, 2.0), None);
+    }
+}

@@ -1,0 +1,244 @@
+//! The Jacobian from communication steps: pulses of the inputs from a saved FMU state, a step map
+//! fitted to what they do, and its logarithm.
+
+use nalgebra::DMatrix;
+
+use super::bench::{Bench, Record};
+use super::differences::{Side, extrapolate};
+use super::fit::{Directions, least_squares};
+use super::logarithm::logarithm_of_one_plus;
+use super::parts::{Part, Parts};
+use super::{Linearise, LineariseError};
+use crate::fmu::Fmu;
+
+/// Steps of the record: the first trial at least, and the last.
+const FEWEST: usize = 8;
+const MOST: usize = 512;
+/// Contrast of the directions that is good, and the least that is accepted.
+const GOOD: f64 = 1e-3;
+const LEAST: f64 = 1e-8;
+/// The step map is found for these multiples of the step, and extrapolated to the step zero.
+const MULTIPLES: [f64; 3] = [4.0, 2.0, 1.0];
+/// The part of the response to a new course of the inputs that may be missed.
+const MISSED: f64 = 1e-2;
+
+/// What the steps tell.
+pub(super) struct Found {
+    pub(super) x: Vec<f64>,
+    pub(super) u: Vec<f64>,
+    pub(super) y: Vec<f64>,
+    /// x' at the operating point.
+    pub(super) rates: Vec<f64>,
+    pub(super) jacobian: DMatrix<f64>,
+    pub(super) errors: DMatrix<f64>,
+    /// Steps of the record.
+    pub(super) count: usize,
+    /// Height of each input's pulse.
+    pub(super) heights: Vec<f64>,
+    /// The part of the response to a new course of the inputs that was missed.
+    pub(super) missed: f64,
+}
+
+/// [A, B, x'; C, D, 0] of one step size, and the standard deviations.
+struct Map {
+    values: DMatrix<f64>,
+    deviations: DMatrix<f64>,
+}
+
+/// The step map: x[k+1] - x[k] = `change` [x; u], y = `outputs` [x; u].
+struct Discrete {
+    change: DMatrix<f64>,
+    outputs: DMatrix<f64>,
+    deviations: DMatrix<f64>,
+}
+
+/// Linearises by steps of `step` s and its multiples.
+pub(super) fn of_steps(
+    fmu: &Fmu,
+    parts: &Parts,
+    states: &[Part],
+    request: &Linearise,
+    step: f64,
+) -> Result<Found, LineariseError> {
+    let mut bench = Bench::new(fmu, parts, states, request, step)?;
+    let count = count(&mut bench, parts, states)?;
+    let record = bench.record(count, true)?;
+    let discrete = fit(&record, parts, states)?;
+    let missed = missed(&mut bench, &discrete, &record, count)?;
+    if missed.is_nan() || missed > MISSED {
+        return Err(LineariseError::NotStates { missed, allowed: MISSED });
+    }
+    let mut maps = Vec::new();
+    for multiple in &MULTIPLES[..MULTIPLES.len() - 1] {
+        let mut longer = Bench::new(fmu, parts, states, request, multiple * step)?;
+        let map = longer.record(count, true).and_then(|record| {
+            let discrete = fit(&record, parts, states)?;
+            Ok(continuous(&longer, &discrete, &record))
+        });
+        // A longer step may be too long for the FMU or for a logarithm.
+        match map {
+            Ok(Some(map)) => maps.push(map),
+            _ => maps.clear(),
+        }
+    }
+    let map = continuous(&bench, &discrete, &record);
+    maps.push(map.ok_or(LineariseError::NoLogarithm { step })?);
+    if maps.len() < 2 {
+        return Err(LineariseError::NoLogarithm { step: 2.0 * step });
+    }
+    let (values, errors) = at_step_zero(&maps);
+    let (n, columns) = (states.len(), values.ncols() - 1);
+    Ok(Found {
+        rates: (0..n).map(|k| values[(k, columns)]).collect(),
+        jacobian: values.columns(0, columns).into_owned(),
+        errors: errors.columns(0, columns).into_owned(),
+        count,
+        heights: record.pulses.iter().map(|pulse| pulse.1).collect(),
+        missed,
+        x: bench.x,
+        u: bench.u,
+        y: bench.y,
+    })
+}
+
+/// How many steps move all states in directions that can be told apart.
+fn count(bench: &mut Bench, parts: &Parts, states: &[Part]) -> Result<usize, LineariseError> {
+    let mut count = FEWEST.max(2 * (states.len() + 1));
+    let mut best: Option<(usize, Directions)> = None;
+    while count <= MOST {
+        let record = match bench.record(count, false) {
+            Ok(record) => record,
+            Err(_) if best.is_some() => break,
+            Err(error) => return Err(error),
+        };
+        let directions = Directions::of(&record.before);
+        let good = directions.contrast >= GOOD;
+        if best.as_ref().is_none_or(|(_, known)| directions.contrast > known.contrast) {
+            best = Some((count, directions));
+        }
+        if good {
+            break;
+        }
+        count *= 2;
+    }
+    match best {
+        Some((count, directions)) if directions.contrast >= LEAST => Ok(count),
+        best => Err(unreachable(best.map(|(_, directions)| directions), parts, states)),
+    }
+}
+
+fn unreachable(directions: Option<Directions>, parts: &Parts, states: &[Part]) -> LineariseError {
+    let names: Vec<&Part> = states.iter().chain(&parts.inputs).collect();
+    let weak = directions.map(|directions| directions.weak(LEAST)).unwrap_or_default();
+    LineariseError::Unreachable {
+        rank: names.len() - weak.len(),
+        expected: names.len(),
+        names: weak.iter().map(|&column| names[column].name.clone()).collect(),
+    }
+}
+
+fn fit(record: &Record, parts: &Parts, states: &[Part]) -> Result<Discrete, LineariseError> {
+    let unreachable = || unreachable(Some(Directions::of(&record.before)), parts, states);
+    let change = least_squares(&record.before, &record.change).ok_or_else(unreachable)?;
+    let outputs = least_squares(&record.after, &record.outputs).ok_or_else(unreachable)?;
+    let mut discrete = Discrete {
+        change: change.solution.transpose(),
+        outputs: outputs.solution.transpose(),
+        deviations: DMatrix::zeros(states.len() + parts.outputs.len(), record.before.ncols()),
+    };
+    let deviations = &mut discrete.deviations;
+    deviations.rows_mut(0, states.len()).copy_from(&change.deviations.transpose());
+    let mut below = deviations.rows_mut(states.len(), parts.outputs.len());
+    below.copy_from(&outputs.deviations.transpose());
+    for (row, output) in parts.outputs.iter().enumerate() {
+        if let Some(state) = states.iter().position(|part| part.reference == output.reference) {
+            discrete.outputs.row_mut(row).fill(0.0);
+            discrete.outputs[(row, state)] = 1.0;
+            discrete.deviations.row_mut(states.len() + row).fill(0.0);
+        }
+    }
+    Ok(discrete)
+}
+
+/// The system whose exact step the map is: [A, B, x'] = log([Phi, Gamma, g; 0, I]) / h, where g is
+/// the drift over one step; in units of the typical sizes.
+fn continuous(bench: &Bench, discrete: &Discrete, record: &Record) -> Option<Map> {
+    let (n, width) = discrete.change.shape();
+    let mut scales: Vec<f64> = (0..n).map(|k| bench.scale(k)).collect();
+    scales.extend(record.pulses.iter().map(|pulse| pulse.1));
+    scales.push(1.0);
+    let drift = bench.drift();
+    let entry = |i: usize, j: usize| if j < width { discrete.change[(i, j)] } else { drift[i] };
+    let scaled = DMatrix::from_fn(width + 1, width + 1, |i, j| {
+        if i < n { entry(i, j) * scales[j] / scales[i] } else { 0.0 }
+    });
+    let logarithm = logarithm_of_one_plus(&scaled)?;
+    let (p, h) = (discrete.outputs.nrows(), bench.step);
+    let values = DMatrix::from_fn(n + p, width + 1, |i, j| match (i < n, j < width) {
+        (true, _) => logarithm[(i, j)] * scales[i] / scales[j] / h,
+        (false, true) => discrete.outputs[(i - n, j)],
+        (false, false) => 0.0,
+    });
+    let deviations = DMatrix::from_fn(n + p, width + 1, |i, j| {
+        let scale = if i < n { 1.0 / h } else { 1.0 };
+        if j < width { discrete.deviations[(i, j)] * scale } else { 0.0 }
+    });
+    Some(Map { values, deviations })
+}
+
+/// Extrapolates each entry to the step zero: an FMU that steps exactly gives the same for every step, one
+/// that integrates with order q errs by the power q of the step.
+fn at_step_zero(maps: &[Map]) -> (DMatrix<f64>, DMatrix<f64>) {
+    let (rows, columns) = maps[0].values.shape();
+    let mut values = DMatrix::zeros(rows, columns);
+    let mut errors = DMatrix::zeros(rows, columns);
+    for i in 0..rows {
+        for j in 0..columns {
+            let entries: Vec<f64> = maps.iter().map(|map| map.values[(i, j)]).collect();
+            let noise = |level: usize| maps[level].deviations[(i, j)];
+            (values[(i, j)], errors[(i, j)]) = extrapolate(&entries, noise, 2.0, |order| order);
+        }
+    }
+    (values, errors)
+}
+
+/// The largest difference between the FMU and the map in their response to all inputs at once, on
+/// and off in the order of Thue and Morse, relative to the response of each reading.
+fn missed(
+    bench: &mut Bench,
+    discrete: &Discrete,
+    record: &Record,
+    count: usize,
+) -> Result<f64, LineariseError> {
+    let n = discrete.change.nrows();
+    let shape = |step: usize, input: usize| {
+        let (side, height) = record.pulses[input];
+        let on = (step / 2 + input).count_ones() % 2 == 0;
+        let sign = if side == Side::Below { -1.0 } else { 1.0 };
+        if on { 0.5 * sign * height } else { 0.0 }
+    };
+    let both = record.pulses.iter().all(|(side, _)| *side == Side::Both);
+    let side = if both { Side::Both } else { Side::Above };
+    let found = bench.response(count, 2, (side, 1.0), shape)?;
+    let mut state = DMatrix::zeros(n, 1);
+    let mut expected = DMatrix::zeros(count + 1, found.ncols());
+    for step in 0..count {
+        let with_inputs = |state: &DMatrix<f64>| {
+            let inputs = (0..record.pulses.len()).map(|input| shape(step, input));
+            DMatrix::from_iterator(discrete.change.ncols(), 1, state.iter().copied().chain(inputs))
+        };
+        state += &discrete.change * with_inputs(&state);
+        let outputs = &discrete.outputs * with_inputs(&state);
+        for (column, value) in state.iter().chain(outputs.iter()).enumerate() {
+            expected[(step + 1, column)] = *value;
+        }
+    }
+    let sizes: Vec<f64> =
+        (0..found.ncols()).map(|k| found.column(k).amax() / bench.scale(k)).collect();
+    let least = 1e-6 * sizes.iter().fold(0.0_f64, |largest, &size| largest.max(size));
+    let relative = (0..found.ncols()).map(|k| {
+        let difference = (found.column(k) - expected.column(k)).amax() / bench.scale(k);
+        difference / sizes[k].max(least).max(f64::MIN_POSITIVE)
+    });
+    Ok(relative.fold(0.0, f64::max))
+}
