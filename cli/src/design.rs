@@ -20,7 +20,7 @@ mod wanted;
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 
 use crate::whole_file;
 use controller_fmu::{Content, ControllerFmu};

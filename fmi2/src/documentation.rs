@@ -108,7 +108,7 @@ fn variables(description: &ModelDescription) -> String {
     let header =
         ["Name", "Causality", "Variability", "Type", "Unit", "Start", "Min", "Max", "Description"];
     let row = |variable: &ScalarVariable| {
-        let (unit, [start, min, max]) = values(&variable.kind, &description.types);
+        let (unit, [start, min, max]) = texts(&variable.kind, &description.types);
         vec![
             code(&variable.name),
             variable.causality.as_str().to_owned(),
@@ -140,7 +140,10 @@ fn type_name(kind: &Kind) -> String {
 }
 
 /// Unit, and start, min and max as text; empty where there is none.
-fn values(kind: &Kind, types: &[SimpleType]) -> (String, [String; 3]) {
+///
+/// `types` are those of the description, in which an enumeration finds the names of its items.
+#[must_use]
+pub fn texts(kind: &Kind, types: &[SimpleType]) -> (String, [String; 3]) {
     let none = String::new;
     match kind {
         Kind::Real(own) => {

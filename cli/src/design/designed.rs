@@ -1,5 +1,10 @@
 //! From the plant file to the gains.
 
+use super::document::PlaceError;
+use super::gains::{FeedbackProblem, Found, Refusal, feedback, observer};
+use super::linear_plant::LinearPlant;
+use super::plant_file::PlantFile;
+use super::wanted::Request;
 use control::aso::{Estimator, FaultyPlant, Gains};
 use control::controller::{Controller, instability};
 use control::detectability::{Detectability, detectability};
@@ -9,11 +14,6 @@ use control::rank::{Rank, controllability};
 use control::sampled;
 use control::{Domain, Error};
 use nalgebra::DMatrix;
-use super::document::PlaceError;
-use super::gains::{FeedbackProblem, Found, Refusal, feedback, observer};
-use super::linear_plant::LinearPlant;
-use super::plant_file::PlantFile;
-use super::wanted::Request;
 
 /// Where errors about faults point.
 const FAULTS: [&str; 3] = ["faults", "F_a", "actuator_faults"];
@@ -78,16 +78,12 @@ pub(crate) fn design(file: &PlantFile<'_>) -> anyhow::Result<Designed> {
         .map_err(|refusal| refused(file, &file.feedback, refusal, linear.states.len(), "states"))?;
     let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
     let order = a_0.nrows();
-    let observer = observer(
-        &file.observer.wanted,
-        (&a_0, &c_0, plant.f_a.ncols()),
-        domain,
-        estimator,
-    )
-    .map_err(|refusal| {
-        let meaning = "states, filters, faults and rates of ramps";
-        refused(file, &file.observer, refusal, order, meaning)
-    })?;
+    let observer =
+        observer(&file.observer.wanted, (&a_0, &c_0, plant.f_a.ncols()), domain, estimator)
+            .map_err(|refusal| {
+                let meaning = "states, filters, faults and rates of ramps";
+                refused(file, &file.observer, refusal, order, meaning)
+            })?;
     let gains = Gains {
         estimator,
         k_x: feedback.gain.clone().resize_horizontally(plant.a.ncols(), 0.0),

@@ -1,9 +1,9 @@
 //! The gain that the plant file wants.
 
+use control::aso::Estimator;
 use control::lmi::{self, Norm, Outcome, Performance, Synthesis};
 use control::placement::{Placement, Quality, place, place_balanced, place_discrete};
 use control::riccati::{Weights, kalman, lqr};
-use control::aso::Estimator;
 use control::sampled::poles;
 use control::{Domain, Error};
 use nalgebra::{Complex, DMatrix};
@@ -117,7 +117,10 @@ pub(crate) fn observer(
         ))),
         Wanted::Weights { states, channels } => {
             let found = kalman(a_0, c_0, states, channels, domain)?;
-            let gain = found.current_gain.filter(|_| estimator == Estimator::Current).unwrap_or(found.gain);
+            let gain = found
+                .current_gain
+                .filter(|_| estimator == Estimator::Current)
+                .unwrap_or(found.gain);
             Ok(weighted(gain, "Kalman filter", found.residual))
         }
         Wanted::Region(region) => {
@@ -138,7 +141,10 @@ pub(crate) fn observer(
             };
             let region = region.stated();
             let found = lmi::observer_gain(a_0, &seen, &region, Some(&performance), domain)?;
-            synthesised(found, "H-infinity norm from the faults' rates to the errors of their estimates")
+            synthesised(
+                found,
+                "H-infinity norm from the faults' rates to the errors of their estimates",
+            )
         }
     }
 }

@@ -105,12 +105,12 @@ fn linearised(file: &PlantFile<'_>) -> anyhow::Result<LinearPlant> {
     let found = linearise(&fmu, &request)
         .map_err(|error| file.error(&["plant"], error.to_string()))
         .with_context(|| format!("cannot linearise {}", path.display()))?;
-    let known = |signal: &master::LinearSignal| Signal {
+    let known = |signal: &master::linearise::Signal| Signal {
         unit: signal.unit.clone(),
         operating: Some(signal.value),
         ..Signal::named(signal.name.clone())
     };
-    let merged = |own: &[Signal], found: &[master::LinearSignal]| {
+    let merged = |own: &[Signal], found: &[master::linearise::Signal]| {
         own.iter().zip(found).map(|(own, found)| own.clone().or(known(found))).collect()
     };
     let (b, c) = (&found.matrices.b, &found.matrices.c);
@@ -180,7 +180,7 @@ fn refuse_feedthrough(
 fn entry(
     file: &PlantFile<'_>,
     fault: &Fault,
-    found: &master::Matrices,
+    found: &master::linearise::Matrices,
     at: usize,
 ) -> anyhow::Result<Entry> {
     let (states, measurements) = (column(&found.f, at), column(&found.g, at));

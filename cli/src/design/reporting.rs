@@ -1,11 +1,12 @@
 //! Puts the numbers of a design into the report.
 
+use control::aso::Estimator;
 use control::eigen::eigenvalues;
 use control::faults::{Entry, loss_tolerance};
 use control::placement::Quality;
-use control::aso::Estimator;
 use control::{Domain, Error};
-use fmi2::description::ModelDescription;
+use fmi2::description::{ModelDescription, ScalarVariable};
+use fmi2::documentation::texts;
 use nalgebra::{Complex, DMatrix};
 
 use super::analysis::Loops;
@@ -39,7 +40,12 @@ pub(crate) fn report(
         plant: self::plant(designed, &names)?,
         checks: checks(designed),
         gains: names.gains(designed),
-        feedback: closed("A + B K_x", &designed.fed_back(), &designed.feedback, &file.feedback.wanted)?,
+        feedback: closed(
+            "A + B K_x",
+            &designed.fed_back(),
+            &designed.feedback,
+            &file.feedback.wanted,
+        )?,
         observer: closed(
             "A_0 - L C_0",
             &gains.error_dynamics(plant),
@@ -192,7 +198,9 @@ fn notes(fault: &Fault, designed: &Designed) -> String {
     let mut parts = vec![match &fault.entrance {
         Entrance::Column(at) => format!("column {} of F_a", at + 1),
         Entrance::Actuator(at) => format!("adds to {}", linear.actuators[*at].name),
-        Entrance::Sensor(at) => format!("adds to the measurement {}", linear.measurements[*at].name),
+        Entrance::Sensor(at) => {
+            format!("adds to the measurement {}", linear.measurements[*at].name)
+        }
         Entrance::Loss { actuator, .. } => {
             format!("{} loses a part of its effect", linear.actuators[*actuator].name)
         }
@@ -215,21 +223,26 @@ fn check(condition: &str, holds: bool, value: Option<f64>, explanation: String) 
 
 fn checks(designed: &Designed) -> Vec<Check> {
     let Designed { controllability, distance, detectability, .. } = designed;
-    let away = |what: &str, lower: f64| {
-        format!("{what}; distance from losing it, relative: {lower:.2e}")
-    };
+    let away =
+        |what: &str, lower: f64| format!("{what}; distance from losing it, relative: {lower:.2e}");
     let mut all = vec![
         check(
             "(A, B) is controllable",
             controllability.is_full(),
             Some(distance.lower),
-            away(&format!("rank {} of {}", controllability.rank, controllability.n), distance.lower),
+            away(
+                &format!("rank {} of {}", controllability.rank, controllability.n),
+                distance.lower,
+            ),
         ),
         check(
             "(A, C) is observable",
             detectability.observability.is_full(),
             None,
-            format!("rank {} of {}", detectability.observability.rank, detectability.observability.n),
+            format!(
+                "rank {} of {}",
+                detectability.observability.rank, detectability.observability.n
+            ),
         ),
         check(
             "the augmented observer exists",
@@ -356,13 +369,17 @@ fn assumptions(designed: &Designed, faults: &[Fault]) -> Vec<String> {
 
 /// The variables of the controller FMU.
 pub(crate) fn interface(description: &ModelDescription) -> Vec<super::report::Variable> {
-    let variable = |variable: &fmi2::description::ScalarVariable| super::report::Variable {
-        name: variable.name.clone(),
-        causality: variable.causality.to_string(),
-        variability: variable.variability.to_string(),
-        unit: variable.unit().map(str::to_owned),
-        start: variable.start_text(),
-        description: variable.description.clone().unwrap_or_default(),
+    let stated = |text: String| Some(text).filter(|text| !text.is_empty());
+    let variable = |variable: &ScalarVariable| {
+        let (unit, [start, ..]) = texts(&variable.kind, &description.types);
+        super::report::Variable {
+            name: variable.name.clone(),
+            causality: variable.causality.as_str().to_owned(),
+            variability: variable.variability.as_str().to_owned(),
+            unit: stated(unit),
+            start: stated(start),
+            description: variable.description.clone().unwrap_or_default(),
+        }
     };
     description.variables.iter().map(variable).collect()
 }

@@ -6,6 +6,7 @@ use control::lmi::{
     Affine, Channel, Disc, Norm, Outcome, Performance, Problem, Region, certify_gain,
     certify_region, observer_gain, state_feedback,
 };
+use control::placement::real;
 use control::{Domain, Error};
 use nalgebra::DMatrix;
 use std::f64::consts::FRAC_PI_4;
@@ -307,7 +308,9 @@ fn the_observer_of_the_paper_is_designed_by_inequalities() {
     let plant = plant();
     let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
     let region = disc(-2100.0, 1000.0);
-    let placed = control::aso::design(&plant, &real(&CONTROLLER_POLES), &real(&OBSERVER_POLES), None).unwrap();
+    let placed =
+        control::aso::design(&plant, &real(&CONTROLLER_POLES), &real(&OBSERVER_POLES), None)
+            .unwrap();
     let placed = placed.gains.error_dynamics(&plant);
     assert!(optimal(certify_region(&placed, &region, Domain::Continuous)).margin > 0.0);
     for norm in [Norm::HInfinity, Norm::EnergyToPeak] {

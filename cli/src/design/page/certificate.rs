@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::matrix::matrix;
 use super::table::{Cell, table};
-use crate::design::report::{FreeP, Matrix, Report, Theorem1};
+use crate::design::report::{FreeP, Matrix, Report, Theorem1, Ultimate};
 
 pub(super) fn bounds(report: &Report) -> Markup {
     let rows: Vec<Vec<Cell>> = report
@@ -16,24 +16,24 @@ pub(super) fn bounds(report: &Report) -> Markup {
                 (&bound.unit).into(),
                 bound.gain_of_fault.into(),
                 bound.gain_of_rate.into(),
-                bound.bound.into(),
+                bound.largest.into(),
             ]
         })
         .collect();
     let heads = [
-        "fault → error",
-        "unit of the error",
+        "fault → quantity",
+        "unit of the quantity",
         "gain of the fault",
         "gain of its rate",
-        "bound of the error",
+        "bound of the quantity",
     ];
     html! {
         p {
-            "The peak-to-peak (L1) gain is the largest magnitude that an error can reach while \
+            "The peak-to-peak (L1) gain is the largest magnitude that a quantity can reach while \
              the fault, or its rate, stays within plus and minus one. The bound is the smaller of \
              gain times bound, where the plant file bounds the fault or its rate."
         }
-        (table("Largest errors", &heads, &rows))
+        (table("Largest values", &heads, &rows))
     }
 }
 
@@ -58,7 +58,30 @@ pub(super) fn certificate(report: &Report) -> Markup {
             Ok(free) => (self::free(report, free)),
             Err(reason) => p { strong { "There is none: " } (reason) },
         }
+        @if let Ok(ultimate) = &certificate.ultimate {
+            h3 { "Where the error ends for bounded rates" }
+            (self::ultimate(report, ultimate))
+        }
         (norms(report))
+    }
+}
+
+fn ultimate(report: &Report, ultimate: &Ultimate) -> Markup {
+    let rows = [
+        ("bound of the norm of the rates", ultimate.rate),
+        ("radius of the ball around the ellipsoid", ultimate.radius),
+        ("margin of the inequalities, relative", ultimate.margin),
+    ];
+    let names = error_names(report, ultimate.peaks.len());
+    let peaks: Vec<(&str, f64)> =
+        names.iter().map(String::as_str).zip(ultimate.peaks.iter().copied()).collect();
+    html! {
+        p {
+            "The smallest ball with an ellipsoid inside that the error does not leave once it is \
+             there, by linear matrix inequalities, while the faults change no faster than stated."
+        }
+        (numbers("Invariant ellipsoid", &rows))
+        (numbers("Largest value of each error in it", &peaks))
     }
 }
 
@@ -73,10 +96,11 @@ fn printed(report: &Report, theorem: &Theorem1) -> Markup {
     ];
     html! {
         p {
-            "P is positive definite, so the estimation error ends within a ball of radius δ around \
-             zero. P grows in proportion to α, which therefore cancels in δ: other than the paper \
+            "The theorem says that the estimation error ends within a ball of radius δ around \
+             zero; what follows from P is that it ends in the smallest ellipsoid of P around that \
+             ball. P grows in proportion to α, which therefore cancels in δ: other than the paper \
              says, a larger α does not shrink the region. One number for all errors, in whatever \
-             units they have, says little of any of them; the table of largest errors says more."
+             units they have, says little of any of them; the table of largest values says more."
         }
         (numbers("Theorem 1", &rows))
         (matrix("p-printed", &p_matrix(report, "P", "solution of (12)", &theorem.p)))
@@ -86,13 +110,15 @@ fn printed(report: &Report, theorem: &Theorem1) -> Markup {
 fn free(report: &Report, free: &FreeP) -> Markup {
     let rows = [
         ("largest certified decay rate (1/s)", free.decay),
+        ("margin of its inequality, relative", free.decay_margin),
         ("smallest certified δ", free.delta),
         ("margin of the inequalities, relative", free.margin),
     ];
     html! {
         p {
-            "P is not tied to the right side of (12) but chosen by linear matrix inequalities, for \
-             the largest decay rate and the smallest δ. The solver is not trusted: the inequalities \
+            "P is not tied to the right side of (12): any P with P (A₀ − L C₀) + (A₀ − L C₀)ᵀ P ≤ −I \
+             serves the theorem as well, and the one with the smallest δ is taken; for the decay rate \
+             any P with P (A₀ − L C₀) + (A₀ − L C₀)ᵀ P < −2 α P. The solver is not trusted: the inequalities \
              were checked again by eigenvalues, and hold by the margin stated."
         }
         (numbers("Free P", &rows))
@@ -106,13 +132,18 @@ fn numbers(caption: &str, rows: &[(&str, f64)]) -> Markup {
     table(caption, &["quantity", "value"], &rows)
 }
 
-/// P, its rows named as those of L_x and L_f, or numbered.
-fn p_matrix(report: &Report, name: &str, meaning: &str, values: &[Vec<f64>]) -> Matrix {
+/// The names of the rows of L_x and L_f, or numbers.
+fn error_names(report: &Report, count: usize) -> Vec<String> {
     let rows = |gain| report.gains.iter().filter(move |matrix| matrix.name == gain);
     let named: Vec<String> =
         rows("L_x").chain(rows("L_f")).flat_map(|matrix| matrix.rows.clone()).collect();
-    let fits = named.len() == values.len();
-    let names = if fits { named } else { (1..=values.len()).map(|k| k.to_string()).collect() };
+    let fits = named.len() == count;
+    if fits { named } else { (1..=count).map(|k| k.to_string()).collect() }
+}
+
+/// P, its rows named as those of L_x and L_f, or numbered.
+fn p_matrix(report: &Report, name: &str, meaning: &str, values: &[Vec<f64>]) -> Matrix {
+    let names = error_names(report, values.len());
     Matrix {
         name: name.to_owned(),
         meaning: meaning.to_owned(),

@@ -154,12 +154,12 @@ pub(super) fn conditioning(report: &Report) -> Markup {
             system.matrix.as_str().into(),
             system.method.as_str().into(),
             system.condition.into(),
-            system.scaled_condition.into(),
+            system.balanced_condition.into(),
             system.pole_error.into(),
         ]
     };
     let heads =
-        ["loop", "matrix", "method", "condition", "condition, scaled", "pole error, relative"];
+        ["loop", "matrix", "method", "condition", "condition, balanced", "pole error, relative"];
     html! {
         (table("Condition of the eigenvectors, and distance from what was wanted", &heads, &[
             row("feedback", &report.feedback),
@@ -167,9 +167,9 @@ pub(super) fn conditioning(report: &Report) -> Markup {
         ]))
         p {
             "A change of the matrix moves an eigenvalue by at most the condition number times the \
-             norm of the change (Bauer and Fike, 1960). Scaled: in coordinates where the \
-             eigenvectors have entries of similar size, so without the part that comes from the \
-             units of the states. The pole error is the largest distance of an eigenvalue from the \
+             norm of the change (Bauer and Fike, 1960). Balanced: in coordinates \
+             scaled so that rows and columns of the matrix have similar size, with little of the \
+             part that comes from the units of the states. The pole error is the largest distance of an eigenvalue from the \
              wanted one, relative to that."
         }
     }

@@ -104,8 +104,8 @@ mod tests {
             method: String::new(),
             wanted: vec![[-1.0, 2.0], [-1.0, -2.0], [-5.0, 0.0]],
             eigenvalues: vec![[-5.1, 0.0], [-1.1, -2.0], [-9.0, 0.0], [-1.1, 2.0]],
-            condition: 1.0,
-            scaled_condition: 1.0,
+            condition: Some(1.0),
+            balanced_condition: Some(1.0),
             pole_error: None,
             region: None,
         };

@@ -77,8 +77,14 @@ fn key_numbers(report: &Report) -> Markup {
             }))
             (slowest("Slowest of the feedback loop", &report.feedback, plane))
             (slowest("Slowest of the observer", &report.observer, plane))
-            (key("Condition of the feedback", &number(report.feedback.condition)))
-            (key("Condition of the observer", &number(report.observer.condition)))
+            @for (name, condition) in [
+                ("Condition of the feedback", report.feedback.condition),
+                ("Condition of the observer", report.observer.condition),
+            ] {
+                @if let Some(condition) = condition {
+                    (key(name, &number(condition)))
+                }
+            }
             (settling(report))
             @if let Ok(theorem) = &report.certificate.printed {
                 (key("δ of theorem 1", &number(theorem.delta)))

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use crate::design::report::{
     Bound, Certificate, Check, Curve, Effectiveness, FreeP, Frequency, Loop, Matrix, Norm, Plant,
-    Region, Report, Sampled, Signal, StepResponse, Theorem1, Variable,
+    Region, Report, Sampled, Signal, StepResponse, Theorem1, Ultimate, Variable,
 };
 
 pub(super) const MARKUP: &str = "</code></pre><script>alert(1)</script>";
@@ -57,8 +57,8 @@ fn sampled_loop(matrix: &str, rates: &[[f64; 2]], region: Option<Region>) -> Loo
         method: format!("weights {QUOTES}"),
         wanted: if region.is_some() { Vec::new() } else { eigenvalues.clone() },
         eigenvalues,
-        condition: 1.234_567_89e3,
-        scaled_condition: f64::INFINITY,
+        condition: Some(1.234_567_89e3),
+        balanced_condition: Some(f64::INFINITY),
         pole_error: None,
         region,
     }
@@ -95,9 +95,16 @@ fn certificate(numbers: &mut Numbers) -> Certificate {
         printed: Err(format!("the design is sampled {MARKUP}")),
         free: Ok(FreeP {
             decay: 12.345_678_9,
+            decay_margin: 2.5e-9,
             delta: 0.012_345_678_9,
             p: numbers.matrix("", 13, 13).values,
             margin: 1.5e-9,
+        }),
+        ultimate: Ok(Ultimate {
+            rate: 3.25,
+            radius: 0.0625,
+            peaks: vec![0.03125, 0.015_625],
+            margin: 1.25e-9,
         }),
         norms: vec![Norm {
             name: "H∞ <".to_owned(),
@@ -196,7 +203,7 @@ pub(super) fn hostile() -> Report {
                 unit: None,
                 gain_of_fault: numbers.next(),
                 gain_of_rate: numbers.next(),
-                bound: (k == 2).then_some(4.321e-5),
+                largest: (k == 2).then_some(4.321e-5),
             })
             .collect(),
         steps: (1..=3)
@@ -224,8 +231,8 @@ pub(super) fn bare() -> Report {
         method: "given".to_owned(),
         wanted: Vec::new(),
         eigenvalues: vec![[pole, 0.0]],
-        condition: 1.0,
-        scaled_condition: 1.0,
+        condition: None,
+        balanced_condition: None,
         pole_error: None,
         region: None,
     };
@@ -249,6 +256,7 @@ pub(super) fn bare() -> Report {
                 delta: 0.75,
             }),
             free: Err("not asked for".to_owned()),
+            ultimate: Err("without \"rate_bound\"".to_owned()),
             norms: Vec::new(),
         },
         bounds: Vec::new(),

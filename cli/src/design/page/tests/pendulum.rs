@@ -162,6 +162,7 @@ impl Design {
                 delta: theorem.delta,
             }),
             free: Err("numerical trouble at a decay rate of 1187 1/s".to_owned()),
+            ultimate: Err("it needs `rate_bound` for every fault".to_owned()),
             norms: vec![norm("H-infinity", 0.002_513_7), norm("generalised H2", 0.041_27)],
         }
     }
@@ -215,7 +216,7 @@ fn bound(error: &str, unit: &str, gain_of_fault: f64, gain_of_rate: f64) -> Boun
         unit: Some(unit.to_owned()),
         gain_of_fault,
         gain_of_rate,
-        bound: Some(30.0 * gain_of_fault),
+        largest: Some(30.0 * gain_of_fault),
     }
 }
 
@@ -226,8 +227,8 @@ fn system(matrix: &str, wanted: &[f64], reached: &DMatrix<f64>, conditions: [f64
             .to_owned(),
         wanted: wanted.iter().map(|pole| [*pole, 0.0]).collect(),
         eigenvalues: pairs(&control::eigen::eigenvalues(reached).unwrap()),
-        condition: conditions[0],
-        scaled_condition: conditions[1],
+        condition: Some(conditions[0]),
+        balanced_condition: Some(conditions[1]),
         pole_error: Some(conditions[2]),
         region: None,
     }
