@@ -24,7 +24,7 @@ from scipy.signal import place_poles
 
 ROOT = Path(__file__).resolve().parent.parent
 SEED = 1985
-CASES = 25
+CASES = 16
 ITERATIONS = [10, 30, 100, 300, 1000]
 KINDS = ["real", "complex", "repeated", "discrete"]
 

@@ -8,8 +8,9 @@ use nalgebra::{Complex, ComplexField, DMatrix, DVector, Dyn, Schur};
 const ITERATIONS_PER_ROW: usize = 100;
 
 /// An entry below the diagonal is zero when it is smaller than this times its neighbours on the
-/// diagonal. Near multiple eigenvalues rounding may keep it above the first number for ever.
-const ZERO: [f64; 2] = [f64::EPSILON, 16.0 * f64::EPSILON];
+/// diagonal. Between equal eigenvalues the rounding errors, which are relative to the norm, may
+/// keep it above the first number for ever.
+const ZERO: [f64; 2] = [f64::EPSILON, 256.0 * f64::EPSILON];
 
 /// The eigenvalues of A, ordered by real part, then by imaginary part.
 ///

@@ -126,15 +126,14 @@ pub fn place_balanced(
     balanced(a, b, poles, &CONTINUOUS)
 }
 
-/// As [`place_balanced`], for x[k+1] = A x[k] + B u[k].
+/// As [`place_balanced`], for the sampled plant `x[k+1] = A x[k] + B u[k]`.
 ///
-/// `poles`: n eigenvalues in the z plane, zero among them if wanted, with the same rules. Tolerance:
-/// 1e-2, the distance of each eigenvalue from the wanted p relative to |p - 1|, verified. So the
-/// decay of a slow eigenvalue is right to 1e-2 of itself, and a fast one may be anywhere within 1e-2
-/// of zero. The latter must be allowed: no gain in double precision does better with a cluster of k
-/// eigenvalues near zero per input than about the k-th root of the rounding error, and the samples
-/// do not tell the difference. Eigenvalues that are well separated come out as exactly as those of
-/// [`place_balanced`].
+/// The gain is that of [`place_balanced`]; only what counts as reached differs. `poles`: n
+/// eigenvalues in the z plane, zero among them if wanted, with the same rules. Tolerance: 1e-2, the
+/// distance of each eigenvalue from the wanted p relative to |p - 1|, verified. So the decay of a
+/// slow eigenvalue is right to 1e-2 of itself, and a fast one lies within about 1e-2 of the wanted
+/// one. That much must be allowed: k eigenvalues near zero for each input move by the k-th root of
+/// a rounding error of A + B K, and the samples hardly tell the difference.
 ///
 /// # Example
 ///

@@ -161,9 +161,7 @@ impl Chart {
         for ((space, normals), w) in problem.spaces.iter().zip(&self.normals).zip(&directions) {
             let (count, free) = (space.wanted.count(), normals.ncols());
             let own = of_columns.columns(column, count).into_owned();
-            let slope = space.states.tr_mul(
-                &own.reshape_generic(nalgebra::Dyn(space.states.nrows()), nalgebra::Const::<1>),
-            );
+            let slope = space.states.tr_mul(&DVector::from_column_slice(own.as_slice()));
             let tangential = &slope - w * w.dot(&slope);
             let length = (1.0 + t.rows(first, free).norm_squared()).sqrt();
             gradient.rows_mut(first, free).copy_from(&(normals.tr_mul(&tangential) / length));

@@ -14,7 +14,7 @@ pub(crate) struct Demand {
 
 /// Of x' = A x.
 pub(crate) const CONTINUOUS: Demand = Demand { origin: 0.0, allowed: 1e-6 };
-/// Of x[k+1] = A x[k], where 1 - z is about -s times the sample time for slow eigenvalues. A few
+/// Of `x[k+1] = A x[k]`, where 1 - z is about -s times the sample time for slow eigenvalues. A few
 /// rounding errors of A + B K move a cluster of k eigenvalues near zero by about their k-th root.
 pub(crate) const DISCRETE: Demand = Demand { origin: 1.0, allowed: 1e-2 };
 
