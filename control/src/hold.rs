@@ -1,4 +1,5 @@
-//! Exact discretisation of a linear system whose input is constant or a straight line over the step.
+//! Exact discretisation of a linear system whose input is constant or a straight line over the
+//! step.
 
 use crate::balance::{Balance, divide_rows, power_of_two};
 use crate::exponential::scaling_and_squaring;
@@ -87,9 +88,9 @@ impl FirstOrderHold {
 /// x(h) = Phi x0 + Gamma w: the exact solution of x' = A x + B w with w constant over the step.
 ///
 /// `a`: n x n; `b`: n x m; `h`: the step in the unit of time of A, above zero. The answer is (Phi,
-/// Gamma), n x n and n x m: Phi = e^(A h), Gamma = integral of e^(A s) B over s from 0 to h. It is the
-/// plant that a sampled controller sees which holds its output from sample to sample. Method, cost
-/// and tolerance as in [`FirstOrderHold::new`], with a block matrix of order n + m.
+/// Gamma), n x n and n x m: Phi = e^(A h), Gamma = integral of e^(A s) B over s from 0 to h. It is
+/// the plant that a sampled controller sees which holds its output from sample to sample. Method,
+/// cost and tolerance as in [`FirstOrderHold::new`], with a block matrix of order n + m.
 ///
 /// Source: C. F. Van Loan (1978), as there.
 ///

@@ -48,7 +48,7 @@ pub struct Regulator {
     pub residual: f64,
 }
 
-/// The linear-quadratic regulator u = K x for x' = A x + B u, or for x[k+1] = A x[k] + B u[k].
+/// The linear-quadratic regulator u = K x for x' = A x + B u, or for `x[k+1] = A x[k] + B u[k]`.
 ///
 /// `a`: n x n; `b`: n x m; the weights as in [`Weights`], for a sampled system those of one sample.
 /// It solves the Riccati equation of the domain, printed in [`crate::riccati`]. The stabilising
@@ -62,9 +62,9 @@ pub struct Regulator {
 /// the residual is below 1e-9 of the absolute terms it is made of.
 ///
 /// Source: E. K.-W. Chu, H.-Y. Fan and W.-W. Lin, A structure-preserving doubling algorithm for
-/// continuous-time algebraic Riccati equations, Linear Algebra Appl. 396 (2005); sampled: with T.-M.
-/// Hwang and C.-S. Wang, Int. J. Control 77 (2004). Newton: D. L. Kleinman, IEEE Trans. Autom. Control
-/// 13 (1968); G. A. Hewer, 16 (1971). Balancing: P. Benner, Symplectic balancing of Hamiltonian
+/// continuous-time algebraic Riccati equations, Linear Algebra Appl. 396 (2005); sampled: with
+/// C.-S. Wang, Int. J. Control 77 (2004). Newton: D. L. Kleinman, IEEE Trans. Autom. Control 13
+/// (1968); G. A. Hewer, 16 (1971). Balancing: P. Benner, Symplectic balancing of Hamiltonian
 /// matrices, SIAM J. Sci. Comput. 22 (2001).
 ///
 /// # Example
@@ -88,7 +88,8 @@ pub struct Regulator {
 /// matrix, [`Error::OutOfRange`] for a bad period; [`Error::NotPositiveDefinite`] for R;
 /// [`Error::NotPositiveSemidefinite`] for Q - N R^-1 N'; [`Error::NotStabilisable`];
 /// [`Error::Unweighted`]; [`Error::NotConverged`], [`Error::ResidualTooLarge`],
-/// [`Error::NotHurwitz`], [`Error::NotSchur`], [`Error::Overflow`] when rounding prevents a solution.
+/// [`Error::NotHurwitz`], [`Error::NotSchur`], [`Error::Overflow`] when rounding prevents a
+/// solution.
 pub fn lqr(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,

@@ -9,11 +9,11 @@ use nalgebra::DMatrix;
 /// Norms that follow from the covariance C W C' of z under white noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Energy {
-    /// The H2 norm: the root of the trace. The root of the mean square of z under white noise of unit
-    /// intensity, and of the energy of z after impulses at all inputs one by one.
+    /// The H2 norm: the root of the trace. The root of the mean square of z under white noise of
+    /// unit intensity, and of the energy of z after impulses at all inputs one by one.
     pub h2: f64,
-    /// The generalised H2 norm: the root of the largest eigenvalue. The largest Euclidean length of z
-    /// that an input of unit energy can cause.
+    /// The generalised H2 norm: the root of the largest eigenvalue. The largest Euclidean length of
+    /// z that an input of unit energy can cause.
     pub peak: f64,
     /// The roots of the diagonal: the largest |`z_i`| that an input of unit energy can cause, p.
     pub peaks: Vec<f64>,
@@ -26,12 +26,12 @@ pub struct Energy {
 /// A W A' - W + B B' = 0,  covariance C W C' + D D'       sampled
 /// ```
 ///
-/// The energy of w is the integral of w'w, in sampled time the sum over the samples without the period.
-/// The norms are finite when A is stable, and in continuous time D = 0. Method, cost and tolerance
-/// those of the Lyapunov equation.
+/// The energy of w is the integral of w'w, in sampled time the sum over the samples without the
+/// period. The norms are finite when A is stable, and in continuous time D = 0. Method, cost and
+/// tolerance those of the Lyapunov equation.
 ///
-/// Source: D. A. Wilson, Convolution and Hankel operator norms for linear systems, IEEE Trans. Autom.
-/// Control 34 (1989).
+/// Source: D. A. Wilson, Convolution and Hankel operator norms for linear systems, IEEE Trans.
+/// Autom. Control 34 (1989).
 ///
 /// # Example
 ///
@@ -40,16 +40,16 @@ pub struct Energy {
 /// use control::response::{System, energy};
 /// use nalgebra::DMatrix;
 /// let one = DMatrix::identity(1, 1);
-/// let lag =
-///     System { a: -&one, b: one.clone(), c: one, d: DMatrix::zeros(1, 1), domain: Domain::Continuous };
+/// let (a, d) = (-&one, DMatrix::zeros(1, 1));
+/// let lag = System { a, b: one.clone(), c: one, d, domain: Domain::Continuous };
 /// assert!((energy(&lag)?.h2 - 0.5_f64.sqrt()).abs() < 1e-15);
 /// # Ok::<(), control::Error>(())
 /// ```
 ///
 /// # Errors
 ///
-/// Those of [`System::check`]; [`Error::OutOfRange`] when D is not zero in continuous time; those of
-/// [`lyapunov`] and [`discrete_lyapunov`].
+/// Those of [`System::check`]; [`Error::OutOfRange`] when D is not zero in continuous time; those
+/// of [`lyapunov`] and [`discrete_lyapunov`].
 pub fn energy(system: &System) -> Result<Energy, Error> {
     system.check()?;
     let System { a, b, c, d, domain } = system;

@@ -26,25 +26,27 @@ pub struct FaultBounds {
 /// |z_i| <= sum over j of min(gain_f[i,j] F_j, gain_r[i,j] R_j + gain_d[i,j] F_j)
 /// ```
 ///
-/// z = [x; e; eps]; `gain_f` is the [`peak_gain`] of [`fault_system`], `gain_r` and `gain_d` that of the two
-/// halves of the inputs of [`fault_rate_system`]. `magnitudes`: F, q, bounds of |`f_j`|; `rates`: R, q,
-/// bounds of |`r_j`|, r = f' - `A_f` f, infinite if the fault may jump (in sampled time r[k] = f[k+1] -
-/// `A_f` f[k]). The bounds hold for every such fault of the linear loop from rest with the commands within the
-/// limits of the actuators, and for each of the two terms alone there is a fault that comes as near as one
-/// likes. Other than delta of theorem 1, each quantity has its own bound in its own unit. They are the upper
-/// ends of brackets 1e-3 wide.
+/// z = [x; e; eps]; `gain_f` is the [`peak_gain`] of [`fault_system`], `gain_r` and `gain_d` that
+/// of the two halves of the inputs of [`fault_rate_system`]. `magnitudes`: F, q, bounds of |`f_j`|;
+/// `rates`: R, q, bounds of |`r_j`|, r = f' - `A_f` f, infinite if the fault may jump (in sampled
+/// time `r[k] = f[k+1] - A_f f[k]`). The bounds hold for every such fault of the linear loop from
+/// rest with the commands within the limits of the actuators, and for each of the two terms alone
+/// there is a fault that comes as near as one likes. Other than delta of theorem 1, each quantity
+/// has its own bound in its own unit. They are the upper ends of brackets 1e-3 wide.
 ///
-/// What they are worth on the pendulum of the paper (|f| <= 30 N, observer -1200 to -3000 / s): half of peak
-/// to peak of cart and pendulum after compensation is 0.96 mm and 1.75 mrad in the simulation, and the bounds
-/// from |f| alone are 1.98 mm and 4.22 mrad. Those of the velocities are 4.3 and 6.1 times what the
-/// simulation shows, because the worst fault jumps. The errors need a rate: without one the worst fault jumps by 60 N,
-/// and the bound of |eps| is 60 N. In the simulation the friction turns round while the cart
-/// sticks, at up to 521 N/s; with that rate the bounds are within 1 % of the largest errors seen.
+/// What they are worth on the pendulum of the paper (|f| <= 30 N, observer -1200 to -3000 / s):
+/// half of peak to peak of cart and pendulum after compensation is 0.96 mm and 1.75 mrad in the
+/// simulation, and the bounds from |f| alone are 1.98 mm and 4.22 mrad. Those of the velocities are
+/// 4.3 and 6.1 times what the simulation shows, because the worst fault jumps. The errors need a
+/// rate: without one the worst fault jumps by 60 N, and the bound of |eps| is 60 N. In the
+/// simulation the friction turns round while the cart sticks, at up to 521 N/s; with that rate the
+/// bounds are within 1 % of the largest errors seen.
 ///
 /// # Errors
 ///
-/// Those of [`Gains::check`] and [`peak_gain`]; [`Error::Shape`], [`Error::OutOfRange`] for `magnitudes` and
-/// `rates`; [`Error::NotHurwitz`], [`Error::NotSchur`] when the loop is not stable.
+/// Those of [`Gains::check`] and [`peak_gain`]; [`Error::Shape`], [`Error::OutOfRange`] for
+/// `magnitudes` and `rates`; [`Error::NotHurwitz`], [`Error::NotSchur`] when the loop is not
+/// stable.
 pub fn fault_bounds(
     plant: &FaultyPlant,
     gains: &Gains,
@@ -100,27 +102,30 @@ pub struct Reversal {
 
 /// The response of the loop at rest to a fault that changes by `change`: a reversal of friction.
 ///
-/// `fault`: which fault, an index from 0; `change`: how much, in its unit, 2 `F_s` for friction that turns
-/// from -`F_s` to `F_s`; `rate`: how fast, above zero, None for a jump; `fraction`: the band of the settling times,
-/// relative to the largest distance of the quantity from its settled value. Since the loop is linear, the
-/// answer is that of [`fault_system`] to a step or a ramp. The peaks of the states predict the amplitude (half
-/// of peak to peak) of the limit cycle that is left after compensation, as far as the loop settles from
-/// one reversal to the next; the peaks of the errors are those at the reversal.
+/// `fault`: which fault, an index from 0; `change`: how much, in its unit, 2 `F_s` for friction
+/// that turns from -`F_s` to `F_s`; `rate`: how fast, above zero, None for a jump; `fraction`: the
+/// band of the settling times, relative to the largest distance of the quantity from its settled
+/// value. Since the loop is linear, the answer is that of [`fault_system`] to a step or a ramp. The
+/// peaks of the states predict the amplitude (half of peak to peak) of the limit cycle that is left
+/// after compensation, as far as the loop settles from one reversal to the next; the peaks of the
+/// errors are those at the reversal.
 ///
-/// On the pendulum of the paper, with 2 `F_s` = 60 N, against the amplitudes of the simulation after
-/// compensation (0.96 mm, 1.75 mrad, 0.0100 m/s, 0.0205 rad/s) and its largest |eps| of 0.88 N:
+/// On the pendulum of the paper, with 2 `F_s` = 60 N, against the amplitudes of the simulation
+/// after compensation (0.96 mm, 1.75 mrad, 0.0100 m/s, 0.0205 rad/s) and its largest |eps| of 0.88
+/// N:
 ///
 /// | | cart | pendulum | cart velocity | angular velocity | eps |
 /// |---|---|---|---|---|---|
 /// | jump | 1.18 mm | 2.59 mrad | 0.0298 m/s | 0.0938 rad/s | 60 N |
 /// | at 521 N/s | 1.17 mm | 2.17 mrad | 0.0098 m/s | 0.0225 rad/s | 0.88 N |
 ///
-/// The jump is right for the positions, since the impulse that the estimate lets through, the integral of
-/// eps, does not depend on the rate. It is no prediction for errors and angular velocity: after
-/// compensation the friction does not jump. The cart stops, and while it sticks the friction swings from -30 N to 30
-/// N in 0.26 s, at up to 521 N/s, as fast as the observer moves the command. That rate is a property of the loop with
-/// friction and has to be known, from a simulation or a measurement, or assumed; it is not predicted here. Nor
-/// is the root mean square of eps (0.28 N), of which |eps| is a bound only.
+/// The jump is right for the positions, since the impulse that the estimate lets through, the
+/// integral of eps, does not depend on the rate. It is no prediction for errors and angular
+/// velocity: after compensation the friction does not jump. The cart stops, and while it sticks the
+/// friction swings from -30 N to 30 N in 0.26 s, at up to 521 N/s, as fast as the observer moves
+/// the command. That rate is a property of the loop with friction and has to be known, from a
+/// simulation or a measurement, or assumed; it is not predicted here. Nor is the root mean square
+/// of eps (0.28 N), of which |eps| is a bound only.
 ///
 /// # Example
 ///
@@ -139,8 +144,8 @@ pub struct Reversal {
 ///
 /// # Errors
 ///
-/// Those of [`Gains::check`] and [`step_response`]; [`Error::OutOfRange`] for `fault`, `change`, `rate` and
-/// `fraction`.
+/// Those of [`Gains::check`] and [`step_response`]; [`Error::OutOfRange`] for `fault`, `change`,
+/// `rate` and `fraction`.
 pub fn reversal(
     plant: &FaultyPlant,
     gains: &Gains,

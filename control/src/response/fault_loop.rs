@@ -13,10 +13,11 @@ use nalgebra::DMatrix;
 /// z = [x; e; f_hat - f]
 /// ```
 ///
-/// e = x - `x_hat`, eps = `f_hat` - f; state [x; e; `f_hat`], 2 n + q; in sampled time the left sides are
-/// those of the next sample. With a current estimator the matrix of the second line is `A_0` - L `C_0`
-/// `A_0` and f enters by (I - L `C_0`) [`F_a`; 0]; the estimates are those after the correction. The commands are within the limits of the actuators.
-/// It describes every f, jumps included, and is stable when the loop is.
+/// e = x - `x_hat`, eps = `f_hat` - f; state [x; e; `f_hat`], 2 n + q; in sampled time the left
+/// sides are those of the next sample. With a current estimator the matrix of the second line is
+/// `A_0` - L `C_0` `A_0` and f enters by (I - L `C_0`) [`F_a`; 0]; the estimates are those after the
+/// correction. The commands are within the limits of the actuators. It describes every f, jumps
+/// included, and is stable when the loop is.
 ///
 /// Source: (1) to (11) of the paper named in [`crate::aso`].
 ///
@@ -39,8 +40,8 @@ pub fn fault_system(plant: &FaultyPlant, gains: &Gains, domain: Domain) -> Resul
     Ok(System { a: loop_dynamics(plant, gains), b, c, d, domain })
 }
 
-/// From [r; f] to [x; e; eps], with r = f' - `A_f` f the part of the fault's rate that the fault model
-/// does not foresee; r = f' for the constant fault.
+/// From [r; f] to [x; e; eps], with r = f' - `A_f` f the part of the fault's rate that the fault
+/// model does not foresee; r = f' for the constant fault.
 ///
 /// ```text
 /// x' = (A + B K_x) x - B K_x e + B K_f eps + (F_a + B K_f) f
@@ -48,8 +49,8 @@ pub fn fault_system(plant: &FaultyPlant, gains: &Gains, domain: Domain) -> Resul
 /// z = [x; e; eps]
 /// ```
 ///
-/// In sampled time r[k] = f[k+1] - `A_f` f[k]. f acts through what the compensation cannot cancel only.
-/// For an f without jumps it is the same loop as [`fault_system`] in other coordinates.
+/// In sampled time `r[k] = f[k+1] - A_f f[k]`. f acts through what the compensation cannot cancel
+/// only. For an f without jumps it is the same loop as [`fault_system`] in other coordinates.
 ///
 /// # Errors
 ///

@@ -13,7 +13,8 @@ use std::f64::consts::PI;
 pub struct FrequencyPoint {
     /// w in rad per unit of time.
     pub frequency: f64,
-    /// G = C (s I - A)^-1 B + D, p x m, s = j w; in sampled time z = e^(j w h) takes the place of s.
+    /// G = C (s I - A)^-1 B + D, p x m, s = j w; in sampled time z = e^(j w h) takes the place of
+    /// s.
     pub gain: DMatrix<Complex<f64>>,
     /// The singular values of G, descending, the smaller of p and m of them.
     pub singular_values: Vec<f64>,
@@ -21,10 +22,10 @@ pub struct FrequencyPoint {
 
 /// G at the frequencies given.
 ///
-/// `frequencies`: in rad per unit of time, not negative. G exists where j w is no eigenvalue of A; the
-/// system need not be stable. Method: balancing, one complex LU decomposition for each frequency, one-sided
-/// Jacobi rotations for the singular values; about 4 n^3 multiplications each. Error: about 1e-16 times
-/// the condition number of s I - A in balanced coordinates.
+/// `frequencies`: in rad per unit of time, not negative. G exists where j w is no eigenvalue of A;
+/// the system need not be stable. Method: balancing, one complex LU decomposition for each
+/// frequency, one-sided Jacobi rotations for the singular values; about 4 n^3 multiplications each.
+/// Error: about 1e-16 times the condition number of s I - A in balanced coordinates.
 ///
 /// # Example
 ///
@@ -33,8 +34,8 @@ pub struct FrequencyPoint {
 /// use control::response::{System, frequency_response};
 /// use nalgebra::DMatrix;
 /// let one = DMatrix::identity(1, 1);
-/// let lag =
-///     System { a: -&one, b: one.clone(), c: one, d: DMatrix::zeros(1, 1), domain: Domain::Continuous };
+/// let (a, d) = (-&one, DMatrix::zeros(1, 1));
+/// let lag = System { a, b: one.clone(), c: one, d, domain: Domain::Continuous };
 /// let points = frequency_response(&lag, &[1.0])?;
 /// assert!((points[0].singular_values[0] - 0.5_f64.sqrt()).abs() < 1e-15);
 /// # Ok::<(), control::Error>(())
@@ -42,8 +43,8 @@ pub struct FrequencyPoint {
 ///
 /// # Errors
 ///
-/// Those of [`System::check`]; [`Error::OutOfRange`] for a frequency that is negative or not finite;
-/// [`Error::Overflow`] at an eigenvalue; [`Error::NotConverged`].
+/// Those of [`System::check`]; [`Error::OutOfRange`] for a frequency that is negative or not
+/// finite; [`Error::Overflow`] at an eigenvalue; [`Error::NotConverged`].
 pub fn frequency_response(
     system: &System,
     frequencies: &[f64],
@@ -55,8 +56,8 @@ pub fn frequency_response(
 
 /// Frequencies for a figure: `per_decade` points in each decade, evenly on the logarithmic scale.
 ///
-/// From a tenth of the slowest eigenvalue of A (those at the origin left out) to ten times the fastest;
-/// in sampled time to the Nyquist frequency pi / h.
+/// From a tenth of the slowest eigenvalue of A (those at the origin left out) to ten times the
+/// fastest; in sampled time to the Nyquist frequency pi / h.
 ///
 /// # Errors
 ///

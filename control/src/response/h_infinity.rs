@@ -17,29 +17,31 @@ pub struct HInfinity {
     pub lower: f64,
     /// No frequency was found at which the largest singular value reaches this.
     pub upper: f64,
-    /// The frequency of `lower` in rad per unit of time; infinite when it is the D of a continuous system.
+    /// The frequency of `lower` in rad per unit of time; infinite when it is the D of a continuous
+    /// system.
     pub frequency: f64,
 }
 
 /// The H-infinity norm: the largest singular value of G over all frequencies.
 ///
 /// It is the largest ratio of the energy of z to that of w, as the root. `width`: relative width of
-/// the answer, at least 1e-10. It is finite when A is stable. Method: the singular values of G equal
-/// gamma at the imaginary eigenvalues of the Hamiltonian matrix
+/// the answer, at least 1e-10. It is finite when A is stable. Method: the singular values of G
+/// equal gamma at the imaginary eigenvalues of the Hamiltonian matrix
 ///
 /// ```text
 /// [A + B R^-1 D' C, B R^-1 B'; -C' (I + D R^-1 D') C, -(A + B R^-1 D' C)'],  R = gamma^2 I - D' D
 /// ```
 ///
-/// so that gamma, a little above the largest value known, is the norm when the largest singular value stays
-/// below gamma at the imaginary parts of all eigenvalues and midway between them. Which eigenvalues are
-/// imaginary need not be decided. Otherwise the largest found takes the place of gamma; this converges
-/// quadratically. A sampled system is first taken to a continuous one by z = (1 + s) / (1 - s).
-/// About 100 n^3 multiplications for the eigenvalues and 4 n^3 for each of the 4 n frequencies in a round;
-/// usually 3 to 6 rounds.
+/// so that gamma, a little above the largest value known, is the norm when the largest singular
+/// value stays below gamma at the imaginary parts of all eigenvalues and midway between them. Which
+/// eigenvalues are imaginary need not be decided. Otherwise the largest found takes the place of
+/// gamma; this converges quadratically. A sampled system is first taken to a continuous one by z =
+/// (1 + s) / (1 - s). About 100 n^3 multiplications for the eigenvalues and 4 n^3 for each of the 4
+/// n frequencies in a round; usually 3 to 6 rounds.
 ///
-/// Source: N. A. Bruinsma and M. Steinbuch, A fast algorithm to compute the H-infinity norm of a transfer
-/// function matrix, Systems & Control Letters 14 (1990); S. Boyd and V. Balakrishnan, 15 (1990).
+/// Source: N. A. Bruinsma and M. Steinbuch, A fast algorithm to compute the H-infinity norm of a
+/// transfer function matrix, Systems & Control Letters 14 (1990); S. Boyd and V. Balakrishnan, 15
+/// (1990).
 ///
 /// # Example
 ///

@@ -76,8 +76,8 @@ impl Intervals {
         Ok(Self { starts, shortest: shortest.collect::<Result<_, _>>()? })
     }
 
-    /// Lengths for one output, each twice the one before, until the tail of h for one input is below
-    /// `part` of what surely lies before it.
+    /// Lengths for one output, each twice the one before, until the tail of h for one input is
+    /// below `part` of what surely lies before it.
     pub(super) fn lengths(
         &self,
         output: usize,

@@ -25,19 +25,19 @@ pub struct Bracket {
 /// gain[i,j] = |D[i,j]| + sum of |h_ij[k]|,       h[k] = C A^k B           sampled
 /// ```
 ///
-/// The largest |`z_i`| that an input `w_j` with |`w_j`| <= 1 can cause from rest, and no less: inputs
-/// exist that come as near as one likes. With several inputs, |`z_i`| <= sum over j of gain[i,j] times the
-/// bound of |`w_j`|. `width`: relative width of the bracket wanted, 1e-3 for example. The gain is
-/// finite when A is stable. Method: over an interval the integral of |h| lies between |integral of
-/// h| and the root of its length times the integral of h^2, both exact from matrix exponentials;
-/// intervals of dyadic length are halved where the two differ most, so that fast and slow modes get
-/// the steps they need; behind the last interval a bound from the contraction of the state. So the
-/// bracket is a proof up to rounding, and it is not narrowed below the rounding error of the
-/// integral of h^2. Cost: for each channel about 100 n^3, and for each time constant or oscillation some
-/// 50 intervals of 3 n^2 multiplications.
+/// The largest |`z_i`| that an input `w_j` with |`w_j`| <= 1 can cause from rest, and no less:
+/// inputs exist that come as near as one likes. With several inputs, |`z_i`| <= sum over j of
+/// `gain[i,j]` times the bound of |`w_j`|. `width`: relative width of the bracket wanted, 1e-3 for
+/// example. The gain is finite when A is stable. Method: over an interval the integral of |h| lies
+/// between |integral of h| and the root of its length times the integral of h^2, both exact from
+/// matrix exponentials; intervals of dyadic length are halved where the two differ most, so that
+/// fast and slow modes get the steps they need; behind the last interval a bound from the
+/// contraction of the state. So the bracket is a proof up to rounding, and it is not narrowed below
+/// the rounding error of the integral of h^2. Cost: for each channel about 100 n^3, and for each
+/// time constant or oscillation some 50 intervals of 3 n^2 multiplications.
 ///
-/// Source: M. A. Dahleh and J. B. Pearson, L1-optimal compensators for continuous-time systems, IEEE
-/// Trans. Autom. Control 32 (1987), equation (3), for the gain; the bracket is elementary.
+/// Source: M. A. Dahleh and J. B. Pearson, L1-optimal compensators for continuous-time systems,
+/// IEEE Trans. Autom. Control 32 (1987), for the gain; the bracket is elementary.
 ///
 /// # Example
 ///

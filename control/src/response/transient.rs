@@ -21,8 +21,8 @@ impl Trace {
     ///
     /// The band is `fraction` times the largest distance of z from its settled value. Between the
     /// points of the grid z is the cubic through both values and slopes in continuous time, 1e-6
-    /// relative to its peak; settling times are between the points where a straight line leaves the band.
-    /// In sampled time both are those of the points.
+    /// relative to its peak; settling times are between the points where a straight line leaves the
+    /// band. In sampled time both are those of the points.
     ///
     /// # Panics
     ///

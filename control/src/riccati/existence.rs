@@ -68,8 +68,8 @@ fn deficient(a: &DMatrix<f64>, c: &DMatrix<f64>, lambda: Complex<f64>) -> Result
     Ok(Singular::of(&all)?.rank(tolerance) < 2 * n)
 }
 
-/// `m` is positive semidefinite to rounding. `before` is what it was computed of, and says how large
-/// that rounding is; both are scaled by its diagonal.
+/// `m` is positive semidefinite to rounding. `before` is what it was computed of, and says how
+/// large that rounding is; both are scaled by its diagonal.
 pub(super) fn require_semidefinite(m: &DMatrix<f64>, before: &DMatrix<f64>) -> Result<(), Error> {
     let n = m.nrows();
     let refused = Error::NotPositiveSemidefinite { matrix: "Q - N R^-1 N'" };

@@ -7,12 +7,13 @@ use nalgebra::{Complex, DMatrix};
 /// The gains of a Kalman filter in steady state.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Filter {
-    /// L, n x p, of `x_hat`' = A `x_hat` + B u + L (y - C `x_hat`), in sampled time of the prediction
-    /// `x_hat`[k+1] = A `x_hat`[k] + B u[k] + L (y[k] - C `x_hat`[k]).
+    /// L, n x p, of `x_hat' = A x_hat + B u + L (y - C x_hat)`; in sampled time of the prediction
+    /// `x_hat[k+1] = A x_hat[k] + B u[k] + L (y[k] - C x_hat[k])`.
     pub gain: DMatrix<f64>,
-    /// M, n x p, of the current estimate `x_hat`[k] + M (y[k] - C `x_hat`[k]); L = A M. Sampled time only.
+    /// M, n x p, of the current estimate `x_hat[k] + M (y[k] - C x_hat[k])`; L = A M. Sampled time
+    /// only.
     pub current_gain: Option<DMatrix<f64>>,
-    /// P, n x n: the covariance of the error x - `x_hat`, in sampled time before y[k] is used.
+    /// P, n x n: the covariance of the error x - `x_hat`, in sampled time before `y[k]` is used.
     pub covariance: DMatrix<f64>,
     /// Eigenvalues of A - L C.
     pub eigenvalues: Vec<Complex<f64>>,
@@ -20,11 +21,12 @@ pub struct Filter {
     pub residual: f64,
 }
 
-/// The Kalman filter for x' = A x + w, y = C x + v, or for x[k+1] = A x[k] + w[k], y[k] = C x[k] + v[k].
+/// The Kalman filter for x' = A x + w, y = C x + v, in sampled time for
+/// `x[k+1] = A x[k] + w[k]` and the same y.
 ///
-/// `a`: n x n; `c`: p x n; `w`: n x n, symmetric positive semidefinite, the intensity of the process
-/// noise (in sampled time its covariance); `v`: p x p, symmetric positive definite, that of the
-/// measurement noise. It solves the equation of [`lqr`] for A', C', W, V:
+/// `a`: n x n; `c`: p x n; `w`: n x n, symmetric positive semidefinite, the intensity of the
+/// process noise (in sampled time its covariance); `v`: p x p, symmetric positive definite, that of
+/// the measurement noise. It solves the equation of [`lqr`] for A', C', W, V:
 ///
 /// ```text
 /// A P + P A' - P C' V^-1 C P + W = 0              L = P C' V^-1

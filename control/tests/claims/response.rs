@@ -1,3 +1,4 @@
+mod extremes;
 mod fault;
 mod norms;
 mod time;

@@ -22,8 +22,8 @@ pub(crate) fn distance(found: &DMatrix<f64>, exact: &DMatrix<f64>) -> f64 {
     DMatrix::from_fn(found.nrows(), found.ncols(), relative).amax()
 }
 
-/// Against 60 digits, entries relative to sqrt(P[i,i] P[j,j]). Where the equation is ill-conditioned,
-/// `SciPy` says how much.
+/// Against 60 digits, entries relative to sqrt(P[i,i] P[j,j]). Where the equation is
+/// ill-conditioned, `SciPy` says how much.
 fn assert_agrees_with_high_precision(kind: &str, domain: Domain) {
     let recorded = cases(RECORDED, kind);
     assert!(recorded.len() >= 28);

@@ -17,11 +17,13 @@ use nalgebra::{DMatrix, DVector};
 
 /// Static friction of the paper in N.
 const STATIC: f64 = 30.0;
-/// How fast the friction turns round in the simulation, in N/s: its largest rate while the cart sticks.
+/// How fast the friction turns round in the simulation, in N/s: its largest rate while the cart
+/// sticks.
 const RATE: f64 = 521.0;
-/// Half of peak to peak of cart, pendulum and their velocities after compensation, in SI units, and the
-/// largest errors x - `x_hat` and f - `f_hat`. Cart and pendulum as in the README's table; the rest from
-/// `aso-ftc run --step 2e-5 --record-every 2e-5 --stop-time 22 --set controller.t_on=1`, t > 14 s.
+/// Half of peak to peak of cart, pendulum and their velocities after compensation, in SI units, and
+/// the largest errors x - `x_hat` and f - `f_hat`. Cart and pendulum as in the README's table; the
+/// rest from `aso-ftc run --step 2e-5 --record-every 2e-5 --stop-time 22 --set controller.t_on=1`,
+/// t > 14 s.
 const AMPLITUDES: [f64; 4] = [0.9619e-3, 1.754e-3, 9.989e-3, 20.50e-3];
 const STATE_ERRORS: [f64; 4] = [3.437e-8, 7.224e-8, 1.631e-4, 4.603e-4];
 const FAULT_ERROR: f64 = 0.8809;
@@ -94,9 +96,9 @@ fn a_reversal_at_the_rate_of_the_simulation_predicts_every_quantity_within_a_qua
     assert!((0.99..1.01).contains(&ratio), "{ratio}");
 }
 
-/// Upper bounds that are no more than three times what is seen: positions from the magnitude of the fault
-/// alone, errors from its rate. The simulated rate is rounded to 521 N/s, and the friction jumps by 0.07 N
-/// when the cart stops: hence the 1 %.
+/// Upper bounds that are no more than three times what is seen: positions from the magnitude of the
+/// fault alone, errors from its rate. The simulated rate is rounded to 521 N/s, and the friction
+/// jumps by 0.07 N when the cart stops: hence the 1 %.
 #[test]
 fn the_bounds_exceed_what_the_simulation_shows_by_less_than_a_factor_of_three() {
     let (plant, gains, _) = paper();

@@ -168,7 +168,8 @@ fn the_grid_reaches_from_a_tenth_of_the_slowest_to_ten_times_the_fastest() {
     assert!((grid[grid.len() - 1] - PI / 0.01).abs() < 1e-9);
 }
 
-/// For c' (s I - A)^-1 b the largest |z| at energy one is reached by the time-reversed impulse response.
+/// For c' (s I - A)^-1 b the largest |z| at energy one is reached by the time-reversed impulse
+/// response.
 #[test]
 fn the_energy_to_peak_norm_is_reached_by_the_reversed_impulse_response() {
     // 1 / (s + a): the energy of the impulse response is 1 / (2 a).

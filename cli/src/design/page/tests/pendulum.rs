@@ -1,6 +1,6 @@
 //! The page of the paper's pendulum: its gains as committed, its curves computed here.
 
-use control::aso::{FaultyPlant, Gains};
+use control::aso::{Estimator, FaultyPlant, Gains};
 use control::exponential::exponential;
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -44,13 +44,14 @@ impl Design {
             DMatrix::from_row_iterator(rows.len(), rows[0].len(), rows.iter().flatten().copied())
         };
         Self {
-            plant: FaultyPlant {
-                a: matrix("A"),
-                b: matrix("B"),
-                c: matrix("C"),
-                f_a: matrix("F_a"),
-            },
+            plant: FaultyPlant::with_constant_faults(
+                matrix("A"),
+                matrix("B"),
+                matrix("C"),
+                matrix("F_a"),
+            ),
             gains: Gains {
+                estimator: Estimator::Prediction,
                 k_x: matrix("K_x"),
                 k_f: matrix("K_f"),
                 l_x: matrix("L_x"),
