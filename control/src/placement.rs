@@ -160,6 +160,17 @@ pub fn place_discrete(
     balanced(a, b, poles, &DISCRETE)
 }
 
+/// [`place_discrete`] with the eigenvectors chosen in the coordinates given.
+pub(crate) fn place_discrete_as_given(
+    a: &DMatrix<f64>,
+    b: &DMatrix<f64>,
+    poles: &[Complex<f64>],
+) -> Result<Placement, Error> {
+    let choice = Choice::given(a, b, poles)?;
+    let scale = choice.balance(a, b);
+    choice.placement(a, b, poles, &scale, &DISCRETE)
+}
+
 fn balanced(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,

@@ -164,7 +164,13 @@ impl<'a> Loops<'a> {
 
     /// Norms from the rates of the faults to the errors of their estimates.
     pub(crate) fn norms(&self) -> Result<Vec<Norm>, Error> {
-        let rates = self.to_fault_errors(&self.of_rates);
+        // The states of the plant do not act on the errors.
+        let mut rates = self.to_fault_errors(&self.of_rates);
+        let all = self.designed.plant.a.nrows();
+        let order = rates.a.nrows() - all;
+        rates.a = rates.a.view((all, all), (order, order)).into();
+        rates.b = rates.b.rows(all, order).into();
+        rates.c = rates.c.columns(all, order).into();
         let norm = |name: &str, value: f64, method: &str| Norm {
             name: name.to_owned(),
             from: "rates of the faults".to_owned(),

@@ -4,7 +4,7 @@ use control::aso::Estimator;
 use control::lmi::{self, Norm, Outcome, Performance, Synthesis};
 use control::placement::{Placement, Quality, place, place_balanced, place_discrete};
 use control::riccati::{Weights, kalman, lqr};
-use control::sampled::poles;
+use control::sampled::{place_estimator, poles};
 use control::{Domain, Error};
 use nalgebra::{Complex, DMatrix};
 
@@ -54,10 +54,10 @@ pub(crate) fn feedback(
         Wanted::Eigenvalues(continuous) => {
             let (wanted, sampled) = in_domain(continuous, domain)?;
             let found = if sampled { place_discrete(a, b, &wanted) } else { place(a, b, &wanted) };
-            Ok(placed(found?, wanted, "Eigenvalues assigned"))
+            Ok(assigned(found?, wanted))
         }
         Wanted::SampledEigenvalues(wanted) => {
-            Ok(placed(place_discrete(a, b, wanted)?, wanted.clone(), "Eigenvalues assigned"))
+            Ok(assigned(place_discrete(a, b, wanted)?, wanted.clone()))
         }
         Wanted::Weights { states, channels } => {
             let weights = Weights { q: states.clone(), r: channels.clone(), n: None };
@@ -95,26 +95,17 @@ pub(crate) fn observer(
     estimator: Estimator,
 ) -> Result<Found, Refusal> {
     let seen = estimator.seen(a_0, c_0);
-    let (a, b) = (a_0.transpose(), seen.transpose());
-    let dual = |mut found: Found| {
-        found.gain = -found.gain.transpose();
-        found
-    };
     match wanted {
         Wanted::Eigenvalues(continuous) => {
             let (wanted, sampled) = in_domain(continuous, domain)?;
-            let found = if sampled {
-                place_discrete(&a, &b, &wanted)
-            } else {
-                place_balanced(&a, &b, &wanted)
-            };
-            Ok(dual(placed(found?, wanted, "Eigenvalues assigned")))
+            if sampled {
+                return estimated(a_0, &seen, wanted);
+            }
+            let placed = place_balanced(&a_0.transpose(), &seen.transpose(), &wanted)?;
+            let gain = -placed.gain.transpose();
+            Ok(assigned(Placement { gain, ..placed }, wanted))
         }
-        Wanted::SampledEigenvalues(wanted) => Ok(dual(placed(
-            place_discrete(&a, &b, wanted)?,
-            wanted.clone(),
-            "Eigenvalues assigned",
-        ))),
+        Wanted::SampledEigenvalues(wanted) => estimated(a_0, &seen, wanted.clone()),
         Wanted::Weights { states, channels } => {
             let found = kalman(a_0, c_0, states, channels, domain)?;
             let gain = found
@@ -160,8 +151,18 @@ fn in_domain(
     }
 }
 
-fn placed(found: Placement, wanted: Vec<Complex<f64>>, method: &str) -> Found {
-    let method = format!("{method}, with well-conditioned eigenvectors.");
+/// The estimator of a sampled loop.
+fn estimated(
+    a_0: &DMatrix<f64>,
+    seen: &DMatrix<f64>,
+    wanted: Vec<Complex<f64>>,
+) -> Result<Found, Refusal> {
+    let (gain, quality) = place_estimator(a_0, seen, &wanted)?;
+    Ok(assigned(Placement { gain, quality }, wanted))
+}
+
+fn assigned(found: Placement, wanted: Vec<Complex<f64>>) -> Found {
+    let method = "Eigenvalues assigned, with well-conditioned eigenvectors.".to_owned();
     Found { gain: found.gain, method, wanted, quality: Some(found.quality) }
 }
 

@@ -105,7 +105,7 @@ impl FaultyPlant {
     /// `K_f` with the least norm of B `K_f` + `F_a`, m x q; the smallest one if there are several.
     ///
     /// It always exists; full compensation needs `F_a` in the range of B, which
-    /// [`AsoDesign::cancellation_residual`] tells. Singular values of B below 1e-12 of the largest
+    /// [`super::AsoDesign::cancellation_residual`] tells. Singular values of B below 1e-12 of the largest
     /// count as zero.
     ///
     /// # Errors
