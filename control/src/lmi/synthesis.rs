@@ -165,12 +165,11 @@ pub fn state_feedback(
         gamma: wanted.gamma,
     });
     let (a_turned, b_turned) = (a.transpose(), b.transpose());
-    let (performance_turned, region_wanted) = (turned.as_ref(), *region);
     let wanted = Wanted {
         a: &a_turned,
         c: &b_turned,
-        region: region_wanted,
-        performance: performance_turned,
+        region: *region,
+        performance: turned.as_ref(),
         domain,
     };
     wanted.search(|found| {
