@@ -52,7 +52,9 @@ fn the_mathematics_depends_on_neither_fmi_nor_files() {
 
 #[test]
 fn nothing_uses_the_models_and_nothing_uses_the_command() {
-    for member in ["control", "lapack", "fmi2", "fmu-plant", "fmu-controller", "master", "cli", "tests"] {
+    for member in
+        ["control", "lapack", "fmi2", "fmu-plant", "fmu-controller", "master", "cli", "tests"]
+    {
         let manifest: toml::Table =
             fs::read_to_string(root().join(member).join("Cargo.toml")).unwrap().parse().unwrap();
         for section in ["dependencies", "dev-dependencies", "build-dependencies"] {
