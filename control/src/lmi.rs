@@ -16,6 +16,7 @@ pub(crate) mod definite;
 mod gain;
 mod problem;
 mod region;
+mod search;
 mod solver;
 mod synthesis;
 
@@ -32,8 +33,8 @@ use nalgebra::{DMatrix, DVector};
 pub enum Outcome<T> {
     /// An answer whose inequalities were checked by eigenvalues.
     Optimal(T),
-    /// No answer exists: these requirements contradict each other, and without any one of them
-    /// the others do not.
+    /// By the numbers of the solver no answer exists: these requirements contradict each other, and
+    /// without any one of them the others do not.
     Infeasible {
         /// Their names, in the order in which they were stated.
         conflict: Vec<&'static str>,

@@ -20,7 +20,7 @@
 //! of a product, nothing is done.
 //!
 //! The matrices of a semidefinite program are small; these routines copy them, work on the copy and
-//! write the answer. They cost 5 to 10 times what a tuned library needs at order 30.
+//! write the answer.
 
 mod factor;
 mod memory;

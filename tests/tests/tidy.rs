@@ -80,9 +80,10 @@ fn unsafe_code_stands_at_the_boundaries_only() {
         "lapack/src/products.rs",
         "lapack/src/routines.rs",
         "lapack/src/symbols.rs",
-        "lapack/tests/definitions/decompositions.rs",
         "lapack/tests/definitions/products.rs",
+        "lapack/tests/definitions/singular.rs",
         "lapack/tests/definitions/solvers.rs",
+        "lapack/tests/definitions/spectrum.rs",
         // Importers of their own, to call the C functions as no safe one would.
         "fmi2/tests/robustness/importer.rs",
         "fuzz/src/design.rs",

@@ -1,7 +1,9 @@
 //! Coordinates in which the solver meets numbers of about one.
 
 use crate::Error;
-use crate::balance::{Balance, divide_columns, divide_rows, multiply_columns, power_of_two};
+use crate::balance::{
+    Balance, divide_columns, divide_rows, multiply_columns, multiply_rows, power_of_two,
+};
 use crate::eigen::eigenvalues;
 use crate::singular::Singular;
 use nalgebra::{Complex, DMatrix, DVector};
@@ -11,7 +13,7 @@ const WIDER: f64 = 1.2;
 /// Doublings of the sum over powers: (1 / `WIDER`)^(2^10) is nothing.
 const DOUBLINGS: usize = 10;
 /// Directions that can hardly be seen are not stretched by more than this.
-const STRETCH: f64 = 1e6;
+const STRETCH: f64 = 1e11;
 
 /// x~ = T x and the time scale: x' = A x becomes x~' = unit A~ x~ with A~ of about one.
 pub(super) struct Coordinates {
@@ -23,12 +25,11 @@ pub(super) struct Coordinates {
 impl Coordinates {
     /// Coordinates in which A differs from a multiple of the identity by little more than its
     /// eigenvalues do: T'T = P with (A - c I)' P (A - c I) - `s^2` P = -`s^2` I, c the mean of the
-    /// eigenvalues, s 1.2 times the largest distance from it.
-    pub(super) fn of_dynamics(a: &DMatrix<f64>) -> Result<Self, Error> {
+    /// eigenvalues, s 1.2 times the largest distance from it. None when rounding errors hide P > 0.
+    pub(super) fn of_dynamics(a: &DMatrix<f64>) -> Result<Option<Self>, Error> {
         let n = a.nrows();
         let Balance { matrix, scale } = Balance::of(a);
-        let order = f64::from(u32::try_from(n).unwrap_or(u32::MAX));
-        let center = matrix.trace() / order;
+        let center = mean_eigenvalue(a);
         let distance = |value: &Complex<f64>| (value - Complex::new(center, 0.0)).norm();
         let farthest = eigenvalues(a)?.iter().map(distance).fold(0.0, f64::max);
         let radius = (WIDER * farthest).max(0.1 * center.abs()).max(f64::MIN_POSITIVE);
@@ -39,39 +40,52 @@ impl Coordinates {
             power = &power * &power;
         }
         let p = (&p + p.transpose()) * 0.5;
-        let factor = p.cholesky().ok_or(Error::NotPositiveDefinite { matrix: "the scaling" })?;
+        let Some(factor) = p.cholesky() else { return Ok(None) };
         let root = factor.l().transpose();
         let inverse = inverse_of_upper(&root);
         let unit = power_of_two(center.abs() + radius);
-        Ok(Self::within(&scale, &root, &inverse, unit))
+        Ok(Some(Self::within(&scale, &root, &inverse, unit)))
     }
 
-    /// Coordinates in which all states are seen equally well through C in the time that `unit`
-    /// allows: T'T is the sum of the first n terms (C `A^k` / `unit^k`)' (C `A^k` / `unit^k`).
+    /// Coordinates in which all states are seen equally well through C by an observer whose
+    /// eigenvalues lie `speed` away from those of A: T'T is the sum of (C `M^k`)' (C `M^k`), k from 0 to
+    /// n - 1, with M = (A - c I) / speed, c the mean of the eigenvalues of A.
     pub(super) fn of_observation(
         a: &DMatrix<f64>,
         c: &DMatrix<f64>,
+        speed: f64,
         unit: f64,
     ) -> Result<Self, Error> {
         let (n, p) = (a.nrows(), c.nrows());
-        let mut seen = DMatrix::zeros(n * p, n);
-        let mut rows = c.clone();
-        for mut row in rows.row_iter_mut() {
-            let norm = row.norm();
-            row /= if norm > 0.0 { power_of_two(norm) } else { 1.0 };
-        }
+        let length = |norm: f64| if norm > 0.0 { 1.0 / power_of_two(norm) } else { 1.0 };
+        let moved = (a - DMatrix::identity(n, n) * mean_eigenvalue(a)) / speed;
+        let mut rows = multiply_rows(c, &DVector::from_fn(p, |row, _| length(c.row(row).norm())));
+        let mut seen = DMatrix::zeros(n * (p + 1), n);
         for k in 0..n {
             seen.rows_mut(k * p, p).copy_from(&rows);
-            rows = rows * a / unit;
+            rows *= &moved;
         }
-        let length = |norm: f64| if norm > 0.0 { 1.0 / power_of_two(norm) } else { 1.0 };
         let scale = DVector::from_fn(n, |at, _| length(seen.column(at).norm()));
-        let found = Singular::of(&multiply_columns(&seen, &scale))?;
-        let least = (found.values[0] / STRETCH).max(f64::MIN_POSITIVE);
-        let values = found.values.map(|value| value.max(least));
-        let root = multiply_columns(&found.right, &values).transpose();
-        let inverse = divide_columns(&found.right, &values);
+        seen = multiply_columns(&seen, &scale);
+        let hardly = seen.norm() / STRETCH;
+        seen.rows_mut(n * p, n).fill_diagonal(hardly);
+        let found = Singular::of(&seen.transpose())?;
+        let (directions, values) = (found.left.columns(0, n), found.values.rows(0, n).into_owned());
+        let root = multiply_rows(&directions.transpose(), &values);
+        let inverse = divide_columns(&directions.into_owned(), &values);
         Ok(Self::within(&scale, &root, &inverse, unit))
+    }
+
+    /// Coordinates in which P~ is the identity; None if it is not positive definite.
+    pub(super) fn refined(&self, p: &DMatrix<f64>) -> Option<Self> {
+        let root = p.clone().cholesky()?.l().transpose();
+        let from = &self.from * inverse_of_upper(&root);
+        Some(Self { to: root * &self.to, from, unit: self.unit })
+    }
+
+    /// Coordinates that suit A' as these suit A.
+    pub(super) fn transposed(&self) -> Self {
+        Self { to: self.from.transpose(), from: self.to.transpose(), unit: self.unit }
     }
 
     /// x = S y with S diagonal, x~ = `root` y.
@@ -110,6 +124,10 @@ impl Coordinates {
     pub(super) fn gain(&self, l: &DMatrix<f64>) -> DMatrix<f64> {
         &self.from * l * self.unit
     }
+}
+
+pub(super) fn mean_eigenvalue(a: &DMatrix<f64>) -> f64 {
+    a.trace() / f64::from(u32::try_from(a.nrows()).unwrap_or(u32::MAX))
 }
 
 fn inverse_of_upper(u: &DMatrix<f64>) -> DMatrix<f64> {

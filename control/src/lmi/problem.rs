@@ -188,6 +188,13 @@ impl Problem {
         Some((objective.at(&unknowns)[(0, 0)], unknowns))
     }
 
+    /// Unknowns as far inside of all requirements as possible, or as little outside: nothing is
+    /// checked.
+    pub(super) fn middle(&self) -> Option<DVector<f64>> {
+        let all: Vec<_> = self.requirements.iter().collect();
+        Some(self.most_inside(&all)?.1)
+    }
+
     /// The largest common slack, at most one, and where it is found.
     fn most_inside(&self, requirements: &[&Requirement]) -> Option<(f64, DVector<f64>)> {
         let mut extended = self.clone();

@@ -12,6 +12,8 @@ use nalgebra::{Complex, DMatrix};
 /// Part of the data by which inequalities are kept in the solver's coordinates.
 pub(super) const MARGIN: f64 = 2e-7;
 
+const NO_P: &str = "no P shows in double precision that the region is kept";
+
 /// A disc around a real number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Disc {
@@ -46,7 +48,7 @@ pub struct RegionCertificate {
     pub margin: f64,
 }
 
-/// How far inside a disc an eigenvalue is, as in "outside of".
+/// A part of a region and its name.
 struct Part {
     name: &'static str,
     shape: Shape,
@@ -124,6 +126,20 @@ impl Region {
     ) -> Vec<(&'static str, Affine)> {
         let parts = self.parts(domain, unit);
         parts.iter().map(|part| (part.name, part.shape.requirement(p, product))).collect()
+    }
+
+    /// Whether all parts have real numbers in common.
+    pub(super) fn has_real_numbers(&self, domain: Domain) -> bool {
+        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+        for part in self.parts(domain, 1.0) {
+            let (from, to) = match part.shape {
+                Shape::HalfPlane(decay) => (f64::NEG_INFINITY, -decay),
+                Shape::Disc(Disc { center, radius }) => (center - radius, center + radius),
+                Shape::Sector(_) => (f64::NEG_INFINITY, 0.0),
+            };
+            (low, high) = (low.max(from), high.min(to));
+        }
+        low < high
     }
 
     /// Names of the parts that an eigenvalue is outside of.
@@ -204,13 +220,26 @@ pub fn certify_region(
     region: &Region,
     domain: Domain,
 ) -> Result<Outcome<RegionCertificate>, Error> {
-    let n = check::square("A", a)?;
+    check::square("A", a)?;
     region.check(domain)?;
     let conflict = region.missed(&eigenvalues(a)?, domain);
     if !conflict.is_empty() {
         return Ok(Outcome::Infeasible { conflict });
     }
-    let coordinates = Coordinates::of_dynamics(a)?;
+    match Coordinates::of_dynamics(a)? {
+        Some(coordinates) => certify_in(&coordinates, a, region, domain),
+        None => Ok(Outcome::Trouble(NO_P)),
+    }
+}
+
+/// The same by a solution in given coordinates.
+pub(super) fn certify_in(
+    coordinates: &Coordinates,
+    a: &DMatrix<f64>,
+    region: &Region,
+    domain: Domain,
+) -> Result<Outcome<RegionCertificate>, Error> {
+    let n = a.nrows();
     let mut problem = Problem::new();
     let p = problem.symmetric(n);
     problem.always(&p, MARGIN);
@@ -223,7 +252,7 @@ pub fn certify_region(
         Outcome::Optimal(solution) => {
             verify(a, region, domain, coordinates.certificate(&solution.value(&p)))
         }
-        _ => Ok(Outcome::Trouble("no P shows in double precision that the region is kept")),
+        _ => Ok(Outcome::Trouble(NO_P)),
     }
 }
 

@@ -1,24 +1,13 @@
 //! Gains from inequalities.
 
-use super::affine::Affine;
-use super::coordinates::Coordinates;
-use super::gain::{Channel, GainBound, Levels, Norm, Terms, certify_gain};
-use super::region::{Disc, MARGIN, Region, RegionCertificate, certify_region};
-use super::{Outcome, Problem};
-use crate::balance::{divide_columns, divide_rows, power_of_two};
+use super::gain::{Channel, GainBound, Norm, certify_gain};
+use super::region::{Region, RegionCertificate, certify_region};
+use super::search::{Found, Wanted};
+use super::{Outcome, gain, region};
 use crate::domain::Domain;
-use crate::eigen::eigenvalues;
 use crate::{Error, check};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
-/// The bound for which a gain is designed, relative to the smallest one.
-const RELAXED_BOUND: f64 = 1.05;
-/// The norm of P L within which a gain is designed, relative to the smallest one.
-const RELAXED_GAIN: f64 = 2.0;
-/// P and P L stay below this in the solver's coordinates when only a bound is wanted.
-const LARGEST: f64 = 1e6;
-
-const NOT_FOUND: &str = "the smallest bound is not found";
 const NOT_PROVEN: &str = "the gain that was found does not prove to keep the requirements";
 
 /// What is wanted of the gain from a disturbance w to an output z.
@@ -60,13 +49,16 @@ pub struct Synthesis {
 /// augmented observer: (`A_0`, `C_0`), B = [0; -I] from the fault rate to the error [e; eps], or
 /// `-F_0` from the fault to [e; `f_hat`].
 ///
-/// Without a performance, and for a given bound, L exists if the region can be reached; with one P
-/// for all parts this is sufficient, for one part alone also necessary. Of all solutions the one
-/// with the smallest norm of Z (P >= I) is taken, in coordinates in which all states are seen equally
-/// well at the speed that the region wants. With a performance the smallest bound is sought and
-/// then kept within 5 %, as far inside of all inequalities as possible: at the smallest bound itself
-/// gains often grow without limit. Where faster is always better, that is without disturbance
-/// on the measurement, give a disc.
+/// Regions alone: L exists if all states are seen and the parts of the region have real numbers
+/// in common. P >= I and Z within twice the smallest norm possible are taken as far inside of all
+/// inequalities as can be. With a performance one P for all inequalities is sufficient, not
+/// necessary; the smallest bound is sought and then kept within 5 %, as far inside as can be, because
+/// at the smallest bound itself gains often grow without limit. Where faster is always better, that is
+/// without disturbance on the measurement, give a disc.
+///
+/// Coordinates: all states are seen equally well at the speed that the region wants; if no gain is
+/// found, three times those in which the nearest P becomes the identity. With a performance P and Z
+/// stay below 1e6 there, and a conflict with "gain" means: not within that.
 ///
 /// What is found is L; its region and its bound are then proven for A - L C as it is, by
 /// [`certify_region`] and [`certify_gain`], each with its own P. Requirements are named "decay",
@@ -116,8 +108,18 @@ pub fn observer_gain(
         check::shape("feed", &wanted.feed, (c.nrows(), k))?;
         check::positive("gamma", wanted.gamma.unwrap_or(1.0))?;
     }
-    let design = Design::new(a, c, *region, performance, domain)?;
-    design.gain()?.then(|gain| design.proven(gain))
+    let wanted = Wanted { a, c, region: *region, performance, domain };
+    wanted.search(|found| {
+        let dynamics = a - &found.gain * c;
+        let channel = performance.map(|wanted| Channel {
+            a: dynamics.clone(),
+            b: &wanted.disturbance - &found.gain * &wanted.feed,
+            c: wanted.output.clone(),
+            d: DMatrix::zeros(wanted.output.nrows(), wanted.disturbance.ncols()),
+        });
+        let wish = channel.zip(performance.map(|wanted| (wanted.norm, wanted.gamma)));
+        prove(found, &dynamics, region, wish, domain)
+    })
 }
 
 /// A state feedback K, u = K x: the eigenvalues of A + B K in a region, the gain from w to z bounded.
@@ -163,9 +165,15 @@ pub fn state_feedback(
         gamma: wanted.gamma,
     });
     let (a_turned, b_turned) = (a.transpose(), b.transpose());
-    let design = Design::new(&a_turned, &b_turned, *region, turned.as_ref(), domain)?;
-    design.gain()?.then(|l| {
-        let gain = -l.transpose();
+    let wanted = Wanted {
+        a: &a_turned,
+        c: &b_turned,
+        region: *region,
+        performance: turned.as_ref(),
+        domain,
+    };
+    wanted.search(|found| {
+        let gain = -found.gain.transpose();
         let dynamics = a + b * &gain;
         let channel = performance.map(|wanted| Channel {
             a: dynamics.clone(),
@@ -174,163 +182,36 @@ pub fn state_feedback(
             d: DMatrix::zeros(wanted.output.nrows(), wanted.disturbance.ncols()),
         });
         let wish = channel.zip(performance.map(|wanted| (wanted.norm, wanted.gamma)));
-        prove(gain, &dynamics, region, wish, domain)
+        let found = Found { gain, coordinates: found.coordinates.transposed() };
+        prove(found, &dynamics, region, wish, domain)
     })
 }
 
-/// The search for L in the solver's coordinates.
-struct Design<'a> {
-    a: &'a DMatrix<f64>,
-    c: &'a DMatrix<f64>,
-    region: Region,
-    performance: Option<&'a Performance>,
-    domain: Domain,
-    coordinates: Coordinates,
-    /// Sizes of the rows of C in the coordinates.
-    rows: DVector<f64>,
-}
-
-impl<'a> Design<'a> {
-    fn new(
-        a: &'a DMatrix<f64>,
-        c: &'a DMatrix<f64>,
-        region: Region,
-        performance: Option<&'a Performance>,
-        domain: Domain,
-    ) -> Result<Self, Error> {
-        let coordinates = Coordinates::of_observation(a, c, speed(a, &region, domain)?)?;
-        let seen = coordinates.output(c);
-        let rows = DVector::from_fn(c.nrows(), |row, _| {
-            let norm = seen.row(row).norm();
-            if norm > 0.0 { power_of_two(norm) } else { 1.0 }
-        });
-        Ok(Self { a, c, region, performance, domain, coordinates, rows })
-    }
-
-    /// L of the given coordinates: the smallest level first, then the middle of what is within
-    /// reach of it.
-    fn gain(&self) -> Result<Outcome<DMatrix<f64>>, Error> {
-        let given = self.performance.and_then(|wanted| Some((wanted, wanted.gamma?)));
-        if let Some((wanted, gamma)) = given {
-            return self.solve(self.levels(wanted).level(gamma));
-        }
-        let relaxed = match self.performance {
-            None => RELAXED_GAIN,
-            Some(wanted) if wanted.norm == Norm::HInfinity => RELAXED_BOUND,
-            Some(_) => RELAXED_BOUND * RELAXED_BOUND,
-        };
-        let (problem, ..) = self.problem(None);
-        match problem.smallest() {
-            Some((smallest, _)) => self.solve(smallest * relaxed),
-            None => problem.solve()?.then(|_| Ok(Outcome::Trouble(NOT_FOUND))),
-        }
-    }
-
-    fn levels(&self, wanted: &Performance) -> Levels {
-        let b = self.coordinates.input(&wanted.disturbance);
-        let e = self.coordinates.output(&wanted.output);
-        Levels::of(wanted.norm, &b, &e, self.coordinates.unit)
-    }
-
-    fn solve(&self, level: f64) -> Result<Outcome<DMatrix<f64>>, Error> {
-        let (problem, [p, z], _) = self.problem(Some(level));
-        problem.solve()?.then(|solution| {
-            let (p, z) = (solution.value(&p), solution.value(&z));
-            let Some(factor) = p.cholesky() else {
-                return Ok(Outcome::Trouble("P is not positive definite in double precision"));
-            };
-            let scaled = divide_columns(&factor.solve(&z), &self.rows);
-            Ok(Outcome::Optimal(self.coordinates.gain(&scaled)))
-        })
-    }
-
-    /// The problem, its P and Z, and the level: given, or to be minimised.
-    fn problem(&self, level: Option<f64>) -> (Problem, [Affine; 2], Affine) {
-        let (n, outputs) = (self.a.nrows(), self.c.nrows());
-        let unit = self.coordinates.unit;
-        let c = divide_rows(&self.coordinates.output(self.c), &self.rows);
-        let mut problem = Problem::new();
-        let (p, z) = (problem.symmetric(n), problem.rectangular(n, outputs));
-        let dynamics = &(&p * &self.coordinates.dynamics(self.a)) - &(&z * &c);
-        for (name, matrix) in self.region.requirements(&p, &dynamics, self.domain, unit) {
-            problem.require(name, &matrix, MARGIN);
-        }
-        let size = |bound: &Affine| {
-            let square = |order: usize| bound.times(&DMatrix::identity(order, order));
-            Affine::blocks(&[&[&square(n), &z], &[&z.transpose(), &square(outputs)]])
-        };
-        let value = level.map_or_else(|| problem.scalar(), |value| Affine::identity(1, value));
-        if level.is_none() {
-            problem.minimise(&value);
-        }
-        let Some(wanted) = self.performance else {
-            problem.always(&p, 1.0);
-            problem.always(&size(&value), MARGIN);
-            return (problem, [p, z], value);
-        };
-        let largest = Affine::identity(1, LARGEST);
-        problem.always(&p, MARGIN);
-        problem.always(&(&Affine::identity(n, LARGEST) - &p), MARGIN);
-        problem.always(&size(&largest), MARGIN);
-        let levels = self.levels(wanted);
-        let feed = divide_rows(&wanted.feed, &self.rows);
-        let (b, e, _) = levels.scale(
-            &self.coordinates.input(&wanted.disturbance),
-            &self.coordinates.output(&wanted.output),
-            &wanted.feed,
-        );
-        let input = &(&p * &b) - &(&z * &(feed / levels.disturbance()));
-        let feed = Affine::zeros(e.nrows(), b.ncols());
-        let output = Affine::constant(&e);
-        let terms = Terms { p: p.clone(), dynamics, input, output, feed, level: value.clone() };
-        for matrix in terms.requirements(wanted.norm, self.domain) {
-            problem.require("gain", &matrix, MARGIN);
-        }
-        (problem, [p, z], value)
-    }
-
-    fn proven(&self, gain: DMatrix<f64>) -> Result<Outcome<Synthesis>, Error> {
-        let dynamics = self.a - &gain * self.c;
-        let wish = self.performance.map(|wanted| {
-            let b = &wanted.disturbance - &gain * &wanted.feed;
-            let d = DMatrix::zeros(wanted.output.nrows(), b.ncols());
-            let channel = Channel { a: dynamics.clone(), b, c: wanted.output.clone(), d };
-            (channel, (wanted.norm, wanted.gamma))
-        });
-        prove(gain, &dynamics, &self.region, wish, self.domain)
-    }
-}
-
-/// Radius of the part of the plane that matters: of the region, or of the eigenvalues of A.
-fn speed(a: &DMatrix<f64>, region: &Region, domain: Domain) -> Result<f64, Error> {
-    if domain != Domain::Continuous {
-        return Ok(1.0);
-    }
-    let own = eigenvalues(a)?.iter().fold(0.0_f64, |size, value| size.max(value.norm()));
-    let disc = region.disc.map_or(0.0, |Disc { center, .. }| center.abs());
-    let wanted = region.decay.unwrap_or(0.0).max(disc);
-    let speed = if wanted > 0.0 { wanted } else { own };
-    Ok(if speed > 0.0 { power_of_two(speed) } else { 1.0 })
-}
-
-/// The proofs for a gain that was found.
+/// The proofs for a gain that was found, in the coordinates of its search or in its own.
 fn prove(
-    gain: DMatrix<f64>,
+    found: Found,
     dynamics: &DMatrix<f64>,
     region: &Region,
     wish: Option<(Channel, (Norm, Option<f64>))>,
     domain: Domain,
 ) -> Result<Outcome<Synthesis>, Error> {
-    let Some(region) = certify_region(dynamics, region, domain)?.optimal() else {
-        return Ok(Outcome::Trouble(NOT_PROVEN));
+    let Found { gain, coordinates } = found;
+    let certificate = match region::certify_in(&coordinates, dynamics, region, domain)?.optimal() {
+        None => certify_region(dynamics, region, domain)?.optimal(),
+        certificate => certificate,
     };
+    let Some(region) = certificate else { return Ok(Outcome::Trouble(NOT_PROVEN)) };
     let Some((channel, (norm, gamma))) = wish else {
         return Ok(Outcome::Optimal(Synthesis { gain, region, bound: None }));
     };
-    match certify_gain(&channel, norm, domain)?.optimal() {
-        Some(bound) if bound.gamma <= gamma.unwrap_or(f64::INFINITY) => {
-            Ok(Outcome::Optimal(Synthesis { gain, region, bound: Some(bound) }))
-        }
-        _ => Ok(Outcome::Trouble(NOT_PROVEN)),
-    }
+    let kept = |bound: &GainBound| bound.gamma <= gamma.unwrap_or(f64::INFINITY);
+    let own = gain::certify_in(coordinates, &channel, norm, domain)?.optimal().filter(kept);
+    let bound = match own {
+        None => certify_gain(&channel, norm, domain)?.optimal().filter(kept),
+        bound => bound,
+    };
+    Ok(match bound {
+        None => Outcome::Trouble(NOT_PROVEN),
+        bound => Outcome::Optimal(Synthesis { gain, region, bound }),
+    })
 }

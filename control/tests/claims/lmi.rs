@@ -355,3 +355,13 @@ fn bad_arguments_are_refused_by_name() {
     let refused = certify_gain(&channel, Norm::EnergyToPeak, Domain::Continuous);
     assert!(matches!(refused, Err(Error::OutOfRange { name: "D", .. })));
 }
+
+/// One output, five states coupled at random, eigenvalues a thousand times faster than the plant's: the
+/// observer exists, but rounding its gain moves the eigenvalues out of the disc.
+#[test]
+fn what_is_lost_in_rounding_is_no_conflict() {
+    let a = crate::integers(5, 5, |i, j| (7 * i * i + 3 * j + 5 * i * j) % 11 - 5);
+    let c = crate::integers(1, 5, |_, j| (3 * j) % 5 - 1);
+    let found = observer_gain(&a, &c, &disc(-20000.0, 2000.0), None, Domain::Continuous).unwrap();
+    assert!(matches!(found, Outcome::Trouble(_)), "{found:?}");
+}

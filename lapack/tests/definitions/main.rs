@@ -6,9 +6,10 @@ extern crate lapack_src as _;
 
 use nalgebra::DMatrix;
 
-mod decompositions;
 mod products;
+mod singular;
 mod solvers;
+mod spectrum;
 
 /// What stands in an array where no routine may write.
 const GUARD: f64 = 12345.0;
@@ -56,4 +57,14 @@ fn assert_orthonormal(m: &DMatrix<f64>) {
     let product = m.transpose() * m;
     let error = (&product - DMatrix::identity(m.ncols(), m.ncols())).amax();
     assert!(error < 1e-14 * 8.0, "{error:e}");
+}
+
+/// Largest entry times the order: a bound of the norm that neither overflows nor underflows.
+fn size(a: &DMatrix<f64>) -> f64 {
+    a.amax() * f64::from(int(a.nrows().max(a.ncols())))
+}
+
+/// The length that a routine asks for in the first entry of its workspace.
+fn asked(work: &[f64]) -> i32 {
+    (1..1000).find(|&length| f64::from(length) >= work[0]).unwrap()
 }
