@@ -29,7 +29,9 @@ pub struct Certificate {
     /// Norm of the residual of (12) relative to that of alpha beta I. Below 1 / sqrt(n + q) the
     /// computed P, rounding included, shows the error dynamics stable.
     pub defect: f64,
-    /// Radius (16) of the region that the error [e; `f_hat`] ends in.
+    /// Radius (16): V = z' P z falls wherever the norm of z = [e; `f_hat`] is larger. The paper says that
+    /// the error ends in that ball; what follows is that it ends in the smallest ellipsoid z' P z =
+    /// constant around it, whose longest axis is sqrt(cond P) times as long.
     pub delta: f64,
     /// Rank of (A, B); full.
     pub controllability: Rank,

@@ -132,8 +132,8 @@ impl Designed {
         all
     }
 
-    /// As stated; else ten times the slowest time constant of the feedback in 1000 steps or more, or
-    /// in steps of the sample time.
+    /// As stated; else about ten times the slowest time constant of the feedback in 2000 steps, or in
+    /// steps of the sample time.
     fn experiment(&self, file: &PlantFile<'_>) -> Result<Experiment, control::Error> {
         let slowest = self.slowest()?;
         let stop_time = file.stop_time.unwrap_or_else(|| round(10.0 / slowest));
@@ -151,11 +151,15 @@ fn per_second(unit: &str) -> Option<String> {
     Unit::parse(&slope).is_ok().then_some(slope)
 }
 
-/// The nearest of 1, 2, 5 times a power of ten, not above `x`.
+/// The nearest of 1, 2, 5 times a power of ten, on the logarithmic scale.
 fn round(x: f64) -> f64 {
-    let power = 10_f64.powf(x.log10().floor());
-    let factor = [5.0, 2.0].into_iter().find(|factor| factor * power <= x).unwrap_or(1.0);
-    factor * power
+    let exponent = x.log10().floor();
+    let part = x.log10() - exponent;
+    let distance = |factor: &f64| (factor.log10() - part).abs();
+    let factors = [1.0, 2.0, 5.0, 10.0].into_iter();
+    let factor = factors.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(1.0);
+    // A division rounds 0.1, 0.01 and so on to the nearest double; a product does not.
+    if exponent < 0.0 { factor / 10_f64.powf(-exponent) } else { factor * 10_f64.powf(exponent) }
 }
 
 impl DesignFile<'_> {
