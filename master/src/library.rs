@@ -251,7 +251,7 @@ impl Drop for Component {
         }
         if let (Some(snapshot), false) = (&self.library.snapshot, self.saved.is_null()) {
             // SAFETY: the instance is alive, the state is its own.
-            unsafe { (snapshot.free_fmu_state)(self.pointer, &raw mut self.saved) };
+            unsafe { (snapshot.free)(self.pointer, &raw mut self.saved) };
         }
         // SAFETY: the instance is alive and not used again.
         unsafe { (self.library.common.free_instance)(self.pointer) };

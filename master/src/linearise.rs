@@ -75,8 +75,10 @@ pub struct Linearise {
 /// * Steps in co-simulation: pulses of each input over up to 512 steps, central differences in
 ///   their height, least squares for the step map [Phi, Gamma], its logarithm, for steps of h, 2 h and
 ///   4 h, extrapolated to h = 0. The map must foretell another course of the inputs within 1 %.
-///   About 50 runs for each input. Away from an equilibrium the FMU drifts while it is
-///   tested; the error estimates say how much that matters.
+///   About 50 runs for each input. Away from an equilibrium the FMU drifts while it is tested: the
+///   map then changes with time in a straight line, and counts at the begin. What the FMU's own
+///   integration errs shows in the error estimates where its inner steps follow the communication
+///   step, and is otherwise part of the plant.
 ///
 /// # Example
 ///

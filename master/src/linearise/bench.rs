@@ -15,6 +15,8 @@ const RESPONSE: f64 = 1e-2;
 const TRIAL: f64 = 1e-2;
 const SMALLEST: f64 = 1e-6;
 const LARGEST: f64 = 0.1;
+/// The drift over a record, in typical sizes, that a fit must know of.
+const DRIFT: f64 = 1e-6;
 /// Heights of the pulses whose responses are extrapolated to the height zero, each half of the last.
 const HEIGHTS: usize = 3;
 
@@ -135,6 +137,13 @@ impl<'p> Bench<'p> {
         (0..self.states.len()).map(|k| self.rest[(1, k)] - self.rest[(0, k)]).collect()
     }
 
+    /// The largest drift of a state over the whole course, in its typical size.
+    fn largest_drift(&self) -> f64 {
+        let last = self.rest.nrows() - 1;
+        let drift = |k: usize| (self.rest[(last, k)] - self.rest[(0, k)]).abs() / self.scale(k);
+        (0..self.states.len()).map(drift).fold(0.0, f64::max)
+    }
+
     /// A pulse of `input` over the first half of `count` steps, small enough for all states, and
     /// its response per unit, of which `heights` are extrapolated.
     pub(super) fn pulse(
@@ -169,6 +178,8 @@ impl<'p> Bench<'p> {
             change: DMatrix::zeros(rows, n),
             outputs: DMatrix::zeros(rows, self.parts.outputs.len()),
             pulses: Vec::with_capacity(m),
+            count,
+            drifts: false,
         };
         for input in 0..m {
             let (pulse, response) = self.pulse(input, count, heights)?;
@@ -189,6 +200,7 @@ impl<'p> Bench<'p> {
             }
             record.pulses.push(pulse);
         }
+        record.drifts = self.largest_drift() > DRIFT;
         Ok(record)
     }
 }
@@ -204,9 +216,37 @@ pub(super) struct Record {
     /// Outputs at the end of the step.
     pub(super) outputs: DMatrix<f64>,
     pub(super) pulses: Vec<Pulse>,
+    /// Steps after each pulse.
+    count: usize,
+    /// The operating point moves meanwhile.
+    pub(super) drifts: bool,
+}
+
+impl Record {
+    /// What the change of the states is fitted to.
+    pub(super) fn for_change(&self) -> DMatrix<f64> {
+        self.with_time(&self.before, 0)
+    }
+
+    /// What the outputs are fitted to.
+    pub(super) fn for_outputs(&self) -> DMatrix<f64> {
+        self.with_time(&self.after, 1)
+    }
+
+    /// X, and in a drift [X, t X] with the part t of the record that is over: coefficients that
+    /// change with time in a straight line.
+    fn with_time(&self, x: &DMatrix<f64>, first: usize) -> DMatrix<f64> {
+        let columns = x.ncols();
+        DMatrix::from_fn(x.nrows(), if self.drifts { 2 * columns } else { columns }, |i, j| {
+            if j < columns {
+                return x[(i, j)];
+            }
+            x[(i, j - columns)] * index(i % self.count + first) / index(self.count)
+        })
+    }
 }
 
 /// A count as a number.
-fn index(count: usize) -> f64 {
+pub(super) fn index(count: usize) -> f64 {
     f64::from(u32::try_from(count).unwrap_or(u32::MAX))
 }

@@ -170,7 +170,7 @@ pub enum LineariseError {
     #[error(
         "the variables named as states do not say how the FMU goes on: a course of the inputs that \
          was not used for the fit is missed by {missed:e} of the response, allowed is {allowed:e}; \
-         name all states, or take a shorter step"
+         name all states, take a shorter step, or a point nearer to an equilibrium"
     )]
     NotStates {
         /// Largest relative difference.

@@ -76,7 +76,7 @@ pub enum Method {
         /// Of what.
         how: Differences,
         /// Estimated error of each entry.
-        errors: Matrices,
+        errors: Box<Matrices>,
     },
 }
 
@@ -265,19 +265,7 @@ pub(super) fn assemble(
     };
     let mut inputs = signals(&parts.inputs, &found.u);
     let faults = inputs.split_off(parts.controlled);
-    let blocks = |m: &DMatrix<f64>| {
-        let rates = m.select_rows(&chosen);
-        let outputs = m.rows(all, parts.outputs.len()).into_owned();
-        let (m, q) = (parts.controlled, parts.inputs.len() - parts.controlled);
-        Matrices {
-            a: rates.select_columns(&chosen),
-            b: rates.columns(all, m).into_owned(),
-            f: rates.columns(all + m, q).into_owned(),
-            c: outputs.select_columns(&chosen),
-            d: outputs.columns(all, m).into_owned(),
-            g: outputs.columns(all + m, q).into_owned(),
-        }
-    };
+    let blocks = |m: &DMatrix<f64>| blocks(m, &chosen, all, parts);
     let scales = super::scales(&found.states, &found.x, &parts.inputs, &found.u);
     let residual = |&row: &usize| {
         let terms = scales.iter().enumerate();
@@ -297,10 +285,26 @@ pub(super) fn assemble(
                 Method::DirectionalDerivatives { interface, disagreement }
             }
             How::Differences(how, errors) => {
-                Method::FiniteDifferences { how, errors: blocks(&errors) }
+                Method::FiniteDifferences { how, errors: Box::new(blocks(&errors)) }
             }
         },
     })
+}
+
+/// The blocks of a matrix whose first rows and columns belong to `all` states, of which some are
+/// chosen.
+fn blocks(m: &DMatrix<f64>, chosen: &[usize], all: usize, parts: &Parts) -> Matrices {
+    let rates = m.select_rows(chosen);
+    let outputs = m.rows(all, parts.outputs.len()).into_owned();
+    let (controlled, faults) = (parts.controlled, parts.inputs.len() - parts.controlled);
+    Matrices {
+        a: rates.select_columns(chosen),
+        b: rates.columns(all, controlled).into_owned(),
+        f: rates.columns(all + controlled, faults).into_owned(),
+        c: outputs.select_columns(chosen),
+        d: outputs.columns(all, controlled).into_owned(),
+        g: outputs.columns(all + controlled, faults).into_owned(),
+    }
 }
 
 /// Positions of the states of the request among those found; nothing that is kept depends on one

@@ -3,7 +3,7 @@
 
 use nalgebra::DMatrix;
 
-use super::bench::{Bench, Record};
+use super::bench::{Bench, Record, index};
 use super::differences::{Side, extrapolate};
 use super::fit::{Directions, least_squares};
 use super::logarithm::logarithm_of_one_plus;
@@ -14,8 +14,10 @@ use crate::fmu::Fmu;
 /// Steps of the record: the first trial at least, and the last.
 const FEWEST: usize = 8;
 const MOST: usize = 512;
-/// Contrast of the directions that is good, and the least that is accepted.
+/// Contrast of the directions that is good, at rest and where the operating point drifts, and the
+/// least that is accepted.
 const GOOD: f64 = 1e-3;
+const GOOD_IN_DRIFT: f64 = 1e-5;
 const LEAST: f64 = 1e-8;
 /// The step map is found for these multiples of the step, and extrapolated to the step zero.
 const MULTIPLES: [f64; 3] = [4.0, 2.0, 1.0];
@@ -49,7 +51,18 @@ struct Map {
 struct Discrete {
     change: DMatrix<f64>,
     outputs: DMatrix<f64>,
+    /// What both gain from the begin of the record to its end; no columns where nothing drifts.
+    slope: [DMatrix<f64>; 2],
     deviations: DMatrix<f64>,
+}
+
+impl Discrete {
+    /// `change` or `outputs` times [x; u] at a part of the record.
+    fn times(&self, which: usize, part: f64, known: &DMatrix<f64>) -> DMatrix<f64> {
+        let now = [&self.change, &self.outputs][which] * known;
+        let slope = &self.slope[which];
+        if slope.ncols() == 0 { now } else { now + slope * known * part }
+    }
 }
 
 /// Linearises by steps of `step` s and its multiples.
@@ -111,8 +124,9 @@ fn count(bench: &mut Bench, parts: &Parts, states: &[Part]) -> Result<usize, Lin
             Err(_) if best.is_some() => break,
             Err(error) => return Err(error),
         };
-        let directions = Directions::of(&record.before);
-        let good = directions.contrast >= GOOD;
+        let directions = Directions::of(&record.for_change());
+        let wanted = if record.drifts { GOOD_IN_DRIFT } else { GOOD };
+        let good = directions.contrast >= wanted;
         if best.as_ref().is_none_or(|(_, known)| directions.contrast > known.contrast) {
             best = Some((count, directions));
         }
@@ -130,6 +144,9 @@ fn count(bench: &mut Bench, parts: &Parts, states: &[Part]) -> Result<usize, Lin
 fn unreachable(directions: Option<Directions>, parts: &Parts, states: &[Part]) -> LineariseError {
     let names: Vec<&Part> = states.iter().chain(&parts.inputs).collect();
     let weak = directions.map(|directions| directions.weak(LEAST)).unwrap_or_default();
+    let mut weak: Vec<usize> = weak.into_iter().map(|column| column % names.len()).collect();
+    weak.sort_unstable();
+    weak.dedup();
     LineariseError::Unreachable {
         rank: names.len() - weak.len(),
         expected: names.len(),
@@ -138,22 +155,27 @@ fn unreachable(directions: Option<Directions>, parts: &Parts, states: &[Part]) -
 }
 
 fn fit(record: &Record, parts: &Parts, states: &[Part]) -> Result<Discrete, LineariseError> {
-    let unreachable = || unreachable(Some(Directions::of(&record.before)), parts, states);
-    let change = least_squares(&record.before, &record.change).ok_or_else(unreachable)?;
-    let outputs = least_squares(&record.after, &record.outputs).ok_or_else(unreachable)?;
+    let (x, width) = (record.for_change(), record.before.ncols());
+    let unreachable = || unreachable(Some(Directions::of(&x)), parts, states);
+    let change = least_squares(&x, &record.change).ok_or_else(unreachable)?;
+    let outputs = least_squares(&record.for_outputs(), &record.outputs).ok_or_else(unreachable)?;
+    let at_zero = |of: &DMatrix<f64>| of.rows(0, width).transpose();
+    let slope = |of: &DMatrix<f64>| of.rows(width, of.nrows() - width).transpose();
     let mut discrete = Discrete {
-        change: change.solution.transpose(),
-        outputs: outputs.solution.transpose(),
-        deviations: DMatrix::zeros(states.len() + parts.outputs.len(), record.before.ncols()),
+        change: at_zero(&change.solution),
+        outputs: at_zero(&outputs.solution),
+        slope: [slope(&change.solution), slope(&outputs.solution)],
+        deviations: DMatrix::zeros(states.len() + parts.outputs.len(), width),
     };
     let deviations = &mut discrete.deviations;
-    deviations.rows_mut(0, states.len()).copy_from(&change.deviations.transpose());
+    deviations.rows_mut(0, states.len()).copy_from(&at_zero(&change.deviations));
     let mut below = deviations.rows_mut(states.len(), parts.outputs.len());
-    below.copy_from(&outputs.deviations.transpose());
+    below.copy_from(&at_zero(&outputs.deviations));
     for (row, output) in parts.outputs.iter().enumerate() {
         if let Some(state) = states.iter().position(|part| part.reference == output.reference) {
             discrete.outputs.row_mut(row).fill(0.0);
             discrete.outputs[(row, state)] = 1.0;
+            discrete.slope[1].row_mut(row).fill(0.0);
             discrete.deviations.row_mut(states.len() + row).fill(0.0);
         }
     }
@@ -213,7 +235,7 @@ fn missed(
     let n = discrete.change.nrows();
     let shape = |step: usize, input: usize| {
         let (side, height) = record.pulses[input];
-        let on = (step / 2 + input).count_ones() % 2 == 0;
+        let on = (step / 2 + input).count_ones().is_multiple_of(2);
         let sign = if side == Side::Below { -1.0 } else { 1.0 };
         if on { 0.5 * sign * height } else { 0.0 }
     };
@@ -227,8 +249,9 @@ fn missed(
             let inputs = (0..record.pulses.len()).map(|input| shape(step, input));
             DMatrix::from_iterator(discrete.change.ncols(), 1, state.iter().copied().chain(inputs))
         };
-        state += &discrete.change * with_inputs(&state);
-        let outputs = &discrete.outputs * with_inputs(&state);
+        let part = |step: usize| index(step) / index(count);
+        state += discrete.times(0, part(step), &with_inputs(&state));
+        let outputs = discrete.times(1, part(step + 1), &with_inputs(&state));
         for (column, value) in state.iter().chain(outputs.iter()).enumerate() {
             expected[(step + 1, column)] = *value;
         }
