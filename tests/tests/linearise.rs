@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use fmi2::package::{Package, Unpacked};
-use master::linearise::{Differences, Disagreement, Method};
+use master::linearise::{Disagreement, Method};
 use master::{Fmu, Interface, Linearisation, Linearise, LineariseError, linearise};
 use nalgebra::DMatrix;
 use tests::{dist, root, run};
@@ -102,7 +102,7 @@ fn expect_within_errors(found: &Linearisation, expected: &DMatrix<f64>) {
 }
 
 /// The pendulum without friction, moving so slowly that it does not stick, and its A, B, F of the
-/// formulas under equation (20) of the paper for x = [x_p, theta, v_p, omega].
+/// formulas under equation (20) of the paper for the states in their order.
 fn pendulum(linearised: &str) -> (Linearise, DMatrix<f64>) {
     let request = Linearise {
         inputs: names(&["u"]),
@@ -243,26 +243,13 @@ fn steps_away_from_an_equilibrium_are_within_their_error_and_the_drift_is_report
 }
 
 #[test]
-fn steps_of_a_falling_pendulum_agree_with_its_directional_derivatives_within_their_error() {
+fn steps_of_a_falling_pendulum_tell_too_little_and_are_refused() {
     let (mut request, _) = pendulum("false");
-    for (name, value) in &mut request.at {
-        match name.as_str() {
-            "theta_0" => "0.3".clone_into(value),
-            "v_p_0" => "0.2".clone_into(value),
-            _ => {}
-        }
-    }
-    request.at.extend(at(&[("omega_0", "0.5"), ("u", "3")]));
-    let expected = linearise(&open("FrictionPendulum.fmu"), &request).unwrap();
+    request.at.retain(|(name, _)| name != "theta_0");
+    request.at.extend(at(&[("theta_0", "0.3"), ("omega_0", "0.5"), ("u", "3")]));
     request.states = names(&["x_p", "theta", "v_p", "omega"]);
-    let found = linearise(&changed("FrictionPendulum.fmu", steps_only), &request).unwrap();
-    println!("{} {:e}", found.method, found.relative_error().unwrap());
-    println!("{}", found.matrices.joined() - &expected.matrices.joined());
-    expect_close(&found, &expected.matrices.joined(), 1e-3);
-    expect_within_errors(&found, &expected.matrices.joined());
-    for (rate, expected) in found.rates.iter().zip(&expected.rates) {
-        assert!((rate - expected).abs() < 1e-4 * expected.abs(), "{rate} {expected}");
-    }
+    let refusal = linearise(&changed("FrictionPendulum.fmu", steps_only), &request).unwrap_err();
+    assert!(refusal.to_string().contains("a point nearer to an equilibrium"), "{refusal}");
 }
 
 #[test]
@@ -406,12 +393,4 @@ fn what_is_missing_for_steps_from_an_fmu_state_is_said() {
     });
     let parts = ["none of the three ways", "providesDirectionalDerivative", "canGetAndSetFMUstate"];
     expect_refusal(&nothing, &parts, states(&["level", "flow"]));
-    let (request, _) = tank();
-    let in_steps = Linearise { states: names(&["level", "flow"]), ..request };
-    let Method::FiniteDifferences { how: Differences::OfSteps { step, .. }, .. } =
-        linearise(&fmu, &in_steps).unwrap().method
-    else {
-        panic!("steps")
-    };
-    assert_eq!(step.to_bits(), 0.05_f64.to_bits());
 }

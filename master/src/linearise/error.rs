@@ -178,6 +178,17 @@ pub enum LineariseError {
         /// The largest one allowed.
         allowed: f64,
     },
+    /// The steps tell too little.
+    #[error(
+        "steps from an FMU state give the matrices to {relative:e} only, allowed is {allowed}; \
+         take a point nearer to an equilibrium, another step, or an FMU for model exchange"
+    )]
+    Inaccurate {
+        /// The largest relative error.
+        relative: f64,
+        /// The largest one allowed.
+        allowed: f64,
+    },
     /// The step map has no real logarithm.
     #[error(
         "no continuous system has the steps of {step} s that the FMU makes: their matrix has no \

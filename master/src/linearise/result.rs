@@ -149,8 +149,7 @@ impl Linearisation {
         let columns = self.states.iter().chain(&self.inputs).chain(&self.faults);
         let sizes: Vec<f64> = columns.map(|signal| signal.typical).collect();
         let (values, errors) = (self.matrices.joined(), errors.joined());
-        let relative = |row| ratio(row_size(&errors, row, &sizes), row_size(&values, row, &sizes));
-        Some((0..values.nrows()).map(relative).fold(0.0, f64::max))
+        Some(relative_error(&errors, &values, &sizes))
     }
 }
 
@@ -212,6 +211,12 @@ fn ratio(part: f64, whole: f64) -> f64 {
 /// The largest entry of a row in units of the typical sizes.
 fn row_size(jacobian: &DMatrix<f64>, row: usize, scales: &[f64]) -> f64 {
     scales.iter().enumerate().map(|(j, scale)| jacobian[(row, j)].abs() * scale).fold(0.0, f64::max)
+}
+
+/// The largest error relative to the largest entry of its row, in units of the typical sizes.
+pub(super) fn relative_error(errors: &DMatrix<f64>, values: &DMatrix<f64>, scales: &[f64]) -> f64 {
+    let relative = |row| ratio(row_size(errors, row, scales), row_size(values, row, scales));
+    (0..values.nrows()).map(relative).fold(0.0, f64::max)
 }
 
 /// Where directional derivatives and differences lie furthest apart, beyond their error.
