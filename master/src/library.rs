@@ -123,6 +123,12 @@ fn c_string(text: &str) -> CString {
     CString::new(text.replace('\0', "")).unwrap_or_default()
 }
 
+/// The callback of `logger.c`.
+fn logger() -> fmi2CallbackLogger {
+    // SAFETY: both are pointers to functions; C calls it with the logger's signature.
+    unsafe { std::mem::transmute::<unsafe extern "C" fn(), fmi2CallbackLogger>(master_logger) }
+}
+
 /// `fmi2Type`: what an instance is made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interface {
@@ -181,12 +187,8 @@ impl Library {
         resources: &str,
     ) -> Result<Component, LoadError> {
         let sink = Arc::new(Sink { receive, messages: Mutex::default() });
-        // SAFETY: both are pointers to functions; C calls it with the logger's signature.
-        let logger = unsafe {
-            std::mem::transmute::<unsafe extern "C" fn(), fmi2CallbackLogger>(master_logger)
-        };
         let callbacks = Rc::new(fmi2CallbackFunctions {
-            logger: Some(logger),
+            logger: Some(logger()),
             allocate_memory: Some(calloc),
             free_memory: Some(free),
             step_finished: None,
@@ -251,7 +253,7 @@ impl Drop for Component {
         }
         if let (Some(snapshot), false) = (&self.library.snapshot, self.saved.is_null()) {
             // SAFETY: the instance is alive, the state is its own.
-            unsafe { (snapshot.free_fmu_state)(self.pointer, &raw mut self.saved) };
+            unsafe { (snapshot.free)(self.pointer, &raw mut self.saved) };
         }
         // SAFETY: the instance is alive and not used again.
         unsafe { (self.library.common.free_instance)(self.pointer) };

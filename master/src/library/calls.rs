@@ -175,7 +175,7 @@ impl Component {
     /// `fmi2GetFMUstate`: keeps the state of now, in place of the one kept before.
     pub(crate) fn save(&mut self) -> Result<(), CallError> {
         let name = "fmi2GetFMUstate";
-        let function = self.library.snapshot(name)?.get_fmu_state;
+        let function = self.library.snapshot(name)?.get;
         // SAFETY: the instance is alive; the state is null or its own.
         let status = unsafe { function(self.pointer, &raw mut self.saved) };
         self.check(name, status)
@@ -185,7 +185,7 @@ impl Component {
     pub(crate) fn restore(&mut self) -> Result<(), CallError> {
         let name = "fmi2SetFMUstate";
         assert!(!self.saved.is_null(), "a state is kept");
-        let function = self.library.snapshot(name)?.set_fmu_state;
+        let function = self.library.snapshot(name)?.set;
         // SAFETY: the instance is alive; the state is its own.
         let status = unsafe { function(self.pointer, self.saved) };
         self.check(name, status)

@@ -102,10 +102,10 @@ functions! {
 functions! {
     /// `canGetAndSetFMUstate`.
     Snapshot {
-        get_fmu_state = "fmi2GetFMUstate":
+        get = "fmi2GetFMUstate":
             fn(fmi2Component, *mut fmi2FMUstate) -> fmi2Status;
-        set_fmu_state = "fmi2SetFMUstate": fn(fmi2Component, fmi2FMUstate) -> fmi2Status;
-        free_fmu_state = "fmi2FreeFMUstate":
+        set = "fmi2SetFMUstate": fn(fmi2Component, fmi2FMUstate) -> fmi2Status;
+        free = "fmi2FreeFMUstate":
             fn(fmi2Component, *mut fmi2FMUstate) -> fmi2Status;
     }
 }

@@ -15,6 +15,8 @@ const RESPONSE: f64 = 1e-2;
 const TRIAL: f64 = 1e-2;
 const SMALLEST: f64 = 1e-6;
 const LARGEST: f64 = 0.1;
+/// The drift over a record, in typical sizes, that a fit must know of.
+const DRIFT: f64 = 1e-6;
 /// Heights of the pulses whose responses are extrapolated to the height zero, each half of the last.
 const HEIGHTS: usize = 3;
 
@@ -97,18 +99,20 @@ impl<'p> Bench<'p> {
     }
 
     /// The change of the readings for a small `shape`(step, input), per unit of the shape, as height
-    /// times shape goes to zero from `height` on through `heights` halvings.
+    /// times shape goes to zero from `height` on through `heights` halvings; and the largest error of
+    /// each reading.
     pub(super) fn response(
         &mut self,
         count: usize,
         heights: usize,
         (side, height): Pulse,
         shape: impl Fn(usize, usize) -> f64,
-    ) -> Result<DMatrix<f64>, LineariseError> {
+    ) -> Result<(DMatrix<f64>, Vec<f64>), LineariseError> {
         if self.rest.nrows() != count + 1 {
             self.rest = self.run(count, |_, _| 0.0)?;
         }
         let mut levels = Vec::with_capacity(heights);
+        let highest = height;
         let mut height = if side == Side::Below { -height } else { height };
         for _ in 0..heights {
             let there = self.run(count, |step, input| height * shape(step, input))?;
@@ -120,14 +124,17 @@ impl<'p> Bench<'p> {
             });
             height *= 0.5;
         }
-        Ok(DMatrix::from_fn(count + 1, self.readings.len(), |row, column| {
+        let mut errors = vec![0.0_f64; self.readings.len()];
+        let response = DMatrix::from_fn(count + 1, errors.len(), |row, column| {
             let values: Vec<f64> = levels.iter().map(|level| level[(row, column)]).collect();
-            let noise = |level: usize| {
-                let size = f64::EPSILON * self.rest[(row, column)].abs() / height.abs();
-                size * 0.5_f64.powi(i32::try_from(heights - level).unwrap_or(0))
-            };
-            extrapolate(&values, noise, 2.0, |order| side.exponent(order)).0
-        }))
+            let rounding = f64::EPSILON * self.rest[(row, column)].abs();
+            let noise = |level: usize| rounding / highest / 0.5_f64.powi(exponent(level));
+            let order = |order| side.exponent(order);
+            let (value, error) = extrapolate(&values, noise, 2.0, order);
+            errors[column] = errors[column].max(error);
+            value
+        });
+        Ok((response, errors))
     }
 
     /// The drift of the states over the first step.
@@ -135,33 +142,38 @@ impl<'p> Bench<'p> {
         (0..self.states.len()).map(|k| self.rest[(1, k)] - self.rest[(0, k)]).collect()
     }
 
+    /// The largest drift of a state over the whole course, in its typical size.
+    fn largest_drift(&self) -> f64 {
+        let last = self.rest.nrows() - 1;
+        let drift = |k: usize| (self.rest[(last, k)] - self.rest[(0, k)]).abs() / self.scale(k);
+        (0..self.states.len()).map(drift).fold(0.0, f64::max)
+    }
+
     /// A pulse of `input` over the first half of `count` steps, small enough for all states, and
-    /// its response per unit, of which `heights` are extrapolated.
-    pub(super) fn pulse(
+    /// its response per unit with the error of each reading.
+    fn pulse(
         &mut self,
         input: usize,
         count: usize,
-        heights: usize,
-    ) -> Result<(Pulse, DMatrix<f64>), LineariseError> {
+    ) -> Result<(Pulse, DMatrix<f64>, Vec<f64>), LineariseError> {
         let (part, value) = (&self.parts.inputs[input], self.u[input]);
         let scale = part.scale(value);
         let shape =
             |step: usize, other: usize| f64::from(u8::from(other == input && step < count / 2));
         let trial = reach(part, value, TRIAL * scale)?;
-        let response = self.response(count, 1, trial, shape)?;
+        let (response, _) = self.response(count, 1, trial, shape)?;
         let largest = (0..self.states.len())
             .map(|k| response.column(k).amax() / self.scale(k))
             .fold(0.0, f64::max);
         let fitting = (RESPONSE / largest).clamp(SMALLEST * scale, LARGEST * scale);
         let pulse = reach(part, value, fitting)?;
-        let response = self.response(count, heights, pulse, shape)?;
-        Ok((pulse, response))
+        let (response, errors) = self.response(count, HEIGHTS, pulse, shape)?;
+        Ok((pulse, response, errors))
     }
 
     /// The responses to a pulse of each input over `count` steps.
-    pub(super) fn record(&mut self, count: usize, fine: bool) -> Result<Record, LineariseError> {
+    pub(super) fn record(&mut self, count: usize) -> Result<Record, LineariseError> {
         let (n, m) = (self.states.len(), self.inputs.len());
-        let heights = if fine { HEIGHTS } else { 1 };
         let rows = m * count;
         let mut record = Record {
             before: DMatrix::zeros(rows, n + m),
@@ -169,10 +181,17 @@ impl<'p> Bench<'p> {
             change: DMatrix::zeros(rows, n),
             outputs: DMatrix::zeros(rows, self.parts.outputs.len()),
             pulses: Vec::with_capacity(m),
+            noise: vec![0.0; self.readings.len()],
+            count,
+            drifts: false,
         };
         for input in 0..m {
-            let (pulse, response) = self.pulse(input, count, heights)?;
+            let (pulse, response, errors) = self.pulse(input, count)?;
             let response = response * pulse.1;
+            for (k, noise) in record.noise.iter_mut().enumerate() {
+                let size = response.column(k).amax() + self.rest.column(k).amax();
+                *noise = noise.max(f64::EPSILON * size + errors[k] * pulse.1);
+            }
             for step in 0..count {
                 let row = input * count + step;
                 for k in 0..n {
@@ -189,6 +208,7 @@ impl<'p> Bench<'p> {
             }
             record.pulses.push(pulse);
         }
+        record.drifts = self.largest_drift() > DRIFT;
         Ok(record)
     }
 }
@@ -204,9 +224,42 @@ pub(super) struct Record {
     /// Outputs at the end of the step.
     pub(super) outputs: DMatrix<f64>,
     pub(super) pulses: Vec<Pulse>,
+    /// The error of each reading: rounding, and what is left of the pulses' height.
+    pub(super) noise: Vec<f64>,
+    /// Steps after each pulse.
+    count: usize,
+    /// The operating point moves meanwhile.
+    pub(super) drifts: bool,
+}
+
+impl Record {
+    /// What the change of the states is fitted to: see `with_time`.
+    pub(super) fn for_change(&self, degree: usize) -> DMatrix<f64> {
+        self.with_time(&self.before, 0, degree)
+    }
+
+    /// What the outputs are fitted to.
+    pub(super) fn for_outputs(&self, degree: usize) -> DMatrix<f64> {
+        self.with_time(&self.after, 1, degree)
+    }
+
+    /// [X, t X, ..., t^degree X] with the part t of the record that is over: coefficients that are a
+    /// polynomial of time.
+    fn with_time(&self, x: &DMatrix<f64>, first: usize, degree: usize) -> DMatrix<f64> {
+        let columns = x.ncols();
+        DMatrix::from_fn(x.nrows(), (degree + 1) * columns, |i, j| {
+            let part = index(i % self.count + first) / index(self.count);
+            x[(i, j % columns)] * part.powi(exponent(j / columns))
+        })
+    }
+}
+
+/// A count as an exponent.
+fn exponent(count: usize) -> i32 {
+    i32::try_from(count).unwrap_or(i32::MAX)
 }
 
 /// A count as a number.
-fn index(count: usize) -> f64 {
+pub(super) fn index(count: usize) -> f64 {
     f64::from(u32::try_from(count).unwrap_or(u32::MAX))
 }

@@ -83,47 +83,63 @@ pub(super) fn extrapolate(
     best
 }
 
-/// Derivatives with respect to one variable of all components of a function, by differences about
-/// `value` with steps from `reach` down.
-///
-/// Where both sides can be reached, half of the difference between the slopes to the right and to
-/// the left counts as an error: at a kink there is no derivative.
-pub(super) fn derivatives(
-    mut function: impl FnMut(f64) -> Result<Vec<f64>, LineariseError>,
-    value: f64,
-    (side, first): (Side, f64),
-) -> Result<Vec<Estimate>, LineariseError> {
-    let middle = function(value)?;
-    let mut slopes = vec![Vec::with_capacity(LEVELS); middle.len()];
-    let mut kinks = slopes.clone();
-    let mut noises = slopes.clone();
-    let mut step = first;
-    for _ in 0..LEVELS {
-        let (from, to) = match side {
-            Side::Both => (value - step, value + step),
-            Side::Above => (value, value + step),
-            Side::Below => (value - step, value),
-        };
-        let (low, high) = (function(from)?, function(to)?);
-        let width = to - from;
-        for (row, &centre) in middle.iter().enumerate() {
-            slopes[row].push((high[row] - low[row]) / width);
-            kinks[row].push((high[row] - centre - (centre - low[row])) / (0.5 * width));
-            noises[row].push(f64::EPSILON * high[row].abs().max(low[row].abs()) / width);
+/// The components of a function about `value`, by steps from the first down.
+struct Samples {
+    side: Side,
+    /// The function at `value`.
+    middle: Vec<f64>,
+    /// What lies between the two points of each step.
+    widths: Vec<f64>,
+    /// Difference quotients, and the difference of the slopes to both sides: component, step.
+    slopes: Vec<Vec<f64>>,
+    kinks: Vec<Vec<f64>>,
+}
+
+impl Samples {
+    fn of(
+        mut function: impl FnMut(f64) -> Result<Vec<f64>, LineariseError>,
+        value: f64,
+        (side, first): (Side, f64),
+    ) -> Result<Self, LineariseError> {
+        let middle = function(value)?;
+        let empty = vec![Vec::with_capacity(LEVELS); middle.len()];
+        let (slopes, kinks) = (empty.clone(), empty);
+        let mut samples = Self { side, middle, widths: Vec::with_capacity(LEVELS), slopes, kinks };
+        let mut step = first;
+        for _ in 0..LEVELS {
+            let (from, to) = match side {
+                Side::Both => (value - step, value + step),
+                Side::Above => (value, value + step),
+                Side::Below => (value - step, value),
+            };
+            let (low, high) = (function(from)?, function(to)?);
+            let width = to - from;
+            for (row, &centre) in samples.middle.iter().enumerate() {
+                let kink = (high[row] - centre) - (centre - low[row]);
+                samples.slopes[row].push((high[row] - low[row]) / width);
+                samples.kinks[row].push(kink / (0.5 * width));
+            }
+            samples.widths.push(width);
+            step /= RATIO;
         }
-        step /= RATIO;
+        Ok(samples)
     }
-    let estimate = |row: usize| {
-        let noise = |level: usize| noises[row][level];
-        let (slope, error) = extrapolate(&slopes[row], noise, RATIO, |order| side.exponent(order));
-        if side != Side::Both {
+
+    /// The slope of a component whose terms are of the size `magnitude`, which says how it is rounded.
+    ///
+    /// Where both sides can be reached, half of the difference between the slopes to the right and
+    /// to the left counts as an error: at a kink there is no derivative.
+    fn slope(&self, row: usize, magnitude: f64) -> Estimate {
+        let noise = |level: usize| f64::EPSILON * magnitude / self.widths[level];
+        let exponent = |order| self.side.exponent(order);
+        let (slope, error) = extrapolate(&self.slopes[row], noise, RATIO, exponent);
+        if self.side != Side::Both {
             return (slope, error);
         }
-        let noise = |level: usize| 4.0 * noises[row][level];
-        let (kink, uncertain) = extrapolate(&kinks[row], noise, RATIO, |order| 2 * order - 1);
+        let noise = |level: usize| 4.0 * noise(level);
+        let (kink, uncertain) = extrapolate(&self.kinks[row], noise, RATIO, |order| 2 * order - 1);
         (slope, if kink.abs() > 4.0 * uncertain { error + 0.5 * kink.abs() } else { error })
-    };
-    Ok((0..middle.len()).map(estimate).collect())
+    }
 }
 
 /// The Jacobian of derivatives and outputs with respect to states and inputs, its errors, and the
@@ -146,21 +162,31 @@ pub(super) fn of_equations(
         errors: DMatrix::zeros(rows, n + m),
         steps: Vec::with_capacity(n + m),
     };
-    for column in 0..n + m {
+    let mut columns = Vec::with_capacity(n + m);
+    // A sum is rounded as its largest term is, which the sum itself does not show.
+    let mut magnitudes = vec![0.0_f64; rows];
+    for (column, scale) in scales.iter().enumerate() {
         let (known, value, part) = if column < n {
             (Known::State(column), equations.x[column], &equations.states[column].part)
         } else {
             let input = column - n;
             (Known::Input(input), equations.u[input], &equations.parts.inputs[input])
         };
-        let reach = reach(part, value, FIRST * scales[column])?;
-        let function = |at: f64| equations.evaluate(Some((known, at)));
-        let estimates = derivatives(function, value, reach)?;
-        for (row, (slope, error)) in estimates.into_iter().enumerate() {
+        let reach = reach(part, value, FIRST * scale)?;
+        let samples = Samples::of(|at| equations.evaluate(Some((known, at))), value, reach)?;
+        for (row, magnitude) in magnitudes.iter_mut().enumerate() {
+            let term = samples.slopes[row][LEVELS / 2] * value.abs().max(reach.1);
+            *magnitude = magnitude.max(samples.middle[row].abs()).max(term.abs());
+        }
+        found.steps.push(reach.1);
+        columns.push(samples);
+    }
+    for (column, samples) in columns.iter().enumerate() {
+        for (row, &magnitude) in magnitudes.iter().enumerate() {
+            let (slope, error) = samples.slope(row, magnitude);
             found.jacobian[(row, column)] = slope;
             found.errors[(row, column)] = error;
         }
-        found.steps.push(reach.1);
     }
     Ok(found)
 }
@@ -170,12 +196,14 @@ mod tests {
     use super::*;
 
     fn slope_at(value: f64, side: Side, function: impl Fn(f64) -> f64) -> Estimate {
-        derivatives(|at| Ok(vec![function(at)]), value, (side, 1e-2)).unwrap()[0]
+        let samples = Samples::of(|at| Ok(vec![function(at)]), value, (side, 1e-2)).unwrap();
+        samples.slope(0, samples.middle[0].abs().max(value.abs()))
     }
 
     #[test]
     fn slopes_of_smooth_functions_are_within_their_small_error_estimates() {
-        let functions: [(fn(f64) -> f64, fn(f64) -> f64); 3] =
+        type Function = fn(f64) -> f64;
+        let functions: [(Function, Function); 3] =
             [(f64::exp, f64::exp), (f64::sin, f64::cos), (|x| x.powi(5), |x| 5.0 * x.powi(4))];
         for (function, derivative) in functions {
             for side in [Side::Both, Side::Above, Side::Below] {

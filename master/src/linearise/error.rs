@@ -170,11 +170,22 @@ pub enum LineariseError {
     #[error(
         "the variables named as states do not say how the FMU goes on: a course of the inputs that \
          was not used for the fit is missed by {missed:e} of the response, allowed is {allowed:e}; \
-         name all states, or take a shorter step"
+         name all states, take a shorter step, or a point nearer to an equilibrium"
     )]
     NotStates {
         /// Largest relative difference.
         missed: f64,
+        /// The largest one allowed.
+        allowed: f64,
+    },
+    /// The steps tell too little.
+    #[error(
+        "steps from an FMU state give the matrices to {relative:e} only, allowed is {allowed}; \
+         take a point nearer to an equilibrium, another step, or an FMU for model exchange"
+    )]
+    Inaccurate {
+        /// The largest relative error.
+        relative: f64,
         /// The largest one allowed.
         allowed: f64,
     },

@@ -51,7 +51,9 @@ fn scaled(x: &DMatrix<f64>) -> (DMatrix<f64>, Vec<f64>) {
 /// to length one; none where X does not have full column rank.
 ///
 /// `x`: r x c with r > c; `y`: r x k. About 2 r c^2 multiplications.
-pub(super) fn least_squares(x: &DMatrix<f64>, y: &DMatrix<f64>) -> Option<Fit> {
+///
+/// `noise`: the rounding error of each column of Y; the deviations count it beside what is left of Y.
+pub(super) fn least_squares(x: &DMatrix<f64>, y: &DMatrix<f64>, noise: &[f64]) -> Option<Fit> {
     let (rows, columns) = x.shape();
     let (scaled, lengths) = scaled(x);
     let qr = scaled.clone().qr();
@@ -61,7 +63,7 @@ pub(super) fn least_squares(x: &DMatrix<f64>, y: &DMatrix<f64>) -> Option<Fit> {
     let inverse = r.solve_upper_triangular(&DMatrix::identity(columns, columns))?;
     let freedom = f64::from(u32::try_from(rows.saturating_sub(columns).max(1)).ok()?).sqrt();
     let mut deviations = DMatrix::from_fn(columns, y.ncols(), |i, j| {
-        inverse.row(i).norm() * left.column(j).norm() / freedom
+        inverse.row(i).norm() * (left.column(j).norm() / freedom + noise[j])
     });
     for (row, length) in lengths.iter().enumerate() {
         solution.row_mut(row).scale_mut(1.0 / length);
@@ -81,12 +83,12 @@ mod tests {
         let x = DMatrix::from_row_slice(4, 2, &[1.0, 0.0, 1.0, 1.0, 1.0, 2.0, 1.0, 3.0]);
         let line = DMatrix::from_column_slice(4, 1, &[0.1, 1.0, 1.9, 2.8]);
         let scatter = DMatrix::from_column_slice(4, 1, &[0.1, -0.1, -0.1, 0.1]);
-        let fit = least_squares(&x, &(&line + scatter)).unwrap();
+        let fit = least_squares(&x, &(&line + scatter), &[0.0]).unwrap();
         assert!((fit.solution[(0, 0)] - 0.1).abs() < 1e-15);
         assert!((fit.solution[(1, 0)] - 0.9).abs() < 1e-15);
         // Variance of the slope: 0.04 / 2 / 5.
         assert!((fit.deviations[(1, 0)] - 0.004_f64.sqrt()).abs() < 1e-15);
-        assert!(least_squares(&x, &line).unwrap().deviations.amax() < 1e-14);
+        assert!(least_squares(&x, &line, &[0.0]).unwrap().deviations.amax() < 1e-14);
     }
 
     #[test]

@@ -47,7 +47,7 @@ fn set(component: &mut Component, setting: &Setting) -> Result<(), LineariseErro
     done.map_err(|source| refused(&setting.name, &setting.text, source))
 }
 
-fn refused(name: &str, value: impl ToString, source: CallError) -> LineariseError {
+fn refused(name: &str, value: &impl ToString, source: CallError) -> LineariseError {
     LineariseError::Refused { name: name.to_owned(), value: value.to_string(), source }
 }
 
@@ -187,7 +187,7 @@ impl<'p> Equations<'p> {
             done => done,
         };
         done.map_err(|source| match changed {
-            Some((name, value)) => refused(name, value, source),
+            Some((name, value)) => refused(name, &value, source),
             None => LineariseError::Call(source),
         })?;
         for (row, &value) in values.iter().enumerate() {
@@ -226,7 +226,7 @@ fn set_states(
     component.set_continuous_states(x).map_err(|source| {
         let names: Vec<_> = states.iter().map(|state| state.part.name.as_str()).collect();
         let values: Vec<_> = x.iter().map(f64::to_string).collect();
-        refused(&names.join(", "), values.join(", "), source)
+        refused(&names.join(", "), &values.join(", "), source)
     })
 }
 

@@ -76,7 +76,7 @@ pub enum Method {
         /// Of what.
         how: Differences,
         /// Estimated error of each entry.
-        errors: Matrices,
+        errors: Box<Matrices>,
     },
 }
 
@@ -149,8 +149,7 @@ impl Linearisation {
         let columns = self.states.iter().chain(&self.inputs).chain(&self.faults);
         let sizes: Vec<f64> = columns.map(|signal| signal.typical).collect();
         let (values, errors) = (self.matrices.joined(), errors.joined());
-        let relative = |row| ratio(row_size(&errors, row, &sizes), row_size(&values, row, &sizes));
-        Some((0..values.nrows()).map(relative).fold(0.0, f64::max))
+        Some(relative_error(&errors, &values, &sizes))
     }
 }
 
@@ -214,6 +213,12 @@ fn row_size(jacobian: &DMatrix<f64>, row: usize, scales: &[f64]) -> f64 {
     scales.iter().enumerate().map(|(j, scale)| jacobian[(row, j)].abs() * scale).fold(0.0, f64::max)
 }
 
+/// The largest error relative to the largest entry of its row, in units of the typical sizes.
+pub(super) fn relative_error(errors: &DMatrix<f64>, values: &DMatrix<f64>, scales: &[f64]) -> f64 {
+    let relative = |row| ratio(row_size(errors, row, scales), row_size(values, row, scales));
+    (0..values.nrows()).map(relative).fold(0.0, f64::max)
+}
+
 /// Where directional derivatives and differences lie furthest apart, beyond their error.
 pub(super) fn disagreement(
     parts: &Parts,
@@ -265,19 +270,7 @@ pub(super) fn assemble(
     };
     let mut inputs = signals(&parts.inputs, &found.u);
     let faults = inputs.split_off(parts.controlled);
-    let blocks = |m: &DMatrix<f64>| {
-        let rates = m.select_rows(&chosen);
-        let outputs = m.rows(all, parts.outputs.len()).into_owned();
-        let (m, q) = (parts.controlled, parts.inputs.len() - parts.controlled);
-        Matrices {
-            a: rates.select_columns(&chosen),
-            b: rates.columns(all, m).into_owned(),
-            f: rates.columns(all + m, q).into_owned(),
-            c: outputs.select_columns(&chosen),
-            d: outputs.columns(all, m).into_owned(),
-            g: outputs.columns(all + m, q).into_owned(),
-        }
-    };
+    let blocks = |m: &DMatrix<f64>| blocks(m, &chosen, all, parts);
     let scales = super::scales(&found.states, &found.x, &parts.inputs, &found.u);
     let residual = |&row: &usize| {
         let terms = scales.iter().enumerate();
@@ -297,10 +290,26 @@ pub(super) fn assemble(
                 Method::DirectionalDerivatives { interface, disagreement }
             }
             How::Differences(how, errors) => {
-                Method::FiniteDifferences { how, errors: blocks(&errors) }
+                Method::FiniteDifferences { how, errors: Box::new(blocks(&errors)) }
             }
         },
     })
+}
+
+/// The blocks of a matrix whose first rows and columns belong to `all` states, of which some are
+/// chosen.
+fn blocks(m: &DMatrix<f64>, chosen: &[usize], all: usize, parts: &Parts) -> Matrices {
+    let rates = m.select_rows(chosen);
+    let outputs = m.rows(all, parts.outputs.len()).into_owned();
+    let (controlled, faults) = (parts.controlled, parts.inputs.len() - parts.controlled);
+    Matrices {
+        a: rates.select_columns(chosen),
+        b: rates.columns(all, controlled).into_owned(),
+        f: rates.columns(all + controlled, faults).into_owned(),
+        c: outputs.select_columns(chosen),
+        d: outputs.columns(all, controlled).into_owned(),
+        g: outputs.columns(all + controlled, faults).into_owned(),
+    }
 }
 
 /// Positions of the states of the request among those found; nothing that is kept depends on one

@@ -3,19 +3,27 @@
 
 use nalgebra::DMatrix;
 
-use super::bench::{Bench, Record};
+use super::bench::{Bench, Record, index};
 use super::differences::{Side, extrapolate};
 use super::fit::{Directions, least_squares};
 use super::logarithm::logarithm_of_one_plus;
 use super::parts::{Part, Parts};
+use super::result::relative_error;
 use super::{Linearise, LineariseError};
 use crate::fmu::Fmu;
 
 /// Steps of the record: the first trial at least, and the last.
 const FEWEST: usize = 8;
 const MOST: usize = 512;
-/// Contrast of the directions that is good, and the least that is accepted.
-const GOOD: f64 = 1e-3;
+/// Relative error of the answer that is good enough.
+const ENOUGH: f64 = 1e-8;
+/// The largest relative error of an answer.
+const ALLOWED: f64 = 0.1;
+const INACCURATE: LineariseError =
+    LineariseError::Inaccurate { relative: f64::INFINITY, allowed: ALLOWED };
+/// The degree in time of the coefficients where the operating point drifts.
+const DEGREE: usize = 2;
+/// The least contrast of the directions that is accepted.
 const LEAST: f64 = 1e-8;
 /// The step map is found for these multiples of the step, and extrapolated to the step zero.
 const MULTIPLES: [f64; 3] = [4.0, 2.0, 1.0];
@@ -37,6 +45,8 @@ pub(super) struct Found {
     pub(super) heights: Vec<f64>,
     /// The part of the response to a new course of the inputs that was missed.
     pub(super) missed: f64,
+    /// Largest of the errors, relative to its row.
+    relative: f64,
 }
 
 /// [A, B, x'; C, D, 0] of one step size, and the standard deviations.
@@ -49,10 +59,27 @@ struct Map {
 struct Discrete {
     change: DMatrix<f64>,
     outputs: DMatrix<f64>,
+    /// What belongs to the powers of time in both; no columns where nothing drifts.
+    powers: [DMatrix<f64>; 2],
     deviations: DMatrix<f64>,
 }
 
-/// Linearises by steps of `step` s and its multiples.
+impl Discrete {
+    /// `change` or `outputs` times [x; u] at a part of the record.
+    fn times(&self, which: usize, part: f64, known: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut product = [&self.change, &self.outputs][which] * known;
+        let (powers, width) = (&self.powers[which], known.nrows());
+        let mut power = part;
+        for first in (0..powers.ncols()).step_by(width) {
+            product += powers.columns(first, width) * known * power;
+            power *= part;
+        }
+        product
+    }
+}
+
+/// Linearises by steps of `step` s and its multiples, with records of growing length until the
+/// errors are small: a short one sees little of slow states, a long one drifts.
 pub(super) fn of_steps(
     fmu: &Fmu,
     parts: &Parts,
@@ -60,76 +87,100 @@ pub(super) fn of_steps(
     request: &Linearise,
     step: f64,
 ) -> Result<Found, LineariseError> {
-    let mut bench = Bench::new(fmu, parts, states, request, step)?;
-    let count = count(&mut bench, parts, states)?;
-    let record = bench.record(count, true)?;
-    let discrete = fit(&record, parts, states)?;
-    let missed = missed(&mut bench, &discrete, &record, count)?;
+    let mut benches = Vec::with_capacity(MULTIPLES.len());
+    for multiple in MULTIPLES {
+        benches.push(Bench::new(fmu, parts, states, request, multiple * step)?);
+    }
+    let mut count = FEWEST.max(2 * (states.len() + 1));
+    let mut best: Option<Found> = None;
+    let mut refusal = None;
+    while count <= MOST {
+        match of_count(&mut benches, parts, states, count) {
+            Ok(found) if best.as_ref().is_none_or(|known| found.relative < known.relative) => {
+                let enough = found.relative < ENOUGH;
+                best = Some(found);
+                if enough {
+                    break;
+                }
+            }
+            Err(error) if refusal.as_ref().is_none_or(is_about_length) => {
+                refusal = Some(error);
+            }
+            Ok(_) | Err(_) => {}
+        }
+        count *= 2;
+    }
+    best.ok_or_else(|| refusal.unwrap_or_else(|| unreachable(None, parts, states)))
+}
+
+/// Whether a record of another length may do.
+fn is_about_length(refusal: &LineariseError) -> bool {
+    matches!(refusal, LineariseError::Unreachable { .. })
+}
+
+/// The same by records of `count` steps; the last bench has the shortest step.
+fn of_count(
+    benches: &mut [Bench],
+    parts: &Parts,
+    states: &[Part],
+    count: usize,
+) -> Result<Found, LineariseError> {
+    let Some((bench, longer)) = benches.split_last_mut() else {
+        return Err(unreachable(None, parts, states));
+    };
+    let record = bench.record(count)?;
+    let directions = Directions::of(&record.before);
+    if directions.contrast < LEAST {
+        return Err(unreachable(Some(directions), parts, states));
+    }
+    let step = bench.step;
+    let discrete = fit(&record, parts, states, degree(&record)).ok_or(INACCURATE)?;
+    let missed = missed(bench, &discrete, &record, count)?;
     if missed.is_nan() || missed > MISSED {
         return Err(LineariseError::NotStates { missed, allowed: MISSED });
     }
     let mut maps = Vec::new();
-    for multiple in &MULTIPLES[..MULTIPLES.len() - 1] {
-        let mut longer = Bench::new(fmu, parts, states, request, multiple * step)?;
-        let map = longer.record(count, true).and_then(|record| {
-            let discrete = fit(&record, parts, states)?;
-            Ok(continuous(&longer, &discrete, &record))
-        });
+    for bench in longer {
         // A longer step may be too long for the FMU or for a logarithm.
-        match map {
+        match bench.record(count).map(|record| map(bench, &record, parts, states)) {
             Ok(Some(map)) => maps.push(map),
             _ => maps.clear(),
         }
     }
-    let map = continuous(&bench, &discrete, &record);
+    let map = map(bench, &record, parts, states);
     maps.push(map.ok_or(LineariseError::NoLogarithm { step })?);
     if maps.len() < 2 {
         return Err(LineariseError::NoLogarithm { step: 2.0 * step });
     }
     let (values, errors) = at_step_zero(&maps);
     let (n, columns) = (states.len(), values.ncols() - 1);
+    let (jacobian, errors) =
+        (values.columns(0, columns).into_owned(), errors.columns(0, columns).into_owned());
+    let scales = super::scales(states, &bench.x, &parts.inputs, &bench.u);
+    let relative = relative_error(&errors, &jacobian, &scales);
+    if relative.is_nan() || relative > ALLOWED {
+        return Err(LineariseError::Inaccurate { relative, allowed: ALLOWED });
+    }
     Ok(Found {
         rates: (0..n).map(|k| values[(k, columns)]).collect(),
-        jacobian: values.columns(0, columns).into_owned(),
-        errors: errors.columns(0, columns).into_owned(),
+        relative,
+        jacobian,
+        errors,
         count,
         heights: record.pulses.iter().map(|pulse| pulse.1).collect(),
         missed,
-        x: bench.x,
-        u: bench.u,
-        y: bench.y,
+        x: bench.x.clone(),
+        u: bench.u.clone(),
+        y: bench.y.clone(),
     })
-}
-
-/// How many steps move all states in directions that can be told apart.
-fn count(bench: &mut Bench, parts: &Parts, states: &[Part]) -> Result<usize, LineariseError> {
-    let mut count = FEWEST.max(2 * (states.len() + 1));
-    let mut best: Option<(usize, Directions)> = None;
-    while count <= MOST {
-        let record = match bench.record(count, false) {
-            Ok(record) => record,
-            Err(_) if best.is_some() => break,
-            Err(error) => return Err(error),
-        };
-        let directions = Directions::of(&record.before);
-        let good = directions.contrast >= GOOD;
-        if best.as_ref().is_none_or(|(_, known)| directions.contrast > known.contrast) {
-            best = Some((count, directions));
-        }
-        if good {
-            break;
-        }
-        count *= 2;
-    }
-    match best {
-        Some((count, directions)) if directions.contrast >= LEAST => Ok(count),
-        best => Err(unreachable(best.map(|(_, directions)| directions), parts, states)),
-    }
 }
 
 fn unreachable(directions: Option<Directions>, parts: &Parts, states: &[Part]) -> LineariseError {
     let names: Vec<&Part> = states.iter().chain(&parts.inputs).collect();
     let weak = directions.map(|directions| directions.weak(LEAST)).unwrap_or_default();
+    let mut weak: Vec<usize> = weak.into_iter().map(|column| column % names.len()).collect();
+    weak.sort_unstable();
+    weak.dedup();
     LineariseError::Unreachable {
         rank: names.len() - weak.len(),
         expected: names.len(),
@@ -137,27 +188,49 @@ fn unreachable(directions: Option<Directions>, parts: &Parts, states: &[Part]) -
     }
 }
 
-fn fit(record: &Record, parts: &Parts, states: &[Part]) -> Result<Discrete, LineariseError> {
-    let unreachable = || unreachable(Some(Directions::of(&record.before)), parts, states);
-    let change = least_squares(&record.before, &record.change).ok_or_else(unreachable)?;
-    let outputs = least_squares(&record.after, &record.outputs).ok_or_else(unreachable)?;
+/// The degree of the polynomials of time that the coefficients are.
+fn degree(record: &Record) -> usize {
+    if record.drifts { DEGREE } else { 0 }
+}
+
+/// The continuous system of a record; where the operating point drifts, what the last degree of
+/// the polynomials changes counts as an error.
+fn map(bench: &Bench, record: &Record, parts: &Parts, states: &[Part]) -> Option<Map> {
+    let of = |degree| continuous(bench, &fit(record, parts, states, degree)?, record);
+    let degree = degree(record);
+    let mut map = of(degree)?;
+    if degree > 0 {
+        map.deviations += (&map.values - of(degree - 1)?.values).abs();
+    }
+    Some(map)
+}
+
+fn fit(record: &Record, parts: &Parts, states: &[Part], degree: usize) -> Option<Discrete> {
+    let width = record.before.ncols();
+    let (state_noise, output_noise) = record.noise.split_at(states.len());
+    let change = least_squares(&record.for_change(degree), &record.change, state_noise)?;
+    let outputs = least_squares(&record.for_outputs(degree), &record.outputs, output_noise)?;
+    let at_zero = |of: &DMatrix<f64>| of.rows(0, width).transpose();
+    let powers = |of: &DMatrix<f64>| of.rows(width, of.nrows() - width).transpose();
     let mut discrete = Discrete {
-        change: change.solution.transpose(),
-        outputs: outputs.solution.transpose(),
-        deviations: DMatrix::zeros(states.len() + parts.outputs.len(), record.before.ncols()),
+        change: at_zero(&change.solution),
+        outputs: at_zero(&outputs.solution),
+        powers: [powers(&change.solution), powers(&outputs.solution)],
+        deviations: DMatrix::zeros(states.len() + parts.outputs.len(), width),
     };
     let deviations = &mut discrete.deviations;
-    deviations.rows_mut(0, states.len()).copy_from(&change.deviations.transpose());
+    deviations.rows_mut(0, states.len()).copy_from(&at_zero(&change.deviations));
     let mut below = deviations.rows_mut(states.len(), parts.outputs.len());
-    below.copy_from(&outputs.deviations.transpose());
+    below.copy_from(&at_zero(&outputs.deviations));
     for (row, output) in parts.outputs.iter().enumerate() {
         if let Some(state) = states.iter().position(|part| part.reference == output.reference) {
             discrete.outputs.row_mut(row).fill(0.0);
             discrete.outputs[(row, state)] = 1.0;
+            discrete.powers[1].row_mut(row).fill(0.0);
             discrete.deviations.row_mut(states.len() + row).fill(0.0);
         }
     }
-    Ok(discrete)
+    Some(discrete)
 }
 
 /// The system whose exact step the map is: [A, B, x'] = log([Phi, Gamma, g; 0, I]) / h, where g is
@@ -213,13 +286,13 @@ fn missed(
     let n = discrete.change.nrows();
     let shape = |step: usize, input: usize| {
         let (side, height) = record.pulses[input];
-        let on = (step / 2 + input).count_ones() % 2 == 0;
+        let on = (step / 2 + input).count_ones().is_multiple_of(2);
         let sign = if side == Side::Below { -1.0 } else { 1.0 };
         if on { 0.5 * sign * height } else { 0.0 }
     };
     let both = record.pulses.iter().all(|(side, _)| *side == Side::Both);
     let side = if both { Side::Both } else { Side::Above };
-    let found = bench.response(count, 2, (side, 1.0), shape)?;
+    let (found, _) = bench.response(count, 2, (side, 1.0), shape)?;
     let mut state = DMatrix::zeros(n, 1);
     let mut expected = DMatrix::zeros(count + 1, found.ncols());
     for step in 0..count {
@@ -227,8 +300,9 @@ fn missed(
             let inputs = (0..record.pulses.len()).map(|input| shape(step, input));
             DMatrix::from_iterator(discrete.change.ncols(), 1, state.iter().copied().chain(inputs))
         };
-        state += &discrete.change * with_inputs(&state);
-        let outputs = &discrete.outputs * with_inputs(&state);
+        let part = |step: usize| index(step) / index(count);
+        state += discrete.times(0, part(step), &with_inputs(&state));
+        let outputs = discrete.times(1, part(step + 1), &with_inputs(&state));
         for (column, value) in state.iter().chain(outputs.iter()).enumerate() {
             expected[(step + 1, column)] = *value;
         }
