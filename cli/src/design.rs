@@ -60,15 +60,13 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
     let design = designed.file(&file, &description)?;
     let mut report = reporting::report(&file, &designed, description)
         .with_context(|| format!("the design for {} cannot be examined", file.name()))?;
-    let fmu = match &options.fmu {
-        None => None,
-        Some(_) => {
-            let content = Content { design: &design, plant: source.text() };
-            let fmu = ControllerFmu::new(&options.from, &content)?;
-            report.interface = reporting::interface(&fmu.description);
-            Some(fmu)
-        }
-    };
+    let mut fmu = None;
+    if options.fmu.is_some() {
+        let content = Content { design: &design, plant: source.text() };
+        let made = ControllerFmu::new(&options.from, &content)?;
+        report.interface = reporting::interface(&made.description);
+        fmu = Some(made);
+    }
     let page = page::page(&report);
     let beside = options.out.parent().unwrap_or(Path::new("")).join("report.html");
     let page_path = options.report.clone().unwrap_or(beside);
@@ -83,7 +81,9 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
         println!("{}", serde_json::to_string_pretty(&report)?);
     } else {
         summarise(&report);
-        written.iter().for_each(|path| println!("{}", path.display()));
+        for path in written {
+            println!("{}", path.display());
+        }
     }
     Ok(report.checks.iter().all(|check| check.holds))
 }

@@ -57,7 +57,7 @@ pub(crate) enum Model {
 pub(crate) struct Sampling {
     /// Sample time, s.
     pub(crate) period: f64,
-    /// Whether u_k uses the measurement y_k (current estimator), or only those before it.
+    /// Whether the command uses the newest measurement (current estimator), or only those before.
     pub(crate) current: bool,
 }
 

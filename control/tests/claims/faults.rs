@@ -113,9 +113,9 @@ impl Truth<'_> {
     }
 }
 
-/// What is left after `seconds` of the slowest mode e^(-6 t), at a condition number up to 1e5.
+/// What is left after `seconds` of the slowest mode e^(-6 t), at a condition number up to 1e7.
 fn modal_bound(design: &AsoDesign, seconds: f64, size: f64) -> f64 {
-    assert!(design.observer.condition < 1e5, "{:?}", design.observer);
+    assert!(design.observer.condition < 1e7, "{:?}", design.observer);
     design.observer.condition * (-6.0 * seconds).exp() * size + 1e-11 * size
 }
 

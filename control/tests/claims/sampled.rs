@@ -95,8 +95,8 @@ fn pendulum_with_ramp(period: f64) -> SampledDesign {
     let FaultyPlant { a, b, c, f_a, .. } = plant();
     let friction = Fault { enters: Entry::Actuator(f_a.column(0).into()), kind: FaultKind::Ramp };
     let extended = ExtendedPlant::new(&a, &b, &c, &[friction], &[]).expect("shapes that fit");
-    let controller = real_poles(&CONTROLLER_POLES, period);
-    let observer = real_poles(&[&OBSERVER_POLES[..], &[-2500.0]].concat(), period);
+    let controller = in_z(&CONTROLLER_POLES, period);
+    let observer = in_z(&[&OBSERVER_POLES[..], &[-2500.0]].concat(), period);
     design(&extended, period, Estimator::Current, &controller, &observer, None).expect("a design")
 }
 
