@@ -176,10 +176,8 @@ labelled!(Signal, Actuator, Fault);
 impl Actuator {
     /// The limits as deviations from the operating point.
     pub(crate) fn range(&self) -> Option<[f64; 2]> {
-        match self.operating {
-            None => self.limits,
-            Some(operating) => self.limits.map(|limits| limits.map(|limit| limit - operating)),
-        }
+        let limits = self.limits?;
+        Some(self.operating.map_or(limits, |operating| limits.map(|limit| limit - operating)))
     }
 }
 
