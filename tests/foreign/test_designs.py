@@ -35,7 +35,7 @@ def random_design(sizes, limits=None, extras=""):
         "t_on": 0.0,
         "monitor": False,
         "states": signals("s", n),
-        "actuators": signals("act", m),
+        "actuators": [{"name": name, "unit": "m"} for name in vector("u", m)],
         "measurements": signals("y", p),
         "faults": signals("f", q),
         "experiment": {"stop_time": 2.0, "step_size": 0.01},

@@ -212,7 +212,7 @@ def test_in_a_loop_with_a_plant_that_is_stepped_first_there_is_no_delay(
     x, part = np.array([1.0, 0.0]), whole(T / parts)
     with begun(fmu, size_of(design), np.zeros(3), C @ x) as instance:
         for i in range((SAMPLES - 1) * parts + 1):
-            u = instance.get("u")
+            u = instance.get("force")
             found += u if i % parts == 0 else []
             before, x = C @ x, part @ [*x, u[0] + 0.7]
             given = before if slopes else C @ x
