@@ -176,8 +176,9 @@ labelled!(Signal, Actuator, Fault);
 impl Actuator {
     /// The limits as deviations from the operating point.
     pub(crate) fn range(&self) -> Option<[f64; 2]> {
-        let limits = self.limits?;
-        Some(self.operating.map_or(limits, |operating| limits.map(|limit| limit - operating)))
+        let [low, high] = self.limits?;
+        let operating = self.operating.unwrap_or(0.0);
+        Some([low - operating, high - operating])
     }
 }
 

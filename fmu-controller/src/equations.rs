@@ -81,14 +81,16 @@ impl Mode {
     }
 
     /// The one of a pair of limits that channel `j` is at.
-    pub(crate) fn side(self, limits: Option<[f64; 2]>, j: usize) -> Option<f64> {
-        let side = [0, 1].into_iter().find(|side| self.is_at(*side, j))?;
-        limits.map(|limits| limits[side])
+    pub(crate) fn side(self, [low, high]: [f64; 2], j: usize) -> f64 {
+        if self.is_at(0, j) { low } else { high }
     }
 
     /// The limit that channel `j` is at.
     pub(crate) fn limit(self, design: &Design, j: usize) -> Option<f64> {
-        self.side(design.actuators[j].range(), j)
+        if !self.is_limited(j) {
+            return None;
+        }
+        design.actuators[j].range().map(|limits| self.side(limits, j))
     }
 
     /// Channel `j` of K_x x_hat + K_f f_hat, the second part while compensating.
