@@ -143,10 +143,9 @@ fn kind(factors: &[f64], limited: bool) -> Option<DependencyKind> {
 
 /// Whether the row of this unknown has factors that are not constant, or cut off by a limit.
 fn is_bent((sizes, limits, _): Shape, unknown: &str) -> bool {
-    match unknown.strip_prefix('u') {
-        Some("") => limits.contains('l'),
+    match unknown.strip_prefix("actuators") {
         Some(index) => {
-            let j: usize = index.trim_matches(['[', ']']).parse().unwrap();
+            let j: usize = index.parse().unwrap();
             limits.as_bytes()[j - 1] == b'l'
         }
         None if unknown.starts_with("E_hat") => true,
