@@ -18,7 +18,7 @@ observer.eigenvalues = [-5, { re = -6, im = 2.5 }]
 "#;
 
 /// What is replaced in `MASS`, by what, and a part of the error.
-const REFUSALS: [(&str, &str, &str); 32] = [
+const REFUSALS: [(&str, &str, &str); 34] = [
     (
         "A = [[0, 1], [0, 0]]",
         "A = [[0, 1], [0]]",
@@ -41,6 +41,16 @@ const REFUSALS: [(&str, &str, &str); 32] = [
         "feedback.eigenvalues = [-1, -2]",
         "feedback.Q = [1, 1]",
         "`feedback.R` is missing: the weight of",
+    ),
+    (
+        "feedback.eigenvalues = [-1, -2]",
+        "feedback.h_infinity = \"least\"",
+        "5:23: feedback.h_infinity: \"least\" needs a `region` with a disc",
+    ),
+    (
+        "feedback.eigenvalues = [-1, -2]",
+        "sample_time = 1\nfeedback.region = { decay = 1, sector = 30 }",
+        "6:41: feedback.region.sector: a sampled design has a region by `decay` only",
     ),
     (
         "feedback.eigenvalues = [-1, -2]",
