@@ -58,12 +58,13 @@ pub struct Certificate {
 /// # Example
 ///
 /// ```
+/// use control::placement::real;
 /// use control::{aso, theorem1};
 /// use nalgebra::DMatrix;
 /// let one = |value| DMatrix::from_element(1, 1, value);
 /// let plant =
 ///     aso::FaultyPlant::with_constant_faults(one(0.5), one(1.0), one(1.0), one(-1.0));
-/// let gains = aso::design(&plant, &[-1.0], &[-2.0, -3.0], None)?.gains;
+/// let gains = aso::design(&plant, &real(&[-1.0]), &real(&[-2.0, -3.0]), None)?.gains;
 /// let small = theorem1::certify(&plant, &gains, 1.0, 30.0)?;
 /// let large = theorem1::certify(&plant, &gains, 1000.0, 30.0)?;
 /// assert!((small.delta / large.delta - 1.0).abs() < 1e-12);

@@ -58,9 +58,10 @@ pub(super) fn certificate(report: &Report) -> Markup {
             Ok(free) => (self::free(report, free)),
             Err(reason) => p { strong { "There is none: " } (reason) },
         }
-        @if let Ok(ultimate) = &certificate.ultimate {
-            h3 { "Where the error ends for bounded rates" }
-            (self::ultimate(report, ultimate))
+        h3 { "Where the error ends for bounded rates" }
+        @match &certificate.ultimate {
+            Ok(ultimate) => (self::ultimate(report, ultimate)),
+            Err(reason) => p { strong { "It is not known: " } (reason) },
         }
         (norms(report))
     }
