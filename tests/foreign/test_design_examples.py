@@ -118,7 +118,8 @@ def test_losses_of_effectiveness_of_both_pumps_are_found(aso_ftc, python, tanks,
 def plane(eigenvalues, period=1.0):
     """Eigenvalues of a loop that is sampled each `period` s, in 1/s."""
     return [
-        (value.real, value.imag) for value in np.log([complex(*own) for own in eigenvalues]) / period
+        (value.real, value.imag)
+        for value in np.log([complex(*own) for own in eigenvalues]) / period
     ]
 
 
@@ -136,8 +137,32 @@ def test_the_fault_of_a_sensor_is_told_from_that_of_a_pump(aso_ftc, python, tank
     assert bias[late] == pytest.approx(0.02, rel=0.01)
     assert abs(table[designed.estimate("f_2")][late]).max() < 0.01 * 1e-5
     for level, operating in LEVELS.items():
-        assert table[f"plant.{level}"][-1] == pytest.approx(operating, abs=1e-8), "not the biased one"
+        assert table[f"plant.{level}"][-1] == pytest.approx(operating, abs=1e-8), "the true level"
     assert table["plant.y_1"][-1] == pytest.approx(LEVELS["h_1"] + 0.02, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("method", "inputs"), [("gauss-seidel", ()), ("gauss-seidel-hold", ("--hold",))]
+)
+def test_fmpy_and_the_rust_master_agree_on_the_tanks(
+    method, inputs, aso_ftc, python, tanks, tmp_path
+):
+    designed = Designed(aso_ftc, "examples/three-tank/plant.toml", tmp_path)
+    steps = ("--step", 0.37, "--stop-time", 400)
+    table, _ = coupled(python, designed, tanks, BOTH, *steps, *inputs)
+    pairs = [(designed.command(name), f"plant.{name}") for name in ("Q_1", "Q_2")]
+    pairs += [(f"plant.y_{k}", f"controller.y_{k}") for k in (1, 2, 3)]
+    connections = [text for pair in pairs for text in ("--connect", "=".join(pair))]
+    settings = [text for name, value in BOTH.items() for text in ("--set", f"{name}={value}")]
+    options = ("--method", method, "--record-every", 0.37, "--out", tmp_path)
+    fmus = ("--plant", tanks, "--controller", designed.fmu)
+    done = aso_ftc("run", *fmus, *connections, *settings, *steps, *options)
+    assert done.returncode == 0, done.stderr
+    path = tmp_path / "results.csv"
+    names = path.read_text(encoding="utf-8").split("\n", 1)[0].split(",")
+    other = dict(zip(names, np.loadtxt(path, delimiter=",", skiprows=1).T))
+    for name, column in table.items():
+        assert (column == other[name]).all(), name
 
 
 @pytest.mark.parametrize("estimator", ["current", "prediction"])
