@@ -17,8 +17,15 @@ class Matrices:
         for name in ("A", "B", "C", "F_a", "K_x", "K_f", "L_x", "L_f"):
             setattr(self, name, np.array(design[name]))
         self.n, self.q = self.F_a.shape
+        self.filtered = "filter" in design
         constant = np.zeros((self.q, self.q)) if self.period is None else np.eye(self.q)
         self.A_f = np.array(design.get("A_f", constant))
+
+    @property
+    def fed_back(self):
+        """A + B K_x of the plant, without the filters of the measurements."""
+        feels = self.n - (len(self.C) if self.filtered else 0)
+        return (self.A + self.B @ self.K_x)[:feels, :feels]
 
     @property
     def augmented(self):
@@ -66,24 +73,30 @@ def balanced(a, b, c):
     return scaled, b / scale[:, None], c * scale
 
 
-def impulse_response(system, period, horizon):
-    """Times and h, one p x m matrix each, without D; `horizon` in s or in samples."""
+def responses(system, period, horizon):
+    """Times, responses to an impulse, without D, and to a step: one p x m matrix each.
+
+    `horizon` in s or in samples; in continuous time the step response is D + C A^-1 (e^(A t) - I) B.
+    """
     a, b, c = balanced(*system[:3])
-    if period is not None:
-        states = [b]
-        for _ in range(horizon):
-            states.append(a @ states[-1])
-        return np.arange(1, horizon + 2), np.array([c @ state for state in states])
-    times = np.concatenate([[0], np.geomspace(1e-7, horizon, 6000)])
-    return times, c @ expm(a * times[:, None, None]) @ b
+    if period is None:
+        times = np.concatenate([[0], np.geomspace(1e-7, horizon, 6000)])
+        states = expm(a * times[:, None, None]) @ b
+        step = system[3] + c @ np.linalg.solve(a, states - b)
+        return times, c @ states, step
+    states = [b]
+    for _ in range(horizon):
+        states.append(a @ states[-1])
+    impulse = np.array([c @ state for state in states])
+    step = system[3] + np.concatenate([0 * impulse[:1], np.cumsum(impulse, axis=0)])
+    return np.arange(1, horizon + 2), impulse, step
 
 
-def accumulated(times, values, period):
-    """The integral or the sum from the beginning to each time."""
+def total(times, values, period):
+    """The integral or the sum of all values."""
     if period is not None:
-        return np.cumsum(values, axis=0)
-    steps = np.diff(times)[:, None, None] * (values[1:] + values[:-1]) / 2
-    return np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(steps, axis=0)])
+        return values.sum(axis=0)
+    return (np.diff(times)[:, None, None] * (values[1:] + values[:-1]) / 2).sum(axis=0)
 
 
 def frequency_response(system, period, frequency):
