@@ -333,3 +333,21 @@ def test_an_fmu_is_made_where_no_compiler_is(aso_ftc, tmp_path):
         done = aso_ftc("design", *arguments, **environment)
         assert done.returncode == 0, done.stderr
     assert made[0].read_bytes() == made[1].read_bytes()
+
+
+@pytest.mark.parametrize("period", [0.001, 0.004])
+def test_the_bound_from_a_rate_in_seconds_holds_for_any_sample_time(
+    aso_ftc, python, tmp_path, period
+):
+    """A fault that grows at its largest rate leads to nearly the largest error."""
+    rate = 10.0  # V/s
+    fault = f'faults = [{{ name = "f_u", actuator = "u", bound = 100, rate_bound = {rate} }}]'
+    sampled = f"sample_time = {period}\n{fault}"
+    file = changed("examples/dc-servo/plant.toml", tmp_path, ('actuator_faults = "all"', sampled))
+    designed = Designed(aso_ftc, file, tmp_path)
+    settings = {"plant.friction": "false", "plant.r_u": rate}
+    steps = ("--step", period, "--stop-time", 0.4)
+    table, _ = coupled(python, designed, packed_plant(aso_ftc, "DcServo"), settings, *steps)
+    error = abs(table["controller.f_hat"] - rate * table["time"]).max()
+    (largest,) = (b["largest"] for b in designed.report["bounds"] if b["error"] == "error of f_u")
+    assert 0.9 * error <= largest <= 1.5 * error
