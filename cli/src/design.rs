@@ -3,6 +3,7 @@
 
 mod analysis;
 mod certificate;
+mod checks;
 mod controller_fmu;
 mod design_file;
 mod designed;

@@ -88,42 +88,32 @@ impl AsoController {
     }
 
     /// Advances the estimate by the part of a step between `offset` and `offset + size`.
-    fn advance(
-        &mut self,
-        observer: &mut Observer,
-        compensating: bool,
-        part: (f64, f64),
-    ) -> Result<(), Failure> {
-        let Signals { z, y, .. } = self.deviations.as_mut().unwrap_or(&mut self.values);
-        let conditions = Conditions {
-            design: &self.design,
-            y: [y, &self.y_slopes],
-            compensating,
-            estimating: compensating || self.design.monitor,
-        };
+    fn advance(&mut self, compensating: bool, part: (f64, f64)) -> Result<(), Failure> {
+        let Self { design, values, deviations, y_slopes, observer, .. } = self;
+        let Signals { z, y, .. } = deviations.as_mut().unwrap_or(values);
+        let estimating = compensating || design.monitor;
+        let conditions = Conditions { design, y: [y, y_slopes], compensating, estimating };
         observer
+            .get_or_insert_with(|| Observer::new(design))
             .advance(z, conditions, part)
             .map_err(|error| Failure::Error(format!("the observer cannot be stepped: {error}")))
     }
 
     /// A step of the observer that is integrated.
     fn integrate(&mut self, step: &Step) -> Result<(), Failure> {
-        let mut observer = self.observer.take().unwrap_or_else(|| Observer::new(&self.design));
         let resolution = clock_rounding(step.end());
         let until_on = self.design.t_on - step.start;
         let inside = self.compensate && until_on > resolution && step.size - until_on > resolution;
         self.deviate();
         if inside {
-            self.advance(&mut observer, false, (0.0, until_on))?;
-            self.advance(&mut observer, true, (until_on, step.size - until_on))?;
+            self.advance(false, (0.0, until_on))?;
+            self.advance(true, (until_on, step.size - until_on))?;
         } else {
-            let compensating = self.compensating(step.start);
-            self.advance(&mut observer, compensating, (0.0, step.size))?;
+            self.advance(self.compensating(step.start), (0.0, step.size))?;
         }
         if let Some(deviations) = &self.deviations {
             deviations.state_into(&self.design, &mut self.values.z);
         }
-        self.observer = Some(observer);
         self.switch(step.end());
         self.evaluate(step.size);
         Ok(())
@@ -143,9 +133,9 @@ impl AsoController {
         if let Some(deviations) = &self.deviations {
             deviations.command_into(design, *mode, &mut self.values.u);
         }
-        let [_, f_hat, _] = design.parts(&self.values.z);
-        let [_, f_slopes, _] = design.parts(z_slopes);
         for loss in &mut self.losses {
+            let [_, f_hat, _] = design.parts(&self.values.z);
+            let [_, f_slopes, _] = design.parts(z_slopes);
             loss.estimate = loss.at(&self.values.u, f_hat);
             loss.slope = loss.along([&self.values.u, u_slopes], [f_hat, f_slopes]);
         }

@@ -176,10 +176,9 @@ labelled!(Signal, Actuator, Fault);
 impl Actuator {
     /// The limits as deviations from the operating point.
     pub(crate) fn range(&self) -> Option<[f64; 2]> {
-        match self.operating {
-            None => self.limits,
-            Some(operating) => self.limits.map(|limits| limits.map(|limit| limit - operating)),
-        }
+        let [low, high] = self.limits?;
+        let operating = self.operating.unwrap_or(0.0);
+        Some([low - operating, high - operating])
     }
 }
 

@@ -81,14 +81,16 @@ impl Mode {
     }
 
     /// The one of a pair of limits that channel `j` is at.
-    pub(crate) fn side(self, limits: Option<[f64; 2]>, j: usize) -> Option<f64> {
-        let side = [0, 1].into_iter().find(|side| self.is_at(*side, j))?;
-        limits.map(|limits| limits[side])
+    pub(crate) fn side(self, [low, high]: [f64; 2], j: usize) -> f64 {
+        if self.is_at(0, j) { low } else { high }
     }
 
     /// The limit that channel `j` is at.
     pub(crate) fn limit(self, design: &Design, j: usize) -> Option<f64> {
-        self.side(design.actuators[j].range(), j)
+        if !self.is_limited(j) {
+            return None;
+        }
+        design.actuators[j].range().map(|limits| self.side(limits, j))
     }
 
     /// Channel `j` of K_x x_hat + K_f f_hat, the second part while compensating.
@@ -125,9 +127,14 @@ impl Mode {
         }
     }
 
-    /// Adds column `k` of L_x and, while estimating, of L_f times `innovation` to x and f of `to`.
-    pub(crate) fn correct(self, design: &Design, k: usize, innovation: f64, to: &mut [f64]) {
-        let [x, f, _] = design.parts_mut(to);
+    /// Adds column `k` of L_x and, while estimating, of L_f times `innovation` to `x` and `f`.
+    pub(crate) fn correct(
+        self,
+        design: &Design,
+        (k, innovation): (usize, f64),
+        x: &mut [f64],
+        f: &mut [f64],
+    ) {
         for (i, x) in x.iter_mut().enumerate() {
             *x += design.l_x.entry(i, k) * innovation;
         }
@@ -144,15 +151,15 @@ impl Mode {
         (z_slopes, u_slopes): (&mut [f64], &mut [f64]),
     ) {
         self.free_rates(design, z, u, z_slopes);
+        let [x_hat, _, y_f] = design.parts(z);
+        let [x_slopes, f_slopes, filter_slopes] = design.parts_mut(z_slopes);
         for (k, (value, slope)) in y.iter().zip(y_slopes).enumerate() {
-            let y = value + slope * offset;
-            self.correct(design, k, innovation(design, z, k, y), z_slopes);
-            if let Some(w) = &design.filter {
-                let at = design.filtered_at(k);
-                z_slopes[at] = w[k] * (y - z[at]);
-            }
+            let innovation = innovation(design, x_hat, y_f, (k, value + slope * offset));
+            self.correct(design, (k, innovation), x_slopes, f_slopes);
         }
-        let [x_slopes, f_slopes, _] = design.parts(z_slopes);
+        for (k, (w, slope)) in design.filter.iter().flatten().zip(filter_slopes).enumerate() {
+            *slope = w * (y[k] + y_slopes[k] * offset - y_f[k]);
+        }
         for (j, slope) in u_slopes.iter_mut().enumerate() {
             let fault = if self.compensating { design.k_f.row_times(j, f_slopes) } else { 0.0 };
             let free = design.k_x.row_times(j, x_slopes) + fault;
@@ -161,9 +168,9 @@ impl Mode {
     }
 }
 
-/// y - C x_hat of measurement `k`; with a filter, y_f - C x_hat.
-pub(crate) fn innovation(design: &Design, z: &[f64], k: usize, y: f64) -> f64 {
-    let [x_hat, _, y_f] = design.parts(z);
+/// y - C x_hat of measurement `k`, which is `y`; with a filter, y_f - C x_hat.
+#[inline]
+pub(crate) fn innovation(design: &Design, x_hat: &[f64], y_f: &[f64], (k, y): (usize, f64)) -> f64 {
     y_f.get(k).unwrap_or(&y) - design.c.row_times(k, x_hat)
 }
 
@@ -182,16 +189,16 @@ impl Mode {
         }
     }
 
-    /// Of [`Mode::correct`]: adds to `to`, for the innovation with its own derivative.
+    /// Of [`Mode::correct`]: adds to `x` and `f`, for the innovation with its own derivative.
     pub(crate) fn correct_along(
         self,
         [point, along]: [&Design; 2],
-        k: usize,
-        [innovation, change]: [f64; 2],
-        to: &mut [f64],
+        (k, [innovation, change]): (usize, [f64; 2]),
+        x: &mut [f64],
+        f: &mut [f64],
     ) {
-        self.correct(point, k, change, to);
-        self.correct(along, k, innovation, to);
+        self.correct(point, (k, change), x, f);
+        self.correct(along, (k, innovation), x, f);
     }
 
     /// Of z', for dz, dy and du in `along`.
@@ -199,12 +206,15 @@ impl Mode {
         let both = [point.design, along.design];
         let (z, dz) = (&point.signals.z, &along.signals.z);
         self.free_rates_along(point, along, slopes);
+        let [x_hat, _, y_f] = point.design.parts(z);
+        let [_, _, dy_f] = point.design.parts(dz);
+        let [x, f, filter_slopes] = point.design.parts_mut(slopes);
         for (k, (y, dy)) in point.signals.y.iter().zip(&along.signals.y).enumerate() {
+            let innovation = innovation(point.design, x_hat, y_f, (k, *y));
             let change = innovation_along(both, [z, dz], k, *dy);
-            self.correct_along(both, k, [innovation(point.design, z, k, *y), change], slopes);
+            self.correct_along(both, (k, [innovation, change]), x, f);
             if let (Some(w), Some(dw)) = (&point.design.filter, &along.design.filter) {
-                let at = point.design.filtered_at(k);
-                slopes[at] = w[k] * (dy - dz[at]) + dw[k] * (y - z[at]);
+                filter_slopes[k] = w[k] * (dy - dy_f[k]) + dw[k] * (y - y_f[k]);
             }
         }
     }

@@ -108,9 +108,16 @@ impl Observer {
         conditions: Conditions<'_>,
         (offset, size): (f64, f64),
     ) -> Result<(), control::Error> {
+        let span = Span { offset, size, halvings: HALVINGS };
         self.before.copy_from_slice(z);
-        self.advance_part(conditions, Span { offset, size, halvings: HALVINGS })?;
-        z.copy_from_slice(&self.before);
+        if conditions.design.actuators.iter().any(|actuator| actuator.limits.is_some()) {
+            self.advance_part(conditions, span)?;
+            z.copy_from_slice(&self.before);
+        } else {
+            let mode = Mode::free(conditions.compensating, conditions.estimating);
+            self.propagate(mode, conditions, span)?;
+            z.copy_from_slice(&self.after);
+        }
         Ok(())
     }
 
@@ -120,8 +127,7 @@ impl Observer {
         span: Span,
     ) -> Result<(), control::Error> {
         let mode = conditions.mode(&self.before);
-        let limited = conditions.design.actuators.iter().any(|actuator| actuator.limits.is_some());
-        if limited && span.halvings > 0 {
+        if span.halvings > 0 {
             let stays = self.stays(mode, conditions, span.half(0))?
                 && self.stays(mode, conditions, span)?;
             if !stays {

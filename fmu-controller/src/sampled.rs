@@ -105,8 +105,9 @@ impl Sampler {
         values.z.copy_from_slice(&self.prediction);
         let own = relative(design, values, deviations);
         self.before.copy_from_slice(&own.z);
+        let [x_hat, _, y_f] = design.parts(&own.z);
         for (k, e) in self.innovations.iter_mut().enumerate() {
-            *e = innovation(design, &own.z, k, own.y[k] + slopes[k] * offset);
+            *e = innovation(design, x_hat, y_f, (k, own.y[k] + slopes[k] * offset));
         }
         if self.estimator == Estimator::Current {
             self.correct(design, Mode::free(compensating, estimating), &mut values.z);
@@ -129,8 +130,9 @@ impl Sampler {
 
     /// Adds the gains times the innovations to `z`.
     fn correct(&self, design: &Design, mode: Mode, z: &mut [f64]) {
+        let [x_hat, f_hat, _] = design.parts_mut(z);
         for (k, e) in self.innovations.iter().enumerate() {
-            mode.correct(design, k, *e, z);
+            mode.correct(design, (k, *e), x_hat, f_hat);
         }
     }
 
@@ -166,8 +168,9 @@ impl Sampler {
             for (k, de) in changes.iter_mut().enumerate() {
                 *de = innovation_along(designs, [&self.before, &along.z], k, along.y[k]);
             }
+            let [x_hat, f_hat, _] = design.parts_mut(&mut along.z);
             for (k, (e, de)) in self.innovations.iter().zip(changes).enumerate() {
-                mode.correct_along(designs, k, [*e, *de], &mut along.z);
+                mode.correct_along(designs, (k, [*e, *de]), x_hat, f_hat);
             }
         }
         mode.command_along(point, design, along);

@@ -54,8 +54,10 @@ impl Signals {
     /// The commands that these deviations are those of: at a limit the limit itself.
     pub(crate) fn command_into(&self, design: &Design, mode: Mode, u: &mut [f64]) {
         for (j, (value, actuator)) in u.iter_mut().zip(&design.actuators).enumerate() {
-            let free = self.u[j] + actuator.operating.unwrap_or_default();
-            *value = mode.side(actuator.limits, j).unwrap_or(free);
+            *value = match actuator.limits {
+                Some(limits) if mode.is_limited(j) => mode.side(limits, j),
+                _ => self.u[j] + actuator.operating.unwrap_or_default(),
+            };
         }
     }
 }

@@ -84,11 +84,12 @@ fn commands(design: &Design) -> Vec<Variable<AsoController>> {
         .iter()
         .enumerate()
         .map(|(j, actuator)| {
-            let name = channel("u", j, actuators.len());
             let Label { unit, meaning } = actuator.label();
             let text = format!("Command: {meaning}");
             let variable =
-                Variable::real(name, text, move |model: &mut AsoController| &mut model.values.u[j]);
+                Variable::real(&actuator.name, text, move |model: &mut AsoController| {
+                    &mut model.values.u[j]
+                });
             output(design, with_unit(variable, unit), dependencies::of_command(design, j))
                 .initially(dependencies::of_initial_command(design, j))
                 .derivative(move |model| &mut model.u_slopes[j])

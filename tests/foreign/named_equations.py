@@ -17,7 +17,8 @@ def size_of(design):
 def losses(design):
     """Of each loss of effectiveness: its output, positions of fault and actuator, least command."""
     actuators = [actuator["name"] for actuator in design["actuators"]]
-    for k, (name, fault) in enumerate(zip(vector("E_hat", len(design["faults"])), design["faults"])):
+    names = vector("E_hat", len(design["faults"]))
+    for k, (name, fault) in enumerate(zip(names, design["faults"])):
         if "loss_of" in fault:
             yield name, k, actuators.index(fault["loss_of"]), fault["least_command"]
 
@@ -71,7 +72,7 @@ def evaluated(values, design, switches, start=False, minus=-1.0):
     v = v + compensating * (named.matrix("K_f", m, q) @ f_hat)
     at = [limited(values, j, command, m) for j, command in enumerate(v + u_op)]
     u = np.array([free if lim is None else lim for lim, free in zip(at, v + u_op)])
-    v = np.array([free if lim is None else lim + minus * u_op[j] for j, (lim, free) in enumerate(zip(at, v))])
+    v = np.array([own if lim is None else lim + minus * op for lim, own, op in zip(at, v, u_op)])
     x_slopes = named.matrix("A", n, n) @ deviation + named.matrix("B", n, m) @ v
     x_slopes = x_slopes + named.matrix("F_a", n, q) @ f_hat
     x_slopes = x_slopes + named.matrix("L_x", n, p) @ innovation
@@ -99,7 +100,7 @@ def rounding(values, direction, design, start):
         if name != "inputs" and not name.startswith(("u_min", "u_max")):
             size[name] = abs(value) + abs(direction.get(name, 0.0))
     terms = evaluated(size, design, (True, True), start, minus=1.0)
-    commands, faults = (vector(s, len(design[of])) for s, of in (("u", "actuators"), ("f_hat", "faults")))
+    commands, faults = vector("u", len(design["actuators"])), vector("f_hat", len(design["faults"]))
     for name, k, j, least in losses(design):
         terms[name] = terms[faults[k]] / least * (1 + terms[commands[j]] / least)
     return {name: 1e-13 * (1 + value) for name, value in terms.items()}

@@ -35,7 +35,7 @@ def random_design(sizes, limits=None, extras=""):
         "t_on": 0.0,
         "monitor": False,
         "states": signals("s", n),
-        "actuators": signals("act", m),
+        "actuators": [{"name": name, "unit": "m"} for name in vector("u", m)],
         "measurements": signals("y", p),
         "faults": signals("f", q),
         "experiment": {"stop_time": 2.0, "step_size": 0.01},
@@ -65,8 +65,9 @@ def extended(design, extras, chance):
         design["faults"][0] |= {"loss_of": design["actuators"][-1]["name"], "least_command": 0.7}
     for estimator in (ESTIMATORS[letter] for letter in extras if letter in ESTIMATORS):
         design |= {"sample_time": SAMPLE_TIME, "estimator": estimator}
-        small = ["A", "A_f", "L_x", "L_f"]
-        design |= {name: 0.3 * chance.normal(size=np.shape(design[name])) for name in small if name in design}
+        for name in ("A", "A_f", "K_x", "K_f", "L_x", "L_f"):
+            if name in design:
+                design[name] = 0.3 * chance.normal(size=np.shape(design[name]))
     return design
 
 

@@ -3,7 +3,7 @@
 use control::Error;
 use control::response::{
     System, energy, fault_rate_system, fault_system, frequency_grid, frequency_response,
-    h_infinity, peak_gain, step_response,
+    h_infinity, peak_gain, ramp_response, step_response,
 };
 use nalgebra::DMatrix;
 
@@ -99,12 +99,15 @@ impl<'a> Loops<'a> {
         Ok(found)
     }
 
-    /// The responses to a sudden change of each fault.
+    /// The responses to a change of each fault: all at once, and at the bound of its rate.
     pub(crate) fn steps(&self) -> Result<Vec<StepResponse>, Error> {
-        let response = |(column, fault): (usize, &Fault)| {
+        let response = |(column, fault, rate): (usize, &Fault, Option<f64>)| {
             let size = fault.step.or(fault.bound).unwrap_or(1.0);
             let mut curves = Vec::new();
-            let trace = step_response(&self.of_faults, column)?;
+            let trace = match rate {
+                None => step_response(&self.of_faults, column)?,
+                Some(rate) => ramp_response(&self.of_faults, column, size / rate)?,
+            };
             for (at, &row) in self.outputs.positions.iter().enumerate() {
                 let found = trace.transient(row, SETTLED);
                 curves.push(Curve {
@@ -118,9 +121,13 @@ impl<'a> Loops<'a> {
                 });
             }
             let (fault, unit) = (fault.name.clone(), fault.unit.clone());
-            Ok(StepResponse { fault, unit, size, curves })
+            Ok(StepResponse { fault, unit, size, rate, curves })
         };
-        self.faults().map(response).collect()
+        let each = |(column, fault): (usize, &'a Fault)| {
+            let at_rate = fault.rate_bound.map(|rate| (column, fault, Some(rate)));
+            std::iter::once((column, fault, None)).chain(at_rate)
+        };
+        self.faults().flat_map(each).map(response).collect()
     }
 
     /// From the faults as `system` has them to the errors of their estimates.

@@ -51,53 +51,20 @@ pub(crate) fn design(file: &PlantFile<'_>) -> anyhow::Result<Designed> {
         .map_err(|error| file.error(&["A"], error.to_string()))?;
     let (controllability, distance) = check_controllable(file, &linear)?;
     let detectability = check_detectable(file, &linear, &extended)?;
-    let estimator = match file.sampling {
-        Some(sampling) if sampling.current => Estimator::Current,
-        _ => Estimator::Prediction,
-    };
-    let (domain, plant) = match file.sampling {
-        None => (Domain::Continuous, extended.plant.clone()),
-        Some(sampling) => {
-            let period = sampling.period;
-            let plant = sampled::sample(&extended, period)
-                .map_err(|error| file.error(&["sample_time"], error.to_string()))?;
-            plant.check_observer_exists().map_err(|error| {
-                file.error(&["sample_time"], format!("sampled each {period} s: {error}"))
-            })?;
-            (Domain::Sampled { period }, plant)
-        }
-    };
-    let n = extended.states;
-    let problem = FeedbackProblem {
-        a: &plant.a.view((0, 0), (n, n)).into(),
-        b: &plant.b.rows(0, n).into(),
-        c,
-        f_a: &plant.f_a.rows(0, n).into(),
-    };
-    let feedback = feedback(&file.feedback.wanted, &problem, domain)
-        .map_err(|refusal| refused(file, &file.feedback, refusal, linear.states.len(), "states"))?;
-    let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
-    let order = a_0.nrows();
-    let observer =
-        observer(&file.observer.wanted, (&a_0, &c_0, plant.f_a.ncols()), domain, estimator)
-            .map_err(|refusal| {
-                let meaning = "states, filters, faults and rates of ramps";
-                refused(file, &file.observer, refusal, order, meaning)
-            })?;
+    let (domain, plant) = in_domain(file, &extended)?;
+    let (feedback, observer) = wanted(file, &extended, (&plant, c), domain)?;
+    let n = plant.a.nrows();
     let gains = Gains {
-        estimator,
-        k_x: feedback.gain.clone().resize_horizontally(plant.a.ncols(), 0.0),
+        estimator: estimator(file),
+        k_x: feedback.gain.clone().resize_horizontally(n, 0.0),
         k_f: sampled::compensation_gain(&extended, domain)?,
-        l_x: observer.gain.rows(0, plant.a.nrows()).into(),
-        l_f: -observer.gain.rows(plant.a.nrows(), plant.f_a.ncols()),
+        l_x: observer.gain.rows(0, n).into(),
+        l_f: -observer.gain.rows(n, plant.f_a.ncols()),
     };
     let controller = Controller::of(&plant, &gains)?;
     let whole = controller.closed_loop(&plant, &vec![1.0; plant.b.ncols()])?;
-    let cancelled = &extended.plant.b * extended.plant.compensation_gain()? + &extended.plant.f_a;
-    let n = extended.states;
     Ok(Designed {
-        cancellation_residual: cancelled.rows(0, n).norm()
-            / extended.plant.f_a.rows(0, n).norm().max(f64::MIN_POSITIVE),
+        cancellation_residual: cancellation_residual(&extended)?,
         instability: instability(&whole, domain)?,
         filter: sampled::filter(&extended, domain),
         linear,
@@ -112,6 +79,63 @@ pub(crate) fn design(file: &PlantFile<'_>) -> anyhow::Result<Designed> {
         detectability,
         controller,
     })
+}
+
+fn estimator(file: &PlantFile<'_>) -> Estimator {
+    match file.sampling {
+        Some(sampling) if sampling.current => Estimator::Current,
+        _ => Estimator::Prediction,
+    }
+}
+
+/// The plant that the observer runs: sampled for a sampled design.
+fn in_domain(
+    file: &PlantFile<'_>,
+    extended: &ExtendedPlant,
+) -> Result<(Domain, FaultyPlant), PlaceError> {
+    let Some(sampling) = file.sampling else {
+        return Ok((Domain::Continuous, extended.plant.clone()));
+    };
+    let period = sampling.period;
+    let refuse =
+        |error: Error| file.error(&["sample_time"], format!("sampled each {period} s: {error}"));
+    let plant = sampled::sample(extended, period).map_err(refuse)?;
+    plant.check_observer_exists().map_err(refuse)?;
+    Ok((Domain::Sampled { period }, plant))
+}
+
+/// The gains of feedback and observer for the plant in its domain; `c` is that of the plant alone.
+fn wanted(
+    file: &PlantFile<'_>,
+    extended: &ExtendedPlant,
+    (plant, c): (&FaultyPlant, &DMatrix<f64>),
+    domain: Domain,
+) -> Result<(Found, Found), PlaceError> {
+    let n = extended.states;
+    let problem = FeedbackProblem {
+        a: &plant.a.view((0, 0), (n, n)).into(),
+        b: &plant.b.rows(0, n).into(),
+        c,
+        f_a: &plant.f_a.rows(0, n).into(),
+    };
+    let feedback = feedback(&file.feedback.wanted, &problem, domain)
+        .map_err(|refusal| refused(file, &file.feedback, refusal, n, "states"))?;
+    let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
+    let pair = (&a_0, &c_0, plant.f_a.ncols());
+    let observer = observer(&file.observer.wanted, pair, domain, estimator(file));
+    let observer = observer.map_err(|refusal| {
+        let meaning = "states, filters, faults and rates of ramps";
+        refused(file, &file.observer, refusal, a_0.nrows(), meaning)
+    })?;
+    Ok((feedback, observer))
+}
+
+/// The part of the faults' effect on the plant's states that the compensation leaves, relative.
+fn cancellation_residual(extended: &ExtendedPlant) -> Result<f64, Error> {
+    let ExtendedPlant { plant, states, .. } = extended;
+    let left = &plant.b * plant.compensation_gain()? + &plant.f_a;
+    let whole = plant.f_a.rows(0, *states).norm();
+    Ok(if whole > 0.0 { left.rows(0, *states).norm() / whole } else { 0.0 })
 }
 
 fn check_controllable(

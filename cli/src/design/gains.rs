@@ -119,25 +119,24 @@ pub(crate) fn observer(
             synthesised(found, "Eigenvalues in the region by linear matrix inequalities")
         }
         Wanted::HInfinity { bound, region } => {
-            let order = a_0.nrows();
-            let last = |rows: usize| DMatrix::identity(rows, rows);
-            let mut rate = DMatrix::zeros(order, faults);
-            rate.rows_mut(order - faults, faults).copy_from(&last(faults));
-            let performance = Performance {
-                output: rate.transpose(),
-                disturbance: rate,
-                feed: DMatrix::zeros(c_0.nrows(), faults),
-                norm: Norm::HInfinity,
-                gamma: *bound,
-            };
+            let performance = rate_to_error((a_0.nrows(), c_0.nrows(), faults), *bound);
             let region = region.stated();
             let found = lmi::observer_gain(a_0, &seen, &region, Some(&performance), domain)?;
-            synthesised(
-                found,
-                "H-infinity norm from the faults' rates to the errors of their estimates",
-            )
+            let method = "H-infinity norm from the faults' rates to the errors of their estimates";
+            synthesised(found, method)
         }
     }
+}
+
+/// From the rates of the faults, the last states of the observer, to the errors of their estimates.
+fn rate_to_error(
+    (order, measurements, faults): (usize, usize, usize),
+    gamma: Option<f64>,
+) -> Performance {
+    let mut rate = DMatrix::zeros(order, faults);
+    rate.rows_mut(order - faults, faults).fill_with_identity();
+    let (output, feed) = (rate.transpose(), DMatrix::zeros(measurements, faults));
+    Performance { disturbance: rate, output, feed, norm: Norm::HInfinity, gamma }
 }
 
 /// The eigenvalues in the plane of the domain, and whether that is the z plane.

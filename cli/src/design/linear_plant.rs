@@ -2,7 +2,7 @@
 
 use anyhow::Context;
 use control::faults::{Entry, Fault as Model, FaultKind};
-use master::{Fmu, Linearise, linearise};
+use master::{Fmu, Linearisation, Linearise, linearise};
 use nalgebra::{DMatrix, DVector};
 
 use super::plant_file::{self, PlantFile};
@@ -52,7 +52,7 @@ impl LinearPlant {
                     residual: None,
                 })
             }
-            plant_file::Model::Fmu { .. } => linearised(file),
+            plant_file::Model::Fmu(fmu) => linearised(file, fmu),
         }
     }
 }
@@ -83,11 +83,38 @@ fn on_signals(fault: &Fault, b: &DMatrix<f64>, p: usize) -> Model {
     modelled(fault, enters)
 }
 
-/// Linearises the FMU of the file.
-fn linearised(file: &PlantFile<'_>) -> anyhow::Result<LinearPlant> {
-    let plant_file::Model::Fmu { path, operating_point, states } = &file.model else {
-        unreachable!("called for an FMU");
+/// The FMU of the file as a linear plant.
+fn linearised(file: &PlantFile<'_>, own: &plant_file::PlantFmu) -> anyhow::Result<LinearPlant> {
+    let (model, found) = linearisation(file, own)?;
+    let known = |signal: &master::linearise::Signal| Signal {
+        unit: signal.unit.clone(),
+        operating: Some(signal.value),
+        ..Signal::named(signal.name.clone())
     };
+    let merged = |own: &[Signal], found: &[master::linearise::Signal]| {
+        own.iter().zip(found).map(|(own, found)| own.clone().or(known(found))).collect()
+    };
+    refuse_feedthrough(file, &found.matrices.d, &found.matrices.c)?;
+    let (faults, models) = faults(file, &found)?;
+    Ok(LinearPlant {
+        states: found.states.iter().map(known).collect(),
+        actuators: merged(&file.actuators, &found.inputs),
+        measurements: merged(&file.measurements, &found.outputs),
+        faults,
+        models,
+        origin: format!("{model}, linearised by {}.", found.method),
+        residual: Some(found.residual),
+        a: found.matrices.a,
+        b: found.matrices.b,
+        c: found.matrices.c,
+    })
+}
+
+/// Linearises the FMU of the file; its name and what was found.
+fn linearisation(
+    file: &PlantFile<'_>,
+    plant_file::PlantFmu { path, operating_point, states }: &plant_file::PlantFmu,
+) -> anyhow::Result<(String, Linearisation)> {
     let fmu = Fmu::open_any(path).map_err(|error| file.error(&["plant"], error.to_string()))?;
     let names = |signals: &[Signal]| signals.iter().map(|signal| signal.name.clone()).collect();
     let inputs = file.faults.iter().filter_map(|fault| match &fault.entrance {
@@ -105,52 +132,37 @@ fn linearised(file: &PlantFile<'_>) -> anyhow::Result<LinearPlant> {
     let found = linearise(&fmu, &request)
         .map_err(|error| file.error(&["plant"], error.to_string()))
         .with_context(|| format!("cannot linearise {}", path.display()))?;
-    let known = |signal: &master::linearise::Signal| Signal {
-        unit: signal.unit.clone(),
-        operating: Some(signal.value),
-        ..Signal::named(signal.name.clone())
-    };
-    let merged = |own: &[Signal], found: &[master::linearise::Signal]| {
-        own.iter().zip(found).map(|(own, found)| own.clone().or(known(found))).collect()
-    };
-    let (b, c) = (&found.matrices.b, &found.matrices.c);
-    refuse_feedthrough(file, &found.matrices.d, c)?;
-    let mut next = 0;
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    Ok((format!("{} ({name})", fmu.description().model_name), found))
+}
+
+/// The faults of the file with the units of the FMU, and where they enter.
+fn faults(file: &PlantFile<'_>, found: &Linearisation) -> anyhow::Result<(Vec<Fault>, Vec<Model>)> {
+    let mut inputs = 0..;
     let mut faults = file.faults.clone();
     let mut models = Vec::with_capacity(faults.len());
     for fault in &mut faults {
-        if let Entrance::Input(_) = fault.entrance {
-            let enters = entry(file, fault, &found.matrices, next)?;
-            fault.unit = fault.unit.take().or_else(|| found.faults[next].unit.clone());
-            models.push(modelled(fault, enters));
-            next += 1;
-        } else {
-            if let Entrance::Actuator(at) | Entrance::Loss { actuator: at, .. } = fault.entrance {
-                fault.unit = fault.unit.take().or_else(|| found.inputs[at].unit.clone());
+        let (signal, model) = match fault.entrance {
+            Entrance::Input(_) => {
+                let at = inputs.next().unwrap_or_default();
+                (&found.faults[at], modelled(fault, entry(file, fault, &found.matrices, at)?))
             }
-            if let Entrance::Sensor(at) = fault.entrance {
-                fault.unit = fault.unit.take().or_else(|| found.outputs[at].unit.clone());
+            Entrance::Sensor(at) => {
+                let measurements = found.outputs.len();
+                (&found.outputs[at], on_signals(fault, &found.matrices.b, measurements))
             }
-            models.push(on_signals(fault, b, c.nrows()));
-        }
+            Entrance::Actuator(at) | Entrance::Loss { actuator: at, .. } => {
+                (&found.inputs[at], on_signals(fault, &found.matrices.b, found.outputs.len()))
+            }
+            Entrance::Column(_) => {
+                let message = format!("fault `{}`: an FMU has no F_a", fault.name);
+                return Err(file.error_at(&fault.place, message).into());
+            }
+        };
+        fault.unit = fault.unit.take().or_else(|| signal.unit.clone());
+        models.push(model);
     }
-    Ok(LinearPlant {
-        a: found.matrices.a.clone(),
-        b: b.clone(),
-        c: c.clone(),
-        states: found.states.iter().map(known).collect(),
-        actuators: merged(&file.actuators, &found.inputs),
-        measurements: merged(&file.measurements, &found.outputs),
-        faults,
-        models,
-        origin: format!(
-            "{} ({}), linearised by {}.",
-            fmu.description().model_name,
-            path.file_name().unwrap_or_default().to_string_lossy(),
-            found.method
-        ),
-        residual: Some(found.residual),
-    })
+    Ok((faults, models))
 }
 
 /// The observer is for measurements that the commands do not reach directly.

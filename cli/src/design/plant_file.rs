@@ -43,13 +43,16 @@ pub(crate) enum Model {
         states: Vec<Signal>,
     },
     /// An FMU is linearised.
-    Fmu {
-        path: PathBuf,
-        /// Values of its variables at the operating point.
-        operating_point: Vec<(String, f64)>,
-        /// States, for an FMU that cannot name them itself.
-        states: Vec<String>,
-    },
+    Fmu(PlantFmu),
+}
+
+/// The FMU of a plant, and where it is linearised.
+pub(crate) struct PlantFmu {
+    pub(crate) path: PathBuf,
+    /// Values of its variables at the operating point.
+    pub(crate) operating_point: Vec<(String, f64)>,
+    /// States, for an FMU that cannot name them itself.
+    pub(crate) states: Vec<String>,
 }
 
 /// How the controller samples.
@@ -221,11 +224,11 @@ fn linearised(
         }
     }
     let states = file.get("states").map(|entry| signals(&entry, false)).transpose()?;
-    let model = Model::Fmu {
+    let model = Model::Fmu(PlantFmu {
         path: folder.join(plant.text()?),
         operating_point,
         states: states.unwrap_or_default().into_iter().map(|signal| signal.name).collect(),
-    };
+    });
     let actuators = file.require("actuators", "the inputs of the FMU that the controller sets")?;
     let meaning = "the outputs of the FMU that the controller reads";
     let measurements = file.require("measurements", meaning)?;

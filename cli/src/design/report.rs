@@ -1,7 +1,7 @@
 //! The numbers of a design: what `--json` prints and what the page shows.
 
 use nalgebra::{Complex, DMatrix};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 /// Everything that is known of a design.
 #[derive(Serialize)]
@@ -19,7 +19,7 @@ pub(crate) struct Report {
     pub(crate) certificate: Certificate,
     /// How large each error can get, one entry for each pair of a fault and an error.
     pub(crate) bounds: Vec<Bound>,
-    /// What a sudden change of each fault does.
+    /// What a change of each fault does: all at once, and at the bound of its rate where one is stated.
     pub(crate) steps: Vec<StepResponse>,
     /// Singular values over the frequency.
     pub(crate) frequency: Vec<Frequency>,
@@ -123,10 +123,13 @@ pub(crate) struct Sampled {
 #[derive(Serialize)]
 pub(crate) struct Certificate {
     /// Theorem 1 as printed, or why it does not hold.
+    #[serde(serialize_with = "or_reason")]
     pub(crate) printed: Result<Theorem1, String>,
     /// The same with P chosen by linear matrix inequalities, or why there is none.
+    #[serde(serialize_with = "or_reason")]
     pub(crate) free: Result<FreeP, String>,
     /// Where the error ends for bounded rates of the faults, or why nothing is said.
+    #[serde(serialize_with = "or_reason")]
     pub(crate) ultimate: Result<Ultimate, String>,
     /// Norms from the faults' rates to the errors: name, value and how it was verified.
     pub(crate) norms: Vec<Norm>,
@@ -193,13 +196,15 @@ pub(crate) struct Bound {
     pub(crate) largest: Option<f64>,
 }
 
-/// What a sudden change of a fault does to the compensated loop.
+/// What a change of a fault does to the compensated loop.
 #[derive(Serialize)]
 pub(crate) struct StepResponse {
     pub(crate) fault: String,
     pub(crate) unit: Option<String>,
     /// Size of the change, in the unit of the fault.
     pub(crate) size: f64,
+    /// How fast it changes, per s; all at once where nothing is stated.
+    pub(crate) rate: Option<f64>,
     pub(crate) curves: Vec<Curve>,
 }
 
@@ -246,6 +251,17 @@ pub(crate) struct Variable {
     pub(crate) unit: Option<String>,
     pub(crate) start: Option<String>,
     pub(crate) description: String,
+}
+
+/// What is known as it is, and `{ "reason": ... }` in the place of what is not.
+fn or_reason<T: Serialize, S: Serializer>(
+    found: &Result<T, String>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    match found {
+        Ok(found) => found.serialize(serializer),
+        Err(reason) => serializer.collect_map([("reason", reason)]),
+    }
 }
 
 /// Row by row.

@@ -11,19 +11,15 @@ use nalgebra::{Complex, DMatrix};
 
 use super::analysis::Loops;
 use super::certificate::certificate;
+use super::checks::checks;
 use super::designed::{Designed, fault_names};
 use super::gains::Found;
 use super::plant_file::PlantFile;
 use super::report::{
-    Check, Effectiveness, Loop, Matrix, Plant, Region, Report, Sampled, Signal, pairs, rows,
+    Effectiveness, Loop, Matrix, Plant, Region, Report, Sampled, Signal, pairs, rows,
 };
 use super::signals::{self, Course, Entrance, Fault};
 use super::wanted::{self, Wanted};
-
-/// Below this part of a fault's effect the compensation counts as complete.
-const CANCELLED: f64 = 1e-9;
-/// An operating point nearer to an equilibrium than this counts as one.
-const AT_REST: f64 = 1e-6;
 
 /// Everything that is known of `designed`.
 pub(crate) fn report(
@@ -106,6 +102,38 @@ impl Names {
         }
     }
 
+    /// A, B, C, F_a of the plant, and what the observer runs where it is another one.
+    fn plant_matrices(&self, designed: &Designed) -> Vec<Matrix> {
+        let Self { states, extended, actuators, measurements, faults } = self;
+        let linear = &designed.linear;
+        let mut matrices = vec![
+            matrix("A", "states", &linear.a, states, states),
+            matrix("B", "commands", &linear.b, states, actuators),
+            matrix("C", "measurements", &linear.c, measurements, states),
+        ];
+        let own = &designed.plant;
+        if own.a == linear.a {
+            matrices.push(matrix("F_a", "faults", &own.f_a, states, faults));
+        } else {
+            let kind = match designed.domain {
+                Domain::Continuous => "extended",
+                Domain::Sampled { .. } => "sampled",
+            };
+            for (name, values, rows, columns) in [
+                ("A_e", &own.a, extended, extended),
+                ("B_e", &own.b, extended, actuators),
+                ("C_e", &own.c, measurements, extended),
+                ("F_e", &own.f_a, extended, faults),
+            ] {
+                matrices.push(matrix(name, &format!("{kind} plant"), values, rows, columns));
+            }
+        }
+        if own.a_f.amax() > 0.0 {
+            matrices.push(matrix("A_f", "fault model", &own.a_f, faults, faults));
+        }
+        matrices
+    }
+
     fn gains(&self, designed: &Designed) -> Vec<Matrix> {
         let gains = &designed.gains;
         let Self { extended, actuators, measurements, faults, .. } = self;
@@ -155,39 +183,13 @@ fn plant(designed: &Designed, names: &Names) -> Result<Plant, Error> {
         operating: 0.0,
         notes: notes(fault, designed),
     };
-    let Names { states, extended, actuators, measurements, faults } = names;
-    let mut matrices = vec![
-        matrix("A", "states", &linear.a, states, states),
-        matrix("B", "commands", &linear.b, states, actuators),
-        matrix("C", "measurements", &linear.c, measurements, states),
-    ];
-    let own = &designed.plant;
-    if own.a == linear.a {
-        matrices.push(matrix("F_a", "faults", &own.f_a, states, faults));
-    } else {
-        let kind = match designed.domain {
-            Domain::Continuous => "extended",
-            Domain::Sampled { .. } => "sampled",
-        };
-        for (name, values, rows, columns) in [
-            ("A_e", &own.a, extended, extended),
-            ("B_e", &own.b, extended, actuators),
-            ("C_e", &own.c, measurements, extended),
-            ("F_e", &own.f_a, extended, faults),
-        ] {
-            matrices.push(matrix(name, &format!("{kind} plant"), values, rows, columns));
-        }
-    }
-    if own.a_f.amax() > 0.0 {
-        matrices.push(matrix("A_f", "fault model", &own.a_f, faults, faults));
-    }
     Ok(Plant {
         origin: linear.origin.clone(),
         states: linear.states.iter().map(signal).collect(),
         actuators: linear.actuators.iter().map(signal).collect(),
         measurements: linear.measurements.iter().map(signal).collect(),
         faults: linear.faults.iter().map(fault).collect(),
-        matrices,
+        matrices: names.plant_matrices(designed),
         eigenvalues: pairs(&eigenvalues(&linear.a)?),
     })
 }
@@ -215,70 +217,6 @@ fn notes(fault: &Fault, designed: &Designed) -> String {
         parts.extend(value.map(|value| format!("{text} {value}")));
     }
     parts.join(", ")
-}
-
-fn check(condition: &str, holds: bool, value: Option<f64>, explanation: String) -> Check {
-    Check { condition: condition.to_owned(), holds, value, explanation }
-}
-
-fn checks(designed: &Designed) -> Vec<Check> {
-    let Designed { controllability, distance, detectability, .. } = designed;
-    let away =
-        |what: &str, lower: f64| format!("{what}; distance from losing it, relative: {lower:.2e}");
-    let mut all = vec![
-        check(
-            "(A, B) is controllable",
-            controllability.is_full(),
-            Some(distance.lower),
-            away(
-                &format!("rank {} of {}", controllability.rank, controllability.n),
-                distance.lower,
-            ),
-        ),
-        check(
-            "(A, C) is observable",
-            detectability.observability.is_full(),
-            None,
-            format!(
-                "rank {} of {}",
-                detectability.observability.rank, detectability.observability.n
-            ),
-        ),
-        check(
-            "the augmented observer exists",
-            detectability.is_full(),
-            Some(detectability.distance.lower),
-            away(
-                "no invariant zero of (A, F_a, C) at an eigenvalue of the fault model",
-                detectability.distance.lower,
-            ),
-        ),
-        check(
-            "the compensation cancels the faults of the actuators",
-            designed.cancellation_residual < CANCELLED,
-            Some(designed.cancellation_residual),
-            "norm of B K_f + F_a relative to F_a; what is left acts on the plant".to_owned(),
-        ),
-        check(
-            "plant and controller are stable together",
-            designed.instability < 0.0,
-            Some(designed.instability),
-            match designed.domain {
-                Domain::Continuous => "largest real part of the eigenvalues, 1/s",
-                Domain::Sampled { .. } => "largest modulus of the eigenvalues, less 1",
-            }
-            .to_owned(),
-        ),
-    ];
-    if let Some(residual) = designed.linear.residual {
-        all.push(check(
-            "the operating point is an equilibrium",
-            residual < AT_REST,
-            Some(residual),
-            "derivatives of the states relative to what typical changes contribute".to_owned(),
-        ));
-    }
-    all
 }
 
 fn closed(

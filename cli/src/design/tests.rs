@@ -206,8 +206,8 @@ feedback.R = [[2]]
 observer.region = { decay = 20 }
 "#;
     let (path, point) = read(text, |file| {
-        let Model::Fmu { path, operating_point, .. } = &file.model else { panic!("an FMU") };
-        (path.clone(), operating_point.clone())
+        let Model::Fmu(own) = &file.model else { panic!("an FMU") };
+        (own.path.clone(), own.operating_point.clone())
     })
     .unwrap();
     assert_eq!(path, Path::new("Plant.fmu"));

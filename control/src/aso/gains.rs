@@ -10,8 +10,8 @@ pub enum Estimator {
     /// The measurement corrects the derivative of the estimate or, when sampled, the next estimate:
     /// u has the whole interval for its computation, and acts one sample late.
     Prediction,
-    /// Sampled only: `x_hat`[k] is corrected by y[k] before u[k] is formed, which must take no time
-    /// to speak of.
+    /// Sampled only: `x_hat[k]` is corrected by `y[k]` before `u[k]` is formed, which must take no
+    /// time to speak of.
     Current,
 }
 

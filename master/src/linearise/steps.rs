@@ -133,25 +133,12 @@ fn of_count(
     if directions.contrast < LEAST {
         return Err(unreachable(Some(directions), parts, states));
     }
-    let step = bench.step;
     let discrete = fit(&record, parts, states, degree(&record)).ok_or(INACCURATE)?;
     let missed = missed(bench, &discrete, &record, count)?;
     if missed.is_nan() || missed > MISSED {
         return Err(LineariseError::NotStates { missed, allowed: MISSED });
     }
-    let mut maps = Vec::new();
-    for bench in longer {
-        // A longer step may be too long for the FMU or for a logarithm.
-        match bench.record(count).map(|record| map(bench, &record, parts, states)) {
-            Ok(Some(map)) => maps.push(map),
-            _ => maps.clear(),
-        }
-    }
-    let map = map(bench, &record, parts, states);
-    maps.push(map.ok_or(LineariseError::NoLogarithm { step })?);
-    if maps.len() < 2 {
-        return Err(LineariseError::NoLogarithm { step: 2.0 * step });
-    }
+    let maps = maps(bench, longer, &record, count, parts, states)?;
     let (values, errors) = at_step_zero(&maps);
     let (n, columns) = (states.len(), values.ncols() - 1);
     let (jacobian, errors) =
@@ -178,14 +165,36 @@ fn of_count(
 fn unreachable(directions: Option<Directions>, parts: &Parts, states: &[Part]) -> LineariseError {
     let names: Vec<&Part> = states.iter().chain(&parts.inputs).collect();
     let weak = directions.map(|directions| directions.weak(LEAST)).unwrap_or_default();
-    let mut weak: Vec<usize> = weak.into_iter().map(|column| column % names.len()).collect();
-    weak.sort_unstable();
-    weak.dedup();
     LineariseError::Unreachable {
         rank: names.len() - weak.len(),
         expected: names.len(),
         names: weak.iter().map(|&column| names[column].name.clone()).collect(),
     }
+}
+
+/// The continuous systems of all step sizes that have one, the shortest last; at least two.
+fn maps(
+    bench: &Bench,
+    longer: &mut [Bench],
+    record: &Record,
+    count: usize,
+    parts: &Parts,
+    states: &[Part],
+) -> Result<Vec<Map>, LineariseError> {
+    let mut maps = Vec::new();
+    for bench in longer {
+        // A longer step may be too long for the FMU or for a logarithm.
+        match bench.record(count).map(|record| map(bench, &record, parts, states)) {
+            Ok(Some(map)) => maps.push(map),
+            _ => maps.clear(),
+        }
+    }
+    let (step, map) = (bench.step, map(bench, record, parts, states));
+    maps.push(map.ok_or(LineariseError::NoLogarithm { step })?);
+    if maps.len() < 2 {
+        return Err(LineariseError::NoLogarithm { step: 2.0 * step });
+    }
+    Ok(maps)
 }
 
 /// The degree of the polynomials of time that the coefficients are.

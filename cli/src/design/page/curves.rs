@@ -96,7 +96,9 @@ pub(super) fn responses(report: &Report) -> Markup {
         p {
             "The fault changes at time 0 by the size stated and then stays; the loop was at rest. \
              The time axes show decades, so that the fast part of the observer and the slow part \
-             of the feedback loop both have room. Each curve has its own scale."
+             of the feedback loop both have room. Each curve has its own scale. Where a fault turns \
+             round again and again, as dry friction does, the largest magnitude of a state predicts \
+             the amplitude (half of peak to peak) of the motion that is left."
         }
         @for (index, response) in report.steps.iter().enumerate() {
             (self::response(&format!("step-{}", index + 1), response))
@@ -107,7 +109,11 @@ pub(super) fn responses(report: &Report) -> Markup {
 fn response(id: &str, response: &StepResponse) -> Markup {
     let unit = response.unit.as_deref().unwrap_or_default();
     let title = html! {
-        "A sudden change of " (response.fault) " by " (number(response.size)) " " (unit)
+        "A change of " (response.fault) " by " (number(response.size)) " " (unit) " "
+        @match response.rate {
+            None => "at once",
+            Some(rate) => { "at " (number(rate)) " " (unit) " per s" }
+        }
     };
     let rows: Vec<Vec<Cell>> = response
         .curves

@@ -123,7 +123,7 @@ fn settling(report: &Report) -> Markup {
     let last = curves.max_by(|a, b| a.settling_time.total_cmp(&b.settling_time));
     html! {
         @if let Some(curve) = last {
-            (key("Settled after a sudden fault", &html! {
+            (key("Settled after a change of a fault", &html! {
                 "within " (number(curve.settling_time)) " s (" (curve.name) ")"
             }))
         }

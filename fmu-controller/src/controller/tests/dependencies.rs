@@ -84,7 +84,7 @@ fn initial_values_depend_on_what_is_listed_and_on_nothing_else() {
             listed.insert(name, on.into_iter().collect());
         };
         for j in 0..m {
-            list(names::channel("u", j, m), dependencies::of_initial_command(design, j));
+            list(design.actuators[j].name.clone(), dependencies::of_initial_command(design, j));
         }
         for (k, name) in names::estimates(design).enumerate() {
             if controller.sampler.is_none() {
@@ -143,10 +143,9 @@ fn kind(factors: &[f64], limited: bool) -> Option<DependencyKind> {
 
 /// Whether the row of this unknown has factors that are not constant, or cut off by a limit.
 fn is_bent((sizes, limits, _): Shape, unknown: &str) -> bool {
-    match unknown.strip_prefix('u') {
-        Some("") => limits.contains('l'),
+    match unknown.strip_prefix("actuators") {
         Some(index) => {
-            let j: usize = index.trim_matches(['[', ']']).parse().unwrap();
+            let j: usize = index.parse().unwrap();
             limits.as_bytes()[j - 1] == b'l'
         }
         None if unknown.starts_with("E_hat") => true,
@@ -168,8 +167,7 @@ fn at_a_point_outputs_and_derivatives_depend_on_what_is_listed_in_the_way_listed
             }
         };
         for j in 0..of.0[1] {
-            let name = names::channel("u", j, of.0[1]);
-            list(&name, &dependencies::of_command(design, j));
+            list(&design.actuators[j].name, &dependencies::of_command(design, j));
         }
         for (k, state) in names::estimates(design).enumerate() {
             list(&state, &[(Constant, vec![state.clone()])]);

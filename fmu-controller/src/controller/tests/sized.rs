@@ -1,7 +1,7 @@
 //! Designs of any size, and every number of a controller by the name of its variable.
 
 use crate::controller::AsoController;
-use crate::design::Design;
+use crate::design::{Actuator, Design};
 use crate::matrix::Matrix;
 use crate::names;
 
@@ -132,9 +132,10 @@ pub(super) fn states(controller: &AsoController) -> Vec<Real> {
 /// Commands, estimates, losses of effectiveness, derivatives.
 pub(super) fn unknowns(controller: &AsoController) -> Vec<Real> {
     let design = &controller.design;
-    let commands = names::channels("u", design.actuators.len()).enumerate();
-    let mut all: Vec<_> =
-        commands.map(|(j, name)| real(name, move |own| &mut own.values.u[j])).collect();
+    let command = |(j, actuator): (usize, &Actuator)| {
+        real(actuator.name.clone(), move |own| &mut own.values.u[j])
+    };
+    let mut all: Vec<_> = design.actuators.iter().enumerate().map(command).collect();
     all.extend(estimates(controller));
     for (position, loss) in controller.losses.iter().enumerate() {
         let name = names::channel("E_hat", loss.fault, design.faults.len());

@@ -211,6 +211,7 @@ pub(super) fn hostile() -> Report {
                 fault: format!("f{k} {QUOTES}"),
                 unit: None,
                 size: 0.375,
+                rate: Some(12.25),
                 curves: (1..=5).map(curve).collect(),
             })
             .collect(),

@@ -83,7 +83,13 @@ impl Design {
         for (index, (name, unit, _)) in STATES.iter().enumerate() {
             curves.push(curve(name, unit, &|state| state[index]));
         }
-        StepResponse { fault: "f_fric".to_owned(), unit: Some("N".to_owned()), size, curves }
+        StepResponse {
+            fault: "f_fric".to_owned(),
+            unit: Some("N".to_owned()),
+            size,
+            rate: None,
+            curves,
+        }
     }
 
     /// Gains from the fault to its estimate and from its rate to the error.

@@ -1,0 +1,79 @@
+//! The conditions that a design must meet.
+
+use control::Domain;
+
+use super::designed::Designed;
+use super::report::Check;
+
+/// Below this part of a fault's effect the compensation counts as complete.
+const CANCELLED: f64 = 1e-9;
+/// An operating point nearer to an equilibrium than this counts as one.
+const AT_REST: f64 = 1e-6;
+
+/// All conditions, each with the number behind it.
+pub(crate) fn checks(designed: &Designed) -> Vec<Check> {
+    let mut all = Vec::from(existence(designed));
+    all.push(check(
+        "the compensation cancels the faults of the actuators",
+        designed.cancellation_residual < CANCELLED,
+        Some(designed.cancellation_residual),
+        "norm of B K_f + F_a relative to F_a; what is left acts on the plant".to_owned(),
+    ));
+    let margin = match designed.domain {
+        Domain::Continuous => "largest real part of the eigenvalues, 1/s",
+        Domain::Sampled { .. } => "largest modulus of the eigenvalues, less 1",
+    };
+    all.push(check(
+        "plant and controller are stable together",
+        designed.instability < 0.0,
+        Some(designed.instability),
+        margin.to_owned(),
+    ));
+    all.extend(designed.linear.residual.map(|residual| {
+        check(
+            "the operating point is an equilibrium",
+            residual < AT_REST,
+            Some(residual),
+            "derivatives of the states relative to what typical changes contribute".to_owned(),
+        )
+    }));
+    all
+}
+
+/// The conditions for feedback and observer to exist; a design that fails one is not made.
+fn existence(designed: &Designed) -> [Check; 3] {
+    let Designed { controllability, distance, detectability, .. } = designed;
+    let away =
+        |what: &str, lower: f64| format!("{what}; distance from losing it, relative: {lower:.2e}");
+    let seen = &detectability.observability;
+    [
+        check(
+            "(A, B) is controllable",
+            controllability.is_full(),
+            Some(distance.lower),
+            away(
+                &format!("rank {} of {}", controllability.rank, controllability.n),
+                distance.lower,
+            ),
+        ),
+        check(
+            "(A, C) is observable",
+            seen.is_full(),
+            None,
+            format!("rank {} of {}", seen.rank, seen.n),
+        ),
+        check(
+            "the augmented observer exists",
+            detectability.is_full(),
+            Some(detectability.distance.lower),
+            away(
+                "no invariant zero of (A, F_a, C) at an eigenvalue of the fault model",
+                detectability.distance.lower,
+            ),
+        ),
+    ]
+}
+
+fn check(condition: &str, holds: bool, value: Option<f64>, explanation: String) -> Check {
+    Check { condition: condition.to_owned(), holds, value, explanation }
+}
