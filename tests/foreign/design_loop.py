@@ -67,24 +67,10 @@ class Designed:
         names = [fault["name"] for fault in self.design["faults"]]
         return qualified("E_hat", names.index(name), len(names))
 
-    def command(self, name):
-        """The qualified name of the command of an actuator."""
-        outputs = [own["name"] for own in self.report["interface"] if own["causality"] == "output"]
-        if name in outputs:
-            return f"controller.{name}"
-        names = [actuator["name"] for actuator in self.design["actuators"]]
-        return qualified("u", names.index(name), len(names))
-
-    def connections(self):
-        """The connections of commands that do not have the name of their actuator."""
-        names = [actuator["name"] for actuator in self.design["actuators"]]
-        pairs = [(self.command(name), f"plant.{name}") for name in names]
-        apart = [pair for pair in pairs if pair[0] != f"controller.{pair[1].partition('.')[2]}"]
-        return [text for pair in apart for text in ("--connect", "=".join(pair))]
-
     def response(self, fault, name):
-        """The report's curve of `name` after a change of `fault`, and the size of that change."""
-        (steps,) = (steps for steps in self.report["steps"] if steps["fault"] == fault)
+        """The report's curve of `name` after a jump of `fault`, and the size of that jump."""
+        jumps = [steps for steps in self.report["steps"] if steps["rate"] is None]
+        (steps,) = (steps for steps in jumps if steps["fault"] == fault)
         (curve,) = (curve for curve in steps["curves"] if curve["name"] == name)
         return curve, steps["size"]
 
@@ -105,7 +91,7 @@ def coupled(python, designed, plant, settings, *arguments):
     done = python(
         ROOT / "scripts" / "couple_with_fmpy.py",
         *("--plant", plant, "--controller", designed.fmu, "--out", out, "--record-every", "1e-9"),
-        *(*designed.connections(), *stated, *arguments),
+        *(*stated, *arguments),
     )
     assert done.returncode == 0, done.stderr
     names = out.read_text(encoding="utf-8").split("\n", 1)[0].split(",")

@@ -105,7 +105,7 @@ def test_losses_of_effectiveness_of_both_pumps_are_found(aso_ftc, python, tanks,
     for (name, loss), fault, pump in zip(losses.items(), ("f_1", "f_2"), ("Q_1", "Q_2")):
         found = table[designed.loss(fault)]
         assert found[after(table, 300 + 5 / slowest)] == pytest.approx(loss, rel=0.02), name
-        command = table[designed.command(pump)][-1]
+        command = table[f"controller.{pump}"][-1]
         # The threshold of excitation takes u_e^2 / (u^2 + u_e^2) of it.
         seen = loss * command**2 / (command**2 + 1e-6**2)
         assert found[-1] == pytest.approx(seen, rel=1e-6)
@@ -150,13 +150,10 @@ def test_fmpy_and_the_rust_master_agree_on_the_tanks(
     designed = Designed(aso_ftc, "examples/three-tank/plant.toml", tmp_path)
     steps = ("--step", 0.37, "--stop-time", 400)
     table, _ = coupled(python, designed, tanks, BOTH, *steps, *inputs)
-    pairs = [(designed.command(name), f"plant.{name}") for name in ("Q_1", "Q_2")]
-    pairs += [(f"plant.y_{k}", f"controller.y_{k}") for k in (1, 2, 3)]
-    connections = [text for pair in pairs for text in ("--connect", "=".join(pair))]
     settings = [text for name, value in BOTH.items() for text in ("--set", f"{name}={value}")]
     options = ("--method", method, "--record-every", 0.37, "--out", tmp_path)
     fmus = ("--plant", tanks, "--controller", designed.fmu)
-    done = aso_ftc("run", *fmus, *connections, *settings, *steps, *options)
+    done = aso_ftc("run", *fmus, *settings, *steps, *options)
     assert done.returncode == 0, done.stderr
     path = tmp_path / "results.csv"
     names = path.read_text(encoding="utf-8").split("\n", 1)[0].split(",")
@@ -181,7 +178,7 @@ def test_a_sampled_controller_stands_any_communication_step(
     must_settle(table, designed, "f_1", 1e-5, 300 + step, [8e-6])
     must_settle(table, designed, "f_2", -8e-6, 300 + step, [1e-5])
     if step == 0.37:
-        changes = np.flatnonzero(np.diff(table[designed.command("Q_1")]))
+        changes = np.flatnonzero(np.diff(table["controller.Q_1"]))
         assert set(np.diff(changes)) >= {2, 3}, "samples each 1 s, seen at steps of 0.37 s"
 
 
