@@ -29,6 +29,14 @@ pub(crate) fn checks(designed: &Designed) -> Vec<Check> {
         Some(designed.instability),
         margin.to_owned(),
     ));
+    all.extend(designed.instability_before.map(|value| {
+        check(
+            "the observer is stable before t_on, while it does not estimate the faults",
+            value < 0.0,
+            Some(value),
+            format!("{margin}, of the states' error; `monitor = true` estimates from the start"),
+        )
+    }));
     all.extend(designed.linear.residual.map(|residual| {
         check(
             "the operating point is an equilibrium",

@@ -40,6 +40,8 @@ pub(crate) struct Designed {
     pub(crate) controller: Controller,
     /// Largest real part of the eigenvalues of the loop, or largest modulus less one; below zero.
     pub(crate) instability: f64,
+    /// The same of the observer's error while the faults are not estimated, where that happens.
+    pub(crate) instability_before: Option<f64>,
 }
 
 /// Designs what `file` wants.
@@ -65,6 +67,11 @@ pub(crate) fn design(file: &PlantFile<'_>) -> anyhow::Result<Designed> {
     let whole = controller.closed_loop(&plant, &vec![1.0; plant.b.ncols()])?;
     Ok(Designed {
         cancellation_residual: cancellation_residual(&extended)?,
+        instability_before: if file.t_on > 0.0 && !file.monitor {
+            Some(instability(&gains.error_dynamics_of_states(&plant), domain)?)
+        } else {
+            None
+        },
         instability: instability(&whole, domain)?,
         filter: sampled::filter(&extended, domain),
         linear,

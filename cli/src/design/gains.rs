@@ -181,14 +181,26 @@ fn synthesised(found: Outcome<Synthesis>, method: &str) -> Result<Found, Refusal
             let method = format!("{method}; region verified with margin {margin:.1e}{bound}.");
             Ok(Found { gain: found.gain, method, wanted: Vec::new(), quality: None })
         }
-        Outcome::Infeasible { conflict } => Err(Refusal::Conflict(format!(
-            "these requirements contradict each other: {}",
-            conflict.join("; ")
-        ))),
+        Outcome::Infeasible { conflict } => Err(Refusal::Conflict(contradiction(&conflict))),
         Outcome::Trouble(reason) => Err(Refusal::Conflict(format!(
             "no answer could be verified: {reason}; other wanted values or units nearer to the size of \
              the signals may help"
         ))),
+    }
+}
+
+/// The requirements as the plant file names them.
+fn contradiction(conflict: &[&str]) -> String {
+    let name = |requirement: &&str| match *requirement {
+        "gain" => "h_infinity".to_owned(),
+        other => other.to_owned(),
+    };
+    match conflict {
+        [one] => format!("this cannot be met, whatever else is wanted: {}", name(one)),
+        several => {
+            let names: Vec<_> = several.iter().map(name).collect();
+            format!("these requirements contradict each other: {}", names.join(", "))
+        }
     }
 }
 

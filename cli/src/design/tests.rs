@@ -4,6 +4,8 @@ use std::path::Path;
 
 use nalgebra::Complex;
 
+use super::checks::checks;
+use super::designed::design;
 use super::document::{Source, Table};
 use super::plant_file::{Model, PlantFile};
 use super::signals::{Course, Entrance};
@@ -18,7 +20,7 @@ observer.eigenvalues = [-5, { re = -6, im = 2.5 }]
 "#;
 
 /// What is replaced in `MASS`, by what, and a part of the error.
-const REFUSALS: [(&str, &str, &str); 32] = [
+const REFUSALS: [(&str, &str, &str); 34] = [
     (
         "A = [[0, 1], [0, 0]]",
         "A = [[0, 1], [0]]",
@@ -41,6 +43,16 @@ const REFUSALS: [(&str, &str, &str); 32] = [
         "feedback.eigenvalues = [-1, -2]",
         "feedback.Q = [1, 1]",
         "`feedback.R` is missing: the weight of",
+    ),
+    (
+        "feedback.eigenvalues = [-1, -2]",
+        "feedback.h_infinity = \"least\"",
+        "5:23: feedback.h_infinity: \"least\" needs a `region` with a disc",
+    ),
+    (
+        "feedback.eigenvalues = [-1, -2]",
+        "sample_time = 1\nfeedback.region = { decay = 1, sector = 30 }",
+        "6:41: feedback.region.sector: a sampled design has a region by `decay` only",
     ),
     (
         "feedback.eigenvalues = [-1, -2]",
@@ -212,4 +224,26 @@ observer.region = { decay = 20 }
     .unwrap();
     assert_eq!(path, Path::new("Plant.fmu"));
     assert_eq!(point, [("phi".to_owned(), 0.5), ("tau.c".to_owned(), 0.0)]);
+}
+
+/// The pendulum sampled at 5 ms by a prediction estimator of a ramp; without estimating the friction
+/// its observer has the spectral radius 1.082 (numpy), and the pendulum falls at once.
+#[test]
+fn an_observer_that_is_unstable_before_t_on_fails_a_check_unless_it_estimates_from_the_start() {
+    let pendulum = include_str!("../../../fmu-controller/pendulum.toml")
+        .replace("bound = 30.0", "kind = \"ramp\"\nbound = 30.0")
+        .replace("-3000.0]", "-3000.0, -2500.0]")
+        .replace("t_on = 40.0", "t_on = 40.0\nsample_time = 0.005\nestimator = \"prediction\"");
+    let failed = |text: &str| {
+        read(text, |file| {
+            let checks = checks(&design(file).unwrap());
+            let failed = checks.into_iter().filter(|check| !check.holds);
+            failed.map(|check| (check.condition, check.value.unwrap())).collect::<Vec<_>>()
+        })
+        .unwrap()
+    };
+    let [(condition, value)] = &failed(&pendulum)[..] else { panic!("one check fails") };
+    assert!(condition.contains("before t_on"), "{condition}");
+    assert!((value - 0.082).abs() < 5e-4, "{value}");
+    assert!(failed(&pendulum.replace("monitor = false", "monitor = true")).is_empty());
 }

@@ -49,6 +49,9 @@ pub(crate) fn request(
     known.extend(weights);
     table.allow(&known)?;
     let region = table.get("region");
+    if let Some(entry) = region.as_ref().filter(|_| sampled) {
+        refuse_unsampled(entry)?;
+    }
     let Some(one) = only_one(table, weights[0])? else {
         let Some(entry) = region else {
             let message = format!("expected one of {}", known.join(", "));
@@ -63,6 +66,11 @@ pub(crate) fn request(
             return Err(entry.error("a region goes alone or with `h_infinity`"));
         }
         Some(entry) => Wanted::HInfinity { bound: bound(&one)?, region: self::region(&entry)? },
+        None if norm && bound(&one)?.is_none() => {
+            let advice = "\"least\" needs a `region` with a disc: without one, ever larger gains lower \
+                          the norm without end";
+            return Err(one.error(advice));
+        }
         None if norm => Wanted::HInfinity { bound: bound(&one)?, region: Region::default() },
         None if one.name.ends_with(".eigenvalues") => Wanted::Eigenvalues(eigenvalues(&one)?),
         None if one.name.ends_with(".sampled_eigenvalues") => {
@@ -77,6 +85,15 @@ pub(crate) fn request(
         }
     };
     Ok(Request { wanted, place: one.place })
+}
+
+/// The shape of a disc or a sector is lost between the planes of s and z; a decay rate is not.
+fn refuse_unsampled(region: &Entry<'_>) -> Result<(), PlaceError> {
+    let table = region.table()?;
+    match ["disc", "sector"].iter().find_map(|key| table.get(key)) {
+        Some(entry) => Err(entry.error("a sampled design has a region by `decay` only")),
+        None => Ok(()),
+    }
 }
 
 /// The one method that the table states beside a region.

@@ -66,6 +66,14 @@ impl Gains {
         &a_0 - self.observer_gain() * self.estimator.seen(&a_0, &plant.augmented_output())
     }
 
+    /// A - `L_x` C, n x n, or A - `L_x` C A for a current estimator: the error of the states while the
+    /// estimates of the faults are held. No eigenvalue of it is placed; a loop that begins without
+    /// estimating faults needs it stable.
+    #[must_use]
+    pub fn error_dynamics_of_states(&self, plant: &FaultyPlant) -> DMatrix<f64> {
+        &plant.a - &self.l_x * self.estimator.seen(&plant.a, &plant.c)
+    }
+
     /// Shapes and finiteness of the gains for a plant.
     ///
     /// # Errors

@@ -31,7 +31,8 @@ impl Wanted {
     }
 }
 
-/// One entry per real eigenvalue and per pair, in the order of `poles`.
+/// One entry per real eigenvalue and per pair, the largest real part first: the order in which the
+/// user states them must not decide which of several local optima is found.
 ///
 /// Refuses an eigenvalue without its conjugate and one that comes more than `inputs` times. Both
 /// are decided on exact equality.
@@ -46,5 +47,10 @@ pub(crate) fn wanted(poles: &[Complex<f64>], inputs: usize) -> Result<Vec<Wanted
             return Err(Error::RepeatedPole { pole, times, inputs });
         }
     }
-    Ok(poles.iter().filter(|pole| pole.im >= 0.0).map(|&pole| Wanted { pole }).collect())
+    let upper = poles.iter().filter(|pole| pole.im >= 0.0);
+    let mut all: Vec<_> = upper.map(|&pole| Wanted { pole }).collect();
+    let order =
+        |x: &Complex<f64>, y: &Complex<f64>| y.re.total_cmp(&x.re).then(x.im.total_cmp(&y.im));
+    all.sort_by(|x, y| order(&x.pole, &y.pole));
+    Ok(all)
 }

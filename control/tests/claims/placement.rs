@@ -35,6 +35,19 @@ fn observer() -> (DMatrix<f64>, DMatrix<f64>) {
     (plant.augmented_dynamics().transpose(), plant.augmented_output().transpose())
 }
 
+#[test]
+fn the_order_in_which_eigenvalues_are_stated_does_not_change_a_bit() {
+    let (a, b) = observer();
+    let mut poles = [&real(&[-1200., -1500., -2500.])[..], &pair(-3000., 800.)].concat();
+    let first = place_balanced(&a, &b, &poles).unwrap();
+    for _ in 0..poles.len() {
+        poles.rotate_left(1);
+        assert_eq!(place_balanced(&a, &b, &poles).unwrap().gain, first.gain);
+    }
+    poles.reverse();
+    assert_eq!(place_balanced(&a, &b, &poles).unwrap().gain, first.gain);
+}
+
 /// Published as rounded here, from the printed A and B.
 #[test]
 fn one_input_gives_the_published_gain() {
