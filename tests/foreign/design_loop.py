@@ -1,0 +1,99 @@
+"""From a plant file to a run in FMPy: `aso-ftc design --fmu`, then scripts/couple_with_fmpy.py."""
+
+import json
+import tomllib
+from pathlib import Path
+
+import numpy as np
+from fmpy import extract
+from fmpy.validation import validate_fmu
+
+from conftest import ROOT
+
+EXAMPLES = {"DcServo": "dc-servo", "ThreeTank": "three-tank"}
+
+
+def packed_plant(aso_ftc, name):
+    """The packed FMU of a plant, where the plant files look for it."""
+    path = ROOT / "dist" / f"{name}.fmu"
+    if not path.is_file():
+        done = aso_ftc("pack", ROOT / "examples" / EXAMPLES[name])
+        assert done.returncode == 0, done.stderr
+    return path
+
+
+def changed(plant_file, folder, *changes):
+    """A copy of a plant file in `folder`, with texts replaced."""
+    text = (ROOT / plant_file).read_text(encoding="utf-8")
+    for old, new in [("../../dist", str(ROOT / "dist")), *changes]:
+        assert old in text or old == "../../dist", old
+        text = text.replace(old, new)
+    path = Path(folder) / "plant.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+class Designed:
+    """What `aso-ftc design PLANT_FILE --fmu` wrote into `folder` and printed."""
+
+    def __init__(self, aso_ftc, plant_file, folder):
+        self.folder, self.fmu = Path(folder), Path(folder) / "Designed.fmu"
+        file = self.folder / "design.toml"
+        wanted = ("--out", file, "--fmu", self.fmu, "--json")
+        done = aso_ftc("design", ROOT / plant_file, *wanted)
+        assert done.returncode == 0, done.stderr
+        self.report = json.loads(done.stdout)
+        self.design = tomllib.loads(file.read_text(encoding="utf-8"))
+        self.page = (self.folder / "report.html").read_text(encoding="utf-8")
+
+    def must_be_sound(self):
+        """All checks hold, FMPy has no objection, the report is there and in the FMU."""
+        assert all(check["holds"] for check in self.report["checks"])
+        assert validate_fmu(str(self.fmu)) == []
+        unpacked = Path(extract(str(self.fmu), unzipdir=str(self.folder / "unpacked")))
+        inside = unpacked / "documentation" / "report.html"
+        assert inside.read_text(encoding="utf-8") == self.page
+        assert self.page.startswith("<!DOCTYPE html>") and self.report["description"] in self.page
+        own = (unpacked / "resources" / "design.toml").read_text(encoding="utf-8")
+        assert tomllib.loads(own) == self.design
+
+    def estimate(self, name):
+        """The qualified name of the estimate of a fault."""
+        names = [fault["name"] for fault in self.design["faults"]]
+        return qualified("f_hat", names.index(name), len(names))
+
+    def loss(self, name):
+        """The qualified name of the estimate of a loss of effectiveness."""
+        names = [fault["name"] for fault in self.design["faults"]]
+        return qualified("E_hat", names.index(name), len(names))
+
+    def response(self, fault, name):
+        """The report's curve of `name` after a jump of `fault`, and the size of that jump."""
+        jumps = [steps for steps in self.report["steps"] if steps["rate"] is None]
+        (steps,) = (steps for steps in jumps if steps["fault"] == fault)
+        (curve,) = (curve for curve in steps["curves"] if curve["name"] == name)
+        return curve, steps["size"]
+
+    def settling_time(self, fault):
+        """When the estimate of `fault` stays within 2 % of a change, by the report."""
+        return self.response(fault, f"error of {fault}")[0]["settling_time"]
+
+
+def qualified(letter, position, count):
+    """The name of channel `position`, from 0, of a signal of the controller."""
+    return f"controller.{letter}" if count == 1 else f"controller.{letter}[{position + 1}]"
+
+
+def coupled(python, designed, plant, settings, *arguments):
+    """Runs plant and controller in FMPy; columns by name and the summary."""
+    out = designed.folder / "results.csv"
+    stated = [text for name, value in settings.items() for text in ("--set", f"{name}={value}")]
+    done = python(
+        ROOT / "scripts" / "couple_with_fmpy.py",
+        *("--plant", plant, "--controller", designed.fmu, "--out", out, "--record-every", "1e-9"),
+        *(*stated, *arguments),
+    )
+    assert done.returncode == 0, done.stderr
+    names = out.read_text(encoding="utf-8").split("\n", 1)[0].split(",")
+    table = dict(zip(names, np.loadtxt(out, delimiter=",", skiprows=1).T))
+    return table, json.loads(done.stdout)

@@ -1,0 +1,117 @@
+"""The loop of a plant and a designed controller by numpy and scipy, from the design file alone.
+
+Its states are those of plant, observer and fault estimate, [x; x_hat; f_hat], of a sampled loop the
+predictions; input is the fault f, outputs are [x; x - x_hat; f_hat - f].
+"""
+
+import numpy as np
+from scipy.linalg import expm, matrix_balance, solve_continuous_lyapunov, solve_discrete_lyapunov
+
+
+class Matrices:
+    """The matrices of a design file as arrays; a fault model that is not stated is a constant."""
+
+    def __init__(self, design):
+        self.period = design.get("sample_time")
+        self.current = design.get("estimator") == "current"
+        for name in ("A", "B", "C", "F_a", "K_x", "K_f", "L_x", "L_f"):
+            setattr(self, name, np.array(design[name]))
+        self.n, self.q = self.F_a.shape
+        self.filtered = "filter" in design
+        constant = np.zeros((self.q, self.q)) if self.period is None else np.eye(self.q)
+        self.A_f = np.array(design.get("A_f", constant))
+
+    @property
+    def fed_back(self):
+        """A + B K_x of the plant, without the filters of the measurements."""
+        feels = self.n - (len(self.C) if self.filtered else 0)
+        return (self.A + self.B @ self.K_x)[:feels, :feels]
+
+    @property
+    def augmented(self):
+        """A_0, C_0, L."""
+        a_0 = np.block([[self.A, -self.F_a], [np.zeros((self.q, self.n)), self.A_f]])
+        c_0 = np.hstack([self.C, np.zeros((len(self.C), self.q))])
+        return a_0, c_0, np.vstack([self.L_x, -self.L_f])
+
+    @property
+    def error_dynamics(self):
+        """A_0 - L C_0, of a current estimator A_0 - L C_0 A_0."""
+        a_0, c_0, gain = self.augmented
+        return a_0 - gain @ c_0 @ (a_0 if self.current else np.eye(len(a_0)))
+
+
+def closed_loop(own, losses=None):
+    """A, B, C, D of the loop; `losses` take a part of the effect of each actuator of the plant."""
+    n, q = own.n, own.q
+    left = np.eye(own.B.shape[1]) - np.diag(losses if losses is not None else [0] * own.B.shape[1])
+    x, x_hat, f_hat = np.split(np.eye(2 * n + q), [n, 2 * n])
+    innovation = own.C @ (x - x_hat)
+    if own.current:
+        x_hat, f_hat = x_hat + own.L_x @ innovation, f_hat + own.L_f @ innovation
+    command = own.K_x @ x_hat + own.K_f @ f_hat
+    correction = (1 - own.current) * innovation
+    a = np.vstack(
+        [
+            own.A @ x + own.B @ left @ command,
+            own.A @ x_hat + own.B @ command + own.F_a @ f_hat + own.L_x @ correction,
+            own.A_f @ f_hat + own.L_f @ correction if own.period else own.L_f @ correction,
+        ]
+    )
+    if own.period is None:
+        a[2 * n :] += own.A_f @ f_hat
+    b = np.vstack([own.F_a, np.zeros((n + q, q))])
+    c = np.vstack([x, x - x_hat, f_hat])
+    d = np.vstack([np.zeros((2 * n, q)), -np.eye(q)])
+    return a, b, c, d
+
+
+def balanced(a, b, c):
+    """The same system in coordinates in which A has rows and columns of equal size."""
+    scaled, (scale, order) = matrix_balance(a, permute=False, separate=True)
+    assert (order == np.arange(len(a))).all()
+    return scaled, b / scale[:, None], c * scale
+
+
+def responses(system, period, horizon):
+    """Times, responses to an impulse, without D, and to a step: one p x m matrix each.
+
+    `horizon` in s or in samples; in continuous time the step response is D + C A^-1 (e^(A t) - I) B.
+    """
+    a, b, c = balanced(*system[:3])
+    if period is None:
+        times = np.concatenate([[0], np.geomspace(1e-7, horizon, 6000)])
+        states = expm(a * times[:, None, None]) @ b
+        step = system[3] + c @ np.linalg.solve(a, states - b)
+        return times, c @ states, step
+    states = [b]
+    for _ in range(horizon):
+        states.append(a @ states[-1])
+    impulse = np.array([c @ state for state in states])
+    step = system[3] + np.concatenate([0 * impulse[:1], np.cumsum(impulse, axis=0)])
+    return np.arange(1, horizon + 2), impulse, step
+
+
+def total(times, values, period):
+    """The integral or the sum of all values."""
+    if period is not None:
+        return values.sum(axis=0)
+    return (np.diff(times)[:, None, None] * (values[1:] + values[:-1]) / 2).sum(axis=0)
+
+
+def frequency_response(system, period, frequency):
+    """C (s I - A)^-1 B + D at s = j w or z = e^(j w T)."""
+    a, b, c, d = system
+    point = 1j * frequency if period is None else np.exp(1j * frequency * period)
+    return c @ np.linalg.solve(point * np.eye(len(a)) - a, b) + d
+
+
+def lyapunov(a, q, period):
+    """P with A' P + P A = -Q, or A' P A - P = -Q, solved by scipy in balanced coordinates."""
+    scaled, (scale, _) = matrix_balance(a, permute=False, separate=True)
+    inner = q * np.outer(scale, scale)
+    if period is None:
+        found = solve_continuous_lyapunov(scaled.T, -inner)
+    else:
+        found = solve_discrete_lyapunov(scaled.T, inner)
+    return found / np.outer(scale, scale)

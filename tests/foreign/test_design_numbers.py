@@ -1,0 +1,377 @@
+"""The numbers of `aso-ftc design --json`, computed again by numpy and scipy."""
+
+import tomllib
+
+import numpy as np
+import pytest
+from fmpy import extract, read_model_description
+from scipy.linalg import expm
+from scipy.optimize import minimize_scalar
+
+from conftest import ROOT
+from design_loop import Designed, changed, coupled, packed_plant
+from design_oracle import (
+    Matrices,
+    closed_loop,
+    frequency_response,
+    lyapunov,
+    responses,
+    total,
+)
+
+PENDULUM = "fmu-controller/pendulum.toml"
+# Plant files, and where their responses have ended: s, or samples.
+DESIGNS = {
+    PENDULUM: 8.0,
+    "fmu-controller/pendulum-three-measurements.toml": 8.0,
+    "examples/dc-servo/plant.toml": 1.0,
+    "examples/dc-servo/ramp.toml": 1.0,
+    "examples/three-tank/plant.toml": 1500,
+    "examples/three-tank/loss-of-effectiveness.toml": 1500,
+    "examples/three-tank/sensor-fault.toml": 1500,
+}
+
+
+def read(file):
+    """A plant file as a dictionary."""
+    return tomllib.loads((ROOT / file).read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module", params=DESIGNS, ids=lambda file: file.partition("/")[2][:-5])
+def case(request, aso_ftc, tmp_path_factory):
+    """A design, its matrices, and where its responses have ended."""
+    for plant in ("DcServo", "ThreeTank"):
+        packed_plant(aso_ftc, plant)
+    designed = Designed(aso_ftc, request.param, tmp_path_factory.mktemp("design"))
+    designed.file = read(request.param)
+    return designed, Matrices(designed.design), DESIGNS[request.param]
+
+
+def numbers(report, name):
+    """A matrix of the report."""
+    return np.array([own for own in report["gains"] if own["name"] == name][0]["values"])
+
+
+def complex_numbers(pairs):
+    """Eigenvalues of the report, in the order of numpy."""
+    return np.sort_complex([complex(*pair) for pair in pairs])
+
+
+def outputs(designed):
+    """The names of the outputs of the loop, in the order of the oracle."""
+    states = [state["name"] for state in designed.design["states"]]
+    return [*states, *(f"error of {name}" for name in [*states, *faults(designed)])]
+
+
+def faults(designed):
+    """The names of the faults and the rates of ramps, in the order of the oracle."""
+    return [fault["name"] for fault in designed.design["faults"]]
+
+
+def stated_faults(designed):
+    """Positions among those of the faults that the report knows, which are no rates."""
+    return [faults(designed).index(own["name"]) for own in designed.report["plant"]["faults"]]
+
+
+def test_the_design_file_has_the_gains_of_the_report_and_the_fmu_reads_it(case, tmp_path):
+    designed, own, _ = case
+    for name in ("K_x", "K_f", "L_x", "L_f"):
+        assert (numbers(designed.report, name) == getattr(own, name)).all()
+    unpacked = extract(str(designed.fmu), unzipdir=str(tmp_path))
+    starts = {v.name: v.start for v in read_model_description(unpacked).modelVariables}
+    for name in ("A", "B", "C", "F_a", "K_x", "K_f", "L_x", "L_f"):
+        for (i, j), value in np.ndenumerate(getattr(own, name)):
+            assert float(starts[f"{name}[{i + 1},{j + 1}]"]) == value
+    interface = {own["name"]: own["start"] for own in designed.report["interface"]}
+    assert {name: starts[name] for name in interface} == interface
+
+
+def test_the_eigenvalues_of_both_loops_are_those_of_the_plant_file(case):
+    designed, own, _ = case
+    for name, dynamics in (("feedback", own.fed_back), ("observer", own.error_dynamics)):
+        loop, wish = designed.report[name], designed.file[name]
+        found = np.sort_complex(np.linalg.eigvals(dynamics))
+        assert found == pytest.approx(complex_numbers(loop["eigenvalues"]), rel=1e-8)
+        if "eigenvalues" in wish:
+            wanted = np.sort(wish["eigenvalues"])
+            wanted = wanted if own.period is None else np.exp(wanted * own.period)
+            assert complex_numbers(loop["wanted"]) == pytest.approx(wanted, rel=1e-14)
+            assert found == pytest.approx(wanted, rel=1e-8) and loop["pole_error"] < 1e-9
+    a = np.array(designed.report["plant"]["matrices"][0]["values"])
+    stated = complex_numbers(designed.report["plant"]["eigenvalues"])
+    assert np.sort_complex(np.linalg.eigvals(a)) == pytest.approx(stated, abs=1e-9)
+
+
+def test_the_sampled_plant_is_the_matrix_exponential(case):
+    designed, own, _ = case
+    a, b, _, *_ = (np.array(m["values"]) for m in designed.report["plant"]["matrices"])
+    n, m = b.shape
+    if own.period is None:
+        assert (own.A[:n, :n] == a).all() and (own.B[:n] == b).all()
+        return
+    held = expm(np.block([[a, b], [np.zeros((m, n + m))]]) * own.period)
+    assert own.A[:n, :n] == pytest.approx(held[:n, :n], rel=1e-13)
+    assert own.B[:n] == pytest.approx(held[:n, n:], rel=1e-13)
+    assert own.F_a[:n, :m] == pytest.approx(own.B[:n], rel=1e-13), "a fault of each pump"
+    if own.filtered:
+        part = 1 - np.exp(-designed.file["filter"] * own.period)
+        assert designed.design["filter"] == pytest.approx([part] * 3, rel=1e-14)
+
+
+def test_the_ranks_are_full(case):
+    designed, own, _ = case
+    a, b, c, *_ = (np.array(m["values"]) for m in designed.report["plant"]["matrices"])
+    powers = [np.linalg.matrix_power(a / np.linalg.norm(a), k) for k in range(len(a))]
+    reached = np.linalg.matrix_rank(np.hstack([power @ b for power in powers]))
+    checks = {check["condition"]: check for check in designed.report["checks"]}
+    controllable = checks["(A, B) is controllable"]
+    assert controllable["holds"] and controllable["explanation"].startswith(f"rank {reached} of ")
+    assert reached == len(a)
+    # With constant faults: no invariant zero at 0, of the sampled plant at 1.
+    shift = 0.0 if own.period is None else 1.0
+    first = stated_faults(designed)
+    pencil = np.block(
+        [
+            [own.A - shift * np.eye(own.n), own.F_a[:, first]],
+            [own.C, np.zeros((len(own.C), len(first)))],
+        ]
+    )
+    scale = abs(pencil).max(axis=0)
+    assert np.linalg.matrix_rank(pencil / scale) == own.n + len(first)
+    assert checks["the augmented observer exists"]["holds"]
+
+
+def test_the_compensation_cancels_the_faults(case):
+    designed, own, _ = case
+    n = len(designed.report["plant"]["states"])
+    wanted = -np.linalg.pinv(own.B[:n]) @ own.F_a[:n]
+    assert own.K_f == pytest.approx(wanted, abs=1e-12)
+    stable = [c for c in designed.report["checks"] if c["condition"].startswith("plant and con")][0]
+    eigenvalues = np.linalg.eigvals(closed_loop(own)[0])
+    worst = eigenvalues.real.max() if own.period is None else abs(eigenvalues).max() - 1
+    assert stable["value"] == pytest.approx(worst, rel=1e-6) and worst < 0
+
+
+def test_the_peak_gains_are_integrals_of_the_impulse_response(case):
+    """That from the rate of a fault, a constant one, is the integral of the step response."""
+    designed, own, horizon = case
+    system = closed_loop(own)
+    times, impulse, step = responses(system, own.period, horizon)
+    of_fault = abs(system[3]) + total(times, abs(impulse), own.period)
+    of_rate = total(times, abs(step), own.period)
+    stated = {own["name"]: own for own in designed.file.get("faults", [])}
+    for bound in designed.report["bounds"]:
+        at = outputs(designed).index(bound["error"]), faults(designed).index(bound["fault"])
+        # Where a state does not feel a fault at all, both are rounding errors.
+        tiny = 1e-9 * of_fault[:, at[1]].max()
+        assert bound["gain_of_fault"] == pytest.approx(of_fault[at], rel=1e-2, abs=tiny)
+        tiny = 1e-9 * of_rate[:, at[1]].max()
+        assert bound["gain_of_rate"] == pytest.approx(of_rate[at], rel=1e-2, abs=tiny)
+        fault = stated.get(bound["fault"], {})
+        products = [of_fault[at] * fault["bound"]] if "bound" in fault else []
+        products += [of_rate[at] * fault["rate_bound"]] if "rate_bound" in fault else []
+        if products:
+            assert bound["largest"] == pytest.approx(min(products), rel=1e-2, abs=tiny)
+        else:
+            assert bound["largest"] is None
+
+
+def driven(system, fault, rate, size, period, times):
+    """States and fault after a jump by `size`, or a rise to it at a rate: one row each time."""
+    a, b, *_ = system
+    n = len(a)
+    # [states; fault; its rate]
+    whole = np.zeros((n + 2, n + 2))
+    whole[:n, :n], whole[:n, n] = a, b[:, fault]
+    start = np.zeros(n + 2)
+    if period is not None:
+        assert rate is None
+        whole[n, n], start[n] = 1, size
+        return np.array([np.linalg.matrix_power(whole, round(t / period)) @ start for t in times])
+    end = 0.0 if rate is None else size / rate
+    start[n:] = [size, 0.0] if rate is None else [0.0, rate]
+    rising = whole.copy()
+    rising[n, n + 1] = 1
+    top = expm(rising * end) @ start
+    before = expm(rising * np.minimum(times, end)[:, None, None]) @ start
+    after = expm(whole * np.maximum(times - end, 0)[:, None, None]) @ top
+    return np.where((times < end)[:, None], before, after)
+
+
+def test_the_responses_to_changes_of_faults_are_those_of_scipy(case):
+    designed, own, _ = case
+    system = closed_loop(own)
+    names, order = outputs(designed), len(system[0])
+    for steps in designed.report["steps"]:
+        fault = faults(designed).index(steps["fault"])
+        row = np.hstack([system[2], system[3][:, [fault]]])
+        for curve in steps["curves"]:
+            at, times = names.index(curve["name"]), np.array(curve["times"])
+            change = (fault, steps["rate"], steps["size"], own.period, times[::7])
+            wanted = driven(system, *change)[:, : order + 1] @ row[at]
+            found = np.array(curve["values"])
+            # An error that does not feel the fault is rounding.
+            band = 1e-5 * abs(found).max() + 1e-17 * steps["size"]
+            assert found[::7] == pytest.approx(wanted, abs=band), curve["name"]
+            assert abs(found).max() <= abs(curve["peak"]) * (1 + 1e-12)
+            assert abs(found).max() == pytest.approx(abs(curve["peak"]), rel=1e-2)
+            last = np.flatnonzero(abs(found - found[-1]) > 0.02 * abs(found).max())[-1]
+            assert times[last] <= curve["settling_time"] <= times[last + 1]
+
+
+def error_response(designed, own, frequency):
+    """From the faults to the errors of their estimates."""
+    response = frequency_response(closed_loop(own), own.period, frequency)[2 * own.n :]
+    return response[np.ix_(stated_faults(designed), stated_faults(designed))]
+
+
+def rate_response(designed, own, frequency):
+    """From the rates of the faults to the errors of their estimates."""
+    response = frequency_response(closed_loop(own), own.period, frequency)[2 * own.n :]
+    point = 1j * frequency if own.period is None else np.exp(1j * frequency * own.period)
+    response = response @ np.linalg.inv(point * np.eye(own.q) - own.A_f)
+    return response[np.ix_(stated_faults(designed), stated_faults(designed))]
+
+
+def test_the_singular_values_are_those_of_numpy(case):
+    designed, own, _ = case
+    error = lambda w: error_response(designed, own, w)
+    rate = lambda w: rate_response(designed, own, w)
+    wanted = {
+        "faults to their estimates": lambda w: error(w) + np.eye(len(stated_faults(designed))),
+        "faults to the errors of their estimates": error,
+        "rates of the faults to the errors of their estimates": rate,
+    }
+    curves = {curve["name"]: curve for curve in designed.report["frequency"]}
+    assert set(curves) == set(wanted)
+    for name, response in wanted.items():
+        frequencies = curves[name]["frequencies"]
+        values = [np.linalg.svd(response(w), compute_uv=False) for w in frequencies]
+        found = np.transpose(curves[name]["singular_values"])
+        assert found == pytest.approx(np.array(values), rel=1e-5, abs=1e-9)
+
+
+def test_the_norms_are_those_of_numpy_and_scipy(case):
+    designed, own, _ = case
+    norms = {norm["name"]: norm["value"] for norm in designed.report["certificate"]["norms"]}
+    size = lambda w: np.linalg.norm(rate_response(designed, own, w), 2)
+    highest = 1e5 if own.period is None else np.pi / own.period
+    grid = np.geomspace(1e-6 * highest, highest, 2000)
+    at = grid[np.argmax([size(w) for w in grid])]
+    found = minimize_scalar(lambda w: -size(w), bounds=(0.9 * at, min(1.1 * at, highest)))
+    assert norms["H-infinity"] == pytest.approx(max(-found.fun, size(at)), rel=2e-3)
+    rows = own.n + np.array(stated_faults(designed))
+    rate = -np.eye(own.n + own.q)[:, rows]
+    if own.current:
+        _, c_0, gain = own.augmented
+        rate = rate - gain @ c_0 @ rate
+    covariance = lyapunov(own.error_dynamics.T, rate @ rate.T, own.period)
+    covariance = covariance[np.ix_(rows, rows)]
+    assert norms["H2"] == pytest.approx(np.sqrt(np.trace(covariance)), rel=1e-6)
+    largest = np.linalg.eigvalsh(covariance)[-1]
+    assert norms["generalised H2"] == pytest.approx(np.sqrt(largest), rel=1e-6)
+
+
+def test_theorem_1_is_that_of_scipy(case):
+    designed, own, _ = case
+    certificate = designed.report["certificate"]
+    if own.period is not None:
+        assert "continuous time" in certificate["printed"]["reason"]
+        return
+    bounds = [fault.get("bound") for fault in designed.file.get("faults", [{}])]
+    if own.A_f.any() or None in bounds:
+        assert any(text in certificate["printed"]["reason"] for text in ("constant", "`bound`"))
+        return
+    printed, dynamics, beta = certificate["printed"], own.error_dynamics, 30.0
+    assert printed["beta"] == beta == np.linalg.norm(bounds)
+    p = lyapunov(dynamics, printed["alpha"] * beta * np.eye(len(dynamics)), None)
+    fault = np.vstack([own.F_a, np.zeros((own.q, own.q))])
+    delta = 2 / printed["alpha"] * np.linalg.norm(p @ fault, 2)
+    assert printed["delta"] == pytest.approx(delta, rel=1e-6)
+    assert np.array(printed["p"]) == pytest.approx(p, rel=1e-6, abs=1e-6 * abs(p).max())
+    free = certificate["free"]
+    assert free["delta"] < printed["delta"]
+    assert 2 * beta * np.linalg.norm(np.array(free["p"]) @ fault, 2) == pytest.approx(
+        free["delta"], rel=1e-6
+    )
+    slowest = -np.linalg.eigvals(dynamics).real.max()
+    assert 0.99 * slowest < free["decay"] < slowest
+
+
+def test_the_largest_stable_loss_is_where_an_eigenvalue_crosses(aso_ftc, tmp_path):
+    """The pendulum whose actuator loses effect: the loop falls before all of it is lost."""
+    begin, end = "F_a = [\n", "[experiment]"
+    file = changed(PENDULUM, tmp_path)
+    text = file.read_text(encoding="utf-8")
+    head, rest = text.split(begin)
+    text = head + end + rest.split(end)[1].split("[[faults]]")[0]
+    text += '[[faults]]\nname = "f_loss"\nloss_of = "u"\nleast_command = 1.0\n'
+    file.write_text(text, encoding="utf-8")
+    designed = Designed(aso_ftc, file, tmp_path)
+    own = Matrices(designed.design)
+    unstable = lambda loss: np.linalg.eigvals(closed_loop(own, [loss])[0]).real.max() > 0
+    low, high = 0.0, 1.0
+    for loss in np.linspace(0, 1, 2001):
+        if unstable(loss):
+            high = loss
+            break
+        low = loss
+    (found,) = designed.report["effectiveness"]
+    assert found["actuator"] == "u"
+    assert low - 1e-3 <= found["largest_stable_loss"] <= high + 1e-3
+
+
+def test_bounds_and_predictions_bracket_what_the_simulation_shows(
+    aso_ftc, python, packed, tmp_path
+):
+    """As control::response::fault_bounds and reversal say: within a factor of 3.
+
+    Bounds of positions and error of the estimate, the peaks of the positions after a reversal at
+    once, all peaks after one at the bound of the rate.
+    """
+    designed = Designed(aso_ftc, PENDULUM, tmp_path)
+    table, _ = coupled(python, designed, packed["plant"], {})
+    late = {name: column[table["time"] > 60] for name, column in table.items()}
+    friction, (fault,) = late["plant.f_fric"], read(PENDULUM)["faults"]
+    # While the cart sticks the friction moves; it does not jump.
+    rate = abs(np.diff(friction)).max() / np.diff(late["time"])[0]
+    assert fault["rate_bound"] == pytest.approx(rate, rel=1e-2)
+    names = ["x_p", "theta", "v_p", "omega"]
+    shown = {name: np.ptp(late[f"plant.{name}"]) / 2 for name in names}
+    shown["error of f_fric"] = abs(late["controller.f_hat"] - friction).max()
+    bounds = {own["error"]: own["largest"] for own in designed.report["bounds"]}
+    for name in ("x_p", "theta", "error of f_fric"):
+        assert shown[name] <= bounds[name] <= 3 * shown[name]
+    jump, glide = designed.report["steps"]
+    assert jump["rate"] is None and glide["rate"] == fault["rate_bound"]
+    for steps, predicted in ((jump, names[:2]), (glide, shown)):
+        peaks = {curve["name"]: abs(curve["peak"]) for curve in steps["curves"]}
+        for name in predicted:
+            assert shown[name] / 3 < peaks[name] < 3 * shown[name], name
+
+
+def test_an_fmu_is_made_where_no_compiler_is(aso_ftc, tmp_path):
+    made = [tmp_path / name for name in ("with.fmu", "without.fmu")]
+    for fmu, environment in zip(made, ({}, {"env": {"PATH": "/nonexistent"}})):
+        arguments = (PENDULUM, "--out", tmp_path / "design.toml", "--fmu", fmu)
+        done = aso_ftc("design", *arguments, **environment)
+        assert done.returncode == 0, done.stderr
+    assert made[0].read_bytes() == made[1].read_bytes()
+
+
+@pytest.mark.parametrize("period", [0.001, 0.004])
+def test_the_bound_from_a_rate_in_seconds_holds_for_any_sample_time(
+    aso_ftc, python, tmp_path, period
+):
+    """A fault that grows at its largest rate leads to nearly the largest error."""
+    rate = 10.0  # V/s
+    fault = f'faults = [{{ name = "f_u", actuator = "u", bound = 100, rate_bound = {rate} }}]'
+    sampled = f"sample_time = {period}\n{fault}"
+    file = changed("examples/dc-servo/plant.toml", tmp_path, ('actuator_faults = "all"', sampled))
+    designed = Designed(aso_ftc, file, tmp_path)
+    settings = {"plant.friction": "false", "plant.r_u": rate}
+    steps = ("--step", period, "--stop-time", 0.4)
+    table, _ = coupled(python, designed, packed_plant(aso_ftc, "DcServo"), settings, *steps)
+    error = abs(table["controller.f_hat"] - rate * table["time"]).max()
+    (largest,) = (b["largest"] for b in designed.report["bounds"] if b["error"] == "error of f_u")
+    assert 0.9 * error <= largest <= 1.5 * error

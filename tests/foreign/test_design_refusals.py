@@ -1,0 +1,241 @@
+"""Bad input of `aso-ftc design`: exit status 2, one message that points into the file."""
+
+import re
+import tomllib
+import zipfile
+
+import numpy as np
+import pytest
+
+from conftest import ROOT
+from design_loop import packed_plant
+
+MASS = """A = [[0, 1], [0, 0]]
+B = [[0], [1]]
+C = [[1, 0]]
+actuator_faults = "all"
+feedback.eigenvalues = [-1, -2]
+observer.eigenvalues = [-5, -6, -7]
+"""
+SERVO = """plant = "Servo.fmu"
+operating_point = { friction = 0 }
+actuators = ["u"]
+measurements = ["theta_m"]
+actuator_faults = "all"
+feedback.eigenvalues = [-40, -60]
+observer.eigenvalues = [-300, -350, -400]
+"""
+NO_EXCHANGE = (r"<ModelExchange .*?/>", "")
+NO_DERIVATIVES = ('providesDirectionalDerivative="true"', "")
+NO_FMU_STATE = ('canGetAndSetFMUstate="true" canSerializeFMUstate="true"', "")
+
+
+def poorer(source, target, *changes):
+    """A copy of an FMU whose description says less."""
+    with zipfile.ZipFile(source) as whole, zipfile.ZipFile(target, "w") as copy:
+        for entry in whole.infolist():
+            content = whole.read(entry)
+            if entry.filename == "modelDescription.xml":
+                text = content.decode()
+                for pattern, replacement in changes:
+                    text, count = re.subn(pattern, replacement, text, flags=re.DOTALL)
+                    assert count, pattern
+                content = text.encode()
+            copy.writestr(entry, content)
+
+
+@pytest.fixture
+def refusal(aso_ftc, tmp_path):
+    """The message for a plant file, which has to be the only file in its folder afterwards."""
+
+    def run(text, *options):
+        file = tmp_path / "plant.toml"
+        file.write_text(text, encoding="utf-8")
+        before = sorted(tmp_path.rglob("*"))
+        done = aso_ftc("design", file, "--out", tmp_path / "design.toml", *options)
+        assert done.returncode == 2 and done.stdout == "", done
+        assert sorted(tmp_path.rglob("*")) == before, "nothing is written"
+        assert done.stderr.count("error:") == 1
+        return done.stderr.replace(f"{tmp_path}/", "")
+
+    return run
+
+
+WRONG = [
+    ("C = [[1, 0]]", "C = [[0, 1]]", "3:5: the measurements y1 show 1 of 2 states only"),
+    ("B = [[0], [1]]", "B = [[1], [0]]", "2:5: the commands u1 reach 1 of 2 states only"),
+    (
+        'actuator_faults = "all"',
+        'F_a = [[1], [0]]\nfaults = [{ name = "drift" }]',
+        "5:11: 2 of 3 independent courses of faults and states are seen: the measurements y1 "
+        "cannot tell a constant value of drift from a movement of x2",
+    ),
+    (
+        'actuator_faults = "all"\n',
+        'filter = 50\nfaults = [{ name = "bias", sensor = "y1" }]\n',
+        "cannot tell a constant value of bias from a movement of x1",
+    ),
+    (
+        'actuator_faults = "all"',
+        'F_a = [[0, 0], [1, 0]]\nfaults = [{ name = "wind" }, { name = "slope" }]',
+        "5:30: fault `slope` cannot be seen from the measurements y1",
+    ),
+    ("[-5, -6, -7]", "[-5, -6]", "6:24: expected 3 eigenvalues"),
+    ("[-5, -6, -7]", "[-5, -5, -7]", "6:24: the eigenvalue -5 is wanted 2 times, at most 1"),
+    (
+        "observer.eigenvalues = [-5, -6, -7]",
+        "observer.region = { decay = 10, disc = { center = -5, radius = 2 } }",
+        "6:19: these requirements contradict each other: decay, disc",
+    ),
+    (
+        "observer.eigenvalues = [-5, -6, -7]",
+        "observer.h_infinity = 1e-9\nobserver.region = { disc = { center = -5, radius = 4 } }",
+        "6:23: this cannot be met, whatever else is wanted: h_infinity",
+    ),
+    (
+        "feedback.eigenvalues = [-1, -2]",
+        "feedback.Q = [1, 1]\nfeedback.R = [0]",
+        "6:14: R is not positive definite",
+    ),
+    (
+        "observer.eigenvalues = [-5, -6, -7]",
+        "observer.W = [1, 1, 1]\nobserver.V = [0]",
+        "7:14: V is not positive definite",
+    ),
+    ("[-1, -2]", "[1, -2]", "5:24: "),
+    ("[-5, -6, -7]", "[-5, -6, 7]", "6:24: "),
+    (
+        'actuator_faults = "all"',
+        'F_a = [[0, 0], [1, 1]]\nfaults = [{ name = "wind" }, { name = "slope" }]',
+        "cannot tell a constant value of wind from slope",
+    ),
+    ("feedback.eigenvalues = [-1, -2]", "feedback.Q = [1]\nfeedback.R = [1]", "5:14: Q is 1x1"),
+    ("A = [[0, 1], [0, 0]]", "A = [[0, 1], [0, 0]", "plant.toml:2:1: "),
+    ("A = [[0, 1], [0, 0]]", "A = [[0, 1], [0, 1e400]]", "1:18: A[2][2]: expected a finite"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "expected"), WRONG, ids=lambda text: text[:40])
+def test_what_cannot_be_designed_is_refused_where_the_file_says_it(refusal, old, new, expected):
+    assert old in MASS
+    message = refusal(MASS.replace(old, new))
+    first, bar, line, underlined = message.splitlines()
+    assert re.match(r"error: plant\.toml:\d+:\d+: ", first) and expected in first
+    row, column = map(int, re.findall(r"plant\.toml:(\d+):(\d+)", first)[0])
+    assert bar.strip() == "|" and line.startswith(f"{row} | ")
+    assert underlined.index("^") == line.index("|") + 1 + column
+    assert MASS.replace(old, new).splitlines()[row - 1] == line.split(" | ", 1)[1]
+
+
+@pytest.mark.parametrize(
+    ("source", "expected"),
+    [
+        (None, "Other.fmu"),
+        ("text", "Other.fmu is no ZIP archive that can be used"),
+        ("DcServo", "Other.fmu has no resources/design.toml; expected an AsoController.fmu"),
+    ],
+)
+def test_a_controller_cannot_be_made_of_any_file(aso_ftc, refusal, tmp_path, source, expected):
+    other = tmp_path / "Other.fmu"
+    if source == "text":
+        other.write_text("no archive", encoding="utf-8")
+    elif source:
+        other.write_bytes(packed_plant(aso_ftc, source).read_bytes())
+    assert expected in refusal(MASS, "--fmu", tmp_path / "Mine.fmu", "--from", other)
+
+
+POORER = [
+    ((), "1:9: cannot open Servo.fmu"),
+    ((NO_EXCHANGE, NO_DERIVATIVES), "name the variables that are its states among theta, omega"),
+    ((NO_EXCHANGE, NO_DERIVATIVES, NO_FMU_STATE), "providesDirectionalDerivative"),
+]
+
+
+@pytest.mark.parametrize(("changes", "expected"), POORER, ids=["missing", "states", "nothing"])
+def test_an_fmu_that_cannot_be_linearised_is_refused_with_what_is_missing(
+    aso_ftc, refusal, tmp_path, changes, expected
+):
+    if changes:
+        poorer(packed_plant(aso_ftc, "DcServo"), tmp_path / "Servo.fmu", *changes)
+    message = refusal(SERVO)
+    assert message.startswith("error: plant.toml:1:9: ") and expected in message
+
+
+def test_the_way_of_linearisation_does_not_change_the_design(aso_ftc, tmp_path):
+    """By derivatives, by differences of the equations, by steps from an FMU state."""
+    found = []
+    for changes, states in (
+        ((), ""),
+        ((NO_DERIVATIVES,), ""),
+        ((NO_EXCHANGE, NO_DERIVATIVES), 'states = ["theta", "omega"]\n'),
+    ):
+        poorer(packed_plant(aso_ftc, "DcServo"), tmp_path / "Servo.fmu", *changes)
+        (tmp_path / "plant.toml").write_text(states + SERVO, encoding="utf-8")
+        done = aso_ftc("design", tmp_path / "plant.toml", "--out", tmp_path / "design.toml")
+        assert done.returncode == 0, done.stderr
+        found.append(tomllib.loads((tmp_path / "design.toml").read_text(encoding="utf-8")))
+    for name in ("K_x", "K_f", "L_x", "L_f"):
+        for other in found[1:]:
+            assert np.array(other[name]) == pytest.approx(np.array(found[0][name]), rel=1e-9)
+
+
+@pytest.mark.parametrize(("name", "line"), [("friction", 2), ("u", 3), ("theta_m", 4)])
+def test_a_misspelt_variable_of_the_fmu_is_named_with_the_nearest(
+    aso_ftc, refusal, tmp_path, name, line
+):
+    poorer(packed_plant(aso_ftc, "DcServo"), tmp_path / "Servo.fmu")
+    text = re.sub(rf"\b{name}\b", f"{name}x", SERVO, count=1)
+    message = refusal(text)
+    assert message.startswith(f"error: plant.toml:{line}:")
+    assert f'has no variable "{name}x", it has {name}, ' in message
+
+
+def test_a_plant_held_by_friction_cannot_be_moved(aso_ftc, refusal, tmp_path):
+    poorer(packed_plant(aso_ftc, "DcServo"), tmp_path / "Servo.fmu")
+    message = refusal(SERVO.replace("friction = 0", "friction = 1"))
+    assert "plant.toml:3:13: the commands u reach 0 of 2 states only" in message
+
+
+def test_an_operating_point_that_is_no_equilibrium_is_a_check_that_fails(aso_ftc, tmp_path):
+    poorer(packed_plant(aso_ftc, "DcServo"), tmp_path / "Servo.fmu")
+    file = tmp_path / "plant.toml"
+    file.write_text(SERVO.replace("friction = 0", "friction = 0, u = 1"), encoding="utf-8")
+    done = aso_ftc("design", file, "--out", tmp_path / "design.toml")
+    assert done.returncode == 1
+    assert "does not hold: the operating point is an equilibrium" in done.stdout
+
+
+@pytest.mark.parametrize("output", ["--out", "--report", "--fmu"])
+def test_of_an_output_that_cannot_be_written_nothing_is_left(aso_ftc, tmp_path, output):
+    (tmp_path / "plant.toml").write_text(MASS, encoding="utf-8")
+    (tmp_path / "file").write_text("in the way", encoding="utf-8")
+    paths = {name: tmp_path / f"made{name}.fmu" for name in ("--out", "--report", "--fmu")}
+    paths[output] = tmp_path / "file" / "made.fmu"
+    options = [part for pair in paths.items() for part in pair]
+    done = aso_ftc("design", tmp_path / "plant.toml", *options)
+    assert done.returncode == 2 and done.stdout == "" and "cannot write" in done.stderr
+    assert (tmp_path / "file").read_text(encoding="utf-8") == "in the way"
+    assert {path.name for path in tmp_path.iterdir()} == {"plant.toml", "file"}
+
+
+def test_an_old_output_survives_a_refusal(aso_ftc, tmp_path):
+    outputs = ("--out", tmp_path / "design.toml", "--fmu", tmp_path / "M.fmu")
+    arguments = (tmp_path / "plant.toml", *outputs)
+    (tmp_path / "plant.toml").write_text(MASS, encoding="utf-8")
+    assert aso_ftc("design", *arguments).returncode == 0
+    files = ["design.toml", "report.html", "M.fmu"]
+    before = [(tmp_path / name).read_bytes() for name in files]
+    (tmp_path / "plant.toml").write_text(MASS.replace("[[1, 0]]", "[[0, 1]]"), encoding="utf-8")
+    assert aso_ftc("design", *arguments).returncode == 2
+    assert [(tmp_path / name).read_bytes() for name in files] == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*files, "plant.toml"])
+
+
+def test_the_files_are_the_same_every_time(aso_ftc, tmp_path):
+    made = []
+    for folder in (tmp_path / "first", tmp_path / "second"):
+        arguments = ("--out", folder / "design.toml", "--fmu", folder / "Mine.fmu")
+        done = aso_ftc("design", ROOT / "fmu-controller" / "pendulum.toml", *arguments)
+        assert done.returncode == 0, done.stderr
+        made.append([path.read_bytes() for path in sorted(folder.iterdir())])
+    assert len(made[0]) == 3 and made[0] == made[1]
