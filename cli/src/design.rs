@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 
-use crate::whole_file;
+use crate::whole_file::Pending;
 use controller_fmu::{Content, ControllerFmu};
 use designed::Designed;
 use document::{Source, Table};
@@ -72,12 +72,18 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
     let beside = options.out.parent().unwrap_or(Path::new("")).join("report.html");
     let page_path = options.report.clone().unwrap_or(beside);
     let mut written = vec![&options.out, &page_path];
+    let files = [(&options.out, &design), (&page_path, &page)];
+    let pending = files
+        .into_iter()
+        .map(|(path, text)| Pending::new(path, text.as_bytes()).with_context(|| unwritten(path)))
+        .collect::<anyhow::Result<Vec<_>>>()?;
     if let (Some(fmu), Some(path)) = (fmu, &options.fmu) {
         fmu.write(path, &page)?;
         written.push(path);
     }
-    write(&options.out, &design)?;
-    write(&page_path, &page)?;
+    for (file, (path, _)) in pending.into_iter().zip(files) {
+        file.commit().with_context(|| unwritten(path))?;
+    }
     if options.json {
         println!("{}", serde_json::to_string_pretty(&report)?);
     } else {
@@ -89,9 +95,8 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
     Ok(report.checks.iter().all(|check| check.holds))
 }
 
-fn write(path: &Path, text: &str) -> anyhow::Result<()> {
-    whole_file::write(path, text.as_bytes())
-        .with_context(|| format!("cannot write {}", path.display()))
+fn unwritten(path: &Path) -> String {
+    format!("cannot write {}", path.display())
 }
 
 /// The user's sentence, or one that names the plant.

@@ -17,7 +17,8 @@ const REFINEMENTS: usize = 2;
 pub struct Solution {
     /// P, n x n, symmetric.
     pub p: DMatrix<f64>,
-    /// Largest entry of |A' P + P A + Q| relative to the same entry of |A'| |P| + |P| |A| + |Q|; in
+    /// With |P|[i,j] at least the root of P[i,i] P[j,j], the
+    /// largest entry of |A' P + P A + Q| relative to the same entry of |A'| |P| + |P| |A| + |Q|; in
     /// sampled time of |A' P A - P + Q| relative to |A'| |P| |A| + |P| + |Q|.
     pub residual: f64,
     /// Norm of the left side plus Q relative to the norm of Q (Frobenius). For a badly scaled A the
@@ -178,7 +179,10 @@ impl Equation {
         q: &DMatrix<f64>,
     ) -> Result<Solution, Error> {
         let remainder = (self.remainder)(a, &p, q);
-        let terms = (self.terms)(&a.abs(), &p.abs(), &q.abs());
+        // An entry of P that is zero in theory holds rounding of this size.
+        let scale = |i: usize, j: usize| (p[(i, i)] * p[(j, j)]).abs().sqrt().max(p[(i, j)].abs());
+        let sizes = DMatrix::from_fn(p.nrows(), p.ncols(), scale);
+        let terms = (self.terms)(&a.abs(), &sizes, &q.abs());
         let residual = relative(&remainder, &terms);
         if residual > ALLOWED_RESIDUAL {
             let (equation, allowed) = (self.name, ALLOWED_RESIDUAL);

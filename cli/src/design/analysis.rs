@@ -1,10 +1,10 @@
 //! What is known of a design: the numbers of the report.
 
-use control::Error;
 use control::response::{
     System, energy, fault_rate_system, fault_system, frequency_grid, frequency_response,
     h_infinity, peak_gain, ramp_response, step_response,
 };
+use control::{Domain, Error};
 use nalgebra::DMatrix;
 
 use super::designed::Designed;
@@ -56,12 +56,13 @@ pub(crate) struct Loops<'a> {
 impl<'a> Loops<'a> {
     pub(crate) fn of(designed: &'a Designed) -> Result<Self, Error> {
         let Designed { plant, gains, domain, .. } = designed;
-        Ok(Self {
-            designed,
-            outputs: Outputs::of(designed),
-            of_faults: fault_system(plant, gains, *domain)?,
-            of_rates: fault_rate_system(plant, gains, *domain)?,
-        })
+        let mut of_rates = fault_rate_system(plant, gains, *domain)?;
+        if let Domain::Sampled { period } = domain {
+            // What the fault changes by from sample to sample is its rate times the sample time.
+            of_rates.b.columns_mut(0, plant.f_a.ncols()).scale_mut(*period);
+        }
+        let of_faults = fault_system(plant, gains, *domain)?;
+        Ok(Self { designed, outputs: Outputs::of(designed), of_faults, of_rates })
     }
 
     fn faults(&self) -> impl Iterator<Item = (usize, &'a Fault)> + use<'a> {

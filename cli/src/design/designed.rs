@@ -189,14 +189,21 @@ fn check_detectable(
     }
     if let Some(hidden) = found.hidden.first() {
         let faults = hidden.faults();
+        let states: Vec<_> = hidden.states().iter().map(|&at| state_name(linear, at)).collect();
+        let mut hiding = faults.iter().map(|&fault| fault_names[fault].as_str());
+        // Without a state, the first fault is hidden by the others.
+        let (told, from): (Vec<_>, String) = match states.as_slice() {
+            [] => (hiding.by_ref().take(1).collect(), hiding.collect::<Vec<_>>().join(", ")),
+            states => (hiding.collect(), format!("a movement of {}", states.join(", "))),
+        };
         let message = format!(
             "{} of {} independent courses of faults and states are seen: the measurements \
-             {measurements} cannot tell a {} of {} from a movement of {}",
+             {measurements} cannot tell a {} of {} from {}",
             hidden.rank,
             hidden.expected,
             if hidden.at.norm() > 0.0 { "change" } else { "constant value" },
-            names(faults.iter().map(|&fault| fault_names[fault].as_str())),
-            names(hidden.states().iter().map(|&state| state_name(linear, state))),
+            told.join(", "),
+            from,
         );
         return Err(at_fault(file, linear, faults[0], message).into());
     }
@@ -258,7 +265,12 @@ fn refused(
         }
         Refusal::Control(error) => error.to_string(),
     };
-    file.error_at(&request.place, message)
+    match &request.other {
+        Some((name, place)) if message.starts_with(&format!("{name} ")) => {
+            file.error_at(place, message)
+        }
+        _ => file.error_at(&request.place, message),
+    }
 }
 
 impl Designed {

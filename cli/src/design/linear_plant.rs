@@ -1,8 +1,7 @@
 //! The plant as a linear system with faults, out of the plant file's matrices or its FMU.
 
-use anyhow::Context;
 use control::faults::{Entry, Fault as Model, FaultKind};
-use master::{Fmu, Linearisation, Linearise, linearise};
+use master::{Fmu, Linearisation, Linearise, LineariseError, linearise};
 use nalgebra::{DMatrix, DVector};
 
 use super::plant_file::{self, PlantFile};
@@ -115,7 +114,8 @@ fn linearisation(
     file: &PlantFile<'_>,
     plant_file::PlantFmu { path, operating_point, states }: &plant_file::PlantFmu,
 ) -> anyhow::Result<(String, Linearisation)> {
-    let fmu = Fmu::open_any(path).map_err(|error| file.error(&["plant"], error.to_string()))?;
+    let fmu = Fmu::open_any(path)
+        .map_err(|error| file.error(&["plant"], format!("{:#}", anyhow::Error::from(error))))?;
     let names = |signals: &[Signal]| signals.iter().map(|signal| signal.name.clone()).collect();
     let inputs = file.faults.iter().filter_map(|fault| match &fault.entrance {
         Entrance::Input(name) => Some(name.clone()),
@@ -129,11 +129,29 @@ fn linearisation(
         at: operating_point.iter().map(|(name, value)| (name.clone(), value.to_string())).collect(),
         ..Linearise::default()
     };
-    let found = linearise(&fmu, &request)
-        .map_err(|error| file.error(&["plant"], error.to_string()))
-        .with_context(|| format!("cannot linearise {}", path.display()))?;
+    let found = linearise(&fmu, &request).map_err(|error| {
+        let place = match &error {
+            LineariseError::UnknownVariable { name, .. } => stating(file, operating_point, name),
+            _ => "plant",
+        };
+        file.error(&[place, "plant"], format!("{}: {error}", path.display()))
+    })?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     Ok((format!("{} ({name})", fmu.description().model_name), found))
+}
+
+/// The entry of the file that names this variable of the FMU.
+fn stating(file: &PlantFile<'_>, operating_point: &[(String, f64)], name: &str) -> &'static str {
+    let among = |signals: &[Signal]| signals.iter().any(|signal| signal.name == name);
+    if operating_point.iter().any(|(variable, _)| variable == name) {
+        "operating_point"
+    } else if among(&file.actuators) {
+        "actuators"
+    } else if among(&file.measurements) {
+        "measurements"
+    } else {
+        "faults"
+    }
 }
 
 /// The faults of the file with the units of the FMU, and where they enter.

@@ -35,6 +35,8 @@ pub(crate) struct Region {
 pub(crate) struct Request {
     pub(crate) wanted: Wanted,
     pub(crate) place: Place,
+    /// Of the second weight and its name.
+    pub(crate) other: Option<(String, Place)>,
 }
 
 const KEYS: [&str; 4] = ["eigenvalues", "sampled_eigenvalues", "region", "h_infinity"];
@@ -58,8 +60,9 @@ pub(crate) fn request(
             return Err(table.source.error(&table.place, message));
         };
         let wanted = Wanted::Region(self::region(&entry)?);
-        return Ok(Request { wanted, place: entry.place });
+        return Ok(Request { wanted, place: entry.place, other: None });
     };
+    let mut second = None;
     let norm = one.name.ends_with(".h_infinity");
     let wanted = match region {
         Some(entry) if !norm => {
@@ -72,19 +75,20 @@ pub(crate) fn request(
             return Err(one.error(advice));
         }
         None if norm => Wanted::HInfinity { bound: bound(&one)?, region: Region::default() },
-        None if one.name.ends_with(".eigenvalues") => Wanted::Eigenvalues(eigenvalues(&one)?),
+        None if one.name.ends_with(".eigenvalues") => Wanted::Eigenvalues(stable(&one, false)?),
         None if one.name.ends_with(".sampled_eigenvalues") => {
             if !sampled {
                 return Err(one.error("the design has no `sample_time`"));
             }
-            Wanted::SampledEigenvalues(eigenvalues(&one)?)
+            Wanted::SampledEigenvalues(stable(&one, true)?)
         }
         None => {
             let other = table.require(weights[1], "the weight of the other signals")?;
+            second = Some((weights[1].to_owned(), other.place.clone()));
             Wanted::Weights { states: weight(&one)?, channels: weight(&other)? }
         }
     };
-    Ok(Request { wanted, place: one.place })
+    Ok(Request { wanted, place: one.place, other: second })
 }
 
 /// The shape of a disc or a sector is lost between the planes of s and z; a decay rate is not.
@@ -107,6 +111,22 @@ fn only_one<'a>(table: &Table<'a>, weight: &str) -> Result<Option<Entry<'a>>, Pl
             Err(second.error(format!("only one of {keys} can be wanted")))
         }
         None => Ok(first),
+    }
+}
+
+/// Eigenvalues of a stable loop.
+fn stable(entry: &Entry<'_>, sampled: bool) -> Result<Vec<Complex<f64>>, PlaceError> {
+    let found = eigenvalues(entry)?;
+    let unstable =
+        |value: &&Complex<f64>| if sampled { value.norm() >= 1.0 } else { value.re >= 0.0 };
+    match found.iter().find(unstable) {
+        None => Ok(found),
+        Some(value) => {
+            let rule = if sampled { "a modulus below 1" } else { "a real part below 0" };
+            let shown = if value.im == 0.0 { value.re.to_string() } else { value.to_string() };
+            Err(entry
+                .error(format!("the loop would not be stable: expected {rule}, found {shown}")))
+        }
     }
 }
 
