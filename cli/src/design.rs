@@ -19,6 +19,7 @@ mod signals;
 mod tests;
 mod wanted;
 
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
@@ -85,7 +86,9 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
         file.commit().with_context(|| unwritten(path))?;
     }
     if options.json {
-        println!("{}", serde_json::to_string_pretty(&report)?);
+        let mut output = std::io::stdout().lock();
+        serde_json::to_writer_pretty(&mut output, &report).context("cannot print the report")?;
+        writeln!(output)?;
     } else {
         summarise(&report);
         for path in written {

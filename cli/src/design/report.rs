@@ -264,9 +264,9 @@ fn or_reason<T: Serialize, S: Serializer>(
     }
 }
 
-/// Row by row.
+/// Row by row, a negative zero as zero.
 pub(crate) fn rows(m: &DMatrix<f64>) -> Vec<Vec<f64>> {
-    m.row_iter().map(|row| row.iter().copied().collect()).collect()
+    m.row_iter().map(|row| row.iter().map(|entry| entry + 0.0).collect()).collect()
 }
 
 /// Real and imaginary parts.

@@ -62,33 +62,29 @@ pub(crate) fn request(
         let wanted = Wanted::Region(self::region(&entry)?);
         return Ok(Request { wanted, place: entry.place, other: None });
     };
-    let mut second = None;
-    let norm = one.name.ends_with(".h_infinity");
-    let wanted = match region {
-        Some(entry) if !norm => {
-            return Err(entry.error("a region goes alone or with `h_infinity`"));
+    if one.name.ends_with(".h_infinity") {
+        let region = region.as_ref().map(self::region).transpose()?.unwrap_or_default();
+        let wanted = Wanted::HInfinity { bound: bound(&one, region)?, region };
+        return Ok(Request { wanted, place: one.place, other: None });
+    }
+    if let Some(entry) = region {
+        return Err(entry.error("a region goes alone or with `h_infinity`"));
+    }
+    if one.name.ends_with(".eigenvalues") {
+        let wanted = Wanted::Eigenvalues(stable(&one, false)?);
+        return Ok(Request { wanted, place: one.place, other: None });
+    }
+    if one.name.ends_with(".sampled_eigenvalues") {
+        if !sampled {
+            return Err(one.error("the design has no `sample_time`"));
         }
-        Some(entry) => Wanted::HInfinity { bound: bound(&one)?, region: self::region(&entry)? },
-        None if norm && bound(&one)?.is_none() => {
-            let advice = "\"least\" needs a `region` with a disc: without one, ever larger gains lower \
-                          the norm without end";
-            return Err(one.error(advice));
-        }
-        None if norm => Wanted::HInfinity { bound: bound(&one)?, region: Region::default() },
-        None if one.name.ends_with(".eigenvalues") => Wanted::Eigenvalues(stable(&one, false)?),
-        None if one.name.ends_with(".sampled_eigenvalues") => {
-            if !sampled {
-                return Err(one.error("the design has no `sample_time`"));
-            }
-            Wanted::SampledEigenvalues(stable(&one, true)?)
-        }
-        None => {
-            let other = table.require(weights[1], "the weight of the other signals")?;
-            second = Some((weights[1].to_owned(), other.place.clone()));
-            Wanted::Weights { states: weight(&one)?, channels: weight(&other)? }
-        }
-    };
-    Ok(Request { wanted, place: one.place, other: second })
+        let wanted = Wanted::SampledEigenvalues(stable(&one, true)?);
+        return Ok(Request { wanted, place: one.place, other: None });
+    }
+    let other = table.require(weights[1], "the weight of the other signals")?;
+    let wanted = Wanted::Weights { states: weight(&one)?, channels: weight(&other)? };
+    let other = Some((weights[1].to_owned(), other.place));
+    Ok(Request { wanted, place: one.place, other })
 }
 
 /// The shape of a disc or a sector is lost between the planes of s and z; a decay rate is not.
@@ -182,13 +178,17 @@ fn disc(entry: &Entry<'_>) -> Result<(f64, f64), PlaceError> {
     }
 }
 
-/// A bound, or the text "least".
-fn bound(entry: &Entry<'_>) -> Result<Option<f64>, PlaceError> {
+/// A bound of the norm, or the text "least".
+fn bound(entry: &Entry<'_>, region: Region) -> Result<Option<f64>, PlaceError> {
     if !entry.is_text() {
         return entry.positive().map(Some);
     }
     match entry.text()? {
-        "least" => Ok(None),
+        "least" if region.disc.is_some() => Ok(None),
+        "least" => Err(entry.error(
+            "\"least\" needs a `region` with a disc: without one, ever larger gains lower the norm \
+             without end",
+        )),
         other => Err(entry.error(format!("expected a number or \"least\", found {other:?}"))),
     }
 }
