@@ -17,7 +17,7 @@ const REFINEMENTS: usize = 2;
 pub struct Solution {
     /// P, n x n, symmetric.
     pub p: DMatrix<f64>,
-    /// With |P|[i,j] at least the root of P[i,i] P[j,j], the
+    /// With `|P|[i,j]` at least the root of `P[i,i] P[j,j]`, the
     /// largest entry of |A' P + P A + Q| relative to the same entry of |A'| |P| + |P| |A| + |Q|; in
     /// sampled time of |A' P A - P + Q| relative to |A'| |P| |A| + |P| + |Q|.
     pub residual: f64,
