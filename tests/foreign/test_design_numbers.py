@@ -113,6 +113,8 @@ def test_the_sampled_plant_is_the_matrix_exponential(case):
     assert own.A[:n, :n] == pytest.approx(held[:n, :n], rel=1e-13)
     assert own.B[:n] == pytest.approx(held[:n, n:], rel=1e-13)
     assert own.F_a[:n, :m] == pytest.approx(own.B[:n], rel=1e-13), "a fault of each pump"
+    shown = {m["name"]: np.array(m["values"]) for m in designed.report["plant"]["matrices"]}
+    assert (shown["F_a"][:, :m] == b).all()
     if own.filtered:
         part = 1 - np.exp(-designed.file["filter"] * own.period)
         assert designed.design["filter"] == pytest.approx([part] * 3, rel=1e-14)

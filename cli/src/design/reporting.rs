@@ -106,15 +106,15 @@ impl Names {
     fn plant_matrices(&self, designed: &Designed) -> Vec<Matrix> {
         let Self { states, extended, actuators, measurements, faults } = self;
         let linear = &designed.linear;
+        let f_a = designed.extended.plant.f_a.rows(0, states.len()).into_owned();
         let mut matrices = vec![
             matrix("A", "states", &linear.a, states, states),
             matrix("B", "commands", &linear.b, states, actuators),
             matrix("C", "measurements", &linear.c, measurements, states),
+            matrix("F_a", "faults", &f_a, states, faults),
         ];
         let own = &designed.plant;
-        if own.a == linear.a {
-            matrices.push(matrix("F_a", "faults", &own.f_a, states, faults));
-        } else {
+        if own.a != linear.a {
             let kind = match designed.domain {
                 Domain::Continuous => "extended",
                 Domain::Sampled { .. } => "sampled",
