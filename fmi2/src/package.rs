@@ -9,7 +9,7 @@ use std::path::PathBuf;
 
 use crate::description::ParseError;
 
-pub use read::Unpacked;
+pub use read::{Unpacked, unpack_archive};
 pub use write::Package;
 
 /// Name of the file that describes an FMU, at the root of the archive.

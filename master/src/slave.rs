@@ -1,5 +1,7 @@
 //! What the master asks of an FMU: the trait [`Slave`], whatever stands behind it.
 
+use std::fmt;
+
 use fmi2::Experiment;
 use fmi2::abi::Status;
 use fmi2::description::ModelDescription;
@@ -13,11 +15,14 @@ pub trait Slave {
     /// The model description that the instance belongs to.
     fn description(&self) -> &ModelDescription;
 
-    /// `fmi2SetupExperiment`.
+    /// `fmi2SetDebugLogging` of all categories.
     ///
     /// # Errors
     ///
-    /// As every function here: [`CallError`] with the status and the FMU's own words.
+    /// As every function here: [`CallError`] with what went wrong and the FMU's own words.
+    fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError>;
+
+    /// `fmi2SetupExperiment`.
     fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError>;
 
     /// `fmi2EnterInitializationMode`.
@@ -47,37 +52,177 @@ pub trait Slave {
     /// `fmi2SetBoolean`: 0 is false.
     fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError>;
 
-    /// `fmi2SetString` of one variable.
-    fn set_string(&mut self, reference: u32, value: &str) -> Result<(), CallError>;
+    /// `fmi2GetString`.
+    fn get_string(&mut self, references: &[u32], values: &mut [String]) -> Result<(), CallError>;
 
-    /// `fmi2SetRealInputDerivatives`, all of first order.
-    fn set_input_slopes(&mut self, references: &[u32], slopes: &[f64]) -> Result<(), CallError>;
+    /// `fmi2SetString`.
+    fn set_string(&mut self, references: &[u32], values: &[String]) -> Result<(), CallError>;
 
-    /// `fmi2GetRealOutputDerivatives`, all of first order.
-    fn get_output_slopes(
+    /// `fmi2SetRealInputDerivatives`.
+    fn set_input_derivatives(
         &mut self,
         references: &[u32],
-        slopes: &mut [f64],
+        orders: &[i32],
+        values: &[f64],
     ) -> Result<(), CallError>;
 
-    /// `fmi2DoStep` from `time` over `size`, both in s.
-    fn do_step(&mut self, time: f64, size: f64) -> Result<(), CallError>;
+    /// `fmi2GetRealOutputDerivatives`.
+    fn get_output_derivatives(
+        &mut self,
+        references: &[u32],
+        orders: &[i32],
+        values: &mut [f64],
+    ) -> Result<(), CallError>;
+
+    /// `fmi2DoStep` from `time` over `size`, both in s. `never_back` is
+    /// `noSetFMUStatePriorToCurrentPoint`. An answer of `fmi2Pending` is waited for.
+    fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<Stepped, CallError>;
+
+    /// `fmi2GetDirectionalDerivative`: the change of `unknowns` when `knowns` change by `seed`.
+    fn directional_derivative(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        changes: &mut [f64],
+    ) -> Result<(), CallError>;
+
+    /// `fmi2GetFMUstate`: keeps the state of now in `slot` (0, 1, 2, ...), in place of the one there.
+    fn save_state(&mut self, slot: usize) -> Result<(), CallError>;
+
+    /// `fmi2SetFMUstate`: back to the state kept in `slot`, which stays there.
+    fn restore_state(&mut self, slot: usize) -> Result<(), CallError>;
+
+    /// `fmi2SerializeFMUstate` of the state of now.
+    fn serialize_state(&mut self) -> Result<Vec<u8>, CallError>;
+
+    /// `fmi2DeSerializeFMUstate`, and on to that state.
+    fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError>;
+
+    /// Sets Real inputs and their derivatives, steps, reads Real outputs and their derivatives:
+    /// one call, so that a slave in another process is asked once. A step done in part reads too.
+    fn advance(&mut self, step: &mut Advance<'_>) -> Result<Stepped, CallError> {
+        if !step.inputs.is_empty() {
+            self.set_real(step.inputs, step.input_values)?;
+        }
+        if !step.derived_inputs.is_empty() {
+            let orders = step.input_orders;
+            self.set_input_derivatives(step.derived_inputs, orders, step.input_derivatives)?;
+        }
+        let done = self.do_step(step.time, step.size, step.never_back)?;
+        if !step.outputs.is_empty() {
+            self.get_real(step.outputs, step.output_values)?;
+        }
+        if !step.derived_outputs.is_empty() {
+            let orders = step.output_orders;
+            self.get_output_derivatives(step.derived_outputs, orders, step.output_derivatives)?;
+        }
+        Ok(done)
+    }
+
+    /// The same slave for another thread to step; none where it is bound to its thread.
+    fn in_thread(&mut self) -> Option<&mut (dyn Slave + Send)> {
+        None
+    }
+}
+
+/// What [`Slave::advance`] sets, steps over and reads.
+#[derive(Debug)]
+pub struct Advance<'a> {
+    /// Value references of the inputs to set, and their values.
+    pub inputs: &'a [u32],
+    /// One for each of `inputs`.
+    pub input_values: &'a [f64],
+    /// Value references of the inputs whose derivatives are set, with orders and values.
+    pub derived_inputs: &'a [u32],
+    /// One for each of `derived_inputs`.
+    pub input_orders: &'a [i32],
+    /// One for each of `derived_inputs`.
+    pub input_derivatives: &'a [f64],
+    /// Begin of the step in s.
+    pub time: f64,
+    /// Its size in s.
+    pub size: f64,
+    /// `noSetFMUStatePriorToCurrentPoint`.
+    pub never_back: bool,
+    /// Value references of the outputs to read.
+    pub outputs: &'a [u32],
+    /// One for each of `outputs`.
+    pub output_values: &'a mut [f64],
+    /// Value references of the outputs whose derivatives are read, with orders and values.
+    pub derived_outputs: &'a [u32],
+    /// One for each of `derived_outputs`.
+    pub output_orders: &'a [i32],
+    /// One for each of `derived_outputs`.
+    pub output_derivatives: &'a mut [f64],
+}
+
+/// How far a step came.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Stepped {
+    /// To its end.
+    Whole,
+    /// `fmi2Discard`: only to `fmi2LastSuccessfulTime`.
+    Part {
+        /// That time in s.
+        reached: f64,
+        /// `fmi2Terminated`: the FMU wants the simulation to end there.
+        terminated: bool,
+    },
 }
 
 /// A call that an FMU refused or failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{function} returned {}{}", name(*.status), quoted(.messages))]
+#[error("{function} {failure}{}", quoted(.messages))]
 pub struct CallError {
     /// The function of the standard.
     pub function: &'static str,
-    /// What it returned; none for a value that the standard does not know.
-    pub status: Option<Status>,
+    /// How it failed.
+    pub failure: Failure,
     /// What the FMU said to the logger during the call.
     pub messages: Vec<String>,
 }
 
-fn name(status: Option<Status>) -> &'static str {
-    status.map_or("an unknown status", Status::name)
+/// How a call failed.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Failure {
+    /// It returned this status.
+    Status(Status),
+    /// It returned a value that the standard does not know.
+    UnknownStatus(i32),
+    /// The library, or this way in, does not have the function.
+    Absent,
+    /// It panicked inside the crate through which it was called.
+    Panicked(String),
+    /// The process of the FMU was ended by this signal: number and name.
+    Killed(i32, &'static str),
+    /// The FMU ended its process with this exit status.
+    Exited(i32),
+    /// It did not return within this time in s; its process was ended.
+    TimedOut(f64),
+    /// It answered something impossible: what.
+    Nonsense(String),
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Failure::Status(status) => write!(formatter, "returned {}", status.name()),
+            Failure::UnknownStatus(status) => {
+                write!(formatter, "returned {status}, expected a status of the standard (0 to 5)")
+            }
+            Failure::Absent => formatter.write_str("is missing from the library"),
+            Failure::Panicked(text) => write!(formatter, "panicked: {text}"),
+            Failure::Killed(number, name) => {
+                write!(formatter, "crashed: its process was ended by signal {number} ({name})")
+            }
+            Failure::Exited(status) => {
+                write!(formatter, "ended its process with exit status {status}")
+            }
+            Failure::TimedOut(seconds) => write!(formatter, "did not return within {seconds} s"),
+            Failure::Nonsense(what) => formatter.write_str(what),
+        }
+    }
 }
 
 fn quoted(messages: &[String]) -> String {

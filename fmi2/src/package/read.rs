@@ -40,13 +40,8 @@ impl Unpacked {
     /// links, duplicate names, encrypted entries, more than 4 GiB or 100,000 entries, or no
     /// readable `modelDescription.xml` at its root.
     pub fn open(path: &Path) -> Result<Self, PackageError> {
-        let file = File::open(path).map_err(file_error("open", path))?;
-        let wrong = |source| PackageError::Archive { path: path.to_owned(), source };
-        let mut archive = ZipArchive::new(BufReader::new(file)).map_err(wrong)?;
-        let folder = tempfile::Builder::new().prefix("fmu-").tempdir();
-        let folder = folder.map_err(file_error("create a folder in", std::env::temp_dir()))?;
+        let folder = unpack_archive(path)?;
         let folder_path = folder.path().to_owned();
-        unpack(&mut archive, path, &folder_path, CAPACITY)?;
         let description = describe(&folder_path, path)?;
         Ok(Unpacked { folder: folder_path, temporary: Some(folder), description })
     }
@@ -93,6 +88,21 @@ impl Unpacked {
             }
         })
     }
+}
+
+/// Unpacks the ZIP archive at `path` (an FMU, or an SSP) into a new temporary folder.
+///
+/// # Errors
+///
+/// [`PackageError`] as for [`Unpacked::open`], whatever is in the archive.
+pub fn unpack_archive(path: &Path) -> Result<TempDir, PackageError> {
+    let file = File::open(path).map_err(file_error("open", path))?;
+    let wrong = |source| PackageError::Archive { path: path.to_owned(), source };
+    let mut archive = ZipArchive::new(BufReader::new(file)).map_err(wrong)?;
+    let folder = tempfile::Builder::new().prefix("fmu-").tempdir();
+    let folder = folder.map_err(file_error("create a folder in", std::env::temp_dir()))?;
+    unpack(&mut archive, path, folder.path(), CAPACITY)?;
+    Ok(folder)
 }
 
 /// All files two levels below `binaries`, sorted.
