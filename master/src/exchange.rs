@@ -11,6 +11,7 @@ use crate::system::{Port, System};
 struct Outputs {
     ports: Vec<Port>,
     references: Vec<u32>,
+    ones: Vec<i32>,
     /// Values at the begin of the last step, of the current one, and at the last time read.
     before: Vec<f64>,
     begin: Vec<f64>,
@@ -26,6 +27,7 @@ struct Inputs {
     /// Slave and position in its [`Outputs`].
     sources: Vec<(usize, usize)>,
     references: Vec<u32>,
+    ones: Vec<i32>,
     values: Vec<f64>,
     slopes: Vec<f64>,
     takes_slopes: bool,
@@ -117,7 +119,7 @@ impl Exchange {
             .map_err(|source| call(name, time, source))?;
         if course == Course::Sloped && outputs.gives_slopes {
             instance
-                .get_output_slopes(&outputs.references, &mut outputs.slopes)
+                .get_output_derivatives(&outputs.references, &outputs.ones, &mut outputs.slopes)
                 .map_err(|source| call(name, time, source))?;
         }
         let both = outputs.latest.iter().chain(&outputs.slopes);
@@ -157,7 +159,7 @@ impl Exchange {
                 .map_err(|source| call(name, time, source))?;
             if sloped {
                 instance
-                    .set_input_slopes(&inputs.references, &inputs.slopes)
+                    .set_input_derivatives(&inputs.references, &inputs.ones, &inputs.slopes)
                     .map_err(|source| call(name, time, source))?;
             }
         }
@@ -233,6 +235,7 @@ impl Outputs {
         }
         self.ports.push(port);
         self.references.push(reference);
+        self.ones.push(1);
         for values in [&mut self.before, &mut self.begin, &mut self.latest, &mut self.slopes] {
             values.push(0.0);
         }
@@ -244,6 +247,7 @@ impl Inputs {
     fn add(&mut self, source: (usize, usize), reference: u32) {
         self.sources.push(source);
         self.references.push(reference);
+        self.ones.push(1);
         self.values.push(0.0);
         self.slopes.push(0.0);
     }

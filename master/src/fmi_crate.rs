@@ -20,7 +20,7 @@ use fmi2::abi::Status;
 use fmi2::description::ModelDescription;
 
 use crate::fmu::{Fmu, FmuError};
-use crate::slave::{CallError, Slave};
+use crate::slave::{CallError, Failure, Slave, Stepped};
 
 /// Why an FMU could not be opened or instantiated through the crate `fmi`.
 #[derive(Debug, thiserror::Error)]
@@ -96,11 +96,11 @@ impl FmiSlave {
             Ok(Err(Fmi2Error::Error | Fmi2Error::TypesPlatformMismatch(_))) => Status::Error,
             // The crate knows no fmi2Pending, nor what the standard does not know.
             Err(message) => {
-                let messages = vec![format!("the crate fmi panics: {message}")];
-                return Err(CallError { function, status: None, messages });
+                let (failure, messages) = (Failure::Panicked(message), Vec::new());
+                return Err(CallError { function, failure, messages });
             }
         };
-        Err(CallError { function, status: Some(status), messages: Vec::new() })
+        Err(CallError { function, failure: Failure::Status(status), messages: Vec::new() })
     }
 }
 
@@ -111,11 +111,6 @@ fn fenced<T>(action: impl FnOnce() -> T) -> Result<T, String> {
         let text = text.or_else(|| payload.downcast_ref::<String>().map(String::as_str));
         text.unwrap_or("without a message").to_owned()
     })
-}
-
-fn no_derivatives(function: &'static str) -> CallError {
-    let messages = vec!["the crate fmi does not offer this function".to_owned()];
-    CallError { function, status: Some(Status::Error), messages }
 }
 
 impl Slave for FmiSlave {
@@ -165,20 +160,14 @@ impl Slave for FmiSlave {
         self.call("fmi2SetBoolean", |instance| instance.set_boolean(references, values))
     }
 
-    fn set_string(&mut self, reference: u32, value: &str) -> Result<(), CallError> {
-        let value = CString::new(value.replace('\0', "")).unwrap_or_default();
-        self.call("fmi2SetString", |instance| instance.set_string(&[reference], &[value]))
+    fn set_string(&mut self, references: &[u32], values: &[String]) -> Result<(), CallError> {
+        let text = |value: &String| CString::new(value.replace('\0', "")).unwrap_or_default();
+        let values: Vec<_> = values.iter().map(text).collect();
+        self.call("fmi2SetString", |instance| instance.set_string(references, &values))
     }
 
-    fn set_input_slopes(&mut self, _: &[u32], _: &[f64]) -> Result<(), CallError> {
-        Err(no_derivatives("fmi2SetRealInputDerivatives"))
-    }
-
-    fn get_output_slopes(&mut self, _: &[u32], _: &mut [f64]) -> Result<(), CallError> {
-        Err(no_derivatives("fmi2GetRealOutputDerivatives"))
-    }
-
-    fn do_step(&mut self, time: f64, size: f64) -> Result<(), CallError> {
-        self.call("fmi2DoStep", |instance| instance.do_step(time, size, true))
+    fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<Stepped, CallError> {
+        self.call("fmi2DoStep", |instance| instance.do_step(time, size, never_back))?;
+        Ok(Stepped::Whole)
     }
 }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 
 use fmi2::Experiment;
 use fmi2::description::ModelDescription;
@@ -10,7 +11,7 @@ use fmi2::package::{PackageError, Unpacked};
 
 use crate::error::LoadError;
 use crate::library::{Component, Interface, Library};
-use crate::slave::{CallError, Slave};
+use crate::slave::{CallError, Slave, Stepped};
 
 /// Why an FMU could not be opened or instantiated.
 #[derive(Debug, thiserror::Error)]
@@ -68,7 +69,8 @@ struct Content {
 }
 
 impl Fmu {
-    /// Unpacks the FMU at `path`, reads its description and loads its library for co-simulation.
+    /// Unpacks the FMU at `path`, which may also be a folder with an unpacked one, reads its
+    /// description and loads its library for co-simulation.
     ///
     /// # Errors
     ///
@@ -88,7 +90,8 @@ impl Fmu {
     ///
     /// Those of [`Fmu::open`]; [`FmuError::NoInterface`] where the FMU has neither interface.
     pub fn open_any(path: &Path) -> Result<Self, FmuError> {
-        let unpacked = Unpacked::open(path)?;
+        let unpacked =
+            if path.is_dir() { Unpacked::in_folder(path)? } else { Unpacked::open(path)? };
         let description = &unpacked.description;
         if description.co_simulation.is_none() && description.model_exchange.is_none() {
             return Err(FmuError::NoInterface { path: path.to_owned() });
@@ -171,6 +174,10 @@ impl Slave for Instance {
         self.fmu.description()
     }
 
+    fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
+        self.component.set_debug_logging(on)
+    }
+
     fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError> {
         self.component.setup_experiment(experiment)
     }
@@ -211,23 +218,70 @@ impl Slave for Instance {
         self.component.set_boolean(references, values)
     }
 
-    fn set_string(&mut self, reference: u32, value: &str) -> Result<(), CallError> {
-        self.component.set_string(reference, value)
+    fn get_string(&mut self, references: &[u32], values: &mut [String]) -> Result<(), CallError> {
+        self.component.get_string(references, values)
     }
 
-    fn set_input_slopes(&mut self, references: &[u32], slopes: &[f64]) -> Result<(), CallError> {
-        self.component.set_input_slopes(references, slopes)
+    fn set_string(&mut self, references: &[u32], values: &[String]) -> Result<(), CallError> {
+        self.component.set_string(references, values)
     }
 
-    fn get_output_slopes(
+    fn set_input_derivatives(
         &mut self,
         references: &[u32],
-        slopes: &mut [f64],
+        orders: &[i32],
+        values: &[f64],
     ) -> Result<(), CallError> {
-        self.component.get_output_slopes(references, slopes)
+        self.component.set_real_input_derivatives(references, orders, values)
     }
 
-    fn do_step(&mut self, time: f64, size: f64) -> Result<(), CallError> {
-        self.component.do_step(time, size, 1)
+    fn get_output_derivatives(
+        &mut self,
+        references: &[u32],
+        orders: &[i32],
+        values: &mut [f64],
+    ) -> Result<(), CallError> {
+        self.component.get_real_output_derivatives(references, orders, values)
+    }
+
+    fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<Stepped, CallError> {
+        self.component.do_step(time, size, never_back)
+    }
+
+    fn directional_derivative(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        changes: &mut [f64],
+    ) -> Result<(), CallError> {
+        self.component.directional_derivative(unknowns, knowns, seed, changes)
+    }
+
+    fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
+        self.component.save_state(slot)
+    }
+
+    fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
+        self.component.restore_state(slot)
+    }
+
+    fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
+        self.component.serialize_state()
+    }
+
+    fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
+        self.component.deserialize_state(bytes)
+    }
+
+    fn in_thread(&mut self) -> Option<&mut (dyn Slave + Send)> {
+        Some(self)
+    }
+}
+
+impl Instance {
+    /// How long an answer of `fmi2Pending` is waited for; none: as long as it takes.
+    pub fn set_time_limit(&mut self, limit: Option<Duration>) {
+        self.component.time_limit = limit;
     }
 }

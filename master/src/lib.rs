@@ -5,6 +5,8 @@
 //! [`linearise()`] gives the matrices of an FMU about an operating point.
 #![deny(unsafe_code)]
 
+pub mod algorithm;
+pub mod assembly;
 mod error;
 mod exchange;
 #[cfg(feature = "fmi")]
@@ -18,6 +20,7 @@ mod probe;
 mod simulation;
 mod slave;
 mod system;
+pub mod transformation;
 mod value;
 
 pub use error::{LoadError, SystemError};
@@ -27,5 +30,5 @@ pub use linearise::{Linearisation, Linearise, LineariseError, linearise};
 pub use order::{Order, by_direct_dependencies};
 pub use probe::Probe;
 pub use simulation::{Method, Simulation};
-pub use slave::{CallError, Slave};
+pub use slave::{Advance, CallError, Failure, Slave, Stepped};
 pub use system::{Connection, Port, System};

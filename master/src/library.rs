@@ -4,43 +4,28 @@
 
 mod calls;
 mod functions;
+mod log;
+mod states;
+mod step;
 
 use std::ffi::{CStr, CString, OsStr, c_char, c_int, c_void};
 use std::path::{Path, PathBuf};
-use std::rc::Rc;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
+use std::time::Duration;
 
 use fmi2::abi::{
     CO_SIMULATION, DESCRIBE, DescribeSink, MODEL_EXCHANGE, Status, fmi2CallbackFunctions,
-    fmi2CallbackLogger, fmi2Component, fmi2FMUstate, fmi2Integer, fmi2Status,
+    fmi2Component, fmi2FMUstate, fmi2Status,
 };
 use libloading::Library as Handle;
 
 use crate::error::LoadError;
-use crate::slave::CallError;
-use functions::{CoSimulation, Common, Directional, ModelExchange, Snapshot};
+use crate::slave::{CallError, Failure};
+use functions::Functions;
+use log::Sink;
 
 const PYTHON: &str = "\nThe library expects Python to be in the process already, as those that \
     PythonFMU exports do: load it first with --preload, for example --preload libpython3.11.so.1.0";
-
-unsafe extern "C" {
-    fn master_logger();
-}
-
-/// Receives the messages of one instance; begins like `struct sink` of `logger.c`.
-#[repr(C)]
-struct Sink {
-    receive: extern "C" fn(*mut Sink, c_int, *const c_char, *const c_char),
-    messages: Mutex<Vec<String>>,
-}
-
-extern "C" fn receive(sink: *mut Sink, _: c_int, _: *const c_char, text: *const c_char) {
-    // SAFETY: the logger hands back the sink that `Component` owns, and a terminated text.
-    let (sink, text) = unsafe { (&*sink, CStr::from_ptr(text)) };
-    if let Ok(mut messages) = sink.messages.lock() {
-        messages.push(text.to_string_lossy().into_owned());
-    }
-}
 
 /// What the operating system says.
 fn reason(error: &libloading::Error) -> String {
@@ -123,12 +108,6 @@ fn c_string(text: &str) -> CString {
     CString::new(text.replace('\0', "")).unwrap_or_default()
 }
 
-/// The callback of `logger.c`.
-fn logger() -> fmi2CallbackLogger {
-    // SAFETY: both are pointers to functions; C calls it with the logger's signature.
-    unsafe { std::mem::transmute::<unsafe extern "C" fn(), fmi2CallbackLogger>(master_logger) }
-}
-
 /// `fmi2Type`: what an instance is made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interface {
@@ -140,11 +119,7 @@ pub enum Interface {
 
 /// A loaded library with the functions of FMI 2.0.
 pub(crate) struct Library {
-    common: Common,
-    simulation: Option<CoSimulation>,
-    exchange: Option<ModelExchange>,
-    snapshot: Option<Snapshot>,
-    directional: Option<Directional>,
+    functions: Functions,
     path: PathBuf,
     _handle: Handle,
 }
@@ -153,29 +128,18 @@ impl Library {
     /// Loads the library and resolves the functions: those of `interface` must be there.
     pub(crate) fn open(path: &Path, interface: Interface) -> Result<Self, LoadError> {
         let handle = load(path)?;
-        let common = Common::load(&handle, path)?;
+        let functions = Functions::load(&handle);
         // SAFETY: takes no argument and returns a static string.
-        let version = unsafe { (common.get_version)().as_ref().map(|text| CStr::from_ptr(text)) };
+        let version = functions
+            .get_version
+            .and_then(|function| unsafe { function().as_ref().map(|text| CStr::from_ptr(text)) });
         let found = version.map(CStr::to_string_lossy).unwrap_or_default();
-        if found != "2.0" {
+        if functions.get_version.is_some() && !found.starts_with("2.") {
             let found = found.into_owned();
             return Err(LoadError::Version { path: path.to_owned(), found });
         }
-        let simulation = CoSimulation::load(&handle, path);
-        let exchange = ModelExchange::load(&handle, path);
-        let (simulation, exchange) = match interface {
-            Interface::CoSimulation => (Some(simulation?), exchange.ok()),
-            Interface::ModelExchange => (simulation.ok(), Some(exchange?)),
-        };
-        Ok(Self {
-            common,
-            simulation,
-            exchange,
-            snapshot: Snapshot::load(&handle, path).ok(),
-            directional: Directional::load(&handle, path).ok(),
-            path: path.to_owned(),
-            _handle: handle,
-        })
+        functions.demand(interface, path)?;
+        Ok(Self { functions, path: path.to_owned(), _handle: handle })
     }
 
     /// `fmi2Instantiate` for `interface`.
@@ -186,9 +150,10 @@ impl Library {
         guid: &str,
         resources: &str,
     ) -> Result<Component, LoadError> {
-        let sink = Arc::new(Sink { receive, messages: Mutex::default() });
-        let callbacks = Rc::new(fmi2CallbackFunctions {
-            logger: Some(logger()),
+        let sink = Arc::new(Sink::new(name));
+        #[expect(clippy::arc_with_non_send_sync, reason = "`Component` says why it may be sent")]
+        let callbacks = Arc::new(fmi2CallbackFunctions {
+            logger: Some(log::logger()),
             allocate_memory: Some(calloc),
             free_memory: Some(free),
             step_finished: None,
@@ -200,27 +165,33 @@ impl Library {
             Interface::CoSimulation => CO_SIMULATION,
         };
         // SAFETY: terminated strings, callbacks that outlive the instance.
-        let pointer = unsafe {
-            (self.common.instantiate)(
+        let pointer = self.functions.instantiate.map_or(std::ptr::null_mut(), |function| unsafe {
+            function(
                 c_name.as_ptr(),
                 kind,
                 c_guid.as_ptr(),
                 c_resources.as_ptr(),
-                Rc::as_ptr(&callbacks),
+                Arc::as_ptr(&callbacks),
                 0,
                 0,
             )
-        };
+        });
         let component = Component {
             pointer,
-            library: self.clone(),
+            functions: self.functions,
             sink,
+            saved: Vec::new(),
+            time_limit: None,
             _callbacks: callbacks,
-            ones: vec![],
-            saved: std::ptr::null_mut(),
+            _library: self.clone(),
         };
         if pointer.is_null() {
-            let reason = component.messages().join("; ");
+            let messages = component.sink.take();
+            let reason = if messages.is_empty() {
+                "it gave no reason".to_owned()
+            } else {
+                messages.join("; ")
+            };
             let (path, instance) = (self.path.clone(), name.to_owned());
             return Err(LoadError::Instantiate { path, instance, reason });
         }
@@ -236,41 +207,50 @@ unsafe extern "C" {
 /// An instance, freed with its last use; the library stays loaded as long.
 pub(crate) struct Component {
     pointer: fmi2Component,
-    library: Arc<Library>,
-    /// Shared with the FMU, which has their addresses.
+    /// Those of the library, at hand.
+    functions: Functions,
+    /// Shared with the FMU, which has its address.
     sink: Arc<Sink>,
-    _callbacks: Rc<fmi2CallbackFunctions>,
-    /// First order, as often as needed.
-    ones: Vec<fmi2Integer>,
-    /// The FMU state that `save` keeps; null before.
-    saved: fmi2FMUstate,
+    /// FMU states by slot; null where there is none.
+    saved: Vec<fmi2FMUstate>,
+    /// How long an answer of `fmi2Pending` is waited for; none: as long as it takes.
+    pub(crate) time_limit: Option<Duration>,
+    _callbacks: Arc<fmi2CallbackFunctions>,
+    _library: Arc<Library>,
 }
+
+// SAFETY: an instance may be used from any thread, by one at a time (FMI 2.0.5, section 2.1); the
+// pointers are to the instance, its states, and what is shared with it through `Arc`.
+unsafe impl Send for Component {}
 
 impl Drop for Component {
     fn drop(&mut self) {
         if self.pointer.is_null() {
             return;
         }
-        if let (Some(snapshot), false) = (&self.library.snapshot, self.saved.is_null()) {
-            // SAFETY: the instance is alive, the state is its own.
-            unsafe { (snapshot.free)(self.pointer, &raw mut self.saved) };
+        for mut state in std::mem::take(&mut self.saved) {
+            self.free_state(&mut state);
         }
-        // SAFETY: the instance is alive and not used again.
-        unsafe { (self.library.common.free_instance)(self.pointer) };
+        if let Some(free_instance) = self.functions.free_instance {
+            // SAFETY: the instance is alive and not used again.
+            unsafe { free_instance(self.pointer) };
+        }
     }
 }
 
 impl Component {
-    /// The messages since this was last asked.
-    fn messages(&self) -> Vec<String> {
-        self.sink.messages.lock().map(|mut list| std::mem::take(&mut *list)).unwrap_or_default()
-    }
-
+    #[inline]
     fn check(&self, function: &'static str, status: fmi2Status) -> Result<(), CallError> {
         if status == Status::OK as fmi2Status || status == Status::Warning as fmi2Status {
             return Ok(());
         }
-        let messages = self.messages();
-        Err(CallError { function, status: Status::from_c(status), messages })
+        let failure =
+            Status::from_c(status).map_or(Failure::UnknownStatus(status), Failure::Status);
+        Err(self.failed(function, failure))
+    }
+
+    #[cold]
+    fn failed(&self, function: &'static str, failure: Failure) -> CallError {
+        CallError { function, failure, messages: self.sink.take() }
     }
 }

@@ -174,7 +174,7 @@ impl Simulation {
 
     fn advance(&mut self, slave: usize, (time, size): (f64, f64)) -> Result<(), SystemError> {
         let (name, instance) = &mut self.system.slaves[slave];
-        instance.do_step(time, size).map_err(|source| call(name, time, source))
+        instance.do_step(time, size, true).map(|_| ()).map_err(|source| call(name, time, source))
     }
 
     /// Ends the simulation: `fmi2Terminate` of every slave, all of them even where one fails.

@@ -9,7 +9,8 @@ use fmi2::description::ModelDescription;
 /// An instance of a co-simulation FMU, by the functions of FMI 2.0.5, sections 2.1 and 4.2.
 ///
 /// Arrays that belong together have the same length. Every call either did what was asked
-/// (`fmi2OK`, `fmi2Warning`) or is an error.
+/// (`fmi2OK`, `fmi2Warning`) or is an error. What a kind of slave does not have, it leaves to the
+/// method given here, which says that the function is missing.
 #[expect(clippy::missing_errors_doc, reason = "said at setup_experiment for all")]
 pub trait Slave {
     /// The model description that the instance belongs to.
@@ -20,7 +21,10 @@ pub trait Slave {
     /// # Errors
     ///
     /// As every function here: [`CallError`] with what went wrong and the FMU's own words.
-    fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError>;
+    fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
+        let _ = on;
+        Err(absent("fmi2SetDebugLogging"))
+    }
 
     /// `fmi2SetupExperiment`.
     fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError>;
@@ -41,22 +45,40 @@ pub trait Slave {
     fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), CallError>;
 
     /// `fmi2GetInteger`, also for enumerations.
-    fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError>;
+    fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
+        let _ = (references, values);
+        Err(absent("fmi2GetInteger"))
+    }
 
     /// `fmi2SetInteger`, also for enumerations.
-    fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError>;
+    fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
+        let _ = (references, values);
+        Err(absent("fmi2SetInteger"))
+    }
 
     /// `fmi2GetBoolean`: 0 is false.
-    fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError>;
+    fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
+        let _ = (references, values);
+        Err(absent("fmi2GetBoolean"))
+    }
 
     /// `fmi2SetBoolean`: 0 is false.
-    fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError>;
+    fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
+        let _ = (references, values);
+        Err(absent("fmi2SetBoolean"))
+    }
 
     /// `fmi2GetString`.
-    fn get_string(&mut self, references: &[u32], values: &mut [String]) -> Result<(), CallError>;
+    fn get_string(&mut self, references: &[u32], values: &mut [String]) -> Result<(), CallError> {
+        let _ = (references, values);
+        Err(absent("fmi2GetString"))
+    }
 
     /// `fmi2SetString`.
-    fn set_string(&mut self, references: &[u32], values: &[String]) -> Result<(), CallError>;
+    fn set_string(&mut self, references: &[u32], values: &[String]) -> Result<(), CallError> {
+        let _ = (references, values);
+        Err(absent("fmi2SetString"))
+    }
 
     /// `fmi2SetRealInputDerivatives`.
     fn set_input_derivatives(
@@ -64,7 +86,10 @@ pub trait Slave {
         references: &[u32],
         orders: &[i32],
         values: &[f64],
-    ) -> Result<(), CallError>;
+    ) -> Result<(), CallError> {
+        let _ = (references, orders, values);
+        Err(absent("fmi2SetRealInputDerivatives"))
+    }
 
     /// `fmi2GetRealOutputDerivatives`.
     fn get_output_derivatives(
@@ -72,7 +97,10 @@ pub trait Slave {
         references: &[u32],
         orders: &[i32],
         values: &mut [f64],
-    ) -> Result<(), CallError>;
+    ) -> Result<(), CallError> {
+        let _ = (references, orders, values);
+        Err(absent("fmi2GetRealOutputDerivatives"))
+    }
 
     /// `fmi2DoStep` from `time` over `size`, both in s. `never_back` is
     /// `noSetFMUStatePriorToCurrentPoint`. An answer of `fmi2Pending` is waited for.
@@ -85,19 +113,33 @@ pub trait Slave {
         knowns: &[u32],
         seed: &[f64],
         changes: &mut [f64],
-    ) -> Result<(), CallError>;
+    ) -> Result<(), CallError> {
+        let _ = (unknowns, knowns, seed, changes);
+        Err(absent("fmi2GetDirectionalDerivative"))
+    }
 
     /// `fmi2GetFMUstate`: keeps the state of now in `slot` (0, 1, 2, ...), in place of the one there.
-    fn save_state(&mut self, slot: usize) -> Result<(), CallError>;
+    fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
+        let _ = slot;
+        Err(absent("fmi2GetFMUstate"))
+    }
 
     /// `fmi2SetFMUstate`: back to the state kept in `slot`, which stays there.
-    fn restore_state(&mut self, slot: usize) -> Result<(), CallError>;
+    fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
+        let _ = slot;
+        Err(absent("fmi2SetFMUstate"))
+    }
 
     /// `fmi2SerializeFMUstate` of the state of now.
-    fn serialize_state(&mut self) -> Result<Vec<u8>, CallError>;
+    fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
+        Err(absent("fmi2SerializeFMUstate"))
+    }
 
     /// `fmi2DeSerializeFMUstate`, and on to that state.
-    fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError>;
+    fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
+        let _ = bytes;
+        Err(absent("fmi2DeSerializeFMUstate"))
+    }
 
     /// Sets Real inputs and their derivatives, steps, reads Real outputs and their derivatives:
     /// one call, so that a slave in another process is asked once. A step done in part reads too.
@@ -211,7 +253,7 @@ impl fmt::Display for Failure {
             Failure::UnknownStatus(status) => {
                 write!(formatter, "returned {status}, expected a status of the standard (0 to 5)")
             }
-            Failure::Absent => formatter.write_str("is missing from the library"),
+            Failure::Absent => formatter.write_str("is missing"),
             Failure::Panicked(text) => write!(formatter, "panicked: {text}"),
             Failure::Killed(number, name) => {
                 write!(formatter, "crashed: its process was ended by signal {number} ({name})")
@@ -225,10 +267,12 @@ impl fmt::Display for Failure {
     }
 }
 
+/// The error that a function is missing.
+#[cold]
+pub(crate) fn absent(function: &'static str) -> CallError {
+    CallError { function, failure: Failure::Absent, messages: Vec::new() }
+}
+
 fn quoted(messages: &[String]) -> String {
-    if messages.is_empty() {
-        " without a message".to_owned()
-    } else {
-        format!(": {}", messages.join("; "))
-    }
+    if messages.is_empty() { String::new() } else { format!(": {}", messages.join("; ")) }
 }

@@ -201,7 +201,7 @@ impl System {
             Value::Real(value) => instance.set_real(&[reference], &[value]),
             Value::Integer(value) => instance.set_integer(&[reference], &[value]),
             Value::Boolean(value) => instance.set_boolean(&[reference], &[value.into()]),
-            Value::String(value) => instance.set_string(reference, &value),
+            Value::String(value) => instance.set_string(&[reference], &[value]),
         };
         let (name, value) = (name.to_owned(), text.to_owned());
         done.map_err(|source| SystemError::Setting { name, value, source })

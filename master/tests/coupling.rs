@@ -4,7 +4,9 @@
 use fmi2::Experiment;
 use fmi2::abi::Status;
 use fmi2::description::ModelDescription;
-use master::{CallError, Method, Simulation, Slave, System, by_direct_dependencies};
+use master::{
+    CallError, Failure, Method, Simulation, Slave, Stepped, System, by_direct_dependencies,
+};
 
 /// x' = gain u, stepped exactly for a line u + slope t; with `direct` the output is y = u instead.
 struct Integrator {
@@ -63,42 +65,37 @@ impl Slave for Integrator {
         self.u = values[0];
         Ok(())
     }
-    fn get_integer(&mut self, _: &[u32], _: &mut [i32]) -> Result<(), CallError> {
-        unreachable!("no such variables")
-    }
-    fn set_integer(&mut self, _: &[u32], _: &[i32]) -> Result<(), CallError> {
-        unreachable!("no such variables")
-    }
-    fn get_boolean(&mut self, _: &[u32], _: &mut [i32]) -> Result<(), CallError> {
-        unreachable!("no such variables")
-    }
-    fn set_boolean(&mut self, _: &[u32], _: &[i32]) -> Result<(), CallError> {
-        unreachable!("no such variables")
-    }
-    fn set_string(&mut self, _: u32, _: &str) -> Result<(), CallError> {
-        unreachable!("no such variables")
-    }
-    fn set_input_slopes(&mut self, _: &[u32], slopes: &[f64]) -> Result<(), CallError> {
+    fn set_input_derivatives(
+        &mut self,
+        _: &[u32],
+        _: &[i32],
+        slopes: &[f64],
+    ) -> Result<(), CallError> {
         self.slope = slopes[0];
         Ok(())
     }
-    fn get_output_slopes(&mut self, _: &[u32], slopes: &mut [f64]) -> Result<(), CallError> {
+    fn get_output_derivatives(
+        &mut self,
+        _: &[u32],
+        _: &[i32],
+        slopes: &mut [f64],
+    ) -> Result<(), CallError> {
         slopes[0] = self.gain * self.u;
         Ok(())
     }
-    fn do_step(&mut self, time: f64, size: f64) -> Result<(), CallError> {
+    fn do_step(&mut self, time: f64, size: f64, _: bool) -> Result<Stepped, CallError> {
         if time >= self.fails_at {
             let messages = vec!["out of paper".to_owned()];
             return Err(CallError {
                 function: "fmi2DoStep",
-                status: Some(Status::Error),
+                failure: Failure::Status(Status::Error),
                 messages,
             });
         }
         self.x += self.gain * (self.u * size + 0.5 * self.slope * size * size);
         self.u += self.slope * size;
         self.slope = 0.0;
-        Ok(())
+        Ok(Stepped::Whole)
     }
 }
 

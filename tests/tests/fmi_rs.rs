@@ -271,7 +271,7 @@ fn the_simulator_of_fmi_rs_runs_each_fmu_as_our_own_loader_steps_it() {
             assert_eq!(bits(&found), bits(&values), "{file}, row {row}: {found:?}, {values:?}");
             #[expect(clippy::cast_precision_loss, reason = "a thousand rows")]
             let next = (row + 1) as f64 * STEP;
-            own.do_step(*time, next - time).unwrap();
+            own.do_step(*time, next - time, true).unwrap();
         }
     }
 }

@@ -1,30 +1,40 @@
 //! What can be asked of an instance, one method for each function of the standard.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
+use std::ffi::CStr;
+
 use fmi2::abi::{fmi2Boolean, fmi2EventInfo};
 
-use super::functions::{CoSimulation, Directional, ModelExchange, Snapshot};
-use super::{Component, Library, c_string};
-use crate::slave::CallError;
+use super::{Component, c_string};
+use crate::slave::{CallError, absent};
 
-/// Defines a method for each function of a table: its arguments, and the C arguments made of them.
+/// The function of that field, or the error that it is missing.
+macro_rules! function {
+    ($self:ident.$field:ident, $name:expr) => {
+        match $self.functions.$field {
+            Some(function) => function,
+            None => return Err(absent($name)),
+        }
+    };
+}
+pub(super) use function;
+
+/// Defines a method for each function: its arguments, and the C arguments made of them.
 macro_rules! calls {
-    (|$library:ident, $function:ident| $table:expr; $($method:ident(
-        $($argument:ident: $type:ty),*) = $name:literal($($c:expr),*);)*
-    ) => {
+    ($($method:ident($($argument:ident: $type:ty),*) = $name:literal($($c:expr),*);)*) => {
         impl Component {
-            $(pub(crate) fn $method(&mut self, $($argument: $type),*) -> Result<(), CallError> {
-                let ($library, $function) = (&*self.library, $name);
+            $(#[inline]
+            pub(crate) fn $method(&mut self, $($argument: $type),*) -> Result<(), CallError> {
+                let function = function!(self.$method, $name);
                 // SAFETY: the instance is alive; slices that belong together are equally long.
-                let status = unsafe { ($table.$method)(self.pointer, $($c),*) };
-                self.check($function, status)
+                let status = unsafe { function(self.pointer, $($c),*) };
+                self.check($name, status)
             })*
         }
     };
 }
 
 calls! {
-    |library, _function| library.common;
     enter_initialization_mode() = "fmi2EnterInitializationMode"();
     exit_initialization_mode() = "fmi2ExitInitializationMode"();
     terminate() = "fmi2Terminate"();
@@ -40,16 +50,12 @@ calls! {
         "fmi2GetBoolean"(references.as_ptr(), same_length(references, values), values.as_mut_ptr());
     set_boolean(references: &[u32], values: &[i32]) =
         "fmi2SetBoolean"(references.as_ptr(), same_length(references, values), values.as_ptr());
-}
-
-calls! {
-    |library, function| library.simulation(function)?;
-    do_step(time: f64, size: f64, never_back: fmi2Boolean) =
-        "fmi2DoStep"(time, size, never_back);
-}
-
-calls! {
-    |library, function| library.exchange(function)?;
+    set_real_input_derivatives(references: &[u32], orders: &[i32], values: &[f64]) =
+        "fmi2SetRealInputDerivatives"(references.as_ptr(), same_length(references, values),
+            orders[..references.len()].as_ptr(), values.as_ptr());
+    get_real_output_derivatives(references: &[u32], orders: &[i32], values: &mut [f64]) =
+        "fmi2GetRealOutputDerivatives"(references.as_ptr(), same_length(references, values),
+            orders[..references.len()].as_ptr(), values.as_mut_ptr());
     enter_event_mode() = "fmi2EnterEventMode"();
     enter_continuous_time_mode() = "fmi2EnterContinuousTimeMode"();
     set_continuous_states(values: &[f64]) =
@@ -63,154 +69,111 @@ calls! {
 }
 
 /// The length that both slices have.
+#[inline]
 fn same_length<A, B>(references: &[A], values: &[B]) -> usize {
     assert_eq!(references.len(), values.len(), "references and values are equally many");
     references.len()
 }
 
-fn absent(function: &'static str) -> CallError {
-    let messages = vec!["the library does not have this function".to_owned()];
-    CallError { function, status: None, messages }
-}
-
-impl Library {
-    fn simulation(&self, function: &'static str) -> Result<&CoSimulation, CallError> {
-        self.simulation.as_ref().ok_or_else(|| absent(function))
-    }
-
-    fn exchange(&self, function: &'static str) -> Result<&ModelExchange, CallError> {
-        self.exchange.as_ref().ok_or_else(|| absent(function))
-    }
-
-    fn snapshot(&self, function: &'static str) -> Result<&Snapshot, CallError> {
-        self.snapshot.as_ref().ok_or_else(|| absent(function))
-    }
-
-    fn directional(&self, function: &'static str) -> Result<&Directional, CallError> {
-        self.directional.as_ref().ok_or_else(|| absent(function))
-    }
-}
-
 impl Component {
+    /// `fmi2SetDebugLogging` of all categories.
+    pub(crate) fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
+        let name = "fmi2SetDebugLogging";
+        let function = function!(self.set_debug_logging, name);
+        // SAFETY: the instance is alive; no categories.
+        let status = unsafe { function(self.pointer, on.into(), 0, std::ptr::null()) };
+        self.check(name, status)
+    }
+
     /// `fmi2SetupExperiment`.
     pub(crate) fn setup_experiment(&mut self, e: &fmi2::Experiment) -> Result<(), CallError> {
         let (tolerance, stop) = (e.tolerance.unwrap_or(0.0), e.stop_time.unwrap_or(0.0));
         let (has_tolerance, has_stop) =
             (fmi2Boolean::from(e.tolerance.is_some()), fmi2Boolean::from(e.stop_time.is_some()));
+        let name = "fmi2SetupExperiment";
+        let function = function!(self.setup_experiment, name);
+        self.sink.set_time(e.start_time);
         // SAFETY: the instance is alive.
         let status = unsafe {
-            (self.library.common.setup_experiment)(
-                self.pointer,
-                has_tolerance,
-                tolerance,
-                e.start_time,
-                has_stop,
-                stop,
-            )
-        };
-        self.check("fmi2SetupExperiment", status)
-    }
-
-    /// `fmi2SetString` of one variable.
-    pub(crate) fn set_string(&mut self, reference: u32, value: &str) -> Result<(), CallError> {
-        let value = c_string(value);
-        // SAFETY: the instance is alive; one reference, one terminated string.
-        let status = unsafe {
-            let pointer = value.as_ptr();
-            (self.library.common.set_string)(
-                self.pointer,
-                &raw const reference,
-                1,
-                &raw const pointer,
-            )
-        };
-        self.check("fmi2SetString", status)
-    }
-
-    /// `fmi2SetRealInputDerivatives` of first order.
-    pub(crate) fn set_input_slopes(&mut self, to: &[u32], slopes: &[f64]) -> Result<(), CallError> {
-        self.ones.resize(self.ones.len().max(same_length(to, slopes)), 1);
-        let name = "fmi2SetRealInputDerivatives";
-        let function = self.library.simulation(name)?.set_real_input_derivatives;
-        // SAFETY: the instance is alive; the arrays have `to.len()` elements.
-        let status = unsafe {
-            function(self.pointer, to.as_ptr(), to.len(), self.ones.as_ptr(), slopes.as_ptr())
+            function(self.pointer, has_tolerance, tolerance, e.start_time, has_stop, stop)
         };
         self.check(name, status)
     }
 
-    /// `fmi2GetRealOutputDerivatives` of first order.
-    pub(crate) fn get_output_slopes(
+    /// `fmi2SetString`.
+    pub(crate) fn set_string(
         &mut self,
-        from: &[u32],
-        slopes: &mut [f64],
+        references: &[u32],
+        values: &[String],
     ) -> Result<(), CallError> {
-        self.ones.resize(self.ones.len().max(same_length(from, slopes)), 1);
-        let name = "fmi2GetRealOutputDerivatives";
-        let function = self.library.simulation(name)?.get_real_output_derivatives;
-        // SAFETY: the instance is alive; the arrays have `from.len()` elements.
-        let status = unsafe {
-            function(
-                self.pointer,
-                from.as_ptr(),
-                from.len(),
-                self.ones.as_ptr(),
-                slopes.as_mut_ptr(),
-            )
-        };
+        let name = "fmi2SetString";
+        let function = function!(self.set_string, name);
+        let count = same_length(references, values);
+        let values: Vec<_> = values.iter().map(|value| c_string(value)).collect();
+        let pointers: Vec<_> = values.iter().map(|value| value.as_ptr()).collect();
+        // SAFETY: the instance is alive; as many references as terminated strings.
+        let status =
+            unsafe { function(self.pointer, references.as_ptr(), count, pointers.as_ptr()) };
         self.check(name, status)
+    }
+
+    /// `fmi2GetString`.
+    pub(crate) fn get_string(
+        &mut self,
+        references: &[u32],
+        values: &mut [String],
+    ) -> Result<(), CallError> {
+        let name = "fmi2GetString";
+        let function = function!(self.get_string, name);
+        let count = same_length(references, values);
+        let mut pointers = vec![std::ptr::null(); count];
+        // SAFETY: the instance is alive; as many references as places for pointers.
+        let status =
+            unsafe { function(self.pointer, references.as_ptr(), count, pointers.as_mut_ptr()) };
+        self.check(name, status)?;
+        for (value, pointer) in values.iter_mut().zip(pointers) {
+            value.clear();
+            // SAFETY: the FMU gives null or terminated strings, which live until the next call.
+            let text = unsafe { pointer.as_ref().map(|text| CStr::from_ptr(text)) };
+            if let Some(text) = text {
+                value.push_str(&text.to_string_lossy());
+            }
+        }
+        Ok(())
     }
 
     /// `fmi2NewDiscreteStates`.
     pub(crate) fn new_discrete_states(&mut self) -> Result<fmi2EventInfo, CallError> {
         let name = "fmi2NewDiscreteStates";
         let mut info = fmi2EventInfo::default();
-        let function = self.library.exchange(name)?.new_discrete_states;
+        let function = function!(self.new_discrete_states, name);
         // SAFETY: the instance is alive; one structure to write to.
         let status = unsafe { function(self.pointer, &raw mut info) };
         self.check(name, status)?;
         Ok(info)
     }
 
-    /// `fmi2GetFMUstate`: keeps the state of now, in place of the one kept before.
-    pub(crate) fn save(&mut self) -> Result<(), CallError> {
-        let name = "fmi2GetFMUstate";
-        let function = self.library.snapshot(name)?.get;
-        // SAFETY: the instance is alive; the state is null or its own.
-        let status = unsafe { function(self.pointer, &raw mut self.saved) };
-        self.check(name, status)
-    }
-
-    /// `fmi2SetFMUstate`: back to the state that [`Component::save`] keeps.
-    pub(crate) fn restore(&mut self) -> Result<(), CallError> {
-        let name = "fmi2SetFMUstate";
-        assert!(!self.saved.is_null(), "a state is kept");
-        let function = self.library.snapshot(name)?.set;
-        // SAFETY: the instance is alive; the state is its own.
-        let status = unsafe { function(self.pointer, self.saved) };
-        self.check(name, status)
-    }
-
-    /// `fmi2GetDirectionalDerivative` with respect to one known, for a change of one.
-    pub(crate) fn derivative(
+    /// `fmi2GetDirectionalDerivative`.
+    pub(crate) fn directional_derivative(
         &mut self,
         unknowns: &[u32],
-        known: u32,
-        values: &mut [f64],
+        knowns: &[u32],
+        seed: &[f64],
+        changes: &mut [f64],
     ) -> Result<(), CallError> {
         let name = "fmi2GetDirectionalDerivative";
-        let function = self.library.directional(name)?.get_directional_derivative;
-        let (length, change) = (same_length(unknowns, values), 1.0);
-        // SAFETY: the instance is alive; `length` unknowns and values, one known and its change.
+        let function = function!(self.get_directional_derivative, name);
+        let (unknown, known) = (same_length(unknowns, changes), same_length(knowns, seed));
+        // SAFETY: the instance is alive; arrays that belong together are equally long.
         let status = unsafe {
             function(
                 self.pointer,
                 unknowns.as_ptr(),
-                length,
-                &raw const known,
-                1,
-                &raw const change,
-                values.as_mut_ptr(),
+                unknown,
+                knowns.as_ptr(),
+                known,
+                seed.as_ptr(),
+                changes.as_mut_ptr(),
             )
         };
         self.check(name, status)

@@ -1,119 +1,130 @@
-//! The functions of the standard by name and signature, in tables: one that every library has, one
-//! for each interface, and one for each capability.
+//! The functions of the standard by name and signature.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
 use std::path::Path;
 
 use fmi2::abi::{
-    fmi2Boolean, fmi2CallbackFunctions, fmi2Component, fmi2EventInfo, fmi2FMUstate, fmi2Integer,
-    fmi2Real, fmi2Status, fmi2String, fmi2Type, fmi2ValueReference,
+    fmi2Boolean, fmi2Byte, fmi2CallbackFunctions, fmi2Component, fmi2EventInfo, fmi2FMUstate,
+    fmi2Integer, fmi2Real, fmi2Status, fmi2StatusKind, fmi2String, fmi2Type, fmi2ValueReference,
 };
 use libloading::Library as Handle;
 
+use super::Interface;
 use crate::error::LoadError;
 
-/// Declares a table of functions and its loading.
+/// Declares the table of functions and its loading.
 macro_rules! functions {
-    ($(#[$doc:meta])* $table:ident {
-        $($field:ident = $name:literal: fn($($argument:ty),*) $(-> $result:ty)?;)*
-    }) => {
-        $(#[$doc])*
+    ($($field:ident = $name:literal: fn($($argument:ty),*) $(-> $result:ty)?;)*) => {
+        /// What a library offers. The standard wants every function in every library; what is
+        /// missing is missed by who calls it.
         #[derive(Clone, Copy)]
-        pub(super) struct $table {
-            $(pub(super) $field: unsafe extern "C" fn($($argument),*) $(-> $result)?,)*
+        pub(super) struct Functions {
+            $(pub(super) $field: Option<unsafe extern "C" fn($($argument),*) $(-> $result)?>,)*
         }
 
-        impl $table {
-            pub(super) fn load(handle: &Handle, path: &Path) -> Result<Self, LoadError> {
-                Ok(Self { $($field: {
+        impl Functions {
+            pub(super) fn load(handle: &Handle) -> Self {
+                Self { $($field: {
                     // SAFETY: the standard gives this name this signature.
                     let symbol = unsafe { handle.get(concat!($name, "\0").as_bytes()) };
-                    *symbol.map_err(|_| LoadError::Missing {
-                        path: path.to_owned(),
-                        function: $name.to_owned(),
-                    })?
-                },)* })
+                    symbol.ok().map(|symbol| *symbol)
+                },)* }
+            }
+
+            /// Whether the function of that name is there.
+            fn has(&self, function: &str) -> bool {
+                match function {
+                    $($name => self.$field.is_some(),)*
+                    _ => false,
+                }
             }
         }
     };
 }
 
 type References = *const fmi2ValueReference;
+type Component = fmi2Component;
 
 functions! {
-    /// What both interfaces have.
-    Common {
-        get_version = "fmi2GetVersion": fn() -> fmi2String;
-        instantiate = "fmi2Instantiate": fn(fmi2String, fmi2Type, fmi2String, fmi2String,
-            *const fmi2CallbackFunctions, fmi2Boolean, fmi2Boolean) -> fmi2Component;
-        free_instance = "fmi2FreeInstance": fn(fmi2Component);
-        setup_experiment = "fmi2SetupExperiment": fn(fmi2Component, fmi2Boolean, fmi2Real, fmi2Real,
-            fmi2Boolean, fmi2Real) -> fmi2Status;
-        enter_initialization_mode = "fmi2EnterInitializationMode": fn(fmi2Component) -> fmi2Status;
-        exit_initialization_mode = "fmi2ExitInitializationMode": fn(fmi2Component) -> fmi2Status;
-        terminate = "fmi2Terminate": fn(fmi2Component) -> fmi2Status;
-        get_real = "fmi2GetReal":
-            fn(fmi2Component, References, usize, *mut fmi2Real) -> fmi2Status;
-        get_integer = "fmi2GetInteger":
-            fn(fmi2Component, References, usize, *mut fmi2Integer) -> fmi2Status;
-        get_boolean = "fmi2GetBoolean":
-            fn(fmi2Component, References, usize, *mut fmi2Boolean) -> fmi2Status;
-        set_real = "fmi2SetReal":
-            fn(fmi2Component, References, usize, *const fmi2Real) -> fmi2Status;
-        set_integer = "fmi2SetInteger":
-            fn(fmi2Component, References, usize, *const fmi2Integer) -> fmi2Status;
-        set_boolean = "fmi2SetBoolean":
-            fn(fmi2Component, References, usize, *const fmi2Boolean) -> fmi2Status;
-        set_string = "fmi2SetString":
-            fn(fmi2Component, References, usize, *const fmi2String) -> fmi2Status;
-    }
+    get_version = "fmi2GetVersion": fn() -> fmi2String;
+    instantiate = "fmi2Instantiate": fn(fmi2String, fmi2Type, fmi2String, fmi2String,
+        *const fmi2CallbackFunctions, fmi2Boolean, fmi2Boolean) -> Component;
+    free_instance = "fmi2FreeInstance": fn(Component);
+    set_debug_logging = "fmi2SetDebugLogging":
+        fn(Component, fmi2Boolean, usize, *const fmi2String) -> fmi2Status;
+    setup_experiment = "fmi2SetupExperiment": fn(Component, fmi2Boolean, fmi2Real, fmi2Real,
+        fmi2Boolean, fmi2Real) -> fmi2Status;
+    enter_initialization_mode = "fmi2EnterInitializationMode": fn(Component) -> fmi2Status;
+    exit_initialization_mode = "fmi2ExitInitializationMode": fn(Component) -> fmi2Status;
+    terminate = "fmi2Terminate": fn(Component) -> fmi2Status;
+    get_real = "fmi2GetReal": fn(Component, References, usize, *mut fmi2Real) -> fmi2Status;
+    get_integer = "fmi2GetInteger":
+        fn(Component, References, usize, *mut fmi2Integer) -> fmi2Status;
+    get_boolean = "fmi2GetBoolean":
+        fn(Component, References, usize, *mut fmi2Boolean) -> fmi2Status;
+    get_string = "fmi2GetString": fn(Component, References, usize, *mut fmi2String) -> fmi2Status;
+    set_real = "fmi2SetReal": fn(Component, References, usize, *const fmi2Real) -> fmi2Status;
+    set_integer = "fmi2SetInteger":
+        fn(Component, References, usize, *const fmi2Integer) -> fmi2Status;
+    set_boolean = "fmi2SetBoolean":
+        fn(Component, References, usize, *const fmi2Boolean) -> fmi2Status;
+    set_string = "fmi2SetString":
+        fn(Component, References, usize, *const fmi2String) -> fmi2Status;
+    get_state = "fmi2GetFMUstate": fn(Component, *mut fmi2FMUstate) -> fmi2Status;
+    set_state = "fmi2SetFMUstate": fn(Component, fmi2FMUstate) -> fmi2Status;
+    free_state = "fmi2FreeFMUstate": fn(Component, *mut fmi2FMUstate) -> fmi2Status;
+    serialized_state_size = "fmi2SerializedFMUstateSize":
+        fn(Component, fmi2FMUstate, *mut usize) -> fmi2Status;
+    serialize_state = "fmi2SerializeFMUstate":
+        fn(Component, fmi2FMUstate, *mut fmi2Byte, usize) -> fmi2Status;
+    deserialize_state = "fmi2DeSerializeFMUstate":
+        fn(Component, *const fmi2Byte, usize, *mut fmi2FMUstate) -> fmi2Status;
+    get_directional_derivative = "fmi2GetDirectionalDerivative": fn(Component, References,
+        usize, References, usize, *const fmi2Real, *mut fmi2Real) -> fmi2Status;
+    set_real_input_derivatives = "fmi2SetRealInputDerivatives": fn(Component, References,
+        usize, *const fmi2Integer, *const fmi2Real) -> fmi2Status;
+    get_real_output_derivatives = "fmi2GetRealOutputDerivatives": fn(Component, References,
+        usize, *const fmi2Integer, *mut fmi2Real) -> fmi2Status;
+    do_step = "fmi2DoStep": fn(Component, fmi2Real, fmi2Real, fmi2Boolean) -> fmi2Status;
+    get_status = "fmi2GetStatus": fn(Component, fmi2StatusKind, *mut fmi2Status) -> fmi2Status;
+    get_real_status = "fmi2GetRealStatus":
+        fn(Component, fmi2StatusKind, *mut fmi2Real) -> fmi2Status;
+    get_boolean_status = "fmi2GetBooleanStatus":
+        fn(Component, fmi2StatusKind, *mut fmi2Boolean) -> fmi2Status;
+    enter_event_mode = "fmi2EnterEventMode": fn(Component) -> fmi2Status;
+    new_discrete_states = "fmi2NewDiscreteStates":
+        fn(Component, *mut fmi2EventInfo) -> fmi2Status;
+    enter_continuous_time_mode = "fmi2EnterContinuousTimeMode": fn(Component) -> fmi2Status;
+    set_continuous_states = "fmi2SetContinuousStates":
+        fn(Component, *const fmi2Real, usize) -> fmi2Status;
+    get_continuous_states = "fmi2GetContinuousStates":
+        fn(Component, *mut fmi2Real, usize) -> fmi2Status;
+    get_derivatives = "fmi2GetDerivatives": fn(Component, *mut fmi2Real, usize) -> fmi2Status;
+    get_nominals = "fmi2GetNominalsOfContinuousStates":
+        fn(Component, *mut fmi2Real, usize) -> fmi2Status;
 }
 
-functions! {
-    /// Co-simulation.
-    CoSimulation {
-        set_real_input_derivatives = "fmi2SetRealInputDerivatives": fn(fmi2Component, References,
-            usize, *const fmi2Integer, *const fmi2Real) -> fmi2Status;
-        get_real_output_derivatives = "fmi2GetRealOutputDerivatives": fn(fmi2Component, References,
-            usize, *const fmi2Integer, *mut fmi2Real) -> fmi2Status;
-        do_step = "fmi2DoStep":
-            fn(fmi2Component, fmi2Real, fmi2Real, fmi2Boolean) -> fmi2Status;
-    }
-}
+/// What no instance can do without.
+const ALWAYS: [&str; 5] = [
+    "fmi2Instantiate",
+    "fmi2FreeInstance",
+    "fmi2SetupExperiment",
+    "fmi2EnterInitializationMode",
+    "fmi2ExitInitializationMode",
+];
 
-functions! {
-    /// Model exchange.
-    ModelExchange {
-        enter_event_mode = "fmi2EnterEventMode": fn(fmi2Component) -> fmi2Status;
-        new_discrete_states = "fmi2NewDiscreteStates":
-            fn(fmi2Component, *mut fmi2EventInfo) -> fmi2Status;
-        enter_continuous_time_mode = "fmi2EnterContinuousTimeMode": fn(fmi2Component) -> fmi2Status;
-        set_continuous_states = "fmi2SetContinuousStates":
-            fn(fmi2Component, *const fmi2Real, usize) -> fmi2Status;
-        get_continuous_states = "fmi2GetContinuousStates":
-            fn(fmi2Component, *mut fmi2Real, usize) -> fmi2Status;
-        get_derivatives = "fmi2GetDerivatives":
-            fn(fmi2Component, *mut fmi2Real, usize) -> fmi2Status;
-        get_nominals = "fmi2GetNominalsOfContinuousStates":
-            fn(fmi2Component, *mut fmi2Real, usize) -> fmi2Status;
-    }
-}
-
-functions! {
-    /// `canGetAndSetFMUstate`.
-    Snapshot {
-        get = "fmi2GetFMUstate":
-            fn(fmi2Component, *mut fmi2FMUstate) -> fmi2Status;
-        set = "fmi2SetFMUstate": fn(fmi2Component, fmi2FMUstate) -> fmi2Status;
-        free = "fmi2FreeFMUstate":
-            fn(fmi2Component, *mut fmi2FMUstate) -> fmi2Status;
-    }
-}
-
-functions! {
-    /// `providesDirectionalDerivative`.
-    Directional {
-        get_directional_derivative = "fmi2GetDirectionalDerivative": fn(fmi2Component, References,
-            usize, References, usize, *const fmi2Real, *mut fmi2Real) -> fmi2Status;
+impl Functions {
+    /// The functions without which `interface` cannot be used are there.
+    pub(super) fn demand(&self, interface: Interface, path: &Path) -> Result<(), LoadError> {
+        let more: &[&str] = match interface {
+            Interface::CoSimulation => &["fmi2DoStep"],
+            Interface::ModelExchange => {
+                &["fmi2NewDiscreteStates", "fmi2GetDerivatives", "fmi2SetContinuousStates"]
+            }
+        };
+        let missing = ALWAYS.iter().chain(more).find(|function| !self.has(function));
+        missing.map_or(Ok(()), |function| {
+            Err(LoadError::Missing { path: path.to_owned(), function: (*function).to_owned() })
+        })
     }
 }

@@ -49,7 +49,7 @@ impl<'p> Bench<'p> {
         step: f64,
     ) -> Result<Self, LineariseError> {
         let mut component = initialised(fmu, Interface::CoSimulation, parts, request)?;
-        component.save()?;
+        component.save_state(0)?;
         let x = read(&mut component, states.iter())?;
         let u = read(&mut component, parts.inputs.iter())?;
         let y = read(&mut component, parts.outputs.iter())?;
@@ -74,7 +74,7 @@ impl<'p> Bench<'p> {
         count: usize,
         deviation: impl Fn(usize, usize) -> f64,
     ) -> Result<DMatrix<f64>, LineariseError> {
-        self.component.restore()?;
+        self.component.restore_state(0)?;
         let mut course = DMatrix::zeros(count + 1, self.readings.len());
         let mut row = vec![0.0; self.readings.len()];
         for step in 0..=count {
@@ -92,7 +92,7 @@ impl<'p> Bench<'p> {
                 let values: Vec<f64> = self.u.iter().enumerate().map(value).collect();
                 self.component.set_real(&self.inputs, &values)?;
                 let time = self.start + index(step) * self.step;
-                self.component.do_step(time, self.step, 0)?;
+                self.component.do_step(time, self.step, false)?;
             }
         }
         Ok(course)

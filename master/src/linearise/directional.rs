@@ -27,7 +27,7 @@ pub(super) fn jacobian(
     let mut values = vec![0.0; unknowns.len()];
     for (column, &known) in knowns.iter().enumerate() {
         if !unknowns.is_empty() {
-            component.derivative(&unknowns, known, &mut values)?;
+            component.directional_derivative(&unknowns, &[known], &[1.0], &mut values)?;
         }
         for (&row, &value) in asked.iter().zip(&values) {
             if !value.is_finite() {

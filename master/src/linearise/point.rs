@@ -42,7 +42,9 @@ fn set(component: &mut Component, setting: &Setting) -> Result<(), LineariseErro
         Value::Real(value) => component.set_real(&to, &[*value]),
         Value::Integer(value) => component.set_integer(&to, &[*value]),
         Value::Boolean(value) => component.set_boolean(&to, &[i32::from(*value)]),
-        Value::String(value) => component.set_string(setting.reference, value),
+        Value::String(value) => {
+            component.set_string(&[setting.reference], std::slice::from_ref(value))
+        }
     };
     done.map_err(|source| refused(&setting.name, &setting.text, source))
 }
@@ -140,7 +142,7 @@ impl<'p> Equations<'p> {
         let flags = fmu.description().model_exchange.as_ref();
         let returns = flags.is_some_and(|flags| flags.can_get_and_set_fmu_state);
         if returns {
-            component.save()?;
+            component.save_state(0)?;
         }
         let references = |parts: &[Part]| parts.iter().map(|part| part.reference).collect();
         let (inputs, outputs) = (references(&parts.inputs), references(&parts.outputs));
@@ -160,7 +162,7 @@ impl<'p> Equations<'p> {
         change: Option<(Known, f64)>,
     ) -> Result<Vec<f64>, LineariseError> {
         if self.returns {
-            self.component.restore()?;
+            self.component.restore_state(0)?;
         }
         let (mut x, mut u) = (self.x.clone(), self.u.clone());
         let mut changed = None;

@@ -1,0 +1,99 @@
+//! `fmi2DoStep` and what its answers ask for.
+#![expect(unsafe_code, reason = "the boundary to C")]
+
+use std::time::{Duration, Instant};
+
+use fmi2::abi::{Status, StatusKind, fmi2Status};
+
+use super::Component;
+use super::calls::function;
+use crate::slave::{CallError, Failure, Stepped, absent};
+
+const NAME: &str = "fmi2DoStep";
+
+/// Longest pause between two questions whether a pending step is done.
+const PAUSE: Duration = Duration::from_millis(1);
+
+impl Component {
+    /// `fmi2DoStep` from `time` over `size`.
+    #[inline]
+    pub(crate) fn do_step(
+        &mut self,
+        time: f64,
+        size: f64,
+        never_back: bool,
+    ) -> Result<Stepped, CallError> {
+        let function = function!(self.do_step, NAME);
+        self.sink.set_time(time);
+        // SAFETY: the instance is alive.
+        let status = unsafe { function(self.pointer, time, size, never_back.into()) };
+        if status == Status::OK as fmi2Status || status == Status::Warning as fmi2Status {
+            return Ok(Stepped::Whole);
+        }
+        self.unfinished(status, time, size)
+    }
+
+    /// What a step that did not answer `fmi2OK` came to.
+    #[cold]
+    fn unfinished(
+        &mut self,
+        mut status: fmi2Status,
+        time: f64,
+        size: f64,
+    ) -> Result<Stepped, CallError> {
+        let (begin, mut pause) = (Instant::now(), Duration::from_micros(1));
+        while status == Status::Pending as fmi2Status {
+            if self.time_limit.is_some_and(|limit| begin.elapsed() > limit) {
+                let seconds = begin.elapsed().as_secs_f64();
+                return Err(self.failed(NAME, Failure::TimedOut(seconds)));
+            }
+            std::thread::sleep(pause);
+            pause = (2 * pause).min(PAUSE);
+            status = self.status(StatusKind::DoStepStatus)?;
+        }
+        if status != Status::Discard as fmi2Status {
+            return self.check(NAME, status).map(|()| Stepped::Whole);
+        }
+        let Ok(reached) = self.real_status(StatusKind::LastSuccessfulTime) else {
+            return self.check(NAME, status).map(|()| Stepped::Whole);
+        };
+        let terminated = self.boolean_status(StatusKind::Terminated).unwrap_or(false);
+        let rounding = 1e-9 * (size.abs() + time.abs());
+        if !(reached >= time - rounding && reached <= time + size + rounding) {
+            let what = format!(
+                "returned fmi2Discard with the last successful time {reached} s, expected one \
+                 from {time} to {} s",
+                time + size
+            );
+            return Err(self.failed(NAME, Failure::Nonsense(what)));
+        }
+        Ok(Stepped::Part { reached, terminated })
+    }
+
+    fn status(&mut self, kind: StatusKind) -> Result<fmi2Status, CallError> {
+        let name = "fmi2GetStatus";
+        let (function, mut value) = (function!(self.get_status, name), 0);
+        // SAFETY: the instance is alive; one place to write to.
+        let status = unsafe { function(self.pointer, kind as i32, &raw mut value) };
+        self.check(name, status)?;
+        Ok(value)
+    }
+
+    fn real_status(&mut self, kind: StatusKind) -> Result<f64, CallError> {
+        let name = "fmi2GetRealStatus";
+        let (function, mut value) = (function!(self.get_real_status, name), f64::NAN);
+        // SAFETY: the instance is alive; one place to write to.
+        let status = unsafe { function(self.pointer, kind as i32, &raw mut value) };
+        self.check(name, status)?;
+        Ok(value)
+    }
+
+    fn boolean_status(&mut self, kind: StatusKind) -> Result<bool, CallError> {
+        let name = "fmi2GetBooleanStatus";
+        let (function, mut value) = (function!(self.get_boolean_status, name), 0);
+        // SAFETY: the instance is alive; one place to write to.
+        let status = unsafe { function(self.pointer, kind as i32, &raw mut value) };
+        self.check(name, status)?;
+        Ok(value != 0)
+    }
+}
