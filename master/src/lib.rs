@@ -23,12 +23,13 @@ mod system;
 pub mod transformation;
 mod value;
 
+pub use algorithm::{Algorithm, Coupling, Course, StepControl, Sweep};
 pub use error::{LoadError, SystemError};
 pub use fmu::{Fmu, FmuError, Instance};
 pub use library::{Interface, describe, preload};
 pub use linearise::{Linearisation, Linearise, LineariseError, linearise};
 pub use order::{Order, by_direct_dependencies};
 pub use probe::Probe;
-pub use simulation::{Method, Simulation};
+pub use simulation::Simulation;
 pub use slave::{Advance, CallError, Failure, Slave, Stepped};
 pub use system::{Connection, Port, System};
