@@ -7,6 +7,7 @@
 
 pub mod algorithm;
 pub mod assembly;
+mod choose;
 mod error;
 mod exchange;
 #[cfg(feature = "fmi")]
@@ -25,6 +26,7 @@ pub mod transformation;
 mod value;
 
 pub use algorithm::{Algorithm, Coupling, Course, StepControl, Sweep};
+pub use choose::{Chosen, Wanted, choose};
 pub use error::{LoadError, SystemError};
 pub use fmu::{Fmu, FmuError, Instance};
 pub use library::{Interface, describe, preload};

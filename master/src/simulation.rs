@@ -39,6 +39,7 @@ impl Simulation {
         algorithm: &Algorithm,
         experiment: &Experiment,
     ) -> Result<Self, SystemError> {
+        algorithm.check(&system)?;
         let grid = Grid::new(&system, algorithm, experiment)?;
         let mut exchange = Exchange::new(&system, algorithm);
         let order = by_direct_dependencies(&system);

@@ -2,7 +2,7 @@
 
 use fmi2::Experiment;
 
-use crate::algorithm::{Algorithm, StepControl};
+use crate::algorithm::Algorithm;
 use crate::error::SystemError;
 use crate::system::System;
 
@@ -37,24 +37,17 @@ impl Grid {
             return Err(SystemError::Time { what, value: stop, rule });
         }
         let grid = Self { start, stop, step, count: 0, time: start };
-        grid.check_rigid(system, algorithm)?;
+        grid.check_rigid(system)?;
         Ok(grid)
     }
 
     /// Slaves that take equal steps only get equal steps.
-    fn check_rigid(&self, system: &System, algorithm: &Algorithm) -> Result<(), SystemError> {
+    fn check_rigid(&self, system: &System) -> Result<(), SystemError> {
         let rigid = system.slaves.iter().find(|(_, slave)| {
             let flags = slave.description().co_simulation.as_ref();
             flags.is_some_and(|flags| !flags.can_handle_variable_communication_step_size)
         });
         let (Some((name, _)), Some(stop)) = (rigid, self.stop) else { return Ok(()) };
-        if algorithm.control != StepControl::Fixed || !algorithm.events.is_empty() {
-            return Err(SystemError::Capability {
-                slave: name.clone(),
-                lacks: "canHandleVariableCommunicationStepSize",
-                wanted: format!("the step control {}", algorithm.control.name()),
-            });
-        }
         let steps = (stop - self.start) / self.step;
         if (steps - steps.round()).abs() > 1e-6 {
             let rule = format!(
