@@ -9,6 +9,7 @@ pub mod algorithm;
 pub mod assembly;
 mod error;
 mod exchange;
+pub mod fault;
 #[cfg(feature = "fmi")]
 pub mod fmi_crate;
 mod fmu;
@@ -17,6 +18,8 @@ pub mod linearise;
 mod nearest;
 mod order;
 mod probe;
+pub mod scenario;
+pub mod signal;
 mod simulation;
 mod slave;
 mod system;
