@@ -10,6 +10,7 @@ pub mod assembly;
 mod choose;
 mod error;
 mod exchange;
+pub mod fault;
 #[cfg(feature = "fmi")]
 pub mod fmi_crate;
 mod fmu;
@@ -19,6 +20,8 @@ mod nearest;
 mod order;
 mod probe;
 mod readout;
+pub mod scenario;
+pub mod signal;
 mod simulation;
 mod slave;
 pub mod solve;
