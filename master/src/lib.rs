@@ -19,6 +19,7 @@ mod order;
 mod probe;
 mod simulation;
 mod slave;
+pub mod ssp;
 mod system;
 pub mod transformation;
 mod value;
