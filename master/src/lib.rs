@@ -25,6 +25,7 @@ pub mod signal;
 mod simulation;
 mod slave;
 pub mod solve;
+pub mod ssp;
 mod system;
 pub mod transformation;
 mod value;
