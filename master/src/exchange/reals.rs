@@ -5,6 +5,8 @@ use super::layout::Layout;
 use super::trace::Span;
 pub(crate) use super::trace::Trace;
 use crate::algorithm::{Algorithm, Coupling, Course, StepControl, Sweep};
+use crate::fault::FaultLine;
+use crate::signal::Sample;
 use crate::slave::{Advance, CallError, Slave, Stepped};
 use crate::system::{Port, System};
 
@@ -12,6 +14,8 @@ use crate::system::{Port, System};
 #[derive(Debug)]
 pub(crate) struct Reals {
     pub(super) layout: Layout,
+    /// Faults by input; empty where there are none at all.
+    faults: Vec<Option<FaultLine>>,
     course: Course,
     sweep: Sweep,
     /// Every input is held and all slaves step together: the latest values are all it takes.
@@ -41,6 +45,7 @@ impl Reals {
             spans: vec![span; system.slaves.len()],
         };
         Self {
+            faults: Vec::new(),
             assumed: vec![0.0; outputs],
             assumes: false,
             values: vec![0.0; layout.sources.len()],
@@ -79,6 +84,32 @@ impl Reals {
     /// The outputs of type Integer that go to Reals: port, and index among the outputs.
     pub(crate) fn from_integers(&self) -> &[(Port, usize)] {
         &self.layout.from_integers
+    }
+
+    /// Puts a fault on the way to an input; false where there is no such connected input.
+    pub(crate) fn set_fault(&mut self, input: Port, fault: &FaultLine) -> bool {
+        let Some(k) = self.layout.input_ports.iter().position(|&port| port == input) else {
+            return false;
+        };
+        self.simple = false;
+        self.faults.resize(self.layout.sources.len(), None);
+        self.faults[k] = Some(fault.clone());
+        true
+    }
+
+    /// Tells the faults the undisturbed values at `time`, which is reached for good.
+    pub(crate) fn commit(&mut self, time: f64) {
+        for (k, fault) in self.faults.iter_mut().enumerate() {
+            if let Some(fault) = fault {
+                let value = self.trace.latest[self.layout.sources[k] as usize];
+                fault.commit(time, self.layout.factors[k].mul_add(value, self.layout.offsets[k]));
+            }
+        }
+    }
+
+    /// The faults, for a checkpoint.
+    pub(crate) fn faults(&mut self) -> impl Iterator<Item = &mut FaultLine> {
+        self.faults.iter_mut().flatten()
     }
 
     /// The slave will step from `time` over `size`: what was its end is its begin.
@@ -145,14 +176,26 @@ impl Reals {
             _ => course.value,
         };
         let factor = layout.factors[k];
-        self.values[k] =
+        let value =
             if layout.plain[slave] { value } else { factor.mul_add(value, layout.offsets[k]) };
-        let (count, first) = (lane.inputs.len(), lane.input_derivative_range.start + position);
-        if lane.input_order > 0 {
-            self.input_derivatives[first] = factor * course.slope;
+        let mut given = Polynomial {
+            value,
+            slope: factor * course.slope,
+            curvature: factor * course.curvature,
+        };
+        if let Some(Some(fault)) = self.faults.get(k) {
+            let at = if known && self.course == Course::Hold { time + size } else { time };
+            let sample = fault.apply_sample(at, Sample { value, slope: given.slope });
+            given = Polynomial { value: sample.value, slope: sample.slope, curvature: 0.0 };
         }
-        if lane.input_order > 1 {
-            self.input_derivatives[first + count] = factor * course.curvature;
+        let (count, first) = (lane.inputs.len(), lane.input_derivative_range.start + position);
+        let order = lane.input_order;
+        self.values[k] = given.value;
+        if order > 0 {
+            self.input_derivatives[first] = given.slope;
+        }
+        if order > 1 {
+            self.input_derivatives[first + count] = given.curvature;
         }
     }
 
