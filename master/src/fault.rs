@@ -179,9 +179,12 @@ impl FaultLine {
     /// simulation has reached for good, the start included.
     pub fn commit(&mut self, time: f64, value: f64) {
         let mut sample = Sample::held(value);
-        for stage in &mut self.stages {
+        let count = self.stages.len();
+        for (position, stage) in self.stages.iter_mut().enumerate() {
             stage.commit(time, sample.value);
-            sample = stage.apply(time, sample);
+            if position + 1 < count {
+                sample = stage.apply(time, sample);
+            }
         }
     }
 
