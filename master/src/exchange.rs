@@ -54,7 +54,7 @@ impl Values {
 impl Exchange {
     pub(crate) fn new(system: &System, algorithm: &Algorithm) -> Self {
         let reals = Reals::new(system, algorithm);
-        let to_reals = reals.from_integers().iter().map(|(port, _)| *port);
+        let to_reals = reals.integer_sources().iter().map(|(port, _)| *port);
         let is_integer = |kind: &Kind| matches!(kind, Kind::Integer(_) | Kind::Enumeration(_));
         let integers = Channel::new(system, INTEGERS, is_integer, to_reals);
         let is_boolean = |kind: &Kind| matches!(kind, Kind::Boolean(_));
@@ -185,8 +185,8 @@ impl Exchange {
     /// Integers that go to Reals.
     #[expect(clippy::needless_range_loop, reason = "the list is borrowed anew each time")]
     fn take_over_integers(&mut self) {
-        for k in 0..self.reals.from_integers().len() {
-            let (port, output) = self.reals.from_integers()[k];
+        for k in 0..self.reals.integer_sources().len() {
+            let (port, output) = self.reals.integer_sources()[k];
             if let Some(&value) = self.integers.value(port) {
                 self.reals.outputs_mut()[output] = f64::from(value);
             }

@@ -6,7 +6,6 @@ use super::trace::Span;
 pub(crate) use super::trace::Trace;
 use crate::algorithm::{Algorithm, Coupling, Course, StepControl, Sweep};
 use crate::fault::FaultLine;
-use crate::signal::Sample;
 use crate::slave::{Advance, CallError, Slave, Stepped};
 use crate::system::{Port, System};
 
@@ -82,7 +81,7 @@ impl Reals {
     }
 
     /// The outputs of type Integer that go to Reals: port, and index among the outputs.
-    pub(crate) fn from_integers(&self) -> &[(Port, usize)] {
+    pub(crate) fn integer_sources(&self) -> &[(Port, usize)] {
         &self.layout.from_integers
     }
 
@@ -184,9 +183,14 @@ impl Reals {
             curvature: factor * course.curvature,
         };
         if let Some(Some(fault)) = self.faults.get(k) {
-            let at = if known && self.course == Course::Hold { time + size } else { time };
-            let sample = fault.apply_sample(at, Sample { value, slope: given.slope });
-            given = Polynomial { value: sample.value, slope: sample.slope, curvature: 0.0 };
+            given = if lane.input_order > 0 {
+                let [value, slope, curvature] =
+                    fault.apply_course(time, [value, given.slope, given.curvature]);
+                Polynomial { value, slope, curvature }
+            } else {
+                let at_end = known && matches!(self.course, Course::Hold | Course::Limited);
+                Polynomial::held(fault.apply(if at_end { time + size } else { time }, value))
+            };
         }
         let (count, first) = (lane.inputs.len(), lane.input_derivative_range.start + position);
         let order = lane.input_order;
@@ -370,15 +374,15 @@ impl Reals {
     }
 }
 
-/// Whether all values are numbers and finite: of any other the difference with itself is none.
+/// Whether all values are numbers and finite: zero times any other is not zero.
 #[inline]
 fn all_finite(values: &[f64]) -> bool {
     let mut sums = [0.0; 4];
     let chunks = values.chunks_exact(4);
-    let rest: f64 = chunks.remainder().iter().map(|value| value - value).sum();
+    let rest: f64 = chunks.remainder().iter().map(|value| 0.0 * value).sum();
     for chunk in chunks {
         for (sum, value) in sums.iter_mut().zip(chunk) {
-            *sum += value - value;
+            *sum += 0.0 * value;
         }
     }
     (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest == 0.0
