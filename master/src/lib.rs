@@ -17,6 +17,7 @@ pub mod linearise;
 mod nearest;
 mod order;
 mod probe;
+pub mod results;
 mod simulation;
 mod slave;
 mod system;
