@@ -11,6 +11,8 @@ mod figure;
 mod new;
 mod pack;
 mod paper_figures;
+#[cfg_attr(not(test), expect(dead_code, reason = "until the verb run has --plot"))]
+mod plot;
 mod recording;
 mod reproduce;
 mod run;

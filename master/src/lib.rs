@@ -20,6 +20,7 @@ mod nearest;
 mod order;
 mod probe;
 mod readout;
+pub mod results;
 pub mod scenario;
 pub mod signal;
 mod simulation;
