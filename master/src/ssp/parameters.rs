@@ -11,7 +11,6 @@ use super::flatten::Flow;
 use super::structure::{ConnectorKind, MappingEntry, Parameter, ParameterSet};
 use super::tree::{Binding, Content, Tree, Vertex};
 use crate::assembly::Setting;
-use crate::transformation::Transformation;
 use value::Value;
 
 /// Names of a binding that match nothing and are still named in a warning.
@@ -179,15 +178,7 @@ impl Applied<'_> {
         let measure = self.tree.measure(&first.from);
         let way =
             Flow::over(self.tree, &path, measure.clone()).map_err(|error| error.to_string())?;
-        let number = match way.transformation {
-            Transformation::Identity => value.number,
-            Transformation::Linear { factor, offset } if factor != 0.0 => {
-                let back =
-                    Transformation::Linear { factor: 1.0 / factor, offset: -offset / factor };
-                value.number.transformed(&back)?
-            }
-            _ => return Err("the transformation on the way has no inverse".to_owned()),
-        };
+        let number = value.number.before(&way.transformation)?;
         self.set_variable(&first.from.clone(), &Value::new(number, measure))
     }
 
