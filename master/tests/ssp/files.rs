@@ -37,7 +37,10 @@ fn pair(a: &str, b: &str) -> String {
 fn an_ssp_is_opened_with_its_default_or_another_variant() {
     let bench = Bench::new();
     let [a, b] = fmus(&bench);
-    let system = pair("resources/my%20a.fmu", "./resources/b.fmu");
+    let system = pair("resources/my%20a.fmu", "./resources/b.fmu").replace(
+        "</ssd:Connectors></ssd:Component><ssd:Component",
+        r#"</ssd:Connectors><ssd:Annotations><ssc:Annotation type="com.opensimulationplatform"><osp:StepSizeHint value="0.25"/></ssc:Annotation></ssd:Annotations></ssd:Component><ssd:Component"#,
+    );
     let experiment = r#"<ssd:DefaultExperiment startTime="1" stopTime="2.5"><ssd:Annotations><ssc:Annotation type="com.opensimulationplatform"><osp:Algorithm><osp:FixedStepAlgorithm baseStepSize="1e-3"/></osp:Algorithm></ssc:Annotation></ssd:Annotations></ssd:DefaultExperiment>"#;
     let lone = component("lone", "resources/b.fmu", "", "");
     let path = archive(
@@ -55,6 +58,7 @@ fn an_ssp_is_opened_with_its_default_or_another_variant() {
     assert_eq!((assembly.start_time, assembly.stop_time), (Some(1.0), Some(2.5)));
     assert_eq!(assembly.name.as_deref(), Some("Test"));
     assert_eq!(opened.experiment.step_size, Some(1e-3));
+    assert_eq!(opened.steps, [("a".to_owned(), 0.25)]);
     for element in &assembly.elements {
         assert!(element.fmu.join("modelDescription.xml").is_file());
     }
@@ -185,19 +189,27 @@ fn what_cannot_be_found_or_run_is_said_with_its_place() {
         (exchange.to_owned(), "a: model exchange is wanted, and only co-simulation can be run"),
         (web, "has the scheme https, expected a relative path or file:"),
         (
-            component("a", "a.fmu", "", "")
-                + &component("a.a", "a.fmu", "", "")
-                + &crate::bench::system("a", "", "", "").replace("name=\"a\"", "name=\"b\""),
-            "expected Component, System and SignalDictionaryReference",
+            "<ssd:Oops/>".to_owned(),
+            "expected Component, System and SignalDictionaryReference, found Oops at line ",
         ),
     ] {
-        let elements = elements
-            .replace("<ssd:Elements></ssd:Elements>", "<ssd:Elements><ssd:Oops/></ssd:Elements>");
         let text = bench.refusal(&root(&elements, ""), "");
         assert!(text.contains(expected), "{text}");
     }
     let missing = bench.path("Nothing.ssd");
     assert!(open(&missing).unwrap_err().to_string().starts_with("cannot read"));
+}
+
+#[test]
+fn two_components_of_one_hierarchical_name_are_refused() {
+    let bench = Bench::new();
+    fmus(&bench);
+    let inner = format!(
+        r#"<ssd:System name="x">{}</ssd:System>"#,
+        root(&component("a", "a.fmu", "", ""), "")
+    );
+    let text = bench.refusal(&root(&(inner + &component("x.a", "a.fmu", "", "")), ""), "");
+    assert!(text.ends_with("two components have the hierarchical name x.a"), "{text}");
 }
 
 #[test]

@@ -33,12 +33,16 @@ fn unknown_elements_geometry_and_foreign_annotations_are_skipped() {
     assert_eq!(structure.system.connections.len(), 0);
 }
 
+/// Compares what the reader of SSD files says of each text.
+fn refused(cases: &[(String, &str)]) {
+    for (text, expected) in cases {
+        assert_eq!(read_ssd(text.as_bytes()).unwrap_err().to_string(), *expected, "{text}");
+    }
+}
+
 #[test]
-fn what_is_wrong_is_said_with_line_column_and_expectation() {
-    let component = |attributes: &str, inside: &str| {
-        ssd(&root(&format!("<ssd:Component {attributes}>{inside}</ssd:Component>"), ""), "")
-    };
-    for (text, expected) in [
+fn what_is_wrong_with_a_file_is_said_with_line_column_and_expectation() {
+    refused(&[
         (
             String::new(),
             "line 1, column 1: expected well-formed XML, found: a file without an element",
@@ -59,6 +63,30 @@ fn what_is_wrong_is_said_with_line_column_and_expectation() {
             ssd("", "").replace("version=\"1.0\"\n", "version=\"2.0\"\n"),
             "line 2, column 1: <SystemStructureDescription>: expected version 1.0, found \"2.0\"",
         ),
+        (
+            ssd("", "<ssd:DefaultExperiment startTime='3' stopTime='2'/>"),
+            "line 9, column 38: <DefaultExperiment>: expected a stopTime of at least 3, found 2",
+        ),
+        (
+            ssd(
+                "",
+                "<ssd:Units><ssc:Unit name='x'><ssc:BaseUnit factor='0'/></ssc:Unit></ssd:Units>",
+            ),
+            "line 9, column 68: <BaseUnit>: expected a factor other than zero, found 0",
+        ),
+        (
+            ssd("", "<ssd:DefaultExperiment startTime='inf'/>"),
+            "line 9, column 38: <DefaultExperiment>: expected a finite number in the attribute startTime, found \"inf\"",
+        ),
+    ]);
+}
+
+#[test]
+fn what_is_wrong_with_a_component_is_said_with_line_column_and_expectation() {
+    let component = |attributes: &str, inside: &str| {
+        ssd(&root(&format!("<ssd:Component {attributes}>{inside}</ssd:Component>"), ""), "")
+    };
+    refused(&[
         (
             component("name='a'", ""),
             "line 9, column 39: <Component>: expected the attribute source, found none",
@@ -92,24 +120,7 @@ fn what_is_wrong_is_said_with_line_column_and_expectation() {
             ),
             "line 10, column 1: <ParameterBinding>: expected a source or an element ParameterSet, found neither",
         ),
-        (
-            ssd("", "<ssd:DefaultExperiment startTime='3' stopTime='2'/>"),
-            "line 9, column 38: <DefaultExperiment>: expected a stopTime of at least 3, found 2",
-        ),
-        (
-            ssd(
-                "",
-                "<ssd:Units><ssc:Unit name='x'><ssc:BaseUnit factor='0'/></ssc:Unit></ssd:Units>",
-            ),
-            "line 9, column 68: <BaseUnit>: expected a factor other than zero, found 0",
-        ),
-        (
-            ssd("", "<ssd:DefaultExperiment startTime='inf'/>"),
-            "line 9, column 38: <DefaultExperiment>: expected a finite number in the attribute startTime, found \"inf\"",
-        ),
-    ] {
-        assert_eq!(read_ssd(text.as_bytes()).unwrap_err().to_string(), expected, "{text}");
-    }
+    ]);
 }
 
 #[test]

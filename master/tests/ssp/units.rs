@@ -98,15 +98,17 @@ fn a_system_connector_converts_if_it_states_a_unit_and_passes_on_if_not() {
     assert_eq!(found[1], "inner.a.y -> b.v * 0.001 + 0.002");
 }
 
+/// A mapping with these sources and targets.
+fn map(kind: &str, pairs: &[(&str, &str)]) -> String {
+    let entry = |(source, target): &(&str, &str)| {
+        format!(r#"<ssc:MapEntry source="{source}" target="{target}"/>"#)
+    };
+    let entries = pairs.iter().map(entry).collect::<Vec<_>>().concat();
+    format!("<ssc:{kind}MappingTransformation>{entries}</ssc:{kind}MappingTransformation>")
+}
+
 #[test]
 fn mappings_keep_what_they_do_not_name() {
-    let map = |kind: &str, pairs: &[(&str, &str)]| {
-        let entries: String = pairs
-            .iter()
-            .map(|(from, to)| format!(r#"<ssc:MapEntry source="{from}" target="{to}"/>"#))
-            .collect();
-        format!("<ssc:{kind}MappingTransformation>{entries}</ssc:{kind}MappingTransformation>")
-    };
     let found = connected("Boolean", "Boolean", &map("Boolean", &[("true", "false")]), "").unwrap();
     assert_eq!(found, ["a.y -> b.u false false"]);
     let swapped = map("Boolean", &[("1", "0"), ("0", "1")]);
@@ -129,22 +131,16 @@ fn integer_mappings_in_a_row_are_one() {
     let bench = Bench::new();
     bench.fmu("a.fmu", "y output Integer");
     bench.fmu("b.fmu", "u input Integer");
-    let map = |pairs: [(i32, i32); 2]| {
-        let entries: String = pairs
-            .iter()
-            .map(|(from, to)| format!(r#"<ssc:MapEntry source="{from}" target="{to}"/>"#))
-            .collect();
-        format!("<ssc:IntegerMappingTransformation>{entries}</ssc:IntegerMappingTransformation>")
-    };
     // 1 -> 2 -> 3; 2 stays, -> 3; 5 -> 7, stays; 7 stays, stays; 9 -> 1.
     let inner = system(
         "inner",
         "out output",
         &component("a", "a.fmu", "y output", ""),
-        &connection("a.y", "out", &map([(1, 2), (5, 7)]), ""),
+        &connection("a.y", "out", &map("Integer", &[("1", "2"), ("5", "7")]), ""),
     );
     let elements = inner + &component("b", "b.fmu", "u input", "");
-    let connections = connection("inner.out", "b.u", &map([(2, 3), (9, 1)]), "");
+    let connections =
+        connection("inner.out", "b.u", &map("Integer", &[("2", "3"), ("9", "1")]), "");
     let opened = bench.open(&root(&elements, &connections), "").unwrap();
     assert_eq!(links(&opened.assembly), ["inner.a.y -> b.u [(1, 3), (2, 3), (5, 7), (9, 1)]"]);
 }

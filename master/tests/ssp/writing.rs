@@ -1,6 +1,7 @@
 //! What is written is read again as the same, and has the same bytes each time.
 
 use std::fs;
+use std::path::Path;
 
 use fmi2::unit::BaseUnit;
 use master::assembly::{Assembly, Element as Fmu, Link, Setting, Terminal};
@@ -94,15 +95,19 @@ fn file<T>(uri: &str, in_component: bool) -> Source<T> {
     Source::File { uri: uri.into(), in_component }
 }
 
-fn structure() -> SystemStructure {
+fn named(name: &str) -> ElementBase {
+    ElementBase { name: name.into(), ..ElementBase::default() }
+}
+
+/// A component with all that a component can have.
+fn component() -> Component {
     let binding = |prefix: &str, values, mapping| ParameterBinding {
         prefix: prefix.into(),
         values,
         mapping,
         at: ElementBase::default().at,
     };
-    let named = |name: &str| ElementBase { name: name.into(), ..ElementBase::default() };
-    let component = Component {
+    Component {
         base: ElementBase {
             connectors: connectors(),
             bindings: vec![
@@ -115,7 +120,11 @@ fn structure() -> SystemStructure {
         source: "resources/a%20b.fmu".into(),
         implementation: Implementation::CoSimulation,
         step_size: Some(0.25),
-    };
+    }
+}
+
+fn structure() -> SystemStructure {
+    let component = component();
     let package =
         Component { content: Content::Package, source: "p.ssp".into(), ..component.clone() };
     let package = Component { base: named("p"), step_size: None, ..package };
@@ -284,5 +293,25 @@ fn assemblies_that_make_no_sense_are_not_written() {
         change(&mut wrong);
         assert_eq!(write(&wrong, None, &target).unwrap_err().to_string(), expected);
         assert!(!target.exists());
+    }
+}
+
+/// The schemas judge these files in `tests/foreign/test_ssp_files.py`. With `UPDATE_SSP_SAMPLES` set
+/// they are written.
+#[test]
+fn the_samples_for_the_schemas_are_what_is_written() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/ssp/data");
+    for (name, text) in [
+        ("sample.ssd", render_ssd(&structure())),
+        ("sample.ssv", render_ssv(&parameters())),
+        ("sample.ssm", render_ssm(&mapping())),
+        ("sample.ssb", render_ssb(&dictionary())),
+    ] {
+        let path = folder.join(name);
+        if std::env::var_os("UPDATE_SSP_SAMPLES").is_some() {
+            fs::create_dir_all(&folder).unwrap();
+            fs::write(&path, &text).unwrap();
+        }
+        assert_eq!(fs::read_to_string(&path).unwrap(), text, "{name} is stale");
     }
 }
