@@ -1,6 +1,6 @@
 """System structures written by hand, each in the style of the tool that it is named after.
 
-All couple the plant and the controller as `held_loop` does, with its settings. `libcosim`: everything
+All couple the plant and the controller as `held_loop` does, with its settings. `libcosim`: all
 in one SSD, annotations of the Open Simulation Platform, FMUs beside it. `ecos`: parameter sets in
 files of their own. `nested`: what only the standard has, systems in systems, units and
 transformations that cancel, a mapping, bindings that override each other.
@@ -26,7 +26,8 @@ SPACE = "http://ssp-standard.org/SSP1/SystemStructure"
 HEAD = f"""<?xml version="1.0" encoding="UTF-8"?>
 <ssd:SystemStructureDescription name="loop" version="1.0"
     xmlns:ssd="{SPACE}Description" xmlns:ssc="{SPACE}Common" xmlns:ssv="{SPACE}ParameterValues"
-    xmlns:ssm="{SPACE}ParameterMapping" xmlns:osp="http://opensimulationplatform.com/SSP/OSPAnnotations">
+    xmlns:ssm="{SPACE}ParameterMapping"
+    xmlns:osp="http://opensimulationplatform.com/SSP/OSPAnnotations">
 """
 TAIL = "</ssd:SystemStructureDescription>\n"
 KINDS = {bool: "Boolean", int: "Integer", float: "Real"}
@@ -59,7 +60,8 @@ def parameters(values, name="initialValues", declaration=""):
         kind = KINDS[type(value)]
         rows.append(f'<ssv:Parameter name="{key}"><ssv:{kind} value="{text}"/></ssv:Parameter>')
     inside = "<ssv:Parameters>" + "".join(rows) + "</ssv:Parameters>"
-    return f'<ssv:ParameterSet version="1.0" name="{name}" {declaration}>{inside}</ssv:ParameterSet>'
+    head = f'<ssv:ParameterSet version="1.0" name="{name}" {declaration}>'
+    return f"{head}{inside}</ssv:ParameterSet>"
 
 
 def inline(parameter_set, attributes="", mapping=""):
@@ -88,6 +90,12 @@ def connections(rows=LINKS):
     return "<ssd:Connections>" + "".join(texts) + "</ssd:Connections>"
 
 
+def root_system(elements):
+    """A root system without connectors."""
+    inside = f"<ssd:Elements>{elements}</ssd:Elements>{connections()}"
+    return f'<ssd:System name="root">{inside}</ssd:System>'
+
+
 def osp(space, content):
     """An annotation of the Open Simulation Platform."""
     kind = "com.opensimulationplatform"
@@ -108,7 +116,7 @@ def libcosim_style(packed, folder):
             role, f"../fmus/{role}.fmu", connectors(role) + settings + hint
         )
     algorithm = f'<osp:Algorithm><osp:FixedStepAlgorithm baseStepSize="{STEP}"/></osp:Algorithm>'
-    system = f'<ssd:System name="root"><ssd:Elements>{elements}</ssd:Elements>{connections()}</ssd:System>'
+    system = root_system(elements)
     experiment = f"<ssd:DefaultExperiment>{osp('ssd', algorithm)}</ssd:DefaultExperiment>"
     target = folder / "demo" / "SystemStructure.ssd"
     target.parent.mkdir()
@@ -138,7 +146,7 @@ def ecos_style(packed, folder):
         elements += component(role, f"resources/{role}.fmu", connectors(role) + binding)
         files[f"resources/{role}.fmu"] = path
         files[values] = parameters(SETTINGS[role], declaration=declaration)
-    system = f'<ssd:System name="root"><ssd:Elements>{elements}</ssd:Elements>{connections()}</ssd:System>'
+    system = root_system(elements)
     experiment = '<ssd:DefaultExperiment startTime="0"/>'
     return archive(folder / "ecos.ssp", HEAD + system + experiment + TAIL, files)
 
@@ -171,10 +179,12 @@ def nested_style(packed, folder):
         f"</ssd:Elements><ssd:Connections>{inside}</ssd:Connections></ssd:System>"
     )
     wrong = {key: 0.25 for key, value in SETTINGS["controller"].items()}
-    controller = component(
-        "controller", "resources/controller.fmu", connectors("controller") + bindings(inline(parameters(wrong)))
+    inside = connectors("controller") + bindings(inline(parameters(wrong)))
+    controller = component("controller", "resources/controller.fmu", inside)
+    across = (
+        '<ssd:Connection startElement="controller" startConnector="u" endElement="cart" '
+        'endConnector="u"/>'
     )
-    across = '<ssd:Connection startElement="controller" startConnector="u" endElement="cart" endConnector="u"/>'
     across += "".join(
         f'<ssd:Connection startElement="controller" startConnector="{name}" endElement="cart" '
         f'endConnector="{name}">{half}</ssd:Connection>'

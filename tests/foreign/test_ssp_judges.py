@@ -143,8 +143,8 @@ def test_fmpy_runs_our_ssp_with_its_first_exchange_one_step_late(package, unpack
     expect_equal(names, late, found)
     _, right = held_loop(unpacked, grid, NO_SETTINGS)
     u = names.index(("controller", "u"))
-    # What the controller first commands, seeing the pendulum where it stands at the start, comes one
-    # step late; the pendulum has hardly moved meanwhile.
+    # What the controller first commands, seeing the pendulum where it stands at the start, comes
+    # one step late; the pendulum has hardly moved meanwhile.
     assert found[0, u] == 0.0
     assert abs(right[0, u]) > 1000.0 and found[1, u] == pytest.approx(right[0, u], rel=1e-4)
 
