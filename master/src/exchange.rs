@@ -183,7 +183,6 @@ impl Exchange {
     }
 
     /// Integers that go to Reals.
-    #[expect(clippy::needless_range_loop, reason = "the list is borrowed anew each time")]
     fn take_over_integers(&mut self) {
         for k in 0..self.reals.integer_sources().len() {
             let (port, output) = self.reals.integer_sources()[k];
