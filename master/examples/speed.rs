@@ -25,7 +25,8 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 use fmi2::Experiment;
 use fmi2::description::Causality;
-use master::{Fmu, Method, Probe, Simulation, System};
+use master::algorithm::{Algorithm, Course, Sweep};
+use master::{Fmu, Probe, Simulation, System};
 use rustix::time::{ClockId, clock_gettime};
 
 #[path = "../../tests/speed/lag.rs"]
@@ -56,7 +57,7 @@ fn read(path: &Path) -> anyhow::Result<System> {
                 if !opened.contains_key(&path) {
                     opened.insert(path.clone(), Fmu::open(&path)?);
                 }
-                system.add(name, Box::new(opened[&path].instantiate(name)?));
+                system.add(name, Box::new(opened[&path].instantiate(name)?))?;
             }
             ["set", variable, value] => system.set(variable, value)?,
             ["connect", from, to] => system.connect(from, to)?,
@@ -71,7 +72,9 @@ fn run(path: &Path, step: f64, steps: u64) -> anyhow::Result<()> {
     let system = read(path)?;
     let mut probe = Probe::new(&system, &system.ports(Causality::Output));
     let experiment = Experiment { start_time: 0.0, stop_time: None, tolerance: None };
-    let mut simulation = Simulation::new(system, Method::Jacobi, &experiment, step)?;
+    let algorithm =
+        Algorithm { sweep: Sweep::Jacobi, course: Course::Hold, ..Algorithm::new(step) };
+    let mut simulation = Simulation::new(system, &algorithm, &experiment)?;
     let (started, wall) = (cpu(), clock.elapsed());
     for _ in 0..steps {
         simulation.step()?;

@@ -149,9 +149,18 @@ pub struct Algorithm {
     pub bonds: Vec<PowerBond>,
     /// Threads that step slaves of one sweep side by side where that pays; 1: none.
     pub jobs: usize,
+    /// Values on connections may be no numbers or infinite.
+    pub allow_nan: bool,
 }
 
 impl Algorithm {
+    /// Fixed communication steps of `step` s, with that order of stepping and that course of the
+    /// inputs; the rest as in [`Algorithm::new`].
+    #[must_use]
+    pub fn fixed(sweep: Sweep, course: Course, step: f64) -> Self {
+        Self { sweep, course, ..Self::new(step) }
+    }
+
     /// Gauss-Seidel with limited slopes and the fixed communication step `step` in s.
     #[must_use]
     pub fn new(step: f64) -> Self {
@@ -170,6 +179,7 @@ impl Algorithm {
             events: Vec::new(),
             bonds: Vec::new(),
             jobs: 1,
+            allow_nan: false,
         }
     }
 }
