@@ -7,8 +7,10 @@
 
 pub mod algorithm;
 pub mod assembly;
+mod choose;
 mod error;
 mod exchange;
+pub mod fault;
 #[cfg(feature = "fmi")]
 pub mod fmi_crate;
 mod fmu;
@@ -17,6 +19,9 @@ pub mod linearise;
 mod nearest;
 mod order;
 mod probe;
+mod readout;
+pub mod scenario;
+pub mod signal;
 mod simulation;
 mod slave;
 pub mod solve;
@@ -25,12 +30,14 @@ pub mod transformation;
 mod value;
 
 pub use algorithm::{Algorithm, Coupling, Course, StepControl, Sweep};
+pub use choose::{Chosen, Wanted, choose};
 pub use error::{LoadError, SystemError};
 pub use fmu::{Fmu, FmuError, Instance};
 pub use library::{Interface, describe, preload};
 pub use linearise::{Linearisation, Linearise, LineariseError, linearise};
 pub use order::{Order, by_direct_dependencies};
 pub use probe::Probe;
-pub use simulation::Simulation;
+pub use readout::Readout;
+pub use simulation::{Checkpoint, Simulation};
 pub use slave::{Advance, CallError, Failure, Slave, Stepped};
 pub use system::{Connection, Port, System};

@@ -47,7 +47,8 @@ fn description(name: &str, guid: &str, ports: usize) -> String {
             outputs,
             r#"    <ScalarVariable name="y{port}" valueReference="{reference}" causality="output"><Real/></ScalarVariable>"#
         );
-        let _ = writeln!(structure, r#"      <Unknown index="{}" dependencies=""/>"#, reference + 1);
+        let _ =
+            writeln!(structure, r#"      <Unknown index="{}" dependencies=""/>"#, reference + 1);
         let _ = writeln!(initial, r#"      <Unknown index="{}" dependencies=""/>"#, reference + 1);
     }
     let time_constant = 2 * ports;

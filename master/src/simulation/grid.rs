@@ -2,7 +2,7 @@
 
 use fmi2::Experiment;
 
-use crate::algorithm::{Algorithm, StepControl};
+use crate::algorithm::Algorithm;
 use crate::error::SystemError;
 use crate::system::System;
 
@@ -37,24 +37,17 @@ impl Grid {
             return Err(SystemError::Time { what, value: stop, rule });
         }
         let grid = Self { start, stop, step, count: 0, time: start };
-        grid.check_rigid(system, algorithm)?;
+        grid.check_rigid(system)?;
         Ok(grid)
     }
 
     /// Slaves that take equal steps only get equal steps.
-    fn check_rigid(&self, system: &System, algorithm: &Algorithm) -> Result<(), SystemError> {
+    fn check_rigid(&self, system: &System) -> Result<(), SystemError> {
         let rigid = system.slaves.iter().find(|(_, slave)| {
             let flags = slave.description().co_simulation.as_ref();
             flags.is_some_and(|flags| !flags.can_handle_variable_communication_step_size)
         });
         let (Some((name, _)), Some(stop)) = (rigid, self.stop) else { return Ok(()) };
-        if algorithm.control != StepControl::Fixed || !algorithm.events.is_empty() {
-            return Err(SystemError::Capability {
-                slave: name.clone(),
-                lacks: "canHandleVariableCommunicationStepSize",
-                wanted: format!("the step control {}", algorithm.control.name()),
-            });
-        }
         let steps = (stop - self.start) / self.step;
         if (steps - steps.round()).abs() > 1e-6 {
             let rule = format!(
@@ -95,9 +88,31 @@ impl Grid {
         }
     }
 
+    /// Size of the step from `time` of a slave that makes `multiple` steps of the grid at once: the
+    /// size of the common step where that is one, 0 where it has gone on already.
+    #[expect(clippy::cast_precision_loss, reason = "2^53 steps take longer than anyone waits")]
+    pub(super) fn size_of(&self, multiple: u32, time: f64, size: f64) -> f64 {
+        if multiple == 1 {
+            return size;
+        }
+        if self.count % u64::from(multiple) != 0 {
+            return 0.0;
+        }
+        let end = self.start + (self.count + u64::from(multiple)) as f64 * self.step;
+        self.stop.map_or(end, |stop| end.min(stop)) - time
+    }
+
     /// The step to `end`, from [`Grid::next`], is done.
     pub(super) fn advance(&mut self, end: f64) {
         self.count += 1;
+        self.time = end;
+    }
+
+    /// A step to `end` is done, a point of the grid or not.
+    pub(super) fn reach(&mut self, end: f64) {
+        if end >= self.next().0 {
+            self.count += 1;
+        }
         self.time = end;
     }
 }
