@@ -3,6 +3,7 @@
 mod course;
 mod discrete;
 mod layout;
+mod pass;
 mod reals;
 mod tasks;
 mod trace;
@@ -166,6 +167,11 @@ impl Exchange {
             self.read_discrete(position, slave.as_mut()).map_err(at)?;
         }
         Ok(done)
+    }
+
+    /// Whether [`Exchange::pass`] does all that a sweep takes.
+    pub(crate) fn passes(&self) -> bool {
+        !self.discrete && self.reals.passes()
     }
 
     fn set_discrete(&self, position: usize, slave: &mut dyn Slave) -> Result<(), CallError> {

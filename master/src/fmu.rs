@@ -274,6 +274,16 @@ impl Slave for Instance {
         self.component.deserialize_state(bytes)
     }
 
+    fn pass(
+        &mut self,
+        inputs: (&[u32], &[f64]),
+        span: (f64, f64),
+        never_back: bool,
+        outputs: (&[u32], &mut [f64]),
+    ) -> Result<Stepped, CallError> {
+        self.component.pass(inputs, span, never_back, outputs)
+    }
+
     fn in_thread(&mut self) -> Option<&mut (dyn Slave + Send)> {
         Some(self)
     }

@@ -177,6 +177,13 @@ impl Library {
             )
         });
         let component = Component {
+            hot: Hot {
+                pointer,
+                set_real: self.functions.set_real,
+                do_step: self.functions.do_step,
+                get_real: self.functions.get_real,
+                sink: sink.clone(),
+            },
             pointer,
             functions: self.functions,
             sink,
@@ -202,8 +209,20 @@ unsafe extern "C" {
     fn free(pointer: *mut c_void);
 }
 
+/// What a step takes, in one line of the processor's cache.
+#[repr(C, align(64))]
+struct Hot {
+    pointer: fmi2Component,
+    set_real: Option<functions::SetReal>,
+    do_step: Option<functions::DoStep>,
+    get_real: Option<functions::GetReal>,
+    sink: Arc<Sink>,
+}
+
 /// An instance, freed with its last use; the library stays loaded as long.
 pub(crate) struct Component {
+    /// What [`Component::pass`] needs.
+    hot: Hot,
     pointer: fmi2Component,
     /// Those of the library, at hand.
     functions: Functions,

@@ -48,6 +48,8 @@ pub struct Simulation {
     /// makes now, 0 for none.
     multiples: Vec<u32>,
     sizes: Vec<f64>,
+    /// Whether a sweep is one pass over the slaves.
+    passes: bool,
     /// The slave that asked for the end of the simulation.
     ended: Option<usize>,
 }
@@ -95,6 +97,7 @@ impl Simulation {
         let control = Control::new(&system, &exchange.reals, algorithm)?;
         let coupled = Coupled::new(&system, &exchange.reals, algorithm, control.scale.clone());
         Ok(Self {
+            passes: algorithm.jobs <= 1 && exchange.passes(),
             system,
             exchange,
             drives: scenario.drives,

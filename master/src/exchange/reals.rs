@@ -1,10 +1,13 @@
 //! Connected Reals: values and derivatives of outputs over their last steps, and what inputs get.
 
+use super::call;
 use super::course::{Known, Polynomial};
 use super::layout::Layout;
+use super::pass::Pass;
 use super::trace::Span;
 pub(crate) use super::trace::Trace;
 use crate::algorithm::{Algorithm, Coupling, Course, StepControl, Sweep};
+use crate::error::SystemError;
 use crate::fault::FaultLine;
 use crate::slave::{Advance, CallError, Slave, Stepped};
 use crate::system::{Port, System};
@@ -26,6 +29,7 @@ pub(crate) struct Reals {
     /// What the inputs get.
     pub(super) values: Vec<f64>,
     pub(super) input_derivatives: Vec<f64>,
+    pass: Pass,
 }
 
 impl Reals {
@@ -43,10 +47,16 @@ impl Reals {
             begin_derivatives: vec![0.0; derivatives],
             spans: vec![span; system.slaves.len()],
         };
+        let mut pass = Pass::default();
+        for lane in &layout.lanes {
+            let sources = &layout.sources[lane.input_range.clone()];
+            pass.add(&lane.inputs, sources, &lane.outputs);
+        }
         Self {
             faults: Vec::new(),
             assumed: vec![0.0; outputs],
             assumes: false,
+            pass,
             values: vec![0.0; layout.sources.len()],
             input_derivatives: vec![0.0; layout.input_derivatives],
             course: algorithm.course,
@@ -344,6 +354,29 @@ impl Reals {
         })?;
         trace.spans[slave].stepped = true;
         Ok(done)
+    }
+
+    /// Whether [`Reals::pass`] does all that a sweep of Jacobi's method takes.
+    pub(crate) fn passes(&self) -> bool {
+        self.simple
+            && self.sweep == Sweep::Jacobi
+            && self.layout.plain.iter().all(|plain| *plain)
+            && self.layout.from_integers.is_empty()
+    }
+
+    /// A sweep of all slaves, see [`Pass::run`]; those that stopped on the way, and whether all
+    /// outputs are finite.
+    #[inline]
+    pub(crate) fn pass(
+        &mut self,
+        system: &mut System,
+        (time, size): (f64, f64),
+        never_back: bool,
+    ) -> Result<(&mut Vec<(usize, Stepped)>, bool), SystemError> {
+        let latest = &mut self.trace.latest;
+        let done = self.pass.run(&mut system.slaves, latest, (time, size), never_back);
+        let parts = done.map_err(|(slave, source)| call(&system.slaves[slave].0, time, source))?;
+        Ok((parts, all_finite(latest)))
     }
 
     /// Reads the connected outputs of a slave and their derivatives.

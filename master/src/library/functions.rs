@@ -104,6 +104,16 @@ functions! {
         fn(Component, *mut fmi2Real, usize) -> fmi2Status;
 }
 
+/// `fmi2SetReal`.
+pub(super) type SetReal =
+    unsafe extern "C" fn(Component, References, usize, *const fmi2Real) -> fmi2Status;
+/// `fmi2GetReal`.
+pub(super) type GetReal =
+    unsafe extern "C" fn(Component, References, usize, *mut fmi2Real) -> fmi2Status;
+/// `fmi2DoStep`.
+pub(super) type DoStep =
+    unsafe extern "C" fn(Component, fmi2Real, fmi2Real, fmi2Boolean) -> fmi2Status;
+
 /// What no instance can do without.
 const ALWAYS: [&str; 5] = [
     "fmi2Instantiate",

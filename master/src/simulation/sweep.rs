@@ -76,6 +76,9 @@ impl Simulation {
         if !self.drives.is_empty() {
             self.drives.write(&mut self.system, time)?;
         }
+        if self.passes {
+            return self.pass(time, size, never_back);
+        }
         for slave in 0..self.multiples.len() {
             self.sizes[slave] = self.grid.size_of(self.multiples[slave], time, size);
             if self.sizes[slave] > 0.0 {
@@ -138,6 +141,24 @@ impl Simulation {
             }
             Ok(())
         })
+    }
+
+    /// Jacobi's method with held inputs and nothing but Reals: one pass over the slaves.
+    fn pass(&mut self, time: f64, size: f64, never_back: bool) -> Result<Swept, SystemError> {
+        let mut swept = Swept::default();
+        let (parts, finite) =
+            self.exchange.reals.pass(&mut self.system, (time, size), never_back)?;
+        if !parts.is_empty() {
+            for (slave, done) in std::mem::take(parts) {
+                self.in_parts(slave, (time, size), done, never_back, &mut swept)?;
+            }
+        }
+        if !finite {
+            for slave in 0..self.system.slaves.len() {
+                self.exchange.check_finite(&self.system, slave, time + size)?;
+            }
+        }
+        Ok(swept)
     }
 
     #[inline]
