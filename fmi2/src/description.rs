@@ -10,7 +10,7 @@ mod rules;
 pub(crate) mod sample;
 
 pub(crate) use guid::Guid;
-pub use parse::{ParseError, Position};
+pub use parse::{ParseError, Position, Warning};
 pub use rules::Problem;
 
 use serde::Serialize;
