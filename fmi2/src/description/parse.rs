@@ -45,12 +45,10 @@ pub enum ParseError {
         found: String,
     },
     /// A file that is too long to be read.
-    #[error("expected at most {limit} bytes, found {found}")]
+    #[error("expected at most {limit} bytes, found more")]
     Length {
         /// How many are accepted.
         limit: usize,
-        /// How many there are.
-        found: usize,
     },
     /// Not well-formed.
     #[error("{at}: expected well-formed XML, found: {found}")]
@@ -113,6 +111,9 @@ pub enum ParseError {
 }
 
 impl ModelDescription {
+    /// Most bytes of a file that is read.
+    pub const MOST_BYTES: usize = 128 << 20;
+
     /// Reads `modelDescription.xml` of FMI 2.0 as [`ModelDescription::read`] does, without warnings.
     ///
     /// # Errors
@@ -153,8 +154,8 @@ impl ModelDescription {
     /// [`ParseError`] with line and column, what is expected and what was found.
     pub fn read(xml: impl AsRef<[u8]>) -> Result<(ModelDescription, Vec<Warning>), ParseError> {
         let bytes = xml.as_ref();
-        if bytes.len() > xml::LENGTH {
-            return Err(ParseError::Length { limit: xml::LENGTH, found: bytes.len() });
+        if bytes.len() > Self::MOST_BYTES {
+            return Err(ParseError::Length { limit: Self::MOST_BYTES });
         }
         let (text, not_utf8) = encoding::decode(bytes)?;
         let element = xml::read(&text)?;

@@ -9,8 +9,6 @@ use quick_xml::reader::Reader;
 
 use super::{ParseError, Position};
 
-/// Longest file in bytes.
-pub(super) const LENGTH: usize = 128 << 20;
 /// Deepest nesting; a model description needs 5.
 const DEPTH: usize = 64;
 /// Most attributes of one element; the standard has 15 at most.

@@ -80,7 +80,7 @@ fn hostile_files_end_in_an_error() {
         write!(wide, " a{number}=''").unwrap();
     }
     assert!(matches!(ModelDescription::parse(wide + "/>"), Err(ParseError::Limit { .. })));
-    let long = " ".repeat(xml::LENGTH + 1);
+    let long = " ".repeat(ModelDescription::MOST_BYTES + 1);
     assert!(matches!(ModelDescription::parse(long), Err(ParseError::Length { .. })));
     for text in [
         "",
