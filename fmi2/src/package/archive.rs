@@ -3,7 +3,7 @@
 use std::cell::Cell;
 use std::collections::HashSet;
 use std::fs::File;
-use std::io::{self, BufReader, Read, Seek, SeekFrom};
+use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
@@ -23,6 +23,9 @@ const CAPACITY: u64 = 4 << 30;
 const BASE: u64 = 64 << 20;
 /// ... and how many more for each byte of the archive. FMUs have 2 to 10, deflate up to 1032.
 const RATIO: u64 = 100;
+
+/// Bytes that are unpacked before they are written.
+const BUFFER: usize = 1 << 20;
 
 /// What is wrong with an archive that has two entries of one name.
 const DUPLICATE: &str = "two entries have the same name";
@@ -189,8 +192,11 @@ fn write_entry(
         std::fs::create_dir_all(parent).map_err(file_error("create", parent))?;
     }
     let executable = entry.unix_mode().is_some_and(|mode| mode & 0o111 != 0);
-    let mut file = File::create_new(target).map_err(file_error("create", target))?;
+    let file = File::create_new(target).map_err(file_error("create", target))?;
+    let size = usize::try_from(entry.size()).unwrap_or(usize::MAX).clamp(1, BUFFER);
+    let mut file = BufWriter::with_capacity(size, file);
     let written = io::copy(&mut entry.take(limit.saturating_add(1)), &mut file);
+    let written = written.and_then(|count| file.flush().map(|()| count));
     let written = written.map_err(file_error("unpack", target))?;
     #[cfg(unix)]
     if executable {
