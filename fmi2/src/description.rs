@@ -92,6 +92,9 @@ pub struct ModelExchange {
     pub can_serialize_fmu_state: bool,
     /// `providesDirectionalDerivative`.
     pub provides_directional_derivative: bool,
+    /// `SourceFiles`: names of files in `sources`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub source_files: Vec<String>,
 }
 
 /// `CoSimulation`: identifier and capability flags (section 4.3.1).
@@ -120,6 +123,9 @@ pub struct CoSimulation {
     pub can_serialize_fmu_state: bool,
     /// `providesDirectionalDerivative`.
     pub provides_directional_derivative: bool,
+    /// `SourceFiles`: names of files in `sources`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub source_files: Vec<String>,
 }
 
 /// `SimpleType` of `TypeDefinitions`.

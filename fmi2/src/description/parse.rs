@@ -136,7 +136,7 @@ impl ModelDescription {
     ///
     /// Defaults of the standard are filled in: `causality` local, `variability` continuous, and
     /// for a variable with `declaredType` the attributes of that type which it does not state
-    /// itself. Annotations and source files are skipped.
+    /// itself. Annotations are skipped.
     ///
     /// What breaks the standard but leaves no doubt about a simulation, and what other importers
     /// accept, is read with a [`Warning`] that says what was assumed: other encodings, `fmiVersion`
@@ -183,7 +183,8 @@ fn root(root: Node<'_>) -> Result<ModelDescription, ParseError> {
         let own = co_simulation.as_ref().map(|own| &own.model_identifier);
         let own = own.or(model_exchange.as_ref().map(|own| &own.model_identifier));
         let own = own.cloned().unwrap_or_default();
-        root.warn_missing("modelName", "a value", &format!("read as {own:?}"));
+        let said = ("a value", "no such attribute".to_owned());
+        root.warn_of(true, root.place("modelName"), said, &format!("read as {own:?}"));
         own
     });
     Ok(ModelDescription {
@@ -244,6 +245,10 @@ fn identifier(element: Node<'_>) -> Result<String, ParseError> {
     Ok(element.required("modelIdentifier")?.to_owned())
 }
 
+fn source_files(element: Node<'_>) -> Result<Vec<String>, ParseError> {
+    element.list("SourceFiles", "File", |file| Ok(file.required("name")?.to_owned()))
+}
+
 fn model_exchange(element: Node<'_>) -> Result<ModelExchange, ParseError> {
     let flag = |name| element.flag(name);
     Ok(ModelExchange {
@@ -255,6 +260,7 @@ fn model_exchange(element: Node<'_>) -> Result<ModelExchange, ParseError> {
         can_get_and_set_fmu_state: flag("canGetAndSetFMUstate"),
         can_serialize_fmu_state: flag("canSerializeFMUstate"),
         provides_directional_derivative: flag("providesDirectionalDerivative"),
+        source_files: source_files(element)?,
     })
 }
 
@@ -274,6 +280,7 @@ fn co_simulation(element: Node<'_>) -> Result<CoSimulation, ParseError> {
         can_get_and_set_fmu_state: flag("canGetAndSetFMUstate"),
         can_serialize_fmu_state: flag("canSerializeFMUstate"),
         provides_directional_derivative: flag("providesDirectionalDerivative"),
+        source_files: source_files(element)?,
     })
 }
 

@@ -35,7 +35,7 @@ pub struct Unpacked {
     folder: PathBuf,
     /// Removes the folder at the end, if it was made for this.
     temporary: Option<TempDir>,
-    /// The files of the archive, if there was one.
+    /// The entries of the archive, if there was one.
     names: Vec<String>,
     /// What `modelDescription.xml` says.
     pub description: ModelDescription,
@@ -96,6 +96,13 @@ impl Unpacked {
     #[must_use]
     pub fn folder(&self) -> &Path {
         self.temporary.as_ref().map_or(&self.folder, TempDir::path)
+    }
+
+    /// The names of all entries of the archive, those of folders with a slash at their end; none where
+    /// the FMU was given as a folder.
+    #[must_use]
+    pub fn entries(&self) -> &[String] {
+        &self.names
     }
 
     /// The folder `resources`, whether the FMU has one or not.

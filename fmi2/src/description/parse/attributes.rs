@@ -38,21 +38,33 @@ impl<'a> Node<'a> {
         ParseError::Attribute { at, element, attribute, expected: expected.to_owned(), found }
     }
 
-    /// A warning about the value `found` of an attribute.
+    /// A warning about the value `found` of an attribute, which the schema does not allow.
     pub(super) fn warn(&self, attribute: &str, expected: &str, found: &str, assumed: &str) {
-        let place = format!("<{}>, attribute {attribute}", self.element.name);
-        self.warn_of(place, expected, format!("{found:?}"), assumed);
+        let place = self.place(attribute);
+        self.warn_of(true, place, (expected, format!("{found:?}")), assumed);
     }
 
-    /// A warning about an attribute that is missing.
-    pub(super) fn warn_missing(&self, attribute: &str, expected: &str, assumed: &str) {
-        let place = format!("<{}>, attribute {attribute}", self.element.name);
-        self.warn_of(place, expected, "no such attribute".to_owned(), assumed);
+    /// A warning about the value `found` of an attribute, which only the text does not allow.
+    pub(super) fn warn_text(&self, attribute: &str, expected: &str, found: &str, assumed: &str) {
+        let place = self.place(attribute);
+        self.warn_of(false, place, (expected, format!("{found:?}")), assumed);
     }
 
-    /// A warning about the element.
-    pub(super) fn warn_of(&self, place: String, expected: &str, found: String, assumed: &str) {
+    /// The name of an attribute in a warning.
+    pub(super) fn place(&self, attribute: &str) -> String {
+        format!("<{}>, attribute {attribute}", self.element.name)
+    }
+
+    /// A warning with what was expected and found.
+    pub(super) fn warn_of(
+        &self,
+        by_schema: bool,
+        place: String,
+        (expected, found): (&str, String),
+        assumed: &str,
+    ) {
         self.warnings.add(Warning {
+            by_schema,
             at: self.element.at,
             place,
             expected: expected.to_owned(),
@@ -93,7 +105,9 @@ impl<'a> Node<'a> {
     pub(super) fn number(&self, name: &'static str) -> Result<Option<f64>, ParseError> {
         let Some((text, trimmed)) = self.content(name, NUMBER) else { return Ok(None) };
         if is_not_finite(trimmed) {
-            self.warn(name, NUMBER, text, NOTHING);
+            // The schema's numbers have these, those of FMI have not.
+            let by_schema = !["INF", "-INF", "NaN"].contains(&trimmed);
+            self.warn_of(by_schema, self.place(name), (NUMBER, format!("{text:?}")), NOTHING);
             return Ok(None);
         }
         match trimmed.parse::<f64>() {

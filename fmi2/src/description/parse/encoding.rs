@@ -65,6 +65,7 @@ fn other(found: String) -> Warning {
         found,
         assumed: "it was read as what it is".to_owned(),
         section: "2.2",
+        by_schema: false,
     }
 }
 

@@ -167,7 +167,8 @@ pub(super) fn check(node: Node<'_>, parent: &str) {
     }
     if shape.list && element.children.is_empty() {
         let place = format!("<{}>", element.name);
-        node.warn_of(place, "an item, or no such list", "none".to_owned(), "read as no list");
+        let said = ("an item, or no such list", "none".to_owned());
+        node.warn_of(true, place, said, "read as no list");
     }
     let mut last = 0;
     for child in &element.children {
@@ -175,8 +176,8 @@ pub(super) fn check(node: Node<'_>, parent: &str) {
         let position = shape.children.iter().position(|name| *name == child.name);
         let Some(position) = position else {
             let place = format!("<{}> in <{}>", child.name, element.name);
-            let found = "another one".to_owned();
-            inner.warn_of(place, "an element of the standard", found, "it was skipped");
+            let said = ("an element of the standard", "another one".to_owned());
+            inner.warn_of(true, place, said, "it was skipped");
             continue;
         };
         // The two interfaces may come in either order.
@@ -185,7 +186,7 @@ pub(super) fn check(node: Node<'_>, parent: &str) {
             let place = format!("<{}>", child.name);
             let expected = format!("the order {}", shape.children.join(", "));
             let found = format!("it after {}", shape.children[last]);
-            inner.warn_of(place, &expected, found, "it was read all the same");
+            inner.warn_of(true, place, (&expected, found), "it was read all the same");
         }
         last = last.max(position);
         check(inner, element.name);

@@ -19,12 +19,7 @@ pub(super) fn read(
     let Some(element) = root.optional_child("ModelStructure")? else {
         let place = "<fmiModelDescription>".to_owned();
         let expected = "an element ModelStructure";
-        root.warn_of(
-            place,
-            expected,
-            "none".to_owned(),
-            "every output is read as depending on anything",
-        );
+        root.warn_of(true, place, (expected, "none".to_owned()), ANYTHING);
         return Ok(ModelStructure {
             outputs: missing_outputs(&[], variables).map(|(row, _)| row).collect(),
             ..ModelStructure::default()
@@ -37,7 +32,7 @@ pub(super) fn read(
         let more = if missing.len() > 5 { ", and others" } else { "" };
         let found = format!("no row for {}{more}", names.join(", "));
         let place = "<ModelStructure>".to_owned();
-        element.warn_of(place, "every output in Outputs", found, ANYTHING);
+        element.warn_of(false, place, ("every output in Outputs", found), ANYTHING);
         outputs.extend(missing.into_iter().map(|(row, _)| row));
     }
     Ok(ModelStructure {
@@ -65,7 +60,7 @@ fn list(element: Node<'_>, name: &'static str, count: usize) -> Result<Vec<Unkno
     for row in list.children_named("Unknown") {
         let text = row.required("index")?;
         let Some(index) = index(text, count) else {
-            row.warn("index", &indices(count), text, "the row was skipped");
+            row.warn_text("index", &indices(count), text, "the row was skipped");
             trusted = false;
             continue;
         };
@@ -78,7 +73,8 @@ fn list(element: Node<'_>, name: &'static str, count: usize) -> Result<Vec<Unkno
         rows.push(Unknown { index, dependencies, kinds });
     }
     if !trusted {
-        list.warn_of(format!("<{name}>"), &indices(count), "others".to_owned(), ANYTHING);
+        let said = (indices(count), "others".to_owned());
+        list.warn_of(false, format!("<{name}>"), (&said.0, said.1), ANYTHING);
         for row in &mut rows {
             (row.dependencies, row.kinds) = (None, None);
         }
@@ -117,7 +113,7 @@ fn dependencies(row: Node<'_>, count: usize) -> Option<Option<Vec<u32>>> {
     let mut found = Vec::new();
     for word in words(text) {
         let Some(index) = index(word, count) else {
-            row.warn("dependencies", &indices(count), word, ANYTHING);
+            row.warn_text("dependencies", &indices(count), word, ANYTHING);
             return None;
         };
         found.push(index);
@@ -139,7 +135,7 @@ fn kinds(row: Node<'_>, dependencies: Option<&[u32]>) -> Option<Vec<DependencyKi
     let kinds: Option<Vec<DependencyKind>> = words(text).map(|word| word.parse().ok()).collect();
     let kinds = kinds.filter(|kinds| dependencies.is_some_and(|own| own.len() == kinds.len()));
     if kinds.is_none() {
-        row.warn(NAME, &expected, text, "read as dependent");
+        row.warn_text(NAME, &expected, text, "read as dependent");
     }
     kinds
 }

@@ -83,7 +83,7 @@ fn check_names(elements: &[Node<'_>], variables: &[ScalarVariable]) -> Result<()
         {
             return Err(element.wrong("name", expected, &variable.name));
         }
-        element.warn("name", expected, &variable.name, "the name stands for the first one");
+        element.warn_text("name", expected, &variable.name, "the name stands for the first one");
     }
     Ok(())
 }
@@ -151,8 +151,11 @@ fn variability(element: Node<'_>, causality: Causality, kind: &Kind) -> Variabil
     let expected = format!("another one than continuous, the default, for {}", kind.element());
     let assumed_as = format!("read as {name}");
     match element.attribute("variability") {
-        Some(text) => element.warn("variability", &expected, text, &assumed_as),
-        None => element.warn_missing("variability", &expected, &assumed_as),
+        Some(text) => element.warn_text("variability", &expected, text, &assumed_as),
+        None => {
+            let said = (expected.as_str(), "no such attribute".to_owned());
+            element.warn_of(false, element.place("variability"), said, &assumed_as);
+        }
     }
     assumed
 }
@@ -218,8 +221,8 @@ fn declared<'a>(element: Node<'_>, types: &Types<'a>) -> Option<(String, &'a Kin
     let kind = element.element.name;
     let Some(name) = element.attribute(NAME) else {
         if kind == "Enumeration" {
-            let expected = "the name of an enumeration";
-            element.warn_missing(NAME, expected, "read without names of its items");
+            let said = ("the name of an enumeration", "no such attribute".to_owned());
+            element.warn_of(true, element.place(NAME), said, "read without names of its items");
         }
         return None;
     };
@@ -227,7 +230,7 @@ fn declared<'a>(element: Node<'_>, types: &Types<'a>) -> Option<(String, &'a Kin
         Some(own) if own.kind.element() == kind => Some((name.to_owned(), &own.kind)),
         _ => {
             let expected = format!("the name of a SimpleType that is {kind}");
-            element.warn(NAME, &expected, name, "read without declared type");
+            element.warn_text(NAME, &expected, name, "read without declared type");
             None
         }
     }

@@ -24,11 +24,13 @@ pub struct Warning {
     pub assumed: String,
     /// Section of FMI 2.0.5.
     pub section: &'static str,
+    /// Whether validation against the schema of the standard finds it too.
+    pub by_schema: bool,
 }
 
 impl fmt::Display for Warning {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Warning { at, place, expected, found, assumed, section } = self;
+        let Warning { at, place, expected, found, assumed, section, .. } = self;
         write!(
             formatter,
             "{at}: {place}: expected {expected}, found {found}; {assumed} (section {section})"
