@@ -65,12 +65,7 @@ pub(super) fn check(
 /// How one entry is packed and called.
 fn entry<R: std::io::Read>(entry: &ZipFile<'_, R>, findings: &mut Findings) {
     let Ok(name) = entry.name().map(std::borrow::Cow::into_owned) else { return };
-    let method = entry.compression();
-    if !matches!(method, CompressionMethod::Stored | CompressionMethod::Deflated) {
-        let what = format!("compressed by {method:?}, expected deflate or none");
-        let why = "FMI Library (libcosim, PyFMI), Ecos and many others cannot unpack it.";
-        findings.add(Error, &name, what, (why, SECTION));
-    } else if entry.version_needed() > 20 {
+    if entry.version_needed() > 20 {
         let needed = f64::from(entry.version_needed()) / 10.0;
         let what = format!("needs version {needed:.1} of ZIP, expected at most 2.0");
         findings.add(
@@ -80,7 +75,8 @@ fn entry<R: std::io::Read>(entry: &ZipFile<'_, R>, findings: &mut Findings) {
             ("It may be a Zip64 archive, which not every importer reads.", SECTION),
         );
     }
-    if entry.flags().is_using_data_descriptor() && method == CompressionMethod::Stored {
+    if entry.flags().is_using_data_descriptor() && entry.compression() == CompressionMethod::Stored
+    {
         let what = "stored with a data descriptor, expected one with deflate only";
         let why = "Tools that read front to back do not find its end. Archives written as a stream have this.";
         findings.add(Error, &name, what, (why, SECTION));

@@ -14,7 +14,7 @@ const WHO: [(&str, &str); 9] = [
         "FMPy's validation and the FMU checker report it; few importers use the list.",
     ),
     ("Outputs", "Importers that order FMUs by their dependencies go wrong."),
-    ("which is not defined", "FMPy's validation refuses it; FMI Library ignores the unit."),
+    ("which is not defined", "FMPy's validation refuses it."),
     ("needs a start value", "FMPy's validation refuses it; FMI Library assumes zero."),
     (
         "generationDateAndTime",

@@ -7,9 +7,9 @@ use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use zip::ZipArchive;
 use zip::read::ZipFile;
 use zip::result::ZipError;
+use zip::{CompressionMethod, ZipArchive};
 
 use super::{PackageError, file_error, paths};
 
@@ -138,6 +138,11 @@ impl Archive {
             if name.ends_with('/') {
                 fs::create_dir_all(&target).map_err(file_error("create", &target))?;
                 continue;
+            }
+            let method = self.zip.by_index_data(index).map(|entry| entry.compression());
+            if !matches!(method, Ok(CompressionMethod::Stored | CompressionMethod::Deflated)) {
+                let expected = "compression by deflate, or none";
+                return Err(PackageError::Entry { entry: name.clone(), expected });
             }
             let entry = self.zip.by_index(index);
             let wrong = |source| PackageError::Archive { path: self.path.clone(), source };
