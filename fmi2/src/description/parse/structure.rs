@@ -64,7 +64,7 @@ fn list(element: Node<'_>, name: &'static str, count: usize) -> Result<Vec<Unkno
             trusted = false;
             continue;
         };
-        let Some(dependencies) = dependencies(row, count) else {
+        let Ok(dependencies) = dependencies(row, count) else {
             trusted = false;
             rows.push(Unknown { index, ..Unknown::default() });
             continue;
@@ -107,18 +107,21 @@ fn words(text: &str) -> impl Iterator<Item = &str> {
     text.split(WHITE_SPACE).filter(|word| !word.is_empty())
 }
 
-/// The attribute `dependencies`, where there is one; nothing where an index is no variable's.
-fn dependencies(row: Node<'_>, count: usize) -> Option<Option<Vec<u32>>> {
-    let Some(text) = row.attribute("dependencies") else { return Some(None) };
+/// An index that is no variable's.
+struct Impossible;
+
+/// The attribute `dependencies`, where there is one.
+fn dependencies(row: Node<'_>, count: usize) -> Result<Option<Vec<u32>>, Impossible> {
+    let Some(text) = row.attribute("dependencies") else { return Ok(None) };
     let mut found = Vec::new();
     for word in words(text) {
         let Some(index) = index(word, count) else {
             row.warn_text("dependencies", &indices(count), word, ANYTHING);
-            return None;
+            return Err(Impossible);
         };
         found.push(index);
     }
-    Some(Some(found))
+    Ok(Some(found))
 }
 
 /// The attribute `dependenciesKind`, where it fits `dependencies`.

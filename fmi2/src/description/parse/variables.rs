@@ -150,13 +150,9 @@ fn variability(element: Node<'_>, causality: Causality, kind: &Kind) -> Variabil
     };
     let expected = format!("another one than continuous, the default, for {}", kind.element());
     let assumed_as = format!("read as {name}");
-    match element.attribute("variability") {
-        Some(text) => element.warn_text("variability", &expected, text, &assumed_as),
-        None => {
-            let said = (expected.as_str(), "no such attribute".to_owned());
-            element.warn_of(false, element.place("variability"), said, &assumed_as);
-        }
-    }
+    let stated = element.attribute("variability");
+    let found = stated.map_or_else(|| "no such attribute".to_owned(), |text| format!("{text:?}"));
+    element.warn_of(false, element.place("variability"), (&expected, found), &assumed_as);
     assumed
 }
 

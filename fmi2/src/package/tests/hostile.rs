@@ -74,7 +74,7 @@ fn entries_that_share_their_bytes_are_refused() {
     let offset: [u8; 4] = bytes[first[1] - 4..first[1]].try_into().unwrap();
     bytes[second[1] - 4..second[1]].copy_from_slice(&offset);
     let error = opened(&bytes).unwrap_err();
-    assert!(format!("{:?}", error).contains("overlap"), "{error:?}");
+    assert!(format!("{error:?}").contains("overlap"), "{error:?}");
 }
 
 #[test]
