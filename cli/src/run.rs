@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use fmi2::Experiment;
 use indicatif::{ProgressBar, ProgressStyle};
-use master::{Fmu, Method, Simulation, System, by_direct_dependencies};
+use master::{Algorithm, Course, Fmu, Simulation, Sweep, System, by_direct_dependencies};
 
 use crate::recording::Recording;
 
@@ -23,13 +23,14 @@ pub(crate) enum MethodName {
     Jacobi,
 }
 
-impl From<MethodName> for Method {
-    fn from(name: MethodName) -> Self {
-        match name {
-            MethodName::GaussSeidel => Method::GaussSeidel,
-            MethodName::GaussSeidelHold => Method::GaussSeidelHold,
-            MethodName::Jacobi => Method::Jacobi,
-        }
+impl MethodName {
+    fn algorithm(self, step: f64) -> Algorithm {
+        let (sweep, course) = match self {
+            MethodName::GaussSeidel => (Sweep::GaussSeidel, Course::Limited),
+            MethodName::GaussSeidelHold => (Sweep::GaussSeidel, Course::Hold),
+            MethodName::Jacobi => (Sweep::Jacobi, Course::Hold),
+        };
+        Algorithm::fixed(sweep, course, step)
     }
 }
 
@@ -130,7 +131,7 @@ pub(crate) fn run(options: &Options) -> anyhow::Result<bool> {
 pub(crate) fn load(plant: &Path, controller: &Path) -> anyhow::Result<System> {
     let mut system = System::default();
     for (name, path) in [("plant", plant), ("controller", controller)] {
-        system.add(name, Box::new(Fmu::open(path)?.instantiate(name)?));
+        system.add(name, Box::new(Fmu::open(path)?.instantiate(name)?))?;
     }
     Ok(system)
 }
@@ -157,7 +158,8 @@ pub(crate) fn simulate(
     let stop_time = Some(options.stop_time);
     let experiment = Experiment { start_time: 0.0, stop_time, tolerance: None };
     let mut recording = Recording::new(&system, 0.0, options.record_every);
-    let mut simulation = Simulation::new(system, options.method.into(), &experiment, options.step)?;
+    let mut simulation =
+        Simulation::new(system, &options.method.algorithm(options.step), &experiment)?;
     let bar = progress(options.stop_time);
     let mut advance = || {
         watch(&mut simulation)?;

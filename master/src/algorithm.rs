@@ -1,8 +1,10 @@
 //! Master algorithms: what can be chosen, by name.
 
+use fmi2::description::CoSimulation;
 use serde::{Deserialize, Serialize};
 
-use crate::system::Port;
+use crate::error::SystemError;
+use crate::system::{Port, System};
 
 /// Declares a choice whose variants have the names of the configuration file.
 macro_rules! choice {
@@ -149,9 +151,18 @@ pub struct Algorithm {
     pub bonds: Vec<PowerBond>,
     /// Threads that step slaves of one sweep side by side where that pays; 1: none.
     pub jobs: usize,
+    /// Values on connections may be no numbers or infinite.
+    pub allow_nan: bool,
 }
 
 impl Algorithm {
+    /// Fixed communication steps of `step` s, with that order of stepping and that course of the
+    /// inputs; the rest as in [`Algorithm::new`].
+    #[must_use]
+    pub fn fixed(sweep: Sweep, course: Course, step: f64) -> Self {
+        Self { sweep, course, ..Self::new(step) }
+    }
+
     /// Gauss-Seidel with limited slopes and the fixed communication step `step` in s.
     #[must_use]
     pub fn new(step: f64) -> Self {
@@ -170,6 +181,93 @@ impl Algorithm {
             events: Vec::new(),
             bonds: Vec::new(),
             jobs: 1,
+            allow_nan: false,
+        }
+    }
+
+    /// Whether the FMUs of `system` can do what the algorithm asks for, and the algorithm makes sense.
+    ///
+    /// # Errors
+    ///
+    /// The flag that an FMU lacks and what needs it; a port that is not what it should be.
+    pub fn check(&self, system: &System) -> Result<(), SystemError> {
+        let repeats = match (self.coupling, self.control) {
+            (Coupling::Once, StepControl::Doubling | StepControl::Embedded) => {
+                Some(format!("the step control {}", self.control.name()))
+            }
+            (Coupling::Once, _) => None,
+            (coupling, _) => Some(format!("the coupling {}", coupling.name())),
+        };
+        let crossing = self.events.iter().any(|event| matches!(event, EventSource::Crossing(_)));
+        if let Some(wanted) = repeats.or(crossing.then(|| "the location of crossings".to_owned())) {
+            let lacks = "canGetAndSetFMUstate";
+            require(system, lacks, &wanted, |flags| flags.can_get_and_set_fmu_state)?;
+        }
+        if self.control != StepControl::Fixed || !self.events.is_empty() {
+            let lacks = "canHandleVariableCommunicationStepSize";
+            let wanted = match self.control {
+                StepControl::Fixed => "steps that end at events".to_owned(),
+                control => format!("the step control {}", control.name()),
+            };
+            require(system, lacks, &wanted, |flags| {
+                flags.can_handle_variable_communication_step_size
+            })?;
+        }
+        let several = self.multiples.iter().any(|&multiple| multiple != 1);
+        let plain = self.control == StepControl::Fixed && self.coupling == Coupling::Once;
+        if several && !(plain && self.events.is_empty()) {
+            let what = "FMUs with multiples of the communication step need fixed steps, made once, \
+                        without events: step-control fixed, coupling once";
+            return Err(SystemError::Algorithm { what: what.to_owned() });
+        }
+        if self.control == StepControl::Energy && self.bonds.is_empty() {
+            let what = "the step control energy needs power bonds: pairs of connected inputs whose \
+                        product is a power";
+            return Err(SystemError::Algorithm { what: what.to_owned() });
+        }
+        self.check_numbers()
+    }
+
+    fn check_numbers(&self) -> Result<(), SystemError> {
+        let numbers = [
+            ("the relative tolerance", self.relative_tolerance),
+            ("the absolute tolerance", self.absolute_tolerance),
+            ("the smallest step", self.smallest_step),
+            ("the largest step", self.largest_step),
+        ];
+        for (what, value) in numbers {
+            if !(value > 0.0 && value.is_finite()) {
+                let what = format!("{what} is {value}, expected a number above 0");
+                return Err(SystemError::Algorithm { what });
+            }
+        }
+        if self.control != StepControl::Fixed
+            && !(self.smallest_step <= self.step && self.step <= self.largest_step)
+        {
+            let what = format!(
+                "the first step is {} s, expected one from the smallest, {} s, to the largest, {} s",
+                self.step, self.smallest_step, self.largest_step
+            );
+            return Err(SystemError::Algorithm { what });
+        }
+        Ok(())
+    }
+}
+
+fn require(
+    system: &System,
+    lacks: &'static str,
+    wanted: &str,
+    can: fn(&CoSimulation) -> bool,
+) -> Result<(), SystemError> {
+    let unable = system
+        .slaves
+        .iter()
+        .find(|(_, slave)| !slave.description().co_simulation.as_ref().is_some_and(can));
+    match unable {
+        None => Ok(()),
+        Some((name, _)) => {
+            Err(SystemError::Capability { slave: name.clone(), lacks, wanted: wanted.to_owned() })
         }
     }
 }

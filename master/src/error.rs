@@ -64,6 +64,12 @@ pub enum SystemError {
         /// What was expected.
         form: &'static str,
     },
+    /// Two slaves have one name.
+    #[error("there are two FMUs of the name {name:?}, expected different names")]
+    SameName {
+        /// The name.
+        name: String,
+    },
     /// There is no slave of that name.
     #[error("{name}: there is no FMU of the name {slave:?}, expected one of {known}")]
     UnknownSlave {
@@ -126,7 +132,7 @@ pub enum SystemError {
         /// The text.
         value: String,
         /// The type.
-        expected: &'static str,
+        expected: String,
     },
     /// An FMU refused a setting.
     #[error("{name} = {value:?}: {source}")]
@@ -157,6 +163,32 @@ pub enum SystemError {
         value: f64,
         /// Time of the master in s.
         time: f64,
+    },
+    /// The algorithm asks for what an FMU cannot do.
+    #[error("{slave} cannot take part in {wanted}: its {lacks} is false")]
+    Capability {
+        /// The slave.
+        slave: String,
+        /// The flag of its model description.
+        lacks: &'static str,
+        /// What needs it.
+        wanted: String,
+    },
+    /// The values of a loop cannot be found.
+    #[error("the loop through {names} at t = {time} s: {why}")]
+    Loop {
+        /// The outputs.
+        names: String,
+        /// Time of the master in s.
+        time: f64,
+        /// How the iteration ended.
+        why: String,
+    },
+    /// The algorithm makes no sense for this system.
+    #[error("{what}")]
+    Algorithm {
+        /// What is wrong.
+        what: String,
     },
     /// The step size or the span of the run makes no sense.
     #[error("{what} is {value} s, expected {rule}")]

@@ -7,6 +7,7 @@
 
 pub mod algorithm;
 pub mod assembly;
+mod choose;
 mod error;
 mod exchange;
 #[cfg(feature = "fmi")]
@@ -19,16 +20,19 @@ mod order;
 mod probe;
 mod simulation;
 mod slave;
+pub mod solve;
 mod system;
 pub mod transformation;
 mod value;
 
+pub use algorithm::{Algorithm, Coupling, Course, StepControl, Sweep};
+pub use choose::{Chosen, Wanted, choose};
 pub use error::{LoadError, SystemError};
 pub use fmu::{Fmu, FmuError, Instance};
 pub use library::{Interface, describe, preload};
 pub use linearise::{Linearisation, Linearise, LineariseError, linearise};
 pub use order::{Order, by_direct_dependencies};
 pub use probe::Probe;
-pub use simulation::{Method, Simulation};
+pub use simulation::Simulation;
 pub use slave::{Advance, CallError, Failure, Slave, Stepped};
 pub use system::{Connection, Port, System};

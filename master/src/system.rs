@@ -1,14 +1,22 @@
 //! A system: slaves by name, the connections between them, and settings of variables by name.
 
-use fmi2::description::{Causality, Kind, ModelDescription, ScalarVariable};
+mod access;
+mod connecting;
+mod units;
 
+use std::collections::HashMap;
+
+use fmi2::description::{Causality, ModelDescription, ScalarVariable};
+
+use crate::assembly::{Link, Terminal};
 use crate::error::SystemError;
 use crate::nearest::nearest;
 use crate::slave::Slave;
+use crate::transformation::Transformation;
 use crate::value::Value;
 
 /// One end of a connection: slave by position, variable by position in its description.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Port {
     /// Position of the slave in [`System::slaves`].
     pub slave: usize,
@@ -17,12 +25,14 @@ pub struct Port {
 }
 
 /// A connection from an output to an input.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Connection {
     /// The output.
     pub from: Port,
     /// The input.
     pub to: Port,
+    /// What becomes of the value on its way, conversion of units included.
+    pub transformation: Transformation,
 }
 
 /// Slaves and connections.
@@ -32,12 +42,28 @@ pub struct System {
     pub slaves: Vec<(String, Box<dyn Slave>)>,
     /// The connections.
     pub connections: Vec<Connection>,
+    /// Variables of each slave by name.
+    variables: Vec<HashMap<String, usize>>,
+    /// Slaves by name.
+    names: HashMap<String, usize>,
+    /// Connection by its input.
+    sources: HashMap<Port, usize>,
 }
 
 impl System {
     /// Adds a slave.
-    pub fn add(&mut self, name: &str, slave: Box<dyn Slave>) {
+    ///
+    /// # Errors
+    ///
+    /// Where there is one of that name already.
+    pub fn add(&mut self, name: &str, slave: Box<dyn Slave>) -> Result<(), SystemError> {
+        if self.names.insert(name.to_owned(), self.slaves.len()).is_some() {
+            return Err(SystemError::SameName { name: name.to_owned() });
+        }
+        let variables = slave.description().variables.iter().enumerate();
+        self.variables.push(variables.map(|(k, variable)| (variable.name.clone(), k)).collect());
         self.slaves.push((name.to_owned(), slave));
+        Ok(())
     }
 
     /// The variable behind a port.
@@ -52,31 +78,64 @@ impl System {
         format!("{}.{}", self.slaves[port.slave].0, self.variable(port).name)
     }
 
-    /// The port called `name`, `slave.variable`.
+    /// The port called `name`, `slave.variable`. Both may have dots in them: of the slaves whose
+    /// name begins `name` and that have such a variable, the one with the longest name counts.
     ///
     /// # Errors
     ///
     /// Where the form is wrong, or slave or variable do not exist.
     pub fn port(&self, name: &str) -> Result<Port, SystemError> {
-        let Some((slave, variable)) = name.split_once('.') else {
+        let mut missing = None;
+        for (at, _) in name.match_indices('.').rev() {
+            let (slave, variable) = (&name[..at], &name[at + 1..]);
+            let Some(&position) = self.names.get(slave) else { continue };
+            if let Some(&variable) = self.variables[position].get(variable) {
+                return Ok(Port { slave: position, variable });
+            }
+            missing = missing.or(Some((position, variable)));
+        }
+        if let Some((slave, variable)) = missing {
+            return Err(unknown(name, variable, self.slaves[slave].1.description()));
+        }
+        let Some((slave, _)) = name.split_once('.') else {
             let form = "slave.variable";
             return Err(SystemError::Syntax { text: name.to_owned(), form });
         };
-        let Some(position) = self.slaves.iter().position(|(known, _)| known == slave) else {
-            let known: Vec<_> = self.slaves.iter().map(|(known, _)| known.as_str()).collect();
-            return Err(SystemError::UnknownSlave {
-                name: name.to_owned(),
-                slave: slave.to_owned(),
-                known: known.join(", "),
-            });
+        Err(self.unknown_slave(name, slave))
+    }
+
+    /// The port at the end of a link.
+    ///
+    /// # Errors
+    ///
+    /// Where slave or variable do not exist.
+    pub fn terminal(&self, terminal: &Terminal) -> Result<Port, SystemError> {
+        let name = terminal.to_string();
+        let Some(&slave) = self.names.get(&terminal.element) else {
+            return Err(self.unknown_slave(&name, &terminal.element));
         };
-        let description = self.slaves[position].1.description();
-        let variable = description
-            .variables
-            .iter()
-            .position(|candidate| candidate.name == variable)
-            .ok_or_else(|| unknown(name, variable, description))?;
-        Ok(Port { slave: position, variable })
+        match self.variables[slave].get(&terminal.variable) {
+            Some(&variable) => Ok(Port { slave, variable }),
+            None => Err(unknown(&name, &terminal.variable, self.slaves[slave].1.description())),
+        }
+    }
+
+    /// The slave called `name`.
+    ///
+    /// # Errors
+    ///
+    /// Where there is none.
+    pub fn slave(&self, name: &str) -> Result<usize, SystemError> {
+        self.names.get(name).copied().ok_or_else(|| self.unknown_slave(name, name))
+    }
+
+    fn unknown_slave(&self, name: &str, slave: &str) -> SystemError {
+        let known: Vec<_> = self.slaves.iter().map(|(known, _)| known.as_str()).collect();
+        SystemError::UnknownSlave {
+            name: name.to_owned(),
+            slave: slave.to_owned(),
+            known: known.join(", "),
+        }
     }
 
     /// Connects an output to an input, both `slave.variable`.
@@ -85,66 +144,18 @@ impl System {
     ///
     /// Where one does not exist, causality, type or unit do not fit, or the input has a source.
     pub fn connect(&mut self, from: &str, to: &str) -> Result<(), SystemError> {
-        let connection = Connection { from: self.port(from)?, to: self.port(to)? };
-        self.expect_causality(connection.from, Causality::Output)?;
-        self.expect_causality(connection.to, Causality::Input)?;
-        let (source, target) = (self.variable(connection.from), self.variable(connection.to));
-        if source.kind.element() != target.kind.element() {
-            return Err(SystemError::Role {
-                name: to.to_owned(),
-                found: format!("a variable of type {}", target.kind.element()),
-                expected: format!("{} as {from}", source.kind.element()),
-            });
-        }
-        if matches!(source.kind, Kind::String(_)) {
-            return Err(SystemError::Role {
-                name: from.to_owned(),
-                found: "a String".to_owned(),
-                expected: "a Real, Integer, Enumeration or Boolean".to_owned(),
-            });
-        }
-        self.expect_equal_units(connection)?;
-        if let Some(first) = self.connections.iter().find(|known| known.to == connection.to) {
-            let (input, first) = (to.to_owned(), self.name(first.from));
-            return Err(SystemError::Twice { input, first, second: from.to_owned() });
-        }
-        self.connections.push(connection);
-        Ok(())
+        let (from, to) = (self.port(from)?, self.port(to)?);
+        self.join(from, to, Transformation::Identity, false)
     }
 
-    fn expect_causality(&self, port: Port, expected: Causality) -> Result<(), SystemError> {
-        let found = self.variable(port).causality;
-        if found == expected {
-            return Ok(());
-        }
-        Err(SystemError::Role {
-            name: self.name(port),
-            found: format!("a variable of causality {}", found.as_str()),
-            expected: expected.as_str().to_owned(),
-        })
-    }
-
-    /// Units fit when one end has none, both have the same name, or the same base and factor.
-    fn expect_equal_units(&self, connection: Connection) -> Result<(), SystemError> {
-        let unit = |port: Port| {
-            let Kind::Real(real) = &self.variable(port).kind else { return None };
-            let name = real.unit.as_ref()?;
-            let description = self.slaves[port.slave].1.description();
-            let base = description.units.iter().find(|unit| unit.name == *name)?.base;
-            Some((name, base))
-        };
-        let (Some(from), Some(to)) = (unit(connection.from), unit(connection.to)) else {
-            return Ok(());
-        };
-        if from.0 == to.0 || (from.1.is_some() && from.1 == to.1) {
-            return Ok(());
-        }
-        Err(SystemError::Unit {
-            from: self.name(connection.from),
-            from_unit: from.0.clone(),
-            to: self.name(connection.to),
-            to_unit: to.0.clone(),
-        })
+    /// Makes the connection that `link` describes.
+    ///
+    /// # Errors
+    ///
+    /// As [`System::connect`], and where the transformation does not fit the types.
+    pub fn link(&mut self, link: &Link) -> Result<(), SystemError> {
+        let (from, to) = (self.terminal(&link.from)?, self.terminal(&link.to)?);
+        self.join(from, to, link.transformation.clone(), link.units_settled)
     }
 
     /// Connects each output to the inputs of other slaves that have its name and no source yet;
@@ -155,12 +166,15 @@ impl System {
     /// As [`System::connect`], where names agree and types or units do not.
     pub fn connect_equal_names(&mut self) -> Result<usize, SystemError> {
         let before = self.connections.len();
+        let mut inputs: HashMap<String, Vec<Port>> = HashMap::new();
+        for to in self.ports(Causality::Input) {
+            inputs.entry(self.variable(to).name.clone()).or_default().push(to);
+        }
         for from in self.ports(Causality::Output) {
-            for to in self.ports(Causality::Input) {
-                let equal = self.variable(from).name == self.variable(to).name;
-                let free = self.connections.iter().all(|known| known.to != to);
-                if from.slave != to.slave && equal && free {
-                    self.connect(&self.name(from), &self.name(to))?;
+            let Some(same) = inputs.get(&self.variable(from).name) else { continue };
+            for &to in same {
+                if from.slave != to.slave && !self.sources.contains_key(&to) {
+                    self.join(from, to, Transformation::Identity, false)?;
                 }
             }
         }
@@ -180,6 +194,12 @@ impl System {
         self.slaves.iter().enumerate().flat_map(of).collect()
     }
 
+    /// The connection that ends at that input.
+    #[must_use]
+    pub fn source(&self, input: Port) -> Option<&Connection> {
+        self.sources.get(&input).map(|&position| &self.connections[position])
+    }
+
     /// Sets the variable called `name` to the value that `text` spells.
     ///
     /// # Errors
@@ -187,24 +207,32 @@ impl System {
     /// Where the variable does not exist, the text is no value of its type, or the FMU refuses it.
     pub fn set(&mut self, name: &str, text: &str) -> Result<(), SystemError> {
         let port = self.port(name)?;
-        let (reference, kind) = {
-            let variable = self.variable(port);
-            (variable.value_reference, variable.kind.clone())
-        };
-        let value = Value::parse(&kind, text).map_err(|expected| SystemError::Value {
-            name: name.to_owned(),
+        self.set_port(port, text)
+    }
+
+    /// As [`System::set`], the variable by its place.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`System::set`].
+    pub fn set_port(&mut self, port: Port, text: &str) -> Result<(), SystemError> {
+        let value = self.value(port, text)?;
+        let done = self.set_value(port, &value);
+        done.map_err(|source| {
+            let (name, value) = (self.name(port), text.to_owned());
+            SystemError::Setting { name, value, source }
+        })
+    }
+
+    /// What `text` spells for that variable.
+    pub(crate) fn value(&self, port: Port, text: &str) -> Result<Value, SystemError> {
+        let description = self.slaves[port.slave].1.description();
+        let kind = &self.variable(port).kind;
+        Value::parse(kind, &description.types, text).map_err(|expected| SystemError::Value {
+            name: self.name(port),
             value: text.to_owned(),
             expected,
-        })?;
-        let (_, instance) = &mut self.slaves[port.slave];
-        let done = match value {
-            Value::Real(value) => instance.set_real(&[reference], &[value]),
-            Value::Integer(value) => instance.set_integer(&[reference], &[value]),
-            Value::Boolean(value) => instance.set_boolean(&[reference], &[value.into()]),
-            Value::String(value) => instance.set_string(&[reference], &[value]),
-        };
-        let (name, value) = (name.to_owned(), text.to_owned());
-        done.map_err(|source| SystemError::Setting { name, value, source })
+        })
     }
 }
 

@@ -1,6 +1,6 @@
 //! The value of a variable, read from text.
 
-use fmi2::description::Kind;
+use fmi2::description::{IntegerType, Kind, SimpleType};
 
 /// A value of one of the types of the standard; an Enumeration is an Integer.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,20 +12,37 @@ pub(crate) enum Value {
 }
 
 impl Value {
-    /// What `text` spells for a variable of that kind, or what was expected.
-    pub(crate) fn parse(kind: &Kind, text: &str) -> Result<Self, &'static str> {
+    /// What `text` spells for a variable of that kind, or what was expected. An item of an
+    /// enumeration may be given by its name in `types`.
+    pub(crate) fn parse(kind: &Kind, types: &[SimpleType], text: &str) -> Result<Self, String> {
         let trimmed = text.trim();
         match kind {
-            Kind::Real(_) => trimmed.parse().map(Value::Real).map_err(|_| "a number"),
-            Kind::Integer(_) | Kind::Enumeration(_) => {
-                trimmed.parse().map(Value::Integer).map_err(|_| "an integer")
+            Kind::Real(_) => trimmed.parse().map(Value::Real).map_err(|_| "a number".to_owned()),
+            Kind::Integer(_) => {
+                trimmed.parse().map(Value::Integer).map_err(|_| "an integer".to_owned())
             }
+            Kind::Enumeration(integer) => enumeration(integer, types, trimmed),
             Kind::Boolean(_) => match trimmed {
                 "true" | "1" => Ok(Value::Boolean(true)),
                 "false" | "0" => Ok(Value::Boolean(false)),
-                _ => Err("true or false"),
+                _ => Err("true or false".to_owned()),
             },
             Kind::String(_) => Ok(Value::String(text.to_owned())),
+        }
+    }
+}
+
+fn enumeration(kind: &IntegerType, types: &[SimpleType], text: &str) -> Result<Value, String> {
+    if let Ok(number) = text.parse() {
+        return Ok(Value::Integer(number));
+    }
+    let declared = types.iter().find(|known| Some(&known.name) == kind.declared_type.as_ref());
+    let items = declared.map(|declared| declared.items.as_slice()).unwrap_or_default();
+    match items.iter().find(|(name, _)| name == text) {
+        Some((_, number)) => Ok(Value::Integer(*number)),
+        None => {
+            let names: Vec<_> = items.iter().map(|(name, _)| name.as_str()).collect();
+            Err(format!("an integer or one of the items {}", names.join(", ")))
         }
     }
 }

@@ -5,8 +5,13 @@ use fmi2::Experiment;
 use fmi2::abi::Status;
 use fmi2::description::ModelDescription;
 use master::{
-    CallError, Failure, Method, Simulation, Slave, Stepped, System, by_direct_dependencies,
+    Algorithm, CallError, Course, Failure, Simulation, Slave, Stepped, Sweep, System,
+    by_direct_dependencies,
 };
+
+const JACOBI: (Sweep, Course) = (Sweep::Jacobi, Course::Hold);
+const GAUSS_SEIDEL: (Sweep, Course) = (Sweep::GaussSeidel, Course::Limited);
+const GAUSS_SEIDEL_HOLD: (Sweep, Course) = (Sweep::GaussSeidel, Course::Hold);
 
 /// x' = gain u, stepped exactly for a line u + slope t; with `direct` the output is y = u instead.
 struct Integrator {
@@ -102,16 +107,16 @@ impl Slave for Integrator {
 /// x' = v, v' = -x: two integrators in a ring, from x = 1, v = 0.5.
 fn ring() -> System {
     let mut system = System::default();
-    system.add("a", Integrator::boxed(1.0, 1.0, false));
-    system.add("b", Integrator::boxed(-1.0, 0.5, false));
+    system.add("a", Integrator::boxed(1.0, 1.0, false)).unwrap();
+    system.add("b", Integrator::boxed(-1.0, 0.5, false)).unwrap();
     system.connect("a.y", "b.u").unwrap();
     system.connect("b.y", "a.u").unwrap();
     system
 }
 
-fn start(system: System, method: Method, stop_time: Option<f64>) -> Simulation {
+fn start(system: System, method: (Sweep, Course), stop_time: Option<f64>) -> Simulation {
     let experiment = Experiment { stop_time, ..Experiment::default() };
-    Simulation::new(system, method, &experiment, 0.5).unwrap()
+    Simulation::new(system, &Algorithm::fixed(method.0, method.1, 0.5), &experiment).unwrap()
 }
 
 fn outputs(simulation: &mut Simulation) -> [f64; 2] {
@@ -125,21 +130,21 @@ fn outputs(simulation: &mut Simulation) -> [f64; 2] {
 
 #[test]
 fn jacobi_steps_all_slaves_from_the_same_values() {
-    let mut simulation = start(ring(), Method::Jacobi, None);
+    let mut simulation = start(ring(), JACOBI, None);
     simulation.step().unwrap();
     assert_eq!(outputs(&mut simulation), [1.0 + 0.5 * 0.5, 0.5 - 0.5 * 1.0]);
 }
 
 #[test]
 fn gauss_seidel_with_held_inputs_gives_the_later_slave_the_new_value() {
-    let mut simulation = start(ring(), Method::GaussSeidelHold, None);
+    let mut simulation = start(ring(), GAUSS_SEIDEL_HOLD, None);
     simulation.step().unwrap();
     assert_eq!(outputs(&mut simulation), [1.25, 0.5 - 0.5 * 1.25]);
 }
 
 #[test]
 fn gauss_seidel_gives_the_later_slave_the_line_between_both_values() {
-    let mut simulation = start(ring(), Method::GaussSeidel, None);
+    let mut simulation = start(ring(), GAUSS_SEIDEL, None);
     simulation.step().unwrap();
     let v = 0.5 - 0.5 * 0.5 * (1.0 + 1.25);
     assert_eq!(outputs(&mut simulation), [1.25, v]);
@@ -151,7 +156,7 @@ fn gauss_seidel_gives_the_later_slave_the_line_between_both_values() {
 
 #[test]
 fn the_last_step_ends_at_the_stop_time() {
-    let mut simulation = start(ring(), Method::Jacobi, Some(1.2));
+    let mut simulation = start(ring(), JACOBI, Some(1.2));
     let mut times = Vec::new();
     while !simulation.is_finished() {
         simulation.step().unwrap();
@@ -168,7 +173,10 @@ fn a_slave_that_takes_equal_steps_only_is_not_given_a_shorter_one() {
     let mut system = ring();
     system.slaves[0].1 = rigid;
     let experiment = Experiment { stop_time: Some(1.2), ..Experiment::default() };
-    let refused = Simulation::new(system, Method::Jacobi, &experiment, 0.5).err().unwrap();
+    let refused =
+        Simulation::new(system, &Algorithm::fixed(Sweep::Jacobi, Course::Hold, 0.5), &experiment)
+            .err()
+            .unwrap();
     let message = "the stop time is 1.2 s, expected a multiple of the communication step 0.5 s, \
                    as a takes equal steps only";
     assert_eq!(refused.to_string(), message);
@@ -177,8 +185,8 @@ fn a_slave_that_takes_equal_steps_only_is_not_given_a_shorter_one() {
 #[test]
 fn a_slave_whose_output_passes_its_input_through_comes_after_its_source() {
     let mut system = System::default();
-    system.add("through", Integrator::boxed(1.0, 0.0, true));
-    system.add("source", Integrator::boxed(1.0, 2.0, false));
+    system.add("through", Integrator::boxed(1.0, 0.0, true)).unwrap();
+    system.add("source", Integrator::boxed(1.0, 2.0, false)).unwrap();
     system.connect("source.y", "through.u").unwrap();
     system.connect("through.y", "source.u").unwrap();
     let order = by_direct_dependencies(&system);
@@ -189,23 +197,23 @@ fn a_slave_whose_output_passes_its_input_through_comes_after_its_source() {
 fn slaves_that_pass_through_in_a_circle_are_reported_as_a_loop() {
     let mut system = System::default();
     for name in ["one", "other"] {
-        system.add(name, Integrator::boxed(1.0, 0.0, true));
+        system.add(name, Integrator::boxed(1.0, 0.0, true)).unwrap();
     }
     system.connect("one.y", "other.u").unwrap();
     system.connect("other.y", "one.u").unwrap();
     let order = by_direct_dependencies(&system);
-    assert_eq!((order.sequence, order.looped), (vec![0, 1], vec![0]));
+    assert_eq!((order.sequence, order.looped), (vec![0, 1], vec![0, 1]));
 }
 
 #[test]
 fn initial_values_pass_through_a_chain_of_direct_dependencies() {
     let mut system = System::default();
-    system.add("last", Integrator::boxed(1.0, 0.0, true));
-    system.add("middle", Integrator::boxed(1.0, 0.0, true));
-    system.add("first", Integrator::boxed(1.0, 7.0, false));
+    system.add("last", Integrator::boxed(1.0, 0.0, true)).unwrap();
+    system.add("middle", Integrator::boxed(1.0, 0.0, true)).unwrap();
+    system.add("first", Integrator::boxed(1.0, 7.0, false)).unwrap();
     system.connect("first.y", "middle.u").unwrap();
     system.connect("middle.y", "last.u").unwrap();
-    let mut simulation = start(system, Method::default(), None);
+    let mut simulation = start(system, GAUSS_SEIDEL, None);
     assert_eq!(outputs(&mut simulation), [7.0, 7.0]);
 }
 
@@ -213,7 +221,7 @@ fn initial_values_pass_through_a_chain_of_direct_dependencies() {
 fn an_output_that_is_not_a_number_stops_the_run_with_its_name_and_time() {
     let mut system = ring();
     system.slaves[0].1 = Integrator::boxed(f64::INFINITY, 1.0, false);
-    let mut simulation = start(system, Method::Jacobi, None);
+    let mut simulation = start(system, JACOBI, None);
     let message = simulation.step().unwrap_err().to_string();
     assert_eq!(message, "a.y is inf at t = 0.5 s, expected a finite number");
 }
@@ -224,7 +232,7 @@ fn a_failing_slave_is_named_with_time_function_and_message() {
     broken.fails_at = 0.5;
     let mut system = ring();
     system.slaves[1].1 = broken;
-    let mut simulation = start(system, Method::Jacobi, None);
+    let mut simulation = start(system, JACOBI, None);
     simulation.step().unwrap();
     let message = simulation.step().unwrap_err().to_string();
     assert_eq!(message, "b at t = 0.5 s: fmi2DoStep returned fmi2Error: out of paper");

@@ -9,7 +9,7 @@ use std::process::{Command, Output};
 use std::sync::OnceLock;
 
 use fmi2::Experiment;
-use master::{Fmu, Method, Probe, Simulation, System};
+use master::{Algorithm, Fmu, Probe, Simulation, System};
 
 /// The folder of the workspace.
 #[must_use]
@@ -76,7 +76,8 @@ pub fn closed_loop(settings: &[(&str, &str)]) -> System {
     let mut system = System::default();
     for (name, file) in [("plant", "FrictionPendulum.fmu"), ("controller", "AsoController.fmu")] {
         let instance = Fmu::open(&dist().join(file)).and_then(|fmu| fmu.instantiate(name));
-        system.add(name, Box::new(instance.unwrap_or_else(|error| panic!("{error}"))));
+        let slave = Box::new(instance.unwrap_or_else(|error| panic!("{error}")));
+        system.add(name, slave).unwrap_or_else(|error| panic!("{error}"));
     }
     let connected = system.connect_equal_names();
     assert_eq!(connected.ok(), Some(3), "x_p, theta and u are connected");
@@ -92,16 +93,11 @@ pub fn closed_loop(settings: &[(&str, &str)]) -> System {
 ///
 /// If the system cannot be initialised or a name does not exist.
 #[must_use]
-pub fn simulation(
-    system: System,
-    method: Method,
-    step: f64,
-    names: &[&str],
-) -> (Simulation, Probe) {
+pub fn simulation(system: System, algorithm: &Algorithm, names: &[&str]) -> (Simulation, Probe) {
     let port = |name: &&str| system.port(name).unwrap_or_else(|error| panic!("{error}"));
     let ports: Vec<_> = names.iter().map(port).collect();
     let probe = Probe::new(&system, &ports);
-    let simulation = Simulation::new(system, method, &Experiment::default(), step);
+    let simulation = Simulation::new(system, algorithm, &Experiment::default());
     (simulation.unwrap_or_else(|error| panic!("{error}")), probe)
 }
 

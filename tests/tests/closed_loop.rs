@@ -2,7 +2,7 @@
 #![forbid(unsafe_code)]
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-use master::Method;
+use master::{Algorithm, Course, Sweep};
 use tests::{Table, closed_loop, root, simulation};
 
 /// The signals that are compared, with the columns of the reference files.
@@ -22,18 +22,17 @@ const SIGNALS: [(&str, &str); 8] = [
 fn differences(
     reference: &Table,
     settings: &[(&str, &str)],
-    method: Method,
-    step: f64,
+    algorithm: &Algorithm,
     end: f64,
 ) -> Vec<f64> {
     let names: Vec<_> = SIGNALS.iter().map(|(name, _)| *name).collect();
-    let (mut simulation, mut probe) = simulation(closed_loop(settings), method, step, &names);
+    let (mut simulation, mut probe) = simulation(closed_loop(settings), algorithm, &names);
     let columns: Vec<_> = SIGNALS.iter().map(|(_, column)| reference.column(column)).collect();
     let mut differences = vec![0.0_f64; SIGNALS.len()];
     let mut values = vec![0.0; SIGNALS.len()];
     let times = reference.column("t");
     for (row, time) in times.iter().enumerate().filter(|(_, time)| **time <= end) {
-        while simulation.time() < time - 0.5 * step {
+        while simulation.time() < time - 0.5 * algorithm.step {
             simulation.step().unwrap();
         }
         probe.read(simulation.system(), *time, &mut values).unwrap();
@@ -67,7 +66,7 @@ fn compensated() -> Table {
 
 #[test]
 fn the_first_5_s_are_those_of_scipy_at_a_communication_step_of_20_us() {
-    let found = differences(&paper(), &[], Method::GaussSeidel, 2e-5, 5.0);
+    let found = differences(&paper(), &[], &Algorithm::new(2e-5), 5.0);
     println!("paper: {found:?}");
     assert!(largest(&found) < 1e-3, "{found:?}");
 }
@@ -75,15 +74,17 @@ fn the_first_5_s_are_those_of_scipy_at_a_communication_step_of_20_us() {
 #[test]
 fn the_first_5_s_with_compensation_are_those_of_scipy_at_a_communication_step_of_20_us() {
     let settings = [("controller.t_on", "1.0")];
-    let found = differences(&compensated(), &settings, Method::GaussSeidel, 2e-5, 5.0);
+    let found = differences(&compensated(), &settings, &Algorithm::new(2e-5), 5.0);
     println!("compensated: {found:?}");
     assert!(largest(&found) < 1e-3, "{found:?}");
 }
 
 /// Differences of the cart's position from the reference over the first 5 s for halved steps.
-fn errors(method: Method, steps: &[f64]) -> Vec<f64> {
+fn errors(method: (Sweep, Course), steps: &[f64]) -> Vec<f64> {
     let reference = paper();
-    let error = |step: &f64| differences(&reference, &[], method, *step, 5.0)[0];
+    let error = |step: &f64| {
+        differences(&reference, &[], &Algorithm::fixed(method.0, method.1, *step), 5.0)[0]
+    };
     let errors = steps.iter().map(error).collect();
     println!("{method:?}: {errors:?} at {steps:?}");
     errors
@@ -96,26 +97,26 @@ fn orders(errors: &[f64]) -> Vec<f64> {
 
 #[test]
 fn gauss_seidel_with_slopes_is_of_second_order() {
-    let orders = orders(&errors(Method::GaussSeidel, &[1e-4, 5e-5, 2.5e-5]));
+    let orders = orders(&errors((Sweep::GaussSeidel, Course::Limited), &[1e-4, 5e-5, 2.5e-5]));
     assert!(orders.iter().all(|order| (1.7..2.6).contains(order)), "{orders:?}");
 }
 
 #[test]
 fn jacobi_is_of_first_order() {
-    let orders = orders(&errors(Method::Jacobi, &[8e-6, 4e-6, 2e-6]));
+    let orders = orders(&errors((Sweep::Jacobi, Course::Hold), &[8e-6, 4e-6, 2e-6]));
     assert!(orders.iter().all(|order| (0.7..1.4).contains(order)), "{orders:?}");
 }
 
 #[test]
 fn gauss_seidel_with_held_inputs_is_of_first_order() {
-    let orders = orders(&errors(Method::GaussSeidelHold, &[8e-6, 4e-6, 2e-6]));
+    let orders = orders(&errors((Sweep::GaussSeidel, Course::Hold), &[8e-6, 4e-6, 2e-6]));
     assert!(orders.iter().all(|order| (0.7..1.4).contains(order)), "{orders:?}");
 }
 
 /// Half of peak to peak of `x_p` and theta and rms of `f_fric` - `f_hat` from 60 to 100 s.
 fn residual(step: f64) -> [f64; 3] {
     let names = ["plant.x_p", "plant.theta", "plant.f_fric", "controller.f_hat"];
-    let (mut simulation, mut probe) = simulation(closed_loop(&[]), Method::default(), step, &names);
+    let (mut simulation, mut probe) = simulation(closed_loop(&[]), &Algorithm::new(step), &names);
     let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     let (mut squares, mut count) = (0.0, 0.0);
     let mut values = [0.0; 4];
@@ -147,7 +148,7 @@ fn the_residual_at_1_ms_is_that_at_10_us_to_1_percent() {
 
 #[test]
 fn a_communication_step_allocates_nothing() {
-    let (mut simulation, _) = simulation(closed_loop(&[]), Method::default(), 1e-3, &[]);
+    let (mut simulation, _) = simulation(closed_loop(&[]), &Algorithm::new(1e-3), &[]);
     for _ in 0..10 {
         simulation.step().unwrap();
     }
@@ -161,7 +162,7 @@ fn a_communication_step_allocates_nothing() {
 
 #[test]
 fn the_order_of_stepping_is_plant_then_controller_without_a_loop() {
-    let (simulation, _) = simulation(closed_loop(&[]), Method::default(), 1e-3, &[]);
+    let (simulation, _) = simulation(closed_loop(&[]), &Algorithm::new(1e-3), &[]);
     assert_eq!(simulation.order().sequence, [0, 1]);
     assert_eq!(simulation.order().looped, []);
 }

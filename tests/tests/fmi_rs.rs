@@ -19,7 +19,7 @@ use fmi_rs::sim::fmi2::{
 };
 use fmi2::Experiment;
 use fmi2::description::{Causality, Initial};
-use master::{Fmu, Method, Slave, System};
+use master::{Algorithm, Course, Fmu, Slave, Sweep, System};
 
 const FILES: [&str; 2] = ["FrictionPendulum.fmu", "AsoController.fmu"];
 const STEP: f64 = 1e-3;
@@ -167,7 +167,8 @@ fn the_closed_loop_by_fmi_rs_is_bit_identical_to_the_one_by_our_master() {
         .collect();
     let ports: Vec<_> = qualified.iter().map(String::as_str).collect();
     let system = tests::closed_loop(&settings);
-    let (mut own, mut probe) = tests::simulation(system, Method::Jacobi, STEP, &ports);
+    let (mut own, mut probe) =
+        tests::simulation(system, &Algorithm::fixed(Sweep::Jacobi, Course::Hold, STEP), &ports);
 
     exchange(&plant, &controller);
     exchange(&plant, &controller);
@@ -240,7 +241,7 @@ fn simulated(file: &str, settings: &[(&str, &str)], stop: f64) -> Trajectories {
 fn own_slave(file: &str, settings: &[(&str, &str)]) -> Box<dyn Slave> {
     let mut system = System::default();
     let fmu = Fmu::open(&tests::dist().join(file)).unwrap();
-    system.add("alone", Box::new(fmu.instantiate("alone").unwrap()));
+    system.add("alone", Box::new(fmu.instantiate("alone").unwrap())).unwrap();
     for (name, value) in settings {
         system.set(&format!("alone.{name}"), value).unwrap();
     }

@@ -61,7 +61,7 @@ pub enum LineariseError {
         /// The text.
         text: String,
         /// What can be read.
-        expected: &'static str,
+        expected: String,
     },
     /// The FMU refuses a value.
     #[error("{name} = {value}: {source}")]

@@ -207,13 +207,13 @@ fn settings(
 ) -> Result<Vec<Setting>, LineariseError> {
     let setting = |(name, text): &(String, String)| {
         let variable = find(description, name)?;
-        let wrong = |expected| {
+        let wrong = |expected: String| {
             let (name, text) = (name.clone(), text.clone());
             LineariseError::Value { name, text, expected }
         };
-        let value = Value::parse(&variable.kind, text).map_err(wrong)?;
+        let value = Value::parse(&variable.kind, &description.types, text).map_err(wrong)?;
         if matches!(value, Value::Real(value) if !value.is_finite()) {
-            return Err(wrong("a finite number"));
+            return Err(wrong("a finite number".to_owned()));
         }
         let at_start = variable.variability != Variability::Constant
             && matches!(variable.initial_in_force(), Some(Initial::Exact | Initial::Approx));

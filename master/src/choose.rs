@@ -1,0 +1,235 @@
+//! The algorithm for a system: what the user wants, completed by what the FMUs can do.
+
+use serde::{Deserialize, Serialize};
+
+use crate::algorithm::{Algorithm, Coupling, Course, EventSource, PowerBond, StepControl, Sweep};
+use crate::error::SystemError;
+use crate::order::by_direct_dependencies;
+use crate::slave::Slave;
+use crate::system::System;
+use fmi2::description::CoSimulation;
+
+/// Communication step in s where neither the user nor an FMU states one.
+const STEP: f64 = 1e-3;
+
+/// What the user states of an [`Algorithm`]; the rest is chosen.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Wanted {
+    /// `jacobi` or `gauss-seidel`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub method: Option<Sweep>,
+    /// Course of the inputs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub course: Option<Course>,
+    /// Repetition of a step.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coupling: Option<Coupling>,
+    /// Choice of the step.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub step_control: Option<StepControl>,
+    /// Communication step in s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub step: Option<f64>,
+    /// Relative tolerance.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relative_tolerance: Option<f64>,
+    /// Absolute tolerance, in nominal values.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub absolute_tolerance: Option<f64>,
+    /// Smallest step of the step control in s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub smallest_step: Option<f64>,
+    /// Largest step of the step control in s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub largest_step: Option<f64>,
+    /// Most iterations of a step.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub iterations: Option<u32>,
+    /// FMUs that step every so many communication steps.
+    #[serde(skip_serializing_if = "std::collections::BTreeMap::is_empty", default)]
+    pub every: std::collections::BTreeMap<String, u32>,
+    /// Outputs, `slave.variable`, that hold the time of their FMU's next event.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub next_event: Vec<String>,
+    /// Outputs, `slave.variable`, whose change of sign ends a step.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub crossing: Vec<String>,
+    /// Pairs of inputs, `slave.variable`, whose product is a power.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub power_bonds: Vec<(String, String)>,
+    /// Threads; 0: as many as the machine has.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub jobs: Option<usize>,
+    /// Let values on connections be no numbers or infinite.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub allow_nan: Option<bool>,
+}
+
+/// An algorithm, and why it is this one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Chosen {
+    /// The algorithm.
+    pub algorithm: Algorithm,
+    /// A sentence for each choice that the user did not make.
+    pub reasons: Vec<String>,
+}
+
+/// Completes what is wanted for `system`.
+///
+/// # Errors
+///
+/// Where names do not exist, or what is wanted needs what an FMU cannot do.
+pub fn choose(system: &System, wanted: &Wanted) -> Result<Chosen, SystemError> {
+    let mut reasons = Vec::new();
+    let step = wanted.step.unwrap_or_else(|| default_step(system, &mut reasons));
+    let base = Algorithm::new(step);
+    let control = wanted.step_control.unwrap_or(StepControl::Fixed);
+    let coupling = wanted.coupling.unwrap_or_else(|| default_coupling(system, &mut reasons));
+    let sweep = wanted.method.unwrap_or_else(|| {
+        let order = by_direct_dependencies(system);
+        let names: Vec<_> = order.sequence.iter().map(|&k| system.slaves[k].0.as_str()).collect();
+        reasons.push(format!(
+            "gauss-seidel, in the order of the direct dependencies: {}",
+            shortened(&names)
+        ));
+        Sweep::GaussSeidel
+    });
+    let course = wanted.course.unwrap_or_else(|| default_course(system, &mut reasons));
+    let loose = matches!(control, StepControl::Increment | StepControl::Energy);
+    let default_relative = if loose { 1e-2 } else { base.relative_tolerance };
+    let algorithm = Algorithm {
+        sweep,
+        course,
+        coupling,
+        control,
+        step,
+        multiples: multiples(system, wanted)?,
+        relative_tolerance: wanted.relative_tolerance.unwrap_or(default_relative),
+        absolute_tolerance: wanted.absolute_tolerance.unwrap_or(base.absolute_tolerance),
+        smallest_step: wanted.smallest_step.unwrap_or(base.smallest_step),
+        largest_step: wanted.largest_step.unwrap_or(base.largest_step),
+        iterations: wanted.iterations.unwrap_or(base.iterations),
+        events: events(system, wanted)?,
+        bonds: bonds(system, wanted)?,
+        jobs: match wanted.jobs {
+            Some(0) => std::thread::available_parallelism().map_or(1, usize::from),
+            Some(jobs) => jobs,
+            None => 1,
+        },
+        allow_nan: wanted.allow_nan.unwrap_or(false),
+    };
+    algorithm.check(system)?;
+    Ok(Chosen { algorithm, reasons })
+}
+
+fn flags(slave: &dyn Slave) -> Option<&CoSimulation> {
+    slave.description().co_simulation.as_ref()
+}
+
+/// The smallest `stepSize` of the FMUs' default experiments.
+fn default_step(system: &System, reasons: &mut Vec<String>) -> f64 {
+    let stated = system.slaves.iter().filter_map(|(name, slave)| {
+        let step = slave.description().default_experiment.as_ref()?.step_size?;
+        (step > 0.0 && step.is_finite()).then_some((name, step))
+    });
+    if let Some((name, step)) = stated.min_by(|a, b| a.1.total_cmp(&b.1)) {
+        reasons.push(format!(
+            "step {step} s: the smallest stepSize of a DefaultExperiment, that of {name}"
+        ));
+        step
+    } else {
+        reasons.push(format!("step {STEP} s: no FMU states a stepSize"));
+        STEP
+    }
+}
+
+/// Iteration where direct dependencies form a loop and every FMU can go back.
+fn default_coupling(system: &System, reasons: &mut Vec<String>) -> Coupling {
+    let order = by_direct_dependencies(system);
+    if order.looped.is_empty() {
+        reasons.push("coupling once: no direct dependencies form a loop".to_owned());
+        return Coupling::Once;
+    }
+    let names: Vec<_> = order.looped.iter().map(|&k| system.slaves[k].0.as_str()).collect();
+    let names = shortened(&names);
+    let able = |can: fn(&CoSimulation) -> bool| {
+        system.slaves.iter().find(|(_, slave)| !flags(slave.as_ref()).is_some_and(can))
+    };
+    if let Some((unable, _)) = able(|flags| flags.can_get_and_set_fmu_state) {
+        reasons.push(format!(
+            "coupling once, although direct dependencies form a loop through {names}: the FMU \
+             state of {unable} cannot be set (canGetAndSetFMUstate)"
+        ));
+        Coupling::Once
+    } else if able(|flags| flags.provides_directional_derivative).is_none() {
+        reasons.push(format!(
+            "coupling newton: direct dependencies form a loop through {names}, and all FMUs have \
+             directional derivatives"
+        ));
+        Coupling::Newton
+    } else {
+        reasons.push(format!(
+            "coupling quasi-newton: direct dependencies form a loop through {names}, and not all \
+             FMUs have directional derivatives"
+        ));
+        Coupling::QuasiNewton
+    }
+}
+
+fn default_course(system: &System, reasons: &mut Vec<String>) -> Course {
+    let fed: std::collections::BTreeSet<usize> =
+        system.connections.iter().map(|connection| connection.to.slave).collect();
+    let unable: Vec<_> = fed
+        .into_iter()
+        .filter(|&k| {
+            !flags(system.slaves[k].1.as_ref()).is_some_and(|flags| flags.can_interpolate_inputs)
+        })
+        .map(|k| system.slaves[k].0.as_str())
+        .collect();
+    if unable.is_empty() {
+        reasons.push(
+            "course limited: all connected FMUs take input derivatives (canInterpolateInputs)"
+                .to_owned(),
+        );
+    } else {
+        reasons.push(format!(
+            "course limited, held for {}: canInterpolateInputs is false",
+            shortened(&unable)
+        ));
+    }
+    Course::Limited
+}
+
+/// The first names of a list.
+fn shortened(names: &[&str]) -> String {
+    const SHOWN: usize = 8;
+    let more = names.len().saturating_sub(SHOWN);
+    let shown = names[..names.len().min(SHOWN)].join(", ");
+    if more == 0 { shown } else { format!("{shown} and {more} more") }
+}
+
+fn multiples(system: &System, wanted: &Wanted) -> Result<Vec<u32>, SystemError> {
+    if wanted.every.is_empty() {
+        return Ok(Vec::new());
+    }
+    let mut multiples = vec![1; system.slaves.len()];
+    for (name, multiple) in &wanted.every {
+        multiples[system.slave(name)?] = *multiple;
+    }
+    Ok(multiples)
+}
+
+fn events(system: &System, wanted: &Wanted) -> Result<Vec<EventSource>, SystemError> {
+    let times = wanted.next_event.iter().map(|name| Ok(EventSource::NextTime(system.port(name)?)));
+    let crossings =
+        wanted.crossing.iter().map(|name| Ok(EventSource::Crossing(system.port(name)?)));
+    times.chain(crossings).collect()
+}
+
+fn bonds(system: &System, wanted: &Wanted) -> Result<Vec<PowerBond>, SystemError> {
+    let bond = |(first, second): &(String, String)| {
+        Ok(PowerBond { first: system.port(first)?, second: system.port(second)? })
+    };
+    wanted.power_bonds.iter().map(bond).collect()
+}

@@ -1,0 +1,116 @@
+//! The course of an input over a step, from what is known of its source.
+
+use crate::algorithm::Course;
+
+/// `value + slope s + curvature s^2 / 2` for the time s since the begin of the step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Polynomial {
+    pub(super) value: f64,
+    pub(super) slope: f64,
+    pub(super) curvature: f64,
+}
+
+/// What is known of an output: values at the begins of its last steps, the last one and two before
+/// it, and at the end of the last; derivatives at the begin where it gives them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Known {
+    pub(super) earlier: f64,
+    pub(super) before: f64,
+    pub(super) begin: f64,
+    pub(super) end: f64,
+    pub(super) slope: Option<f64>,
+    pub(super) curvature: Option<f64>,
+    /// Sizes of the last three steps in s.
+    pub(super) earlier_size: f64,
+    pub(super) last_size: f64,
+    pub(super) size: f64,
+}
+
+impl Polynomial {
+    pub(super) fn held(value: f64) -> Self {
+        Self { value, slope: 0.0, curvature: 0.0 }
+    }
+
+    /// The same polynomial with its origin `lead` s later.
+    pub(super) fn later(self, lead: f64) -> Self {
+        if lead == 0.0 {
+            return self;
+        }
+        Self {
+            value: self.value + lead * (self.slope + 0.5 * lead * self.curvature),
+            slope: self.slope + lead * self.curvature,
+            curvature: self.curvature,
+        }
+    }
+
+    /// Its value at the end of `size` s.
+    pub(super) fn end(self, size: f64) -> f64 {
+        self.later(size).value
+    }
+
+    /// Its mean over `size` s.
+    pub(super) fn mean(self, size: f64) -> f64 {
+        self.value + size * (self.slope / 2.0 + size * self.curvature / 6.0)
+    }
+}
+
+impl Known {
+    /// Over the step whose end is not known: from the begin onwards.
+    pub(super) fn extrapolated(&self, course: Course) -> Polynomial {
+        let quotient = (self.begin - self.before) / self.last_size;
+        let (slope, curvature) = match course {
+            Course::Hold => (0.0, 0.0),
+            Course::Limited => (self.limited(quotient), 0.0),
+            Course::Linear => (self.slope.unwrap_or(quotient), 0.0),
+            Course::Quadratic => self.parabola(quotient),
+        };
+        Polynomial { value: self.begin, slope, curvature }
+    }
+
+    /// Of derivative and difference quotient the smaller one, zero where their signs differ.
+    fn limited(&self, quotient: f64) -> f64 {
+        let Some(slope) = self.slope else { return quotient };
+        if slope * quotient <= 0.0 {
+            0.0
+        } else if slope.abs() < quotient.abs() {
+            slope
+        } else {
+            quotient
+        }
+    }
+
+    /// Slope and curvature at the begin: both given; or the parabola with the given slope through
+    /// the value before; or the one through the last three values.
+    fn parabola(&self, quotient: f64) -> (f64, f64) {
+        match (self.slope, self.curvature) {
+            (Some(slope), Some(curvature)) => (slope, curvature),
+            (Some(slope), None) => (slope, 2.0 * (slope - quotient) / self.last_size),
+            (None, _) => {
+                let sooner = (self.before - self.earlier) / self.earlier_size;
+                let curvature = 2.0 * (quotient - sooner) / (self.last_size + self.earlier_size);
+                (quotient + 0.5 * curvature * self.last_size, curvature)
+            }
+        }
+    }
+
+    /// Over the step whose end is known: between begin and end.
+    pub(super) fn interpolated(&self, course: Course) -> Polynomial {
+        let slope = (self.end - self.begin) / self.size;
+        match course {
+            Course::Hold => Polynomial::held(self.end),
+            Course::Limited | Course::Linear => {
+                Polynomial { value: self.begin, slope, curvature: 0.0 }
+            }
+            Course::Quadratic => {
+                let quotient = (self.begin - self.before) / self.last_size;
+                // Newton's divided difference where there is no derivative at the begin.
+                let curvature = match self.slope {
+                    Some(derivative) => 2.0 * (slope - derivative) / self.size,
+                    None => 2.0 * (slope - quotient) / (self.size + self.last_size),
+                };
+                let slope = slope - 0.5 * curvature * self.size;
+                Polynomial { value: self.begin, slope, curvature }
+            }
+        }
+    }
+}

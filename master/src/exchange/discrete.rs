@@ -1,0 +1,161 @@
+//! Connected Integers, Enumerations, Booleans and Strings: always held.
+
+use std::collections::HashMap;
+use std::ops::Range;
+
+use fmi2::description::Kind;
+
+use crate::slave::{CallError, Slave};
+use crate::system::{Connection, Port, System};
+use crate::transformation::Transformation;
+
+type Get<T> = fn(&mut dyn Slave, &[u32], &mut [T]) -> Result<(), CallError>;
+type Set<T> = fn(&mut dyn Slave, &[u32], &[T]) -> Result<(), CallError>;
+
+/// The functions and the transformation of a type.
+pub(crate) struct Access<T> {
+    get: Get<T>,
+    set: Set<T>,
+    map: fn(&T, &Transformation) -> T,
+}
+
+/// Integers and Enumerations.
+pub(crate) const INTEGERS: Access<i32> = Access {
+    get: |slave, references, values| slave.get_integer(references, values),
+    set: |slave, references, values| slave.set_integer(references, values),
+    map: |value, transformation| match transformation {
+        Transformation::Integer(pairs) => {
+            pairs.iter().find(|(from, _)| from == value).map_or(*value, |(_, to)| *to)
+        }
+        _ => *value,
+    },
+};
+
+/// Booleans.
+pub(crate) const BOOLEANS: Access<i32> = Access {
+    get: |slave, references, values| slave.get_boolean(references, values),
+    set: |slave, references, values| slave.set_boolean(references, values),
+    map: |value, transformation| match transformation {
+        Transformation::Boolean { from_false, from_true } => {
+            i32::from(if *value == 0 { *from_false } else { *from_true })
+        }
+        _ => *value,
+    },
+};
+
+/// Strings.
+pub(crate) const STRINGS: Access<String> = Access {
+    get: |slave, references, values| slave.get_string(references, values),
+    set: |slave, references, values| slave.set_string(references, values),
+    map: |value, _| value.clone(),
+};
+
+/// What one slave sets and reads of a type.
+#[derive(Default)]
+struct Lane {
+    inputs: Vec<u32>,
+    input_range: Range<usize>,
+    outputs: Vec<u32>,
+    output_range: Range<usize>,
+}
+
+/// The connected variables of one type.
+pub(crate) struct Channel<T> {
+    access: Access<T>,
+    lanes: Vec<Lane>,
+    output_ports: Vec<Port>,
+    /// For each input the index of its output, and what becomes of the value.
+    sources: Vec<usize>,
+    transformations: Vec<Transformation>,
+    input_ports: Vec<Port>,
+    /// Values of the outputs.
+    pub(crate) latest: Vec<T>,
+    /// What the inputs get.
+    values: Vec<T>,
+}
+
+impl<T: Clone + Default> Channel<T> {
+    /// The connections between variables of the kinds that `is_of` accepts, and the outputs `more`.
+    pub(crate) fn new(
+        system: &System,
+        access: Access<T>,
+        is_of: fn(&Kind) -> bool,
+        more: impl Iterator<Item = Port>,
+    ) -> Self {
+        let belongs = |connection: &&Connection| is_of(&system.variable(connection.to).kind);
+        let connections: Vec<_> = system.connections.iter().filter(belongs).collect();
+        let mut outputs: Vec<Port> =
+            connections.iter().map(|connection| connection.from).chain(more).collect();
+        outputs.sort_unstable_by_key(|port| (port.slave, port.variable));
+        outputs.dedup();
+        let mut inputs: Vec<_> = connections.clone();
+        inputs.sort_by_key(|connection| connection.to.slave);
+        let indices: HashMap<Port, usize> =
+            outputs.iter().enumerate().map(|(index, &port)| (port, index)).collect();
+        let mut lanes: Vec<Lane> = system.slaves.iter().map(|_| Lane::default()).collect();
+        for (slave, lane) in lanes.iter_mut().enumerate() {
+            let begin = outputs.partition_point(|port| port.slave < slave);
+            let end = outputs.partition_point(|port| port.slave <= slave);
+            lane.outputs = references(system, outputs[begin..end].iter().copied());
+            lane.output_range = begin..end;
+            let begin = inputs.partition_point(|connection| connection.to.slave < slave);
+            let end = inputs.partition_point(|connection| connection.to.slave <= slave);
+            let ports = inputs[begin..end].iter().map(|connection| connection.to);
+            lane.inputs = references(system, ports);
+            lane.input_range = begin..end;
+        }
+        Self {
+            access,
+            lanes,
+            sources: inputs.iter().map(|connection| indices[&connection.from]).collect(),
+            transformations: inputs.iter().map(|each| each.transformation.clone()).collect(),
+            input_ports: inputs.iter().map(|connection| connection.to).collect(),
+            latest: vec![T::default(); outputs.len()],
+            values: vec![T::default(); inputs.len()],
+            output_ports: outputs,
+        }
+    }
+
+    /// The value of an output that is exchanged.
+    pub(crate) fn value(&self, port: Port) -> Option<&T> {
+        let key = |known: &Port| (known.slave, known.variable);
+        let found = self.output_ports.binary_search_by_key(&key(&port), key);
+        found.ok().map(|index| &self.latest[index])
+    }
+
+    /// For each input its port and its source.
+    pub(crate) fn inputs(&self) -> impl Iterator<Item = (Port, Port)> {
+        let pairs = self.input_ports.iter().zip(&self.sources);
+        pairs.map(|(&input, &source)| (input, self.output_ports[source]))
+    }
+
+    /// The inputs of `slave` from the values of now.
+    pub(crate) fn gather(&mut self, slave: usize) {
+        for k in self.lanes[slave].input_range.clone() {
+            let value = &self.latest[self.sources[k]];
+            self.values[k] = (self.access.map)(value, &self.transformations[k]);
+        }
+    }
+
+    /// Sets the gathered inputs.
+    pub(crate) fn set(&self, slave: usize, instance: &mut dyn Slave) -> Result<(), CallError> {
+        let lane = &self.lanes[slave];
+        if lane.inputs.is_empty() {
+            return Ok(());
+        }
+        (self.access.set)(instance, &lane.inputs, &self.values[lane.input_range.clone()])
+    }
+
+    /// Reads the outputs.
+    pub(crate) fn read(&mut self, slave: usize, instance: &mut dyn Slave) -> Result<(), CallError> {
+        let lane = &self.lanes[slave];
+        if lane.outputs.is_empty() {
+            return Ok(());
+        }
+        (self.access.get)(instance, &lane.outputs, &mut self.latest[lane.output_range.clone()])
+    }
+}
+
+fn references(system: &System, ports: impl Iterator<Item = Port>) -> Vec<u32> {
+    ports.map(|port| system.variable(port).value_reference).collect()
+}

@@ -1,0 +1,183 @@
+//! Which values go where: arrays of value references and indices, made once.
+
+use std::collections::HashMap;
+use std::ops::Range;
+
+use fmi2::description::Kind;
+
+use crate::algorithm::{Algorithm, Course};
+use crate::system::{Port, System};
+use crate::transformation::Transformation;
+
+/// What one slave sets and reads of connected Reals.
+#[derive(Debug, Default)]
+pub(super) struct Lane {
+    pub(super) inputs: Vec<u32>,
+    /// Of the inputs in the arrays of all slaves.
+    pub(super) input_range: Range<usize>,
+    pub(super) derived_inputs: Vec<u32>,
+    pub(super) input_orders: Vec<i32>,
+    pub(super) input_derivative_range: Range<usize>,
+    pub(super) outputs: Vec<u32>,
+    pub(super) output_range: Range<usize>,
+    pub(super) derived_outputs: Vec<u32>,
+    pub(super) output_orders: Vec<i32>,
+    pub(super) output_derivative_range: Range<usize>,
+    /// Highest derivative that its inputs get and that its outputs give.
+    pub(super) input_order: usize,
+    pub(super) output_order: usize,
+}
+
+/// The connected Reals of all slaves.
+#[derive(Debug, Default)]
+pub(super) struct Layout {
+    pub(super) lanes: Vec<Lane>,
+    /// For each input: index of its output, factor and offset, and whether its course is a value
+    /// that is held.
+    pub(super) sources: Vec<u32>,
+    pub(super) factors: Vec<f64>,
+    pub(super) offsets: Vec<f64>,
+    pub(super) held: Vec<bool>,
+    pub(super) input_ports: Vec<Port>,
+    /// For each slave, whether all its inputs are outputs as they are.
+    pub(super) plain: Vec<bool>,
+    /// For each output: its port, its slave, and where its derivatives of first and second order
+    /// stand among the derivatives.
+    pub(super) output_ports: Vec<Port>,
+    pub(super) owners: Vec<u32>,
+    pub(super) slopes: Vec<Option<u32>>,
+    pub(super) curvatures: Vec<Option<u32>>,
+    /// Derivatives of all outputs, and of all inputs.
+    pub(super) output_derivatives: usize,
+    pub(super) input_derivatives: usize,
+    /// Outputs of type Integer that go to Reals: port, and index among the outputs, behind those of
+    /// the slaves.
+    pub(super) from_integers: Vec<(Port, usize)>,
+    indices: HashMap<Port, u32>,
+}
+
+impl Layout {
+    pub(super) fn new(system: &System, algorithm: &Algorithm) -> Self {
+        let count = system.slaves.len();
+        let mut layout = Self { plain: vec![true; count], ..Self::default() };
+        layout.lanes.resize_with(count, Lane::default);
+        layout.collect_outputs(system);
+        layout.collect_inputs(system);
+        for (slave, lane) in layout.lanes.iter_mut().enumerate() {
+            let Some(flags) = &system.slaves[slave].1.description().co_simulation else { continue };
+            let wanted = match algorithm.course {
+                Course::Hold => 0,
+                Course::Limited | Course::Linear => 1,
+                Course::Quadratic => 2,
+            };
+            lane.input_order = if flags.can_interpolate_inputs { wanted } else { 0 };
+            lane.output_order = wanted.min(flags.max_output_derivative_order as usize);
+        }
+        layout.place_derivatives();
+        layout
+    }
+
+    /// Every connected Real output once, slave by slave; then the Integers that go to Reals.
+    fn collect_outputs(&mut self, system: &System) {
+        let mut by_slave = vec![Vec::new(); self.lanes.len()];
+        let mut integers = Vec::new();
+        for connection in &system.connections {
+            let (from, to) = (connection.from, connection.to);
+            if !matches!(system.variable(to).kind, Kind::Real(_)) {
+                continue;
+            }
+            if self.indices.insert(from, 0).is_some() {
+                continue;
+            }
+            if matches!(system.variable(from).kind, Kind::Real(_)) {
+                by_slave[from.slave].push(from);
+            } else {
+                integers.push(from);
+            }
+        }
+        for (slave, ports) in by_slave.into_iter().enumerate() {
+            let begin = self.output_ports.len();
+            for port in ports {
+                self.add_output(port);
+                self.lanes[slave].outputs.push(system.variable(port).value_reference);
+            }
+            self.lanes[slave].output_range = begin..self.output_ports.len();
+        }
+        for port in integers {
+            self.from_integers.push((port, self.output_ports.len()));
+            self.add_output(port);
+        }
+    }
+
+    fn add_output(&mut self, port: Port) {
+        self.indices.insert(port, index(self.output_ports.len()));
+        self.output_ports.push(port);
+        self.owners.push(index(port.slave));
+        self.slopes.push(None);
+        self.curvatures.push(None);
+    }
+
+    fn collect_inputs(&mut self, system: &System) {
+        let mut by_slave = vec![Vec::new(); self.lanes.len()];
+        for connection in &system.connections {
+            if matches!(system.variable(connection.to).kind, Kind::Real(_)) {
+                by_slave[connection.to.slave].push(connection);
+            }
+        }
+        for (slave, connections) in by_slave.into_iter().enumerate() {
+            let begin = self.sources.len();
+            for connection in connections {
+                let variable = system.variable(connection.to);
+                self.lanes[slave].inputs.push(variable.value_reference);
+                self.input_ports.push(connection.to);
+                self.sources.push(self.indices[&connection.from]);
+                let (factor, offset) = match connection.transformation {
+                    Transformation::Linear { factor, offset } => (factor, offset),
+                    _ => (1.0, 0.0),
+                };
+                self.plain[slave] &= connection.transformation == Transformation::Identity;
+                self.factors.push(factor);
+                self.offsets.push(offset);
+                let real = matches!(system.variable(connection.from).kind, Kind::Real(_));
+                self.held.push(!real);
+            }
+            self.lanes[slave].input_range = begin..self.sources.len();
+        }
+    }
+
+    /// Derivatives stand slave by slave, those of first order before those of second.
+    fn place_derivatives(&mut self) {
+        for lane in &mut self.lanes {
+            let begin = self.output_derivatives;
+            for order in 1..=lane.output_order {
+                for output in lane.output_range.clone() {
+                    let places = if order == 1 { &mut self.slopes } else { &mut self.curvatures };
+                    places[output] = Some(index(self.output_derivatives));
+                    self.output_derivatives += 1;
+                }
+                lane.derived_outputs.extend(&lane.outputs);
+                lane.output_orders
+                    .extend(lane.outputs.iter().map(|_| if order == 1 { 1 } else { 2 }));
+            }
+            lane.output_derivative_range = begin..self.output_derivatives;
+            let begin = self.input_derivatives;
+            for order in 1..=lane.input_order {
+                self.input_derivatives += lane.inputs.len();
+                lane.derived_inputs.extend(&lane.inputs);
+                lane.input_orders
+                    .extend(lane.inputs.iter().map(|_| if order == 1 { 1 } else { 2 }));
+            }
+            lane.input_derivative_range = begin..self.input_derivatives;
+        }
+    }
+
+    /// The index of an output.
+    pub(super) fn output(&self, port: Port) -> Option<usize> {
+        self.indices.get(&port).map(|&index| index as usize)
+    }
+}
+
+/// A position as it is kept: systems have fewer than 2^32 variables.
+fn index(position: usize) -> u32 {
+    u32::try_from(position).unwrap_or(u32::MAX)
+}

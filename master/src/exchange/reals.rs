@@ -1,0 +1,321 @@
+//! Connected Reals: values and derivatives of outputs over their last steps, and what inputs get.
+
+use serde::{Deserialize, Serialize};
+
+use super::course::{Known, Polynomial};
+use super::layout::Layout;
+use crate::algorithm::{Algorithm, Course, Sweep};
+use crate::slave::{Advance, CallError, Slave, Stepped};
+use crate::system::{Port, System};
+
+/// When a slave last stepped.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+struct Span {
+    /// Begin of its last step in s.
+    begin: f64,
+    /// Sizes of the last step and of those before it in s.
+    size: f64,
+    last_size: f64,
+    earlier_size: f64,
+    /// Whether the values at its end count already.
+    stepped: bool,
+}
+
+/// Everything that changes on the way.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub(crate) struct Trace {
+    /// Values of all outputs at the end of the last step, at its begin, and before.
+    latest: Vec<f64>,
+    begin: Vec<f64>,
+    before: Vec<f64>,
+    earlier: Vec<f64>,
+    /// Derivatives of all outputs at the end of the last step and at its begin.
+    derivatives: Vec<f64>,
+    begin_derivatives: Vec<f64>,
+    /// For each slave, and one for what comes from no slave.
+    spans: Vec<Span>,
+}
+
+/// The connected Reals of a system.
+#[derive(Debug)]
+pub(crate) struct Reals {
+    layout: Layout,
+    course: Course,
+    sweep: Sweep,
+    /// Every input is held and all slaves step together: the latest values are all it takes.
+    simple: bool,
+    pub(crate) trace: Trace,
+    /// What the inputs get.
+    values: Vec<f64>,
+    input_derivatives: Vec<f64>,
+}
+
+impl Trace {
+    /// Takes over all values of `other`, of the same system, into the arrays that are there.
+    pub(crate) fn copy(&mut self, other: &Self) {
+        self.latest.clone_from(&other.latest);
+        self.begin.clone_from(&other.begin);
+        self.before.clone_from(&other.before);
+        self.earlier.clone_from(&other.earlier);
+        self.derivatives.clone_from(&other.derivatives);
+        self.begin_derivatives.clone_from(&other.begin_derivatives);
+        self.spans.clone_from(&other.spans);
+    }
+}
+
+impl Reals {
+    pub(crate) fn new(system: &System, algorithm: &Algorithm) -> Self {
+        let layout = Layout::new(system, algorithm);
+        let (outputs, derivatives) = (layout.output_ports.len(), layout.output_derivatives);
+        let span =
+            Span { begin: 0.0, size: 1.0, last_size: 1.0, earlier_size: 1.0, stepped: false };
+        let trace = Trace {
+            latest: vec![0.0; outputs],
+            begin: vec![0.0; outputs],
+            before: vec![0.0; outputs],
+            earlier: vec![0.0; outputs],
+            derivatives: vec![0.0; derivatives],
+            begin_derivatives: vec![0.0; derivatives],
+            spans: vec![span; system.slaves.len() + 1],
+        };
+        Self {
+            values: vec![0.0; layout.sources.len()],
+            input_derivatives: vec![0.0; layout.input_derivatives],
+            course: algorithm.course,
+            sweep: algorithm.sweep,
+            simple: algorithm.course == Course::Hold
+                && algorithm.multiples.iter().all(|&multiple| multiple == 1),
+            layout,
+            trace,
+        }
+    }
+
+    /// The index of an output among [`Reals::outputs`], where it is connected.
+    pub(crate) fn output(&self, port: Port) -> Option<usize> {
+        self.layout.output(port)
+    }
+
+    /// The connected outputs.
+    pub(crate) fn ports(&self) -> &[Port] {
+        &self.layout.output_ports
+    }
+
+    /// Their values.
+    pub(crate) fn outputs(&self) -> &[f64] {
+        &self.trace.latest
+    }
+
+    /// As [`Reals::outputs`], to be changed by an iteration.
+    pub(crate) fn outputs_mut(&mut self) -> &mut [f64] {
+        &mut self.trace.latest
+    }
+
+    /// The outputs of type Integer that go to Reals: port, and index among the outputs.
+    pub(crate) fn from_integers(&self) -> &[(Port, usize)] {
+        &self.layout.from_integers
+    }
+
+    /// For each connected input its port, the index of its output, factor and offset.
+    pub(crate) fn inputs(&self) -> impl Iterator<Item = (Port, usize, f64, f64)> {
+        let layout = &self.layout;
+        (0..layout.sources.len()).map(|k| {
+            let source = layout.sources[k] as usize;
+            (layout.input_ports[k], source, layout.factors[k], layout.offsets[k])
+        })
+    }
+
+    /// The slave will step from `time` over `size`: what was its end is its begin.
+    pub(crate) fn shift(&mut self, slave: usize, time: f64, size: f64) {
+        if self.simple {
+            return;
+        }
+        let trace = &mut self.trace;
+        let (range, derived) = match self.layout.lanes.get(slave) {
+            Some(lane) => (lane.output_range.clone(), lane.output_derivative_range.clone()),
+            None => {
+                let first = self.layout.from_integers.first();
+                (first.map_or(trace.latest.len(), |first| first.1)..trace.latest.len(), 0..0)
+            }
+        };
+        let span = &mut trace.spans[slave];
+        (span.earlier_size, span.last_size) = (span.last_size, span.size);
+        (span.begin, span.size, span.stepped) = (time, size, false);
+        trace.earlier[range.clone()].copy_from_slice(&trace.before[range.clone()]);
+        trace.before[range.clone()].copy_from_slice(&trace.begin[range.clone()]);
+        trace.begin[range.clone()].copy_from_slice(&trace.latest[range]);
+        let derivatives = &trace.derivatives[derived.clone()];
+        trace.begin_derivatives[derived].copy_from_slice(derivatives);
+    }
+
+    /// Values of now have no past: the course of inputs begins anew.
+    pub(crate) fn forget(&mut self) {
+        let trace = &mut self.trace;
+        for past in [&mut trace.begin, &mut trace.before, &mut trace.earlier] {
+            past.copy_from_slice(&trace.latest);
+        }
+    }
+
+    /// The inputs of `slave` for a step from `time` over `size`.
+    pub(crate) fn gather(&mut self, slave: usize, time: f64, size: f64) {
+        let range = self.layout.lanes[slave].input_range.clone();
+        if self.simple {
+            let sources = &self.layout.sources[range.clone()];
+            for (value, &source) in self.values[range.clone()].iter_mut().zip(sources) {
+                *value = self.trace.latest[source as usize];
+            }
+            if !self.layout.plain[slave] {
+                for k in range {
+                    self.values[k] =
+                        self.layout.factors[k].mul_add(self.values[k], self.layout.offsets[k]);
+                }
+            }
+            return;
+        }
+        let begin = range.start;
+        for k in range {
+            self.place(slave, k, k - begin, time, size);
+        }
+    }
+
+    /// Value and derivatives of the input at index `k`, the slave's input number `position`.
+    fn place(&mut self, slave: usize, k: usize, position: usize, time: f64, size: f64) {
+        let (layout, lane) = (&self.layout, &self.layout.lanes[slave]);
+        let mut course = self.polynomial(layout.sources[k] as usize, time);
+        let known = self.is_known(layout.sources[k] as usize);
+        if layout.held[k] || self.course == Course::Hold {
+            course = Polynomial::held(course.value);
+        }
+        let value = match (lane.input_order, self.course) {
+            (0, Course::Limited) if known => course.end(size),
+            (0, Course::Linear | Course::Quadratic) => course.mean(size),
+            _ => course.value,
+        };
+        let factor = layout.factors[k];
+        self.values[k] =
+            if layout.plain[slave] { value } else { factor.mul_add(value, layout.offsets[k]) };
+        let (count, first) = (lane.inputs.len(), lane.input_derivative_range.start + position);
+        if lane.input_order > 0 {
+            self.input_derivatives[first] = factor * course.slope;
+        }
+        if lane.input_order > 1 {
+            self.input_derivatives[first + count] = factor * course.curvature;
+        }
+    }
+
+    /// Whether the source of that output has stepped beyond the begin of the current step.
+    fn is_known(&self, output: usize) -> bool {
+        self.sweep == Sweep::GaussSeidel
+            && self.trace.spans[self.layout.owners[output] as usize].stepped
+    }
+
+    /// What is known of an output over the last step of its slave.
+    fn known(&self, output: usize, span: &Span) -> Known {
+        let (layout, trace) = (&self.layout, &self.trace);
+        let derivative = |place: Option<u32>| place.map(|k| trace.begin_derivatives[k as usize]);
+        Known {
+            earlier: trace.earlier[output],
+            before: trace.before[output],
+            begin: trace.begin[output],
+            end: trace.latest[output],
+            slope: derivative(layout.slopes[output]),
+            curvature: derivative(layout.curvatures[output]),
+            earlier_size: span.earlier_size,
+            last_size: span.last_size,
+            size: span.size,
+        }
+    }
+
+    /// The course of an output from `time` on.
+    fn polynomial(&self, output: usize, time: f64) -> Polynomial {
+        let (layout, trace) = (&self.layout, &self.trace);
+        let span = &trace.spans[layout.owners[output] as usize];
+        let known = self.known(output, span);
+        let course = if self.is_known(output) {
+            known.interpolated(self.course)
+        } else {
+            known.extrapolated(self.course)
+        };
+        course.later(time - span.begin)
+    }
+
+    /// How far the extrapolation of each output over the last step of `size` s was off, into `errors`.
+    pub(crate) fn extrapolation_errors(&self, size: f64, errors: &mut [f64]) {
+        for (output, error) in errors.iter_mut().enumerate() {
+            let span = &self.trace.spans[self.layout.owners[output] as usize];
+            let mut known = self.known(output, span);
+            known.size = size;
+            *error = self.trace.latest[output] - known.extrapolated(self.course).end(size);
+        }
+    }
+
+    /// Sets the gathered inputs of `slave`, steps it, reads its outputs.
+    #[inline]
+    pub(crate) fn advance(
+        &mut self,
+        slave: usize,
+        instance: &mut dyn Slave,
+        (time, size): (f64, f64),
+        never_back: bool,
+    ) -> Result<Stepped, CallError> {
+        let lane = &self.layout.lanes[slave];
+        let trace = &mut self.trace;
+        let done = instance.advance(&mut Advance {
+            inputs: &lane.inputs,
+            input_values: &self.values[lane.input_range.clone()],
+            derived_inputs: &lane.derived_inputs,
+            input_orders: &lane.input_orders,
+            input_derivatives: &self.input_derivatives[lane.input_derivative_range.clone()],
+            time,
+            size,
+            never_back,
+            outputs: &lane.outputs,
+            output_values: &mut trace.latest[lane.output_range.clone()],
+            derived_outputs: &lane.derived_outputs,
+            output_orders: &lane.output_orders,
+            output_derivatives: &mut trace.derivatives[lane.output_derivative_range.clone()],
+        })?;
+        trace.spans[slave].stepped = true;
+        Ok(done)
+    }
+
+    /// Reads the connected outputs of a slave and their derivatives.
+    pub(crate) fn read(&mut self, slave: usize, instance: &mut dyn Slave) -> Result<(), CallError> {
+        let (lane, trace) = (&self.layout.lanes[slave], &mut self.trace);
+        if !lane.outputs.is_empty() {
+            instance.get_real(&lane.outputs, &mut trace.latest[lane.output_range.clone()])?;
+        }
+        if lane.derived_outputs.is_empty() {
+            return Ok(());
+        }
+        let derivatives = &mut trace.derivatives[lane.output_derivative_range.clone()];
+        instance.get_output_derivatives(&lane.derived_outputs, &lane.output_orders, derivatives)
+    }
+
+    /// The output that has a value or a derivative that is not finite.
+    pub(crate) fn not_finite(&self, slave: usize) -> Option<(Port, f64)> {
+        let (lane, trace) = (&self.layout.lanes[slave], &self.trace);
+        let values = &trace.latest[lane.output_range.clone()];
+        let derivatives = &trace.derivatives[lane.output_derivative_range.clone()];
+        if all_finite(values) && all_finite(derivatives) {
+            return None;
+        }
+        let both = values.iter().chain(derivatives).enumerate();
+        let (position, &value) = both.into_iter().find(|(_, value)| !value.is_finite())?;
+        let output = lane.output_range.start + position % values.len();
+        Some((self.layout.output_ports[output], value))
+    }
+}
+
+/// Whether all values are numbers and finite: of any other the difference with itself is none.
+#[inline]
+fn all_finite(values: &[f64]) -> bool {
+    let mut sums = [0.0; 4];
+    let chunks = values.chunks_exact(4);
+    let rest: f64 = chunks.remainder().iter().map(|value| value - value).sum();
+    for chunk in chunks {
+        for (sum, value) in sums.iter_mut().zip(chunk) {
+            *sum += value - value;
+        }
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest == 0.0
+}

@@ -1,0 +1,167 @@
+//! The time of a change of sign.
+
+use serde::{Deserialize, Serialize};
+
+/// A change of sign between two times, made narrower by each further value.
+///
+/// Signs as FMI has them for event indicators: above zero, or not. Interpolate, truncate and project
+/// (Oliveira and Takahashi 2021, "An enhancement of the bisection method average performance
+/// preserving minmax optimality", ACM Trans. Math. Softw. 47, with `kappa_1 = 0.2 / (b - a)`, `kappa_2 = 2`,
+/// `n_0 = 1`): superlinear where the function is smooth, and never more than one value above what
+/// bisection needs, `ceil(log2((b - a) / width)) + 1`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Bracket {
+    left: (f64, f64),
+    right: (f64, f64),
+    width: f64,
+    truncation: f64,
+    /// Half the width that bisection would have reached, had it one value more.
+    radius: f64,
+}
+
+impl Bracket {
+    /// A change of sign between the times `left` and `right`, given with the values there, to be known
+    /// to `width` s; none where there is no change, or one of the four is not finite.
+    ///
+    /// A width below what the numbers can tell apart is taken as that.
+    #[must_use]
+    pub fn new(left: (f64, f64), right: (f64, f64), width: f64) -> Option<Self> {
+        let all = [left.0, left.1, right.0, right.1];
+        let changes = (left.1 > 0.0) != (right.1 > 0.0);
+        if !changes || !all.iter().all(|value| value.is_finite()) || left.0 >= right.0 {
+            return None;
+        }
+        let whole = right.0 - left.0;
+        let least = 4.0 * f64::EPSILON * left.0.abs().max(right.0.abs());
+        let width = if width > least { width } else { least };
+        let halvings = (whole / width).log2().ceil().max(0.0);
+        let radius = 0.5 * width * (halvings + 1.0).exp2();
+        Some(Self { left, right, width, truncation: 0.2 / whole, radius })
+    }
+
+    /// Where to evaluate next; none where the change of sign is known to the width.
+    #[must_use]
+    pub fn ask(&self) -> Option<f64> {
+        let ((a, fa), (b, fb)) = (self.left, self.right);
+        if b - a <= self.width {
+            return None;
+        }
+        let middle = a + 0.5 * (b - a);
+        let secant = a + (b - a) * (fa / (fa - fb));
+        let towards = if middle >= secant { 1.0 } else { -1.0 };
+        let step = self.truncation * (b - a).powi(2);
+        let truncated =
+            if step <= (middle - secant).abs() { secant + towards * step } else { middle };
+        let room = (self.radius - 0.5 * (b - a)).max(0.0);
+        let projected =
+            if (truncated - middle).abs() <= room { truncated } else { middle - towards * room };
+        let inside = projected > a && projected < b;
+        Some(if inside { projected } else { middle })
+    }
+
+    /// The value at the time asked for. Not a number leaves all as it is but the patience.
+    pub fn tell(&mut self, time: f64, value: f64) {
+        self.radius *= 0.5;
+        if (value > 0.0) == (self.right.1 > 0.0) {
+            self.right = (time, value);
+        } else {
+            self.left = (time, value);
+        }
+    }
+
+    /// The last time known before the change of sign.
+    #[must_use]
+    pub fn before(&self) -> f64 {
+        self.left.0
+    }
+
+    /// The first time known after it: where a step has to end so that the event has happened.
+    #[must_use]
+    pub fn after(&self) -> f64 {
+        self.right.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The bracket at the end, and how many values it took.
+    fn locate(function: impl Fn(f64) -> f64, a: f64, b: f64, width: f64) -> (Bracket, u32) {
+        let mut bracket = Bracket::new((a, function(a)), (b, function(b)), width).unwrap();
+        let mut count = 0;
+        while let Some(time) = bracket.ask() {
+            assert!(time > bracket.before() && time < bracket.after());
+            bracket.tell(time, function(time));
+            count += 1;
+        }
+        (bracket, count)
+    }
+
+    #[test]
+    fn roots_known_in_closed_form_lie_in_the_bracket() {
+        type Function = fn(f64) -> f64;
+        let cases: [(Function, f64, f64, f64); 5] = [
+            (|t| t * t - 2.0, 0.0, 2.0, f64::sqrt(2.0)),
+            (|t| t.cos(), 1.0, 2.0, std::f64::consts::FRAC_PI_2),
+            (|t| (1.0 - 9.81 * 0.5 * t * t).powi(3), 0.0, 1.0, f64::sqrt(2.0 / 9.81)),
+            (|t| (t - 1e-9).exp() - 1.0, -1.0, 1.0, 1e-9),
+            (|t| if t < 0.3 { 1.0 } else { -5.0 }, 0.0, 1.0, 0.3),
+        ];
+        for (number, (function, a, b, root)) in cases.into_iter().enumerate() {
+            let (found, _) = locate(function, a, b, 1e-12);
+            let range = found.before() - 1e-15..=found.after() + 1e-15;
+            assert!(range.contains(&root), "{number}: {found:?}");
+            assert!(found.after() - found.before() <= 1e-12);
+        }
+    }
+
+    #[test]
+    fn never_more_values_than_bisection_and_one() {
+        // ceil(log2(1 / 1e-9)) = 30
+        let hard: [fn(f64) -> f64; 4] = [
+            |t| if t < 0.7 { 1e-9 } else { -1e9 },
+            |t| (t - 0.9).powi(21),
+            |t| (0.1 - t).signum(),
+            |t| (-50.0 * t).exp() - 1e-15,
+        ];
+        for function in hard {
+            assert!(locate(function, 0.0, 1.0, 1e-9).1 <= 31);
+        }
+    }
+
+    #[test]
+    fn smooth_functions_take_far_fewer() {
+        let (_, count) = locate(|t| t * t * t + t - 1.0, 0.0, 1.0, 1e-12);
+        assert!(count <= 10, "{count} where bisection takes 40");
+    }
+
+    #[test]
+    fn a_value_of_zero_is_not_above_zero() {
+        // From above to exactly zero is a change, from zero to below is none.
+        let found = Bracket::new((0.0, 1.0), (1.0, 0.0), 1e-3).unwrap();
+        assert_eq!(found.after().to_bits(), 1.0_f64.to_bits());
+        assert!(Bracket::new((0.0, 0.0), (1.0, -1.0), 1e-3).is_none());
+        assert!(Bracket::new((0.0, 0.0), (1.0, 1.0), 1e-3).is_some());
+    }
+
+    #[test]
+    fn what_is_no_bracket_is_refused() {
+        assert!(Bracket::new((0.0, 1.0), (1.0, 2.0), 1e-3).is_none());
+        assert!(Bracket::new((1.0, 1.0), (0.0, -1.0), 1e-3).is_none());
+        assert!(Bracket::new((0.0, f64::NAN), (1.0, 1.0), 1e-3).is_none());
+        assert!(Bracket::new((0.0, f64::NEG_INFINITY), (1.0, 1.0), 1e-3).is_none());
+    }
+
+    #[test]
+    fn a_width_that_doubles_cannot_resolve_ends_too() {
+        let (found, count) = locate(|t| t - 1000.5, 1000.0, 1001.0, 0.0);
+        assert!(found.after() - found.before() < 1e-12 && count < 60);
+        let gap = |t| {
+            let late = if t < 1001.0 { f64::NAN } else { -1.0 };
+            if t < 1000.3 { 1.0 } else { late }
+        };
+        let (_, count) = locate(gap, 1000.0, 1001.0, 0.0);
+        assert!(count < 60);
+    }
+}

@@ -1,0 +1,176 @@
+//! The matrix of an iteration, learned from its steps.
+
+use serde::{Deserialize, Serialize};
+
+/// A change of the residual that is less than this part of that of the values is their rounding.
+const ROUNDING: f64 = 1e-11;
+
+/// Pairs of differences: dR of residuals and dG of values, the newest first.
+///
+/// The least squares problem `min |r - dR c|` in the weighted norm is solved by Gram-Schmidt
+/// orthogonalisation, done twice, from the newest column to the oldest. A column of which less than a given
+/// part is left beside the newer ones says nothing new, and is dropped: the filter QR2 of
+/// Haelterman, Bogaers, Scheufele, Uekermann and Mehl 2016, "Improving the performance of the
+/// partitioned QN-ILS procedure for fluid-structure interaction problems: Filtering".
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct Secants {
+    n: usize,
+    capacity: usize,
+    /// Slots in use, the newest first, and the solution to which each belongs.
+    order: Vec<usize>,
+    ages: Vec<u32>,
+    free: Vec<usize>,
+    residuals: Vec<f64>,
+    values: Vec<f64>,
+    /// Orthonormal columns, the triangle R (column by column), `Q' r` and then c.
+    orthonormal: Vec<f64>,
+    triangle: Vec<f64>,
+    coefficients: Vec<f64>,
+}
+
+impl Secants {
+    pub(super) fn new(n: usize, capacity: usize) -> Self {
+        Self {
+            n,
+            capacity,
+            order: Vec::with_capacity(capacity),
+            ages: vec![0; capacity],
+            free: (0..capacity).collect(),
+            residuals: vec![0.0; n * capacity],
+            values: vec![0.0; n * capacity],
+            orthonormal: vec![0.0; n * capacity],
+            triangle: vec![0.0; capacity * capacity],
+            coefficients: vec![0.0; capacity],
+        }
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.free.append(&mut self.order);
+        self.free.sort_unstable_by(|a, b| b.cmp(a));
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.order.is_empty()
+    }
+
+    /// A solution has ended: all pairs are one older, those older than `oldest` are dropped.
+    pub(super) fn grow_older(&mut self, oldest: u32) {
+        for &slot in &self.order {
+            self.ages[slot] += 1;
+        }
+        let (ages, free) = (&self.ages, &mut self.free);
+        self.order.retain(|&slot| {
+            let kept = ages[slot] <= oldest;
+            if !kept {
+                free.push(slot);
+            }
+            kept
+        });
+    }
+
+    /// Adds the pair `after - before`; the oldest one makes room.
+    pub(super) fn push(&mut self, residual: (&[f64], &[f64]), value: (&[f64], &[f64])) {
+        let Some(slot) = self.free.pop().or_else(|| self.order.pop()) else { return };
+        let place = slot * self.n..(slot + 1) * self.n;
+        subtract(&mut self.residuals[place.clone()], residual);
+        subtract(&mut self.values[place], value);
+        self.ages[slot] = 0;
+        self.order.insert(0, slot);
+    }
+
+    /// `u_next = g - dG c`, where c is the least squares solution of `dR c = residual`.
+    ///
+    /// `filters`: parts below which pairs of this solution and of earlier ones are dropped.
+    pub(super) fn apply(
+        &mut self,
+        residual: &[f64],
+        weights: &[f64],
+        filters: (f64, f64),
+        (g, u_next): (&[f64], &mut [f64]),
+    ) {
+        let mut kept = 0;
+        while kept < self.order.len() {
+            let slot = self.order[kept];
+            let filter = if self.ages[slot] == 0 { filters.0 } else { filters.1 };
+            if kept < self.n && self.orthogonalise(slot, kept, weights, filter) {
+                kept += 1;
+            } else {
+                self.order.remove(kept);
+                self.free.push(slot);
+            }
+        }
+        self.project(kept, residual, weights);
+        u_next.copy_from_slice(g);
+        for (&slot, coefficient) in self.order.iter().zip(&self.coefficients) {
+            let column = &self.values[slot * self.n..(slot + 1) * self.n];
+            for (next, entry) in u_next.iter_mut().zip(column) {
+                *next -= coefficient * entry;
+            }
+        }
+    }
+
+    /// Makes column `kept` of Q and R of `slot`; false where less than `filter` of it is new.
+    fn orthogonalise(&mut self, slot: usize, kept: usize, weights: &[f64], filter: f64) -> bool {
+        let n = self.n;
+        let (done, rest) = self.orthonormal.split_at_mut(kept * n);
+        let column = &mut rest[..n];
+        let source = &self.residuals[slot * n..(slot + 1) * n];
+        for ((entry, value), weight) in column.iter_mut().zip(source).zip(weights) {
+            *entry = value / weight;
+        }
+        let whole = length(column);
+        let triangle = &mut self.triangle[kept * self.capacity..][..=kept];
+        triangle.fill(0.0);
+        for _ in 0..2 {
+            for (other, entry) in done.chunks_exact(n).zip(triangle.iter_mut()) {
+                let part = dot(other, column);
+                *entry += part;
+                for (value, direction) in column.iter_mut().zip(other) {
+                    *value -= part * direction;
+                }
+            }
+        }
+        let left = length(column);
+        let change = &self.values[slot * n..(slot + 1) * n];
+        let change = change.iter().zip(weights).map(|(value, weight)| (value / weight).powi(2));
+        if left <= filter * whole || left <= ROUNDING * change.sum::<f64>().sqrt() || left.is_nan()
+        {
+            return false;
+        }
+        triangle[kept] = left;
+        for entry in column {
+            *entry /= left;
+        }
+        true
+    }
+
+    /// The coefficients c: `R c = Q' residual`.
+    fn project(&mut self, kept: usize, residual: &[f64], weights: &[f64]) {
+        for (column, entry) in self.orthonormal.chunks_exact(self.n).zip(&mut self.coefficients) {
+            let products = column.iter().zip(residual).zip(weights);
+            *entry = products.map(|((q, r), weight)| q * r / weight).sum();
+        }
+        for column in (0..kept).rev() {
+            let entries = &self.triangle[column * self.capacity..][..=column];
+            let value = self.coefficients[column] / entries[column];
+            self.coefficients[column] = value;
+            for (other, entry) in self.coefficients.iter_mut().zip(&entries[..column]) {
+                *other -= entry * value;
+            }
+        }
+    }
+}
+
+fn subtract(target: &mut [f64], (after, before): (&[f64], &[f64])) {
+    for ((target, after), before) in target.iter_mut().zip(after).zip(before) {
+        *target = after - before;
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn length(a: &[f64]) -> f64 {
+    dot(a, a).sqrt()
+}

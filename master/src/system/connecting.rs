@@ -1,0 +1,92 @@
+//! Whether two variables can be connected, and what happens to values between them.
+
+use fmi2::description::{Causality, Kind};
+
+use super::{Connection, Port, System, units};
+use crate::error::SystemError;
+use crate::transformation::Transformation;
+
+impl System {
+    /// Connects `from` to `to`.
+    pub(super) fn join(
+        &mut self,
+        from: Port,
+        to: Port,
+        transformation: Transformation,
+        units_settled: bool,
+    ) -> Result<(), SystemError> {
+        self.expect_causality(from, Causality::Output)?;
+        self.expect_causality(to, Causality::Input)?;
+        self.expect_fitting_types(from, to, &transformation)?;
+        let transformation = if units_settled {
+            transformation
+        } else {
+            match self.conversion(from, to)? {
+                Some(conversion) => units::after(conversion, transformation),
+                None => transformation,
+            }
+        };
+        if let Some(first) = self.source(to) {
+            let first = self.name(first.from);
+            return Err(SystemError::Twice {
+                input: self.name(to),
+                first,
+                second: self.name(from),
+            });
+        }
+        self.sources.insert(to, self.connections.len());
+        self.connections.push(Connection { from, to, transformation });
+        Ok(())
+    }
+
+    fn expect_causality(&self, port: Port, expected: Causality) -> Result<(), SystemError> {
+        let found = self.variable(port).causality;
+        if found == expected {
+            return Ok(());
+        }
+        Err(SystemError::Role {
+            name: self.name(port),
+            found: format!("a variable of causality {}", found.as_str()),
+            expected: expected.as_str().to_owned(),
+        })
+    }
+
+    /// Types fit when they are the same, an Integer and an Enumeration, or an Integer that goes to a
+    /// Real; the transformation must be one of that type.
+    fn expect_fitting_types(
+        &self,
+        from: Port,
+        to: Port,
+        transformation: &Transformation,
+    ) -> Result<(), SystemError> {
+        use Kind::{Boolean, Enumeration, Integer, Real, String};
+        let (source, target) = (&self.variable(from).kind, &self.variable(to).kind);
+        let fits = match (source, target) {
+            (Real(_) | Integer(_) | Enumeration(_), Real(_)) => {
+                matches!(transformation, Transformation::Identity | Transformation::Linear { .. })
+            }
+            (Integer(_) | Enumeration(_), Integer(_) | Enumeration(_)) => {
+                matches!(transformation, Transformation::Identity | Transformation::Integer(_))
+            }
+            (Boolean(_), Boolean(_)) => {
+                matches!(transformation, Transformation::Identity | Transformation::Boolean { .. })
+            }
+            (String(_), String(_)) => *transformation == Transformation::Identity,
+            _ => {
+                return Err(SystemError::Role {
+                    name: self.name(to),
+                    found: format!("a variable of type {}", target.element()),
+                    expected: format!("{} as {}", source.element(), self.name(from)),
+                });
+            }
+        };
+        if fits {
+            return Ok(());
+        }
+        Err(SystemError::Role {
+            name: self.name(to),
+            found: format!("a variable of type {}", target.element()),
+            expected: format!("the type that its transformation is for: {transformation:?}"),
+        })
+    }
+}

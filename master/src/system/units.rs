@@ -1,0 +1,65 @@
+//! Conversion between units of the same base.
+
+use fmi2::description::Kind;
+use fmi2::unit::BaseUnit;
+
+use super::{Port, System};
+use crate::error::SystemError;
+use crate::transformation::Transformation;
+
+impl System {
+    /// Name and base of a variable's unit, where it has one.
+    fn unit(&self, port: Port) -> Option<(&String, Option<BaseUnit>)> {
+        let Kind::Real(real) = &self.variable(port).kind else { return None };
+        let name = real.unit.as_ref()?;
+        let description = self.slaves[port.slave].1.description();
+        let base = description.units.iter().find(|unit| unit.name == *name)?.base;
+        Some((name, base))
+    }
+
+    /// Factor and offset from the unit of one variable to that of the other; none where they are
+    /// the same or one of them has no unit.
+    pub(super) fn conversion(
+        &self,
+        from: Port,
+        to: Port,
+    ) -> Result<Option<(f64, f64)>, SystemError> {
+        let (Some(source), Some(target)) = (self.unit(from), self.unit(to)) else {
+            return Ok(None);
+        };
+        if source.0 == target.0 {
+            return Ok(None);
+        }
+        let both = source.1.zip(target.1);
+        let same_base = both.filter(|(source, target)| exponents(source) == exponents(target));
+        let Some((source, target)) = same_base else {
+            return Err(SystemError::Unit {
+                from: self.name(from),
+                from_unit: source.0.clone(),
+                to: self.name(to),
+                to_unit: target.0.clone(),
+            });
+        };
+        if (source.factor, source.offset) == (target.factor, target.offset) {
+            return Ok(None);
+        }
+        // base = factor unit + offset, on both sides.
+        let factor = source.factor / target.factor;
+        Ok(Some((factor, (source.offset - target.offset) / target.factor)))
+    }
+}
+
+fn exponents(base: &BaseUnit) -> [i32; 8] {
+    [base.kg, base.m, base.s, base.a, base.k, base.mol, base.cd, base.rad]
+}
+
+/// `transformation` of what the conversion, factor and offset, gives.
+pub(super) fn after(conversion: (f64, f64), transformation: Transformation) -> Transformation {
+    match transformation {
+        Transformation::Linear { factor, offset } => Transformation::Linear {
+            factor: factor * conversion.0,
+            offset: factor * conversion.1 + offset,
+        },
+        _ => Transformation::Linear { factor: conversion.0, offset: conversion.1 },
+    }
+}
