@@ -50,6 +50,12 @@ EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size,
     Slave *slave = c;
     Values *now = &slave->now;
     (void)never_back;
+    if (now->state == DISCARDED && is(slave, "discard at t1 and go on")) {
+        now->state = STEPPING;
+    }
+    if (now->state == DISCARDED) {
+        return refuse(slave, "a discarded step must be repeated or the last one");
+    }
     demand(now->state == STEPPING);
     if (fabs(time - now->time) > 1e-9) {
         return refuse(slave, "the step does not begin where the last one ended");

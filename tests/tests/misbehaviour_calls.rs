@@ -131,7 +131,6 @@ fn a_step_that_was_discarded_without_any_progress_came_to_its_begin() {
 
 #[test]
 fn an_fmu_that_wants_the_simulation_to_end_says_where() {
-    let mut slave = ready("end at t1");
     let end = Stepped::Part { reached: 0.5, terminated: true };
     let mut slave = ready("end at t1");
     assert_eq!(slave.do_step(0.0, 1.0, true), Ok(end));
