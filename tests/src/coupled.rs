@@ -26,7 +26,7 @@ pub struct Run {
 }
 
 impl Run {
-    /// Couples `fmus` by name from 0 s to 1 s in steps of [`STEP`], told `more`. An FMU whose
+    /// Couples `fmus` by name in steps of [`STEP`], to 1 s unless `more` says otherwise. An FMU whose
     /// behaviour is the same as that of another one is given as the same file.
     ///
     /// # Panics
@@ -47,7 +47,10 @@ impl Run {
             arguments.extend(["--fmu".to_owned(), format!("{name}={}", path.display())]);
         }
         let step = STEP.to_string();
-        let fixed = ["--step", &step, "--stop-time", "1", "--method", "jacobi", "--course", "hold"];
+        let mut fixed = vec!["--step", &step, "--method", "jacobi", "--course", "hold"];
+        if !more.contains(&"--stop-time") {
+            fixed.extend(["--stop-time", "1"]);
+        }
         let all = ["run"].into_iter().chain(arguments.iter().map(String::as_str));
         let all = all.chain(fixed).chain(["--out", "out"]).chain(more.iter().copied());
         let (status, message) = end(folder.path(), &all.collect::<Vec<_>>());
