@@ -139,6 +139,13 @@ fn an_fmu_that_wants_the_simulation_to_end_says_where() {
 }
 
 #[test]
+fn a_discarded_step_without_a_last_successful_time_is_an_error() {
+    let error = ready("discard at t1 without saying so").do_step(0.0, 1.0, true).unwrap_err();
+    assert_eq!(error.failure, Failure::Status(Status::Discard));
+    assert_eq!(error.messages, ["the step is too long"]);
+}
+
+#[test]
 fn a_last_successful_time_outside_the_step_is_nonsense() {
     let error = ready("lie about t1").do_step(0.0, 1.0, true).unwrap_err();
     let Failure::Nonsense(what) = &error.failure else { panic!("{error}") };
@@ -168,6 +175,37 @@ fn a_pending_step_that_is_discarded_later_tells_how_far_it_came() {
     let mut slave = ready("pend and discard at t1");
     slave.set_time_limit(Some(Duration::from_secs(60)));
     assert_eq!(slave.do_step(0.0, 1.0, true), Ok(PART));
+}
+
+/// Section 4.2.4: the FMU ends the process where an instance is freed that has not stopped.
+#[test]
+fn a_step_that_is_pending_for_ever_is_canceled_or_left_alone_after_the_time_limit() {
+    let stubborn = CFmu::that("pend").without(&["fmi2CancelStep"]);
+    for fmu in [CFmu::that("pend"), stubborn] {
+        let folder = tempfile::tempdir().unwrap();
+        let opened = Fmu::open(&fmu.write(folder.path(), "slave")).unwrap();
+        let mut slave = opened.instantiate("slave").unwrap();
+        slave.set_integer(&[2], &[-1]).unwrap();
+        slave.set_time_limit(Some(Duration::from_millis(50)));
+        initialise(&mut slave).unwrap();
+        let error = slave.do_step(0.0, 0.5, true).unwrap_err();
+        assert_eq!(error.to_string(), "fmi2DoStep did not return within 0.05 s");
+    }
+}
+
+/// Section 2.1.3: the FMU ends the process where a function of any instance is called afterwards.
+#[test]
+fn after_a_fatal_error_no_instance_is_freed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = CFmu::that("fail fatally in fmi2DoStep").write(folder.path(), "slave");
+    let fmu = Fmu::open(&path).unwrap();
+    let mut slaves = ["a", "b"].map(|name| fmu.instantiate(name).unwrap());
+    for slave in &mut slaves {
+        initialise(slave).unwrap();
+    }
+    slaves[0].do_step(0.0, 0.5, true).unwrap();
+    let error = slaves[0].do_step(0.5, 0.5, true).unwrap_err();
+    assert_eq!(error.failure, Failure::Status(Status::Fatal));
 }
 
 #[test]
