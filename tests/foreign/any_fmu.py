@@ -33,7 +33,7 @@ def numbers(table, name):
 
 @contextmanager
 def instance(path, folder, settings=None):
-    """An initialised instance by FMPy, and its variables by name."""
+    """An initialised instance by FMPy with Reals and Integers set, and its variables by name."""
     description = read_model_description(str(path))
     variables = {variable.name: variable for variable in description.modelVariables}
     slave = FMU2Slave(
@@ -45,7 +45,8 @@ def instance(path, folder, settings=None):
     slave.instantiate()
     slave.setupExperiment(startTime=0.0)
     for name, value in (settings or {}).items():
-        slave.setReal([variables[name].valueReference], [value])
+        real = variables[name].type == "Real"
+        (slave.setReal if real else slave.setInteger)([variables[name].valueReference], [value])
     slave.enterInitializationMode()
     slave.exitInitializationMode()
     yield slave, variables

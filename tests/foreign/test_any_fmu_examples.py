@@ -17,7 +17,7 @@ EXAMPLES = {
 STEP, COUNT = 2.0**-7, 384  # s; three seconds
 # One input of each FMU that has some, so that something happens.
 DRIVEN = {
-    "Pid": {"w": 1.0},
+    "Pid": {"w": 1.0, "mode": 2},
     "LookupTable": {"speed": 90.0},
     "ThreeTank": {"Q_1": 1e-4},
     "DcServo": {"u": 6.0},
@@ -51,6 +51,6 @@ def test_an_example_alone_has_the_bits_of_fmpy(aso_ftc, examples, model, tmp_pat
     table = run(aso_ftc, tmp_path, {"m": examples[model]}, STEP, STEP * COUNT, *sets)
     expected = stepped(examples[model], tmp_path / "fmu", STEP, COUNT, outputs, settings)
     assert np.array_equal(numbers(table, "time"), np.arange(COUNT + 1) * STEP)
-    assert outputs and np.ptp(expected, axis=0).any(), "something happens"
+    assert outputs and expected[1:].any(), "something happens"
     for name, column in zip(outputs, expected.T):
         assert np.array_equal(numbers(table, f"m.{name}"), column), name
