@@ -1,7 +1,6 @@
 //! FMUs in C under `aso-ftc run --isolate`: whatever one does to its process, the run ends with
 //! the FMU, the call, the time and the signal, and the results so far are whole.
 #![forbid(unsafe_code)]
-#![expect(clippy::float_cmp, reason = "exact by construction")]
 
 use tests::c_fmu::CFmu;
 use tests::coupled::{Run, STEP};
