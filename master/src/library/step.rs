@@ -103,9 +103,9 @@ impl Component {
     ) -> Result<Stepped, CallError> {
         let (begin, mut pause) = (Instant::now(), Duration::from_micros(1));
         while status == Status::Pending as fmi2Status {
-            if self.time_limit.is_some_and(|limit| begin.elapsed() > limit) {
-                let seconds = begin.elapsed().as_secs_f64();
-                return Err(self.failed(NAME, Failure::TimedOut(seconds)));
+            if let Some(limit) = self.time_limit.filter(|limit| begin.elapsed() > *limit) {
+                self.cancel();
+                return Err(self.failed(NAME, Failure::TimedOut(limit.as_secs_f64())));
             }
             std::thread::sleep(pause);
             pause = (2 * pause).min(PAUSE);
@@ -114,8 +114,12 @@ impl Component {
         if status != Status::Discard as fmi2Status {
             return self.check(NAME, status).map(|()| Stepped::Whole);
         }
-        let Ok(reached) = self.real_status(StatusKind::LastSuccessfulTime) else {
-            return self.check(NAME, status).map(|()| Stepped::Whole);
+        let reached = match self.real_status(StatusKind::LastSuccessfulTime) {
+            Ok(reached) => reached,
+            Err(CallError { messages, .. }) => {
+                let failure = Failure::Status(Status::Discard);
+                return Err(CallError { function: NAME, failure, messages });
+            }
         };
         let terminated = self.boolean_status(StatusKind::Terminated).unwrap_or(false);
         let rounding = 1e-9 * (size.abs() + time.abs());
@@ -128,6 +132,16 @@ impl Component {
             return Err(self.failed(NAME, Failure::Nonsense(what)));
         }
         Ok(Stepped::Part { reached, terminated })
+    }
+
+    /// `fmi2CancelStep`: only then may the instance be freed (section 4.2.4).
+    fn cancel(&mut self) {
+        // SAFETY: the instance is alive.
+        let canceled = self
+            .functions
+            .cancel_step
+            .is_some_and(|function| unsafe { function(self.pointer) == Status::OK as fmi2Status });
+        self.abandoned = !canceled;
     }
 
     fn status(&mut self, kind: StatusKind) -> Result<fmi2Status, CallError> {
