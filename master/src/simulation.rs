@@ -17,6 +17,7 @@ use crate::error::SystemError;
 use crate::exchange::{Exchange, call};
 use crate::order::{Order, by_direct_dependencies};
 use crate::scenario::{Drives, Prepared};
+use crate::slave::{CallError, Failure};
 use crate::system::System;
 use adaptive::Repetition;
 use control::Control;
@@ -230,8 +231,11 @@ impl Simulation {
         let time = self.grid.time;
         let mut first = Ok(());
         for (name, slave) in &mut self.system.slaves {
-            let done = slave.terminate().map_err(|source| call(name, time, source));
-            first = first.and(done);
+            match slave.terminate() {
+                // There is nothing to end.
+                Ok(()) | Err(CallError { failure: Failure::Absent, .. }) => {}
+                Err(source) => first = first.and(Err(call(name, time, source))),
+            }
         }
         first
     }

@@ -9,7 +9,7 @@ pub(crate) use super::trace::Trace;
 use crate::algorithm::{Algorithm, Coupling, Course, StepControl, Sweep};
 use crate::error::SystemError;
 use crate::fault::FaultLine;
-use crate::slave::{Advance, CallError, Slave, Stepped};
+use crate::slave::{CallError, Slave, Stepped};
 use crate::system::{Port, System};
 
 /// The connected Reals of a system.
@@ -337,21 +337,13 @@ impl Reals {
     ) -> Result<Stepped, CallError> {
         let lane = &self.layout.lanes[slave];
         let trace = &mut self.trace;
-        let done = instance.advance(&mut Advance {
-            inputs: &lane.inputs,
-            input_values: &self.values[lane.input_range.clone()],
-            derived_inputs: &lane.derived_inputs,
-            input_orders: &lane.input_orders,
-            input_derivatives: &self.input_derivatives[lane.input_derivative_range.clone()],
-            time,
-            size,
-            never_back,
-            outputs: &lane.outputs,
-            output_values: &mut trace.latest[lane.output_range.clone()],
-            derived_outputs: &lane.derived_outputs,
-            output_orders: &lane.output_orders,
-            output_derivatives: &mut trace.derivatives[lane.output_derivative_range.clone()],
-        })?;
+        let inputs =
+            (&self.values[..], &self.input_derivatives[lane.input_derivative_range.clone()]);
+        let outputs = (
+            &mut trace.latest[lane.output_range.clone()],
+            &mut trace.derivatives[lane.output_derivative_range.clone()],
+        );
+        let done = instance.advance(&mut lane.step(inputs, (time, size), never_back, outputs))?;
         trace.spans[slave].stepped = true;
         Ok(done)
     }

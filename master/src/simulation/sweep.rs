@@ -12,6 +12,9 @@ use crate::system::System;
 /// Most attempts of a slave to come to the end of a step that it makes in parts.
 const PARTS: u32 = 1000;
 
+/// What helps where a slave does not go on after `fmi2Discard`.
+const ADVICE: &str = "the step before it was discarded; with rollback all FMUs repeat it";
+
 /// How a sweep ended.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Swept {
@@ -222,9 +225,10 @@ impl Simulation {
             }
             begin = reached;
             let (name, instance) = &mut self.system.slaves[slave];
-            done = instance
-                .do_step(begin, end - begin, true)
-                .map_err(|source| call(name, begin, source))?;
+            done = instance.do_step(begin, end - begin, true).map_err(|mut source| {
+                source.messages.push(ADVICE.to_owned());
+                call(name, begin, source)
+            })?;
         }
         let what = format!(
             "returned fmi2Discard and came to {begin} s only, on the way from {time} to {end} s"
