@@ -356,19 +356,23 @@ impl Reals {
             && self.layout.from_integers.is_empty()
     }
 
-    /// A sweep of all slaves, see [`Pass::run`]; those that stopped on the way, and whether all
-    /// outputs are finite.
+    /// A sweep of all slaves, see [`Pass::run`]; those that stopped on the way.
     #[inline]
     pub(crate) fn pass(
         &mut self,
         system: &mut System,
         (time, size): (f64, f64),
         never_back: bool,
-    ) -> Result<(&mut Vec<(usize, Stepped)>, bool), SystemError> {
+    ) -> Result<&mut Vec<(usize, Stepped)>, SystemError> {
         let latest = &mut self.trace.latest;
         let done = self.pass.run(&mut system.slaves, latest, (time, size), never_back);
-        let parts = done.map_err(|(slave, source)| call(&system.slaves[slave].0, time, source))?;
-        Ok((parts, all_finite(latest)))
+        done.map_err(|(slave, source)| call(&system.slaves[slave].0, time, source))
+    }
+
+    /// Whether all outputs are finite numbers.
+    #[inline]
+    pub(crate) fn is_finite(&self) -> bool {
+        all_finite(&self.trace.latest)
     }
 
     /// Reads the connected outputs of a slave and their derivatives.

@@ -33,7 +33,6 @@ impl Reals {
             if !chosen[slave] {
                 continue;
             }
-            let (time, size) = span(slave);
             let inputs =
                 (&self.values[..], &self.input_derivatives[lane.input_derivative_range.clone()]);
             let outputs = (output_values, output_derivatives);

@@ -149,14 +149,13 @@ impl Simulation {
     /// Jacobi's method with held inputs and nothing but Reals: one pass over the slaves.
     fn pass(&mut self, time: f64, size: f64, never_back: bool) -> Result<Swept, SystemError> {
         let mut swept = Swept::default();
-        let (parts, finite) =
-            self.exchange.reals.pass(&mut self.system, (time, size), never_back)?;
+        let parts = self.exchange.reals.pass(&mut self.system, (time, size), never_back)?;
         if !parts.is_empty() {
             for (slave, done) in std::mem::take(parts) {
                 self.in_parts(slave, (time, size), done, never_back, &mut swept)?;
             }
         }
-        if !finite {
+        if !self.exchange.reals.is_finite() {
             for slave in 0..self.system.slaves.len() {
                 self.exchange.check_finite(&self.system, slave, time + size)?;
             }
