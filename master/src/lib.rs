@@ -12,6 +12,7 @@ mod exchange;
 #[cfg(feature = "fmi")]
 pub mod fmi_crate;
 mod fmu;
+pub mod isolate;
 mod library;
 pub mod linearise;
 mod nearest;
