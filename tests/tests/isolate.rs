@@ -33,7 +33,7 @@ fn ready(options: &Options) -> Isolated {
 fn error_of(trouble: Trouble, options: &Options) -> (Isolated, CallError) {
     let mut slave = ready(options);
     slave.set_integer(&[0], &[trouble as i32]).unwrap();
-    let error = advance(&mut slave, 1.0, 0.5).unwrap_err();
+    let error = advance(&mut slave, 1.0, 0.5).expect_err(&format!("{trouble:?}"));
     let again = slave.get_real(&[1], &mut [0.0]).unwrap_err();
     assert_eq!((again.failure, again.function), (error.failure.clone(), "fmi2GetReal"));
     (slave, error)
@@ -75,54 +75,72 @@ fn reals(description: &ModelDescription, causality: Option<Causality>) -> Vec<u3
         .collect()
 }
 
+/// Inputs, outputs and their derivatives of the pendulum.
+struct Pendulum<'a> {
+    plant: &'a mut dyn Slave,
+    inputs: Vec<u32>,
+    outputs: Vec<u32>,
+    /// The bits of all that was read.
+    course: Vec<u64>,
+}
+
+impl Pendulum<'_> {
+    fn step(&mut self, time: f64, force: f64) {
+        let (inputs, outputs) = (self.inputs.len(), self.outputs.len());
+        let (mut values, mut derivatives) = (vec![0.0; outputs], vec![0.0; outputs]);
+        let mut step = Advance {
+            inputs: &self.inputs,
+            input_values: &vec![force; inputs],
+            derived_inputs: &self.inputs,
+            input_orders: &vec![1; inputs],
+            input_derivatives: &vec![3.0; inputs],
+            time,
+            size: 0.001,
+            never_back: false,
+            outputs: &self.outputs,
+            output_values: &mut values,
+            derived_outputs: &self.outputs,
+            output_orders: &vec![1; outputs],
+            output_derivatives: &mut derivatives,
+        };
+        assert_eq!(self.plant.advance(&mut step).unwrap(), Stepped::Whole);
+        self.keep(&values);
+        self.keep(&derivatives);
+    }
+
+    fn keep(&mut self, values: &[f64]) {
+        self.course.extend(values.iter().map(|value| value.to_bits()));
+    }
+}
+
 /// All Reals of the pendulum, by bits, after each of some steps that go back now and then, and at
 /// the end its state as bytes and a derivative.
 fn course(plant: &mut dyn Slave) -> (Vec<u64>, Vec<u8>) {
     let description = plant.description().clone();
-    let (all, inputs) = (reals(&description, None), reals(&description, Some(Causality::Input)));
-    let outputs = reals(&description, Some(Causality::Output));
+    let of = |causality| reals(&description, causality);
+    let (inputs, outputs) = (of(Some(Causality::Input)), of(Some(Causality::Output)));
     plant.setup_experiment(&Experiment { stop_time: Some(5.0), ..Experiment::default() }).unwrap();
     plant.enter_initialization_mode().unwrap();
     plant.exit_initialization_mode().unwrap();
-    let (mut course, ones) = (Vec::new(), vec![1; outputs.len()]);
-    let (mut values, mut derivatives) = (vec![0.0; outputs.len()], vec![0.0; outputs.len()]);
+    let mut pendulum = Pendulum { plant, inputs, outputs, course: Vec::new() };
     for count in 0..2000_u32 {
         let time = f64::from(count) * 0.001;
-        for repeated in 0..2 {
-            if count % 50 == 7 {
-                if repeated == 0 { plant.save_state(3) } else { plant.restore_state(3) }.unwrap();
-            } else if repeated == 1 {
-                continue;
-            }
-            let input: Vec<_> =
-                inputs.iter().map(|_| 20.0 * (7.0 * time + f64::from(repeated)).sin()).collect();
-            let mut step = Advance {
-                inputs: &inputs,
-                input_values: &input,
-                derived_inputs: &inputs,
-                input_orders: &vec![1; inputs.len()],
-                input_derivatives: &vec![3.0; inputs.len()],
-                time,
-                size: 0.001,
-                never_back: false,
-                outputs: &outputs,
-                output_values: &mut values,
-                derived_outputs: &outputs,
-                output_orders: &ones,
-                output_derivatives: &mut derivatives,
-            };
-            assert_eq!(plant.advance(&mut step).unwrap(), Stepped::Whole);
-            course.extend(values.iter().chain(&derivatives).map(|value| value.to_bits()));
+        let force = 20.0 * (7.0 * time).sin();
+        if count % 50 == 7 {
+            pendulum.plant.save_state(3).unwrap();
+            pendulum.step(time, -force);
+            pendulum.plant.restore_state(3).unwrap();
         }
+        pendulum.step(time, force);
     }
-    let mut values = vec![0.0; all.len()];
+    let Pendulum { plant, inputs, outputs, mut course } = pendulum;
+    let all = of(None);
+    let (mut values, mut changes) = (vec![0.0; all.len()], vec![0.0; outputs.len()]);
     plant.get_real(&all, &mut values).unwrap();
-    course.extend(values.iter().map(|value| value.to_bits()));
-    let mut changes = vec![0.0; outputs.len()];
     plant
         .directional_derivative(&outputs, &inputs, &vec![1.0; inputs.len()], &mut changes)
         .unwrap();
-    course.extend(changes.iter().map(|change| change.to_bits()));
+    course.extend(values.iter().chain(&changes).map(|value| value.to_bits()));
     let state = plant.serialize_state().unwrap();
     plant.deserialize_state(&state).unwrap();
     assert_eq!(plant.serialize_state().unwrap(), state);
@@ -159,7 +177,8 @@ fn every_type_of_variable_and_long_data_pass() {
     assert_eq!(advance(&mut slave, 3.0, 0.5).unwrap(), (Stepped::Whole, 1.5));
     let state = slave.serialize_state().unwrap();
     assert!(state.len() > 1 << 20);
-    assert_eq!(state.iter().filter(|byte| **byte == 1).count(), 2, "boolean and first step");
+    let ones = state.iter().map(|byte| usize::from(*byte == 1)).sum::<usize>();
+    assert_eq!(ones, 2, "the Boolean and the first step");
     advance(&mut slave, 3.0, 0.5).unwrap();
     slave.deserialize_state(&state).unwrap();
     assert_eq!(advance(&mut slave, 0.0, 0.5).unwrap().1, 1.5);
@@ -210,11 +229,12 @@ fn errors_and_early_ends_are_those_of_the_fmu_itself() {
     near.exit_initialization_mode().unwrap();
     let slaves: [&mut dyn Slave; 2] = [&mut near, &mut far];
     let [near, far] = slaves.map(|slave| {
-        let mut found = Vec::new();
-        found.push(slave.set_real(&[1], &[2.0]).unwrap_err());
-        found.push(slave.directional_derivative(&[1], &[0], &[1.0], &mut [0.0]).unwrap_err());
-        found.push(slave.restore_state(7).unwrap_err());
-        found.push(slave.deserialize_state(b"short").unwrap_err());
+        let mut found = vec![
+            slave.set_real(&[1], &[2.0]).unwrap_err(),
+            slave.directional_derivative(&[1], &[0], &[1.0], &mut [0.0]).unwrap_err(),
+            slave.restore_state(7).unwrap_err(),
+            slave.deserialize_state(b"short").unwrap_err(),
+        ];
         slave.set_integer(&[0], &[Trouble::Refuse as i32]).unwrap();
         found.push(advance(slave, 1.0, 0.5).unwrap_err());
         slave.set_integer(&[0], &[Trouble::StopEarly as i32]).unwrap();

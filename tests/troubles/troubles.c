@@ -213,7 +213,11 @@ static int overflow_stack(int depth) {
 
 static void break_heap(void) {
     char *volatile block = malloc(24);
-    memset(block - 16, 0x41, 64);
+    volatile char *beyond = block;
+    for (int k = 0; k < 64; k++) {
+        beyond[k] = 'A';
+    }
+    free(block);
     free(block);
 }
 
@@ -250,7 +254,7 @@ static int in_step(struct instance *i, double time, double size) {
         *find_shared(&count) = 77;
         be_silent_for_ever();
         break;
-    case DIVIDE_BY_ZERO: zero = 1 / zero; break;
+    case DIVIDE_BY_ZERO: zero = 7 / zero; break;
     case CLOSE_FILES:
         for (int file = 3; file < 1024; file++) {
             close(file);
