@@ -19,6 +19,7 @@ mod run;
 mod scenario;
 mod summary;
 mod whole_file;
+mod worker;
 
 use std::process::ExitCode;
 
@@ -49,6 +50,9 @@ enum Verb {
 }
 
 fn main() -> ExitCode {
+    if let Some(status) = worker::worker() {
+        return status;
+    }
     let done = match Arguments::parse().verb {
         Verb::Reproduce(options) => reproduce::reproduce(&options),
         Verb::Pack(options) => pack::pack(&options),

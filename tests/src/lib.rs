@@ -3,6 +3,9 @@
 
 pub mod c_fmu;
 pub mod coupled;
+mod troubles;
+
+pub use troubles::{Trouble, troubles};
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
