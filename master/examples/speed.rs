@@ -1,7 +1,7 @@
 //! Runs a system as fast as the master can and says what it cost, for `scripts/benchmark-peers`.
 //!
 //!     speed pack FOLDER PORTS
-//!     speed run SYSTEM STEP STEPS
+//!     speed run SYSTEM STEP STEPS [RESULTS]
 //!
 //! `pack` builds the tiny FMU of `tests/speed` and prints its path. `run` reads a file with a line
 //! for each thing that there is, initialises, and makes STEPS steps of STEP s by Jacobi's method with
@@ -11,6 +11,7 @@
 //!     set NAME.VARIABLE VALUE
 //!     connect NAME.OUTPUT NAME.INPUT
 //!
+//! With RESULTS, a file of the format that its extension says, every output of every step goes there.
 //! It prints a JSON object: processor time in ns of the start (from the archives to the end of
 //! initialisation) and of one step, wall time of the start, peak memory in KiB, and the sum of all
 //! Real outputs at the end.
@@ -26,7 +27,8 @@ use anyhow::{Context, bail};
 use fmi2::Experiment;
 use fmi2::description::Causality;
 use master::algorithm::{Algorithm, Course, Sweep};
-use master::{Fmu, Probe, Simulation, System};
+use master::results::{Column, ColumnKind, create};
+use master::{Fmu, Readout, Simulation, System};
 use rustix::time::{ClockId, clock_gettime};
 
 #[path = "../../tests/speed/lag.rs"]
@@ -67,10 +69,14 @@ fn read(path: &Path) -> anyhow::Result<System> {
     Ok(system)
 }
 
-fn run(path: &Path, step: f64, steps: u64) -> anyhow::Result<()> {
+fn run(path: &Path, step: f64, steps: u64, results: Option<&Path>) -> anyhow::Result<()> {
     let (begin, clock) = (cpu(), Instant::now());
     let system = read(path)?;
-    let mut probe = Probe::new(&system, &system.ports(Causality::Output));
+    let ports = system.ports(Causality::Output);
+    let name = |port| Column { name: system.name(port), kind: ColumnKind::Real, unit: None };
+    let columns: Vec<Column> = ports.iter().map(|&port| name(port)).collect();
+    let mut sink = results.map(|path| create(path, &columns)).transpose()?;
+    let mut readout = Readout::new(&system, &ports);
     let experiment = Experiment { start_time: 0.0, stop_time: None, tolerance: None };
     let algorithm =
         Algorithm { sweep: Sweep::Jacobi, course: Course::Hold, ..Algorithm::new(step) };
@@ -78,17 +84,25 @@ fn run(path: &Path, step: f64, steps: u64) -> anyhow::Result<()> {
     let (started, wall) = (cpu(), clock.elapsed());
     for _ in 0..steps {
         simulation.step()?;
+        if let Some(sink) = &mut sink {
+            let time = simulation.time();
+            readout.read(simulation.system(), time)?;
+            sink.row(time, &readout.row())?;
+        }
+    }
+    if let Some(sink) = sink {
+        sink.finish()?;
     }
     let stepped = cpu();
-    let (mut values, time) = (vec![0.0; probe.names().len()], simulation.time());
-    probe.read(simulation.system(), time, &mut values)?;
+    let time = simulation.time();
+    readout.read(simulation.system(), time)?;
     println!(
         "{{\"start_ns\": {}, \"start_wall_ns\": {}, \"step_ns\": {}, \"peak_kib\": {}, \"sum\": {}}}",
         started - begin,
         wall.as_nanos(),
         (stepped - started) / steps.max(1) as f64,
         peak(),
-        values.iter().sum::<f64>()
+        readout.reals.iter().sum::<f64>()
     );
     Ok(())
 }
@@ -100,7 +114,10 @@ fn main() -> anyhow::Result<()> {
             println!("{}", lag::pack(Path::new(folder), ports.parse()?)?.display());
             Ok(())
         }
-        ["run", path, step, steps] => run(Path::new(path), step.parse()?, steps.parse()?),
-        _ => bail!("expected pack FOLDER PORTS or run SYSTEM STEP STEPS"),
+        ["run", path, step, steps] => run(Path::new(path), step.parse()?, steps.parse()?, None),
+        ["run", path, step, steps, results] => {
+            run(Path::new(path), step.parse()?, steps.parse()?, Some(Path::new(results)))
+        }
+        _ => bail!("expected pack FOLDER PORTS or run SYSTEM STEP STEPS [RESULTS]"),
     }
 }

@@ -6,6 +6,7 @@ use fmi2::description::Kind;
 
 use crate::error::SystemError;
 use crate::exchange::call;
+use crate::results::Row;
 use crate::slave::{CallError, Slave};
 use crate::system::{Port, System};
 
@@ -93,6 +94,17 @@ impl Readout {
             ReadKind::String => self.strings.len(),
         };
         length - 1
+    }
+
+    /// The values as a row of results.
+    #[must_use]
+    pub fn row(&self) -> Row<'_> {
+        Row {
+            reals: &self.reals,
+            integers: &self.integers,
+            booleans: &self.booleans,
+            strings: &self.strings,
+        }
     }
 
     /// Reads all values.
