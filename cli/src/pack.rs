@@ -3,6 +3,7 @@
 
 mod library;
 mod licenses;
+mod ssp;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -38,6 +39,9 @@ pub(crate) struct Options {
     /// Also write the model descriptions into the folder modelDescription of the workspace
     #[arg(long, conflicts_with = "crates")]
     update_descriptions: bool,
+    /// Also write InvertedPendulum.ssp: both FMUs of this workspace, connected, for 100 s
+    #[arg(long, conflicts_with = "crates")]
+    ssp: bool,
 }
 
 /// Builds and packs the given crates or all models of the workspace.
@@ -51,7 +55,8 @@ pub(crate) fn pack(options: &Options) -> anyhow::Result<bool> {
         return Ok(true);
     }
     let root = workspace()?;
-    for fmu in pack_into(&root, &options.out)? {
+    let fmus = pack_into(&root, &options.out)?;
+    for fmu in &fmus {
         if options.update_descriptions {
             let name = format!("{}.xml", fmu.description.model_name);
             let target = root.join("modelDescription").join(name);
@@ -59,6 +64,9 @@ pub(crate) fn pack(options: &Options) -> anyhow::Result<bool> {
                 .with_context(|| format!("cannot write {}", target.display()))?;
         }
         println!("{}", fmu.path.display());
+    }
+    if options.ssp {
+        println!("{}", ssp::write(&fmus, &options.out)?.display());
     }
     Ok(true)
 }

@@ -10,6 +10,9 @@ mod rules;
 pub(crate) mod sample;
 
 pub(crate) use guid::Guid;
+#[doc(hidden)] // Public as `fmi2::xml::Element`.
+pub use parse::Element;
+pub(crate) use parse::read_xml;
 pub use parse::{ParseError, Position};
 pub use rules::Problem;
 

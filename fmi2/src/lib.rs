@@ -50,6 +50,7 @@ mod model;
 pub mod package;
 pub mod unit;
 mod variable;
+pub mod xml;
 
 pub use interface::{describe, problems};
 pub use model::{About, At, Event, Experiment, Failure, Model, ModelExchange, Step};

@@ -21,6 +21,7 @@ mod probe;
 mod simulation;
 mod slave;
 pub mod solve;
+pub mod ssp;
 mod system;
 pub mod transformation;
 mod value;

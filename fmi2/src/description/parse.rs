@@ -12,7 +12,12 @@ use super::{
     Unknown,
 };
 use crate::unit::{BaseUnit, DisplayUnit, Unit};
-use xml::Element;
+pub use xml::Element;
+
+/// The root element of an XML file, with the bounds of a model description.
+pub(crate) fn read_xml(bytes: &[u8]) -> Result<Element, ParseError> {
+    xml::read(&encoding::decode(bytes)?)
+}
 
 /// A place in an XML file; both numbers count from 1, columns in characters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -124,7 +129,7 @@ impl ModelDescription {
     /// );
     /// ```
     pub fn parse(xml: impl AsRef<[u8]>) -> Result<ModelDescription, ParseError> {
-        let root = xml::read(&encoding::decode(xml.as_ref())?)?;
+        let root = read_xml(xml.as_ref())?;
         if root.name != "fmiModelDescription" {
             let found = format!("<{}>", root.name);
             return Err(root.misses("the root element fmiModelDescription", found));

@@ -11,14 +11,17 @@ const DEPTH: usize = 64;
 /// Most attributes of one element; the standard has 15 at most.
 const ATTRIBUTES: usize = 256;
 
-/// An element: its attributes and child elements. Text is not used by FMI 2.0.
+/// An element: its attributes and child elements. Text is not used by FMI 2.0 and SSP 1.0.
 #[derive(Debug)]
-pub(super) struct Element {
-    pub(super) name: String,
-    pub(super) attributes: Vec<(String, String)>,
-    pub(super) children: Vec<Element>,
+pub struct Element {
+    /// Name with its prefix, as it stands in the file.
+    pub name: String,
+    /// Names and values, in order.
+    pub attributes: Vec<(String, String)>,
+    /// Child elements, in order.
+    pub children: Vec<Element>,
     /// Where it begins.
-    pub(super) at: Position,
+    pub at: Position,
 }
 
 /// Follows the position in a text that is read once, front to back.

@@ -1,0 +1,53 @@
+//! `aso-ftc pack --ssp`: the plant and the controller, connected, as one SSP.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use master::assembly::{Assembly, Element, Link, Terminal};
+use master::ssp;
+use master::transformation::Transformation;
+
+use super::Packed;
+
+/// Names of the elements, in the order of the models of the workspace.
+const NAMES: [&str; 2] = ["plant", "controller"];
+/// Output and input of each connection.
+const LINKS: [[&str; 4]; 3] = [
+    ["plant", "x_p", "controller", "x_p"],
+    ["plant", "theta", "controller", "theta"],
+    ["controller", "u", "plant", "u"],
+];
+/// Stop time of the paper's experiment in s.
+const STOP_TIME: f64 = 100.0;
+/// The command is sampled at this step in s, the one that both FMUs propose.
+const STEP: f64 = 1e-3;
+
+/// Writes `InvertedPendulum.ssp` into the folder `out`.
+pub(super) fn write(fmus: &[Packed], out: &Path) -> anyhow::Result<PathBuf> {
+    let elements = NAMES.iter().zip(fmus).map(|(name, packed)| Element {
+        name: (*name).to_owned(),
+        fmu: packed.path.clone(),
+        settings: Vec::new(),
+    });
+    let end = |element: &str, variable: &str| Terminal {
+        element: element.to_owned(),
+        variable: variable.to_owned(),
+    };
+    let links = LINKS.map(|[source, output, target, input]| Link {
+        from: end(source, output),
+        to: end(target, input),
+        transformation: Transformation::Identity,
+        units_settled: false,
+    });
+    let assembly = Assembly {
+        name: Some("InvertedPendulum".to_owned()),
+        elements: elements.collect(),
+        links: links.into(),
+        start_time: Some(0.0),
+        stop_time: Some(STOP_TIME),
+    };
+    let target = out.join("InvertedPendulum.ssp");
+    ssp::write(&assembly, Some(STEP), &target)
+        .with_context(|| format!("cannot write {}", target.display()))?;
+    Ok(target)
+}

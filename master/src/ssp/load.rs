@@ -1,0 +1,274 @@
+//! Files to a [`Tree`].
+
+mod files;
+
+use std::collections::HashMap;
+use std::path::Path;
+use std::rc::Rc;
+
+use fmi2::description::Position;
+
+use super::error::{SspError, meaning};
+use super::source::{Base, Target};
+use super::structure::{
+    Component, Connector, ConnectorKind, Content as Kind, DictionaryReference, DictionarySource,
+    Element, ElementBase, Implementation, ParameterBinding, System,
+};
+use super::tree::{Binding, Content, Document, File, Node, Tree};
+use files::Files;
+
+/// Deepest nesting of systems, over all files.
+const DEPTH: usize = 64;
+/// Most elements of all systems together.
+const ELEMENTS: usize = 100_000;
+/// Most elements, connectors, connections and parameters of all instances together.
+const PARTS: usize = 2_000_000;
+
+/// Where a node goes.
+struct Place<'a> {
+    parent: Option<usize>,
+    path: String,
+    depth: usize,
+    /// The bindings of the component that refers to a system, and the file they stand in.
+    outer: Option<(&'a [ParameterBinding], &'a Rc<File>)>,
+}
+
+/// Reads the SSD or the SSP at `path` with all that it refers to.
+pub(super) fn load(path: &Path, variant: Option<&str>) -> Result<(Tree, Rc<Document>), SspError> {
+    let mut loader = Loader::default();
+    let document = loader.files.document(&Target {
+        path: path.to_owned(),
+        shown: path.to_owned(),
+        fragment: variant.map(str::to_owned),
+    })?;
+    let place = Place { parent: None, path: String::new(), depth: 0, outer: None };
+    loader.system(&document.structure.system, &document, place)?;
+    let Loader { mut tree, files, .. } = loader;
+    (tree.fmus, tree.folders) = files.finish();
+    Ok((tree, document))
+}
+
+#[derive(Default)]
+struct Loader {
+    tree: Tree,
+    files: Files,
+    parts: usize,
+}
+
+impl Loader {
+    fn count(&mut self, parts: usize) -> Result<(), SspError> {
+        self.parts = self.parts.saturating_add(parts).saturating_add(1);
+        if self.tree.nodes.len() > ELEMENTS {
+            return Err(SspError::Limit { limit: ELEMENTS, what: "elements" });
+        }
+        if self.parts > PARTS {
+            return Err(SspError::Limit { limit: PARTS, what: "connectors and parameters" });
+        }
+        Ok(())
+    }
+
+    fn add(
+        &mut self,
+        base: &ElementBase,
+        place: Place<'_>,
+        file: &Rc<File>,
+    ) -> Result<usize, SspError> {
+        self.count(base.connectors.len())?;
+        self.tree.nodes.push(Node {
+            path: place.path,
+            parent: place.parent,
+            children: HashMap::new(),
+            dictionaries: HashMap::new(),
+            file: file.clone(),
+            at: base.at.0,
+            connectors: base.connectors.clone(),
+            connections: Vec::new(),
+            bindings: Vec::new(),
+            step_size: None,
+            content: Content::System,
+        });
+        Ok(self.tree.nodes.len() - 1)
+    }
+
+    fn system(
+        &mut self,
+        system: &System,
+        document: &Rc<Document>,
+        place: Place<'_>,
+    ) -> Result<usize, SspError> {
+        let (file, at) = (&document.file, system.base.at.0);
+        let (depth, outer) = (place.depth, place.outer);
+        if depth == DEPTH {
+            let sentence = format!("systems are nested in each other {DEPTH} times");
+            return Err(meaning(at, sentence).in_file(&file.shown));
+        }
+        let path = place.path.clone();
+        let node = self.add(&system.base, place, file)?;
+        self.count(system.connections.len())?;
+        self.tree.nodes[node].connections.clone_from(&system.connections);
+        let mut bindings = self.bindings(&system.base.bindings, file, None)?;
+        if let Some((outer, outer_file)) = outer {
+            bindings.extend(self.bindings(outer, outer_file, Some(&file.base))?);
+        }
+        self.tree.nodes[node].bindings = bindings;
+        for dictionary in &system.dictionaries {
+            let index = self.dictionary(dictionary, file, node)?;
+            self.tree.nodes[node].dictionaries.insert(dictionary.name.clone(), index);
+        }
+        for element in &system.elements {
+            let name = &element.base().name;
+            let path = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
+            let place = Place { parent: Some(node), path, depth: depth + 1, outer: None };
+            let index = match element {
+                Element::System(system) => self.system(system, document, place)?,
+                Element::Component(component) => self.component(component, document, place)?,
+                Element::Dictionary(reference) => self.reference(reference, file, place)?,
+            };
+            self.tree.nodes[node].children.insert(name.clone(), index);
+        }
+        Ok(node)
+    }
+
+    fn component(
+        &mut self,
+        component: &Component,
+        document: &Rc<Document>,
+        place: Place<'_>,
+    ) -> Result<usize, SspError> {
+        let (file, at) = (&document.file, component.base.at.0);
+        let here = |sentence: String| meaning(at, sentence).in_file(&file.shown);
+        let place = Place { outer: Some((&component.base.bindings, file)), ..place };
+        if let Some(id) = component.source.strip_prefix('#') {
+            let system = with_id(&document.structure.system, id);
+            let system = system.ok_or_else(|| here(format!("no system has the id {id:?}")))?;
+            return self.system(system, document, place);
+        }
+        let target = file.base.resolve(&component.source).map_err(here)?;
+        if component.content == Kind::Fmu {
+            return self.fmu(component, &target, file, place);
+        }
+        if component.content == Kind::Definition && target.fragment.is_some() {
+            return Err(here(format!("expected a file, found {:?}", component.source)));
+        }
+        let archive = component.content == Kind::Package;
+        let inner = self.files.referred(&target, &file.base, archive);
+        let inner = inner.map_err(|error| error.in_file(&target.shown))?;
+        self.system(&inner.structure.system, &inner, place)
+    }
+
+    fn fmu(
+        &mut self,
+        component: &Component,
+        target: &Target,
+        file: &Rc<File>,
+        place: Place<'_>,
+    ) -> Result<usize, SspError> {
+        let here = |sentence: &str| {
+            let sentence = format!("{}: {sentence}", component.base.name);
+            meaning(component.base.at.0, sentence).in_file(&file.shown)
+        };
+        if component.implementation == Implementation::ModelExchange {
+            return Err(here("model exchange is wanted, and only co-simulation can be run"));
+        }
+        let index = self.files.fmu(target)?;
+        let fmu = &self.files.fmus[index];
+        if fmu.description.co_simulation.is_none() {
+            return Err(here(&format!("{} offers no co-simulation", target.shown.display())));
+        }
+        let inside = Base::archive(fmu.folder(), &target.shown);
+        let node = self.add(&component.base, place, file)?;
+        let bindings = self.bindings(&component.base.bindings, file, Some(&inside))?;
+        let added = &mut self.tree.nodes[node];
+        added.content = Content::Fmu(index);
+        (added.bindings, added.step_size) = (bindings, component.step_size);
+        Ok(node)
+    }
+
+    fn dictionary(
+        &mut self,
+        source: &DictionarySource,
+        file: &Rc<File>,
+        system: usize,
+    ) -> Result<usize, SspError> {
+        let here = |sentence| meaning(source.at.0, sentence).in_file(&file.shown);
+        let (dictionary, shown) =
+            self.files.dictionary(&source.content, file).map_err(|error| error.or(here))?;
+        let connectors = dictionary.entries.iter().map(|(name, kind)| Connector {
+            name: name.clone(),
+            kind: ConnectorKind::Inout,
+            kind_of_value: Some(kind.clone()),
+        });
+        let base = ElementBase {
+            name: source.name.clone(),
+            connectors: connectors.collect(),
+            at: source.at,
+            ..ElementBase::default()
+        };
+        let own =
+            File { shown, base: file.base.clone(), definitions: dictionary.definitions.clone() };
+        let path = format!("{}.{}", self.tree.nodes[system].path, source.name);
+        let path = path.trim_start_matches('.').to_owned();
+        let place = Place { parent: Some(system), path, depth: 0, outer: None };
+        let node = self.add(&base, place, &Rc::new(own))?;
+        self.tree.nodes[node].content = Content::Dictionary;
+        Ok(node)
+    }
+
+    /// A dictionary is looked up in the system around the reference, then further out.
+    fn reference(
+        &mut self,
+        reference: &DictionaryReference,
+        file: &Rc<File>,
+        place: Place<'_>,
+    ) -> Result<usize, SspError> {
+        let mut system = place.parent;
+        let found = loop {
+            let Some(index) = system else {
+                let sentence = format!("no signal dictionary {:?}", reference.dictionary);
+                return Err(meaning(reference.base.at.0, sentence).in_file(&file.shown));
+            };
+            let node = &self.tree.nodes[index];
+            if let Some(found) = node.dictionaries.get(&reference.dictionary) {
+                break *found;
+            }
+            system = node.parent;
+        };
+        let node = self.add(&reference.base, place, file)?;
+        self.tree.nodes[node].content = Content::Reference(found);
+        Ok(node)
+    }
+
+    /// Bindings with the files they name; `component` is the base of those in the component.
+    fn bindings(
+        &mut self,
+        bindings: &[ParameterBinding],
+        file: &Rc<File>,
+        component: Option<&Base>,
+    ) -> Result<Vec<Binding>, SspError> {
+        let mut loaded = Vec::new();
+        for binding in bindings {
+            let here = |sentence: String| meaning(binding.at.0, sentence).in_file(&file.shown);
+            let values = self.files.values(&binding.values, file, component);
+            let values = values.map_err(|error| error.or(here))?;
+            let mapping = binding.mapping.as_ref();
+            let mapping = mapping.map(|each| self.files.mapping(each, file, component)).transpose();
+            let mapping = mapping.map_err(|error| error.or(here))?;
+            self.count(values.parameters.len())?;
+            self.count(mapping.as_ref().map_or(0, |mapping| mapping.entries.len()))?;
+            let (prefix, at): (_, Position) = (binding.prefix.clone(), binding.at.0);
+            loaded.push(Binding { prefix, values, mapping, file: file.clone(), at });
+        }
+        Ok(loaded)
+    }
+}
+
+/// The system with that `id`, at any depth.
+fn with_id<'a>(system: &'a System, id: &str) -> Option<&'a System> {
+    if system.base.id.as_deref() == Some(id) {
+        return Some(system);
+    }
+    system.elements.iter().find_map(|element| match element {
+        Element::System(inner) => with_id(inner, id),
+        _ => None,
+    })
+}

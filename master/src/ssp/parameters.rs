@@ -1,0 +1,257 @@
+//! Parameter bindings to settings of FMUs (SSP 1.0.1, sections 5.2.3, 6 and 7).
+
+mod value;
+
+use std::collections::{BTreeMap, HashMap};
+
+use fmi2::description::{Causality, Initial, Kind, ScalarVariable, Variability};
+
+use super::error::{SspError, meaning};
+use super::flatten::Flow;
+use super::structure::{ConnectorKind, MappingEntry, Parameter, ParameterSet};
+use super::tree::{Binding, Content, Tree, Vertex};
+use crate::assembly::Setting;
+use crate::transformation::Transformation;
+use value::Value;
+
+/// Names of a binding that match nothing and are still named in a warning.
+const NAMED: usize = 5;
+
+/// Settings of each FMU by the index of its node.
+pub(super) type Settings = BTreeMap<usize, Vec<Setting>>;
+
+/// Applies all bindings: those of inner elements first, so that those of outer ones win.
+pub(super) fn settings(
+    tree: &Tree,
+    flow: &Flow,
+    warnings: &mut Vec<String>,
+) -> Result<Settings, SspError> {
+    let mut applied =
+        Applied { tree, below: below(flow), flow, settings: Settings::new(), warnings };
+    // A system stands before all that is in it; its dictionaries and elements in their order.
+    let mut order: Vec<usize> = (0..tree.nodes.len()).collect();
+    order.sort_by_cached_key(|node| std::cmp::Reverse(depth(tree, *node)));
+    for node in order {
+        for binding in &tree.nodes[node].bindings {
+            applied.bind(node, binding).map_err(|error| error.in_file(&binding.file.shown))?;
+        }
+    }
+    Ok(applied.settings)
+}
+
+fn depth(tree: &Tree, node: usize) -> usize {
+    std::iter::successors(Some(node), |node| tree.nodes[*node].parent).count()
+}
+
+/// Edges by where they begin.
+fn below(flow: &Flow) -> HashMap<&Vertex, Vec<&Vertex>> {
+    let mut below: HashMap<&Vertex, Vec<&Vertex>> = HashMap::new();
+    for edge in &flow.edges {
+        below.entry(&edge.from).or_default().push(&edge.to);
+    }
+    below
+}
+
+struct Applied<'a> {
+    tree: &'a Tree,
+    flow: &'a Flow,
+    below: HashMap<&'a Vertex, Vec<&'a Vertex>>,
+    settings: Settings,
+    warnings: &'a mut Vec<String>,
+}
+
+impl Applied<'_> {
+    fn bind(&mut self, node: usize, binding: &Binding) -> Result<(), SspError> {
+        let mut unmatched = Vec::new();
+        let values = &binding.values;
+        match &binding.mapping {
+            None => {
+                for parameter in &values.parameters {
+                    let name = format!("{}{}", binding.prefix, parameter.name);
+                    let entry = MappingEntry { target: name, ..MappingEntry::default() };
+                    self.apply(node, binding, (parameter, &entry), &mut unmatched)?;
+                }
+            }
+            Some(mapping) => {
+                let sources: HashMap<String, &Parameter> = values
+                    .parameters
+                    .iter()
+                    .map(|each| (format!("{}{}", binding.prefix, each.name), each))
+                    .collect();
+                for entry in &mapping.entries {
+                    match sources.get(&entry.source) {
+                        Some(parameter) => {
+                            self.apply(node, binding, (parameter, entry), &mut unmatched)?;
+                        }
+                        None => unmatched.push(entry.source.clone()),
+                    }
+                }
+            }
+        }
+        if !unmatched.is_empty() {
+            self.warn_unmatched(values, node, &unmatched);
+        }
+        Ok(())
+    }
+
+    fn warn_unmatched(&mut self, values: &ParameterSet, node: usize, names: &[String]) {
+        let owner = match self.tree.nodes[node].path.as_str() {
+            "" => "the system".to_owned(),
+            path => path.to_owned(),
+        };
+        let rest = names.len().saturating_sub(NAMED);
+        let more = if rest > 0 { format!(" and {rest} more") } else { String::new() };
+        let names = names[..names.len() - rest].join(", ");
+        let set = &values.name;
+        self.warnings.push(format!("parameter set {set:?}: {owner} has no {names}{more}: ignored"));
+    }
+
+    /// One parameter to every variable that its name means.
+    fn apply(
+        &mut self,
+        node: usize,
+        binding: &Binding,
+        (parameter, entry): (&Parameter, &MappingEntry),
+        unmatched: &mut Vec<String>,
+    ) -> Result<(), SspError> {
+        let mut targets = Vec::new();
+        find(self.tree, node, &entry.target, &mut targets);
+        if targets.is_empty() {
+            unmatched.push(entry.target.clone());
+        }
+        for target in targets {
+            let wrong = |sentence| {
+                let name = self.tree.name(&target);
+                meaning(binding.at, format!("parameter {} for {name}: {sentence}", parameter.name))
+            };
+            let measure = self.tree.measure(&target);
+            let value = Value::of(parameter, &binding.values.definitions);
+            let (value, doubts) = value.converted(&entry.conversion, measure).map_err(wrong)?;
+            let name = self.tree.name(&target);
+            self.warnings.extend(doubts.iter().map(|doubt| format!("setting of {name}: {doubt}")));
+            self.set(&target, value).map_err(wrong)?;
+        }
+        Ok(())
+    }
+
+    /// Sets an FMU's variable, or what is connected to a system's connector.
+    fn set(&mut self, target: &Vertex, value: Value) -> Result<(), String> {
+        if matches!(self.tree.nodes[target.node].content, Content::Fmu(_)) {
+            return self.set_variable(target, &value);
+        }
+        let kind = self.tree.connector(target.node, &target.connector).map(|each| each.kind);
+        let gives = matches!(kind, Some(ConnectorKind::Input | ConnectorKind::Parameter));
+        if gives { self.set_downstream(target, &value) } else { self.set_upstream(target, value) }
+    }
+
+    /// All variables that the connector leads to.
+    fn set_downstream(&mut self, target: &Vertex, value: &Value) -> Result<(), String> {
+        let mut waiting = vec![target];
+        let mut steps = self.flow.edges.len();
+        let mut ends = Vec::new();
+        while let Some(vertex) = waiting.pop() {
+            for next in self.below.get(vertex).into_iter().flatten() {
+                steps = steps.checked_sub(1).ok_or("a ring of connections")?;
+                match self.tree.nodes[next.node].content {
+                    Content::Fmu(_) => ends.push((*next).clone()),
+                    _ => waiting.push(next),
+                }
+            }
+        }
+        ends.sort_unstable();
+        for end in ends {
+            let path = self.flow.upstream(self.tree, &end).map_err(|error| error.to_string())?;
+            // The source may lie further up than the connector that is set.
+            let begin = path.iter().position(|edge| edge.from == *target).unwrap_or(0);
+            let measure = self.tree.measure(target).or(value.measure().clone());
+            let way = Flow::over(self.tree, &path[begin..], measure);
+            let way = way.map_err(|error| error.to_string())?;
+            let number = value.number.transformed(&way.transformation)?;
+            self.set_variable(&end, &Value::new(number, way.measure))?;
+        }
+        Ok(())
+    }
+
+    /// The output that the connector shows; its start value is what the connector shall show.
+    fn set_upstream(&mut self, target: &Vertex, value: Value) -> Result<(), String> {
+        let path = self.flow.upstream(self.tree, target).map_err(|error| error.to_string())?;
+        let Some(first) = path.first() else { return Ok(()) };
+        let measure = self.tree.measure(&first.from);
+        let way =
+            Flow::over(self.tree, &path, measure.clone()).map_err(|error| error.to_string())?;
+        let number = match way.transformation {
+            Transformation::Identity => value.number,
+            Transformation::Linear { factor, offset } if factor != 0.0 => {
+                let back =
+                    Transformation::Linear { factor: 1.0 / factor, offset: -offset / factor };
+                value.number.transformed(&back)?
+            }
+            _ => return Err("the transformation on the way has no inverse".to_owned()),
+        };
+        self.set_variable(&first.from.clone(), &Value::new(number, measure))
+    }
+
+    fn set_variable(&mut self, target: &Vertex, value: &Value) -> Result<(), String> {
+        let (tree, name) = (self.tree, self.tree.name(target));
+        let Some(variable) = tree.variable(target) else {
+            return Err(format!("the FMU has no variable {name}"));
+        };
+        if !settable(variable) {
+            let causality = variable.causality.as_str();
+            self.warnings.push(format!(
+                "{name} is {causality} and {} without a start value: its setting is ignored",
+                variable.variability.as_str()
+            ));
+            return Ok(());
+        }
+        let items = tree.measure(target).items;
+        let text = value.number.text(&variable.kind, items.as_deref())?;
+        let setting = Setting { variable: variable.name.clone(), value: text };
+        let settings = self.settings.entry(target.node).or_default();
+        match settings.iter_mut().find(|known| known.variable == setting.variable) {
+            Some(known) => *known = setting,
+            None => settings.push(setting),
+        }
+        Ok(())
+    }
+}
+
+/// All variables and connectors of `node` that `name` means: hierarchical names need not be unique.
+fn find(tree: &Tree, node: usize, name: &str, found: &mut Vec<Vertex>) {
+    let here = &tree.nodes[node];
+    match here.content {
+        Content::Fmu(_) => {
+            let vertex = Vertex { node, connector: name.to_owned() };
+            if tree.variable(&vertex).is_some() {
+                found.push(vertex);
+            }
+        }
+        Content::System => {
+            if tree.connector(node, name).is_some() {
+                found.push(Vertex { node, connector: name.to_owned() });
+            }
+            for (position, _) in name.match_indices('.') {
+                if let Some(child) = here.children.get(&name[..position]) {
+                    find(tree, *child, &name[position + 1..], found);
+                }
+            }
+        }
+        Content::Dictionary | Content::Reference(_) => {}
+    }
+}
+
+/// Whether a value before the initialization is legal: an input, or one that has a start value.
+fn settable(variable: &ScalarVariable) -> bool {
+    let has_start = match &variable.kind {
+        Kind::Real(real) => real.start.is_some(),
+        Kind::Integer(kind) | Kind::Enumeration(kind) => kind.start.is_some(),
+        Kind::Boolean(start) => start.is_some(),
+        Kind::String(start) => start.is_some(),
+    };
+    let initial = variable.initial_in_force();
+    variable.variability != Variability::Constant
+        && variable.causality != Causality::Independent
+        && (variable.causality == Causality::Input
+            || has_start
+            || matches!(initial, Some(Initial::Exact | Initial::Approx)))
+}

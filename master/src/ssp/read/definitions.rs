@@ -1,0 +1,123 @@
+//! Units, enumerations, types, transformations: what several kinds of files have (section 4).
+
+use std::collections::HashSet;
+use std::hash::Hash;
+
+use fmi2::unit::BaseUnit;
+
+use crate::ssp::error::SspError;
+use crate::ssp::structure::{Conversion, Definitions, Enumeration, Transformation, Type, Unit};
+use crate::ssp::xml::Node;
+
+pub(super) fn definitions(root: &Node) -> Result<Definitions, SspError> {
+    let enumerations = root.list("Enumerations", "Enumeration", enumeration)?;
+    let units = root.list("Units", "Unit", unit)?;
+    root.unique("enumerations", enumerations.iter().map(|each| each.name.as_str()))?;
+    root.unique("units", units.iter().map(|each| each.name.as_str()))?;
+    Ok(Definitions { enumerations, units })
+}
+
+fn enumeration(node: &Node) -> Result<Enumeration, SspError> {
+    let items = node
+        .children_named("Item")
+        .map(|item| Ok((item.required("name")?.to_owned(), item.needed("value", Node::integer)?)));
+    let items = items.collect::<Result<Vec<_>, SspError>>()?;
+    node.unique("items", items.iter().map(|(name, _)| name.as_str()))?;
+    Ok(Enumeration { name: node.required("name")?.to_owned(), items })
+}
+
+fn unit(node: &Node) -> Result<Unit, SspError> {
+    let base = node.child("BaseUnit")?;
+    let base = base.ok_or_else(|| node.wrong("an element BaseUnit", "none"))?;
+    let exponent = |name| Ok::<_, SspError>(base.integer(name)?.unwrap_or(0));
+    let factor = base.number("factor")?.unwrap_or(1.0);
+    if factor == 0.0 {
+        return Err(base.wrong("a factor other than zero", "0"));
+    }
+    let base = BaseUnit {
+        kg: exponent("kg")?,
+        m: exponent("m")?,
+        s: exponent("s")?,
+        a: exponent("A")?,
+        k: exponent("K")?,
+        mol: exponent("mol")?,
+        cd: exponent("cd")?,
+        rad: exponent("rad")?,
+        factor,
+        offset: base.number("offset")?.unwrap_or(0.0),
+    };
+    Ok(Unit { name: node.required("name")?.to_owned(), base })
+}
+
+/// The type that one of the children is.
+pub(super) fn value_type(node: &Node) -> Result<Option<Type>, SspError> {
+    let mut found = None;
+    for child in node.own_children() {
+        let kind = match child.name.as_str() {
+            "Real" => Type::Real(child.text("unit")),
+            "Integer" => Type::Integer,
+            "Boolean" => Type::Boolean,
+            "String" => Type::String,
+            "Enumeration" => Type::Enumeration(child.required("name")?.to_owned()),
+            "Binary" => Type::Binary,
+            _ => continue,
+        };
+        if found.is_some() {
+            return Err(node.wrong("one type", format!("another one, {}", child.name)));
+        }
+        found = Some(kind);
+    }
+    Ok(found)
+}
+
+/// The transformation that one of the children is, and `suppressUnitConversion`.
+pub(super) fn conversion(node: &Node) -> Result<Conversion, SspError> {
+    let mut transformation = None;
+    for child in node.own_children().filter(|child| child.name.ends_with("Transformation")) {
+        if transformation.is_some() {
+            return Err(node.wrong("one transformation", "two"));
+        }
+        transformation = Some(read_transformation(child)?);
+    }
+    let suppress_units = node.boolean("suppressUnitConversion")?.unwrap_or(false);
+    Ok(Conversion { transformation, suppress_units })
+}
+
+fn read_transformation(node: &Node) -> Result<Transformation, SspError> {
+    let text = |entry: &Node, name: &str| Ok(entry.text(name));
+    match node.name.as_str() {
+        "LinearTransformation" => Ok(Transformation::Linear {
+            factor: node.number("factor")?.unwrap_or(1.0),
+            offset: node.number("offset")?.unwrap_or(0.0),
+        }),
+        "BooleanMappingTransformation" => {
+            Ok(Transformation::Boolean(entries(node, Node::boolean)?))
+        }
+        "IntegerMappingTransformation" => {
+            Ok(Transformation::Integer(entries(node, Node::integer)?))
+        }
+        "EnumerationMappingTransformation" => Ok(Transformation::Enumeration(entries(node, text)?)),
+        other => {
+            let expected = "LinearTransformation or BooleanMappingTransformation, \
+                 IntegerMappingTransformation or EnumerationMappingTransformation";
+            Err(node.wrong(expected, other))
+        }
+    }
+}
+
+/// Source and target of each `MapEntry`; no source may occur twice.
+fn entries<T: Clone + Eq + Hash>(
+    node: &Node,
+    read: impl Fn(&Node, &str) -> Result<Option<T>, SspError>,
+) -> Result<Vec<(T, T)>, SspError> {
+    let mut entries = Vec::new();
+    let mut sources = HashSet::new();
+    for entry in node.children_named("MapEntry") {
+        let (source, target) = (entry.needed("source", &read)?, entry.needed("target", &read)?);
+        if !sources.insert(source.clone()) {
+            return Err(entry.wrong("a source that no other entry has", "a second one"));
+        }
+        entries.push((source, target));
+    }
+    Ok(entries)
+}

@@ -1,0 +1,269 @@
+//! The plain data of [`super::structure`] to XML. Equal data give equal bytes.
+
+mod tag;
+
+use super::structure::{
+    Component, Connection, Connector, Content, Conversion, DefaultExperiment, Definitions,
+    DictionarySource, Element, ElementBase, End, Implementation, MappingEntry, Parameter,
+    ParameterBinding, ParameterMapping, ParameterSet, ParameterValue, SignalDictionary, Source,
+    System, SystemStructure, Transformation, Type,
+};
+use tag::Tag;
+
+/// The SSD file.
+#[must_use]
+pub fn render_ssd(structure: &SystemStructure) -> String {
+    let mut root = Tag::root("ssd:SystemStructureDescription")
+        .with("version", "1.0")
+        .with("name", &structure.name)
+        .add(system(&structure.system));
+    root = definitions(root, "ssd", &structure.definitions);
+    root.maybe_add(structure.experiment.as_ref().map(experiment)).render()
+}
+
+/// The SSV file.
+#[must_use]
+pub fn render_ssv(set: &ParameterSet) -> String {
+    parameter_set(Tag::root("ssv:ParameterSet"), set).render()
+}
+
+/// The SSM file.
+#[must_use]
+pub fn render_ssm(mapping: &ParameterMapping) -> String {
+    parameter_mapping(Tag::root("ssm:ParameterMapping"), mapping).render()
+}
+
+/// The SSB file.
+#[must_use]
+pub fn render_ssb(dictionary: &SignalDictionary) -> String {
+    signal_dictionary(Tag::root("ssb:SignalDictionary"), dictionary).render()
+}
+
+fn system(system: &System) -> Tag {
+    let elements = system.elements.iter().map(|element| match element {
+        Element::System(inner) => self::system(inner),
+        Element::Component(component) => self::component(component),
+        Element::Dictionary(reference) => {
+            let tag = Tag::new("ssd:SignalDictionaryReference");
+            base(tag, &reference.base).with("dictionary", &reference.dictionary)
+        }
+    });
+    base(Tag::new("ssd:System"), &system.base)
+        .list("ssd:Elements", elements)
+        .list("ssd:Connections", system.connections.iter().map(connection))
+        .list("ssd:SignalDictionaries", system.dictionaries.iter().map(dictionary))
+}
+
+fn base(tag: Tag, base: &ElementBase) -> Tag {
+    tag.maybe("id", base.id.as_deref())
+        .with("name", &base.name)
+        .list("ssd:Connectors", base.connectors.iter().map(connector))
+        .list("ssd:ParameterBindings", base.bindings.iter().map(binding))
+}
+
+fn component(component: &Component) -> Tag {
+    let content = match component.content {
+        Content::Fmu => "application/x-fmu-sharedlibrary",
+        Content::Definition => "application/x-ssp-definition",
+        Content::Package => "application/x-ssp-package",
+    };
+    let implementation = match component.implementation {
+        Implementation::Any => None,
+        Implementation::CoSimulation => Some("CoSimulation"),
+        Implementation::ModelExchange => Some("ModelExchange"),
+    };
+    let hint =
+        component.step_size.map(|size| Tag::new("osp:StepSizeHint").with("value", number(size)));
+    base(Tag::new("ssd:Component"), &component.base)
+        .with("type", content)
+        .with("source", &component.source)
+        .maybe("implementation", implementation)
+        .maybe_add(hint.map(annotation))
+}
+
+fn annotation(content: Tag) -> Tag {
+    let annotation = Tag::new("ssc:Annotation").with("type", "com.opensimulationplatform");
+    Tag::new("ssd:Annotations").add(annotation.add(content))
+}
+
+fn connector(connector: &Connector) -> Tag {
+    Tag::new("ssd:Connector")
+        .with("name", &connector.name)
+        .with("kind", connector.kind.as_str())
+        .maybe_add(connector.kind_of_value.as_ref().map(value_type))
+}
+
+fn value_type(kind: &Type) -> Tag {
+    match kind {
+        Type::Real(unit) => Tag::new("ssc:Real").maybe("unit", unit.as_deref()),
+        Type::Integer => Tag::new("ssc:Integer"),
+        Type::Boolean => Tag::new("ssc:Boolean"),
+        Type::String => Tag::new("ssc:String"),
+        Type::Enumeration(name) => Tag::new("ssc:Enumeration").with("name", name),
+        Type::Binary => Tag::new("ssc:Binary"),
+    }
+}
+
+fn connection(connection: &Connection) -> Tag {
+    let end = |tag: Tag, element, connector, end: &End| {
+        tag.maybe(element, end.element.as_deref()).with(connector, &end.connector)
+    };
+    let tag = Tag::new("ssd:Connection");
+    let tag = end(tag, "startElement", "startConnector", &connection.start);
+    let tag = end(tag, "endElement", "endConnector", &connection.end);
+    conversion(tag, &connection.conversion)
+}
+
+fn conversion(tag: Tag, conversion: &Conversion) -> Tag {
+    let suppress = conversion.suppress_units.then_some("true");
+    tag.maybe("suppressUnitConversion", suppress)
+        .maybe_add(conversion.transformation.as_ref().map(transformation))
+}
+
+/// Both attributes of a linear one are written: Ecos takes a missing factor for zero.
+fn transformation(transformation: &Transformation) -> Tag {
+    fn entries<T: ToString>(tag: Tag, pairs: &[(T, T)]) -> Tag {
+        pairs.iter().fold(tag, |tag, (source, target)| {
+            let entry = Tag::new("ssc:MapEntry").with("source", source.to_string());
+            tag.add(entry.with("target", target.to_string()))
+        })
+    }
+    match transformation {
+        Transformation::Linear { factor, offset } => Tag::new("ssc:LinearTransformation")
+            .with("factor", number(*factor))
+            .with("offset", number(*offset)),
+        Transformation::Boolean(pairs) => {
+            entries(Tag::new("ssc:BooleanMappingTransformation"), pairs)
+        }
+        Transformation::Integer(pairs) => {
+            entries(Tag::new("ssc:IntegerMappingTransformation"), pairs)
+        }
+        Transformation::Enumeration(pairs) => {
+            entries(Tag::new("ssc:EnumerationMappingTransformation"), pairs)
+        }
+    }
+}
+
+fn binding(binding: &ParameterBinding) -> Tag {
+    let prefix = Some(binding.prefix.as_str()).filter(|prefix| !prefix.is_empty());
+    let tag = Tag::new("ssd:ParameterBinding").maybe("prefix", prefix);
+    let tag = match &binding.values {
+        Source::Inline(set) => {
+            let inline = parameter_set(Tag::new("ssv:ParameterSet"), set);
+            tag.add(Tag::new("ssd:ParameterValues").add(inline))
+        }
+        Source::File { uri, in_component } => file(tag, uri, *in_component),
+    };
+    tag.maybe_add(binding.mapping.as_ref().map(|mapping| {
+        let tag = Tag::new("ssd:ParameterMapping");
+        match mapping {
+            Source::Inline(mapping) => {
+                tag.add(parameter_mapping(Tag::new("ssm:ParameterMapping"), mapping))
+            }
+            Source::File { uri, in_component } => file(tag, uri, *in_component),
+        }
+    }))
+}
+
+fn file(tag: Tag, uri: &str, in_component: bool) -> Tag {
+    tag.with("source", uri).maybe("sourceBase", in_component.then_some("component"))
+}
+
+fn dictionary(dictionary: &DictionarySource) -> Tag {
+    let tag = Tag::new("ssd:SignalDictionary").with("name", &dictionary.name);
+    match &dictionary.content {
+        Source::Inline(content) => {
+            tag.add(signal_dictionary(Tag::new("ssb:SignalDictionary"), content))
+        }
+        Source::File { uri, .. } => tag.with("source", uri),
+    }
+}
+
+fn signal_dictionary(tag: Tag, dictionary: &SignalDictionary) -> Tag {
+    let tag = dictionary.entries.iter().fold(tag.with("version", "1.0"), |tag, (name, kind)| {
+        tag.add(Tag::new("ssb:DictionaryEntry").with("name", name).add(value_type(kind)))
+    });
+    definitions(tag, "ssb", &dictionary.definitions)
+}
+
+fn parameter_set(tag: Tag, set: &ParameterSet) -> Tag {
+    let parameters = set.parameters.iter().map(parameter);
+    let list = parameters.fold(Tag::new("ssv:Parameters"), Tag::add);
+    let tag = tag.with("version", "1.0").with("name", &set.name).add(list);
+    definitions(tag, "ssv", &set.definitions)
+}
+
+fn parameter(parameter: &Parameter) -> Tag {
+    let value = match &parameter.value {
+        ParameterValue::Real(value, unit) => {
+            Tag::new("ssv:Real").with("value", number(*value)).maybe("unit", unit.as_deref())
+        }
+        ParameterValue::Integer(value) => Tag::new("ssv:Integer").with("value", value.to_string()),
+        ParameterValue::Boolean(value) => Tag::new("ssv:Boolean").with("value", value.to_string()),
+        ParameterValue::String(text) => Tag::new("ssv:String").with("value", text),
+        ParameterValue::Enumeration(item, name) => {
+            Tag::new("ssv:Enumeration").with("value", item).maybe("name", name.as_deref())
+        }
+        ParameterValue::Binary(digits) => Tag::new("ssv:Binary").with("value", digits),
+    };
+    Tag::new("ssv:Parameter").with("name", &parameter.name).add(value)
+}
+
+fn parameter_mapping(tag: Tag, mapping: &ParameterMapping) -> Tag {
+    mapping.entries.iter().fold(tag.with("version", "1.0"), |tag, entry: &MappingEntry| {
+        let row = Tag::new("ssm:MappingEntry")
+            .with("source", &entry.source)
+            .with("target", &entry.target);
+        tag.add(conversion(row, &entry.conversion))
+    })
+}
+
+/// `Enumerations` and `Units` of the namespace of the file, with content of the common one.
+fn definitions(tag: Tag, space: &str, definitions: &Definitions) -> Tag {
+    let enumerations = definitions.enumerations.iter().map(|enumeration| {
+        let items = enumeration.items.iter().map(|(name, value)| {
+            Tag::new("ssc:Item").with("name", name).with("value", value.to_string())
+        });
+        items.fold(Tag::new("ssc:Enumeration").with("name", &enumeration.name), Tag::add)
+    });
+    let units = definitions.units.iter().map(|unit| {
+        let base = &unit.base;
+        let exponents = [
+            ("kg", base.kg),
+            ("m", base.m),
+            ("s", base.s),
+            ("A", base.a),
+            ("K", base.k),
+            ("mol", base.mol),
+            ("cd", base.cd),
+            ("rad", base.rad),
+        ];
+        let stated = exponents.into_iter().filter(|(_, exponent)| *exponent != 0);
+        let tag = stated.fold(Tag::new("ssc:BaseUnit"), |tag, (name, exponent)| {
+            tag.with(name, exponent.to_string())
+        });
+        let factor = (base.factor != 1.0).then(|| number(base.factor));
+        let offset = (base.offset != 0.0).then(|| number(base.offset));
+        let tag = tag.maybe("factor", factor.as_deref()).maybe("offset", offset.as_deref());
+        Tag::new("ssc:Unit").with("name", &unit.name).add(tag)
+    });
+    tag.list(&format!("{space}:Enumerations"), enumerations).list(&format!("{space}:Units"), units)
+}
+
+/// The step stands where libcosim looks for it.
+fn experiment(experiment: &DefaultExperiment) -> Tag {
+    let time = |time: Option<f64>| time.map(number);
+    let step = experiment.step_size.map(|size| {
+        let fixed = Tag::new("osp:FixedStepAlgorithm").with("baseStepSize", number(size));
+        annotation(Tag::new("osp:Algorithm").add(fixed))
+    });
+    Tag::new("ssd:DefaultExperiment")
+        .maybe("startTime", time(experiment.start_time).as_deref())
+        .maybe("stopTime", time(experiment.stop_time).as_deref())
+        .maybe_add(step)
+}
+
+/// The shortest text that is read as the same number.
+fn number(value: f64) -> String {
+    format!("{value:?}")
+}

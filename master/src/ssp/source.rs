@@ -1,0 +1,192 @@
+//! What a URI in an SSD names (SSP 1.0.1, sections 2.3 and 5.4).
+
+use std::path::{Path, PathBuf};
+
+use fmi2::location::path_from_uri;
+use percent_encoding::percent_decode_str;
+
+/// The folder that relative URIs of a file start from.
+#[derive(Clone, Debug)]
+pub(super) struct Base {
+    /// The folder, or below it after [`Base::below`].
+    pub(super) folder: PathBuf,
+    /// The folder as the user knows it: `plant.ssp/resources` for one in a temporary folder.
+    pub(super) shown: PathBuf,
+    /// The unpacked archive that nothing may lead out of.
+    pub(super) archive: Option<PathBuf>,
+}
+
+/// A file that a URI names.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Target {
+    /// Its place.
+    pub(super) path: PathBuf,
+    /// Its name for the user.
+    pub(super) shown: PathBuf,
+    /// What follows `#`.
+    pub(super) fragment: Option<String>,
+}
+
+impl Base {
+    /// The base of a file in the unpacked archive `folder`, shown as `shown`.
+    pub(super) fn archive(folder: &Path, shown: &Path) -> Self {
+        let (folder, shown) = (folder.to_owned(), shown.to_owned());
+        Base { archive: Some(folder.clone()), folder, shown }
+    }
+
+    /// The base of the file `target`, which was found from here.
+    pub(super) fn below(&self, target: &Target) -> Self {
+        let folder = |path: &Path| path.parent().map(Path::to_path_buf).unwrap_or_default();
+        Base {
+            folder: folder(&target.path),
+            shown: folder(&target.shown),
+            archive: self.archive.clone(),
+        }
+    }
+
+    /// The file that `uri` names, or what is wrong with it: a sentence.
+    pub(super) fn resolve(&self, uri: &str) -> Result<Target, String> {
+        let (path, fragment) = match uri.split_once('#') {
+            Some((path, fragment)) => (path, Some(decoded(fragment)?)),
+            None => (uri, None),
+        };
+        if path.contains('?') {
+            return Err(format!("{uri:?} has a query, expected the path of a file"));
+        }
+        if let Some(scheme) = scheme(path) {
+            if !scheme.eq_ignore_ascii_case("file") {
+                return Err(format!(
+                    "{uri:?} has the scheme {scheme}, expected a relative path or file:"
+                ));
+            }
+            self.refuse_absolute(uri)?;
+            let path = path_from_uri(path).map_err(|error| error.to_string())?;
+            return Ok(Target { shown: path.clone(), path, fragment });
+        }
+        let decoded = decoded(path)?;
+        if decoded.starts_with('/') {
+            self.refuse_absolute(uri)?;
+            let path = PathBuf::from(decoded);
+            return Ok(Target { shown: path.clone(), path, fragment });
+        }
+        let (folder, shown) = (self.walk(&self.folder, &decoded), self.walk(&self.shown, &decoded));
+        match (folder, shown) {
+            (Some(path), Some(shown)) => Ok(Target { path, shown, fragment }),
+            _ => Err(format!("{uri:?} leads out of the archive")),
+        }
+    }
+
+    fn refuse_absolute(&self, uri: &str) -> Result<(), String> {
+        match self.archive {
+            Some(_) => Err(format!("{uri:?} is absolute, expected a path inside the archive")),
+            None => Ok(()),
+        }
+    }
+
+    /// `relative` from `folder`, part by part; none where it leaves the archive.
+    fn walk(&self, folder: &Path, relative: &str) -> Option<PathBuf> {
+        let inside = |path: &Path| path.parent().map(Path::to_path_buf);
+        let mut depth = match &self.archive {
+            Some(root) => Some(self.folder.strip_prefix(root).ok()?.components().count()),
+            None => None,
+        };
+        let mut path = folder.to_owned();
+        for part in relative.split('/') {
+            match (part, &mut depth) {
+                ("" | ".", _) => {}
+                ("..", Some(depth)) => {
+                    *depth = depth.checked_sub(1)?;
+                    path = inside(&path)?;
+                }
+                (part, depth) => {
+                    *depth = depth.map(|depth| depth + 1);
+                    path.push(part);
+                }
+            }
+        }
+        Some(path)
+    }
+}
+
+fn decoded(text: &str) -> Result<String, String> {
+    let decoded = percent_decode_str(text).decode_utf8();
+    let decoded = decoded.map_err(|_| format!("{text:?} is not UTF-8 once decoded"))?;
+    if decoded.contains('\0') {
+        return Err(format!("{text:?} has a NUL"));
+    }
+    Ok(decoded.into_owned())
+}
+
+/// The scheme of an absolute URI (RFC 3986, section 3.1).
+fn scheme(uri: &str) -> Option<&str> {
+    let (scheme, _) = uri.split_once(':')?;
+    let mut characters = scheme.chars();
+    let starts = characters.next().is_some_and(|first| first.is_ascii_alphabetic());
+    let rest = |character: char| character.is_ascii_alphanumeric() || "+-.".contains(character);
+    (starts && characters.all(rest)).then_some(scheme)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn archive() -> Base {
+        let mut base = Base::archive(Path::new("/tmp/x"), Path::new("a.ssp"));
+        base.folder.push("resources");
+        base.shown.push("resources");
+        base
+    }
+
+    fn disk() -> Base {
+        Base { folder: "/data/s".into(), shown: "s".into(), archive: None }
+    }
+
+    #[test]
+    fn relative_uris_are_decoded_and_start_at_the_ssd() {
+        for (uri, path, shown) in [
+            ("a.fmu", "/tmp/x/resources/a.fmu", "a.ssp/resources/a.fmu"),
+            ("./b%20c/d%25.fmu", "/tmp/x/resources/b c/d%.fmu", "a.ssp/resources/b c/d%.fmu"),
+            ("../e.ssv", "/tmp/x/e.ssv", "a.ssp/e.ssv"),
+            ("f:g.fmu/../h.fmu", "", ""),
+        ] {
+            let found = archive().resolve(uri);
+            if path.is_empty() {
+                assert!(found.unwrap_err().contains("the scheme f"), "{uri}");
+                continue;
+            }
+            let expected = Target { path: path.into(), shown: shown.into(), fragment: None };
+            assert_eq!(found, Ok(expected), "{uri}");
+        }
+        let found = archive().resolve("sub.ssp#Variant%20B.ssd").unwrap();
+        assert_eq!(found.fragment.as_deref(), Some("Variant B.ssd"));
+    }
+
+    #[test]
+    fn nothing_leads_out_of_an_archive() {
+        for uri in ["../../a", "%2e%2e/%2E%2E/a", "b/../../../a", "..%2f..%2fa"] {
+            let sentence = archive().resolve(uri).unwrap_err();
+            assert!(sentence.ends_with("leads out of the archive"), "{sentence}");
+        }
+        for uri in ["/etc/passwd", "file:///etc/passwd", "%2Fetc"] {
+            let sentence = archive().resolve(uri).unwrap_err();
+            assert!(sentence.contains("is absolute"), "{sentence}");
+        }
+    }
+
+    #[test]
+    fn a_file_on_disk_may_name_others_anywhere_on_disk_but_not_elsewhere() {
+        let path = |uri| disk().resolve(uri).unwrap().path;
+        assert_eq!(path("../fmi2/a.fmu"), Path::new("/data/s/../fmi2/a.fmu"));
+        assert_eq!(path("file:///b%20c.fmu"), Path::new("/b c.fmu"));
+        assert_eq!(path("/d.fmu"), Path::new("/d.fmu"));
+        for (uri, words) in [
+            ("https://x.org/a.fmu", "the scheme https"),
+            ("a.fmu?x=1", "a query"),
+            ("a%00b", "a NUL"),
+            ("%ff", "not UTF-8"),
+        ] {
+            let sentence = disk().resolve(uri).unwrap_err();
+            assert!(sentence.contains(words), "{sentence}");
+        }
+    }
+}

@@ -1,0 +1,393 @@
+//! The content of SSD, SSV, SSM and SSB files (SSP 1.0.1, sections 4 to 8) as plain data.
+//!
+//! Geometry, graphical elements and annotations are left out, but for the step sizes that the
+//! annotations of the Open Simulation Platform give.
+
+use fmi2::description::Position;
+use fmi2::unit::BaseUnit;
+
+/// `SystemStructureDescription`, the root element of an SSD file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SystemStructure {
+    /// `name`.
+    pub name: String,
+    /// The root system.
+    pub system: System,
+    /// `Enumerations` and `Units`.
+    pub definitions: Definitions,
+    /// `DefaultExperiment`.
+    pub experiment: Option<DefaultExperiment>,
+}
+
+/// The definitions that hold within one file (section 4.4).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Definitions {
+    /// `Enumerations`.
+    pub enumerations: Vec<Enumeration>,
+    /// `Units`.
+    pub units: Vec<Unit>,
+}
+
+/// `Enumeration`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Enumeration {
+    /// `name`, unique in the file.
+    pub name: String,
+    /// Name and value of each `Item`.
+    pub items: Vec<(String, i32)>,
+}
+
+/// `Unit`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unit {
+    /// `name`, unique in the file.
+    pub name: String,
+    /// `BaseUnit`.
+    pub base: BaseUnit,
+}
+
+/// `DefaultExperiment`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DefaultExperiment {
+    /// `startTime` in s.
+    pub start_time: Option<f64>,
+    /// `stopTime` in s.
+    pub stop_time: Option<f64>,
+    /// Base step in s, `osp:FixedStepAlgorithm` in an annotation `com.opensimulationplatform`.
+    pub step_size: Option<f64>,
+}
+
+/// `System` (section 5.3).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct System {
+    /// What every element has.
+    pub base: ElementBase,
+    /// `Elements`.
+    pub elements: Vec<Element>,
+    /// `Connections`.
+    pub connections: Vec<Connection>,
+    /// `SignalDictionaries`.
+    pub dictionaries: Vec<DictionarySource>,
+}
+
+/// What systems, components and references to signal dictionaries have in common (section 5.2).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ElementBase {
+    /// `name`, unique within the system around it.
+    pub name: String,
+    /// `id`, unique in the file.
+    pub id: Option<String>,
+    /// `Connectors`.
+    pub connectors: Vec<Connector>,
+    /// `ParameterBindings`; later ones win.
+    pub bindings: Vec<ParameterBinding>,
+    /// Where it begins in its file.
+    pub at: Place,
+}
+
+/// A place in a file; the first one in what was made otherwise.
+#[derive(Clone, Copy, Debug)]
+pub struct Place(pub Position);
+
+impl Default for Place {
+    fn default() -> Self {
+        Place(Position { line: 1, column: 1 })
+    }
+}
+
+/// The same content is the same content wherever it stands.
+impl PartialEq for Place {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+/// An element of a system.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Element {
+    /// `Component`.
+    Component(Component),
+    /// `System`, nested.
+    System(System),
+    /// `SignalDictionaryReference`.
+    Dictionary(DictionaryReference),
+}
+
+impl Element {
+    /// What every element has.
+    #[must_use]
+    pub fn base(&self) -> &ElementBase {
+        match self {
+            Element::Component(component) => &component.base,
+            Element::System(system) => &system.base,
+            Element::Dictionary(reference) => &reference.base,
+        }
+    }
+}
+
+/// `Component` (section 5.4).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Component {
+    /// What every element has.
+    pub base: ElementBase,
+    /// `type`.
+    pub content: Content,
+    /// `source`, a URI.
+    pub source: String,
+    /// `implementation`.
+    pub implementation: Implementation,
+    /// Step in s, `osp:StepSizeHint` in an annotation `com.opensimulationplatform`.
+    pub step_size: Option<f64>,
+}
+
+/// `type` of a component: what its source is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Content {
+    /// `application/x-fmu-sharedlibrary`.
+    #[default]
+    Fmu,
+    /// `application/x-ssp-definition`, an SSD file.
+    Definition,
+    /// `application/x-ssp-package`, an SSP archive.
+    Package,
+}
+
+/// `implementation` of a component.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Implementation {
+    /// `any`.
+    #[default]
+    Any,
+    /// `CoSimulation`.
+    CoSimulation,
+    /// `ModelExchange`.
+    ModelExchange,
+}
+
+/// `SignalDictionaryReference` (section 5.5).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DictionaryReference {
+    /// What every element has.
+    pub base: ElementBase,
+    /// `dictionary`: name of a dictionary of the system around it, or of one further out.
+    pub dictionary: String,
+}
+
+/// `SignalDictionary` of a system: its name and its content.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DictionarySource {
+    /// `name`.
+    pub name: String,
+    /// The dictionary.
+    pub content: Source<SignalDictionary>,
+    /// Where it begins.
+    pub at: Place,
+}
+
+/// `SignalDictionary`, the root element of an SSB file (section 8).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SignalDictionary {
+    /// Name and type of each `DictionaryEntry`.
+    pub entries: Vec<(String, Type)>,
+    /// `Enumerations` and `Units`.
+    pub definitions: Definitions,
+}
+
+/// `Connector` (section 5.2.1).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Connector {
+    /// `name`; of a component the name of the FMU's variable.
+    pub name: String,
+    /// `kind`.
+    pub kind: ConnectorKind,
+    /// Type, where it is stated.
+    pub kind_of_value: Option<Type>,
+}
+
+/// `kind` of a connector.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ConnectorKind {
+    /// `input`.
+    Input,
+    /// `output`.
+    Output,
+    /// `parameter`.
+    Parameter,
+    /// `calculatedParameter`.
+    CalculatedParameter,
+    /// `inout`, of references to signal dictionaries.
+    Inout,
+}
+
+impl ConnectorKind {
+    /// The spelling of the standard.
+    #[must_use]
+    pub fn as_str(self) -> &'static str {
+        match self {
+            ConnectorKind::Input => "input",
+            ConnectorKind::Output => "output",
+            ConnectorKind::Parameter => "parameter",
+            ConnectorKind::CalculatedParameter => "calculatedParameter",
+            ConnectorKind::Inout => "inout",
+        }
+    }
+}
+
+/// Type of a connector or of an entry of a signal dictionary (section 4.5.1).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Type {
+    /// `Real` with its `unit`.
+    Real(Option<String>),
+    /// `Integer`.
+    Integer,
+    /// `Boolean`.
+    Boolean,
+    /// `String`.
+    String,
+    /// `Enumeration` with its `name`.
+    Enumeration(String),
+    /// `Binary`, which FMI 2.0 does not have.
+    Binary,
+}
+
+/// `Connection` (section 5.3.2). Which end is the source follows from the kinds of the connectors.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Connection {
+    /// `startElement` and `startConnector`.
+    pub start: End,
+    /// `endElement` and `endConnector`.
+    pub end: End,
+    /// What becomes of the value.
+    pub conversion: Conversion,
+    /// Where it begins.
+    pub at: Place,
+}
+
+/// One end of a connection.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct End {
+    /// The element; the system itself if there is none.
+    pub element: Option<String>,
+    /// The connector.
+    pub connector: String,
+}
+
+impl std::fmt::Display for End {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match &self.element {
+            Some(element) => write!(formatter, "{element}.{}", self.connector),
+            None => write!(formatter, "{}", self.connector),
+        }
+    }
+}
+
+/// What becomes of a value on a connection or in a mapping: first the units, then the transformation.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Conversion {
+    /// The transformation, if there is one.
+    pub transformation: Option<Transformation>,
+    /// `suppressUnitConversion`.
+    pub suppress_units: bool,
+}
+
+/// A transformation as it stands in the file (section 4.5.2).
+#[derive(Clone, Debug, PartialEq)]
+pub enum Transformation {
+    /// `LinearTransformation`: `target = factor source + offset`.
+    Linear {
+        /// `factor`.
+        factor: f64,
+        /// `offset`.
+        offset: f64,
+    },
+    /// `BooleanMappingTransformation`: source and target of each entry.
+    Boolean(Vec<(bool, bool)>),
+    /// `IntegerMappingTransformation`.
+    Integer(Vec<(i32, i32)>),
+    /// `EnumerationMappingTransformation`: names of items.
+    Enumeration(Vec<(String, String)>),
+}
+
+/// `ParameterBinding` (section 5.2.3).
+#[derive(Clone, Debug, PartialEq)]
+pub struct ParameterBinding {
+    /// `prefix` of all names in the source.
+    pub prefix: String,
+    /// The parameter values.
+    pub values: Source<ParameterSet>,
+    /// `ParameterMapping`; with one, only what it maps is applied.
+    pub mapping: Option<Source<ParameterMapping>>,
+    /// Where it begins.
+    pub at: Place,
+}
+
+/// Something that stands in the file or in another one.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Source<T> {
+    /// In this file.
+    Inline(T),
+    /// In a file of its own.
+    File {
+        /// `source`, a URI.
+        uri: String,
+        /// `sourceBase` is `component`: relative to the component, not to the SSD.
+        in_component: bool,
+    },
+}
+
+/// `ParameterSet`, the root element of an SSV file (section 6).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ParameterSet {
+    /// `name`.
+    pub name: String,
+    /// `Parameters`.
+    pub parameters: Vec<Parameter>,
+    /// `Enumerations` and `Units`.
+    pub definitions: Definitions,
+}
+
+/// `Parameter`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameter {
+    /// `name`, unique in its set.
+    pub name: String,
+    /// The value.
+    pub value: ParameterValue,
+}
+
+/// Value of a parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ParameterValue {
+    /// `Real` with its `unit`.
+    Real(f64, Option<String>),
+    /// `Integer`.
+    Integer(i32),
+    /// `Boolean`.
+    Boolean(bool),
+    /// `String`.
+    String(String),
+    /// `Enumeration`: name of an item, and `name` of the enumeration.
+    Enumeration(String, Option<String>),
+    /// `Binary`, which FMI 2.0 does not have, in hexadecimal digits.
+    Binary(String),
+}
+
+/// `ParameterMapping`, the root element of an SSM file (section 7).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ParameterMapping {
+    /// `MappingEntry`s.
+    pub entries: Vec<MappingEntry>,
+}
+
+/// `MappingEntry`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MappingEntry {
+    /// `source`: name of a parameter, with the prefix of the binding.
+    pub source: String,
+    /// `target`: name in the system or component.
+    pub target: String,
+    /// What becomes of the value.
+    pub conversion: Conversion,
+    /// Where it begins.
+    pub at: Place,
+}

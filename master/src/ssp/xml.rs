@@ -1,0 +1,228 @@
+//! Elements of SSP's namespaces, with typed access to what they hold.
+
+use std::str::FromStr;
+
+use fmi2::description::Position;
+use fmi2::xml;
+
+use super::error::SspError;
+
+/// All namespaces of SSP 1.0 begin so.
+const NAMESPACE: &str = "http://ssp-standard.org/SSP1/";
+/// Largest file that is read.
+const CAPACITY: usize = 64 << 20;
+/// Most tags that are read, which bounds the memory that a file of short tags takes.
+const TAGS: usize = 4_000_000;
+/// The white space of XML.
+const WHITE_SPACE: [char; 4] = [' ', '\t', '\r', '\n'];
+
+/// An element. Which of SSP's namespaces it is of does not matter: names do not collide, and some
+/// tools write `ssd:Real` for `ssc:Real`.
+#[derive(Debug)]
+pub(super) struct Node {
+    /// Name without prefix.
+    pub(super) name: String,
+    /// Whether it is of a namespace of SSP.
+    own: bool,
+    attributes: Vec<(String, String)>,
+    children: Vec<Node>,
+    pub(super) at: Position,
+}
+
+/// Reads a file whose root element is `root` of the namespace that ends in `space`.
+pub(super) fn read(bytes: &[u8], space: &str, root: &str) -> Result<Node, SspError> {
+    if bytes.len() > CAPACITY {
+        return Err(SspError::Limit { limit: CAPACITY, what: "bytes" });
+    }
+    if bytes.iter().filter(|byte| **byte == b'<').count() > TAGS {
+        return Err(SspError::Limit { limit: TAGS, what: "tags" });
+    }
+    let element = xml::read(bytes)?;
+    let wanted = format!("{NAMESPACE}{space}");
+    let mut scope = Vec::new();
+    let found_space = resolve(&element, &mut scope)?;
+    let local = element.name.rsplit(':').next().unwrap_or_default().to_owned();
+    if found_space.as_deref() != Some(&wanted) || local != root {
+        return Err(SspError::Content {
+            at: element.at,
+            found: format!("namespace {:?}", found_space.unwrap_or_default()),
+            element: element.name,
+            expected: format!("the root element {root} of the namespace {wanted:?}"),
+        });
+    }
+    let node = node(element, &mut Vec::new())?;
+    node.version()?;
+    Ok(node)
+}
+
+/// Adds the declarations of `element` to `scope` and finds its namespace.
+fn resolve(
+    element: &xml::Element,
+    scope: &mut Vec<(String, String)>,
+) -> Result<Option<String>, SspError> {
+    for (name, value) in &element.attributes {
+        if name == "xmlns" {
+            scope.push((String::new(), value.clone()));
+        } else if let Some(prefix) = name.strip_prefix("xmlns:") {
+            scope.push((prefix.to_owned(), value.clone()));
+        }
+    }
+    let prefix = element.name.split_once(':').map_or("", |(prefix, _)| prefix);
+    let space = scope.iter().rev().find(|(known, _)| known == prefix);
+    match space {
+        Some((_, space)) => Ok(Some(space.clone())),
+        None if prefix.is_empty() => Ok(None),
+        None => Err(SspError::Content {
+            at: element.at,
+            element: element.name.clone(),
+            expected: format!("a declaration xmlns:{prefix}"),
+            found: "none".to_owned(),
+        }),
+    }
+}
+
+fn node(element: xml::Element, scope: &mut Vec<(String, String)>) -> Result<Node, SspError> {
+    let outer = scope.len();
+    let space = resolve(&element, scope)?;
+    let children = element.children.into_iter().map(|child| node(child, scope));
+    let children: Result<Vec<Node>, SspError> = children.collect();
+    scope.truncate(outer);
+    Ok(Node {
+        name: element.name.rsplit(':').next().unwrap_or_default().to_owned(),
+        own: space.is_some_and(|space| space.starts_with(NAMESPACE)),
+        attributes: element.attributes,
+        children: children?,
+        at: element.at,
+    })
+}
+
+impl Node {
+    /// The error for something that is not as it must be.
+    pub(super) fn wrong(&self, expected: impl Into<String>, found: impl Into<String>) -> SspError {
+        let (at, element) = (self.at, self.name.clone());
+        SspError::Content { at, element, expected: expected.into(), found: found.into() }
+    }
+
+    /// Every root element has a version; 1.x can be read (section 2.2).
+    fn version(&self) -> Result<(), SspError> {
+        let version = self.required("version")?;
+        if version.strip_prefix("1.").is_some_and(|minor| !minor.is_empty()) {
+            return Ok(());
+        }
+        Err(self.wrong("version 1.0", format!("{version:?}")))
+    }
+
+    pub(super) fn attribute(&self, name: &str) -> Option<&str> {
+        let own = self.attributes.iter().find(|(own, _)| own == name);
+        own.map(|(_, value)| value.as_str())
+    }
+
+    pub(super) fn text(&self, name: &str) -> Option<String> {
+        self.attribute(name).map(str::to_owned)
+    }
+
+    pub(super) fn required(&self, name: &str) -> Result<&str, SspError> {
+        let value = self.attribute(name);
+        value.ok_or_else(|| self.wrong(format!("the attribute {name}"), "none"))
+    }
+
+    /// The attribute `name` read by `read`, which gives none for what is not `expected`.
+    fn parsed<T>(
+        &self,
+        name: &str,
+        expected: &str,
+        read: impl Fn(&str) -> Option<T>,
+    ) -> Result<Option<T>, SspError> {
+        let wrong = |text: &str| {
+            self.wrong(format!("{expected} in the attribute {name}"), format!("{text:?}"))
+        };
+        let value = self.attribute(name);
+        value
+            .map(|text| read(text.trim_matches(WHITE_SPACE)).ok_or_else(|| wrong(text)))
+            .transpose()
+    }
+
+    /// A finite `xs:double`.
+    pub(super) fn number(&self, name: &str) -> Result<Option<f64>, SspError> {
+        let finite = |text: &str| f64::from_str(text).ok().filter(|value| value.is_finite());
+        self.parsed(name, "a finite number", finite)
+    }
+
+    /// `xs:int`.
+    pub(super) fn integer(&self, name: &str) -> Result<Option<i32>, SspError> {
+        let expected = "an integer from -2147483648 to 2147483647";
+        self.parsed(name, expected, |text| i32::from_str(text).ok())
+    }
+
+    /// `xs:boolean`.
+    pub(super) fn boolean(&self, name: &str) -> Result<Option<bool>, SspError> {
+        self.parsed(name, "true, false, 1 or 0", |text| match text {
+            "true" | "1" => Some(true),
+            "false" | "0" => Some(false),
+            _ => None,
+        })
+    }
+
+    /// An attribute that must be there, read by one of the methods above.
+    pub(super) fn needed<T>(
+        &self,
+        name: &str,
+        read: impl Fn(&Self, &str) -> Result<Option<T>, SspError>,
+    ) -> Result<T, SspError> {
+        self.required(name)?;
+        read(self, name)?.ok_or_else(|| self.wrong(format!("the attribute {name}"), "none"))
+    }
+
+    /// The children of SSP's namespaces.
+    pub(super) fn own_children(&self) -> impl Iterator<Item = &Node> {
+        self.children.iter().filter(|child| child.own)
+    }
+
+    /// Children of whatever namespace, for annotations.
+    pub(super) fn any_child(&self, name: &str) -> Option<&Node> {
+        self.children.iter().find(|child| child.name == name)
+    }
+
+    pub(super) fn children_named(&self, name: &str) -> impl Iterator<Item = &Node> {
+        self.own_children().filter(move |child| child.name == name)
+    }
+
+    /// The child called `name`, which may be absent but not repeated.
+    pub(super) fn child(&self, name: &str) -> Result<Option<&Node>, SspError> {
+        let mut children = self.children_named(name);
+        let first = children.next();
+        match children.next() {
+            None => Ok(first),
+            Some(second) => {
+                Err(self.wrong(format!("one element {name}"), format!("another at {}", second.at)))
+            }
+        }
+    }
+
+    /// What `read` makes of each child of the child called `list`; none if there is no such list.
+    pub(super) fn list<T>(
+        &self,
+        list: &str,
+        item: &str,
+        read: impl Fn(&Node) -> Result<T, SspError>,
+    ) -> Result<Vec<T>, SspError> {
+        let list = self.child(list)?;
+        list.map_or(Ok(Vec::new()), |list| list.children_named(item).map(read).collect())
+    }
+
+    /// Fails at the first name that two of `names` have.
+    pub(super) fn unique<'a>(
+        &self,
+        what: &str,
+        names: impl IntoIterator<Item = &'a str>,
+    ) -> Result<(), SspError> {
+        let mut seen = std::collections::HashSet::new();
+        match names.into_iter().find(|name| !seen.insert(*name)) {
+            None => Ok(()),
+            Some(name) => {
+                Err(self
+                    .wrong(format!("{what} of different names"), format!("two called {name:?}")))
+            }
+        }
+    }
+}
