@@ -10,6 +10,7 @@ pub mod assembly;
 mod choose;
 mod error;
 mod exchange;
+pub mod fault;
 #[cfg(feature = "fmi")]
 pub mod fmi_crate;
 mod fmu;
@@ -18,6 +19,8 @@ pub mod linearise;
 mod nearest;
 mod order;
 mod probe;
+pub mod scenario;
+pub mod signal;
 mod simulation;
 mod slave;
 pub mod solve;

@@ -1,0 +1,84 @@
+//! Units of stated values.
+
+use fmi2::description::{Kind, ModelDescription, ScalarVariable};
+use fmi2::unit::{BaseUnit, Unit};
+
+use super::Reason;
+
+/// `value of the variable = factor * value stated + offset`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Conversion {
+    pub(super) factor: f64,
+    pub(super) offset: f64,
+}
+
+impl Conversion {
+    /// Leaves values as they are.
+    pub(super) const NONE: Self = Self { factor: 1.0, offset: 0.0 };
+
+    /// Of a value.
+    pub(super) fn absolute(self, value: f64) -> f64 {
+        self.factor * value + self.offset
+    }
+
+    /// Of a difference of values.
+    pub(super) fn relative(self, difference: f64) -> f64 {
+        self.factor * difference
+    }
+
+    /// From `stated` to the unit of `variable`, called `name`; none where nothing is stated.
+    pub(super) fn find(
+        stated: Option<&str>,
+        name: &str,
+        variable: &ScalarVariable,
+        description: &ModelDescription,
+    ) -> Result<Self, Reason> {
+        let Some(stated) = stated else { return Ok(Self::NONE) };
+        let name = name.to_owned();
+        let Some(own) = unit_of(variable, description) else {
+            return Err(Reason::NoUnit { name, stated: stated.to_owned() });
+        };
+        if own == stated {
+            return Ok(Self::NONE);
+        }
+        let target = base_of(own, description)?;
+        let source = base_of(stated, description)?;
+        if exponents(&source) != exponents(&target) {
+            let (stated, own) = (stated.to_owned(), own.to_owned());
+            return Err(Reason::Dimension { name, stated, own });
+        }
+        let factor = source.factor / target.factor;
+        let offset = (source.offset - target.offset) / target.factor;
+        if factor.is_finite() && factor != 0.0 && offset.is_finite() {
+            return Ok(Self { factor, offset });
+        }
+        let (stated, own) = (stated.to_owned(), own.to_owned());
+        Err(Reason::Dimension { name, stated, own })
+    }
+}
+
+/// Name of the unit of a Real, its own or that of its type.
+fn unit_of<'a>(variable: &'a ScalarVariable, description: &'a ModelDescription) -> Option<&'a str> {
+    let Kind::Real(real) = &variable.kind else { return None };
+    let declared = || {
+        let name = real.declared_type.as_ref()?;
+        match &description.types.iter().find(|one| one.name == *name)?.kind {
+            Kind::Real(kind) => kind.unit.as_deref(),
+            _ => None,
+        }
+    };
+    real.unit.as_deref().or_else(declared)
+}
+
+/// A unit as the FMU defines it, or else as its name says.
+fn base_of(name: &str, description: &ModelDescription) -> Result<BaseUnit, Reason> {
+    let defined = description.units.iter().find(|unit| unit.name == name);
+    if let Some(base) = defined.and_then(|unit| unit.base) {
+        return Ok(base);
+    }
+    Ok(Unit::parse(name)?.base.unwrap_or_default())
+}
+
+fn exponents(base: &BaseUnit) -> [i32; 8] {
+    [base.kg, base.m, base.s, base.a, base.k, base.mol, base.cd, base.rad]
+}

@@ -1,0 +1,107 @@
+//! A value as it stands in the file.
+
+use std::fmt;
+
+use fmi2::description::{Kind, ModelDescription, ScalarVariable};
+use serde::de::{Error, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
+
+/// A number, `true` or `false`, or a text.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Literal {
+    /// A number.
+    Number(f64),
+    /// A Boolean.
+    Boolean(bool),
+    /// A text: of a String, or the name of an item of an Enumeration.
+    Text(String),
+}
+
+impl fmt::Display for Literal {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Literal::Number(number) => write!(formatter, "{number}"),
+            Literal::Boolean(flag) => write!(formatter, "{flag}"),
+            Literal::Text(text) => write!(formatter, "{text:?}"),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Literal {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(LiteralVisitor)
+    }
+}
+
+struct LiteralVisitor;
+
+impl Visitor<'_> for LiteralVisitor {
+    type Value = Literal;
+
+    fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("a number, true, false or a text in quotes")
+    }
+
+    fn visit_bool<E: Error>(self, value: bool) -> Result<Literal, E> {
+        Ok(Literal::Boolean(value))
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "a number of the file is a double")]
+    fn visit_i64<E: Error>(self, value: i64) -> Result<Literal, E> {
+        Ok(Literal::Number(value as f64))
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "a number of the file is a double")]
+    fn visit_u64<E: Error>(self, value: u64) -> Result<Literal, E> {
+        Ok(Literal::Number(value as f64))
+    }
+
+    fn visit_f64<E: Error>(self, value: f64) -> Result<Literal, E> {
+        Ok(Literal::Number(value))
+    }
+
+    fn visit_str<E: Error>(self, value: &str) -> Result<Literal, E> {
+        Ok(Literal::Text(value.to_owned()))
+    }
+}
+
+impl Literal {
+    /// The value for a variable that is no String, as a number: Booleans are 0 and 1, an item of an
+    /// Enumeration is its number. Else what was expected.
+    pub(super) fn number(
+        &self,
+        variable: &ScalarVariable,
+        description: &ModelDescription,
+    ) -> Result<f64, String> {
+        match (&variable.kind, self) {
+            (Kind::Real(_), Literal::Number(number)) if number.is_finite() => Ok(*number),
+            (Kind::Real(_), _) => Err("a finite number".to_owned()),
+            (Kind::Integer(_) | Kind::Enumeration(_), Literal::Number(number))
+                if is_integer(*number) =>
+            {
+                Ok(*number)
+            }
+            (Kind::Integer(_), _) => Err("an Integer of 32 bits".to_owned()),
+            (Kind::Enumeration(kind), _) => {
+                let named = |name: &String| description.types.iter().find(|one| one.name == *name);
+                let items = kind.declared_type.as_ref().and_then(named);
+                let items = items.map_or(&[][..], |one| &one.items[..]);
+                let item =
+                    items.iter().find(|(name, _)| matches!(self, Self::Text(text) if text == name));
+                item.map(|(_, number)| f64::from(*number)).ok_or_else(|| {
+                    let names: Vec<_> = items.iter().map(|(name, _)| name.as_str()).collect();
+                    format!("a whole number or one of {}", names.join(", "))
+                })
+            }
+            (Kind::Boolean(_), Literal::Boolean(flag)) => Ok(f64::from(u8::from(*flag))),
+            (Kind::Boolean(_), _) => Err("true or false".to_owned()),
+            (Kind::String(_), _) => Err("no number, as it is a String".to_owned()),
+        }
+    }
+}
+
+/// Whether a number is an Integer of the standard.
+pub(super) fn is_integer(number: f64) -> bool {
+    number.fract() == 0.0 && (f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&number)
+}

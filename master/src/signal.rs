@@ -1,0 +1,155 @@
+//! Signals over time, for what no output is connected to.
+
+pub mod table;
+mod track;
+
+pub use track::{Between, Track, TrackError};
+
+use std::f64::consts::TAU;
+
+/// Relative difference of two times that are taken for the same; as in `FMPy` (Python's
+/// `math.isclose`).
+const SAME: f64 = 1e-9;
+
+/// Whether two times are the same but for rounding.
+pub(crate) fn near(one: f64, other: f64) -> bool {
+    let difference = (one - other).abs();
+    difference == 0.0 || difference.is_finite() && difference <= SAME * one.abs().max(other.abs())
+}
+
+/// Whether `time` is at `moment` but for rounding, or past it.
+pub(crate) fn reached(time: f64, moment: f64) -> bool {
+    time >= moment || near(time, moment)
+}
+
+/// The earlier of `first` and those of `moments` that are past `after`.
+pub(crate) fn earliest(after: f64, moments: impl IntoIterator<Item = f64>) -> Option<f64> {
+    moments.into_iter().filter(|&moment| !reached(after, moment)).reduce(f64::min)
+}
+
+/// Value and right-hand derivative by time at one instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sample {
+    /// The value.
+    pub value: f64,
+    /// Its derivative by time, for the time to come.
+    pub slope: f64,
+}
+
+impl Sample {
+    /// A value that stays.
+    #[must_use]
+    pub fn held(value: f64) -> Self {
+        Self { value, slope: 0.0 }
+    }
+}
+
+/// A place in a [`Track`], so that the next look-up near it costs nothing. It never changes a
+/// result, and time may go back.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Cursor(usize);
+
+/// A function of time. Where it jumps, the value is the one after the jump.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Signal {
+    /// One value.
+    Constant(f64),
+    /// `begin` up to the time `from`, `end` after the time `until`, a line between.
+    Ramp {
+        /// Time in s.
+        from: f64,
+        /// Time in s, after `from`.
+        until: f64,
+        /// Value before.
+        begin: f64,
+        /// Value after.
+        end: f64,
+    },
+    /// `offset` before the time `from`, then
+    /// `offset + amplitude sin(2 pi frequency (t - from) + phase)`.
+    Sine {
+        /// Amplitude.
+        amplitude: f64,
+        /// Frequency in Hz.
+        frequency: f64,
+        /// Phase in rad.
+        phase: f64,
+        /// Mean.
+        offset: f64,
+        /// Time in s.
+        from: f64,
+    },
+    /// Points in time.
+    Track(Track),
+}
+
+impl Signal {
+    /// The value at `time`, in s.
+    #[must_use]
+    pub fn value(&self, time: f64) -> f64 {
+        self.at(time, &mut Cursor::default()).value
+    }
+
+    /// The right-hand derivative by time at `time`, in s.
+    #[must_use]
+    pub fn slope(&self, time: f64) -> f64 {
+        self.at(time, &mut Cursor::default()).slope
+    }
+
+    /// Both at `time`, in s. With the `cursor` of the call before, a time near that call's costs
+    /// no search.
+    pub fn at(&self, time: f64, cursor: &mut Cursor) -> Sample {
+        match self {
+            Signal::Constant(value) => Sample::held(*value),
+            Signal::Ramp { from, until, begin, end } => {
+                let part = ((time - from) / (until - from)).clamp(0.0, 1.0);
+                let moves = reached(time, *from) && !reached(time, *until);
+                let slope = if moves { (end - begin) / (until - from) } else { 0.0 };
+                // Both ends are met exactly.
+                Sample { value: (1.0 - part) * begin + part * end, slope }
+            }
+            Signal::Sine { amplitude, frequency, phase, offset, from } => {
+                if !reached(time, *from) {
+                    return Sample::held(*offset);
+                }
+                let rate = TAU * frequency;
+                let (sine, cosine) = (rate * (time - from) + phase).sin_cos();
+                Sample { value: offset + amplitude * sine, slope: amplitude * rate * cosine }
+            }
+            Signal::Track(track) => track.at(time, &mut cursor.0),
+        }
+    }
+
+    /// The first time past `after`, both in s, at which the signal jumps or has a kink where a step
+    /// should end. The points between the lines of a track are not among them, unless it jumps
+    /// there.
+    #[must_use]
+    pub fn next_break(&self, after: f64) -> Option<f64> {
+        match self {
+            Signal::Constant(_) => None,
+            Signal::Ramp { from, until, .. } => earliest(after, [*from, *until]),
+            Signal::Sine { from, .. } => earliest(after, [*from]),
+            Signal::Track(track) => track.next_break(after),
+        }
+    }
+
+    /// The signal `factor s(t) + offset`.
+    #[must_use]
+    pub fn scaled(self, scale: f64, shift: f64) -> Self {
+        let absolute = |value: f64| scale * value + shift;
+        match self {
+            Signal::Constant(value) => Signal::Constant(absolute(value)),
+            Signal::Ramp { from, until, begin, end } => {
+                Signal::Ramp { from, until, begin: absolute(begin), end: absolute(end) }
+            }
+            Signal::Sine { amplitude, frequency, phase, offset, from } => {
+                let (amplitude, offset) = (scale * amplitude, absolute(offset));
+                Signal::Sine { amplitude, frequency, phase, offset, from }
+            }
+            Signal::Track(track) => Signal::Track(track.map(absolute)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

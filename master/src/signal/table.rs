@@ -1,0 +1,241 @@
+//! Signals in a CSV file, in the layout that `FMPy` reads and writes: a header with the names, in
+//! quotes or not, `time` first; then one row for each point in time, ascending; a time that stands
+//! twice is a jump.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+use std::sync::Arc;
+
+use csv::{ByteRecord, ReaderBuilder, Trim};
+
+/// Largest file, in bytes.
+pub const LARGEST_FILE: u64 = 256 << 20;
+/// Longest quotation in a message, in characters.
+const LONGEST_QUOTATION: usize = 40;
+
+/// The columns of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Table {
+    /// Names of the columns but the first, in their order.
+    pub names: Vec<String>,
+    /// The first column: time in s, ascending.
+    pub times: Arc<[f64]>,
+    /// The others, as long as `times`.
+    pub columns: Vec<Arc<[f64]>>,
+}
+
+impl Table {
+    /// The column of that name.
+    #[must_use]
+    pub fn column(&self, name: &str) -> Option<&Arc<[f64]>> {
+        let position = self.names.iter().position(|known| known == name)?;
+        Some(&self.columns[position])
+    }
+}
+
+/// Why a text is no [`Table`]. Lines and columns count from 1.
+#[derive(Debug, thiserror::Error)]
+pub enum TableError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Unreadable(#[from] std::io::Error),
+    /// The file is larger than [`LARGEST_FILE`].
+    #[error("the file is larger than {LARGEST_FILE} bytes")]
+    Large,
+    /// It is not text.
+    #[error("line {line}: expected UTF-8 text, found other bytes")]
+    Encoding {
+        /// The line.
+        line: usize,
+    },
+    /// There is nothing in it.
+    #[error("the file is empty, expected a header such as \"time\",\"u\" and rows of numbers")]
+    Empty,
+    /// The first column is not the time.
+    #[error("line {line}: the first column is {found:?}, expected \"time\"{hint}")]
+    NoTime {
+        /// The line.
+        line: usize,
+        /// Name of the first column.
+        found: String,
+        /// What is probably wrong.
+        hint: &'static str,
+    },
+    /// A column without a name.
+    #[error("line {line}: column {column} has no name")]
+    Unnamed {
+        /// The line.
+        line: usize,
+        /// The column.
+        column: usize,
+    },
+    /// Two columns of one name.
+    #[error("line {line}: the columns {first} and {second} are both called {name:?}")]
+    Twice {
+        /// The line.
+        line: usize,
+        /// The name.
+        name: String,
+        /// One column.
+        first: usize,
+        /// The other column.
+        second: usize,
+    },
+    /// No column but the time.
+    #[error("line {line}: there is no column but the time")]
+    NoColumns {
+        /// The line.
+        line: usize,
+    },
+    /// No row.
+    #[error("there is no row after the header")]
+    NoRows,
+    /// A row that is longer or shorter than the header.
+    #[error("line {line}: expected {expected} entries as in the header, found {found}")]
+    Width {
+        /// The line.
+        line: usize,
+        /// Length of the header.
+        expected: usize,
+        /// Length of the row.
+        found: usize,
+    },
+    /// An entry that is no finite number.
+    #[error("line {line}, column {column:?}: expected a finite number, found {found:?}")]
+    Number {
+        /// The line.
+        line: usize,
+        /// Name of the column.
+        column: String,
+        /// The entry.
+        found: String,
+    },
+    /// A time before the one before it.
+    #[error("line {line}: the time {found} s comes after {before} s, expected ascending times")]
+    Order {
+        /// The line.
+        line: usize,
+        /// The time before.
+        before: f64,
+        /// The time.
+        found: f64,
+    },
+}
+
+/// Reads a file.
+///
+/// # Errors
+///
+/// [`TableError`]: where the file cannot be read, is too large, or is no table.
+pub fn read(path: &Path) -> Result<Table, TableError> {
+    let mut bytes = Vec::new();
+    File::open(path)?.take(LARGEST_FILE + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > LARGEST_FILE {
+        return Err(TableError::Large);
+    }
+    parse(&bytes)
+}
+
+/// Reads the content of a file. Time and memory are in proportion to its length.
+///
+/// # Errors
+///
+/// [`TableError`]: where it is no table, with the line.
+pub fn parse(bytes: &[u8]) -> Result<Table, TableError> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    if let Err(error) = std::str::from_utf8(bytes) {
+        let line = line_at(bytes, error.valid_up_to());
+        return Err(TableError::Encoding { line });
+    }
+    let mut reader =
+        ReaderBuilder::new().has_headers(false).flexible(true).trim(Trim::All).from_reader(bytes);
+    let mut record = ByteRecord::new();
+    if !advance(&mut reader, &mut record)? {
+        return Err(TableError::Empty);
+    }
+    let names = header(&record, line_of(bytes, &record))?;
+    let mut columns = vec![Vec::new(); names.len()];
+    while advance(&mut reader, &mut record)? {
+        if record.len() != names.len() {
+            let (expected, found) = (names.len(), record.len());
+            return Err(TableError::Width { line: line_of(bytes, &record), expected, found });
+        }
+        for ((field, column), name) in record.iter().zip(&mut columns).zip(&names) {
+            let number = number(field).ok_or_else(|| TableError::Number {
+                line: line_of(bytes, &record),
+                column: name.clone(),
+                found: quotation(field),
+            })?;
+            column.push(number);
+        }
+        if let [.., before, found] = columns[0][..]
+            && found < before
+        {
+            return Err(TableError::Order { line: line_of(bytes, &record), before, found });
+        }
+    }
+    if columns[0].is_empty() {
+        return Err(TableError::NoRows);
+    }
+    let mut columns = columns.into_iter().map(Arc::from);
+    let times = columns.next().ok_or(TableError::Empty)?;
+    Ok(Table { names: names[1..].to_vec(), times, columns: columns.collect() })
+}
+
+/// Reads the next record; whether there was one.
+fn advance(reader: &mut csv::Reader<&[u8]>, record: &mut ByteRecord) -> Result<bool, TableError> {
+    // Bytes in memory, of any length, are always read.
+    reader.read_byte_record(record).map_err(|error| TableError::Unreadable(error.into()))
+}
+
+/// The names of all columns.
+fn header(record: &ByteRecord, line: usize) -> Result<Vec<String>, TableError> {
+    let name = |field: &[u8]| String::from_utf8_lossy(field).into_owned();
+    let names: Vec<String> = record.iter().map(name).collect();
+    let first = names.first().map_or("", String::as_str);
+    if first != "time" {
+        let semicolons = names.len() == 1 && first.contains(';');
+        let hint = if semicolons { "; entries are separated by commas" } else { "" };
+        return Err(TableError::NoTime { line, found: quotation(first.as_bytes()), hint });
+    }
+    let mut known = std::collections::HashMap::new();
+    for (position, name) in names.iter().enumerate() {
+        if name.is_empty() {
+            return Err(TableError::Unnamed { line, column: position + 1 });
+        }
+        if let Some(first) = known.insert(name, position) {
+            let (name, second) = (quotation(name.as_bytes()), position + 1);
+            return Err(TableError::Twice { line, name, first: first + 1, second });
+        }
+    }
+    if names.len() == 1 {
+        return Err(TableError::NoColumns { line });
+    }
+    Ok(names)
+}
+
+fn number(field: &[u8]) -> Option<f64> {
+    let number: f64 = std::str::from_utf8(field).ok()?.parse().ok()?;
+    number.is_finite().then_some(number)
+}
+
+/// The begin of an entry.
+fn quotation(field: &[u8]) -> String {
+    String::from_utf8_lossy(field).chars().take(LONGEST_QUOTATION).collect()
+}
+
+/// Line of a record, which begins after the empty lines at its position.
+fn line_of(bytes: &[u8], record: &ByteRecord) -> usize {
+    let position = record.position().map_or(0, csv::Position::byte);
+    let start = usize::try_from(position).unwrap_or(0).min(bytes.len());
+    let empty = bytes[start..].iter().take_while(|&&byte| byte == b'\n' || byte == b'\r').count();
+    line_at(bytes, start + empty)
+}
+
+fn line_at(bytes: &[u8], position: usize) -> usize {
+    bytes[..position].split(|&byte| byte == b'\n').count()
+}
+
+#[cfg(test)]
+mod tests;
