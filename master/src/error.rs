@@ -174,6 +174,16 @@ pub enum SystemError {
         /// What needs it.
         wanted: String,
     },
+    /// The values of a loop cannot be found.
+    #[error("the loop through {names} at t = {time} s: {why}")]
+    Loop {
+        /// The outputs.
+        names: String,
+        /// Time of the master in s.
+        time: f64,
+        /// How the iteration ended.
+        why: String,
+    },
     /// The algorithm makes no sense for this system.
     #[error("{what}")]
     Algorithm {

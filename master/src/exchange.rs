@@ -122,39 +122,10 @@ impl Exchange {
         time: f64,
     ) -> Result<(), SystemError> {
         let (name, slave) = &mut system.slaves[position];
-        self.reals
-            .read_derivatives(position, slave.as_mut())
-            .map_err(|source| call(name, time, source))?;
-        self.read_values(system, position, time)
-    }
-
-    /// Reads all connected outputs of the slave at `position`.
-    pub(crate) fn read_values(
-        &mut self,
-        system: &mut System,
-        position: usize,
-        time: f64,
-    ) -> Result<(), SystemError> {
-        let (name, slave) = &mut system.slaves[position];
         let done = self.reals.read(position, slave.as_mut());
         done.and_then(|()| self.read_discrete(position, slave.as_mut()))
             .map_err(|source| call(name, time, source))?;
         self.check_finite(system, position, time)
-    }
-
-    /// In initialization mode: sets the inputs of the slave at `position` to what is known.
-    pub(crate) fn set(
-        &mut self,
-        system: &mut System,
-        position: usize,
-        time: f64,
-    ) -> Result<(), SystemError> {
-        self.reals.forget();
-        self.gather(position, time, 0.0);
-        let (name, slave) = &mut system.slaves[position];
-        let done = self.reals.set(position, slave.as_mut());
-        done.and_then(|()| self.set_discrete(position, slave.as_mut()))
-            .map_err(|source| call(name, time, source))
     }
 
     /// Every connected Real output of the slave is a finite number.

@@ -1,5 +1,10 @@
 //! The order in which Gauss-Seidel steps the slaves.
 
+use std::collections::{HashMap, HashSet};
+
+use fmi2::description::{ModelDescription, Unknown};
+
+use crate::solve::components;
 use crate::system::System;
 
 /// An order of stepping.
@@ -7,8 +12,8 @@ use crate::system::System;
 pub struct Order {
     /// Positions of the slaves, first to last.
     pub sequence: Vec<usize>,
-    /// Slaves that depend directly on each other in a circle (an algebraic loop); they stand in
-    /// the order of their addition.
+    /// Slaves that depend directly on each other in a circle (an algebraic loop), ascending; in
+    /// `sequence` those of one circle stand in the order of their addition.
     pub looped: Vec<usize>,
 }
 
@@ -17,42 +22,81 @@ pub struct Order {
 /// free keep the order of their addition.
 #[must_use]
 pub fn by_direct_dependencies(system: &System) -> Order {
-    let count = system.slaves.len();
-    let mut needs = vec![vec![false; count]; count];
-    for connection in &system.connections {
-        if passes_through(system, connection.to.slave, connection.to.variable) {
-            needs[connection.to.slave][connection.from.slave] = true;
-        }
-    }
-    let mut order = Order { sequence: Vec::with_capacity(count), looped: Vec::new() };
-    while order.sequence.len() < count {
-        let waiting = |slave: &usize| !order.sequence.contains(slave);
-        let free = |slave: &usize| {
-            (0..count).all(|other| other == *slave || !needs[*slave][other] || !waiting(&other))
-        };
-        let next = (0..count).filter(waiting).find(free);
-        let Some(slave) = next.or_else(|| (0..count).find(waiting)) else { break };
-        if next.is_none() {
-            order.looped.push(slave);
-        }
-        order.sequence.push(slave);
-    }
-    order
-}
-
-/// Whether a connected output of the slave depends directly on its input `input`.
-fn passes_through(system: &System, slave: usize, input: usize) -> bool {
-    let description = system.slaves[slave].1.description();
-    system
+    let through = passed_through(system);
+    let edges: Vec<(usize, usize)> = system
         .connections
         .iter()
-        .filter(|connection| connection.from.slave == slave)
-        .filter_map(|connection| {
-            let index = u32::try_from(connection.from.variable + 1).ok()?;
-            description.structure.outputs.iter().find(|unknown| unknown.index == index)
-        })
-        .any(|unknown| match &unknown.dependencies {
-            None => true,
-            Some(indices) => indices.iter().any(|&index| index as usize == input + 1),
-        })
+        .filter(|connection| through[connection.to.slave].has(connection.to.variable))
+        .map(|connection| (connection.from.slave, connection.to.slave))
+        .collect();
+    let found = components(system.slaves.len(), &edges);
+    let loops = (0..found.len()).filter(|&k| found.is_loop(k));
+    let mut looped: Vec<usize> = loops.flat_map(|k| found.nodes(k)).copied().collect();
+    looped.sort_unstable();
+    Order { sequence: found.sequence().to_vec(), looped }
+}
+
+/// Inputs, by position.
+enum Inputs {
+    All,
+    These(HashSet<usize>),
+}
+
+impl Inputs {
+    fn has(&self, input: usize) -> bool {
+        match self {
+            Inputs::All => true,
+            Inputs::These(inputs) => inputs.contains(&input),
+        }
+    }
+}
+
+/// For each slave the inputs on which a connected output depends directly.
+fn passed_through(system: &System) -> Vec<Inputs> {
+    let mut through: Vec<Inputs> =
+        system.slaves.iter().map(|_| Inputs::These(HashSet::new())).collect();
+    let mut rows: Vec<Option<HashMap<u32, &Unknown>>> = vec![None; system.slaves.len()];
+    for connection in &system.connections {
+        let from = connection.from;
+        let description = system.slaves[from.slave].1.description();
+        let rows = rows[from.slave].get_or_insert_with(|| by_index(&description.structure.outputs));
+        let Some(unknown) = u32::try_from(from.variable + 1).ok().and_then(|k| rows.get(&k)) else {
+            continue;
+        };
+        match (&unknown.dependencies, &mut through[from.slave]) {
+            (None, inputs) => *inputs = Inputs::All,
+            (Some(list), Inputs::These(inputs)) => {
+                inputs.extend(list.iter().map(|&index| index as usize - 1));
+            }
+            (Some(_), Inputs::All) => {}
+        }
+    }
+    through
+}
+
+fn by_index(unknowns: &[Unknown]) -> HashMap<u32, &Unknown> {
+    unknowns.iter().map(|unknown| (unknown.index, unknown)).collect()
+}
+
+/// Rows of `ModelStructure` by the index of their variable, for one model.
+pub(crate) struct Rows<'a> {
+    initial: HashMap<u32, &'a Unknown>,
+    outputs: HashMap<u32, &'a Unknown>,
+}
+
+impl<'a> Rows<'a> {
+    pub(crate) fn new(description: &'a ModelDescription) -> Self {
+        Self {
+            initial: by_index(&description.structure.initial_unknowns),
+            outputs: by_index(&description.structure.outputs),
+        }
+    }
+
+    /// The variables (1-based indices) on which the output at that position depends in
+    /// initialization mode; none: maybe on all.
+    pub(crate) fn initial_dependencies(&self, output: usize) -> Option<&'a [u32]> {
+        let index = u32::try_from(output + 1).ok()?;
+        let row = self.initial.get(&index).or_else(|| self.outputs.get(&index))?;
+        row.dependencies.as_deref()
+    }
 }

@@ -43,7 +43,11 @@ impl Simulation {
         let grid = Grid::new(&system, algorithm, experiment)?;
         let mut exchange = Exchange::new(&system, algorithm);
         let order = by_direct_dependencies(&system);
-        initial::initialise(&mut system, &mut exchange, &order, experiment)?;
+        initial::initialise(&mut system, experiment)?;
+        for slave in 0..system.slaves.len() {
+            exchange.read(&mut system, slave, experiment.start_time)?;
+        }
+        exchange.reals.forget();
         let count = system.slaves.len();
         let multiples = grid::multiples(&system, algorithm)?;
         Ok(Self {

@@ -1,5 +1,6 @@
 //! A system: slaves by name, the connections between them, and settings of variables by name.
 
+mod access;
 mod connecting;
 mod units;
 
@@ -216,14 +217,7 @@ impl System {
     /// Those of [`System::set`].
     pub fn set_port(&mut self, port: Port, text: &str) -> Result<(), SystemError> {
         let value = self.value(port, text)?;
-        let reference = [self.variable(port).value_reference];
-        let (_, slave) = &mut self.slaves[port.slave];
-        let done = match value {
-            Value::Real(value) => slave.set_real(&reference, &[value]),
-            Value::Integer(value) => slave.set_integer(&reference, &[value]),
-            Value::Boolean(value) => slave.set_boolean(&reference, &[value.into()]),
-            Value::String(value) => slave.set_string(&reference, &[value]),
-        };
+        let done = self.set_value(port, &value);
         done.map_err(|source| {
             let (name, value) = (self.name(port), text.to_owned());
             SystemError::Setting { name, value, source }

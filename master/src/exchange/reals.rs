@@ -278,35 +278,16 @@ impl Reals {
         Ok(done)
     }
 
-    /// Sets the gathered inputs of a slave, without derivatives.
-    pub(crate) fn set(&self, slave: usize, instance: &mut dyn Slave) -> Result<(), CallError> {
-        let lane = &self.layout.lanes[slave];
-        if lane.inputs.is_empty() {
-            return Ok(());
-        }
-        instance.set_real(&lane.inputs, &self.values[lane.input_range.clone()])
-    }
-
-    /// Reads the connected outputs of a slave.
+    /// Reads the connected outputs of a slave and their derivatives.
     pub(crate) fn read(&mut self, slave: usize, instance: &mut dyn Slave) -> Result<(), CallError> {
-        let lane = &self.layout.lanes[slave];
-        if lane.outputs.is_empty() {
-            return Ok(());
+        let (lane, trace) = (&self.layout.lanes[slave], &mut self.trace);
+        if !lane.outputs.is_empty() {
+            instance.get_real(&lane.outputs, &mut trace.latest[lane.output_range.clone()])?;
         }
-        instance.get_real(&lane.outputs, &mut self.trace.latest[lane.output_range.clone()])
-    }
-
-    /// Reads the derivatives of the connected outputs of a slave.
-    pub(crate) fn read_derivatives(
-        &mut self,
-        slave: usize,
-        instance: &mut dyn Slave,
-    ) -> Result<(), CallError> {
-        let lane = &self.layout.lanes[slave];
         if lane.derived_outputs.is_empty() {
             return Ok(());
         }
-        let derivatives = &mut self.trace.derivatives[lane.output_derivative_range.clone()];
+        let derivatives = &mut trace.derivatives[lane.output_derivative_range.clone()];
         instance.get_output_derivatives(&lane.derived_outputs, &lane.output_orders, derivatives)
     }
 

@@ -1,20 +1,24 @@
-//! Initialization of the connected system.
+//! Initialization of the connected system: outputs in the order of their dependencies, loops solved.
+
+use std::collections::HashMap;
 
 use fmi2::Experiment;
+use fmi2::description::Kind;
 
 use crate::error::SystemError;
-use crate::exchange::{Exchange, call};
-use crate::order::Order;
-use crate::system::System;
+use crate::exchange::call;
+use crate::order::Rows;
+use crate::solve::{Components, Newton, Progress, Scale, Solver, components};
+use crate::system::{Port, System};
+use crate::value::Value;
 
-/// Initialises all slaves; the connected values are exchanged in initialization mode until each has
-/// passed through every slave.
-pub(super) fn initialise(
-    system: &mut System,
-    exchange: &mut Exchange,
-    order: &Order,
-    experiment: &Experiment,
-) -> Result<(), SystemError> {
+/// Tolerance of the values in a loop, relative and in nominal values.
+const TOLERANCE: f64 = 1e-10;
+/// Most evaluations of a loop, and most passes through one of values that are no Reals.
+const EVALUATIONS: u32 = 100;
+
+/// Brings all slaves into initialization mode, solves the connections there, and ends it.
+pub(super) fn initialise(system: &mut System, experiment: &Experiment) -> Result<(), SystemError> {
     let start = experiment.start_time;
     for (name, slave) in &mut system.slaves {
         slave
@@ -22,21 +26,216 @@ pub(super) fn initialise(
             .and_then(|()| slave.enter_initialization_mode())
             .map_err(|source| call(name, start, source))?;
     }
-    for &slave in &order.sequence {
-        exchange.read_values(system, slave, start)?;
-    }
-    for _ in 0..=system.slaves.len() {
-        for &slave in &order.sequence {
-            exchange.set(system, slave, start)?;
-            exchange.read_values(system, slave, start)?;
+    let mut graph = Graph::new(system);
+    for component in 0..graph.components.len() {
+        let nodes = graph.components.nodes(component).to_vec();
+        if graph.components.is_loop(component) {
+            graph.solve(system, &nodes, start)?;
+        } else {
+            for node in nodes {
+                let value = graph.read(system, node, start)?;
+                graph.write(system, node, &value, start)?;
+            }
         }
     }
     for (name, slave) in &mut system.slaves {
         slave.exit_initialization_mode().map_err(|source| call(name, start, source))?;
     }
-    for slave in 0..system.slaves.len() {
-        exchange.read(system, slave, start)?;
-    }
-    exchange.reals.forget();
     Ok(())
+}
+
+/// Connected outputs and what they depend on.
+struct Graph {
+    outputs: Vec<Port>,
+    /// For each output the connections that begin there.
+    connections: Vec<Vec<usize>>,
+    components: Components,
+}
+
+impl Graph {
+    fn new(system: &System) -> Self {
+        let mut outputs: Vec<Port> = Vec::new();
+        let mut nodes: HashMap<Port, usize> = HashMap::new();
+        let mut connections: Vec<Vec<usize>> = Vec::new();
+        let mut inputs: Vec<Vec<(usize, usize)>> = vec![Vec::new(); system.slaves.len()];
+        for (number, connection) in system.connections.iter().enumerate() {
+            let node = *nodes.entry(connection.from).or_insert_with(|| {
+                outputs.push(connection.from);
+                connections.push(Vec::new());
+                outputs.len() - 1
+            });
+            connections[node].push(number);
+            inputs[connection.to.slave].push((connection.to.variable, node));
+        }
+        let rows: Vec<_> =
+            system.slaves.iter().map(|(_, slave)| Rows::new(slave.description())).collect();
+        let mut edges = Vec::new();
+        for (node, output) in outputs.iter().enumerate() {
+            let inputs = &inputs[output.slave];
+            match rows[output.slave].initial_dependencies(output.variable) {
+                None => edges.extend(inputs.iter().map(|&(_, source)| (source, node))),
+                Some(list) => {
+                    let needed = inputs
+                        .iter()
+                        .filter(|(input, _)| list.iter().any(|&index| index as usize == input + 1));
+                    edges.extend(needed.map(|&(_, source)| (source, node)));
+                }
+            }
+        }
+        let components = components(outputs.len(), &edges);
+        Self { outputs, connections, components }
+    }
+
+    fn read(&self, system: &mut System, node: usize, time: f64) -> Result<Value, SystemError> {
+        let port = self.outputs[node];
+        system.get_value(port).map_err(|source| call(&system.slaves[port.slave].0, time, source))
+    }
+
+    /// Gives the value of an output to all inputs that are connected to it.
+    fn write(
+        &self,
+        system: &mut System,
+        node: usize,
+        value: &Value,
+        time: f64,
+    ) -> Result<(), SystemError> {
+        for &number in &self.connections[node] {
+            let connection = &system.connections[number];
+            let to = connection.to;
+            let value = system.transformed(value, &connection.transformation, to);
+            system
+                .set_value(to, &value)
+                .map_err(|source| call(&system.slaves[to.slave].0, time, source))?;
+        }
+        Ok(())
+    }
+
+    /// Solves a loop: the Reals by Newton's method, the others by passing them on until they stay.
+    fn solve(
+        &mut self,
+        system: &mut System,
+        nodes: &[usize],
+        time: f64,
+    ) -> Result<(), SystemError> {
+        let is_real =
+            |node: &usize| matches!(system.variable(self.outputs[*node]).kind, Kind::Real(_));
+        let (reals, others): (Vec<usize>, Vec<usize>) =
+            nodes.iter().partition(|node| is_real(node));
+        let mut held = self.read_all(system, &others, time)?;
+        for _ in 0..EVALUATIONS {
+            for (&node, value) in others.iter().zip(&held) {
+                self.write(system, node, value, time)?;
+            }
+            self.solve_reals(system, &reals, time)?;
+            let found = self.read_all(system, &others, time)?;
+            if found == held {
+                return Ok(());
+            }
+            held = found;
+        }
+        let why = format!("its discrete values do not settle within {EVALUATIONS} passes");
+        Err(self.unsolved(system, nodes, time, why))
+    }
+
+    fn read_all(
+        &self,
+        system: &mut System,
+        nodes: &[usize],
+        time: f64,
+    ) -> Result<Vec<Value>, SystemError> {
+        nodes.iter().map(|&node| self.read(system, node, time)).collect()
+    }
+
+    /// `G(u)`: the outputs when they have the values u where they are connected.
+    fn evaluate(
+        &self,
+        system: &mut System,
+        nodes: &[usize],
+        u: &[f64],
+        time: f64,
+    ) -> Result<Vec<f64>, SystemError> {
+        for (&node, &value) in nodes.iter().zip(u) {
+            self.write(system, node, &Value::Real(value), time)?;
+        }
+        self.reals(system, nodes, time)
+    }
+
+    fn reals(
+        &self,
+        system: &mut System,
+        nodes: &[usize],
+        time: f64,
+    ) -> Result<Vec<f64>, SystemError> {
+        let real = |value| if let Value::Real(value) = value { value } else { f64::NAN };
+        Ok(self.read_all(system, nodes, time)?.into_iter().map(real).collect())
+    }
+
+    fn solve_reals(
+        &self,
+        system: &mut System,
+        nodes: &[usize],
+        time: f64,
+    ) -> Result<(), SystemError> {
+        let nominal = |&node: &usize| match &system.variable(self.outputs[node]).kind {
+            Kind::Real(real) => real.nominal.unwrap_or(1.0),
+            _ => 1.0,
+        };
+        let nominals = nodes.iter().map(nominal).collect();
+        let mut solver = Newton::new(Scale::new(TOLERANCE, TOLERANCE, nominals), EVALUATIONS);
+        let mut u = self.reals(system, nodes, time)?;
+        let mut next = u.clone();
+        solver.begin();
+        let mut g = self.evaluate(system, nodes, &u, time)?;
+        loop {
+            let why = match solver.next(&u, &g, &mut next) {
+                Progress::Converged { .. } => return Ok(()),
+                Progress::Evaluate => {
+                    u.copy_from_slice(&next);
+                    g = self.evaluate(system, nodes, &u, time)?;
+                    continue;
+                }
+                Progress::Matrix => {
+                    self.differentiate(system, nodes, (&u, &g), &mut solver, time)?;
+                    continue;
+                }
+                Progress::NotConverged { iterations, residual } => format!(
+                    "not solved within {iterations} evaluations, the residual is {residual:.1e} of \
+                     the tolerance {TOLERANCE:e}"
+                ),
+                Progress::Diverged { iterations } => {
+                    format!("the iteration diverges (evaluation {iterations})")
+                }
+                Progress::Singular { condition } => format!(
+                    "it has no solution or many: its matrix is singular (condition {condition:.1e})"
+                ),
+            };
+            return Err(self.unsolved(system, nodes, time, why));
+        }
+    }
+
+    /// The matrix `dG/du` by differences.
+    fn differentiate(
+        &self,
+        system: &mut System,
+        nodes: &[usize],
+        (u, g): (&[f64], &[f64]),
+        solver: &mut Newton,
+        time: f64,
+    ) -> Result<(), SystemError> {
+        for column in 0..nodes.len() {
+            let change = solver.perturbation(column, u);
+            let mut moved = u.to_vec();
+            moved[column] += change;
+            let there = self.evaluate(system, nodes, &moved, time)?;
+            let quotients: Vec<f64> =
+                there.iter().zip(g).map(|(there, here)| (there - here) / change).collect();
+            solver.set_column(column, &quotients);
+        }
+        self.evaluate(system, nodes, u, time).map(|_| ())
+    }
+
+    fn unsolved(&self, system: &System, nodes: &[usize], time: f64, why: String) -> SystemError {
+        let names: Vec<_> = nodes.iter().map(|&node| system.name(self.outputs[node])).collect();
+        SystemError::Loop { names: names.join(", "), time, why }
+    }
 }
