@@ -228,6 +228,14 @@ impl Algorithm {
         self.check_numbers()
     }
 
+    /// Whether steps are repeated, which every slave must be able to do.
+    pub(crate) fn repeats(&self) -> bool {
+        let crossing = self.events.iter().any(|event| matches!(event, EventSource::Crossing(_)));
+        crossing
+            || self.coupling != Coupling::Once
+            || matches!(self.control, StepControl::Doubling | StepControl::Embedded)
+    }
+
     fn check_numbers(&self) -> Result<(), SystemError> {
         let numbers = [
             ("the relative tolerance", self.relative_tolerance),

@@ -184,6 +184,29 @@ pub enum SystemError {
         /// How the iteration ended.
         why: String,
     },
+    /// The iteration of a step finds no values that agree.
+    #[error("the step from t = {time} s over {size} s cannot be solved: {why}")]
+    Coupling {
+        /// Begin of the step in s.
+        time: f64,
+        /// Its size in s.
+        size: f64,
+        /// How the iteration ended.
+        why: String,
+    },
+    /// The smallest step is not small enough.
+    #[error(
+        "the smallest step, {size} s at t = {time} s, still has an error of {error:.1e} times the \
+         tolerance"
+    )]
+    Stuck {
+        /// Begin of the step in s.
+        time: f64,
+        /// Its size in s.
+        size: f64,
+        /// Its error in tolerances.
+        error: f64,
+    },
     /// The algorithm makes no sense for this system.
     #[error("{what}")]
     Algorithm {

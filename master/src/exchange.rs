@@ -4,12 +4,15 @@ mod course;
 mod discrete;
 mod layout;
 mod reals;
+mod tasks;
+mod trace;
 
 use fmi2::description::Kind;
 use serde::{Deserialize, Serialize};
 
 use crate::algorithm::Algorithm;
 use crate::error::SystemError;
+use crate::simulation::Task;
 use crate::slave::{CallError, Slave, Stepped};
 use crate::system::System;
 use discrete::{BOOLEANS, Channel, INTEGERS, STRINGS};
@@ -33,6 +36,16 @@ pub(crate) struct Values {
     integers: Vec<i32>,
     booleans: Vec<i32>,
     strings: Vec<String>,
+}
+
+impl Values {
+    /// Whether these are values of a system with as many connected variables.
+    pub(crate) fn has_shape_of(&self, other: &Self) -> bool {
+        self.reals.has_shape_of(&other.reals)
+            && self.integers.len() == other.integers.len()
+            && self.booleans.len() == other.booleans.len()
+            && self.strings.len() == other.strings.len()
+    }
 }
 
 impl Exchange {
@@ -85,6 +98,32 @@ impl Exchange {
         let done = done.map_err(|source| call(name, time, source))?;
         if self.discrete {
             self.read_discrete(position, slave).map_err(|source| call(name, time, source))?;
+        }
+        Ok(done)
+    }
+
+    /// As [`Exchange::advance`] for several slaves at once: `run` makes the steps of those that can
+    /// be stepped in another thread. Each slave's step is the time and the size that `span` gives.
+    pub(crate) fn advance_all(
+        &mut self,
+        system: &mut System,
+        slaves: &[usize],
+        span: &dyn Fn(usize) -> (f64, f64),
+        never_back: bool,
+        run: impl FnOnce(&mut [Task<'_>]),
+    ) -> Result<Vec<Stepped>, SystemError> {
+        for &position in slaves {
+            let (name, slave) = &mut system.slaves[position];
+            self.set_discrete(position, slave.as_mut())
+                .map_err(|source| call(name, span(position).0, source))?;
+        }
+        let results = self.reals.advance_all(system, slaves, span, never_back, run);
+        let mut done = Vec::with_capacity(slaves.len());
+        for (&position, result) in slaves.iter().zip(results) {
+            let (name, slave) = &mut system.slaves[position];
+            let at = |source| call(name, span(position).0, source);
+            done.push(result.map_err(at)?);
+            self.read_discrete(position, slave.as_mut()).map_err(at)?;
         }
         Ok(done)
     }

@@ -37,6 +37,6 @@ pub use library::{Interface, describe, preload};
 pub use linearise::{Linearisation, Linearise, LineariseError, linearise};
 pub use order::{Order, by_direct_dependencies};
 pub use probe::Probe;
-pub use simulation::Simulation;
+pub use simulation::{Checkpoint, Simulation};
 pub use slave::{Advance, CallError, Failure, Slave, Stepped};
 pub use system::{Connection, Port, System};

@@ -1,28 +1,51 @@
 //! The master algorithm at work: initialisation and communication steps.
 
+mod adaptive;
+mod checkpoint;
+mod control;
+mod events;
 mod grid;
 mod initial;
+mod iterate;
+mod parallel;
 mod sweep;
 
 use fmi2::Experiment;
 
-use crate::algorithm::Algorithm;
+use crate::algorithm::{Algorithm, StepControl};
 use crate::error::SystemError;
 use crate::exchange::{Exchange, call};
 use crate::order::{Order, by_direct_dependencies};
 use crate::system::System;
+use adaptive::Repetition;
+use control::Control;
+use events::Events;
 use grid::Grid;
+use iterate::Coupled;
+use parallel::Parallel;
+use sweep::{Groups, Swept};
+
+pub use checkpoint::Checkpoint;
+pub(crate) use parallel::Task;
 
 /// A system in simulation.
 pub struct Simulation {
     system: System,
-    algorithm: Algorithm,
     exchange: Exchange,
     order: Order,
     grid: Grid,
-    /// Slaves that have a step to make now, and for each the steps of the grid that it takes.
-    due: Vec<bool>,
+    control: Control,
+    coupled: Option<Coupled>,
+    repetition: Repetition,
+    /// Steps are repeated: every slave can go back.
+    repeats: bool,
+    events: Option<Events>,
+    groups: Groups,
+    parallel: Option<Parallel>,
+    /// For each slave the steps of the grid that it makes at once, and the size of the step that it
+    /// makes now, 0 for none.
     multiples: Vec<u32>,
+    sizes: Vec<f64>,
     /// The slave that asked for the end of the simulation.
     ended: Option<usize>,
 }
@@ -48,15 +71,23 @@ impl Simulation {
             exchange.read(&mut system, slave, experiment.start_time)?;
         }
         exchange.reals.forget();
-        let count = system.slaves.len();
+        let groups = Groups::new(&system, algorithm.sweep, &order);
         let multiples = grid::multiples(&system, algorithm)?;
+        let control = Control::new(&system, &exchange.reals, algorithm)?;
+        let coupled = Coupled::new(&system, &exchange.reals, algorithm, control.scale.clone());
         Ok(Self {
             system,
-            algorithm: algorithm.clone(),
             exchange,
             order,
             grid,
-            due: vec![true; count],
+            control,
+            coupled,
+            repetition: Repetition::default(),
+            repeats: algorithm.repeats(),
+            events: Events::new(&algorithm.events),
+            parallel: Parallel::new(algorithm.jobs, groups.len())?,
+            groups,
+            sizes: vec![0.0; multiples.len()],
             multiples,
             ended: None,
         })
@@ -98,14 +129,69 @@ impl Simulation {
     /// Where an FMU does not finish the step or an output is not finite; the simulation then
     /// stands at the begin of the step in some slaves and at its end in others.
     pub fn step(&mut self) -> Result<(), SystemError> {
-        let (end, size) = self.grid.next();
-        let swept = self.sweep(self.grid.time, size, true)?;
-        self.grid.advance(end);
+        let swept = match (self.events.take(), self.control.kind) {
+            (None, StepControl::Fixed) if self.coupled.is_none() => {
+                let (end, size) = self.grid.next();
+                let swept = self.sweep(self.grid.time, size, true)?;
+                self.grid.advance(end);
+                swept
+            }
+            (None, _) => {
+                let (end, swept) = self.stretch(self.grid.time, self.planned())?;
+                self.grid.reach(end);
+                swept
+            }
+            (Some(mut events), _) => {
+                let done = self.step_to_event(&mut events);
+                self.events = Some(events);
+                done?
+            }
+        };
         if let Some((slave, reached)) = swept.terminated {
             self.ended = Some(slave);
             self.grid.time = reached;
         }
         Ok(())
+    }
+
+    /// Where the next step would end.
+    fn planned(&self) -> f64 {
+        match self.control.kind {
+            StepControl::Fixed => self.grid.next().0,
+            _ => self.grid.end_of(self.control.size),
+        }
+    }
+
+    /// A step from `time` to `end` or, where it cannot or must not be as long, not as far.
+    fn stretch(&mut self, time: f64, end: f64) -> Result<(f64, Swept), SystemError> {
+        if self.repeats {
+            let mut repetition = std::mem::take(&mut self.repetition);
+            let done = self.controlled(&mut repetition, time, end);
+            self.repetition = repetition;
+            return done;
+        }
+        let swept = self.sweep(time, end - time, true)?;
+        self.control.look_back(&self.exchange.reals, end - time);
+        Ok((end, swept))
+    }
+
+    fn step_to_event(&mut self, events: &mut Events) -> Result<Swept, SystemError> {
+        let time = self.grid.time;
+        let planned = self.planned();
+        let limit = self.next_event(events, time, planned)?;
+        self.watch(events, time)?;
+        let (mut end, mut swept) = self.stretch(time, limit)?;
+        let crossing = self.locate(events, time, end)?;
+        let happened = crossing.is_some() || (limit < planned && end >= limit);
+        if let Some(crossing) = crossing {
+            (end, swept) = crossing;
+        }
+        if happened {
+            self.exchange.reals.forget();
+            self.control.forget();
+        }
+        self.grid.reach(end);
+        Ok(swept)
     }
 
     /// Ends the simulation: `fmi2Terminate` of every slave, all of them even where one fails.

@@ -67,7 +67,6 @@ pub(crate) struct Channel<T> {
     /// For each input the index of its output, and what becomes of the value.
     sources: Vec<usize>,
     transformations: Vec<Transformation>,
-    input_ports: Vec<Port>,
     /// Values of the outputs.
     pub(crate) latest: Vec<T>,
     /// What the inputs get.
@@ -109,7 +108,6 @@ impl<T: Clone + Default> Channel<T> {
             lanes,
             sources: inputs.iter().map(|connection| indices[&connection.from]).collect(),
             transformations: inputs.iter().map(|each| each.transformation.clone()).collect(),
-            input_ports: inputs.iter().map(|connection| connection.to).collect(),
             latest: vec![T::default(); outputs.len()],
             values: vec![T::default(); inputs.len()],
             output_ports: outputs,
@@ -121,12 +119,6 @@ impl<T: Clone + Default> Channel<T> {
         let key = |known: &Port| (known.slave, known.variable);
         let found = self.output_ports.binary_search_by_key(&key(&port), key);
         found.ok().map(|index| &self.latest[index])
-    }
-
-    /// For each input its port and its source.
-    pub(crate) fn inputs(&self) -> impl Iterator<Item = (Port, Port)> {
-        let pairs = self.input_ports.iter().zip(&self.sources);
-        pairs.map(|(&input, &source)| (input, self.output_ports[source]))
     }
 
     /// The inputs of `slave` from the values of now.

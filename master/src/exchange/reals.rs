@@ -1,66 +1,28 @@
 //! Connected Reals: values and derivatives of outputs over their last steps, and what inputs get.
 
-use serde::{Deserialize, Serialize};
-
 use super::course::{Known, Polynomial};
 use super::layout::Layout;
-use crate::algorithm::{Algorithm, Course, Sweep};
+use super::trace::Span;
+pub(crate) use super::trace::Trace;
+use crate::algorithm::{Algorithm, Coupling, Course, StepControl, Sweep};
 use crate::slave::{Advance, CallError, Slave, Stepped};
 use crate::system::{Port, System};
-
-/// When a slave last stepped.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-struct Span {
-    /// Begin of its last step in s.
-    begin: f64,
-    /// Sizes of the last step and of those before it in s.
-    size: f64,
-    last_size: f64,
-    earlier_size: f64,
-    /// Whether the values at its end count already.
-    stepped: bool,
-}
-
-/// Everything that changes on the way.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub(crate) struct Trace {
-    /// Values of all outputs at the end of the last step, at its begin, and before.
-    latest: Vec<f64>,
-    begin: Vec<f64>,
-    before: Vec<f64>,
-    earlier: Vec<f64>,
-    /// Derivatives of all outputs at the end of the last step and at its begin.
-    derivatives: Vec<f64>,
-    begin_derivatives: Vec<f64>,
-    /// For each slave, and one for what comes from no slave.
-    spans: Vec<Span>,
-}
 
 /// The connected Reals of a system.
 #[derive(Debug)]
 pub(crate) struct Reals {
-    layout: Layout,
+    pub(super) layout: Layout,
     course: Course,
     sweep: Sweep,
     /// Every input is held and all slaves step together: the latest values are all it takes.
     simple: bool,
     pub(crate) trace: Trace,
+    /// Values of the outputs at the end of the step, assumed by an iteration.
+    assumed: Vec<f64>,
+    assumes: bool,
     /// What the inputs get.
-    values: Vec<f64>,
-    input_derivatives: Vec<f64>,
-}
-
-impl Trace {
-    /// Takes over all values of `other`, of the same system, into the arrays that are there.
-    pub(crate) fn copy(&mut self, other: &Self) {
-        self.latest.clone_from(&other.latest);
-        self.begin.clone_from(&other.begin);
-        self.before.clone_from(&other.before);
-        self.earlier.clone_from(&other.earlier);
-        self.derivatives.clone_from(&other.derivatives);
-        self.begin_derivatives.clone_from(&other.begin_derivatives);
-        self.spans.clone_from(&other.spans);
-    }
+    pub(super) values: Vec<f64>,
+    pub(super) input_derivatives: Vec<f64>,
 }
 
 impl Reals {
@@ -76,14 +38,18 @@ impl Reals {
             earlier: vec![0.0; outputs],
             derivatives: vec![0.0; derivatives],
             begin_derivatives: vec![0.0; derivatives],
-            spans: vec![span; system.slaves.len() + 1],
+            spans: vec![span; system.slaves.len()],
         };
         Self {
+            assumed: vec![0.0; outputs],
+            assumes: false,
             values: vec![0.0; layout.sources.len()],
             input_derivatives: vec![0.0; layout.input_derivatives],
             course: algorithm.course,
             sweep: algorithm.sweep,
             simple: algorithm.course == Course::Hold
+                && algorithm.coupling == Coupling::Once
+                && algorithm.control == StepControl::Fixed
                 && algorithm.multiples.iter().all(|&multiple| multiple == 1),
             layout,
             trace,
@@ -115,28 +81,14 @@ impl Reals {
         &self.layout.from_integers
     }
 
-    /// For each connected input its port, the index of its output, factor and offset.
-    pub(crate) fn inputs(&self) -> impl Iterator<Item = (Port, usize, f64, f64)> {
-        let layout = &self.layout;
-        (0..layout.sources.len()).map(|k| {
-            let source = layout.sources[k] as usize;
-            (layout.input_ports[k], source, layout.factors[k], layout.offsets[k])
-        })
-    }
-
     /// The slave will step from `time` over `size`: what was its end is its begin.
     pub(crate) fn shift(&mut self, slave: usize, time: f64, size: f64) {
         if self.simple {
             return;
         }
         let trace = &mut self.trace;
-        let (range, derived) = match self.layout.lanes.get(slave) {
-            Some(lane) => (lane.output_range.clone(), lane.output_derivative_range.clone()),
-            None => {
-                let first = self.layout.from_integers.first();
-                (first.map_or(trace.latest.len(), |first| first.1)..trace.latest.len(), 0..0)
-            }
-        };
+        let lane = &self.layout.lanes[slave];
+        let (range, derived) = (lane.output_range.clone(), lane.output_derivative_range.clone());
         let span = &mut trace.spans[slave];
         (span.earlier_size, span.last_size) = (span.last_size, span.size);
         (span.begin, span.size, span.stepped) = (time, size, false);
@@ -180,11 +132,13 @@ impl Reals {
     /// Value and derivatives of the input at index `k`, the slave's input number `position`.
     fn place(&mut self, slave: usize, k: usize, position: usize, time: f64, size: f64) {
         let (layout, lane) = (&self.layout, &self.layout.lanes[slave]);
-        let mut course = self.polynomial(layout.sources[k] as usize, time);
-        let known = self.is_known(layout.sources[k] as usize);
-        if layout.held[k] || self.course == Course::Hold {
-            course = Polynomial::held(course.value);
-        }
+        let source = layout.sources[k] as usize;
+        let known = self.is_known(source);
+        let course = if layout.held[k] {
+            Polynomial::held(self.trace.latest[source])
+        } else {
+            self.polynomial(source, time)
+        };
         let value = match (lane.input_order, self.course) {
             (0, Course::Limited) if known => course.end(size),
             (0, Course::Linear | Course::Quadratic) => course.mean(size),
@@ -204,8 +158,8 @@ impl Reals {
 
     /// Whether the source of that output has stepped beyond the begin of the current step.
     fn is_known(&self, output: usize) -> bool {
-        self.sweep == Sweep::GaussSeidel
-            && self.trace.spans[self.layout.owners[output] as usize].stepped
+        let stepped = self.trace.spans[self.layout.owners[output] as usize].stepped;
+        self.assumes || (stepped && self.sweep == Sweep::GaussSeidel)
     }
 
     /// What is known of an output over the last step of its slave.
@@ -216,7 +170,11 @@ impl Reals {
             earlier: trace.earlier[output],
             before: trace.before[output],
             begin: trace.begin[output],
-            end: trace.latest[output],
+            end: if self.assumes && !(span.stepped && self.sweep == Sweep::GaussSeidel) {
+                self.assumed[output]
+            } else {
+                trace.latest[output]
+            },
             slope: derivative(layout.slopes[output]),
             curvature: derivative(layout.curvatures[output]),
             earlier_size: span.earlier_size,
@@ -236,6 +194,69 @@ impl Reals {
             known.extrapolated(self.course)
         };
         course.later(time - span.begin)
+    }
+
+    /// From now on all inputs are interpolated to these values of their outputs at the end of the
+    /// step; none: as the algorithm has it.
+    pub(crate) fn assume(&mut self, ends: Option<&[f64]>) {
+        self.assumes = ends.is_some();
+        if let Some(ends) = ends {
+            self.assumed.copy_from_slice(ends);
+        }
+    }
+
+    /// The extrapolation of each output over a step of `size` s from now, into `ends`.
+    pub(crate) fn predictions(&self, size: f64, ends: &mut [f64]) {
+        let trace = &self.trace;
+        for (output, end) in ends.iter_mut().enumerate() {
+            let span = &trace.spans[self.layout.owners[output] as usize];
+            let derivative = |place: Option<u32>| place.map(|k| trace.derivatives[k as usize]);
+            let known = Known {
+                earlier: trace.before[output],
+                before: trace.begin[output],
+                begin: trace.latest[output],
+                end: trace.latest[output],
+                slope: derivative(self.layout.slopes[output]),
+                curvature: derivative(self.layout.curvatures[output]),
+                earlier_size: span.last_size,
+                last_size: span.size,
+                size,
+            };
+            *end = known.extrapolated(self.course).end(size);
+        }
+    }
+
+    /// The change of all outputs per change of one through the inputs that it is connected to, by
+    /// directional derivatives; slave and error where one has none.
+    pub(crate) fn derivatives_to(
+        &self,
+        system: &mut System,
+        output: usize,
+        changes: &mut [f64],
+    ) -> Result<(), (usize, CallError)> {
+        let layout = &self.layout;
+        for (slave, lane) in layout.lanes.iter().enumerate() {
+            for k in lane.input_range.clone() {
+                if layout.sources[k] as usize != output || lane.outputs.is_empty() {
+                    continue;
+                }
+                let known = lane.inputs[k - lane.input_range.start];
+                let mut own = vec![0.0; lane.outputs.len()];
+                system.slaves[slave]
+                    .1
+                    .directional_derivative(&lane.outputs, &[known], &[layout.factors[k]], &mut own)
+                    .map_err(|source| (slave, source))?;
+                for (change, own) in changes[lane.output_range.clone()].iter_mut().zip(own) {
+                    *change += own;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Values of the outputs at the begin of the last step.
+    pub(crate) fn begins(&self) -> &[f64] {
+        &self.trace.begin
     }
 
     /// How far the extrapolation of each output over the last step of `size` s was off, into `errors`.

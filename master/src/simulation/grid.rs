@@ -88,9 +88,31 @@ impl Grid {
         }
     }
 
+    /// Size of the step from `time` of a slave that makes `multiple` steps of the grid at once: the
+    /// size of the common step where that is one, 0 where it has gone on already.
+    #[expect(clippy::cast_precision_loss, reason = "2^53 steps take longer than anyone waits")]
+    pub(super) fn size_of(&self, multiple: u32, time: f64, size: f64) -> f64 {
+        if multiple == 1 {
+            return size;
+        }
+        if self.count % u64::from(multiple) != 0 {
+            return 0.0;
+        }
+        let end = self.start + (self.count + u64::from(multiple)) as f64 * self.step;
+        self.stop.map_or(end, |stop| end.min(stop)) - time
+    }
+
     /// The step to `end`, from [`Grid::next`], is done.
     pub(super) fn advance(&mut self, end: f64) {
         self.count += 1;
+        self.time = end;
+    }
+
+    /// A step to `end` is done, a point of the grid or not.
+    pub(super) fn reach(&mut self, end: f64) {
+        if end >= self.next().0 {
+            self.count += 1;
+        }
         self.time = end;
     }
 }

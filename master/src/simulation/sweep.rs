@@ -1,10 +1,13 @@
 //! One step of all slaves, side by side or one after the other.
 
 use super::Simulation;
+use super::parallel::{Parallel, run};
 use crate::algorithm::Sweep;
 use crate::error::SystemError;
 use crate::exchange::call;
+use crate::order::Order;
 use crate::slave::{CallError, Failure, Stepped};
+use crate::system::System;
 
 /// Most attempts of a slave to come to the end of a step that it makes in parts.
 const PARTS: u32 = 1000;
@@ -18,6 +21,48 @@ pub(super) struct Swept {
     pub(super) reached: Option<f64>,
 }
 
+/// The slaves in groups, to be stepped one after the other; within a group all inputs are taken
+/// before the first step.
+pub(super) struct Groups {
+    sequence: Vec<usize>,
+    /// Where each group begins in `sequence`, and the end of the last.
+    begins: Vec<usize>,
+}
+
+impl Groups {
+    /// Jacobi: all slaves are one group. Gauss-Seidel: neighbours in the order of stepping are one
+    /// where none is connected to another, as then it makes no difference.
+    pub(super) fn new(system: &System, sweep: Sweep, order: &Order) -> Self {
+        let count = system.slaves.len();
+        if sweep == Sweep::Jacobi {
+            return Self { sequence: (0..count).collect(), begins: vec![0, count] };
+        }
+        let mut neighbours = vec![Vec::new(); count];
+        for connection in &system.connections {
+            let (from, to) = (connection.from.slave, connection.to.slave);
+            neighbours[from].push(to);
+            neighbours[to].push(from);
+        }
+        let mut begins = vec![0];
+        // The group that a slave cannot be in.
+        let mut excluded_from = vec![usize::MAX; count];
+        for (position, &slave) in order.sequence.iter().enumerate() {
+            if excluded_from[slave] == begins.len() {
+                begins.push(position);
+            }
+            for &neighbour in &neighbours[slave] {
+                excluded_from[neighbour] = begins.len();
+            }
+        }
+        begins.push(count);
+        Self { sequence: order.sequence.clone(), begins }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.begins.len() - 1
+    }
+}
+
 impl Simulation {
     /// Steps all slaves from `time` over `size`. With `never_back` a slave that stops on the way
     /// (`fmi2Discard`) goes on from there by itself; otherwise the step is left as it is, to be repeated.
@@ -28,37 +73,96 @@ impl Simulation {
         never_back: bool,
     ) -> Result<Swept, SystemError> {
         let mut swept = Swept::default();
-        for slave in 0..self.due.len() {
-            if self.due[slave] {
-                self.exchange.shift(slave, time, size);
+        for slave in 0..self.multiples.len() {
+            self.sizes[slave] = self.grid.size_of(self.multiples[slave], time, size);
+            if self.sizes[slave] > 0.0 {
+                self.exchange.shift(slave, time, self.sizes[slave]);
             }
         }
-        if self.algorithm.sweep == Sweep::Jacobi {
-            for slave in 0..self.due.len() {
-                self.exchange.gather(slave, time, size);
+        for group in 0..self.groups.len() {
+            let (begin, end) = (self.groups.begins[group], self.groups.begins[group + 1]);
+            for position in begin..end {
+                let slave = self.groups.sequence[position];
+                self.exchange.gather(slave, time, self.sizes[slave]);
             }
-            for slave in 0..self.due.len() {
-                self.advance(slave, (time, size), never_back, &mut swept)?;
+            if let Some(mut parallel) = self.parallel.take() {
+                let done = self.side_by_side(&mut parallel, group, (time, never_back), &mut swept);
+                self.parallel = Some(parallel);
+                done?;
+                continue;
             }
-        } else {
-            for position in 0..self.order.sequence.len() {
-                let slave = self.order.sequence[position];
-                self.exchange.gather(slave, time, size);
-                self.advance(slave, (time, size), never_back, &mut swept)?;
+            for position in begin..end {
+                self.advance(self.groups.sequence[position], time, never_back, &mut swept)?;
             }
         }
         Ok(swept)
+    }
+
+    /// One step of a group, in threads if that has been found to be faster.
+    #[cold]
+    fn side_by_side(
+        &mut self,
+        parallel: &mut Parallel,
+        group: usize,
+        (time, never_back): (f64, bool),
+        swept: &mut Swept,
+    ) -> Result<(), SystemError> {
+        let (begin, end) = (self.groups.begins[group], self.groups.begins[group + 1]);
+        let in_threads = end - begin > 1 && parallel.in_threads(group);
+        parallel.measure(group, |pool| {
+            let members = begin..end;
+            if !in_threads {
+                for position in members {
+                    self.advance(self.groups.sequence[position], time, never_back, swept)?;
+                }
+                return Ok(());
+            }
+            let due: Vec<usize> = self.groups.sequence[members]
+                .iter()
+                .copied()
+                .filter(|&slave| self.sizes[slave] > 0.0)
+                .collect();
+            let sizes = &self.sizes;
+            let done = self.exchange.advance_all(
+                &mut self.system,
+                &due,
+                &|slave| (time, sizes[slave]),
+                never_back,
+                |tasks| run(pool, tasks),
+            )?;
+            for (slave, done) in due.into_iter().zip(done) {
+                self.finish(slave, time, done, never_back, swept)?;
+            }
+            Ok(())
+        })
     }
 
     #[inline]
     fn advance(
         &mut self,
         slave: usize,
-        (time, size): (f64, f64),
+        time: f64,
         never_back: bool,
         swept: &mut Swept,
     ) -> Result<(), SystemError> {
+        let size = self.sizes[slave];
+        if size == 0.0 {
+            return Ok(());
+        }
         let done = self.exchange.advance(&mut self.system, slave, (time, size), never_back)?;
+        self.finish(slave, time, done, never_back, swept)
+    }
+
+    #[inline]
+    fn finish(
+        &mut self,
+        slave: usize,
+        time: f64,
+        done: Stepped,
+        never_back: bool,
+        swept: &mut Swept,
+    ) -> Result<(), SystemError> {
+        let size = self.sizes[slave];
         if done != Stepped::Whole {
             self.in_parts(slave, (time, size), done, never_back, swept)?;
         }
@@ -85,12 +189,12 @@ impl Simulation {
                 swept.terminated = Some((slave, reached));
                 return Ok(());
             }
+            if reached <= begin {
+                break;
+            }
             if !never_back {
                 swept.reached = Some(swept.reached.map_or(reached, |least| least.min(reached)));
                 return Ok(());
-            }
-            if reached <= begin {
-                break;
             }
             begin = reached;
             let (name, instance) = &mut self.system.slaves[slave];
@@ -99,7 +203,7 @@ impl Simulation {
                 .map_err(|source| call(name, begin, source))?;
         }
         let what = format!(
-            "returned fmi2Discard again and again on the way from {time} to {end} s, and came to {begin} s"
+            "returned fmi2Discard and came to {begin} s only, on the way from {time} to {end} s"
         );
         let source = CallError {
             function: "fmi2DoStep",

@@ -1,0 +1,107 @@
+//! Steps whose size is chosen on the way.
+
+use super::Simulation;
+use super::sweep::Swept;
+use crate::algorithm::StepControl;
+use crate::error::SystemError;
+use crate::exchange::Values;
+use crate::solve::Verdict;
+
+/// The slot of FMU states from which a rejected step is repeated.
+const SLOT: usize = 1;
+
+/// What the repetition of a step needs.
+#[derive(Default)]
+pub(super) struct Repetition {
+    begin: Values,
+    whole: Vec<f64>,
+}
+
+impl Simulation {
+    /// A step from `time` to `end`, or not as far: no slave stops on the way, and where the step control
+    /// looks at the error, it is within the tolerance.
+    pub(super) fn controlled(
+        &mut self,
+        repetition: &mut Repetition,
+        time: f64,
+        mut end: f64,
+    ) -> Result<(f64, Swept), SystemError> {
+        self.save_states(SLOT, time)?;
+        self.exchange.save(&mut repetition.begin);
+        loop {
+            let size = end - time;
+            let (error, swept) = match self.control.kind {
+                StepControl::Doubling => self.halved(repetition, time, size)?,
+                _ => self.extrapolated(time, size)?,
+            };
+            if swept.terminated.is_some() {
+                return Ok((end, swept));
+            }
+            end = match (swept.reached, self.control.judge(size, error)) {
+                (Some(reached), _) => reached,
+                (None, Verdict::Rejected { retry }) => time + retry,
+                (None, Verdict::Stuck) => return Err(SystemError::Stuck { time, size, error }),
+                (None, Verdict::Accepted { .. }) => {
+                    self.control.look_back(&self.exchange.reals, size);
+                    return Ok((end, swept));
+                }
+            };
+            self.restore_states(SLOT, time)?;
+            self.exchange.restore(&repetition.begin);
+        }
+    }
+
+    /// One whole step, then two halves, which stand: the error estimated from both.
+    fn halved(
+        &mut self,
+        repetition: &mut Repetition,
+        time: f64,
+        size: f64,
+    ) -> Result<(f64, Swept), SystemError> {
+        let whole = self.attempt(time, size, false)?;
+        if whole.reached.is_some() || whole.terminated.is_some() {
+            return Ok((0.0, whole));
+        }
+        repetition.whole.clear();
+        repetition.whole.extend_from_slice(self.exchange.reals.outputs());
+        self.restore_states(SLOT, time)?;
+        self.exchange.restore(&repetition.begin);
+        let middle = time + 0.5 * size;
+        for (begin, size) in [(time, middle - time), (middle, time + size - middle)] {
+            let half = self.attempt(begin, size, false)?;
+            if half.reached.is_some() || half.terminated.is_some() {
+                return Ok((0.0, half));
+            }
+        }
+        let halves = self.exchange.reals.outputs();
+        Ok((self.control.doubling_error(halves, &repetition.whole), Swept::default()))
+    }
+
+    /// One step, its error estimated from that of the extrapolation.
+    fn extrapolated(&mut self, time: f64, size: f64) -> Result<(f64, Swept), SystemError> {
+        let swept = self.attempt(time, size, false)?;
+        if self.control.kind != StepControl::Embedded {
+            return Ok((0.0, swept));
+        }
+        let error = self.control.extrapolation_error(&self.exchange.reals, size);
+        Ok((error, swept))
+    }
+
+    /// `fmi2GetFMUstate` of all slaves.
+    pub(super) fn save_states(&mut self, slot: usize, time: f64) -> Result<(), SystemError> {
+        for (name, slave) in &mut self.system.slaves {
+            slave.save_state(slot).map_err(|source| crate::exchange::call(name, time, source))?;
+        }
+        Ok(())
+    }
+
+    /// `fmi2SetFMUstate` of all slaves.
+    pub(super) fn restore_states(&mut self, slot: usize, time: f64) -> Result<(), SystemError> {
+        for (name, slave) in &mut self.system.slaves {
+            slave
+                .restore_state(slot)
+                .map_err(|source| crate::exchange::call(name, time, source))?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,130 @@
+//! A simulation as data, to go on with later.
+
+use fmi2::Experiment;
+use serde::{Deserialize, Serialize};
+
+use super::Simulation;
+use super::control::Controller;
+use super::iterate::Iteration;
+use crate::algorithm::Algorithm;
+use crate::error::SystemError;
+use crate::exchange::{Values, call};
+use crate::system::System;
+
+/// Everything that a simulation needs to go on from where it stands, bit by bit.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Checkpoint {
+    time: f64,
+    count: u64,
+    size: f64,
+    controller: Controller,
+    iteration: Option<Iteration>,
+    values: Values,
+    /// For each slave its name, the GUID of its FMU and its serialized FMU state.
+    slaves: Vec<(String, String, Vec<u8>)>,
+}
+
+impl Checkpoint {
+    /// Time reached in s.
+    #[must_use]
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+}
+
+impl Simulation {
+    /// The simulation as it stands.
+    ///
+    /// # Errors
+    ///
+    /// Where an FMU cannot serialize its state (`canSerializeFMUstate`), or fails to.
+    pub fn checkpoint(&mut self) -> Result<Checkpoint, SystemError> {
+        let time = self.grid.time;
+        let mut slaves = Vec::new();
+        for (name, slave) in &mut self.system.slaves {
+            let flags = slave.description().co_simulation.as_ref();
+            if !flags.is_some_and(|flags| flags.can_serialize_fmu_state) {
+                return Err(SystemError::Capability {
+                    slave: name.clone(),
+                    lacks: "canSerializeFMUstate",
+                    wanted: "a checkpoint".to_owned(),
+                });
+            }
+            let bytes = slave.serialize_state().map_err(|source| call(name, time, source))?;
+            slaves.push((name.clone(), slave.description().guid.clone(), bytes));
+        }
+        let mut values = Values::default();
+        self.exchange.save(&mut values);
+        Ok(Checkpoint {
+            time,
+            count: self.grid.count,
+            size: self.control.size,
+            controller: self.control.controller.clone(),
+            iteration: self.coupled.as_ref().map(|coupled| coupled.iteration.clone()),
+            values,
+            slaves,
+        })
+    }
+
+    /// The simulation that `checkpoint` was made of, with new slaves in `system`.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Simulation::new`]; where the slaves, the connections or the algorithm are others
+    /// than those of the checkpoint, or an FMU refuses its state.
+    pub fn resume(
+        system: System,
+        algorithm: &Algorithm,
+        experiment: &Experiment,
+        checkpoint: &Checkpoint,
+    ) -> Result<Self, SystemError> {
+        let mut simulation = Self::new(system, algorithm, experiment)?;
+        simulation.expect_origin_of(checkpoint)?;
+        let states = checkpoint.slaves.iter();
+        for ((name, slave), (_, _, bytes)) in simulation.system.slaves.iter_mut().zip(states) {
+            slave.deserialize_state(bytes).map_err(|source| call(name, checkpoint.time, source))?;
+        }
+        simulation.exchange.restore(&checkpoint.values);
+        (simulation.grid.time, simulation.grid.count) = (checkpoint.time, checkpoint.count);
+        simulation.control.size = checkpoint.size;
+        simulation.control.controller = checkpoint.controller.clone();
+        if let (Some(coupled), Some(iteration)) = (&mut simulation.coupled, &checkpoint.iteration) {
+            coupled.iteration = iteration.clone();
+        }
+        Ok(simulation)
+    }
+
+    fn expect_origin_of(&self, checkpoint: &Checkpoint) -> Result<(), SystemError> {
+        let own = self
+            .system
+            .slaves
+            .iter()
+            .map(|(name, slave)| (name.as_str(), slave.description().guid.as_str()));
+        let theirs = checkpoint.slaves.iter().map(|(name, guid, _)| (name.as_str(), guid.as_str()));
+        let list = |names: &mut dyn Iterator<Item = (&str, &str)>| {
+            names.map(|(name, guid)| format!("{name} {guid}")).collect::<Vec<_>>().join(", ")
+        };
+        if !own.clone().eq(theirs.clone()) {
+            let (mut theirs, mut own) = (theirs, own);
+            let what = format!(
+                "the checkpoint is one of other FMUs: expected {}, found {}",
+                list(&mut theirs),
+                list(&mut own)
+            );
+            return Err(SystemError::Algorithm { what });
+        }
+        let mut values = Values::default();
+        self.exchange.save(&mut values);
+        let same = values.has_shape_of(&checkpoint.values)
+            && std::mem::discriminant(&self.control.controller)
+                == std::mem::discriminant(&checkpoint.controller)
+            && self.coupled.as_ref().map(|coupled| std::mem::discriminant(&coupled.iteration))
+                == checkpoint.iteration.as_ref().map(std::mem::discriminant);
+        if same {
+            return Ok(());
+        }
+        let what = "the checkpoint was made with other connections or another algorithm, expected \
+                    the same ones";
+        Err(SystemError::Algorithm { what: what.to_owned() })
+    }
+}
