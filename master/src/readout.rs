@@ -1,0 +1,121 @@
+//! Reading chosen variables of a system, each as its type has it, for results.
+
+use std::ops::Range;
+
+use fmi2::description::Kind;
+
+use crate::error::SystemError;
+use crate::exchange::call;
+use crate::slave::{CallError, Slave};
+use crate::system::{Port, System};
+
+/// Values of chosen variables, in arrays by type: each in the order of the variables of that type.
+#[derive(Debug, Default)]
+pub struct Readout {
+    reads: Vec<Read>,
+    /// Values of Reals.
+    pub reals: Vec<f64>,
+    /// Values of Integers and Enumerations.
+    pub integers: Vec<i32>,
+    /// Values of Booleans: 0 is false.
+    pub booleans: Vec<i32>,
+    /// Values of Strings.
+    pub strings: Vec<String>,
+}
+
+/// Variables of one slave and one type that stand side by side.
+#[derive(Debug)]
+struct Read {
+    slave: usize,
+    kind: ReadKind,
+    references: Vec<u32>,
+    range: Range<usize>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum ReadKind {
+    Real,
+    Integer,
+    Boolean,
+    String,
+}
+
+impl ReadKind {
+    fn of(kind: &Kind) -> Self {
+        match kind {
+            Kind::Real(_) => ReadKind::Real,
+            Kind::Integer(_) | Kind::Enumeration(_) => ReadKind::Integer,
+            Kind::Boolean(_) => ReadKind::Boolean,
+            Kind::String(_) => ReadKind::String,
+        }
+    }
+}
+
+impl Readout {
+    /// A readout of `ports`, in that order.
+    #[must_use]
+    pub fn new(system: &System, ports: &[Port]) -> Self {
+        let mut readout = Self::default();
+        for &port in ports {
+            let variable = system.variable(port);
+            let kind = ReadKind::of(&variable.kind);
+            let position = readout.add(kind);
+            // The last read of that kind, so that the range stays one.
+            let last = readout.reads.iter_mut().rev().find(|read| read.kind == kind);
+            match last.filter(|read| read.slave == port.slave) {
+                Some(read) => {
+                    read.references.push(variable.value_reference);
+                    read.range.end = position + 1;
+                }
+                None => readout.reads.push(Read {
+                    slave: port.slave,
+                    kind,
+                    references: vec![variable.value_reference],
+                    range: position..position + 1,
+                }),
+            }
+        }
+        readout
+    }
+
+    /// Makes room for a value; its position.
+    fn add(&mut self, kind: ReadKind) -> usize {
+        match kind {
+            ReadKind::Real => self.reals.push(0.0),
+            ReadKind::Integer => self.integers.push(0),
+            ReadKind::Boolean => self.booleans.push(0),
+            ReadKind::String => self.strings.push(String::new()),
+        }
+        let length = match kind {
+            ReadKind::Real => self.reals.len(),
+            ReadKind::Integer => self.integers.len(),
+            ReadKind::Boolean => self.booleans.len(),
+            ReadKind::String => self.strings.len(),
+        };
+        length - 1
+    }
+
+    /// Reads all values.
+    ///
+    /// # Errors
+    ///
+    /// Where an FMU refuses; `time` is for the message.
+    pub fn read(&mut self, system: &mut System, time: f64) -> Result<(), SystemError> {
+        for position in 0..self.reads.len() {
+            let (name, slave) = &mut system.slaves[self.reads[position].slave];
+            self.read_one(position, slave.as_mut()).map_err(|source| call(name, time, source))?;
+        }
+        Ok(())
+    }
+
+    fn read_one(&mut self, position: usize, slave: &mut dyn Slave) -> Result<(), CallError> {
+        let read = &self.reads[position];
+        let (references, range) = (&read.references, read.range.clone());
+        match read.kind {
+            ReadKind::Real => slave.get_real(references, &mut self.reals[range]),
+            ReadKind::Integer => slave.get_integer(references, &mut self.integers[range]),
+            ReadKind::Boolean => slave.get_boolean(references, &mut self.booleans[range]),
+            ReadKind::String => slave.get_string(references, &mut self.strings[range]),
+        }
+    }
+}
