@@ -15,6 +15,8 @@ mod new;
 mod pack;
 mod paper_figures;
 mod plot;
+#[cfg_attr(not(test), expect(dead_code, reason = "until the verb run has --plot"))]
+mod recording;
 mod reproduce;
 mod run;
 mod scenario;

@@ -22,6 +22,7 @@ mod probe;
 mod readout;
 pub mod scenario;
 pub mod signal;
+pub mod results;
 mod simulation;
 mod slave;
 pub mod solve;
