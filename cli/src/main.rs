@@ -22,6 +22,7 @@ mod run;
 mod scenario;
 mod summary;
 mod whole_file;
+mod worker;
 
 use std::process::ExitCode;
 
@@ -57,6 +58,10 @@ fn main() -> ExitCode {
         logging::begin(0, false);
     }
     let done = match verb {
+    if let Some(status) = worker::worker() {
+        return status;
+    }
+    let done = match Arguments::parse().verb {
         Verb::Reproduce(options) => reproduce::reproduce(&options),
         Verb::Pack(options) => pack::pack(&options),
         Verb::New(options) => new::new(&options),
