@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 pub(crate) use every::Every;
-pub(crate) use ordered::{Ordered, SettingValue, Settings};
+pub(crate) use ordered::{Ordered, Settings};
 pub(crate) use tables::{Experiment, Isolation, Results, Saving, Wire};
 
 use crate::design::document::{Place, PlaceError, Source};
@@ -66,11 +66,7 @@ impl Loaded {
     }
 
     /// `error`, pointing at `place` of the file; what the command line stated has no place.
-    pub(crate) fn point(
-        &self,
-        place: &Place,
-        error: impl Into<anyhow::Error>,
-    ) -> anyhow::Error {
+    pub(crate) fn point(&self, place: &Place, error: impl Into<anyhow::Error>) -> anyhow::Error {
         let error = error.into();
         match &self.source {
             Some(source) if !place.is_empty() => source.error(place, format!("{error:#}")).into(),
@@ -136,9 +132,8 @@ impl Config {
         ];
         fmus.chain(files.into_iter().flatten()).for_each(&mut change);
         let signals = self.scenario.signal.iter_mut();
-        let signals = signals.filter_map(|signal| {
-            signal.get_mut().csv.as_mut().map(|csv| &mut csv.get_mut().file)
-        });
+        let signals = signals
+            .filter_map(|signal| signal.get_mut().csv.as_mut().map(|csv| &mut csv.get_mut().file));
         let tables = self.scenario.table.iter_mut().map(|table| &mut table.get_mut().csv);
         for file in signals.chain(tables) {
             let mut path = PathBuf::from(file.get_ref());

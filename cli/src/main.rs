@@ -15,8 +15,6 @@ mod new;
 mod pack;
 mod paper_figures;
 mod plot;
-#[cfg_attr(not(test), expect(dead_code, reason = "until the verb run has --plot"))]
-mod recording;
 mod reproduce;
 mod run;
 mod scenario;
@@ -53,15 +51,14 @@ enum Verb {
 }
 
 fn main() -> ExitCode {
+    if let Some(status) = worker::worker() {
+        return status;
+    }
     let verb = Arguments::parse().verb;
     if !matches!(verb, Verb::Run(_)) {
         logging::begin(0, false);
     }
     let done = match verb {
-    if let Some(status) = worker::worker() {
-        return status;
-    }
-    let done = match Arguments::parse().verb {
         Verb::Reproduce(options) => reproduce::reproduce(&options),
         Verb::Pack(options) => pack::pack(&options),
         Verb::New(options) => new::new(&options),

@@ -26,7 +26,6 @@ pub(crate) use assemble::assemble;
 pub(crate) use options::{AlgorithmOptions, Options, setting};
 use plan::{Plan, plan};
 pub(crate) use record::{Recorder, select};
-use saved::Saved;
 
 /// Most connections that are listed.
 const LISTED: usize = 20;

@@ -9,7 +9,7 @@ use master::assembly::{Assembly, Element, Link, Terminal};
 use master::ssp::structure::DefaultExperiment;
 use master::ssp::{self, Folders};
 use master::transformation::Transformation;
-use master::{CallError, Failure, Fmu, Slave, System};
+use master::{CallError, Failure, Fmu, Slave, System, isolate};
 
 use crate::config::{Config, Loaded, Wire};
 
@@ -27,8 +27,10 @@ pub(crate) struct Assembled {
 /// Loads and connects what the configuration names, and makes its settings.
 pub(crate) fn assemble(loaded: &Loaded, logging: bool) -> anyhow::Result<Assembled> {
     let config = &loaded.config;
-    for library in &config.preload {
-        master::preload(library.as_ref())?;
+    if config.isolation.isolate != Some(true) {
+        for library in &config.preload {
+            master::preload(library.as_ref())?;
+        }
     }
     let (mut assembly, experiment, steps, folders) = base(config)?;
     for (name, path) in &config.fmus.0 {
@@ -74,29 +76,68 @@ fn element(name: &str, path: &Path) -> Element {
     Element { name: name.to_owned(), fmu: path.to_owned(), settings: Vec::new() }
 }
 
-/// Instantiates the FMUs; one that several elements use is unpacked once.
+/// Instantiates the FMUs.
 fn instantiate(elements: &[Element], config: &Config, logging: bool) -> anyhow::Result<System> {
     let limit = config.isolation.time_limit.as_ref().map(|limit| *limit.get_ref());
-    let limit = limit.map(Duration::try_from_secs_f64).transpose().context("time-limit")?;
+    let time_limit = limit.map(Duration::try_from_secs_f64).transpose().context("time-limit")?;
+    let preload = config.preload.iter().map(Into::into).collect();
+    let isolation = isolate::Options { time_limit, preload, logging, executable: None };
+    let mut opening = Opening { isolation, opened: HashMap::new(), isolated: HashMap::new() };
     let mut system = System::default();
-    let mut opened: HashMap<&PathBuf, Fmu> = HashMap::new();
     for element in elements {
-        let fmu = match opened.get(&element.fmu) {
-            Some(fmu) => fmu.clone(),
-            None => {
-                let fmu = Fmu::open(&element.fmu)?;
-                opened.insert(&element.fmu, fmu.clone());
-                fmu
-            }
+        let slave: Box<dyn Slave> = if config.isolation.isolate == Some(true) {
+            Box::new(opening.isolated(element)?)
+        } else {
+            opening.here(element)?
         };
-        let mut slave = fmu.instantiate(&element.name)?;
-        slave.set_time_limit(limit);
-        if logging {
-            switch_logging_on(&element.name, &mut slave);
-        }
-        system.add(&element.name, Box::new(slave))?;
+        system.add(&element.name, slave)?;
     }
     Ok(system)
+}
+
+/// FMUs on their way into the system; one that several elements use is unpacked once.
+struct Opening<'a> {
+    isolation: isolate::Options,
+    opened: HashMap<&'a PathBuf, (Fmu, usize)>,
+    isolated: HashMap<&'a PathBuf, isolate::Package>,
+}
+
+impl<'a> Opening<'a> {
+    /// An instance in a process of its own.
+    fn isolated(&mut self, element: &'a Element) -> anyhow::Result<isolate::Isolated> {
+        let package = match self.isolated.get(&element.fmu) {
+            Some(package) => package.clone(),
+            None => isolate::Package::open(&element.fmu)?,
+        };
+        let slave = package.instantiate(&element.name, &self.isolation)?;
+        self.isolated.insert(&element.fmu, package);
+        Ok(slave)
+    }
+
+    /// An instance in this process, unless there can be no more of them.
+    fn here(&mut self, element: &'a Element) -> anyhow::Result<Box<dyn Slave>> {
+        let (fmu, count) = match self.opened.remove(&element.fmu) {
+            Some((fmu, count)) => (fmu, count + 1),
+            None => (Fmu::open(&element.fmu)?, 1),
+        };
+        let flags = fmu.description().co_simulation.as_ref();
+        let once = flags.is_some_and(|flags| flags.can_be_instantiated_only_once_per_process);
+        let instance = if once && count > 1 { None } else { Some(fmu.instantiate(&element.name)?) };
+        self.opened.insert(&element.fmu, (fmu, count));
+        let Some(mut slave) = instance else {
+            tracing::info!(
+                "{}: a process of its own, as there is another instance of its FMU \
+                 (canBeInstantiatedOnlyOncePerProcess)",
+                element.name
+            );
+            return Ok(Box::new(self.isolated(element)?));
+        };
+        slave.set_time_limit(self.isolation.time_limit);
+        if self.isolation.logging {
+            switch_logging_on(&element.name, &mut slave);
+        }
+        Ok(Box::new(slave))
+    }
 }
 
 fn switch_logging_on(name: &str, slave: &mut dyn Slave) {
@@ -122,10 +163,8 @@ fn connect(system: &mut System, loaded: &Loaded, links: &[Link]) -> anyhow::Resu
             variable: system.variable(port).name.clone(),
         };
         let stated = factor.is_some() || offset.is_some();
-        let linear = Transformation::Linear {
-            factor: factor.unwrap_or(1.0),
-            offset: offset.unwrap_or(0.0),
-        };
+        let linear =
+            Transformation::Linear { factor: factor.unwrap_or(1.0), offset: offset.unwrap_or(0.0) };
         taken.insert(terminal(to));
         own.push((
             wire.span(),

@@ -35,7 +35,8 @@ pub(super) fn plan(config: &mut Config, assembled: &Assembled) -> anyhow::Result
     let (start, stop) = times(config, assembled, &mut reasons)?;
     let tolerance = config.experiment.tolerance.as_ref().map(|tolerance| *tolerance.get_ref());
     let experiment = Experiment { start_time: start, stop_time: Some(stop), tolerance };
-    let every = config.results.every.unwrap_or_else(|| rows(&algorithm, stop - start, &mut reasons));
+    let every =
+        config.results.every.unwrap_or_else(|| rows(&algorithm, stop - start, &mut reasons));
     complete(&mut config.algorithm, &algorithm, system);
     config.experiment.start_time = Some(Spanned::new(0..0, start));
     config.experiment.stop_time = Some(Spanned::new(0..0, stop));
@@ -78,7 +79,11 @@ fn propose_steps(wanted: &mut Wanted, assembled: &Assembled, reasons: &mut Vec<S
     }
 }
 
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "2 and more; saturates")]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "2 and more; saturates"
+)]
 fn count(multiple: f64) -> u32 {
     multiple as u32
 }
@@ -102,7 +107,8 @@ fn times(
         let stated = defaults().filter_map(|(name, one)| Some((name, one.start_time?)));
         match stated.filter(|(_, time)| finite(time)).min_by(|a, b| a.1.total_cmp(&b.1)) {
             Some((name, time)) => {
-                reasons.push(format!("start time {time} s: that of the DefaultExperiment of {name}"));
+                reasons
+                    .push(format!("start time {time} s: that of the DefaultExperiment of {name}"));
                 time
             }
             None => 0.0,

@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::Context;
 use fmi2::description::{Causality, Kind};
 use master::results::{self, Column, ColumnKind, Decimation, Due, Row, Selection, Sink};
-use master::{Port, Simulation, System, SystemError};
+use master::{Port, Readout, Simulation, System};
 
 use crate::config::Every;
 
@@ -13,20 +13,7 @@ use crate::config::Every;
 pub(crate) struct Recorder {
     sink: Box<dyn Sink>,
     due: Due,
-    reads: Vec<Read>,
-    reals: Vec<f64>,
-    integers: Vec<i32>,
-    booleans: Vec<i32>,
-    strings: Vec<String>,
-}
-
-/// Columns of one FMU and one type that stand together.
-struct Read {
-    slave: usize,
-    kind: ColumnKind,
-    references: Vec<u32>,
-    /// Position of the first among the columns of that type.
-    first: usize,
+    readout: Readout,
 }
 
 impl Recorder {
@@ -44,41 +31,8 @@ impl Recorder {
             Every::Seconds(seconds) => Decimation::Every(seconds),
         };
         let columns: Vec<_> = ports.iter().map(|&port| column(system, port)).collect();
-        let sink = results::create(path, &columns)?;
-        let count = |kind| columns.iter().filter(|column| column.kind == kind).count();
-        let mut recorder = Self {
-            sink,
-            due: Due::new(decimation, start),
-            reads: Vec::new(),
-            reals: vec![0.0; count(ColumnKind::Real)],
-            integers: vec![0; count(ColumnKind::Integer)],
-            booleans: vec![0; count(ColumnKind::Boolean)],
-            strings: vec![String::new(); count(ColumnKind::String)],
-        };
-        recorder.plan(system, ports, &columns);
-        Ok(Some(recorder))
-    }
-
-    /// Groups what one call can read.
-    fn plan(&mut self, system: &System, ports: &[Port], columns: &[Column]) {
-        let mut counts = [0_usize; 4];
-        for (port, column) in ports.iter().zip(columns) {
-            let count = &mut counts[column.kind as usize];
-            let reference = system.variable(*port).value_reference;
-            let last = self.reads.iter_mut().rev().find(|read| read.kind == column.kind);
-            match last.filter(|read| read.slave == port.slave) {
-                Some(read) => read.references.push(reference),
-                None => self.reads.push(Read {
-                    slave: port.slave,
-                    kind: column.kind,
-                    references: vec![reference],
-                    first: *count,
-                }),
-            }
-            *count += 1;
-        }
-        // One FMU after the other.
-        self.reads.sort_by_key(|read| read.slave);
+        let (due, readout) = (Due::new(decimation, start), Readout::new(system, ports));
+        Ok(Some(Self { sink: results::create(path, &columns)?, due, readout }))
     }
 
     /// Goes on with the rows of a run that was resumed.
@@ -99,24 +53,8 @@ impl Recorder {
     }
 
     fn record(&mut self, system: &mut System, time: f64) -> anyhow::Result<()> {
-        for read in &self.reads {
-            let (name, slave) = &mut system.slaves[read.slave];
-            let range = read.first..read.first + read.references.len();
-            let done = match read.kind {
-                ColumnKind::Real => slave.get_real(&read.references, &mut self.reals[range]),
-                ColumnKind::Integer => {
-                    slave.get_integer(&read.references, &mut self.integers[range])
-                }
-                ColumnKind::Boolean => {
-                    slave.get_boolean(&read.references, &mut self.booleans[range])
-                }
-                ColumnKind::String => slave.get_string(&read.references, &mut self.strings[range]),
-            };
-            if let Err(source) = done {
-                return Err(SystemError::Call { slave: name.clone(), time, source }.into());
-            }
-        }
-        let Self { reals, integers, booleans, strings, .. } = self;
+        self.readout.read(system, time)?;
+        let Readout { reals, integers, booleans, strings, .. } = &self.readout;
         Ok(self.sink.row(time, &Row { reals, integers, booleans, strings })?)
     }
 
