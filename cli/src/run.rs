@@ -15,9 +15,10 @@ use std::process::ExitCode;
 
 use anyhow::{Context, bail};
 use master::results::Selection;
+use master::scenario::{Prepared as Scenario, Setup};
 use master::{Coupling, Port, Simulation, System, by_direct_dependencies};
 
-use crate::config::{Config, Every};
+use crate::config::{Config, Every, Loaded};
 use crate::logging;
 use crate::plot;
 use advance::Saver;
@@ -64,6 +65,7 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Prepared>> {
     let mut assembled = assemble(&loaded, options.verbose > 0)?;
     let plan = plan(&mut loaded.config, &assembled)?;
     let system = std::mem::take(&mut assembled.system);
+    let scenario = scenario(&loaded, &system, &plan)?;
     let config = loaded.config;
     let text = {
         let mut config = config.clone();
@@ -88,9 +90,11 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Prepared>> {
     let mut simulation = match &saved {
         Some(saved) => {
             let checkpoint = saved.checkpoint();
-            Simulation::resume(system, &plan.algorithm, &plan.experiment, checkpoint)?
+            Simulation::resume(system, &plan.algorithm, &plan.experiment, scenario, checkpoint)?
         }
-        None => Simulation::new(system, &plan.algorithm, &plan.experiment)?,
+        None => {
+            Simulation::with_scenario(system, &plan.algorithm, &plan.experiment, scenario)?
+        }
     };
     let mut recorder = Recorder::create(file, simulation.system(), &ports, plan.every, start)?;
     let due = saved.as_ref().and_then(|saved| saved.due(plan.every));
@@ -108,6 +112,19 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Prepared>> {
         units,
         _folders: assembled.folders,
     }))
+}
+
+/// What is done to the system while it runs.
+fn scenario(loaded: &Loaded, system: &System, plan: &Plan) -> anyhow::Result<Scenario> {
+    // Its paths already begin beside the file.
+    let folder = Path::new("");
+    let setup = Setup { folder, start: plan.experiment.start_time, step: plan.algorithm.step };
+    let resolved = loaded.config.scenario.resolve(system, &setup);
+    let scenario = resolved.map_err(|error| loaded.point(&error.place.clone(), error))?;
+    for (file, column) in &scenario.unused {
+        tracing::info!("{}: the column {column:?} drives nothing", file.display());
+    }
+    Ok(scenario)
 }
 
 fn results_file(config: &Config) -> anyhow::Result<&Path> {

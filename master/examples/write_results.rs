@@ -46,10 +46,11 @@ fn give(sink: &mut dyn Sink, k: u32, bits: &mut u64, numbers: bool) -> Result<()
         f64::from_bits(*bits)
     };
     let reals = [real(), real()];
-    let texts = [format!("row {k}, \"\u{e4}\"{}", if k % 3 == 0 { "\n" } else { "" })];
+    let texts = [format!("row {k}, \"\u{e4}\"{}", if k.is_multiple_of(3) { "\n" } else { "" })];
     let strings: &[String] = if numbers { &[] } else { &texts };
     let integer = i32::from_ne_bytes(k.wrapping_mul(2_654_435_761).to_ne_bytes());
-    let row = Row { reals: &reals, integers: &[integer], booleans: &[i32::from(k % 2 == 1)], strings };
+    let row =
+        Row { reals: &reals, integers: &[integer], booleans: &[i32::from(k % 2 == 1)], strings };
     sink.row(f64::from(k) * 1e-3, &row)
 }
 

@@ -12,9 +12,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::algorithm::Algorithm;
 use crate::error::SystemError;
+use crate::fault::FaultLine;
 use crate::simulation::Task;
 use crate::slave::{CallError, Slave, Stepped};
-use crate::system::System;
+use crate::system::{Port, System};
 use discrete::{BOOLEANS, Channel, INTEGERS, STRINGS};
 pub(crate) use reals::{Reals, Trace};
 
@@ -27,6 +28,8 @@ pub(crate) struct Exchange {
     /// Whether there are connections of other types than Real.
     discrete: bool,
     allow_nan: bool,
+    /// Whether there are faults on connections.
+    faulty: bool,
 }
 
 /// All values on their way: what is kept to repeat a step or to go on later.
@@ -51,7 +54,7 @@ impl Values {
 impl Exchange {
     pub(crate) fn new(system: &System, algorithm: &Algorithm) -> Self {
         let reals = Reals::new(system, algorithm);
-        let to_reals = reals.from_integers().iter().map(|(port, _)| *port);
+        let to_reals = reals.integer_sources().iter().map(|(port, _)| *port);
         let is_integer = |kind: &Kind| matches!(kind, Kind::Integer(_) | Kind::Enumeration(_));
         let integers = Channel::new(system, INTEGERS, is_integer, to_reals);
         let is_boolean = |kind: &Kind| matches!(kind, Kind::Boolean(_));
@@ -62,7 +65,44 @@ impl Exchange {
             && booleans.latest.is_empty()
             && strings.latest.is_empty());
         let allow_nan = algorithm.allow_nan;
-        Self { reals, integers, booleans, strings, discrete, allow_nan }
+        Self { reals, integers, booleans, strings, discrete, allow_nan, faulty: false }
+    }
+
+    /// Puts faults on connections, by their inputs.
+    pub(crate) fn set_faults(
+        &mut self,
+        system: &System,
+        faults: &[(Port, FaultLine)],
+    ) -> Result<(), SystemError> {
+        for (input, fault) in faults {
+            let set = self.reals.set_fault(*input, fault)
+                || self.integers.set_fault(*input, fault)
+                || self.booleans.set_fault(*input, fault);
+            if !set {
+                let what = format!(
+                    "{} has a fault, expected a connected input that is no String",
+                    system.name(*input)
+                );
+                return Err(SystemError::Algorithm { what });
+            }
+        }
+        self.faulty = !faults.is_empty();
+        Ok(())
+    }
+
+    /// The communication point `time` is reached for good.
+    #[inline]
+    pub(crate) fn commit(&mut self, time: f64) {
+        if self.faulty {
+            self.reals.commit(time);
+            self.integers.commit(time);
+            self.booleans.commit(time);
+        }
+    }
+
+    /// The faults, for a checkpoint.
+    pub(crate) fn faults(&mut self) -> impl Iterator<Item = &mut FaultLine> {
+        self.reals.faults().chain(self.integers.faults()).chain(self.booleans.faults())
     }
 
     /// Before a step of `slave` from `time` over `size`: what it reached is where it begins.
@@ -74,9 +114,9 @@ impl Exchange {
     pub(crate) fn gather(&mut self, slave: usize, time: f64, size: f64) {
         self.reals.gather(slave, time, size);
         if self.discrete {
-            self.integers.gather(slave);
-            self.booleans.gather(slave);
-            self.strings.gather(slave);
+            self.integers.gather(slave, time);
+            self.booleans.gather(slave, time);
+            self.strings.gather(slave, time);
         }
     }
 
@@ -145,8 +185,8 @@ impl Exchange {
     /// Integers that go to Reals.
     #[expect(clippy::needless_range_loop, reason = "the list is borrowed anew each time")]
     fn take_over_integers(&mut self) {
-        for k in 0..self.reals.from_integers().len() {
-            let (port, output) = self.reals.from_integers()[k];
+        for k in 0..self.reals.integer_sources().len() {
+            let (port, output) = self.reals.integer_sources()[k];
             if let Some(&value) = self.integers.value(port) {
                 self.reals.outputs_mut()[output] = f64::from(value);
             }

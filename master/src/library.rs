@@ -185,17 +185,15 @@ impl Library {
             _callbacks: callbacks,
             _library: self.clone(),
         };
-        if pointer.is_null() {
-            let messages = component.sink.take();
-            let reason = if messages.is_empty() {
-                "it gave no reason".to_owned()
-            } else {
-                messages.join("; ")
-            };
-            let (path, instance) = (self.path.clone(), name.to_owned());
-            return Err(LoadError::Instantiate { path, instance, reason });
-        }
-        Ok(component)
+        if pointer.is_null() { Err(self.not_instantiated(name, &component)) } else { Ok(component) }
+    }
+
+    /// The error of an instance that the FMU did not make.
+    fn not_instantiated(&self, name: &str, component: &Component) -> LoadError {
+        let messages = component.sink.take();
+        let reason =
+            if messages.is_empty() { "it gave no reason".to_owned() } else { messages.join("; ") };
+        LoadError::Instantiate { path: self.path.clone(), instance: name.to_owned(), reason }
     }
 }
 

@@ -16,7 +16,7 @@ pub use body::{
     Bias, Csv, Delay, Drift, Dropout, Gain, Inversion, Noise, Quantisation, Ramp, Saturation, Sine,
     Stuck,
 };
-pub use drive::{Drive, DriveKind, Drives};
+pub use drive::{CheckpointError, Drive, DriveKind, DriveState, Drives};
 pub use error::{Reason, ScenarioError};
 pub use literal::Literal;
 pub use resolve::{Lookup, Prepared, Setup};
@@ -142,6 +142,3 @@ pub struct Disturbed {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub inversion: Option<Spanned<Inversion>>,
 }
-
-#[cfg(test)]
-mod tests;

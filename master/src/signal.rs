@@ -7,7 +7,9 @@ pub use track::{Between, Track, TrackError};
 
 use std::f64::consts::TAU;
 
-/// Relative difference of two times that are taken for the same; as in `FMPy` (Python's
+use serde::{Deserialize, Serialize};
+
+/// Relative difference of two times that are taken for the same; as in FMPy (Python's
 /// `math.isclose`).
 const SAME: f64 = 1e-9;
 
@@ -28,7 +30,7 @@ pub(crate) fn earliest(after: f64, moments: impl IntoIterator<Item = f64>) -> Op
 }
 
 /// Value and right-hand derivative by time at one instant.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sample {
     /// The value.
     pub value: f64,
@@ -106,7 +108,8 @@ impl Signal {
                 let moves = reached(time, *from) && !reached(time, *until);
                 let slope = if moves { (end - begin) / (until - from) } else { 0.0 };
                 // Both ends are met exactly.
-                Sample { value: (1.0 - part) * begin + part * end, slope }
+                let value = if part < 1.0 { begin + part * (end - begin) } else { *end };
+                Sample { value, slope }
             }
             Signal::Sine { amplitude, frequency, phase, offset, from } => {
                 if !reached(time, *from) {

@@ -16,6 +16,7 @@ use crate::algorithm::{Algorithm, StepControl};
 use crate::error::SystemError;
 use crate::exchange::{Exchange, call};
 use crate::order::{Order, by_direct_dependencies};
+use crate::scenario::{Drives, Prepared};
 use crate::system::System;
 use adaptive::Repetition;
 use control::Control;
@@ -32,6 +33,7 @@ pub(crate) use parallel::Task;
 pub struct Simulation {
     system: System,
     exchange: Exchange,
+    drives: Drives,
     order: Order,
     grid: Grid,
     control: Control,
@@ -58,19 +60,36 @@ impl Simulation {
     /// Where times make no sense, the algorithm asks for what an FMU cannot do, an FMU fails, or
     /// an output is not finite.
     pub fn new(
+        system: System,
+        algorithm: &Algorithm,
+        experiment: &Experiment,
+    ) -> Result<Self, SystemError> {
+        Self::with_scenario(system, algorithm, experiment, Prepared::default())
+    }
+
+    /// As [`Simulation::new`], with variables that follow signals and faults on connections.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Simulation::new`]; where a fault is on no connection.
+    pub fn with_scenario(
         mut system: System,
         algorithm: &Algorithm,
         experiment: &Experiment,
+        mut scenario: Prepared,
     ) -> Result<Self, SystemError> {
         algorithm.check(&system)?;
         let grid = Grid::new(&system, algorithm, experiment)?;
         let mut exchange = Exchange::new(&system, algorithm);
         let order = by_direct_dependencies(&system);
-        initial::initialise(&mut system, experiment)?;
+        exchange.set_faults(&system, &scenario.faults)?;
+        initial::initialise(&mut system, experiment, &mut scenario)?;
         for slave in 0..system.slaves.len() {
             exchange.read(&mut system, slave, experiment.start_time)?;
         }
         exchange.reals.forget();
+        exchange.commit(experiment.start_time);
+        scenario.drives.commit(experiment.start_time);
         let groups = Groups::new(&system, algorithm.sweep, &order);
         let multiples = grid::multiples(&system, algorithm)?;
         let control = Control::new(&system, &exchange.reals, algorithm)?;
@@ -78,6 +97,7 @@ impl Simulation {
         Ok(Self {
             system,
             exchange,
+            drives: scenario.drives,
             order,
             grid,
             control,
@@ -151,15 +171,19 @@ impl Simulation {
             self.ended = Some(slave);
             self.grid.time = reached;
         }
+        self.exchange.commit(self.grid.time);
+        self.drives.commit(self.grid.time);
         Ok(())
     }
 
-    /// Where the next step would end.
+    /// Where the next step would end; steps that are not fixed end where a signal bends.
     fn planned(&self) -> f64 {
-        match self.control.kind {
-            StepControl::Fixed => self.grid.next().0,
-            _ => self.grid.end_of(self.control.size),
+        if self.control.kind == StepControl::Fixed {
+            return self.grid.next().0;
         }
+        let end = self.grid.end_of(self.control.size);
+        let least = self.grid.time + 1e-9 * self.control.size;
+        self.drives.next_break(least).map_or(end, |bend| end.min(bend))
     }
 
     /// A step from `time` to `end` or, where it cannot or must not be as long, not as far.

@@ -2,6 +2,8 @@
 
 use fmi2::description::{IntegerType, Kind, SimpleType};
 
+use crate::fault::FaultLine;
+
 /// A value of one of the types of the standard; an Enumeration is an Integer.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Value {
@@ -28,6 +30,20 @@ impl Value {
                 _ => Err("true or false".to_owned()),
             },
             Kind::String(_) => Ok(Value::String(text.to_owned())),
+        }
+    }
+}
+
+impl Value {
+    /// What a fault makes of it at `time`; a String stays.
+    pub(crate) fn disturb(&mut self, fault: &FaultLine, time: f64) {
+        match self {
+            Value::Real(value) => *value = fault.apply(time, *value),
+            Value::Integer(value) => *value = fault.apply_integer(time, *value),
+            Value::Boolean(value) => {
+                *value = fault.apply_boolean(time, i32::from(*value)) != 0;
+            }
+            Value::String(_) => {}
         }
     }
 }

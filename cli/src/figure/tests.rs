@@ -82,7 +82,7 @@ fn long_numbers_along_the_axes_stay_on_the_page_beside_the_label_of_the_axis() {
     let mut long = 0;
     for text in texts.filter(|node| node.attribute("transform").is_none()) {
         // Digits of the font are 0.636 em wide (DejaVu Sans).
-        let letters = text.text().unwrap().chars().count() as f64;
+        let letters = f64::from(u8::try_from(text.text().unwrap().chars().count()).unwrap());
         let width = 0.636 * TEXT_SIZE * letters;
         let x = number(&text, "x");
         match text.attribute("text-anchor") {

@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use fmi2::description::Kind;
 
+use crate::fault::FaultLine;
 use crate::slave::{CallError, Slave};
 use crate::system::{Connection, Port, System};
 use crate::transformation::Transformation;
@@ -17,6 +18,8 @@ pub(crate) struct Access<T> {
     get: Get<T>,
     set: Set<T>,
     map: fn(&T, &Transformation) -> T,
+    disturb: fn(&FaultLine, f64, &T) -> T,
+    number: fn(&T) -> f64,
 }
 
 /// Integers and Enumerations.
@@ -29,6 +32,8 @@ pub(crate) const INTEGERS: Access<i32> = Access {
         }
         _ => *value,
     },
+    disturb: |fault, time, value| fault.apply_integer(time, *value),
+    number: |value| f64::from(*value),
 };
 
 /// Booleans.
@@ -41,6 +46,8 @@ pub(crate) const BOOLEANS: Access<i32> = Access {
         }
         _ => *value,
     },
+    disturb: |fault, time, value| fault.apply_boolean(time, *value),
+    number: |value| f64::from(i32::from(*value != 0)),
 };
 
 /// Strings.
@@ -48,6 +55,8 @@ pub(crate) const STRINGS: Access<String> = Access {
     get: |slave, references, values| slave.get_string(references, values),
     set: |slave, references, values| slave.set_string(references, values),
     map: |value, _| value.clone(),
+    disturb: |_, _, value| value.clone(),
+    number: |_| f64::NAN,
 };
 
 /// What one slave sets and reads of a type.
@@ -67,6 +76,8 @@ pub(crate) struct Channel<T> {
     /// For each input the index of its output, and what becomes of the value.
     sources: Vec<usize>,
     transformations: Vec<Transformation>,
+    input_ports: Vec<Port>,
+    faults: Vec<Option<FaultLine>>,
     /// Values of the outputs.
     pub(crate) latest: Vec<T>,
     /// What the inputs get.
@@ -108,6 +119,8 @@ impl<T: Clone + Default> Channel<T> {
             lanes,
             sources: inputs.iter().map(|connection| indices[&connection.from]).collect(),
             transformations: inputs.iter().map(|each| each.transformation.clone()).collect(),
+            input_ports: inputs.iter().map(|connection| connection.to).collect(),
+            faults: vec![None; inputs.len()],
             latest: vec![T::default(); outputs.len()],
             values: vec![T::default(); inputs.len()],
             output_ports: outputs,
@@ -121,11 +134,39 @@ impl<T: Clone + Default> Channel<T> {
         found.ok().map(|index| &self.latest[index])
     }
 
-    /// The inputs of `slave` from the values of now.
-    pub(crate) fn gather(&mut self, slave: usize) {
+    /// Puts a fault on the way to an input; false where there is no such connected input.
+    pub(crate) fn set_fault(&mut self, input: Port, fault: &FaultLine) -> bool {
+        let Some(k) = self.input_ports.iter().position(|&port| port == input) else {
+            return false;
+        };
+        self.faults[k] = Some(fault.clone());
+        true
+    }
+
+    /// Tells the faults the undisturbed values at `time`, which is reached for good.
+    pub(crate) fn commit(&mut self, time: f64) {
+        for (k, fault) in self.faults.iter_mut().enumerate() {
+            if let Some(fault) = fault {
+                let value =
+                    (self.access.map)(&self.latest[self.sources[k]], &self.transformations[k]);
+                fault.commit(time, (self.access.number)(&value));
+            }
+        }
+    }
+
+    /// The faults, for a checkpoint.
+    pub(crate) fn faults(&mut self) -> impl Iterator<Item = &mut FaultLine> {
+        self.faults.iter_mut().flatten()
+    }
+
+    /// The inputs of `slave` from the values of now, for a step from `time`.
+    pub(crate) fn gather(&mut self, slave: usize, time: f64) {
         for k in self.lanes[slave].input_range.clone() {
-            let value = &self.latest[self.sources[k]];
-            self.values[k] = (self.access.map)(value, &self.transformations[k]);
+            let value = (self.access.map)(&self.latest[self.sources[k]], &self.transformations[k]);
+            self.values[k] = match &self.faults[k] {
+                Some(fault) => (self.access.disturb)(fault, time, &value),
+                None => value,
+            };
         }
     }
 

@@ -5,6 +5,7 @@ use super::layout::Layout;
 use super::trace::Span;
 pub(crate) use super::trace::Trace;
 use crate::algorithm::{Algorithm, Coupling, Course, StepControl, Sweep};
+use crate::fault::FaultLine;
 use crate::slave::{Advance, CallError, Slave, Stepped};
 use crate::system::{Port, System};
 
@@ -12,6 +13,8 @@ use crate::system::{Port, System};
 #[derive(Debug)]
 pub(crate) struct Reals {
     pub(super) layout: Layout,
+    /// Faults by input; empty where there are none at all.
+    faults: Vec<Option<FaultLine>>,
     course: Course,
     sweep: Sweep,
     /// Every input is held and all slaves step together: the latest values are all it takes.
@@ -41,6 +44,7 @@ impl Reals {
             spans: vec![span; system.slaves.len()],
         };
         Self {
+            faults: Vec::new(),
             assumed: vec![0.0; outputs],
             assumes: false,
             values: vec![0.0; layout.sources.len()],
@@ -77,8 +81,34 @@ impl Reals {
     }
 
     /// The outputs of type Integer that go to Reals: port, and index among the outputs.
-    pub(crate) fn from_integers(&self) -> &[(Port, usize)] {
+    pub(crate) fn integer_sources(&self) -> &[(Port, usize)] {
         &self.layout.from_integers
+    }
+
+    /// Puts a fault on the way to an input; false where there is no such connected input.
+    pub(crate) fn set_fault(&mut self, input: Port, fault: &FaultLine) -> bool {
+        let Some(k) = self.layout.input_ports.iter().position(|&port| port == input) else {
+            return false;
+        };
+        self.simple = false;
+        self.faults.resize(self.layout.sources.len(), None);
+        self.faults[k] = Some(fault.clone());
+        true
+    }
+
+    /// Tells the faults the undisturbed values at `time`, which is reached for good.
+    pub(crate) fn commit(&mut self, time: f64) {
+        for (k, fault) in self.faults.iter_mut().enumerate() {
+            if let Some(fault) = fault {
+                let value = self.trace.latest[self.layout.sources[k] as usize];
+                fault.commit(time, self.layout.factors[k].mul_add(value, self.layout.offsets[k]));
+            }
+        }
+    }
+
+    /// The faults, for a checkpoint.
+    pub(crate) fn faults(&mut self) -> impl Iterator<Item = &mut FaultLine> {
+        self.faults.iter_mut().flatten()
     }
 
     /// The slave will step from `time` over `size`: what was its end is its begin.
@@ -145,14 +175,31 @@ impl Reals {
             _ => course.value,
         };
         let factor = layout.factors[k];
-        self.values[k] =
+        let value =
             if layout.plain[slave] { value } else { factor.mul_add(value, layout.offsets[k]) };
-        let (count, first) = (lane.inputs.len(), lane.input_derivative_range.start + position);
-        if lane.input_order > 0 {
-            self.input_derivatives[first] = factor * course.slope;
+        let mut given = Polynomial {
+            value,
+            slope: factor * course.slope,
+            curvature: factor * course.curvature,
+        };
+        if let Some(Some(fault)) = self.faults.get(k) {
+            given = if lane.input_order > 0 {
+                let [value, slope, curvature] =
+                    fault.apply_course(time, [value, given.slope, given.curvature]);
+                Polynomial { value, slope, curvature }
+            } else {
+                let at_end = known && matches!(self.course, Course::Hold | Course::Limited);
+                Polynomial::held(fault.apply(if at_end { time + size } else { time }, value))
+            };
         }
-        if lane.input_order > 1 {
-            self.input_derivatives[first + count] = factor * course.curvature;
+        let (count, first) = (lane.inputs.len(), lane.input_derivative_range.start + position);
+        let order = lane.input_order;
+        self.values[k] = given.value;
+        if order > 0 {
+            self.input_derivatives[first] = given.slope;
+        }
+        if order > 1 {
+            self.input_derivatives[first + count] = given.curvature;
         }
     }
 
@@ -327,15 +374,15 @@ impl Reals {
     }
 }
 
-/// Whether all values are numbers and finite: of any other the difference with itself is none.
+/// Whether all values are numbers and finite: zero times any other is not zero.
 #[inline]
 fn all_finite(values: &[f64]) -> bool {
     let mut sums = [0.0; 4];
     let chunks = values.chunks_exact(4);
-    let rest: f64 = chunks.remainder().iter().map(|value| value - value).sum();
+    let rest: f64 = chunks.remainder().iter().map(|value| 0.0 * value).sum();
     for chunk in chunks {
         for (sum, value) in sums.iter_mut().zip(chunk) {
-            *sum += value - value;
+            *sum += 0.0 * value;
         }
     }
     (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest == 0.0

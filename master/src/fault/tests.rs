@@ -1,1 +1,163 @@
+//! Each fault against a series computed by hand.
+#![expect(clippy::float_cmp, reason = "exact by construction")]
 
+mod random;
+mod remembered;
+
+use super::*;
+
+fn window(from: f64, until: Option<f64>) -> Window {
+    Window { from, until }
+}
+
+fn single(fault: Fault, from: f64, until: Option<f64>) -> FaultLine {
+    FaultLine::new(vec![(window(from, until), fault)], 0.1).unwrap()
+}
+
+/// What arrives of values at communication points.
+fn series(line: &mut FaultLine, values: &[(f64, f64)]) -> Vec<f64> {
+    values
+        .iter()
+        .map(|&(time, value)| {
+            let arrived = line.apply(time, value);
+            line.commit(time, value);
+            assert_eq!(line.apply(time, value), arrived, "the same before and after the commit");
+            arrived
+        })
+        .collect()
+}
+
+#[test]
+fn a_bias_is_added_from_its_begin_until_before_its_end() {
+    let mut line = single(Fault::Bias(0.5), 1.0, Some(3.0));
+    let found = series(&mut line, &[(0.0, 1.0), (1.0, 2.0), (2.0, 4.0), (3.0, 8.0)]);
+    assert_eq!(found, [1.0, 2.5, 4.5, 8.0]);
+}
+
+#[test]
+fn a_time_reached_but_for_rounding_is_reached() {
+    let line = single(Fault::Bias(1.0), 0.3, Some(0.8));
+    // 3 and 8 steps of 0.1 s in doubles, on both sides of the decimal fractions.
+    assert_eq!(line.apply(0.1 + 0.1 + 0.1, 0.0), 1.0);
+    assert_eq!(line.apply(0.3 - 1e-12, 0.0), 1.0);
+    assert_eq!(line.apply(0.8 - 1e-12, 0.0), 0.0);
+    assert_eq!(line.apply(0.3 - 1e-6, 0.0), 0.0);
+}
+
+#[test]
+fn a_gain_multiplies_the_value_and_its_slope() {
+    let line = single(Fault::Gain(-2.0), 0.0, None);
+    let arrived = line.apply_sample(1.0, Sample { value: 3.0, slope: 5.0 });
+    assert_eq!(arrived, Sample { value: -6.0, slope: -10.0 });
+    assert_eq!(line.apply_course(1.0, [3.0, 5.0, 7.0]), [-6.0, -10.0, -14.0]);
+}
+
+#[test]
+fn what_is_added_leaves_the_curvature_and_what_jumps_has_none() {
+    let course = [1.0, 2.0, 3.0];
+    let of = |fault: Fault| single(fault, 0.0, None).apply_course(4.0, course);
+    assert_eq!(of(Fault::Bias(1.0)), [2.0, 2.0, 3.0]);
+    assert_eq!(of(Fault::Drift(0.5)), [3.0, 2.5, 3.0]);
+    assert_eq!(of(Fault::Stuck(Some(9.0))), [9.0, 0.0, 0.0]);
+    assert_eq!(of(Fault::Quantisation { step: 2.0, offset: 0.0 }), [2.0, 0.0, 0.0]);
+    assert_eq!(of(Fault::Saturation { lowest: None, highest: Some(0.5) }), [0.5, 0.0, 0.0]);
+    assert_eq!(of(Fault::Saturation { lowest: None, highest: Some(5.0) }), course);
+}
+
+#[test]
+fn a_drift_grows_from_its_begin_and_is_gone_after_its_end() {
+    let mut line = single(Fault::Drift(0.25), 2.0, Some(6.0));
+    let found = series(&mut line, &[(0.0, 1.0), (2.0, 1.0), (4.0, 1.0), (5.0, 3.0), (6.0, 1.0)]);
+    assert_eq!(found, [1.0, 1.0, 1.5, 3.75, 1.0]);
+    let arrived = line.apply_sample(4.0, Sample { value: 0.0, slope: 1.0 });
+    assert_eq!(arrived, Sample { value: 0.5, slope: 1.25 });
+}
+
+#[test]
+fn a_sensor_sticks_at_the_value_of_the_first_communication_point_of_its_window() {
+    let mut line = single(Fault::Stuck(None), 12.0, Some(13.0));
+    let values = [(11.9, 3.0), (12.1, 5.0), (12.5, 7.0), (12.9, -7.0), (13.1, 9.0)];
+    assert_eq!(series(&mut line, &values), [3.0, 5.0, 5.0, 5.0, 9.0]);
+    let arrived = line.apply_sample(12.5, Sample { value: 1.0, slope: 4.0 });
+    assert_eq!(arrived, Sample::held(5.0));
+}
+
+#[test]
+fn a_sensor_sticks_at_the_value_given() {
+    let mut line = single(Fault::Stuck(Some(-1.0)), 1.0, None);
+    assert_eq!(series(&mut line, &[(0.0, 3.0), (1.0, 5.0), (2.0, 7.0)]), [3.0, -1.0, -1.0]);
+}
+
+#[test]
+fn the_nearest_level_arrives_and_halves_go_away_from_zero() {
+    let line = single(Fault::Quantisation { step: 0.5, offset: 0.0 }, 0.0, None);
+    for (value, expected) in
+        [(0.74, 0.5), (0.75, 1.0), (0.2, 0.0), (-0.25, -0.5), (-0.2, 0.0), (7.0, 7.0)]
+    {
+        assert_eq!(line.apply(0.0, value), expected, "{value}");
+    }
+    let line = single(Fault::Quantisation { step: 2.0, offset: 0.5 }, 0.0, None);
+    for (value, expected) in [(0.0, 0.5), (1.4, 0.5), (1.6, 2.5), (-0.6, -1.5)] {
+        assert_eq!(line.apply(0.0, value), expected, "{value}");
+    }
+    let finest = single(Fault::Quantisation { step: 1e-308, offset: 0.0 }, 0.0, None);
+    assert_eq!(finest.apply(0.0, 1e10), 1e10);
+    let arrived = line.apply_sample(0.0, Sample { value: 0.0, slope: 3.0 });
+    assert_eq!(arrived, Sample::held(0.5));
+}
+
+#[test]
+fn a_saturated_value_stays_at_its_bound_and_has_no_slope() {
+    let line = single(Fault::Saturation { lowest: Some(-1.0), highest: Some(2.0) }, 0.0, None);
+    let moving = |value| Sample { value, slope: 3.0 };
+    assert_eq!(line.apply_sample(0.0, moving(1.5)), moving(1.5));
+    assert_eq!(line.apply_sample(0.0, moving(2.5)), Sample::held(2.0));
+    assert_eq!(line.apply_sample(0.0, moving(-1.5)), Sample::held(-1.0));
+    let open = single(Fault::Saturation { lowest: None, highest: Some(2.0) }, 0.0, None);
+    assert_eq!(open.apply(0.0, -1e9), -1e9);
+}
+
+#[test]
+fn faults_act_in_the_order_stated() {
+    let (bias, gain) = (Fault::Bias(1.0), Fault::Gain(10.0));
+    let always = window(0.0, None);
+    let of = |first: &Fault, second: &Fault| {
+        FaultLine::new(vec![(always, first.clone()), (always, second.clone())], 0.1).unwrap()
+    };
+    assert_eq!(of(&bias, &gain).apply(0.0, 2.0), 30.0);
+    assert_eq!(of(&gain, &bias).apply(0.0, 2.0), 21.0);
+    // What sticks is what the fault before it leaves.
+    let mut line = of(&bias, &Fault::Stuck(None));
+    assert_eq!(series(&mut line, &[(0.0, 2.0), (1.0, 5.0)]), [3.0, 3.0]);
+}
+
+#[test]
+fn integers_and_booleans_have_faults_too() {
+    let mut stuck = single(Fault::Stuck(None), 1.0, None);
+    stuck.commit(0.0, 1.0);
+    stuck.commit(1.0, 4.0);
+    assert_eq!(stuck.apply_integer(2.0, -7), 4);
+    let bias = single(Fault::Bias(3.0), 0.0, None);
+    assert_eq!(bias.apply_integer(0.0, -7), -4);
+    assert_eq!(bias.apply_integer(0.0, i32::MAX), i32::MAX);
+    let inversion = single(Fault::Inversion, 1.0, Some(2.0));
+    let found: Vec<_> = [(0.0, 1), (1.0, 1), (1.5, 0), (1.5, 7), (2.0, 0)]
+        .map(|(time, value)| inversion.apply_boolean(time, value))
+        .into();
+    assert_eq!(found, [1, 0, 1, 0, 0]);
+}
+
+#[test]
+fn breaks_are_begin_and_end_and_the_edges_of_a_periodic_dropout() {
+    let lost = Lost::Periodic { period: 2.0, part: 0.5 };
+    let dropout = Fault::Dropout { lost, instead: None };
+    let faults = vec![(window(1.0, Some(5.2)), dropout), (window(3.2, None), Fault::Bias(1.0))];
+    let line = FaultLine::new(faults, 0.1).unwrap();
+    let mut found = vec![0.0];
+    while let Some(next) = line.next_break(found[found.len() - 1]) {
+        found.push(next);
+    }
+    assert_eq!(found, [0.0, 1.0, 1.5, 3.0, 3.2, 3.5, 5.0, 5.2]);
+    // A time that differs by rounding is behind.
+    assert_eq!(line.next_break(1.0 - 1e-12), Some(1.5));
+}

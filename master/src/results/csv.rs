@@ -1,5 +1,7 @@
 //! Comma-separated values in the layout of `FMPy`, RFC 4180.
 
+mod lines;
+
 use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -7,6 +9,7 @@ use std::time::Duration;
 
 use super::pace::Pace;
 use super::{Column, ColumnKind, ResultsError, Row, Sink, TIME, Widths, check_names, create_file};
+use lines::Lines;
 
 /// Bytes that are gathered before they go to the operating system.
 const BUFFER: usize = 256 * 1024;
@@ -25,7 +28,7 @@ pub struct CsvSink {
     widths: Widths,
     kinds: Vec<ColumnKind>,
     /// Whole lines that are not yet in the file.
-    lines: Vec<u8>,
+    lines: Lines,
     /// Length of the file: always whole lines.
     written: u64,
     pace: Pace,
@@ -39,11 +42,13 @@ impl CsvSink {
     /// [`ResultsError::Duplicate`], [`ResultsError::Write`].
     pub fn create(path: &Path, columns: &[Column]) -> Result<Self, ResultsError> {
         check_names(columns)?;
-        let mut lines = Vec::with_capacity(2 * BUFFER);
-        quote(&mut lines, TIME);
+        let mut lines = Lines::new(columns, 2 * BUFFER);
+        let names = columns.iter().map(|column| column.name.as_str());
+        lines.begin(std::iter::once(TIME).chain(names));
+        lines.quote(TIME);
         for column in columns {
             lines.push(b',');
-            quote(&mut lines, &column.name);
+            lines.quote(&column.name);
         }
         lines.push(b'\n');
         let mut sink = Self {
@@ -61,9 +66,9 @@ impl CsvSink {
 
     /// Appends the lines to the file, or leaves it as it was.
     fn hand_over(&mut self) -> Result<(), ResultsError> {
-        match self.file.write_all(&self.lines) {
+        match self.file.write_all(self.lines.bytes()) {
             Ok(()) => {
-                self.written += self.lines.len() as u64;
+                self.written += self.lines.bytes().len() as u64;
                 self.lines.clear();
                 Ok(())
             }
@@ -85,25 +90,28 @@ impl Sink for CsvSink {
         let mut integers = row.integers.iter();
         let mut booleans = row.booleans.iter();
         let mut strings = row.strings.iter();
-        real(lines, time);
+        lines.begin(row.strings.iter().map(String::as_str));
+        lines.real(time);
         for kind in &self.kinds {
             lines.push(b',');
             match kind {
-                ColumnKind::Real => reals.next().into_iter().for_each(|value| real(lines, *value)),
-                ColumnKind::Integer => integers.next().into_iter().for_each(|value| {
-                    lines.extend_from_slice(itoa::Buffer::new().format(*value).as_bytes());
-                }),
+                ColumnKind::Real => reals.next().into_iter().for_each(|value| lines.real(*value)),
+                ColumnKind::Integer => {
+                    integers.next().into_iter().for_each(|value| lines.integer(*value));
+                }
                 ColumnKind::Boolean => booleans
                     .next()
                     .into_iter()
                     .for_each(|value| lines.push(if *value == 0 { b'0' } else { b'1' })),
-                ColumnKind::String => {
-                    strings.next().into_iter().for_each(|text| quote(lines, text));
-                }
+                ColumnKind::String => strings.next().into_iter().for_each(|text| lines.quote(text)),
             }
         }
         lines.push(b'\n');
-        if self.lines.len() >= BUFFER || self.pace.due() { self.hand_over() } else { Ok(()) }
+        if self.lines.bytes().len() >= BUFFER || self.pace.due() {
+            self.hand_over()
+        } else {
+            Ok(())
+        }
     }
 
     fn flush(&mut self) -> Result<(), ResultsError> {
@@ -120,30 +128,6 @@ impl Drop for CsvSink {
         // Nobody is left to be told of a failure.
         let _ = self.hand_over();
     }
-}
-
-/// The shortest decimal that reads back as the same bits; always with a point or an exponent, so
-/// that no reader takes a column for integers by its first rows.
-fn real(lines: &mut Vec<u8>, value: f64) {
-    if value.is_finite() {
-        lines.extend_from_slice(zmij::Buffer::new().format_finite(value).as_bytes());
-    } else if value.is_nan() {
-        lines.extend_from_slice(b"NaN");
-    } else {
-        lines.extend_from_slice(if value > 0.0 { b"inf" } else { b"-inf" });
-    }
-}
-
-/// A text in quotation marks; those inside are doubled.
-fn quote(lines: &mut Vec<u8>, text: &str) {
-    lines.push(b'"');
-    for (place, part) in text.split('"').enumerate() {
-        if place > 0 {
-            lines.extend_from_slice(b"\"\"");
-        }
-        lines.extend_from_slice(part.as_bytes());
-    }
-    lines.push(b'"');
 }
 
 #[cfg(test)]

@@ -34,7 +34,7 @@ impl Table {
             Format::Parquet => groups::columns(path)?,
         };
         if columns.is_empty() {
-            return Err(unreadable(path, "it has no columns"));
+            return Err(unreadable(path, &"it has no columns"));
         }
         let time = columns.iter().position(|column| column.name == super::TIME).unwrap_or(0);
         Ok(Self { path: path.to_owned(), format, columns, time })
@@ -116,7 +116,7 @@ impl Table {
     }
 }
 
-fn unreadable(path: &Path, reason: impl ToString) -> ResultsError {
+fn unreadable(path: &Path, reason: &impl ToString) -> ResultsError {
     ResultsError::Read { path: path.to_owned(), reason: reason.to_string() }
 }
 

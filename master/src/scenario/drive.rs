@@ -1,6 +1,7 @@
 //! Variables that follow signals while a simulation runs.
 
 use fmi2::description::Kind;
+use serde::{Deserialize, Serialize};
 
 use crate::error::SystemError;
 use crate::exchange::call;
@@ -110,6 +111,23 @@ pub(super) struct Course {
     /// Minus infinity: always.
     pub(super) begin: f64,
     pub(super) texts: Vec<String>,
+}
+
+/// What a checkpoint holds of a [`Drive`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DriveState {
+    faults: Option<FaultLine>,
+    accepted: Option<Sample>,
+}
+
+/// A checkpoint that does not fit.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the checkpoint is of {found} driven variables, expected {expected} as in the scenario")]
+pub struct CheckpointError {
+    /// Driven variables of the scenario.
+    pub expected: usize,
+    /// Those of the checkpoint.
+    pub found: usize,
 }
 
 /// All driven variables of a system. Nothing here allocates after the construction.
@@ -259,23 +277,28 @@ impl Drives {
         self.all.iter().filter_map(|drive| drive.next_break(after)).reduce(f64::min)
     }
 
-    /// The faults on driven variables, for a checkpoint.
+    /// What a checkpoint holds of them, in their order.
     #[must_use]
-    pub fn faults(&self) -> Vec<(Port, FaultLine)> {
-        let of = |drive: &Drive| Some((drive.port, drive.faults.clone()?));
-        self.all.iter().filter_map(of).collect()
+    pub fn state(&self) -> Vec<DriveState> {
+        let of =
+            |drive: &Drive| DriveState { faults: drive.faults.clone(), accepted: drive.accepted };
+        self.all.iter().map(of).collect()
     }
 
-    /// Takes faults back from a checkpoint; all values count as not set yet.
-    pub fn restore(&mut self, faults: Vec<(Port, FaultLine)>) {
-        for (port, line) in faults {
-            if let Some(drive) = self.all.iter_mut().find(|drive| drive.port == port) {
-                drive.faults = Some(line);
-            }
+    /// Takes back what a checkpoint holds, at a communication point.
+    ///
+    /// # Errors
+    ///
+    /// Where it is of another scenario.
+    pub fn restore(&mut self, state: Vec<DriveState>) -> Result<(), CheckpointError> {
+        if state.len() != self.all.len() {
+            return Err(CheckpointError { expected: self.all.len(), found: state.len() });
         }
-        for drive in &mut self.all {
-            (drive.written, drive.accepted) = (None, None);
+        for (drive, DriveState { faults, accepted }) in self.all.iter_mut().zip(state) {
+            drive.faults = faults;
+            (drive.written, drive.accepted) = (accepted, accepted);
         }
+        Ok(())
     }
 }
 

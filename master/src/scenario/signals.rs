@@ -50,7 +50,8 @@ impl<'a> Resolver<'a> {
             let value = conversion(set.unit.as_ref(), target)
                 .and_then(|conversion| encode(set.value.get_ref(), target, conversion, texts))
                 .map_err(at(&set.value, &path))?;
-            points.push((set.at, value));
+            // Plus zero, as minus zero is the same time.
+            points.push((set.at + 0.0, value));
         }
         for Settings { target, path, entry, points, texts } in variables {
             let course = settings_course(points, texts).map_err(at(entry, &path))?;
@@ -245,7 +246,7 @@ fn sine_signal(sine: &Sine, start: f64) -> Result<Signal, Reason> {
     })
 }
 
-/// A column as `FMPy` takes it: lines for continuous Reals, else held.
+/// A column as FMPy takes it: lines for continuous Reals, else held.
 fn column_signal(
     path: &Path,
     table: &Table,

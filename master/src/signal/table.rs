@@ -1,4 +1,4 @@
-//! Signals in a CSV file, in the layout that `FMPy` reads and writes: a header with the names, in
+//! Signals in a CSV file, in the layout that FMPy reads and writes: a header with the names, in
 //! quotes or not, `time` first; then one row for each point in time, ascending; a time that stands
 //! twice is a jump.
 

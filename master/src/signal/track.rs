@@ -1,4 +1,4 @@
-//! Points in time with what is between them, by the conventions of `FMPy` 0.3 (`fmpy.simulation.Input`).
+//! Points in time with what is between them, by the conventions of FMPy 0.3 (`fmpy.simulation.Input`).
 
 use std::sync::Arc;
 
@@ -25,7 +25,7 @@ pub enum Between {
 /// * Held values begin at their time.
 /// * Times whose relative difference is at most 1e-9 are the same.
 ///
-/// The values are those of `FMPy` to the last bit. The derivatives at a point differ: `FMPy` gives those
+/// The values are those of FMPy to the last bit. The derivatives at a point differ: FMPy gives those
 /// of the line before it, here they are those of the line that begins there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Track {

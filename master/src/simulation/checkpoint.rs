@@ -9,6 +9,8 @@ use super::iterate::Iteration;
 use crate::algorithm::Algorithm;
 use crate::error::SystemError;
 use crate::exchange::{Values, call};
+use crate::fault::FaultLine;
+use crate::scenario::{DriveState, Prepared};
 use crate::system::System;
 
 /// Everything that a simulation needs to go on from where it stands, bit by bit.
@@ -20,6 +22,8 @@ pub struct Checkpoint {
     controller: Controller,
     iteration: Option<Iteration>,
     values: Values,
+    faults: Vec<FaultLine>,
+    drives: Vec<DriveState>,
     /// For each slave its name, the GUID of its FMU and its serialized FMU state.
     slaves: Vec<(String, String, Vec<u8>)>,
 }
@@ -62,6 +66,8 @@ impl Simulation {
             controller: self.control.controller.clone(),
             iteration: self.coupled.as_ref().map(|coupled| coupled.iteration.clone()),
             values,
+            faults: self.exchange.faults().map(|fault| fault.clone()).collect(),
+            drives: self.drives.state(),
             slaves,
         })
     }
@@ -76,15 +82,23 @@ impl Simulation {
         system: System,
         algorithm: &Algorithm,
         experiment: &Experiment,
+        scenario: Prepared,
         checkpoint: &Checkpoint,
     ) -> Result<Self, SystemError> {
-        let mut simulation = Self::new(system, algorithm, experiment)?;
+        let mut simulation = Self::with_scenario(system, algorithm, experiment, scenario)?;
         simulation.expect_origin_of(checkpoint)?;
         let states = checkpoint.slaves.iter();
         for ((name, slave), (_, _, bytes)) in simulation.system.slaves.iter_mut().zip(states) {
             slave.deserialize_state(bytes).map_err(|source| call(name, checkpoint.time, source))?;
         }
         simulation.exchange.restore(&checkpoint.values);
+        for (fault, kept) in simulation.exchange.faults().zip(&checkpoint.faults) {
+            fault.clone_from(kept);
+        }
+        simulation
+            .drives
+            .restore(checkpoint.drives.clone())
+            .map_err(|error| SystemError::Algorithm { what: error.to_string() })?;
         (simulation.grid.time, simulation.grid.count) = (checkpoint.time, checkpoint.count);
         simulation.control.size = checkpoint.size;
         simulation.control.controller = checkpoint.controller.clone();
@@ -94,7 +108,7 @@ impl Simulation {
         Ok(simulation)
     }
 
-    fn expect_origin_of(&self, checkpoint: &Checkpoint) -> Result<(), SystemError> {
+    fn expect_origin_of(&mut self, checkpoint: &Checkpoint) -> Result<(), SystemError> {
         let own = self
             .system
             .slaves
@@ -116,6 +130,7 @@ impl Simulation {
         let mut values = Values::default();
         self.exchange.save(&mut values);
         let same = values.has_shape_of(&checkpoint.values)
+            && self.exchange.faults().count() == checkpoint.faults.len()
             && std::mem::discriminant(&self.control.controller)
                 == std::mem::discriminant(&checkpoint.controller)
             && self.coupled.as_ref().map(|coupled| std::mem::discriminant(&coupled.iteration))

@@ -7,7 +7,9 @@ use fmi2::description::Kind;
 
 use crate::error::SystemError;
 use crate::exchange::call;
+use crate::fault::FaultLine;
 use crate::order::Rows;
+use crate::scenario::Prepared;
 use crate::solve::{Components, Newton, Progress, Scale, Solver, components};
 use crate::system::{Port, System};
 use crate::value::Value;
@@ -18,7 +20,11 @@ const TOLERANCE: f64 = 1e-10;
 const EVALUATIONS: u32 = 100;
 
 /// Brings all slaves into initialization mode, solves the connections there, and ends it.
-pub(super) fn initialise(system: &mut System, experiment: &Experiment) -> Result<(), SystemError> {
+pub(super) fn initialise(
+    system: &mut System,
+    experiment: &Experiment,
+    scenario: &mut Prepared,
+) -> Result<(), SystemError> {
     let start = experiment.start_time;
     for (name, slave) in &mut system.slaves {
         slave
@@ -26,7 +32,8 @@ pub(super) fn initialise(system: &mut System, experiment: &Experiment) -> Result
             .and_then(|()| slave.enter_initialization_mode())
             .map_err(|source| call(name, start, source))?;
     }
-    let mut graph = Graph::new(system);
+    scenario.drives.write(system, start)?;
+    let mut graph = Graph::new(system, &scenario.faults);
     for component in 0..graph.components.len() {
         let nodes = graph.components.nodes(component).to_vec();
         if graph.components.is_loop(component) {
@@ -45,15 +52,16 @@ pub(super) fn initialise(system: &mut System, experiment: &Experiment) -> Result
 }
 
 /// Connected outputs and what they depend on.
-struct Graph {
+struct Graph<'a> {
+    faults: HashMap<Port, &'a FaultLine>,
     outputs: Vec<Port>,
     /// For each output the connections that begin there.
     connections: Vec<Vec<usize>>,
     components: Components,
 }
 
-impl Graph {
-    fn new(system: &System) -> Self {
+impl<'a> Graph<'a> {
+    fn new(system: &System, faults: &'a [(Port, FaultLine)]) -> Self {
         let mut outputs: Vec<Port> = Vec::new();
         let mut nodes: HashMap<Port, usize> = HashMap::new();
         let mut connections: Vec<Vec<usize>> = Vec::new();
@@ -83,7 +91,8 @@ impl Graph {
             }
         }
         let components = components(outputs.len(), &edges);
-        Self { outputs, connections, components }
+        let faults = faults.iter().map(|(input, fault)| (*input, fault)).collect();
+        Self { faults, outputs, connections, components }
     }
 
     fn read(&self, system: &mut System, node: usize, time: f64) -> Result<Value, SystemError> {
@@ -102,7 +111,10 @@ impl Graph {
         for &number in &self.connections[node] {
             let connection = &system.connections[number];
             let to = connection.to;
-            let value = system.transformed(value, &connection.transformation, to);
+            let mut value = system.transformed(value, &connection.transformation, to);
+            if let Some(fault) = self.faults.get(&to) {
+                value.disturb(fault, time);
+            }
             system
                 .set_value(to, &value)
                 .map_err(|source| call(&system.slaves[to.slave].0, time, source))?;

@@ -73,6 +73,9 @@ impl Simulation {
         never_back: bool,
     ) -> Result<Swept, SystemError> {
         let mut swept = Swept::default();
+        if !self.drives.is_empty() {
+            self.drives.write(&mut self.system, time)?;
+        }
         for slave in 0..self.multiples.len() {
             self.sizes[slave] = self.grid.size_of(self.multiples[slave], time, size);
             if self.sizes[slave] > 0.0 {

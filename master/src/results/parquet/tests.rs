@@ -88,8 +88,8 @@ fn row_groups_are_bounded_and_follow_each_other_whatever_is_flushed_between() {
     let mut sink = Box::new(ParquetSink::create(&path, &columns).unwrap());
     let mut values = vec![0.0; 4000];
     for k in 0..1300 {
-        for (place, value) in values.iter_mut().enumerate() {
-            *value = f64::from(k) * 0.1 + place as f64;
+        for (place, value) in (0_u32..).zip(&mut values) {
+            *value = f64::from(k) * 0.1 + f64::from(place);
         }
         sink.row(f64::from(k), &Row { reals: &values, ..Row::default() }).unwrap();
         if k % 397 == 0 {

@@ -17,8 +17,8 @@ use crate::results::parquet::units;
 const ROWS: usize = 8192;
 
 fn open(path: &Path) -> Result<SerializedFileReader<File>, ResultsError> {
-    let file = File::open(path).map_err(|error| unreadable(path, error))?;
-    SerializedFileReader::new(file).map_err(|error| unreadable(path, error))
+    let file = File::open(path).map_err(|error| unreadable(path, &error))?;
+    SerializedFileReader::new(file).map_err(|error| unreadable(path, &error))
 }
 
 pub(super) fn columns(path: &Path) -> Result<Vec<Column>, ResultsError> {
@@ -31,7 +31,7 @@ pub(super) fn columns(path: &Path) -> Result<Vec<Column>, ResultsError> {
         .map(|column| {
             let name = column.path().parts().join(".");
             if column.max_rep_level() > 0 || column.path().parts().len() > 1 {
-                return Err(unreadable(path, format!("{name} is nested, expected plain columns")));
+                return Err(unreadable(path, &format!("{name} is nested, expected plain columns")));
             }
             let kind = match column.physical_type() {
                 Physical::DOUBLE | Physical::FLOAT => ColumnKind::Real,
@@ -55,11 +55,11 @@ pub(super) fn visit(
         return Err(ResultsError::Text { path: path.to_owned(), name });
     }
     let reader = open(path)?;
-    let length = std::fs::metadata(path).map_err(|error| unreadable(path, error))?.len();
+    let length = std::fs::metadata(path).map_err(|error| unreadable(path, &error))?.len();
     for group in 0..reader.num_row_groups() {
         check_places(&reader, group, wanted, length)
             .and_then(|()| visit_group(&reader, group, wanted, visitor))
-            .map_err(|error| unreadable(path, error))?;
+            .map_err(|error| unreadable(path, &error))?;
     }
     Ok(())
 }

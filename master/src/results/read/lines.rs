@@ -12,14 +12,14 @@ use crate::results::ColumnKind;
 const BUFFER: usize = 256 * 1024;
 
 fn reader(path: &Path) -> Result<Reader<File>, ResultsError> {
-    let file = File::open(path).map_err(|error| unreadable(path, error))?;
+    let file = File::open(path).map_err(|error| unreadable(path, &error))?;
     // Flexible, because the last line may have been cut.
     Ok(ReaderBuilder::new().flexible(true).buffer_capacity(BUFFER).from_reader(file))
 }
 
 pub(super) fn columns(path: &Path) -> Result<Vec<Column>, ResultsError> {
     let mut reader = reader(path)?;
-    let names = reader.byte_headers().map_err(|error| unreadable(path, error))?;
+    let names = reader.byte_headers().map_err(|error| unreadable(path, &error))?;
     let column = |name: &[u8]| Column {
         name: String::from_utf8_lossy(name).trim().to_owned(),
         kind: ColumnKind::Real,
@@ -39,7 +39,7 @@ pub(super) fn visit(
     let mut row = vec![0.0; wanted.len()];
     // A line that is no row is one cut short if nothing follows, and an error otherwise.
     let mut wrong: Option<ResultsError> = None;
-    while reader.read_byte_record(&mut record).map_err(|error| unreadable(path, error))? {
+    while reader.read_byte_record(&mut record).map_err(|error| unreadable(path, &error))? {
         if let Some(error) = wrong {
             return Err(error);
         }
@@ -47,7 +47,7 @@ pub(super) fn visit(
         if record.len() != columns.len() {
             let (expected, found) = (columns.len(), record.len());
             let reason = format!("line {line} has {found} values, expected {expected}");
-            wrong = Some(unreadable(path, reason));
+            wrong = Some(unreadable(path, &reason));
             continue;
         }
         for (value, position) in row.iter_mut().zip(wanted) {
