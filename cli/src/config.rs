@@ -16,6 +16,7 @@ pub(crate) use ordered::{Ordered, Settings};
 pub(crate) use tables::{Experiment, Isolation, Results, Saving, Wire};
 
 use crate::design::document::{Place, PlaceError, Source};
+use crate::logging;
 
 /// The content of a `system.toml`; what is not stated is chosen.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -43,11 +44,18 @@ pub(crate) struct Config {
     /// What is written.
     pub(crate) results: Results,
     /// FMUs in processes of their own.
+    #[serde(skip_serializing_if = "is_default")]
     pub(crate) isolation: Isolation,
     /// Checkpoints.
+    #[serde(skip_serializing_if = "is_default")]
     pub(crate) checkpoint: Saving,
     /// What is done to the system while it runs.
+    #[serde(skip_serializing_if = "is_default")]
     pub(crate) scenario: Scenario,
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 /// A configuration and the text that it was read from, to which errors may point.
@@ -69,7 +77,9 @@ impl Loaded {
     pub(crate) fn point(&self, place: &Place, error: impl Into<anyhow::Error>) -> anyhow::Error {
         let error = error.into();
         match &self.source {
-            Some(source) if !place.is_empty() => source.error(place, format!("{error:#}")).into(),
+            Some(source) if !place.is_empty() => {
+                source.error(place, logging::sentence(&error)).into()
+            }
             _ => error,
         }
     }

@@ -11,6 +11,7 @@ use master::{Algorithm, Probe, Simulation, System, SystemError, Wanted, choose};
 
 use crate::claims::{Claim, Measurement, WATCHED, table};
 use crate::config::{Config, Every, Loaded};
+use crate::logging;
 use crate::run::{AlgorithmOptions, Beside, Ended, Recorder, assemble, select, setting};
 use crate::scenario::Scenario;
 use crate::summary::{Certified, Summary};
@@ -62,7 +63,7 @@ pub(crate) fn reproduce(options: &Options) -> anyhow::Result<bool> {
     let mut run = Run::new(options, system, &algorithm)?;
     let ended = run.advance(options)?;
     let lost = match ended {
-        Ended::Lost(error) => Some(format!("{error:#}")),
+        Ended::Lost(error) => Some(logging::sentence(&error)),
         Ended::ByFmu(name) => Some(format!("{name} asked for the end of the simulation")),
         Ended::AtStop | Ended::Interrupted => None,
     };

@@ -39,7 +39,7 @@ pub(crate) fn run(options: &Options) -> ExitCode {
         Ok(None) => ExitCode::SUCCESS,
         Ok(Some(prepared)) => prepared.go(),
         Err(error) => {
-            tracing::error!("{error:#}");
+            tracing::error!("{}", logging::sentence(&error));
             ExitCode::from(2)
         }
     }
@@ -92,9 +92,7 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Prepared>> {
             let checkpoint = saved.checkpoint();
             Simulation::resume(system, &plan.algorithm, &plan.experiment, scenario, checkpoint)?
         }
-        None => {
-            Simulation::with_scenario(system, &plan.algorithm, &plan.experiment, scenario)?
-        }
+        None => Simulation::with_scenario(system, &plan.algorithm, &plan.experiment, scenario)?,
     };
     let mut recorder = Recorder::create(file, simulation.system(), &ports, plan.every, start)?;
     let due = saved.as_ref().and_then(|saved| saved.due(plan.every));
@@ -225,12 +223,13 @@ impl Prepared {
                 interrupt::STATUS
             }
             Ended::Lost(error) => {
-                tracing::error!("the run ended early, after t = {time} s: {error:#}");
+                let error = logging::sentence(error);
+                tracing::error!("the run ended early, after t = {time} s: {error}");
                 1
             }
         };
         if let Err(error) = written {
-            tracing::error!("{error:#}");
+            tracing::error!("{}", logging::sentence(&error));
             return ExitCode::from(status.max(1));
         }
         ExitCode::from(status)

@@ -29,6 +29,7 @@ pub(super) fn plan(config: &mut Config, assembled: &Assembled) -> anyhow::Result
     let system = &assembled.system;
     let mut reasons = Vec::new();
     propose_steps(&mut config.algorithm, assembled, &mut reasons);
+    check_step(&config.algorithm)?;
     let chosen = choose(system, &config.algorithm)?;
     reasons.extend(chosen.reasons);
     let algorithm = chosen.algorithm;
@@ -41,6 +42,7 @@ pub(super) fn plan(config: &mut Config, assembled: &Assembled) -> anyhow::Result
     config.experiment.start_time = Some(Spanned::new(0..0, start));
     config.experiment.stop_time = Some(Spanned::new(0..0, stop));
     config.results.every = Some(every);
+    config.isolation.isolate.get_or_insert(false);
     if config.system.is_none() && config.connections.is_none() {
         let wire = |connection: &master::Connection| {
             Wire::new(system.name(connection.from), system.name(connection.to))
@@ -48,6 +50,16 @@ pub(super) fn plan(config: &mut Config, assembled: &Assembled) -> anyhow::Result
         config.connections = Some(system.connections.iter().map(wire).collect());
     }
     Ok(Plan { algorithm, experiment, stop, every, reasons })
+}
+
+/// The step, before numbers that follow from it are looked at.
+fn check_step(wanted: &Wanted) -> anyhow::Result<()> {
+    match wanted.step {
+        Some(step) if !(step > 0.0 && step.is_finite()) => {
+            bail!("the communication step is {step} s, expected more than 0")
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Takes steps that an SSP proposes where nothing else is said.
