@@ -3,6 +3,7 @@
 mod course;
 mod discrete;
 mod layout;
+mod pass;
 mod reals;
 mod tasks;
 mod trace;
@@ -168,6 +169,11 @@ impl Exchange {
         Ok(done)
     }
 
+    /// Whether [`Exchange::pass`] does all that a sweep takes.
+    pub(crate) fn passes(&self) -> bool {
+        !self.discrete && self.reals.passes()
+    }
+
     fn set_discrete(&self, position: usize, slave: &mut dyn Slave) -> Result<(), CallError> {
         self.integers.set(position, slave)?;
         self.booleans.set(position, slave)?;
@@ -183,7 +189,6 @@ impl Exchange {
     }
 
     /// Integers that go to Reals.
-    #[expect(clippy::needless_range_loop, reason = "the list is borrowed anew each time")]
     fn take_over_integers(&mut self) {
         for k in 0..self.reals.integer_sources().len() {
             let (port, output) = self.reals.integer_sources()[k];

@@ -1,6 +1,8 @@
 /* An FMU for co-simulation that integrates y' = u by Euler's method, until its Integer `trouble` asks
  * for one of the troubles below. It has a long state and lacks directional derivatives. */
 #define _GNU_SOURCE
+#include <pthread.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -168,33 +170,61 @@ int fmi2GetString(void *c, const unsigned *r, size_t count, const char **v) {
     return OK;
 }
 
-/* The shared memory of the worker, word by word. */
-static void write_over_shared(unsigned char byte, size_t most) {
+/* Finds the shared memory of the worker. */
+static uint64_t *find_shared(size_t *count) {
     FILE *maps = fopen("/proc/self/maps", "r");
     char line[512];
+    uint64_t *found = NULL;
     while (maps != NULL && fgets(line, sizeof line, maps) != NULL) {
         unsigned long begin, end;
         if (strstr(line, "/memfd:fmu") && sscanf(line, "%lx-%lx", &begin, &end) == 2) {
-            size_t length = end - begin < most ? end - begin : most;
-            memset((void *)begin, byte, length);
+            found = (uint64_t *)begin;
+            *count = (end - begin) / sizeof *found;
         }
     }
+    if (maps != NULL) {
+        fclose(maps);
+    }
+    return found;
+}
+
+/* Fills it with numbers of all magnitudes, for ever. */
+static void *overwrite_shared(void *unused) {
+    size_t count = 0;
+    volatile uint64_t *words = find_shared(&count);
+    uint64_t random = 1;
+    (void)unused;
+    for (size_t k = 0; count > 0; k = (k + 1) % count) {
+        random = random * 6364136223846793005u + 1;
+        words[k] = random >> (random >> 58);
+    }
+    return NULL;
 }
 
 static int overflow_stack(int depth) {
     volatile char frame[4096];
+    static volatile int for_ever = 1;
+    if (!for_ever) {
+        return 0;
+    }
     memset((void *)frame, depth, sizeof frame);
     return overflow_stack(depth + 1) + frame[depth % 4096];
 }
 
 static void break_heap(void) {
-    char *block = malloc(24);
-    memset(block - 16, 0x41, 64);
+    char *volatile block = malloc(24);
+    volatile char *beyond = block;
+    for (int k = 0; k < 64; k++) {
+        beyond[k] = 'A';
+    }
+    free(block);
     free(block);
 }
 
 static int in_step(struct instance *i, double time, double size) {
     volatile int zero = 0;
+    pthread_t thread;
+    size_t count;
     switch (i->values.trouble) {
     case CRASH_IN_STEP:
         say(i, WARNING, "this will not end well");
@@ -219,9 +249,12 @@ static int in_step(struct instance *i, double time, double size) {
         printf("noise on standard output\n");
         fflush(stdout);
         break;
-    case OVERWRITE_SHARED: write_over_shared(0xff, (size_t)-1); break;
-    case ANSWER_WRONG_TURN: write_over_shared(0x7f, 8); be_silent_for_ever(); break;
-    case DIVIDE_BY_ZERO: zero = 1 / zero; break;
+    case OVERWRITE_SHARED: pthread_create(&thread, NULL, overwrite_shared, NULL); break;
+    case ANSWER_WRONG_TURN:
+        *find_shared(&count) = 77;
+        be_silent_for_ever();
+        break;
+    case DIVIDE_BY_ZERO: zero = 7 / zero; break;
     case CLOSE_FILES:
         for (int file = 3; file < 1024; file++) {
             close(file);

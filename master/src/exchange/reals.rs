@@ -1,12 +1,15 @@
 //! Connected Reals: values and derivatives of outputs over their last steps, and what inputs get.
 
+use super::call;
 use super::course::{Known, Polynomial};
 use super::layout::Layout;
+use super::pass::Pass;
 use super::trace::Span;
 pub(crate) use super::trace::Trace;
 use crate::algorithm::{Algorithm, Coupling, Course, StepControl, Sweep};
+use crate::error::SystemError;
 use crate::fault::FaultLine;
-use crate::slave::{Advance, CallError, Slave, Stepped};
+use crate::slave::{CallError, Slave, Stepped};
 use crate::system::{Port, System};
 
 /// The connected Reals of a system.
@@ -26,6 +29,7 @@ pub(crate) struct Reals {
     /// What the inputs get.
     pub(super) values: Vec<f64>,
     pub(super) input_derivatives: Vec<f64>,
+    pass: Pass,
 }
 
 impl Reals {
@@ -43,10 +47,16 @@ impl Reals {
             begin_derivatives: vec![0.0; derivatives],
             spans: vec![span; system.slaves.len()],
         };
+        let mut pass = Pass::default();
+        for lane in &layout.lanes {
+            let sources = &layout.sources[lane.input_range.clone()];
+            pass.add(&lane.inputs, sources, &lane.outputs);
+        }
         Self {
             faults: Vec::new(),
             assumed: vec![0.0; outputs],
             assumes: false,
+            pass,
             values: vec![0.0; layout.sources.len()],
             input_derivatives: vec![0.0; layout.input_derivatives],
             course: algorithm.course,
@@ -327,23 +337,42 @@ impl Reals {
     ) -> Result<Stepped, CallError> {
         let lane = &self.layout.lanes[slave];
         let trace = &mut self.trace;
-        let done = instance.advance(&mut Advance {
-            inputs: &lane.inputs,
-            input_values: &self.values[lane.input_range.clone()],
-            derived_inputs: &lane.derived_inputs,
-            input_orders: &lane.input_orders,
-            input_derivatives: &self.input_derivatives[lane.input_derivative_range.clone()],
-            time,
-            size,
-            never_back,
-            outputs: &lane.outputs,
-            output_values: &mut trace.latest[lane.output_range.clone()],
-            derived_outputs: &lane.derived_outputs,
-            output_orders: &lane.output_orders,
-            output_derivatives: &mut trace.derivatives[lane.output_derivative_range.clone()],
-        })?;
+        let inputs =
+            (&self.values[..], &self.input_derivatives[lane.input_derivative_range.clone()]);
+        let outputs = (
+            &mut trace.latest[lane.output_range.clone()],
+            &mut trace.derivatives[lane.output_derivative_range.clone()],
+        );
+        let done = instance.advance(&mut lane.step(inputs, (time, size), never_back, outputs))?;
         trace.spans[slave].stepped = true;
         Ok(done)
+    }
+
+    /// Whether [`Reals::pass`] does all that a sweep of Jacobi's method takes.
+    pub(crate) fn passes(&self) -> bool {
+        self.simple
+            && self.sweep == Sweep::Jacobi
+            && self.layout.plain.iter().all(|plain| *plain)
+            && self.layout.from_integers.is_empty()
+    }
+
+    /// A sweep of all slaves, see [`Pass::run`]; those that stopped on the way.
+    #[inline]
+    pub(crate) fn pass(
+        &mut self,
+        system: &mut System,
+        (time, size): (f64, f64),
+        never_back: bool,
+    ) -> Result<&mut Vec<(usize, Stepped)>, SystemError> {
+        let latest = &mut self.trace.latest;
+        let done = self.pass.run(&mut system.slaves, latest, (time, size), never_back);
+        done.map_err(|(slave, source)| call(&system.slaves[slave].0, time, source))
+    }
+
+    /// Whether all outputs are finite numbers.
+    #[inline]
+    pub(crate) fn is_finite(&self) -> bool {
+        all_finite(&self.trace.latest)
     }
 
     /// Reads the connected outputs of a slave and their derivatives.

@@ -20,10 +20,8 @@ const LOOKS: u32 = 10;
 const GIVING: Duration = Duration::from_micros(60);
 /// A processor that comes back this late is wanted by other programs.
 const CROWDED: Duration = Duration::from_micros(500);
-/// Waits at full speed, then asleep, after that was seen.
-const CAUTIOUS: u32 = 200;
-/// Looks at full speed of such a wait.
-const CAUTIOUS_LOOKS: u32 = 200;
+/// Waits in which it is not given away after that was seen.
+const CAUTIOUS: u32 = 50;
 
 /// Which side this is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,8 +83,7 @@ impl Line {
     /// Waits until the turn is no longer `old`.
     #[inline]
     pub(super) fn wait(&mut self, old: u64) -> Seen {
-        let looks = if self.cautious > 0 { CAUTIOUS_LOOKS } else { LOOKS };
-        for _ in 0..looks {
+        for _ in 0..LOOKS {
             if let Some(seen) = self.look(old) {
                 return seen;
             }
