@@ -53,6 +53,8 @@ struct Prepared {
     stop: f64,
     resumed: bool,
     config: Config,
+    /// The current folder at the begin.
+    here: PathBuf,
     /// Units by variable, for the plot.
     units: Vec<(String, String)>,
     /// Outlives the simulation.
@@ -62,16 +64,15 @@ struct Prepared {
 /// Everything before the first step; nothing where only the configuration was asked for.
 fn prepare(options: &Options) -> anyhow::Result<Option<Prepared>> {
     let (mut loaded, saved) = options.load()?;
+    // An FMU may change the current folder.
+    let here = std::env::current_dir().context("the current folder")?;
+    loaded.config.make_absolute().context("the current folder")?;
     let mut assembled = assemble(&loaded, options.verbose > 0)?;
     let plan = plan(&mut loaded.config, &assembled)?;
     let system = std::mem::take(&mut assembled.system);
     let scenario = scenario(&loaded, &system, &plan)?;
     let config = loaded.config;
-    let text = {
-        let mut config = config.clone();
-        config.make_absolute().context("the current folder")?;
-        config.render()?
-    };
+    let text = config.render()?;
     if options.print_config {
         print!("{text}");
         return Ok(None);
@@ -87,6 +88,7 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Prepared>> {
     let units = units(&system, &ports);
     let start = plan.experiment.start_time;
     let file = results_file(&config)?;
+    interrupt::listen()?;
     let mut simulation = match &saved {
         Some(saved) => {
             let checkpoint = saved.checkpoint();
@@ -99,7 +101,6 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Prepared>> {
     if let (Some(recorder), Some(due)) = (&mut recorder, due) {
         recorder.set_due(due);
     }
-    interrupt::listen()?;
     Ok(Some(Prepared {
         simulation,
         recorder,
@@ -107,6 +108,7 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Prepared>> {
         stop: plan.stop,
         resumed: due.is_some(),
         config,
+        here,
         units,
         _folders: assembled.folders,
     }))
@@ -237,11 +239,13 @@ impl Prepared {
 
     /// Ends the results, draws them, and says what was written.
     fn write(&mut self, ended: &Ended) -> anyhow::Result<()> {
-        let mut written: Vec<PathBuf> = Vec::new();
+        let written = |path: &Path| {
+            println!("{}", path.strip_prefix(&self.here).unwrap_or(path).display());
+        };
         if let Some(recorder) = self.recorder.take() {
             recorder.finish()?;
             let file = results_file(&self.config)?;
-            println!("{}", file.display());
+            written(file);
             let results = &self.config.results;
             if let (false, Some(picture)) = (results.plot.is_empty(), &results.plot_file) {
                 let unit = |name: &str| {
@@ -249,13 +253,12 @@ impl Prepared {
                     known.map(|(_, unit)| unit.clone())
                 };
                 plot::plot_with_units(file, &results.plot, &unit, picture)?;
-                written.push(picture.clone());
+                written(picture);
             }
         }
         if let (Some(saver), false) = (&self.saver, matches!(ended, Ended::Lost(_))) {
-            written.push(saver.path.clone());
+            written(&saver.path);
         }
-        written.iter().for_each(|path| println!("{}", path.display()));
         Ok(())
     }
 }

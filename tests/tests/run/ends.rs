@@ -3,12 +3,19 @@
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
+use tests::c_fmu::CFmu;
+
 use super::*;
 
 /// A plant whose sensor sticks: the pendulum falls, and soon whirls beyond what the plant computes.
 const LOST: &str = "
 [experiment]
 stop-time = 2
+
+[[scenario.set]]
+variable = 'plant.f_a'
+at = 0.5
+value = 2.0
 
 [[scenario.fault]]
 connection = 'controller.x_p'
@@ -82,11 +89,43 @@ fn a_lost_run_keeps_its_rows_and_its_checkpoints() {
 }
 
 #[test]
-fn values_that_are_no_numbers_end_the_run_unless_allowed() {
+fn an_fmu_that_cannot_save_its_state_is_told_before_the_run() {
     let bench = Bench::new();
-    let wild = ["--set", "plant.x_p_0=1e200", "--set", "plant.linearised=true"];
-    let output = bench.coupled(&[&["--stop-time", "1"][..], &wild].concat());
-    assert!([Some(1), Some(2)].contains(&output.status.code()), "{}", said(&output));
+    let fmu = CFmu::well_behaved().without_rollback().write(bench.folder.path(), "a");
+    let fmu = format!("a={}", fmu.display());
+    let options = ["--fmu", &fmu, "--stop-time", "1", "--step", "0.25", "--out", "out"];
+    fails(
+        &bench.run(&[&options[..], &["--checkpoint", "state"]].concat()),
+        2,
+        &["a cannot take part in a checkpoint", "canSerializeFMUstate"],
+    );
+    printed(&bench.run(&options));
+    fails(&bench.run(&options[..2]), 2, &["no stop time", "--stop-time"]);
+}
+
+#[test]
+fn a_second_signal_ends_a_run_whose_fmu_hangs() {
+    let bench = Bench::new();
+    let fmu = CFmu::that("hang in fmi2DoStep").write(bench.folder.path(), "a");
+    let fmu = format!("a={}", fmu.display());
+    let more = ["--fmu", &fmu, "--stop-time", "1", "--step", "0.25", "--out", "out"];
+    let mut child = bench.command(&more).stdout(Stdio::null()).spawn().unwrap();
+    let begin = Instant::now();
+    while !fs::read_to_string(bench.path("out/results.csv")).is_ok_and(|text| !text.is_empty()) {
+        assert!(begin.elapsed() < Duration::from_secs(60), "there is no file");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    // The signals may come before the process hears them or before it hangs; at the end there have
+    // been two.
+    let status = loop {
+        let _ = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+        std::thread::sleep(Duration::from_millis(50));
+        if let Some(status) = child.try_wait().unwrap() {
+            break status;
+        }
+        assert!(begin.elapsed() < Duration::from_secs(60), "it does not end");
+    };
+    assert_eq!(status.code(), Some(130));
 }
 
 #[test]
