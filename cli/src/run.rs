@@ -27,6 +27,7 @@ pub(crate) use assemble::assemble;
 pub(crate) use options::{AlgorithmOptions, Options, setting};
 use plan::{Plan, plan};
 pub(crate) use record::{Recorder, select};
+use saved::Saved;
 
 /// Most connections that are listed.
 const LISTED: usize = 20;
@@ -89,13 +90,7 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Prepared>> {
     let start = plan.experiment.start_time;
     let file = results_file(&config)?;
     interrupt::listen()?;
-    let mut simulation = match &saved {
-        Some(saved) => {
-            let checkpoint = saved.checkpoint();
-            Simulation::resume(system, &plan.algorithm, &plan.experiment, scenario, checkpoint)?
-        }
-        None => Simulation::with_scenario(system, &plan.algorithm, &plan.experiment, scenario)?,
-    };
+    let mut simulation = begin(system, &plan, scenario, saved.as_ref())?;
     let mut recorder = Recorder::create(file, simulation.system(), &ports, plan.every, start)?;
     let due = saved.as_ref().and_then(|saved| saved.due(plan.every));
     if let (Some(recorder), Some(due)) = (&mut recorder, due) {
@@ -112,6 +107,22 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Prepared>> {
         units,
         _folders: assembled.folders,
     }))
+}
+
+/// The system initialised, or where the checkpoint left it.
+fn begin(
+    system: System,
+    plan: &Plan,
+    scenario: Scenario,
+    saved: Option<&Saved>,
+) -> anyhow::Result<Simulation> {
+    let Plan { algorithm, experiment, .. } = plan;
+    Ok(match saved {
+        Some(saved) => {
+            Simulation::resume(system, algorithm, experiment, scenario, saved.checkpoint())?
+        }
+        None => Simulation::with_scenario(system, algorithm, experiment, scenario)?,
+    })
 }
 
 /// What is done to the system while it runs.
@@ -217,7 +228,7 @@ impl Prepared {
         let status = match &ended {
             Ended::AtStop => 0,
             Ended::ByFmu(name) => {
-                println!("{name} asked for the end of the simulation at t = {time} s");
+                tracing::warn!("{name} asked for the end of the simulation at t = {time} s");
                 0
             }
             Ended::Interrupted => {

@@ -9,7 +9,7 @@ use master::assembly::{Assembly, Element, Link, Terminal};
 use master::ssp::structure::DefaultExperiment;
 use master::ssp::{self, Folders};
 use master::transformation::Transformation;
-use master::{CallError, Failure, Fmu, Slave, System, isolate};
+use master::{CallError, Failure, Fmu, Instance, Slave, System, isolate};
 
 use crate::config::{Config, Loaded, Wire};
 
@@ -88,7 +88,7 @@ fn instantiate(elements: &[Element], config: &Config, logging: bool) -> anyhow::
         let slave: Box<dyn Slave> = if config.isolation.isolate == Some(true) {
             Box::new(opening.isolated(element)?)
         } else {
-            opening.here(element)?
+            Box::new(opening.here(element)?)
         };
         system.add(&element.name, slave)?;
     }
@@ -98,7 +98,7 @@ fn instantiate(elements: &[Element], config: &Config, logging: bool) -> anyhow::
 /// FMUs on their way into the system; one that several elements use is unpacked once.
 struct Opening<'a> {
     isolation: isolate::Options,
-    opened: HashMap<&'a PathBuf, (Fmu, usize)>,
+    opened: HashMap<&'a PathBuf, Fmu>,
     isolated: HashMap<&'a PathBuf, isolate::Package>,
 }
 
@@ -114,29 +114,19 @@ impl<'a> Opening<'a> {
         Ok(slave)
     }
 
-    /// An instance in this process, unless there can be no more of them.
-    fn here(&mut self, element: &'a Element) -> anyhow::Result<Box<dyn Slave>> {
-        let (fmu, count) = match self.opened.remove(&element.fmu) {
-            Some((fmu, count)) => (fmu, count + 1),
-            None => (Fmu::open(&element.fmu)?, 1),
+    /// An instance in this process.
+    fn here(&mut self, element: &'a Element) -> anyhow::Result<Instance> {
+        let fmu = match self.opened.get(&element.fmu) {
+            Some(fmu) => fmu.clone(),
+            None => Fmu::open(&element.fmu)?,
         };
-        let flags = fmu.description().co_simulation.as_ref();
-        let once = flags.is_some_and(|flags| flags.can_be_instantiated_only_once_per_process);
-        let instance = if once && count > 1 { None } else { Some(fmu.instantiate(&element.name)?) };
-        self.opened.insert(&element.fmu, (fmu, count));
-        let Some(mut slave) = instance else {
-            tracing::info!(
-                "{}: a process of its own, as there is another instance of its FMU \
-                 (canBeInstantiatedOnlyOncePerProcess)",
-                element.name
-            );
-            return Ok(Box::new(self.isolated(element)?));
-        };
+        let mut slave = fmu.instantiate(&element.name)?;
+        self.opened.insert(&element.fmu, fmu);
         slave.set_time_limit(self.isolation.time_limit);
         if self.isolation.logging {
             switch_logging_on(&element.name, &mut slave);
         }
-        Ok(Box::new(slave))
+        Ok(slave)
     }
 }
 
@@ -184,7 +174,10 @@ fn connect(system: &mut System, loaded: &Loaded, links: &[Link]) -> anyhow::Resu
     }
     let alone = config.connections.is_none() && config.system.is_none();
     if alone && system.slaves.len() > 1 && system.connect_equal_names()? == 0 {
-        bail!("no output has the name of an input of another FMU; connect them by --connect");
+        tracing::warn!(
+            "no output has the name of an input of another FMU, so nothing is connected; connect \
+             them by --connect"
+        );
     }
     Ok(())
 }

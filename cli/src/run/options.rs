@@ -40,6 +40,9 @@ pub(crate) struct AlgorithmOptions {
     /// Absolute tolerance of iteration and step control, in nominal values
     #[arg(long, value_name = "FRACTION", allow_negative_numbers = true)]
     pub(crate) absolute_tolerance: Option<f64>,
+    /// Repeat a step that an FMU made in part only as far as it came; all FMUs must be able to go back
+    #[arg(long)]
+    pub(crate) rollback: bool,
     /// Let an FMU step every N communication steps only; may be repeated
     #[arg(long, value_name = "FMU=N", value_parser = multiple)]
     pub(crate) every: Vec<(String, u32)>,
@@ -174,6 +177,7 @@ impl AlgorithmOptions {
         put(&mut wanted.relative_tolerance, self.relative_tolerance);
         put(&mut wanted.absolute_tolerance, self.absolute_tolerance);
         put(&mut wanted.jobs, self.jobs);
+        put(&mut wanted.rollback, self.rollback.then_some(true));
         put(&mut wanted.allow_nan, self.allow_nan.then_some(true));
         wanted.every.extend(self.every.iter().cloned());
     }

@@ -170,6 +170,7 @@ fn complete(wanted: &mut Wanted, algorithm: &Algorithm, system: &System) {
     wanted.largest_step = Some(algorithm.largest_step);
     wanted.iterations = Some(algorithm.iterations);
     wanted.jobs = Some(wanted.jobs.unwrap_or(algorithm.jobs));
+    wanted.rollback = Some(algorithm.rollback);
     wanted.allow_nan = Some(algorithm.allow_nan);
     let multiples = system.slaves.iter().zip(&algorithm.multiples);
     wanted.every = multiples.map(|((name, _), multiple)| (name.clone(), *multiple)).collect();

@@ -7,21 +7,6 @@ use tests::c_fmu::CFmu;
 
 use super::*;
 
-/// A plant whose sensor sticks: the pendulum falls, and soon whirls beyond what the plant computes.
-const LOST: &str = "
-[experiment]
-stop-time = 2
-
-[[scenario.set]]
-variable = 'plant.f_a'
-at = 0.5
-value = 2.0
-
-[[scenario.fault]]
-connection = 'controller.x_p'
-stuck = { from = 1.0 }
-";
-
 /// Runs plant and controller for `stop` s, sends `signal` when there are some rows.
 fn interrupted(bench: &Bench, signal: &str, stop: &str, more: &[&str]) -> Output {
     let times = ["--stop-time", stop, "--record-every", "0.1"];
@@ -63,7 +48,7 @@ fn an_interrupted_run_goes_on_as_if_it_had_not_been() {
     fails(&output, 130, &["interrupted"]);
     let printed = printed(&bench.run(&["--resume", "state"]));
     let file = printed.lines().find(|line| line.contains("results-from-")).unwrap();
-    let (first, second) = (bench.read("out/results.csv"), fs::read_to_string(file).unwrap());
+    let (first, second) = (bench.read("out/results.csv"), bench.read(file));
     let (head, rows) = second.split_once('\n').unwrap();
     assert_eq!(first.lines().next(), Some(head));
     whole.coupled_well(&["--stop-time", "400", "--record-every", "0.1"]);
@@ -73,19 +58,33 @@ fn an_interrupted_run_goes_on_as_if_it_had_not_been() {
 #[test]
 fn a_lost_run_keeps_its_rows_and_its_checkpoints() {
     let bench = Bench::new();
-    bench.write("system.toml", &system_toml(LOST));
+    let write = |fmu: CFmu, name: &str| {
+        format!("{name}={}", fmu.write(bench.folder.path(), name).display())
+    };
+    let (a, b) = (write(CFmu::that("fail in fmi2DoStep"), "a"), write(CFmu::well_behaved(), "b"));
+    let fmus = ["--fmu", &a, "--fmu", &b, "--connect", "a.y=b.u", "--set", "a.t1=0.875"];
+    let times = ["--step", "0.0625", "--stop-time", "2", "--out", "out"];
     let saving = ["--checkpoint", "state", "--checkpoint-every", "0.25"];
-    let output = bench.run(&[&["system.toml", "--out", "out"][..], &saving].concat());
-    fails(&output, 1, &["the run ended early, after t = 1.0", "plant at t = 1.0", "fmi2DoStep"]);
+    let output = bench.run(&[&fmus[..], &times, &saving].concat());
+    fails(&output, 1, &["the run ended early, after t = 0.875 s: a at t = 0.875 s: fmi2DoStep"]);
     let first = bench.read("out/results.csv");
-    let rows = whole_rows(&first);
-    assert!((1001..1200).contains(&rows), "{rows} rows at steps of 1 ms");
-    // The last checkpoint is that at 1 s: the same end again.
-    fails(&bench.run(&["--resume", "state"]), 1, &["the run ended early"]);
-    let second = bench.read("out/results-from-1.csv");
-    let tail: Vec<_> = first.lines().skip(1002).collect();
-    assert_eq!(second.lines().skip(1).collect::<Vec<_>>(), tail);
-    assert!(tail[0].starts_with("1.001,"), "{}", tail[0]);
+    assert_eq!(whole_rows(&first), 15, "0 to 0.875");
+    // The last checkpoint is that at 0.75 s: the same end again.
+    fails(&bench.run(&["--resume", "state"]), 1, &["the run ended early, after t = 0.875 s"]);
+    let second = bench.read("out/results-from-0.75.csv");
+    let (first, second): (Vec<_>, Vec<_>) = (first.lines().collect(), second.lines().collect());
+    assert!(second[1].starts_with("0.8125,"), "{second:?}");
+    assert_eq!((second[0], &second[1..]), (first[0], &first[14..]));
+}
+
+#[test]
+fn an_output_that_is_no_number_ends_the_run_unless_allowed() {
+    let bench = Bench::new();
+    let more = ["--set", "plant.linearised=true", "--set", "plant.theta_0=1e300"];
+    let output = bench.coupled(&more);
+    fails(&output, 2, &["controller.u is NaN at t = 0 s, expected a finite number"]);
+    let allowed = bench.coupled(&[&more[..], &["--allow-nan"]].concat());
+    assert!(!said(&allowed).contains("controller.u is NaN"), "{}", said(&allowed));
 }
 
 #[test]
