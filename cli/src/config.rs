@@ -113,8 +113,8 @@ impl Config {
         self.experiment.check()?;
         self.isolation.check()?;
         self.checkpoint.check()?;
-        let wires = self.connections.iter().flatten();
-        wires.map(|wire| wire.get_ref().check(&wire.span())).collect()
+        let mut wires = self.connections.iter().flatten();
+        wires.try_for_each(|wire| wire.get_ref().check(&wire.span()))
     }
 
     /// Lets relative paths begin at `folder`.

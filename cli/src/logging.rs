@@ -1,6 +1,6 @@
 //! Messages: on standard error, as text or as JSON, past the bar of progress.
 
-use std::fmt;
+use std::fmt::{self, Write as _};
 use std::io::{self, Write};
 use std::sync::OnceLock;
 
@@ -148,7 +148,10 @@ impl Visit for Parts {
     fn record_debug(&mut self, field: &Field, value: &dyn fmt::Debug) {
         match field.name() {
             "message" => self.message = format!("{value:?}"),
-            name => self.others += &format!(", {name} = {value:?}"),
+            name => {
+                // Writing to a String cannot fail.
+                let _ = write!(self.others, ", {name} = {value:?}");
+            }
         }
     }
 }

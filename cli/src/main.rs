@@ -43,7 +43,7 @@ enum Verb {
     /// Write a crate with a small model, to begin with
     New(new::Options),
     /// Couple FMUs: of an SSP, an SSD or a system.toml, or named here
-    Run(run::Options),
+    Run(Box<run::Options>),
     /// Design observer and feedback for the plant of a file
     Design(design::Options),
     /// Check the model description of an FMU against the rules of FMI 2.0.5

@@ -119,8 +119,8 @@ impl<'de> Deserialize<'de> for Settings {
         flat.sort_by_key(|(_, _, place)| place.start);
         let mut names: Vec<&String> = flat.iter().map(|(name, _, _)| name).collect();
         names.sort();
-        if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
-            return Err(D::Error::custom(format!("{} is set twice", pair[0])));
+        if let Some(position) = (1..names.len()).find(|&k| names[k - 1] == names[k]) {
+            return Err(D::Error::custom(format!("{} is set twice", names[position])));
         }
         Ok(Self(flat))
     }
