@@ -150,3 +150,19 @@ fn hostile_text_ends_in_an_error() {
     refused(&format!("a = {}", "[".repeat(100_000)));
     refused("[settings]\na = 99999999999999999999");
 }
+
+#[test]
+fn the_documented_example_has_every_entry_of_the_algorithm() {
+    let document = include_str!("../../../docs/system-toml.md");
+    let example = document.split("```").nth(1).unwrap().strip_prefix("toml\n").unwrap();
+    let config = parsed(example);
+    assert_eq!((config.fmus.0.len(), config.settings.0.len()), (1, 3));
+    // An entry that is not known names those that are.
+    let message = refused("[algorithm]\nx = 1");
+    let known: Vec<_> = message.lines().next().unwrap().split('`').skip(3).step_by(2).collect();
+    assert!(known.len() >= 17, "{message}");
+    let stated = example.parse::<toml::Table>().unwrap();
+    for name in known {
+        assert!(stated["algorithm"].get(name).is_some(), "{name} is not in the example");
+    }
+}
