@@ -104,7 +104,7 @@ def couple(fmu, step, method="gauss-seidel", settings=None):
             return None
         ended.check_returncode()
         with (Path(folder) / "results.csv").open(encoding="utf-8") as rows:
-            names = next(rows).strip().split(",")
+            names = next(csv.reader(rows))
             columns = [names.index(name) for name in ("time", "plant.x_p", "plant.theta")]
             time, cart, angle = np.loadtxt(rows, delimiter=",", usecols=columns, unpack=True)
     if np.abs(angle).max() > math.pi / 2:

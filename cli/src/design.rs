@@ -7,7 +7,7 @@ mod checks;
 mod controller_fmu;
 mod design_file;
 mod designed;
-mod document;
+pub(crate) mod document;
 mod gains;
 mod linear_plant;
 mod page;

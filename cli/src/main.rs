@@ -1,19 +1,20 @@
 //! `aso-ftc`: exports the fault-tolerant controller and the friction pendulum as FMUs, couples
 //! FMUs, repeats the experiment of Patton and Klinkhieo (2009).
 //!
-//! Exit status: 0 done, 1 a claim does not hold, 2 misuse or bad input.
+//! Exit status: 0 done, 1 a claim does not hold or a run was lost, 2 misuse or bad input, 130 a run
+//! was interrupted.
 #![forbid(unsafe_code)]
 
 mod check;
 mod claims;
+mod config;
 mod design;
 mod figure;
+mod logging;
 mod new;
 mod pack;
 mod paper_figures;
-#[cfg_attr(not(test), expect(dead_code, reason = "until the verb run has --plot"))]
 mod plot;
-mod recording;
 mod reproduce;
 mod run;
 mod scenario;
@@ -41,8 +42,8 @@ enum Verb {
     Pack(pack::Options),
     /// Write a crate with a small model, to begin with
     New(new::Options),
-    /// Couple a plant FMU and a controller FMU
-    Run(run::Options),
+    /// Couple FMUs: of an SSP, an SSD or a system.toml, or named here
+    Run(Box<run::Options>),
     /// Design observer and feedback for the plant of a file
     Design(design::Options),
     /// Check the model description of an FMU against the rules of FMI 2.0.5
@@ -53,11 +54,15 @@ fn main() -> ExitCode {
     if let Some(status) = worker::worker() {
         return status;
     }
-    let done = match Arguments::parse().verb {
+    let verb = Arguments::parse().verb;
+    if !matches!(verb, Verb::Run(_)) {
+        logging::begin(0, false);
+    }
+    let done = match verb {
         Verb::Reproduce(options) => reproduce::reproduce(&options),
         Verb::Pack(options) => pack::pack(&options),
         Verb::New(options) => new::new(&options),
-        Verb::Run(options) => run::run(&options),
+        Verb::Run(options) => return run::run(&options),
         Verb::Design(options) => design::design(&options),
         Verb::Check(options) => check::check(&options),
     };
@@ -65,7 +70,7 @@ fn main() -> ExitCode {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(1),
         Err(error) => {
-            eprintln!("error: {error:#}");
+            eprintln!("error: {}", logging::sentence(&error));
             ExitCode::from(2)
         }
     }

@@ -14,6 +14,10 @@ const FARTHEST: f64 = 5.0;
 const STEEPEST: f64 = 6.3;
 const STRONGEST: f64 = 4.0;
 
+/// The columns that the figures are drawn from.
+pub(crate) const COLUMNS: [&str; 5] =
+    ["time", "plant.x_p", "plant.theta", "plant.f_fric", "controller.f_hat"];
+
 /// Why the figures of the paper were not written.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum PaperFigureError {

@@ -30,6 +30,7 @@ struct Curve {
 ///
 /// Another ending, a name that the file does not have, texts, a file that cannot be read or
 /// written.
+#[cfg(test)]
 pub(crate) fn plot(results: &Path, variables: &[String], out: &Path) -> anyhow::Result<()> {
     plot_with_units(results, variables, &|_| None, out)
 }

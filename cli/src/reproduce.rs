@@ -1,17 +1,26 @@
 //! `aso-ftc reproduce`: the paper's experiment, from the sources to the figures.
 #![expect(clippy::print_stdout, reason = "the result of the command")]
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
-use clap::ValueEnum;
-use master::{Probe, System};
+use anyhow::{Context, bail};
+use fmi2::Experiment;
+use master::results::Table;
+use master::{Algorithm, Probe, Simulation, System, SystemError, Wanted, choose};
 
 use crate::claims::{Claim, Measurement, WATCHED, table};
-use crate::run::{Finished, RunOptions, load, simulate};
+use crate::config::{Config, Every, Loaded};
+use crate::logging;
+use crate::run::{AlgorithmOptions, Beside, Ended, Recorder, assemble, select, setting};
 use crate::scenario::Scenario;
 use crate::summary::{Certified, Summary};
 use crate::{pack, paper_figures, summary};
+
+/// The signals, in the folder of the results.
+const RESULTS: &str = "results.csv";
+/// Communication step in s.
+const STEP: f64 = 0.001;
 
 #[derive(clap::Args)]
 pub(crate) struct Options {
@@ -24,57 +33,119 @@ pub(crate) struct Options {
     /// Folder for the FMUs
     #[arg(long, value_name = "FOLDER", default_value = "dist")]
     dist: PathBuf,
+    /// Stop time in s
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, default_value_t = 100.0)]
+    stop_time: f64,
+    /// Interval between the rows of results.csv in s, or `step` (each communication point)
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, default_value = "0.01")]
+    #[arg(value_parser = str::parse::<Every>)]
+    record_every: Every,
+    /// Set a variable before the run, for example `plant.F_c=20`; may be repeated
+    #[arg(long = "set", value_name = "FMU.VARIABLE=VALUE", value_parser = setting)]
+    settings: Vec<(String, String)>,
     #[command(flatten)]
-    run: RunOptions,
+    algorithm: AlgorithmOptions,
 }
 
 /// Packs, runs, writes, compares; true where every claim that could be judged holds.
 pub(crate) fn reproduce(options: &Options) -> anyhow::Result<bool> {
-    pack::pack_into(&pack::workspace()?, &options.dist)?;
-    let mut system =
-        load(&options.dist.join("FrictionPendulum.fmu"), &options.dist.join("AsoController.fmu"))?;
-    system.connect_equal_names()?;
-    let settings = settings(options);
-    for (name, value) in &settings {
-        system.set(name, value)?;
+    if options.record_every == Every::Never {
+        bail!("--record-every never leaves nothing to draw, expected seconds or `step`");
     }
+    pack::pack_into(&pack::workspace()?, &options.dist)?;
+    let settings = settings(options);
+    let system = assemble(&experiment(options, &settings), false)?.system;
+    let mut wanted = Wanted { step: Some(STEP), ..Wanted::default() };
+    options.algorithm.apply(&mut wanted);
+    let algorithm = choose(&system, &wanted)?.algorithm;
     std::fs::create_dir_all(&options.out)
         .with_context(|| format!("cannot make the folder {}", options.out.display()))?;
-    let mut watch = Watch::new(&system)?;
-    let mut finished = simulate(system, &options.run, |simulation| watch.add(simulation))?;
-    let claims = watch.claims(&finished);
-    let t_on = watch.t_on();
-    let certified = Certified::of(finished.simulation.system(), watch.fault_bound())?;
+    let mut run = Run::new(options, system, &algorithm)?;
+    let ended = run.advance(options)?;
+    let lost = match ended {
+        Ended::Lost(error) => Some(logging::sentence(&error)),
+        Ended::ByFmu(name) => Some(format!("{name} asked for the end of the simulation")),
+        Ended::AtStop | Ended::Interrupted => None,
+    };
+    let reached = run.simulation.time();
+    let claims = run.watch.claims(reached, lost.is_some());
+    let certified = Certified::of(run.simulation.system(), run.watch.fault_bound())?;
     let written = Summary {
         scenario: options.scenario.name(),
-        method: name_of(&options.run.method),
-        communication_step: options.run.step,
-        stop_time: options.run.stop_time,
-        reached: finished.simulation.time(),
-        lost: finished.lost.as_deref(),
-        fell: watch.fell(),
+        method: algorithm.sweep.name(),
+        course: algorithm.course.name(),
+        communication_step: algorithm.step,
+        stop_time: options.stop_time,
+        reached,
+        lost: lost.as_deref(),
+        fell: run.watch.fell(),
         settings: settings.iter().map(|(name, value)| format!("{name}={value}")).collect(),
         claims: &claims,
         design: &certified,
     };
-    write(&options.out, &finished, t_on, &written)?;
+    let columns = columns(&options.out.join(RESULTS))?;
+    let column = |name: &str| columns.get(name).map(Vec::as_slice);
+    paper_figures::write(&column, run.watch.t_on(), &options.out)?;
+    summary::write(&written, &options.out.join("summary.json"))?;
     report(options, &written);
     Ok(claims.iter().all(|claim| claim.holds != Some(false)))
 }
 
+/// Plant and controller with these settings.
+fn experiment(options: &Options, settings: &[(String, String)]) -> Loaded {
+    let mut config = Config::default();
+    for (name, file) in [("plant", "FrictionPendulum.fmu"), ("controller", "AsoController.fmu")] {
+        config.fmus.put(name.to_owned(), options.dist.join(file));
+    }
+    for (name, value) in settings {
+        config.settings.push(name.clone(), value.clone());
+    }
+    Loaded { config, source: None }
+}
+
 /// Those of the scenario, then those of the command line.
 fn settings(options: &Options) -> Vec<(String, String)> {
-    options.scenario.settings().into_iter().chain(options.run.settings.iter().cloned()).collect()
+    options.scenario.settings().into_iter().chain(options.settings.iter().cloned()).collect()
 }
 
-fn name_of(value: &impl ValueEnum) -> String {
-    value.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
+/// The experiment under way.
+struct Run {
+    simulation: Simulation,
+    recorder: Option<Recorder>,
+    watch: Watch,
 }
 
-fn write(out: &Path, finished: &Finished, t_on: f64, written: &Summary) -> anyhow::Result<()> {
-    finished.recording.write(&out.join("results.csv"))?;
-    paper_figures::write(&|name| finished.recording.column(name), t_on, out)?;
-    summary::write(written, &out.join("summary.json"))
+impl Run {
+    fn new(options: &Options, system: System, algorithm: &Algorithm) -> anyhow::Result<Self> {
+        let watch = Watch::new(&system)?;
+        let ports = select(&system, &[], &[])?;
+        let stop_time = Some(options.stop_time);
+        let experiment = Experiment { start_time: 0.0, stop_time, tolerance: None };
+        let mut simulation = Simulation::new(system, algorithm, &experiment)?;
+        let (file, every) = (options.out.join(RESULTS), options.record_every);
+        let recorder = Recorder::create(&file, simulation.system(), &ports, every, 0.0)?;
+        Ok(Self { simulation, recorder, watch })
+    }
+
+    fn advance(&mut self, options: &Options) -> anyhow::Result<Ended> {
+        let beside = Beside::recording(self.recorder.as_mut(), options.stop_time);
+        let watch = &mut self.watch;
+        let ended = beside.advance(&mut self.simulation, |simulation| watch.add(simulation));
+        self.recorder.take().map_or(Ok(()), Recorder::finish)?;
+        Ok(ended)
+    }
+}
+
+/// The columns of a file of results that the figures need, by name.
+fn columns(path: &Path) -> anyhow::Result<HashMap<String, Vec<f64>>> {
+    let table = Table::open(path)?;
+    let mut columns = HashMap::new();
+    for (position, column) in table.columns().iter().enumerate() {
+        if paper_figures::COLUMNS.contains(&column.name.as_str()) {
+            columns.insert(column.name.clone(), table.column(position)?);
+        }
+    }
+    Ok(columns)
 }
 
 fn report(options: &Options, written: &Summary) {
@@ -115,7 +186,7 @@ impl Watch {
         })
     }
 
-    fn add(&mut self, simulation: &mut master::Simulation) -> Result<(), master::SystemError> {
+    fn add(&mut self, simulation: &mut Simulation) -> Result<(), SystemError> {
         let time = simulation.time();
         if self.measurement.is_none() {
             self.parameters.read(simulation.system(), time, &mut self.parameter_values)?;
@@ -142,8 +213,7 @@ impl Watch {
         self.parameter_values[1]
     }
 
-    fn claims(&self, finished: &Finished) -> Vec<Claim> {
-        let (end, lost) = (finished.simulation.time(), finished.lost.is_some());
+    fn claims(&self, end: f64, lost: bool) -> Vec<Claim> {
         self.measurement.as_ref().map(|measured| measured.claims(end, lost)).unwrap_or_default()
     }
 }

@@ -1,200 +1,275 @@
-//! `aso-ftc run`: couples a plant FMU and a controller FMU, and what all runs share.
+//! `aso-ftc run`: couples FMUs, and what all runs share.
 #![expect(clippy::print_stdout, reason = "the result of the command")]
 
-use std::ffi::OsString;
-use std::io::IsTerminal;
+mod advance;
+mod assemble;
+mod interrupt;
+mod options;
+mod plan;
+mod progress;
+mod record;
+mod saved;
+
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 
 use anyhow::{Context, bail};
-use fmi2::Experiment;
-use indicatif::{ProgressBar, ProgressStyle};
-use master::{Algorithm, Course, Fmu, Simulation, Sweep, System, by_direct_dependencies};
+use master::results::Selection;
+use master::scenario::{Prepared as Scenario, Setup};
+use master::{Coupling, Port, Simulation, System, by_direct_dependencies};
 
-use crate::recording::Recording;
+use crate::config::{Config, Every, Loaded};
+use crate::logging;
+use crate::plot;
+use advance::Saver;
+pub(crate) use advance::{Beside, Ended};
+pub(crate) use assemble::assemble;
+pub(crate) use options::{AlgorithmOptions, Options, setting};
+use plan::{Plan, plan};
+pub(crate) use record::{Recorder, select};
+use saved::Saved;
 
-/// Name of a master algorithm.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub(crate) enum MethodName {
-    /// One FMU after the other; inputs follow lines through known values and output derivatives
-    GaussSeidel,
-    /// One FMU after the other; inputs are held
-    GaussSeidelHold,
-    /// All FMUs from the same values, held over the step
-    Jacobi,
-}
+/// Most connections that are listed.
+const LISTED: usize = 20;
 
-impl MethodName {
-    fn algorithm(self, step: f64) -> Algorithm {
-        let (sweep, course) = match self {
-            MethodName::GaussSeidel => (Sweep::GaussSeidel, Course::Limited),
-            MethodName::GaussSeidelHold => (Sweep::GaussSeidel, Course::Hold),
-            MethodName::Jacobi => (Sweep::Jacobi, Course::Hold),
-        };
-        Algorithm::fixed(sweep, course, step)
-    }
-}
-
-/// What every run can be told.
-#[derive(clap::Args)]
-pub(crate) struct RunOptions {
-    /// Communication step in s
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, default_value_t = 0.001)]
-    pub(crate) step: f64,
-    /// Stop time in s
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, default_value_t = 100.0)]
-    pub(crate) stop_time: f64,
-    /// Master algorithm
-    #[arg(long, value_enum, default_value_t = MethodName::GaussSeidel)]
-    pub(crate) method: MethodName,
-    /// Interval between the rows of results.csv in s
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, default_value_t = 0.01)]
-    pub(crate) record_every: f64,
-    /// Set a variable before the run, for example `plant.F_c=20`; may be repeated
-    #[arg(long = "set", value_name = "FMU.VARIABLE=VALUE", value_parser = setting)]
-    pub(crate) settings: Vec<(String, String)>,
-}
-
-#[derive(clap::Args)]
-pub(crate) struct Options {
-    /// The plant
-    #[arg(long, value_name = "FMU", default_value = "dist/FrictionPendulum.fmu")]
-    plant: PathBuf,
-    /// The controller
-    #[arg(long, value_name = "FMU", default_value = "dist/AsoController.fmu")]
-    controller: PathBuf,
-    /// Connect an output to an input; without this, equal names are connected; may be repeated
-    #[arg(long = "connect", value_name = "FROM=TO", value_parser = setting)]
-    connections: Vec<(String, String)>,
-    /// Load a shared library first, its symbols visible to the FMUs; may be repeated
-    #[arg(long, value_name = "LIBRARY")]
-    preload: Vec<OsString>,
-    /// Folder for results.csv
-    #[arg(long, value_name = "FOLDER", default_value = "results/run")]
-    out: PathBuf,
-    #[command(flatten)]
-    run: RunOptions,
-}
-
-/// Splits `name=value`.
-fn setting(text: &str) -> Result<(String, String), String> {
-    match text.split_once('=') {
-        Some((name, value)) if !name.is_empty() => Ok((name.to_owned(), value.to_owned())),
-        _ => Err("expected the form NAME=VALUE".to_owned()),
-    }
-}
-
-/// Couples two FMUs and writes what came out.
-pub(crate) fn run(options: &Options) -> anyhow::Result<bool> {
-    for library in &options.preload {
-        master::preload(library)?;
-    }
-    let mut system = load(&options.plant, &options.controller)?;
-    if options.connections.is_empty() {
-        if system.connect_equal_names()? == 0 {
-            bail!("no output has the name of an input of the other FMU; connect them by --connect");
-        }
-    } else {
-        for (from, to) in &options.connections {
-            system.connect(from, to)?;
+/// Couples FMUs and writes what comes out. Exit status: 0 the run came to its end, 1 it was lost on
+/// its way, 2 it did not begin, 130 it was interrupted.
+pub(crate) fn run(options: &Options) -> ExitCode {
+    logging::begin(options.verbose, options.log_json);
+    match prepare(options) {
+        Ok(None) => ExitCode::SUCCESS,
+        Ok(Some(prepared)) => prepared.go(),
+        Err(error) => {
+            tracing::error!("{}", logging::sentence(&error));
+            ExitCode::from(2)
         }
     }
-    let names: Vec<_> = system
-        .connections
-        .iter()
-        .map(|connection| {
-            format!("{} -> {}", system.name(connection.from), system.name(connection.to))
-        })
-        .collect();
-    println!("{}", names.join("\n"));
-    std::fs::create_dir_all(&options.out)
-        .with_context(|| format!("cannot make the folder {}", options.out.display()))?;
-    for (name, value) in &options.run.settings {
-        system.set(name, value)?;
-    }
-    let order = by_direct_dependencies(&system);
-    if !order.looped.is_empty() {
-        let names: Vec<_> =
-            order.looped.iter().map(|slave| system.slaves[*slave].0.as_str()).collect();
-        eprintln!("note: direct dependencies form a loop through {}", names.join(", "));
-    }
-    let finished = simulate(system, &options.run, |_| Ok(()))?;
-    let results = options.out.join("results.csv");
-    finished.recording.write(&results)?;
-    println!("{}", results.display());
-    match finished.lost {
-        None => Ok(true),
-        Some(reason) => bail!("the run ended early: {reason}"),
-    }
 }
 
-/// The two FMUs, instantiated as `plant` and `controller`, not yet connected.
-pub(crate) fn load(plant: &Path, controller: &Path) -> anyhow::Result<System> {
-    let mut system = System::default();
-    for (name, path) in [("plant", plant), ("controller", controller)] {
-        system.add(name, Box::new(Fmu::open(path)?.instantiate(name)?))?;
+/// A run that can begin.
+struct Prepared {
+    simulation: Simulation,
+    recorder: Option<Recorder>,
+    saver: Option<Saver>,
+    stop: f64,
+    resumed: bool,
+    config: Config,
+    /// The current folder at the begin.
+    here: PathBuf,
+    /// Units by variable, for the plot.
+    units: Vec<(String, String)>,
+    /// Outlives the simulation.
+    _folders: Option<master::ssp::Folders>,
+}
+
+/// Everything before the first step; nothing where only the configuration was asked for.
+fn prepare(options: &Options) -> anyhow::Result<Option<Prepared>> {
+    let (mut loaded, saved) = options.load()?;
+    // An FMU may change the current folder.
+    let here = std::env::current_dir().context("the current folder")?;
+    loaded.config.make_absolute().context("the current folder")?;
+    let mut assembled = assemble(&loaded, options.verbose > 0)?;
+    let plan = plan(&mut loaded.config, &assembled)?;
+    let system = std::mem::take(&mut assembled.system);
+    let scenario = scenario(&loaded, &system, &plan)?;
+    let config = loaded.config;
+    let text = config.render()?;
+    if options.print_config {
+        print!("{text}");
+        return Ok(None);
     }
-    Ok(system)
+    let ports = select(&system, &config.results.record, &config.results.exclude)?;
+    check_saving(&config, &system)?;
+    check_plot(&config, &system, &ports)?;
+    println!("{}", connections(&system));
+    if options.explain {
+        println!("{}", plan.explanation(&system));
+    }
+    warn_of_loop(&plan, &system);
+    let units = units(&system, &ports);
+    let start = plan.experiment.start_time;
+    let file = results_file(&config)?;
+    interrupt::listen()?;
+    let mut simulation = begin(system, &plan, scenario, saved.as_ref())?;
+    let mut recorder = Recorder::create(file, simulation.system(), &ports, plan.every, start)?;
+    let due = saved.as_ref().and_then(|saved| saved.due(plan.every));
+    if let (Some(recorder), Some(due)) = (&mut recorder, due) {
+        recorder.set_due(due);
+    }
+    Ok(Some(Prepared {
+        simulation,
+        recorder,
+        saver: saver(&config, text, plan.every),
+        stop: plan.stop,
+        resumed: due.is_some(),
+        config,
+        here,
+        units,
+        _folders: assembled.folders,
+    }))
 }
 
-/// A run that came to its end, planned or not.
-pub(crate) struct Finished {
-    pub(crate) recording: Recording,
-    pub(crate) simulation: Simulation,
-    /// Why it ended before the stop time.
-    pub(crate) lost: Option<String>,
-}
-
-/// Initialises `system` and advances it to the stop time; `watch` sees the start and every step.
-///
-/// An FMU that fails on the way ends the run: what was recorded until then is kept.
-pub(crate) fn simulate(
+/// The system initialised, or where the checkpoint left it.
+fn begin(
     system: System,
-    options: &RunOptions,
-    mut watch: impl FnMut(&mut Simulation) -> Result<(), master::SystemError>,
-) -> anyhow::Result<Finished> {
-    if !(options.record_every > 0.0 && options.record_every.is_finite()) {
-        bail!("--record-every is {} s, expected more than 0", options.record_every);
-    }
-    let stop_time = Some(options.stop_time);
-    let experiment = Experiment { start_time: 0.0, stop_time, tolerance: None };
-    let mut recording = Recording::new(&system, 0.0, options.record_every);
-    let mut simulation =
-        Simulation::new(system, &options.method.algorithm(options.step), &experiment)?;
-    let bar = progress(options.stop_time);
-    let mut advance = || {
-        watch(&mut simulation)?;
-        recording.sample(&mut simulation)?;
-        while !simulation.is_finished() {
-            simulation.step()?;
-            watch(&mut simulation)?;
-            recording.sample(&mut simulation)?;
-            show(&bar, simulation.time());
+    plan: &Plan,
+    scenario: Scenario,
+    saved: Option<&Saved>,
+) -> anyhow::Result<Simulation> {
+    let Plan { algorithm, experiment, .. } = plan;
+    Ok(match saved {
+        Some(saved) => {
+            Simulation::resume(system, algorithm, experiment, scenario, saved.checkpoint())?
         }
-        simulation.terminate()
+        None => Simulation::with_scenario(system, algorithm, experiment, scenario)?,
+    })
+}
+
+/// What is done to the system while it runs.
+fn scenario(loaded: &Loaded, system: &System, plan: &Plan) -> anyhow::Result<Scenario> {
+    // Its paths already begin beside the file.
+    let folder = Path::new("");
+    let setup = Setup { folder, start: plan.experiment.start_time, step: plan.algorithm.step };
+    let resolved = loaded.config.scenario.resolve(system, &setup);
+    let scenario = resolved.map_err(|error| loaded.point(&error.place.clone(), error))?;
+    for (file, column) in &scenario.unused {
+        tracing::info!("{}: the column {column:?} drives nothing", file.display());
+    }
+    Ok(scenario)
+}
+
+fn results_file(config: &Config) -> anyhow::Result<&Path> {
+    config.results.file.as_deref().context("no file for the results")
+}
+
+/// A checkpoint that cannot be saved is better known before the run than after it.
+fn check_saving(config: &Config, system: &System) -> anyhow::Result<()> {
+    if config.checkpoint.file.is_none() {
+        return Ok(());
+    }
+    let unable = system.slaves.iter().find(|(_, slave)| {
+        let flags = slave.description().co_simulation.as_ref();
+        !flags.is_some_and(|flags| flags.can_serialize_fmu_state)
+    });
+    match unable {
+        Some((name, _)) => {
+            bail!("{name} cannot take part in a checkpoint: its canSerializeFMUstate is false")
+        }
+        None => Ok(()),
+    }
+}
+
+/// What cannot be drawn is better known before the run than after it.
+fn check_plot(config: &Config, system: &System, ports: &[Port]) -> anyhow::Result<()> {
+    let results = &config.results;
+    let (false, Some(picture)) = (results.plot.is_empty(), &results.plot_file) else {
+        return Ok(());
     };
-    let lost = advance().err().map(|error: master::SystemError| error.to_string());
-    bar.finish_and_clear();
-    Ok(Finished { recording, simulation, lost })
-}
-
-/// A bar of simulated time; hidden where the output is no terminal.
-fn progress(stop_time: f64) -> ProgressBar {
-    if !std::io::stderr().is_terminal() {
-        return ProgressBar::hidden();
+    let ending = picture.extension().unwrap_or_default().to_ascii_lowercase();
+    if ending != "svg" && ending != "png" {
+        bail!("{}: a plot is a .svg or a .png", picture.display());
     }
-    let style = ProgressStyle::with_template("{bar:40} {pos} of {len} s simulated")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
-    ProgressBar::new(whole_seconds(stop_time)).with_style(style)
+    if results.every == Some(Every::Never) {
+        bail!("there is nothing to plot where rows are recorded `never`");
+    }
+    let names: Vec<_> = ports.iter().map(|&port| system.name(port)).collect();
+    let selection = Selection { include: results.plot.clone(), exclude: Vec::new() };
+    selection.choose(&names).context("plot").map(|_| ())
 }
 
-fn show(bar: &ProgressBar, time: f64) {
-    let seconds = whole_seconds(time);
-    if seconds != bar.position() {
-        bar.set_position(seconds);
+fn saver(config: &Config, text: String, every: Every) -> Option<Saver> {
+    let interval = config.checkpoint.every.as_ref().map(|every| *every.get_ref());
+    config.checkpoint.file.clone().map(|path| Saver { path, interval, text, every })
+}
+
+/// The connections, the first ones by name.
+fn connections(system: &System) -> String {
+    let names = system.connections.iter().map(|connection| {
+        format!("{} -> {}", system.name(connection.from), system.name(connection.to))
+    });
+    let mut lines: Vec<_> = names.take(LISTED).collect();
+    let more = system.connections.len().saturating_sub(LISTED);
+    if more > 0 {
+        lines.push(format!("and {more} more connections"));
+    }
+    if lines.is_empty() {
+        lines.push("no connections".to_owned());
+    }
+    lines.join("\n")
+}
+
+fn warn_of_loop(plan: &Plan, system: &System) {
+    let looped = by_direct_dependencies(system).looped;
+    if plan.algorithm.coupling == Coupling::Once && !looped.is_empty() {
+        let names: Vec<_> = looped.iter().map(|&slave| system.slaves[slave].0.as_str()).collect();
+        tracing::warn!(
+            "direct dependencies form a loop through {}, which is not iterated",
+            names.join(", ")
+        );
     }
 }
 
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a display")]
-fn whole_seconds(time: f64) -> u64 {
-    time.max(0.0) as u64
+fn units(system: &System, ports: &[Port]) -> Vec<(String, String)> {
+    let unit = |port: &Port| Some((system.name(*port), record::unit(system, *port)?));
+    ports.iter().filter_map(unit).collect()
+}
+
+impl Prepared {
+    fn go(mut self) -> ExitCode {
+        let beside = Beside {
+            recorder: self.recorder.as_mut(),
+            saver: self.saver.as_ref(),
+            stop: self.stop,
+            resumed: self.resumed,
+        };
+        let ended = beside.advance(&mut self.simulation, |_| Ok(()));
+        let time = self.simulation.time();
+        let written = self.write(&ended);
+        let status = match &ended {
+            Ended::AtStop => 0,
+            Ended::ByFmu(name) => {
+                tracing::warn!("{name} asked for the end of the simulation at t = {time} s");
+                0
+            }
+            Ended::Interrupted => {
+                tracing::error!("the run was interrupted at t = {time} s");
+                interrupt::STATUS
+            }
+            Ended::Lost(error) => {
+                let error = logging::sentence(error);
+                tracing::error!("the run ended early, after t = {time} s: {error}");
+                1
+            }
+        };
+        if let Err(error) = written {
+            tracing::error!("{}", logging::sentence(&error));
+            return ExitCode::from(status.max(1));
+        }
+        ExitCode::from(status)
+    }
+
+    /// Ends the results, draws them, and says what was written.
+    fn write(&mut self, ended: &Ended) -> anyhow::Result<()> {
+        let written = |path: &Path| {
+            println!("{}", path.strip_prefix(&self.here).unwrap_or(path).display());
+        };
+        if let Some(recorder) = self.recorder.take() {
+            recorder.finish()?;
+            let file = results_file(&self.config)?;
+            written(file);
+            let results = &self.config.results;
+            if let (false, Some(picture)) = (results.plot.is_empty(), &results.plot_file) {
+                let unit = |name: &str| {
+                    let known = self.units.iter().find(|(known, _)| known == name);
+                    known.map(|(_, unit)| unit.clone())
+                };
+                plot::plot_with_units(file, &results.plot, &unit, picture)?;
+                written(picture);
+            }
+        }
+        if let (Some(saver), false) = (&self.saver, matches!(ended, Ended::Lost(_))) {
+            written(&saver.path);
+        }
+        Ok(())
+    }
 }

@@ -21,7 +21,8 @@ const ALPHA: f64 = 1.0;
 #[derive(Serialize)]
 pub(crate) struct Summary<'a> {
     pub(crate) scenario: &'static str,
-    pub(crate) method: String,
+    pub(crate) method: &'static str,
+    pub(crate) course: &'static str,
     /// In s.
     pub(crate) communication_step: f64,
     /// In s.

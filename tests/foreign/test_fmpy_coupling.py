@@ -1,5 +1,6 @@
 """The two FMUs coupled by FMPy: the same end and the same residual as by the Rust master."""
 
+import csv
 import json
 
 import numpy as np
@@ -57,7 +58,7 @@ def by_rust(scenario, aso_ftc, packed, folder):
     )
     assert done.returncode == 0, done.stderr
     path = folder / "results.csv"
-    names = path.read_text(encoding="utf-8").split("\n", 1)[0].split(",")
+    names = next(csv.reader(path.read_text(encoding="utf-8").splitlines()))
     table = np.loadtxt(path, delimiter=",", skiprows=1)
     return dict(zip(names, table.T))
 

@@ -4,6 +4,7 @@ The library of PythonFMU 0.7 uses some 45 symbols of Python and does not say whi
 them: they must be in the process already. So the command, no Python, loads libpython first.
 """
 
+import csv
 import os
 import sys
 import sysconfig
@@ -69,7 +70,7 @@ def run(aso_ftc, packed, tmp_path):
         if status:
             return done.stderr
         path = tmp_path / "out" / "results.csv"
-        names = path.read_text(encoding="utf-8").split("\n", 1)[0].split(",")
+        names = next(csv.reader(path.read_text(encoding="utf-8").splitlines()))
         return dict(zip(names, np.loadtxt(path, delimiter=",", skiprows=1).T))
 
     return simulate

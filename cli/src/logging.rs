@@ -1,0 +1,157 @@
+//! Messages: on standard error, as text or as JSON, past the bar of progress.
+
+use std::fmt::{self, Write as _};
+use std::io::{self, Write};
+use std::sync::OnceLock;
+
+use indicatif::MultiProgress;
+use tracing::field::{Field, Visit};
+use tracing::{Event, Level, Subscriber};
+use tracing_subscriber::filter::LevelFilter;
+use tracing_subscriber::fmt::format::Writer;
+use tracing_subscriber::fmt::{FmtContext, FormatEvent, FormatFields, MakeWriter};
+use tracing_subscriber::registry::LookupSpan;
+
+/// `target` of the events that the messages of an FMU are.
+const FMU: &str = "fmu";
+
+/// From now on messages are written: warnings, with `verbose` 1 information, with 2 everything.
+pub(crate) fn begin(verbose: u8, json: bool) {
+    let level = match verbose {
+        0 => LevelFilter::WARN,
+        1 => LevelFilter::INFO,
+        _ => LevelFilter::TRACE,
+    };
+    let builder = tracing_subscriber::fmt().with_max_level(level).with_writer(StandardError);
+    // There is one already where this was called before.
+    let _ = if json {
+        tracing::subscriber::set_global_default(builder.json().flatten_event(true).finish())
+    } else {
+        tracing::subscriber::set_global_default(builder.event_format(Sentence).finish())
+    };
+}
+
+/// An error with its causes, each said once: some errors quote theirs.
+pub(crate) fn sentence(error: &anyhow::Error) -> String {
+    let mut said = String::new();
+    for cause in error.chain().map(ToString::to_string) {
+        if said.is_empty() {
+            said = cause;
+        } else if !said.contains(&cause) {
+            said = format!("{said}: {cause}");
+        }
+    }
+    said
+}
+
+/// Where bars of progress are drawn.
+pub(crate) fn bars() -> &'static MultiProgress {
+    static BARS: OnceLock<MultiProgress> = OnceLock::new();
+    BARS.get_or_init(MultiProgress::new)
+}
+
+/// Standard error, with the bar taken away meanwhile.
+struct StandardError;
+
+impl Write for StandardError {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        bars().suspend(|| io::stderr().write_all(bytes))?;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        io::stderr().flush()
+    }
+}
+
+impl MakeWriter<'_> for StandardError {
+    type Writer = Self;
+
+    fn make_writer(&self) -> Self {
+        Self
+    }
+}
+
+/// One message as text: `warning: plant, t = 0.5 s, logStatusWarning: ...`.
+struct Sentence;
+
+impl<S, N> FormatEvent<S, N> for Sentence
+where
+    S: Subscriber + for<'a> LookupSpan<'a>,
+    N: for<'a> FormatFields<'a> + 'static,
+{
+    fn format_event(
+        &self,
+        _: &FmtContext<'_, S, N>,
+        mut writer: Writer<'_>,
+        event: &Event<'_>,
+    ) -> fmt::Result {
+        let metadata = event.metadata();
+        let mut parts = Parts::default();
+        event.record(&mut parts);
+        let word = match *metadata.level() {
+            Level::ERROR => "error",
+            Level::WARN => "warning",
+            Level::INFO => "info",
+            Level::DEBUG => "debug",
+            Level::TRACE => "trace",
+        };
+        if metadata.target() != FMU {
+            return writeln!(writer, "{word}: {}{}", parts.message, parts.others);
+        }
+        let Parts { message, instance, category, time, others } = parts;
+        write!(writer, "{word}: {}", plain(&instance))?;
+        if let Some(time) = time {
+            write!(writer, ", t = {time} s")?;
+        }
+        if !category.is_empty() {
+            write!(writer, ", {}", plain(&category))?;
+        }
+        writeln!(writer, ": {}{others}", plain(&message))
+    }
+}
+
+/// What an FMU says is text for one line: nothing in it moves the cursor of a terminal.
+fn plain(text: &str) -> String {
+    let text = text.trim_end();
+    text.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect()
+}
+
+/// The fields of a message.
+#[derive(Default)]
+struct Parts {
+    message: String,
+    instance: String,
+    category: String,
+    time: Option<f64>,
+    others: String,
+}
+
+impl Visit for Parts {
+    fn record_f64(&mut self, field: &Field, value: f64) {
+        if field.name() == "time" {
+            self.time = Some(value);
+        } else {
+            self.record_debug(field, &value);
+        }
+    }
+
+    fn record_str(&mut self, field: &Field, value: &str) {
+        match field.name() {
+            "message" => value.clone_into(&mut self.message),
+            "instance" => value.clone_into(&mut self.instance),
+            "category" => value.clone_into(&mut self.category),
+            _ => self.record_debug(field, &value),
+        }
+    }
+
+    fn record_debug(&mut self, field: &Field, value: &dyn fmt::Debug) {
+        match field.name() {
+            "message" => self.message = format!("{value:?}"),
+            name => {
+                // Writing to a String cannot fail.
+                let _ = write!(self.others, ", {name} = {value:?}");
+            }
+        }
+    }
+}

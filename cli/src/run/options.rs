@@ -1,0 +1,324 @@
+//! The command line of `aso-ftc run`, put over a `system.toml`.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+use master::{Coupling, Course, StepControl, Sweep, Wanted};
+use toml::Spanned;
+
+use super::saved::Saved;
+use crate::config::{Config, Every, Loaded, Wire};
+
+/// Where results go unless told otherwise.
+const OUT: &str = "results/run";
+/// The FMUs that are coupled where nothing is stated.
+const PLANT: &str = "dist/FrictionPendulum.fmu";
+const CONTROLLER: &str = "dist/AsoController.fmu";
+
+/// The algorithm. What is not stated is chosen by what the FMUs can do.
+#[derive(clap::Args)]
+pub(crate) struct AlgorithmOptions {
+    /// Communication step in s; the first one where it is chosen on the way
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    pub(crate) step: Option<f64>,
+    /// Order of stepping: gauss-seidel (one FMU after the other) or jacobi (all from the same
+    /// values)
+    #[arg(long, value_parser = method)]
+    pub(crate) method: Option<Sweep>,
+    /// Course of inputs during a step: hold, limited, linear or quadratic
+    #[arg(long, value_parser = str::parse::<Course>)]
+    pub(crate) course: Option<Course>,
+    /// Repetition of a step until inputs and outputs agree: once, newton, anderson or quasi-newton
+    #[arg(long, value_parser = str::parse::<Coupling>)]
+    pub(crate) coupling: Option<Coupling>,
+    /// Choice of the step: fixed, doubling, embedded, increment or energy
+    #[arg(long, value_parser = str::parse::<StepControl>)]
+    pub(crate) step_control: Option<StepControl>,
+    /// Relative tolerance of iteration and step control
+    #[arg(long, value_name = "FRACTION", allow_negative_numbers = true)]
+    pub(crate) relative_tolerance: Option<f64>,
+    /// Absolute tolerance of iteration and step control, in nominal values
+    #[arg(long, value_name = "FRACTION", allow_negative_numbers = true)]
+    pub(crate) absolute_tolerance: Option<f64>,
+    /// Repeat a step that an FMU made in part only as far as it came; all FMUs must be able to go back
+    #[arg(long)]
+    pub(crate) rollback: bool,
+    /// Let an FMU step every N communication steps only; may be repeated
+    #[arg(long, value_name = "FMU=N", value_parser = multiple)]
+    pub(crate) every: Vec<(String, u32)>,
+    /// Threads that step FMUs side by side where that pays; 0: as many as there are processors
+    #[arg(long, value_name = "N")]
+    pub(crate) jobs: Option<usize>,
+    /// Let values on connections be no numbers or infinite
+    #[arg(long)]
+    pub(crate) allow_nan: bool,
+}
+
+#[derive(clap::Args)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
+pub(crate) struct Options {
+    /// An SSP archive, an SSD file beside its FMUs, or a system.toml
+    #[arg(value_name = "SYSTEM", conflicts_with_all = ["plant", "controller", "resume"])]
+    system: Option<PathBuf>,
+    /// Add an FMU, or put another in the place of one of the system; may be repeated
+    #[arg(long = "fmu", value_name = "NAME=FMU", value_parser = setting)]
+    #[arg(conflicts_with_all = ["plant", "controller"])]
+    fmus: Vec<(String, String)>,
+    /// The FMU called plant [default: dist/FrictionPendulum.fmu]
+    #[arg(long, value_name = "FMU", conflicts_with = "resume")]
+    plant: Option<PathBuf>,
+    /// The FMU called controller [default: dist/AsoController.fmu]
+    #[arg(long, value_name = "FMU", conflicts_with = "resume")]
+    controller: Option<PathBuf>,
+    /// Connect an output to an input; without this, equal names of FMUs given here are connected;
+    /// may be repeated
+    #[arg(long = "connect", value_name = "FROM=TO", value_parser = setting)]
+    connections: Vec<(String, String)>,
+    /// Set a variable before the run, for example `plant.F_c=20`; may be repeated
+    #[arg(long = "set", value_name = "FMU.VARIABLE=VALUE", value_parser = setting)]
+    settings: Vec<(String, String)>,
+    /// Start time in s
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    start_time: Option<f64>,
+    /// Stop time in s [default: that of the system, else the latest of the FMUs]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    stop_time: Option<f64>,
+    #[command(flatten)]
+    algorithm: AlgorithmOptions,
+    /// Record these variables, by name or pattern (`plant.*`), instead of all inputs, outputs and
+    /// locals; may be repeated
+    #[arg(long, value_name = "PATTERN")]
+    record: Vec<String>,
+    /// Do not record these variables; may be repeated
+    #[arg(long, value_name = "PATTERN")]
+    exclude: Vec<String>,
+    /// Interval between rows in s, or `step` (each communication point), or `never`
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    #[arg(value_parser = str::parse::<Every>)]
+    record_every: Option<Every>,
+    /// File for the results, .csv or .parquet [default: results.csv in the folder of --out]
+    #[arg(long, value_name = "FILE")]
+    results: Option<PathBuf>,
+    /// Format of the results: csv or parquet
+    #[arg(long, value_parser = ["csv", "parquet"])]
+    format: Option<String>,
+    /// Plot variables, by name or pattern, separated by commas; may be repeated
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    plot: Vec<String>,
+    /// File for the plot, .svg or .png [default: plot.svg in the folder of --out]
+    #[arg(long, value_name = "FILE")]
+    plot_file: Option<PathBuf>,
+    /// Folder for what is written [default: results/run]
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+    /// Run each FMU in a process of its own
+    #[arg(long)]
+    isolate: bool,
+    /// How long a call of an FMU may take: with --isolate any call, else an answer that is pending
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    time_limit: Option<f64>,
+    /// Load a shared library first, its symbols visible to the FMUs; may be repeated
+    #[arg(long, value_name = "LIBRARY")]
+    preload: Vec<String>,
+    /// Save the state of the run to this file at its end, and where it is interrupted
+    #[arg(long, value_name = "FILE")]
+    checkpoint: Option<PathBuf>,
+    /// Save it every so many simulated seconds, too
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    checkpoint_every: Option<f64>,
+    /// Go on from a checkpoint, which knows its system
+    #[arg(long, value_name = "FILE")]
+    resume: Option<PathBuf>,
+    /// Print the complete configuration in force as a system.toml, and do not run
+    #[arg(long)]
+    pub(super) print_config: bool,
+    /// Print the algorithm and why it is this one
+    #[arg(long)]
+    pub(super) explain: bool,
+    /// Say more, FMUs included; -vv: everything
+    #[arg(short, long, action = clap::ArgAction::Count)]
+    pub(crate) verbose: u8,
+    /// Write messages as JSON, one object on each line
+    #[arg(long)]
+    pub(crate) log_json: bool,
+}
+
+/// Splits `name=value`.
+pub(crate) fn setting(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((name, value)) if !name.is_empty() => Ok((name.to_owned(), value.to_owned())),
+        _ => Err("expected the form NAME=VALUE".to_owned()),
+    }
+}
+
+fn multiple(text: &str) -> Result<(String, u32), String> {
+    let (name, value) = setting(text)?;
+    match value.parse() {
+        Ok(count) if count > 0 => Ok((name, count)),
+        _ => Err(format!("expected a whole number above 0, found {value:?}")),
+    }
+}
+
+fn method(text: &str) -> Result<Sweep, String> {
+    if text == "gauss-seidel-hold" {
+        return Err("say `--method gauss-seidel --course hold`".to_owned());
+    }
+    text.parse()
+}
+
+impl AlgorithmOptions {
+    /// Puts what is stated over `wanted`.
+    pub(crate) fn apply(&self, wanted: &mut Wanted) {
+        put(&mut wanted.step, self.step);
+        put(&mut wanted.method, self.method);
+        put(&mut wanted.course, self.course);
+        put(&mut wanted.coupling, self.coupling);
+        put(&mut wanted.step_control, self.step_control);
+        put(&mut wanted.relative_tolerance, self.relative_tolerance);
+        put(&mut wanted.absolute_tolerance, self.absolute_tolerance);
+        put(&mut wanted.jobs, self.jobs);
+        put(&mut wanted.rollback, self.rollback.then_some(true));
+        put(&mut wanted.allow_nan, self.allow_nan.then_some(true));
+        wanted.every.extend(self.every.iter().cloned());
+    }
+}
+
+/// Puts `over` in the place of `value`, where there is something.
+fn put<T>(value: &mut Option<T>, over: Option<T>) {
+    if over.is_some() {
+        *value = over;
+    }
+}
+
+impl Options {
+    /// The configuration: the file's or the checkpoint's, with the command line over it; and the
+    /// checkpoint.
+    pub(super) fn load(&self) -> anyhow::Result<(Loaded, Option<Saved>)> {
+        let (mut loaded, saved) = self.base()?;
+        let config = &mut loaded.config;
+        self.put_system(config);
+        self.algorithm.apply(&mut config.algorithm);
+        let placed = |value: Option<f64>| value.map(|value| Spanned::new(0..0, value));
+        put(&mut config.experiment.start_time, placed(self.start_time));
+        put(&mut config.experiment.stop_time, placed(self.stop_time));
+        put(&mut config.isolation.isolate, self.isolate.then_some(true));
+        put(&mut config.isolation.time_limit, placed(self.time_limit));
+        put(&mut config.checkpoint.file, self.checkpoint.clone());
+        put(&mut config.checkpoint.every, placed(self.checkpoint_every));
+        self.put_results(config, saved.as_ref());
+        config.check_numbers()?;
+        Ok((loaded, saved))
+    }
+
+    fn base(&self) -> anyhow::Result<(Loaded, Option<Saved>)> {
+        if let Some(path) = &self.resume {
+            let saved = Saved::read(path)?;
+            let (config, source) = (saved.config(path)?, None);
+            return Ok((Loaded { config, source }, Some(saved)));
+        }
+        let mut config = Config::default();
+        match &self.system {
+            Some(path) if has_ending(path, "toml") => return Ok((Loaded::read(path)?, None)),
+            Some(path) if path.is_dir() || has_ending(path, "ssp") || has_ending(path, "ssd") => {
+                config.system = Some(path.clone());
+            }
+            Some(path) => bail!(
+                "{}: expected a system: an .ssp, an .ssd or a .toml; FMUs are given by --fmu \
+                 NAME=FMU",
+                path.display()
+            ),
+            None if self.fmus.is_empty() => {
+                let path = |stated: &Option<PathBuf>, default: &str| {
+                    stated.clone().unwrap_or_else(|| default.into())
+                };
+                config.fmus.put("plant".to_owned(), path(&self.plant, PLANT));
+                config.fmus.put("controller".to_owned(), path(&self.controller, CONTROLLER));
+            }
+            None => {}
+        }
+        Ok((Loaded { config, source: None }, None))
+    }
+
+    fn put_system(&self, config: &mut Config) {
+        for (name, path) in &self.fmus {
+            config.fmus.put(name.clone(), path.into());
+        }
+        for (from, to) in &self.connections {
+            let wires = config.connections.get_or_insert_default();
+            wires.retain(|wire| wire.get_ref().to.get_ref() != to);
+            wires.push(Wire::new(from.clone(), to.clone()));
+        }
+        for (name, value) in &self.settings {
+            config.settings.push(name.clone(), value.clone());
+        }
+        config.preload.extend(self.preload.iter().cloned());
+    }
+
+    fn put_results(&self, config: &mut Config, saved: Option<&Saved>) {
+        let results = &mut config.results;
+        if !self.record.is_empty() {
+            results.record.clone_from(&self.record);
+        }
+        if !self.exclude.is_empty() {
+            results.exclude.clone_from(&self.exclude);
+        }
+        if !self.plot.is_empty() {
+            results.plot.clone_from(&self.plot);
+        }
+        put(&mut results.every, self.record_every);
+        let out = self.out.as_deref();
+        let format = self.format.as_deref();
+        // The rows before a checkpoint are not lost by going on from it.
+        let place = |stated: &Option<PathBuf>, known: &Option<PathBuf>, name: &str| {
+            if let Some(path) = stated {
+                return path.clone();
+            }
+            let path = match (out, known) {
+                (None, Some(known)) => known.clone(),
+                (out, _) => out.unwrap_or(Path::new(OUT)).join(name),
+            };
+            saved.map_or(path.clone(), |saved| resumed(&path, saved.time()))
+        };
+        let mut file = place(&self.results, &results.file, "results.csv");
+        if let Some(format) = format {
+            file.set_extension(format);
+        }
+        results.file = Some(file);
+        results.plot_file = Some(place(&self.plot_file, &results.plot_file, "plot.svg"));
+    }
+}
+
+/// The file for what comes after `time`, beside the one for what came before.
+fn resumed(path: &Path, time: f64) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    // Of a run that was resumed before.
+    let stem = stem.split("-from-").next().unwrap_or_default();
+    let ending = path.extension().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!("{stem}-from-{time}.{ending}"))
+}
+
+fn has_ending(path: &Path, ending: &str) -> bool {
+    path.extension().is_some_and(|found| found.eq_ignore_ascii_case(ending))
+}
+
+impl Config {
+    /// Refuses numbers of the command line that make no sense; those of a file were looked at with
+    /// their place.
+    fn check_numbers(&self) -> anyhow::Result<()> {
+        let above = [
+            ("--time-limit", &self.isolation.time_limit),
+            ("--checkpoint-every", &self.checkpoint.every),
+        ];
+        for (name, value) in above {
+            if let Some(value) = value.as_ref().map(Spanned::get_ref)
+                && !(*value > 0.0 && value.is_finite())
+            {
+                bail!("{name} is {value} s, expected a finite number above 0");
+            }
+        }
+        if self.checkpoint.every.is_some() {
+            self.checkpoint.file.as_ref().context("--checkpoint-every needs --checkpoint FILE")?;
+        }
+        Ok(())
+    }
+}

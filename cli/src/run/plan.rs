@@ -1,0 +1,202 @@
+//! What a configuration leaves open, decided by the system: algorithm, times, how often to record.
+
+use anyhow::{Context, bail};
+use fmi2::Experiment;
+use master::{Algorithm, Coupling, StepControl, System, Wanted, by_direct_dependencies, choose};
+use toml::Spanned;
+
+use super::assemble::Assembled;
+use crate::config::{Config, Every, Wire};
+
+/// Most rows that are recorded where nothing is stated and steps are fixed.
+const ROWS: f64 = 1e4;
+/// Share of a step by which a proposed step may miss a multiple of the communication step.
+const NEAR: f64 = 1e-6;
+
+/// Everything decided.
+pub(super) struct Plan {
+    pub(super) algorithm: Algorithm,
+    pub(super) experiment: Experiment,
+    /// In s.
+    pub(super) stop: f64,
+    pub(super) every: Every,
+    /// A sentence for each decision that the user did not make.
+    pub(super) reasons: Vec<String>,
+}
+
+/// Decides, and completes `config` accordingly.
+pub(super) fn plan(config: &mut Config, assembled: &Assembled) -> anyhow::Result<Plan> {
+    let system = &assembled.system;
+    let mut reasons = Vec::new();
+    propose_steps(&mut config.algorithm, assembled, &mut reasons);
+    check_step(&config.algorithm)?;
+    let chosen = choose(system, &config.algorithm)?;
+    reasons.extend(chosen.reasons);
+    let algorithm = chosen.algorithm;
+    let (start, stop) = times(config, assembled, &mut reasons)?;
+    let tolerance = config.experiment.tolerance.as_ref().map(|tolerance| *tolerance.get_ref());
+    let experiment = Experiment { start_time: start, stop_time: Some(stop), tolerance };
+    let every =
+        config.results.every.unwrap_or_else(|| rows(&algorithm, stop - start, &mut reasons));
+    complete(&mut config.algorithm, &algorithm, system);
+    config.experiment.start_time = Some(Spanned::new(0..0, start));
+    config.experiment.stop_time = Some(Spanned::new(0..0, stop));
+    config.results.every = Some(every);
+    config.isolation.isolate.get_or_insert(false);
+    if config.system.is_none() && config.connections.is_none() {
+        let wire = |connection: &master::Connection| {
+            Wire::new(system.name(connection.from), system.name(connection.to))
+        };
+        config.connections = Some(system.connections.iter().map(wire).collect());
+    }
+    Ok(Plan { algorithm, experiment, stop, every, reasons })
+}
+
+/// The step, before numbers that follow from it are looked at.
+fn check_step(wanted: &Wanted) -> anyhow::Result<()> {
+    match wanted.step {
+        Some(step) if !(step > 0.0 && step.is_finite()) => {
+            bail!("the communication step is {step} s, expected more than 0")
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Takes steps that an SSP proposes where nothing else is said.
+fn propose_steps(wanted: &mut Wanted, assembled: &Assembled, reasons: &mut Vec<String>) {
+    let sound = |step: &f64| *step > 0.0 && step.is_finite();
+    let hints = assembled.steps.iter().filter(|(_, step)| sound(step));
+    if wanted.step.is_none() {
+        let least = hints.clone().map(|(_, step)| *step).reduce(f64::min);
+        wanted.step = assembled.experiment.step_size.filter(sound).or(least);
+        if let Some(step) = wanted.step {
+            reasons.push(format!("step {step} s: that of the system structure"));
+        }
+    }
+    let plain = wanted.step_control.is_none_or(|control| control == StepControl::Fixed)
+        && wanted.coupling.is_none_or(|coupling| coupling == Coupling::Once)
+        && wanted.next_event.is_empty()
+        && wanted.crossing.is_empty()
+        && by_direct_dependencies(&assembled.system).looped.is_empty();
+    let Some(step) = wanted.step.filter(|_| plain && wanted.every.is_empty()) else { return };
+    for (name, proposed) in hints {
+        let multiple = (proposed / step).round();
+        if multiple >= 2.0 && (proposed / step - multiple).abs() < NEAR * multiple {
+            reasons.push(format!(
+                "{name} steps every {multiple} communication steps: the system structure proposes \
+                 {proposed} s for it"
+            ));
+            wanted.every.insert(name.clone(), count(multiple));
+        }
+    }
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "2 and more; saturates"
+)]
+fn count(multiple: f64) -> u32 {
+    multiple as u32
+}
+
+/// Start and stop time in s: stated, of the system structure, or of the FMUs.
+fn times(
+    config: &Config,
+    assembled: &Assembled,
+    reasons: &mut Vec<String>,
+) -> anyhow::Result<(f64, f64)> {
+    let stated = |time: &Option<Spanned<f64>>| time.as_ref().map(|time| *time.get_ref());
+    let defaults = || {
+        let slaves = assembled.system.slaves.iter();
+        slaves.filter_map(|(name, slave)| {
+            slave.description().default_experiment.as_ref().map(|default| (name, default))
+        })
+    };
+    let finite = |time: &f64| time.is_finite();
+    let known = stated(&config.experiment.start_time).or(assembled.experiment.start_time);
+    let start = known.unwrap_or_else(|| {
+        let stated = defaults().filter_map(|(name, one)| Some((name, one.start_time?)));
+        match stated.filter(|(_, time)| finite(time)).min_by(|a, b| a.1.total_cmp(&b.1)) {
+            Some((name, time)) => {
+                reasons
+                    .push(format!("start time {time} s: that of the DefaultExperiment of {name}"));
+                time
+            }
+            None => 0.0,
+        }
+    });
+    if let Some(stop) = stated(&config.experiment.stop_time).or(assembled.experiment.stop_time) {
+        return Ok((start, stop));
+    }
+    let latest = defaults()
+        .filter_map(|(name, one)| Some((name, one.stop_time?)))
+        .filter(|(_, time)| finite(time))
+        .max_by(|a, b| a.1.total_cmp(&b.1));
+    let (name, stop) = latest.context(
+        "no stop time: neither the system nor the DefaultExperiment of an FMU states one, expected \
+         --stop-time SECONDS",
+    )?;
+    reasons.push(format!(
+        "stop time {stop} s: the latest stopTime of a DefaultExperiment, that of {name}"
+    ));
+    if stop <= start {
+        bail!("the stop time {stop} s of {name} is not after the start time {start} s");
+    }
+    Ok((start, stop))
+}
+
+/// Each communication point, unless these would be very many.
+fn rows(algorithm: &Algorithm, length: f64, reasons: &mut Vec<String>) -> Every {
+    if algorithm.control == StepControl::Fixed && length > ROWS * algorithm.step * (1.0 + NEAR) {
+        let interval = length / ROWS;
+        reasons.push(format!("a row every {interval} s: {ROWS} intervals"));
+        Every::Seconds(interval)
+    } else {
+        Every::Step
+    }
+}
+
+/// States all that was chosen.
+fn complete(wanted: &mut Wanted, algorithm: &Algorithm, system: &System) {
+    wanted.method = Some(algorithm.sweep);
+    wanted.course = Some(algorithm.course);
+    wanted.coupling = Some(algorithm.coupling);
+    wanted.step_control = Some(algorithm.control);
+    wanted.step = Some(algorithm.step);
+    wanted.relative_tolerance = Some(algorithm.relative_tolerance);
+    wanted.absolute_tolerance = Some(algorithm.absolute_tolerance);
+    wanted.smallest_step = Some(algorithm.smallest_step);
+    wanted.largest_step = Some(algorithm.largest_step);
+    wanted.iterations = Some(algorithm.iterations);
+    wanted.jobs = Some(wanted.jobs.unwrap_or(algorithm.jobs));
+    wanted.rollback = Some(algorithm.rollback);
+    wanted.allow_nan = Some(algorithm.allow_nan);
+    let multiples = system.slaves.iter().zip(&algorithm.multiples);
+    wanted.every = multiples.map(|((name, _), multiple)| (name.clone(), *multiple)).collect();
+}
+
+impl Plan {
+    /// What `--explain` prints.
+    pub(super) fn explanation(&self, system: &System) -> String {
+        let algorithm = &self.algorithm;
+        let mut lines = vec![
+            format!(
+                "algorithm: {}, course {}, coupling {}, {} step {} s",
+                algorithm.sweep.name(),
+                algorithm.course.name(),
+                algorithm.coupling.name(),
+                algorithm.control.name(),
+                algorithm.step
+            ),
+            format!("time: {} to {} s", self.experiment.start_time, self.stop),
+        ];
+        for ((name, _), multiple) in system.slaves.iter().zip(&algorithm.multiples) {
+            if *multiple != 1 {
+                lines.push(format!("{name} steps every {multiple} communication steps"));
+            }
+        }
+        lines.extend(self.reasons.iter().map(|reason| format!("- {reason}")));
+        lines.join("\n")
+    }
+}

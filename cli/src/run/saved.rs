@@ -1,0 +1,77 @@
+//! The file of a checkpoint: configuration, simulation, and where the recording stands.
+
+use std::path::Path;
+
+use anyhow::{Context, bail};
+use master::Checkpoint;
+use master::results::Due;
+use serde::{Deserialize, Serialize};
+
+use crate::config::{self, Config, Every};
+use crate::whole_file;
+
+/// What a file of this kind and version begins with; four bytes of CRC-32 of the rest follow.
+const MAGIC: &[u8; 16] = b"aso-ftc-state-1\n";
+
+/// A run as it stands.
+#[derive(Serialize, Deserialize)]
+pub(super) struct Saved {
+    /// The complete configuration, a `system.toml` with absolute paths.
+    text: String,
+    checkpoint: Checkpoint,
+    /// How often rows are recorded, and when the next one is; none where nothing is recorded.
+    due: Option<(String, Due)>,
+}
+
+impl Saved {
+    pub(super) fn new(text: &str, checkpoint: Checkpoint, due: Option<(Every, Due)>) -> Self {
+        let due = due.map(|(every, due)| (every.to_string(), due));
+        Self { text: text.to_owned(), checkpoint, due }
+    }
+
+    /// Writes the file: whole or not at all.
+    pub(super) fn write(&self, path: &Path) -> anyhow::Result<()> {
+        let content = postcard::to_stdvec(self)?;
+        let mut bytes = MAGIC.to_vec();
+        bytes.extend(crc32fast::hash(&content).to_le_bytes());
+        bytes.extend(content);
+        whole_file::write(path, &bytes).with_context(|| format!("cannot write {}", path.display()))
+    }
+
+    /// Reads the file at `path`.
+    pub(super) fn read(path: &Path) -> anyhow::Result<Self> {
+        let shown = path.display();
+        let bytes = std::fs::read(path).with_context(|| format!("cannot read {shown}"))?;
+        let Some((sum, content)) =
+            bytes.strip_prefix(MAGIC).and_then(|rest| rest.split_first_chunk::<4>())
+        else {
+            bail!("{shown}: expected a checkpoint of this version of aso-ftc");
+        };
+        if crc32fast::hash(content) != u32::from_le_bytes(*sum) {
+            bail!("{shown}: the checkpoint is damaged: its checksum does not fit");
+        }
+        postcard::from_bytes(content)
+            .with_context(|| format!("{shown}: expected a checkpoint of this version of aso-ftc"))
+    }
+
+    /// The configuration of the run, from the checkpoint at `path`.
+    pub(super) fn config(&self, path: &Path) -> anyhow::Result<Config> {
+        Ok(config::parse(&self.text, path)?)
+    }
+
+    /// When the next row is due, where rows are recorded as they were.
+    pub(super) fn due(&self, every: Every) -> Option<&Due> {
+        let (text, due) = self.due.as_ref()?;
+        (*text == every.to_string()).then_some(due)
+    }
+
+    /// The simulation.
+    pub(super) fn checkpoint(&self) -> &Checkpoint {
+        &self.checkpoint
+    }
+
+    /// Time reached in s.
+    pub(super) fn time(&self) -> f64 {
+        self.checkpoint.time()
+    }
+}

@@ -1,0 +1,150 @@
+//! How runs end, and go on.
+
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+use tests::c_fmu::CFmu;
+
+use super::*;
+
+/// Runs plant and controller for `stop` s, sends `signal` when there are some rows.
+fn interrupted(bench: &Bench, signal: &str, stop: &str, more: &[&str]) -> Output {
+    let times = ["--stop-time", stop, "--record-every", "0.1"];
+    let arguments = coupled(&[&times, more].concat());
+    let arguments: Vec<_> = arguments.iter().map(String::as_str).collect();
+    let mut command = bench.command(&arguments);
+    let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let results = bench.path("out/results.csv");
+    let begin = Instant::now();
+    while fs::metadata(&results).map_or(0, |file| file.len()) < 50_000 {
+        assert!(begin.elapsed() < Duration::from_secs(60), "there are no rows");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    let kill = Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
+    assert!(kill.success());
+    child.wait_with_output().unwrap()
+}
+
+#[test]
+fn an_interrupted_run_leaves_whole_rows_and_says_where_it_stopped() {
+    for signal in ["-INT", "-TERM"] {
+        let bench = Bench::new();
+        let output = interrupted(&bench, signal, "1e6", &[]);
+        fails(&output, 130, &["the run was interrupted at t = "]);
+        let text = bench.read("out/results.csv");
+        let rows = whole_rows(&text);
+        let message = said(&output);
+        let time = message.split("at t = ").nth(1).unwrap().split(' ').next().unwrap();
+        let reached: f64 = time.parse().unwrap();
+        let last: f64 = text.lines().last().unwrap().split(',').next().unwrap().parse().unwrap();
+        assert!(rows > 50 && last <= reached && reached < last + 0.1 + 1e-9, "{last} {reached}");
+    }
+}
+
+#[test]
+fn an_interrupted_run_goes_on_as_if_it_had_not_been() {
+    let (bench, whole) = (Bench::new(), Bench::new());
+    let output = interrupted(&bench, "-INT", "400", &["--checkpoint", "state"]);
+    fails(&output, 130, &["interrupted"]);
+    let printed = printed(&bench.run(&["--resume", "state"]));
+    let file = printed.lines().find(|line| line.contains("results-from-")).unwrap();
+    let (first, second) = (bench.read("out/results.csv"), bench.read(file));
+    let (head, rows) = second.split_once('\n').unwrap();
+    assert_eq!(first.lines().next(), Some(head));
+    whole.coupled_well(&["--stop-time", "400", "--record-every", "0.1"]);
+    assert!(first + rows == whole.read("out/results.csv"), "every row, bit by bit");
+}
+
+#[test]
+fn a_lost_run_keeps_its_rows_and_its_checkpoints() {
+    let bench = Bench::new();
+    let write = |fmu: CFmu, name: &str| {
+        format!("{name}={}", fmu.write(bench.folder.path(), name).display())
+    };
+    let (a, b) = (write(CFmu::that("fail in fmi2DoStep"), "a"), write(CFmu::well_behaved(), "b"));
+    let fmus = ["--fmu", &a, "--fmu", &b, "--connect", "a.y=b.u", "--set", "a.t1=0.875"];
+    let times = ["--step", "0.0625", "--stop-time", "2", "--out", "out"];
+    let saving = ["--checkpoint", "state", "--checkpoint-every", "0.25"];
+    let output = bench.run(&[&fmus[..], &times, &saving].concat());
+    fails(&output, 1, &["the run ended early, after t = 0.875 s: a at t = 0.875 s: fmi2DoStep"]);
+    let first = bench.read("out/results.csv");
+    assert_eq!(whole_rows(&first), 15, "0 to 0.875");
+    // The last checkpoint is that at 0.75 s: the same end again.
+    fails(&bench.run(&["--resume", "state"]), 1, &["the run ended early, after t = 0.875 s"]);
+    let second = bench.read("out/results-from-0.75.csv");
+    let (first, second): (Vec<_>, Vec<_>) = (first.lines().collect(), second.lines().collect());
+    assert!(second[1].starts_with("0.8125,"), "{second:?}");
+    assert_eq!((second[0], &second[1..]), (first[0], &first[14..]));
+}
+
+#[test]
+fn an_output_that_is_no_number_ends_the_run_unless_allowed() {
+    let bench = Bench::new();
+    let more = ["--set", "plant.linearised=true", "--set", "plant.theta_0=1e300"];
+    let output = bench.coupled(&more);
+    fails(&output, 2, &["controller.u is NaN at t = 0 s, expected a finite number"]);
+    let allowed = bench.coupled(&[&more[..], &["--allow-nan"]].concat());
+    assert!(!said(&allowed).contains("controller.u is NaN"), "{}", said(&allowed));
+}
+
+#[test]
+fn an_fmu_that_cannot_save_its_state_is_told_before_the_run() {
+    let bench = Bench::new();
+    let fmu = CFmu::well_behaved().without_rollback().write(bench.folder.path(), "a");
+    let fmu = format!("a={}", fmu.display());
+    let options = ["--fmu", &fmu, "--stop-time", "1", "--step", "0.25", "--out", "out"];
+    fails(
+        &bench.run(&[&options[..], &["--checkpoint", "state"]].concat()),
+        2,
+        &["a cannot take part in a checkpoint", "canSerializeFMUstate"],
+    );
+    printed(&bench.run(&options));
+    fails(&bench.run(&options[..2]), 2, &["no stop time", "--stop-time"]);
+}
+
+#[test]
+fn a_second_signal_ends_a_run_whose_fmu_hangs() {
+    let bench = Bench::new();
+    let fmu = CFmu::that("hang in fmi2DoStep").write(bench.folder.path(), "a");
+    let fmu = format!("a={}", fmu.display());
+    let more = ["--fmu", &fmu, "--stop-time", "1", "--step", "0.25", "--out", "out"];
+    let mut child = bench.command(&more).stdout(Stdio::null()).spawn().unwrap();
+    let begin = Instant::now();
+    while !fs::read_to_string(bench.path("out/results.csv")).is_ok_and(|text| !text.is_empty()) {
+        assert!(begin.elapsed() < Duration::from_secs(60), "there is no file");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    // The signals may come before the process hears them or before it hangs; at the end there have
+    // been two.
+    let status = loop {
+        let _ = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+        std::thread::sleep(Duration::from_millis(50));
+        if let Some(status) = child.try_wait().unwrap() {
+            break status;
+        }
+        assert!(begin.elapsed() < Duration::from_secs(60), "it does not end");
+    };
+    assert_eq!(status.code(), Some(130));
+}
+
+#[test]
+fn bad_checkpoints_are_refused() {
+    let bench = Bench::new();
+    bench.coupled_well(&["--stop-time", "0.1", "--checkpoint", "state"]);
+    let good = fs::read(bench.path("state")).unwrap();
+    let mut bad = good.clone();
+    *bad.last_mut().unwrap() ^= 1;
+    fs::write(bench.path("bad"), &bad).unwrap();
+    fails(&bench.run(&["--resume", "bad"]), 2, &["bad", "damaged", "checksum"]);
+    fs::write(bench.path("bad"), &good[..30]).unwrap();
+    fails(&bench.run(&["--resume", "bad"]), 2, &["bad: "]);
+    fs::write(bench.path("bad"), "no checkpoint").unwrap();
+    fails(&bench.run(&["--resume", "bad"]), 2, &["bad: expected a checkpoint"]);
+    fails(&bench.run(&["--resume", "none"]), 2, &["none"]);
+    let other = ["--resume", "state", "--course", "hold", "--coupling", "anderson"];
+    fails(&bench.run(&other), 2, &["checkpoint", "another algorithm"]);
+    let swapped = format!("controller={}", fmu("FrictionPendulum"));
+    let output = bench.run(&["--resume", "state", "--fmu", &swapped]);
+    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+    fails(&bench.coupled(&["--checkpoint-every", "1"]), 2, &["--checkpoint FILE"]);
+}

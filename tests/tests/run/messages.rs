@@ -1,0 +1,86 @@
+//! What is said on standard error.
+
+use serde_json::Value;
+
+use super::*;
+
+const UNSOUND: [&str; 4] = ["--stop-time", "1", "--set", "plant.F_s=20"];
+
+#[test]
+fn messages_of_an_fmu_have_its_name_the_time_and_their_category() {
+    let bench = Bench::new();
+    let output = bench.coupled(&UNSOUND);
+    fails(&output, 2, &["error: plant, t = 0 s, logStatusError: ", "F_s = 20"]);
+}
+
+#[test]
+fn as_json_each_line_is_an_object() {
+    let bench = Bench::new();
+    let output = bench.coupled(&[&UNSOUND[..], &["--log-json"]].concat());
+    assert_eq!(output.status.code(), Some(2));
+    let lines: Vec<Value> =
+        said(&output).lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let fmu = lines.iter().find(|line| line["target"] == "fmu").unwrap();
+    assert_eq!(fmu["instance"], "plant");
+    assert_eq!(fmu["category"], "logStatusError");
+    assert_eq!((&fmu["time"], &fmu["level"]), (&Value::from(0.0), &Value::from("ERROR")));
+    assert!(fmu["message"].as_str().unwrap().contains("F_s = 20"));
+    let last = lines.last().unwrap();
+    assert!(last["message"].as_str().unwrap().starts_with("plant at t = 0 s: fmi2EnterInit"));
+}
+
+#[test]
+fn a_cause_is_said_once() {
+    let bench = Bench::new();
+    let message = said(&bench.coupled(&UNSOUND));
+    let last = message.lines().last().unwrap();
+    assert_eq!(last.matches("returned fmi2Error").count(), 1, "{last}");
+}
+
+#[test]
+fn a_run_without_trouble_says_nothing_on_standard_error() {
+    let bench = Bench::new();
+    assert_eq!(said(&bench.coupled(&["--stop-time", "0.1"])), "");
+}
+
+#[test]
+fn fmus_without_common_names_run_unconnected_with_a_warning() {
+    let bench = Bench::new();
+    let fmus = ["a", "b"].map(|name| format!("{name}={}", fmu("FrictionPendulum")));
+    let output = bench.run(&["--fmu", &fmus[0], "--fmu", &fmus[1], "--stop-time", "0.01"]);
+    assert_eq!(printed(&output).lines().next(), Some("no connections"));
+    assert!(said(&output).contains("warning: no output has the name of an input"));
+}
+
+#[test]
+fn misuse_is_refused_with_what_was_expected() {
+    let bench = Bench::new();
+    for (options, parts) in [
+        (&["--method", "gauss-seidel-hold"][..], &["--method gauss-seidel --course hold"][..]),
+        (&["--method", "jakobi"], &["jacobi, gauss-seidel"]),
+        (&["--course", "cubic"], &["hold, limited, linear, quadratic"]),
+        (&["--coupling", "twice"], &["once, newton, anderson, quasi-newton"]),
+        (&["--step-control", "free"], &["fixed, doubling, embedded, increment, energy"]),
+        (&["--every", "plant=0"], &["above 0", "\"0\""]),
+        (&["--every", "motor=2"], &["motor", "plant, controller"]),
+        (&["--fmu", "a=b.fmu"], &["--plant"]),
+        (&["--record", "plant.z*"], &["plant.z*"]),
+        (&["--plot", "plant.zz"], &["plot", "plant.zz"]),
+        (&["--plot", "plant.x_p", "--plot-file", "a.pdf"], &["a.pdf", ".svg"]),
+        (&["--plot", "plant.x_p", "--record-every", "never"], &["never"]),
+        (&["--results", "a.xlsx"], &["a.xlsx", ".csv or .parquet"]),
+        (&["--time-limit", "0"], &["--time-limit", "above 0"]),
+        (&["--start-time", "5", "--stop-time", "4"], &["stop time", "4"]),
+        (&["--relative-tolerance", "-1"], &["relative tolerance", "-1"]),
+        (&["--connect", "plant.x_p"], &["NAME=VALUE"]),
+    ] {
+        fails(&bench.coupled(options), 2, parts);
+        assert!(!bench.path("out/results.csv").exists(), "{options:?}");
+    }
+    fails(&run(&["run", "some.fmu"]), 2, &["some.fmu", "--fmu NAME=FMU"]);
+    fails(&run(&["run", "none.toml"]), 2, &["none.toml"]);
+    fails(&run(&["run", "none.ssp"]), 2, &["none.ssp"]);
+    fails(&bench.run(&["a.toml", "--plant", "b.fmu"]), 2, &["--plant"]);
+    bench.write("empty.toml", "");
+    fails(&bench.run(&["empty.toml"]), 2, &["no FMU"]);
+}
