@@ -1,7 +1,7 @@
 //! Connected Reals: values and derivatives of outputs over their last steps, and what inputs get.
 
 use super::course::{Known, Polynomial};
-use super::layout::Layout;
+use super::layout::{Lane, Layout};
 use super::trace::Span;
 pub(crate) use super::trace::Trace;
 use crate::algorithm::{Algorithm, Coupling, Course, StepControl, Sweep};
@@ -33,8 +33,6 @@ impl Reals {
     pub(crate) fn new(system: &System, algorithm: &Algorithm) -> Self {
         let layout = Layout::new(system, algorithm);
         let (outputs, derivatives) = (layout.output_ports.len(), layout.output_derivatives);
-        let span =
-            Span { begin: 0.0, size: 1.0, last_size: 1.0, earlier_size: 1.0, stepped: false };
         let trace = Trace {
             latest: vec![0.0; outputs],
             begin: vec![0.0; outputs],
@@ -42,7 +40,7 @@ impl Reals {
             earlier: vec![0.0; outputs],
             derivatives: vec![0.0; derivatives],
             begin_derivatives: vec![0.0; derivatives],
-            spans: vec![span; system.slaves.len()],
+            spans: vec![Span::default(); system.slaves.len()],
         };
         Self {
             faults: Vec::new(),
@@ -136,6 +134,37 @@ impl Reals {
         for past in [&mut trace.begin, &mut trace.before, &mut trace.earlier] {
             past.copy_from_slice(&trace.latest);
         }
+        for span in &mut trace.spans {
+            span.forget();
+        }
+    }
+
+    /// Order of convergence of the course as the slaves can follow it: a mean that is held is of order
+    /// 2, the value at one end of the step of order 1.
+    pub(crate) fn order(&self) -> u8 {
+        let held = |lane: &Lane| lane.input_order == 0 && !lane.inputs.is_empty();
+        let held = self.layout.lanes.iter().any(held);
+        match self.course {
+            Course::Hold => 1,
+            Course::Limited if held => 1,
+            Course::Quadratic if !held => 3,
+            Course::Limited | Course::Linear | Course::Quadratic => 2,
+        }
+    }
+
+    /// Tells `slave` the gathered derivatives of its inputs before its first step: derivatives of
+    /// outputs that depend directly on inputs are made of them.
+    pub(crate) fn set_derivatives(
+        &self,
+        slave: usize,
+        instance: &mut dyn Slave,
+    ) -> Result<(), CallError> {
+        let lane = &self.layout.lanes[slave];
+        if lane.derived_inputs.is_empty() {
+            return Ok(());
+        }
+        let derivatives = &self.input_derivatives[lane.input_derivative_range.clone()];
+        instance.set_input_derivatives(&lane.derived_inputs, &lane.input_orders, derivatives)
     }
 
     /// The inputs of `slave` for a step from `time` over `size`.
