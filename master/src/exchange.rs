@@ -4,6 +4,7 @@ mod course;
 mod discrete;
 mod layout;
 mod reals;
+mod start;
 mod tasks;
 mod trace;
 
@@ -18,9 +19,6 @@ use crate::slave::{CallError, Slave, Stepped};
 use crate::system::{Port, System};
 use discrete::{BOOLEANS, Channel, INTEGERS, STRINGS};
 pub(crate) use reals::{Reals, Trace};
-
-/// Passes for the derivatives at the start: first derivatives through two slaves, second through one.
-const PASSES: usize = 3;
 
 /// The connections of a system, ready to be carried out.
 pub(crate) struct Exchange {
@@ -208,29 +206,6 @@ impl Exchange {
         done.and_then(|()| self.read_discrete(position, slave.as_mut()))
             .map_err(|source| call(name, time, source))?;
         self.check_finite(system, position, time)
-    }
-
-    /// At the start `time`, before a first step of `size` s: derivatives of all outputs, also of
-    /// those that depend directly on inputs. Each pass brings them through one more slave.
-    pub(crate) fn derive_at_start(
-        &mut self,
-        system: &mut System,
-        (time, size): (f64, f64),
-    ) -> Result<(), SystemError> {
-        for _ in 0..PASSES {
-            for slave in 0..system.slaves.len() {
-                self.shift(slave, time, size);
-            }
-            for slave in 0..system.slaves.len() {
-                self.reals.gather(slave, time, size);
-                let (name, instance) = &mut system.slaves[slave];
-                self.reals
-                    .set_derivatives(slave, instance.as_mut())
-                    .map_err(|source| call(name, time, source))?;
-                self.read(system, slave, time)?;
-            }
-        }
-        Ok(())
     }
 
     /// Every connected Real output of the slave is a finite number.

@@ -152,21 +152,6 @@ impl Reals {
         }
     }
 
-    /// Tells `slave` the gathered derivatives of its inputs before its first step: derivatives of
-    /// outputs that depend directly on inputs are made of them.
-    pub(crate) fn set_derivatives(
-        &self,
-        slave: usize,
-        instance: &mut dyn Slave,
-    ) -> Result<(), CallError> {
-        let lane = &self.layout.lanes[slave];
-        if lane.derived_inputs.is_empty() {
-            return Ok(());
-        }
-        let derivatives = &self.input_derivatives[lane.input_derivative_range.clone()];
-        instance.set_input_derivatives(&lane.derived_inputs, &lane.input_orders, derivatives)
-    }
-
     /// The inputs of `slave` for a step from `time` over `size`.
     pub(crate) fn gather(&mut self, slave: usize, time: f64, size: f64) {
         let range = self.layout.lanes[slave].input_range.clone();

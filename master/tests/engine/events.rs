@@ -91,3 +91,26 @@ fn between_events_fixed_steps_stay_on_the_grid() {
     }
     assert_eq!(times.len(), 9);
 }
+
+/// The lag behind a jump to 1 at 0.5 s: `1 - exp(-(t - 0.5))`, whether 0.5 s is a point of the grid or not.
+/// A line through values before and after the jump would go on to 2.
+#[test]
+fn after_an_event_inputs_do_not_go_on_as_before() {
+    let step = |time: f64| if time > 0.5 - 1e-9 { 1.0 } else { 0.0 };
+    let next = |time: f64| if time > 0.5 - 1e-9 { f64::INFINITY } else { 0.5 };
+    for course in [Course::Hold, Course::Limited, Course::Linear, Course::Quadratic] {
+        for size in [0.1, 0.08] {
+            let (system, _) = system([step, next], whole);
+            let event = EventSource::NextTime(system.port("p.z").unwrap());
+            let algorithm =
+                Algorithm { events: vec![event], ..Algorithm::fixed(Sweep::Jacobi, course, size) };
+            let mut simulation = Simulation::new(system, &algorithm, &until(1.0)).unwrap();
+            times(&mut simulation);
+            let mut value = [0.0];
+            let lag = &mut simulation.system().slaves[1].1;
+            lag.get_real(&[crate::linear::OUTPUTS], &mut value).unwrap();
+            let expected = 1.0 - f64::exp(-0.5);
+            assert!((value[0] - expected).abs() < 1e-12, "{} {size}: {value:?}", course.name());
+        }
+    }
+}
