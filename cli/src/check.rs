@@ -1,25 +1,108 @@
-//! `aso-ftc check`: what in a model description breaks a rule.
+//! `aso-ftc check`: what an importer will stumble over.
 #![expect(clippy::print_stdout, reason = "the result of the command")]
 
-use std::path::PathBuf;
+mod archive;
+mod behaviour;
+mod binaries;
+mod description;
+mod finding;
+mod heard;
+#[cfg(test)]
+mod tests;
+mod values;
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
 
 use fmi2::package::Unpacked;
+use master::{Fmu, Slave};
+use serde::Serialize;
+
+use finding::{Finding, Severity};
 
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// The FMU
     fmu: PathBuf,
+    /// Print the findings as JSON
+    #[arg(long)]
+    json: bool,
+    /// Look at the files only, do not run the FMU
+    #[arg(long)]
+    no_run: bool,
+    /// Load a shared library first, its symbols visible to the FMU; may be repeated
+    #[arg(long, value_name = "LIBRARY")]
+    preload: Vec<OsString>,
 }
 
-/// Prints each broken rule; true where there is none.
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Report<'a> {
+    fmu: &'a Path,
+    errors: usize,
+    warnings: usize,
+    notes: usize,
+    findings: &'a [Finding],
+}
+
+/// Prints each finding; true where none is an error.
 pub(crate) fn check(options: &Options) -> anyhow::Result<bool> {
-    let unpacked = Unpacked::open(&options.fmu)?;
-    let problems = unpacked.description.problems();
-    for problem in &problems {
-        println!("{problem}");
+    let findings = findings(options)?;
+    let count = |severity| findings.iter().filter(|own| own.severity == severity).count();
+    let (errors, warnings) = (count(Severity::Error), count(Severity::Warning));
+    let notes = count(Severity::Note);
+    let fmu = &options.fmu;
+    if options.json {
+        let report = Report { fmu, errors, warnings, notes, findings: &findings };
+        println!("{}", serde_json::to_string_pretty(&report)?);
+        return Ok(errors == 0);
     }
-    if problems.is_empty() {
-        println!("{}: no rule is broken", options.fmu.display());
+    for finding in &findings {
+        println!("{finding}");
     }
-    Ok(problems.is_empty())
+    let name = fmu.display();
+    match (errors, warnings) {
+        (0, 0) => println!("{name}: no rule is broken"),
+        _ => println!("{name}: errors {errors}, warnings {warnings}, notes {notes}"),
+    }
+    Ok(errors == 0)
+}
+
+/// All findings, errors first.
+fn findings(options: &Options) -> anyhow::Result<Vec<Finding>> {
+    let unpacked = Unpacked::open_whole(&options.fmu)?;
+    let description = &unpacked.description;
+    let mut findings = archive::check(&options.fmu, unpacked.entries(), description)?;
+    findings.extend(description::check(description, &unpacked.warnings));
+    findings.extend(binaries::check(unpacked.folder(), unpacked.entries(), description));
+    if can_run(&unpacked) && !options.no_run {
+        findings.extend(run(options, &unpacked)?);
+    }
+    findings.sort_by_key(|finding| (finding.severity, finding.part));
+    Ok(findings)
+}
+
+/// Whether there is a library for this platform, and nothing else is needed.
+fn can_run(unpacked: &Unpacked) -> bool {
+    let simulation = unpacked.description.co_simulation.as_ref();
+    simulation.is_some_and(|own| {
+        !own.needs_execution_tool && unpacked.library(&own.model_identifier).is_ok()
+    })
+}
+
+fn run(options: &Options, unpacked: &Unpacked) -> anyhow::Result<Vec<Finding>> {
+    for library in &options.preload {
+        master::preload(library)?;
+    }
+    let mut fmu = None;
+    let mut make = |name: &str| -> anyhow::Result<Box<dyn Slave>> {
+        let opened = match fmu.take() {
+            Some(opened) => opened,
+            None => Fmu::open(unpacked.folder())?,
+        };
+        let instance = opened.instantiate(name);
+        fmu = Some(opened);
+        Ok(Box::new(instance?))
+    };
+    Ok(behaviour::check(&unpacked.description, &mut make))
 }

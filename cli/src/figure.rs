@@ -5,6 +5,7 @@
 
 pub(crate) mod axis;
 mod canvas;
+mod legend;
 pub(crate) mod trace;
 
 use std::io;
@@ -12,6 +13,7 @@ use std::path::{Path, PathBuf};
 
 use axis::Axis;
 use canvas::{Anchor, Canvas};
+use legend::Entry;
 
 pub(crate) use canvas::rasterise;
 
@@ -20,6 +22,7 @@ use crate::whole_file;
 /// Width of a figure in SVG units; the PNG has twice as many pixels.
 const WIDTH: f64 = 1000.0;
 
+/// Least room to the left of the frames: for the label of the axis and those of its ticks.
 const LEFT: f64 = 100.0;
 const RIGHT: f64 = 22.0;
 const TITLE_HEIGHT: f64 = 40.0;
@@ -60,6 +63,8 @@ pub(crate) struct Panel<'a> {
     pub(crate) series: Vec<Series<'a>>,
     /// Moments in time: vertical dashed lines with a text.
     pub(crate) marks: Vec<(f64, &'a str)>,
+    /// Height of the frame, where it is another than usual.
+    pub(crate) frame_height: Option<f64>,
     /// A magnitude that is claimed: thin lines at plus and minus it, named in the legend.
     pub(crate) limit: Option<(f64, &'a str)>,
 }
@@ -83,6 +88,9 @@ pub(crate) enum Ink {
     Sky,
     Vermilion,
     Green,
+    Orange,
+    Purple,
+    Black,
 }
 
 impl Ink {
@@ -92,6 +100,9 @@ impl Ink {
             Self::Sky => "#56b4e9",
             Self::Vermilion => "#d55e00",
             Self::Green => "#009e73",
+            Self::Orange => "#e69f00",
+            Self::Purple => "#cc79a7",
+            Self::Black => "#000000",
         }
     }
 }
@@ -142,40 +153,67 @@ impl Figure<'_> {
                 });
             }
         }
-        let height = TITLE_HEIGHT + self.panels.iter().map(Panel::height).sum::<f64>();
+        // One for all, so that equal times stand below each other.
+        let left = self.panels.iter().map(Panel::left).fold(LEFT, f64::max);
+        let heights: Vec<f64> = self.panels.iter().map(|panel| panel.height(left)).collect();
+        let height = TITLE_HEIGHT + heights.iter().sum::<f64>();
         let mut canvas = Canvas::new(WIDTH, height, self.title);
         canvas.text((WIDTH / 2.0, 30.0), Anchor::Middle, TITLE_SIZE, TEXT, self.title);
         let mut top = TITLE_HEIGHT;
-        for panel in &self.panels {
-            panel.draw(&mut canvas, top + LEGEND_HEIGHT);
-            top += panel.height();
+        for (panel, height) in self.panels.iter().zip(heights) {
+            panel.draw(&mut canvas, left, top);
+            top += height;
         }
         Ok(canvas.finish())
     }
 }
 
 impl Panel<'_> {
-    fn height(&self) -> f64 {
+    fn height(&self, left: f64) -> f64 {
         let label = if self.x_label.is_empty() { 0.0 } else { LABEL_HEIGHT };
-        LEGEND_HEIGHT + PLOT_HEIGHT + TICK_HEIGHT + label + GAP
+        self.legend_height(left) + self.frame_height() + TICK_HEIGHT + label + GAP
     }
 
-    fn draw(&self, canvas: &mut Canvas, top: f64) {
-        let (right, bottom) = (WIDTH - RIGHT, top + PLOT_HEIGHT);
+    fn frame_height(&self) -> f64 {
+        self.frame_height.unwrap_or(PLOT_HEIGHT)
+    }
+
+    fn legend_height(&self, left: f64) -> f64 {
+        LEGEND_HEIGHT + legend::height(&self.legend(&self.horizontal(left)), left)
+    }
+
+    /// Where the frame has to begin for the labels of the ticks to stay beside that of the axis.
+    fn left(&self) -> f64 {
+        let vertical = self.vertical(self.horizontal(LEFT).range(), (PLOT_HEIGHT, 0.0));
+        let width = |(_, label): (f64, String)| canvas::digits_width(&label, TEXT_SIZE);
+        36.0 + vertical.ticks().into_iter().map(width).fold(0.0, f64::max)
+    }
+
+    fn horizontal(&self, left: f64) -> Axis {
         let (start, end) = self.x_range.unwrap_or_else(|| self.times());
-        let horizontal = Axis::exact((start, end), (LEFT, right), 10);
-        let visible = self.values_between(horizontal.range());
+        Axis::exact((start, end), (left, WIDTH - RIGHT), 10)
+    }
+
+    fn vertical(&self, times: (f64, f64), pixels: (f64, f64)) -> Axis {
         let limit = self.limit.into_iter().flat_map(|(size, _)| [size, -size]);
-        let vertical = Axis::around(visible.clone().chain(limit), self.y_cap, (bottom, top), 7);
+        Axis::around(self.values_between(times).chain(limit), self.y_cap, pixels, 7)
+    }
+
+    fn draw(&self, canvas: &mut Canvas, left: f64, top: f64) {
+        let top = top + self.legend_height(left);
+        let (right, bottom) = (WIDTH - RIGHT, top + self.frame_height());
+        let horizontal = self.horizontal(left);
+        let visible = self.values_between(horizontal.range());
+        let vertical = self.vertical(horizontal.range(), (bottom, top));
 
         self.draw_grid(canvas, &horizontal, &vertical);
         if let Some((size, _)) = self.limit {
             for level in [size, -size] {
                 let y = vertical.place(level);
-                canvas.line((LEFT, y), (right, y), FRAME, "1.2", LIMIT_DASH);
+                canvas.line((left, y), (right, y), FRAME, "1.2", LIMIT_DASH);
             }
         }
-        let window = canvas.window((LEFT, top), (right, bottom));
+        let window = canvas.window((left, top), (right, bottom));
         for series in &self.series {
             let path = trace::path(series.time, series.values, &horizontal, &vertical);
             canvas.curve(window, &path, series.ink.code(), series.width());
@@ -184,11 +222,15 @@ impl Panel<'_> {
             let x = horizontal.place(*at);
             canvas.line((x, top), (x, bottom), TEXT, "1.5", MARK_DASH);
         }
-        canvas.frame((LEFT, top), (right, bottom), FRAME);
+        canvas.frame((left, top), (right, bottom), FRAME);
         let outside = visible.clone().any(|value| !vertical.contains(value));
-        self.draw_legend(canvas, top - 10.0, &horizontal, outside);
+        legend::draw(canvas, &self.legend(&horizontal), left, top - 10.0);
+        if outside {
+            let end = (right, top - 10.0);
+            canvas.text(end, Anchor::End, TEXT_SIZE, TEXT, "a curve leaves the frame");
+        }
         if visible.count() == 0 {
-            let middle = (f64::midpoint(LEFT, right), f64::midpoint(top, bottom) - 20.0);
+            let middle = (f64::midpoint(left, right), f64::midpoint(top, bottom) - 20.0);
             canvas.text(middle, Anchor::Middle, TEXT_SIZE, TEXT, "no finite data");
         }
     }
@@ -215,7 +257,9 @@ impl Panel<'_> {
         for (at, label) in horizontal.ticks() {
             let x = horizontal.place(at);
             canvas.line((x, top), (x, bottom), GRID, "1", "none");
-            canvas.text((x, bottom + 20.0), Anchor::Middle, TEXT_SIZE, TEXT, &label);
+            let inside = WIDTH - 0.5 * canvas::digits_width(&label, TEXT_SIZE);
+            let place = (x.min(inside), bottom + 20.0);
+            canvas.text(place, Anchor::Middle, TEXT_SIZE, TEXT, &label);
         }
         for (at, label) in vertical.ticks() {
             let y = vertical.place(at);
@@ -231,27 +275,16 @@ impl Panel<'_> {
         self.marks.iter().filter(|(at, _)| horizontal.contains(*at))
     }
 
-    fn draw_legend(&self, canvas: &mut Canvas, baseline: f64, horizontal: &Axis, outside: bool) {
-        let mut x = LEFT;
-        let mut entry = |colour: &str, width: &str, dash: &str, label: &str| {
-            let y = baseline - 5.5;
-            canvas.line((x, y), (x + 30.0, y), colour, width, dash);
-            canvas.text((x + 38.0, baseline), Anchor::Start, TEXT_SIZE, TEXT, label);
-            x += 38.0 + canvas::text_width(label, TEXT_SIZE) + 26.0;
-        };
-        for series in &self.series {
-            entry(series.ink.code(), series.width(), "none", series.label);
-        }
-        if let Some((_, label)) = self.limit {
-            entry(FRAME, "1.2", LIMIT_DASH, label);
-        }
-        for (_, label) in self.visible_marks(horizontal) {
-            entry(TEXT, "1.5", MARK_DASH, label);
-        }
-        if outside {
-            let end = (WIDTH - RIGHT, baseline);
-            canvas.text(end, Anchor::End, TEXT_SIZE, TEXT, "a curve leaves the frame");
-        }
+    fn legend(&self, horizontal: &Axis) -> Vec<Entry<'_>> {
+        let entry = |colour, width, dash, label| Entry { colour, width, dash, label };
+        let curves = self
+            .series
+            .iter()
+            .map(|series| entry(series.ink.code(), series.width(), "none", series.label));
+        let limit = self.limit.map(|(_, label)| entry(FRAME, "1.2", LIMIT_DASH, label));
+        let marks =
+            self.visible_marks(horizontal).map(|(_, label)| entry(TEXT, "1.5", MARK_DASH, label));
+        curves.chain(limit).chain(marks).collect()
     }
 }
 

@@ -11,12 +11,15 @@ mod figure;
 mod new;
 mod pack;
 mod paper_figures;
+#[cfg_attr(not(test), expect(dead_code, reason = "until the verb run has --plot"))]
+mod plot;
 mod recording;
 mod reproduce;
 mod run;
 mod scenario;
 mod summary;
 mod whole_file;
+mod worker;
 
 use std::process::ExitCode;
 
@@ -47,6 +50,9 @@ enum Verb {
 }
 
 fn main() -> ExitCode {
+    if let Some(status) = worker::worker() {
+        return status;
+    }
     let done = match Arguments::parse().verb {
         Verb::Reproduce(options) => reproduce::reproduce(&options),
         Verb::Pack(options) => pack::pack(&options),

@@ -125,9 +125,11 @@ pub(crate) fn describe(
 ) -> anyhow::Result<(String, ModelDescription)> {
     let xml = master::describe(file, resources)
         .with_context(|| format!("the library of {name} does not describe itself"))?;
-    let description = ModelDescription::parse(xml.as_bytes())
+    let (description, warnings) = ModelDescription::read(xml.as_bytes())
         .with_context(|| format!("the model description of {name}"))?;
-    let problems: Vec<String> = description.problems().iter().map(ToString::to_string).collect();
+    let problems = description.problems();
+    let warnings = warnings.iter().map(ToString::to_string);
+    let problems: Vec<String> = warnings.chain(problems.iter().map(ToString::to_string)).collect();
     if !problems.is_empty() {
         bail!("the variables of {name} break rules of FMI 2.0.5:\n{}", problems.join("\n"));
     }

@@ -10,10 +10,8 @@ mod rules;
 pub(crate) mod sample;
 
 pub(crate) use guid::Guid;
-#[doc(hidden)] // Public as `fmi2::xml::Element`.
-pub use parse::Element;
 pub(crate) use parse::read_xml;
-pub use parse::{ParseError, Position};
+pub use parse::{ParseError, Position, Warning};
 pub use rules::Problem;
 
 use serde::Serialize;
@@ -95,6 +93,9 @@ pub struct ModelExchange {
     pub can_serialize_fmu_state: bool,
     /// `providesDirectionalDerivative`.
     pub provides_directional_derivative: bool,
+    /// `SourceFiles`: names of files in `sources`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub source_files: Vec<String>,
 }
 
 /// `CoSimulation`: identifier and capability flags (section 4.3.1).
@@ -123,6 +124,9 @@ pub struct CoSimulation {
     pub can_serialize_fmu_state: bool,
     /// `providesDirectionalDerivative`.
     pub provides_directional_derivative: bool,
+    /// `SourceFiles`: names of files in `sources`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub source_files: Vec<String>,
 }
 
 /// `SimpleType` of `TypeDefinitions`.

@@ -1,5 +1,6 @@
 //! `.fmu` archives (FMI 2.0.5, section 2.3): writing one, and unpacking one to use it.
 
+mod archive;
 mod paths;
 mod read;
 mod write;

@@ -41,6 +41,8 @@ targets! {
     /// See `targets.rs`.
     model_description: targets::model_description;
     /// See `targets.rs`.
+    package: targets::package;
+    /// See `targets.rs`.
     call_sequence: targets::call_sequence;
     /// See `design.rs`.
     design_file: design::design_file;

@@ -1,7 +1,7 @@
 //! Error over the number of steps, for fixed steps and for every choice of the step.
 //!
 //! `cargo run --release -p master --example work_precision > docs/work_precision.csv`, then
-//! `python scripts/work_precision.py` draws docs/work_precision.svg.
+//! `python scripts/work_precision.py` draws the figure.
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a program for the table it prints")]
 
 #[allow(dead_code, reason = "shared: each user needs a part")]
@@ -19,6 +19,8 @@ use master::algorithm::PowerBond;
 use master::{Algorithm, Course, StepControl, Sweep};
 use network::{Network, Run};
 
+use StepControl::{Doubling, Embedded, Energy, Increment};
+
 /// The span of every run in s.
 const STOP: f64 = 5.0;
 
@@ -33,7 +35,6 @@ fn study(problem: &str, network: &Network, bonds: &[PowerBond]) {
         let step = STOP / 2.0_f64.powi(power);
         print(problem, StepControl::Fixed, step, &network.run(ABLE, &fixed(step), STOP).unwrap());
     }
-    use StepControl::{Doubling, Embedded, Energy, Increment};
     for control in [Doubling, Embedded, Increment, Energy] {
         // An increment of the tolerance is a whole step's; that of the others an error.
         let powers = if control == Increment { 2..=7 } else { 4..=14 };

@@ -153,6 +153,9 @@ pub struct Algorithm {
     pub bonds: Vec<PowerBond>,
     /// Threads that step slaves of one sweep side by side where that pays; 1: none.
     pub jobs: usize,
+    /// FMU states are kept before every step, so that one that an FMU does not finish (`fmi2Discard`)
+    /// is repeated by all, as far as that one came.
+    pub rollback: bool,
     /// Values on connections may be no numbers or infinite.
     pub allow_nan: bool,
 }
@@ -183,6 +186,7 @@ impl Algorithm {
             events: Vec::new(),
             bonds: Vec::new(),
             jobs: 1,
+            rollback: false,
             allow_nan: false,
         }
     }
@@ -201,7 +205,9 @@ impl Algorithm {
             (coupling, _) => Some(format!("the coupling {}", coupling.name())),
         };
         let crossing = self.events.iter().any(|event| matches!(event, EventSource::Crossing(_)));
-        if let Some(wanted) = repeats.or(crossing.then(|| "the location of crossings".to_owned())) {
+        let located = crossing.then(|| "the location of crossings".to_owned());
+        let kept = self.rollback.then(|| "steps with rollback".to_owned());
+        if let Some(wanted) = repeats.or(located).or(kept) {
             let lacks = "canGetAndSetFMUstate";
             require(system, lacks, &wanted, |flags| flags.can_get_and_set_fmu_state)?;
         }
@@ -234,6 +240,7 @@ impl Algorithm {
     pub(crate) fn repeats(&self) -> bool {
         let crossing = self.events.iter().any(|event| matches!(event, EventSource::Crossing(_)));
         crossing
+            || self.rollback
             || self.coupling != Coupling::Once
             || matches!(self.control, StepControl::Doubling | StepControl::Embedded)
     }

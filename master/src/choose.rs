@@ -61,6 +61,9 @@ pub struct Wanted {
     /// Threads; 0: as many as the machine has.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub jobs: Option<usize>,
+    /// Keep FMU states before every step, to repeat one that an FMU does not finish.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rollback: Option<bool>,
     /// Let values on connections be no numbers or infinite.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub allow_nan: Option<bool>,
@@ -117,6 +120,7 @@ pub fn choose(system: &System, wanted: &Wanted) -> Result<Chosen, SystemError> {
             Some(jobs) => jobs,
             None => 1,
         },
+        rollback: wanted.rollback.unwrap_or(false),
         allow_nan: wanted.allow_nan.unwrap_or(false),
     };
     algorithm.check(system)?;

@@ -3,7 +3,9 @@
 mod course;
 mod discrete;
 mod layout;
+mod pass;
 mod reals;
+mod repeat;
 mod start;
 mod tasks;
 mod trace;
@@ -55,7 +57,7 @@ impl Values {
 impl Exchange {
     pub(crate) fn new(system: &System, algorithm: &Algorithm) -> Self {
         let reals = Reals::new(system, algorithm);
-        let to_reals = reals.from_integers().iter().map(|(port, _)| *port);
+        let to_reals = reals.integer_sources().iter().map(|(port, _)| *port);
         let is_integer = |kind: &Kind| matches!(kind, Kind::Integer(_) | Kind::Enumeration(_));
         let integers = Channel::new(system, INTEGERS, is_integer, to_reals);
         let is_boolean = |kind: &Kind| matches!(kind, Kind::Boolean(_));
@@ -169,6 +171,11 @@ impl Exchange {
         Ok(done)
     }
 
+    /// Whether [`Exchange::pass`] does all that a sweep takes.
+    pub(crate) fn passes(&self) -> bool {
+        !self.discrete && self.reals.passes()
+    }
+
     fn set_discrete(&self, position: usize, slave: &mut dyn Slave) -> Result<(), CallError> {
         self.integers.set(position, slave)?;
         self.booleans.set(position, slave)?;
@@ -184,10 +191,9 @@ impl Exchange {
     }
 
     /// Integers that go to Reals.
-    #[expect(clippy::needless_range_loop, reason = "the list is borrowed anew each time")]
     fn take_over_integers(&mut self) {
-        for k in 0..self.reals.from_integers().len() {
-            let (port, output) = self.reals.from_integers()[k];
+        for k in 0..self.reals.integer_sources().len() {
+            let (port, output) = self.reals.integer_sources()[k];
             if let Some(&value) = self.integers.value(port) {
                 self.reals.outputs_mut()[output] = f64::from(value);
             }

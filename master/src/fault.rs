@@ -159,7 +159,14 @@ impl FaultLine {
     /// changes in jumps it is zero.
     #[must_use]
     pub fn apply_sample(&self, time: f64, sample: Sample) -> Sample {
-        self.stages.iter().fold(sample, |sample, stage| stage.apply(time, sample))
+        let [value, slope, _] = self.apply_course(time, [sample.value, sample.slope, 0.0]);
+        Sample { value, slope }
+    }
+
+    /// As [`FaultLine::apply_sample`], with the second derivative too: value, slope, curvature.
+    #[must_use]
+    pub fn apply_course(&self, time: f64, course: [f64; 3]) -> [f64; 3] {
+        self.stages.iter().fold(course, |course, stage| stage.apply(time, course))
     }
 
     /// As [`FaultLine::apply`], for Integers, rounded and within their range.
@@ -178,10 +185,13 @@ impl FaultLine {
     /// Takes note of the undisturbed `value` at the communication point `time`, in s, that the
     /// simulation has reached for good, the start included.
     pub fn commit(&mut self, time: f64, value: f64) {
-        let mut sample = Sample::held(value);
-        for stage in &mut self.stages {
-            stage.commit(time, sample.value);
-            sample = stage.apply(time, sample);
+        let mut course = [value, 0.0, 0.0];
+        let count = self.stages.len();
+        for (position, stage) in self.stages.iter_mut().enumerate() {
+            stage.commit(time, course[0]);
+            if position + 1 < count {
+                course = stage.apply(time, course);
+            }
         }
     }
 

@@ -2,7 +2,8 @@
 //!
 //! What that crate does not do well is kept away from it. [`Fmu::open`] goes first: its model
 //! description is the one in use, and it refuses archives that lead out of their folder and
-//! libraries that lack a function. Panics of the crate become errors.
+//! libraries that lack a function which no instance can do without. Panics of the crate become
+//! errors: it panics where another function is called that the library lacks.
 //!
 //! Two things stay as they are. The FMU's messages go to the crate `log` and are not in the
 //! errors. An FMU that logs with a null category, or with the status `fmi2Pending`, ends the

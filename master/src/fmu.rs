@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use fmi2::Experiment;
@@ -30,6 +31,18 @@ pub enum FmuError {
     NoCoSimulation {
         /// The FMU.
         path: PathBuf,
+    },
+    /// One instance is all that it can have in a process.
+    #[error(
+        "{instance}: {model} can be instantiated only once per process \
+         (canBeInstantiatedOnlyOncePerProcess), and it has been; with --isolate each instance gets \
+         a process of its own"
+    )]
+    OnlyOnce {
+        /// Name of the second instance.
+        instance: String,
+        /// `modelName`.
+        model: String,
     },
     /// There is no interface in it, or not the one wanted.
     #[error(
@@ -66,6 +79,8 @@ struct Content {
     /// For co-simulation; none where the FMU has model exchange only.
     library: Option<Arc<Library>>,
     unpacked: Unpacked,
+    /// Whether there has been an instance.
+    instantiated: AtomicBool,
 }
 
 impl Fmu {
@@ -92,6 +107,9 @@ impl Fmu {
     pub fn open_any(path: &Path) -> Result<Self, FmuError> {
         let unpacked =
             if path.is_dir() { Unpacked::in_folder(path)? } else { Unpacked::open(path)? };
+        for warning in &unpacked.warnings {
+            tracing::warn!("{}: {warning}", path.display());
+        }
         let description = &unpacked.description;
         if description.co_simulation.is_none() && description.model_exchange.is_none() {
             return Err(FmuError::NoInterface { path: path.to_owned() });
@@ -101,7 +119,9 @@ impl Fmu {
             open_library(description, &library, Interface::CoSimulation)
         });
         let library = library.transpose()?;
-        Ok(Self { content: Arc::new(Content { library, unpacked }) })
+        Ok(Self {
+            content: Arc::new(Content { library, unpacked, instantiated: AtomicBool::new(false) }),
+        })
     }
 
     /// The model description.
@@ -116,6 +136,13 @@ impl Fmu {
     ///
     /// [`LoadError::Instantiate`] with what the FMU said.
     pub fn instantiate(&self, name: &str) -> Result<Instance, FmuError> {
+        let description = self.description();
+        let once = description.co_simulation.as_ref();
+        let once = once.is_some_and(|flags| flags.can_be_instantiated_only_once_per_process);
+        if once && self.content.instantiated.swap(true, Ordering::Relaxed) {
+            let (instance, model) = (name.to_owned(), description.model_name.clone());
+            return Err(FmuError::OnlyOnce { instance, model });
+        }
         let component = self.component(Interface::CoSimulation, name)?;
         Ok(Instance { component, fmu: self.clone() })
     }
@@ -272,6 +299,16 @@ impl Slave for Instance {
 
     fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
         self.component.deserialize_state(bytes)
+    }
+
+    fn pass(
+        &mut self,
+        inputs: (&[u32], &[f64]),
+        span: (f64, f64),
+        never_back: bool,
+        outputs: (&[u32], &mut [f64]),
+    ) -> Result<Stepped, CallError> {
+        self.component.pass(inputs, span, never_back, outputs)
     }
 
     fn in_thread(&mut self) -> Option<&mut (dyn Slave + Send)> {

@@ -14,12 +14,14 @@ pub mod fault;
 #[cfg(feature = "fmi")]
 pub mod fmi_crate;
 mod fmu;
+pub mod isolate;
 mod library;
 pub mod linearise;
 mod nearest;
 mod order;
 mod probe;
 mod readout;
+pub mod results;
 pub mod scenario;
 pub mod signal;
 mod simulation;

@@ -11,6 +11,7 @@ mod step;
 use std::ffi::{CStr, CString, OsStr, c_char, c_int, c_void};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use fmi2::abi::{
@@ -121,6 +122,8 @@ pub enum Interface {
 pub(crate) struct Library {
     functions: Functions,
     path: PathBuf,
+    /// An instance returned `fmi2Fatal`: no function of any may be called again (section 2.1.3).
+    corrupted: AtomicBool,
     _handle: Handle,
 }
 
@@ -139,7 +142,8 @@ impl Library {
             return Err(LoadError::Version { path: path.to_owned(), found });
         }
         functions.demand(interface, path)?;
-        Ok(Self { functions, path: path.to_owned(), _handle: handle })
+        let corrupted = AtomicBool::new(false);
+        Ok(Self { functions, path: path.to_owned(), corrupted, _handle: handle })
     }
 
     /// `fmi2Instantiate` for `interface`.
@@ -177,25 +181,31 @@ impl Library {
             )
         });
         let component = Component {
+            hot: Hot {
+                pointer,
+                set_real: self.functions.set_real,
+                do_step: self.functions.do_step,
+                get_real: self.functions.get_real,
+                sink: sink.clone(),
+            },
             pointer,
             functions: self.functions,
             sink,
             saved: Vec::new(),
             time_limit: None,
-            _callbacks: callbacks,
-            _library: self.clone(),
+            abandoned: false,
+            callbacks,
+            library: self.clone(),
         };
-        if pointer.is_null() {
-            let messages = component.sink.take();
-            let reason = if messages.is_empty() {
-                "it gave no reason".to_owned()
-            } else {
-                messages.join("; ")
-            };
-            let (path, instance) = (self.path.clone(), name.to_owned());
-            return Err(LoadError::Instantiate { path, instance, reason });
-        }
-        Ok(component)
+        if pointer.is_null() { Err(self.not_instantiated(name, &component)) } else { Ok(component) }
+    }
+
+    /// The error of an instance that the FMU did not make.
+    fn not_instantiated(&self, name: &str, component: &Component) -> LoadError {
+        let messages = component.sink.take();
+        let reason =
+            if messages.is_empty() { "it gave no reason".to_owned() } else { messages.join("; ") };
+        LoadError::Instantiate { path: self.path.clone(), instance: name.to_owned(), reason }
     }
 }
 
@@ -204,8 +214,20 @@ unsafe extern "C" {
     fn free(pointer: *mut c_void);
 }
 
+/// What a step takes, in one line of the processor's cache.
+#[repr(C, align(64))]
+struct Hot {
+    pointer: fmi2Component,
+    set_real: Option<functions::SetReal>,
+    do_step: Option<functions::DoStep>,
+    get_real: Option<functions::GetReal>,
+    sink: Arc<Sink>,
+}
+
 /// An instance, freed with its last use; the library stays loaded as long.
 pub(crate) struct Component {
+    /// What [`Component::pass`] needs.
+    hot: Hot,
     pointer: fmi2Component,
     /// Those of the library, at hand.
     functions: Functions,
@@ -215,8 +237,10 @@ pub(crate) struct Component {
     saved: Vec<fmi2FMUstate>,
     /// How long an answer of `fmi2Pending` is waited for; none: as long as it takes.
     pub(crate) time_limit: Option<Duration>,
-    _callbacks: Arc<fmi2CallbackFunctions>,
-    _library: Arc<Library>,
+    /// It is still busy with a step that could not be canceled, and may not be freed.
+    abandoned: bool,
+    callbacks: Arc<fmi2CallbackFunctions>,
+    library: Arc<Library>,
 }
 
 // SAFETY: an instance may be used from any thread, by one at a time (FMI 2.0.5, section 2.1); the
@@ -226,6 +250,11 @@ unsafe impl Send for Component {}
 impl Drop for Component {
     fn drop(&mut self) {
         if self.pointer.is_null() {
+            return;
+        }
+        if self.abandoned || self.library.corrupted.load(Ordering::Relaxed) {
+            // Whatever it may still use stays: library, callbacks and the receiver of messages.
+            std::mem::forget((self.library.clone(), self.callbacks.clone(), self.sink.clone()));
             return;
         }
         for mut state in std::mem::take(&mut self.saved) {
@@ -243,6 +272,9 @@ impl Component {
     fn check(&self, function: &'static str, status: fmi2Status) -> Result<(), CallError> {
         if status == Status::OK as fmi2Status || status == Status::Warning as fmi2Status {
             return Ok(());
+        }
+        if status == Status::Fatal as fmi2Status {
+            self.library.corrupted.store(true, Ordering::Relaxed);
         }
         let failure =
             Status::from_c(status).map_or(Failure::UnknownStatus(status), Failure::Status);

@@ -5,19 +5,25 @@ use fmi2::description::ModelDescription;
 /// Most edits between two names that are near each other.
 const EDITS: usize = 2;
 
-/// Up to five variables that contain `name`, are contained in it or differ by two letters, as part
-/// of a sentence; case does not count.
+/// Up to five variables that are near `name`, as part of a sentence.
 pub(crate) fn nearest(description: &ModelDescription, name: &str) -> String {
+    let names = description.variables.iter().map(|known| known.name.as_str());
+    let similar = among(names, name);
+    if similar.is_empty() { String::new() } else { format!(", it has {}", similar.join(", ")) }
+}
+
+/// Up to five of `names` that contain `name`, are contained in it or differ by two letters; case
+/// does not count.
+pub(crate) fn among<'a>(names: impl Iterator<Item = &'a str>, name: &str) -> Vec<&'a str> {
     let wanted = name.to_lowercase();
     let near = |known: &&str| {
         let known = known.to_lowercase();
         known.contains(&wanted) || wanted.contains(&known) || distance(&known, &wanted) <= EDITS
     };
-    let names = description.variables.iter().map(|known| known.name.as_str());
     let mut similar: Vec<_> = names.filter(near).collect();
     similar.sort_by_key(|known| distance(&known.to_lowercase(), &wanted));
     similar.truncate(5);
-    if similar.is_empty() { String::new() } else { format!(", it has {}", similar.join(", ")) }
+    similar
 }
 
 /// Letters to insert, delete or replace between two texts (Levenshtein 1966).

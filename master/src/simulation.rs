@@ -17,6 +17,7 @@ use crate::error::SystemError;
 use crate::exchange::{Exchange, call};
 use crate::order::{Order, by_direct_dependencies};
 use crate::scenario::{Drives, Prepared};
+use crate::slave::{CallError, Failure};
 use crate::system::System;
 use adaptive::Repetition;
 use control::Control;
@@ -48,6 +49,8 @@ pub struct Simulation {
     /// makes now, 0 for none.
     multiples: Vec<u32>,
     sizes: Vec<f64>,
+    /// Whether a sweep is one pass over the slaves.
+    passes: bool,
     /// The slave that asked for the end of the simulation.
     ended: Option<usize>,
 }
@@ -99,6 +102,7 @@ impl Simulation {
         let control = Control::new(&system, &exchange.reals, algorithm)?;
         let coupled = Coupled::new(&system, &exchange.reals, algorithm, control.scale.clone());
         Ok(Self {
+            passes: algorithm.jobs <= 1 && exchange.passes(),
             system,
             exchange,
             drives: scenario.drives,
@@ -232,8 +236,11 @@ impl Simulation {
         let time = self.grid.time;
         let mut first = Ok(());
         for (name, slave) in &mut self.system.slaves {
-            let done = slave.terminate().map_err(|source| call(name, time, source));
-            first = first.and(done);
+            match slave.terminate() {
+                // There is nothing to end.
+                Ok(()) | Err(CallError { failure: Failure::Absent, .. }) => {}
+                Err(source) => first = first.and(Err(call(name, time, source))),
+            }
         }
         first
     }

@@ -162,6 +162,33 @@ pub trait Slave {
         Ok(done)
     }
 
+    /// [`Slave::advance`] without derivatives, in the shape that costs least: the values of the
+    /// inputs with these references are set, the span (time and size in s) is stepped over, the
+    /// outputs with these references are read.
+    fn pass(
+        &mut self,
+        inputs: (&[u32], &[f64]),
+        (time, size): (f64, f64),
+        never_back: bool,
+        outputs: (&[u32], &mut [f64]),
+    ) -> Result<Stepped, CallError> {
+        self.advance(&mut Advance {
+            inputs: inputs.0,
+            input_values: inputs.1,
+            derived_inputs: &[],
+            input_orders: &[],
+            input_derivatives: &[],
+            time,
+            size,
+            never_back,
+            outputs: outputs.0,
+            output_values: outputs.1,
+            derived_outputs: &[],
+            output_orders: &[],
+            output_derivatives: &mut [],
+        })
+    }
+
     /// The same slave for another thread to step; none where it is bound to its thread.
     fn in_thread(&mut self) -> Option<&mut (dyn Slave + Send)> {
         None

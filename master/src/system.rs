@@ -42,6 +42,8 @@ pub struct System {
     pub slaves: Vec<(String, Box<dyn Slave>)>,
     /// The connections.
     pub connections: Vec<Connection>,
+    /// Connections to parameters, of use in initialization mode only.
+    pub(crate) initial: Vec<Connection>,
     /// Variables of each slave by name.
     variables: Vec<HashMap<String, usize>>,
     /// Slaves by name.

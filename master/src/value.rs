@@ -54,11 +54,9 @@ fn enumeration(kind: &IntegerType, types: &[SimpleType], text: &str) -> Result<V
     }
     let declared = types.iter().find(|known| Some(&known.name) == kind.declared_type.as_ref());
     let items = declared.map(|declared| declared.items.as_slice()).unwrap_or_default();
-    match items.iter().find(|(name, _)| name == text) {
-        Some((_, number)) => Ok(Value::Integer(*number)),
-        None => {
-            let names: Vec<_> = items.iter().map(|(name, _)| name.as_str()).collect();
-            Err(format!("an integer or one of the items {}", names.join(", ")))
-        }
+    if let Some((_, number)) = items.iter().find(|(name, _)| name == text) {
+        return Ok(Value::Integer(*number));
     }
+    let names: Vec<_> = items.iter().map(|(name, _)| name.as_str()).collect();
+    Err(format!("an integer or one of the items {}", names.join(", ")))
 }

@@ -1,6 +1,12 @@
 //! What the tests share: the packed FMUs, the command, the coupled system.
 #![forbid(unsafe_code)]
 
+pub mod c_fmu;
+pub mod coupled;
+mod troubles;
+
+pub use troubles::{Trouble, troubles};
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;

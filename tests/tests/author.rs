@@ -73,7 +73,7 @@ fn a_new_crate_is_packed_to_the_same_bytes_in_any_folder_and_with_the_files_of_i
         fs::read(folder.path().join("HeatPump.fmu")).unwrap()
     });
     assert!(one == other);
-    let fmu = Unpacked::open(&folders[0].path().join("HeatPump.fmu")).unwrap();
+    let fmu = Unpacked::open_whole(&folders[0].path().join("HeatPump.fmu")).unwrap();
     let library = fs::read(fmu.library("HeatPump").unwrap()).unwrap();
     let home = std::env::var("HOME").unwrap_or_default();
     for path in [folders[0].path(), &root(), Path::new(&home)] {
@@ -104,7 +104,7 @@ fn packs_the_files_of_the_author(place: &Path) {
     fs::write(own.join("model.png"), picture).unwrap();
     let output = run_in(&own, &["pack", "."]);
     assert!(output.status.success(), "{}", message(&output));
-    let fmu = Unpacked::open(&own.join("dist/HeatPump.fmu")).unwrap();
+    let fmu = Unpacked::open_whole(&own.join("dist/HeatPump.fmu")).unwrap();
     for path in files {
         assert_eq!(fs::read_to_string(fmu.folder().join(path)).unwrap(), path);
     }

@@ -95,7 +95,7 @@ fn what_the_crate_fmi_lacks_is_neither_promised_nor_silently_left_out() {
     assert_eq!(error.failure, Failure::Absent);
 }
 
-/// The functions that our own loader demands and that return a status.
+/// Functions that return a status, of those that a slave through the crate calls.
 const STATUS_FUNCTIONS: [&str; 14] = [
     "fmi2SetupExperiment",
     "fmi2EnterInitializationMode",
@@ -152,15 +152,33 @@ fn a_pending_step_is_an_error_although_the_crate_fmi_panics_at_it() {
 }
 
 #[test]
-fn a_missing_function_is_an_error_before_the_crate_fmi_calls_it() {
+fn a_function_that_no_instance_can_do_without_is_missed_before_the_crate_fmi_sees_the_library() {
+    for missing in ["fmi2SetupExperiment", "fmi2ExitInitializationMode", "fmi2DoStep"] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut functions = STATUS_FUNCTIONS.to_vec();
+        functions.retain(|function| *function != missing);
+        let path = stub(folder.path(), &functions, 0);
+        let refused = FmiSlave::open(&path, "stub").err();
+        let Some(FmiCrateError::Fmu(FmuError::Load(LoadError::Missing { function, .. }))) = refused
+        else {
+            panic!("{refused:?}");
+        };
+        assert_eq!(function, missing);
+    }
+}
+
+#[test]
+fn another_missing_function_is_an_error_where_it_is_called_although_the_crate_fmi_panics_at_it() {
     let folder = tempfile::tempdir().unwrap();
     let mut functions = STATUS_FUNCTIONS.to_vec();
-    functions.retain(|function| *function != "fmi2Terminate");
+    functions.retain(|function| !["fmi2GetReal", "fmi2Terminate"].contains(function));
     let path = stub(folder.path(), &functions, 0);
-    let refused = FmiSlave::open(&path, "stub").err();
-    let Some(FmiCrateError::Fmu(FmuError::Load(LoadError::Missing { function, .. }))) = refused
-    else {
-        panic!("{refused:?}");
-    };
-    assert_eq!(function, "fmi2Terminate");
+    let mut slave = FmiSlave::open(&path, "stub").unwrap();
+    slave.setup_experiment(&Experiment::default()).unwrap();
+    slave.enter_initialization_mode().unwrap();
+    slave.exit_initialization_mode().unwrap();
+    let errors = [slave.get_real(&[1], &mut [0.0]), slave.terminate()].map(Result::unwrap_err);
+    assert_eq!(errors.each_ref().map(|error| error.function), ["fmi2GetReal", "fmi2Terminate"]);
+    assert!(errors.iter().all(|error| matches!(error.failure, Failure::Panicked(_))), "{errors:?}");
+    slave.do_step(0.0, 1.0, true).unwrap();
 }

@@ -13,7 +13,7 @@ use tests::{dist, root, run};
 const MODELS: [&str; 2] = ["FrictionPendulum", "AsoController"];
 
 fn unpacked(model: &str) -> Unpacked {
-    Unpacked::open(&dist().join(format!("{model}.fmu"))).unwrap()
+    Unpacked::open_whole(&dist().join(format!("{model}.fmu"))).unwrap()
 }
 
 #[test]

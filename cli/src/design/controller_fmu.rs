@@ -27,7 +27,7 @@ pub(crate) struct ControllerFmu {
 impl ControllerFmu {
     /// Puts `content` into the FMU `base` and lets its library describe itself.
     pub(crate) fn new(base: &Path, content: &Content<'_>) -> anyhow::Result<Self> {
-        let unpacked = Unpacked::open(base)
+        let unpacked = Unpacked::open_whole(base)
             .with_context(|| format!("cannot open {}, the packed controller", base.display()))?;
         let design = unpacked.resources().join("design.toml");
         if !design.is_file() {

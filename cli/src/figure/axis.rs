@@ -191,7 +191,9 @@ fn label(value: f64, step: f64, largest: f64) -> String {
         return "0".to_owned();
     }
     let text = if largest >= 1e6 || step < 1e-4 {
-        format!("{value:.1e}")
+        let digits = value.abs().log10().floor() - step.log10().floor();
+        let digits = (1_u8..12).find(|count| f64::from(*count) >= digits).unwrap_or(12);
+        format!("{value:.*e}", usize::from(digits))
     } else {
         let decimals = (0_u8..6).find(|decimals| {
             let scaled = step * 10_f64.powi(i32::from(*decimals));
@@ -217,6 +219,7 @@ mod tests {
             (3.0, 3.0),
             (0.0, 0.0),
             (1e5, 1e5 + 1.0),
+            (-1e7, -1e7 + 3.0),
             (f64::NAN, 1.0),
         ] {
             let axis = Axis::exact((low, high), (0.0, 100.0), 5);

@@ -130,6 +130,11 @@ pub(super) fn text_width(text: &str, size: f64) -> f64 {
     text.chars().map(|_| 0.58 * size).sum()
 }
 
+/// Width of a number in the font that is linked in, whose digits are broader than its letters.
+pub(super) fn digits_width(text: &str, size: f64) -> f64 {
+    text.chars().map(|_| 0.64 * size).sum()
+}
+
 /// Text as XML content; characters that XML cannot hold become spaces.
 fn escape(text: &str) -> String {
     text.chars()

@@ -67,6 +67,37 @@ fn value_labels_stay_on_the_page_and_do_not_touch() {
 }
 
 #[test]
+fn long_numbers_along_the_axes_stay_on_the_page_beside_the_label_of_the_axis() {
+    let time = [99_999.0, 100_000.0];
+    let values = [123_456.0, 123_458.5];
+    let mut figure = example(&time, &values);
+    figure.panels[0].limit = None;
+    figure.panels[0].marks.clear();
+    let svg = figure.svg().unwrap();
+    let document = Document::parse(&svg).unwrap();
+    let number = |node: &resvg::usvg::roxmltree::Node<'_, '_>, name: &str| -> f64 {
+        node.attribute(name).unwrap().parse().unwrap()
+    };
+    let texts = document.descendants().filter(|node| node.has_tag_name("text"));
+    let mut long = 0;
+    for text in texts.filter(|node| node.attribute("transform").is_none()) {
+        // Digits of the font are 0.636 em wide (DejaVu Sans).
+        let letters = f64::from(u8::try_from(text.text().unwrap().chars().count()).unwrap());
+        let width = 0.636 * TEXT_SIZE * letters;
+        let x = number(&text, "x");
+        match text.attribute("text-anchor") {
+            Some("end") => assert!(x - width > 26.0, "{text:?} meets the label of the axis"),
+            Some("middle") if letters > 4.0 && text.text().unwrap().starts_with(['9', '1']) => {
+                assert!(x + 0.5 * width <= WIDTH, "{text:?}");
+            }
+            _ => continue,
+        }
+        long += usize::from(letters > 7.0);
+    }
+    assert!(long > 3, "the numbers are long");
+}
+
+#[test]
 fn the_files_are_an_svg_and_a_png_of_2000_pixels_the_same_bytes_twice() {
     let folder = tempfile::tempdir().unwrap();
     let mut figure = example(&TIME, &VALUES);

@@ -2,21 +2,27 @@
 
 mod attributes;
 mod encoding;
+mod schema;
+mod structure;
 mod variables;
+mod warning;
 mod xml;
 
 use std::fmt;
 
-use super::{
-    CoSimulation, DefaultExperiment, LogCategory, ModelDescription, ModelExchange, ModelStructure,
-    Unknown,
-};
+use super::{CoSimulation, DefaultExperiment, LogCategory, ModelDescription, ModelExchange};
 use crate::unit::{BaseUnit, DisplayUnit, Unit};
-pub use xml::Element;
+use attributes::{Node, WHITE_SPACE};
+pub use warning::Warning;
+use warning::Warnings;
 
 /// The root element of an XML file, with the bounds of a model description.
-pub(crate) fn read_xml(bytes: &[u8]) -> Result<Element, ParseError> {
-    xml::read(&encoding::decode(bytes)?)
+pub(crate) fn read_xml(bytes: &[u8]) -> Result<crate::xml::Element, ParseError> {
+    if bytes.len() > ModelDescription::MOST_BYTES {
+        return Err(ParseError::Length { limit: ModelDescription::MOST_BYTES });
+    }
+    let (text, _) = encoding::decode(bytes)?;
+    Ok(xml::read(&text)?.into_owned())
 }
 
 /// A place in an XML file; both numbers count from 1, columns in characters.
@@ -28,6 +34,10 @@ pub struct Position {
     pub column: u32,
 }
 
+impl Position {
+    const START: Position = Position { line: 1, column: 1 };
+}
+
 impl fmt::Display for Position {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(formatter, "line {}, column {}", self.line, self.column)
@@ -37,11 +47,17 @@ impl fmt::Display for Position {
 /// Why a text is not the model description of an FMI 2.0 FMU.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ParseError {
-    /// Not the XML that the reader can decode.
-    #[error("expected XML in UTF-8 or ISO-8859-1, found {found}")]
+    /// Not text that the reader can decode.
+    #[error("expected XML in UTF-8, or in the encoding that it declares, found {found}")]
     Encoding {
         /// The encoding, or the place of the first wrong byte.
         found: String,
+    },
+    /// A file that is too long to be read.
+    #[error("expected at most {limit} bytes, found more")]
+    Length {
+        /// How many are accepted.
+        limit: usize,
     },
     /// Not well-formed.
     #[error("{at}: expected well-formed XML, found: {found}")]
@@ -104,21 +120,14 @@ pub enum ParseError {
 }
 
 impl ModelDescription {
-    /// Reads `modelDescription.xml` of FMI 2.0.
-    ///
-    /// Defaults of the standard are filled in: `causality` local, `variability` continuous, and
-    /// for a variable with `declaredType` the attributes of that type which it does not state
-    /// itself. Unknown elements and attributes, annotations and source files are skipped. What
-    /// would mislead an importer is an error: missing required attributes, malformed or infinite
-    /// numbers, unknown enumeration values, unknown or mismatching declared types, duplicate
-    /// variable names, indices that are no variable's. Rules that a simulation can do without are
-    /// left to [`ModelDescription::problems`].
-    ///
-    /// A byte order mark is accepted, and so is ISO-8859-1 where the file declares it.
+    /// Most bytes of a file that is read.
+    pub const MOST_BYTES: usize = 128 << 20;
+
+    /// Reads `modelDescription.xml` of FMI 2.0 as [`ModelDescription::read`] does, without warnings.
     ///
     /// # Errors
     ///
-    /// [`ParseError`] with line and column, what is expected and what was found.
+    /// Those of [`ModelDescription::read`].
     ///
     /// ```
     /// use fmi2::description::ModelDescription;
@@ -129,104 +138,167 @@ impl ModelDescription {
     /// );
     /// ```
     pub fn parse(xml: impl AsRef<[u8]>) -> Result<ModelDescription, ParseError> {
-        let root = read_xml(xml.as_ref())?;
-        if root.name != "fmiModelDescription" {
-            let found = format!("<{}>", root.name);
-            return Err(root.misses("the root element fmiModelDescription", found));
+        Self::read(xml).map(|(description, _)| description)
+    }
+
+    /// Reads `modelDescription.xml` of FMI 2.0, and says what in it the standard does not allow.
+    ///
+    /// Defaults of the standard are filled in: `causality` local, `variability` continuous, and
+    /// for a variable with `declaredType` the attributes of that type which it does not state
+    /// itself. Annotations are skipped.
+    ///
+    /// What breaks the standard but leaves no doubt about a simulation, and what other importers
+    /// accept, is read with a [`Warning`] that says what was assumed: other encodings, `fmiVersion`
+    /// 2.0.x, unknown elements and attributes, wrong order, words in another case, unknown words,
+    /// flags, types and dependencies, numbers that are infinite or empty. What would mislead is an
+    /// error: missing required attributes, malformed numbers and such as are too large, value
+    /// references that two inputs or parameters share, names of two outputs, types that refer to types.
+    /// Rules that concern what was read are those of [`ModelDescription::problems`].
+    ///
+    /// Read are at most 128 MiB, 3,000,000 elements, 12,000,000 attributes, 1,000,000 variables;
+    /// cost: linear in the length of the file. At most 1000 warnings are kept.
+    ///
+    /// # Errors
+    ///
+    /// [`ParseError`] with line and column, what is expected and what was found.
+    pub fn read(xml: impl AsRef<[u8]>) -> Result<(ModelDescription, Vec<Warning>), ParseError> {
+        let bytes = xml.as_ref();
+        if bytes.len() > Self::MOST_BYTES {
+            return Err(ParseError::Length { limit: Self::MOST_BYTES });
         }
-        let version = root.required("fmiVersion")?;
-        if version != "2.0" {
-            return Err(ParseError::Version { at: root.at, found: version.to_owned() });
+        let (text, not_utf8) = encoding::decode(bytes)?;
+        let element = xml::read(&text)?;
+        let warnings = Warnings::default();
+        let description = root(Node { element: &element, warnings: &warnings })?;
+        let mut warnings = warnings.finish();
+        warnings.splice(0..0, not_utf8);
+        Ok((description, warnings))
+    }
+}
+
+fn root(root: Node<'_>) -> Result<ModelDescription, ParseError> {
+    if root.element.name != "fmiModelDescription" {
+        let found = format!("<{}>", root.element.name);
+        return Err(root.misses("the root element fmiModelDescription", found));
+    }
+    version(root)?;
+    schema::check(root, "");
+    let types = variables::types(root)?;
+    let variables = variables::variables(root.child("ModelVariables")?, &types)?;
+    let structure = structure::read(root, &variables)?;
+    let model_exchange = root.optional_child("ModelExchange")?.map(model_exchange).transpose()?;
+    let co_simulation = root.optional_child("CoSimulation")?.map(co_simulation).transpose()?;
+    let model_name = root.text("modelName").unwrap_or_else(|| {
+        let own = co_simulation.as_ref().map(|own| &own.model_identifier);
+        let own = own.or(model_exchange.as_ref().map(|own| &own.model_identifier));
+        let own = own.cloned().unwrap_or_default();
+        let said = ("a value", "no such attribute".to_owned());
+        root.warn_of(true, root.place("modelName"), said, &format!("read as {own:?}"));
+        own
+    });
+    Ok(ModelDescription {
+        fmi_version: "2.0".to_owned(),
+        model_name,
+        guid: root.required("guid")?.to_owned(),
+        description: root.text("description"),
+        author: root.text("author"),
+        version: root.text("version"),
+        copyright: root.text("copyright"),
+        license: root.text("license"),
+        generation_tool: root.text("generationTool"),
+        generation_date_and_time: root.text("generationDateAndTime"),
+        structured_names: structured_names(root),
+        number_of_event_indicators: root.optional_unsigned("numberOfEventIndicators"),
+        model_exchange,
+        co_simulation,
+        units: root.list("UnitDefinitions", "Unit", unit)?,
+        types,
+        log_categories: root.list("LogCategories", "Category", category)?,
+        default_experiment: root
+            .optional_child("DefaultExperiment")?
+            .map(experiment)
+            .transpose()?,
+        variables,
+        structure,
+    })
+}
+
+/// `fmiVersion` is 2.0; 2.0.1 to 2.0.5, which are versions of the text, are meant as that.
+fn version(root: Node<'_>) -> Result<(), ParseError> {
+    let found = root.required("fmiVersion")?;
+    if found == "2.0" {
+        return Ok(());
+    }
+    let patch = found.trim_matches(WHITE_SPACE).strip_prefix("2.0");
+    let patch = patch.map(|rest| rest.strip_prefix('.').unwrap_or(rest));
+    if patch.is_none_or(|patch| patch.len() > 3 || !patch.bytes().all(|own| own.is_ascii_digit())) {
+        return Err(ParseError::Version { at: root.element.at, found: found.to_owned() });
+    }
+    root.warn("fmiVersion", "2.0 for every 2.0.x", found, "read as 2.0");
+    Ok(())
+}
+
+fn structured_names(root: Node<'_>) -> bool {
+    const NAME: &str = "variableNamingConvention";
+    match root.attribute(NAME) {
+        None | Some("flat") => false,
+        Some("structured") => true,
+        Some(other) => {
+            root.warn(NAME, "flat or structured", other, "read as flat");
+            false
         }
-        let variables = root.child("ModelVariables")?;
-        let structure = root.child("ModelStructure")?;
-        let types = variables::types(&root)?;
-        let variables = variables::variables(variables, &types)?;
-        let structure = model_structure(structure, variables.len())?;
-        Ok(ModelDescription {
-            fmi_version: version.to_owned(),
-            model_name: root.required("modelName")?.to_owned(),
-            guid: root.required("guid")?.to_owned(),
-            description: root.text("description"),
-            author: root.text("author"),
-            version: root.text("version"),
-            copyright: root.text("copyright"),
-            license: root.text("license"),
-            generation_tool: root.text("generationTool"),
-            generation_date_and_time: root.text("generationDateAndTime"),
-            structured_names: structured_names(&root)?,
-            number_of_event_indicators: root.unsigned("numberOfEventIndicators")?,
-            model_exchange: root
-                .optional_child("ModelExchange")?
-                .map(model_exchange)
-                .transpose()?,
-            co_simulation: root.optional_child("CoSimulation")?.map(co_simulation).transpose()?,
-            units: root.list("UnitDefinitions", "Unit", unit)?,
-            types,
-            log_categories: root.list("LogCategories", "Category", category)?,
-            default_experiment: root
-                .optional_child("DefaultExperiment")?
-                .map(experiment)
-                .transpose()?,
-            variables,
-            structure,
-        })
     }
 }
 
-impl Element {
-    fn identifier(&self) -> Result<String, ParseError> {
-        Ok(self.required("modelIdentifier")?.to_owned())
-    }
+fn identifier(element: Node<'_>) -> Result<String, ParseError> {
+    Ok(element.required("modelIdentifier")?.to_owned())
 }
 
-fn structured_names(root: &Element) -> Result<bool, ParseError> {
-    match root.attribute("variableNamingConvention") {
-        None | Some("flat") => Ok(false),
-        Some("structured") => Ok(true),
-        Some(other) => Err(root.wrong("variableNamingConvention", "flat or structured", other)),
-    }
+fn source_files(element: Node<'_>) -> Result<Vec<String>, ParseError> {
+    element.list("SourceFiles", "File", |file| Ok(file.required("name")?.to_owned()))
 }
 
-fn model_exchange(element: &Element) -> Result<ModelExchange, ParseError> {
-    let flag = |name| Ok(element.boolean(name)?.unwrap_or(false));
+fn model_exchange(element: Node<'_>) -> Result<ModelExchange, ParseError> {
+    let flag = |name| element.flag(name);
     Ok(ModelExchange {
-        model_identifier: element.identifier()?,
-        needs_execution_tool: flag("needsExecutionTool")?,
-        completed_integrator_step_not_needed: flag("completedIntegratorStepNotNeeded")?,
-        can_be_instantiated_only_once_per_process: flag("canBeInstantiatedOnlyOncePerProcess")?,
-        can_not_use_memory_management_functions: flag("canNotUseMemoryManagementFunctions")?,
-        can_get_and_set_fmu_state: flag("canGetAndSetFMUstate")?,
-        can_serialize_fmu_state: flag("canSerializeFMUstate")?,
-        provides_directional_derivative: flag("providesDirectionalDerivative")?,
+        model_identifier: identifier(element)?,
+        needs_execution_tool: flag("needsExecutionTool"),
+        completed_integrator_step_not_needed: flag("completedIntegratorStepNotNeeded"),
+        can_be_instantiated_only_once_per_process: flag("canBeInstantiatedOnlyOncePerProcess"),
+        can_not_use_memory_management_functions: flag("canNotUseMemoryManagementFunctions"),
+        can_get_and_set_fmu_state: flag("canGetAndSetFMUstate"),
+        can_serialize_fmu_state: flag("canSerializeFMUstate"),
+        provides_directional_derivative: flag("providesDirectionalDerivative"),
+        source_files: source_files(element)?,
     })
 }
 
-fn co_simulation(element: &Element) -> Result<CoSimulation, ParseError> {
-    let flag = |name| Ok(element.boolean(name)?.unwrap_or(false));
+fn co_simulation(element: Node<'_>) -> Result<CoSimulation, ParseError> {
+    let flag = |name| element.flag(name);
     Ok(CoSimulation {
-        model_identifier: element.identifier()?,
-        needs_execution_tool: flag("needsExecutionTool")?,
-        can_handle_variable_communication_step_size: flag(
-            "canHandleVariableCommunicationStepSize",
-        )?,
-        can_interpolate_inputs: flag("canInterpolateInputs")?,
-        max_output_derivative_order: element.unsigned("maxOutputDerivativeOrder")?.unwrap_or(0),
-        can_run_asynchronuously: flag("canRunAsynchronuously")?,
-        can_be_instantiated_only_once_per_process: flag("canBeInstantiatedOnlyOncePerProcess")?,
-        can_not_use_memory_management_functions: flag("canNotUseMemoryManagementFunctions")?,
-        can_get_and_set_fmu_state: flag("canGetAndSetFMUstate")?,
-        can_serialize_fmu_state: flag("canSerializeFMUstate")?,
-        provides_directional_derivative: flag("providesDirectionalDerivative")?,
+        model_identifier: identifier(element)?,
+        needs_execution_tool: flag("needsExecutionTool"),
+        can_handle_variable_communication_step_size: flag("canHandleVariableCommunicationStepSize"),
+        can_interpolate_inputs: flag("canInterpolateInputs"),
+        max_output_derivative_order: element
+            .optional_unsigned("maxOutputDerivativeOrder")
+            .unwrap_or(0),
+        can_run_asynchronuously: flag("canRunAsynchronuously"),
+        can_be_instantiated_only_once_per_process: flag("canBeInstantiatedOnlyOncePerProcess"),
+        can_not_use_memory_management_functions: flag("canNotUseMemoryManagementFunctions"),
+        can_get_and_set_fmu_state: flag("canGetAndSetFMUstate"),
+        can_serialize_fmu_state: flag("canSerializeFMUstate"),
+        provides_directional_derivative: flag("providesDirectionalDerivative"),
+        source_files: source_files(element)?,
     })
 }
 
-fn unit(element: &Element) -> Result<Unit, ParseError> {
+fn unit(element: Node<'_>) -> Result<Unit, ParseError> {
     let display_units = element.children_named("DisplayUnit").map(|display| {
         Ok(DisplayUnit {
             name: display.required("name")?.to_owned(),
-            factor: display.number("factor")?.unwrap_or(1.0),
-            offset: display.number("offset")?.unwrap_or(0.0),
+            factor: display.finite("factor", 1.0)?,
+            offset: display.finite("offset", 0.0)?,
         })
     });
     Ok(Unit {
@@ -236,7 +308,7 @@ fn unit(element: &Element) -> Result<Unit, ParseError> {
     })
 }
 
-fn base_unit(element: &Element) -> Result<BaseUnit, ParseError> {
+fn base_unit(element: Node<'_>) -> Result<BaseUnit, ParseError> {
     let exponent = |name| Ok(element.integer(name)?.unwrap_or(0));
     Ok(BaseUnit {
         kg: exponent("kg")?,
@@ -247,50 +319,23 @@ fn base_unit(element: &Element) -> Result<BaseUnit, ParseError> {
         mol: exponent("mol")?,
         cd: exponent("cd")?,
         rad: exponent("rad")?,
-        factor: element.number("factor")?.unwrap_or(1.0),
-        offset: element.number("offset")?.unwrap_or(0.0),
+        factor: element.finite("factor", 1.0)?,
+        offset: element.finite("offset", 0.0)?,
     })
 }
 
-fn category(element: &Element) -> Result<LogCategory, ParseError> {
+fn category(element: Node<'_>) -> Result<LogCategory, ParseError> {
     let name = element.required("name")?.to_owned();
     Ok(LogCategory { name, description: element.text("description") })
 }
 
-fn experiment(element: &Element) -> Result<DefaultExperiment, ParseError> {
+fn experiment(element: Node<'_>) -> Result<DefaultExperiment, ParseError> {
     Ok(DefaultExperiment {
         start_time: element.number("startTime")?,
         stop_time: element.number("stopTime")?,
         tolerance: element.number("tolerance")?,
         step_size: element.number("stepSize")?,
     })
-}
-
-fn model_structure(element: &Element, variables: usize) -> Result<ModelStructure, ParseError> {
-    let list = |name| element.list(name, "Unknown", |row| unknown(row, variables));
-    Ok(ModelStructure {
-        outputs: list("Outputs")?,
-        derivatives: list("Derivatives")?,
-        initial_unknowns: list("InitialUnknowns")?,
-    })
-}
-
-fn unknown(element: &Element, variables: usize) -> Result<Unknown, ParseError> {
-    let index = element.index("index", element.required("index")?, variables)?;
-    let dependencies =
-        element.items("dependencies", |text| element.index("dependencies", text, variables))?;
-    let kinds = element.items("dependenciesKind", |text| {
-        let expected = "dependent, constant, fixed, tunable or discrete";
-        text.parse().map_err(|()| element.wrong("dependenciesKind", expected, text))
-    })?;
-    if let Some(kinds) = &kinds {
-        let count = dependencies.as_ref().map_or(0, Vec::len);
-        if dependencies.is_none() || count != kinds.len() {
-            let expected = format!("as many entries as dependencies has, {count}");
-            return Err(element.wrong("dependenciesKind", &expected, &kinds.len().to_string()));
-        }
-    }
-    Ok(Unknown { index, dependencies, kinds })
 }
 
 #[cfg(test)]

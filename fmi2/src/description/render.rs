@@ -116,7 +116,7 @@ impl Output {
         let only_once = &flags.can_be_instantiated_only_once_per_process;
         let own_memory = &flags.can_not_use_memory_management_functions;
         let derivatives = &flags.provides_directional_derivative;
-        self.empty(
+        self.interface(
             Tag::new("ModelExchange")
                 .with("modelIdentifier", &flags.model_identifier)
                 .unless_default("needsExecutionTool", &flags.needs_execution_tool)
@@ -126,14 +126,29 @@ impl Output {
                 .unless_default("canGetAndSetFMUstate", &flags.can_get_and_set_fmu_state)
                 .unless_default("canSerializeFMUstate", &flags.can_serialize_fmu_state)
                 .unless_default("providesDirectionalDerivative", derivatives),
+            &flags.source_files,
         );
+    }
+
+    /// An interface with its source files.
+    fn interface(&mut self, tag: Tag<'_>, files: &[String]) {
+        if files.is_empty() {
+            return self.empty(tag);
+        }
+        self.around(tag, |output| {
+            output.around(Tag::new("SourceFiles"), |output| {
+                for file in files {
+                    output.empty(Tag::new("File").with("name", file));
+                }
+            });
+        });
     }
 
     fn co_simulation(&mut self, flags: &CoSimulation) {
         let variable_step = &flags.can_handle_variable_communication_step_size;
         let only_once = &flags.can_be_instantiated_only_once_per_process;
         let own_memory = &flags.can_not_use_memory_management_functions;
-        self.empty(
+        self.interface(
             Tag::new("CoSimulation")
                 .with("modelIdentifier", &flags.model_identifier)
                 .unless_default("needsExecutionTool", &flags.needs_execution_tool)
@@ -149,6 +164,7 @@ impl Output {
                     "providesDirectionalDerivative",
                     &flags.provides_directional_derivative,
                 ),
+            &flags.source_files,
         );
     }
 

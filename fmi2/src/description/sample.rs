@@ -53,6 +53,7 @@ fn all_exchange_capabilities() -> ModelExchange {
         can_get_and_set_fmu_state: true,
         can_serialize_fmu_state: true,
         provides_directional_derivative: true,
+        source_files: vec!["all.c".to_owned(), "a & b.c".to_owned()],
     }
 }
 
@@ -69,6 +70,7 @@ fn all_capabilities() -> CoSimulation {
         can_get_and_set_fmu_state: true,
         can_serialize_fmu_state: true,
         provides_directional_derivative: true,
+        source_files: vec!["all.c".to_owned(), "a & b.c".to_owned()],
     }
 }
 

@@ -8,6 +8,10 @@ const DEVICES: [&str; 4] = ["con", "prn", "aux", "nul"];
 const FOLDERS: [&str; 6] =
     ["documentation", "sources", "binaries", "resources", "extra", "terminalsAndIcons"];
 
+/// Longest path in bytes, and deepest.
+const LENGTH: usize = 1024;
+const DEPTH: usize = 64;
+
 /// What is wrong with `path` if it could lead out of the folder it is unpacked into: the rule.
 pub(super) fn unsafe_to_unpack(path: &str) -> Option<&'static str> {
     if path.contains('\\') {
@@ -20,6 +24,9 @@ pub(super) fn unsafe_to_unpack(path: &str) -> Option<&'static str> {
     }
     if path.contains(|character: char| character == ':' || character.is_control()) {
         return Some("a path without drive letter and control characters");
+    }
+    if path.len() > LENGTH || path.split('/').count() > DEPTH {
+        return Some("a path of at most 1024 bytes and 64 levels");
     }
     None
 }

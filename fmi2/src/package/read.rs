@@ -1,24 +1,33 @@
 //! Unpacking an FMU.
 
-use std::fs::{self, File};
-use std::io::{self, BufReader, Read as _};
+use std::fs;
+use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
-use zip::ZipArchive;
-use zip::read::ZipFile;
-use zip::result::ZipError;
 
-use super::{DESCRIPTION, PackageError, file_error, paths, platforms};
-use crate::description::ModelDescription;
+use super::archive::Archive;
+use super::{DESCRIPTION, PackageError, file_error, platforms};
+use crate::description::{ModelDescription, Warning};
 
-/// Most bytes that are unpacked.
-const CAPACITY: u64 = 4 << 30;
-/// Most entries that are unpacked.
-const ENTRIES: usize = 100_000;
-
-/// What is wrong with an archive that has two entries of one name.
-const DUPLICATE: &str = "two entries have the same name";
+/// The folders of `binaries` that the standard names.
+const PLATFORMS: [&str; 15] = [
+    "win32",
+    "win64",
+    "linux32",
+    "linux64",
+    "darwin32",
+    "darwin64",
+    "x86-windows",
+    "x86_64-windows",
+    "aarch64-windows",
+    "x86-linux",
+    "x86_64-linux",
+    "aarch64-linux",
+    "x86-darwin",
+    "x86_64-darwin",
+    "aarch64-darwin",
+];
 
 /// An FMU as a folder, with its model description.
 #[derive(Debug)]
@@ -26,24 +35,50 @@ pub struct Unpacked {
     folder: PathBuf,
     /// Removes the folder at the end, if it was made for this.
     temporary: Option<TempDir>,
+    /// The entries of the archive, if there was one.
+    names: Vec<String>,
     /// What `modelDescription.xml` says.
     pub description: ModelDescription,
+    /// What in it breaks the standard and was read all the same.
+    pub warnings: Vec<Warning>,
 }
 
 impl Unpacked {
-    /// Unpacks the archive at `path` into a new temporary folder, which lives as long as the
-    /// result. A library loaded from it must be closed before.
+    /// Unpacks what a simulation can need of the archive at `path` into a new temporary folder, which
+    /// lives as long as the result. A library loaded from it must be closed before. Left out are
+    /// documentation, sources, pictures and the libraries of other platforms.
     ///
     /// # Errors
     ///
     /// [`PackageError`] if the file is no ZIP archive, has entries that lead out of the folder,
-    /// links, duplicate names, encrypted entries, more than 4 GiB or 100,000 entries, or no
-    /// readable `modelDescription.xml` at its root.
+    /// links, duplicate names, a file and a folder of one name, overlapping or encrypted entries,
+    /// more than 100,000 entries, more than 4 GiB or more than 64 MiB and 100 times its own size, or
+    /// no readable `modelDescription.xml` at its root. What is refused for its list of entries is so
+    /// before anything is written.
     pub fn open(path: &Path) -> Result<Self, PackageError> {
-        let folder = unpack_archive(path)?;
-        let folder_path = folder.path().to_owned();
-        let description = describe(&folder_path, path)?;
-        Ok(Unpacked { folder: folder_path, temporary: Some(folder), description })
+        Self::unpack(path, is_needed)
+    }
+
+    /// As [`Unpacked::open`], all of it: to pack it again, or to look at the rest.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Unpacked::open`].
+    pub fn open_whole(path: &Path) -> Result<Self, PackageError> {
+        Self::unpack(path, |_| true)
+    }
+
+    fn unpack(path: &Path, wanted: impl Fn(&str) -> bool) -> Result<Self, PackageError> {
+        let mut archive = Archive::open(path)?;
+        if !archive.names().iter().any(|name| name == DESCRIPTION) {
+            return Err(missing(archive.names()));
+        }
+        let temporary = folder()?;
+        archive.unpack(temporary.path(), wanted)?;
+        let (description, warnings) = describe(temporary.path(), path)?;
+        let names = archive.names().to_vec();
+        let folder = temporary.path().to_owned();
+        Ok(Unpacked { folder, temporary: Some(temporary), names, description, warnings })
     }
 
     /// Uses the FMU that is already unpacked in `folder`.
@@ -53,14 +88,21 @@ impl Unpacked {
     /// [`PackageError`] if there is no readable `modelDescription.xml`.
     pub fn in_folder(folder: &Path) -> Result<Self, PackageError> {
         let folder = folder.canonicalize().map_err(file_error("open", folder))?;
-        let description = describe(&folder, &folder)?;
-        Ok(Unpacked { folder, temporary: None, description })
+        let (description, warnings) = describe(&folder, &folder)?;
+        Ok(Unpacked { folder, temporary: None, names: Vec::new(), description, warnings })
     }
 
     /// The folder with `modelDescription.xml`; an absolute path.
     #[must_use]
     pub fn folder(&self) -> &Path {
         self.temporary.as_ref().map_or(&self.folder, TempDir::path)
+    }
+
+    /// The names of all entries of the archive, those of folders with a slash at their end; none where
+    /// the FMU was given as a folder.
+    #[must_use]
+    pub fn entries(&self) -> &[String] {
+        &self.names
     }
 
     /// The folder `resources`, whether the FMU has one or not.
@@ -81,12 +123,54 @@ impl Unpacked {
         candidates.into_iter().find(|path| path.is_file()).ok_or_else(|| {
             let wanted: Vec<String> =
                 platforms().iter().map(|platform| format!("binaries/{platform}/{name}")).collect();
-            let found = libraries(&binaries);
+            let found = self.libraries();
             PackageError::Missing {
                 expected: format!("the library {}", wanted.join(" or ")),
                 found: if found.is_empty() { "no library".to_owned() } else { found.join(", ") },
             }
         })
+    }
+
+    /// The files two levels below `binaries`, whatever its case; at most 20, sorted.
+    fn libraries(&self) -> Vec<String> {
+        let mut found = if self.temporary.is_some() {
+            self.names.clone()
+        } else {
+            below(self.folder())
+                .filter(|path| path.is_dir())
+                .flat_map(|top| below(&top).collect::<Vec<_>>())
+                .flat_map(|platform| below(&platform).collect::<Vec<_>>())
+                .filter_map(|file| {
+                    let parts = file.strip_prefix(self.folder()).ok()?.iter();
+                    let parts: Vec<_> = parts.map(|part| part.to_string_lossy()).collect();
+                    Some(parts.join("/"))
+                })
+                .collect()
+        };
+        found.retain(|name| {
+            let parts: Vec<&str> = name.split('/').collect();
+            matches!(parts.as_slice(), [top, _, file]
+                if top.eq_ignore_ascii_case("binaries") && !file.is_empty())
+        });
+        found.sort();
+        found.truncate(20);
+        found
+    }
+}
+
+fn below(folder: &Path) -> impl Iterator<Item = PathBuf> + use<> {
+    fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path())
+}
+
+/// Whether a simulation on this platform can need the file: all but what it certainly does not.
+fn is_needed(name: &str) -> bool {
+    let mut parts = name.split('/');
+    match (parts.next(), parts.next()) {
+        (Some("documentation" | "sources" | "terminalsAndIcons" | "model.png"), _) => false,
+        (Some("binaries"), Some(platform)) => {
+            platforms().contains(&platform) || !PLATFORMS.contains(&platform)
+        }
+        _ => true,
     }
 }
 
@@ -96,106 +180,58 @@ impl Unpacked {
 ///
 /// [`PackageError`] as for [`Unpacked::open`], whatever is in the archive.
 pub fn unpack_archive(path: &Path) -> Result<TempDir, PackageError> {
-    let file = File::open(path).map_err(file_error("open", path))?;
-    let wrong = |source| PackageError::Archive { path: path.to_owned(), source };
-    let mut archive = ZipArchive::new(BufReader::new(file)).map_err(wrong)?;
-    let folder = tempfile::Builder::new().prefix("fmu-").tempdir();
-    let folder = folder.map_err(file_error("create a folder in", std::env::temp_dir()))?;
-    unpack(&mut archive, path, folder.path(), CAPACITY)?;
+    let mut archive = Archive::open(path)?;
+    let folder = folder()?;
+    archive.unpack(folder.path(), |_| true)?;
     Ok(folder)
 }
 
-/// All files two levels below `binaries`, sorted.
-fn libraries(binaries: &Path) -> Vec<String> {
-    let children = |folder: &Path| fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut found: Vec<String> = children(binaries)
-        .flat_map(|platform| children(&platform.path()))
-        .filter_map(|file| Some(file.path().strip_prefix(binaries.parent()?).ok()?.to_owned()))
-        .map(|path| path.display().to_string())
-        .collect();
-    found.sort();
-    found
+fn folder() -> Result<TempDir, PackageError> {
+    let folder = tempfile::Builder::new().prefix("fmu-").tempdir();
+    folder.map_err(file_error("create a folder in", std::env::temp_dir()))
 }
 
-fn describe(folder: &Path, path: &Path) -> Result<ModelDescription, PackageError> {
+fn describe(folder: &Path, path: &Path) -> Result<(ModelDescription, Vec<Warning>), PackageError> {
     let file = folder.join(DESCRIPTION);
-    let xml = match fs::read(&file) {
+    let xml = match start(&file) {
         Ok(xml) => xml,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Err(missing(folder)),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            let names =
+                below(folder).filter_map(|path| path.file_name()?.to_str().map(str::to_owned));
+            return Err(missing(&names.collect::<Vec<_>>()));
+        }
         Err(error) => return Err(file_error("read", file)(error)),
     };
-    ModelDescription::parse(xml)
+    ModelDescription::read(xml)
         .map_err(|source| PackageError::Description { path: path.to_owned(), source })
 }
 
-fn missing(folder: &Path) -> PackageError {
-    let names = fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut names: Vec<String> =
-        names.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
-    names.sort();
-    names.truncate(10);
-    let expected = format!("{DESCRIPTION} at the root of the FMU");
-    let found = if names.is_empty() { "nothing".to_owned() } else { names.join(", ") };
-    PackageError::Missing { expected, found }
+/// A file, or as much of it as is longer than every model description.
+fn start(file: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let most = u64::try_from(ModelDescription::MOST_BYTES).unwrap_or(u64::MAX);
+    fs::File::open(file)?.take(most.saturating_add(1)).read_to_end(&mut bytes)?;
+    Ok(bytes)
 }
 
-pub(super) fn unpack(
-    archive: &mut ZipArchive<BufReader<File>>,
-    path: &Path,
-    folder: &Path,
-    capacity: u64,
-) -> Result<(), PackageError> {
-    let wrong = |source| PackageError::Archive { path: path.to_owned(), source };
-    let limit = |limit, unit| PackageError::Limit { path: path.to_owned(), limit, unit };
-    if archive.len() > ENTRIES {
-        return Err(limit(ENTRIES as u64, "entries"));
-    }
-    if archive.has_duplicate_names() {
-        return Err(wrong(ZipError::InvalidArchive(DUPLICATE.into())));
-    }
-    let mut left = capacity;
-    for index in 0..archive.len() {
-        let entry = archive.by_index(index).map_err(wrong)?;
-        let name = entry.name().map_err(wrong)?.into_owned();
-        let rule = paths::unsafe_to_unpack(&name);
-        let rule = rule.or(entry.is_symlink().then_some("a file or a folder, not a link"));
-        if let Some(expected) = rule {
-            return Err(PackageError::Entry { entry: name, expected });
+/// No model description among `names`: one that is nearly there, or what there is.
+fn missing(names: &[String]) -> PackageError {
+    let near = names.iter().find(|name| {
+        let file = name.rsplit_once('/').map_or(name.as_str(), |(_, file)| file);
+        file.eq_ignore_ascii_case(DESCRIPTION)
+    });
+    let mut tops: Vec<&str> =
+        names.iter().map(|name| name.split('/').next().unwrap_or(name)).collect();
+    tops.sort_unstable();
+    tops.dedup();
+    tops.truncate(10);
+    let found = match near {
+        Some(near) if near.eq_ignore_ascii_case(DESCRIPTION) => {
+            format!("{near}, which differs in upper and lower case")
         }
-        let target = folder.join(&name);
-        if entry.is_dir() {
-            fs::create_dir_all(&target).map_err(file_error("create", &target))?;
-            continue;
-        }
-        if entry.size() > left {
-            return Err(limit(capacity, "bytes"));
-        }
-        let written = write_entry(entry, &target, left)?;
-        left = left.checked_sub(written).ok_or_else(|| limit(capacity, "bytes"))?;
-    }
-    Ok(())
-}
-
-/// Writes one file, stopping after `limit` + 1 bytes whatever the archive says of its size.
-fn write_entry(
-    entry: ZipFile<'_, BufReader<File>>,
-    target: &Path,
-    limit: u64,
-) -> Result<u64, PackageError> {
-    if let Some(parent) = target.parent() {
-        fs::create_dir_all(parent).map_err(file_error("create", parent))?;
-    }
-    let executable = entry.unix_mode().is_some_and(|mode| mode & 0o111 != 0);
-    let mut file = File::create_new(target).map_err(file_error("create", target))?;
-    let written = io::copy(&mut entry.take(limit.saturating_add(1)), &mut file);
-    let written = written.map_err(file_error("unpack", target))?;
-    #[cfg(unix)]
-    if executable {
-        use std::os::unix::fs::PermissionsExt as _;
-        let mode = fs::Permissions::from_mode(0o755);
-        fs::set_permissions(target, mode).map_err(file_error("write", target))?;
-    }
-    #[cfg(not(unix))]
-    let _ = executable;
-    Ok(written)
+        Some(near) => format!("{near}, which is in a folder"),
+        None if tops.is_empty() => "nothing".to_owned(),
+        None => tops.join(", "),
+    };
+    PackageError::Missing { expected: format!("{DESCRIPTION} at the root of the FMU"), found }
 }

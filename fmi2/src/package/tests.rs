@@ -1,10 +1,10 @@
 use std::fs;
-use std::io::BufReader;
 use std::path::Path;
 
 use super::*;
 use tempfile::TempDir;
 
+mod hostile;
 mod raw;
 
 const XML: &str = r#"<fmiModelDescription fmiVersion="2.0" modelName="M" guid="{1}">
@@ -249,7 +249,11 @@ fn what_is_no_fmu_is_refused_with_the_reason() {
     let text = opened(b"just text").unwrap_err();
     assert!(matches!(text, PackageError::Archive { .. }), "{text}");
     let nested = opened(&raw::archive(&[("M/modelDescription.xml", XML, 0o100_644)])).unwrap_err();
-    assert_eq!(nested.to_string(), "expected modelDescription.xml at the root of the FMU, found M");
+    assert_eq!(
+        nested.to_string(),
+        "expected modelDescription.xml at the root of the FMU, found M/modelDescription.xml, \
+         which is in a folder"
+    );
     let broken = opened(&raw::archive(&[(DESCRIPTION, "<a", 0o100_644)])).unwrap_err();
     assert!(matches!(broken, PackageError::Description { .. }), "{broken}");
     let whole = written(&package());
@@ -271,12 +275,13 @@ fn no_more_is_unpacked_than_the_limit() {
     let folder = folder();
     let path = folder.path().join("M.fmu");
     package().write(&path).unwrap();
-    let open = || zip::ZipArchive::new(BufReader::new(fs::File::open(&path).unwrap())).unwrap();
     let total = 100_000 + XML.len() + "not really a library".len() + "<p>".len();
     let total = u64::try_from(total).unwrap();
-    let target = folder.path().join("out");
-    read::unpack(&mut open(), &path, &target, total).unwrap();
-    let target = folder.path().join("less");
-    let error = read::unpack(&mut open(), &path, &target, total - 1).unwrap_err();
+    let unpack = |name: &str, capacity| {
+        let mut archive = archive::Archive::open(&path).unwrap();
+        archive.unpack_up_to(&folder.path().join(name), capacity, |_| true)
+    };
+    unpack("out", total).unwrap();
+    let error = unpack("less", total - 1).unwrap_err();
     assert!(matches!(error, PackageError::Limit { unit: "bytes", .. }), "{error}");
 }

@@ -7,6 +7,7 @@ mod calls;
 mod choice;
 mod importer;
 mod machine;
+mod mutations;
 mod prediction;
 mod replay;
 mod sequence;

@@ -1,16 +1,22 @@
 //! The corpora of the fuzz targets, once more.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::targets;
 
+/// The files of a corpus.
+pub(crate) fn corpus(name: &str) -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus").join(name);
+    let files = std::fs::read_dir(folder).unwrap().map(|file| file.unwrap().path());
+    let mut files: Vec<_> = files.collect();
+    assert!(!files.is_empty());
+    files.sort();
+    files
+}
+
 /// Gives each file of a corpus to its target.
 fn replay(name: &str, target: fn(&[u8])) {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus").join(name);
-    let files: Vec<_> =
-        std::fs::read_dir(folder).unwrap().map(|file| file.unwrap().path()).collect();
-    assert!(!files.is_empty());
-    for file in files {
+    for file in corpus(name) {
         let outcome = std::panic::catch_unwind(|| target(&std::fs::read(&file).unwrap()));
         assert!(outcome.is_ok(), "{}: {:?}", file.display(), outcome.err());
     }
@@ -32,6 +38,12 @@ fn resource_locations_of_the_corpus_do_no_harm() {
 #[cfg_attr(miri, ignore = "reads files")]
 fn model_descriptions_of_the_corpus_do_no_harm() {
     replay("model_description", targets::model_description);
+}
+
+#[cfg(feature = "package")]
+#[test]
+fn archives_of_the_corpus_do_no_harm() {
+    replay("package", targets::package);
 }
 
 #[test]

@@ -108,15 +108,54 @@ pub(crate) fn resource_location(data: &[u8]) {
     assert_eq!(importer.exists(), readable);
 }
 
-/// `modelDescription.xml`: what was read and written again reads as the same.
+/// `modelDescription.xml`: what was read and written again reads as the same; without a warning,
+/// where it breaks no rule.
 pub(crate) fn model_description(data: &[u8]) {
-    let Ok(read) = ModelDescription::parse(data) else { return };
+    let Ok((read, _)) = ModelDescription::read(data) else { return };
     let problems = read.problems();
     let xml = read.to_xml();
-    match ModelDescription::parse(&xml) {
-        Ok(again) => assert_eq!(again.to_xml(), xml),
+    match ModelDescription::read(&xml) {
+        Ok((again, warnings)) => {
+            assert_eq!(again.to_xml(), xml);
+            assert!(warnings.is_empty() || !problems.is_empty(), "{warnings:?}: {xml}");
+        }
         Err(error) => assert!(!problems.is_empty(), "{error}: {xml}"),
     }
+}
+
+/// An FMU archive: nothing is written beside the folder it is unpacked into, no more than the limit,
+/// and nothing stays.
+#[cfg(feature = "package")]
+pub(crate) fn package(data: &[u8]) {
+    use fmi2::package::{Unpacked, unpack_archive};
+    let folder = tempfile::tempdir().unwrap_or_else(|error| panic!("{error}"));
+    let path = folder.path().join("M.fmu");
+    std::fs::write(&path, data).unwrap_or_else(|error| panic!("{error}"));
+    if let Ok(unpacked) = Unpacked::open(&path) {
+        let inside = unpacked.folder().to_owned();
+        assert!(inside.join("modelDescription.xml").is_file());
+        let _ = unpacked.library("M");
+        drop(unpacked);
+        assert!(!inside.exists());
+    }
+    if let Ok(unpacked) = unpack_archive(&path) {
+        let limit = (64 << 20) + 100 * data.len() as u64;
+        assert!(size(unpacked.path()) <= limit);
+    }
+    let beside = std::fs::read_dir(folder.path()).map(Iterator::count);
+    assert_eq!(beside.ok(), Some(1));
+}
+
+/// Bytes in all files of a folder, which holds nothing but files and folders.
+#[cfg(feature = "package")]
+fn size(folder: &std::path::Path) -> u64 {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let sizes = entries.map(|entry| match entry.file_type() {
+        Ok(kind) if kind.is_dir() => size(&entry.path()),
+        Ok(kind) if kind.is_file() => entry.metadata().map_or(0, |own| own.len()),
+        other => panic!("{}: {other:?}", entry.path().display()),
+    });
+    sizes.sum()
 }
 
 /// Any sequence of calls: see `sequence.rs`.

@@ -6,6 +6,7 @@ use std::ops::Range;
 use fmi2::description::Kind;
 
 use crate::algorithm::{Algorithm, Course};
+use crate::slave::Advance;
 use crate::system::{Port, System};
 use crate::transformation::Transformation;
 
@@ -26,6 +27,35 @@ pub(super) struct Lane {
     /// Highest derivative that its inputs get and that its outputs give.
     pub(super) input_order: usize,
     pub(super) output_order: usize,
+}
+
+impl Lane {
+    /// A step with the values of all inputs and of all its own outputs, each with the derivatives of
+    /// its own.
+    #[inline]
+    pub(super) fn step<'a>(
+        &'a self,
+        (values, input_derivatives): (&'a [f64], &'a [f64]),
+        (time, size): (f64, f64),
+        never_back: bool,
+        (output_values, output_derivatives): (&'a mut [f64], &'a mut [f64]),
+    ) -> Advance<'a> {
+        Advance {
+            inputs: &self.inputs,
+            input_values: &values[self.input_range.clone()],
+            derived_inputs: &self.derived_inputs,
+            input_orders: &self.input_orders,
+            input_derivatives,
+            time,
+            size,
+            never_back,
+            outputs: &self.outputs,
+            output_values,
+            derived_outputs: &self.derived_outputs,
+            output_orders: &self.output_orders,
+            output_derivatives,
+        }
+    }
 }
 
 /// The connected Reals of all slaves.

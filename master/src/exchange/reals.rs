@@ -1,13 +1,15 @@
 //! Connected Reals: values and derivatives of outputs over their last steps, and what inputs get.
 
+use super::call;
 use super::course::{Known, Polynomial};
-use super::layout::{Lane, Layout};
+use super::layout::Layout;
+use super::pass::Pass;
 use super::trace::Span;
 pub(crate) use super::trace::Trace;
 use crate::algorithm::{Algorithm, Coupling, Course, StepControl, Sweep};
+use crate::error::SystemError;
 use crate::fault::FaultLine;
-use crate::signal::Sample;
-use crate::slave::{Advance, CallError, Slave, Stepped};
+use crate::slave::{CallError, Slave, Stepped};
 use crate::system::{Port, System};
 
 /// The connected Reals of a system.
@@ -16,17 +18,18 @@ pub(crate) struct Reals {
     pub(super) layout: Layout,
     /// Faults by input; empty where there are none at all.
     faults: Vec<Option<FaultLine>>,
-    course: Course,
-    sweep: Sweep,
+    pub(super) course: Course,
+    pub(super) sweep: Sweep,
     /// Every input is held and all slaves step together: the latest values are all it takes.
     simple: bool,
     pub(crate) trace: Trace,
     /// Values of the outputs at the end of the step, assumed by an iteration.
-    assumed: Vec<f64>,
-    assumes: bool,
+    pub(super) assumed: Vec<f64>,
+    pub(super) assumes: bool,
     /// What the inputs get.
     pub(super) values: Vec<f64>,
     pub(super) input_derivatives: Vec<f64>,
+    pass: Pass,
 }
 
 impl Reals {
@@ -42,10 +45,16 @@ impl Reals {
             begin_derivatives: vec![0.0; derivatives],
             spans: vec![Span::default(); system.slaves.len()],
         };
+        let mut pass = Pass::default();
+        for lane in &layout.lanes {
+            let sources = &layout.sources[lane.input_range.clone()];
+            pass.add(&lane.inputs, sources, &lane.outputs);
+        }
         Self {
             faults: Vec::new(),
             assumed: vec![0.0; outputs],
             assumes: false,
+            pass,
             values: vec![0.0; layout.sources.len()],
             input_derivatives: vec![0.0; layout.input_derivatives],
             course: algorithm.course,
@@ -80,7 +89,7 @@ impl Reals {
     }
 
     /// The outputs of type Integer that go to Reals: port, and index among the outputs.
-    pub(crate) fn from_integers(&self) -> &[(Port, usize)] {
+    pub(crate) fn integer_sources(&self) -> &[(Port, usize)] {
         &self.layout.from_integers
     }
 
@@ -139,19 +148,6 @@ impl Reals {
         }
     }
 
-    /// Order of convergence of the course as the slaves can follow it: a mean that is held is of order
-    /// 2, the value at one end of the step of order 1.
-    pub(crate) fn order(&self) -> u8 {
-        let held = |lane: &Lane| lane.input_order == 0 && !lane.inputs.is_empty();
-        let held = self.layout.lanes.iter().any(held);
-        match self.course {
-            Course::Hold => 1,
-            Course::Limited if held => 1,
-            Course::Quadratic if !held => 3,
-            Course::Limited | Course::Linear | Course::Quadratic => 2,
-        }
-    }
-
     /// The inputs of `slave` for a step from `time` over `size`.
     pub(crate) fn gather(&mut self, slave: usize, time: f64, size: f64) {
         let range = self.layout.lanes[slave].input_range.clone();
@@ -198,9 +194,14 @@ impl Reals {
             curvature: factor * course.curvature,
         };
         if let Some(Some(fault)) = self.faults.get(k) {
-            let at = if known && self.course == Course::Hold { time + size } else { time };
-            let sample = fault.apply_sample(at, Sample { value, slope: given.slope });
-            given = Polynomial { value: sample.value, slope: sample.slope, curvature: 0.0 };
+            given = if lane.input_order > 0 {
+                let [value, slope, curvature] =
+                    fault.apply_course(time, [value, given.slope, given.curvature]);
+                Polynomial { value, slope, curvature }
+            } else {
+                let at_end = known && matches!(self.course, Course::Hold | Course::Limited);
+                Polynomial::held(fault.apply(if at_end { time + size } else { time }, value))
+            };
         }
         let (count, first) = (lane.inputs.len(), lane.input_derivative_range.start + position);
         let order = lane.input_order;
@@ -220,7 +221,7 @@ impl Reals {
     }
 
     /// What is known of an output over the last step of its slave.
-    fn known(&self, output: usize, span: &Span) -> Known {
+    pub(super) fn known(&self, output: usize, span: &Span) -> Known {
         let (layout, trace) = (&self.layout, &self.trace);
         let derivative = |place: Option<u32>| place.map(|k| trace.begin_derivatives[k as usize]);
         Known {
@@ -253,79 +254,6 @@ impl Reals {
         course.later(time - span.begin)
     }
 
-    /// From now on all inputs are interpolated to these values of their outputs at the end of the
-    /// step; none: as the algorithm has it.
-    pub(crate) fn assume(&mut self, ends: Option<&[f64]>) {
-        self.assumes = ends.is_some();
-        if let Some(ends) = ends {
-            self.assumed.copy_from_slice(ends);
-        }
-    }
-
-    /// The extrapolation of each output over a step of `size` s from now, into `ends`.
-    pub(crate) fn predictions(&self, size: f64, ends: &mut [f64]) {
-        let trace = &self.trace;
-        for (output, end) in ends.iter_mut().enumerate() {
-            let span = &trace.spans[self.layout.owners[output] as usize];
-            let derivative = |place: Option<u32>| place.map(|k| trace.derivatives[k as usize]);
-            let known = Known {
-                earlier: trace.before[output],
-                before: trace.begin[output],
-                begin: trace.latest[output],
-                end: trace.latest[output],
-                slope: derivative(self.layout.slopes[output]),
-                curvature: derivative(self.layout.curvatures[output]),
-                earlier_size: span.last_size,
-                last_size: span.size,
-                size,
-            };
-            *end = known.extrapolated(self.course).end(size);
-        }
-    }
-
-    /// The change of all outputs per change of one through the inputs that it is connected to, by
-    /// directional derivatives; slave and error where one has none.
-    pub(crate) fn derivatives_to(
-        &self,
-        system: &mut System,
-        output: usize,
-        changes: &mut [f64],
-    ) -> Result<(), (usize, CallError)> {
-        let layout = &self.layout;
-        for (slave, lane) in layout.lanes.iter().enumerate() {
-            for k in lane.input_range.clone() {
-                if layout.sources[k] as usize != output || lane.outputs.is_empty() {
-                    continue;
-                }
-                let known = lane.inputs[k - lane.input_range.start];
-                let mut own = vec![0.0; lane.outputs.len()];
-                system.slaves[slave]
-                    .1
-                    .directional_derivative(&lane.outputs, &[known], &[layout.factors[k]], &mut own)
-                    .map_err(|source| (slave, source))?;
-                for (change, own) in changes[lane.output_range.clone()].iter_mut().zip(own) {
-                    *change += own;
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Values of the outputs at the begin of the last step.
-    pub(crate) fn begins(&self) -> &[f64] {
-        &self.trace.begin
-    }
-
-    /// How far the extrapolation of each output over the last step of `size` s was off, into `errors`.
-    pub(crate) fn extrapolation_errors(&self, size: f64, errors: &mut [f64]) {
-        for (output, error) in errors.iter_mut().enumerate() {
-            let span = &self.trace.spans[self.layout.owners[output] as usize];
-            let mut known = self.known(output, span);
-            known.size = size;
-            *error = self.trace.latest[output] - known.extrapolated(self.course).end(size);
-        }
-    }
-
     /// Sets the gathered inputs of `slave`, steps it, reads its outputs.
     #[inline]
     pub(crate) fn advance(
@@ -337,23 +265,42 @@ impl Reals {
     ) -> Result<Stepped, CallError> {
         let lane = &self.layout.lanes[slave];
         let trace = &mut self.trace;
-        let done = instance.advance(&mut Advance {
-            inputs: &lane.inputs,
-            input_values: &self.values[lane.input_range.clone()],
-            derived_inputs: &lane.derived_inputs,
-            input_orders: &lane.input_orders,
-            input_derivatives: &self.input_derivatives[lane.input_derivative_range.clone()],
-            time,
-            size,
-            never_back,
-            outputs: &lane.outputs,
-            output_values: &mut trace.latest[lane.output_range.clone()],
-            derived_outputs: &lane.derived_outputs,
-            output_orders: &lane.output_orders,
-            output_derivatives: &mut trace.derivatives[lane.output_derivative_range.clone()],
-        })?;
+        let inputs =
+            (&self.values[..], &self.input_derivatives[lane.input_derivative_range.clone()]);
+        let outputs = (
+            &mut trace.latest[lane.output_range.clone()],
+            &mut trace.derivatives[lane.output_derivative_range.clone()],
+        );
+        let done = instance.advance(&mut lane.step(inputs, (time, size), never_back, outputs))?;
         trace.spans[slave].stepped = true;
         Ok(done)
+    }
+
+    /// Whether [`Reals::pass`] does all that a sweep of Jacobi's method takes.
+    pub(crate) fn passes(&self) -> bool {
+        self.simple
+            && self.sweep == Sweep::Jacobi
+            && self.layout.plain.iter().all(|plain| *plain)
+            && self.layout.from_integers.is_empty()
+    }
+
+    /// A sweep of all slaves, see [`Pass::run`]; those that stopped on the way.
+    #[inline]
+    pub(crate) fn pass(
+        &mut self,
+        system: &mut System,
+        (time, size): (f64, f64),
+        never_back: bool,
+    ) -> Result<&mut Vec<(usize, Stepped)>, SystemError> {
+        let latest = &mut self.trace.latest;
+        let done = self.pass.run(&mut system.slaves, latest, (time, size), never_back);
+        done.map_err(|(slave, source)| call(&system.slaves[slave].0, time, source))
+    }
+
+    /// Whether all outputs are finite numbers.
+    #[inline]
+    pub(crate) fn is_finite(&self) -> bool {
+        all_finite(&self.trace.latest)
     }
 
     /// Reads the connected outputs of a slave and their derivatives.
@@ -384,15 +331,15 @@ impl Reals {
     }
 }
 
-/// Whether all values are numbers and finite: of any other the difference with itself is none.
+/// Whether all values are numbers and finite: zero times any other is not zero.
 #[inline]
 fn all_finite(values: &[f64]) -> bool {
     let mut sums = [0.0; 4];
     let chunks = values.chunks_exact(4);
-    let rest: f64 = chunks.remainder().iter().map(|value| value - value).sum();
+    let rest: f64 = chunks.remainder().iter().map(|value| 0.0 * value).sum();
     for chunk in chunks {
         for (sum, value) in sums.iter_mut().zip(chunk) {
-            *sum += value - value;
+            *sum += 0.0 * value;
         }
     }
     (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest == 0.0

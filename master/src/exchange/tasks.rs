@@ -2,7 +2,7 @@
 
 use super::reals::Reals;
 use crate::simulation::Task;
-use crate::slave::{Advance, CallError, Stepped};
+use crate::slave::{CallError, Stepped};
 use crate::system::System;
 
 impl Reals {
@@ -33,22 +33,10 @@ impl Reals {
             if !chosen[slave] {
                 continue;
             }
-            let (time, size) = span(slave);
-            let mut step = Advance {
-                inputs: &lane.inputs,
-                input_values: &self.values[lane.input_range.clone()],
-                derived_inputs: &lane.derived_inputs,
-                input_orders: &lane.input_orders,
-                input_derivatives: &self.input_derivatives[lane.input_derivative_range.clone()],
-                time,
-                size,
-                never_back,
-                outputs: &lane.outputs,
-                output_values,
-                derived_outputs: &lane.derived_outputs,
-                output_orders: &lane.output_orders,
-                output_derivatives,
-            };
+            let inputs =
+                (&self.values[..], &self.input_derivatives[lane.input_derivative_range.clone()]);
+            let outputs = (output_values, output_derivatives);
+            let mut step = lane.step(inputs, span(slave), never_back, outputs);
             if instance.in_thread().is_none() {
                 own.push((slave, instance.advance(&mut step)));
             } else if let Some(instance) = instance.in_thread() {

@@ -27,42 +27,43 @@ impl Stage {
         Ok(Self { window, fault, kept: None, line })
     }
 
-    /// What it makes of `sample`.
-    pub(super) fn apply(&self, time: f64, sample: Sample) -> Sample {
+    /// What it makes of a value with its two derivatives by time.
+    pub(super) fn apply(&self, time: f64, course: [f64; 3]) -> [f64; 3] {
         if !self.window.contains(time) {
-            return sample;
+            return course;
         }
-        let Sample { value, slope } = sample;
+        let [value, slope, curvature] = course;
+        let held = |value: f64| [value, 0.0, 0.0];
         match &self.fault {
-            Fault::Bias(bias) => Sample { value: value + bias, slope },
-            Fault::Gain(factor) => Sample { value: factor * value, slope: factor * slope },
+            Fault::Bias(bias) => [value + bias, slope, curvature],
+            Fault::Gain(factor) => course.map(|derivative| factor * derivative),
             Fault::Drift(rate) => {
                 let since = (time - self.window.from).max(0.0);
-                Sample { value: value + rate * since, slope: slope + rate }
+                [value + rate * since, slope + rate, curvature]
             }
-            Fault::Stuck(given) => Sample::held(given.or(self.kept).unwrap_or(value)),
+            Fault::Stuck(given) => held(given.or(self.kept).unwrap_or(value)),
             Fault::Dropout { lost, instead } if self.loses(lost, time) => {
-                Sample::held(instead.or(self.kept).unwrap_or(value))
+                held(instead.or(self.kept).unwrap_or(value))
             }
-            Fault::Dropout { .. } => sample,
-            Fault::Delay { hold, initial, .. } => match &self.line {
-                Some(line) => line.at(time, value, *hold, *initial),
-                None => sample,
-            },
+            Fault::Dropout { .. } => course,
+            Fault::Delay { hold, initial, .. } => self.line.as_ref().map_or(course, |line| {
+                let Sample { value, slope } = line.at(time, value, *hold, *initial);
+                [value, slope, 0.0]
+            }),
             Fault::Quantisation { step, offset } => {
                 let level = offset + step * ((value - offset) / step).round();
                 // A step too small for a double leaves the value as it is.
-                Sample::held(if level.is_finite() { level } else { value })
+                held(if level.is_finite() { level } else { value })
             }
             Fault::Saturation { lowest, highest } => {
                 let below = lowest.filter(|&lowest| value < lowest);
                 let beyond = below.or(highest.filter(|&highest| value > highest));
-                beyond.map_or(sample, Sample::held)
+                beyond.map_or(course, held)
             }
             Fault::Noise { spread, draw } => {
-                Sample { value: value + draw.noise(*spread, self.window.from, time), slope }
+                [value + draw.noise(*spread, self.window.from, time), slope, curvature]
             }
-            Fault::Inversion => Sample { value: 1.0 - value, slope: -slope },
+            Fault::Inversion => [1.0 - value, -slope, -curvature],
         }
     }
 

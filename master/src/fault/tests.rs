@@ -49,6 +49,19 @@ fn a_gain_multiplies_the_value_and_its_slope() {
     let line = single(Fault::Gain(-2.0), 0.0, None);
     let arrived = line.apply_sample(1.0, Sample { value: 3.0, slope: 5.0 });
     assert_eq!(arrived, Sample { value: -6.0, slope: -10.0 });
+    assert_eq!(line.apply_course(1.0, [3.0, 5.0, 7.0]), [-6.0, -10.0, -14.0]);
+}
+
+#[test]
+fn what_is_added_leaves_the_curvature_and_what_jumps_has_none() {
+    let course = [1.0, 2.0, 3.0];
+    let of = |fault: Fault| single(fault, 0.0, None).apply_course(4.0, course);
+    assert_eq!(of(Fault::Bias(1.0)), [2.0, 2.0, 3.0]);
+    assert_eq!(of(Fault::Drift(0.5)), [3.0, 2.5, 3.0]);
+    assert_eq!(of(Fault::Stuck(Some(9.0))), [9.0, 0.0, 0.0]);
+    assert_eq!(of(Fault::Quantisation { step: 2.0, offset: 0.0 }), [2.0, 0.0, 0.0]);
+    assert_eq!(of(Fault::Saturation { lowest: None, highest: Some(0.5) }), [0.5, 0.0, 0.0]);
+    assert_eq!(of(Fault::Saturation { lowest: None, highest: Some(5.0) }), course);
 }
 
 #[test]

@@ -70,7 +70,7 @@ calls! {
 
 /// The length that both slices have.
 #[inline]
-fn same_length<A, B>(references: &[A], values: &[B]) -> usize {
+pub(super) fn same_length<A, B>(references: &[A], values: &[B]) -> usize {
     assert_eq!(references.len(), values.len(), "references and values are equally many");
     references.len()
 }

@@ -86,6 +86,7 @@ functions! {
     get_real_output_derivatives = "fmi2GetRealOutputDerivatives": fn(Component, References,
         usize, *const fmi2Integer, *mut fmi2Real) -> fmi2Status;
     do_step = "fmi2DoStep": fn(Component, fmi2Real, fmi2Real, fmi2Boolean) -> fmi2Status;
+    cancel_step = "fmi2CancelStep": fn(Component) -> fmi2Status;
     get_status = "fmi2GetStatus": fn(Component, fmi2StatusKind, *mut fmi2Status) -> fmi2Status;
     get_real_status = "fmi2GetRealStatus":
         fn(Component, fmi2StatusKind, *mut fmi2Real) -> fmi2Status;
@@ -103,6 +104,16 @@ functions! {
     get_nominals = "fmi2GetNominalsOfContinuousStates":
         fn(Component, *mut fmi2Real, usize) -> fmi2Status;
 }
+
+/// `fmi2SetReal`.
+pub(super) type SetReal =
+    unsafe extern "C" fn(Component, References, usize, *const fmi2Real) -> fmi2Status;
+/// `fmi2GetReal`.
+pub(super) type GetReal =
+    unsafe extern "C" fn(Component, References, usize, *mut fmi2Real) -> fmi2Status;
+/// `fmi2DoStep`.
+pub(super) type DoStep =
+    unsafe extern "C" fn(Component, fmi2Real, fmi2Real, fmi2Boolean) -> fmi2Status;
 
 /// What no instance can do without.
 const ALWAYS: [&str; 5] = [

@@ -6,10 +6,12 @@ use std::time::{Duration, Instant};
 use fmi2::abi::{Status, StatusKind, fmi2Status};
 
 use super::Component;
-use super::calls::function;
+use super::calls::{function, same_length};
 use crate::slave::{CallError, Failure, Stepped, absent};
 
 const NAME: &str = "fmi2DoStep";
+const SET: &str = "fmi2SetReal";
+const GET: &str = "fmi2GetReal";
 
 /// Longest pause between two questions whether a pending step is done.
 const PAUSE: Duration = Duration::from_millis(1);
@@ -33,6 +35,64 @@ impl Component {
         self.unfinished(status, time, size)
     }
 
+    /// [`crate::slave::Slave::pass`]: the three calls of C one after the other, their statuses
+    /// looked at without a detour. An answer out of the ordinary is left to the methods of its
+    /// own.
+    #[inline]
+    pub(crate) fn pass(
+        &mut self,
+        (inputs, values): (&[u32], &[f64]),
+        (time, size): (f64, f64),
+        never_back: bool,
+        (outputs, results): (&[u32], &mut [f64]),
+    ) -> Result<Stepped, CallError> {
+        let hot = &self.hot;
+        let usual =
+            |status| status == Status::OK as fmi2Status || status == Status::Warning as fmi2Status;
+        if !inputs.is_empty() {
+            let Some(function) = hot.set_real else { return Err(absent(SET)) };
+            let count = same_length(inputs, values);
+            // SAFETY: the instance is alive; as many references as values.
+            let status = unsafe { function(hot.pointer, inputs.as_ptr(), count, values.as_ptr()) };
+            if !usual(status) {
+                self.check(SET, status)?;
+            }
+        }
+        let Some(function) = hot.do_step else { return Err(absent(NAME)) };
+        hot.sink.set_time(time);
+        // SAFETY: the instance is alive.
+        let status = unsafe { function(hot.pointer, time, size, never_back.into()) };
+        if !usual(status) {
+            let done = self.unfinished(status, time, size)?;
+            return self.read_part(outputs, results, done);
+        }
+        if !outputs.is_empty() {
+            let Some(function) = hot.get_real else { return Err(absent(GET)) };
+            let count = same_length(outputs, results);
+            // SAFETY: the instance is alive; as many references as values.
+            let status =
+                unsafe { function(hot.pointer, outputs.as_ptr(), count, results.as_mut_ptr()) };
+            if !usual(status) {
+                self.check(GET, status)?;
+            }
+        }
+        Ok(Stepped::Whole)
+    }
+
+    /// Reads the outputs after a step that was not done at once.
+    #[cold]
+    fn read_part(
+        &mut self,
+        outputs: &[u32],
+        results: &mut [f64],
+        done: Stepped,
+    ) -> Result<Stepped, CallError> {
+        if !outputs.is_empty() {
+            self.get_real(outputs, results)?;
+        }
+        Ok(done)
+    }
+
     /// What a step that did not answer `fmi2OK` came to.
     #[cold]
     fn unfinished(
@@ -43,9 +103,9 @@ impl Component {
     ) -> Result<Stepped, CallError> {
         let (begin, mut pause) = (Instant::now(), Duration::from_micros(1));
         while status == Status::Pending as fmi2Status {
-            if self.time_limit.is_some_and(|limit| begin.elapsed() > limit) {
-                let seconds = begin.elapsed().as_secs_f64();
-                return Err(self.failed(NAME, Failure::TimedOut(seconds)));
+            if let Some(limit) = self.time_limit.filter(|limit| begin.elapsed() > *limit) {
+                self.cancel();
+                return Err(self.failed(NAME, Failure::TimedOut(limit.as_secs_f64())));
             }
             std::thread::sleep(pause);
             pause = (2 * pause).min(PAUSE);
@@ -54,8 +114,12 @@ impl Component {
         if status != Status::Discard as fmi2Status {
             return self.check(NAME, status).map(|()| Stepped::Whole);
         }
-        let Ok(reached) = self.real_status(StatusKind::LastSuccessfulTime) else {
-            return self.check(NAME, status).map(|()| Stepped::Whole);
+        let reached = match self.real_status(StatusKind::LastSuccessfulTime) {
+            Ok(reached) => reached,
+            Err(CallError { messages, .. }) => {
+                let failure = Failure::Status(Status::Discard);
+                return Err(CallError { function: NAME, failure, messages });
+            }
         };
         let terminated = self.boolean_status(StatusKind::Terminated).unwrap_or(false);
         let rounding = 1e-9 * (size.abs() + time.abs());
@@ -68,6 +132,16 @@ impl Component {
             return Err(self.failed(NAME, Failure::Nonsense(what)));
         }
         Ok(Stepped::Part { reached, terminated })
+    }
+
+    /// `fmi2CancelStep`: only then may the instance be freed (section 4.2.4).
+    fn cancel(&mut self) {
+        // SAFETY: the instance is alive.
+        let canceled = self
+            .functions
+            .cancel_step
+            .is_some_and(|function| unsafe { function(self.pointer) == Status::OK as fmi2Status });
+        self.abandoned = !canceled;
     }
 
     fn status(&mut self, kind: StatusKind) -> Result<fmi2Status, CallError> {

@@ -47,8 +47,7 @@ impl Lookup for System {
     }
 
     fn source(&self, input: Port) -> Option<Port> {
-        let connection = self.connections.iter().find(|connection| connection.to == input);
-        connection.map(|connection| connection.from)
+        System::source(self, input).map(|connection| connection.from)
     }
 }
 

@@ -80,7 +80,7 @@ impl Grid {
         let end = self.start + (self.count + 1) as f64 * self.step;
         let rounding = 1e-6 * self.step;
         // After an event the rest of the way to the grid.
-        let size = if self.time == begin { self.step } else { end - self.time };
+        let size = if self.time.total_cmp(&begin).is_eq() { self.step } else { end - self.time };
         match self.stop {
             Some(stop) if end > stop + rounding => (stop, stop - self.time),
             Some(stop) if end > stop - rounding => (stop, size),
@@ -95,7 +95,7 @@ impl Grid {
         if multiple == 1 {
             return size;
         }
-        if self.count % u64::from(multiple) != 0 {
+        if !self.count.is_multiple_of(u64::from(multiple)) {
             return 0.0;
         }
         let end = self.start + (self.count + u64::from(multiple)) as f64 * self.step;

@@ -66,7 +66,7 @@ impl<'a> Graph<'a> {
         let mut nodes: HashMap<Port, usize> = HashMap::new();
         let mut connections: Vec<Vec<usize>> = Vec::new();
         let mut inputs: Vec<Vec<(usize, usize)>> = vec![Vec::new(); system.slaves.len()];
-        for (number, connection) in system.connections.iter().enumerate() {
+        for (number, connection) in system.connections.iter().chain(&system.initial).enumerate() {
             let node = *nodes.entry(connection.from).or_insert_with(|| {
                 outputs.push(connection.from);
                 connections.push(Vec::new());
@@ -109,7 +109,11 @@ impl<'a> Graph<'a> {
         time: f64,
     ) -> Result<(), SystemError> {
         for &number in &self.connections[node] {
-            let connection = &system.connections[number];
+            let all = system.connections.len();
+            let connection = match number.checked_sub(all) {
+                None => &system.connections[number],
+                Some(number) => &system.initial[number],
+            };
             let to = connection.to;
             let mut value = system.transformed(value, &connection.transformation, to);
             if let Some(fault) = self.faults.get(&to) {

@@ -14,6 +14,9 @@ const PARTS: u32 = 1000;
 /// Part of a step that may be missing at its end: the rounding of times.
 const ROUNDING: f64 = 1e-9;
 
+/// What helps where a slave does not go on after `fmi2Discard`.
+const ADVICE: &str = "the step before it was discarded; with rollback all FMUs repeat it";
+
 /// How a sweep ended.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Swept {
@@ -78,6 +81,9 @@ impl Simulation {
         if !self.drives.is_empty() {
             self.drives.write(&mut self.system, time)?;
         }
+        if self.passes {
+            return self.pass(time, size, never_back);
+        }
         for slave in 0..self.multiples.len() {
             self.sizes[slave] = self.grid.size_of(self.multiples[slave], time, size);
             if self.sizes[slave] > 0.0 {
@@ -140,6 +146,23 @@ impl Simulation {
             }
             Ok(())
         })
+    }
+
+    /// Jacobi's method with held inputs and nothing but Reals: one pass over the slaves.
+    fn pass(&mut self, time: f64, size: f64, never_back: bool) -> Result<Swept, SystemError> {
+        let mut swept = Swept::default();
+        let parts = self.exchange.reals.pass(&mut self.system, (time, size), never_back)?;
+        if !parts.is_empty() {
+            for (slave, done) in std::mem::take(parts) {
+                self.in_parts(slave, (time, size), done, never_back, &mut swept)?;
+            }
+        }
+        if !self.exchange.reals.is_finite() {
+            for slave in 0..self.system.slaves.len() {
+                self.exchange.check_finite(&self.system, slave, time + size)?;
+            }
+        }
+        Ok(swept)
     }
 
     #[inline]
@@ -206,9 +229,10 @@ impl Simulation {
             }
             begin = reached;
             let (name, instance) = &mut self.system.slaves[slave];
-            done = instance
-                .do_step(begin, end - begin, true)
-                .map_err(|source| call(name, begin, source))?;
+            done = instance.do_step(begin, end - begin, true).map_err(|mut source| {
+                source.messages.push(ADVICE.to_owned());
+                call(name, begin, source)
+            })?;
         }
         let what = format!(
             "returned fmi2Discard and came to {begin} s only, on the way from {time} to {end} s"

@@ -192,7 +192,7 @@ impl Loader {
     ) -> Result<usize, SspError> {
         let here = |sentence| meaning(source.at.0, sentence).in_file(&file.shown);
         let (dictionary, shown) =
-            self.files.dictionary(&source.content, file).map_err(|error| error.or(here))?;
+            Files::dictionary(&source.content, file).map_err(|error| error.or(here))?;
         let connectors = dictionary.entries.iter().map(|(name, kind)| Connector {
             name: name.clone(),
             kind: ConnectorKind::Inout,

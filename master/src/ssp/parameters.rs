@@ -11,7 +11,6 @@ use super::flatten::Flow;
 use super::structure::{ConnectorKind, MappingEntry, Parameter, ParameterSet};
 use super::tree::{Binding, Content, Tree, Vertex};
 use crate::assembly::Setting;
-use crate::transformation::Transformation;
 use value::Value;
 
 /// Names of a binding that match nothing and are still named in a warning.
@@ -129,19 +128,19 @@ impl Applied<'_> {
             let (value, doubts) = value.converted(&entry.conversion, measure).map_err(wrong)?;
             let name = self.tree.name(&target);
             self.warnings.extend(doubts.iter().map(|doubt| format!("setting of {name}: {doubt}")));
-            self.set(&target, value).map_err(wrong)?;
+            self.set(&target, &value).map_err(wrong)?;
         }
         Ok(())
     }
 
     /// Sets an FMU's variable, or what is connected to a system's connector.
-    fn set(&mut self, target: &Vertex, value: Value) -> Result<(), String> {
+    fn set(&mut self, target: &Vertex, value: &Value) -> Result<(), String> {
         if matches!(self.tree.nodes[target.node].content, Content::Fmu(_)) {
-            return self.set_variable(target, &value);
+            return self.set_variable(target, value);
         }
         let kind = self.tree.connector(target.node, &target.connector).map(|each| each.kind);
         let gives = matches!(kind, Some(ConnectorKind::Input | ConnectorKind::Parameter));
-        if gives { self.set_downstream(target, &value) } else { self.set_upstream(target, value) }
+        if gives { self.set_downstream(target, value) } else { self.set_upstream(target, value) }
     }
 
     /// All variables that the connector leads to.
@@ -173,21 +172,15 @@ impl Applied<'_> {
     }
 
     /// The output that the connector shows; its start value is what the connector shall show.
-    fn set_upstream(&mut self, target: &Vertex, value: Value) -> Result<(), String> {
+    fn set_upstream(&mut self, target: &Vertex, value: &Value) -> Result<(), String> {
         let path = self.flow.upstream(self.tree, target).map_err(|error| error.to_string())?;
-        let Some(first) = path.first() else { return Ok(()) };
+        let is_fmu =
+            |vertex: &Vertex| matches!(self.tree.nodes[vertex.node].content, Content::Fmu(_));
+        let Some(first) = path.first().filter(|first| is_fmu(&first.from)) else { return Ok(()) };
         let measure = self.tree.measure(&first.from);
         let way =
             Flow::over(self.tree, &path, measure.clone()).map_err(|error| error.to_string())?;
-        let number = match way.transformation {
-            Transformation::Identity => value.number,
-            Transformation::Linear { factor, offset } if factor != 0.0 => {
-                let back =
-                    Transformation::Linear { factor: 1.0 / factor, offset: -offset / factor };
-                value.number.transformed(&back)?
-            }
-            _ => return Err("the transformation on the way has no inverse".to_owned()),
-        };
+        let number = value.number.before(&way.transformation)?;
         self.set_variable(&first.from.clone(), &Value::new(number, measure))
     }
 

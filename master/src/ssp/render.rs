@@ -242,7 +242,7 @@ fn definitions(tag: Tag, space: &str, definitions: &Definitions) -> Tag {
         let tag = stated.fold(Tag::new("ssc:BaseUnit"), |tag, (name, exponent)| {
             tag.with(name, exponent.to_string())
         });
-        let factor = (base.factor != 1.0).then(|| number(base.factor));
+        let factor = Some(number(base.factor)).filter(|factor| factor != "1.0");
         let offset = (base.offset != 0.0).then(|| number(base.offset));
         let tag = tag.maybe("factor", factor.as_deref()).maybe("offset", offset.as_deref());
         Tag::new("ssc:Unit").with("name", &unit.name).add(tag)

@@ -2,7 +2,7 @@
 
 mod archive;
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use fmi2::description::{Causality, Kind, ModelDescription, ScalarVariable};
@@ -36,8 +36,10 @@ const SETTINGS: &str = "settings";
 /// its variable, or a file that cannot be read or written.
 pub fn write(assembly: &Assembly, step_size: Option<f64>, target: &Path) -> Result<(), SspError> {
     let mut writer = Writing::default();
+    let ends = assembly.links.iter().flat_map(|link| [&link.from, &link.to]);
+    let linked = ends.map(|end| (end.element.as_str(), end.variable.as_str())).collect();
     for element in &assembly.elements {
-        writer.element(element, assembly)?;
+        writer.element(element, &linked)?;
     }
     let connections = assembly.links.iter().map(|link| writer.connection(link));
     let connections = connections.collect::<Result<_, SspError>>()?;
@@ -53,8 +55,11 @@ pub fn write(assembly: &Assembly, step_size: Option<f64>, target: &Path) -> Resu
             step_size,
         }),
     };
-    writer.archive.write(render_ssd(&structure), target)
+    writer.archive.write(&render_ssd(&structure), target)
 }
+
+/// Elements and variables that are connected.
+type Linked<'a> = HashSet<(&'a str, &'a str)>;
 
 /// What has been collected so far.
 #[derive(Default)]
@@ -71,20 +76,19 @@ impl Writing {
     fn element(
         &mut self,
         element: &crate::assembly::Element,
-        assembly: &Assembly,
+        linked: &Linked<'_>,
     ) -> Result<(), SspError> {
         let path = &element.fmu;
         let fmu = if path.is_dir() { Unpacked::in_folder(path)? } else { Unpacked::open(path)? };
-        let source = match self.fmus.get(path) {
-            Some(known) => known.clone(),
-            None => {
-                let added = self.archive.add_fmu(path, &fmu)?;
-                self.fmus.insert(path.clone(), added.clone());
-                added
-            }
+        let source = if let Some(known) = self.fmus.get(path) {
+            known.clone()
+        } else {
+            let added = self.archive.add_fmu(path, &fmu)?;
+            self.fmus.insert(path.clone(), added.clone());
+            added
         };
         let description = fmu.description.clone();
-        let connectors = self.connectors(&element.name, &description, assembly)?;
+        let connectors = self.connectors(&element.name, &description, linked)?;
         let bindings = self.bindings(&element.name, &element.settings, &description)?;
         let (name, base) = (element.name.clone(), ElementBase::default());
         if self.descriptions.insert(name.clone(), description).is_some() {
@@ -99,17 +103,13 @@ impl Writing {
         &mut self,
         element: &str,
         description: &ModelDescription,
-        assembly: &Assembly,
+        linked: &Linked<'_>,
     ) -> Result<Vec<Connector>, SspError> {
-        let linked = |name: &str| {
-            let ends = assembly.links.iter().flat_map(|link| [&link.from, &link.to]);
-            ends.into_iter().any(|end| end.element == element && end.variable == name)
-        };
         let mut connectors = Vec::new();
         for variable in &description.variables {
             let is_shown = variable.causality == Causality::Output
                 && matches!(variable.kind, Kind::Real(_) | Kind::Integer(_) | Kind::Boolean(_));
-            if !is_shown && !linked(&variable.name) {
+            if !is_shown && !linked.contains(&(element, variable.name.as_str())) {
                 continue;
             }
             let kind = kind_of(variable.causality).ok_or_else(|| {

@@ -34,7 +34,7 @@ pub(super) fn read(bytes: &[u8], space: &str, root: &str) -> Result<Node, SspErr
     if bytes.len() > CAPACITY {
         return Err(SspError::Limit { limit: CAPACITY, what: "bytes" });
     }
-    if bytes.iter().filter(|byte| **byte == b'<').count() > TAGS {
+    if bytes.split(|byte| *byte == b'<').count() > TAGS {
         return Err(SspError::Limit { limit: TAGS, what: "tags" });
     }
     let element = xml::read(bytes)?;

@@ -7,7 +7,8 @@ use crate::error::SystemError;
 use crate::transformation::Transformation;
 
 impl System {
-    /// Connects `from` to `to`.
+    /// Connects an output to an input, or an output or a calculated parameter to a parameter, which
+    /// then gets its value in initialization mode.
     pub(super) fn join(
         &mut self,
         from: Port,
@@ -15,18 +16,28 @@ impl System {
         transformation: Transformation,
         units_settled: bool,
     ) -> Result<(), SystemError> {
-        self.expect_causality(from, Causality::Output)?;
-        self.expect_causality(to, Causality::Input)?;
+        let to_parameter = self.variable(to).causality == Causality::Parameter;
+        if !(to_parameter && self.variable(from).causality == Causality::CalculatedParameter) {
+            self.expect_causality(from, Causality::Output)?;
+        }
+        if !to_parameter {
+            self.expect_causality(to, Causality::Input)?;
+        }
         self.expect_fitting_types(from, to, &transformation)?;
         let transformation = if units_settled {
             transformation
         } else {
             match self.conversion(from, to)? {
-                Some(conversion) => units::after(conversion, transformation),
+                Some(conversion) => units::after(conversion, &transformation),
                 None => transformation,
             }
         };
-        if let Some(first) = self.source(to) {
+        let first = if to_parameter {
+            self.initial.iter().find(|known| known.to == to)
+        } else {
+            self.source(to)
+        };
+        if let Some(first) = first {
             let first = self.name(first.from);
             return Err(SystemError::Twice {
                 input: self.name(to),
@@ -34,8 +45,13 @@ impl System {
                 second: self.name(from),
             });
         }
-        self.sources.insert(to, self.connections.len());
-        self.connections.push(Connection { from, to, transformation });
+        let connection = Connection { from, to, transformation };
+        if to_parameter {
+            self.initial.push(connection);
+        } else {
+            self.sources.insert(to, self.connections.len());
+            self.connections.push(connection);
+        }
         Ok(())
     }
 

@@ -54,9 +54,9 @@ fn exponents(base: &BaseUnit) -> [i32; 8] {
 }
 
 /// `transformation` of what the conversion, factor and offset, gives.
-pub(super) fn after(conversion: (f64, f64), transformation: Transformation) -> Transformation {
+pub(super) fn after(conversion: (f64, f64), transformation: &Transformation) -> Transformation {
     match transformation {
-        Transformation::Linear { factor, offset } => Transformation::Linear {
+        &Transformation::Linear { factor, offset } => Transformation::Linear {
             factor: factor * conversion.0,
             offset: factor * conversion.1 + offset,
         },

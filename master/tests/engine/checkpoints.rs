@@ -20,11 +20,12 @@ connection = "a.u0"
 noise = { deviation = 0.01, seed = 7 }
 "#;
 
+#[derive(serde::Deserialize)]
+struct File {
+    scenario: Scenario,
+}
+
 fn prepared(text: &str, system: &System) -> Prepared {
-    #[derive(serde::Deserialize)]
-    struct File {
-        scenario: Scenario,
-    }
     if text.is_empty() {
         return Prepared::default();
     }
@@ -95,8 +96,9 @@ fn chosen_steps_go_on_bit_by_bit() {
     let system = problems::two_masses(20.0, 0.5).system(ABLE, &Arc::default());
     let port = |name: &str| system.port(name).unwrap();
     let bonds = vec![PowerBond { first: port("b.u1"), second: port("a.u0") }];
-    use StepControl::{Doubling, Embedded, Energy, Increment};
-    for control in [Doubling, Embedded, Increment, Energy] {
+    for control in
+        [StepControl::Doubling, StepControl::Embedded, StepControl::Increment, StepControl::Energy]
+    {
         let (bonds, relative_tolerance) = (bonds.clone(), 1e-2);
         let algorithm = Algorithm { control, bonds, relative_tolerance, ..Algorithm::new(0.01) };
         verify(control.name(), ABLE, &algorithm, "");

@@ -117,7 +117,7 @@ impl Network {
             run.points += 1;
             last = time;
             // Between, a slave with a step of its own is ahead.
-            if run.points % common != 0 {
+            if !run.points.is_multiple_of(common) {
                 continue;
             }
             let exact = &outputs * ((&matrix * time).exp() * &start);

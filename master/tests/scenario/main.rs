@@ -133,8 +133,8 @@ fn listener(interpolates: bool) -> (Box<dyn Slave>, Told) {
 fn system() -> (System, Told, Told) {
     let ((plant, plant_told), (ctrl, ctrl_told)) = (listener(true), listener(false));
     let mut system = System::default();
-    system.add("plant", plant);
-    system.add("ctrl", ctrl);
+    system.add("plant", plant).unwrap();
+    system.add("ctrl", ctrl).unwrap();
     system.connect("plant.y", "ctrl.force").unwrap();
     system.connect("plant.y", "ctrl.angle").unwrap();
     system.connect("plant.n", "ctrl.count").unwrap();

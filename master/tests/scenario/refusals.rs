@@ -182,61 +182,73 @@ fn files_that_do_not_fit_are_refused() {
     assert!(found.starts_with(&format!("scenario.table[1]: {}: ", path("none.csv"))), "{found}");
 }
 
+/// A fault on that connection is refused with that message.
+fn expect_of_fault(connection: &str, body: &str, message: &str) {
+    let text = fault(&format!("connection = \"{connection}\", {body}"));
+    expect(&text, &format!("scenario.fault[1]: {message}"));
+}
+
 #[test]
-fn faults_that_are_none_are_refused() {
-    for (connection, rest, message) in [
-        ("ctrl.force", "bias = { value = inf }", "value is inf, expected a finite number"),
-        ("ctrl.force", "stuck = { from = nan }", "from is NaN, expected a finite number"),
-        ("ctrl.force", "stuck = { from = 2, until = 2 }", "until is 2, expected a time after from"),
+fn faults_with_numbers_that_make_no_sense_are_refused() {
+    for (body, message) in [
+        ("bias = { value = inf }", "value is inf, expected a finite number"),
+        ("stuck = { from = nan }", "from is NaN, expected a finite number"),
+        ("stuck = { from = 2, until = 2 }", "until is 2, expected a time after from"),
         (
-            "ctrl.force",
-            "dropout = { period = 1 }",
-            "dropout: expected period and lost, or probability, or none of them",
-        ),
-        (
-            "ctrl.force",
-            "dropout = { seed = 1 }",
-            "dropout: expected every and seed only with probability",
-        ),
-        (
-            "ctrl.force",
             "dropout = { period = 1, lost = 1 }",
             "lost is 1, expected a time above 0 and below the period",
         ),
+        ("dropout = { probability = 2 }", "probability is 2, expected a number from 0 to 1"),
+        ("dropout = { probability = 0.5, every = 0 }", "every is 0, expected a number above 0"),
+        ("delay = { seconds = 0 }", "seconds is 0, expected a number above 0"),
         (
-            "ctrl.force",
-            "dropout = { probability = 2 }",
-            "probability is 2, expected a number from 0 to 1",
-        ),
-        (
-            "ctrl.force",
-            "dropout = { probability = 0.5, every = 0 }",
-            "every is 0, expected a number above 0",
-        ),
-        ("ctrl.force", "delay = { seconds = 0 }", "seconds is 0, expected a number above 0"),
-        (
-            "ctrl.force",
             "delay = { seconds = 1e9 }",
-            "a delay of 1000000000 s is 2000000000 communication steps of 0.5 s, expected at most 250000",
+            "a delay of 1000000000 s is 2000000000 communication steps of 0.5 s, expected at most \
+             250000",
         ),
-        ("ctrl.force", "quantisation = { step = -1 }", "step is -1, expected a number above 0"),
-        ("ctrl.force", "saturation = {}", "saturation: expected min or max or both"),
+        ("quantisation = { step = -1 }", "step is -1, expected a number above 0"),
+        ("saturation = { min = 2, max = 1 }", "max is 1, expected a number not below min"),
+        ("noise = { deviation = 0 }", "deviation is 0, expected a number above 0"),
+    ] {
+        expect_of_fault("ctrl.force", body, message);
+    }
+}
+
+#[test]
+fn faults_that_say_too_little_or_too_much_are_refused() {
+    for (body, message) in [
         (
-            "ctrl.force",
-            "saturation = { min = 2, max = 1 }",
-            "max is 1, expected a number not below min",
+            "dropout = { period = 1 }",
+            "dropout: expected period and lost, or probability, or none of them",
         ),
-        ("ctrl.force", "noise = {}", "noise: expected deviation (normal) or amplitude (uniform)"),
-        ("ctrl.force", "noise = { deviation = 0 }", "deviation is 0, expected a number above 0"),
+        ("dropout = { seed = 1 }", "dropout: expected every and seed only with probability"),
+        ("saturation = {}", "saturation: expected min or max or both"),
+        ("noise = {}", "noise: expected deviation (normal) or amplitude (uniform)"),
+        (
+            "bias = { value = 1 }, gain = { factor = 2 }",
+            "found bias and gain, expected exactly one of bias, gain, drift, stuck, dropout, delay, \
+             quantisation, saturation, noise, inversion",
+        ),
+    ] {
+        expect_of_fault("ctrl.force", body, message);
+    }
+}
+
+#[test]
+fn faults_that_do_not_fit_their_connection_are_refused() {
+    let no_source = "expected a connected input, or one that a signal drives";
+    for (connection, body, message) in [
         (
             "ctrl.force",
             "inversion = {}",
-            "inversion does not fit ctrl.force, which is of type Real; expected any kind but inversion",
+            "inversion does not fit ctrl.force, which is of type Real; expected any kind but \
+             inversion",
         ),
         (
             "ctrl.count",
             "gain = { factor = 2 }",
-            "gain does not fit ctrl.count, which is of type Integer; expected bias, stuck, dropout, delay or saturation",
+            "gain does not fit ctrl.count, which is of type Integer; expected bias, stuck, dropout, \
+             delay or saturation",
         ),
         (
             "ctrl.count",
@@ -246,22 +258,12 @@ fn faults_that_are_none_are_refused() {
         (
             "ctrl.level",
             "stuck = {}",
-            "ctrl.level is an input without a source, expected a connected input, or one that a signal drives",
+            &format!("ctrl.level is an input without a source, {no_source}"),
         ),
-        (
-            "plant.y",
-            "stuck = {}",
-            "plant.y is an output, expected a connected input, or one that a signal drives",
-        ),
+        ("plant.y", "stuck = {}", &format!("plant.y is an output, {no_source}")),
         ("ctrl.y=ctrl.force", "stuck = {}", "ctrl.force is connected to plant.y, expected ctrl.y"),
-        (
-            "ctrl.force",
-            "bias = { value = 1 }, gain = { factor = 2 }",
-            "found bias and gain, expected exactly one of bias, gain, drift, stuck, dropout, delay, quantisation, saturation, noise, inversion",
-        ),
     ] {
-        let text = fault(&format!("connection = \"{connection}\", {rest}"));
-        expect(&text, &format!("scenario.fault[1]: {message}"));
+        expect_of_fault(connection, body, message);
     }
 }
 

@@ -1,18 +1,31 @@
-//! Typed access to attributes and children, with errors that name them.
+//! Typed access to attributes and children, with errors and warnings that name them.
 
 use std::str::FromStr;
 
 use super::ParseError;
+use super::warning::{Warning, Warnings, section};
 use super::xml::Element;
 
 /// The white space of XML.
-const WHITE_SPACE: [char; 4] = [' ', '\t', '\r', '\n'];
+pub(super) const WHITE_SPACE: [char; 4] = [' ', '\t', '\r', '\n'];
+const NUMBER: &str = "a finite number";
+const INTEGER: &str = "an integer from -2147483648 to 2147483647";
+const UNSIGNED: &str = "an integer from 0 to 4294967295";
+const BOOLEAN: &str = "true, false, 1 or 0";
+const NOTHING: &str = "read as if it were not there";
 
-impl Element {
+/// An element that is being read, and where warnings go.
+#[derive(Clone, Copy)]
+pub(super) struct Node<'a> {
+    pub(super) element: &'a Element<'a>,
+    pub(super) warnings: &'a Warnings,
+}
+
+impl<'a> Node<'a> {
     /// The error for a missing or surplus child.
     pub(super) fn misses(&self, expected: impl Into<String>, found: String) -> ParseError {
-        let (at, element, expected) = (self.at, self.name.clone(), expected.into());
-        ParseError::Element { at, element, expected, found }
+        let (at, element) = (self.element.at, self.element.name.to_owned());
+        ParseError::Element { at, element, expected: expected.into(), found }
     }
 
     /// The error for the value `found` of an attribute.
@@ -21,139 +34,203 @@ impl Element {
     }
 
     fn fault(&self, attribute: &'static str, expected: &str, found: String) -> ParseError {
-        let (at, element, expected) = (self.at, self.name.clone(), expected.to_owned());
-        ParseError::Attribute { at, element, attribute, expected, found }
+        let (at, element) = (self.element.at, self.element.name.to_owned());
+        ParseError::Attribute { at, element, attribute, expected: expected.to_owned(), found }
     }
 
-    pub(super) fn attribute(&self, name: &str) -> Option<&str> {
-        let own = self.attributes.iter().find(|(own, _)| own == name);
-        own.map(|(_, value)| value.as_str())
+    /// A warning about the value `found` of an attribute, which the schema does not allow.
+    pub(super) fn warn(&self, attribute: &str, expected: &str, found: &str, assumed: &str) {
+        let place = self.place(attribute);
+        self.warn_of(true, place, (expected, format!("{found:?}")), assumed);
+    }
+
+    /// A warning about the value `found` of an attribute, which only the text does not allow.
+    pub(super) fn warn_text(&self, attribute: &str, expected: &str, found: &str, assumed: &str) {
+        let place = self.place(attribute);
+        self.warn_of(false, place, (expected, format!("{found:?}")), assumed);
+    }
+
+    /// The name of an attribute in a warning.
+    pub(super) fn place(&self, attribute: &str) -> String {
+        format!("<{}>, attribute {attribute}", self.element.name)
+    }
+
+    /// A warning with what was expected and found.
+    pub(super) fn warn_of(
+        &self,
+        by_schema: bool,
+        place: String,
+        (expected, found): (&str, String),
+        assumed: &str,
+    ) {
+        self.warnings.add(Warning {
+            by_schema,
+            at: self.element.at,
+            place,
+            expected: expected.to_owned(),
+            found,
+            assumed: assumed.to_owned(),
+            section: section(self.element),
+        });
+    }
+
+    pub(super) fn attribute(&self, name: &str) -> Option<&'a str> {
+        let own = self.element.attributes.iter().find(|(own, _)| *own == name);
+        own.map(|(_, value)| value.as_ref())
     }
 
     pub(super) fn text(&self, name: &str) -> Option<String> {
         self.attribute(name).map(str::to_owned)
     }
 
-    pub(super) fn required(&self, name: &'static str) -> Result<&str, ParseError> {
+    pub(super) fn required(&self, name: &'static str) -> Result<&'a str, ParseError> {
         let value = self.attribute(name);
         value.ok_or_else(|| self.fault(name, "a value", "no such attribute".to_owned()))
     }
 
-    /// A finite `xs:double`.
+    /// The text of an attribute without white space around it; an empty one is warned of and
+    /// taken for none.
+    fn content(&self, name: &str, expected: &str) -> Option<(&'a str, &'a str)> {
+        let text = self.attribute(name)?;
+        let trimmed = text.trim_matches(WHITE_SPACE);
+        if trimmed.is_empty() {
+            self.warn(name, expected, text, NOTHING);
+            return None;
+        }
+        Some((text, trimmed))
+    }
+
+    /// An `xs:double`. One that is infinite or no number says as much as none, and is warned of;
+    /// one that is too large for a double is an error.
     pub(super) fn number(&self, name: &'static str) -> Result<Option<f64>, ParseError> {
-        let finite = self.parsed::<f64>(name, "a finite number")?.filter(|value| value.is_finite());
-        match self.attribute(name) {
-            Some(text) if finite.is_none() => Err(self.wrong(name, "a finite number", text)),
-            _ => Ok(finite),
+        let Some((text, trimmed)) = self.content(name, NUMBER) else { return Ok(None) };
+        if is_not_finite(trimmed) {
+            // The schema's numbers have these, those of FMI have not.
+            let by_schema = !["INF", "-INF", "NaN"].contains(&trimmed);
+            self.warn_of(by_schema, self.place(name), (NUMBER, format!("{text:?}")), NOTHING);
+            return Ok(None);
+        }
+        match trimmed.parse::<f64>() {
+            Ok(value) if value.is_finite() => Ok(Some(value)),
+            _ => Err(self.wrong(name, NUMBER, text)),
         }
     }
 
-    /// `xs:int`.
+    /// An `xs:double` that a conversion is made with: nothing but a finite number will do.
+    pub(super) fn finite(&self, name: &'static str, default: f64) -> Result<f64, ParseError> {
+        let Some(text) = self.attribute(name) else { return Ok(default) };
+        let value = text.trim_matches(WHITE_SPACE).parse::<f64>().ok();
+        value.filter(|value| value.is_finite()).ok_or_else(|| self.wrong(name, NUMBER, text))
+    }
+
+    /// `xs:int`. An integer written with a point (`1.0`) is warned of.
     pub(super) fn integer(&self, name: &'static str) -> Result<Option<i32>, ParseError> {
-        self.parsed(name, "an integer from -2147483648 to 2147483647")
+        let Some((text, trimmed)) = self.content(name, INTEGER) else { return Ok(None) };
+        if let Ok(value) = trimmed.parse() {
+            return Ok(Some(value));
+        }
+        let real = trimmed.parse::<f64>().ok().filter(|real| real.fract() == 0.0);
+        let value = real.and_then(|real| format!("{real:.0}").parse::<i32>().ok());
+        let value = value.ok_or_else(|| self.wrong(name, INTEGER, text))?;
+        self.warn(name, INTEGER, text, &format!("read as {value}"));
+        Ok(Some(value))
     }
 
-    /// `xs:unsignedInt`.
-    pub(super) fn unsigned(&self, name: &'static str) -> Result<Option<u32>, ParseError> {
-        self.parsed(name, "an integer from 0 to 4294967295")
+    /// `xs:unsignedInt`, or an error.
+    pub(super) fn unsigned(&self, name: &'static str) -> Result<u32, ParseError> {
+        let text = self.required(name)?;
+        let value = text.trim_matches(WHITE_SPACE).parse();
+        value.map_err(|_| self.wrong(name, UNSIGNED, text))
     }
 
-    /// `xs:boolean`.
+    /// `xs:unsignedInt` of something that a simulation can do without.
+    pub(super) fn optional_unsigned(&self, name: &'static str) -> Option<u32> {
+        let (text, trimmed) = self.content(name, UNSIGNED)?;
+        let value = trimmed.parse().ok();
+        if value.is_none() {
+            self.warn(name, UNSIGNED, text, NOTHING);
+        }
+        value
+    }
+
+    /// `xs:boolean` in any case.
     pub(super) fn boolean(&self, name: &'static str) -> Result<Option<bool>, ParseError> {
-        let value = self.attribute(name);
-        value
-            .map(|text| match text.trim_matches(WHITE_SPACE) {
-                "true" | "1" => Ok(true),
-                "false" | "0" => Ok(false),
-                _ => Err(self.wrong(name, "true, false, 1 or 0", text)),
-            })
-            .transpose()
+        let Some((text, trimmed)) = self.content(name, BOOLEAN) else { return Ok(None) };
+        let value = self.truth(name, trimmed);
+        value.map(Some).ok_or_else(|| self.wrong(name, BOOLEAN, text))
     }
 
-    /// One of a fixed set of words.
-    pub(super) fn word<T: FromStr>(
-        &self,
-        name: &'static str,
-        expected: &str,
-    ) -> Result<Option<T>, ParseError> {
-        let value = self.attribute(name);
-        value.map(|text| text.parse().map_err(|_| self.wrong(name, expected, text))).transpose()
-    }
-
-    fn parsed<T: FromStr>(
-        &self,
-        name: &'static str,
-        expected: &str,
-    ) -> Result<Option<T>, ParseError> {
-        let value = self.attribute(name);
-        value
-            .map(|text| {
-                let trimmed = text.trim_matches(WHITE_SPACE);
-                trimmed.parse().map_err(|_| self.wrong(name, expected, text))
-            })
-            .transpose()
-    }
-
-    /// The 1-based index of one of `count` variables.
-    pub(super) fn index(
-        &self,
-        name: &'static str,
-        text: &str,
-        count: usize,
-    ) -> Result<u32, ParseError> {
-        let index = text.trim_matches(WHITE_SPACE).parse::<u32>().ok();
-        let inside = |index: &u32| usize::try_from(*index).is_ok_and(|own| own <= count);
-        index.filter(|index| *index > 0 && inside(index)).ok_or_else(|| {
-            let expected = format!("the index of a variable, 1 to {count}");
-            self.wrong(name, &expected, text)
+    /// A capability: false where its value is none of `xs:boolean`.
+    pub(super) fn flag(&self, name: &'static str) -> bool {
+        let Some((text, trimmed)) = self.content(name, BOOLEAN) else { return false };
+        self.truth(name, trimmed).unwrap_or_else(|| {
+            self.warn(name, BOOLEAN, text, "read as false");
+            false
         })
     }
 
-    /// An attribute that is a list separated by white space.
-    pub(super) fn items<T>(
-        &self,
-        name: &str,
-        item: impl Fn(&str) -> Result<T, ParseError>,
-    ) -> Result<Option<Vec<T>>, ParseError> {
-        let value = self.attribute(name);
-        value
-            .map(|text| {
-                let words = text.split(WHITE_SPACE).filter(|word| !word.is_empty());
-                words.map(item).collect()
-            })
-            .transpose()
+    fn truth(&self, name: &'static str, text: &str) -> Option<bool> {
+        let value = match text {
+            "true" | "1" => return Some(true),
+            "false" | "0" => return Some(false),
+            _ if text.eq_ignore_ascii_case("true") => true,
+            _ if text.eq_ignore_ascii_case("false") => false,
+            _ => return None,
+        };
+        self.warn(name, BOOLEAN, text, &format!("read as {value}"));
+        Some(value)
     }
 
-    pub(super) fn children_named(&self, name: &str) -> impl Iterator<Item = &Element> {
-        self.children.iter().filter(move |child| child.name == name)
+    /// One of `words`, also in another case; another one is taken for none.
+    pub(super) fn word<T: FromStr>(&self, name: &'static str, words: &[&str]) -> Option<T> {
+        let text = self.attribute(name)?;
+        if let Ok(value) = text.parse() {
+            return Some(value);
+        }
+        let expected = format!("one of {}", words.join(", "));
+        let trimmed = text.trim_matches(WHITE_SPACE);
+        let meant = words.iter().find(|word| word.eq_ignore_ascii_case(trimmed));
+        let assumed = meant.map_or(NOTHING.to_owned(), |word| format!("read as {word}"));
+        self.warn(name, &expected, text, &assumed);
+        meant.and_then(|word| word.parse().ok())
     }
 
-    /// The child called `name`, which may be absent but not repeated.
-    pub(super) fn optional_child(&self, name: &str) -> Result<Option<&Element>, ParseError> {
+    pub(super) fn children_named(self, name: &'a str) -> impl Iterator<Item = Node<'a>> {
+        let named = self.element.children.iter().filter(move |child| child.name == name);
+        named.map(move |element| Node { element, ..self })
+    }
+
+    pub(super) fn optional_child(self, name: &'a str) -> Result<Option<Node<'a>>, ParseError> {
         let mut children = self.children_named(name);
         let first = children.next();
         match children.next() {
             None => Ok(first),
             Some(second) => {
-                let found = format!("another at {}", second.at);
+                let found = format!("another at {}", second.element.at);
                 Err(self.misses(format!("one element {name}"), found))
             }
         }
     }
 
-    pub(super) fn child(&self, name: &str) -> Result<&Element, ParseError> {
+    pub(super) fn child(self, name: &'a str) -> Result<Node<'a>, ParseError> {
         let child = self.optional_child(name)?;
         child.ok_or_else(|| self.misses(format!("an element {name}"), "none".to_owned()))
     }
 
     /// The items called `item` of the list called `name`; none if there is no such list.
     pub(super) fn list<T>(
-        &self,
-        name: &str,
-        item: &str,
-        read: impl Fn(&Element) -> Result<T, ParseError>,
+        self,
+        name: &'a str,
+        item: &'a str,
+        read: impl Fn(Node<'a>) -> Result<T, ParseError>,
     ) -> Result<Vec<T>, ParseError> {
         let list = self.optional_child(name)?;
         list.map_or(Ok(Vec::new()), |list| list.children_named(item).map(read).collect())
     }
+}
+
+/// Whether a number is spelt as infinite or as none: by XML Schema, C, C#, Java or Windows.
+fn is_not_finite(text: &str) -> bool {
+    let unsigned = text.trim_start_matches(['+', '-']).to_ascii_lowercase();
+    ["inf", "infinity", "nan"].contains(&unsigned.as_str()) || unsigned.starts_with("1.#")
 }

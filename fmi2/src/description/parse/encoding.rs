@@ -2,27 +2,70 @@
 
 use std::borrow::Cow;
 
+use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 use quick_xml::events::Event;
 use quick_xml::reader::Reader;
 
-use super::ParseError;
+use super::{ParseError, Position, Warning};
 
 /// Longest XML declaration that is looked at.
 const DECLARATION: usize = 256;
 
-/// The text of an XML file in UTF-8, or in ISO-8859-1 if it says so.
-pub(super) fn decode(bytes: &[u8]) -> Result<Cow<'_, str>, ParseError> {
-    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
-        return Err(ParseError::Encoding { found: "the byte order mark of UTF-16".to_owned() });
+/// The text of an XML file, and a warning where it is not UTF-8 as FMI wants it.
+pub(super) fn decode(bytes: &[u8]) -> Result<(Cow<'_, str>, Option<Warning>), ParseError> {
+    if let Some((encoding, mark)) = Encoding::for_bom(bytes) {
+        let rest = &bytes[mark..];
+        if encoding == UTF_8 {
+            return Ok((utf8(rest)?, Some(other("a byte order mark".to_owned()))));
+        }
+        return converted(rest, encoding);
     }
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    let declared = declared(bytes).unwrap_or_else(|| "UTF-8".to_owned());
-    match declared.to_ascii_lowercase().as_str() {
-        "utf-8" | "utf8" | "us-ascii" | "ascii" => utf8(bytes),
-        "iso-8859-1" | "latin1" | "latin-1" => {
-            Ok(bytes.iter().map(|byte| char::from(*byte)).collect::<String>().into())
+    // Without a mark, the first character "<" tells the two forms of UTF-16 apart.
+    match bytes {
+        [b'<', 0, ..] => return converted(bytes, UTF_16LE),
+        [0, b'<', ..] => return converted(bytes, UTF_16BE),
+        _ => {}
+    }
+    let Some(declared) = declared(bytes) else {
+        return Ok((utf8(bytes)?, None));
+    };
+    match Encoding::for_label(declared.as_bytes()) {
+        Some(encoding) if encoding == UTF_8 => Ok((utf8(bytes)?, None)),
+        // Every byte that ASCII has means the same in UTF-8.
+        _ if declared.eq_ignore_ascii_case("us-ascii")
+            || declared.eq_ignore_ascii_case("ascii") =>
+        {
+            Ok((utf8(bytes)?, Some(other(format!("encoding {declared:?}")))))
+        }
+        // What declares UTF-16 in single bytes is not UTF-16.
+        Some(encoding) if encoding != UTF_16LE && encoding != UTF_16BE => {
+            converted(bytes, encoding)
         }
         _ => Err(ParseError::Encoding { found: format!("encoding {declared:?}") }),
+    }
+}
+
+fn converted<'a>(
+    bytes: &'a [u8],
+    encoding: &'static Encoding,
+) -> Result<(Cow<'a, str>, Option<Warning>), ParseError> {
+    let found = format!("encoding {:?}", encoding.name());
+    let text = encoding.decode_without_bom_handling_and_without_replacement(bytes);
+    let text = text.ok_or_else(|| ParseError::Encoding {
+        found: format!("{found} with bytes that it does not have"),
+    })?;
+    Ok((text, Some(other(found))))
+}
+
+fn other(found: String) -> Warning {
+    Warning {
+        at: Position::START,
+        place: "the file".to_owned(),
+        expected: "UTF-8 without a byte order mark".to_owned(),
+        found,
+        assumed: "it was read as what it is".to_owned(),
+        section: "2.2",
+        by_schema: false,
     }
 }
 
@@ -41,9 +84,7 @@ fn declared(bytes: &[u8]) -> Option<String> {
     let end = start.windows(2).position(|pair| pair == b"?>")? + 2;
     let mut reader = Reader::from_str(std::str::from_utf8(&start[..end]).ok()?);
     match reader.read_event() {
-        Ok(Event::Decl(declaration)) => {
-            declaration.encoding()?.ok().map(std::borrow::Cow::into_owned)
-        }
+        Ok(Event::Decl(declaration)) => declaration.encoding()?.ok().map(Cow::into_owned),
         _ => None,
     }
 }

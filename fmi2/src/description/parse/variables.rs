@@ -1,25 +1,35 @@
 //! `TypeDefinitions` and `ModelVariables`.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
 use super::ParseError;
-use super::xml::Element;
+use super::attributes::Node;
+use super::structure::{index, indices};
 use crate::description::{
     Causality, IntegerType, Kind, RealType, ScalarVariable, SimpleType, Variability,
 };
 
 const KINDS: [&str; 5] = ["Real", "Integer", "Boolean", "String", "Enumeration"];
+const CAUSALITIES: [&str; 6] =
+    ["parameter", "calculatedParameter", "input", "output", "local", "independent"];
+const VARIABILITIES: [&str; 5] = ["constant", "fixed", "tunable", "discrete", "continuous"];
+/// Most variables.
+const VARIABLES: usize = 1_000_000;
 
 /// The types of `TypeDefinitions`, by name.
 type Types<'a> = HashMap<&'a str, &'a SimpleType>;
 
-pub(super) fn types(root: &Element) -> Result<Vec<SimpleType>, ParseError> {
+pub(super) fn types(root: Node<'_>) -> Result<Vec<SimpleType>, ParseError> {
     root.list("TypeDefinitions", "SimpleType", |element| {
         let typed = typed(element)?;
+        if let Some(other) = typed.attribute("declaredType") {
+            // Types that refer to types could go round in a circle.
+            return Err(typed.wrong("declaredType", "no reference to another type", other));
+        }
         Ok(SimpleType {
             name: element.required("name")?.to_owned(),
             description: element.text("description"),
-            kind: match typed.name.as_str() {
+            kind: match typed.element.name {
                 "Real" => Kind::Real(real_limits(typed, &RealType::default())?),
                 "Integer" => Kind::Integer(integer_limits(typed, &IntegerType::default())?),
                 "Boolean" => Kind::Boolean(None),
@@ -31,56 +41,127 @@ pub(super) fn types(root: &Element) -> Result<Vec<SimpleType>, ParseError> {
     })
 }
 
-fn item(element: &Element) -> Result<(String, i32), ParseError> {
-    let value = element.required("value").and_then(|_| element.integer("value"))?;
-    Ok((element.required("name")?.to_owned(), value.unwrap_or_default()))
+fn item(element: Node<'_>) -> Result<(String, i32), ParseError> {
+    let text = element.required("value")?;
+    let value = element.integer("value")?;
+    let value = value.ok_or_else(|| element.wrong("value", "an integer", text))?;
+    Ok((element.required("name")?.to_owned(), value))
 }
 
 pub(super) fn variables(
-    list: &Element,
+    list: Node<'_>,
     types: &[SimpleType],
 ) -> Result<Vec<ScalarVariable>, ParseError> {
     let types: Types<'_> = types.iter().map(|own| (own.name.as_str(), own)).collect();
-    let elements: Vec<&Element> = list.children_named("ScalarVariable").collect();
-    let mut names = HashSet::new();
+    let elements: Vec<Node<'_>> = list.children_named("ScalarVariable").collect();
+    if elements.len() > VARIABLES {
+        let at = list.element.at;
+        return Err(ParseError::Limit { at, what: "variables", limit: VARIABLES });
+    }
     let mut variables = Vec::with_capacity(elements.len());
     for element in &elements {
-        let variable = variable(element, &types, elements.len())?;
-        if !names.insert(element.required("name")?) {
-            return Err(element.wrong("name", "a name that is used once", &variable.name));
-        }
-        variables.push(variable);
+        variables.push(variable(*element, &types, elements.len())?);
     }
+    check_names(&elements, &variables)?;
+    check_references(&elements, &variables)?;
     Ok(variables)
 }
 
+/// A name that two variables have is refused unless it does not matter which one is meant.
+fn check_names(elements: &[Node<'_>], variables: &[ScalarVariable]) -> Result<(), ParseError> {
+    let mut names: HashMap<&str, &ScalarVariable> = HashMap::with_capacity(variables.len());
+    for (element, variable) in elements.iter().zip(variables) {
+        let Some(first) = names.get(variable.name.as_str()) else {
+            names.insert(&variable.name, variable);
+            continue;
+        };
+        let expected = "a name that is used once";
+        let local = [first, &variable].iter().all(|own| own.causality == Causality::Local);
+        if !local
+            && (base(&first.kind), first.value_reference)
+                != (base(&variable.kind), variable.value_reference)
+        {
+            return Err(element.wrong("name", expected, &variable.name));
+        }
+        element.warn_text("name", expected, &variable.name, "the name stands for the first one");
+    }
+    Ok(())
+}
+
+/// What is set from outside must not overwrite each other.
+fn check_references(elements: &[Node<'_>], variables: &[ScalarVariable]) -> Result<(), ParseError> {
+    let mut settable: HashMap<(u8, u32), &str> = HashMap::new();
+    for (element, variable) in elements.iter().zip(variables) {
+        if !matches!(variable.causality, Causality::Input | Causality::Parameter) {
+            continue;
+        }
+        let key = (base(&variable.kind), variable.value_reference);
+        if let Some(first) = settable.insert(key, &variable.name) {
+            let expected =
+                format!("one that no other input or parameter of this type has, {first} has it");
+            let found = variable.value_reference.to_string();
+            return Err(element.wrong("valueReference", &expected, &found));
+        }
+    }
+    Ok(())
+}
+
+/// Variables of one base type share the value references.
+fn base(kind: &Kind) -> u8 {
+    match kind {
+        Kind::Real(_) => 0,
+        Kind::Integer(_) | Kind::Enumeration(_) => 1,
+        Kind::Boolean(_) => 2,
+        Kind::String(_) => 3,
+    }
+}
+
 fn variable(
-    element: &Element,
+    element: Node<'_>,
     types: &Types<'_>,
     count: usize,
 ) -> Result<ScalarVariable, ParseError> {
-    element.required("valueReference")?;
-    let causality = element
-        .word("causality", "parameter, calculatedParameter, input, output, local or independent")?;
-    let variability =
-        element.word("variability", "constant, fixed, tunable, discrete or continuous")?;
+    let name = element.required("name")?.to_owned();
+    let value_reference = element.unsigned("valueReference")?;
+    let causality = element.word("causality", &CAUSALITIES).unwrap_or(Causality::Local);
+    let kind = kind(typed(element)?, types, count)?;
     Ok(ScalarVariable {
-        name: element.required("name")?.to_owned(),
-        value_reference: element.unsigned("valueReference")?.unwrap_or_default(),
+        name,
+        value_reference,
         description: element.text("description"),
-        causality: causality.unwrap_or(Causality::Local),
-        variability: variability.unwrap_or(Variability::Continuous),
-        initial: element.word("initial", "exact, approx or calculated")?,
-        kind: kind(typed(element)?, types, count)?,
+        causality,
+        variability: variability(element, causality, &kind),
+        initial: element.word("initial", &["exact", "approx", "calculated"]),
+        kind,
     })
 }
 
+/// `variability`: where only a Real can be what the file says, or its default, the least that the
+/// other types can be.
+fn variability(element: Node<'_>, causality: Causality, kind: &Kind) -> Variability {
+    let stated = element.word("variability", &VARIABILITIES);
+    let variability = stated.unwrap_or(Variability::Continuous);
+    if matches!(kind, Kind::Real(_)) || variability != Variability::Continuous {
+        return variability;
+    }
+    let (assumed, name) = match causality {
+        Causality::Parameter | Causality::CalculatedParameter => (Variability::Fixed, "fixed"),
+        _ => (Variability::Discrete, "discrete"),
+    };
+    let expected = format!("another one than continuous, the default, for {}", kind.element());
+    let assumed_as = format!("read as {name}");
+    let stated = element.attribute("variability");
+    let found = stated.map_or_else(|| "no such attribute".to_owned(), |text| format!("{text:?}"));
+    element.warn_of(false, element.place("variability"), (&expected, found), &assumed_as);
+    assumed
+}
+
 /// The one child that says which type a variable or a type definition has.
-fn typed(element: &Element) -> Result<&Element, ParseError> {
-    let is_kind = |child: &&Element| KINDS.contains(&child.name.as_str());
-    let mut found = element.children.iter().filter(is_kind);
+fn typed(element: Node<'_>) -> Result<Node<'_>, ParseError> {
+    let is_kind = |child: &&super::xml::Element<'_>| KINDS.contains(&child.name);
+    let mut found = element.element.children.iter().filter(is_kind);
     match (found.next(), found.next()) {
-        (Some(only), None) => Ok(only),
+        (Some(only), None) => Ok(Node { element: only, ..element }),
         (first, _) => {
             let found = if first.is_some() { "more" } else { "none" };
             let expected = "one of Real, Integer, Boolean, String and Enumeration";
@@ -89,62 +170,69 @@ fn typed(element: &Element) -> Result<&Element, ParseError> {
     }
 }
 
-fn kind(element: &Element, types: &Types<'_>, count: usize) -> Result<Kind, ParseError> {
-    let declared = declared(element, types)?;
-    Ok(match (element.name.as_str(), declared) {
-        ("Real", declared) => {
-            let defaults = match declared {
-                Some(Kind::Real(real)) => real.clone(),
-                _ => RealType::default(),
+fn kind(element: Node<'_>, types: &Types<'_>, count: usize) -> Result<Kind, ParseError> {
+    let declared = declared(element, types);
+    Ok(match element.element.name {
+        "Real" => {
+            let (name, defaults) = match declared {
+                Some((name, Kind::Real(real))) => (Some(name), real.clone()),
+                _ => (None, RealType::default()),
             };
-            let derivative = element.attribute("derivative");
             Kind::Real(RealType {
-                declared_type: element.text("declaredType"),
+                declared_type: name,
                 start: element.number("start")?,
-                derivative: derivative
-                    .map(|text| element.index("derivative", text, count))
-                    .transpose()?,
-                reinit: element.boolean("reinit")?.unwrap_or(false),
+                derivative: derivative(element, count)?,
+                reinit: element.flag("reinit"),
                 ..real_limits(element, &defaults)?
             })
         }
-        ("Boolean", _) => Kind::Boolean(element.boolean("start")?),
-        ("String", _) => Kind::String(element.text("start")),
-        (name, declared) => {
-            let defaults = match declared {
-                Some(Kind::Integer(own) | Kind::Enumeration(own)) => own.clone(),
-                _ => IntegerType::default(),
+        "Boolean" => Kind::Boolean(element.boolean("start")?),
+        "String" => Kind::String(element.text("start")),
+        other => {
+            let (name, defaults) = match declared {
+                Some((name, Kind::Integer(own) | Kind::Enumeration(own))) => {
+                    (Some(name), own.clone())
+                }
+                _ => (None, IntegerType::default()),
             };
             let own = IntegerType {
-                declared_type: element.text("declaredType"),
+                declared_type: name,
                 start: element.integer("start")?,
                 ..integer_limits(element, &defaults)?
             };
-            if name == "Integer" { Kind::Integer(own) } else { Kind::Enumeration(own) }
+            if other == "Integer" { Kind::Integer(own) } else { Kind::Enumeration(own) }
         }
     })
 }
 
-/// The declared type of a variable: it must exist and be of the variable's own kind.
-fn declared<'a>(element: &Element, types: &Types<'a>) -> Result<Option<&'a Kind>, ParseError> {
-    let name = if element.name == "Enumeration" {
-        element.required("declaredType")?
-    } else {
-        let Some(name) = element.attribute("declaredType") else {
-            return Ok(None);
-        };
-        name
+fn derivative(element: Node<'_>, count: usize) -> Result<Option<u32>, ParseError> {
+    let Some(text) = element.attribute("derivative") else { return Ok(None) };
+    let index = index(text, count);
+    index.map(Some).ok_or_else(|| element.wrong("derivative", &indices(count), text))
+}
+
+/// The declared type of a variable, if it exists and is of the variable's own kind.
+fn declared<'a>(element: Node<'_>, types: &Types<'a>) -> Option<(String, &'a Kind)> {
+    const NAME: &str = "declaredType";
+    let kind = element.element.name;
+    let Some(name) = element.attribute(NAME) else {
+        if kind == "Enumeration" {
+            let said = ("the name of an enumeration", "no such attribute".to_owned());
+            element.warn_of(true, element.place(NAME), said, "read without names of its items");
+        }
+        return None;
     };
     match types.get(name) {
-        Some(own) if own.kind.element() == element.name => Ok(Some(&own.kind)),
+        Some(own) if own.kind.element() == kind => Some((name.to_owned(), &own.kind)),
         _ => {
-            let expected = format!("the name of a SimpleType that is {}", element.name);
-            Err(element.wrong("declaredType", &expected, name))
+            let expected = format!("the name of a SimpleType that is {kind}");
+            element.warn_text(NAME, &expected, name, "read without declared type");
+            None
         }
     }
 }
 
-fn real_limits(element: &Element, defaults: &RealType) -> Result<RealType, ParseError> {
+fn real_limits(element: Node<'_>, defaults: &RealType) -> Result<RealType, ParseError> {
     Ok(RealType {
         quantity: element.text("quantity").or(defaults.quantity.clone()),
         unit: element.text("unit").or(defaults.unit.clone()),
@@ -156,7 +244,7 @@ fn real_limits(element: &Element, defaults: &RealType) -> Result<RealType, Parse
     })
 }
 
-fn integer_limits(element: &Element, defaults: &IntegerType) -> Result<IntegerType, ParseError> {
+fn integer_limits(element: Node<'_>, defaults: &IntegerType) -> Result<IntegerType, ParseError> {
     Ok(IntegerType {
         quantity: element.text("quantity").or(defaults.quantity.clone()),
         min: element.integer("min")?.or(defaults.min),

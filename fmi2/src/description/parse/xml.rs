@@ -1,6 +1,9 @@
 //! Text to a tree of elements, with a bound on everything that could grow without sense.
 
+use std::borrow::Cow;
+
 use quick_xml::XmlVersion;
+use quick_xml::events::attributes::Attributes;
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::reader::Reader;
 
@@ -10,18 +13,34 @@ use super::{ParseError, Position};
 const DEPTH: usize = 64;
 /// Most attributes of one element; the standard has 15 at most.
 const ATTRIBUTES: usize = 256;
+/// Most elements; a variable needs 2.
+const ELEMENTS: usize = 3_000_000;
+/// Most attributes of all elements together.
+const ALL_ATTRIBUTES: usize = 12_000_000;
 
-/// An element: its attributes and child elements. Text is not used by FMI 2.0 and SSP 1.0.
+/// An element: its attributes and child elements. Text is not used by FMI 2.0.
 #[derive(Debug)]
-pub struct Element {
-    /// Name with its prefix, as it stands in the file.
-    pub name: String,
-    /// Names and values, in order.
-    pub attributes: Vec<(String, String)>,
-    /// Child elements, in order.
-    pub children: Vec<Element>,
+pub(super) struct Element<'a> {
+    pub(super) name: &'a str,
+    pub(super) attributes: Vec<(&'a str, Cow<'a, str>)>,
+    pub(super) children: Vec<Element<'a>>,
     /// Where it begins.
-    pub at: Position,
+    pub(super) at: Position,
+}
+
+impl Element<'_> {
+    /// The same with text of its own; the reader bounds the depth.
+    pub(super) fn into_owned(self) -> crate::xml::Element {
+        let attributes = self.attributes.into_iter();
+        crate::xml::Element {
+            name: self.name.to_owned(),
+            attributes: attributes
+                .map(|(name, value)| (name.to_owned(), value.into_owned()))
+                .collect(),
+            children: self.children.into_iter().map(Element::into_owned).collect(),
+            at: self.at,
+        }
+    }
 }
 
 /// Follows the position in a text that is read once, front to back.
@@ -49,16 +68,17 @@ impl Place<'_> {
 
 /// The elements that are open, and the root once it is closed.
 #[derive(Default)]
-struct Tree {
-    open: Vec<Element>,
-    root: Option<Element>,
+struct Tree<'a> {
+    open: Vec<Element<'a>>,
+    root: Option<Element<'a>>,
+    elements: usize,
+    attributes: usize,
 }
 
-impl Tree {
-    fn start(&mut self, element: Element) -> Result<(), ParseError> {
+impl<'a> Tree<'a> {
+    fn start(&mut self, element: Element<'a>) -> Result<(), ParseError> {
         if self.open.len() == DEPTH {
-            let what = "levels of nested elements";
-            return Err(ParseError::Limit { at: element.at, what, limit: DEPTH });
+            return Err(limit(element.at, "levels of nested elements", DEPTH));
         }
         self.open.push(element);
         Ok(())
@@ -69,7 +89,7 @@ impl Tree {
         self.open.pop().map_or(Ok(()), |element| self.add(element))
     }
 
-    fn add(&mut self, element: Element) -> Result<(), ParseError> {
+    fn add(&mut self, element: Element<'a>) -> Result<(), ParseError> {
         if let Some(parent) = self.open.last_mut() {
             parent.children.push(element);
         } else if self.root.is_none() {
@@ -81,7 +101,7 @@ impl Tree {
         Ok(())
     }
 
-    fn finish(self, at: Position) -> Result<Element, ParseError> {
+    fn finish(self, at: Position) -> Result<Element<'a>, ParseError> {
         if let Some(element) = self.open.last() {
             let found = format!("the end of the file inside <{}>", element.name);
             return Err(ParseError::Xml { at: element.at, found });
@@ -89,16 +109,55 @@ impl Tree {
         let none = || ParseError::Xml { at, found: "a file without an element".to_owned() };
         self.root.ok_or_else(none)
     }
+
+    /// The element of a tag, whose text begins at `offset` of `text`.
+    fn element(
+        &mut self,
+        tag: &BytesStart<'_>,
+        text: &'a str,
+        offset: usize,
+        at: Position,
+    ) -> Result<Element<'a>, ParseError> {
+        self.elements += 1;
+        if self.elements > ELEMENTS {
+            return Err(limit(at, "elements", ELEMENTS));
+        }
+        let length = tag.name().as_ref().len();
+        let inner = text.get(offset + 1..offset + 1 + tag.len()).unwrap_or_default();
+        let name = inner.get(..length).unwrap_or_default();
+        let mut attributes = Vec::new();
+        for attribute in Attributes::new(inner, length) {
+            if attributes.len() == ATTRIBUTES {
+                return Err(limit(at, "attributes", ATTRIBUTES));
+            }
+            let wrong =
+                |found: String| ParseError::Xml { at, found: format!("in <{name}>: {found}") };
+            let attribute = attribute.map_err(|error| wrong(error.to_string()))?;
+            let value = attribute
+                .normalized_value(XmlVersion::Explicit1_0)
+                .map_err(|error| wrong(error.to_string()))?;
+            attributes.push((attribute.key.into_inner(), value));
+        }
+        self.attributes += attributes.len();
+        if self.attributes > ALL_ATTRIBUTES {
+            return Err(limit(at, "attributes in all", ALL_ATTRIBUTES));
+        }
+        Ok(Element { name, attributes, children: Vec::new(), at })
+    }
+}
+
+fn limit(at: Position, what: &'static str, limit: usize) -> ParseError {
+    ParseError::Limit { at, what, limit }
 }
 
 /// Reads the one root element of `text`. Annotations are skipped.
-pub(super) fn read(text: &str) -> Result<Element, ParseError> {
+pub(super) fn read(text: &str) -> Result<Element<'_>, ParseError> {
     let mut reader = Reader::from_str(text);
-    let start = Position { line: 1, column: 1 };
-    let mut place = Place { text: text.as_bytes(), offset: 0, at: start };
+    let mut place = Place { text: text.as_bytes(), offset: 0, at: Position::START };
     let mut tree = Tree::default();
     loop {
         let at = place.advance(reader.buffer_position());
+        let offset = place.offset;
         match reader.read_event() {
             Err(error) => {
                 let at = place.advance(reader.error_position());
@@ -109,8 +168,14 @@ pub(super) fn read(text: &str) -> Result<Element, ParseError> {
                 let skipped = reader.read_to_end(tag.name());
                 skipped.map_err(|error| ParseError::Xml { at, found: error.to_string() })?;
             }
-            Ok(Event::Start(tag)) => tree.start(element(&tag, at)?)?,
-            Ok(Event::Empty(tag)) => tree.add(element(&tag, at)?)?,
+            Ok(Event::Start(tag)) => {
+                let element = tree.element(&tag, text, offset, at)?;
+                tree.start(element)?;
+            }
+            Ok(Event::Empty(tag)) => {
+                let element = tree.element(&tag, text, offset, at)?;
+                tree.add(element)?;
+            }
             Ok(Event::End(_)) => tree.end()?,
             Ok(Event::Eof) => return tree.finish(at),
             Ok(_) => {}
@@ -120,24 +185,4 @@ pub(super) fn read(text: &str) -> Result<Element, ParseError> {
 
 fn is_annotation(tag: &BytesStart<'_>) -> bool {
     matches!(tag.name().as_ref(), "VendorAnnotations" | "Annotations")
-}
-
-fn element(tag: &BytesStart<'_>, at: Position) -> Result<Element, ParseError> {
-    let mut attributes = Vec::new();
-    for attribute in tag.attributes() {
-        if attributes.len() == ATTRIBUTES {
-            return Err(ParseError::Limit { at, what: "attributes", limit: ATTRIBUTES });
-        }
-        let wrong = |found: String| {
-            let element = tag.name().as_ref().to_owned();
-            ParseError::Xml { at, found: format!("in <{element}>: {found}") }
-        };
-        let attribute = attribute.map_err(|error| wrong(error.to_string()))?;
-        let value = attribute
-            .normalized_value(XmlVersion::Explicit1_0)
-            .map_err(|error| wrong(error.to_string()))?;
-        attributes.push((attribute.key.as_ref().to_owned(), value.into_owned()));
-    }
-    let name = tag.name().as_ref().to_owned();
-    Ok(Element { name, attributes, children: Vec::new(), at })
 }

@@ -161,7 +161,6 @@ impl Files {
 
     /// The dictionary and the name of the file that it stands in.
     pub(super) fn dictionary(
-        &mut self,
         source: &Source<SignalDictionary>,
         file: &File,
     ) -> Result<(SignalDictionary, PathBuf), Missing> {
@@ -218,8 +217,9 @@ fn read_file<T>(target: &Target, read: fn(&[u8]) -> Result<T, SspError>) -> Resu
 /// The SSD files at the root of an unpacked SSP.
 fn definitions_in(folder: &Path) -> String {
     let names = fs::read_dir(folder).into_iter().flatten().flatten();
-    let names = names.map(|entry| entry.file_name().to_string_lossy().into_owned());
-    let mut names: Vec<String> = names.filter(|name| name.ends_with(".ssd")).collect();
+    let is_ssd = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "ssd");
+    let names = names.map(|entry| PathBuf::from(entry.file_name())).filter(is_ssd);
+    let mut names: Vec<String> = names.map(|name| name.display().to_string()).collect();
     names.sort();
     names.truncate(10);
     if names.is_empty() { "no SSD".to_owned() } else { names.join(", ") }

@@ -109,6 +109,17 @@ impl Number {
         })
     }
 
+    /// The value that `transformation` makes this one of.
+    pub(super) fn before(&self, transformation: &Transformation) -> Result<Number, String> {
+        match (transformation, self) {
+            (Transformation::Identity, _) => Ok(self.clone()),
+            (Transformation::Linear { factor, offset }, Number::Real(value)) if *factor != 0.0 => {
+                Ok(Number::Real((value - offset) / factor))
+            }
+            _ => Err("the transformation on the way has no inverse".to_owned()),
+        }
+    }
+
     /// The value as the text of a setting of a variable of that kind.
     pub(super) fn text(
         &self,

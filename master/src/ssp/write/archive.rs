@@ -63,7 +63,7 @@ impl Archive {
     }
 
     /// Writes the archive with `ssd` as its system structure, as a whole or not at all.
-    pub(super) fn write(&self, ssd: String, target: &Path) -> Result<(), SspError> {
+    pub(super) fn write(&self, ssd: &str, target: &Path) -> Result<(), SspError> {
         let mut entries = vec![("SystemStructure.ssd", ssd.as_bytes())];
         entries.extend(self.entries.iter().map(|(path, bytes)| (path.as_str(), bytes.as_slice())));
         let bytes = zip(target, &entries)?;

@@ -20,23 +20,53 @@ fn errors_point_at_the_line_and_column_of_the_element() {
     }
 }
 
+/// What the file is said to be, with the warning.
+fn named(bytes: &[u8]) -> (String, String) {
+    let (description, warnings) = ModelDescription::read(bytes).unwrap();
+    let [warning] = warnings.as_slice() else { panic!("{warnings:?}") };
+    (description.model_name, warning.found.clone())
+}
+
 #[test]
-fn encodings_other_than_utf_8_are_decoded_or_named() {
-    let latin = with(X, "").replace("UTF-8", "ISO-8859-1").replace("\"M\"", "\"K\u{f6}rper\"");
-    let bytes: Vec<u8> = latin.chars().map(|character| character as u8).collect();
-    assert_eq!(ModelDescription::parse(&bytes).unwrap().model_name, "K\u{f6}rper");
+fn encodings_that_other_importers_read_are_read_with_a_warning() {
+    let xml = with(X, "").replace("\"M\"", "\"K\u{f6}rper\"");
+    let latin = xml.replace("UTF-8", "ISO-8859-1");
+    let latin: Vec<u8> = latin.chars().map(|character| character as u8).collect();
+    assert_eq!(named(&latin).0, "K\u{f6}rper");
+    // In windows-1252 the byte 0x80 is the euro sign.
+    let windows = with(X, "").replace("UTF-8", "windows-1252").replace("\"M\"", "\"#\"");
+    let windows: Vec<u8> =
+        windows.bytes().map(|own| if own == b'#' { 0x80 } else { own }).collect();
+    assert_eq!(named(&windows), ("\u{20ac}".to_owned(), "encoding \"windows-1252\"".to_owned()));
 
-    let marked = [b"\xef\xbb\xbf".as_slice(), with(X, "").as_bytes()].concat();
-    assert_eq!(ModelDescription::parse(marked).unwrap().model_name, "M");
+    let wide = xml.replace("UTF-8", "UTF-16");
+    let little: Vec<u8> = wide.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let big: Vec<u8> = wide.encode_utf16().flat_map(u16::to_be_bytes).collect();
+    for (mark, bytes, name) in [
+        ([0xff, 0xfe].as_slice(), &little, "UTF-16LE"),
+        (&[0xfe, 0xff], &big, "UTF-16BE"),
+        (&[], &little, "UTF-16LE"),
+        (&[], &big, "UTF-16BE"),
+    ] {
+        let found = format!("encoding {name:?}");
+        assert_eq!(named(&[mark, bytes].concat()), ("K\u{f6}rper".to_owned(), found));
+    }
+    let marked = [b"\xef\xbb\xbf".as_slice(), xml.as_bytes()].concat();
+    assert_eq!(named(&marked), ("K\u{f6}rper".to_owned(), "a byte order mark".to_owned()));
+}
 
-    let undeclared = bytes.iter().skip_while(|byte| **byte != b'\n').copied().collect::<Vec<_>>();
-    let error = ModelDescription::parse(undeclared).unwrap_err();
-    assert!(error.to_string().contains("0xf6"), "{error}");
-    for declared in ["windows-1252", "UTF-16", "Shift_JIS"] {
+#[test]
+fn what_cannot_be_decoded_is_named() {
+    let latin = with(X, "").replace("\"M\"", "\"\u{f6}\"");
+    let latin: Vec<u8> = latin.chars().map(|character| character as u8).collect();
+    let error = ModelDescription::parse(latin).unwrap_err().to_string();
+    assert!(error.contains("0xf6") && error.contains("line 2"), "{error}");
+    for declared in ["UTF-16", "EBCDIC-CP-US"] {
         let error = ModelDescription::parse(with(X, "").replace("UTF-8", declared)).unwrap_err();
         assert!(error.to_string().contains(declared), "{error}");
     }
-    assert!(ModelDescription::parse(b"\xff\xfe<\0").unwrap_err().to_string().contains("UTF-16"));
+    let half = ModelDescription::parse(b"\xff\xfe<\0\0\xdc").unwrap_err().to_string();
+    assert!(half.contains("UTF-16LE"), "{half}");
 }
 
 #[test]
@@ -50,6 +80,8 @@ fn hostile_files_end_in_an_error() {
         write!(wide, " a{number}=''").unwrap();
     }
     assert!(matches!(ModelDescription::parse(wide + "/>"), Err(ParseError::Limit { .. })));
+    let long = " ".repeat(ModelDescription::MOST_BYTES + 1);
+    assert!(matches!(ModelDescription::parse(long), Err(ParseError::Length { .. })));
     for text in [
         "",
         "<",
@@ -69,6 +101,34 @@ fn hostile_files_end_in_an_error() {
         let error = ModelDescription::parse(text).unwrap_err();
         assert!(matches!(error, ParseError::Xml { .. }), "{text}: {error}");
     }
+}
+
+/// A description with many of one element, which must be refused.
+fn flooded(element: &str, count: usize) -> String {
+    let xml = with(&element.repeat(count), "");
+    match ModelDescription::parse(xml).unwrap_err() {
+        ParseError::Limit { what, .. } => what.to_owned(),
+        other => panic!("{other}"),
+    }
+}
+
+#[test]
+fn files_with_millions_of_elements_attributes_or_variables_are_refused() {
+    assert_eq!(flooded("<a/>", 3_000_001), "elements");
+    let mut hundred = "<a".to_owned();
+    for number in 0..100 {
+        write!(hundred, " a{number}=''").unwrap();
+    }
+    assert_eq!(flooded(&(hundred + "/>"), 120_001), "attributes in all");
+    assert_eq!(flooded("<ScalarVariable/>", 1_000_001), "variables");
+}
+
+#[test]
+fn a_file_full_of_faults_is_read_with_a_bounded_number_of_warnings() {
+    let xml = with(&"<what/>".repeat(100_000), "");
+    let (_, warnings) = ModelDescription::read(xml).unwrap();
+    assert_eq!(warnings.len(), 1001);
+    assert!(warnings[1000].to_string().contains("the others are not listed"));
 }
 
 #[test]

@@ -1,0 +1,206 @@
+//! The archive (section 2.3): how it is packed, and what is in it.
+
+use std::collections::{HashMap, HashSet};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use fmi2::description::ModelDescription;
+use zip::CompressionMethod;
+use zip::read::ZipFile;
+
+use super::finding::Severity::{Error, Note, Warning};
+use super::finding::{Finding, Findings, Part};
+
+const SECTION: &str = "2.3";
+const TOP: [&str; 8] = [
+    "modelDescription.xml",
+    "model.png",
+    "documentation",
+    "sources",
+    "binaries",
+    "resources",
+    "extra",
+    "terminalsAndIcons",
+];
+const DEVICES: [&str; 4] = ["con", "prn", "aux", "nul"];
+const UTF8: u16 = 1 << 11;
+/// Windows has 260 characters for the whole path; an importer unpacks into some folder.
+const LONG: usize = 180;
+
+/// An archive with the names of its files, which can be unpacked safely.
+pub(super) fn check(
+    path: &Path,
+    names: &[String],
+    description: &ModelDescription,
+) -> anyhow::Result<Vec<Finding>> {
+    let mut findings = Findings::about(Part::Archive);
+    if path.extension().is_none_or(|extension| extension != "fmu") {
+        let why = "FMPy and others open .fmu only.";
+        findings.add(
+            Error,
+            path.display().to_string(),
+            "expected the extension .fmu",
+            (why, SECTION),
+        );
+    }
+    let mut archive = zip::ZipArchive::new(BufReader::new(File::open(path)?))?;
+    for index in 0..archive.len() {
+        entry(&archive.by_index_raw(index)?, &mut findings);
+    }
+    if let Err(error) = archive.validate_header_consistency() {
+        let why = "Tools that read an archive front to back see other files than those that use its list.";
+        findings.add(Error, "the archive", error.to_string(), (why, SECTION));
+    }
+    case(names, &mut findings);
+    top_level(names, &mut findings);
+    documentation(names, &mut findings);
+    sources(names, description, &mut findings);
+    if let Ok(index) = archive.by_name("model.png") {
+        picture(index, &mut findings);
+    }
+    Ok(findings.all)
+}
+
+/// How one entry is packed and called.
+fn entry<R: std::io::Read>(entry: &ZipFile<'_, R>, findings: &mut Findings) {
+    let Ok(name) = entry.name().map(std::borrow::Cow::into_owned) else { return };
+    if entry.version_needed() > 20 {
+        let needed = f64::from(entry.version_needed()) / 10.0;
+        let what = format!("needs version {needed:.1} of ZIP, expected at most 2.0");
+        findings.add(
+            Error,
+            &name,
+            what,
+            ("It may be a Zip64 archive, which not every importer reads.", SECTION),
+        );
+    }
+    if entry.flags().is_using_data_descriptor() && entry.compression() == CompressionMethod::Stored
+    {
+        let what = "stored with a data descriptor, expected one with deflate only";
+        let why = "Tools that read front to back do not find its end. Archives written as a stream have this.";
+        findings.add(Error, &name, what, (why, SECTION));
+    }
+    if !name.is_ascii() && entry.flags().as_u16() & UTF8 == 0 {
+        let why = "Importers decode the name in different ways.";
+        findings.add(
+            Error,
+            &name,
+            "a name that is not ASCII, without the flag for UTF-8",
+            (why, SECTION),
+        );
+    }
+    if name.contains(['<', '>', '"', '|', '?', '*']) || name.split('/').any(breaks_windows) {
+        let why = "It cannot be unpacked on Windows.";
+        findings.add(Warning, &name, "a name that Windows does not allow", (why, ""));
+    }
+    if name.len() > LONG {
+        let what = format!("a path of {} bytes", name.len());
+        findings.add(
+            Note,
+            &name,
+            what,
+            ("With more than 260 in all, Windows may refuse to unpack it.", ""),
+        );
+    }
+    if entry.unix_mode().is_some_and(|mode| mode & 0o400 == 0) {
+        let why = "unzip on UNIX makes a file that nobody can read.";
+        findings.add(Warning, &name, "UNIX mode without the right to read", (why, ""));
+    }
+}
+
+fn breaks_windows(part: &str) -> bool {
+    let stem = part.split('.').next().unwrap_or(part).to_ascii_lowercase();
+    part.ends_with(['.', ' ']) || DEVICES.contains(&stem.as_str())
+}
+
+fn case(names: &[String], findings: &mut Findings) {
+    let mut seen: HashMap<String, &str> = HashMap::new();
+    for name in names {
+        if let Some(other) = seen.insert(name.to_lowercase(), name) {
+            let what = format!("differs from {other} in upper and lower case only");
+            let why = "On Windows and macOS one overwrites the other.";
+            findings.add(Warning, name, what, (why, ""));
+        }
+    }
+}
+
+fn top_level(names: &[String], findings: &mut Findings) {
+    let mut seen = HashSet::new();
+    for name in names {
+        let top = name.split('/').next().unwrap_or(name);
+        if !seen.insert(top) || TOP.contains(&top) {
+            continue;
+        }
+        let near = TOP.iter().find(|own| own.eq_ignore_ascii_case(top));
+        let what = match near {
+            Some(near) => format!("expected {near}, in this case"),
+            None if top == "icons" => "expected terminalsAndIcons".to_owned(),
+            None => format!("expected nothing but {} at the top", TOP.join(", ")),
+        };
+        let why =
+            near.map_or("", |_| "Importers do not find it where upper and lower case differ.");
+        findings.add(Error, top, what, (why, SECTION));
+    }
+    let has = |folder: &str| names.iter().any(|name| name.starts_with(folder));
+    if !has("binaries/") && !has("sources/") {
+        let what = "expected binaries or sources, found neither";
+        findings.add(Error, "the archive", what, ("Nobody can run it.", SECTION));
+    }
+    for name in names {
+        let reserved = ["org.modelica", "org.fmi-standard"];
+        let inner = name.strip_prefix("extra/").and_then(|rest| rest.split('/').next());
+        let Some(inner) = inner.filter(|inner| !inner.is_empty()) else { continue };
+        if reserved.iter().any(|prefix| inner.starts_with(prefix)) || !inner.contains('.') {
+            let what = "expected a folder called by a reverse domain name of its own";
+            findings.add(Warning, name, what, ("", "2.3.1"));
+        }
+    }
+}
+
+fn documentation(names: &[String], findings: &mut Findings) {
+    let has = |path: &str| names.iter().any(|name| name.starts_with(path));
+    if has("documentation/") && !has("documentation/index.html") {
+        let what = "expected index.html in it, the entry to the documentation";
+        findings.add(Error, "documentation", what, ("Tools have nothing to show.", SECTION));
+    }
+    if !has("documentation/licenses/license.") {
+        let what = "expected documentation/licenses/license.txt or .html, found neither";
+        findings.add(Note, "documentation", what, ("Users do not know what they may do.", SECTION));
+    }
+}
+
+/// `SourceFiles` are in `sources`.
+fn sources(names: &[String], description: &ModelDescription, findings: &mut Findings) {
+    for (interface, files) in [
+        ("ModelExchange", description.model_exchange.as_ref().map(|own| &own.source_files)),
+        ("CoSimulation", description.co_simulation.as_ref().map(|own| &own.source_files)),
+    ] {
+        for file in files.into_iter().flatten() {
+            let path = format!("sources/{file}");
+            if !names.contains(&path) {
+                let what =
+                    format!("expected {path}, which SourceFiles of {interface} names, found none");
+                findings.add(
+                    Error,
+                    "sources",
+                    what,
+                    ("It cannot be built for another platform.", "2.3"),
+                );
+            }
+        }
+    }
+}
+
+fn picture<R: std::io::Read>(mut file: ZipFile<'_, R>, findings: &mut Findings) {
+    use std::io::Read as _;
+    let mut start = [0; 8];
+    if file.read_exact(&mut start).is_err() || start != *b"\x89PNG\r\n\x1a\n" {
+        findings.add(
+            Warning,
+            "model.png",
+            "expected a PNG file",
+            ("Tools show no picture.", SECTION),
+        );
+    }
+}

@@ -1,0 +1,289 @@
+//! What the library does when it is called as an importer calls it.
+
+use std::collections::BTreeSet;
+
+use fmi2::Experiment;
+use fmi2::description::ModelDescription;
+use master::{CallError, Failure, Slave, Stepped};
+
+use super::finding::Severity::{Error, Note, Warning};
+use super::finding::{Finding, Findings, Part};
+use super::heard::Heard;
+use super::values::{Value, get, kept, outputs, start, unknown_reference};
+
+/// Steps of a trial.
+const STEPS: u32 = 10;
+/// Variables of one kind that are compared; the others are as they are.
+const LOOKED_AT: usize = 1000;
+/// Findings of one kind that are listed.
+const LISTED: usize = 10;
+
+/// Makes an instance of the name given.
+pub(super) type Make<'a> = dyn FnMut(&str) -> anyhow::Result<Box<dyn Slave>> + 'a;
+
+/// The outputs at each communication point of a trial, the start with them.
+type Course = Vec<Vec<Value>>;
+
+/// Tries the FMU of `description`, of which `make` gives instances.
+pub(super) fn check(description: &ModelDescription, make: &mut Make<'_>) -> Vec<Finding> {
+    let mut trial = Trial { description, make, findings: Findings::about(Part::Behaviour) };
+    let ((), categories) = Heard::during(|| trial.run());
+    trial.categories(&categories);
+    trial.findings.all
+}
+
+struct Trial<'a> {
+    description: &'a ModelDescription,
+    make: &'a mut Make<'a>,
+    findings: Findings,
+}
+
+impl Trial<'_> {
+    fn run(&mut self) {
+        let Some(first) = self.course("first") else { return };
+        if let Some(second) = self.course("second").filter(|second| *second != first) {
+            let point = first.iter().zip(&second).position(|(one, other)| one != other);
+            let what =
+                format!("a second instance has other outputs, from step {}", point.unwrap_or(0));
+            let why =
+                "A run cannot be repeated: statics, uninitialised memory or the clock are used.";
+            self.findings.add(Warning, "fmi2DoStep", what, (why, "2.1"));
+        }
+        self.unknown_reference();
+        self.past_the_end();
+        self.states();
+    }
+
+    /// An instance in initialization mode or beyond; what fails is a finding.
+    fn initialized(&mut self, name: &str, stop_time: Option<f64>) -> Option<Box<dyn Slave>> {
+        let mut slave = match (self.make)(name) {
+            Ok(slave) => slave,
+            Err(error) => {
+                let why = "No importer can use it here.";
+                self.findings.add(Error, "fmi2Instantiate", format!("{error:#}"), (why, "2.1.5"));
+                return None;
+            }
+        };
+        let start_time = self.start_time();
+        let experiment = Experiment { start_time, stop_time, tolerance: None };
+        let done = slave
+            .setup_experiment(&experiment)
+            .and_then(|()| slave.enter_initialization_mode())
+            .and_then(|()| slave.exit_initialization_mode());
+        match done {
+            Ok(()) => Some(slave),
+            Err(error) => {
+                self.failed(&error, "with the start values of the FMU itself", "4.2.4");
+                None
+            }
+        }
+    }
+
+    fn failed(&mut self, error: &CallError, when: &str, section: &'static str) {
+        let what = format!("{} {when}", error.failure);
+        let messages = error.messages.join("; ");
+        self.findings.add(Error, error.function, what, (&messages, section));
+        if error.messages.is_empty() && matches!(error.failure, Failure::Status(_)) {
+            let why = "Nobody learns what was wrong.";
+            self.findings.add(Warning, error.function, "fails without a message", (why, "2.1.3"));
+        }
+    }
+
+    fn start_time(&self) -> f64 {
+        self.description.default_experiment.and_then(|own| own.start_time).unwrap_or(0.0)
+    }
+
+    fn step_size(&self) -> f64 {
+        let own = self.description.default_experiment.unwrap_or_default();
+        let span = own.stop_time.map(|stop| (stop - self.start_time()) / 1000.0);
+        own.step_size.or(span).filter(|size| *size > 0.0).unwrap_or(0.001)
+    }
+
+    /// Time of communication point `k`.
+    fn time(&self, k: u32) -> f64 {
+        self.start_time() + f64::from(k) * self.step_size()
+    }
+
+    /// Runs an instance of that name from begin to end.
+    fn course(&mut self, name: &str) -> Option<Course> {
+        let mut slave = self.initialized(name, None)?;
+        if name == "first" {
+            self.start_values(&mut *slave);
+        }
+        let course = self.steps(&mut *slave, 0)?;
+        if name == "first" {
+            self.numbers(&course);
+        }
+        if let Err(error) = slave.terminate() {
+            self.failed(&error, "after the last step", "4.2.4");
+            return Some(course);
+        }
+        let read = outputs(self.description).next().map(|output| get(&mut *slave, output));
+        if let (Some(Err(error)), "first") = (read, name) {
+            let what = format!("{} after fmi2Terminate", error.failure);
+            let why = "Final values cannot be read, as the table of calls allows.";
+            self.findings.add(Warning, error.function, what, (why, "4.2.4"));
+        }
+        Some(course)
+    }
+
+    /// The outputs now and after each of the steps from communication point `from` on.
+    fn steps(&mut self, slave: &mut dyn Slave, from: u32) -> Option<Course> {
+        let mut course = vec![self.read(slave)?];
+        for k in from..from + STEPS {
+            match slave.do_step(self.time(k), self.step_size(), true) {
+                Ok(Stepped::Whole) => course.push(self.read(slave)?),
+                Ok(Stepped::Part { reached, .. }) => {
+                    let what =
+                        format!("a step of {} s is done to {reached} s only", self.step_size());
+                    let why = "FMPy and others end the run there.";
+                    self.findings.add(Note, "fmi2DoStep", what, (why, "4.2.2"));
+                    break;
+                }
+                Err(error) => {
+                    self.failed(&error, &format!("at t = {} s", self.time(k)), "4.2.2");
+                    return None;
+                }
+            }
+        }
+        Some(course)
+    }
+
+    fn read(&mut self, slave: &mut dyn Slave) -> Option<Vec<Value>> {
+        let values = outputs(self.description).take(LOOKED_AT).map(|own| get(slave, own));
+        values
+            .collect::<Result<_, _>>()
+            .map_err(|error| self.failed(&error, "for an output", "2.1.7"))
+            .ok()
+    }
+
+    fn start_values(&mut self, slave: &mut dyn Slave) {
+        let mut others = 0_usize;
+        for variable in kept(self.description).take(LOOKED_AT) {
+            let Some(stated) = start(variable) else { continue };
+            let found = match get(slave, variable) {
+                Ok(found) if found.agrees(&stated) => continue,
+                Ok(found) => format!("the library starts with {found}, the XML says {stated}"),
+                Err(error) => format!("{error}"),
+            };
+            others += 1;
+            if others <= LISTED {
+                let why =
+                    "Importers that do not set start values simulate another model than they show.";
+                self.findings.add(
+                    Error,
+                    format!("variable {}", variable.name),
+                    found,
+                    (why, "2.2.7"),
+                );
+            }
+        }
+        if others > LISTED {
+            let what = format!("{} more start values differ", others - LISTED);
+            self.findings.add(Error, "start values", what, ("", "2.2.7"));
+        }
+    }
+
+    fn numbers(&mut self, course: &Course) {
+        for (index, variable) in outputs(self.description).take(LOOKED_AT).enumerate() {
+            let step =
+                course.iter().position(|row| row.get(index).is_some_and(|own| !own.is_finite()));
+            if let Some(step) = step {
+                let what = format!("is no finite number after {step} steps");
+                let why = "Most masters carry it on to the end of the run.";
+                self.findings.add(
+                    Warning,
+                    format!("variable {}", variable.name),
+                    what,
+                    (why, "2.2.7"),
+                );
+            }
+        }
+    }
+
+    /// A value reference that no variable has is an error.
+    fn unknown_reference(&mut self) {
+        let Some(mut slave) = self.initialized("unknown", None) else { return };
+        match slave.get_real(&[unknown_reference(self.description)], &mut [0.0]) {
+            Ok(()) => {
+                let what = "accepts a value reference that no variable has, expected fmi2Error";
+                let why = "A wrong connection goes unnoticed.";
+                self.findings.add(Error, "fmi2GetReal", what, (why, "2.1.2"));
+            }
+            Err(error) if error.messages.is_empty() => {
+                let what = "refuses an unknown value reference without a message";
+                self.findings.add(
+                    Warning,
+                    "fmi2GetReal",
+                    what,
+                    ("Nobody learns what was wrong.", "2.1.3"),
+                );
+            }
+            Err(_) => {}
+        }
+    }
+
+    /// A step beyond a stop time that was defined is an error.
+    fn past_the_end(&mut self) {
+        let (start, size) = (self.start_time(), self.step_size());
+        let Some(mut slave) = self.initialized("end", Some(start + 0.5 * size)) else { return };
+        if matches!(slave.do_step(start, size, true), Ok(Stepped::Whole)) {
+            let what = "steps past a stopTime that was defined, expected fmi2Error";
+            let why = "What an FMU computes beyond the end of its data goes unnoticed.";
+            self.findings.add(Warning, "fmi2DoStep", what, (why, "2.1.6"));
+        }
+    }
+
+    /// A state that is restored, directly or through bytes, goes on as before.
+    fn states(&mut self) {
+        let Some(flags) = &self.description.co_simulation else { return };
+        if !flags.can_get_and_set_fmu_state {
+            return;
+        }
+        let serialize = flags.can_serialize_fmu_state;
+        let Some(mut slave) = self.initialized("states", None) else { return };
+        if self.steps(&mut *slave, 0).is_none_or(|course| course.len() <= STEPS as usize) {
+            return;
+        }
+        if let Err(error) = slave.save_state(0) {
+            return self.failed(&error, "though canGetAndSetFMUstate is true", "2.1.8");
+        }
+        let bytes = match serialize.then(|| slave.serialize_state()).transpose() {
+            Ok(bytes) => bytes,
+            Err(error) => {
+                return self.failed(&error, "though canSerializeFMUstate is true", "2.1.8");
+            }
+        };
+        let Some(first) = self.steps(&mut *slave, STEPS) else { return };
+        if let Err(error) = slave.restore_state(0) {
+            return self.failed(&error, "for a state of the same instance", "2.1.8");
+        }
+        self.again(&mut *slave, &first, "fmi2SetFMUstate");
+        if let Some(bytes) = bytes {
+            if let Err(error) = slave.deserialize_state(&bytes) {
+                return self.failed(&error, "for bytes of the same instance", "2.1.8");
+            }
+            self.again(&mut *slave, &first, "fmi2DeSerializeFMUstate");
+        }
+    }
+
+    fn again(&mut self, slave: &mut dyn Slave, first: &Course, function: &str) {
+        if self.steps(slave, STEPS).is_some_and(|second| second != *first) {
+            let what = "the outputs after the state was restored differ from those before";
+            let why = "Masters that repeat a step, and optimisers, get wrong results.";
+            self.findings.add(Error, function, what, (why, "2.1.8"));
+        }
+    }
+
+    fn categories(&mut self, used: &BTreeSet<String>) {
+        for category in used.iter().filter(|own| !own.is_empty()) {
+            let declared = self.description.log_categories.iter().any(|own| own.name == *category);
+            if !declared {
+                let what =
+                    format!("uses the category {category:?}, which LogCategories does not list");
+                let why = "Users cannot switch it on or off.";
+                self.findings.add(Error, "logger", what, (why, "2.2.4"));
+            }
+        }
+    }
+}

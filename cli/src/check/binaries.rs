@@ -1,0 +1,300 @@
+//! The shared libraries of all platforms, looked at without loading them.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+
+use fmi2::call_order::{Function, InterfaceType, State, allowed};
+use fmi2::description::ModelDescription;
+use object::{Architecture, BinaryFormat, ImportFlags, NameOrOrdinal, Object as _};
+
+use super::finding::Severity::{Error, Note, Warning};
+use super::finding::{Finding, Findings, Part};
+
+const SECTION: &str = "2.3";
+
+/// A folder of `binaries`: what its libraries must be.
+struct Platform {
+    folder: &'static str,
+    format: BinaryFormat,
+    machine: Architecture,
+    suffix: &'static str,
+}
+
+const fn platform(
+    folder: &'static str,
+    format: BinaryFormat,
+    machine: Architecture,
+    suffix: &'static str,
+) -> Platform {
+    Platform { folder, format, machine, suffix }
+}
+
+const PLATFORMS: [Platform; 15] = {
+    use Architecture::{Aarch64, I386, X86_64};
+    use BinaryFormat::{Elf, MachO, Pe};
+    [
+        platform("win32", Pe, I386, ".dll"),
+        platform("win64", Pe, X86_64, ".dll"),
+        platform("linux32", Elf, I386, ".so"),
+        platform("linux64", Elf, X86_64, ".so"),
+        platform("darwin32", MachO, I386, ".dylib"),
+        platform("darwin64", MachO, X86_64, ".dylib"),
+        platform("x86-windows", Pe, I386, ".dll"),
+        platform("x86_64-windows", Pe, X86_64, ".dll"),
+        platform("aarch64-windows", Pe, Aarch64, ".dll"),
+        platform("x86-linux", Elf, I386, ".so"),
+        platform("x86_64-linux", Elf, X86_64, ".so"),
+        platform("aarch64-linux", Elf, Aarch64, ".so"),
+        platform("x86-darwin", MachO, I386, ".dylib"),
+        platform("x86_64-darwin", MachO, X86_64, ".dylib"),
+        platform("aarch64-darwin", MachO, Aarch64, ".dylib"),
+    ]
+};
+
+/// Checks the folder `binaries` of the FMU that is unpacked in `folder` and has files of `names`.
+pub(super) fn check(
+    folder: &Path,
+    names: &[String],
+    description: &ModelDescription,
+) -> Vec<Finding> {
+    let mut findings = Findings::about(Part::Binaries);
+    let found: BTreeSet<&str> = names
+        .iter()
+        .filter_map(|name| name.strip_prefix("binaries/")?.split_once('/').map(|(top, _)| top))
+        .collect();
+    for name in found {
+        let Some(platform) = PLATFORMS.iter().find(|own| own.folder == name) else {
+            let what =
+                "expected the name of a platform, as win64, linux64, darwin64, aarch64-linux";
+            let why = "Importers do not look there, unless a library does.";
+            findings.add(Note, format!("binaries/{name}"), what, (why, SECTION));
+            continue;
+        };
+        for (interfaces, identifier) in interfaces(description) {
+            let path = format!("binaries/{name}/{identifier}{}", platform.suffix);
+            if !names.contains(&path) {
+                let there =
+                    names.iter().filter(|own| own.starts_with(&format!("binaries/{name}/")));
+                let there: Vec<&str> = there.take(5).map(String::as_str).collect();
+                let what = format!("expected this library, found {}", there.join(", "));
+                findings.add(Error, path, what, ("Importers look for modelIdentifier.", SECTION));
+                continue;
+            }
+            library(folder, &path, platform, (&interfaces, names), &mut findings);
+        }
+    }
+    findings.all
+}
+
+/// The names of the libraries, each with the interfaces that it serves.
+fn interfaces(description: &ModelDescription) -> Vec<(Vec<InterfaceType>, String)> {
+    use InterfaceType::{CoSimulation, ModelExchange};
+    let exchange = description.model_exchange.as_ref().map(|own| own.model_identifier.clone());
+    let simulation = description.co_simulation.as_ref().map(|own| own.model_identifier.clone());
+    match (simulation, exchange) {
+        (Some(one), Some(other)) if one == other => vec![(vec![CoSimulation, ModelExchange], one)],
+        (one, other) => [(CoSimulation, one), (ModelExchange, other)]
+            .into_iter()
+            .filter_map(|(interface, name)| Some((vec![interface], name?)))
+            .collect(),
+    }
+}
+
+fn library(
+    folder: &Path,
+    path: &str,
+    platform: &Platform,
+    (interfaces, names): (&[InterfaceType], &[String]),
+    findings: &mut Findings,
+) {
+    let bytes = match fs::read(folder.join(path)) {
+        Ok(bytes) => bytes,
+        Err(error) => return findings.add(Error, path, error.to_string(), ("", "")),
+    };
+    let Some(bytes) = slice_of(&bytes, platform.machine) else {
+        let what = format!("expected a part for {:?} in it", platform.machine);
+        return findings.add(Error, path, what, ("It does not load.", SECTION));
+    };
+    let file = match object::File::parse(bytes) {
+        Ok(file) => file,
+        Err(error) => {
+            let what = format!("expected a shared library, found a file that is none: {error}");
+            return findings.add(Error, path, what, ("It does not load.", SECTION));
+        }
+    };
+    let (format, machine) = (file.format(), file.architecture());
+    if (format, machine) != (platform.format, platform.machine) {
+        let what = format!(
+            "expected {:?} for {:?}, found {format:?} for {machine:?}",
+            platform.format, platform.machine
+        );
+        return findings.add(Error, path, what, ("The system refuses to load it.", SECTION));
+    }
+    functions(&file, path, interfaces, findings);
+    needs(&file, path, names, findings);
+    versions(&file, path, findings);
+}
+
+/// The part for `machine` of a file; of a universal one for macOS that of this machine.
+fn slice_of(bytes: &[u8], machine: Architecture) -> Option<&[u8]> {
+    use object::read::macho::{FatArch as _, MachOFatFile32, MachOFatFile64};
+    if let Ok(fat) = MachOFatFile32::parse(bytes) {
+        let part = fat.arches().iter().find(|part| part.architecture() == machine)?;
+        return part.data(bytes).ok();
+    }
+    if let Ok(fat) = MachOFatFile64::parse(bytes) {
+        let part = fat.arches().iter().find(|part| part.architecture() == machine)?;
+        return part.data(bytes).ok();
+    }
+    Some(bytes)
+}
+
+/// Functions that need no instance.
+const ALWAYS: [&str; 3] = ["fmi2GetTypesPlatform", "fmi2GetVersion", "fmi2Instantiate"];
+
+/// The functions that every library for `interfaces` exports.
+fn wanted(interfaces: &[InterfaceType]) -> impl Iterator<Item = &'static str> {
+    let belongs = |function: &Function| {
+        let mut states = State::EVERY.iter();
+        states.any(|state| interfaces.iter().any(|own| allowed(*own, *function, *state)))
+    };
+    let own = Function::EVERY.iter().copied().filter(belongs).map(Function::name);
+    ALWAYS.into_iter().chain(own)
+}
+
+fn functions(
+    file: &object::File<'_>,
+    path: &str,
+    interfaces: &[InterfaceType],
+    findings: &mut Findings,
+) {
+    let mut exported = BTreeSet::new();
+    let Ok(exports) = file.exports() else {
+        return findings.add(Error, path, "expected a readable list of exports", ("", "2.1"));
+    };
+    for export in exports.flatten() {
+        if let NameOrOrdinal::Name(name) = export.name() {
+            let name = String::from_utf8_lossy(name);
+            // Names in C begin with an underscore on macOS, where the list has it.
+            let plain = name.strip_prefix('_').filter(|rest| rest.starts_with("fmi2"));
+            exported.insert(plain.unwrap_or(&name).to_owned());
+        }
+    }
+    let missing: BTreeSet<_> =
+        wanted(interfaces).filter(|name| !exported.contains(*name)).collect();
+    if missing.is_empty() {
+        return;
+    }
+    let prefixed = exported.iter().find(|name| name.ends_with("_fmi2DoStep"));
+    if let Some(prefixed) = prefixed.filter(|_| missing.contains(&"fmi2DoStep")) {
+        let what = format!("expected functions without prefix, found {prefixed}");
+        let why = "Importers of FMI 2.0 look for the plain names; prefixes are for source code.";
+        return findings.add(Error, path, what, (why, "2.1.1"));
+    }
+    let missing: Vec<_> = missing.into_iter().collect();
+    let what = format!("lacks {}", missing.join(", "));
+    let why =
+        "Importers that look up all functions at once refuse it, for example FMPy and FMI Library.";
+    findings.add(Error, path, what, (why, "2.1.1"));
+}
+
+/// Libraries that belong to the system, by the beginnings of their names in lower case.
+const SYSTEM: [&str; 48] = [
+    "libc.so",
+    "libm.so",
+    "libpthread.so",
+    "libdl.so",
+    "librt.so",
+    "libutil.so",
+    "libgcc_s.so",
+    "ld-linux",
+    "linux-vdso",
+    "libstdc++.so",
+    "/usr/lib/",
+    "/system/",
+    "kernel32",
+    "kernelbase",
+    "ntdll",
+    "user32",
+    "advapi32",
+    "ws2_32",
+    "ole32",
+    "oleaut32",
+    "shell32",
+    "shlwapi",
+    "gdi32",
+    "comdlg32",
+    "comctl32",
+    "msvcrt.dll",
+    "bcrypt",
+    "crypt32",
+    "userenv",
+    "dbghelp",
+    "psapi",
+    "version.dll",
+    "winmm",
+    "rpcrt4",
+    "secur32",
+    "iphlpapi",
+    "setupapi",
+    "imm32",
+    "powrprof",
+    "netapi32",
+    "mpr.dll",
+    "wsock32",
+    "api-ms-win-",
+    "ext-ms-win-",
+    "ucrtbase",
+    "opengl32",
+    "normaliz",
+    "cfgmgr32",
+];
+
+fn needs(file: &object::File<'_>, path: &str, names: &[String], findings: &mut Findings) {
+    let folder = path.rsplit_once('/').map_or("", |(folder, _)| folder);
+    for library in file.import_libraries().into_iter().flatten().flatten() {
+        let name = String::from_utf8_lossy(library.name()).into_owned();
+        let lower = name.to_ascii_lowercase();
+        if SYSTEM.iter().any(|own| lower.starts_with(own)) {
+            continue;
+        }
+        let last = name.rsplit('/').next().unwrap_or(&name);
+        let beside = format!("{folder}/{last}");
+        if names.iter().any(|own| own.eq_ignore_ascii_case(&beside)) {
+            continue;
+        }
+        let what = format!("needs {name}, which is neither beside it nor part of the system");
+        let why = match lower.as_str() {
+            _ if lower.starts_with("vcruntime") || lower.starts_with("msvcp") => {
+                "It loads only where the redistributable of Visual C++ is installed; /MT avoids that."
+            }
+            _ if lower.starts_with("libpython") => "It loads only where this Python is installed.",
+            _ => {
+                "It loads only where that is installed; list it in documentation/externalDependencies.txt."
+            }
+        };
+        findings.add(Warning, path, what, (why, SECTION));
+    }
+}
+
+/// The newest version of glibc that a library for Linux needs.
+fn versions(file: &object::File<'_>, path: &str, findings: &mut Findings) {
+    let mut newest: Option<(Vec<u32>, String)> = None;
+    for import in file.imports().into_iter().flatten().flatten() {
+        let ImportFlags::Elf { version: Some(version), .. } = import.flags() else { continue };
+        let Some(text) =
+            std::str::from_utf8(version).ok().and_then(|own| own.strip_prefix("GLIBC_"))
+        else {
+            continue;
+        };
+        let numbers: Vec<u32> = text.split('.').map_while(|part| part.parse().ok()).collect();
+        if newest.as_ref().is_none_or(|(most, _)| *most < numbers) {
+            newest = Some((numbers, text.to_owned()));
+        }
+    }
+    if let Some((_, version)) = newest {
+        let what = format!("needs glibc {version} or later");
+        findings.add(Note, path, what, ("It does not load on older systems.", ""));
+    }
+}

@@ -1,0 +1,205 @@
+//! The behaviour of slaves that do one thing wrong.
+
+use fmi2::Experiment;
+use fmi2::abi::Status;
+use fmi2::description::ModelDescription;
+use master::{CallError, Failure, Slave, Stepped};
+
+use super::behaviour;
+use super::finding::{Finding, Severity};
+
+const XML: &str = r#"<fmiModelDescription fmiVersion="2.0" modelName="Sum" guid="g">
+<CoSimulation modelIdentifier="Sum" canGetAndSetFMUstate="true" canSerializeFMUstate="true"/>
+<DefaultExperiment startTime="0" stopTime="1" stepSize="0.125"/>
+<ModelVariables>
+<ScalarVariable name="u" valueReference="1" causality="input"><Real start="2"/></ScalarVariable>
+<ScalarVariable name="y" valueReference="2" causality="output"><Real/></ScalarVariable>
+</ModelVariables><ModelStructure><Outputs><Unknown index="2"/></Outputs></ModelStructure>
+</fmiModelDescription>"#;
+
+/// What a slave does wrong.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Fault {
+    Nothing,
+    StartValue,
+    UnknownReference,
+    Silent,
+    NoEnd,
+    Nan,
+    EachOtherwise,
+    LostState,
+    NoState,
+    ReadAfterTheEnd,
+    Step,
+}
+
+/// The integral of its input, without anything else.
+struct Sum {
+    description: ModelDescription,
+    fault: Fault,
+    number: u32,
+    u: f64,
+    y: f64,
+    end: f64,
+    saved: f64,
+    terminated: bool,
+}
+
+fn refused(function: &'static str, words: &str) -> CallError {
+    let messages = if words.is_empty() { vec![] } else { vec![words.to_owned()] };
+    CallError { function, failure: Failure::Status(Status::Error), messages }
+}
+
+impl Slave for Sum {
+    fn description(&self) -> &ModelDescription {
+        &self.description
+    }
+
+    fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError> {
+        self.end = experiment.stop_time.unwrap_or(f64::INFINITY);
+        Ok(())
+    }
+
+    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
+
+    fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
+
+    fn terminate(&mut self) -> Result<(), CallError> {
+        self.terminated = true;
+        Ok(())
+    }
+
+    fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
+        if self.terminated && self.fault == Fault::ReadAfterTheEnd {
+            return Err(refused("fmi2GetReal", "it is over"));
+        }
+        values[0] = match references[0] {
+            1 => self.u,
+            2 => self.y,
+            _ if self.fault == Fault::UnknownReference => 0.0,
+            _ => {
+                let words = if self.fault == Fault::Silent { "" } else { "no such variable" };
+                return Err(refused("fmi2GetReal", words));
+            }
+        };
+        Ok(())
+    }
+
+    fn set_real(&mut self, _: &[u32], values: &[f64]) -> Result<(), CallError> {
+        self.u = values[0];
+        Ok(())
+    }
+
+    fn do_step(&mut self, time: f64, size: f64, _: bool) -> Result<Stepped, CallError> {
+        if self.fault == Fault::Step && time > 0.5 {
+            return Err(refused("fmi2DoStep", "tired"));
+        }
+        if time + size > self.end && self.fault != Fault::NoEnd {
+            return Err(refused("fmi2DoStep", "past the end"));
+        }
+        self.y += self.u * size;
+        if self.fault == Fault::EachOtherwise {
+            self.y += f64::from(self.number);
+        }
+        if self.fault == Fault::Nan {
+            self.y = f64::NAN;
+        }
+        Ok(Stepped::Whole)
+    }
+
+    fn save_state(&mut self, _: usize) -> Result<(), CallError> {
+        if self.fault == Fault::NoState {
+            return Err(refused("fmi2GetFMUstate", "not today"));
+        }
+        self.saved = self.y;
+        Ok(())
+    }
+
+    fn restore_state(&mut self, _: usize) -> Result<(), CallError> {
+        if self.fault != Fault::LostState {
+            self.y = self.saved;
+        }
+        Ok(())
+    }
+
+    fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
+        Ok(self.y.to_le_bytes().to_vec())
+    }
+
+    fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
+        if self.fault != Fault::LostState {
+            self.y = f64::from_le_bytes(bytes.try_into().unwrap());
+        }
+        Ok(())
+    }
+}
+
+fn findings(fault: Fault) -> Vec<Finding> {
+    let description = ModelDescription::parse(XML).unwrap();
+    let mut number = 0;
+    let mut make = |_: &str| -> anyhow::Result<Box<dyn Slave>> {
+        number += 1;
+        Ok(Box::new(Sum {
+            description: description.clone(),
+            fault,
+            number,
+            u: if fault == Fault::StartValue { 3.0 } else { 2.0 },
+            y: 0.0,
+            end: 0.0,
+            saved: 0.0,
+            terminated: false,
+        }))
+    };
+    behaviour::check(&description, &mut make)
+}
+
+#[test]
+fn a_slave_that_does_nothing_wrong_has_no_findings() {
+    assert_eq!(findings(Fault::Nothing), []);
+}
+
+#[test]
+fn each_fault_is_found_with_its_section() {
+    use Severity::{Error, Warning};
+    for (fault, severity, place, words, section) in [
+        (Fault::StartValue, Error, "variable u", "starts with 3.0, the XML says 2.0", "2.2.7"),
+        (Fault::UnknownReference, Error, "fmi2GetReal", "accepts a value reference", "2.1.2"),
+        (Fault::Silent, Warning, "fmi2GetReal", "without a message", "2.1.3"),
+        (Fault::NoEnd, Warning, "fmi2DoStep", "past a stopTime", "2.1.6"),
+        (Fault::Nan, Warning, "variable y", "no finite number after 1 steps", "2.2.7"),
+        (Fault::EachOtherwise, Warning, "fmi2DoStep", "has other outputs, from step 1", "2.1"),
+        (Fault::LostState, Error, "fmi2SetFMUstate", "differ from those before", "2.1.8"),
+        (Fault::LostState, Error, "fmi2DeSerializeFMUstate", "differ", "2.1.8"),
+        (Fault::NoState, Error, "fmi2GetFMUstate", "canGetAndSetFMUstate is true", "2.1.8"),
+        (Fault::ReadAfterTheEnd, Warning, "fmi2GetReal", "after fmi2Terminate", "4.2.4"),
+        (Fault::Step, Error, "fmi2DoStep", "at t = 0.625 s", "4.2.2"),
+    ] {
+        let all = findings(fault);
+        let found = all.iter().find(|own| own.place == place && own.what.contains(words));
+        let found = found.unwrap_or_else(|| panic!("{fault:?}: {all:#?}"));
+        assert_eq!((found.severity, found.section), (severity, Some(section)), "{found}");
+    }
+}
+
+#[test]
+fn a_finding_says_what_where_why_and_by_which_section() {
+    let all = findings(Fault::UnknownReference);
+    assert_eq!(
+        all[0].to_string(),
+        "error: fmi2GetReal: accepts a value reference that no variable has, expected fmi2Error \
+         (section 2.1.2)\n    A wrong connection goes unnoticed."
+    );
+}
+
+#[test]
+fn what_cannot_be_instantiated_is_one_finding() {
+    let description = ModelDescription::parse(XML).unwrap();
+    let mut make = |_: &str| -> anyhow::Result<Box<dyn Slave>> { anyhow::bail!("no licence") };
+    let all = behaviour::check(&description, &mut make);
+    assert!(all.iter().all(|own| own.place == "fmi2Instantiate" && own.what == "no licence"));
+    assert_eq!(all.len(), 1, "{all:#?}");
+}

@@ -1,0 +1,100 @@
+//! The values of the variables of a slave, and those that the XML promises.
+
+use fmi2::description::{Causality, Kind, ModelDescription, ScalarVariable, Variability};
+use master::{CallError, Slave};
+
+/// A value of any type, comparable by its bits.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Value {
+    Real(u64),
+    Integer(i32),
+    Boolean(bool),
+    String(String),
+}
+
+impl std::fmt::Display for Value {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Value::Real(bits) => write!(formatter, "{:?}", f64::from_bits(*bits)),
+            Value::Integer(value) => write!(formatter, "{value}"),
+            Value::Boolean(value) => write!(formatter, "{value}"),
+            Value::String(value) => write!(formatter, "{value:?}"),
+        }
+    }
+}
+
+impl Value {
+    /// Whether it is the number that the XML states, whose last digit may be rounded.
+    pub(super) fn agrees(&self, stated: &Value) -> bool {
+        match (self, stated) {
+            (Value::Real(found), Value::Real(stated)) => {
+                let (found, stated) = (f64::from_bits(*found), f64::from_bits(*stated));
+                (found - stated).abs() <= 1e-14 * stated.abs().max(found.abs())
+            }
+            _ => self == stated,
+        }
+    }
+
+    pub(super) fn is_finite(&self) -> bool {
+        !matches!(self, Value::Real(bits) if !f64::from_bits(*bits).is_finite())
+    }
+}
+
+/// Reads one variable.
+pub(super) fn get(slave: &mut dyn Slave, variable: &ScalarVariable) -> Result<Value, CallError> {
+    let reference = [variable.value_reference];
+    Ok(match variable.kind {
+        Kind::Real(_) => {
+            let mut value = [0.0];
+            slave.get_real(&reference, &mut value)?;
+            Value::Real(value[0].to_bits())
+        }
+        Kind::Integer(_) | Kind::Enumeration(_) => {
+            let mut value = [0];
+            slave.get_integer(&reference, &mut value)?;
+            Value::Integer(value[0])
+        }
+        Kind::Boolean(_) => {
+            let mut value = [0];
+            slave.get_boolean(&reference, &mut value)?;
+            Value::Boolean(value[0] != 0)
+        }
+        Kind::String(_) => {
+            let mut value = [String::new()];
+            slave.get_string(&reference, &mut value)?;
+            let [value] = value;
+            Value::String(value)
+        }
+    })
+}
+
+/// The start value in the XML.
+pub(super) fn start(variable: &ScalarVariable) -> Option<Value> {
+    match &variable.kind {
+        Kind::Real(own) => own.start.map(|value| Value::Real(value.to_bits())),
+        Kind::Integer(own) | Kind::Enumeration(own) => own.start.map(Value::Integer),
+        Kind::Boolean(start) => start.map(Value::Boolean),
+        Kind::String(start) => start.clone().map(Value::String),
+    }
+}
+
+/// The variables that keep their start value through the initialization: parameters, inputs,
+/// constants.
+pub(super) fn kept(description: &ModelDescription) -> impl Iterator<Item = &ScalarVariable> {
+    description.variables.iter().filter(|own| {
+        matches!(own.causality, Causality::Parameter | Causality::Input)
+            || own.variability == Variability::Constant
+    })
+}
+
+/// The variables whose course is compared.
+pub(super) fn outputs(description: &ModelDescription) -> impl Iterator<Item = &ScalarVariable> {
+    description.variables.iter().filter(|own| own.causality == Causality::Output)
+}
+
+/// A value reference that no variable has.
+pub(super) fn unknown_reference(description: &ModelDescription) -> u32 {
+    let used: std::collections::HashSet<u32> =
+        description.variables.iter().map(|own| own.value_reference).collect();
+    (0..=u32::MAX).rev().find(|reference| !used.contains(reference)).unwrap_or(u32::MAX)
+}

@@ -1,0 +1,138 @@
+//! `--plot`: variables of a results file over time, as SVG or PNG.
+
+use std::path::Path;
+
+use anyhow::{Context, bail, ensure};
+use master::results::{Column, ColumnKind, Selection, Table};
+
+use crate::figure::{Figure, Ink, Panel, Series, rasterise};
+use crate::whole_file;
+
+/// Colours in the order of the curves of a panel, and so the most curves that a panel has.
+const INKS: [Ink; 7] =
+    [Ink::Blue, Ink::Vermilion, Ink::Green, Ink::Purple, Ink::Sky, Ink::Orange, Ink::Black];
+/// Most curves of a picture that can still be looked at.
+const CURVES: usize = 64;
+
+/// A variable with what is drawn of it.
+struct Curve {
+    label: String,
+    unit: Option<String>,
+    time: Vec<f64>,
+    values: Vec<f64>,
+}
+
+/// Draws variables of a results file, by name or pattern, over time: one panel for each unit. The
+/// ending of `out`, `.svg` or `.png`, chooses the format. Memory does not depend on the length of
+/// the file.
+///
+/// # Errors
+///
+/// Another ending, a name that the file does not have, texts, a file that cannot be read or
+/// written.
+pub(crate) fn plot(results: &Path, variables: &[String], out: &Path) -> anyhow::Result<()> {
+    plot_with_units(results, variables, &|_| None, out)
+}
+
+/// As [`plot`]; `unit` is asked for the units of variables where the file does not state any,
+/// which is so in CSV.
+///
+/// # Errors
+///
+/// As [`plot`].
+pub(crate) fn plot_with_units(
+    results: &Path,
+    variables: &[String],
+    unit: &dyn Fn(&str) -> Option<String>,
+    out: &Path,
+) -> anyhow::Result<()> {
+    let ending = out.extension().unwrap_or_default().to_ascii_lowercase();
+    ensure!(ending == "svg" || ending == "png", "{}: a plot is a .svg or a .png", out.display());
+    let curves = curves(results, variables, unit)?;
+    let title = results.file_name().unwrap_or_default().to_string_lossy();
+    let svg = Figure { title: &title, panels: panels(&curves) }.svg()?;
+    let bytes = if ending == "png" { rasterise(&svg)? } else { svg.into_bytes() };
+    whole_file::write(out, &bytes).with_context(|| format!("cannot write {}", out.display()))
+}
+
+/// Reads what is to be drawn.
+fn curves(
+    results: &Path,
+    variables: &[String],
+    unit: &dyn Fn(&str) -> Option<String>,
+) -> anyhow::Result<Vec<Curve>> {
+    let table = Table::open(results)?;
+    let selection = Selection { include: variables.to_vec(), exclude: Vec::new() };
+    let mut positions = table.choose(&selection)?;
+    // A pattern means what can be drawn.
+    positions.retain(|position| {
+        let column = &table.columns()[*position];
+        let drawable = *position != table.time() && column.kind != ColumnKind::String;
+        drawable || variables.contains(&column.name)
+    });
+    if positions.len() > CURVES {
+        bail!("{} variables to plot, expected at most {CURVES}: choose fewer", positions.len());
+    }
+    ensure!(!positions.is_empty(), "{}: no variable to plot", results.display());
+    let envelopes = table.envelopes(&positions)?;
+    let curve = |(position, envelope): (usize, master::results::Envelope)| {
+        let column = &table.columns()[position];
+        let (time, values) = envelope.samples();
+        let (time, values) = if stepwise(column) { stairs(&time, &values) } else { (time, values) };
+        let unit = column.unit.clone().or_else(|| unit(&column.name));
+        let label = unit
+            .as_ref()
+            .map_or_else(|| column.name.clone(), |unit| format!("{} in {unit}", column.name));
+        Curve { label, unit, time, values }
+    };
+    Ok(positions.into_iter().zip(envelopes).map(curve).collect())
+}
+
+/// Whether a variable has no values between two samples.
+fn stepwise(column: &Column) -> bool {
+    matches!(column.kind, ColumnKind::Integer | ColumnKind::Boolean)
+}
+
+/// Each value lasts until the next one.
+fn stairs(time: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let ends = time.iter().skip(1).chain(time.last());
+    let steps = time.iter().zip(ends).zip(values);
+    steps.flat_map(|((start, end), value)| [(*start, *value), (*end, *value)]).unzip()
+}
+
+/// Curves of one unit share a panel, as far as there are colours.
+fn panels(curves: &[Curve]) -> Vec<Panel<'_>> {
+    let mut groups: Vec<Vec<&Curve>> = Vec::new();
+    for curve in curves {
+        let same =
+            |group: &&mut Vec<&Curve>| group[0].unit == curve.unit && group.len() < INKS.len();
+        match groups.iter_mut().find(same) {
+            Some(group) => group.push(curve),
+            None => groups.push(vec![curve]),
+        }
+    }
+    let count = groups.len();
+    let frame_height = match count {
+        1 => Some(420.0),
+        2 => Some(260.0),
+        _ => None,
+    };
+    let mut panels = Vec::new();
+    for (place, group) in groups.into_iter().enumerate() {
+        panels.push(Panel {
+            x_label: if place + 1 == count { "time in s" } else { "" },
+            y_label: group[0].unit.as_deref().unwrap_or_default(),
+            frame_height,
+            series: group.into_iter().zip(INKS).map(series).collect(),
+            ..Panel::default()
+        });
+    }
+    panels
+}
+
+fn series((curve, ink): (&Curve, Ink)) -> Series<'_> {
+    Series { label: &curve.label, time: &curve.time, values: &curve.values, ink, broad: false }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,21 @@
+//! The process of an isolated FMU: this program, started by itself.
+
+use std::process::ExitCode;
+
+use master::isolate::WORKER;
+
+/// Serves the master that started this process as a worker; none where no master did.
+pub(crate) fn worker() -> Option<ExitCode> {
+    if std::env::args_os().nth(1)? != WORKER {
+        return None;
+    }
+    Some(match master::isolate::worker() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            let cause = std::error::Error::source(&error);
+            let cause = cause.map(|cause| format!(": {cause}")).unwrap_or_default();
+            eprintln!("error: {error}{cause}");
+            ExitCode::from(2)
+        }
+    })
+}

@@ -1,0 +1,144 @@
+//! `ModelStructure`.
+
+use std::collections::HashSet;
+
+use super::ParseError;
+use super::attributes::{Node, WHITE_SPACE};
+use crate::description::{Causality, DependencyKind, ModelStructure, ScalarVariable, Unknown};
+
+const ANYTHING: &str = "read as depending on anything";
+
+/// Reads `ModelStructure` of `root` for `variables`.
+///
+/// A list with an index that is no variable's is not to be trusted: its rows are read as depending
+/// on anything. So are outputs that are missing from `Outputs`.
+pub(super) fn read(
+    root: Node<'_>,
+    variables: &[ScalarVariable],
+) -> Result<ModelStructure, ParseError> {
+    let Some(element) = root.optional_child("ModelStructure")? else {
+        let place = "<fmiModelDescription>".to_owned();
+        let expected = "an element ModelStructure";
+        root.warn_of(true, place, (expected, "none".to_owned()), ANYTHING);
+        return Ok(ModelStructure {
+            outputs: missing_outputs(&[], variables).map(|(row, _)| row).collect(),
+            ..ModelStructure::default()
+        });
+    };
+    let mut outputs = list(element, "Outputs", variables.len())?;
+    let missing: Vec<_> = missing_outputs(&outputs, variables).collect();
+    if !missing.is_empty() {
+        let names: Vec<_> = missing.iter().take(5).map(|(_, name)| *name).collect();
+        let more = if missing.len() > 5 { ", and others" } else { "" };
+        let found = format!("no row for {}{more}", names.join(", "));
+        let place = "<ModelStructure>".to_owned();
+        element.warn_of(false, place, ("every output in Outputs", found), ANYTHING);
+        outputs.extend(missing.into_iter().map(|(row, _)| row));
+    }
+    Ok(ModelStructure {
+        outputs,
+        derivatives: derivatives(element, variables.len())?,
+        initial_unknowns: list(element, "InitialUnknowns", variables.len())?,
+    })
+}
+
+fn missing_outputs<'a>(
+    rows: &[Unknown],
+    variables: &'a [ScalarVariable],
+) -> impl Iterator<Item = (Unknown, &'a str)> {
+    let listed: HashSet<u32> = rows.iter().map(|row| row.index).collect();
+    (1..).zip(variables).filter_map(move |(index, own)| {
+        let missing = own.causality == Causality::Output && !listed.contains(&index);
+        missing.then(|| (Unknown { index, ..Unknown::default() }, own.name.as_str()))
+    })
+}
+
+fn list(element: Node<'_>, name: &'static str, count: usize) -> Result<Vec<Unknown>, ParseError> {
+    let Some(list) = element.optional_child(name)? else { return Ok(Vec::new()) };
+    let mut trusted = true;
+    let mut rows = Vec::new();
+    for row in list.children_named("Unknown") {
+        let text = row.required("index")?;
+        let Some(index) = index(text, count) else {
+            row.warn_text("index", &indices(count), text, "the row was skipped");
+            trusted = false;
+            continue;
+        };
+        let Ok(dependencies) = dependencies(row, count) else {
+            trusted = false;
+            rows.push(Unknown { index, ..Unknown::default() });
+            continue;
+        };
+        let kinds = kinds(row, dependencies.as_deref());
+        rows.push(Unknown { index, dependencies, kinds });
+    }
+    if !trusted {
+        let said = (indices(count), "others".to_owned());
+        list.warn_of(false, format!("<{name}>"), (&said.0, said.1), ANYTHING);
+        for row in &mut rows {
+            (row.dependencies, row.kinds) = (None, None);
+        }
+    }
+    Ok(rows)
+}
+
+/// `Derivatives`, which say what the states are: an index that is no variable's is an error.
+fn derivatives(element: Node<'_>, count: usize) -> Result<Vec<Unknown>, ParseError> {
+    if let Some(list) = element.optional_child("Derivatives")? {
+        for row in list.children_named("Unknown") {
+            let text = row.required("index")?;
+            index(text, count).ok_or_else(|| row.wrong("index", &indices(count), text))?;
+        }
+    }
+    list(element, "Derivatives", count)
+}
+
+/// The 1-based index of one of `count` variables.
+pub(super) fn index(text: &str, count: usize) -> Option<u32> {
+    let index = text.trim_matches(WHITE_SPACE).parse::<u32>().ok()?;
+    (index > 0 && usize::try_from(index).is_ok_and(|own| own <= count)).then_some(index)
+}
+
+pub(super) fn indices(count: usize) -> String {
+    format!("the index of a variable, 1 to {count}")
+}
+
+fn words(text: &str) -> impl Iterator<Item = &str> {
+    text.split(WHITE_SPACE).filter(|word| !word.is_empty())
+}
+
+/// An index that is no variable's.
+struct Impossible;
+
+/// The attribute `dependencies`, where there is one.
+fn dependencies(row: Node<'_>, count: usize) -> Result<Option<Vec<u32>>, Impossible> {
+    let Some(text) = row.attribute("dependencies") else { return Ok(None) };
+    let mut found = Vec::new();
+    for word in words(text) {
+        let Some(index) = index(word, count) else {
+            row.warn_text("dependencies", &indices(count), word, ANYTHING);
+            return Err(Impossible);
+        };
+        found.push(index);
+    }
+    Ok(Some(found))
+}
+
+/// The attribute `dependenciesKind`, where it fits `dependencies`.
+fn kinds(row: Node<'_>, dependencies: Option<&[u32]>) -> Option<Vec<DependencyKind>> {
+    const NAME: &str = "dependenciesKind";
+    let text = row.attribute(NAME)?;
+    let expected = match dependencies {
+        None => "no such attribute without dependencies".to_owned(),
+        Some(own) => format!(
+            "{} of dependent, constant, fixed, tunable or discrete, as many as dependencies",
+            own.len()
+        ),
+    };
+    let kinds: Option<Vec<DependencyKind>> = words(text).map(|word| word.parse().ok()).collect();
+    let kinds = kinds.filter(|kinds| dependencies.is_some_and(|own| own.len() == kinds.len()));
+    if kinds.is_none() {
+        row.warn_text(NAME, &expected, text, "read as dependent");
+    }
+    kinds
+}

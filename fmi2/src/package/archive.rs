@@ -1,0 +1,215 @@
+//! A ZIP archive whose names and sizes have been looked at before anything is unpacked.
+
+use std::cell::Cell;
+use std::collections::HashSet;
+use std::fs::File;
+use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write as _};
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+
+use zip::read::ZipFile;
+use zip::result::ZipError;
+use zip::{CompressionMethod, ZipArchive};
+
+use super::{PackageError, file_error, paths};
+
+/// Most entries.
+const ENTRIES: usize = 100_000;
+/// Longest list of entries in bytes.
+const DIRECTORY: u64 = 32 << 20;
+/// Most bytes that any archive may unpack to.
+const CAPACITY: u64 = 4 << 30;
+/// Bytes that even the smallest archive may unpack to ...
+const BASE: u64 = 64 << 20;
+/// ... and how many more for each byte of the archive. FMUs have 2 to 10, deflate up to 1032.
+const RATIO: u64 = 100;
+
+/// Bytes that are unpacked before they are written.
+const BUFFER: usize = 1 << 20;
+
+/// What is wrong with an archive that has two entries of one name.
+const DUPLICATE: &str = "two entries have the same name";
+/// What is wrong with an archive whose entries share their bytes, as those of a bomb do.
+const OVERLAP: &str = "entries overlap";
+
+/// A reader that gives no more than so many bytes, as long as that is limited.
+pub(super) struct Metered<R> {
+    inner: R,
+    left: Rc<Cell<u64>>,
+}
+
+impl<R: Read> Read for Metered<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.inner.read(buffer)?;
+        let left = self.left.get().checked_sub(u64::try_from(count).unwrap_or(u64::MAX));
+        let left = left.ok_or_else(|| io::Error::other("the list of entries is too long"))?;
+        self.left.set(left);
+        Ok(count)
+    }
+}
+
+impl<R: Seek> Seek for Metered<R> {
+    fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
+        self.inner.seek(position)
+    }
+}
+
+/// An archive that is safe to unpack.
+pub(super) struct Archive {
+    zip: ZipArchive<Metered<BufReader<File>>>,
+    path: PathBuf,
+    /// All names, those of folders with a slash at their end; in the order of the archive.
+    names: Vec<String>,
+    capacity: u64,
+}
+
+impl Archive {
+    /// Opens the archive at `path` and looks at its list of entries.
+    pub(super) fn open(path: &Path) -> Result<Self, PackageError> {
+        let file = File::open(path).map_err(file_error("open", path))?;
+        let length = file.metadata().map_err(file_error("read", path))?.len();
+        let left = Rc::new(Cell::new(DIRECTORY));
+        let reader = Metered { inner: BufReader::new(file), left: left.clone() };
+        let wrong = |source| PackageError::Archive { path: path.to_owned(), source };
+        let zip = ZipArchive::new(reader).map_err(wrong)?;
+        left.set(u64::MAX);
+        let capacity = BASE.saturating_add(RATIO.saturating_mul(length)).min(CAPACITY);
+        let mut archive = Self { zip, path: path.to_owned(), names: Vec::new(), capacity };
+        archive.look()?;
+        Ok(archive)
+    }
+
+    fn look(&mut self) -> Result<(), PackageError> {
+        if self.zip.len() > ENTRIES {
+            return Err(self.limit(ENTRIES as u64, "entries"));
+        }
+        if self.zip.has_duplicate_names() {
+            return Err(self.wrong(ZipError::InvalidArchive(DUPLICATE.into())));
+        }
+        let mut total = 0_u64;
+        for index in 0..self.zip.len() {
+            let entry = self.zip.by_index_data(index).map_err(|error| self.wrong(error))?;
+            let name = entry.name().map_err(|error| self.wrong(error))?.into_owned();
+            let rule = paths::unsafe_to_unpack(&name);
+            let rule = rule.or(entry.is_symlink().then_some("a file or a folder, not a link"));
+            if let Some(expected) = rule {
+                return Err(PackageError::Entry { entry: name, expected });
+            }
+            total = total.saturating_add(entry.size());
+            self.names.push(name);
+        }
+        if total > self.capacity {
+            return Err(self.limit(self.capacity, "bytes"));
+        }
+        if let Some(name) = file_and_folder(&self.names) {
+            let expected = "a file or a folder of that name, not both";
+            return Err(PackageError::Entry { entry: name, expected });
+        }
+        if self.zip.has_overlapping_entries().map_err(|error| self.wrong(error))? {
+            return Err(self.wrong(ZipError::InvalidArchive(OVERLAP.into())));
+        }
+        Ok(())
+    }
+
+    pub(super) fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Unpacks into `folder` the entries that are `wanted`.
+    pub(super) fn unpack(
+        &mut self,
+        folder: &Path,
+        wanted: impl Fn(&str) -> bool,
+    ) -> Result<(), PackageError> {
+        self.unpack_up_to(folder, self.capacity, wanted)
+    }
+
+    /// The same, no more than `capacity` bytes.
+    pub(super) fn unpack_up_to(
+        &mut self,
+        folder: &Path,
+        capacity: u64,
+        wanted: impl Fn(&str) -> bool,
+    ) -> Result<(), PackageError> {
+        use std::fs;
+        let mut left = capacity;
+        for (index, name) in self.names.iter().enumerate().filter(|(_, name)| wanted(name)) {
+            let target = folder.join(name);
+            if name.ends_with('/') {
+                fs::create_dir_all(&target).map_err(file_error("create", &target))?;
+                continue;
+            }
+            let method = self.zip.by_index_data(index).map(|entry| entry.compression());
+            if !matches!(method, Ok(CompressionMethod::Stored | CompressionMethod::Deflated)) {
+                let expected = "compression by deflate, or none";
+                return Err(PackageError::Entry { entry: name.clone(), expected });
+            }
+            let entry = self.zip.by_index(index);
+            let wrong = |source| PackageError::Archive { path: self.path.clone(), source };
+            let limit =
+                || PackageError::Limit { path: self.path.clone(), limit: capacity, unit: "bytes" };
+            // What the list says is not to be believed: more than is left is not written.
+            let written = write_entry(entry.map_err(wrong)?, &target, left)?;
+            left = left.checked_sub(written).ok_or_else(limit)?;
+        }
+        Ok(())
+    }
+
+    fn wrong(&self, source: ZipError) -> PackageError {
+        PackageError::Archive { path: self.path.clone(), source }
+    }
+
+    fn limit(&self, limit: u64, unit: &'static str) -> PackageError {
+        PackageError::Limit { path: self.path.clone(), limit, unit }
+    }
+}
+
+/// A name that is a file's and a folder's.
+fn file_and_folder(names: &[String]) -> Option<String> {
+    let files: HashSet<&str> =
+        names.iter().filter(|name| !name.ends_with('/')).map(String::as_str).collect();
+    let mut folders = HashSet::new();
+    for name in names {
+        let mut inner = name.strip_suffix('/').map_or(name.as_str(), |folder| folder);
+        if inner.len() < name.len() && files.contains(inner) {
+            return Some(inner.to_owned());
+        }
+        while let Some((folder, _)) = inner.rsplit_once('/') {
+            if !folders.insert(folder) {
+                break;
+            }
+            if files.contains(folder) {
+                return Some(folder.to_owned());
+            }
+            inner = folder;
+        }
+    }
+    None
+}
+
+/// Writes one file, stopping after `limit` + 1 bytes whatever the archive says of its size.
+fn write_entry(
+    entry: ZipFile<'_, Metered<BufReader<File>>>,
+    target: &Path,
+    limit: u64,
+) -> Result<u64, PackageError> {
+    if let Some(parent) = target.parent() {
+        std::fs::create_dir_all(parent).map_err(file_error("create", parent))?;
+    }
+    let executable = entry.unix_mode().is_some_and(|mode| mode & 0o111 != 0);
+    let file = File::create_new(target).map_err(file_error("create", target))?;
+    let size = usize::try_from(entry.size()).unwrap_or(usize::MAX).clamp(1, BUFFER);
+    let mut file = BufWriter::with_capacity(size, file);
+    let written = io::copy(&mut entry.take(limit.saturating_add(1)), &mut file);
+    let written = written.and_then(|count| file.flush().map(|()| count));
+    let written = written.map_err(file_error("unpack", target))?;
+    #[cfg(unix)]
+    if executable {
+        use std::os::unix::fs::PermissionsExt as _;
+        let mode = std::fs::Permissions::from_mode(0o755);
+        std::fs::set_permissions(target, mode).map_err(file_error("write", target))?;
+    }
+    #[cfg(not(unix))]
+    let _ = executable;
+    Ok(written)
+}

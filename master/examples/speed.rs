@@ -1,0 +1,106 @@
+//! Runs a system as fast as the master can and says what it cost, for `scripts/benchmark-peers`.
+//!
+//!     speed pack FOLDER PORTS
+//!     speed run SYSTEM STEP STEPS
+//!
+//! `pack` builds the tiny FMU of `tests/speed` and prints its path. `run` reads a file with a line
+//! for each thing that there is, initialises, and makes STEPS steps of STEP s by Jacobi's method with
+//! held inputs, as `tests/speed/loop.c` does:
+//!
+//!     fmu NAME PATH
+//!     set NAME.VARIABLE VALUE
+//!     connect NAME.OUTPUT NAME.INPUT
+//!
+//! It prints a JSON object: processor time in ns of the start (from the archives to the end of
+//! initialisation) and of one step, wall time of the start, peak memory in KiB, and the sum of all
+//! Real outputs at the end.
+#![forbid(unsafe_code)]
+#![expect(clippy::print_stdout, reason = "the result")]
+#![expect(clippy::cast_precision_loss, reason = "figures for a table")]
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::{Context, bail};
+use fmi2::Experiment;
+use fmi2::description::Causality;
+use master::algorithm::{Algorithm, Course, Sweep};
+use master::{Fmu, Probe, Simulation, System};
+use rustix::time::{ClockId, clock_gettime};
+
+#[path = "../../tests/speed/lag.rs"]
+#[expect(dead_code, reason = "the rings are for the benchmark beside this")]
+mod lag;
+
+/// Processor time of this process in ns.
+fn cpu() -> f64 {
+    let now = clock_gettime(ClockId::ProcessCPUTime);
+    now.tv_sec as f64 * 1e9 + now.tv_nsec as f64
+}
+
+/// Peak memory in KiB, where Linux says it; else 0.
+fn peak() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    line.and_then(|text| text.split_whitespace().next()?.parse().ok()).unwrap_or(0)
+}
+
+/// The system of a file; an archive that is named several times is opened once.
+fn read(path: &Path) -> anyhow::Result<System> {
+    let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
+    let (mut system, mut opened) = (System::default(), HashMap::<PathBuf, Fmu>::new());
+    for line in text.lines() {
+        match line.split(' ').collect::<Vec<_>>()[..] {
+            ["fmu", name, path] => {
+                let path = PathBuf::from(path);
+                if !opened.contains_key(&path) {
+                    opened.insert(path.clone(), Fmu::open(&path)?);
+                }
+                system.add(name, Box::new(opened[&path].instantiate(name)?))?;
+            }
+            ["set", variable, value] => system.set(variable, value)?,
+            ["connect", from, to] => system.connect(from, to)?,
+            _ => bail!("{line:?}: expected fmu NAME PATH, set NAME VALUE or connect FROM TO"),
+        }
+    }
+    Ok(system)
+}
+
+fn run(path: &Path, step: f64, steps: u64) -> anyhow::Result<()> {
+    let (begin, clock) = (cpu(), Instant::now());
+    let system = read(path)?;
+    let mut probe = Probe::new(&system, &system.ports(Causality::Output));
+    let experiment = Experiment { start_time: 0.0, stop_time: None, tolerance: None };
+    let algorithm =
+        Algorithm { sweep: Sweep::Jacobi, course: Course::Hold, ..Algorithm::new(step) };
+    let mut simulation = Simulation::new(system, &algorithm, &experiment)?;
+    let (started, wall) = (cpu(), clock.elapsed());
+    for _ in 0..steps {
+        simulation.step()?;
+    }
+    let stepped = cpu();
+    let (mut values, time) = (vec![0.0; probe.names().len()], simulation.time());
+    probe.read(simulation.system(), time, &mut values)?;
+    println!(
+        "{{\"start_ns\": {}, \"start_wall_ns\": {}, \"step_ns\": {}, \"peak_kib\": {}, \"sum\": {}}}",
+        started - begin,
+        wall.as_nanos(),
+        (stepped - started) / steps.max(1) as f64,
+        peak(),
+        values.iter().sum::<f64>()
+    );
+    Ok(())
+}
+
+fn main() -> anyhow::Result<()> {
+    let arguments: Vec<_> = std::env::args().skip(1).collect();
+    match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        ["pack", folder, ports] => {
+            println!("{}", lag::pack(Path::new(folder), ports.parse()?)?.display());
+            Ok(())
+        }
+        ["run", path, step, steps] => run(Path::new(path), step.parse()?, steps.parse()?),
+        _ => bail!("expected pack FOLDER PORTS or run SYSTEM STEP STEPS"),
+    }
+}

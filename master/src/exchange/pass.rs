@@ -1,0 +1,81 @@
+//! Jacobi's method with held inputs and nothing but Reals: a sweep is one pass over the slaves.
+
+use std::ops::Range;
+
+use crate::slave::{CallError, Slave, Stepped};
+
+/// Where the values of one slave stand among those of all.
+#[derive(Clone, Debug)]
+struct Place {
+    inputs: Range<usize>,
+    outputs: Range<usize>,
+}
+
+/// The arrays of a pass, close together: value references, sources and values of all slaves.
+#[derive(Debug, Default)]
+pub(super) struct Pass {
+    places: Vec<Place>,
+    inputs: Vec<u32>,
+    /// For each input the index of its output.
+    sources: Vec<u32>,
+    /// What each input gets.
+    values: Vec<f64>,
+    outputs: Vec<u32>,
+    /// Outputs at the end of the step while those at its begin still count.
+    next: Vec<f64>,
+    /// Slaves that did not come to the end of their step.
+    parts: Vec<(usize, Stepped)>,
+}
+
+impl Pass {
+    /// Adds the next slave: the references of its inputs, their sources, those of its outputs.
+    pub(super) fn add(&mut self, inputs: &[u32], sources: &[u32], outputs: &[u32]) {
+        let (first_input, first_output) = (self.inputs.len(), self.outputs.len());
+        self.inputs.extend(inputs);
+        self.sources.extend(sources);
+        self.values.resize(self.inputs.len(), 0.0);
+        self.outputs.extend(outputs);
+        self.next.resize(self.outputs.len(), 0.0);
+        self.places.push(Place {
+            inputs: first_input..self.inputs.len(),
+            outputs: first_output..self.outputs.len(),
+        });
+        self.parts.reserve(self.places.len());
+    }
+
+    /// Sets the inputs of all slaves to values among `latest`, steps them from `time` over `size`
+    /// and reads their outputs, which take the place of `latest` when all have stepped. Gives those
+    /// that stopped on the way.
+    ///
+    /// # Errors
+    ///
+    /// The first failure and its slave; `latest` is then as it was.
+    pub(super) fn run(
+        &mut self,
+        slaves: &mut [(String, Box<dyn Slave>)],
+        latest: &mut Vec<f64>,
+        span: (f64, f64),
+        never_back: bool,
+    ) -> Result<&mut Vec<(usize, Stepped)>, (usize, CallError)> {
+        self.parts.clear();
+        for (slave, ((_, instance), place)) in slaves.iter_mut().zip(&self.places).enumerate() {
+            let values = &mut self.values[place.inputs.clone()];
+            for (value, &source) in values.iter_mut().zip(&self.sources[place.inputs.clone()]) {
+                *value = latest[source as usize];
+            }
+            let done = instance.pass(
+                (&self.inputs[place.inputs.clone()], values),
+                span,
+                never_back,
+                (&self.outputs[place.outputs.clone()], &mut self.next[place.outputs.clone()]),
+            );
+            match done {
+                Ok(Stepped::Whole) => {}
+                Ok(part) => self.parts.push((slave, part)),
+                Err(error) => return Err((slave, error)),
+            }
+        }
+        std::mem::swap(latest, &mut self.next);
+        Ok(&mut self.parts)
+    }
+}

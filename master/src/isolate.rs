@@ -1,0 +1,192 @@
+//! FMUs in processes of their own: what one does to its process leaves the master whole.
+//!
+//! [`open`] starts a worker, which is the same program called with [`WORKER`] as its only argument
+//! and hands over to [`worker()`]. It loads the FMU and does what the master's side, [`Isolated`],
+//! asks for. Both share memory for arguments, results and messages, and take turns.
+//!
+//! This works on Linux; elsewhere [`open`] says that it does not.
+
+#[cfg(target_os = "linux")]
+mod command;
+#[cfg(not(target_os = "linux"))]
+mod elsewhere;
+#[cfg(target_os = "linux")]
+mod isolated;
+#[cfg(target_os = "linux")]
+mod layout;
+#[cfg(target_os = "linux")]
+mod line;
+#[cfg(target_os = "linux")]
+mod log;
+#[cfg(target_os = "linux")]
+mod perform;
+#[cfg(target_os = "linux")]
+mod process;
+#[cfg(target_os = "linux")]
+mod region;
+#[cfg(target_os = "linux")]
+mod slave;
+#[cfg(target_os = "linux")]
+mod strings;
+#[cfg(target_os = "linux")]
+mod words;
+#[cfg(target_os = "linux")]
+mod worker;
+
+use std::ffi::OsString;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use fmi2::package::{PackageError, Unpacked};
+
+use crate::slave::CallError;
+
+#[cfg(not(target_os = "linux"))]
+pub use elsewhere::{Isolated, worker};
+#[cfg(target_os = "linux")]
+pub use isolated::Isolated;
+#[cfg(target_os = "linux")]
+pub use worker::worker;
+
+/// The first argument of a program that is to be a worker.
+pub const WORKER: &str = "--fmu-worker";
+
+/// How FMUs are isolated.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// How long each call may take; its process is ended then. None: as long as it takes.
+    pub time_limit: Option<Duration>,
+    /// Libraries to load before that of the FMU, as [`crate::preload`] does.
+    pub preload: Vec<OsString>,
+    /// Whether `fmi2SetDebugLogging` is called where the FMU has it.
+    pub logging: bool,
+    /// The program that becomes the worker; none: this one.
+    pub executable: Option<PathBuf>,
+}
+
+/// Why an FMU could not be isolated.
+#[derive(Debug, thiserror::Error)]
+pub enum IsolateError {
+    /// The archive or its model description.
+    #[error(transparent)]
+    Package(Box<PackageError>),
+    /// There is no co-simulation in it.
+    #[error("{path}: the FMU offers no co-simulation, expected the element CoSimulation")]
+    NoCoSimulation {
+        /// The FMU.
+        path: PathBuf,
+    },
+    /// The operating system refused shared memory or a connection.
+    #[error("{what} for the process of {instance}")]
+    System {
+        /// What was wanted.
+        what: &'static str,
+        /// The instance.
+        instance: String,
+        /// What it said.
+        source: io::Error,
+    },
+    /// The process could not be started.
+    #[error("cannot start {} for {instance}", executable.display())]
+    Start {
+        /// The program.
+        executable: PathBuf,
+        /// The instance.
+        instance: String,
+        /// What the operating system said.
+        source: io::Error,
+    },
+    /// The worker could not load or instantiate the FMU.
+    #[error("{instance}: {reason}")]
+    Refused {
+        /// The instance.
+        instance: String,
+        /// Why.
+        reason: String,
+    },
+    /// The worker ended or did not answer while it loaded or instantiated the FMU.
+    #[error("{instance}: {source}")]
+    Call {
+        /// The instance.
+        instance: String,
+        /// What happened.
+        source: CallError,
+    },
+    /// Not on this operating system.
+    #[error("{instance}: FMUs are isolated on Linux only so far")]
+    Platform {
+        /// The instance.
+        instance: String,
+    },
+}
+
+impl From<PackageError> for IsolateError {
+    fn from(error: PackageError) -> Self {
+        IsolateError::Package(Box::new(error))
+    }
+}
+
+/// An FMU, unpacked once for all of its isolated instances.
+#[derive(Clone, Debug)]
+pub struct Package {
+    unpacked: Arc<Unpacked>,
+}
+
+impl Package {
+    /// Unpacks the FMU at `path`, which may also be a folder with an unpacked one. Nothing of it is
+    /// loaded into this process.
+    ///
+    /// # Errors
+    ///
+    /// [`IsolateError::Package`], [`IsolateError::NoCoSimulation`].
+    pub fn open(path: &Path) -> Result<Self, IsolateError> {
+        let unpacked =
+            if path.is_dir() { Unpacked::in_folder(path)? } else { Unpacked::open(path)? };
+        if unpacked.description.co_simulation.is_none() {
+            return Err(IsolateError::NoCoSimulation { path: path.to_owned() });
+        }
+        Ok(Self { unpacked: Arc::new(unpacked) })
+    }
+
+    /// An instance called `name` in a process of its own.
+    ///
+    /// # Errors
+    ///
+    /// [`IsolateError`]: no process, or an FMU that does not load or that ends its process.
+    pub fn instantiate(&self, name: &str, options: &Options) -> Result<Isolated, IsolateError> {
+        Isolated::start(self.unpacked.clone(), name, options)
+    }
+}
+
+/// An instance called `name` of the FMU at `path`, in a process of its own.
+///
+/// # Errors
+///
+/// Those of [`Package::open`] and [`Package::instantiate`].
+pub fn open(path: &Path, name: &str, options: &Options) -> Result<Isolated, IsolateError> {
+    Package::open(path)?.instantiate(name, options)
+}
+
+/// Why a program could not be a worker.
+#[derive(Debug, thiserror::Error)]
+pub enum WorkerError {
+    /// It was not started by a master.
+    #[error("{WORKER} is for the master's own use: {what}")]
+    Alone {
+        /// What is missing.
+        what: &'static str,
+        /// What the operating system said.
+        source: io::Error,
+    },
+    /// The master wrote something else than a command.
+    #[error("the memory shared with the master is corrupted: found {found}, expected a command")]
+    Corrupted {
+        /// What was found.
+        found: u64,
+    },
+    /// Not on this operating system.
+    #[error("FMUs are isolated on Linux only so far")]
+    Platform,
+}

@@ -1,0 +1,289 @@
+//! The master's side of an isolated instance: what passes between it and the worker.
+
+use std::os::unix::ffi::OsStrExt as _;
+use std::os::unix::net::UnixStream;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use fmi2::package::Unpacked;
+
+use super::command::{Command, DONE, FAILED, function_at, read_error};
+use super::layout::Shared;
+use super::line::{Line, Seen, Side};
+use super::log::Inbox;
+use super::process::Process;
+use super::words::{Reader, Writer};
+use super::{IsolateError, Options};
+use crate::slave::{CallError, Failure};
+
+/// Longest sleep between two looks at the messages and at the clock.
+const SLICE: Duration = Duration::from_millis(100);
+/// How long a worker whose connection has ended may take to end.
+const ENDING: Duration = Duration::from_secs(2);
+/// How long `fmi2FreeInstance` may take where the calls have no limit.
+const FREEING: Duration = Duration::from_secs(10);
+/// Most bytes that a worker may answer.
+const MOST: usize = 1 << 32;
+
+/// An instance in a process of its own.
+///
+/// After a call that ended its process every further call gives the same error.
+pub struct Isolated {
+    line: Line,
+    process: Process,
+    inbox: Inbox,
+    /// The last turn that this side knows of: odd while the worker acts.
+    turn: u64,
+    /// Why there is no worker any more.
+    ended: Option<Failure>,
+    time_limit: Option<Duration>,
+    slice: Duration,
+    /// The unpacked FMU: removed when no instance needs it.
+    pub(super) package: Arc<Unpacked>,
+}
+
+impl Isolated {
+    /// Starts a worker and has it instantiate the FMU.
+    pub(super) fn start(
+        package: Arc<Unpacked>,
+        name: &str,
+        options: &Options,
+    ) -> Result<Self, IsolateError> {
+        let system = |what| {
+            let instance = name.to_owned();
+            move |source| IsolateError::System { what, instance, source }
+        };
+        let count = package.description.variables.len();
+        let (shared, memory) = Shared::create(count).map_err(system("no shared memory"))?;
+        let (here, there) = UnixStream::pair().map_err(system("no connection"))?;
+        let slice = options.time_limit.map_or(SLICE, |limit| (limit / 8).min(SLICE));
+        let slice = slice.max(Duration::from_millis(1));
+        here.set_read_timeout(Some(slice)).map_err(system("no time limit"))?;
+        here.set_write_timeout(Some(slice)).map_err(system("no time limit"))?;
+        let executable = options.executable.clone().map_or_else(std::env::current_exe, Ok);
+        let executable = executable.map_err(system("no program"))?;
+        let process = Process::start(&executable, there, memory).map_err(|source| {
+            IsolateError::Start { executable, instance: name.to_owned(), source }
+        })?;
+        let mut isolated = Self {
+            line: Line::new(Arc::new(shared), here, Side::Master),
+            process,
+            inbox: Inbox::new(name),
+            turn: 0,
+            ended: None,
+            time_limit: options.time_limit,
+            slice,
+            package,
+        };
+        match isolated.open(name, options) {
+            Ok(None) => Ok(isolated),
+            Ok(Some(reason)) => Err(IsolateError::Refused { instance: name.to_owned(), reason }),
+            Err(source) => Err(IsolateError::Call { instance: name.to_owned(), source }),
+        }
+    }
+
+    /// Has the worker load and instantiate the FMU; why that did not work, if it did not.
+    fn open(&mut self, name: &str, options: &Options) -> Result<Option<String>, CallError> {
+        let package = self.package.clone();
+        let write = |writer: &mut Writer<'_>| {
+            writer.put_bytes(package.folder().as_os_str().as_bytes());
+            writer.put_bytes(name.as_bytes());
+            writer.put(options.logging);
+            writer.put(options.preload.len());
+            for library in &options.preload {
+                writer.put_bytes(library.as_bytes());
+            }
+        };
+        self.call(Command::Open, write, |reader| {
+            let refused: bool = reader.take()?;
+            if refused { reader.take_text().map(Some) } else { Some(None) }
+        })
+    }
+
+    /// Posts `command` with what `write` writes, and gives what `read` makes of the answer.
+    #[inline]
+    pub(super) fn call<T>(
+        &mut self,
+        command: Command,
+        write: impl FnOnce(&mut Writer<'_>),
+        read: impl FnOnce(&mut Reader<'_>) -> Option<T>,
+    ) -> Result<T, CallError> {
+        self.post(command, write)?;
+        self.answer(command, read)
+    }
+
+    /// Posts `command` with what `write` writes.
+    #[inline]
+    pub(super) fn post(
+        &mut self,
+        command: Command,
+        write: impl FnOnce(&mut Writer<'_>),
+    ) -> Result<(), CallError> {
+        if let Some(failure) = &self.ended {
+            return Err(error(command, failure.clone()));
+        }
+        if self.turn % 2 == 1 {
+            return Err(nonsense(command, "was called before the step begun was finished"));
+        }
+        self.inbox.forget();
+        let shared = &self.line.shared;
+        let mut writer = Writer::new(shared.area());
+        write(&mut writer);
+        if !writer.fits() {
+            return Err(nonsense(command, "was given more than its shared memory holds"));
+        }
+        shared.command().store(command.to_word(), Ordering::Relaxed);
+        shared.place().store(command.to_word(), Ordering::Relaxed);
+        self.turn = self.turn.wrapping_add(1);
+        self.line.post(self.turn);
+        Ok(())
+    }
+
+    /// Waits for the answer to `command`, and gives what `read` makes of it.
+    #[inline]
+    pub(super) fn answer<T>(
+        &mut self,
+        command: Command,
+        read: impl FnOnce(&mut Reader<'_>) -> Option<T>,
+    ) -> Result<T, CallError> {
+        if let Some(failure) = &self.ended {
+            return Err(error(command, failure.clone()));
+        }
+        if let Err(failure) = self.wait() {
+            return Err(self.lose(command, failure));
+        }
+        self.inbox.empty(&self.line.shared);
+        let mut reader = Reader::new(self.line.shared.area());
+        let answer = match reader.take() {
+            Some(DONE) => read(&mut reader).map(Ok),
+            Some(FAILED) => read_error(command, &mut reader).map(Err),
+            _ => None,
+        };
+        answer.unwrap_or_else(|| Err(self.senseless(command)))
+    }
+
+    /// Waits until the worker has answered.
+    #[inline]
+    fn wait(&mut self) -> Result<(), Failure> {
+        let (posted, mut begin) = (self.turn, None);
+        loop {
+            match self.line.wait(posted) {
+                Seen::Turn(turn) if turn == posted.wrapping_add(1) => {
+                    self.turn = turn;
+                    return Ok(());
+                }
+                seen => self.worry(seen, &mut begin)?,
+            }
+        }
+    }
+
+    /// Judges what was seen instead of an answer. `begin` is when the wait began, as soon as known.
+    #[cold]
+    fn worry(&mut self, seen: Seen, begin: &mut Option<Instant>) -> Result<(), Failure> {
+        let broken = |what: &str| Failure::Nonsense(what.to_owned());
+        if let Seen::Turn(_) = seen {
+            return Err(broken("is lost: its process wrote over shared memory"));
+        }
+        if seen == Seen::Closed {
+            let ended = self.process.ends_within(ENDING);
+            return Err(ended.unwrap_or_else(|| broken("closed the connection to the master")));
+        }
+        self.inbox.empty(&self.line.shared);
+        if let Some(failure) = self.process.ended() {
+            return Err(failure);
+        }
+        // The first look comes one slice after the begin.
+        let now = Instant::now();
+        let begin = *begin.get_or_insert(now.checked_sub(self.slice).unwrap_or(now));
+        match self.time_limit {
+            Some(limit) if now.duration_since(begin) >= limit => {
+                Err(Failure::TimedOut(limit.as_secs_f64()))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Gives the worker up: the error of `command`.
+    #[cold]
+    fn lose(&mut self, command: Command, failure: Failure) -> CallError {
+        self.process.kill();
+        let shared = &self.line.shared;
+        self.inbox.empty(shared);
+        let place = shared.place().load(Ordering::Relaxed);
+        let function = function_at(place).unwrap_or(command.function());
+        self.ended = Some(failure.clone());
+        CallError { function, failure, messages: self.inbox.take() }
+    }
+
+    /// Brings `bytes` to the worker, for the next command.
+    pub(super) fn bring(&mut self, bytes: &[u8]) -> Result<(), CallError> {
+        let most = 8 * self.line.shared.area().len().saturating_sub(2);
+        let mut first = true;
+        for piece in bytes.chunks(most) {
+            let write = |writer: &mut Writer<'_>| {
+                writer.put(first);
+                writer.put_bytes(piece);
+            };
+            self.call(Command::Bring, write, |_| Some(()))?;
+            first = false;
+        }
+        Ok(())
+    }
+
+    /// The `total` bytes that the answer to `command` left with the worker.
+    pub(super) fn fetch(&mut self, command: Command, total: usize) -> Result<Vec<u8>, CallError> {
+        let mut bytes = Vec::new();
+        let limit = total.min(MOST);
+        while bytes.len() < limit {
+            let (before, offset) = (bytes.len(), bytes.len());
+            let write = |writer: &mut Writer<'_>| writer.put(offset);
+            self.call(Command::Fetch, write, |reader| reader.take_bytes(&mut bytes))?;
+            if bytes.len() == before {
+                break;
+            }
+        }
+        if bytes.len() != total {
+            let what = format!("announced {total} bytes and gave {}", bytes.len());
+            return Err(self.lose(command, Failure::Nonsense(what)));
+        }
+        Ok(bytes)
+    }
+
+    /// The error that the answer to `command` makes no sense.
+    pub(super) fn senseless(&mut self, command: Command) -> CallError {
+        let what = "left an answer that makes no sense: its process wrote over shared memory";
+        self.lose(command, Failure::Nonsense(what.to_owned()))
+    }
+
+    /// The process of the worker.
+    #[must_use]
+    pub fn process_id(&self) -> u32 {
+        self.process.id()
+    }
+}
+
+impl Drop for Isolated {
+    /// Has the worker free the instance and end; one that does not is ended.
+    fn drop(&mut self) {
+        if self.ended.is_some() || self.turn % 2 == 1 {
+            return;
+        }
+        self.time_limit = Some(self.time_limit.unwrap_or(FREEING).min(FREEING));
+        match self.call(Command::Free, |_| (), |_| Some(())) {
+            Ok(()) => {
+                self.process.ends_within(ENDING);
+            }
+            Err(error) => self.inbox.complain(&error),
+        }
+    }
+}
+
+fn error(command: Command, failure: Failure) -> CallError {
+    CallError { function: command.function(), failure, messages: Vec::new() }
+}
+
+#[cold]
+fn nonsense(command: Command, what: &str) -> CallError {
+    error(command, Failure::Nonsense(what.to_owned()))
+}

@@ -1,0 +1,140 @@
+//! At which communication points a row is recorded.
+
+use serde::{Deserialize, Serialize};
+
+/// Share of the interval by which a communication point may lie before an instant of the grid and
+/// still stand for it: time is rounded.
+const TOLERANCE: f64 = 1e-9;
+
+/// Which communication points are recorded.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Decimation {
+    /// All of them.
+    All,
+    /// The first one at or after each instant start + k interval; interval in s, above zero. A
+    /// step over several instants gives one row.
+    Every(f64),
+    /// The first one and every n-th after it; n above zero.
+    Nth(u64),
+}
+
+impl Decimation {
+    /// An interval or a count that can be kept to; otherwise the sentence that says why not.
+    ///
+    /// # Errors
+    ///
+    /// The sentence.
+    pub fn check(self) -> Result<Self, String> {
+        match self {
+            Self::Every(interval) if !(interval > 0.0 && interval.is_finite()) => {
+                Err(format!("rows are recorded every {interval} s, expected an interval above 0"))
+            }
+            Self::Nth(0) => Err("rows are recorded every 0 steps, expected at least 1".to_owned()),
+            sound => Ok(sound),
+        }
+    }
+}
+
+/// Tells for each communication point whether it is recorded. Serialisable, so that a resumed run
+/// records the same points.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Due {
+    decimation: Decimation,
+    /// In s.
+    start: f64,
+    /// Number of the next instant of the grid, or of communication points so far.
+    next: f64,
+    points: u64,
+}
+
+impl Due {
+    /// Counts from `start` in s.
+    #[must_use]
+    pub fn new(decimation: Decimation, start: f64) -> Self {
+        Self { decimation, start, next: 0.0, points: 0 }
+    }
+
+    /// Whether the communication point at `time` in s is recorded. To be asked once for each, in
+    /// their order.
+    pub fn at(&mut self, time: f64) -> bool {
+        match self.decimation {
+            Decimation::All => true,
+            Decimation::Nth(count) => {
+                let due = self.points.is_multiple_of(count.max(1));
+                self.points += 1;
+                due
+            }
+            Decimation::Every(interval) => {
+                let passed = (time - self.start) / interval + TOLERANCE;
+                let due = passed >= self.next;
+                if due {
+                    self.next = passed.floor() + 1.0;
+                }
+                due
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn recorded(decimation: Decimation, start: f64, times: &[f64]) -> Vec<f64> {
+        let mut due = Due::new(decimation, start);
+        times.iter().copied().filter(|time| due.at(*time)).collect()
+    }
+
+    #[test]
+    fn the_grid_is_met_though_its_instants_are_rounded() {
+        let times: Vec<f64> = (0..=1_000_000).map(|k| 1.5 + f64::from(k) * 1e-3).collect();
+        let kept = recorded(Decimation::Every(0.1), 1.5, &times);
+        assert_eq!(kept.len(), 10_001);
+        for (k, time) in (0_u32..).zip(kept) {
+            assert!((time - (1.5 + 0.1 * f64::from(k))).abs() < 1e-9, "{k}: {time}");
+        }
+    }
+
+    #[test]
+    fn a_grid_between_the_points_takes_the_first_point_after_each_instant() {
+        let times: Vec<f64> = (0..=10).map(f64::from).collect();
+        assert_eq!(recorded(Decimation::Every(2.5), 0.0, &times), [0.0, 3.0, 5.0, 8.0, 10.0]);
+    }
+
+    #[test]
+    fn a_step_over_several_instants_gives_one_row_and_an_event_none_of_its_own() {
+        let times = [0.0, 0.0, 3.5, 3.5, 3.9, 4.0];
+        assert_eq!(recorded(Decimation::Every(1.0), 0.0, &times), [0.0, 3.5, 4.0]);
+        assert_eq!(recorded(Decimation::All, 0.0, &times), times);
+    }
+
+    #[test]
+    fn every_third_point_begins_with_the_first() {
+        let times: Vec<f64> = (0..8).map(f64::from).collect();
+        assert_eq!(recorded(Decimation::Nth(3), 0.0, &times), [0.0, 3.0, 6.0]);
+    }
+
+    #[test]
+    fn a_saved_state_goes_on_with_the_same_points() {
+        let times: Vec<f64> = (0..100).map(|k| f64::from(k) * 0.07).collect();
+        for decimation in [Decimation::Every(0.2), Decimation::Nth(7), Decimation::All] {
+            let mut due = Due::new(decimation, 0.0);
+            let mut kept: Vec<f64> = times[..41].iter().copied().filter(|t| due.at(*t)).collect();
+            let text = serde_json::to_string(&due).unwrap();
+            let mut resumed: Due = serde_json::from_str(&text).unwrap();
+            kept.extend(times[41..].iter().filter(|time| resumed.at(**time)));
+            assert_eq!(kept, recorded(decimation, 0.0, &times), "{decimation:?}");
+        }
+    }
+
+    #[test]
+    fn an_interval_that_cannot_be_kept_to_is_refused() {
+        for unsound in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let sentence = Decimation::Every(unsound).check().unwrap_err();
+            assert!(sentence.contains(&unsound.to_string()), "{sentence}");
+        }
+        assert!(Decimation::Nth(0).check().is_err());
+        assert_eq!(Decimation::Nth(1).check(), Ok(Decimation::Nth(1)));
+    }
+}

@@ -1,0 +1,139 @@
+//! Rows that wait to become a row group, column by column.
+
+use ::parquet::data_type::ByteArray;
+
+use super::{Column, ColumnKind, Row};
+
+/// Bytes of values in a block, about.
+const BYTES: usize = 16 << 20;
+/// Rows of a block: where there are many columns the first, where there are few the last.
+const ROWS: std::ops::RangeInclusive<usize> = 512..=65_536;
+/// Values between the ends of neighbouring columns: one cache line, or a row whose columns lie a
+/// power of two apart would use one set of the cache only.
+const PADDING: usize = 8;
+
+/// Columns of fixed room. Texts lie row by row in one.
+#[derive(Debug)]
+pub(super) struct Block {
+    /// Rows that it holds, and that it can hold.
+    rows: usize,
+    room: usize,
+    reals: Vec<f64>,
+    integers: Vec<i32>,
+    booleans: Vec<bool>,
+    texts: Vec<u8>,
+    /// Where each text ends.
+    ends: Vec<usize>,
+    /// Texts in a row.
+    strings: usize,
+}
+
+impl Block {
+    pub(super) fn new(columns: &[Column]) -> Self {
+        let count = |kind| columns.iter().filter(|column| column.kind == kind).count();
+        let (reals, integers) = (1 + count(ColumnKind::Real), count(ColumnKind::Integer));
+        let (booleans, strings) = (count(ColumnKind::Boolean), count(ColumnKind::String));
+        let width = 8 * reals + 4 * integers + booleans + 16 * strings;
+        let room = (BYTES / width).clamp(*ROWS.start(), *ROWS.end());
+        let stride = room + PADDING;
+        Self {
+            rows: 0,
+            room,
+            reals: vec![0.0; reals * stride],
+            integers: vec![0; integers * stride],
+            booleans: vec![false; booleans * stride],
+            texts: Vec::new(),
+            ends: Vec::with_capacity(strings * room),
+            strings,
+        }
+    }
+
+    #[cfg(test)]
+    pub(super) fn room(&self) -> usize {
+        self.room
+    }
+
+    pub(super) fn rows(&self) -> usize {
+        self.rows
+    }
+
+    pub(super) fn is_full(&self) -> bool {
+        self.rows == self.room || self.texts.len() >= BYTES
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.rows = 0;
+        self.texts.clear();
+        self.ends.clear();
+    }
+
+    /// Adds a row to a block that is not full.
+    pub(super) fn push(&mut self, time: f64, row: &Row<'_>) {
+        let stride = self.room + PADDING;
+        let reals = self.reals[self.rows..].iter_mut().step_by(stride);
+        for (place, value) in reals.zip(std::iter::once(&time).chain(row.reals)) {
+            *place = *value;
+        }
+        // A kind without columns has no room to start in.
+        let integers = self.integers.iter_mut().skip(self.rows).step_by(stride);
+        for (place, value) in integers.zip(row.integers) {
+            *place = *value;
+        }
+        let booleans = self.booleans.iter_mut().skip(self.rows).step_by(stride);
+        for (place, value) in booleans.zip(row.booleans) {
+            *place = *value != 0;
+        }
+        for text in row.strings {
+            self.texts.extend_from_slice(text.as_bytes());
+            self.ends.push(self.texts.len());
+        }
+        self.rows += 1;
+    }
+
+    /// Gives the columns one after another.
+    pub(super) fn reader(&self) -> Reader<'_> {
+        Reader { block: self, reals: 0, integers: 0, booleans: 0, strings: 0 }
+    }
+}
+
+/// The next column of each kind.
+pub(super) struct Reader<'a> {
+    block: &'a Block,
+    reals: usize,
+    integers: usize,
+    booleans: usize,
+    strings: usize,
+}
+
+impl Reader<'_> {
+    pub(super) fn reals(&mut self) -> &[f64] {
+        column(&self.block.reals, &mut self.reals, self.block)
+    }
+
+    pub(super) fn integers(&mut self) -> &[i32] {
+        column(&self.block.integers, &mut self.integers, self.block)
+    }
+
+    pub(super) fn booleans(&mut self) -> &[bool] {
+        column(&self.block.booleans, &mut self.booleans, self.block)
+    }
+
+    pub(super) fn strings(&mut self) -> Vec<ByteArray> {
+        let first = self.strings;
+        self.strings += 1;
+        let ends = &self.block.ends;
+        (0..self.block.rows)
+            .map(|row| {
+                let place = row * self.block.strings + first;
+                let start = if place == 0 { 0 } else { ends[place - 1] };
+                ByteArray::from(self.block.texts[start..ends[place]].to_vec())
+            })
+            .collect()
+    }
+}
+
+fn column<'a, T>(values: &'a [T], next: &mut usize, block: &Block) -> &'a [T] {
+    let start = *next * (block.room + PADDING);
+    *next += 1;
+    &values[start..start + block.rows]
+}

@@ -1,0 +1,135 @@
+use std::fs;
+use std::sync::Arc;
+
+use ::parquet::data_type::{DoubleType, Int64Type};
+use ::parquet::file::properties::WriterProperties;
+use ::parquet::file::writer::SerializedFileWriter;
+use ::parquet::schema::parser::parse_message_type;
+
+use super::super::tests::{give, mixed};
+use super::super::{ColumnKind, create};
+use super::*;
+
+fn written(folder: &Path, name: &str, text: &str) -> Table {
+    let path = folder.join(name);
+    fs::write(&path, text).unwrap();
+    Table::open(&path).unwrap()
+}
+
+#[test]
+fn both_formats_give_back_every_number_that_was_written() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["a.csv", "a.parquet"] {
+        let path = folder.path().join(name);
+        let mut sink = create(&path, &mixed()).unwrap();
+        (0..20_000).for_each(|k| give(sink.as_mut(), k));
+        sink.finish().unwrap();
+        let table = Table::open(&path).unwrap();
+        let names: Vec<&str> = table.columns().iter().map(|one| one.name.as_str()).collect();
+        let place = |name: &str| names.iter().position(|known| *known == name).unwrap();
+        let wanted = ["plant.x_p", "plant.count", "plant.stuck", "ctrl.on"].map(place);
+        let mut k = 0;
+        let check = &mut |time: f64, row: &[f64]| {
+            let number = f64::from(k);
+            let expected = [number * 0.1, f64::from(i32::MIN + k), f64::from(k % 2), 1.0];
+            assert_eq!((time, row), (number * 1e-3, &expected[..]));
+            k += 1;
+        };
+        table.visit(&wanted, check).unwrap();
+        assert_eq!(k, 20_000);
+        let unit = table.columns()[place("plant.x_p")].unit.as_deref();
+        assert_eq!(unit, if name == "a.parquet" { Some("m") } else { None });
+        let text = place("ctrl.text");
+        let refused = table.column(text).unwrap_err().to_string();
+        assert!(refused.contains("ctrl.text") && refused.contains("expected"), "{refused}");
+    }
+}
+
+#[test]
+fn a_last_line_that_was_cut_is_no_row_and_one_before_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = written(folder.path(), "a.csv", "time,x,y\n0,1,2\n1,3,4\n2,5");
+    assert_eq!(table.column(1).unwrap(), [1.0, 3.0]);
+    let table = written(folder.path(), "b.csv", "time,x,y\n0,1,2\n1,3\n2,5,6\n");
+    let refused = table.column(1).unwrap_err().to_string();
+    assert!(refused.contains("line 3 has 2 values, expected 3"), "{refused}");
+}
+
+#[test]
+fn words_for_truth_are_numbers_and_other_texts_are_named_with_their_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = written(folder.path(), "a.csv", "time,x\n0,True\n1,False\n2,\n3,inf\n");
+    let values = table.column(1).unwrap();
+    assert_eq!(values[..2], [1.0, 0.0]);
+    assert!(values[2].is_nan() && values[3] == f64::INFINITY);
+    let table = written(folder.path(), "b.csv", "time,\"a,b\"\n0,1\n1,abc\n");
+    let refused = table.column(1).unwrap_err().to_string();
+    assert!(refused.ends_with("b.csv, line 3: a,b is \"abc\", expected a number"), "{refused}");
+}
+
+#[test]
+fn what_is_no_results_file_is_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    for (name, bytes) in [("a.parquet", &b"no parquet"[..]), ("b.parquet", b""), ("c.csv", b"")] {
+        fs::write(path(name), bytes).unwrap();
+        let refused = Table::open(&path(name)).unwrap_err().to_string();
+        assert!(refused.starts_with("cannot read ") && refused.contains(name), "{refused}");
+    }
+    assert!(matches!(Table::open(&path("none.csv")), Err(ResultsError::Read { .. })));
+    assert!(matches!(Table::open(&path("a.mat")), Err(ResultsError::Format { .. })));
+    let table = written(folder.path(), "d.csv", "time,speed\n0,1\n");
+    let wanted = Selection { include: vec!["sped".to_owned()], exclude: vec![] };
+    let refused = table.choose(&wanted).unwrap_err().to_string();
+    assert!(refused.contains("d.csv") && refused.contains("speed"), "{refused}");
+}
+
+#[test]
+fn a_damaged_parquet_file_is_an_error_and_no_panic() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.parquet");
+    let mut sink = create(&path, &mixed()).unwrap();
+    (0..300).for_each(|k| give(sink.as_mut(), k));
+    sink.finish().unwrap();
+    let whole = fs::read(&path).unwrap();
+    let mut refused = 0;
+    for place in (0..whole.len()).step_by(23) {
+        let mut bytes = whole.clone();
+        bytes[place] ^= 0x55;
+        fs::write(&path, &bytes).unwrap();
+        refused += usize::from(Table::open(&path).and_then(|table| table.column(2)).is_err());
+        fs::write(&path, &whole[..place]).unwrap();
+        assert!(Table::open(&path).is_err(), "cut at {place}");
+    }
+    assert!(refused > 0);
+}
+
+#[test]
+fn nulls_long_integers_and_a_time_of_another_name_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.parquet");
+    let schema = "message m { required double t; optional double x; required int64 n; }";
+    let schema = Arc::new(parse_message_type(schema).unwrap());
+    let file = fs::File::create(&path).unwrap();
+    let properties = Arc::new(WriterProperties::builder().build());
+    let mut writer = SerializedFileWriter::new(file, schema, properties).unwrap();
+    let mut group = writer.next_row_group().unwrap();
+    let mut column = group.next_column().unwrap().unwrap();
+    column.typed::<DoubleType>().write_batch(&[0.0, 1.0, 2.0], None, None).unwrap();
+    column.close().unwrap();
+    let mut column = group.next_column().unwrap().unwrap();
+    column.typed::<DoubleType>().write_batch(&[5.0, 6.0], Some(&[1, 0, 1]), None).unwrap();
+    column.close().unwrap();
+    let mut column = group.next_column().unwrap().unwrap();
+    column.typed::<Int64Type>().write_batch(&[1, 2, 3], None, None).unwrap();
+    column.close().unwrap();
+    group.close().unwrap();
+    writer.close().unwrap();
+    let table = Table::open(&path).unwrap();
+    let kinds: Vec<ColumnKind> = table.columns().iter().map(|column| column.kind).collect();
+    assert_eq!(kinds, [ColumnKind::Real, ColumnKind::Real, ColumnKind::Integer]);
+    let mut rows = Vec::new();
+    table.visit(&[1, 2], &mut |time, row| rows.push((time, row[0], row[1]))).unwrap();
+    assert_eq!((rows[0], rows[2]), ((0.0, 5.0, 1.0), (2.0, 6.0, 3.0)));
+    assert!(rows[1].1.is_nan() && (rows[1].2 - 2.0).abs() < 1e-12);
+}

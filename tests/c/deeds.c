@@ -1,0 +1,136 @@
+/* What a slave does when it is told to misbehave. */
+#define _GNU_SOURCE
+#include "slave.h"
+
+#include <fenv.h>
+#include <locale.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { FLOOD = 1000000, LONG = 1000000, LEAK = 1 << 16 };
+
+/* Some instance returned fmi2Fatal: no function of any may be called again (section 2.1.3). */
+static int corrupted;
+
+int is(const Slave *slave, const char *behaviour) {
+    return strcmp(slave->behaviour, behaviour) == 0;
+}
+
+void say(const Slave *slave, fmi2Status status, const char *text) {
+    static const char *const categories[] = {
+        "logAll", "logStatusWarning", "logStatusDiscard",
+        "logStatusError", "logStatusFatal", "logStatusPending",
+    };
+    const char *category = status <= fmi2Pending ? categories[status] : NULL;
+    void *environment = slave->functions->componentEnvironment;
+    slave->functions->logger(environment, slave->name, status, category, "%s", text);
+}
+
+static void talk(const Slave *slave, const char *deed) {
+    const fmi2CallbackFunctions *f = slave->functions;
+    if (strcmp(deed, "flood") == 0) {
+        for (int k = 0; k < FLOOD; k++) {
+            f->logger(f->componentEnvironment, slave->name, fmi2OK, "logAll", "message %d", k);
+        }
+    } else if (strcmp(deed, "long message") == 0) {
+        char *text = malloc(LONG + 1);
+        memset(text, 'm', LONG);
+        text[LONG] = '\0';
+        say(slave, fmi2Warning, text);
+        free(text);
+    } else if (strcmp(deed, "no category") == 0) {
+        f->logger(f->componentEnvironment, slave->name, fmi2Warning, NULL, "uncategorised");
+    } else if (strcmp(deed, "no message") == 0) {
+        f->logger(f->componentEnvironment, slave->name, fmi2Warning, "logAll", NULL);
+    } else if (strcmp(deed, "no name") == 0) {
+        f->logger(f->componentEnvironment, NULL, fmi2Warning, "logAll", "anonymous");
+    } else if (strcmp(deed, "specifiers") == 0) {
+        f->logger(f->componentEnvironment, "%s%n", fmi2Warning, "%s%n", "%d%% of %s at %.3f %s", 7,
+                  "%s%n", 0.125, "\xff\xfe");
+    } else if (strcmp(deed, "print") == 0) {
+        printf("printed by an FMU\n");
+        fflush(stdout);
+    }
+}
+
+/* What the FMU does to the process that it is in. */
+static void meddle(const char *deed) {
+    if (strcmp(deed, "crash") == 0) {
+        volatile int *volatile nowhere = NULL;
+        *nowhere = 0;
+    } else if (strcmp(deed, "abort") == 0) {
+        abort();
+    } else if (strcmp(deed, "exit 3") == 0) {
+        exit(3);
+    } else if (strcmp(deed, "exit 0") == 0) {
+        exit(0);
+    } else if (strcmp(deed, "hang") == 0) {
+        for (;;) {
+            usleep(1000);
+        }
+    } else if (strcmp(deed, "spin") == 0) {
+        for (volatile int forever = 1; forever;) {
+        }
+    } else if (strcmp(deed, "corrupt the heap") == 0) {
+        char *volatile small = malloc(24);
+        memset(small, 0xff, 4096);
+        for (size_t size = 16; size < 4096; size += 16) {
+            char *volatile other = malloc(size);
+            free(other);
+        }
+        abort();
+    } else if (strcmp(deed, "round up") == 0) {
+        fesetround(FE_UPWARD);
+    } else if (strcmp(deed, "change the locale") == 0) {
+        /* Where there is no German locale the name of the folder for C messages changes at least. */
+        if (setlocale(LC_ALL, "de_DE.UTF-8") == NULL) {
+            setlocale(LC_ALL, "C.UTF-8");
+        }
+    } else if (strcmp(deed, "change the folder") == 0) {
+        if (chdir("/") != 0) {
+            abort();
+        }
+    } else if (strcmp(deed, "leak") == 0) {
+        char *volatile lost = malloc(LEAK);
+        memset(lost, 1, LEAK);
+    }
+}
+
+fmi2Status misbehave(Slave *slave, const char *function) {
+    static const char *const statuses[] = { "warn", "discard", "fail", "fail fatally", "stay pending" };
+    const char *in = strstr(slave->behaviour, " in ");
+    char deed[sizeof slave->behaviour] = "";
+    if (in == NULL || strcmp(in + 4, function) != 0) {
+        return is(slave, "warn everywhere") ? fmi2Warning : fmi2OK;
+    }
+    memcpy(deed, slave->behaviour, (size_t)(in - slave->behaviour));
+    talk(slave, deed);
+    meddle(deed);
+    for (int k = 0; k < 5; k++) {
+        if (strcmp(deed, statuses[k]) == 0) {
+            say(slave, fmi2Warning + k, "as it was told");
+            slave->now.state = k >= 2 ? FAILED : slave->now.state;
+            corrupted |= k == 3;
+            return fmi2Warning + k;
+        }
+    }
+    return strcmp(deed, "return 17") == 0 ? (fmi2Status)17 : fmi2OK;
+}
+
+int due(const Slave *slave) {
+    return slave->now.time >= slave->t1 - 1e-9;
+}
+
+void demand(int allowed) {
+    if (!allowed || corrupted) {
+        abort();
+    }
+}
+
+fmi2Status refuse(Slave *slave, const char *text) {
+    say(slave, fmi2Error, text);
+    slave->now.state = FAILED;
+    return fmi2Error;
+}

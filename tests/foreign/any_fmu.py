@@ -1,0 +1,65 @@
+"""Runs of any FMUs by `aso-ftc run`, and the same by FMPy's C functions."""
+
+import csv
+from contextlib import contextmanager
+
+import numpy as np
+from fmpy import extract, read_model_description
+from fmpy.fmi2 import FMU2Slave
+
+# Every input held over a step at the value of its begin.
+HELD = ("--method", "jacobi", "--course", "hold")
+
+
+def run(aso_ftc, folder, fmus, step, stop, *more, links=(), status=0, **options):
+    """Couples `fmus`, paths by name; the columns of results.csv as texts, or what was said."""
+    arguments = [part for name, path in fmus.items() for part in ("--fmu", f"{name}={path}")]
+    arguments += [part for link in links for part in ("--connect", link)]
+    arguments += ["--step", step, "--stop-time", stop, "--out", folder / "out", *HELD, *more]
+    done = aso_ftc("run", *arguments, **options)
+    assert done.returncode == status, done.stderr
+    if status:
+        return done.stderr
+    with open(folder / "out" / "results.csv", encoding="utf-8", newline="") as file:
+        names, *rows = csv.reader(file)
+    assert len(set(names)) == len(names) and {len(row) for row in rows} == {len(names)}
+    return dict(zip(names, zip(*rows)))
+
+
+def numbers(table, name):
+    """A column as doubles."""
+    return np.array(table[name], dtype=float)
+
+
+@contextmanager
+def instance(path, folder, settings=None):
+    """An initialised instance by FMPy with Reals and Integers set, and its variables by name."""
+    description = read_model_description(str(path))
+    variables = {variable.name: variable for variable in description.modelVariables}
+    slave = FMU2Slave(
+        guid=description.guid,
+        unzipDirectory=extract(str(path), str(folder)),
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        instanceName="own",
+    )
+    slave.instantiate()
+    slave.setupExperiment(startTime=0.0)
+    for name, value in (settings or {}).items():
+        real = variables[name].type == "Real"
+        (slave.setReal if real else slave.setInteger)([variables[name].valueReference], [value])
+    slave.enterInitializationMode()
+    slave.exitInitializationMode()
+    yield slave, variables
+    slave.terminate()
+    slave.freeInstance()
+
+
+def stepped(path, folder, step, count, names, settings=None):
+    """The Real outputs `names` at 0, H, ..., count H, by FMPy's fmi2DoStep."""
+    with instance(path, folder, settings) as (slave, variables):
+        references = [variables[name].valueReference for name in names]
+        rows = [slave.getReal(references)]
+        for k in range(count):
+            slave.doStep(currentCommunicationPoint=k * step, communicationStepSize=step)
+            rows.append(slave.getReal(references))
+    return np.array(rows)

@@ -1,0 +1,243 @@
+"""`aso-ftc check` on FMUs with one fault each; the schema, FMPy and Python's zipfile are the judges."""
+
+import json
+import random
+import re
+import zipfile
+from pathlib import Path
+
+import fmpy
+import pytest
+from fmpy import read_model_description
+from lxml import etree
+
+SCHEMA = Path(fmpy.__file__).parent / "schema" / "fmi2" / "fmi2ModelDescription.xsd"
+REFUSES = "FMPy refuses what the schema does not allow"
+
+
+@pytest.fixture
+def check(aso_ftc):
+    """Checks an FMU: exit status and findings as (severity, part, where, what, why, section)."""
+
+    def run(path, *more):
+        done = aso_ftc("check", "--json", *more, path)
+        assert done.returncode in (0, 1), done
+        report = json.loads(done.stdout)
+        errors = [own for own in report["findings"] if own["severity"] == "error"]
+        assert report["errors"] == len(errors) and done.returncode == (1 if errors else 0)
+        return done.returncode, report["findings"]
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def files(packed):
+    """Name and content of the files in the plant."""
+    with zipfile.ZipFile(packed["plant"]) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def library(files):
+    return next(name for name in files if name.startswith("binaries/"))
+
+
+@pytest.fixture
+def fmu(tmp_path, files):
+    """Packs the plant with changed files (None: left out) into an FMU."""
+
+    def pack(changes, method=zipfile.ZIP_DEFLATED, name="Changed.fmu"):
+        path = tmp_path / name
+        with zipfile.ZipFile(path, "w") as archive:
+            for inner, content in {**files, **changes}.items():
+                if content is not None and "licenses/" not in inner:
+                    archive.writestr(zipfile.ZipInfo(inner, (1980, 1, 1, 0, 0, 0)), content, method)
+        return path
+
+    return pack
+
+
+def the_one(findings, part, words):
+    found = [own for own in findings if own["part"] == part and words in own["what"]]
+    assert len(found) == 1, findings
+    return found[0]
+
+
+@pytest.mark.parametrize("role", ["plant", "controller"])
+def test_our_fmus_break_no_rule_and_need_the_glibc_that_is_in_their_symbols(check, packed, files, role):
+    status, findings = check(packed[role])
+    assert status == 0
+    assert {own["severity"] for own in findings} <= {"note"}, findings
+    with zipfile.ZipFile(packed[role]) as archive:
+        code = archive.read(library(dict.fromkeys(archive.namelist())))
+    versions = re.findall(rb"GLIBC_([0-9.]+)", code)
+    newest = max(versions, key=lambda own: [int(part) for part in own.split(b".")]).decode()
+    assert f"glibc {newest} " in the_one(findings, "binaries", "glibc")["what"]
+
+
+def test_what_cannot_be_read_ends_with_status_2(aso_ftc, fmu, tmp_path):
+    (tmp_path / "Text.fmu").write_text("no archive")
+    for path in [tmp_path / "Text.fmu", tmp_path / "Nowhere.fmu", fmu({"modelDescription.xml": "<a"})]:
+        done = aso_ftc("check", path)
+        assert done.returncode == 2 and done.stderr.startswith("error: "), done
+
+
+def mutated(xml, seed):
+    """The description with one change, made by chance."""
+    chance = random.Random(seed)
+    root = etree.fromstring(xml)
+    element = chance.choice([own for own in root.iter() if isinstance(own.tag, str)])
+    operation = chance.randrange(6)
+    if operation == 0:
+        element.set("colour", "red")
+    elif operation == 1 and element.attrib:
+        del element.attrib[chance.choice(sorted(element.attrib))]
+    elif operation == 2 and element.attrib:
+        element.set(chance.choice(sorted(element.attrib)), chance.choice(["?", "", "NaN", "True", "1.0", "-1"]))
+    elif operation == 3:
+        etree.SubElement(element, chance.choice(["Array", "Unknown", "Real", "Outputs"]))
+    elif operation == 4 and len(element) > 1:
+        element.append(element[chance.randrange(len(element) - 1)])
+    elif len(element):
+        element.remove(chance.choice(list(element)))
+    return etree.tostring(root, xml_declaration=True, encoding="UTF-8")
+
+
+def test_what_the_schema_refuses_is_an_error_and_what_fmpy_is_said_to_refuse_it_refuses(
+    aso_ftc, tmp_path, files
+):
+    schema = etree.XMLSchema(etree.parse(SCHEMA))
+    refused = 0
+    for seed in range(150):
+        xml = mutated(files["modelDescription.xml"], seed)
+        path = tmp_path / "Mutated.fmu"
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("modelDescription.xml", xml)
+            archive.writestr("sources/all.c", "")
+        done = aso_ftc("check", "--json", path)
+        if not schema.validate(etree.fromstring(xml)):
+            refused += 1
+            assert done.returncode in (1, 2), (seed, schema.error_log)
+        if done.returncode != 2 and REFUSES in done.stdout:
+            with pytest.raises(Exception):
+                read_model_description(str(path), validate=True)
+    assert refused > 50
+
+
+def test_compression_that_importers_cannot_read_is_refused(aso_ftc, fmu):
+    for method, name in [(zipfile.ZIP_BZIP2, "bzip2"), (zipfile.ZIP_LZMA, "lzma")]:
+        done = aso_ftc("check", fmu({}, method))
+        assert done.returncode == 2, (name, done)
+        assert "expected compression by deflate, or none" in done.stderr, (name, done)
+
+
+def test_stored_entries_of_a_stream_are_an_error(check, tmp_path, files):
+    path = tmp_path / "Stream.fmu"
+
+    class Stream:
+        def __init__(self, file):
+            self.file = file
+
+        def write(self, data):
+            return self.file.write(data)
+
+        def flush(self):
+            self.file.flush()
+
+    with path.open("wb") as file, zipfile.ZipFile(Stream(file), "w") as archive:
+        archive.writestr("modelDescription.xml", files["modelDescription.xml"])
+        archive.writestr("sources/all.c", "")
+    status, findings = check(path)
+    found = [own for own in findings if "data descriptor" in own["what"]]
+    assert status == 1 and {own["where"] for own in found} == {"modelDescription.xml", "sources/all.c"}
+
+
+@pytest.mark.parametrize(
+    "changes, words, severity",
+    [
+        ({"readme.txt": "x"}, "expected nothing but", "error"),
+        ({"Resources/x": "x"}, "expected resources, in this case", "error"),
+        ({"documentation/index.html": None}, "expected index.html", "error"),
+        ({"model.png": "GIF89a"}, "expected a PNG", "warning"),
+        ({"resources/a": "1", "resources/A": "2"}, "in upper and lower case only", "warning"),
+        ({"resources/nul.txt": "1"}, "a name that Windows does not allow", "warning"),
+        ({"extra/data": "1"}, "reverse domain name", "warning"),
+    ],
+)
+def test_odd_files_are_found(check, fmu, changes, words, severity):
+    _, findings = check(fmu(changes), "--no-run")
+    assert the_one(findings, "archive", words)["severity"] == severity
+
+
+def test_source_files_that_are_not_there_are_an_error(check, fmu, files):
+    xml = files["modelDescription.xml"].decode()
+    with_sources = re.sub(
+        r"(<CoSimulation[^>]*)/>", r'\1><SourceFiles><File name="a.c"/></SourceFiles></CoSimulation>', xml
+    )
+    assert with_sources != xml
+    _, findings = check(fmu({"modelDescription.xml": with_sources}), "--no-run")
+    assert "sources/a.c" in the_one(findings, "archive", "SourceFiles")["what"]
+    _, findings = check(fmu({"modelDescription.xml": with_sources, "sources/a.c": ""}), "--no-run")
+    assert not [own for own in findings if "SourceFiles" in own["what"]]
+
+
+def test_a_library_for_another_machine_is_an_error(check, fmu, files):
+    name = library(files)
+    code = bytearray(files[name])
+    assert code[18:20] == b"\x3e\x00"  # e_machine: EM_X86_64
+    code[18:20] = b"\xb7\x00"  # EM_AARCH64
+    status, findings = check(fmu({name: bytes(code)}), "--no-run")
+    found = the_one(findings, "binaries", "expected Elf for X86_64, found Elf for Aarch64")
+    assert status == 1 and found["section"] == "2.3"
+
+
+def test_a_library_in_the_folder_of_another_system_is_an_error(check, fmu, files):
+    windows = "binaries/win64/FrictionPendulum.dll"
+    _, findings = check(fmu({windows: files[library(files)]}), "--no-run")
+    assert the_one(findings, "binaries", "expected Pe for X86_64")["where"] == windows
+    _, findings = check(fmu({windows: b"not a library"}), "--no-run")
+    assert the_one(findings, "binaries", "found a file that is none")["where"] == windows
+
+
+def test_a_library_of_another_name_is_an_error(check, fmu, files):
+    name = library(files)
+    other = name.replace("FrictionPendulum", "libFrictionPendulum")
+    _, findings = check(fmu({name: None, other: files[name]}))
+    assert other in the_one(findings, "binaries", "expected this library")["what"]
+
+
+def test_functions_that_are_missing_or_have_a_prefix_are_an_error(check, fmu, files):
+    name = library(files)
+    code = files[name].replace(b"\0fmi2DoStep\0", b"\0fmi2DoStap\0")
+    _, findings = check(fmu({name: code}), "--no-run")
+    assert the_one(findings, "binaries", "lacks")["what"] == "lacks fmi2DoStep"
+    # Of the same length, as the text has its place in the table.
+    code = files[name].replace(b"\0fmi2CompletedIntegratorStep\0", b"\0FrictionPendulu_fmi2DoStep\0".replace(b"F", b"FF", 1)[:29])
+    code = code.replace(b"\0fmi2DoStep\0", b"\0fmi2DoStap\0")
+    _, findings = check(fmu({name: code}), "--no-run")
+    assert "_fmi2DoStep" in the_one(findings, "binaries", "without prefix")["what"]
+
+
+def test_a_start_value_that_the_library_does_not_have_is_an_error(check, fmu, files):
+    xml = files["modelDescription.xml"].decode()
+    number = re.search(r'name="F_c".*?start="([^"]*)"', xml, re.DOTALL)
+    changed = xml[: number.start(1)] + "17.5" + xml[number.end(1) :]
+    status, findings = check(fmu({"modelDescription.xml": changed}))
+    found = the_one(findings, "behaviour", "17.5")
+    assert status == 1 and found["where"] == "variable F_c"
+    assert found["what"].startswith(f"the library starts with {float(number.group(1))}")
+
+
+def test_a_category_that_is_not_declared_is_an_error(check, fmu, files):
+    xml = re.sub(r"\s*<LogCategories>.*?</LogCategories>", "", files["modelDescription.xml"].decode(), flags=re.DOTALL)
+    _, findings = check(fmu({"modelDescription.xml": xml}))
+    assert {own["section"] for own in findings if own["where"] == "logger"} == {"2.2.4"}
+
+
+def test_people_read_each_finding_with_its_place_section_and_reason(aso_ftc, fmu, files):
+    xml = files["modelDescription.xml"].decode().replace("<ModelVariables>", '<ModelVariables colour="red">')
+    done = aso_ftc("check", "--no-run", fmu({"modelDescription.xml": xml}))
+    line = xml[: xml.index("<ModelVariables")].count("\n") + 1
+    said = f"error: modelDescription.xml, line {line}, column 3: <ModelVariables>, attribute colour: "
+    assert done.returncode == 1 and said in done.stdout, done.stdout
+    assert "(section 2.2.7)\n    " + REFUSES in done.stdout
+    assert "errors 1, warnings 0" in done.stdout

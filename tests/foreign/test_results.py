@@ -1,0 +1,153 @@
+"""Files of results, read by those who read CSV and Parquet: FMPy, numpy, pandas, polars, pyarrow.
+
+The example write_results writes a table whose Reals have the bits of a generator, which is stated
+here again: every number has to come back with the same bits.
+"""
+
+import json
+import subprocess
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import polars as pl
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from fmpy.util import read_csv
+
+ROWS = 70_000
+NAMES = ["time", "plant.x_p", "plant.mode", "ctrl.x_hat[1]", "ctrl.on", "ctrl.text"]
+UNITS = {"time": "s", "plant.x_p": "m", "ctrl.x_hat[1]": "rad/s"}
+
+
+def expected(rows=ROWS):
+    """The table of the example: Knuth's MMIX generator over all doubles."""
+    bits, state = np.empty(2 * rows, dtype=np.uint64), 1
+    for place in range(2 * rows):
+        state = (state * 6364136223846793005 + 1442695040888963407) % 2**64
+        bits[place] = state
+    reals = bits.view(np.float64).reshape(rows, 2)
+    k = np.arange(rows, dtype=np.uint32)
+    texts = [f'row {j}, "ä"' + ("\n" if j % 3 == 0 else "") for j in range(rows)]
+    return {
+        "time": np.arange(rows) * 1e-3,
+        "plant.x_p": reals[:, 0],
+        "plant.mode": (k * np.uint32(2654435761)).view(np.int32),
+        "ctrl.x_hat[1]": reals[:, 1],
+        "ctrl.on": k % 2 == 1,
+        "ctrl.text": texts,
+    }
+
+
+@pytest.fixture(scope="module")
+def write_results(root):
+    """Runs the example; its exit status comes back."""
+    cargo = ["cargo", "build", "--release", "--locked", "--package", "master"]
+    subprocess.run([*cargo, "--example", "write_results"], cwd=root, check=True)
+    program = root / "target" / "release" / "examples" / "write_results"
+    return lambda *arguments: subprocess.run([program, *arguments], capture_output=True).returncode
+
+
+@pytest.fixture(scope="module")
+def files(write_results, tmp_path_factory):
+    """A file of each format with all types, a CSV without texts, and what is in them."""
+    folder = tmp_path_factory.mktemp("results")
+    csv, parquet, numbers = (folder / name for name in ("a.csv", "a.parquet", "numbers.csv"))
+    assert write_results(csv, parquet) == 0
+    assert write_results("--numbers", numbers) == 0
+    return SimpleNamespace(csv=csv, parquet=parquet, numbers=numbers, table=expected())
+
+
+def same(found, wanted):
+    """The same bits; one not-a-number is as good as another."""
+    found, wanted = np.asarray(found, dtype=np.float64), np.asarray(wanted, dtype=np.float64)
+    either = np.isnan(wanted)
+    assert np.array_equal(np.isnan(found), either)
+    return np.array_equal(found[~either].view(np.uint64), wanted[~either].view(np.uint64))
+
+
+def assert_table(column, names, table, rows=ROWS):
+    """Every column of a reader, given as a function of its name."""
+    for name in names:
+        found = column(name)
+        assert len(found) == rows
+        if name == "ctrl.text":
+            assert list(found) == table[name][:rows]
+        else:
+            assert same(found, table[name][:rows]), name
+
+
+def test_the_table_has_hard_numbers(files):
+    reals = files.table["plant.x_p"]
+    assert np.isnan(reals).any() and (np.abs(reals[np.isfinite(reals)]) < 1e-300).any()
+    assert (np.abs(reals[np.isfinite(reals)]) > 1e300).any()
+
+
+def test_fmpy_reads_the_csv_file_with_the_same_bits(files):
+    found = read_csv(files.numbers)
+    assert list(found.dtype.names) == NAMES[:-1]
+    assert_table(lambda name: found[name], NAMES[:-1], files.table)
+
+
+def test_genfromtxt_of_numpy_reads_the_csv_file_with_the_same_bits(files):
+    found = np.genfromtxt(files.numbers, delimiter=",", skip_header=1)
+    assert_table(lambda name: found[:, NAMES.index(name)], NAMES[:-1], files.table)
+    named = np.genfromtxt(
+        files.numbers, delimiter=",", names=True, deletechars="", max_rows=1
+    )
+    assert [name.strip('"') for name in named.dtype.names] == NAMES[:-1]
+
+
+def test_pandas_reads_the_csv_file_with_the_same_bits(files):
+    found = pd.read_csv(files.csv)
+    assert list(found.columns) == NAMES
+    assert found.dtypes["plant.mode"] == np.int64
+    assert_table(lambda name: found[name].to_numpy(), NAMES, files.table)
+
+
+def test_polars_reads_the_csv_file_with_the_same_bits(files):
+    found = pl.read_csv(files.csv)
+    assert found.columns == NAMES
+    assert found.schema["time"] == pl.Float64 and found.schema["plant.mode"] == pl.Int64
+    assert_table(lambda name: found[name].to_numpy(), NAMES, files.table)
+
+
+def test_pyarrow_reads_the_parquet_file_typed_without_nulls_and_with_units(files):
+    found = pq.read_table(files.parquet)
+    types = [pa.float64(), pa.float64(), pa.int32(), pa.float64(), pa.bool_(), pa.string()]
+    assert found.schema.names == NAMES and found.schema.types == types
+    assert not any(field.nullable for field in found.schema)
+    assert json.loads(found.schema.metadata[b"units"]) == UNITS
+    assert_table(lambda name: found[name].to_pandas().to_numpy(), NAMES, files.table)
+    assert pq.ParquetFile(files.parquet).metadata.num_row_groups > 1
+    assert pq.read_table(files.parquet, columns=["ctrl.x_hat[1]"]).num_columns == 1
+
+
+def test_pandas_reads_the_parquet_file_with_the_same_bits_and_the_units(files):
+    found = pd.read_parquet(files.parquet)
+    assert list(found.columns) == NAMES
+    assert found.dtypes["ctrl.on"] == bool and found.dtypes["plant.mode"] == np.int32
+    assert found.attrs["units"] == UNITS
+    assert_table(lambda name: found[name].to_numpy(), NAMES, files.table)
+
+
+def test_polars_reads_the_parquet_file_with_the_same_bits_and_the_units(files):
+    found = pl.read_parquet(files.parquet)
+    kinds = [pl.Float64, pl.Float64, pl.Int32, pl.Float64, pl.Boolean, pl.String]
+    assert found.schema == dict(zip(NAMES, kinds))
+    assert json.loads(pl.read_parquet_metadata(files.parquet)["units"]) == UNITS
+    assert_table(lambda name: found[name].to_numpy(), NAMES, files.table)
+    some = pl.scan_parquet(files.parquet).filter(pl.col("ctrl.on")).select("plant.x_p").collect()
+    assert same(some["plant.x_p"], files.table["plant.x_p"][1::2])
+
+
+def test_a_crash_leaves_every_row_up_to_the_flush_before_it(write_results, tmp_path, files):
+    csv, parquet = tmp_path / "a.csv", tmp_path / "a.parquet"
+    assert write_results("--interrupt", csv) != 0
+    assert write_results("--interrupt", parquet) != 0
+    found = pd.read_csv(csv)
+    assert_table(lambda name: found[name].to_numpy(), NAMES, files.table)
+    assert csv.read_bytes().endswith(b"\n")
+    found = pd.read_parquet(parquet)
+    assert_table(lambda name: found[name].to_numpy(), NAMES, files.table)

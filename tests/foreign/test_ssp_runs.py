@@ -1,0 +1,68 @@
+"""`aso-ftc run` on system structures: ours and those written for other tools, to the same bits.
+
+The loop by hand (`held_loop`) is what libcosim, Ecos and FMPy agree with in test_ssp_judges.py.
+"""
+
+import csv
+
+import numpy as np
+import pytest
+
+from held_loop import STEP, expect_equal, held_loop
+from ssp_files import ecos_style, libcosim_style, nested_style
+
+COUNT = 2_000
+NO_SETTINGS = {"plant": {}, "controller": {}}
+
+
+@pytest.fixture
+def run(aso_ftc, tmp_path):
+    """Runs a system structure; the named columns of what it recorded, and the times."""
+
+    def run(path, step, stop, names):
+        out = tmp_path / "out"
+        options = ["--step", step, "--stop", stop, "--method", "jacobi", "--course", "hold"]
+        done = aso_ftc("run", path, "--out", out, *options)
+        assert done.returncode == 0, done.stderr
+        with open(out / "results.csv", encoding="utf-8", newline="") as file:
+            rows = list(csv.DictReader(file))
+        values = np.array([[float(row[name]) for name in names] for row in rows])
+        return np.array([float(row["time"]) for row in rows]), values
+
+    return run
+
+
+def grid(step, count):
+    """Times are the start time plus multiples of the step."""
+    return [(k * step, step) for k in range(count)]
+
+
+@pytest.mark.parametrize(
+    ("style", "plant"),
+    [(libcosim_style, "plant"), (ecos_style, "plant"), (nested_style, "cart.plant")],
+)
+def test_structures_of_every_style_run_to_the_bits_of_the_loop_by_hand(
+    run, packed, unpacked, tmp_path, style, plant
+):
+    names, expected = held_loop(unpacked, grid(STEP, COUNT))
+    elements = {"plant": plant, "controller": "controller"}
+    columns = [f"{elements[role]}.{name}" for role, name in names]
+    times, found = run(style(packed, tmp_path), STEP, COUNT * STEP, columns)
+    assert list(times) == [k * STEP for k in range(COUNT + 1)]
+    expect_equal(names, expected, found[1:])
+
+
+def test_our_ssp_runs_in_our_master_to_the_bits_of_the_loop_by_hand(run, root, unpacked):
+    step = 1e-3
+    names, expected = held_loop(unpacked, grid(step, COUNT), NO_SETTINGS)
+    columns = [f"{role}.{name}" for role, name in names]
+    _, found = run(root / "dist" / "InvertedPendulum.ssp", step, COUNT * step, columns)
+    expect_equal(names, expected, found[1:])
+
+
+def test_a_structure_that_cannot_be_read_is_refused_with_its_place(aso_ftc, tmp_path):
+    path = tmp_path / "SystemStructure.ssd"
+    path.write_text("<x>\n <y a='1' a='2'/></x>", encoding="utf-8")
+    done = aso_ftc("run", path, "--out", tmp_path / "out")
+    assert done.returncode == 2
+    assert f"{path}: line 2, column " in done.stderr

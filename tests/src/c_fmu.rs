@@ -1,0 +1,179 @@
+//! FMUs in C that misbehave on request; `tests/c/slave.h` says how.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::Mutex;
+
+use fmi2::package::{Package, platforms};
+
+use crate::root;
+
+const SOURCES: [&str; 4] = ["deeds.c", "life.c", "steps.c", "values.c"];
+
+/// Libraries that this process has built, by what the compiler was told.
+static LIBRARIES: Mutex<BTreeMap<Vec<String>, Vec<u8>>> = Mutex::new(BTreeMap::new());
+
+/// An FMU in C to be built.
+#[derive(Clone, Debug)]
+pub struct CFmu {
+    behaviour: String,
+    flags: BTreeMap<String, String>,
+    definitions: Vec<String>,
+    root_attributes: String,
+}
+
+impl CFmu {
+    /// One whose parameter `behaviour` starts as that.
+    #[must_use]
+    pub fn that(behaviour: &str) -> Self {
+        let flags = [
+            "canHandleVariableCommunicationStepSize",
+            "canGetAndSetFMUstate",
+            "canSerializeFMUstate",
+            "canNotUseMemoryManagementFunctions",
+        ];
+        let flags = flags.map(|flag| (flag.to_owned(), "true".to_owned()));
+        Self {
+            behaviour: behaviour.to_owned(),
+            flags: flags.into(),
+            definitions: Vec::new(),
+            root_attributes: String::new(),
+        }
+    }
+
+    /// One without misbehaviour.
+    #[must_use]
+    pub fn well_behaved() -> Self {
+        Self::that("as it should")
+    }
+
+    /// The same with an attribute of the element `CoSimulation`.
+    #[must_use]
+    pub fn flag(mut self, name: &str, value: bool) -> Self {
+        self.flags.insert(name.to_owned(), value.to_string());
+        self
+    }
+
+    /// The same that cannot go back to an earlier state.
+    #[must_use]
+    pub fn without_rollback(self) -> Self {
+        self.flag("canGetAndSetFMUstate", false).flag("canSerializeFMUstate", false)
+    }
+
+    /// The same without some functions of the standard.
+    #[must_use]
+    pub fn without(mut self, functions: &[&str]) -> Self {
+        let renamed = functions.iter().map(|function| format!("-D{function}=left_out_{function}"));
+        self.definitions.extend(renamed);
+        self
+    }
+
+    /// The same with another answer of `fmi2GetVersion`.
+    #[must_use]
+    pub fn version(mut self, version: &str) -> Self {
+        self.definitions.push(format!("-DVERSION=\"{version}\""));
+        self
+    }
+
+    /// The same, exported by that tool and in need of it.
+    #[must_use]
+    pub fn needing(mut self, tool: &str) -> Self {
+        let _ = write!(self.root_attributes, " generationTool=\"{tool}\"");
+        self.flag("needsExecutionTool", true)
+    }
+
+    /// Writes it to `folder/name.fmu`.
+    ///
+    /// # Panics
+    ///
+    /// Where it cannot be built or written.
+    #[must_use]
+    pub fn write(&self, folder: &Path, name: &str) -> PathBuf {
+        let mut package = Package::new(self.description());
+        let suffix = std::env::consts::DLL_SUFFIX;
+        package.add(format!("binaries/{}/slave{suffix}", platforms()[0]), self.library());
+        let path = folder.join(name).with_extension("fmu");
+        package.write(&path).unwrap_or_else(|error| panic!("{error}"));
+        path
+    }
+
+    fn description(&self) -> String {
+        let flags: Vec<_> =
+            self.flags.iter().map(|(name, value)| format!(" {name}=\"{value}\"")).collect();
+        let flags = flags.concat();
+        let (behaviour, attributes) = (&self.behaviour, &self.root_attributes);
+        let variables = variables(behaviour);
+        let output = |name| {
+            let at = variables.iter().position(|variable| variable.contains(&quoted(name)));
+            format!("<Unknown index=\"{}\" dependencies=\"\"/>\n", at.unwrap_or_default() + 1)
+        };
+        let outputs = ["y", "i_out", "b_out", "s_out", "e_out"].map(output).concat();
+        let variables = variables.concat();
+        format!(
+            "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
+             <fmiModelDescription fmiVersion=\"2.0\" modelName=\"Slave\" guid=\"{behaviour}\"\
+             {attributes}>\n<CoSimulation modelIdentifier=\"slave\"{flags}/>\n\
+             <TypeDefinitions><SimpleType name=\"Mode\"><Enumeration><Item name=\"off\" \
+             value=\"1\"/><Item name=\"on\" value=\"2\"/></Enumeration></SimpleType>\
+             </TypeDefinitions>\n<ModelVariables>\n{variables}</ModelVariables>\n\
+             <ModelStructure><Outputs>\n{outputs}</Outputs></ModelStructure>\n\
+             </fmiModelDescription>\n"
+        )
+    }
+
+    /// The shared library, built once for each set of definitions.
+    fn library(&self) -> Vec<u8> {
+        let mut known = LIBRARIES.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if let Some(library) = known.get(&self.definitions) {
+            return library.clone();
+        }
+        let folder = tempfile::tempdir().unwrap_or_else(|error| panic!("{error}"));
+        let target = folder.path().join("slave");
+        let mut compiler = Command::new("cc");
+        compiler.current_dir(root().join("tests/c")).args(&self.definitions);
+        compiler.args(["-std=c11", "-shared", "-fPIC", "-fvisibility=hidden", "-Wall"]);
+        compiler.args(["-Wextra", "-Werror", "-o"]).arg(&target).args(SOURCES).arg("-lm");
+        assert!(compiler.status().is_ok_and(|status| status.success()), "{compiler:?} fails");
+        let library = fs::read(&target).unwrap_or_else(|error| panic!("{error}"));
+        known.insert(self.definitions.clone(), library.clone());
+        library
+    }
+}
+
+fn quoted(name: &str) -> String {
+    format!("\"{name}\"")
+}
+
+/// The variables as XML; `tests/c/slave.h` has their value references.
+fn variables(behaviour: &str) -> Vec<String> {
+    let variable = |name: &str, reference: u32, role: &str, kind: &str| {
+        format!(
+            "<ScalarVariable name=\"{name}\" valueReference=\"{reference}\" {role}>{kind}\
+             </ScalarVariable>\n"
+        )
+    };
+    let (input, output) = (
+        "causality=\"input\" variability=\"discrete\"",
+        "causality=\"output\" variability=\"discrete\" initial=\"exact\"",
+    );
+    let fixed = "causality=\"parameter\" variability=\"fixed\"";
+    let text = format!("<String start=\"{behaviour}\"/>");
+    vec![
+        variable("u", 0, "causality=\"input\"", "<Real start=\"1\"/>"),
+        variable("y", 1, "causality=\"output\" initial=\"exact\"", "<Real start=\"0\"/>"),
+        variable("i_in", 0, input, "<Integer start=\"0\"/>"),
+        variable("i_out", 1, output, "<Integer start=\"0\"/>"),
+        variable("b_in", 0, input, "<Boolean start=\"false\"/>"),
+        variable("b_out", 1, output, "<Boolean start=\"false\"/>"),
+        variable("s_in", 0, input, "<String start=\"\"/>"),
+        variable("s_out", 1, output, "<String start=\"\"/>"),
+        variable("e_in", 10, input, "<Enumeration declaredType=\"Mode\" start=\"1\"/>"),
+        variable("e_out", 11, output, "<Enumeration declaredType=\"Mode\" start=\"1\"/>"),
+        variable("t1", 2, fixed, "<Real start=\"0.5\"/>"),
+        variable("n", 2, fixed, "<Integer start=\"3\"/>"),
+        variable("behaviour", 2, fixed, &text),
+    ]
+}
