@@ -97,8 +97,8 @@ fn the_energy_of_a_bond_makes_steps_small_where_it_is_lost() {
     let (coarse, fine) = (of(1e-3), of(1e-5));
     assert!(coarse.sizes.1 > 3.0 * coarse.sizes.0, "{coarse:?}");
     // Of order 2: a hundredth of the tolerance is a tenth of the step.
-    let ratio = fine.points as f64 / coarse.points as f64;
-    assert!((5.0..15.0).contains(&ratio), "{coarse:?} {fine:?}");
+    let times = 5 * coarse.points..15 * coarse.points;
+    assert!(times.contains(&fine.points), "{coarse:?} {fine:?}");
     assert!(fine.error < 0.2 * coarse.error, "{coarse:?} {fine:?}");
     assert_eq!(fine.calls, 2 * fine.points, "nothing is repeated");
 }

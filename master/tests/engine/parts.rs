@@ -118,6 +118,18 @@ fn a_slave_that_comes_nowhere_is_an_error() {
     }
 }
 
+fn nearly(_: f64, end: f64) -> Stepped {
+    Stepped::Part { reached: end - 1e-13, terminated: false }
+}
+
+#[test]
+fn a_step_that_lacks_the_rounding_of_its_end_is_whole() {
+    for coupling in [Coupling::Once, Coupling::Newton] {
+        let algorithm = Algorithm { coupling, ..Algorithm::new(0.25) };
+        assert_eq!(run(nearly, &algorithm).0, [0.25, 0.5, 0.75, 1.0]);
+    }
+}
+
 fn breaks(time: f64) -> f64 {
     if time > 0.6 { f64::NAN } else { 1.0 }
 }

@@ -38,7 +38,7 @@ pub(crate) fn system(outputs: [Output; 2], way: Way) -> (System, Asked) {
         </ModelVariables><ModelStructure><Outputs><Unknown index="1" dependencies=""/>
         <Unknown index="2" dependencies=""/></Outputs>
         </ModelStructure></fmiModelDescription>"#;
-    let description = ModelDescription::parse(xml.to_owned()).unwrap();
+    let description = ModelDescription::parse(xml).unwrap();
     let (time, kept) = (0.0, [0.0; 3]);
     let puppet = Puppet { description, time, kept, outputs, way, asked: Arc::clone(&asked) };
     let mut system = System::default();

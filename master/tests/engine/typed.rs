@@ -17,16 +17,18 @@ pub(crate) struct Typed {
 }
 
 fn boxed() -> Box<Typed> {
-    let (mut variables, mut outputs) = (String::new(), String::new());
-    let types = [("Real", "0"), ("Integer", "0"), ("Boolean", "false"), ("String", "long enough")];
-    for (k, (kind, start)) in types.into_iter().enumerate() {
-        variables += &format!(
-            r#"<ScalarVariable name="in{k}" valueReference="0" causality="input"><{kind} start="{start}"/>
-            </ScalarVariable><ScalarVariable name="out{k}" valueReference="1" causality="output"><{kind}/>
+    let types = [("Real", "0"), ("Integer", "0"), ("Boolean", "false"), ("String", "none")];
+    let pair = |(k, (kind, start)): (usize, &(&str, &str))| {
+        format!(
+            r#"<ScalarVariable name="in{k}" valueReference="0" causality="input">
+            <{kind} start="{start}"/></ScalarVariable>
+            <ScalarVariable name="out{k}" valueReference="1" causality="output"><{kind}/>
             </ScalarVariable>"#
-        );
-        outputs += &format!(r#"<Unknown index="{}" dependencies=""/>"#, 2 * k + 2);
-    }
+        )
+    };
+    let variables: String = types.iter().enumerate().map(pair).collect();
+    let output = |k: usize| format!(r#"<Unknown index="{}" dependencies=""/>"#, 2 * k + 2);
+    let outputs: String = (0..types.len()).map(output).collect();
     let xml = format!(
         r#"<fmiModelDescription fmiVersion="2.0" modelName="Typed" guid="typed">
         <CoSimulation modelIdentifier="T" canInterpolateInputs="true" maxOutputDerivativeOrder="1"
