@@ -49,9 +49,11 @@ choice! {
 }
 
 choice! {
-    /// What an input does during a step. A slave that takes no input derivatives
-    /// (`canInterpolateInputs`) gets the mean of that course over the step, held. Polynomials through
-    /// known values: Kuebler and Schiehlen 2000, "Two methods of simulator coupling".
+    /// What an input does during a step. Polynomials through known values: Kuebler and Schiehlen
+    /// 2000, "Two methods of simulator coupling". A slave that takes no input derivatives
+    /// (`canInterpolateInputs`) gets the mean of the line or parabola over the step, held, which is
+    /// of order 2 (1 where its outputs depend directly on such an input); of a limited line the
+    /// value at the end where that is known, else at the begin, which is of order 1.
     Course {
         /// Its value at the begin of the step, or at the end where the source has stepped already.
         Hold = "hold",

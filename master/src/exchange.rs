@@ -5,6 +5,8 @@ mod discrete;
 mod layout;
 mod pass;
 mod reals;
+mod repeat;
+mod start;
 mod tasks;
 mod trace;
 

@@ -12,7 +12,7 @@ mod sweep;
 
 use fmi2::Experiment;
 
-use crate::algorithm::{Algorithm, StepControl};
+use crate::algorithm::{Algorithm, Course, StepControl};
 use crate::error::SystemError;
 use crate::exchange::{Exchange, call};
 use crate::order::{Order, by_direct_dependencies};
@@ -89,6 +89,10 @@ impl Simulation {
         initial::initialise(&mut system, experiment, &mut scenario)?;
         for slave in 0..system.slaves.len() {
             exchange.read(&mut system, slave, experiment.start_time)?;
+        }
+        if algorithm.course == Course::Quadratic {
+            let first = (experiment.start_time, algorithm.step);
+            exchange.derive_at_start(&mut system, first)?;
         }
         exchange.reals.forget();
         exchange.commit(experiment.start_time);
@@ -206,11 +210,12 @@ impl Simulation {
     fn step_to_event(&mut self, events: &mut Events) -> Result<Swept, SystemError> {
         let time = self.grid.time;
         let planned = self.planned();
-        let limit = self.next_event(events, time, planned)?;
+        let next = self.next_event(events, time, planned)?;
+        let limit = next.unwrap_or(planned);
         self.watch(events, time)?;
         let (mut end, mut swept) = self.stretch(time, limit)?;
         let crossing = self.locate(events, time, end)?;
-        let happened = crossing.is_some() || (limit < planned && end >= limit);
+        let happened = crossing.is_some() || (next.is_some() && end >= limit);
         if let Some(crossing) = crossing {
             (end, swept) = crossing;
         }

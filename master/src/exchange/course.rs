@@ -114,3 +114,7 @@ impl Known {
         }
     }
 }
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "exact by construction")]
+mod tests;

@@ -17,7 +17,8 @@ type Set<T> = fn(&mut dyn Slave, &[u32], &[T]) -> Result<(), CallError>;
 pub(crate) struct Access<T> {
     get: Get<T>,
     set: Set<T>,
-    map: fn(&T, &Transformation) -> T,
+    /// What becomes of a value, into the place of another.
+    map: fn(&T, &Transformation, &mut T),
     disturb: fn(&FaultLine, f64, &T) -> T,
     number: fn(&T) -> f64,
 }
@@ -26,11 +27,13 @@ pub(crate) struct Access<T> {
 pub(crate) const INTEGERS: Access<i32> = Access {
     get: |slave, references, values| slave.get_integer(references, values),
     set: |slave, references, values| slave.set_integer(references, values),
-    map: |value, transformation| match transformation {
-        Transformation::Integer(pairs) => {
-            pairs.iter().find(|(from, _)| from == value).map_or(*value, |(_, to)| *to)
+    map: |value, transformation, target| {
+        *target = match transformation {
+            Transformation::Integer(pairs) => {
+                pairs.iter().find(|(from, _)| from == value).map_or(*value, |(_, to)| *to)
+            }
+            _ => *value,
         }
-        _ => *value,
     },
     disturb: |fault, time, value| fault.apply_integer(time, *value),
     number: |value| f64::from(*value),
@@ -40,11 +43,13 @@ pub(crate) const INTEGERS: Access<i32> = Access {
 pub(crate) const BOOLEANS: Access<i32> = Access {
     get: |slave, references, values| slave.get_boolean(references, values),
     set: |slave, references, values| slave.set_boolean(references, values),
-    map: |value, transformation| match transformation {
-        Transformation::Boolean { from_false, from_true } => {
-            i32::from(if *value == 0 { *from_false } else { *from_true })
+    map: |value, transformation, target| {
+        *target = match transformation {
+            Transformation::Boolean { from_false, from_true } => {
+                i32::from(if *value == 0 { *from_false } else { *from_true })
+            }
+            _ => *value,
         }
-        _ => *value,
     },
     disturb: |fault, time, value| fault.apply_boolean(time, *value),
     number: |value| f64::from(i32::from(*value != 0)),
@@ -54,7 +59,7 @@ pub(crate) const BOOLEANS: Access<i32> = Access {
 pub(crate) const STRINGS: Access<String> = Access {
     get: |slave, references, values| slave.get_string(references, values),
     set: |slave, references, values| slave.set_string(references, values),
-    map: |value, _| value.clone(),
+    map: |value, _, target| target.clone_from(value),
     disturb: |_, _, value| value.clone(),
     number: |_| f64::NAN,
 };
@@ -147,8 +152,9 @@ impl<T: Clone + Default> Channel<T> {
     pub(crate) fn commit(&mut self, time: f64) {
         for (k, fault) in self.faults.iter_mut().enumerate() {
             if let Some(fault) = fault {
-                let value =
-                    (self.access.map)(&self.latest[self.sources[k]], &self.transformations[k]);
+                let mut value = T::default();
+                let latest = &self.latest[self.sources[k]];
+                (self.access.map)(latest, &self.transformations[k], &mut value);
                 fault.commit(time, (self.access.number)(&value));
             }
         }
@@ -162,11 +168,11 @@ impl<T: Clone + Default> Channel<T> {
     /// The inputs of `slave` from the values of now, for a step from `time`.
     pub(crate) fn gather(&mut self, slave: usize, time: f64) {
         for k in self.lanes[slave].input_range.clone() {
-            let value = (self.access.map)(&self.latest[self.sources[k]], &self.transformations[k]);
-            self.values[k] = match &self.faults[k] {
-                Some(fault) => (self.access.disturb)(fault, time, &value),
-                None => value,
-            };
+            let latest = &self.latest[self.sources[k]];
+            (self.access.map)(latest, &self.transformations[k], &mut self.values[k]);
+            if let Some(fault) = &self.faults[k] {
+                self.values[k] = (self.access.disturb)(fault, time, &self.values[k]);
+            }
         }
     }
 

@@ -18,14 +18,14 @@ pub(crate) struct Reals {
     pub(super) layout: Layout,
     /// Faults by input; empty where there are none at all.
     faults: Vec<Option<FaultLine>>,
-    course: Course,
-    sweep: Sweep,
+    pub(super) course: Course,
+    pub(super) sweep: Sweep,
     /// Every input is held and all slaves step together: the latest values are all it takes.
     simple: bool,
     pub(crate) trace: Trace,
     /// Values of the outputs at the end of the step, assumed by an iteration.
-    assumed: Vec<f64>,
-    assumes: bool,
+    pub(super) assumed: Vec<f64>,
+    pub(super) assumes: bool,
     /// What the inputs get.
     pub(super) values: Vec<f64>,
     pub(super) input_derivatives: Vec<f64>,
@@ -36,8 +36,6 @@ impl Reals {
     pub(crate) fn new(system: &System, algorithm: &Algorithm) -> Self {
         let layout = Layout::new(system, algorithm);
         let (outputs, derivatives) = (layout.output_ports.len(), layout.output_derivatives);
-        let span =
-            Span { begin: 0.0, size: 1.0, last_size: 1.0, earlier_size: 1.0, stepped: false };
         let trace = Trace {
             latest: vec![0.0; outputs],
             begin: vec![0.0; outputs],
@@ -45,7 +43,7 @@ impl Reals {
             earlier: vec![0.0; outputs],
             derivatives: vec![0.0; derivatives],
             begin_derivatives: vec![0.0; derivatives],
-            spans: vec![span; system.slaves.len()],
+            spans: vec![Span::default(); system.slaves.len()],
         };
         let mut pass = Pass::default();
         for lane in &layout.lanes {
@@ -145,6 +143,9 @@ impl Reals {
         for past in [&mut trace.begin, &mut trace.before, &mut trace.earlier] {
             past.copy_from_slice(&trace.latest);
         }
+        for span in &mut trace.spans {
+            span.forget();
+        }
     }
 
     /// The inputs of `slave` for a step from `time` over `size`.
@@ -220,7 +221,7 @@ impl Reals {
     }
 
     /// What is known of an output over the last step of its slave.
-    fn known(&self, output: usize, span: &Span) -> Known {
+    pub(super) fn known(&self, output: usize, span: &Span) -> Known {
         let (layout, trace) = (&self.layout, &self.trace);
         let derivative = |place: Option<u32>| place.map(|k| trace.begin_derivatives[k as usize]);
         Known {
@@ -251,79 +252,6 @@ impl Reals {
             known.extrapolated(self.course)
         };
         course.later(time - span.begin)
-    }
-
-    /// From now on all inputs are interpolated to these values of their outputs at the end of the
-    /// step; none: as the algorithm has it.
-    pub(crate) fn assume(&mut self, ends: Option<&[f64]>) {
-        self.assumes = ends.is_some();
-        if let Some(ends) = ends {
-            self.assumed.copy_from_slice(ends);
-        }
-    }
-
-    /// The extrapolation of each output over a step of `size` s from now, into `ends`.
-    pub(crate) fn predictions(&self, size: f64, ends: &mut [f64]) {
-        let trace = &self.trace;
-        for (output, end) in ends.iter_mut().enumerate() {
-            let span = &trace.spans[self.layout.owners[output] as usize];
-            let derivative = |place: Option<u32>| place.map(|k| trace.derivatives[k as usize]);
-            let known = Known {
-                earlier: trace.before[output],
-                before: trace.begin[output],
-                begin: trace.latest[output],
-                end: trace.latest[output],
-                slope: derivative(self.layout.slopes[output]),
-                curvature: derivative(self.layout.curvatures[output]),
-                earlier_size: span.last_size,
-                last_size: span.size,
-                size,
-            };
-            *end = known.extrapolated(self.course).end(size);
-        }
-    }
-
-    /// The change of all outputs per change of one through the inputs that it is connected to, by
-    /// directional derivatives; slave and error where one has none.
-    pub(crate) fn derivatives_to(
-        &self,
-        system: &mut System,
-        output: usize,
-        changes: &mut [f64],
-    ) -> Result<(), (usize, CallError)> {
-        let layout = &self.layout;
-        for (slave, lane) in layout.lanes.iter().enumerate() {
-            for k in lane.input_range.clone() {
-                if layout.sources[k] as usize != output || lane.outputs.is_empty() {
-                    continue;
-                }
-                let known = lane.inputs[k - lane.input_range.start];
-                let mut own = vec![0.0; lane.outputs.len()];
-                system.slaves[slave]
-                    .1
-                    .directional_derivative(&lane.outputs, &[known], &[layout.factors[k]], &mut own)
-                    .map_err(|source| (slave, source))?;
-                for (change, own) in changes[lane.output_range.clone()].iter_mut().zip(own) {
-                    *change += own;
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Values of the outputs at the begin of the last step.
-    pub(crate) fn begins(&self) -> &[f64] {
-        &self.trace.begin
-    }
-
-    /// How far the extrapolation of each output over the last step of `size` s was off, into `errors`.
-    pub(crate) fn extrapolation_errors(&self, size: f64, errors: &mut [f64]) {
-        for (output, error) in errors.iter_mut().enumerate() {
-            let span = &self.trace.spans[self.layout.owners[output] as usize];
-            let mut known = self.known(output, span);
-            known.size = size;
-            *error = self.trace.latest[output] - known.extrapolated(self.course).end(size);
-        }
     }
 
     /// Sets the gathered inputs of `slave`, steps it, reads its outputs.

@@ -15,6 +15,23 @@ pub(super) struct Span {
     pub(super) stepped: bool,
 }
 
+/// Size in s of a step that never was: by it values of now change at no rate.
+const NEVER: f64 = f64::MAX;
+
+impl Default for Span {
+    fn default() -> Self {
+        let (begin, stepped) = (0.0, false);
+        Self { begin, size: NEVER, last_size: NEVER, earlier_size: NEVER, stepped }
+    }
+}
+
+impl Span {
+    /// No step was before now.
+    pub(super) fn forget(&mut self) {
+        (self.size, self.last_size, self.earlier_size) = (NEVER, NEVER, NEVER);
+    }
+}
+
 /// Everything that changes on the way.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Trace {

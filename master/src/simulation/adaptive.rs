@@ -37,13 +37,17 @@ impl Simulation {
             if swept.terminated.is_some() {
                 return Ok((end, swept));
             }
-            end = match (swept.reached, self.control.judge(size, error)) {
-                (Some(reached), _) => reached,
-                (None, Verdict::Rejected { retry }) => time + retry,
-                (None, Verdict::Stuck) => return Err(SystemError::Stuck { time, size, error }),
-                (None, Verdict::Accepted { .. }) => {
-                    self.control.look_back(&self.exchange.reals, size);
-                    return Ok((end, swept));
+            // A step in part has no error to judge.
+            end = if let Some(reached) = swept.reached {
+                reached
+            } else {
+                match self.control.judge(size, error) {
+                    Verdict::Rejected { retry } => time + retry,
+                    Verdict::Stuck => return Err(SystemError::Stuck { time, size, error }),
+                    Verdict::Accepted { .. } => {
+                        self.control.look_back(&self.exchange.reals, size);
+                        return Ok((end, swept));
+                    }
                 }
             };
             self.restore_states(SLOT, time)?;

@@ -26,6 +26,8 @@ pub struct Checkpoint {
     drives: Vec<DriveState>,
     /// For each slave its name, the GUID of its FMU and its serialized FMU state.
     slaves: Vec<(String, String, Vec<u8>)>,
+    /// The slave that asked for the end.
+    ended: Option<usize>,
 }
 
 impl Checkpoint {
@@ -69,6 +71,7 @@ impl Simulation {
             faults: self.exchange.faults().map(|fault| fault.clone()).collect(),
             drives: self.drives.state(),
             slaves,
+            ended: self.ended,
         })
     }
 
@@ -100,6 +103,7 @@ impl Simulation {
             .restore(checkpoint.drives.clone())
             .map_err(|error| SystemError::Algorithm { what: error.to_string() })?;
         (simulation.grid.time, simulation.grid.count) = (checkpoint.time, checkpoint.count);
+        simulation.ended = checkpoint.ended;
         simulation.control.size = checkpoint.size;
         simulation.control.controller = checkpoint.controller.clone();
         if let (Some(coupled), Some(iteration)) = (&mut simulation.coupled, &checkpoint.iteration) {

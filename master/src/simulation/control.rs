@@ -48,10 +48,12 @@ impl Control {
         reals: &Reals,
         algorithm: &Algorithm,
     ) -> Result<Self, SystemError> {
-        let order = match algorithm.course {
-            Course::Hold => 1,
-            Course::Limited | Course::Linear => 2,
-            Course::Quadratic => 3,
+        let order = reals.order();
+        // Of the extrapolation: that of the course, whatever the slaves make of it.
+        let extrapolation = match algorithm.course {
+            Course::Hold => 1.0,
+            Course::Limited | Course::Linear => 2.0,
+            Course::Quadratic => 3.0,
         };
         let bounds =
             SizeBounds { smallest: algorithm.smallest_step, largest: algorithm.largest_step };
@@ -60,15 +62,16 @@ impl Control {
         let bonds = bonds(system, reals, algorithm)?;
         let powers: Vec<f64> =
             bonds.iter().map(|&(first, second)| nominals[first] * nominals[second]).collect();
-        let exponent = f64::from(order);
         let controller = match algorithm.control {
             StepControl::Fixed => Controller::Fixed,
-            StepControl::Doubling => Controller::Error(ErrorControl::new(bounds, exponent + 1.0)),
-            StepControl::Embedded => Controller::Error(ErrorControl::new(bounds, exponent)),
+            StepControl::Doubling => {
+                Controller::Error(ErrorControl::new(bounds, f64::from(order) + 1.0))
+            }
+            StepControl::Embedded => Controller::Error(ErrorControl::new(bounds, extrapolation)),
             StepControl::Increment => Controller::Forward(ForwardControl::new(bounds, 1.0)),
             StepControl::Energy => Controller::Energy(EnergyControl::new(
                 bounds,
-                exponent,
+                extrapolation,
                 (relative, absolute),
                 &powers,
             )),
@@ -80,7 +83,7 @@ impl Control {
             size: algorithm.step,
             scale: Scale::new(relative, absolute, nominals),
             bonds,
-            order,
+            order: i32::from(order),
             errors: vec![0.0; count],
             predicted: vec![0.0; count],
             states: Vec::with_capacity(powers.len()),

@@ -52,19 +52,21 @@ impl Simulation {
         Ok(if let Value::Real(value) = value { value } else { f64::NAN })
     }
 
-    /// The end of a step that was to go to `end`: the first time of an event that lies on the way.
+    /// The first time of an event that lies on the way to `end`; `end` itself where it is as near as
+    /// rounding.
     pub(super) fn next_event(
         &mut self,
         events: &Events,
         time: f64,
         end: f64,
-    ) -> Result<f64, SystemError> {
+    ) -> Result<Option<f64>, SystemError> {
         let rounding = ROUNDING * (end - time);
-        let mut first = end;
+        let mut first: Option<f64> = None;
         for &port in &events.times {
             let next = self.read_real(port, time)?;
-            if next > time + rounding && next < first - rounding {
-                first = next;
+            if next > time + rounding && next <= end + rounding {
+                let next = if next < end - rounding { next } else { end };
+                first = Some(first.map_or(next, |first| first.min(next)));
             }
         }
         Ok(first)

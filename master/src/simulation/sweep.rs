@@ -11,6 +11,8 @@ use crate::system::System;
 
 /// Most attempts of a slave to come to the end of a step that it makes in parts.
 const PARTS: u32 = 1000;
+/// Part of a step that may be missing at its end: the rounding of times.
+const ROUNDING: f64 = 1e-9;
 
 /// What helps where a slave does not go on after `fmi2Discard`.
 const ADVICE: &str = "the step before it was discarded; with rollback all FMUs repeat it";
@@ -217,6 +219,9 @@ impl Simulation {
             }
             if reached <= begin {
                 break;
+            }
+            if reached >= end - ROUNDING * size {
+                return self.exchange.read(&mut self.system, slave, end);
             }
             if !never_back {
                 swept.reached = Some(swept.reached.map_or(reached, |least| least.min(reached)));

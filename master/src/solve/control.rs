@@ -9,6 +9,8 @@ const SHRINK: f64 = 0.2;
 const GROW: f64 = 5.0;
 /// Errors below this count as this much, so that one error of zero is no reason for a leap.
 const LEAST: f64 = 1e-10;
+/// Part of the size asked for below which a step was cut short, and not by the rounding of times.
+const CUT: f64 = 1.0 - 1e-9;
 
 /// Smallest and largest step in s.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -50,6 +52,16 @@ impl Law {
         let factor = now.powf(-integral - proportional) * self.before.powf(proportional);
         self.before = now;
         factor.clamp(SHRINK, GROW)
+    }
+
+    /// 0.9 times the step with an error of 1, by one of `size` with that error.
+    fn tolerable(&self, size: f64, error: f64) -> f64 {
+        size * SAFETY * error.max(LEAST).powf(-1.0 / self.exponent)
+    }
+
+    /// Errors of a step cut short, or before an event, are no measure for those to come.
+    fn forget(&mut self) {
+        self.before = 1.0;
     }
 }
 
@@ -103,9 +115,9 @@ impl ErrorControl {
         if self.rejected {
             next = next.min(size);
         }
-        if size < self.wanted {
-            let tolerable = size * SAFETY * error.max(LEAST).powf(-1.0 / self.law.exponent);
-            next = next.max(self.wanted.min(tolerable));
+        if size < CUT * self.wanted {
+            next = next.max(self.wanted.min(self.law.tolerable(size, error)));
+            self.law.forget();
         }
         self.rejected = false;
         self.wanted = self.bounds.clamp(next);
@@ -125,7 +137,7 @@ impl ErrorControl {
 
     /// Forgets the last error, as after an event.
     pub fn forget(&mut self) {
-        self.law.before = 1.0;
+        self.law.forget();
     }
 }
 
@@ -135,26 +147,36 @@ impl ErrorControl {
 pub struct ForwardControl {
     bounds: SizeBounds,
     law: Law,
+    /// The size asked for last.
+    wanted: f64,
 }
 
 impl ForwardControl {
     /// `exponent`: q of the measure. At least 1 is taken.
     #[must_use]
     pub fn new(bounds: SizeBounds, exponent: f64) -> Self {
-        Self { bounds, law: Law::new(exponent.max(1.0)) }
+        Self { bounds, law: Law::new(exponent.max(1.0)), wanted: bounds.smallest }
     }
 
     /// The next step in s after one of `size` s, which was to have a measure of at most 1; not a
     /// number counts as infinite.
+    ///
+    /// A step that was shorter than asked for does not make the following ones short.
     pub fn next(&mut self, size: f64, measure: f64) -> f64 {
         let measure = if measure.is_nan() { f64::INFINITY } else { measure };
-        let factor = self.law.factor(measure.min(1.0 / LEAST));
-        self.bounds.clamp(size * factor)
+        let measure = measure.min(1.0 / LEAST);
+        let mut next = size * self.law.factor(measure);
+        if size < CUT * self.wanted {
+            next = next.max(self.wanted.min(self.law.tolerable(size, measure)));
+            self.law.forget();
+        }
+        self.wanted = self.bounds.clamp(next);
+        self.wanted
     }
 
     /// Forgets the last measure, as after an event.
     pub fn forget(&mut self) {
-        self.law.before = 1.0;
+        self.law.forget();
     }
 }
 

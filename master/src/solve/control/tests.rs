@@ -77,6 +77,23 @@ fn a_step_cut_short_by_an_event_does_not_make_the_next_one_short() {
 }
 
 #[test]
+fn steps_after_one_cut_short_are_as_they_were() {
+    let (mut error, mut forward) =
+        (ErrorControl::new(BOUNDS, 2.0), ForwardControl::new(BOUNDS, 1.0));
+    let settled = run(&mut error, 2.0, |_| 50.0).pop().unwrap();
+    let moved = (0..500).fold(1e-3, |size, _| forward.next(size, 4.0 * size));
+    assert!((moved - 0.225).abs() < 1e-6, "nine tenths of a quarter: {moved}");
+    let (mut first, mut second) = (settled / 1e3, moved / 1e3);
+    for _ in 0..3 {
+        let Verdict::Accepted { next } = error.judge(first, 50.0 * first * first) else { panic!() };
+        first = next;
+        second = forward.next(second, 4.0 * second);
+        assert!((first / settled - 1.0).abs() < 1e-3, "{first} after {settled}");
+        assert!((second / moved - 1.0).abs() < 1e-3, "{second} after {moved}");
+    }
+}
+
+#[test]
 fn without_repetition_the_increment_settles_at_nine_tenths_of_what_is_wanted() {
     let mut control = ForwardControl::new(BOUNDS, 1.0);
     let mut size = 1e-3;

@@ -1,0 +1,67 @@
+//! Error over the number of steps, for fixed steps and for every choice of the step.
+//!
+//! `cargo run --release -p master --example work_precision > docs/work_precision.csv`, then
+//! `python scripts/work_precision.py` draws the figure.
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a program for the table it prints")]
+
+#[allow(dead_code, reason = "shared: each user needs a part")]
+#[path = "../tests/order/linear.rs"]
+mod linear;
+#[allow(dead_code, reason = "shared: each user needs a part")]
+#[path = "../tests/order/network.rs"]
+mod network;
+#[allow(dead_code, reason = "shared: each user needs a part")]
+#[path = "../tests/order/problems.rs"]
+mod problems;
+
+use linear::ABLE;
+use master::algorithm::PowerBond;
+use master::{Algorithm, Course, StepControl, Sweep};
+use network::{Network, Run};
+
+use StepControl::{Doubling, Embedded, Energy, Increment};
+
+/// The span of every run in s.
+const STOP: f64 = 5.0;
+
+fn print(problem: &str, control: StepControl, parameter: f64, run: &Run) {
+    let (control, Run { points, calls, error, .. }) = (control.name(), run);
+    println!("{problem},{control},{parameter:e},{points},{calls},{error:.4e}");
+}
+
+fn study(problem: &str, network: &Network, bonds: &[PowerBond]) {
+    let fixed = |step: f64| Algorithm::fixed(Sweep::GaussSeidel, Course::Linear, step);
+    for power in 6..=14 {
+        let step = STOP / 2.0_f64.powi(power);
+        print(problem, StepControl::Fixed, step, &network.run(ABLE, &fixed(step), STOP).unwrap());
+    }
+    for control in [Doubling, Embedded, Increment, Energy] {
+        // An increment of the tolerance is a whole step's; that of the others an error.
+        let powers = if control == Increment { 2..=7 } else { 4..=14 };
+        for power in powers {
+            let tolerance = 10.0_f64.powf(-0.5 * f64::from(power));
+            let algorithm = Algorithm {
+                control,
+                relative_tolerance: tolerance,
+                absolute_tolerance: tolerance,
+                largest_step: 1.0,
+                smallest_step: 1e-9,
+                bonds: bonds.to_vec(),
+                ..fixed(1e-4)
+            };
+            if control != Energy || !bonds.is_empty() {
+                let run = network.run(ABLE, &algorithm, STOP).unwrap();
+                print(problem, control, tolerance, &run);
+            }
+        }
+    }
+}
+
+fn main() {
+    println!("problem,step control,step in s or tolerance,steps,fmi2DoStep,largest error");
+    study("transient", &problems::transient(), &[]);
+    let masses = problems::two_masses(1e3, 20.0);
+    let system = masses.system(ABLE, &std::sync::Arc::default());
+    let (first, second) = (system.port("b.u1").unwrap(), system.port("a.u0").unwrap());
+    study("two masses", &masses, &[PowerBond { first, second }]);
+}

@@ -1,0 +1,37 @@
+//! The engine: initialization, step control, events, steps in part, threads, checkpoints, scenarios.
+#![expect(clippy::unwrap_used, clippy::float_cmp, reason = "tests; exact by construction")]
+
+#[path = "engine/checkpoints.rs"]
+mod checkpoints;
+#[path = "engine/control.rs"]
+mod control;
+#[path = "engine/events.rs"]
+mod events;
+#[path = "engine/initial.rs"]
+mod initial;
+#[allow(dead_code, reason = "shared: each user needs a part")]
+#[path = "order/linear.rs"]
+mod linear;
+#[allow(dead_code, reason = "shared: each user needs a part")]
+#[path = "order/network.rs"]
+mod network;
+#[path = "engine/parts.rs"]
+mod parts;
+#[allow(dead_code, reason = "shared: each user needs a part")]
+#[path = "order/problems.rs"]
+mod problems;
+#[path = "engine/puppet.rs"]
+mod puppet;
+#[path = "engine/scenario.rs"]
+mod scenario;
+#[path = "engine/stepping.rs"]
+mod stepping;
+#[path = "engine/typed.rs"]
+mod typed;
+
+use fmi2::Experiment;
+
+/// From 0 to `stop` s.
+fn until(stop: f64) -> Experiment {
+    Experiment { stop_time: Some(stop), ..Experiment::default() }
+}

@@ -1,0 +1,137 @@
+//! A run that goes on from a checkpoint, bit by bit.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use master::algorithm::PowerBond;
+use master::scenario::{Prepared, Scenario, Setup};
+use master::{Algorithm, Checkpoint, Coupling, Course, Simulation, StepControl, Sweep, System};
+
+use crate::linear::{ABLE, Abilities};
+use crate::network::Network;
+use crate::{problems, until};
+
+const FAULTS: &str = r#"
+[[scenario.fault]]
+connection = "b.u0"
+delay = { seconds = 0.07, from = 0.05 }
+[[scenario.fault]]
+connection = "a.u0"
+noise = { deviation = 0.01, seed = 7 }
+"#;
+
+#[derive(serde::Deserialize)]
+struct File {
+    scenario: Scenario,
+}
+
+fn prepared(text: &str, system: &System) -> Prepared {
+    if text.is_empty() {
+        return Prepared::default();
+    }
+    let file: File = toml::from_str(text).unwrap();
+    let setup = Setup { folder: Path::new("."), start: 0.0, step: 0.01 };
+    file.scenario.resolve(system, &setup).unwrap()
+}
+
+/// Times and outputs of `steps` steps, as bits.
+fn bits(simulation: &mut Simulation, network: &Network, steps: usize) -> Vec<u64> {
+    let mut all = Vec::new();
+    for _ in 0..steps {
+        simulation.step().unwrap();
+        all.push(simulation.time().to_bits());
+        all.extend(network.outputs(simulation.system()).iter().map(|value| value.to_bits()));
+    }
+    all
+}
+
+fn verify(label: &str, able: Abilities, algorithm: &Algorithm, scenario: &str) {
+    let network = problems::two_masses(20.0, 0.5);
+    let new = || {
+        let system = network.system(able, &Arc::default());
+        let scenario = prepared(scenario, &system);
+        (system, scenario)
+    };
+    let (system, scenario) = new();
+    let mut whole = Simulation::with_scenario(system, algorithm, &until(100.0), scenario).unwrap();
+    bits(&mut whole, &network, 13);
+    let kept = postcard::to_stdvec(&whole.checkpoint().unwrap()).unwrap();
+    let checkpoint: Checkpoint = postcard::from_bytes(&kept).unwrap();
+    assert_eq!(checkpoint.time(), whole.time());
+    let expected = bits(&mut whole, &network, 20);
+    let (system, scenario) = new();
+    let resumed = Simulation::resume(system, algorithm, &until(100.0), scenario, &checkpoint);
+    let found = bits(&mut resumed.unwrap(), &network, 20);
+    assert_eq!(found, expected, "{label}");
+}
+
+#[test]
+fn fixed_steps_go_on_bit_by_bit() {
+    let past = Abilities { derivatives: 0, ..ABLE };
+    for sweep in [Sweep::Jacobi, Sweep::GaussSeidel] {
+        for course in [Course::Hold, Course::Limited, Course::Linear, Course::Quadratic] {
+            for multiples in [vec![], vec![1, 4], vec![3, 1]] {
+                let label = format!("{} {} {multiples:?}", sweep.name(), course.name());
+                let algorithm = Algorithm { multiples, ..Algorithm::fixed(sweep, course, 0.01) };
+                verify(&label, ABLE, &algorithm, "");
+                verify(&label, past, &algorithm, FAULTS);
+            }
+        }
+    }
+}
+
+#[test]
+fn iterated_steps_go_on_bit_by_bit() {
+    for coupling in [Coupling::Newton, Coupling::Anderson, Coupling::QuasiNewton] {
+        for control in [StepControl::Fixed, StepControl::Doubling] {
+            let algorithm = Algorithm { coupling, control, ..Algorithm::new(0.01) };
+            verify(coupling.name(), ABLE, &algorithm, "");
+            verify(coupling.name(), ABLE, &algorithm, FAULTS);
+        }
+    }
+}
+
+#[test]
+fn chosen_steps_go_on_bit_by_bit() {
+    let system = problems::two_masses(20.0, 0.5).system(ABLE, &Arc::default());
+    let port = |name: &str| system.port(name).unwrap();
+    let bonds = vec![PowerBond { first: port("b.u1"), second: port("a.u0") }];
+    for control in
+        [StepControl::Doubling, StepControl::Embedded, StepControl::Increment, StepControl::Energy]
+    {
+        let (bonds, relative_tolerance) = (bonds.clone(), 1e-2);
+        let algorithm = Algorithm { control, bonds, relative_tolerance, ..Algorithm::new(0.01) };
+        verify(control.name(), ABLE, &algorithm, "");
+    }
+}
+
+#[test]
+fn a_checkpoint_of_another_algorithm_is_refused() {
+    let network = problems::two_masses(20.0, 0.5);
+    let system = || network.system(ABLE, &Arc::default());
+    let mut one = Simulation::new(system(), &Algorithm::new(0.01), &until(1.0)).unwrap();
+    one.step().unwrap();
+    let checkpoint = one.checkpoint().unwrap();
+    let other = Algorithm { control: StepControl::Doubling, ..Algorithm::new(0.01) };
+    let refused =
+        Simulation::resume(system(), &other, &until(1.0), Prepared::default(), &checkpoint);
+    let message = refused.err().unwrap().to_string();
+    assert!(message.contains("another algorithm"), "{message}");
+}
+
+#[test]
+fn a_run_that_was_ended_by_a_slave_stays_ended() {
+    let (system, _) = crate::puppet::system([f64::sin; 2], crate::parts::ends);
+    let algorithm = Algorithm::fixed(Sweep::Jacobi, Course::Hold, 0.25);
+    let mut run = Simulation::new(system, &algorithm, &until(1.0)).unwrap();
+    while !run.is_finished() {
+        run.step().unwrap();
+    }
+    let checkpoint = run.checkpoint().unwrap();
+    let (system, _) = crate::puppet::system([f64::sin; 2], crate::parts::ends);
+    let resumed =
+        Simulation::resume(system, &algorithm, &until(1.0), Prepared::default(), &checkpoint);
+    let resumed = resumed.unwrap();
+    assert!(resumed.is_finished());
+    assert_eq!(resumed.ended_by(), Some("p"));
+}

@@ -1,0 +1,149 @@
+//! Steps whose size is chosen on the way.
+
+use master::algorithm::PowerBond;
+use master::{Algorithm, Course, StepControl, Sweep, SystemError};
+
+use crate::linear::{ABLE, Abilities};
+use crate::network::{Network, Run};
+use crate::problems;
+
+const STOP: f64 = 5.0;
+
+fn chosen(control: StepControl, tolerance: f64) -> Algorithm {
+    Algorithm {
+        control,
+        relative_tolerance: tolerance,
+        absolute_tolerance: tolerance,
+        largest_step: 1.0,
+        smallest_step: 1e-9,
+        ..Algorithm::fixed(Sweep::GaussSeidel, Course::Linear, 1e-3)
+    }
+}
+
+fn run(network: &Network, algorithm: &Algorithm) -> Run {
+    network.run(ABLE, algorithm, STOP).unwrap()
+}
+
+/// The fixed steps whose error is at most `error`, to within a tenth of their number.
+fn fixed_of(network: &Network, error: f64) -> Run {
+    let mut steps = 16.0;
+    loop {
+        let found =
+            run(network, &Algorithm::fixed(Sweep::GaussSeidel, Course::Linear, STOP / steps));
+        if found.error <= error {
+            return found;
+        }
+        steps = f64::ceil(steps * 1.1);
+    }
+}
+
+/// The error of one step by halves, which is of order 3, is kept at the tolerance, that of the
+/// extrapolation as well: with steps of `tolerance^(1/3)` the error of the run goes as
+/// `tolerance^(2/3)`, with steps of `tolerance^(1/2)` as the tolerance.
+#[test]
+fn repeated_steps_keep_the_error_near_the_tolerance() {
+    let network = problems::transient();
+    for (control, exponent) in [(StepControl::Doubling, 2.0 / 3.0), (StepControl::Embedded, 1.0)] {
+        for tolerance in [1e-3, 1e-4, 1e-5, 1e-6] {
+            let found = run(&network, &chosen(control, tolerance));
+            let label = format!("{} {tolerance}: {found:?}", control.name());
+            assert!(found.error < 5.0 * f64::powf(tolerance, exponent), "{label}");
+            assert!(found.error > 0.01 * tolerance, "{label}");
+        }
+    }
+}
+
+#[test]
+fn repeated_steps_are_fewer_than_fixed_ones_at_the_same_error() {
+    let network = problems::transient();
+    for control in [StepControl::Doubling, StepControl::Embedded] {
+        for tolerance in [1e-4, 1e-5] {
+            let found = run(&network, &chosen(control, tolerance));
+            let fixed = fixed_of(&network, found.error);
+            let label = format!("{} {tolerance}: {found:?}, {fixed:?}", control.name());
+            assert!(2 * found.points < fixed.points, "{label}");
+            assert!(found.calls < fixed.calls, "{label}");
+        }
+    }
+}
+
+/// The connected signals move by the tolerance in each step, which is the error of held inputs.
+#[test]
+fn the_increment_makes_steps_small_where_signals_move_fast() {
+    let network = problems::transient();
+    let of = |tolerance: f64| {
+        let control = chosen(StepControl::Increment, tolerance);
+        run(&network, &Algorithm { course: Course::Hold, step: 1e-4, ..control })
+    };
+    let (coarse, fine) = (of(1e-2), of(1e-3));
+    assert!(coarse.sizes.1 > 10.0 * coarse.sizes.0, "{coarse:?}");
+    assert!(fine.points > 5 * coarse.points, "{coarse:?} {fine:?}");
+    assert!(fine.error < 0.3 * coarse.error, "{coarse:?} {fine:?}");
+    assert_eq!(fine.calls, 2 * fine.points, "nothing is repeated");
+}
+
+fn bond(network: &Network) -> PowerBond {
+    let system = network.system(ABLE, &std::sync::Arc::default());
+    PowerBond { first: system.port("b.u1").unwrap(), second: system.port("a.u0").unwrap() }
+}
+
+#[test]
+fn the_energy_of_a_bond_makes_steps_small_where_it_is_lost() {
+    let network = problems::two_masses(1e3, 20.0);
+    let of = |tolerance: f64| {
+        let bonds = vec![bond(&network)];
+        run(&network, &Algorithm { bonds, ..chosen(StepControl::Energy, tolerance) })
+    };
+    let (coarse, fine) = (of(1e-3), of(1e-5));
+    assert!(coarse.sizes.1 > 3.0 * coarse.sizes.0, "{coarse:?}");
+    // Of order 2: a hundredth of the tolerance is a tenth of the step.
+    let times = 5 * coarse.points..15 * coarse.points;
+    assert!(times.contains(&fine.points), "{coarse:?} {fine:?}");
+    assert!(fine.error < 0.2 * coarse.error, "{coarse:?} {fine:?}");
+    assert_eq!(fine.calls, 2 * fine.points, "nothing is repeated");
+}
+
+/// On a stiff and damped coupling. The first step is not chosen: it has to be small by itself.
+#[test]
+fn steps_by_increment_and_by_energy_are_fewer_than_fixed_ones_at_the_same_error() {
+    let network = problems::two_masses(1e3, 20.0);
+    for (control, tolerance) in [(StepControl::Increment, 0.03), (StepControl::Energy, 1e-5)] {
+        let bonds = vec![bond(&network)];
+        let algorithm = Algorithm { bonds, step: 1e-4, ..chosen(control, tolerance) };
+        let found = run(&network, &algorithm);
+        let fixed = fixed_of(&network, found.error);
+        assert!(3 * found.points < 2 * fixed.points, "{found:?}, {fixed:?}");
+    }
+}
+
+#[test]
+fn the_energy_needs_bonds() {
+    let network = problems::two_masses(1e3, 20.0);
+    let refused = network.run(ABLE, &chosen(StepControl::Energy, 1e-2), STOP).unwrap_err();
+    assert!(matches!(refused, SystemError::Algorithm { .. }), "{refused}");
+}
+
+#[test]
+fn a_tolerance_that_the_smallest_step_does_not_meet_is_an_error() {
+    let network = problems::transient();
+    let algorithm = Algorithm { smallest_step: 1e-3, ..chosen(StepControl::Embedded, 1e-9) };
+    let refused = network.run(ABLE, &algorithm, STOP).unwrap_err();
+    assert!(matches!(refused, SystemError::Stuck { .. }), "{refused}");
+}
+
+/// The estimate knows that means are of order 2 whatever the course, and held ends of order 1.
+#[test]
+fn doubling_keeps_the_tolerance_with_slaves_that_hold_their_inputs() {
+    let network = problems::coupled_oscillators();
+    let able = Abilities { interpolates: false, ..ABLE };
+    for (course, exponent) in [
+        (Course::Hold, 1.0 / 2.0),
+        (Course::Limited, 1.0 / 2.0),
+        (Course::Linear, 2.0 / 3.0),
+        (Course::Quadratic, 2.0 / 3.0),
+    ] {
+        let algorithm = Algorithm { course, ..chosen(StepControl::Doubling, 1e-5) };
+        let found = network.run(able, &algorithm, STOP).unwrap();
+        assert!(found.error < 5.0 * f64::powf(1e-5, exponent), "{}: {found:?}", course.name());
+    }
+}

@@ -1,0 +1,104 @@
+//! A slave that does what a test tells it.
+
+use std::sync::{Arc, Mutex};
+
+use fmi2::Experiment;
+use fmi2::description::ModelDescription;
+use master::{CallError, Slave, Stepped, System};
+
+/// Output over time in s.
+type Output = fn(f64) -> f64;
+/// How far a step between two times comes.
+type Way = fn(f64, f64) -> Stepped;
+/// The steps asked for: begin and end in s.
+pub(crate) type Asked = Arc<Mutex<Vec<(f64, f64)>>>;
+
+/// Has the outputs y, which is connected, and z, which is not: functions of time.
+pub(crate) struct Puppet {
+    description: ModelDescription,
+    time: f64,
+    kept: [f64; 3],
+    outputs: [Output; 2],
+    way: Way,
+    asked: Asked,
+}
+
+pub(crate) fn whole(_: f64, _: f64) -> Stepped {
+    Stepped::Whole
+}
+
+/// A system of one puppet called p with a lag a behind its y, and the steps that p was asked for.
+pub(crate) fn system(outputs: [Output; 2], way: Way) -> (System, Asked) {
+    let asked = Asked::default();
+    let xml = r#"<fmiModelDescription fmiVersion="2.0" modelName="Puppet" guid="puppet">
+        <CoSimulation modelIdentifier="P" canHandleVariableCommunicationStepSize="true"
+        canGetAndSetFMUstate="true" canSerializeFMUstate="true"/><ModelVariables>
+        <ScalarVariable name="y" valueReference="0" causality="output"><Real/></ScalarVariable>
+        <ScalarVariable name="z" valueReference="1" causality="output"><Real/></ScalarVariable>
+        </ModelVariables><ModelStructure><Outputs><Unknown index="1" dependencies=""/>
+        <Unknown index="2" dependencies=""/></Outputs>
+        </ModelStructure></fmiModelDescription>"#;
+    let description = ModelDescription::parse(xml).unwrap();
+    let (time, kept) = (0.0, [0.0; 3]);
+    let puppet = Puppet { description, time, kept, outputs, way, asked: Arc::clone(&asked) };
+    let mut system = System::default();
+    system.add("p", Box::new(puppet)).unwrap();
+    let lag = crate::linear::Block::new(&[&[-1.0]], &[&[1.0]], &[&[1.0]], &[&[0.0]], &[0.0]);
+    let lag = crate::linear::Linear::boxed(&lag, crate::linear::ABLE, &Arc::default());
+    system.add("a", lag).unwrap();
+    system.connect("p.y", "a.u0").unwrap();
+    (system, asked)
+}
+
+impl Slave for Puppet {
+    fn description(&self) -> &ModelDescription {
+        &self.description
+    }
+    fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError> {
+        self.time = experiment.start_time;
+        Ok(())
+    }
+    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
+    fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
+    fn terminate(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
+    fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
+        for (value, &reference) in values.iter_mut().zip(references) {
+            *value = (self.outputs[reference as usize])(self.time);
+        }
+        Ok(())
+    }
+    fn set_real(&mut self, _: &[u32], _: &[f64]) -> Result<(), CallError> {
+        Ok(())
+    }
+    fn do_step(&mut self, time: f64, size: f64, _: bool) -> Result<Stepped, CallError> {
+        assert!((time - self.time).abs() < 1e-12, "a step begins where the last one ended");
+        self.asked.lock().unwrap().push((time, time + size));
+        let stepped = (self.way)(time, time + size);
+        self.time = match stepped {
+            Stepped::Whole => time + size,
+            Stepped::Part { reached, .. } => reached,
+        };
+        Ok(stepped)
+    }
+    fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
+        self.kept[slot] = self.time;
+        Ok(())
+    }
+    fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
+        self.time = self.kept[slot];
+        Ok(())
+    }
+    fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
+        Ok(self.time.to_le_bytes().to_vec())
+    }
+    fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
+        self.time = f64::from_le_bytes(bytes.try_into().unwrap());
+        Ok(())
+    }
+}

@@ -1,0 +1,118 @@
+//! A slave with variables of all types, which allocates nothing.
+
+use fmi2::Experiment;
+use fmi2::description::ModelDescription;
+use master::{CallError, Slave, Stepped, System};
+
+type Done = Result<(), CallError>;
+
+/// Each output is the input of its type, one further: the Real 0.5 more in each step, the Integer 1
+/// more, the Boolean the other one, the String the same.
+pub(crate) struct Typed {
+    description: ModelDescription,
+    real: f64,
+    integer: i32,
+    boolean: i32,
+    text: String,
+}
+
+fn boxed() -> Box<Typed> {
+    let types = [("Real", "0"), ("Integer", "0"), ("Boolean", "false"), ("String", "none")];
+    let pair = |(k, (kind, start)): (usize, &(&str, &str))| {
+        format!(
+            r#"<ScalarVariable name="in{k}" valueReference="0" causality="input">
+            <{kind} start="{start}"/></ScalarVariable>
+            <ScalarVariable name="out{k}" valueReference="1" causality="output"><{kind}/>
+            </ScalarVariable>"#
+        )
+    };
+    let variables: String = types.iter().enumerate().map(pair).collect();
+    let output = |k: usize| format!(r#"<Unknown index="{}" dependencies=""/>"#, 2 * k + 2);
+    let outputs: String = (0..types.len()).map(output).collect();
+    let xml = format!(
+        r#"<fmiModelDescription fmiVersion="2.0" modelName="Typed" guid="typed">
+        <CoSimulation modelIdentifier="T" canInterpolateInputs="true" maxOutputDerivativeOrder="1"
+        canHandleVariableCommunicationStepSize="true"/><ModelVariables>{variables}</ModelVariables>
+        <ModelStructure><Outputs>{outputs}</Outputs></ModelStructure></fmiModelDescription>"#
+    );
+    let text = "a text that does not fit into the place of a pointer".to_owned();
+    let description = ModelDescription::parse(xml).unwrap();
+    Box::new(Typed { description, real: 1.0, integer: 1, boolean: 1, text })
+}
+
+/// Three of them in a circle, each type connected.
+pub(crate) fn ring() -> System {
+    let mut system = System::default();
+    for name in ["a", "b", "c"] {
+        system.add(name, boxed()).unwrap();
+    }
+    for (from, to) in [("a", "b"), ("b", "c"), ("c", "a")] {
+        for k in 0..4 {
+            system.connect(&format!("{from}.out{k}"), &format!("{to}.in{k}")).unwrap();
+        }
+    }
+    system
+}
+
+impl Slave for Typed {
+    fn description(&self) -> &ModelDescription {
+        &self.description
+    }
+    fn setup_experiment(&mut self, _: &Experiment) -> Done {
+        Ok(())
+    }
+    fn enter_initialization_mode(&mut self) -> Done {
+        Ok(())
+    }
+    fn exit_initialization_mode(&mut self) -> Done {
+        Ok(())
+    }
+    fn terminate(&mut self) -> Done {
+        Ok(())
+    }
+    fn get_real(&mut self, _: &[u32], values: &mut [f64]) -> Done {
+        values[0] = self.real;
+        Ok(())
+    }
+    fn set_real(&mut self, _: &[u32], values: &[f64]) -> Done {
+        self.real = values[0];
+        Ok(())
+    }
+    fn get_integer(&mut self, _: &[u32], values: &mut [i32]) -> Done {
+        values[0] = self.integer;
+        Ok(())
+    }
+    fn set_integer(&mut self, _: &[u32], values: &[i32]) -> Done {
+        self.integer = values[0];
+        Ok(())
+    }
+    fn get_boolean(&mut self, _: &[u32], values: &mut [i32]) -> Done {
+        values[0] = self.boolean;
+        Ok(())
+    }
+    fn set_boolean(&mut self, _: &[u32], values: &[i32]) -> Done {
+        self.boolean = values[0];
+        Ok(())
+    }
+    fn get_string(&mut self, _: &[u32], values: &mut [String]) -> Done {
+        values[0].clone_from(&self.text);
+        Ok(())
+    }
+    fn set_string(&mut self, _: &[u32], values: &[String]) -> Done {
+        self.text.clone_from(&values[0]);
+        Ok(())
+    }
+    fn set_input_derivatives(&mut self, _: &[u32], _: &[i32], _: &[f64]) -> Done {
+        Ok(())
+    }
+    fn get_output_derivatives(&mut self, _: &[u32], _: &[i32], values: &mut [f64]) -> Done {
+        values[0] = 0.0;
+        Ok(())
+    }
+    fn do_step(&mut self, _: f64, _: f64, _: bool) -> Result<Stepped, CallError> {
+        self.real += 0.5;
+        self.integer += 1;
+        self.boolean = 1 - self.boolean;
+        Ok(Stepped::Whole)
+    }
+}

@@ -1,0 +1,136 @@
+//! Blocks in a network, and the solution of the whole as one system.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use fmi2::Experiment;
+use master::{Algorithm, Simulation, System, SystemError};
+use nalgebra::{DMatrix, DVector};
+
+use crate::linear::{Abilities, Block, Linear, OUTPUTS};
+
+/// Blocks a, b, ..., and links (block, output) to (block, input).
+#[derive(Clone)]
+pub(crate) struct Network {
+    pub(crate) blocks: Vec<Block>,
+    pub(crate) links: Vec<((usize, usize), (usize, usize))>,
+}
+
+/// What a run gave.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Run {
+    /// Largest error of an output at a communication point, absolute: of the whole run, and of
+    /// its second half, where what happened in the first steps has come down to its order.
+    pub(crate) error: f64,
+    pub(crate) late: f64,
+    /// Communication steps made.
+    pub(crate) points: usize,
+    /// `fmi2DoStep` of all slaves, repetitions included.
+    pub(crate) calls: usize,
+    /// Smallest and largest step in s.
+    pub(crate) sizes: (f64, f64),
+}
+
+/// Name of the block at that position.
+pub(crate) fn name(position: usize) -> String {
+    ["a", "b", "c", "d"][position].to_owned()
+}
+
+impl Network {
+    /// The slaves, connected; `steps` counts their steps.
+    pub(crate) fn system(&self, able: Abilities, steps: &Arc<AtomicUsize>) -> System {
+        let mut system = System::default();
+        for (position, block) in self.blocks.iter().enumerate() {
+            system.add(&name(position), Linear::boxed(block, able, steps)).unwrap();
+        }
+        for &((from, output), (to, input)) in &self.links {
+            let (from, to) = (name(from), name(to));
+            system.connect(&format!("{from}.y{output}"), &format!("{to}.u{input}")).unwrap();
+        }
+        system
+    }
+
+    /// `x' = M x`, `y = N x` of the whole: with `u = P y` is `y = (I - D P)^-1 C x`.
+    pub(crate) fn whole(&self) -> (DMatrix<f64>, DMatrix<f64>, DVector<f64>) {
+        let stack = |of: fn(&Block) -> &DMatrix<f64>| {
+            let parts: Vec<_> = self.blocks.iter().map(of).collect();
+            let rows = parts.iter().map(|part| part.nrows()).sum();
+            let columns = parts.iter().map(|part| part.ncols()).sum();
+            let mut whole = DMatrix::zeros(rows, columns);
+            let mut corner = (0, 0);
+            for part in parts {
+                whole.view_mut(corner, part.shape()).copy_from(part);
+                corner = (corner.0 + part.nrows(), corner.1 + part.ncols());
+            }
+            whole
+        };
+        let (a, b) = (stack(|block| &block.a), stack(|block| &block.b));
+        let (c, d) = (stack(|block| &block.c), stack(|block| &block.d));
+        let first = |block: usize, of: fn(&Block) -> usize| -> usize {
+            self.blocks[..block].iter().map(of).sum()
+        };
+        let mut links = DMatrix::zeros(b.ncols(), c.nrows());
+        for &((from, output), (to, input)) in &self.links {
+            let row = first(to, |block| block.b.ncols()) + input;
+            links[(row, first(from, |block| block.c.nrows()) + output)] = 1.0;
+        }
+        let loops = DMatrix::identity(c.nrows(), c.nrows()) - &d * &links;
+        let outputs = loops.lu().solve(&c).unwrap();
+        let starts = self.blocks.iter().flat_map(|block| block.start.iter().copied());
+        let start = DVector::from_iterator(a.nrows(), starts);
+        (&a + &b * &links * &outputs, outputs, start)
+    }
+
+    /// All outputs of a system of these blocks, in their order.
+    pub(crate) fn outputs(&self, system: &mut System) -> Vec<f64> {
+        let mut all = Vec::new();
+        for ((_, slave), block) in system.slaves.iter_mut().zip(&self.blocks) {
+            let count = block.c.nrows();
+            let references: Vec<u32> = (OUTPUTS..).take(count).collect();
+            let mut values = vec![0.0; count];
+            slave.get_real(&references, &mut values).unwrap();
+            all.extend(values);
+        }
+        all
+    }
+
+    /// A run from 0 to `stop` s against the matrix exponential of the whole.
+    pub(crate) fn run(
+        &self,
+        able: Abilities,
+        algorithm: &Algorithm,
+        stop: f64,
+    ) -> Result<Run, SystemError> {
+        let calls = Arc::new(AtomicUsize::new(0));
+        let system = self.system(able, &calls);
+        let experiment = Experiment { stop_time: Some(stop), ..Experiment::default() };
+        let mut simulation = Simulation::new(system, algorithm, &experiment)?;
+        let (matrix, outputs, start) = self.whole();
+        let common = algorithm.multiples.iter().copied().max().unwrap_or(1) as usize;
+        let mut run =
+            Run { error: 0.0, late: 0.0, points: 0, calls: 0, sizes: (f64::INFINITY, 0.0) };
+        let mut last = 0.0;
+        while !simulation.is_finished() {
+            simulation.step()?;
+            let time = simulation.time();
+            run.sizes = (run.sizes.0.min(time - last), run.sizes.1.max(time - last));
+            run.points += 1;
+            last = time;
+            // Between, a slave with a step of its own is ahead.
+            if !run.points.is_multiple_of(common) {
+                continue;
+            }
+            let exact = &outputs * ((&matrix * time).exp() * &start);
+            let found = DVector::from_vec(self.outputs(simulation.system()));
+            let error = (found - exact).iter().fold(0.0, |most: f64, part| {
+                if part.is_nan() { f64::INFINITY } else { most.max(part.abs()) }
+            });
+            run.error = run.error.max(error);
+            if time > 0.5 * stop {
+                run.late = run.late.max(error);
+            }
+        }
+        run.calls = calls.load(Ordering::Relaxed);
+        Ok(run)
+    }
+}
