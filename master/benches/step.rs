@@ -95,7 +95,7 @@ fn compare(criterion: &mut Criterion, folder: &Path) -> anyhow::Result<()> {
         let mut simulation = simulation(&fmu, count, ports)?;
         group.bench_function(BenchmarkId::new("simulation", count), |bencher| {
             bencher.iter(|| {
-                failed = std::mem::replace(&mut failed, Ok(())).and_then(|()| simulation.step())
+                failed = std::mem::replace(&mut failed, Ok(())).and_then(|()| simulation.step());
             });
         });
         failed.context("the simulation fails")?;
@@ -103,7 +103,7 @@ fn compare(criterion: &mut Criterion, folder: &Path) -> anyhow::Result<()> {
         let mut calls = Calls::new(&fmu, count, ports)?;
         group.bench_function(BenchmarkId::new("calls", count), |bencher| {
             bencher.iter(|| {
-                failed = std::mem::replace(&mut failed, Ok(())).and_then(|()| calls.step())
+                failed = std::mem::replace(&mut failed, Ok(())).and_then(|()| calls.step());
             });
         });
         failed.context("a call fails")?;

@@ -154,7 +154,7 @@ pub enum SystemError {
         /// Function, status and messages.
         source: CallError,
     },
-    /// An output is not a number.
+    /// An output, or what a connection makes of one, is not a number.
     #[error("{name} is {value} at t = {time} s, expected a finite number")]
     NotFinite {
         /// The output.

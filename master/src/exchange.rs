@@ -233,6 +233,25 @@ impl Exchange {
         }
     }
 
+    /// What connections and faults make of outputs for the gathered inputs of the slave is finite.
+    #[inline]
+    pub(crate) fn check_inputs(
+        &self,
+        system: &System,
+        slave: usize,
+        time: f64,
+    ) -> Result<(), SystemError> {
+        if self.allow_nan {
+            return Ok(());
+        }
+        match self.reals.input_not_finite(slave) {
+            None => Ok(()),
+            Some((port, value)) => {
+                Err(SystemError::NotFinite { name: system.name(port), value, time })
+            }
+        }
+    }
+
     /// Keeps all values in `values`.
     pub(crate) fn save(&self, values: &mut Values) {
         values.reals.copy(&self.reals.trace);

@@ -155,14 +155,7 @@ impl Library {
         resources: &str,
     ) -> Result<Component, LoadError> {
         let sink = Arc::new(Sink::new(name));
-        #[expect(clippy::arc_with_non_send_sync, reason = "`Component` says why it may be sent")]
-        let callbacks = Arc::new(fmi2CallbackFunctions {
-            logger: Some(log::logger()),
-            allocate_memory: Some(calloc),
-            free_memory: Some(free),
-            step_finished: None,
-            component_environment: Arc::as_ptr(&sink).cast_mut().cast(),
-        });
+        let callbacks = callbacks(&sink);
         let (c_name, c_guid, c_resources) = (c_string(name), c_string(guid), c_string(resources));
         let kind = match interface {
             Interface::ModelExchange => MODEL_EXCHANGE,
@@ -207,6 +200,18 @@ impl Library {
             if messages.is_empty() { "it gave no reason".to_owned() } else { messages.join("; ") };
         LoadError::Instantiate { path: self.path.clone(), instance: name.to_owned(), reason }
     }
+}
+
+/// What an instance is given to call; `sink` receives its messages.
+#[expect(clippy::arc_with_non_send_sync, reason = "`Component` says why it may be sent")]
+fn callbacks(sink: &Arc<Sink>) -> Arc<fmi2CallbackFunctions> {
+    Arc::new(fmi2CallbackFunctions {
+        logger: Some(log::logger()),
+        allocate_memory: Some(calloc),
+        free_memory: Some(free),
+        step_finished: None,
+        component_environment: Arc::as_ptr(sink).cast_mut().cast(),
+    })
 }
 
 unsafe extern "C" {

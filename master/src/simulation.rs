@@ -227,6 +227,22 @@ impl Simulation {
         Ok(swept)
     }
 
+    /// After [`Simulation::terminate`]: [`crate::Slave::free`] of every slave, all of them even where
+    /// one fails.
+    ///
+    /// # Errors
+    ///
+    /// The first failure.
+    pub fn free(&mut self) -> Result<(), SystemError> {
+        let time = self.grid.time;
+        let mut first = Ok(());
+        for (name, slave) in &mut self.system.slaves {
+            let done = slave.free().map_err(|source| call(name, time, source));
+            first = first.and(done);
+        }
+        first
+    }
+
     /// Ends the simulation: `fmi2Terminate` of every slave, all of them even where one fails.
     ///
     /// # Errors

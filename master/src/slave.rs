@@ -38,6 +38,12 @@ pub trait Slave {
     /// `fmi2Terminate`.
     fn terminate(&mut self) -> Result<(), CallError>;
 
+    /// `fmi2FreeInstance` at once, where it can be told whether that works: of an instance in a
+    /// process of its own. No other call may follow. The others are freed when they are dropped.
+    fn free(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
+
     /// `fmi2GetReal`.
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError>;
 

@@ -90,6 +90,7 @@ impl<'a> Beside<'a> {
         }
         self.save(simulation)?;
         simulation.terminate()?;
+        simulation.free()?;
         Ok(match simulation.ended_by() {
             Some(name) => Ended::ByFmu(name.to_owned()),
             None if simulation.is_finished() => Ended::AtStop,

@@ -316,6 +316,17 @@ impl Reals {
         instance.get_output_derivatives(&lane.derived_outputs, &lane.output_orders, derivatives)
     }
 
+    /// The input of a slave that a transformation or a fault gives a value that is not finite.
+    #[inline]
+    pub(crate) fn input_not_finite(&self, slave: usize) -> Option<(Port, f64)> {
+        if self.layout.plain[slave] && self.faults.is_empty() {
+            return None;
+        }
+        let range = self.layout.lanes[slave].input_range.clone();
+        let found = range.into_iter().find(|&k| !self.values[k].is_finite())?;
+        Some((self.layout.input_ports[found], self.values[found]))
+    }
+
     /// The output that has a value or a derivative that is not finite.
     pub(crate) fn not_finite(&self, slave: usize) -> Option<(Port, f64)> {
         let (lane, trace) = (&self.layout.lanes[slave], &self.trace);

@@ -37,6 +37,8 @@ pub struct Isolated {
     turn: u64,
     /// Why there is no worker any more.
     ended: Option<Failure>,
+    /// `fmi2FreeInstance` has been called.
+    freed: bool,
     time_limit: Option<Duration>,
     slice: Duration,
     /// The unpacked FMU: removed when no instance needs it.
@@ -72,6 +74,7 @@ impl Isolated {
             inbox: Inbox::new(name),
             turn: 0,
             ended: None,
+            freed: false,
             time_limit: options.time_limit,
             slice,
             package,
@@ -263,18 +266,24 @@ impl Isolated {
     }
 }
 
-impl Drop for Isolated {
-    /// Has the worker free the instance and end; one that does not is ended.
-    fn drop(&mut self) {
-        if self.ended.is_some() || self.turn % 2 == 1 {
-            return;
+impl Isolated {
+    /// Has the worker free the instance and end, if it has not; one that does not is ended.
+    pub(super) fn free_instance(&mut self) -> Result<(), CallError> {
+        if self.freed || self.ended.is_some() || self.turn % 2 == 1 {
+            return Ok(());
         }
+        self.freed = true;
         self.time_limit = Some(self.time_limit.unwrap_or(FREEING).min(FREEING));
-        match self.call(Command::Free, |_| (), |_| Some(())) {
-            Ok(()) => {
-                self.process.ends_within(ENDING);
-            }
-            Err(error) => self.inbox.complain(&error),
+        self.call(Command::Free, |_| (), |_| Some(()))?;
+        self.process.ends_within(ENDING);
+        Ok(())
+    }
+}
+
+impl Drop for Isolated {
+    fn drop(&mut self) {
+        if let Err(error) = self.free_instance() {
+            self.inbox.complain(&error);
         }
     }
 }

@@ -111,6 +111,10 @@ impl Slave for Isolated {
         self.plain(Command::Terminate)
     }
 
+    fn free(&mut self) -> Result<(), CallError> {
+        self.free_instance()
+    }
+
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
         let write = |writer: &mut Writer<'_>| writer.put_list(references);
         self.call(Command::GetReal, write, |reader| reader.take_all(values))

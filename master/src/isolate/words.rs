@@ -211,7 +211,6 @@ impl<'a> Reader<'a> {
 }
 
 #[cfg(test)]
-#[expect(clippy::float_cmp, reason = "tests; numbers as written")]
 mod tests {
     use super::*;
 

@@ -95,6 +95,7 @@ impl Simulation {
             for position in begin..end {
                 let slave = self.groups.sequence[position];
                 self.exchange.gather(slave, time, self.sizes[slave]);
+                self.exchange.check_inputs(&self.system, slave, time)?;
             }
             if let Some(mut parallel) = self.parallel.take() {
                 let done = self.side_by_side(&mut parallel, group, (time, never_back), &mut swept);
