@@ -1,6 +1,6 @@
 //! System Structure and Parameterization (SSP 1.0.1): SSD, SSV, SSM and SSB files and SSP archives.
 //!
-//! [`open`] makes an [`Assembly`] of a file, [`write`] makes an SSP of an assembly. [`read_ssd`] and
+//! [`open`] makes an [`Assembly`] of a file, [`write()`] makes an SSP of an assembly. [`read_ssd`] and
 //! its like only read.
 
 mod conversion;

@@ -135,7 +135,7 @@ fn unusual_fmus_run_in_processes_as_any_other() {
 
 #[test]
 fn a_step_that_is_discarded_half_way_is_made_in_parts_across_processes() {
-    let run = isolated("discard at t1", &["--set", "a.t1=0.53125"]);
+    let run = isolated("discard at t1", &["--set", "a.t1=0.53125", "--rollback"]);
     run.expect(0, TO_T1);
     let time = run.numbers("time");
     assert_eq!((time.last(), &run.numbers("a.y")), (Some(&1.0), &time));

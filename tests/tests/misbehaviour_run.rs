@@ -165,9 +165,9 @@ fn values_that_are_no_numbers_go_on_where_they_are_allowed() {
 const MIDDLE: [&str; 2] = ["--set", "a.t1=0.53125"];
 
 #[test]
-fn a_step_that_is_discarded_half_way_is_made_in_parts_where_the_fmus_can_go_back() {
+fn a_step_that_is_discarded_half_way_is_made_in_parts_with_rollback() {
     for behaviour in ["discard at t1", "pend and discard at t1"] {
-        let run = Run::pair(&CFmu::that(behaviour), &MIDDLE);
+        let run = Run::pair(&CFmu::that(behaviour), &[MIDDLE[0], MIDDLE[1], "--rollback"]);
         run.expect(0, TO_T1);
         let (time, y) = (run.numbers("time"), run.numbers("a.y"));
         assert_eq!(time, y);

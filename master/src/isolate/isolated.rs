@@ -24,7 +24,7 @@ const ENDING: Duration = Duration::from_secs(2);
 /// How long `fmi2FreeInstance` may take where the calls have no limit.
 const FREEING: Duration = Duration::from_secs(10);
 /// Most bytes that a worker may answer.
-const MOST: usize = 1 << 32;
+const MOST: usize = u32::MAX as usize;
 
 /// An instance in a process of its own.
 ///
