@@ -24,23 +24,13 @@ struct Curve {
 
 /// Draws variables of a results file, by name or pattern, over time: one panel for each unit. The
 /// ending of `out`, `.svg` or `.png`, chooses the format. Memory does not depend on the length of
-/// the file.
+/// the file. `unit` is asked for the units of variables where the file does not state any, which is
+/// so in CSV.
 ///
 /// # Errors
 ///
 /// Another ending, a name that the file does not have, texts, a file that cannot be read or
 /// written.
-#[cfg(test)]
-pub(crate) fn plot(results: &Path, variables: &[String], out: &Path) -> anyhow::Result<()> {
-    plot_with_units(results, variables, &|_| None, out)
-}
-
-/// As [`plot`]; `unit` is asked for the units of variables where the file does not state any,
-/// which is so in CSV.
-///
-/// # Errors
-///
-/// As [`plot`].
 pub(crate) fn plot_with_units(
     results: &Path,
     variables: &[String],

@@ -104,13 +104,14 @@ fn instances_of_one_fmu_are_independent() {
 }
 
 #[test]
-fn a_second_instance_of_an_fmu_for_one_only_is_refused_in_its_words_and_the_first_lives_on() {
+fn a_second_instance_of_an_fmu_for_one_only_is_refused_and_the_first_lives_on() {
     let one = CFmu::that("one instance only").flag("canBeInstantiatedOnlyOncePerProcess", true);
     let fmu = open(&one);
     let mut first = fmu.instantiate("first").unwrap();
     let second = fmu.instantiate("second").err().unwrap().to_string();
-    assert!(second.contains("the instance second"), "{second}");
-    assert!(second.contains("there is an instance already"), "{second}");
+    for part in ["second", "canBeInstantiatedOnlyOncePerProcess", "--isolate"] {
+        assert!(second.contains(part), "{second}");
+    }
     initialise(&mut first).unwrap();
     first.do_step(0.0, 0.5, true).unwrap();
     assert_eq!(output(&mut first), 0.5);

@@ -193,3 +193,8 @@ fn eight_curves_of_one_unit_are_two_panels_so_that_no_colour_has_two_meanings() 
     let svg = svg(&path, &["*"]);
     assert_eq!((svg.matches("<clipPath").count(), curves(&svg).len()), (2, 8));
 }
+
+/// A plot of a file that states no units.
+fn plot(results: &Path, variables: &[String], out: &Path) -> anyhow::Result<()> {
+    plot_with_units(results, variables, &|_| None, out)
+}
