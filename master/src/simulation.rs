@@ -158,7 +158,7 @@ impl Simulation {
     /// stands at the begin of the step in some slaves and at its end in others.
     pub fn step(&mut self) -> Result<(), SystemError> {
         let swept = match (self.events.take(), self.control.kind) {
-            (None, StepControl::Fixed) if self.coupled.is_none() => {
+            (None, StepControl::Fixed) if !self.repeats => {
                 let (end, size) = self.grid.next();
                 let swept = self.sweep(self.grid.time, size, true)?;
                 self.grid.advance(end);
