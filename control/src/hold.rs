@@ -174,11 +174,36 @@ fn length(name: &'static str, vector: &[f64], expected: usize) -> Result<(), Err
     Err(Error::Shape { matrix: name, expected: (expected, 1), found: (vector.len(), 1) })
 }
 
-/// out += M v, column by column.
-fn add_product(m: &DMatrix<f64>, v: &[f64], out: &mut [f64]) {
-    for (column, factor) in m.as_slice().chunks_exact(out.len().max(1)).zip(v) {
-        for (sum, entry) in out.iter_mut().zip(column) {
-            *sum += entry * factor;
+/// Columns of up to eight numbers stay in registers.
+macro_rules! fixed_sizes {
+    ($m:expr, $v:expr, $out:expr; $($n:literal)*) => {
+        match $out.len() {
+            $($n => add_columns::<$n>($m.as_slice().as_chunks().0, $v, $out),)*
+            n => {
+                for (column, factor) in $m.as_slice().chunks_exact(n.max(1)).zip($v) {
+                    add_scaled(column, *factor, $out);
+                }
+            }
         }
+    };
+}
+
+/// out += M v, column by column; the same sums for every size.
+fn add_product(m: &DMatrix<f64>, v: &[f64], out: &mut [f64]) {
+    fixed_sizes!(m, v, out; 1 2 3 4 5 6 7 8);
+}
+
+fn add_columns<const N: usize>(columns: &[[f64; N]], v: &[f64], out: &mut [f64]) {
+    let Some(out) = out.first_chunk_mut::<N>() else { return };
+    let mut sums = *out;
+    for (column, factor) in columns.iter().zip(v) {
+        add_scaled(column, *factor, &mut sums);
+    }
+    *out = sums;
+}
+
+fn add_scaled(column: &[f64], factor: f64, sums: &mut [f64]) {
+    for (sum, entry) in sums.iter_mut().zip(column) {
+        *sum += entry * factor;
     }
 }

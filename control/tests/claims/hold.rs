@@ -94,6 +94,25 @@ fn a_straight_solution_is_followed_exactly() {
     assert!(error < 1e-12 * hold.phi.amax().max(1.0), "{error:e}");
 }
 
+/// Sizes below, at and above those that are kept in registers, beside nalgebra's own products.
+#[test]
+fn a_step_of_any_order_is_the_sum_of_the_products() {
+    for n in 1..=12 {
+        let entry = |i: usize, j: usize| {
+            f64::from(u32::try_from(5 * i + 3 * j + i * j).unwrap() % 11) - 5.0
+        };
+        let vector = |size, factor| DMatrix::from_fn(size, 1, |i, _| factor * entry(i, i + 2));
+        let (a, b) = (DMatrix::from_fn(n, n, entry), DMatrix::from_fn(n, 2, entry));
+        let hold = FirstOrderHold::new(&a, &b, 0.01).unwrap();
+        let (x, w0, w1) = (vector(n, 0.7), vector(2, 1.3), vector(2, -2.1));
+        let mut out = vec![f64::NAN; n];
+        hold.step_into(x.as_slice(), w0.as_slice(), w1.as_slice(), &mut out).unwrap();
+        let expected = &hold.phi * &x + &hold.gamma_0 * &w0 + &hold.gamma_1 * &w1;
+        let error = (matrix(n, 1, &out) - &expected).amax();
+        assert!(error <= 1e-14 * expected.amax().max(1.0), "n = {n}: {error:e}");
+    }
+}
+
 #[test]
 fn a_wrong_length_is_refused_and_leaves_the_output_untouched() {
     let hold = controller(1e-3);
