@@ -33,8 +33,8 @@ impl Balance {
 
     fn level(&mut self, state: usize) -> bool {
         let own = self.matrix[(state, state)].abs();
-        let column = self.matrix.column(state).lp_norm(1) - own;
-        let row = self.matrix.row(state).lp_norm(1) - own;
+        let column = self.matrix.column(state).iter().map(|x| x.abs()).sum::<f64>() - own;
+        let row = self.matrix.row(state).iter().map(|x| x.abs()).sum::<f64>() - own;
         let factor = power_of_two((row / column).sqrt());
         if !factor.is_normal() || column * factor + row / factor >= WORTHWHILE * (column + row) {
             return false;
@@ -51,9 +51,14 @@ impl Balance {
     }
 }
 
-/// The power of two nearest to x > 0 on the logarithmic scale; NaN stays NaN.
+/// The power of two nearest to x > 0 on the logarithmic scale; what is not normal stays as it is.
 pub(crate) fn power_of_two(x: f64) -> f64 {
-    x.log2().round().exp2()
+    if !x.is_normal() {
+        return x;
+    }
+    let (fraction, exponent) = libm::frexp(x);
+    let nearest = if fraction < std::f64::consts::FRAC_1_SQRT_2 { exponent - 1 } else { exponent };
+    libm::ldexp(1.0, nearest)
 }
 
 /// Diag(d)^-1 M.
@@ -98,6 +103,18 @@ mod tests {
         let balance = Balance::of(&a);
         assert_eq!(balance.restore(&balance.matrix), a);
         assert!(balance.matrix.norm() < 10.0, "{}", balance.matrix);
+    }
+
+    #[test]
+    fn the_nearest_power_of_two_is_that_of_the_rounded_logarithm() {
+        let (mut x, mut count) = (3.1e-308, 0);
+        while x < 1e308 {
+            assert_eq!(power_of_two(x).to_bits(), x.log2().round().exp2().to_bits(), "{x:e}");
+            (x, count) = (x * 1.37, count + 1);
+        }
+        assert!(count > 4000);
+        assert!(power_of_two(f64::NAN).is_nan() && !power_of_two(f64::MAX).is_normal());
+        assert_eq!([power_of_two(0.0), power_of_two(f64::INFINITY)], [0.0, f64::INFINITY]);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The matrix exponential.
 
 use crate::balance::Balance;
-use crate::{Error, check};
+use crate::{Error, check, product};
 use nalgebra::DMatrix;
 
 /// Numerator of the Pade approximant of order 13 (Higham 2005, table 2.3 and equation (2.5)).
@@ -67,27 +67,27 @@ pub(crate) fn scaling_and_squaring(a: &DMatrix<f64>) -> Result<DMatrix<f64>, Err
     }
     let mut power = approximant(&scaled)?;
     for _ in 0..squarings {
-        power = &power * &power;
+        power = product(&power, &power);
     }
     check::in_range("e^A", power)
 }
 
 /// The largest column sum.
 fn one_norm(a: &DMatrix<f64>) -> f64 {
-    a.column_iter().map(|column| column.lp_norm(1)).fold(0.0, f64::max)
+    a.column_iter().map(|column| column.iter().map(|x| x.abs()).sum()).fold(0.0, f64::max)
 }
 
 /// (V - U)^-1 (V + U), with U the odd and V the even part of the numerator.
 fn approximant(a: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
     let identity = DMatrix::identity(a.nrows(), a.ncols());
-    let second = a * a;
-    let fourth = &second * &second;
-    let sixth = &fourth * &second;
+    let second = product(a, a);
+    let fourth = product(&second, &second);
+    let sixth = product(&fourth, &second);
     let part = |at: usize| {
         let high = &sixth * PADE[at + 12] + &fourth * PADE[at + 10] + &second * PADE[at + 8];
         let low = &sixth * PADE[at + 6] + &fourth * PADE[at + 4] + &second * PADE[at + 2];
-        &sixth * high + low + &identity * PADE[at]
+        product(&sixth, &high) + low + &identity * PADE[at]
     };
-    let (even, odd) = (part(0), a * part(1));
+    let (even, odd) = (part(0), product(a, &part(1)));
     (&even - &odd).lu().solve(&(even + odd)).ok_or(Error::Overflow { what: "e^A" })
 }

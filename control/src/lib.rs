@@ -11,6 +11,7 @@
 //!   [`theorem1`]: the bound that belongs to it.
 //! * [`faults`]: fault models beyond the constant fault; [`detectability`]: which faults can be seen.
 //! * [`sampled`]: the controller designed for its sample time; [`controller`]: its equations.
+//! * [`product`]: products of matrices for exported models.
 //! * `lmi`, behind the feature of that name: linear matrix inequalities by Clarabel, for pole
 //!   regions, H-infinity and generalised H2 bounds, and theorem 1 with free P.
 //!
@@ -35,6 +36,7 @@ pub mod hold;
 pub mod lmi;
 pub mod lyapunov;
 pub mod placement;
+mod product;
 pub mod rank;
 pub mod response;
 pub mod riccati;
@@ -46,3 +48,4 @@ pub mod zeros;
 
 pub use domain::Domain;
 pub use error::Error;
+pub use product::product;

@@ -7,6 +7,7 @@
 use std::sync::Arc;
 
 use control::hold::FirstOrderHold;
+use control::product;
 use nalgebra::DMatrix;
 
 use crate::design::Design;
@@ -62,9 +63,9 @@ fn system(design: &Design, mode: Mode) -> (DMatrix<f64>, DMatrix<f64>) {
     let estimating = f64::from(mode.estimating);
     let (a, k_x, k_f) = (dense(|own| &own.a), dense(|own| &own.k_x), dense(|own| &own.k_f));
     let mut state = DMatrix::zeros(design.order(), design.order());
-    state.view_mut((0, 0), (n, n)).copy_from(&(&a + &free * &k_x - &l_x * &c));
-    state.view_mut((0, n), (n, q)).copy_from(&(&f_a + &free * &k_f * compensating));
-    state.view_mut((n, 0), (q, n)).copy_from(&(&l_f * &c * -estimating));
+    state.view_mut((0, 0), (n, n)).copy_from(&(&a + product(&free, &k_x) - product(&l_x, &c)));
+    state.view_mut((0, n), (n, q)).copy_from(&(&f_a + product(&free, &k_f) * compensating));
+    state.view_mut((n, 0), (q, n)).copy_from(&(product(&l_f, &c) * -estimating));
     if let Some(a_f) = &design.a_f {
         state.view_mut((n, n), (q, q)).copy_from(&(a_f.dense() * estimating));
     }

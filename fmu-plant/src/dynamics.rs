@@ -110,7 +110,7 @@ impl<D: Number> RigidBody<D> {
         if self.linearised {
             return Position { sine: angle, cosine: D::one(), centrifugal: D::zero() };
         }
-        let (sine, cosine) = angle.sin_cos();
+        let (sine, cosine) = angle.sine_and_cosine();
         Position { sine, cosine, centrifugal: rate * rate * sine }
     }
 
@@ -135,7 +135,7 @@ impl<D: Number> RigidBody<D> {
     #[inline]
     pub fn stick(&self, state: &State<D>) -> State<D> {
         let [_, angle, _, rate] = *state;
-        let sine = if self.linearised { angle } else { angle.sin() };
+        let sine = if self.linearised { angle } else { angle.sine() };
         let torque = self.weight * sine - self.pendulum_damping * rate;
         [D::zero(), rate, D::zero(), torque * self.inverse_inertia]
     }
@@ -154,14 +154,16 @@ impl<D: Number> RigidBody<D> {
 }
 
 impl RigidBody {
-    /// Time derivative in N/s of the balancing force while the cart is held and the force changes
-    /// at `force_rate` in N/s.
+    /// The balancing force in N, and its time derivative in N/s while the cart is held and the force
+    /// changes at `force_rate` in N/s.
     #[must_use]
     #[inline]
-    pub fn balancing_rate(&self, state: &State, force_rate: f64) -> f64 {
+    pub fn balancing(&self, state: &State, force: f64, force_rate: f64) -> (f64, f64) {
         let [_, angle, _, rate] = *state;
         let at = self.position(angle, rate);
         let torque = self.weight * at.sine - self.pendulum_damping * rate;
+        let lever = at.cosine * torque;
+        let balance = force + self.coupling * (at.centrifugal - lever * self.inverse_inertia);
         let turn = torque * self.inverse_inertia;
         let sine_rate = at.cosine * rate;
         let (cosine_rate, centrifugal_rate) = if self.linearised {
@@ -171,7 +173,8 @@ impl RigidBody {
         };
         let torque_rate = self.weight * sine_rate - self.pendulum_damping * turn;
         let lever_rate = cosine_rate * torque + at.cosine * torque_rate;
-        force_rate + self.coupling * (centrifugal_rate - lever_rate * self.inverse_inertia)
+        let change = centrifugal_rate - lever_rate * self.inverse_inertia;
+        (balance, force_rate + self.coupling * change)
     }
 }
 
@@ -261,7 +264,8 @@ mod tests {
                     body.balancing_force(&moved, 5.0 + 3.0 * t)
                 };
                 let numeric = (along(1e-5) - along(-1e-5)) / 2e-5;
-                let rate = body.balancing_rate(&state, 3.0);
+                let (force, rate) = body.balancing(&state, 5.0, 3.0);
+                assert_eq!(force.to_bits(), body.balancing_force(&state, 5.0).to_bits());
                 assert!((numeric - rate).abs() < 1e-6 * rate.abs().max(1.0), "{numeric} {rate}");
             }
         }

@@ -64,7 +64,7 @@ impl<D: Number> StribeckLaw<D> {
     #[inline]
     pub fn magnitude(&self, velocity: D) -> D {
         let power = (velocity.absolute() * self.inverse_velocity).power(self.exponent);
-        self.coulomb + self.excess * (-power).exp()
+        self.coulomb + self.excess * (-power).exponential()
     }
 
     /// The friction in N of a cart that slides in the given direction at this velocity in m/s.

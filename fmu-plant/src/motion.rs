@@ -298,7 +298,11 @@ enum Progress {
 
 /// Factor from the length of a step with this squared scaled error to the next one.
 fn growth(squared_error: f64) -> f64 {
-    if squared_error.is_finite() { (0.9 * squared_error.powf(-0.1)).clamp(0.2, 5.0) } else { 0.1 }
+    if squared_error.is_finite() {
+        (0.9 * libm::pow(squared_error, -0.1)).clamp(0.2, 5.0)
+    } else {
+        0.1
+    }
 }
 
 #[cfg(test)]

@@ -1,4 +1,7 @@
 //! The numbers that the equations of the plant are written in.
+//!
+//! Sine, exponential and power are those of the crate `libm`, which have the same bits on every
+//! platform; those of the standard library are the platform's.
 
 use num_dual::{Dual64, DualNum};
 
@@ -8,6 +11,18 @@ pub trait Number: DualNum<Primitive = f64> + Copy {
     /// The absolute value; at zero its derivative is the one from the right.
     #[must_use]
     fn absolute(self) -> Self;
+
+    /// The sine.
+    #[must_use]
+    fn sine(self) -> Self;
+
+    /// Sine and cosine.
+    #[must_use]
+    fn sine_and_cosine(self) -> (Self, Self);
+
+    /// The exponential function.
+    #[must_use]
+    fn exponential(self) -> Self;
 
     /// `self^exponent` of a number `self >= 0` and an exponent above zero.
     ///
@@ -24,8 +39,23 @@ impl Number for f64 {
     }
 
     #[inline]
+    fn sine(self) -> Self {
+        libm::sin(self)
+    }
+
+    #[inline]
+    fn sine_and_cosine(self) -> (Self, Self) {
+        libm::sincos(self)
+    }
+
+    #[inline]
+    fn exponential(self) -> Self {
+        libm::exp(self)
+    }
+
+    #[inline]
     fn power(self, exponent: Self) -> Self {
-        if (exponent - 2.0).abs() < Self::EPSILON { self * self } else { self.powf(exponent) }
+        if (exponent - 2.0).abs() < Self::EPSILON { self * self } else { libm::pow(self, exponent) }
     }
 }
 
@@ -34,12 +64,26 @@ impl Number for Dual64 {
         if self.re < 0.0 { -self } else { self }
     }
 
+    fn sine(self) -> Self {
+        self.sine_and_cosine().0
+    }
+
+    fn sine_and_cosine(self) -> (Self, Self) {
+        let (sine, cosine) = self.re.sine_and_cosine();
+        (Self::new(sine, cosine * self.eps), Self::new(cosine, -sine * self.eps))
+    }
+
+    fn exponential(self) -> Self {
+        let value = self.re.exponential();
+        Self::new(value, value * self.eps)
+    }
+
     fn power(self, exponent: Self) -> Self {
         let value = self.re.power(exponent.re);
         let part = |change: f64, factor: f64| if change == 0.0 { 0.0 } else { change * factor };
-        let by_base = part(self.eps, exponent.re * self.re.powf(exponent.re - 1.0));
+        let by_base = part(self.eps, exponent.re * libm::pow(self.re, exponent.re - 1.0));
         // x^d ln x tends to zero with x.
-        let logarithm = if value == 0.0 { 0.0 } else { self.re.ln() };
+        let logarithm = if value == 0.0 { 0.0 } else { libm::log(self.re) };
         Self::new(value, by_base + part(exponent.eps, value * logarithm))
     }
 }

@@ -109,8 +109,9 @@ impl Plant {
 
     /// The balancing force and its rise over a length in s at its present rate.
     fn balancing(&self, elapsed: f64, state: &State, length: f64) -> (f64, f64) {
-        let rate = self.body.balancing_rate(state, self.force.rate_at(elapsed));
-        (self.balancing_force(elapsed, state), length * rate)
+        let (force, force_rate) = (self.force.at(elapsed), self.force.rate_at(elapsed));
+        let (balance, rate) = self.body.balancing(state, force, force_rate);
+        (balance, length * rate)
     }
 
     fn balancing_force(&self, elapsed: f64, state: &State) -> f64 {
