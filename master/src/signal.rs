@@ -116,7 +116,7 @@ impl Signal {
                     return Sample::held(*offset);
                 }
                 let rate = TAU * frequency;
-                let (sine, cosine) = (rate * (time - from) + phase).sin_cos();
+                let (sine, cosine) = libm::sincos(rate * (time - from) + phase);
                 Sample { value: offset + amplitude * sine, slope: amplitude * rate * cosine }
             }
             Signal::Track(track) => track.at(time, &mut cursor.0),

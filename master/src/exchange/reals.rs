@@ -109,7 +109,7 @@ impl Reals {
         for (k, fault) in self.faults.iter_mut().enumerate() {
             if let Some(fault) = fault {
                 let value = self.trace.latest[self.layout.sources[k] as usize];
-                fault.commit(time, self.layout.factors[k].mul_add(value, self.layout.offsets[k]));
+                fault.commit(time, self.layout.factors[k] * value + self.layout.offsets[k]);
             }
         }
     }
@@ -159,7 +159,7 @@ impl Reals {
             if !self.layout.plain[slave] {
                 for k in range {
                     self.values[k] =
-                        self.layout.factors[k].mul_add(self.values[k], self.layout.offsets[k]);
+                        self.layout.factors[k] * self.values[k] + self.layout.offsets[k];
                 }
             }
             return;
@@ -186,8 +186,7 @@ impl Reals {
             _ => course.value,
         };
         let factor = layout.factors[k];
-        let value =
-            if layout.plain[slave] { value } else { factor.mul_add(value, layout.offsets[k]) };
+        let value = if layout.plain[slave] { value } else { factor * value + layout.offsets[k] };
         let mut given = Polynomial {
             value,
             slope: factor * course.slope,

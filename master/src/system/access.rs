@@ -56,14 +56,14 @@ impl System {
                 Value::Boolean(if *value { *from_true } else { *from_false })
             }
             (Value::Real(value), Transformation::Linear { factor, offset }) => {
-                Value::Real(factor.mul_add(*value, *offset))
+                Value::Real(factor * value + offset)
             }
             (Value::Integer(value), _) if matches!(self.variable(to).kind, Kind::Real(_)) => {
                 let (factor, offset) = match transformation {
                     Transformation::Linear { factor, offset } => (*factor, *offset),
                     _ => (1.0, 0.0),
                 };
-                Value::Real(factor.mul_add(f64::from(*value), offset))
+                Value::Real(factor * f64::from(*value) + offset)
             }
             _ => value.clone(),
         }
