@@ -3,7 +3,7 @@
 
 mod archive;
 mod behaviour;
-mod binaries;
+pub(crate) mod binaries;
 mod description;
 mod finding;
 mod heard;
@@ -18,7 +18,9 @@ use fmi2::package::Unpacked;
 use master::{Fmu, Slave};
 use serde::Serialize;
 
-use finding::{Finding, Severity};
+use finding::Finding;
+
+pub(crate) use finding::Severity;
 
 #[derive(clap::Args)]
 pub(crate) struct Options {
@@ -74,7 +76,8 @@ fn findings(options: &Options) -> anyhow::Result<Vec<Finding>> {
     let description = &unpacked.description;
     let mut findings = archive::check(&options.fmu, unpacked.entries(), description)?;
     findings.extend(description::check(description, &unpacked.warnings));
-    findings.extend(binaries::check(unpacked.folder(), unpacked.entries(), description));
+    let read = |path: &str| std::fs::read(unpacked.folder().join(path));
+    findings.extend(binaries::check(&read, unpacked.entries(), description));
     if can_run(&unpacked) && !options.no_run {
         findings.extend(run(options, &unpacked)?);
     }

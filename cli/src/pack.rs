@@ -1,8 +1,10 @@
 //! `aso-ftc pack`: builds the library of a crate that uses `fmi2` and packs it into an FMU.
 #![expect(clippy::print_stdout, reason = "the result of the command")]
 
+mod binaries;
 mod library;
 mod licenses;
+mod sbom;
 mod ssp;
 
 use std::fs;
@@ -14,6 +16,7 @@ use fmi2::documentation::page;
 use fmi2::package::Package;
 
 use crate::figure::rasterise;
+use crate::whole_file;
 
 /// The models of this workspace.
 const MODELS: [&str; 2] = ["fmu-plant", "fmu-controller"];
@@ -42,12 +45,24 @@ pub(crate) struct Options {
     /// Also write InvertedPendulum.ssp: both FMUs of this workspace, connected, for 100 s
     #[arg(long, conflicts_with = "crates")]
     ssp: bool,
+    /// Pack the libraries in this folder, as FOLDER/win64/MODEL.dll, in place of the one built here
+    #[arg(long, value_name = "FOLDER")]
+    binaries: Option<PathBuf>,
+    /// Also write a bill of materials beside each FMU
+    #[arg(long)]
+    sbom: bool,
 }
 
 /// Builds and packs the given crates or all models of the workspace.
 pub(crate) fn pack(options: &Options) -> anyhow::Result<bool> {
+    let packing = Packing {
+        out: &options.out,
+        binaries: options.binaries.as_deref(),
+        sbom: options.sbom,
+        locked: options.crates.is_empty(),
+    };
     for folder in &options.crates {
-        let fmu = pack_crate(folder, &options.out, false)
+        let fmu = pack_crate(folder, &packing)
             .with_context(|| format!("cannot pack {}", folder.display()))?;
         println!("{}", fmu.path.display());
     }
@@ -55,7 +70,7 @@ pub(crate) fn pack(options: &Options) -> anyhow::Result<bool> {
         return Ok(true);
     }
     let root = workspace()?;
-    let fmus = pack_into(&root, &options.out)?;
+    let fmus = pack_models(&root, &packing)?;
     for fmu in &fmus {
         if options.update_descriptions {
             let name = format!("{}.xml", fmu.description.model_name);
@@ -71,6 +86,17 @@ pub(crate) fn pack(options: &Options) -> anyhow::Result<bool> {
     Ok(true)
 }
 
+/// How to pack.
+struct Packing<'a> {
+    /// Folder for the FMUs.
+    out: &'a Path,
+    /// Folder with libraries of all platforms.
+    binaries: Option<&'a Path>,
+    sbom: bool,
+    /// As in cargo.
+    locked: bool,
+}
+
 /// An FMU as packed.
 pub(crate) struct Packed {
     pub(crate) path: PathBuf,
@@ -80,7 +106,11 @@ pub(crate) struct Packed {
 
 /// Builds all models of the workspace `root` and packs each into the folder `out`.
 pub(crate) fn pack_into(root: &Path, out: &Path) -> anyhow::Result<Vec<Packed>> {
-    MODELS.iter().map(|model| pack_crate(&root.join(model), out, true)).collect()
+    pack_models(root, &Packing { out, binaries: None, sbom: false, locked: true })
+}
+
+fn pack_models(root: &Path, packing: &Packing<'_>) -> anyhow::Result<Vec<Packed>> {
+    MODELS.iter().map(|model| pack_crate(&root.join(model), packing)).collect()
 }
 
 /// The folder of this workspace: the nearest one upwards that has the models.
@@ -99,22 +129,43 @@ pub(crate) fn workspace() -> anyhow::Result<PathBuf> {
         })
 }
 
-fn pack_crate(folder: &Path, out: &Path, locked: bool) -> anyhow::Result<Packed> {
-    let library = library::build(folder, locked)?;
+fn pack_crate(folder: &Path, packing: &Packing<'_>) -> anyhow::Result<Packed> {
+    let others = packing.binaries.map_or(Ok(Vec::new()), binaries::targets)?;
+    let library = library::build(folder, packing.locked, &others)?;
     let resources = folder.join("resources");
     let (xml, description) = describe(&library.file, &resources, &library.package.name)?;
     let mut package = Package::new(xml.clone());
     let identifier = &description.model_name;
-    let (platform, suffix) = (fmi2::package::platforms(), std::env::consts::DLL_SUFFIX);
-    let platform = platform.first().context("FMI has no name for this platform")?;
-    package.add(format!("binaries/{platform}/{identifier}{suffix}"), read(&library.file)?);
+    let libraries = match packing.binaries {
+        Some(folder) => binaries::collect(folder, &description)?,
+        None => vec![own_library(&library, &description)?],
+    };
+    for (path, bytes) in libraries {
+        package.add(path, bytes);
+    }
     add_resources(&mut package, folder)?;
     add_documentation(&mut package, folder, &description)?;
     add_picture(&mut package, folder)?;
     licenses::add(&mut package, &library)?;
-    let path = out.join(format!("{identifier}.fmu"));
+    let path = packing.out.join(format!("{identifier}.fmu"));
     package.write(&path)?;
+    if packing.sbom {
+        let (bill, target) = (sbom::bill(&description, &library)?, path.with_extension("cdx.json"));
+        whole_file::write(&target, &bill)
+            .with_context(|| format!("cannot write {}", target.display()))?;
+    }
     Ok(Packed { path, xml, description })
+}
+
+/// Where the library that was built here goes in the FMU, and its bytes.
+fn own_library(
+    library: &library::Library,
+    description: &ModelDescription,
+) -> anyhow::Result<(String, Vec<u8>)> {
+    let (platform, suffix) = (fmi2::package::platforms(), std::env::consts::DLL_SUFFIX);
+    let platform = platform.first().context("FMI has no name for this platform")?;
+    let path = format!("binaries/{platform}/{}{suffix}", description.model_name);
+    Ok((path, read(&library.file)?))
 }
 
 /// What the library at `file` says of itself with `resources`; `name` is for messages.

@@ -1,8 +1,7 @@
 //! The shared libraries of all platforms, looked at without loading them.
 
 use std::collections::BTreeSet;
-use std::fs;
-use std::path::Path;
+use std::io;
 
 use fmi2::call_order::{Function, InterfaceType, State, allowed};
 use fmi2::description::ModelDescription;
@@ -52,9 +51,12 @@ const PLATFORMS: [Platform; 15] = {
     ]
 };
 
-/// Checks the folder `binaries` of the FMU that is unpacked in `folder` and has files of `names`.
-pub(super) fn check(
-    folder: &Path,
+/// The bytes of a file of the FMU, by its name there.
+pub(crate) type Read<'a> = dyn Fn(&str) -> io::Result<Vec<u8>> + 'a;
+
+/// Checks the folder `binaries` of an FMU that has files of `names`.
+pub(crate) fn check(
+    read: &Read<'_>,
     names: &[String],
     description: &ModelDescription,
 ) -> Vec<Finding> {
@@ -81,7 +83,7 @@ pub(super) fn check(
                 findings.add(Error, path, what, ("Importers look for modelIdentifier.", SECTION));
                 continue;
             }
-            library(folder, &path, platform, (&interfaces, names), &mut findings);
+            library(read, &path, platform, (&interfaces, names), &mut findings);
         }
     }
     findings.all
@@ -102,13 +104,13 @@ fn interfaces(description: &ModelDescription) -> Vec<(Vec<InterfaceType>, String
 }
 
 fn library(
-    folder: &Path,
+    read: &Read<'_>,
     path: &str,
     platform: &Platform,
     (interfaces, names): (&[InterfaceType], &[String]),
     findings: &mut Findings,
 ) {
-    let bytes = match fs::read(folder.join(path)) {
+    let bytes = match read(path) {
         Ok(bytes) => bytes,
         Err(error) => return findings.add(Error, path, error.to_string(), ("", "")),
     };

@@ -13,13 +13,7 @@ use cargo_metadata::{
 };
 
 /// The profile `fmu` for workspaces that have none of this name.
-const PROFILE: [&str; 5] = [
-    "profile.fmu.inherits = 'release'",
-    "profile.fmu.panic = 'unwind'",
-    "profile.fmu.lto = 'thin'",
-    "profile.fmu.codegen-units = 1",
-    "profile.fmu.strip = 'symbols'",
-];
+const PROFILE: &str = include_str!("fmu-profile.toml");
 
 /// The library of a crate, and what was compiled into it.
 pub(super) struct Library {
@@ -37,12 +31,13 @@ pub(super) struct Toolchain {
     host: String,
 }
 
-/// Builds the library of the crate in `folder`; `locked` as in cargo.
+/// Builds the library of the crate in `folder`; `locked` as in cargo. The dependencies are also those
+/// of the targets `others`, for which it is built elsewhere.
 ///
 /// # Errors
 ///
 /// Where there is no such crate, it is no `cdylib`, or it does not compile.
-pub(super) fn build(folder: &Path, locked: bool) -> anyhow::Result<Library> {
+pub(super) fn build(folder: &Path, locked: bool, others: &[&str]) -> anyhow::Result<Library> {
     let folder = std::path::absolute(folder)?;
     let manifest = folder.join("Cargo.toml");
     let manifest = manifest.display();
@@ -58,18 +53,24 @@ pub(super) fn build(folder: &Path, locked: bool) -> anyhow::Result<Library> {
         bail!("{manifest}: expected a library with crate-type = [\"cdylib\"] under [lib]");
     }
     let artifacts = compile(&folder, &metadata, locked)?;
+    let mut dependencies = dependencies(&metadata, package, &artifacts);
+    let everywhere: HashSet<_> =
+        reached(&metadata, package).into_iter().map(|own| &own.id).collect();
+    for target in others {
+        let there = self::metadata(&folder, target, locked)?;
+        let more = reached(&there, package).into_iter().filter(|own| !everywhere.contains(&own.id));
+        let more: Vec<_> = more.filter(|own| !dependencies.contains(own)).cloned().collect();
+        dependencies.extend(more);
+    }
+    dependencies
+        .sort_by(|one, other| (&one.name, &one.version).cmp(&(&other.name, &other.version)));
     let file = artifacts
         .iter()
         .filter(|artifact| artifact.package_id == package.id)
         .flat_map(|artifact| &artifact.filenames)
         .find(|file| file.extension() == Some(std::env::consts::DLL_EXTENSION))
         .with_context(|| format!("{manifest}: cargo made no library for this platform"))?;
-    Ok(Library {
-        file: file.into(),
-        package: package.clone(),
-        dependencies: dependencies(&metadata, package, &artifacts),
-        toolchain,
-    })
+    Ok(Library { file: file.into(), package: package.clone(), dependencies, toolchain })
 }
 
 impl Toolchain {
@@ -123,7 +124,9 @@ fn compile(folder: &Path, metadata: &Metadata, locked: bool) -> anyhow::Result<V
     command.arg(&target).args(["--message-format", "json-render-diagnostics"]);
     command.args(locked.then_some("--locked"));
     if !has_profile(root.as_std_path())? {
-        command.args(PROFILE.iter().flat_map(|setting| ["--config", setting]));
+        for (name, value) in profile()? {
+            command.args(["--config", &format!("profile.fmu.{name}={value}")]);
+        }
     }
     // Cargo gives rustc paths relative to the workspace; with absolute ones, a macro may have it.
     command.args(["--", &format!("--remap-path-prefix={root}=.")]);
@@ -166,6 +169,14 @@ fn remappings(metadata: &Metadata) -> Vec<String> {
     flags
 }
 
+/// The settings of [`PROFILE`].
+fn profile() -> anyhow::Result<toml::Table> {
+    let mut file: toml::Table = PROFILE.parse()?;
+    let profile = file.get_mut("profile").and_then(|profiles| profiles.get_mut("fmu"));
+    let settings = profile.and_then(|profile| profile.as_table_mut()).map(std::mem::take);
+    settings.context("fmu-profile.toml has no profile.fmu")
+}
+
 /// Whether the manifest of the workspace states the profile `fmu`.
 fn has_profile(root: &Path) -> anyhow::Result<bool> {
     let manifest = root.join("Cargo.toml");
@@ -173,26 +184,29 @@ fn has_profile(root: &Path) -> anyhow::Result<bool> {
     Ok(manifest.get("profile").is_some_and(|profiles| profiles.get("fmu").is_some()))
 }
 
-/// The packages that are in the library: reached without build scripts, tests and procedural
-/// macros, and built.
+/// The packages that are in the library: reached, and built.
 fn dependencies(metadata: &Metadata, root: &Package, artifacts: &[Artifact]) -> Vec<Package> {
     let built: HashSet<&PackageId> = artifacts.iter().map(|own| &own.package_id).collect();
+    reached(metadata, root).into_iter().filter(|own| built.contains(&own.id)).cloned().collect()
+}
+
+/// The packages that `root` needs, without build scripts, tests and procedural macros.
+fn reached<'a>(metadata: &'a Metadata, root: &Package) -> Vec<&'a Package> {
     let nodes = metadata.resolve.iter().flat_map(|resolve| &resolve.nodes);
     let nodes: Vec<_> = nodes.collect();
-    let (mut open, mut found) = (vec![&root.id], Vec::<Package>::new());
+    let (mut open, mut found) = (vec![&root.id], Vec::<&Package>::new());
     while let Some(id) = open.pop() {
         let own = nodes.iter().filter(|node| node.id == *id).flat_map(|node| &node.deps);
         for dependency in own {
             let normal = dependency.dep_kinds.iter().any(|own| own.kind == DependencyKind::Normal);
             let package = &metadata[&dependency.pkg];
             let known = found.iter().any(|known| known.id == package.id);
-            if normal && !known && built.contains(&package.id) && !is_macro(package) {
+            if normal && !known && !is_macro(package) {
                 open.push(&dependency.pkg);
-                found.push(package.clone());
+                found.push(package);
             }
         }
     }
-    found.sort_by(|one, other| (&one.name, &one.version).cmp(&(&other.name, &other.version)));
     found
 }
 

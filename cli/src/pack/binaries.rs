@@ -1,0 +1,103 @@
+//! Libraries of other platforms, built elsewhere.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+use fmi2::description::ModelDescription;
+
+use super::read;
+use crate::check::{Severity, binaries};
+
+/// What Rust calls the platforms of FMI that crates may differ on.
+const TARGETS: [(&str, &[&str]); 8] = [
+    ("linux64", &["x86_64-unknown-linux-gnu"]),
+    ("linux32", &["i686-unknown-linux-gnu"]),
+    ("win64", &["x86_64-pc-windows-gnu"]),
+    ("win32", &["i686-pc-windows-gnu"]),
+    ("darwin64", &["x86_64-apple-darwin", "aarch64-apple-darwin"]),
+    ("aarch64-linux", &["aarch64-unknown-linux-gnu"]),
+    ("aarch64-windows", &["aarch64-pc-windows-gnullvm"]),
+    ("aarch64-darwin", &["aarch64-apple-darwin"]),
+];
+
+/// The targets of the platforms that are in `folder`.
+///
+/// # Errors
+///
+/// Where the folder cannot be read.
+pub(super) fn targets(folder: &Path) -> anyhow::Result<Vec<&'static str>> {
+    let there = folders(folder)?;
+    let is_there = |name: &str| there.iter().any(|path| path.ends_with(name));
+    let found = TARGETS.iter().filter(|(name, _)| is_there(name)).flat_map(|(_, targets)| *targets);
+    Ok(found.copied().collect())
+}
+
+/// The libraries of a model among those in `folder`, as `win64/MODEL.dll`: where each goes in the
+/// FMU, and its bytes.
+///
+/// # Errors
+///
+/// Where there is none, or one that importers would refuse: of another platform than its folder
+/// says, or without a function of the standard.
+pub(super) fn collect(
+    folder: &Path,
+    description: &ModelDescription,
+) -> anyhow::Result<Vec<(String, Vec<u8>)>> {
+    let model = &description.model_name;
+    let mut found = Vec::new();
+    for platform in folders(folder)? {
+        for file in files(&platform)? {
+            if file.file_stem().is_some_and(|stem| stem.to_str() == Some(model)) {
+                let part =
+                    |path: &Path| path.file_name().map(|name| name.to_string_lossy().into_owned());
+                let names = part(&platform).zip(part(&file));
+                let (platform, name) = names.context("a file without a name")?;
+                found.push((format!("binaries/{platform}/{name}"), read(&file)?));
+            }
+        }
+    }
+    if found.is_empty() {
+        let folder = folder.display();
+        bail!(
+            "there is no library of {model} in {folder}: expected \
+             {folder}/win64/{model}.dll, {folder}/linux64/{model}.so or the like"
+        );
+    }
+    refuse_broken(&found, description)
+        .with_context(|| format!("the libraries of {model} in {}", folder.display()))?;
+    Ok(found)
+}
+
+fn refuse_broken(
+    found: &[(String, Vec<u8>)],
+    description: &ModelDescription,
+) -> anyhow::Result<()> {
+    let names: Vec<_> = found.iter().map(|(path, _)| path.clone()).collect();
+    let bytes = |path: &str| {
+        let own = found.iter().find(|(name, _)| name == path);
+        own.map(|(_, bytes)| bytes.clone()).ok_or_else(|| std::io::ErrorKind::NotFound.into())
+    };
+    let faults: Vec<_> = binaries::check(&bytes, &names, description)
+        .into_iter()
+        .filter(|finding| finding.severity != Severity::Note)
+        .map(|finding| finding.to_string())
+        .collect();
+    if faults.is_empty() { Ok(()) } else { bail!("{}", faults.join("\n")) }
+}
+
+/// The folders in `folder`, by name.
+fn folders(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    Ok(files(folder)?.into_iter().filter(|path| path.is_dir()).collect())
+}
+
+/// What is in `folder`, by name.
+fn files(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let failed = || format!("cannot read {}", folder.display());
+    let items = fs::read_dir(folder).with_context(failed)?;
+    let mut paths = items
+        .map(|item| Ok(item.with_context(failed)?.path()))
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    paths.sort();
+    Ok(paths)
+}

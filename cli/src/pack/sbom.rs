@@ -1,0 +1,88 @@
+//! A bill of materials of an FMU in `CycloneDX` 1.5: the model and what is compiled into its libraries.
+//!
+//! It has neither a time nor a serial number, so that the same sources give the same bytes.
+
+use anyhow::{Context, bail};
+use cargo_metadata::Package as Crate;
+use cyclonedx_bom::external_models::normalized_string::NormalizedString;
+use cyclonedx_bom::external_models::uri::Purl;
+use cyclonedx_bom::models::bom::{Bom, SpecVersion};
+use cyclonedx_bom::models::component::{Classification, Component, Components};
+use cyclonedx_bom::models::dependency::{Dependencies, Dependency};
+use cyclonedx_bom::models::license::{LicenseChoice, Licenses};
+use cyclonedx_bom::models::metadata::Metadata;
+use cyclonedx_bom::prelude::{SpdxExpression, Validate as _};
+use fmi2::description::ModelDescription;
+
+use super::library::Library;
+
+/// The bill of the FMU with this description, as JSON.
+///
+/// # Errors
+///
+/// Where a crate states what `CycloneDX` cannot have: a name or an expression of licences.
+pub(super) fn bill(description: &ModelDescription, library: &Library) -> anyhow::Result<Vec<u8>> {
+    let own = &library.package;
+    let mut model = component(own, Classification::Application)?;
+    model.name = NormalizedString::new(&description.model_name);
+    model.description = description.description.as_deref().map(NormalizedString::new);
+    let mut parts = library
+        .dependencies
+        .iter()
+        .map(|package| component(package, Classification::Library))
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    parts.push(standard_library(&library.toolchain.release));
+    let needs = Dependency {
+        dependency_ref: reference(own),
+        dependencies: parts.iter().filter_map(|part| part.bom_ref.clone()).collect(),
+    };
+    let bom = Bom {
+        serial_number: None,
+        metadata: Some(Metadata { component: Some(model), ..Metadata::default() }),
+        components: Some(Components(parts)),
+        dependencies: Some(Dependencies(vec![needs])),
+        spec_version: SpecVersion::V1_5,
+        ..Bom::default()
+    };
+    let result = bom.validate_version(SpecVersion::V1_5);
+    if result.has_errors() {
+        let faults: Vec<_> =
+            result.errors().map(|(field, fault)| format!("{field}: {fault:?}")).collect();
+        bail!("the bill of materials of {} is not valid: {}", own.name, faults.join("; "));
+    }
+    let mut bytes = Vec::new();
+    bom.output_as_json(&mut bytes, SpecVersion::V1_5)
+        .with_context(|| format!("the bill of materials of {}", own.name))?;
+    bytes.push(b'\n');
+    Ok(bytes)
+}
+
+fn reference(package: &Crate) -> String {
+    format!("{}@{}", package.name, package.version)
+}
+
+fn component(package: &Crate, kind: Classification) -> anyhow::Result<Component> {
+    let (name, version) = (package.name.as_str(), package.version.to_string());
+    let mut component = Component::new(kind, name, &version, Some(reference(package)));
+    if package.source.is_some() {
+        component.purl = Some(Purl::new("cargo", name, &version)?);
+    }
+    component.licenses = package.license.as_deref().map(licenses).transpose()?;
+    Ok(component)
+}
+
+/// The licences by a SPDX expression; crates of old have a slash for OR.
+fn licenses(stated: &str) -> anyhow::Result<Licenses> {
+    let expression = SpdxExpression::parse_lax(stated.replace('/', " OR "))
+        .with_context(|| format!("the licence {stated:?}"))?;
+    Ok(Licenses(vec![LicenseChoice::Expression(expression)]))
+}
+
+fn standard_library(release: &str) -> Component {
+    let reference = format!("rust-std@{release}");
+    let mut component =
+        Component::new(Classification::Library, "rust-std", release, Some(reference));
+    let licenses = SpdxExpression::new("MIT OR Apache-2.0");
+    component.licenses = Some(Licenses(vec![LicenseChoice::Expression(licenses)]));
+    component
+}

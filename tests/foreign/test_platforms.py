@@ -1,0 +1,264 @@
+"""The FMUs for every platform, as scripts/cross packed them: each binary on its platform, or read.
+
+Linux runs as it is and with an old glibc's symbols only, Windows under wine, ARM Linux under qemu.
+Nothing here runs macOS; its files are read. The folder of the FMUs is target/cross/dist, or what the
+variable PLATFORM_FMUS names.
+"""
+
+import hashlib
+import json
+import os
+import subprocess
+import zipfile
+from pathlib import Path
+
+import lief
+import pytest
+from fmpy import read_model_description, simulate_fmu
+from fmpy.util import add_remoting
+
+STEPS = 5000
+MODELS = {"plant": "FrictionPendulum", "controller": "AsoController"}
+CONNECTED = ("x_p", "theta", "u")
+# How each platform compiles the host, runs it, and names files.
+RUN = {
+    "linux64": (["cc"], []),
+    "win64": (["x86_64-w64-mingw32-gcc", "-static"], ["wine"]),
+    "aarch64-linux": (["aarch64-linux-gnu-gcc"], ["qemu-aarch64", "-L", "/usr/aarch64-linux-gnu"]),
+}
+SUFFIX = {"linux64": "so", "win64": "dll", "darwin64": "dylib", "aarch64-linux": "so"}
+SUFFIX["aarch64-darwin"] = "dylib"
+# Libraries that every Windows 10 has.
+WINDOWS = {"kernel32.dll", "ntdll.dll", "msvcrt.dll", "bcryptprimitives.dll"}
+WINDOWS |= {"api-ms-win-core-synch-l1-2-0.dll"}
+LINUX = {"libc.so.6", "libm.so.6", "libpthread.so.0", "libdl.so.2"}
+LINUX |= {"ld-linux-x86-64.so.2", "ld-linux-aarch64.so.1"}
+
+
+@pytest.fixture(scope="session")
+def fmus(root):
+    """The FMUs of scripts/cross, by role."""
+    folder = Path(os.environ.get("PLATFORM_FMUS", root / "target" / "cross" / "dist"))
+    paths = {role: folder / f"{model}.fmu" for role, model in MODELS.items()}
+    for path in paths.values():
+        assert path.is_file(), f"{path} is missing: run scripts/cross --out {folder} first"
+    return paths
+
+
+def binary(fmus, role, platform):
+    """The name of a library in its FMU; skips what was not built."""
+    name = f"binaries/{platform}/{MODELS[role]}.{SUFFIX[platform]}"
+    if name not in zipfile.ZipFile(fmus[role]).namelist():
+        pytest.skip(f"scripts/cross was not asked for {platform}")
+    return name
+
+
+@pytest.fixture(scope="session")
+def wine(tmp_path_factory):
+    """Variables for wine in a folder of its own, with the one library that wine 8 lacks."""
+    folder = tmp_path_factory.mktemp("wine")
+    variables = {"WINEPREFIX": str(folder / "prefix"), "WINEARCH": "win64", "WINEDEBUG": "-all"}
+    # FMPy calls it by this name.
+    (folder / "wine64").write_text('#!/bin/sh\nexec wine "$@"\n')
+    (folder / "wine64").chmod(0o755)
+    variables["PATH"] = f"{folder}:{os.environ['PATH']}"
+    environment = {**os.environ, **variables}
+    subprocess.run(["wineboot", "--init"], env=environment, check=True, capture_output=True)
+    # Random numbers of Windows, by the function that stands behind them in wine.
+    source = folder / "bcryptprimitives.c"
+    source.write_text(
+        "#include <windows.h>\n#include <ntsecapi.h>\n"
+        "__declspec(dllexport) BOOL ProcessPrng(PBYTE bytes, SIZE_T count)\n"
+        "{ return RtlGenRandom(bytes, (ULONG)count); }\n"
+    )
+    target = folder / "prefix" / "drive_c" / "windows" / "system32" / "bcryptprimitives.dll"
+    if not target.exists():
+        compiler = ["x86_64-w64-mingw32-gcc", "-shared", "-o", target, source, "-ladvapi32"]
+        subprocess.run(compiler, check=True)
+    yield environment
+    subprocess.run(["wineserver", "-k"], env=environment, check=False)
+
+
+def words(fmu, library, folder, windows):
+    """What the host wants to know of an FMU."""
+    description = read_model_description(str(fmu))
+    reference = {v.name: str(v.valueReference) for v in description.modelVariables}
+    drive = "Z:" if windows else ""
+    uri = f"file:///{drive}{folder / 'resources'}".replace("////", "///")
+    return [f"{drive}{library}", description.guid, uri, *(reference[name] for name in CONNECTED)]
+
+
+@pytest.fixture(scope="session")
+def hosted(fmus, root, tmp_path_factory, request):
+    """What the host prints on a platform, with the binaries in the FMUs."""
+    printed = {}
+
+    def run(platform):
+        if platform not in printed:
+            folder = tmp_path_factory.mktemp(platform)
+            compiler, runner = RUN[platform]
+            windows = platform == "win64"
+            program = folder / ("host.exe" if windows else "host")
+            source = root / "tests" / "platforms" / "host.c"
+            options = ["-std=c11", "-O2", "-Wall", "-Wextra", "-Werror", "-o", program, source]
+            libraries = [] if windows else ["-ldl"]
+            subprocess.run([*compiler, *options, *libraries], check=True)
+            arguments = [str(STEPS)]
+            for role, fmu in fmus.items():
+                name = binary(fmus, role, platform)
+                zipfile.ZipFile(fmu).extractall(folder / role)
+                arguments += words(fmu, folder / role / name, folder / role, windows)
+            environment = request.getfixturevalue("wine") if windows else None
+            command = [*runner, program, *arguments]
+            done = subprocess.run(command, capture_output=True, text=True, env=environment)
+            assert done.returncode == 0, f"{platform}: {done.stdout}\n{done.stderr}"
+            printed[platform] = done.stdout.replace("\r\n", "\n")
+        return printed[platform]
+
+    return run
+
+
+@pytest.mark.parametrize("platform", RUN)
+def test_the_interface_holds_on_each_platform(fmus, hosted, platform):
+    binary(fmus, "plant", platform)
+    text = hosted(platform)
+    assert text.endswith("done\n") and "FAILED" not in text
+
+
+@pytest.mark.parametrize("platform", [name for name in RUN if name != "linux64"])
+def test_the_closed_loop_has_the_bits_of_linux(fmus, hosted, platform, packed, unpacked, root):
+    binary(fmus, "plant", platform)
+    lines = lambda text: [line for line in text.splitlines() if line.startswith("step ")]
+    assert len(lines(hosted(platform))) == 10
+    assert lines(hosted(platform)) == lines(native(packed, unpacked, root))
+
+
+def native(packed, unpacked, root):
+    """What the host prints with the FMUs of `aso-ftc pack`, built for this machine alone."""
+    program = Path(unpacked["plant"].path).parent / "host"
+    source = root / "tests" / "platforms" / "host.c"
+    subprocess.run(["cc", "-std=c11", "-O2", "-o", program, source, "-ldl"], check=True)
+    arguments = [str(STEPS)]
+    for role, fmu in packed.items():
+        own = Path(unpacked[role].path)
+        arguments += words(fmu, own, own.parents[2], False)
+    return subprocess.run([program, *arguments], capture_output=True, text=True, check=True).stdout
+
+
+@pytest.mark.parametrize("role", MODELS)
+def test_fmpys_windows_server_has_the_results_of_linux(fmus, packed, role, wine, tmp_path, monkeypatch):
+    binary(fmus, role, "win64")
+    alone = tmp_path / "windows.fmu"
+    with zipfile.ZipFile(fmus[role]) as whole, zipfile.ZipFile(alone, "w") as part:
+        for name in whole.namelist():
+            if not name.startswith("binaries/") or name.startswith("binaries/win64/"):
+                part.writestr(name, whole.read(name))
+    for name in ("WINEPREFIX", "WINEARCH", "WINEDEBUG", "PATH"):
+        monkeypatch.setenv(name, wine[name])
+    add_remoting(str(alone), "linux64", "win64")
+    settings = {"fmi_type": "CoSimulation", "stop_time": 1.0, "output_interval": 0.01}
+    here = simulate_fmu(str(packed[role]), **settings)
+    there = simulate_fmu(str(alone), **settings)
+    assert len(there) == 101 and there.dtype == here.dtype
+    assert there.tobytes() == here.tobytes()
+
+
+@pytest.mark.parametrize("role", MODELS)
+@pytest.mark.parametrize("platform", SUFFIX)
+def test_nothing_but_the_functions_of_fmi_is_exported(fmus, role, platform):
+    library = zipfile.ZipFile(fmus[role]).read(binary(fmus, role, platform))
+    for part in slices(library):
+        names = exported(part)
+        assert len(names) == 45, names
+        assert {name for name in names if not name.startswith("fmi2")} == {"fmuDescribe"}
+
+
+def slices(library):
+    """The binaries in a file: one, or one for each machine of macOS."""
+    parsed = lief.parse(list(library))
+    if isinstance(parsed, lief.MachO.Binary):
+        return list(lief.MachO.parse(list(library)))
+    return [parsed]
+
+
+def exported(part):
+    """The names that a loader finds."""
+    if isinstance(part, lief.ELF.Binary):
+        return {symbol.name for symbol in part.exported_symbols}
+    if isinstance(part, lief.PE.Binary):
+        return {entry.name for entry in part.get_export().entries}
+    # In C every name of macOS begins with an underscore.
+    return {info.symbol.name.removeprefix("_") for info in part.dyld_exports_trie.exports}
+
+
+@pytest.mark.parametrize("role", MODELS)
+@pytest.mark.parametrize("platform", ["linux64", "aarch64-linux"])
+def test_linux_needs_glibc_of_2012_and_nothing_else(fmus, role, platform):
+    (part,) = slices(zipfile.ZipFile(fmus[role]).read(binary(fmus, role, platform)))
+    assert set(part.libraries) <= LINUX
+    versions = [
+        tuple(map(int, entry.name.removeprefix("GLIBC_").split(".")))
+        for needed in part.symbols_version_requirement
+        for entry in needed.get_auxiliary_symbols()
+    ]
+    assert versions and max(versions) <= (2, 17)
+
+
+@pytest.mark.parametrize("role", MODELS)
+def test_windows_needs_libraries_of_the_system_only(fmus, role):
+    (part,) = slices(zipfile.ZipFile(fmus[role]).read(binary(fmus, role, "win64")))
+    assert {name.lower() for name in part.libraries} <= WINDOWS
+    assert part.header.time_date_stamps == 0
+
+
+@pytest.mark.parametrize("role", MODELS)
+@pytest.mark.parametrize("platform", ["darwin64", "aarch64-darwin"])
+def test_macos_finds_what_it_asks_for_in_each_part(fmus, role, platform):
+    parts = slices(zipfile.ZipFile(fmus[role]).read(binary(fmus, role, platform)))
+    machines = {part.header.cpu_type.name: part for part in parts}
+    assert set(machines) == ({"X86_64", "ARM64"} if platform == "darwin64" else {"ARM64"})
+    for machine, part in machines.items():
+        own, *others = part.libraries
+        assert own.name == f"@rpath/{MODELS[role]}.dylib"
+        assert [other.name for other in others] == ["/usr/lib/libSystem.B.dylib"]
+        least = part.version_min.version if part.has_version_min else part.build_version.minos
+        assert least[:2] == ([11, 0] if machine == "ARM64" else [10, 12])
+        well_formed, fault = lief.MachO.check_layout(part)
+        assert well_formed, fault
+
+
+@pytest.mark.parametrize("role", MODELS)
+@pytest.mark.parametrize("platform", ["darwin64", "aarch64-darwin"])
+def test_the_signature_for_arm_macs_is_that_of_the_pages(fmus, role, platform):
+    library = zipfile.ZipFile(fmus[role]).read(binary(fmus, role, platform))
+    (part,) = [part for part in slices(library) if part.header.cpu_type.name == "ARM64"]
+    start = part.fat_offset
+    begin = start + part.code_signature.data_offset
+    blob = library[begin : begin + part.code_signature.data_size]
+    word = lambda at: int.from_bytes(blob[at : at + 4], "big")
+    assert word(0) == 0xFADE0CC0  # a list of blobs
+    directories = [word(16 + 8 * k) for k in range(word(8)) if word(12 + 8 * k) == 0]
+    (at,) = directories
+    assert word(at) == 0xFADE0C02  # a code directory
+    flags, hashes, pages, limit = word(at + 12), word(at + 16), word(at + 28), word(at + 32)
+    size, kind, page = blob[at + 36], blob[at + 37], 1 << blob[at + 39]
+    assert flags & 2 and (size, kind) == (32, 2)  # without a certificate; SHA-256
+    assert limit == part.code_signature.data_offset and pages == -(-limit // page)
+    for k in range(pages):
+        code = library[start + k * page : start + min((k + 1) * page, limit)]
+        stated = blob[at + hashes + 32 * k :][:32]
+        assert hashlib.sha256(code).digest() == stated, f"page {k}"
+
+
+def test_sums_and_bills_belong_to_the_fmus(fmus):
+    folder = fmus["plant"].parent
+    done = subprocess.run(["sha256sum", "--check", "SHA256SUMS"], cwd=folder, capture_output=True)
+    assert done.returncode == 0 and done.stdout.count(b": OK") == 4
+    for fmu in fmus.values():
+        bill = json.loads(fmu.with_suffix(".cdx.json").read_text(encoding="utf-8"))
+        assert (bill["bomFormat"], bill["specVersion"]) == ("CycloneDX", "1.5")
+        listed = {f"{part['name']}-{part['version']}" for part in bill["components"]}
+        texts = zipfile.ZipFile(fmu).namelist()
+        prefix = "documentation/licenses/"
+        packed = {name.split("/")[2] for name in texts if name.startswith(prefix) and name.count("/") > 2}
+        assert {name for name in packed if not name.startswith("rust-")} <= listed
