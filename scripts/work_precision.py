@@ -1,6 +1,6 @@
 """Draws docs/work_precision.svg from docs/work_precision.csv.
 
-Usage: cargo run --release -p master --example work_precision > docs/work_precision.csv
+Usage: cargo run --release -p tests --example work_precision > docs/work_precision.csv
        python scripts/work_precision.py
 """
 

@@ -102,9 +102,7 @@ pub fn place(
     b: &DMatrix<f64>,
     poles: &[Complex<f64>],
 ) -> Result<Placement, Error> {
-    let choice = Choice::given(a, b, poles)?;
-    let scale = choice.balance(a, b);
-    choice.placement(a, b, poles, &scale, &CONTINUOUS)
+    as_given(a, b, poles, &CONTINUOUS)
 }
 
 /// As [`place`], with the eigenvectors well conditioned in balanced coordinates.
@@ -166,9 +164,18 @@ pub(crate) fn place_discrete_as_given(
     b: &DMatrix<f64>,
     poles: &[Complex<f64>],
 ) -> Result<Placement, Error> {
+    as_given(a, b, poles, &DISCRETE)
+}
+
+fn as_given(
+    a: &DMatrix<f64>,
+    b: &DMatrix<f64>,
+    poles: &[Complex<f64>],
+    demand: &Demand,
+) -> Result<Placement, Error> {
     let choice = Choice::given(a, b, poles)?;
     let scale = choice.balance(a, b);
-    choice.placement(a, b, poles, &scale, &DISCRETE)
+    choice.placement(a, b, poles, &scale, demand)
 }
 
 fn balanced(

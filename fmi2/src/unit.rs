@@ -54,9 +54,29 @@ impl Default for BaseUnit {
 }
 
 impl BaseUnit {
-    fn from_exponents(exponents: [i32; 8], factor: f64, offset: f64) -> Self {
+    /// What the exponents are called in XML, in the order of [`BaseUnit::exponents`].
+    pub const EXPONENTS: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
+
+    /// Of exponents in the order of [`BaseUnit::EXPONENTS`].
+    #[must_use]
+    pub fn from_exponents(exponents: [i32; 8], factor: f64, offset: f64) -> Self {
         let [kg, m, s, a, k, mol, cd, rad] = exponents;
         BaseUnit { kg, m, s, a, k, mol, cd, rad, factor, offset }
+    }
+
+    /// The exponents in the order of [`BaseUnit::EXPONENTS`].
+    #[must_use]
+    pub fn exponents(&self) -> [i32; 8] {
+        [self.kg, self.m, self.s, self.a, self.k, self.mol, self.cd, self.rad]
+    }
+
+    /// Factor and offset from values in this unit to values in `other`, as `base = factor * unit +
+    /// offset` holds for both; none where they measure different quantities.
+    #[must_use]
+    pub fn conversion(&self, other: &BaseUnit) -> Option<(f64, f64)> {
+        let factor = self.factor / other.factor;
+        let offset = (self.offset - other.offset) / other.factor;
+        (self.exponents() == other.exponents()).then_some((factor, offset))
     }
 }
 

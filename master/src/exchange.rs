@@ -222,15 +222,7 @@ impl Exchange {
         slave: usize,
         time: f64,
     ) -> Result<(), SystemError> {
-        if self.allow_nan {
-            return Ok(());
-        }
-        match self.reals.not_finite(slave) {
-            None => Ok(()),
-            Some((port, value)) => {
-                Err(SystemError::NotFinite { name: system.name(port), value, time })
-            }
-        }
+        self.refuse(system, time, || self.reals.not_finite(slave))
     }
 
     /// What connections and faults make of outputs for the gathered inputs of the slave is finite.
@@ -241,10 +233,21 @@ impl Exchange {
         slave: usize,
         time: f64,
     ) -> Result<(), SystemError> {
+        self.refuse(system, time, || self.reals.input_not_finite(slave))
+    }
+
+    /// The error of the value that `wrong` finds, unless any value will do.
+    #[inline]
+    fn refuse(
+        &self,
+        system: &System,
+        time: f64,
+        wrong: impl FnOnce() -> Option<(Port, f64)>,
+    ) -> Result<(), SystemError> {
         if self.allow_nan {
             return Ok(());
         }
-        match self.reals.input_not_finite(slave) {
+        match wrong() {
             None => Ok(()),
             Some((port, value)) => {
                 Err(SystemError::NotFinite { name: system.name(port), value, time })

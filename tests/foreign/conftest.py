@@ -14,6 +14,14 @@ PACKED = {
     "plant": ROOT / "dist" / "FrictionPendulum.fmu",
     "controller": ROOT / "dist" / "AsoController.fmu",
 }
+EXAMPLES = {
+    "van-der-pol": "VanDerPol",
+    "bouncing-ball": "BouncingBall",
+    "pid": "Pid",
+    "lookup-table": "LookupTable",
+    "three-tank": "ThreeTank",
+    "dc-servo": "DcServo",
+}
 
 
 @pytest.fixture(scope="session")
@@ -75,3 +83,12 @@ def python():
         return subprocess.run(command, capture_output=True, text=True, **options)
 
     return run
+
+
+@pytest.fixture(scope="session")
+def examples(aso_ftc, root, tmp_path_factory):
+    """The packed examples, by name of the model."""
+    out = tmp_path_factory.mktemp("examples")
+    done = aso_ftc("pack", *(root / "examples" / name for name in EXAMPLES), "--out", out)
+    assert done.returncode == 0, done.stderr
+    return {model: out / f"{model}.fmu" for model in EXAMPLES.values()}

@@ -5,15 +5,8 @@ import pytest
 from fmpy import read_model_description
 
 from any_fmu import numbers, run, stepped
+from conftest import EXAMPLES
 
-EXAMPLES = {
-    "van-der-pol": "VanDerPol",
-    "bouncing-ball": "BouncingBall",
-    "pid": "Pid",
-    "lookup-table": "LookupTable",
-    "three-tank": "ThreeTank",
-    "dc-servo": "DcServo",
-}
 STEP, COUNT = 2.0**-7, 384  # s; three seconds
 # One input of each FMU that has some, so that something happens.
 DRIVEN = {
@@ -22,15 +15,6 @@ DRIVEN = {
     "ThreeTank": {"Q_1": 1e-4},
     "DcServo": {"u": 6.0},
 }
-
-
-@pytest.fixture(scope="module")
-def examples(aso_ftc, root, tmp_path_factory):
-    """The packed examples, by name of the model."""
-    out = tmp_path_factory.mktemp("examples")
-    done = aso_ftc("pack", *(root / "examples" / name for name in EXAMPLES), "--out", out)
-    assert done.returncode == 0, done.stderr
-    return {model: out / f"{model}.fmu" for model in EXAMPLES.values()}
 
 
 def driven(model, variables):

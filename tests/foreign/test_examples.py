@@ -10,26 +10,12 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from fmpy import extract, read_model_description, simulate_fmu
-from fmpy.fmi2 import FMU2Slave
+from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 from scipy.integrate import solve_ivp
 
-EXAMPLES = {
-    "van-der-pol": "VanDerPol",
-    "bouncing-ball": "BouncingBall",
-    "pid": "Pid",
-    "lookup-table": "LookupTable",
-}
-
-
-@pytest.fixture(scope="module")
-def examples(aso_ftc, root, tmp_path_factory):
-    """The packed examples, by name of the model."""
-    out = tmp_path_factory.mktemp("examples")
-    done = aso_ftc("pack", *(root / "examples" / name for name in EXAMPLES), "--out", out)
-    assert done.returncode == 0, done.stderr
-    return {model: out / f"{model}.fmu" for model in EXAMPLES.values()}
+from any_fmu import instance
+from conftest import EXAMPLES
 
 
 def published(root, name):
@@ -40,23 +26,8 @@ def published(root, name):
 @contextmanager
 def slave(fmu, folder, start=None):
     """An instance by FMPy after initialization, and its value references by name."""
-    description = read_model_description(str(fmu))
-    names = {variable.name: variable.valueReference for variable in description.modelVariables}
-    instance = FMU2Slave(
-        guid=description.guid,
-        unzipDirectory=extract(str(fmu), str(folder)),
-        modelIdentifier=description.coSimulation.modelIdentifier,
-        instanceName="own",
-    )
-    instance.instantiate()
-    instance.setupExperiment(startTime=0.0)
-    for name, value in (start or {}).items():
-        instance.setReal([names[name]], [value])
-    instance.enterInitializationMode()
-    instance.exitInitializationMode()
-    yield instance, names
-    instance.terminate()
-    instance.freeInstance()
+    with instance(fmu, folder, start) as (initialized, variables):
+        yield initialized, {name: variable.valueReference for name, variable in variables.items()}
 
 
 @pytest.mark.parametrize("model", EXAMPLES.values())

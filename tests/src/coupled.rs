@@ -13,6 +13,25 @@ use crate::command;
 /// Communication step of the runs in s, a power of two: sums of it are exact.
 pub const STEP: f64 = 1.0 / 16.0;
 
+/// Rows of the results of a whole run.
+pub const ALL: usize = 17;
+/// Rows of one that ends at the last successful step, to t1.
+pub const TO_T1: usize = 9;
+/// Behaviour that is unusual and harms nobody.
+pub const UNUSUAL: [&str; 11] = [
+    "as it should",
+    "pend",
+    "warn everywhere",
+    "step of one size",
+    "no category in fmi2DoStep",
+    "no message in fmi2DoStep",
+    "no name in fmi2DoStep",
+    "specifiers in fmi2DoStep",
+    "long message in fmi2DoStep",
+    "print in fmi2DoStep",
+    "leak in fmi2DoStep",
+];
+
 /// Longest that a run may take before it counts as hung.
 const PATIENCE: Duration = Duration::from_secs(300);
 

@@ -1,8 +1,12 @@
-//! What the tests share: the packed FMUs, the command, the coupled system.
+//! What the tests share: the packed FMUs, the command, the coupled system; FMUs that misbehave; linear
+//! slaves, networks of them and their exact solution.
 #![forbid(unsafe_code)]
 
 pub mod c_fmu;
 pub mod coupled;
+pub mod linear;
+pub mod network;
+pub mod problems;
 mod troubles;
 
 pub use troubles::{Trouble, troubles};

@@ -1,4 +1,7 @@
-//! An FMU in C that does whatever an FMU must not do.
+//! An FMU in C that does whatever an FMU must not do, mostly to its process.
+//!
+//! Unlike those of [`c_fmu`](crate::c_fmu), which are strict, it takes any call at any time: it is
+//! told between two steps what to do next, and has texts and a state that are long.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -4,27 +4,11 @@
 #![forbid(unsafe_code)]
 
 use tests::c_fmu::CFmu;
-use tests::coupled::{Run, STEP};
-
-/// Rows of a whole run, and of one that ends at the last successful step, to t1.
-const ALL: usize = 17;
-const TO_T1: usize = 9;
+use tests::coupled::{ALL, Run, STEP, TO_T1, UNUSUAL};
 
 #[test]
 fn unusual_fmus_run_as_any_other() {
-    for behaviour in [
-        "as it should",
-        "pend",
-        "warn everywhere",
-        "step of one size",
-        "no category in fmi2DoStep",
-        "no message in fmi2DoStep",
-        "no name in fmi2DoStep",
-        "specifiers in fmi2DoStep",
-        "long message in fmi2DoStep",
-        "print in fmi2DoStep",
-        "leak in fmi2DoStep",
-    ] {
+    for behaviour in UNUSUAL {
         Run::pair(&CFmu::that(behaviour), &[]).expect(0, ALL);
     }
     Run::pair(&CFmu::that("no way back").without_rollback(), &[]).expect(0, ALL);

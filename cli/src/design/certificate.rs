@@ -2,7 +2,7 @@
 
 use control::Domain;
 use control::lmi::Outcome;
-use control::theorem1::{certify, largest_decay, smallest_region, ultimate_bound};
+use control::theorem1::{self, certify, largest_decay, smallest_region, ultimate_bound};
 
 use super::designed::Designed;
 use super::report::{Certificate, FreeP, Norm, Theorem1, Ultimate, rows};
@@ -46,16 +46,21 @@ fn printed(designed: &Designed) -> Result<Theorem1, String> {
     applies(designed)?;
     let beta = fault_bound(designed)?;
     let found = certify(&designed.plant, &designed.gains, ALPHA, beta);
-    let found = found.map_err(|error| error.to_string())?;
-    Ok(Theorem1 {
-        alpha: found.alpha,
-        beta: found.beta,
-        p: rows(&found.p),
-        smallest_eigenvalue: found.p_range.0,
-        largest_eigenvalue: found.p_range.1,
-        residual: found.residual,
-        delta: found.delta,
-    })
+    found.map(|found| (&found).into()).map_err(|error| error.to_string())
+}
+
+impl From<&theorem1::Certificate> for Theorem1 {
+    fn from(found: &theorem1::Certificate) -> Self {
+        Self {
+            alpha: found.alpha,
+            beta: found.beta,
+            p: rows(&found.p),
+            smallest_eigenvalue: found.p_range.0,
+            largest_eigenvalue: found.p_range.1,
+            residual: found.residual,
+            delta: found.delta,
+        }
+    }
 }
 
 fn verified<T>(outcome: Result<Outcome<T>, control::Error>) -> Result<T, String> {

@@ -309,19 +309,12 @@ fn unit(element: Node<'_>) -> Result<Unit, ParseError> {
 }
 
 fn base_unit(element: Node<'_>) -> Result<BaseUnit, ParseError> {
-    let exponent = |name| Ok(element.integer(name)?.unwrap_or(0));
-    Ok(BaseUnit {
-        kg: exponent("kg")?,
-        m: exponent("m")?,
-        s: exponent("s")?,
-        a: exponent("A")?,
-        k: exponent("K")?,
-        mol: exponent("mol")?,
-        cd: exponent("cd")?,
-        rad: exponent("rad")?,
-        factor: element.finite("factor", 1.0)?,
-        offset: element.finite("offset", 0.0)?,
-    })
+    let mut exponents = [0; 8];
+    for (exponent, name) in exponents.iter_mut().zip(BaseUnit::EXPONENTS) {
+        *exponent = element.integer(name)?.unwrap_or(0);
+    }
+    let (factor, offset) = (element.finite("factor", 1.0)?, element.finite("offset", 0.0)?);
+    Ok(BaseUnit::from_exponents(exponents, factor, offset))
 }
 
 fn category(element: Node<'_>) -> Result<LogCategory, ParseError> {

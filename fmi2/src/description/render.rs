@@ -185,15 +185,10 @@ impl Output {
     }
 
     fn base_unit(&mut self, base: &BaseUnit) {
-        let tag = Tag::new("BaseUnit")
-            .unless_default("kg", &base.kg)
-            .unless_default("m", &base.m)
-            .unless_default("s", &base.s)
-            .unless_default("A", &base.a)
-            .unless_default("K", &base.k)
-            .unless_default("mol", &base.mol)
-            .unless_default("cd", &base.cd)
-            .unless_default("rad", &base.rad);
+        let exponents = BaseUnit::EXPONENTS.into_iter().zip(base.exponents());
+        let tag = exponents.fold(Tag::new("BaseUnit"), |tag, (name, exponent)| {
+            tag.unless_default(name, &exponent)
+        });
         self.empty(conversion(tag, base.factor, base.offset));
     }
 

@@ -5,8 +5,37 @@ fn base(expression: &str) -> BaseUnit {
 }
 
 fn exponents(expression: &str) -> [i32; 8] {
-    let BaseUnit { kg, m, s, a, k, mol, cd, rad, .. } = base(expression);
-    [kg, m, s, a, k, mol, cd, rad]
+    base(expression).exponents()
+}
+
+#[test]
+fn exponents_come_in_the_order_of_their_names() {
+    for (position, name) in BaseUnit::EXPONENTS.into_iter().enumerate() {
+        let mut expected = [0; 8];
+        expected[position] = 1;
+        assert_eq!(exponents(name), expected, "{name}");
+    }
+    let BaseUnit { kg, m, s, a, k, mol, cd, rad, .. } =
+        BaseUnit::from_exponents([1, 2, 3, 4, 5, 6, 7, 8], 1.0, 0.0);
+    assert_eq!([kg, m, s, a, k, mol, cd, rad], [1, 2, 3, 4, 5, 6, 7, 8]);
+}
+
+#[test]
+fn values_convert_between_units_of_one_quantity_only() {
+    for (from, to, value, expected) in [
+        ("degC", "K", 20.0, 293.15),
+        ("K", "degC", 293.15, 20.0),
+        ("km/h", "m/s", 36.0, 10.0),
+        ("rad", "deg", 0.5, 90.0 / std::f64::consts::PI),
+        ("N.m", "J", 3.0, 3.0),
+    ] {
+        let (factor, offset) = base(from).conversion(&base(to)).unwrap();
+        let found = factor * value + offset;
+        assert!((found - expected).abs() <= 1e-12 * expected, "{from} to {to}: {found}");
+    }
+    for (from, to) in [("N", "kg"), ("rad", "1"), ("K", "mol")] {
+        assert_eq!(base(from).conversion(&base(to)), None, "{from} to {to}");
+    }
 }
 
 #[test]

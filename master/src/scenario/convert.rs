@@ -43,17 +43,12 @@ impl Conversion {
         }
         let target = base_of(own, description)?;
         let source = base_of(stated, description)?;
-        if exponents(&source) != exponents(&target) {
-            let (stated, own) = (stated.to_owned(), own.to_owned());
-            return Err(Reason::Dimension { name, stated, own });
+        match source.conversion(&target) {
+            Some((factor, offset)) if factor.is_finite() && factor != 0.0 && offset.is_finite() => {
+                Ok(Self { factor, offset })
+            }
+            _ => Err(Reason::Dimension { name, stated: stated.to_owned(), own: own.to_owned() }),
         }
-        let factor = source.factor / target.factor;
-        let offset = (source.offset - target.offset) / target.factor;
-        if factor.is_finite() && factor != 0.0 && offset.is_finite() {
-            return Ok(Self { factor, offset });
-        }
-        let (stated, own) = (stated.to_owned(), own.to_owned());
-        Err(Reason::Dimension { name, stated, own })
     }
 }
 
@@ -77,8 +72,4 @@ fn base_of(name: &str, description: &ModelDescription) -> Result<BaseUnit, Reaso
         return Ok(base);
     }
     Ok(Unit::parse(name)?.base.unwrap_or_default())
-}
-
-fn exponents(base: &BaseUnit) -> [i32; 8] {
-    [base.kg, base.m, base.s, base.a, base.k, base.mol, base.cd, base.rad]
 }

@@ -45,12 +45,8 @@ impl Solver for Anderson {
         if let Some(end) = self.watch.look(u, g) {
             return end;
         }
-        let (residual, value) = (&self.watch.residual, &mut self.last);
-        if self.watch.iterations > 1 {
-            self.secants.push((residual, &value.0), (g, &value.1));
-        }
-        value.0.copy_from_slice(residual);
-        value.1.copy_from_slice(g);
+        let residual = &self.watch.residual;
+        self.secants.learn(&mut self.last, (residual, g), self.watch.iterations <= 1);
         self.secants.apply(residual, &self.watch.weights, (FILTER, FILTER), (g, u_next));
         Progress::Evaluate
     }

@@ -49,12 +49,8 @@ impl Solver for QuasiNewton {
         if let Some(end) = self.watch.look(u, g) {
             return end;
         }
-        let (residual, value) = (&self.watch.residual, &mut self.last);
-        if self.watch.iterations > 1 {
-            self.secants.push((residual, &value.0), (g, &value.1));
-        }
-        value.0.copy_from_slice(residual);
-        value.1.copy_from_slice(g);
+        let residual = &self.watch.residual;
+        self.secants.learn(&mut self.last, (residual, g), self.watch.iterations <= 1);
         if self.secants.is_empty() {
             for ((next, u), residual) in u_next.iter_mut().zip(u).zip(residual) {
                 *next = u + RELAXATION * residual;

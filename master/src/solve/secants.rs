@@ -69,13 +69,28 @@ impl Secants {
     }
 
     /// Adds the pair `after - before`; the oldest one makes room.
-    pub(super) fn push(&mut self, residual: (&[f64], &[f64]), value: (&[f64], &[f64])) {
+    fn push(&mut self, residual: (&[f64], &[f64]), value: (&[f64], &[f64])) {
         let Some(slot) = self.free.pop().or_else(|| self.order.pop()) else { return };
         let place = slot * self.n..(slot + 1) * self.n;
         subtract(&mut self.residuals[place.clone()], residual);
         subtract(&mut self.values[place], value);
         self.ages[slot] = 0;
         self.order.insert(0, slot);
+    }
+
+    /// The evaluation `now`, residual and value: adds what it differs from `last`, unless it is the
+    /// `first`, and takes its place there.
+    pub(super) fn learn(
+        &mut self,
+        last: &mut (Vec<f64>, Vec<f64>),
+        now: (&[f64], &[f64]),
+        first: bool,
+    ) {
+        if !first {
+            self.push((now.0, &last.0), (now.1, &last.1));
+        }
+        last.0.copy_from_slice(now.0);
+        last.1.copy_from_slice(now.1);
     }
 
     /// `u_next = g - dG c`, where c is the least squares solution of `dR c = residual`.

@@ -81,21 +81,15 @@ pub(super) fn between(from: &Measure, to: &Measure) -> Result<Option<(f64, f64)>
     let (Some(source), Some(target)) = (from_base, to_base) else {
         return Ok(same_name.then_some(SAME));
     };
-    if exponents(source) != exponents(target) {
+    let Some((factor, offset)) = source.conversion(target) else {
         return if same_name {
             Ok(Some(SAME))
         } else {
             Err(format!("{from_name} and {to_name} are units of different quantities"))
         };
-    }
-    let factor = if source == target { 1.0 } else { source.factor / target.factor };
-    let offset = (source.offset - target.offset) / target.factor;
+    };
     let nearly_one = (factor - 1.0).abs() < SAME_FACTOR && offset.abs() < SAME_FACTOR;
     Ok(Some(if same_name && nearly_one { SAME } else { (factor, offset) }))
-}
-
-fn exponents(base: &BaseUnit) -> [i32; 8] {
-    [base.kg, base.m, base.s, base.a, base.k, base.mol, base.cd, base.rad]
 }
 
 /// A value on its way: what is known of it, and what has become of it so far.

@@ -2,6 +2,8 @@
 
 mod tag;
 
+use fmi2::unit::BaseUnit;
+
 use super::structure::{
     Component, Connection, Connector, Content, Conversion, DefaultExperiment, Definitions,
     DictionarySource, Element, ElementBase, End, Implementation, MappingEntry, Parameter,
@@ -228,17 +230,8 @@ fn definitions(tag: Tag, space: &str, definitions: &Definitions) -> Tag {
     });
     let units = definitions.units.iter().map(|unit| {
         let base = &unit.base;
-        let exponents = [
-            ("kg", base.kg),
-            ("m", base.m),
-            ("s", base.s),
-            ("A", base.a),
-            ("K", base.k),
-            ("mol", base.mol),
-            ("cd", base.cd),
-            ("rad", base.rad),
-        ];
-        let stated = exponents.into_iter().filter(|(_, exponent)| *exponent != 0);
+        let exponents = BaseUnit::EXPONENTS.into_iter().zip(base.exponents());
+        let stated = exponents.filter(|(_, exponent)| *exponent != 0);
         let tag = stated.fold(Tag::new("ssc:BaseUnit"), |tag, (name, exponent)| {
             tag.with(name, exponent.to_string())
         });

@@ -31,8 +31,7 @@ impl System {
             return Ok(None);
         }
         let both = source.1.zip(target.1);
-        let same_base = both.filter(|(source, target)| exponents(source) == exponents(target));
-        let Some((source, target)) = same_base else {
+        let Some(conversion) = both.and_then(|(source, target)| source.conversion(&target)) else {
             return Err(SystemError::Unit {
                 from: self.name(from),
                 from_unit: source.0.clone(),
@@ -40,17 +39,8 @@ impl System {
                 to_unit: target.0.clone(),
             });
         };
-        if (source.factor, source.offset) == (target.factor, target.offset) {
-            return Ok(None);
-        }
-        // base = factor unit + offset, on both sides.
-        let factor = source.factor / target.factor;
-        Ok(Some((factor, (source.offset - target.offset) / target.factor)))
+        Ok(Some(conversion).filter(|conversion| *conversion != (1.0, 0.0)))
     }
-}
-
-fn exponents(base: &BaseUnit) -> [i32; 8] {
-    [base.kg, base.m, base.s, base.a, base.k, base.mol, base.cd, base.rad]
 }
 
 /// `transformation` of what the conversion, factor and offset, gives.

@@ -1,25 +1,34 @@
 //! Elements and attributes that the schema of FMI 2.0.5 does not have, or has in another order.
 
 use super::attributes::Node;
+use crate::unit::BaseUnit;
 
 /// An element of the schema: its attributes and its children in order.
 struct Shape {
     attributes: &'static [&'static str],
+    /// Attributes that other elements have too.
+    shared: &'static [&'static str],
     children: &'static [&'static str],
     /// The children are one optional list, which must not be empty.
     list: bool,
 }
 
+impl Shape {
+    const fn with(self, shared: &'static [&'static str]) -> Shape {
+        Shape { shared, ..self }
+    }
+}
+
 const fn leaf(attributes: &'static [&'static str]) -> Shape {
-    Shape { attributes, children: &[], list: false }
+    branch(attributes, &[])
 }
 
 const fn list(children: &'static [&'static str]) -> Shape {
-    Shape { attributes: &[], children, list: true }
+    Shape { list: true, ..branch(&[], children) }
 }
 
 const fn branch(attributes: &'static [&'static str], children: &'static [&'static str]) -> Shape {
-    Shape { attributes, children, list: false }
+    Shape { attributes, shared: &[], children, list: false }
 }
 
 const ROOT: Shape = branch(
@@ -49,35 +58,28 @@ const ROOT: Shape = branch(
         "ModelStructure",
     ],
 );
-const MODEL_EXCHANGE: Shape = branch(
-    &[
-        "modelIdentifier",
-        "needsExecutionTool",
-        "completedIntegratorStepNotNeeded",
-        "canBeInstantiatedOnlyOncePerProcess",
-        "canNotUseMemoryManagementFunctions",
-        "canGetAndSetFMUstate",
-        "canSerializeFMUstate",
-        "providesDirectionalDerivative",
-    ],
-    &["SourceFiles"],
-);
+/// Attributes of both interfaces.
+const INTERFACE: &[&str] = &[
+    "modelIdentifier",
+    "needsExecutionTool",
+    "canBeInstantiatedOnlyOncePerProcess",
+    "canNotUseMemoryManagementFunctions",
+    "canGetAndSetFMUstate",
+    "canSerializeFMUstate",
+    "providesDirectionalDerivative",
+];
+const MODEL_EXCHANGE: Shape =
+    branch(&["completedIntegratorStepNotNeeded"], &["SourceFiles"]).with(INTERFACE);
 const CO_SIMULATION: Shape = branch(
     &[
-        "modelIdentifier",
-        "needsExecutionTool",
         "canHandleVariableCommunicationStepSize",
         "canInterpolateInputs",
         "maxOutputDerivativeOrder",
         "canRunAsynchronuously",
-        "canBeInstantiatedOnlyOncePerProcess",
-        "canNotUseMemoryManagementFunctions",
-        "canGetAndSetFMUstate",
-        "canSerializeFMUstate",
-        "providesDirectionalDerivative",
     ],
     &["SourceFiles"],
-);
+)
+.with(INTERFACE);
 const VARIABLE: Shape = branch(
     &[
         "name",
@@ -90,32 +92,10 @@ const VARIABLE: Shape = branch(
     ],
     &["Real", "Integer", "Boolean", "String", "Enumeration", "Annotations"],
 );
-const REAL_VARIABLE: Shape = leaf(&[
-    "declaredType",
-    "quantity",
-    "unit",
-    "displayUnit",
-    "relativeQuantity",
-    "min",
-    "max",
-    "nominal",
-    "unbounded",
-    "start",
-    "derivative",
-    "reinit",
-]);
-const REAL_TYPE: Shape = leaf(&[
-    "quantity",
-    "unit",
-    "displayUnit",
-    "relativeQuantity",
-    "min",
-    "max",
-    "nominal",
-    "unbounded",
-]);
-const INTEGER_VARIABLE: Shape = leaf(&["declaredType", "quantity", "min", "max", "start"]);
-const BASE_UNIT: Shape = leaf(&["kg", "m", "s", "A", "K", "mol", "cd", "rad", "factor", "offset"]);
+/// Attributes of Real and of Integer, as a type and as a variable.
+const REAL: &[&str] =
+    &["quantity", "unit", "displayUnit", "relativeQuantity", "min", "max", "nominal", "unbounded"];
+const INTEGER: &[&str] = &["quantity", "min", "max"];
 
 /// The shape of the element `name` in `parent`; none where the schema does not go on.
 fn shape(parent: &str, name: &str) -> Option<Shape> {
@@ -127,15 +107,15 @@ fn shape(parent: &str, name: &str) -> Option<Shape> {
         (_, "File") => leaf(&["name"]),
         (_, "UnitDefinitions") => list(&["Unit"]),
         (_, "Unit") => branch(&["name"], &["BaseUnit", "DisplayUnit"]),
-        (_, "BaseUnit") => BASE_UNIT,
+        (_, "BaseUnit") => leaf(&["factor", "offset"]).with(&BaseUnit::EXPONENTS),
         (_, "DisplayUnit") => leaf(&["name", "factor", "offset"]),
         (_, "TypeDefinitions") => list(&["SimpleType"]),
         (_, "SimpleType") => branch(
             &["name", "description"],
             &["Real", "Integer", "Boolean", "String", "Enumeration"],
         ),
-        ("SimpleType", "Real") => REAL_TYPE,
-        ("SimpleType", "Integer") => leaf(&["quantity", "min", "max"]),
+        ("SimpleType", "Real") => leaf(REAL),
+        ("SimpleType", "Integer") => leaf(INTEGER),
         ("SimpleType", "Enumeration") => branch(&["quantity"], &["Item"]),
         (_, "Item") => leaf(&["name", "value", "description"]),
         (_, "LogCategories") => list(&["Category"]),
@@ -144,8 +124,12 @@ fn shape(parent: &str, name: &str) -> Option<Shape> {
         // That it is empty is for the rules to say.
         (_, "ModelVariables") => branch(&[], &["ScalarVariable"]),
         (_, "ScalarVariable") => VARIABLE,
-        ("ScalarVariable", "Real") => REAL_VARIABLE,
-        ("ScalarVariable", "Integer" | "Enumeration") => INTEGER_VARIABLE,
+        ("ScalarVariable", "Real") => {
+            leaf(&["declaredType", "start", "derivative", "reinit"]).with(REAL)
+        }
+        ("ScalarVariable", "Integer" | "Enumeration") => {
+            leaf(&["declaredType", "start"]).with(INTEGER)
+        }
         ("ScalarVariable", "Boolean" | "String") => leaf(&["declaredType", "start"]),
         (_, "ModelStructure") => branch(&[], &["Outputs", "Derivatives", "InitialUnknowns"]),
         (_, "Outputs" | "Derivatives" | "InitialUnknowns") => list(&["Unknown"]),
@@ -160,7 +144,8 @@ pub(super) fn check(node: Node<'_>, parent: &str) {
     let Some(shape) = shape(parent, element.name) else { return };
     for (name, value) in &element.attributes {
         // Name spaces are not FMI's.
-        let known = shape.attributes.contains(name) || *name == "xmlns" || name.contains(':');
+        let own = shape.attributes.contains(name) || shape.shared.contains(name);
+        let known = own || *name == "xmlns" || name.contains(':');
         if !known {
             node.warn(name, "an attribute of the standard", value, "it was skipped");
         }

@@ -29,23 +29,15 @@ fn enumeration(node: &Node) -> Result<Enumeration, SspError> {
 fn unit(node: &Node) -> Result<Unit, SspError> {
     let base = node.child("BaseUnit")?;
     let base = base.ok_or_else(|| node.wrong("an element BaseUnit", "none"))?;
-    let exponent = |name| Ok::<_, SspError>(base.integer(name)?.unwrap_or(0));
     let factor = base.number("factor")?.unwrap_or(1.0);
     if factor == 0.0 {
         return Err(base.wrong("a factor other than zero", "0"));
     }
-    let base = BaseUnit {
-        kg: exponent("kg")?,
-        m: exponent("m")?,
-        s: exponent("s")?,
-        a: exponent("A")?,
-        k: exponent("K")?,
-        mol: exponent("mol")?,
-        cd: exponent("cd")?,
-        rad: exponent("rad")?,
-        factor,
-        offset: base.number("offset")?.unwrap_or(0.0),
-    };
+    let mut exponents = [0; 8];
+    for (exponent, name) in exponents.iter_mut().zip(BaseUnit::EXPONENTS) {
+        *exponent = base.integer(name)?.unwrap_or(0);
+    }
+    let base = BaseUnit::from_exponents(exponents, factor, base.number("offset")?.unwrap_or(0.0));
     Ok(Unit { name: node.required("name")?.to_owned(), base })
 }
 

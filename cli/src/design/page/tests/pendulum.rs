@@ -6,7 +6,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::design::report::{
     Bound, Certificate, Check, Curve, Frequency, Loop, Matrix, Norm, Plant, Report, Signal,
-    StepResponse, Theorem1, pairs, rows,
+    StepResponse, pairs, rows,
 };
 
 const DESIGN: &str = include_str!("../../../../../fmu-controller/resources/design.toml");
@@ -159,15 +159,7 @@ impl Design {
             method: "eigenvalues of the Hamiltonian matrix".to_owned(),
         };
         Certificate {
-            printed: Ok(Theorem1 {
-                alpha: theorem.alpha,
-                beta: theorem.beta,
-                p: rows(&theorem.p),
-                smallest_eigenvalue: theorem.p_range.0,
-                largest_eigenvalue: theorem.p_range.1,
-                residual: theorem.residual,
-                delta: theorem.delta,
-            }),
+            printed: Ok((&theorem).into()),
             free: Err("numerical trouble at a decay rate of 1187 1/s".to_owned()),
             ultimate: Err("it needs `rate_bound` for every fault".to_owned()),
             norms: vec![norm("H-infinity", 0.002_513_7), norm("generalised H2", 0.041_27)],

@@ -2,10 +2,9 @@
 
 use master::algorithm::PowerBond;
 use master::{Algorithm, Course, StepControl, Sweep, SystemError};
-
-use crate::linear::{ABLE, Abilities};
-use crate::network::{Network, Run};
-use crate::problems;
+use tests::linear::{ABLE, Abilities};
+use tests::network::{Network, Run};
+use tests::problems;
 
 const STOP: f64 = 5.0;
 

@@ -1,23 +1,14 @@
 //! Error over the number of steps, for fixed steps and for every choice of the step.
 //!
-//! `cargo run --release -p master --example work_precision > docs/work_precision.csv`, then
+//! `cargo run --release -p tests --example work_precision > docs/work_precision.csv`, then
 //! `python scripts/work_precision.py` draws the figure.
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a program for the table it prints")]
 
-#[allow(dead_code, reason = "shared: each user needs a part")]
-#[path = "../tests/order/linear.rs"]
-mod linear;
-#[allow(dead_code, reason = "shared: each user needs a part")]
-#[path = "../tests/order/network.rs"]
-mod network;
-#[allow(dead_code, reason = "shared: each user needs a part")]
-#[path = "../tests/order/problems.rs"]
-mod problems;
-
-use linear::ABLE;
 use master::algorithm::PowerBond;
 use master::{Algorithm, Course, StepControl, Sweep};
-use network::{Network, Run};
+use tests::linear::ABLE;
+use tests::network::{Network, Run};
+use tests::problems;
 
 use StepControl::{Doubling, Embedded, Energy, Increment};
 

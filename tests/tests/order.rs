@@ -1,21 +1,12 @@
 //! The order of convergence of every method, against the matrix exponential of the whole system.
 //!
-//! `cargo test --release -p master --test order -- --nocapture` prints the tables.
+//! `cargo test --release -p tests --test order -- --nocapture` prints the tables.
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "tests; the tables are printed")]
 
-#[allow(dead_code, reason = "shared: each user needs a part")]
-#[path = "order/linear.rs"]
-mod linear;
-#[allow(dead_code, reason = "shared: each user needs a part")]
-#[path = "order/network.rs"]
-mod network;
-#[allow(dead_code, reason = "shared: each user needs a part")]
-#[path = "order/problems.rs"]
-mod problems;
-
-use linear::{ABLE, Abilities};
 use master::{Algorithm, Coupling, Course, Sweep, SystemError};
-use network::Network;
+use tests::linear::{ABLE, Abilities};
+use tests::network::Network;
+use tests::problems;
 
 const STOP: f64 = 4.0;
 /// Communication steps of each run.

@@ -1,35 +1,35 @@
 //! A slave for the tests of convergence: a linear system, stepped exactly.
+#![expect(clippy::unwrap_used, reason = "for tests, which are to fail")]
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use fmi2::Experiment;
 use fmi2::description::ModelDescription;
 use master::{CallError, Slave, Stepped};
 use nalgebra::{DMatrix, DVector};
 
 /// Value reference of the first output; those of the inputs begin at 0.
-pub(crate) const OUTPUTS: u32 = 100;
+pub const OUTPUTS: u32 = 100;
 
 /// `x' = A x + B u`, `y = C x + D u`, from `x(0)`.
 #[derive(Clone)]
-pub(crate) struct Block {
-    pub(crate) a: DMatrix<f64>,
-    pub(crate) b: DMatrix<f64>,
-    pub(crate) c: DMatrix<f64>,
-    pub(crate) d: DMatrix<f64>,
-    pub(crate) start: DVector<f64>,
+pub struct Block {
+    /// A, n x n.
+    pub a: DMatrix<f64>,
+    /// B, n x m.
+    pub b: DMatrix<f64>,
+    /// C, p x n.
+    pub c: DMatrix<f64>,
+    /// D, p x m.
+    pub d: DMatrix<f64>,
+    /// x(0).
+    pub start: DVector<f64>,
 }
 
 impl Block {
     /// From rows.
-    pub(crate) fn new(
-        a: &[&[f64]],
-        b: &[&[f64]],
-        c: &[&[f64]],
-        d: &[&[f64]],
-        start: &[f64],
-    ) -> Self {
+    #[must_use]
+    pub fn new(a: &[&[f64]], b: &[&[f64]], c: &[&[f64]], d: &[&[f64]], start: &[f64]) -> Self {
         let of = |rows: &[&[f64]]| {
             DMatrix::from_fn(rows.len(), rows.first().map_or(0, |row| row.len()), |i, k| rows[i][k])
         };
@@ -40,24 +40,23 @@ impl Block {
 
 /// What a slave can do.
 #[derive(Clone, Copy)]
-pub(crate) struct Abilities {
+pub struct Abilities {
     /// `canInterpolateInputs`.
-    pub(crate) interpolates: bool,
+    pub interpolates: bool,
     /// `maxOutputDerivativeOrder`.
-    pub(crate) derivatives: u32,
+    pub derivatives: u32,
     /// `providesDirectionalDerivative`.
-    pub(crate) directional: bool,
+    pub directional: bool,
 }
 
 /// All of them.
-pub(crate) const ABLE: Abilities =
-    Abilities { interpolates: true, derivatives: 2, directional: true };
+pub const ABLE: Abilities = Abilities { interpolates: true, derivatives: 2, directional: true };
 
 /// Everything that changes: x, then u, u' and u''.
 type State = DVector<f64>;
 
 /// A slave made of a [`Block`].
-pub(crate) struct Linear {
+pub struct Linear {
     description: ModelDescription,
     block: Block,
     state: State,
@@ -70,7 +69,7 @@ pub(crate) struct Linear {
 
 impl Linear {
     /// `steps` counts `fmi2DoStep`.
-    pub(crate) fn boxed(block: &Block, able: Abilities, steps: &Arc<AtomicUsize>) -> Box<Self> {
+    pub fn boxed(block: &Block, able: Abilities, steps: &Arc<AtomicUsize>) -> Box<Self> {
         let (n, m) = (block.a.nrows(), block.b.ncols());
         let mut matrix = DMatrix::zeros(n + 3 * m, n + 3 * m);
         matrix.view_mut((0, 0), (n, n)).copy_from(&block.a);
@@ -153,18 +152,6 @@ type Done = Result<(), CallError>;
 impl Slave for Linear {
     fn description(&self) -> &ModelDescription {
         &self.description
-    }
-    fn setup_experiment(&mut self, _: &Experiment) -> Done {
-        Ok(())
-    }
-    fn enter_initialization_mode(&mut self) -> Done {
-        Ok(())
-    }
-    fn exit_initialization_mode(&mut self) -> Done {
-        Ok(())
-    }
-    fn terminate(&mut self) -> Done {
-        Ok(())
     }
 
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Done {

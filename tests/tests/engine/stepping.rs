@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use master::{Algorithm, Coupling, Course, Simulation, Sweep};
+use tests::linear::ABLE;
+use tests::problems;
 
-use crate::linear::ABLE;
-use crate::{problems, typed, until};
+use crate::{typed, until};
 
 const ALL: [Course; 4] = [Course::Hold, Course::Limited, Course::Linear, Course::Quadratic];
 

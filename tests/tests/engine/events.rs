@@ -2,6 +2,7 @@
 
 use master::algorithm::EventSource;
 use master::{Algorithm, Course, Simulation, StepControl, Sweep};
+use tests::linear::OUTPUTS;
 
 use crate::puppet::{system, whole};
 use crate::until;
@@ -108,7 +109,7 @@ fn after_an_event_inputs_do_not_go_on_as_before() {
             times(&mut simulation);
             let mut value = [0.0];
             let lag = &mut simulation.system().slaves[1].1;
-            lag.get_real(&[crate::linear::OUTPUTS], &mut value).unwrap();
+            lag.get_real(&[OUTPUTS], &mut value).unwrap();
             let expected = 1.0 - f64::exp(-0.5);
             assert!((value[0] - expected).abs() < 1e-12, "{} {size}: {value:?}", course.name());
         }

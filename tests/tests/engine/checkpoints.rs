@@ -6,10 +6,11 @@ use std::sync::Arc;
 use master::algorithm::PowerBond;
 use master::scenario::{Prepared, Scenario, Setup};
 use master::{Algorithm, Checkpoint, Coupling, Course, Simulation, StepControl, Sweep, System};
+use tests::linear::{ABLE, Abilities};
+use tests::network::Network;
+use tests::problems;
 
-use crate::linear::{ABLE, Abilities};
-use crate::network::Network;
-use crate::{problems, until};
+use crate::until;
 
 const FAULTS: &str = r#"
 [[scenario.fault]]

@@ -9,17 +9,8 @@ mod control;
 mod events;
 #[path = "engine/initial.rs"]
 mod initial;
-#[allow(dead_code, reason = "shared: each user needs a part")]
-#[path = "order/linear.rs"]
-mod linear;
-#[allow(dead_code, reason = "shared: each user needs a part")]
-#[path = "order/network.rs"]
-mod network;
 #[path = "engine/parts.rs"]
 mod parts;
-#[allow(dead_code, reason = "shared: each user needs a part")]
-#[path = "order/problems.rs"]
-mod problems;
 #[path = "engine/puppet.rs"]
 mod puppet;
 #[path = "engine/scenario.rs"]

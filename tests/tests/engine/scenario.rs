@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use master::scenario::{Scenario, Setup};
 use master::{Algorithm, Course, Simulation, StepControl, Sweep, System};
+use tests::linear::{ABLE, Block};
+use tests::network::Network;
 
-use crate::linear::{ABLE, Block};
-use crate::network::Network;
 use crate::until;
 
 #[derive(serde::Deserialize)]

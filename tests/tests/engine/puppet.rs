@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex};
 use fmi2::Experiment;
 use fmi2::description::ModelDescription;
 use master::{CallError, Slave, Stepped, System};
+use tests::linear::{ABLE, Block, Linear};
 
 /// Output over time in s.
 type Output = fn(f64) -> f64;
@@ -43,8 +44,8 @@ pub(crate) fn system(outputs: [Output; 2], way: Way) -> (System, Asked) {
     let puppet = Puppet { description, time, kept, outputs, way, asked: Arc::clone(&asked) };
     let mut system = System::default();
     system.add("p", Box::new(puppet)).unwrap();
-    let lag = crate::linear::Block::new(&[&[-1.0]], &[&[1.0]], &[&[1.0]], &[&[0.0]], &[0.0]);
-    let lag = crate::linear::Linear::boxed(&lag, crate::linear::ABLE, &Arc::default());
+    let lag = Block::new(&[&[-1.0]], &[&[1.0]], &[&[1.0]], &[&[0.0]], &[0.0]);
+    let lag = Linear::boxed(&lag, ABLE, &Arc::default());
     system.add("a", lag).unwrap();
     system.connect("p.y", "a.u0").unwrap();
     (system, asked)
@@ -56,15 +57,6 @@ impl Slave for Puppet {
     }
     fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError> {
         self.time = experiment.start_time;
-        Ok(())
-    }
-    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
-        Ok(())
-    }
-    fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
-        Ok(())
-    }
-    fn terminate(&mut self) -> Result<(), CallError> {
         Ok(())
     }
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {

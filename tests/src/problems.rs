@@ -5,7 +5,8 @@ use crate::network::Network;
 
 /// Two oscillators, each of 1 kg on a spring and a damper to a wall, with a spring of 2 N/m between
 /// them. Each gets the other's displacement and gives its own: no direct dependency.
-pub(crate) fn coupled_oscillators() -> Network {
+#[must_use]
+pub fn coupled_oscillators() -> Network {
     let oscillator = |stiffness: f64, damping: f64, start: &[f64]| {
         Block::new(
             &[&[0.0, 1.0], &[-stiffness - 2.0, -damping]],
@@ -24,7 +25,8 @@ pub(crate) fn coupled_oscillators() -> Network {
 /// The linear two-mass oscillator, cut by force and displacement: the first mass gets the force of
 /// the coupling spring and damper, the second one has these and gets displacement and velocity, on
 /// which its force depends directly. Stiffness in N/m and damping in N s/m of the coupling.
-pub(crate) fn two_masses(stiffness: f64, damping: f64) -> Network {
+#[must_use]
+pub fn two_masses(stiffness: f64, damping: f64) -> Network {
     let first = Block::new(
         &[&[0.0, 1.0], &[-10.0, -0.1]],
         &[&[0.0], &[1.0]],
@@ -47,7 +49,8 @@ pub(crate) fn two_masses(stiffness: f64, damping: f64) -> Network {
 
 /// Two first-order lags with direct feedthrough in a circle: `y = x + g u` each, with the gain `g1 g2`
 /// of the algebraic loop.
-pub(crate) fn algebraic_loop(first: f64, second: f64) -> Network {
+#[must_use]
+pub fn algebraic_loop(first: f64, second: f64) -> Network {
     let lag = |rate: f64, gain: f64, start: f64| {
         Block::new(&[&[-rate]], &[&[0.5]], &[&[1.0]], &[&[gain]], &[start])
     };
@@ -58,7 +61,8 @@ pub(crate) fn algebraic_loop(first: f64, second: f64) -> Network {
 }
 
 /// A fast lag (10 ms) from rest at 1 behind a slow oscillator: a short transient, then a smooth course.
-pub(crate) fn transient() -> Network {
+#[must_use]
+pub fn transient() -> Network {
     let fast = Block::new(&[&[-100.0]], &[&[100.0]], &[&[1.0]], &[&[0.0]], &[1.0]);
     let slow = Block::new(
         &[&[0.0, 1.0], &[-1.0, -0.2]],

@@ -1,4 +1,5 @@
 //! Blocks in a network, and the solution of the whole as one system.
+#![expect(clippy::unwrap_used, reason = "for tests, which are to fail")]
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -9,36 +10,44 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::linear::{Abilities, Block, Linear, OUTPUTS};
 
-/// Blocks a, b, ..., and links (block, output) to (block, input).
+/// Blocks a, b, ..., and how they are linked.
 #[derive(Clone)]
-pub(crate) struct Network {
-    pub(crate) blocks: Vec<Block>,
-    pub(crate) links: Vec<((usize, usize), (usize, usize))>,
+pub struct Network {
+    /// In the order of their names.
+    pub blocks: Vec<Block>,
+    /// From (block, output) to (block, input).
+    pub links: Vec<((usize, usize), (usize, usize))>,
 }
 
 /// What a run gave.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Run {
-    /// Largest error of an output at a communication point, absolute: of the whole run, and of
-    /// its second half, where what happened in the first steps has come down to its order.
-    pub(crate) error: f64,
-    pub(crate) late: f64,
+pub struct Run {
+    /// Largest error of an output at a communication point, absolute.
+    pub error: f64,
+    /// The same in the second half, where what happened in the first steps has come down to its
+    /// order.
+    pub late: f64,
     /// Communication steps made.
-    pub(crate) points: usize,
+    pub points: usize,
     /// `fmi2DoStep` of all slaves, repetitions included.
-    pub(crate) calls: usize,
+    pub calls: usize,
     /// Smallest and largest step in s.
-    pub(crate) sizes: (f64, f64),
+    pub sizes: (f64, f64),
 }
 
 /// Name of the block at that position.
-pub(crate) fn name(position: usize) -> String {
+fn name(position: usize) -> String {
     ["a", "b", "c", "d"][position].to_owned()
 }
 
 impl Network {
     /// The slaves, connected; `steps` counts their steps.
-    pub(crate) fn system(&self, able: Abilities, steps: &Arc<AtomicUsize>) -> System {
+    ///
+    /// # Panics
+    ///
+    /// Where a link names what the blocks do not have.
+    #[must_use]
+    pub fn system(&self, able: Abilities, steps: &Arc<AtomicUsize>) -> System {
         let mut system = System::default();
         for (position, block) in self.blocks.iter().enumerate() {
             system.add(&name(position), Linear::boxed(block, able, steps)).unwrap();
@@ -51,7 +60,7 @@ impl Network {
     }
 
     /// `x' = M x`, `y = N x` of the whole: with `u = P y` is `y = (I - D P)^-1 C x`.
-    pub(crate) fn whole(&self) -> (DMatrix<f64>, DMatrix<f64>, DVector<f64>) {
+    fn whole(&self) -> (DMatrix<f64>, DMatrix<f64>, DVector<f64>) {
         let stack = |of: fn(&Block) -> &DMatrix<f64>| {
             let parts: Vec<_> = self.blocks.iter().map(of).collect();
             let rows = parts.iter().map(|part| part.nrows()).sum();
@@ -82,7 +91,11 @@ impl Network {
     }
 
     /// All outputs of a system of these blocks, in their order.
-    pub(crate) fn outputs(&self, system: &mut System) -> Vec<f64> {
+    ///
+    /// # Panics
+    ///
+    /// Where a slave does not have them.
+    pub fn outputs(&self, system: &mut System) -> Vec<f64> {
         let mut all = Vec::new();
         for ((_, slave), block) in system.slaves.iter_mut().zip(&self.blocks) {
             let count = block.c.nrows();
@@ -95,7 +108,15 @@ impl Network {
     }
 
     /// A run from 0 to `stop` s against the matrix exponential of the whole.
-    pub(crate) fn run(
+    ///
+    /// # Errors
+    ///
+    /// Those of the simulation.
+    ///
+    /// # Panics
+    ///
+    /// Where the loops through the blocks have no solution.
+    pub fn run(
         &self,
         able: Abilities,
         algorithm: &Algorithm,
