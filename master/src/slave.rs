@@ -10,8 +10,7 @@ use fmi2::description::ModelDescription;
 ///
 /// Arrays that belong together have the same length. Every call either did what was asked
 /// (`fmi2OK`, `fmi2Warning`) or is an error. What a kind of slave does not have, it leaves to the
-/// method given here: the four of its beginning and end have nothing to do, the others say that the
-/// function is missing.
+/// method given here, which says that the function is missing.
 #[expect(clippy::missing_errors_doc, reason = "said at setup_experiment for all")]
 pub trait Slave {
     /// The model description that the instance belongs to.
@@ -28,25 +27,16 @@ pub trait Slave {
     }
 
     /// `fmi2SetupExperiment`.
-    fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError> {
-        let _ = experiment;
-        Ok(())
-    }
+    fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError>;
 
     /// `fmi2EnterInitializationMode`.
-    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
-        Ok(())
-    }
+    fn enter_initialization_mode(&mut self) -> Result<(), CallError>;
 
     /// `fmi2ExitInitializationMode`.
-    fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
-        Ok(())
-    }
+    fn exit_initialization_mode(&mut self) -> Result<(), CallError>;
 
     /// `fmi2Terminate`.
-    fn terminate(&mut self) -> Result<(), CallError> {
-        Ok(())
-    }
+    fn terminate(&mut self) -> Result<(), CallError>;
 
     /// `fmi2FreeInstance` at once, where it can be told whether that works: of an instance in a
     /// process of its own. No other call may follow. The others are freed when they are dropped.

@@ -48,6 +48,18 @@ impl Slave for Integrator {
     fn description(&self) -> &ModelDescription {
         &self.description
     }
+    fn setup_experiment(&mut self, _: &Experiment) -> Result<(), CallError> {
+        Ok(())
+    }
+    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
+    fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
+    fn terminate(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
         assert_eq!(references, [2]);
         values[0] = if self.direct { self.u } else { self.x };

@@ -4,6 +4,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use fmi2::Experiment;
 use fmi2::description::ModelDescription;
 use master::{CallError, Slave, Stepped};
 use nalgebra::{DMatrix, DVector};
@@ -152,6 +153,18 @@ type Done = Result<(), CallError>;
 impl Slave for Linear {
     fn description(&self) -> &ModelDescription {
         &self.description
+    }
+    fn setup_experiment(&mut self, _: &Experiment) -> Done {
+        Ok(())
+    }
+    fn enter_initialization_mode(&mut self) -> Done {
+        Ok(())
+    }
+    fn exit_initialization_mode(&mut self) -> Done {
+        Ok(())
+    }
+    fn terminate(&mut self) -> Done {
+        Ok(())
     }
 
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Done {

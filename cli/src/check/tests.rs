@@ -60,6 +60,14 @@ impl Slave for Sum {
         Ok(())
     }
 
+    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
+
+    fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
+
     fn terminate(&mut self) -> Result<(), CallError> {
         self.terminated = true;
         Ok(())

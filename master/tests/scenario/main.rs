@@ -10,6 +10,7 @@ use std::cell::RefCell;
 use std::path::Path;
 use std::rc::Rc;
 
+use fmi2::Experiment;
 use fmi2::description::ModelDescription;
 use master::scenario::{Prepared, Scenario, ScenarioError, Setup};
 use master::{CallError, Slave, Stepped, System};
@@ -32,6 +33,18 @@ impl Listener {
 impl Slave for Listener {
     fn description(&self) -> &ModelDescription {
         &self.description
+    }
+    fn setup_experiment(&mut self, _: &Experiment) -> Result<(), CallError> {
+        Ok(())
+    }
+    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
+    fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
+    fn terminate(&mut self) -> Result<(), CallError> {
+        Ok(())
     }
     fn get_real(&mut self, _: &[u32], values: &mut [f64]) -> Result<(), CallError> {
         values.fill(0.0);

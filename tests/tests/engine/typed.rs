@@ -1,5 +1,6 @@
 //! A slave with variables of all types, which allocates nothing.
 
+use fmi2::Experiment;
 use fmi2::description::ModelDescription;
 use master::{CallError, Slave, Stepped, System};
 
@@ -56,6 +57,18 @@ pub(crate) fn ring() -> System {
 impl Slave for Typed {
     fn description(&self) -> &ModelDescription {
         &self.description
+    }
+    fn setup_experiment(&mut self, _: &Experiment) -> Done {
+        Ok(())
+    }
+    fn enter_initialization_mode(&mut self) -> Done {
+        Ok(())
+    }
+    fn exit_initialization_mode(&mut self) -> Done {
+        Ok(())
+    }
+    fn terminate(&mut self) -> Done {
+        Ok(())
     }
     fn get_real(&mut self, _: &[u32], values: &mut [f64]) -> Done {
         values[0] = self.real;
