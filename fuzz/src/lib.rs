@@ -1,4 +1,5 @@
-//! The fuzz targets: those of `fmi2/tests/robustness`, and one for the controller's design file.
+//! The fuzz targets: those of `fmi2/tests/robustness` and of `master/tests/robustness`, one for the
+//! controller's design file and one for `system.toml`.
 
 #[path = "../../fmi2/tests/robustness/array.rs"]
 mod array;
@@ -10,6 +11,8 @@ mod choice;
 mod importer;
 #[path = "../../fmi2/tests/robustness/machine.rs"]
 mod machine;
+#[path = "../../master/tests/robustness/targets.rs"]
+mod master_files;
 #[path = "../../fmi2/tests/robustness/prediction.rs"]
 mod prediction;
 #[path = "../../fmi2/tests/robustness/sequence.rs"]
@@ -46,4 +49,16 @@ targets! {
     call_sequence: targets::call_sequence;
     /// See `design.rs`.
     design_file: design::design_file;
+    /// See `master/tests/robustness/targets.rs`.
+    system_structure: master_files::system_structure;
+    /// See `master/tests/robustness/targets.rs`.
+    parameter_values: master_files::parameter_values;
+    /// See `master/tests/robustness/targets.rs`.
+    parameter_mapping: master_files::parameter_mapping;
+    /// See `master/tests/robustness/targets.rs`.
+    signal_dictionary: master_files::signal_dictionary;
+    /// See `master/tests/robustness/targets.rs`.
+    signal_table: master_files::signal_table;
+    /// See `cli/src/config/tests/target.rs`.
+    system_toml: command::system_toml;
 }

@@ -1,3 +1,5 @@
+mod robustness;
+
 use std::path::Path;
 
 use super::*;

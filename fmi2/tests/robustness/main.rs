@@ -4,7 +4,10 @@
 
 mod array;
 mod calls;
+#[cfg(not(miri))]
+mod changes;
 mod choice;
+mod corpus;
 mod importer;
 mod machine;
 mod mutations;

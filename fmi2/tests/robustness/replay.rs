@@ -1,26 +1,7 @@
 //! The corpora of the fuzz targets, once more.
 
-use std::path::{Path, PathBuf};
-
+use crate::corpus::replay;
 use crate::targets;
-
-/// The files of a corpus.
-pub(crate) fn corpus(name: &str) -> Vec<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus").join(name);
-    let files = std::fs::read_dir(folder).unwrap().map(|file| file.unwrap().path());
-    let mut files: Vec<_> = files.collect();
-    assert!(!files.is_empty());
-    files.sort();
-    files
-}
-
-/// Gives each file of a corpus to its target.
-fn replay(name: &str, target: fn(&[u8])) {
-    for file in corpus(name) {
-        let outcome = std::panic::catch_unwind(|| target(&std::fs::read(&file).unwrap()));
-        assert!(outcome.is_ok(), "{}: {:?}", file.display(), outcome.err());
-    }
-}
 
 #[test]
 #[cfg_attr(miri, ignore = "reads files")]

@@ -1,5 +1,6 @@
 //! Elements of SSP's namespaces, with typed access to what they hold.
 
+use std::collections::{HashMap, HashSet};
 use std::str::FromStr;
 
 use fmi2::description::Position;
@@ -39,61 +40,84 @@ pub(super) fn read(bytes: &[u8], space: &str, root: &str) -> Result<Node, SspErr
     }
     let element = xml::read(bytes)?;
     let wanted = format!("{NAMESPACE}{space}");
-    let mut scope = Vec::new();
-    let found_space = resolve(&element, &mut scope)?;
+    let mut scope = Scope::default();
+    scope.open(&element);
+    let found = scope.space(&element)?.unwrap_or_default();
     let local = element.name.rsplit(':').next().unwrap_or_default().to_owned();
-    if found_space.as_deref() != Some(&wanted) || local != root {
+    if *found != wanted || local != root {
         return Err(SspError::Content {
             at: element.at,
-            found: format!("namespace {:?}", found_space.unwrap_or_default()),
+            found: format!("namespace {found:?}"),
             element: element.name,
             expected: format!("the root element {root} of the namespace {wanted:?}"),
         });
     }
-    let node = node(element, &mut Vec::new())?;
+    let node = scope.node(element)?;
     node.version()?;
     Ok(node)
 }
 
-/// Adds the declarations of `element` to `scope` and finds its namespace.
-fn resolve(
-    element: &xml::Element,
-    scope: &mut Vec<(String, String)>,
-) -> Result<Option<String>, SspError> {
-    for (name, value) in &element.attributes {
-        if name == "xmlns" {
-            scope.push((String::new(), value.clone()));
-        } else if let Some(prefix) = name.strip_prefix("xmlns:") {
-            scope.push((prefix.to_owned(), value.clone()));
+/// The namespaces that are declared where the reader is, by prefix, the innermost last.
+#[derive(Default)]
+struct Scope(HashMap<String, Vec<String>>);
+
+impl Scope {
+    /// Adds what `element` declares.
+    fn open(&mut self, element: &xml::Element) {
+        for (prefix, space) in declarations(&element.attributes) {
+            self.0.entry(prefix.to_owned()).or_default().push(space.to_owned());
         }
     }
-    let prefix = element.name.split_once(':').map_or("", |(prefix, _)| prefix);
-    let space = scope.iter().rev().find(|(known, _)| known == prefix);
-    match space {
-        Some((_, space)) => Ok(Some(space.clone())),
-        None if prefix.is_empty() => Ok(None),
-        None => Err(SspError::Content {
-            at: element.at,
-            element: element.name.clone(),
-            expected: format!("a declaration xmlns:{prefix}"),
-            found: "none".to_owned(),
-        }),
+
+    /// Takes back what an element with these attributes declared.
+    fn close(&mut self, attributes: &[(String, String)]) {
+        for (prefix, _) in declarations(attributes) {
+            self.0.get_mut(prefix).map(Vec::pop);
+        }
+    }
+
+    /// The namespace of an element whose declarations were added; none without a prefix and a
+    /// default.
+    fn space(&self, element: &xml::Element) -> Result<Option<&str>, SspError> {
+        let prefix = element.name.split_once(':').map_or("", |(prefix, _)| prefix);
+        match self.0.get(prefix).and_then(|spaces| spaces.last()) {
+            Some(space) => Ok(Some(space)),
+            None if prefix.is_empty() => Ok(None),
+            None => Err(SspError::Content {
+                at: element.at,
+                element: element.name.clone(),
+                expected: format!("a declaration xmlns:{prefix}"),
+                found: "none".to_owned(),
+            }),
+        }
+    }
+
+    fn node(&mut self, element: xml::Element) -> Result<Node, SspError> {
+        self.open(&element);
+        let own = self.space(&element)?.is_some_and(|space| space.starts_with(NAMESPACE));
+        let children = element.children.into_iter().map(|child| self.node(child));
+        let children = children.collect::<Result<Vec<Node>, SspError>>()?;
+        self.close(&element.attributes);
+        let name = element.name.rsplit(':').next().unwrap_or_default().to_owned();
+        let node = Node { name, own, attributes: element.attributes, children, at: element.at };
+        node.characters()?;
+        Ok(node)
     }
 }
 
-fn node(element: xml::Element, scope: &mut Vec<(String, String)>) -> Result<Node, SspError> {
-    let outer = scope.len();
-    let space = resolve(&element, scope)?;
-    let children = element.children.into_iter().map(|child| node(child, scope));
-    let children: Result<Vec<Node>, SspError> = children.collect();
-    scope.truncate(outer);
-    Ok(Node {
-        name: element.name.rsplit(':').next().unwrap_or_default().to_owned(),
-        own: space.is_some_and(|space| space.starts_with(NAMESPACE)),
-        attributes: element.attributes,
-        children: children?,
-        at: element.at,
+/// Prefixes and namespaces that attributes declare; an empty prefix for the default.
+fn declarations(attributes: &[(String, String)]) -> impl Iterator<Item = (&str, &str)> {
+    attributes.iter().filter_map(|(name, space)| {
+        let prefix = name.strip_prefix("xmlns")?;
+        let prefix = if prefix.is_empty() { prefix } else { prefix.strip_prefix(':')? };
+        Some((prefix, space.as_str()))
     })
+}
+
+/// Whether XML 1.0 can hold `character` (its production 2).
+pub(super) fn is_character(character: char) -> bool {
+    matches!(character, '\t' | '\n' | '\r' | ' '..='\u{d7ff}' | '\u{e000}'..='\u{fffd}')
+        || character >= '\u{10000}'
 }
 
 impl Node {
@@ -101,6 +125,17 @@ impl Node {
     pub(super) fn wrong(&self, expected: impl Into<String>, found: impl Into<String>) -> SspError {
         let (at, element) = (self.at, self.name.clone());
         SspError::Content { at, element, expected: expected.into(), found: found.into() }
+    }
+
+    /// The attributes hold characters of XML only, so that what was read can be written.
+    fn characters(&self) -> Result<(), SspError> {
+        for (name, value) in &self.attributes {
+            if let Some(found) = value.chars().find(|character| !is_character(*character)) {
+                let expected = format!("characters of XML in the attribute {name}");
+                return Err(self.wrong(expected, format!("U+{:04X}", u32::from(found))));
+            }
+        }
+        Ok(())
     }
 
     /// Every root element has a version; 1.x can be read (section 2.2).
@@ -216,7 +251,7 @@ impl Node {
         what: &str,
         names: impl IntoIterator<Item = &'a str>,
     ) -> Result<(), SspError> {
-        let mut seen = std::collections::HashSet::new();
+        let mut seen = HashSet::new();
         match names.into_iter().find(|name| !seen.insert(*name)) {
             None => Ok(()),
             Some(name) => {

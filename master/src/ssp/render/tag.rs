@@ -3,6 +3,8 @@
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, Event};
 
+use crate::ssp::xml::is_character;
+
 /// What the prefixes mean. Importers compare prefixes: these are the usual ones.
 const PREFIXES: [(&str, &str); 6] = [
     ("xmlns:ssd", "http://ssp-standard.org/SSP1/SystemStructureDescription"),
@@ -31,7 +33,7 @@ impl Tag {
     }
 
     pub(super) fn with(mut self, name: &str, value: impl AsRef<str>) -> Self {
-        let replace = |character| if is_xml(character) { character } else { '\u{fffd}' };
+        let replace = |character| if is_character(character) { character } else { '\u{fffd}' };
         self.attributes.push((name.to_owned(), value.as_ref().chars().map(replace).collect()));
         self
     }
@@ -89,10 +91,4 @@ impl Tag {
 fn write(writer: &mut Writer<Vec<u8>>, event: Event<'_>) {
     // Writing into memory cannot fail.
     let _ = writer.write_event(event);
-}
-
-/// Whether XML 1.0 can hold `character` (its production 2).
-fn is_xml(character: char) -> bool {
-    matches!(character, '\t' | '\n' | '\r' | ' '..='\u{d7ff}' | '\u{e000}'..='\u{fffd}')
-        || character >= '\u{10000}'
 }
