@@ -35,6 +35,8 @@ pub struct Isolated {
     inbox: Inbox,
     /// The last turn that this side knows of: odd while the worker acts.
     turn: u64,
+    /// When the worker was asked for what is not waited for yet, where that matters.
+    asked: Option<Instant>,
     /// Why there is no worker any more.
     ended: Option<Failure>,
     /// `fmi2FreeInstance` has been called.
@@ -73,6 +75,7 @@ impl Isolated {
             process,
             inbox: Inbox::new(name),
             turn: 0,
+            asked: None,
             ended: None,
             freed: false,
             time_limit: options.time_limit,
@@ -116,7 +119,8 @@ impl Isolated {
         self.answer(command, read)
     }
 
-    /// Posts `command` with what `write` writes.
+    /// Posts `command` with what `write` writes. An answer that nobody waited for is waited for and
+    /// forgotten first.
     #[inline]
     pub(super) fn post(
         &mut self,
@@ -126,8 +130,10 @@ impl Isolated {
         if let Some(failure) = &self.ended {
             return Err(error(command, failure.clone()));
         }
-        if self.turn % 2 == 1 {
-            return Err(nonsense(command, "was called before the step begun was finished"));
+        if self.acts()
+            && let Err(failure) = self.wait()
+        {
+            return Err(self.lose(command, failure));
         }
         self.inbox.forget();
         let shared = &self.line.shared;
@@ -143,6 +149,17 @@ impl Isolated {
         Ok(())
     }
 
+    /// Whether the worker has been asked for what is not waited for yet.
+    fn acts(&self) -> bool {
+        self.turn % 2 == 1
+    }
+
+    /// The answer to what was posted will be waited for later: the time of the call runs from now.
+    #[inline]
+    pub(super) fn left_alone(&mut self) {
+        self.asked = self.time_limit.map(|_| Instant::now());
+    }
+
     /// Waits for the answer to `command`, and gives what `read` makes of it.
     #[inline]
     pub(super) fn answer<T>(
@@ -152,6 +169,9 @@ impl Isolated {
     ) -> Result<T, CallError> {
         if let Some(failure) = &self.ended {
             return Err(error(command, failure.clone()));
+        }
+        if !self.acts() {
+            return Err(nonsense(command, "was to be finished and had not been begun"));
         }
         if let Err(failure) = self.wait() {
             return Err(self.lose(command, failure));
@@ -169,7 +189,7 @@ impl Isolated {
     /// Waits until the worker has answered.
     #[inline]
     fn wait(&mut self) -> Result<(), Failure> {
-        let (posted, mut begin) = (self.turn, None);
+        let (posted, mut begin) = (self.turn, self.asked.take());
         loop {
             match self.line.wait(posted) {
                 Seen::Turn(turn) if turn == posted.wrapping_add(1) => {
@@ -269,7 +289,7 @@ impl Isolated {
 impl Isolated {
     /// Has the worker free the instance and end, if it has not; one that does not is ended.
     pub(super) fn free_instance(&mut self) -> Result<(), CallError> {
-        if self.freed || self.ended.is_some() || self.turn % 2 == 1 {
+        if self.freed || self.ended.is_some() {
             return Ok(());
         }
         self.freed = true;
