@@ -321,6 +321,33 @@ fn an_fmu_that_fails_at_once_is_reported() {
 }
 
 #[test]
+fn an_instance_is_made_anew_in_the_same_process() {
+    let mut slave = ready(&options());
+    let process = slave.process_id();
+    for _ in 0..3 {
+        assert_eq!(advance(&mut slave, 1.0, 0.5).unwrap(), (Stepped::Whole, 0.5));
+        slave.renew("two", &options()).unwrap();
+        assert_eq!(slave.process_id(), process);
+        slave.setup_experiment(&Experiment::default()).unwrap();
+        slave.enter_initialization_mode().unwrap();
+        slave.exit_initialization_mode().unwrap();
+    }
+    let refused = slave.renew("refuses", &options()).unwrap_err().to_string();
+    assert!(refused.contains("not under this name"), "{refused}");
+    drop(slave);
+    assert!(is_gone(process));
+    let IsolateError::Call { source, .. } =
+        ready(&options()).renew("crashes at once", &options()).unwrap_err()
+    else {
+        panic!()
+    };
+    assert_eq!(
+        (source.function, source.failure),
+        ("fmi2Instantiate", Failure::Killed(11, "SIGSEGV"))
+    );
+}
+
+#[test]
 fn what_cannot_be_isolated_is_refused_by_name() {
     let missing = isolate::open("missing.fmu".as_ref(), "one", &options()).err().unwrap();
     assert!(missing.to_string().contains("missing.fmu"), "{missing}");

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use fmi2::package::Unpacked;
 
-use super::command::{Command, DONE, FAILED, function_at, read_error};
+use super::command::{Command, DONE, FAILED, INSTANTIATED, NOT_PRELOADED, function_at, read_error};
 use super::layout::Shared;
 use super::line::{Line, Seen, Side};
 use super::log::Inbox;
@@ -82,15 +82,28 @@ impl Isolated {
             slice,
             package,
         };
-        match isolated.open(name, options) {
-            Ok(None) => Ok(isolated),
-            Ok(Some(reason)) => Err(IsolateError::Refused { instance: name.to_owned(), reason }),
-            Err(source) => Err(IsolateError::Call { instance: name.to_owned(), source }),
-        }
+        let opened = isolated.open(name, options);
+        made(name, opened).map(|()| isolated)
     }
 
-    /// Has the worker load and instantiate the FMU; why that did not work, if it did not.
-    fn open(&mut self, name: &str, options: &Options) -> Result<Option<String>, CallError> {
+    /// Frees the instance and makes one called `name` in its place, in the same process with the same
+    /// library.
+    ///
+    /// # Errors
+    ///
+    /// [`IsolateError::Refused`], [`IsolateError::Call`].
+    pub fn renew(&mut self, name: &str, options: &Options) -> Result<(), IsolateError> {
+        let write = |writer: &mut Writer<'_>| {
+            writer.put_bytes(name.as_bytes());
+            writer.put(options.logging);
+        };
+        let done = self.call(Command::Renew, write, outcome);
+        self.inbox.rename(name);
+        made(name, done)
+    }
+
+    /// Has the worker load and instantiate the FMU: what came of it.
+    fn open(&mut self, name: &str, options: &Options) -> Result<(u64, String), CallError> {
         let package = self.package.clone();
         let write = |writer: &mut Writer<'_>| {
             writer.put_bytes(package.folder().as_os_str().as_bytes());
@@ -101,10 +114,7 @@ impl Isolated {
                 writer.put_bytes(library.as_bytes());
             }
         };
-        self.call(Command::Open, write, |reader| {
-            let refused: bool = reader.take()?;
-            if refused { reader.take_text().map(Some) } else { Some(None) }
-        })
+        self.call(Command::Open, write, outcome)
     }
 
     /// Posts `command` with what `write` writes, and gives what `read` makes of the answer.
@@ -305,6 +315,23 @@ impl Drop for Isolated {
         if let Err(error) = self.free_instance() {
             self.inbox.complain(&error);
         }
+    }
+}
+
+/// What came of an instantiation, and the reason.
+fn outcome(reader: &mut Reader<'_>) -> Option<(u64, String)> {
+    let outcome: u64 = reader.take()?;
+    let reason = if outcome == INSTANTIATED { String::new() } else { reader.take_text()? };
+    Some((outcome, reason))
+}
+
+fn made(name: &str, answer: Result<(u64, String), CallError>) -> Result<(), IsolateError> {
+    let instance = name.to_owned();
+    match answer {
+        Ok((INSTANTIATED, _)) => Ok(()),
+        Ok((NOT_PRELOADED, reason)) => Err(IsolateError::Preload { reason }),
+        Ok((_, reason)) => Err(IsolateError::Refused { instance, reason }),
+        Err(source) => Err(IsolateError::Call { instance, source }),
     }
 }
 
