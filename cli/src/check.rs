@@ -13,9 +13,12 @@ mod values;
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
+use anyhow::{Context as _, anyhow};
 use fmi2::package::Unpacked;
-use master::{Fmu, Slave};
+use master::isolate::{self, IsolateError, Isolated, Package};
+use master::{Fmu, Instance};
 use serde::Serialize;
 
 use finding::Finding;
@@ -32,6 +35,9 @@ pub(crate) struct Options {
     /// Look at the files only, do not run the FMU
     #[arg(long)]
     no_run: bool,
+    /// How long a call of the FMU may take while it is tried
+    #[arg(long, value_name = "SECONDS", default_value_t = 30.0, allow_negative_numbers = true)]
+    time_limit: f64,
     /// Load a shared library first, its symbols visible to the FMU; may be repeated
     #[arg(long, value_name = "LIBRARY")]
     preload: Vec<OsString>,
@@ -93,19 +99,62 @@ fn can_run(unpacked: &Unpacked) -> bool {
     })
 }
 
+/// Tries the FMU: on Linux in processes of its own, which may crash or hang.
 fn run(options: &Options, unpacked: &Unpacked) -> anyhow::Result<Vec<Finding>> {
+    let seconds = options.time_limit;
+    let limit = Duration::try_from_secs_f64(seconds).ok().filter(|limit| !limit.is_zero());
+    let limit = limit.with_context(|| {
+        format!("--time-limit is {seconds}, expected a number of seconds above 0")
+    })?;
+    if cfg!(target_os = "linux") {
+        return isolated(options, unpacked, limit);
+    }
     for library in &options.preload {
         master::preload(library)?;
     }
     let mut fmu = None;
-    let mut make = |name: &str| -> anyhow::Result<Box<dyn Slave>> {
+    let mut make = |name: &str, before: Option<Instance>| -> anyhow::Result<Instance> {
+        drop(before);
         let opened = match fmu.take() {
             Some(opened) => opened,
             None => Fmu::open(unpacked.folder())?,
         };
         let instance = opened.instantiate(name);
         fmu = Some(opened);
-        Ok(Box::new(instance?))
+        let mut instance = instance?;
+        instance.set_time_limit(Some(limit));
+        Ok(instance)
     };
     Ok(behaviour::check(&unpacked.description, &mut make))
+}
+
+/// Tries the FMU in processes of its own. What is no fault of the FMU is an error of the command.
+fn isolated(
+    options: &Options,
+    unpacked: &Unpacked,
+    limit: Duration,
+) -> anyhow::Result<Vec<Finding>> {
+    let package = Package::open(unpacked.folder())?;
+    let preload = options.preload.clone();
+    let options = isolate::Options { time_limit: Some(limit), preload, ..Default::default() };
+    let flags = unpacked.description.co_simulation.as_ref();
+    let once = flags.is_some_and(|flags| flags.can_be_instantiated_only_once_per_process);
+    let mut broken = None;
+    let mut make = |name: &str, before: Option<Isolated>| -> anyhow::Result<Isolated> {
+        let made = match before.filter(|_| !once) {
+            Some(mut slave) => slave.renew(name, &options).map(|()| slave),
+            None => package.instantiate(name, &options),
+        };
+        made.map_err(|error| match error {
+            IsolateError::Refused { reason, .. } => anyhow!(reason),
+            IsolateError::Call { source, .. } => source.into(),
+            other => {
+                let said = anyhow!("{other}");
+                broken = Some(other);
+                said
+            }
+        })
+    };
+    let found = behaviour::check(&unpacked.description, &mut make);
+    broken.map_or(Ok(found), |error| Err(error.into()))
 }

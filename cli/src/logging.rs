@@ -148,6 +148,8 @@ impl Visit for Parts {
     fn record_debug(&mut self, field: &Field, value: &dyn fmt::Debug) {
         match field.name() {
             "message" => self.message = format!("{value:?}"),
+            // A number that the message says too.
+            "lost" => {}
             name => {
                 // Writing to a String cannot fail.
                 let _ = write!(self.others, ", {name} = {value:?}");

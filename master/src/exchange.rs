@@ -145,6 +145,45 @@ impl Exchange {
         Ok(done)
     }
 
+    /// The first half of [`Exchange::advance`] of a slave in the background; nothing for another.
+    pub(crate) fn begin(
+        &mut self,
+        system: &mut System,
+        position: usize,
+        (time, size): (f64, f64),
+        never_back: bool,
+    ) -> Result<(), SystemError> {
+        let (name, slave) = &mut system.slaves[position];
+        if slave.in_background().is_none() {
+            return Ok(());
+        }
+        let set = self.set_discrete(position, slave.as_mut());
+        set.and_then(|()| match slave.in_background() {
+            Some(slave) => {
+                slave.begin_advance(&self.reals.step(position, (time, size), never_back))
+            }
+            None => Ok(()),
+        })
+        .map_err(|source| call(name, time, source))
+    }
+
+    /// The second half of [`Exchange::advance`] of a slave in the background; all of it for another.
+    pub(crate) fn finish(
+        &mut self,
+        system: &mut System,
+        position: usize,
+        (time, size): (f64, f64),
+        never_back: bool,
+    ) -> Result<Stepped, SystemError> {
+        let (name, slave) = &mut system.slaves[position];
+        if slave.in_background().is_none() {
+            return self.advance(system, position, (time, size), never_back);
+        }
+        let done = self.reals.finish(position, slave.as_mut(), (time, size), never_back);
+        done.and_then(|done| self.read_discrete(position, slave.as_mut()).map(|()| done))
+            .map_err(|source| call(name, time, source))
+    }
+
     /// As [`Exchange::advance`] for several slaves at once: `run` makes the steps of those that can
     /// be stepped in another thread. Each slave's step is the time and the size that `span` gives.
     pub(crate) fn advance_all(

@@ -317,6 +317,11 @@ impl Slave for Instance {
 }
 
 impl Instance {
+    /// The FMU that it is of.
+    pub(crate) fn fmu(&self) -> &Fmu {
+        &self.fmu
+    }
+
     /// How long an answer of `fmi2Pending` is waited for; none: as long as it takes.
     pub fn set_time_limit(&mut self, limit: Option<Duration>) {
         self.component.time_limit = limit;

@@ -98,6 +98,12 @@ pub enum IsolateError {
         /// What the operating system said.
         source: io::Error,
     },
+    /// The worker could not load a library that was to be loaded before that of the FMU.
+    #[error("{reason}")]
+    Preload {
+        /// Which, and why.
+        reason: String,
+    },
     /// The worker could not load or instantiate the FMU.
     #[error("{instance}: {reason}")]
     Refused {

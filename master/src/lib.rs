@@ -42,5 +42,5 @@ pub use order::{Order, by_direct_dependencies};
 pub use probe::Probe;
 pub use readout::Readout;
 pub use simulation::{Checkpoint, Simulation};
-pub use slave::{Advance, CallError, Failure, Slave, Stepped};
+pub use slave::{Advance, Background, CallError, Failure, Slave, Stepped};
 pub use system::{Connection, Port, System};

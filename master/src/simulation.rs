@@ -9,6 +9,7 @@ mod initial;
 mod iterate;
 mod parallel;
 mod sweep;
+mod together;
 
 use fmi2::Experiment;
 
@@ -26,6 +27,7 @@ use grid::Grid;
 use iterate::Coupled;
 use parallel::Parallel;
 use sweep::{Groups, Swept};
+use together::any_in_background;
 
 pub use checkpoint::Checkpoint;
 pub(crate) use parallel::Task;
@@ -51,6 +53,8 @@ pub struct Simulation {
     sizes: Vec<f64>,
     /// Whether a sweep is one pass over the slaves.
     passes: bool,
+    /// Whether some slaves step in the background.
+    background: bool,
     /// The slave that asked for the end of the simulation.
     ended: Option<usize>,
 }
@@ -101,8 +105,10 @@ impl Simulation {
         let multiples = grid::multiples(&system, algorithm)?;
         let control = Control::new(&system, &exchange.reals, algorithm)?;
         let coupled = Coupled::new(&system, &exchange.reals, algorithm, control.scale.clone());
+        let background = any_in_background(&mut system);
         Ok(Self {
-            passes: algorithm.jobs <= 1 && exchange.passes(),
+            passes: algorithm.jobs <= 1 && exchange.passes() && !background,
+            background,
             system,
             exchange,
             drives: scenario.drives,

@@ -178,26 +178,45 @@ pub trait Slave {
         never_back: bool,
         outputs: (&[u32], &mut [f64]),
     ) -> Result<Stepped, CallError> {
-        self.advance(&mut Advance {
-            inputs: inputs.0,
-            input_values: inputs.1,
-            derived_inputs: &[],
-            input_orders: &[],
-            input_derivatives: &[],
-            time,
-            size,
-            never_back,
-            outputs: outputs.0,
-            output_values: outputs.1,
-            derived_outputs: &[],
-            output_orders: &[],
-            output_derivatives: &mut [],
-        })
+        self.advance(&mut Advance::held(inputs, (time, size), never_back, outputs))
     }
 
     /// The same slave for another thread to step; none where it is bound to its thread.
     fn in_thread(&mut self) -> Option<&mut (dyn Slave + Send)> {
         None
+    }
+
+    /// The same slave to begin steps that are finished later; none, always, where a step takes its
+    /// caller along.
+    fn in_background(&mut self) -> Option<&mut dyn Background> {
+        None
+    }
+}
+
+/// A slave that steps while its caller goes on, for example to begin the steps of others.
+pub trait Background {
+    /// The first half of [`Slave::advance`]: sets the inputs and begins the step. What comes next is
+    /// [`Background::finish_advance`]; any other call waits for the end of the step, whose outcome
+    /// is then lost.
+    ///
+    /// # Errors
+    ///
+    /// Where the step cannot be begun: there is nothing to finish then.
+    fn begin_advance(&mut self, step: &Advance<'_>) -> Result<(), CallError>;
+
+    /// The second half of [`Slave::advance`]: waits for the step that was begun and reads the outputs.
+    ///
+    /// # Errors
+    ///
+    /// As [`Slave::advance`], and where no step was begun.
+    fn finish_advance(&mut self, step: &mut Advance<'_>) -> Result<Stepped, CallError>;
+}
+
+/// [`Background::finish_advance`] of a slave in the background, [`Slave::advance`] of another.
+pub(crate) fn finish(slave: &mut dyn Slave, step: &mut Advance<'_>) -> Result<Stepped, CallError> {
+    match slave.in_background() {
+        Some(slave) => slave.finish_advance(step),
+        None => slave.advance(step),
     }
 }
 
@@ -230,6 +249,34 @@ pub struct Advance<'a> {
     pub output_orders: &'a [i32],
     /// One for each of `derived_outputs`.
     pub output_derivatives: &'a mut [f64],
+}
+
+impl<'a> Advance<'a> {
+    /// A step from `time` over `size` without derivatives: references and values of the inputs, and
+    /// of the outputs.
+    #[must_use]
+    pub fn held(
+        (inputs, input_values): (&'a [u32], &'a [f64]),
+        (time, size): (f64, f64),
+        never_back: bool,
+        (outputs, output_values): (&'a [u32], &'a mut [f64]),
+    ) -> Self {
+        Self {
+            inputs,
+            input_values,
+            derived_inputs: &[],
+            input_orders: &[],
+            input_derivatives: &[],
+            time,
+            size,
+            never_back,
+            outputs,
+            output_values,
+            derived_outputs: &[],
+            output_orders: &[],
+            output_derivatives: &mut [],
+        }
+    }
 }
 
 /// How far a step came.

@@ -11,9 +11,14 @@ mod linux {
     use std::time::{Duration, Instant};
 
     use fmi2::Experiment;
-    use fmi2::description::{Causality, Kind};
+    use fmi2::description::{Causality, Kind, ModelDescription};
+    use master::assembly::{Link, Terminal};
     use master::isolate::{self, Isolated, Options};
-    use master::{Advance, Fmu, Slave};
+    use master::transformation::Transformation;
+    use master::{
+        Advance, Algorithm, Background as _, CallError, Course, Fmu, Simulation, Slave, Stepped,
+        Sweep, System,
+    };
     use tests::{dist, troubles};
 
     /// Steps of one sample, and samples.
@@ -44,21 +49,9 @@ mod linux {
         }
 
         fn step(&mut self, count: u32) -> Advance<'_> {
-            Advance {
-                inputs: &self.inputs,
-                input_values: &self.input,
-                derived_inputs: &[],
-                input_orders: &[],
-                input_derivatives: &[],
-                time: f64::from(count) * SIZE,
-                size: SIZE,
-                never_back: true,
-                outputs: &self.outputs,
-                output_values: &mut self.output,
-                derived_outputs: &[],
-                output_orders: &[],
-                output_derivatives: &mut [],
-            }
+            let inputs = (&self.inputs[..], &self.input[..]);
+            let outputs = (&self.outputs[..], &mut self.output[..]);
+            Advance::held(inputs, (f64::from(count) * SIZE, SIZE), true, outputs)
         }
     }
 
@@ -101,6 +94,62 @@ mod linux {
         }
     }
 
+    /// An isolated instance of which the master does not know that it steps in the background.
+    struct Alone(Isolated);
+
+    impl Slave for Alone {
+        fn description(&self) -> &ModelDescription {
+            self.0.description()
+        }
+        fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError> {
+            self.0.setup_experiment(experiment)
+        }
+        fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
+            self.0.enter_initialization_mode()
+        }
+        fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
+            self.0.exit_initialization_mode()
+        }
+        fn terminate(&mut self) -> Result<(), CallError> {
+            self.0.terminate()
+        }
+        fn get_real(&mut self, which: &[u32], values: &mut [f64]) -> Result<(), CallError> {
+            self.0.get_real(which, values)
+        }
+        fn set_real(&mut self, which: &[u32], values: &[f64]) -> Result<(), CallError> {
+            self.0.set_real(which, values)
+        }
+        fn do_step(&mut self, time: f64, size: f64, back: bool) -> Result<Stepped, CallError> {
+            self.0.do_step(time, size, back)
+        }
+        fn advance(&mut self, step: &mut Advance<'_>) -> Result<Stepped, CallError> {
+            self.0.advance(step)
+        }
+    }
+
+    /// Microseconds per step of a ring of slaves, the output of each (second of `ports`) the input of
+    /// the next (first of them), by Jacobi's method with held inputs.
+    fn by_master(slaves: Vec<Box<dyn Slave>>, (input, output): (&str, &str)) -> Vec<f64> {
+        let mut system = System::default();
+        let count = slaves.len();
+        for (position, slave) in slaves.into_iter().enumerate() {
+            system.add(&format!("i{position}"), slave).unwrap();
+        }
+        for position in 0..count {
+            let end = |position: usize, variable: &str| Terminal {
+                element: format!("i{position}"),
+                variable: variable.to_owned(),
+            };
+            let (from, to) = (end(position, output), end((position + 1) % count, input));
+            // A position goes to a force: only the calls matter.
+            let transformation = Transformation::Identity;
+            system.link(&Link { from, to, transformation, units_settled: true }).unwrap();
+        }
+        let algorithm = Algorithm::fixed(Sweep::Jacobi, Course::Hold, SIZE);
+        let mut simulation = Simulation::new(system, &algorithm, &Experiment::default()).unwrap();
+        samples(|_| simulation.step().unwrap())
+    }
+
     fn print(what: &str, instances: usize, near: &[f64], far: &[f64]) {
         let at = |samples: &[f64], part: usize| samples[part * (samples.len() - 1) / 4];
         let added =
@@ -115,7 +164,7 @@ mod linux {
         );
     }
 
-    fn measure(what: &str, fmu: &Path) {
+    fn measure(what: &str, fmu: &Path, ports: (&str, &str)) {
         let opened = Fmu::open(fmu).unwrap();
         for instances in [1, 2, 4] {
             let names: Vec<String> = (0..instances).map(|k| format!("i{k}")).collect();
@@ -134,6 +183,16 @@ mod linux {
                 let all = samples(|count| together(&mut far, count));
                 print(&format!("{what}, begun together"), instances, &near, &all);
             }
+            let here =
+                |name: &String| Box::new(opened.instantiate(name).unwrap()) as Box<dyn Slave>;
+            let there = |name: &String| package.instantiate(name, &Options::default()).unwrap();
+            let near = by_master(names.iter().map(here).collect(), ports);
+            let alone = |name: &String| Box::new(Alone(there(name))) as Box<dyn Slave>;
+            let one = by_master(names.iter().map(alone).collect(), ports);
+            print(&format!("{what}, by the master, one after the other"), instances, &near, &one);
+            let far = |name: &String| Box::new(there(name)) as Box<dyn Slave>;
+            let all = by_master(names.iter().map(far).collect(), ports);
+            print(&format!("{what}, by the master"), instances, &near, &all);
         }
     }
 
@@ -142,8 +201,8 @@ mod linux {
             "| FMU | instances | in process, median | isolated, best | median | 3rd quartile | added per instance |"
         );
         println!("|---|---|---|---|---|---|---|");
-        measure("C, 1 input, 1 output", troubles());
-        measure("pendulum", &dist().join("FrictionPendulum.fmu"));
+        measure("C, 1 input, 1 output", troubles(), ("u", "y"));
+        measure("pendulum", &dist().join("FrictionPendulum.fmu"), ("u", "x_p"));
         let package = isolate::Package::open(troubles()).unwrap();
         let begin = Instant::now();
         for _ in 0..20 {

@@ -23,6 +23,7 @@ pub struct CFmu {
     flags: BTreeMap<String, String>,
     definitions: Vec<String>,
     root_attributes: String,
+    experiment: String,
 }
 
 impl CFmu {
@@ -41,6 +42,7 @@ impl CFmu {
             flags: flags.into(),
             definitions: Vec::new(),
             root_attributes: String::new(),
+            experiment: String::new(),
         }
     }
 
@@ -78,6 +80,22 @@ impl CFmu {
         self
     }
 
+    /// The same that proposes steps of `size` s.
+    #[must_use]
+    pub fn proposing(mut self, size: f64) -> Self {
+        self.experiment = format!("<DefaultExperiment stopTime=\"1\" stepSize=\"{size}\"/>\n");
+        self
+    }
+
+    /// The same whose answer of `fmi2GetVersion` is the text that `symbol` points to, which another
+    /// library in the process has to define.
+    #[must_use]
+    pub fn expecting(mut self, symbol: &str) -> Self {
+        let value = format!("({{ extern const char *{symbol}; {symbol}; }})");
+        self.definitions.push(format!("-DVERSION={value}"));
+        self
+    }
+
     /// The same, exported by that tool and in need of it.
     #[must_use]
     pub fn needing(mut self, tool: &str) -> Self {
@@ -105,6 +123,7 @@ impl CFmu {
             self.flags.iter().map(|(name, value)| format!(" {name}=\"{value}\"")).collect();
         let flags = flags.concat();
         let (behaviour, attributes) = (&self.behaviour, &self.root_attributes);
+        let experiment = &self.experiment;
         let variables = variables(behaviour);
         let output = |name| {
             let at = variables.iter().position(|variable| variable.contains(&quoted(name)));
@@ -118,7 +137,7 @@ impl CFmu {
              {attributes}>\n<CoSimulation modelIdentifier=\"slave\"{flags}/>\n\
              <TypeDefinitions><SimpleType name=\"Mode\"><Enumeration><Item name=\"off\" \
              value=\"1\"/><Item name=\"on\" value=\"2\"/></Enumeration></SimpleType>\
-             </TypeDefinitions>\n<ModelVariables>\n{variables}</ModelVariables>\n\
+             </TypeDefinitions>\n{experiment}<ModelVariables>\n{variables}</ModelVariables>\n\
              <ModelStructure><Outputs>\n{outputs}</Outputs></ModelStructure>\n\
              </fmiModelDescription>\n"
         )

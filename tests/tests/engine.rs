@@ -1,6 +1,10 @@
 //! The engine: initialization, step control, events, steps in part, threads, checkpoints, scenarios.
 #![expect(clippy::unwrap_used, clippy::float_cmp, reason = "tests; exact by construction")]
 
+#[path = "engine/ahead.rs"]
+mod ahead;
+#[path = "engine/background.rs"]
+mod background;
 #[path = "engine/checkpoints.rs"]
 mod checkpoints;
 #[path = "engine/control.rs"]

@@ -42,21 +42,8 @@ fn error_of(trouble: Trouble, options: &Options) -> (Isolated, CallError) {
 /// Sets u = `input`, steps 0.5 s from 0 s; y.
 fn advance(slave: &mut dyn Slave, input: f64, size: f64) -> Result<(Stepped, f64), CallError> {
     let mut output = [f64::NAN];
-    let mut step = Advance {
-        inputs: &[0],
-        input_values: &[input],
-        derived_inputs: &[],
-        input_orders: &[],
-        input_derivatives: &[],
-        time: 0.0,
-        size,
-        never_back: true,
-        outputs: &[1],
-        output_values: &mut output,
-        derived_outputs: &[],
-        output_orders: &[],
-        output_derivatives: &mut [],
-    };
+    let input = [input];
+    let mut step = Advance::held((&[0], &input), (0.0, size), true, (&[1], &mut output));
     let done = slave.advance(&mut step)?;
     Ok((done, output[0]))
 }
@@ -182,42 +169,6 @@ fn every_type_of_variable_and_long_data_pass() {
     advance(&mut slave, 3.0, 0.5).unwrap();
     slave.deserialize_state(&state).unwrap();
     assert_eq!(advance(&mut slave, 0.0, 0.5).unwrap().1, 1.5);
-}
-
-#[test]
-fn steps_begun_together_are_finished_together() {
-    let mut slaves = [ready(&options()), ready(&options()), ready(&options())];
-    let mut outputs = [[0.0]; 3];
-    for _ in 0..100 {
-        for (input, slave) in [1.0, 2.0, 3.0].iter().zip(&mut slaves) {
-            slave.begin_advance(&step(&[*input], &mut [0.0])).unwrap();
-        }
-        let early = slaves[0].get_real(&[1], &mut [0.0]).unwrap_err();
-        assert!(early.to_string().contains("before the step begun was finished"), "{early}");
-        for ((input, slave), output) in [1.0, 2.0, 3.0].iter().zip(&mut slaves).zip(&mut outputs) {
-            slave.finish_advance(&mut step(&[*input], output)).unwrap();
-        }
-    }
-    assert_eq!(outputs, [[25.0], [50.0], [75.0]]);
-}
-
-/// A step of 0.25 s.
-fn step<'a>(input: &'a [f64], output: &'a mut [f64]) -> Advance<'a> {
-    Advance {
-        inputs: &[0],
-        input_values: input,
-        derived_inputs: &[],
-        input_orders: &[],
-        input_derivatives: &[],
-        time: 0.0,
-        size: 0.25,
-        never_back: true,
-        outputs: &[1],
-        output_values: output,
-        derived_outputs: &[],
-        output_orders: &[],
-        output_derivatives: &mut [],
-    }
 }
 
 #[test]
@@ -367,6 +318,33 @@ fn an_fmu_that_fails_at_once_is_reported() {
     assert_eq!(source.messages, ["going down"]);
     let refused = error("refuses").to_string();
     assert!(refused.contains("not under this name") && refused.contains("refuses"), "{refused}");
+}
+
+#[test]
+fn an_instance_is_made_anew_in_the_same_process() {
+    let mut slave = ready(&options());
+    let process = slave.process_id();
+    for _ in 0..3 {
+        assert_eq!(advance(&mut slave, 1.0, 0.5).unwrap(), (Stepped::Whole, 0.5));
+        slave.renew("two", &options()).unwrap();
+        assert_eq!(slave.process_id(), process);
+        slave.setup_experiment(&Experiment::default()).unwrap();
+        slave.enter_initialization_mode().unwrap();
+        slave.exit_initialization_mode().unwrap();
+    }
+    let refused = slave.renew("refuses", &options()).unwrap_err().to_string();
+    assert!(refused.contains("not under this name"), "{refused}");
+    drop(slave);
+    assert!(is_gone(process));
+    let IsolateError::Call { source, .. } =
+        ready(&options()).renew("crashes at once", &options()).unwrap_err()
+    else {
+        panic!()
+    };
+    assert_eq!(
+        (source.function, source.failure),
+        ("fmi2Instantiate", Failure::Killed(11, "SIGSEGV"))
+    );
 }
 
 #[test]

@@ -18,49 +18,84 @@ const LOOKED_AT: usize = 1000;
 /// Findings of one kind that are listed.
 const LISTED: usize = 10;
 
-/// Makes an instance of the name given.
-pub(super) type Make<'a> = dyn FnMut(&str) -> anyhow::Result<Box<dyn Slave>> + 'a;
+/// Messages of a trial from which on they are a flood: a hundred or so for each of its steps.
+const FLOOD: u64 = 10_000;
+
+/// Makes an instance of the name given; in place of another one, in the same process, where there is
+/// one.
+pub(super) type Make<'a, S> = dyn FnMut(&str, Option<S>) -> anyhow::Result<S> + 'a;
 
 /// The outputs at each communication point of a trial, the start with them.
 type Course = Vec<Vec<Value>>;
 
 /// Tries the FMU of `description`, of which `make` gives instances.
-pub(super) fn check(description: &ModelDescription, make: &mut Make<'_>) -> Vec<Finding> {
+pub(super) fn check<S: Slave>(
+    description: &ModelDescription,
+    make: &mut Make<'_, S>,
+) -> Vec<Finding> {
     let mut trial = Trial { description, make, findings: Findings::about(Part::Behaviour) };
-    let ((), categories) = Heard::during(|| trial.run());
-    trial.categories(&categories);
+    let ((), told) = Heard::during(|| trial.run());
+    trial.categories(&told.categories);
+    if told.messages > FLOOD {
+        let what = format!("sends {} messages in this trial, with logging off", told.messages);
+        let why = "They slow every run down and bury what others say.";
+        trial.findings.add(Warning, "logger", what, (why, "2.1.5"));
+    }
     trial.findings.all
 }
 
-struct Trial<'a> {
+struct Trial<'a, S> {
     description: &'a ModelDescription,
-    make: &'a mut Make<'a>,
+    make: &'a mut Make<'a, S>,
     findings: Findings,
 }
 
-impl Trial<'_> {
+/// Whether the process of the FMU is gone, or as good as that.
+fn gone(error: &CallError) -> bool {
+    use Failure::{Exited, Killed, Nonsense, TimedOut};
+    matches!(error.failure, Killed(..) | Exited(_) | TimedOut(_) | Nonsense(_))
+}
+
+/// What such an end does to an importer.
+fn harm(failure: &Failure) -> Option<&'static str> {
+    match failure {
+        Failure::Killed(..) | Failure::Exited(_) => Some(
+            "An importer that calls it in its own process ends with it, and loses its results.",
+        ),
+        Failure::TimedOut(_) => Some("An importer waits for it, perhaps for ever."),
+        _ => None,
+    }
+}
+
+impl<S: Slave> Trial<'_, S> {
     fn run(&mut self) {
-        let Some(first) = self.course("first") else { return };
-        if let Some(second) = self.course("second").filter(|second| *second != first) {
-            let point = first.iter().zip(&second).position(|(one, other)| one != other);
-            let what =
-                format!("a second instance has other outputs, from step {}", point.unwrap_or(0));
-            let why =
-                "A run cannot be repeated: statics, uninitialised memory or the clock are used.";
-            self.findings.add(Warning, "fmi2DoStep", what, (why, "2.1"));
+        let Some((first, slave)) = self.course("first", None) else { return };
+        if let Some((second, mut slave)) = self.course("second", Some(slave)) {
+            if second != first {
+                self.differ(&first, &second);
+            }
+            if let Err(error) = slave.free() {
+                self.failed(&error, "after fmi2Terminate", "4.2.4");
+            }
         }
         self.unknown_reference();
         self.past_the_end();
         self.states();
     }
 
+    fn differ(&mut self, first: &Course, second: &Course) {
+        let point = first.iter().zip(second).position(|(one, other)| one != other);
+        let what = format!("a second instance has other outputs, from step {}", point.unwrap_or(0));
+        let why = "A run cannot be repeated: statics, uninitialised memory or the clock are used.";
+        self.findings.add(Warning, "fmi2DoStep", what, (why, "2.1"));
+    }
+
     /// An instance in initialization mode or beyond; what fails is a finding.
-    fn initialized(&mut self, name: &str, stop_time: Option<f64>) -> Option<Box<dyn Slave>> {
-        let mut slave = match (self.make)(name) {
+    fn initialized(&mut self, name: &str, stop_time: Option<f64>, before: Option<S>) -> Option<S> {
+        let mut slave = match (self.make)(name, before) {
             Ok(slave) => slave,
             Err(error) => {
-                let why = "No importer can use it here.";
-                self.findings.add(Error, "fmi2Instantiate", format!("{error:#}"), (why, "2.1.5"));
+                self.refused(&error);
                 return None;
             }
         };
@@ -79,10 +114,29 @@ impl Trial<'_> {
         }
     }
 
+    /// There is no instance.
+    fn refused(&mut self, error: &anyhow::Error) {
+        match error.downcast_ref::<CallError>() {
+            Some(error) if error.function == "fmi2FreeInstance" => {
+                self.failed(error, "after fmi2Terminate", "4.2.4");
+            }
+            Some(error) => self.failed(error, "when an instance is made", "2.1.5"),
+            None => {
+                let why = "No importer can use it here.";
+                self.findings.add(Error, "fmi2Instantiate", format!("{error:#}"), (why, "2.1.5"));
+            }
+        }
+    }
+
     fn failed(&mut self, error: &CallError, when: &str, section: &'static str) {
         let what = format!("{} {when}", error.failure);
         let messages = error.messages.join("; ");
-        self.findings.add(Error, error.function, what, (&messages, section));
+        let why = match harm(&error.failure) {
+            Some(harm) if messages.is_empty() => harm.to_owned(),
+            Some(harm) => format!("{harm} Its last messages: {messages}"),
+            None => messages,
+        };
+        self.findings.add(Error, error.function, what, (&why, section));
         if error.messages.is_empty() && matches!(error.failure, Failure::Status(_)) {
             let why = "Nobody learns what was wrong.";
             self.findings.add(Warning, error.function, "fails without a message", (why, "2.1.3"));
@@ -104,31 +158,38 @@ impl Trial<'_> {
         self.start_time() + f64::from(k) * self.step_size()
     }
 
-    /// Runs an instance of that name from begin to end.
-    fn course(&mut self, name: &str) -> Option<Course> {
-        let mut slave = self.initialized(name, None)?;
+    /// Runs an instance of that name from begin to end: outputs and instance.
+    fn course(&mut self, name: &str, before: Option<S>) -> Option<(Course, S)> {
+        let mut slave = self.initialized(name, None, before)?;
         if name == "first" {
-            self.start_values(&mut *slave);
+            self.start_values(&mut slave)?;
         }
-        let course = self.steps(&mut *slave, 0)?;
+        let course = self.steps(&mut slave, 0)?;
         if name == "first" {
             self.numbers(&course);
         }
         if let Err(error) = slave.terminate() {
             self.failed(&error, "after the last step", "4.2.4");
-            return Some(course);
+            return (!gone(&error)).then_some((course, slave));
         }
-        let read = outputs(self.description).next().map(|output| get(&mut *slave, output));
-        if let (Some(Err(error)), "first") = (read, name) {
-            let what = format!("{} after fmi2Terminate", error.failure);
-            let why = "Final values cannot be read, as the table of calls allows.";
-            self.findings.add(Warning, error.function, what, (why, "4.2.4"));
+        let read = outputs(self.description).next().map(|output| get(&mut slave, output));
+        match read {
+            Some(Err(error)) if gone(&error) => {
+                self.failed(&error, "after fmi2Terminate", "4.2.4");
+                return None;
+            }
+            Some(Err(error)) if name == "first" => {
+                let what = format!("{} after fmi2Terminate", error.failure);
+                let why = "Final values cannot be read, as the table of calls allows.";
+                self.findings.add(Warning, error.function, what, (why, "4.2.4"));
+            }
+            _ => {}
         }
-        Some(course)
+        Some((course, slave))
     }
 
     /// The outputs now and after each of the steps from communication point `from` on.
-    fn steps(&mut self, slave: &mut dyn Slave, from: u32) -> Option<Course> {
+    fn steps(&mut self, slave: &mut S, from: u32) -> Option<Course> {
         let mut course = vec![self.read(slave)?];
         for k in from..from + STEPS {
             match slave.do_step(self.time(k), self.step_size(), true) {
@@ -149,7 +210,7 @@ impl Trial<'_> {
         Some(course)
     }
 
-    fn read(&mut self, slave: &mut dyn Slave) -> Option<Vec<Value>> {
+    fn read(&mut self, slave: &mut S) -> Option<Vec<Value>> {
         let values = outputs(self.description).take(LOOKED_AT).map(|own| get(slave, own));
         values
             .collect::<Result<_, _>>()
@@ -157,12 +218,17 @@ impl Trial<'_> {
             .ok()
     }
 
-    fn start_values(&mut self, slave: &mut dyn Slave) {
+    /// Compares start values; none where the process of the FMU ended meanwhile.
+    fn start_values(&mut self, slave: &mut S) -> Option<()> {
         let mut others = 0_usize;
         for variable in kept(self.description).take(LOOKED_AT) {
             let Some(stated) = start(variable) else { continue };
             let found = match get(slave, variable) {
                 Ok(found) if found.agrees(&stated) => continue,
+                Err(error) if gone(&error) => {
+                    self.failed(&error, &format!("when {} is read", variable.name), "2.1.7");
+                    return None;
+                }
                 Ok(found) => format!("the library starts with {found}, the XML says {stated}"),
                 Err(error) => format!("{error}"),
             };
@@ -182,6 +248,7 @@ impl Trial<'_> {
             let what = format!("{} more start values differ", others - LISTED);
             self.findings.add(Error, "start values", what, ("", "2.2.7"));
         }
+        Some(())
     }
 
     fn numbers(&mut self, course: &Course) {
@@ -203,12 +270,15 @@ impl Trial<'_> {
 
     /// A value reference that no variable has is an error.
     fn unknown_reference(&mut self) {
-        let Some(mut slave) = self.initialized("unknown", None) else { return };
+        let Some(mut slave) = self.initialized("unknown", None, None) else { return };
         match slave.get_real(&[unknown_reference(self.description)], &mut [0.0]) {
             Ok(()) => {
                 let what = "accepts a value reference that no variable has, expected fmi2Error";
                 let why = "A wrong connection goes unnoticed.";
                 self.findings.add(Error, "fmi2GetReal", what, (why, "2.1.2"));
+            }
+            Err(error) if gone(&error) => {
+                self.failed(&error, "for a value reference that no variable has", "2.1.2");
             }
             Err(error) if error.messages.is_empty() => {
                 let what = "refuses an unknown value reference without a message";
@@ -226,11 +296,19 @@ impl Trial<'_> {
     /// A step beyond a stop time that was defined is an error.
     fn past_the_end(&mut self) {
         let (start, size) = (self.start_time(), self.step_size());
-        let Some(mut slave) = self.initialized("end", Some(start + 0.5 * size)) else { return };
-        if matches!(slave.do_step(start, size, true), Ok(Stepped::Whole)) {
-            let what = "steps past a stopTime that was defined, expected fmi2Error";
-            let why = "What an FMU computes beyond the end of its data goes unnoticed.";
-            self.findings.add(Warning, "fmi2DoStep", what, (why, "2.1.6"));
+        let Some(mut slave) = self.initialized("end", Some(start + 0.5 * size), None) else {
+            return;
+        };
+        match slave.do_step(start, size, true) {
+            Ok(Stepped::Whole) => {
+                let what = "steps past a stopTime that was defined, expected fmi2Error";
+                let why = "What an FMU computes beyond the end of its data goes unnoticed.";
+                self.findings.add(Warning, "fmi2DoStep", what, (why, "2.1.6"));
+            }
+            Err(error) if gone(&error) => {
+                self.failed(&error, "for a step past a stopTime that was defined", "2.1.6");
+            }
+            _ => {}
         }
     }
 
@@ -241,8 +319,8 @@ impl Trial<'_> {
             return;
         }
         let serialize = flags.can_serialize_fmu_state;
-        let Some(mut slave) = self.initialized("states", None) else { return };
-        if self.steps(&mut *slave, 0).is_none_or(|course| course.len() <= STEPS as usize) {
+        let Some(mut slave) = self.initialized("states", None, None) else { return };
+        if self.steps(&mut slave, 0).is_none_or(|course| course.len() <= STEPS as usize) {
             return;
         }
         if let Err(error) = slave.save_state(0) {
@@ -254,25 +332,28 @@ impl Trial<'_> {
                 return self.failed(&error, "though canSerializeFMUstate is true", "2.1.8");
             }
         };
-        let Some(first) = self.steps(&mut *slave, STEPS) else { return };
+        let Some(first) = self.steps(&mut slave, STEPS) else { return };
         if let Err(error) = slave.restore_state(0) {
             return self.failed(&error, "for a state of the same instance", "2.1.8");
         }
-        self.again(&mut *slave, &first, "fmi2SetFMUstate");
-        if let Some(bytes) = bytes {
+        let lives = self.again(&mut slave, &first, "fmi2SetFMUstate");
+        if let Some(bytes) = bytes.filter(|_| lives) {
             if let Err(error) = slave.deserialize_state(&bytes) {
                 return self.failed(&error, "for bytes of the same instance", "2.1.8");
             }
-            self.again(&mut *slave, &first, "fmi2DeSerializeFMUstate");
+            self.again(&mut slave, &first, "fmi2DeSerializeFMUstate");
         }
     }
 
-    fn again(&mut self, slave: &mut dyn Slave, first: &Course, function: &str) {
-        if self.steps(slave, STEPS).is_some_and(|second| second != *first) {
+    /// Whether the steps could be made again.
+    fn again(&mut self, slave: &mut S, first: &Course, function: &str) -> bool {
+        let second = self.steps(slave, STEPS);
+        if second.as_ref().is_some_and(|second| second != first) {
             let what = "the outputs after the state was restored differ from those before";
             let why = "Masters that repeat a step, and optimisers, get wrong results.";
             self.findings.add(Error, function, what, (why, "2.1.8"));
         }
+        second.is_some()
     }
 
     fn categories(&mut self, used: &BTreeSet<String>) {

@@ -11,26 +11,41 @@ use tracing::{Event, Metadata, Subscriber};
 /// Where the master sends the messages of FMUs.
 const TARGET: &str = "fmu";
 
-/// Hears the log categories that are used.
+/// What was heard.
+#[derive(Default)]
+pub(super) struct Told {
+    /// The log categories that are used.
+    pub(super) categories: BTreeSet<String>,
+    /// Messages, also those that came too fast to be kept.
+    pub(super) messages: u64,
+}
+
+/// Hears the messages.
 #[derive(Clone, Default)]
 pub(super) struct Heard {
-    categories: Arc<Mutex<BTreeSet<String>>>,
+    told: Arc<Mutex<Told>>,
 }
 
 impl Heard {
-    /// Runs `body` and gives the categories of all messages that came.
-    pub(super) fn during<T>(body: impl FnOnce() -> T) -> (T, BTreeSet<String>) {
+    /// Runs `body` and gives what came meanwhile.
+    pub(super) fn during<T>(body: impl FnOnce() -> T) -> (T, Told) {
         let heard = Self::default();
         let result = tracing::subscriber::with_default(heard.clone(), body);
-        let categories = heard.categories.lock().map(|mut own| std::mem::take(&mut *own));
-        (result, categories.unwrap_or_default())
+        let told = heard.told.lock().map(|mut own| std::mem::take(&mut *own));
+        (result, told.unwrap_or_default())
     }
 }
 
-/// Takes the field `category` of an event.
-struct Category(Option<String>);
+/// Takes the field `category` of an event, and the number of messages that it stands for.
+struct Category(Option<String>, u64);
 
 impl Visit for Category {
+    fn record_u64(&mut self, field: &Field, value: u64) {
+        if field.name() == "lost" {
+            self.1 = value;
+        }
+    }
+
     fn record_str(&mut self, field: &Field, value: &str) {
         if field.name() == "category" {
             self.0 = Some(value.to_owned());
@@ -58,10 +73,11 @@ impl Subscriber for Heard {
     fn record_follows_from(&self, _: &Id, _: &Id) {}
 
     fn event(&self, event: &Event<'_>) {
-        let mut category = Category(None);
+        let mut category = Category(None, 1);
         event.record(&mut category);
-        if let (Some(name), Ok(mut all)) = (category.0, self.categories.lock()) {
-            all.insert(name);
+        if let Ok(mut told) = self.told.lock() {
+            told.messages = told.messages.saturating_add(category.1);
+            told.categories.extend(category.0);
         }
     }
 

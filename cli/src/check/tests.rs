@@ -141,9 +141,9 @@ impl Slave for Sum {
 fn findings(fault: Fault) -> Vec<Finding> {
     let description = ModelDescription::parse(XML).unwrap();
     let mut number = 0;
-    let mut make = |_: &str| -> anyhow::Result<Box<dyn Slave>> {
+    let mut make = |_: &str, _: Option<Sum>| -> anyhow::Result<Sum> {
         number += 1;
-        Ok(Box::new(Sum {
+        Ok(Sum {
             description: description.clone(),
             fault,
             number,
@@ -152,7 +152,7 @@ fn findings(fault: Fault) -> Vec<Finding> {
             end: 0.0,
             saved: 0.0,
             terminated: false,
-        }))
+        })
     };
     behaviour::check(&description, &mut make)
 }
@@ -198,7 +198,7 @@ fn a_finding_says_what_where_why_and_by_which_section() {
 #[test]
 fn what_cannot_be_instantiated_is_one_finding() {
     let description = ModelDescription::parse(XML).unwrap();
-    let mut make = |_: &str| -> anyhow::Result<Box<dyn Slave>> { anyhow::bail!("no licence") };
+    let mut make = |_: &str, _: Option<Sum>| -> anyhow::Result<Sum> { anyhow::bail!("no licence") };
     let all = behaviour::check(&description, &mut make);
     assert!(all.iter().all(|own| own.place == "fmi2Instantiate" && own.what == "no licence"));
     assert_eq!(all.len(), 1, "{all:#?}");

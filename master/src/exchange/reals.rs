@@ -9,7 +9,7 @@ pub(crate) use super::trace::Trace;
 use crate::algorithm::{Algorithm, Coupling, Course, StepControl, Sweep};
 use crate::error::SystemError;
 use crate::fault::FaultLine;
-use crate::slave::{CallError, Slave, Stepped};
+use crate::slave::{Advance, CallError, Slave, Stepped};
 use crate::system::{Port, System};
 
 /// The connected Reals of a system.
@@ -259,9 +259,17 @@ impl Reals {
         &mut self,
         slave: usize,
         instance: &mut dyn Slave,
-        (time, size): (f64, f64),
+        span: (f64, f64),
         never_back: bool,
     ) -> Result<Stepped, CallError> {
+        let done = instance.advance(&mut self.step(slave, span, never_back))?;
+        self.trace.spans[slave].stepped = true;
+        Ok(done)
+    }
+
+    /// The step of `slave` with its gathered inputs.
+    #[inline]
+    pub(super) fn step(&mut self, slave: usize, span: (f64, f64), never_back: bool) -> Advance<'_> {
         let lane = &self.layout.lanes[slave];
         let trace = &mut self.trace;
         let inputs =
@@ -270,9 +278,7 @@ impl Reals {
             &mut trace.latest[lane.output_range.clone()],
             &mut trace.derivatives[lane.output_derivative_range.clone()],
         );
-        let done = instance.advance(&mut lane.step(inputs, (time, size), never_back, outputs))?;
-        trace.spans[slave].stepped = true;
-        Ok(done)
+        lane.step(inputs, span, never_back, outputs)
     }
 
     /// Whether [`Reals::pass`] does all that a sweep of Jacobi's method takes.

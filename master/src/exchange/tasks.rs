@@ -1,12 +1,26 @@
-//! The steps of several slaves at once.
+//! The steps of several slaves at once, and steps that are begun and finished.
 
 use super::reals::Reals;
 use crate::simulation::Task;
-use crate::slave::{CallError, Stepped};
+use crate::slave::{Advance, CallError, Slave, Stepped, finish};
 use crate::system::System;
 
 impl Reals {
-    /// [`Reals::advance`] of several slaves: those that can be stepped in another thread by `run`.
+    /// The second half of [`Reals::advance`].
+    pub(super) fn finish(
+        &mut self,
+        slave: usize,
+        instance: &mut dyn Slave,
+        span: (f64, f64),
+        never_back: bool,
+    ) -> Result<Stepped, CallError> {
+        let done = finish(instance, &mut self.step(slave, span, never_back))?;
+        self.trace.spans[slave].stepped = true;
+        Ok(done)
+    }
+
+    /// [`Reals::advance`] of several slaves: those in the background begin first, then those that can
+    /// be stepped in another thread are by `run`.
     pub(crate) fn advance_all(
         &mut self,
         system: &mut System,
@@ -22,7 +36,7 @@ impl Reals {
         let mut results: Vec<Option<Result<Stepped, CallError>>> = vec![None; chosen.len()];
         let (mut values, mut derivatives) =
             (self.trace.latest.as_mut_slice(), self.trace.derivatives.as_mut_slice());
-        let (mut tasks, mut own) = (Vec::with_capacity(slaves.len()), Vec::new());
+        let mut sorted = Sorted::default();
         for (slave, (_, instance)) in system.slaves.iter_mut().enumerate() {
             let lane = &self.layout.lanes[slave];
             let (output_values, rest) = values.split_at_mut(lane.output_range.len());
@@ -36,19 +50,62 @@ impl Reals {
             let inputs =
                 (&self.values[..], &self.input_derivatives[lane.input_derivative_range.clone()]);
             let outputs = (output_values, output_derivatives);
-            let mut step = lane.step(inputs, span(slave), never_back, outputs);
-            if instance.in_thread().is_none() {
-                own.push((slave, instance.advance(&mut step)));
-            } else if let Some(instance) = instance.in_thread() {
-                tasks.push(Task { slave, instance, step, done: Ok(Stepped::Whole) });
-            }
+            let step = lane.step(inputs, span(slave), never_back, outputs);
+            sorted.add(slave, instance.as_mut(), step);
         }
-        run(&mut tasks);
-        own.extend(tasks.into_iter().map(|task| (task.slave, task.done)));
-        for (slave, done) in own {
+        for (slave, done) in sorted.run(run) {
             self.trace.spans[slave].stepped |= done.is_ok();
             results[slave] = Some(done);
         }
         slaves.iter().map(|&slave| results[slave].take().unwrap_or(Ok(Stepped::Whole))).collect()
+    }
+}
+
+/// Steps by the way in which they are made.
+#[derive(Default)]
+struct Sorted<'a> {
+    /// Begun in the background.
+    begun: Vec<Step<'a>>,
+    /// For this thread.
+    bound: Vec<Step<'a>>,
+    /// For any thread.
+    tasks: Vec<Task<'a>>,
+    done: Vec<(usize, Result<Stepped, CallError>)>,
+}
+
+/// A slave and its step.
+type Step<'a> = (usize, &'a mut dyn Slave, Advance<'a>);
+
+impl<'a> Sorted<'a> {
+    /// Adds a step, and begins it where that can be done.
+    fn add(&mut self, slave: usize, instance: &'a mut dyn Slave, step: Advance<'a>) {
+        match instance.in_background().map(|instance| instance.begin_advance(&step)) {
+            Some(Ok(())) => self.begun.push((slave, instance, step)),
+            Some(Err(error)) => self.done.push((slave, Err(error))),
+            None if instance.in_thread().is_none() => self.bound.push((slave, instance, step)),
+            None => {
+                if let Some(instance) = instance.in_thread() {
+                    self.tasks.push(Task { slave, instance, step, done: Ok(Stepped::Whole) });
+                }
+            }
+        }
+    }
+
+    /// Makes all steps: what came of them.
+    fn run(
+        mut self,
+        run: impl FnOnce(&mut [Task<'_>]),
+    ) -> Vec<(usize, Result<Stepped, CallError>)> {
+        for (slave, instance, mut step) in self.bound {
+            self.done.push((slave, instance.advance(&mut step)));
+        }
+        if !self.tasks.is_empty() {
+            run(&mut self.tasks);
+        }
+        self.done.extend(self.tasks.into_iter().map(|task| (task.slave, task.done)));
+        for (slave, instance, mut step) in self.begun {
+            self.done.push((slave, finish(instance, &mut step)));
+        }
+        self.done
     }
 }

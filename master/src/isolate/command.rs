@@ -68,6 +68,8 @@ commands! {
     Bring = "the transfer of data to it",
     Fetch = "the transfer of data from it",
     Free = "fmi2FreeInstance",
+    // Frees the instance and makes another one.
+    Renew = "fmi2Instantiate",
 }
 
 impl Command {
@@ -95,6 +97,12 @@ pub(super) fn function_at(place: u64) -> Option<&'static str> {
 pub(super) const DONE: u64 = 0;
 /// How an answer begins where a [`CallError`] follows.
 pub(super) const FAILED: u64 = 1;
+
+/// What came of an instantiation: there is an instance, the FMU does not load or instantiate, a
+/// library to be loaded before it does not load. A reason follows the last two.
+pub(super) const INSTANTIATED: u64 = 0;
+pub(super) const REFUSED: u64 = 1;
+pub(super) const NOT_PRELOADED: u64 = 2;
 
 /// Most bytes of one text of an error.
 const TEXT: usize = 8192;

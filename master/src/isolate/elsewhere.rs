@@ -20,6 +20,15 @@ impl Isolated {
     pub(super) fn start(_: Arc<Unpacked>, name: &str, _: &Options) -> Result<Self, IsolateError> {
         Err(IsolateError::Platform { instance: name.to_owned() })
     }
+
+    /// Makes another instance in its place: there is none.
+    ///
+    /// # Errors
+    ///
+    /// None, as there is nothing to call this on.
+    pub fn renew(&mut self, _: &str, _: &Options) -> Result<(), IsolateError> {
+        match self.never {}
+    }
 }
 
 /// Refuses to be a worker.

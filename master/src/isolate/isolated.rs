@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use fmi2::package::Unpacked;
 
-use super::command::{Command, DONE, FAILED, function_at, read_error};
+use super::command::{Command, DONE, FAILED, INSTANTIATED, NOT_PRELOADED, function_at, read_error};
 use super::layout::Shared;
 use super::line::{Line, Seen, Side};
 use super::log::Inbox;
@@ -35,6 +35,8 @@ pub struct Isolated {
     inbox: Inbox,
     /// The last turn that this side knows of: odd while the worker acts.
     turn: u64,
+    /// When the worker was asked for what is not waited for yet, where that matters.
+    asked: Option<Instant>,
     /// Why there is no worker any more.
     ended: Option<Failure>,
     /// `fmi2FreeInstance` has been called.
@@ -73,21 +75,35 @@ impl Isolated {
             process,
             inbox: Inbox::new(name),
             turn: 0,
+            asked: None,
             ended: None,
             freed: false,
             time_limit: options.time_limit,
             slice,
             package,
         };
-        match isolated.open(name, options) {
-            Ok(None) => Ok(isolated),
-            Ok(Some(reason)) => Err(IsolateError::Refused { instance: name.to_owned(), reason }),
-            Err(source) => Err(IsolateError::Call { instance: name.to_owned(), source }),
-        }
+        let opened = isolated.open(name, options);
+        made(name, opened).map(|()| isolated)
     }
 
-    /// Has the worker load and instantiate the FMU; why that did not work, if it did not.
-    fn open(&mut self, name: &str, options: &Options) -> Result<Option<String>, CallError> {
+    /// Frees the instance and makes one called `name` in its place, in the same process with the same
+    /// library.
+    ///
+    /// # Errors
+    ///
+    /// [`IsolateError::Refused`], [`IsolateError::Call`].
+    pub fn renew(&mut self, name: &str, options: &Options) -> Result<(), IsolateError> {
+        let write = |writer: &mut Writer<'_>| {
+            writer.put_bytes(name.as_bytes());
+            writer.put(options.logging);
+        };
+        let done = self.call(Command::Renew, write, outcome);
+        self.inbox.rename(name);
+        made(name, done)
+    }
+
+    /// Has the worker load and instantiate the FMU: what came of it.
+    fn open(&mut self, name: &str, options: &Options) -> Result<(u64, String), CallError> {
         let package = self.package.clone();
         let write = |writer: &mut Writer<'_>| {
             writer.put_bytes(package.folder().as_os_str().as_bytes());
@@ -98,10 +114,7 @@ impl Isolated {
                 writer.put_bytes(library.as_bytes());
             }
         };
-        self.call(Command::Open, write, |reader| {
-            let refused: bool = reader.take()?;
-            if refused { reader.take_text().map(Some) } else { Some(None) }
-        })
+        self.call(Command::Open, write, outcome)
     }
 
     /// Posts `command` with what `write` writes, and gives what `read` makes of the answer.
@@ -116,7 +129,8 @@ impl Isolated {
         self.answer(command, read)
     }
 
-    /// Posts `command` with what `write` writes.
+    /// Posts `command` with what `write` writes. An answer that nobody waited for is waited for and
+    /// forgotten first.
     #[inline]
     pub(super) fn post(
         &mut self,
@@ -126,8 +140,10 @@ impl Isolated {
         if let Some(failure) = &self.ended {
             return Err(error(command, failure.clone()));
         }
-        if self.turn % 2 == 1 {
-            return Err(nonsense(command, "was called before the step begun was finished"));
+        if self.acts()
+            && let Err(failure) = self.wait()
+        {
+            return Err(self.lose(command, failure));
         }
         self.inbox.forget();
         let shared = &self.line.shared;
@@ -143,6 +159,17 @@ impl Isolated {
         Ok(())
     }
 
+    /// Whether the worker has been asked for what is not waited for yet.
+    fn acts(&self) -> bool {
+        self.turn % 2 == 1
+    }
+
+    /// The answer to what was posted will be waited for later: the time of the call runs from now.
+    #[inline]
+    pub(super) fn left_alone(&mut self) {
+        self.asked = self.time_limit.map(|_| Instant::now());
+    }
+
     /// Waits for the answer to `command`, and gives what `read` makes of it.
     #[inline]
     pub(super) fn answer<T>(
@@ -152,6 +179,9 @@ impl Isolated {
     ) -> Result<T, CallError> {
         if let Some(failure) = &self.ended {
             return Err(error(command, failure.clone()));
+        }
+        if !self.acts() {
+            return Err(nonsense(command, "was to be finished and had not been begun"));
         }
         if let Err(failure) = self.wait() {
             return Err(self.lose(command, failure));
@@ -169,7 +199,7 @@ impl Isolated {
     /// Waits until the worker has answered.
     #[inline]
     fn wait(&mut self) -> Result<(), Failure> {
-        let (posted, mut begin) = (self.turn, None);
+        let (posted, mut begin) = (self.turn, self.asked.take());
         loop {
             match self.line.wait(posted) {
                 Seen::Turn(turn) if turn == posted.wrapping_add(1) => {
@@ -269,7 +299,7 @@ impl Isolated {
 impl Isolated {
     /// Has the worker free the instance and end, if it has not; one that does not is ended.
     pub(super) fn free_instance(&mut self) -> Result<(), CallError> {
-        if self.freed || self.ended.is_some() || self.turn % 2 == 1 {
+        if self.freed || self.ended.is_some() {
             return Ok(());
         }
         self.freed = true;
@@ -285,6 +315,23 @@ impl Drop for Isolated {
         if let Err(error) = self.free_instance() {
             self.inbox.complain(&error);
         }
+    }
+}
+
+/// What came of an instantiation, and the reason.
+fn outcome(reader: &mut Reader<'_>) -> Option<(u64, String)> {
+    let outcome: u64 = reader.take()?;
+    let reason = if outcome == INSTANTIATED { String::new() } else { reader.take_text()? };
+    Some((outcome, reason))
+}
+
+fn made(name: &str, answer: Result<(u64, String), CallError>) -> Result<(), IsolateError> {
+    let instance = name.to_owned();
+    match answer {
+        Ok((INSTANTIATED, _)) => Ok(()),
+        Ok((NOT_PRELOADED, reason)) => Err(IsolateError::Preload { reason }),
+        Ok((_, reason)) => Err(IsolateError::Refused { instance, reason }),
+        Err(source) => Err(IsolateError::Call { instance, source }),
     }
 }
 

@@ -148,6 +148,11 @@ impl Inbox {
         Self { instance: instance.to_owned(), ..Self::default() }
     }
 
+    /// From now on the messages are those of this instance.
+    pub(super) fn rename(&mut self, instance: &str) {
+        instance.clone_into(&mut self.instance);
+    }
+
     /// Hands over what has come to [`tracing`].
     #[inline]
     pub(super) fn empty(&mut self, shared: &Shared) {
@@ -179,7 +184,7 @@ impl Inbox {
         self.dropped = dropped;
         if count > 0 {
             let instance = self.instance.as_str();
-            tracing::warn!(target: "fmu", instance, "{count} more messages came too fast and are lost");
+            tracing::warn!(target: "fmu", instance, lost = count, "{count} more messages came too fast and are lost");
         }
     }
 

@@ -8,7 +8,7 @@ use super::command::{Command, DONE};
 use super::layout::Shared;
 use super::strings;
 use super::words::{Reader, Word, Writer};
-use crate::fmu::Instance;
+use crate::fmu::{Fmu, Instance};
 use crate::slave::{CallError, Slave, Stepped};
 
 /// What came of a command; none where its arguments make no sense.
@@ -64,6 +64,11 @@ impl Work {
             brought: Vec::new(),
             left: Vec::new(),
         }
+    }
+
+    /// The FMU of the instance.
+    pub(super) fn fmu(&self) -> Fmu {
+        self.instance.fmu().clone()
     }
 
     /// Does `command` with the arguments in `reader`; the results go to `writer`.

@@ -7,7 +7,7 @@ use super::command::Command;
 use super::isolated::Isolated;
 use super::strings;
 use super::words::{Reader, Writer};
-use crate::slave::{Advance, CallError, Slave, Stepped};
+use crate::slave::{Advance, Background, CallError, Slave, Stepped};
 
 /// For commands without arguments, or without results.
 fn nothing(_: &mut Writer<'_>) {}
@@ -40,16 +40,11 @@ impl Isolated {
     fn plain(&mut self, command: Command) -> Result<(), CallError> {
         self.call(command, nothing, no_result)
     }
+}
 
-    /// The first half of [`Slave::advance`]: the worker sets and steps while the caller goes on, for
-    /// example to begin the steps of other instances. Nothing else may be called before
-    /// [`Isolated::finish_advance`].
-    ///
-    /// # Errors
-    ///
-    /// As [`Slave::advance`] where the worker is gone; nothing is begun then.
+impl Background for Isolated {
     #[inline]
-    pub fn begin_advance(&mut self, step: &Advance<'_>) -> Result<(), CallError> {
+    fn begin_advance(&mut self, step: &Advance<'_>) -> Result<(), CallError> {
         self.post(Command::Advance, |writer| {
             writer.put(step.time);
             writer.put(step.size);
@@ -60,16 +55,13 @@ impl Isolated {
             writer.put_list(step.outputs);
             writer.put_list(step.derived_outputs);
             writer.put_all(step.output_orders);
-        })
+        })?;
+        self.left_alone();
+        Ok(())
     }
 
-    /// The second half of [`Slave::advance`]: waits for the step that was begun and reads.
-    ///
-    /// # Errors
-    ///
-    /// As [`Slave::advance`].
     #[inline]
-    pub fn finish_advance(&mut self, step: &mut Advance<'_>) -> Result<Stepped, CallError> {
+    fn finish_advance(&mut self, step: &mut Advance<'_>) -> Result<Stepped, CallError> {
         self.answer(Command::Advance, |reader| {
             let done = stepped(reader)?;
             reader.take_all(step.output_values)?;
@@ -232,6 +224,10 @@ impl Slave for Isolated {
     }
 
     fn in_thread(&mut self) -> Option<&mut (dyn Slave + Send)> {
+        Some(self)
+    }
+
+    fn in_background(&mut self) -> Option<&mut dyn Background> {
         Some(self)
     }
 }

@@ -9,20 +9,26 @@ use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, poll};
-use rustix::process::{Signal, kill_current_process_group};
+use rustix::process::{Signal, getppid, kill_current_process_group};
 use rustix::stdio::{dup2_stdin, dup2_stdout};
 
 use super::WorkerError;
-use super::command::{Command, DONE, LOADING, place, write_error};
+use super::command::{
+    Command, DONE, INSTANTIATED, LOADING, NOT_PRELOADED, REFUSED, place, write_error,
+};
 use super::layout::Shared;
 use super::line::{Line, Seen, Side};
 use super::log::Forward;
 use super::perform::Work;
 use super::words::{Reader, Writer};
 use crate::slave::{CallError, Failure};
-use crate::{Fmu, FmuError};
+use crate::{Fmu, FmuError, Instance};
+
+/// Between two looks whether the master is there, where the connection cannot tell.
+const LOOK: Duration = Duration::from_millis(100);
 
 /// Makes this process the worker of the master that started it, until the master has it end or is
 /// gone. What is printed to standard output goes to standard error.
@@ -54,10 +60,15 @@ fn leave_standard_streams() -> io::Result<()> {
 
 /// Ends this process, and those that it started, as soon as the master is gone, wherever the FMU is.
 fn end_with_master(socket: &UnixStream) -> io::Result<()> {
-    let socket = socket.try_clone()?;
+    let (socket, master) = (socket.try_clone()?, getppid());
     let watch = move || {
         // Without events asked for, only the end of the connection is reported.
-        while poll(&mut [PollFd::new(&socket, PollFlags::empty())], None).is_err() {}
+        let mut ends = [PollFd::new(&socket, PollFlags::empty())];
+        while poll(&mut ends, None).is_err() {}
+        // An FMU that closes all files closes the connection: only its master can tell of that.
+        while ends[0].revents().contains(PollFlags::NVAL) && getppid() == master {
+            std::thread::sleep(LOOK);
+        }
         let _ = kill_current_process_group(Signal::KILL);
     };
     std::thread::Builder::new().name("master".to_owned()).spawn(watch).map(|_| ())
@@ -79,7 +90,8 @@ fn serve(line: &mut Line) -> Result<(), WorkerError> {
         let mut writer = Writer::new(shared.area());
         let done = match (command, &mut work) {
             (Command::Open, work @ None) => open(&shared, work, &mut reader, &mut writer),
-            (Command::Free, work @ Some(_)) => {
+            (Command::Renew, work @ Some(_)) => renew(&shared, work, &mut reader, &mut writer),
+            (Command::Free, work) => {
                 *work = None;
                 writer.put(DONE);
                 Some(Ok(()))
@@ -132,35 +144,59 @@ fn open(
         preload.push(library);
     }
     shared.place().store(place(LOADING), Ordering::Relaxed);
-    let opened = load(&folder, &preload).and_then(|fmu| {
+    for library in &preload {
+        if let Err(error) = crate::preload(OsStr::from_bytes(library)) {
+            writer.put(DONE);
+            writer.put(NOT_PRELOADED);
+            writer.put_bytes(explained(&error).as_bytes());
+            return Some(Ok(()));
+        }
+    }
+    let opened = Fmu::open(Path::new(OsStr::from_bytes(&folder))).and_then(|fmu| {
         shared.place().store(Command::Open.to_word(), Ordering::Relaxed);
         fmu.instantiate(&name)
     });
-    writer.put(DONE);
-    match opened {
-        Ok(instance) => {
-            writer.put(false);
-            *work = Some(Work::new(instance, logging));
-        }
-        Err(error) => {
-            writer.put(true);
-            writer.put_bytes(explained(&error).as_bytes());
-        }
-    }
+    *work = tell(opened, writer).map(|instance| Work::new(instance, logging));
     Some(Ok(()))
 }
 
-fn load(folder: &[u8], preload: &[Vec<u8>]) -> Result<Fmu, FmuError> {
-    for library in preload {
-        crate::preload(OsStr::from_bytes(library))?;
+/// Frees the instance and makes another one.
+fn renew(
+    shared: &Shared,
+    work: &mut Option<Work>,
+    reader: &mut Reader<'_>,
+    writer: &mut Writer<'_>,
+) -> Option<Result<(), CallError>> {
+    let name = reader.take_text()?;
+    let logging: bool = reader.take()?;
+    let fmu = work.as_ref()?.fmu();
+    shared.place().store(Command::Free.to_word(), Ordering::Relaxed);
+    *work = None;
+    shared.place().store(Command::Open.to_word(), Ordering::Relaxed);
+    *work = tell(fmu.instantiate(&name), writer).map(|instance| Work::new(instance, logging));
+    Some(Ok(()))
+}
+
+/// Writes whether there is an instance, or why not.
+fn tell(made: Result<Instance, FmuError>, writer: &mut Writer<'_>) -> Option<Instance> {
+    writer.put(DONE);
+    match made {
+        Ok(instance) => {
+            writer.put(INSTANTIATED);
+            Some(instance)
+        }
+        Err(error) => {
+            writer.put(REFUSED);
+            writer.put_bytes(explained(&error).as_bytes());
+            None
+        }
     }
-    Fmu::open(Path::new(OsStr::from_bytes(folder)))
 }
 
 /// An error and its causes.
-fn explained(error: &FmuError) -> String {
+fn explained(error: &dyn std::error::Error) -> String {
     let mut text = error.to_string();
-    let mut cause = std::error::Error::source(error);
+    let mut cause = error.source();
     while let Some(error) = cause {
         text.push_str(": ");
         text.push_str(&error.to_string());

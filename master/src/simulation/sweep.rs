@@ -29,7 +29,7 @@ pub(super) struct Swept {
 /// The slaves in groups, to be stepped one after the other; within a group all inputs are taken
 /// before the first step.
 pub(super) struct Groups {
-    sequence: Vec<usize>,
+    pub(super) sequence: Vec<usize>,
     /// Where each group begins in `sequence`, and the end of the last.
     begins: Vec<usize>,
 }
@@ -77,13 +77,24 @@ impl Simulation {
         size: f64,
         never_back: bool,
     ) -> Result<Swept, SystemError> {
-        let mut swept = Swept::default();
         if !self.drives.is_empty() {
             self.drives.write(&mut self.system, time)?;
         }
         if self.passes {
             return self.pass(time, size, never_back);
         }
+        self.step_groups(time, size, never_back)
+    }
+
+    /// A sweep group by group. Apart from [`Simulation::pass`], whose loop is to stay small.
+    #[inline(never)]
+    fn step_groups(
+        &mut self,
+        time: f64,
+        size: f64,
+        never_back: bool,
+    ) -> Result<Swept, SystemError> {
+        let mut swept = Swept::default();
         for slave in 0..self.multiples.len() {
             self.sizes[slave] = self.grid.size_of(self.multiples[slave], time, size);
             if self.sizes[slave] > 0.0 {
@@ -103,9 +114,7 @@ impl Simulation {
                 done?;
                 continue;
             }
-            for position in begin..end {
-                self.advance(self.groups.sequence[position], time, never_back, &mut swept)?;
-            }
+            self.advance_members(begin..end, time, never_back, &mut swept)?;
         }
         Ok(swept)
     }
@@ -124,10 +133,7 @@ impl Simulation {
         parallel.measure(group, |pool| {
             let members = begin..end;
             if !in_threads {
-                for position in members {
-                    self.advance(self.groups.sequence[position], time, never_back, swept)?;
-                }
-                return Ok(());
+                return self.advance_members(members, time, never_back, swept);
             }
             let due: Vec<usize> = self.groups.sequence[members]
                 .iter()
@@ -167,7 +173,7 @@ impl Simulation {
     }
 
     #[inline]
-    fn advance(
+    pub(super) fn advance(
         &mut self,
         slave: usize,
         time: f64,
@@ -183,7 +189,7 @@ impl Simulation {
     }
 
     #[inline]
-    fn finish(
+    pub(super) fn finish(
         &mut self,
         slave: usize,
         time: f64,
