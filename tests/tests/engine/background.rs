@@ -5,8 +5,9 @@ use std::sync::Arc;
 use master::{Algorithm, Coupling, Course, Simulation, StepControl, Stepped, Sweep, System};
 
 use crate::ahead::{Fails, ahead};
-use crate::linear::ABLE;
-use crate::{problems, puppet, typed, until};
+use crate::{puppet, typed, until};
+use tests::linear::ABLE;
+use tests::problems;
 
 #[expect(clippy::unnecessary_wraps, reason = "the form of a choice")]
 fn all(_: &str) -> Option<Fails> {
