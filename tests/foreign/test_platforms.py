@@ -190,6 +190,25 @@ def test_fmpys_windows_server_has_the_results_of_linux(fmus, packed, role, wine,
     assert there.tobytes() == here.tobytes()
 
 
+def test_the_master_for_windows_writes_the_file_of_linux(fmus, packed, aso_ftc, wine, tmp_path):
+    command = os.environ.get("WINDOWS_COMMAND")
+    if not command:
+        pytest.skip("scripts/cross was not asked for aso-ftc.exe")
+    for role in MODELS:
+        binary(fmus, role, "win64")
+    options = ["run", "--stop-time", "100", "--record-every", "0.01"]
+    drive = [f"--{role}=Z:{path}" for role, path in fmus.items()]
+    program = ["wine", command, *options, *drive, f"--out=Z:{tmp_path / 'windows'}"]
+    done = subprocess.run(program, env=wine, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    here = [f"--{role}={path}" for role, path in packed.items()]
+    done = aso_ftc(*options, *here, f"--out={tmp_path / 'linux'}")
+    assert done.returncode == 0, done.stderr
+    windows, linux = (tmp_path / name / "results.csv" for name in ("windows", "linux"))
+    assert linux.read_bytes().count(b"\n") == 10_002
+    assert windows.read_bytes() == linux.read_bytes()
+
+
 @pytest.mark.parametrize("role", MODELS)
 @pytest.mark.parametrize("platform", SUFFIX)
 def test_nothing_but_the_functions_of_fmi_is_exported(fmus, role, platform):
