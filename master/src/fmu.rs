@@ -318,7 +318,8 @@ impl Slave for Instance {
 
 impl Instance {
     /// The FMU that it is of.
-    pub(crate) fn fmu(&self) -> &Fmu {
+    #[must_use]
+    pub fn fmu(&self) -> &Fmu {
         &self.fmu
     }
 

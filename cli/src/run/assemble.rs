@@ -107,7 +107,7 @@ impl<'a> Opening<'a> {
     fn isolated(&mut self, element: &'a Element) -> anyhow::Result<isolate::Isolated> {
         let package = match self.isolated.get(&element.fmu) {
             Some(package) => package.clone(),
-            None => isolate::Package::open(&element.fmu)?,
+            None => isolate::Package::open(&element.fmu).with_context(|| element.name.clone())?,
         };
         let slave = package.instantiate(&element.name, &self.isolation)?;
         self.isolated.insert(&element.fmu, package);
@@ -118,7 +118,7 @@ impl<'a> Opening<'a> {
     fn here(&mut self, element: &'a Element) -> anyhow::Result<Instance> {
         let fmu = match self.opened.get(&element.fmu) {
             Some(fmu) => fmu.clone(),
-            None => Fmu::open(&element.fmu)?,
+            None => Fmu::open(&element.fmu).with_context(|| element.name.clone())?,
         };
         let mut slave = fmu.instantiate(&element.name)?;
         self.opened.insert(&element.fmu, fmu);

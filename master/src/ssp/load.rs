@@ -172,9 +172,12 @@ impl Loader {
         }
         let index = self.files.fmu(target)?;
         let fmu = &self.files.fmus[index];
-        if fmu.description.co_simulation.is_none() {
-            return Err(here(&format!("{} offers no co-simulation", target.shown.display())));
-        }
+        let shown = target.shown.display();
+        let Some(flags) = &fmu.description.co_simulation else {
+            return Err(here(&format!("{shown} offers no co-simulation")));
+        };
+        // Only here is it known which libraries the archive has.
+        fmu.library(&flags.model_identifier).map_err(|error| here(&format!("{shown}: {error}")))?;
         let inside = Base::archive(fmu.folder(), &target.shown);
         let node = self.add(&component.base, place, file)?;
         let bindings = self.bindings(&component.base.bindings, file, Some(&inside))?;
