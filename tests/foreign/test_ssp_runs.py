@@ -4,6 +4,8 @@ The loop by hand (`held_loop`) is what libcosim, Ecos and FMPy agree with in tes
 """
 
 import csv
+import io
+import zipfile
 
 import numpy as np
 import pytest
@@ -66,3 +68,34 @@ def test_a_structure_that_cannot_be_read_is_refused_with_its_place(aso_ftc, tmp_
     done = aso_ftc("run", path, "--out", tmp_path / "out")
     assert done.returncode == 2
     assert f"{path}: line 2, column " in done.stderr
+
+
+def for_windows(data):
+    """The FMU in `data` with its library for Linux where that for Windows is expected."""
+    made = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(data)) as fmu, zipfile.ZipFile(made, "w") as other:
+        for name in fmu.namelist():
+            target = name.replace("binaries/linux64", "binaries/win64").replace(".so", ".dll")
+            other.writestr(target, fmu.read(name))
+    return made.getvalue()
+
+
+def test_an_fmu_without_a_library_for_this_platform_is_named_with_those_it_has(
+    aso_ftc, root, packed, tmp_path
+):
+    path = tmp_path / "half.ssp"
+    with zipfile.ZipFile(root / "dist" / "InvertedPendulum.ssp") as whole:
+        with zipfile.ZipFile(path, "w") as half:
+            for name in whole.namelist():
+                data = whole.read(name)
+                plant = name.endswith("FrictionPendulum.fmu")
+                half.writestr(name, for_windows(data) if plant else data)
+    alone = tmp_path / "Windows.fmu"
+    alone.write_bytes(for_windows(packed["plant"].read_bytes()))
+    out = tmp_path / "out"
+    for system in ([path], ["--fmu", f"plant={alone}"]):
+        done = aso_ftc("run", *system, "--out", out)
+        assert done.returncode == 2 and not out.exists()
+        assert "plant: " in done.stderr
+        assert "expected the library binaries/linux64/FrictionPendulum.so" in done.stderr
+        assert "found binaries/win64/FrictionPendulum.dll" in done.stderr
