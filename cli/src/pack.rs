@@ -150,7 +150,8 @@ fn pack_crate(folder: &Path, packing: &Packing<'_>) -> anyhow::Result<Packed> {
     let path = packing.out.join(format!("{identifier}.fmu"));
     package.write(&path)?;
     if packing.sbom {
-        let (bill, target) = (sbom::bill(&description, &library)?, path.with_extension("cdx.json"));
+        let bill = sbom::bill(&description, &library, packing.binaries.is_some())?;
+        let target = path.with_extension("cdx.json");
         whole_file::write(&target, &bill)
             .with_context(|| format!("cannot write {}", target.display()))?;
     }

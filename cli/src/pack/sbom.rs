@@ -16,12 +16,17 @@ use fmi2::description::ModelDescription;
 
 use super::library::Library;
 
-/// The bill of the FMU with this description, as JSON.
+/// The bill of the FMU with this description, as JSON; `foreign` are libraries that were built
+/// elsewhere, by a compiler whose version is not known here.
 ///
 /// # Errors
 ///
 /// Where a crate states what `CycloneDX` cannot have: a name or an expression of licences.
-pub(super) fn bill(description: &ModelDescription, library: &Library) -> anyhow::Result<Vec<u8>> {
+pub(super) fn bill(
+    description: &ModelDescription,
+    library: &Library,
+    foreign: bool,
+) -> anyhow::Result<Vec<u8>> {
     let own = &library.package;
     let mut model = component(own, Classification::Application)?;
     model.name = NormalizedString::new(&description.model_name);
@@ -31,7 +36,7 @@ pub(super) fn bill(description: &ModelDescription, library: &Library) -> anyhow:
         .iter()
         .map(|package| component(package, Classification::Library))
         .collect::<anyhow::Result<Vec<_>>>()?;
-    parts.push(standard_library(&library.toolchain.release));
+    parts.push(standard_library((!foreign).then_some(&library.toolchain.release)));
     let needs = Dependency {
         dependency_ref: reference(own),
         dependencies: parts.iter().filter_map(|part| part.bom_ref.clone()).collect(),
@@ -78,10 +83,16 @@ fn licenses(stated: &str) -> anyhow::Result<Licenses> {
     Ok(Licenses(vec![LicenseChoice::Expression(expression)]))
 }
 
-fn standard_library(release: &str) -> Component {
-    let reference = format!("rust-std@{release}");
-    let mut component =
-        Component::new(Classification::Library, "rust-std", release, Some(reference));
+fn standard_library(release: Option<&String>) -> Component {
+    let name = "rust-std";
+    let reference = release.map_or(name.to_owned(), |release| format!("{name}@{release}"));
+    let version = release.map_or("", String::as_str);
+    let mut component = Component::new(Classification::Library, name, version, Some(reference));
+    if release.is_none() {
+        component.version = None;
+        let what = "of the compiler that built each library";
+        component.description = Some(NormalizedString::new(what));
+    }
     let licenses = SpdxExpression::new("MIT OR Apache-2.0");
     component.licenses = Some(Licenses(vec![LicenseChoice::Expression(licenses)]));
     component
