@@ -157,13 +157,13 @@ fn to_run_an_fmu_only_what_can_be_needed_is_unpacked() {
         package.add(other, "x");
     }
     let foreign = if platforms().contains(&"win64") { "linux64" } else { "win64" };
-    package.add(format!("binaries/{foreign}/M.dll"), "x");
+    package.add(format!("binaries/{foreign}/Foreign.dll"), "x");
     package.write(&target).unwrap();
     let files = |unpacked: &Unpacked| {
         let mut again = Package::new(String::new());
         again.add_folder("", unpacked.folder()).unwrap();
         let text = format!("{again:?}");
-        ["index.html", "all.c", "model.png", "icon.png", "M.dll", "plan9", "data", "z.bin"]
+        ["index.html", "all.c", "model.png", "icon.png", "Foreign.dll", "plan9", "data", "z.bin"]
             .map(|name| text.contains(name))
     };
     let needed = Unpacked::open(&target).unwrap();
