@@ -4,6 +4,7 @@
 
 pub mod c_fmu;
 pub mod coupled;
+pub mod isolated;
 pub mod linear;
 pub mod network;
 pub mod problems;

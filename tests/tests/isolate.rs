@@ -10,24 +10,8 @@ use fmi2::abi::Status;
 use fmi2::description::{Causality, Kind, ModelDescription};
 use master::isolate::{self, IsolateError, Isolated, Options};
 use master::{Advance, CallError, Failure, Fmu, Slave, Stepped};
-use tests::{Trouble, command, dist, troubles};
-
-fn options() -> Options {
-    Options { executable: Some(command().to_owned()), ..Options::default() }
-}
-
-fn limited(milliseconds: u64) -> Options {
-    Options { time_limit: Some(Duration::from_millis(milliseconds)), ..options() }
-}
-
-/// The troublesome FMU, ready to step.
-fn ready(options: &Options) -> Isolated {
-    let mut slave = isolate::open(troubles(), "one", options).unwrap();
-    slave.setup_experiment(&Experiment::default()).unwrap();
-    slave.enter_initialization_mode().unwrap();
-    slave.exit_initialization_mode().unwrap();
-    slave
-}
+use tests::isolated::{limited, options, ready};
+use tests::{Trouble, dist, troubles};
 
 /// The error of a step of 0.5 s in which the FMU makes that trouble.
 fn error_of(trouble: Trouble, options: &Options) -> (Isolated, CallError) {

@@ -1,33 +1,15 @@
 //! Isolated FMUs step at the same time: the same numbers, and the same reports.
 #![cfg(target_os = "linux")]
 #![forbid(unsafe_code)]
-#![expect(clippy::unwrap_used, clippy::float_cmp, reason = "tests; exact by construction")]
+#![expect(clippy::float_cmp, reason = "tests; exact by construction")]
 
 use std::time::{Duration, Instant};
 
-use fmi2::Experiment;
-use master::isolate::{self, Isolated, Options};
 use master::{Advance, Background as _, Failure, Slave as _};
+use tests::Trouble;
 use tests::c_fmu::CFmu;
 use tests::coupled::Run;
-use tests::{Trouble, command, troubles};
-
-fn options() -> Options {
-    Options { executable: Some(command().to_owned()), ..Options::default() }
-}
-
-fn limited(milliseconds: u64) -> Options {
-    Options { time_limit: Some(Duration::from_millis(milliseconds)), ..options() }
-}
-
-/// The troublesome FMU, ready to step.
-fn ready(options: &Options) -> Isolated {
-    let mut slave = isolate::open(troubles(), "one", options).unwrap();
-    slave.setup_experiment(&Experiment::default()).unwrap();
-    slave.enter_initialization_mode().unwrap();
-    slave.exit_initialization_mode().unwrap();
-    slave
-}
+use tests::isolated::{limited, options, ready};
 
 #[test]
 fn steps_begun_together_are_finished_together() {

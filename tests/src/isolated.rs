@@ -1,0 +1,35 @@
+//! The troublesome FMU in a process of its own.
+
+use std::time::Duration;
+
+use fmi2::Experiment;
+use master::Slave as _;
+use master::isolate::{self, Isolated, Options};
+
+use crate::{command, troubles};
+
+/// Isolation by the command `aso-ftc`, without a limit of time.
+#[must_use]
+pub fn options() -> Options {
+    Options { executable: Some(command().to_owned()), ..Options::default() }
+}
+
+/// As [`options`], with a limit of time for each call.
+#[must_use]
+pub fn limited(milliseconds: u64) -> Options {
+    Options { time_limit: Some(Duration::from_millis(milliseconds)), ..options() }
+}
+
+/// The troublesome FMU, ready to step.
+///
+/// # Panics
+///
+/// Where it cannot be isolated or initialized.
+#[must_use]
+pub fn ready(options: &Options) -> Isolated {
+    let mut slave = isolate::open(troubles(), "one", options).expect("it can be isolated");
+    slave.setup_experiment(&Experiment::default()).expect("set up");
+    slave.enter_initialization_mode().expect("entered");
+    slave.exit_initialization_mode().expect("left");
+    slave
+}
