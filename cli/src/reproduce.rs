@@ -12,7 +12,7 @@ use master::{Algorithm, Probe, Simulation, System, SystemError, Wanted, choose};
 use crate::claims::{Claim, Measurement, WATCHED, table};
 use crate::config::{Config, Every, Loaded};
 use crate::logging;
-use crate::run::{AlgorithmOptions, Beside, Ended, Recorder, assemble, select, setting};
+use crate::run::{AlgorithmOptions, Beside, Ended, Making, Recorder, assemble, select, setting};
 use crate::scenario::Scenario;
 use crate::summary::{Certified, Summary};
 use crate::{pack, paper_figures, summary};
@@ -54,10 +54,10 @@ pub(crate) fn reproduce(options: &Options) -> anyhow::Result<bool> {
     }
     pack::pack_into(&pack::workspace()?, &options.dist)?;
     let settings = settings(options);
-    let system = assemble(&experiment(options, &settings), false)?.system;
+    let system = assemble(&experiment(options, &settings), &Making::default())?.system;
     let mut wanted = Wanted { step: Some(STEP), ..Wanted::default() };
     options.algorithm.apply(&mut wanted);
-    let algorithm = choose(&system, &wanted)?.algorithm;
+    let algorithm = choose(&system, &wanted, options.stop_time)?.algorithm;
     std::fs::create_dir_all(&options.out)
         .with_context(|| format!("cannot make the folder {}", options.out.display()))?;
     let mut run = Run::new(options, system, &algorithm)?;
@@ -123,12 +123,12 @@ impl Run {
         let experiment = Experiment { start_time: 0.0, stop_time, tolerance: None };
         let mut simulation = Simulation::new(system, algorithm, &experiment)?;
         let (file, every) = (options.out.join(RESULTS), options.record_every);
-        let recorder = Recorder::create(&file, simulation.system(), &ports, every, 0.0)?;
+        let recorder = Recorder::create(&file, &mut simulation, &ports, every, 0.0)?;
         Ok(Self { simulation, recorder, watch })
     }
 
     fn advance(&mut self, options: &Options) -> anyhow::Result<Ended> {
-        let beside = Beside::recording(self.recorder.as_mut(), options.stop_time);
+        let mut beside = Beside::recording(self.recorder.as_mut(), options.stop_time);
         let watch = &mut self.watch;
         let ended = beside.advance(&mut self.simulation, |simulation| watch.add(simulation));
         self.recorder.take().map_or(Ok(()), Recorder::finish)?;

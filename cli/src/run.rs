@@ -4,6 +4,7 @@
 mod advance;
 mod assemble;
 mod interrupt;
+mod open_inputs;
 mod options;
 mod plan;
 mod progress;
@@ -16,14 +17,15 @@ use std::process::ExitCode;
 use anyhow::{Context, bail};
 use master::results::Selection;
 use master::scenario::{Prepared as Scenario, Setup};
-use master::{Coupling, Port, Simulation, System, by_direct_dependencies};
+use master::{CallLog, Coupling, Port, Simulation, System, by_direct_dependencies};
 
 use crate::config::{Config, Every, Loaded};
 use crate::logging;
 use crate::plot;
 use advance::Saver;
+use advance::Tally;
 pub(crate) use advance::{Beside, Ended};
-pub(crate) use assemble::assemble;
+pub(crate) use assemble::{Making, assemble};
 pub(crate) use options::{AlgorithmOptions, Options, setting};
 use plan::{Plan, plan};
 pub(crate) use record::{Recorder, select};
@@ -68,7 +70,13 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Prepared>> {
     // An FMU may change the current folder.
     let here = std::env::current_dir().context("the current folder")?;
     loaded.config.make_absolute().context("the current folder")?;
-    let mut assembled = assemble(&loaded, options.verbose > 0)?;
+    let log_calls = options.log_calls.as_deref().map(open_call_log).transpose()?;
+    let making = Making {
+        logging: options.verbose > 0,
+        by_unit: options.names_fmus_by_file(),
+        log_calls: log_calls.as_ref(),
+    };
+    let mut assembled = assemble(&loaded, &making)?;
     let plan = plan(&mut loaded.config, &assembled)?;
     let system = std::mem::take(&mut assembled.system);
     let scenario = scenario(&loaded, &system, &plan)?;
@@ -91,7 +99,7 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Prepared>> {
     let file = results_file(&config)?;
     interrupt::listen()?;
     let mut simulation = begin(system, &plan, scenario, saved.as_ref())?;
-    let mut recorder = Recorder::create(file, simulation.system(), &ports, plan.every, start)?;
+    let mut recorder = Recorder::create(file, &mut simulation, &ports, plan.every, start)?;
     let due = saved.as_ref().and_then(|saved| saved.due(plan.every));
     if let (Some(recorder), Some(due)) = (&mut recorder, due) {
         recorder.set_due(due);
@@ -107,6 +115,10 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Prepared>> {
         units,
         _folders: assembled.folders,
     }))
+}
+
+fn open_call_log(path: &Path) -> anyhow::Result<CallLog> {
+    CallLog::create(path).with_context(|| format!("cannot write {}", path.display()))
 }
 
 /// The system initialised, or where the checkpoint left it.
@@ -209,6 +221,17 @@ fn warn_of_loop(plan: &Plan, system: &System) {
     }
 }
 
+/// How far a run came, in how many steps and how fast.
+fn summary(tally: Tally, begin: f64, time: f64) -> String {
+    let Tally { steps, seconds } = tally;
+    let steps = if steps == 1 { "1 step".to_owned() } else { format!("{steps} steps") };
+    let factor = (time - begin) / seconds.max(f64::MIN_POSITIVE);
+    format!(
+        "t = {time} s reached in {steps} and {seconds:.3} s of wall-clock time, {factor:.3} times \
+         real time"
+    )
+}
+
 fn units(system: &System, ports: &[Port]) -> Vec<(String, String)> {
     let unit = |port: &Port| Some((system.name(*port), record::unit(system, *port)?));
     ports.iter().filter_map(unit).collect()
@@ -216,14 +239,19 @@ fn units(system: &System, ports: &[Port]) -> Vec<(String, String)> {
 
 impl Prepared {
     fn go(mut self) -> ExitCode {
-        let beside = Beside {
+        let begin = self.simulation.time();
+        let mut beside = Beside {
             recorder: self.recorder.as_mut(),
             saver: self.saver.as_ref(),
             stop: self.stop,
             resumed: self.resumed,
+            tally: Tally::default(),
         };
         let ended = beside.advance(&mut self.simulation, |_| Ok(()));
+        let tally = beside.tally;
         let time = self.simulation.time();
+        println!("{}", summary(tally, begin, time));
+        self.warn_of_fallbacks(tally);
         let written = self.write(&ended);
         let status = match &ended {
             Ended::AtStop => 0,
@@ -246,6 +274,20 @@ impl Prepared {
             return ExitCode::from(status.max(1));
         }
         ExitCode::from(status)
+    }
+
+    fn warn_of_fallbacks(&self, tally: Tally) {
+        let Some(fallbacks) = self.simulation.fallbacks().filter(|known| known.count > 0) else {
+            return;
+        };
+        tracing::warn!(
+            "the iteration failed in {} of {} steps, which were made once instead; the first \
+             failure: {}. A smaller --step or a larger --relative-tolerance may help; --coupling once \
+             makes every step once",
+            fallbacks.count,
+            tally.steps,
+            fallbacks.first
+        );
     }
 
     /// Ends the results, draws them, and says what was written.

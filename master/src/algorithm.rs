@@ -147,6 +147,8 @@ pub struct Algorithm {
     pub largest_step: f64,
     /// Most iterations of one step.
     pub iterations: u32,
+    /// A step whose iteration fails is made once; otherwise it ends the run.
+    pub fallback: bool,
     /// Events that end a step.
     pub events: Vec<EventSource>,
     /// Power bonds, for [`StepControl::Energy`].
@@ -183,6 +185,7 @@ impl Algorithm {
             smallest_step: step * 1e-6,
             largest_step: step * 1e3,
             iterations: 50,
+            fallback: false,
             events: Vec::new(),
             bonds: Vec::new(),
             jobs: 1,

@@ -9,8 +9,11 @@ use crate::slave::Slave;
 use crate::system::System;
 use fmi2::description::CoSimulation;
 
-/// Communication step in s where neither the user nor an FMU states one.
+/// Communication step in s where neither the user nor an FMU states one, for runs of up to
+/// [`STEPS`] steps.
 const STEP: f64 = 1e-3;
+/// Most steps of a run whose step nobody states.
+const STEPS: f64 = 1e5;
 
 /// What the user states of an [`Algorithm`]; the rest is chosen.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -46,6 +49,9 @@ pub struct Wanted {
     /// Most iterations of a step.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub iterations: Option<u32>,
+    /// Make a step once whose iteration fails; by default where the coupling is not stated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fallback: Option<bool>,
     /// FMUs that step every so many communication steps.
     #[serde(skip_serializing_if = "std::collections::BTreeMap::is_empty", default)]
     pub every: std::collections::BTreeMap<String, u32>,
@@ -78,14 +84,14 @@ pub struct Chosen {
     pub reasons: Vec<String>,
 }
 
-/// Completes what is wanted for `system`.
+/// Completes what is wanted for a run of `length` s of `system`.
 ///
 /// # Errors
 ///
 /// Where names do not exist, or what is wanted needs what an FMU cannot do.
-pub fn choose(system: &System, wanted: &Wanted) -> Result<Chosen, SystemError> {
+pub fn choose(system: &System, wanted: &Wanted, length: f64) -> Result<Chosen, SystemError> {
     let mut reasons = Vec::new();
-    let step = wanted.step.unwrap_or_else(|| default_step(system, &mut reasons));
+    let step = wanted.step.unwrap_or_else(|| default_step(system, length, &mut reasons));
     let base = Algorithm::new(step);
     let control = wanted.step_control.unwrap_or(StepControl::Fixed);
     let coupling = wanted.coupling.unwrap_or_else(|| default_coupling(system, &mut reasons));
@@ -113,6 +119,7 @@ pub fn choose(system: &System, wanted: &Wanted) -> Result<Chosen, SystemError> {
         smallest_step: wanted.smallest_step.unwrap_or(base.smallest_step),
         largest_step: wanted.largest_step.unwrap_or(base.largest_step),
         iterations: wanted.iterations.unwrap_or(base.iterations),
+        fallback: wanted.fallback.unwrap_or(wanted.coupling.is_none()),
         events: events(system, wanted)?,
         bonds: bonds(system, wanted)?,
         jobs: match wanted.jobs {
@@ -131,8 +138,9 @@ fn flags(slave: &dyn Slave) -> Option<&CoSimulation> {
     slave.description().co_simulation.as_ref()
 }
 
-/// The smallest `stepSize` of the FMUs' default experiments.
-fn default_step(system: &System, reasons: &mut Vec<String>) -> f64 {
+/// The smallest `stepSize` of the FMUs' default experiments; else 1 ms, or the power of ten by which
+/// a run of `length` s has fewer steps than [`STEPS`].
+fn default_step(system: &System, length: f64, reasons: &mut Vec<String>) -> f64 {
     let stated = system.slaves.iter().filter_map(|(name, slave)| {
         let step = slave.description().default_experiment.as_ref()?.step_size?;
         (step > 0.0 && step.is_finite()).then_some((name, step))
@@ -143,8 +151,10 @@ fn default_step(system: &System, reasons: &mut Vec<String>) -> f64 {
         ));
         step
     } else {
-        reasons.push(format!("step {STEP} s: no FMU states a stepSize"));
-        STEP
+        let step =
+            if length > STEPS * STEP { 10_f64.powf((length / STEPS).log10().ceil()) } else { STEP };
+        reasons.push(format!("step {step} s: no FMU states a stepSize"));
+        step
     }
 }
 

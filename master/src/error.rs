@@ -144,6 +144,19 @@ pub enum SystemError {
         /// Function, status and messages.
         source: CallError,
     },
+    /// An FMU does not keep a setting.
+    #[error(
+        "{name}: the value {value} that was set is lost: after the initialization the FMU has \
+         {found}; it ignores or replaces what is set, so leave the setting out"
+    )]
+    LostSetting {
+        /// The variable.
+        name: String,
+        /// The text.
+        value: String,
+        /// What the FMU has.
+        found: String,
+    },
     /// A function of an FMU failed.
     #[error("{slave} at t = {time} s: {source}")]
     Call {
@@ -206,6 +219,19 @@ pub enum SystemError {
         size: f64,
         /// Its error in tolerances.
         error: f64,
+    },
+    /// The steps have become too small to get on.
+    #[error(
+        "{steps} steps in a row were no longer than the smallest step, {smallest} s, and the run is \
+         at t = {time} s only; a larger relative tolerance, a larger smallest step or fixed steps help"
+    )]
+    Crawl {
+        /// Steps.
+        steps: u32,
+        /// Smallest step in s.
+        smallest: f64,
+        /// Time reached in s.
+        time: f64,
     },
     /// The algorithm makes no sense for this system.
     #[error("{what}")]

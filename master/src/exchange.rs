@@ -20,6 +20,7 @@ use crate::simulation::Task;
 use crate::slave::{CallError, Slave, Stepped};
 use crate::system::{Port, System};
 use discrete::{BOOLEANS, Channel, INTEGERS, STRINGS};
+pub(crate) use layout::Refusal;
 pub(crate) use reals::{Reals, Trace};
 
 /// The connections of a system, ready to be carried out.
@@ -55,8 +56,9 @@ impl Values {
 }
 
 impl Exchange {
-    pub(crate) fn new(system: &System, algorithm: &Algorithm) -> Self {
-        let reals = Reals::new(system, algorithm);
+    /// The connections of `system`; slaves that are `refusing` derivatives do without them.
+    pub(crate) fn new(system: &System, algorithm: &Algorithm, refusing: &[Refusal]) -> Self {
+        let reals = Reals::new(system, algorithm, refusing);
         let to_reals = reals.integer_sources().iter().map(|(port, _)| *port);
         let is_integer = |kind: &Kind| matches!(kind, Kind::Integer(_) | Kind::Enumeration(_));
         let integers = Channel::new(system, INTEGERS, is_integer, to_reals);
@@ -253,15 +255,31 @@ impl Exchange {
         self.check_finite(system, position, time)
     }
 
-    /// Every connected Real output of the slave is a finite number.
+    /// Every connected Real output of the slave is a finite number; a derivative that is not is
+    /// reported once.
     #[inline]
     pub(crate) fn check_finite(
-        &self,
+        &mut self,
         system: &System,
         slave: usize,
         time: f64,
     ) -> Result<(), SystemError> {
+        if !self.reals.derivatives_are_finite(slave) {
+            self.report_derivatives(system, slave, time);
+        }
         self.refuse(system, time, || self.reals.not_finite(slave))
+    }
+
+    /// Names the outputs of the slave whose derivatives are not finite for the first time.
+    #[cold]
+    fn report_derivatives(&mut self, system: &System, slave: usize, time: f64) {
+        while let Some((port, value)) = self.reals.report_derivative(slave) {
+            let name = system.name(port);
+            tracing::warn!(
+                "{name}: its output derivative (fmi2GetRealOutputDerivatives) is {value} at \
+                 t = {time} s; connections from {name} are held while it is not finite"
+            );
+        }
     }
 
     /// What connections and faults make of outputs for the gathered inputs of the slave is finite.

@@ -7,6 +7,7 @@
 
 pub mod algorithm;
 pub mod assembly;
+mod call_log;
 mod choose;
 mod error;
 mod exchange;
@@ -33,6 +34,7 @@ pub mod transformation;
 mod value;
 
 pub use algorithm::{Algorithm, Coupling, Course, StepControl, Sweep};
+pub use call_log::{CallLog, LoggedSlave};
 pub use choose::{Chosen, Wanted, choose};
 pub use error::{LoadError, SystemError};
 pub use fmu::{Fmu, FmuError, Instance};
@@ -41,6 +43,6 @@ pub use linearise::{Linearisation, Linearise, LineariseError, linearise};
 pub use order::{Order, by_direct_dependencies};
 pub use probe::Probe;
 pub use readout::Readout;
-pub use simulation::{Checkpoint, Simulation};
+pub use simulation::{Checkpoint, Fallbacks, Simulation};
 pub use slave::{Advance, Background, CallError, Failure, Slave, Stepped};
 pub use system::{Connection, Port, System};

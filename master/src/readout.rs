@@ -7,6 +7,7 @@ use fmi2::description::Kind;
 use crate::error::SystemError;
 use crate::exchange::call;
 use crate::results::Row;
+use crate::scenario::{DriveKind, Drives, integer};
 use crate::slave::{CallError, Slave};
 use crate::system::{Port, System};
 
@@ -22,6 +23,8 @@ pub struct Readout {
     pub booleans: Vec<i32>,
     /// Values of Strings.
     pub strings: Vec<String>,
+    /// Variables that follow a signal: which of the [`Drives`], and the position of the value.
+    driven: Vec<(usize, usize)>,
 }
 
 /// Variables of one slave and one type that stand side by side.
@@ -79,6 +82,34 @@ impl Readout {
         readout
     }
 
+    /// From now on the variables that follow a signal have its value at the time that is read, not
+    /// the one that the FMU was given for its last step.
+    pub(crate) fn follow(&mut self, drives: &Drives, system: &System, ports: &[Port]) {
+        let kind = |port: Port| ReadKind::of(&system.variable(port).kind);
+        for (number, drive) in drives.iter().enumerate() {
+            if let Some(at) = ports.iter().position(|port| *port == drive.port()) {
+                let same = |port: &&Port| kind(**port) == kind(drive.port());
+                self.driven.push((number, ports[..at].iter().filter(same).count()));
+            }
+        }
+    }
+
+    /// Gives driven variables their values at `time`, in s.
+    pub(crate) fn apply(&mut self, drives: &mut Drives, time: f64) {
+        for &(number, position) in &self.driven {
+            drives.show(number, time, |kind, value, text| match kind {
+                DriveKind::Real { .. } => self.reals[position] = value,
+                DriveKind::Integer => self.integers[position] = integer(value),
+                DriveKind::Boolean => self.booleans[position] = i32::from(value != 0.0),
+                DriveKind::String => {
+                    if let Some(text) = text {
+                        self.strings[position].clone_from(text);
+                    }
+                }
+            });
+        }
+    }
+
     /// Makes room for a value; its position.
     fn add(&mut self, kind: ReadKind) -> usize {
         match kind {
@@ -118,6 +149,43 @@ impl Readout {
             self.read_one(position, slave.as_mut()).map_err(|source| call(name, time, source))?;
         }
         Ok(())
+    }
+
+    /// The variables among `ports`, of which this is the readout, that their FMUs refuse to read now,
+    /// each with the refusal. A group of variables that is read as one is taken apart only where it
+    /// fails.
+    ///
+    /// # Errors
+    ///
+    /// Where an FMU ends its process or returns `fmi2Fatal`; `time` is for the message.
+    pub fn unreadable(
+        &mut self,
+        system: &mut System,
+        ports: &[Port],
+        time: f64,
+    ) -> Result<Vec<(Port, CallError)>, SystemError> {
+        let mut refused = Vec::new();
+        for position in 0..self.reads.len() {
+            let slave = self.reads[position].slave;
+            let (name, instance) = &mut system.slaves[slave];
+            match self.read_one(position, instance.as_mut()) {
+                Ok(()) => continue,
+                Err(source) if !source.leaves_the_instance_usable() => {
+                    return Err(call(name, time, source));
+                }
+                Err(_) => {}
+            }
+            let kind = self.reads[position].kind;
+            let members = ports.iter().filter(|port| {
+                port.slave == slave && ReadKind::of(&system.variable(**port).kind) == kind
+            });
+            for &port in members.collect::<Vec<_>>() {
+                if let Err(error) = system.get_value(port) {
+                    refused.push((port, error));
+                }
+            }
+        }
+        Ok(refused)
     }
 
     fn read_one(&mut self, position: usize, slave: &mut dyn Slave) -> Result<(), CallError> {

@@ -16,6 +16,7 @@ pub use body::{
     Bias, Csv, Delay, Drift, Dropout, Gain, Inversion, Noise, Quantisation, Ramp, Saturation, Sine,
     Stuck,
 };
+pub(crate) use drive::integer;
 pub use drive::{CheckpointError, Drive, DriveKind, DriveState, Drives};
 pub use error::{Reason, ScenarioError};
 pub use literal::Literal;

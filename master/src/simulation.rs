@@ -1,6 +1,7 @@
 //! The master algorithm at work: initialisation and communication steps.
 
 mod adaptive;
+mod capabilities;
 mod checkpoint;
 mod control;
 mod events;
@@ -17,9 +18,10 @@ use crate::algorithm::{Algorithm, Course, StepControl};
 use crate::error::SystemError;
 use crate::exchange::{Exchange, call};
 use crate::order::{Order, by_direct_dependencies};
+use crate::readout::Readout;
 use crate::scenario::{Drives, Prepared};
 use crate::slave::{CallError, Failure};
-use crate::system::System;
+use crate::system::{Port, System};
 use adaptive::Repetition;
 use control::Control;
 use events::Events;
@@ -30,6 +32,7 @@ use sweep::{Groups, Swept};
 use together::any_in_background;
 
 pub use checkpoint::Checkpoint;
+pub use iterate::Fallbacks;
 pub(crate) use parallel::Task;
 
 /// A system in simulation.
@@ -44,6 +47,8 @@ pub struct Simulation {
     repetition: Repetition,
     /// Steps are repeated: every slave can go back.
     repeats: bool,
+    /// Steps differ in size.
+    varies: bool,
     events: Option<Events>,
     groups: Groups,
     parallel: Option<Parallel>,
@@ -87,10 +92,11 @@ impl Simulation {
     ) -> Result<Self, SystemError> {
         algorithm.check(&system)?;
         let grid = Grid::new(&system, algorithm, experiment)?;
-        let mut exchange = Exchange::new(&system, algorithm);
         let order = by_direct_dependencies(&system);
-        exchange.set_faults(&system, &scenario.faults)?;
         initial::initialise(&mut system, experiment, &mut scenario)?;
+        let algorithm = &capabilities::confirm_rollback(&mut system, algorithm);
+        let mut exchange = capabilities::exchange(&mut system, algorithm);
+        exchange.set_faults(&system, &scenario.faults)?;
         for slave in 0..system.slaves.len() {
             exchange.read(&mut system, slave, experiment.start_time)?;
         }
@@ -118,6 +124,7 @@ impl Simulation {
             coupled,
             repetition: Repetition::default(),
             repeats: algorithm.repeats(),
+            varies: algorithm.control != StepControl::Fixed || !algorithm.events.is_empty(),
             events: Events::new(&algorithm.events),
             parallel: Parallel::new(algorithm.jobs, groups.len())?,
             groups,
@@ -156,6 +163,26 @@ impl Simulation {
         &mut self.system
     }
 
+    /// A readout of `ports` for [`Simulation::read`].
+    #[must_use]
+    pub fn readout(&self, ports: &[Port]) -> Readout {
+        let mut readout = Readout::new(&self.system, ports);
+        readout.follow(&self.drives, &self.system, ports);
+        readout
+    }
+
+    /// Reads the values of the time reached. A variable that follows a signal has the signal's value
+    /// at that time, which its FMU is given for the next step.
+    ///
+    /// # Errors
+    ///
+    /// Where an FMU refuses.
+    pub fn read(&mut self, readout: &mut Readout) -> Result<(), SystemError> {
+        readout.read(&mut self.system, self.grid.time)?;
+        readout.apply(&mut self.drives, self.grid.time);
+        Ok(())
+    }
+
     /// One communication step.
     ///
     /// # Errors
@@ -163,6 +190,7 @@ impl Simulation {
     /// Where an FMU does not finish the step or an output is not finite; the simulation then
     /// stands at the begin of the step in some slaves and at its end in others.
     pub fn step(&mut self) -> Result<(), SystemError> {
+        let begin = self.grid.time;
         let swept = match (self.events.take(), self.control.kind) {
             (None, StepControl::Fixed) if !self.repeats => {
                 let (end, size) = self.grid.next();
@@ -187,6 +215,9 @@ impl Simulation {
         }
         self.exchange.commit(self.grid.time);
         self.drives.commit(self.grid.time);
+        if self.varies && !self.is_finished() {
+            self.control.count_small(self.grid.time, self.grid.time - begin)?;
+        }
         Ok(())
     }
 

@@ -181,6 +181,11 @@ pub trait Slave {
         self.advance(&mut Advance::held(inputs, (time, size), never_back, outputs))
     }
 
+    /// Whether a call has returned `fmi2Warning` since this was last asked, where that is known.
+    fn take_warning(&mut self) -> bool {
+        false
+    }
+
     /// The same slave for another thread to step; none where it is bound to its thread.
     fn in_thread(&mut self) -> Option<&mut (dyn Slave + Send)> {
         None
@@ -303,6 +308,18 @@ pub struct CallError {
     pub failure: Failure,
     /// What the FMU said to the logger during the call.
     pub messages: Vec<String>,
+}
+
+impl CallError {
+    /// Whether the instance may be used on: the call was refused, without `fmi2Fatal` and without the
+    /// end of a process.
+    pub(crate) fn leaves_the_instance_usable(&self) -> bool {
+        match &self.failure {
+            Failure::Status(status) => *status != Status::Fatal,
+            Failure::Absent => true,
+            _ => false,
+        }
+    }
 }
 
 /// How a call failed.

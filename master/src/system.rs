@@ -2,6 +2,7 @@
 
 mod access;
 mod connecting;
+mod settings;
 mod units;
 
 use std::collections::HashMap;
@@ -44,6 +45,8 @@ pub struct System {
     pub connections: Vec<Connection>,
     /// Connections to parameters, of use in initialization mode only.
     pub(crate) initial: Vec<Connection>,
+    /// Values for variables that the FMUs get when they are initialised.
+    pub(crate) settings: Vec<settings::Setting>,
     /// Variables of each slave by name.
     variables: Vec<HashMap<String, usize>>,
     /// Slaves by name.
@@ -183,6 +186,59 @@ impl System {
         Ok(self.connections.len() - before)
     }
 
+    /// Connects an output to an input of another FMU where each is the only free one of its unit in the
+    /// whole system; the connections made.
+    ///
+    /// # Errors
+    ///
+    /// As [`System::connect`].
+    pub fn connect_equal_units(&mut self) -> Result<Vec<Connection>, SystemError> {
+        let before = self.connections.len();
+        let (outputs, inputs) = (self.free_outputs(), self.free_inputs());
+        let unit = |port: Port| self.dimension(port).map(str::to_owned);
+        let units: Vec<_> = inputs.iter().map(|&input| unit(input)).collect();
+        let sources: Vec<_> = outputs.iter().map(|&output| unit(output)).collect();
+        for (&to, unit) in inputs.iter().zip(&units) {
+            let same = |other: &&Option<String>| unit.is_some() && *other == unit;
+            if units.iter().filter(same).count() != 1 || sources.iter().filter(same).count() != 1 {
+                continue;
+            }
+            let from = sources.iter().position(|other| other == unit).map(|at| outputs[at]);
+            if let Some(from) = from.filter(|from| from.slave != to.slave) {
+                self.join(from, to, Transformation::Identity, false)?;
+            }
+        }
+        Ok(self.connections[before..].to_vec())
+    }
+
+    /// Inputs without a connection.
+    #[must_use]
+    pub fn free_inputs(&self) -> Vec<Port> {
+        let mut inputs = self.ports(Causality::Input);
+        inputs.retain(|input| self.source(*input).is_none());
+        inputs
+    }
+
+    /// Outputs without a connection.
+    #[must_use]
+    pub fn free_outputs(&self) -> Vec<Port> {
+        let mut outputs = self.ports(Causality::Output);
+        outputs.retain(|output| self.connections.iter().all(|known| known.from != *output));
+        outputs
+    }
+
+    /// Outputs that may be connected to `input`: of other FMUs, free, of its type and its unit.
+    #[must_use]
+    pub fn candidates(&self, input: Port) -> Vec<Port> {
+        let mut outputs = self.free_outputs();
+        outputs.retain(|&output| {
+            output.slave != input.slave
+                && self.variable(output).kind.element() == self.variable(input).kind.element()
+                && self.dimension(output) == self.dimension(input)
+        });
+        outputs
+    }
+
     /// Every variable of that causality.
     #[must_use]
     pub fn ports(&self, causality: Causality) -> Vec<Port> {
@@ -200,30 +256,6 @@ impl System {
     #[must_use]
     pub fn source(&self, input: Port) -> Option<&Connection> {
         self.sources.get(&input).map(|&position| &self.connections[position])
-    }
-
-    /// Sets the variable called `name` to the value that `text` spells.
-    ///
-    /// # Errors
-    ///
-    /// Where the variable does not exist, the text is no value of its type, or the FMU refuses it.
-    pub fn set(&mut self, name: &str, text: &str) -> Result<(), SystemError> {
-        let port = self.port(name)?;
-        self.set_port(port, text)
-    }
-
-    /// As [`System::set`], the variable by its place.
-    ///
-    /// # Errors
-    ///
-    /// Those of [`System::set`].
-    pub fn set_port(&mut self, port: Port, text: &str) -> Result<(), SystemError> {
-        let value = self.value(port, text)?;
-        let done = self.set_value(port, &value);
-        done.map_err(|source| {
-            let (name, value) = (self.name(port), text.to_owned());
-            SystemError::Setting { name, value, source }
-        })
     }
 
     /// What `text` spells for that variable.

@@ -1,8 +1,13 @@
 //! The value of a variable, read from text.
 
+use std::fmt;
+
 use fmi2::description::{IntegerType, Kind, SimpleType};
 
 use crate::fault::FaultLine;
+
+/// Relative difference of a Real that an FMU may make of a value that it is given.
+const NEAR: f64 = 1e-9;
 
 /// A value of one of the types of the standard; an Enumeration is an Integer.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,6 +35,43 @@ impl Value {
                 _ => Err("true or false".to_owned()),
             },
             Kind::String(_) => Ok(Value::String(text.to_owned())),
+        }
+    }
+}
+
+impl Value {
+    /// The start value in a description, where there is a number or a Boolean.
+    pub(crate) fn start(kind: &Kind) -> Option<Self> {
+        match kind {
+            Kind::Real(real) => real.start.map(Value::Real),
+            Kind::Integer(integer) | Kind::Enumeration(integer) => {
+                integer.start.map(Value::Integer)
+            }
+            Kind::Boolean(start) => start.map(Value::Boolean),
+            Kind::String(_) => None,
+        }
+    }
+
+    /// Whether `found`, read from an FMU, is this value: Reals but for a relative difference of 1e-9.
+    pub(crate) fn is_near(&self, found: &Self) -> bool {
+        match (self, found) {
+            (Value::Real(value), Value::Real(found)) => {
+                value.total_cmp(found).is_eq()
+                    || (found - value).abs() <= NEAR * value.abs()
+                    || value.is_nan() && found.is_nan()
+            }
+            _ => self == found,
+        }
+    }
+}
+
+impl fmt::Display for Value {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Value::Real(value) => value.fmt(formatter),
+            Value::Integer(value) => value.fmt(formatter),
+            Value::Boolean(value) => value.fmt(formatter),
+            Value::String(value) => write!(formatter, "{value:?}"),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The stepping loop, with what happens beside it.
 
 use std::path::PathBuf;
+use std::time::Instant;
 
 use master::{Simulation, SystemError};
 
@@ -32,6 +33,15 @@ pub(super) struct Saver {
     pub(super) every: Every,
 }
 
+/// How much a run has done.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Tally {
+    /// Communication steps.
+    pub(crate) steps: u64,
+    /// Wall-clock time in s.
+    pub(crate) seconds: f64,
+}
+
 /// What goes on beside the steps.
 pub(crate) struct Beside<'a> {
     pub(super) recorder: Option<&'a mut Recorder>,
@@ -40,24 +50,25 @@ pub(crate) struct Beside<'a> {
     pub(super) stop: f64,
     /// The point where the simulation stands was recorded by the run that was resumed.
     pub(super) resumed: bool,
+    pub(super) tally: Tally,
 }
 
 impl<'a> Beside<'a> {
     /// Nothing but a recording.
     pub(crate) fn recording(recorder: Option<&'a mut Recorder>, stop: f64) -> Self {
-        Self { recorder, saver: None, stop, resumed: false }
+        Self { recorder, saver: None, stop, resumed: false, tally: Tally::default() }
     }
 
     /// Advances `simulation` to its end; `watch` sees the start and every step.
     pub(crate) fn advance(
-        mut self,
+        &mut self,
         simulation: &mut Simulation,
         watch: impl FnMut(&mut Simulation) -> Result<(), SystemError>,
     ) -> Ended {
-        match self.steps(simulation, watch) {
-            Ok(ended) => ended,
-            Err(error) => Ended::Lost(error),
-        }
+        let begin = Instant::now();
+        let ended = self.steps(simulation, watch).unwrap_or_else(Ended::Lost);
+        self.tally.seconds = begin.elapsed().as_secs_f64();
+        ended
     }
 
     fn steps(
@@ -76,6 +87,7 @@ impl<'a> Beside<'a> {
         }
         while !simulation.is_finished() && !interrupt::is_raised() {
             simulation.step()?;
+            self.tally.steps += 1;
             watch(simulation)?;
             self.sample(simulation)?;
             let time = simulation.time();

@@ -1,4 +1,5 @@
 //! From a configuration to a system of connected FMUs.
+#![expect(clippy::print_stdout, reason = "the result of the command")]
 
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -9,8 +10,9 @@ use master::assembly::{Assembly, Element, Link, Terminal};
 use master::ssp::structure::DefaultExperiment;
 use master::ssp::{self, Folders};
 use master::transformation::Transformation;
-use master::{CallError, Failure, Fmu, Instance, Slave, System, isolate};
+use master::{CallError, CallLog, Failure, Fmu, Instance, Slave, System, isolate};
 
+use super::open_inputs;
 use crate::config::{Config, Loaded, Wire};
 
 /// A system, not yet initialised.
@@ -24,8 +26,19 @@ pub(crate) struct Assembled {
     pub(crate) folders: Option<Folders>,
 }
 
+/// What the command line adds to the configuration.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Making<'a> {
+    /// FMUs log everything.
+    pub(crate) logging: bool,
+    /// Free outputs and inputs of equal units are connected.
+    pub(crate) by_unit: bool,
+    /// Where FMI calls are written.
+    pub(crate) log_calls: Option<&'a CallLog>,
+}
+
 /// Loads and connects what the configuration names, and makes its settings.
-pub(crate) fn assemble(loaded: &Loaded, logging: bool) -> anyhow::Result<Assembled> {
+pub(crate) fn assemble(loaded: &Loaded, making: &Making<'_>) -> anyhow::Result<Assembled> {
     let config = &loaded.config;
     if config.isolation.isolate != Some(true) {
         for library in &config.preload {
@@ -42,8 +55,8 @@ pub(crate) fn assemble(loaded: &Loaded, logging: bool) -> anyhow::Result<Assembl
     if assembly.elements.is_empty() {
         bail!("there is no FMU in the system, expected `system` or an entry of [fmus]");
     }
-    let mut system = instantiate(&assembly.elements, config, logging)?;
-    connect(&mut system, loaded, &assembly.links)?;
+    let mut system = instantiate(&assembly.elements, config, making)?;
+    connect(&mut system, loaded, &assembly.links, making.by_unit)?;
     for element in &assembly.elements {
         for setting in &element.settings {
             let (element, variable) = (element.name.clone(), setting.variable.clone());
@@ -77,7 +90,12 @@ fn element(name: &str, path: &Path) -> Element {
 }
 
 /// Instantiates the FMUs.
-fn instantiate(elements: &[Element], config: &Config, logging: bool) -> anyhow::Result<System> {
+fn instantiate(
+    elements: &[Element],
+    config: &Config,
+    making: &Making<'_>,
+) -> anyhow::Result<System> {
+    let logging = making.logging;
     let limit = config.isolation.time_limit.as_ref().map(|limit| *limit.get_ref());
     let time_limit = limit.map(Duration::try_from_secs_f64).transpose().context("time-limit")?;
     let preload = config.preload.iter().map(Into::into).collect();
@@ -89,6 +107,10 @@ fn instantiate(elements: &[Element], config: &Config, logging: bool) -> anyhow::
             Box::new(opening.isolated(element)?)
         } else {
             Box::new(opening.here(element)?)
+        };
+        let slave = match making.log_calls {
+            Some(log) => Box::new(log.listen(&element.name, slave)),
+            None => slave,
         };
         system.add(&element.name, slave)?;
     }
@@ -138,7 +160,13 @@ fn switch_logging_on(name: &str, slave: &mut dyn Slave) {
 }
 
 /// Makes the connections: those of the configuration go before `links` to the same inputs.
-fn connect(system: &mut System, loaded: &Loaded, links: &[Link]) -> anyhow::Result<()> {
+/// Where none are stated, equal names are connected, and `by_unit` also equal units.
+fn connect(
+    system: &mut System,
+    loaded: &Loaded,
+    links: &[Link],
+    by_unit: bool,
+) -> anyhow::Result<()> {
     let config = &loaded.config;
     let mut taken = HashSet::new();
     let mut own = Vec::new();
@@ -173,11 +201,26 @@ fn connect(system: &mut System, loaded: &Loaded, links: &[Link]) -> anyhow::Resu
         system.link(link).map_err(|error| loaded.point(place, error))?;
     }
     let alone = config.connections.is_none() && config.system.is_none();
-    if alone && system.slaves.len() > 1 && system.connect_equal_names()? == 0 {
+    if !alone || system.slaves.len() < 2 {
+        return Ok(());
+    }
+    let by_name = system.connect_equal_names()?;
+    let by_unit = if by_unit { system.connect_equal_units()? } else { Vec::new() };
+    for connection in &by_unit {
+        let (from, to) = (system.name(connection.from), system.name(connection.to));
         tracing::warn!(
-            "no output has the name of an input of another FMU, so nothing is connected; connect \
-             them by --connect"
+            "{from} and {to} are connected because no other free output and input have their unit; \
+             --connect states connections instead"
         );
+    }
+    if by_name + by_unit.len() == 0 {
+        tracing::warn!(
+            "no output has the name of an input of another FMU, so nothing is connected"
+        );
+    }
+    let open = open_inputs::list(system);
+    if !open.is_empty() {
+        println!("{open}");
     }
     Ok(())
 }

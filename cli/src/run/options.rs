@@ -34,7 +34,8 @@ pub(crate) struct AlgorithmOptions {
     /// Choice of the step: fixed, doubling, embedded, increment or energy
     #[arg(long, value_parser = str::parse::<StepControl>)]
     pub(crate) step_control: Option<StepControl>,
-    /// Relative tolerance of iteration and step control
+    /// Relative tolerance of iteration and step control, in the master; what the solvers inside the
+    /// FMUs are told is --tolerance
     #[arg(long, value_name = "FRACTION", allow_negative_numbers = true)]
     pub(crate) relative_tolerance: Option<f64>,
     /// Absolute tolerance of iteration and step control, in nominal values
@@ -57,9 +58,10 @@ pub(crate) struct AlgorithmOptions {
 #[derive(clap::Args)]
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(crate) struct Options {
-    /// An SSP archive, an SSD file beside its FMUs, or a system.toml
-    #[arg(value_name = "SYSTEM", conflicts_with_all = ["plant", "controller", "resume"])]
-    system: Option<PathBuf>,
+    /// An SSP archive, an SSD file beside its FMUs, or a system.toml; or FMUs, which get the names of
+    /// their files
+    #[arg(value_name = "SYSTEM|FMU", conflicts_with_all = ["plant", "controller", "resume"])]
+    inputs: Vec<PathBuf>,
     /// Add an FMU, or put another in the place of one of the system; may be repeated
     #[arg(long = "fmu", value_name = "NAME=FMU", value_parser = setting)]
     #[arg(conflicts_with_all = ["plant", "controller"])]
@@ -70,9 +72,10 @@ pub(crate) struct Options {
     /// The FMU called controller [default: dist/AsoController.fmu]
     #[arg(long, value_name = "FMU", conflicts_with = "resume")]
     controller: Option<PathBuf>,
-    /// Connect an output to an input; without this, equal names of FMUs given here are connected;
-    /// may be repeated
-    #[arg(long = "connect", value_name = "FROM=TO", value_parser = setting)]
+    /// Connect an output to an input, for example `plant.y=controller.y`; may be repeated. Without
+    /// this, FMUs given here are connected where names are equal, and those given without `--fmu`
+    /// also where one free output and one free input have the same unit
+    #[arg(long = "connect", value_name = "FROM=TO", value_parser = connection)]
     connections: Vec<(String, String)>,
     /// Set a variable before the run, for example `plant.F_c=20`; may be repeated
     #[arg(long = "set", value_name = "FMU.VARIABLE=VALUE", value_parser = setting)]
@@ -80,9 +83,14 @@ pub(crate) struct Options {
     /// Start time in s
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     start_time: Option<f64>,
-    /// Stop time in s [default: that of the system, else the latest of the FMUs]
+    /// Stop time in s [default: that of the system, else the latest of the FMUs, else 1 s after the
+    /// start]
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     stop_time: Option<f64>,
+    /// Relative tolerance that the solvers inside the FMUs are told [default: that of each FMU's
+    /// DefaultExperiment]; the tolerance of the coupling is --relative-tolerance
+    #[arg(long, value_name = "FRACTION", allow_negative_numbers = true)]
+    tolerance: Option<f64>,
     #[command(flatten)]
     algorithm: AlgorithmOptions,
     /// Record these variables, by name or pattern (`plant.*`), instead of all inputs, outputs and
@@ -132,6 +140,9 @@ pub(crate) struct Options {
     /// Print the complete configuration in force as a system.toml, and do not run
     #[arg(long)]
     pub(super) print_config: bool,
+    /// Write every FMI call with its arguments, results and status to this file
+    #[arg(long, value_name = "FILE")]
+    pub(super) log_calls: Option<PathBuf>,
     /// Print the algorithm and why it is this one
     #[arg(long)]
     pub(super) explain: bool,
@@ -149,6 +160,19 @@ pub(crate) fn setting(text: &str) -> Result<(String, String), String> {
         Some((name, value)) if !name.is_empty() => Ok((name.to_owned(), value.to_owned())),
         _ => Err("expected the form NAME=VALUE".to_owned()),
     }
+}
+
+/// Splits `from=to`.
+fn connection(text: &str) -> Result<(String, String), String> {
+    let split =
+        |sign| text.split_once(sign).filter(|(from, to)| !from.is_empty() && !to.is_empty());
+    if let Some((from, to)) = split("=") {
+        return Ok((from.to_owned(), to.to_owned()));
+    }
+    let meant = ["->", ":", ","].into_iter().find_map(split);
+    let (from, to) = meant.unwrap_or(("plant.y", "controller.y"));
+    let word = if meant.is_some() { "write" } else { "for example" };
+    Err(format!("expected OUTPUT=INPUT, {word} --connect {}={}", from.trim(), to.trim()))
 }
 
 fn multiple(text: &str) -> Result<(String, u32), String> {
@@ -196,11 +220,12 @@ impl Options {
     pub(super) fn load(&self) -> anyhow::Result<(Loaded, Option<Saved>)> {
         let (mut loaded, saved) = self.base()?;
         let config = &mut loaded.config;
-        self.put_system(config);
+        self.put_system(config)?;
         self.algorithm.apply(&mut config.algorithm);
         let placed = |value: Option<f64>| value.map(|value| Spanned::new(0..0, value));
         put(&mut config.experiment.start_time, placed(self.start_time));
         put(&mut config.experiment.stop_time, placed(self.stop_time));
+        put(&mut config.experiment.tolerance, placed(self.tolerance));
         put(&mut config.isolation.isolate, self.isolate.then_some(true));
         put(&mut config.isolation.time_limit, placed(self.time_limit));
         put(&mut config.checkpoint.file, self.checkpoint.clone());
@@ -217,33 +242,53 @@ impl Options {
             return Ok((Loaded { config, source }, Some(saved)));
         }
         let mut config = Config::default();
-        match &self.system {
-            Some(path) if has_ending(path, "toml") => return Ok((Loaded::read(path)?, None)),
-            Some(path) if path.is_dir() || has_ending(path, "ssp") || has_ending(path, "ssd") => {
+        match self.inputs.as_slice() {
+            fmus if !fmus.is_empty() && fmus.iter().all(|path| is_fmu(path)) => {
+                for path in fmus {
+                    let name = free_name(path, &config);
+                    config.fmus.put(name, path.clone());
+                }
+            }
+            [path] if has_ending(path, "toml") => return Ok((Loaded::read(path)?, None)),
+            [path] if path.is_dir() || has_ending(path, "ssp") || has_ending(path, "ssd") => {
                 config.system = Some(path.clone());
             }
-            Some(path) => bail!(
-                "{}: expected a system: an .ssp, an .ssd or a .toml; FMUs are given by --fmu \
-                 NAME=FMU",
+            [path] => bail!(
+                "{}: expected a system, that is an .ssp, an .ssd or a .toml, or an .fmu",
                 path.display()
             ),
-            None if self.fmus.is_empty() => {
+            [_, _, ..] => bail!(
+                "expected one system or any number of FMUs, found {}; an FMU is put into a system \
+                 by --fmu NAME=FMU",
+                self.inputs
+                    .iter()
+                    .map(|path| path.display().to_string())
+                    .collect::<Vec<_>>()
+                    .join(", ")
+            ),
+            [] if self.fmus.is_empty() => {
                 let path = |stated: &Option<PathBuf>, default: &str| {
                     stated.clone().unwrap_or_else(|| default.into())
                 };
                 config.fmus.put("plant".to_owned(), path(&self.plant, PLANT));
                 config.fmus.put("controller".to_owned(), path(&self.controller, CONTROLLER));
             }
-            None => {}
+            [] => {}
         }
         Ok((Loaded { config, source: None }, None))
     }
 
-    fn put_system(&self, config: &mut Config) {
+    fn put_system(&self, config: &mut Config) -> anyhow::Result<()> {
         for (name, path) in &self.fmus {
             config.fmus.put(name.clone(), path.into());
         }
-        for (from, to) in &self.connections {
+        for (position, (from, to)) in self.connections.iter().enumerate() {
+            let earlier = &self.connections[..position];
+            if let Some((first, _)) = earlier.iter().find(|(_, known)| known == to) {
+                bail!(
+                    "{to} has two sources, {first} and {from}, expected one --connect for an input"
+                );
+            }
             let wires = config.connections.get_or_insert_default();
             wires.retain(|wire| wire.get_ref().to.get_ref() != to);
             wires.push(Wire::new(from.clone(), to.clone()));
@@ -252,6 +297,12 @@ impl Options {
             config.settings.push(name.clone(), value.clone());
         }
         config.preload.extend(self.preload.iter().cloned());
+        Ok(())
+    }
+
+    /// Whether FMUs are given by their files alone.
+    pub(super) fn names_fmus_by_file(&self) -> bool {
+        self.inputs.first().is_some_and(|path| is_fmu(path))
     }
 
     fn put_results(&self, config: &mut Config, saved: Option<&Saved>) {
@@ -297,6 +348,19 @@ fn resumed(path: &Path, time: f64) -> PathBuf {
     path.with_file_name(format!("{stem}-from-{time}.{ending}"))
 }
 
+/// Whether that is an FMU, packed or unpacked.
+fn is_fmu(path: &Path) -> bool {
+    has_ending(path, "fmu") || path.join("modelDescription.xml").is_file()
+}
+
+/// The name of the file, with a number behind it where there is an FMU of that name already.
+fn free_name(path: &Path, config: &Config) -> String {
+    let stem = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+    let taken = |name: &String| config.fmus.0.iter().any(|(known, _)| known == name);
+    let numbered = (2..).map(|number| format!("{stem}_{number}"));
+    std::iter::once(stem.clone()).chain(numbered).find(|name| !taken(name)).unwrap_or(stem)
+}
+
 fn has_ending(path: &Path, ending: &str) -> bool {
     path.extension().is_some_and(|found| found.eq_ignore_ascii_case(ending))
 }
@@ -306,6 +370,7 @@ impl Config {
     /// their place.
     fn check_numbers(&self) -> anyhow::Result<()> {
         let above = [
+            ("--tolerance", &self.experiment.tolerance),
             ("--time-limit", &self.isolation.time_limit),
             ("--checkpoint-every", &self.checkpoint.every),
         ];
@@ -313,7 +378,7 @@ impl Config {
             if let Some(value) = value.as_ref().map(Spanned::get_ref)
                 && !(*value > 0.0 && value.is_finite())
             {
-                bail!("{name} is {value} s, expected a finite number above 0");
+                bail!("{name} is {value}, expected a finite number above 0");
             }
         }
         if self.checkpoint.every.is_some() {

@@ -1,6 +1,6 @@
 //! What a configuration leaves open, decided by the system: algorithm, times, how often to record.
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use fmi2::Experiment;
 use master::{Algorithm, Coupling, StepControl, System, Wanted, by_direct_dependencies, choose};
 use toml::Spanned;
@@ -10,6 +10,8 @@ use crate::config::{Config, Every, Wire};
 
 /// Most rows that are recorded where nothing is stated and steps are fixed.
 const ROWS: f64 = 1e4;
+/// Length in s of a run whose stop time nobody states, as in FMPy.
+const LENGTH: f64 = 1.0;
 /// Share of a step by which a proposed step may miss a multiple of the communication step.
 const NEAR: f64 = 1e-6;
 
@@ -30,11 +32,12 @@ pub(super) fn plan(config: &mut Config, assembled: &Assembled) -> anyhow::Result
     let mut reasons = Vec::new();
     propose_steps(&mut config.algorithm, assembled, &mut reasons);
     check_step(&config.algorithm)?;
-    let chosen = choose(system, &config.algorithm)?;
+    let (start, stop) = times(config, assembled, &mut reasons)?;
+    let chosen = choose(system, &config.algorithm, stop - start)?;
     reasons.extend(chosen.reasons);
     let algorithm = chosen.algorithm;
-    let (start, stop) = times(config, assembled, &mut reasons)?;
     let tolerance = config.experiment.tolerance.as_ref().map(|tolerance| *tolerance.get_ref());
+    explain_tolerances(system, tolerance, &mut reasons);
     let experiment = Experiment { start_time: start, stop_time: Some(stop), tolerance };
     let every =
         config.results.every.unwrap_or_else(|| rows(&algorithm, stop - start, &mut reasons));
@@ -50,6 +53,20 @@ pub(super) fn plan(config: &mut Config, assembled: &Assembled) -> anyhow::Result
         config.connections = Some(system.connections.iter().map(wire).collect());
     }
     Ok(Plan { algorithm, experiment, stop, every, reasons })
+}
+
+/// What the solvers inside the FMUs are told.
+fn explain_tolerances(system: &System, stated: Option<f64>, reasons: &mut Vec<String>) {
+    if stated.is_some() {
+        return;
+    }
+    for (name, slave) in &system.slaves {
+        let default = slave.description().default_experiment.as_ref();
+        if let Some(tolerance) = default.and_then(|default| default.tolerance) {
+            reasons
+                .push(format!("tolerance {tolerance:e} for {name}: that of its DefaultExperiment"));
+        }
+    }
 }
 
 /// The step, before numbers that follow from it are looked at.
@@ -131,18 +148,21 @@ fn times(
     }
     let latest = defaults()
         .filter_map(|(name, one)| Some((name, one.stop_time?)))
-        .filter(|(_, time)| finite(time))
+        .filter(|(_, time)| finite(time) && *time > start)
         .max_by(|a, b| a.1.total_cmp(&b.1));
-    let (name, stop) = latest.context(
-        "no stop time: neither the system nor the DefaultExperiment of an FMU states one, expected \
-         --stop-time SECONDS",
-    )?;
+    let Some((name, stop)) = latest else {
+        let stop = start + LENGTH;
+        let reason = format!(
+            "stop time {stop} s: neither the system nor the DefaultExperiment of an FMU states one \
+             after the start time {start} s"
+        );
+        tracing::warn!("{reason}; --stop-time SECONDS sets it");
+        reasons.push(reason);
+        return Ok((start, stop));
+    };
     reasons.push(format!(
         "stop time {stop} s: the latest stopTime of a DefaultExperiment, that of {name}"
     ));
-    if stop <= start {
-        bail!("the stop time {stop} s of {name} is not after the start time {start} s");
-    }
     Ok((start, stop))
 }
 
@@ -169,6 +189,7 @@ fn complete(wanted: &mut Wanted, algorithm: &Algorithm, system: &System) {
     wanted.smallest_step = Some(algorithm.smallest_step);
     wanted.largest_step = Some(algorithm.largest_step);
     wanted.iterations = Some(algorithm.iterations);
+    wanted.fallback = Some(algorithm.fallback);
     wanted.jobs = Some(wanted.jobs.unwrap_or(algorithm.jobs));
     wanted.rollback = Some(algorithm.rollback);
     wanted.allow_nan = Some(algorithm.allow_nan);

@@ -20,7 +20,7 @@ impl Recorder {
     /// A recorder of `ports` into the file at `path`; none where nothing is to be recorded.
     pub(crate) fn create(
         path: &Path,
-        system: &System,
+        simulation: &mut Simulation,
         ports: &[Port],
         every: Every,
         start: f64,
@@ -30,8 +30,10 @@ impl Recorder {
             Every::Step => Decimation::All,
             Every::Seconds(seconds) => Decimation::Every(seconds),
         };
+        let ports = readable(simulation.system(), ports, start)?;
+        let system = simulation.system();
         let columns: Vec<_> = ports.iter().map(|&port| column(system, port)).collect();
-        let (due, readout) = (Due::new(decimation, start), Readout::new(system, ports));
+        let (due, readout) = (Due::new(decimation, start), simulation.readout(&ports));
         Ok(Some(Self { sink: results::create(path, &columns)?, due, readout }))
     }
 
@@ -49,11 +51,11 @@ impl Recorder {
     #[inline]
     pub(crate) fn sample(&mut self, simulation: &mut Simulation) -> anyhow::Result<()> {
         let time = simulation.time();
-        if self.due.at(time) { self.record(simulation.system(), time) } else { Ok(()) }
+        if self.due.at(time) { self.record(simulation, time) } else { Ok(()) }
     }
 
-    fn record(&mut self, system: &mut System, time: f64) -> anyhow::Result<()> {
-        self.readout.read(system, time)?;
+    fn record(&mut self, simulation: &mut Simulation, time: f64) -> anyhow::Result<()> {
+        simulation.read(&mut self.readout)?;
         let Readout { reals, integers, booleans, strings, .. } = &self.readout;
         Ok(self.sink.row(time, &Row { reals, integers, booleans, strings })?)
     }
@@ -67,6 +69,16 @@ impl Recorder {
     pub(crate) fn finish(self) -> anyhow::Result<()> {
         Ok(self.sink.finish()?)
     }
+}
+
+/// `ports` without the variables that their FMUs refuse to read, which are named in a warning.
+fn readable(system: &mut System, ports: &[Port], time: f64) -> anyhow::Result<Vec<Port>> {
+    let refused = Readout::new(system, ports).unreadable(system, ports, time)?;
+    for (port, error) in &refused {
+        tracing::warn!("{}: {error}; it is left out of the results", system.name(*port));
+    }
+    let kept = ports.iter().filter(|port| refused.iter().all(|(refused, _)| refused != *port));
+    Ok(kept.copied().collect())
 }
 
 fn column(system: &System, port: Port) -> Column {

@@ -33,7 +33,7 @@ impl Tolerance {
     pub fn new(relative: f64) -> Result<Self, Refusal> {
         require("tolerance", relative, relative > 0.0, "finite and > 0")?;
         let relative = relative.clamp(1e-12, 1e-3);
-        Ok(Self { relative, absolute: relative * 1e-3 })
+        Ok(Self { relative, absolute: relative / 1e3 })
     }
 
     /// Sum of the squares of the errors of a step, each relative to its bound.

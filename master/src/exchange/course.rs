@@ -55,8 +55,13 @@ impl Polynomial {
 }
 
 impl Known {
-    /// Over the step whose end is not known: from the begin onwards.
+    /// Over the step whose end is not known: from its start onwards. Held where a derivative of the
+    /// output is NaN or infinite, as some FMUs give it at the start time.
     pub(super) fn extrapolated(&self, course: Course) -> Polynomial {
+        let finite = |derivative: Option<f64>| derivative.is_none_or(f64::is_finite);
+        if !(finite(self.slope) && finite(self.curvature)) {
+            return Polynomial::held(self.begin);
+        }
         let quotient = (self.begin - self.before) / self.last_size;
         let (slope, curvature) = match course {
             Course::Hold => (0.0, 0.0),
@@ -104,7 +109,7 @@ impl Known {
             Course::Quadratic => {
                 let quotient = (self.begin - self.before) / self.last_size;
                 // Newton's divided difference where there is no derivative at the begin.
-                let curvature = match self.slope {
+                let curvature = match self.slope.filter(|slope| slope.is_finite()) {
                     Some(derivative) => 2.0 * (slope - derivative) / self.size,
                     None => 2.0 * (slope - quotient) / (self.size + self.last_size),
                 };

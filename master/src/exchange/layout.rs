@@ -10,6 +10,15 @@ use crate::slave::Advance;
 use crate::system::{Port, System};
 use crate::transformation::Transformation;
 
+/// Derivatives that a slave refuses although its description promises them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Refusal {
+    /// `fmi2SetRealInputDerivatives` fails.
+    pub(crate) inputs: bool,
+    /// `fmi2GetRealOutputDerivatives` fails.
+    pub(crate) outputs: bool,
+}
+
 /// What one slave sets and reads of connected Reals.
 #[derive(Debug, Default)]
 pub(super) struct Lane {
@@ -87,7 +96,7 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    pub(super) fn new(system: &System, algorithm: &Algorithm) -> Self {
+    pub(super) fn new(system: &System, algorithm: &Algorithm, refusing: &[Refusal]) -> Self {
         let count = system.slaves.len();
         let mut layout = Self { plain: vec![true; count], ..Self::default() };
         layout.lanes.resize_with(count, Lane::default);
@@ -100,8 +109,13 @@ impl Layout {
                 Course::Limited | Course::Linear => 1,
                 Course::Quadratic => 2,
             };
-            lane.input_order = if flags.can_interpolate_inputs { wanted } else { 0 };
-            lane.output_order = wanted.min(flags.max_output_derivative_order as usize);
+            let refusal = refusing.get(slave).copied().unwrap_or_default();
+            if flags.can_interpolate_inputs && !refusal.inputs {
+                lane.input_order = wanted;
+            }
+            if !refusal.outputs {
+                lane.output_order = wanted.min(flags.max_output_derivative_order as usize);
+            }
         }
         layout.place_derivatives();
         layout

@@ -2,7 +2,7 @@
 
 use super::call;
 use super::course::{Known, Polynomial};
-use super::layout::Layout;
+use super::layout::{Layout, Refusal};
 use super::pass::Pass;
 use super::trace::Span;
 pub(crate) use super::trace::Trace;
@@ -29,12 +29,14 @@ pub(crate) struct Reals {
     /// What the inputs get.
     pub(super) values: Vec<f64>,
     pub(super) input_derivatives: Vec<f64>,
+    /// For each output, whether its derivative has been reported as not finite.
+    reported: Vec<bool>,
     pass: Pass,
 }
 
 impl Reals {
-    pub(crate) fn new(system: &System, algorithm: &Algorithm) -> Self {
-        let layout = Layout::new(system, algorithm);
+    pub(crate) fn new(system: &System, algorithm: &Algorithm, refusing: &[Refusal]) -> Self {
+        let layout = Layout::new(system, algorithm, refusing);
         let (outputs, derivatives) = (layout.output_ports.len(), layout.output_derivatives);
         let trace = Trace {
             latest: vec![0.0; outputs],
@@ -57,6 +59,7 @@ impl Reals {
             pass,
             values: vec![0.0; layout.sources.len()],
             input_derivatives: vec![0.0; layout.input_derivatives],
+            reported: vec![false; outputs],
             course: algorithm.course,
             sweep: algorithm.sweep,
             simple: algorithm.course == Course::Hold
@@ -308,6 +311,28 @@ impl Reals {
         all_finite(&self.trace.latest)
     }
 
+    /// Asks a slave for the derivatives of its connected outputs, and gives its connected inputs
+    /// derivatives of 0.
+    pub(crate) fn try_derivatives(
+        &self,
+        slave: usize,
+        instance: &mut dyn Slave,
+    ) -> (Result<(), CallError>, Result<(), CallError>) {
+        let lane = &self.layout.lanes[slave];
+        let (mut outputs, mut inputs) = (Ok(()), Ok(()));
+        if !lane.derived_outputs.is_empty() {
+            let mut values = vec![0.0; lane.derived_outputs.len()];
+            let (references, orders) = (&lane.derived_outputs, &lane.output_orders);
+            outputs = instance.get_output_derivatives(references, orders, &mut values);
+        }
+        if !lane.derived_inputs.is_empty() {
+            let values = vec![0.0; lane.derived_inputs.len()];
+            inputs =
+                instance.set_input_derivatives(&lane.derived_inputs, &lane.input_orders, &values);
+        }
+        (outputs, inputs)
+    }
+
     /// Reads the connected outputs of a slave and their derivatives.
     pub(crate) fn read(&mut self, slave: usize, instance: &mut dyn Slave) -> Result<(), CallError> {
         let (lane, trace) = (&self.layout.lanes[slave], &mut self.trace);
@@ -332,18 +357,39 @@ impl Reals {
         Some((self.layout.input_ports[found], self.values[found]))
     }
 
-    /// The output that has a value or a derivative that is not finite.
+    /// The output of a slave whose value is not finite.
+    #[inline]
     pub(crate) fn not_finite(&self, slave: usize) -> Option<(Port, f64)> {
-        let (lane, trace) = (&self.layout.lanes[slave], &self.trace);
-        let values = &trace.latest[lane.output_range.clone()];
-        let derivatives = &trace.derivatives[lane.output_derivative_range.clone()];
-        if all_finite(values) && all_finite(derivatives) {
+        let range = self.layout.lanes[slave].output_range.clone();
+        let values = &self.trace.latest[range.clone()];
+        if all_finite(values) {
             return None;
         }
-        let both = values.iter().chain(derivatives).enumerate();
-        let (position, &value) = both.into_iter().find(|(_, value)| !value.is_finite())?;
-        let output = lane.output_range.start + position % values.len();
-        Some((self.layout.output_ports[output], value))
+        let position = values.iter().position(|value| !value.is_finite())?;
+        Some((self.layout.output_ports[range.start + position], values[position]))
+    }
+
+    /// Whether all derivatives of a slave's outputs are finite. Connections whose derivatives are
+    /// not are held: see [`Known::extrapolated`].
+    #[inline]
+    pub(crate) fn derivatives_are_finite(&self, slave: usize) -> bool {
+        let range = self.layout.lanes[slave].output_derivative_range.clone();
+        all_finite(&self.trace.derivatives[range])
+    }
+
+    /// An output of a slave whose derivative is not finite and has not been reported before.
+    #[cold]
+    pub(crate) fn report_derivative(&mut self, slave: usize) -> Option<(Port, f64)> {
+        for output in self.layout.lanes[slave].output_range.clone() {
+            let places = [self.layout.slopes[output], self.layout.curvatures[output]];
+            let derivatives = places.into_iter().flatten();
+            let mut derivatives = derivatives.map(|place| self.trace.derivatives[place as usize]);
+            let Some(value) = derivatives.find(|value| !value.is_finite()) else { continue };
+            if !std::mem::replace(&mut self.reported[output], true) {
+                return Some((self.layout.output_ports[output], value));
+            }
+        }
+        None
     }
 }
 

@@ -179,6 +179,19 @@ impl Drives {
         self.all.iter_mut()
     }
 
+    /// Hands type, value and text of one at `time`, in s, to `show`, unless it keeps its start value.
+    pub(crate) fn show(
+        &mut self,
+        number: usize,
+        time: f64,
+        show: impl FnOnce(DriveKind, f64, Option<&String>),
+    ) {
+        let drive = &mut self.all[number];
+        if let Some(sample) = drive.sample(time) {
+            show(drive.kind, sample.value, drive.text(sample.value));
+        }
+    }
+
     /// Whether there are none.
     #[must_use]
     pub fn is_empty(&self) -> bool {
@@ -312,8 +325,9 @@ fn rank(kind: DriveKind) -> u8 {
     }
 }
 
+/// The Integer that a signal's value stands for.
 #[expect(clippy::cast_possible_truncation, reason = "saturates")]
-fn integer(value: f64) -> i32 {
+pub(crate) fn integer(value: f64) -> i32 {
     value.round() as i32
 }
 

@@ -24,6 +24,9 @@ pub(super) struct Control {
     pub(super) controller: Controller,
     /// The next step in s.
     pub(super) size: f64,
+    /// The smallest step in s, and how many of the last steps were no longer.
+    pub(super) smallest: f64,
+    pub(super) small: u32,
     pub(super) scale: Scale,
     /// For each bond the outputs at the other ends of its connections.
     bonds: Vec<(usize, usize)>,
@@ -33,6 +36,9 @@ pub(super) struct Control {
     predicted: Vec<f64>,
     states: Vec<Bond>,
 }
+
+/// Steps of the smallest size in a row that end a run: it would not reach its stop time.
+const SMALL_STEPS: u32 = 1000;
 
 /// Magnitude of a variable: its `nominal`, else 1.
 pub(super) fn nominal(system: &System, port: Port) -> f64 {
@@ -81,6 +87,8 @@ impl Control {
             kind: algorithm.control,
             controller,
             size: algorithm.step,
+            smallest: algorithm.smallest_step,
+            small: 0,
             scale: Scale::new(relative, absolute, nominals),
             bonds,
             order: i32::from(order),
@@ -150,6 +158,23 @@ impl Control {
             }
             _ => {}
         }
+    }
+
+    /// A step of `size` s to `time` is done.
+    ///
+    /// # Errors
+    ///
+    /// Where it is one of too many in a row that are as small as the smallest.
+    pub(super) fn count_small(&mut self, time: f64, size: f64) -> Result<(), SystemError> {
+        if size > 2.0 * self.smallest {
+            self.small = 0;
+            return Ok(());
+        }
+        self.small += 1;
+        if self.small < SMALL_STEPS {
+            return Ok(());
+        }
+        Err(SystemError::Crawl { steps: self.small, smallest: self.smallest, time })
     }
 
     /// After an event the past says nothing.

@@ -3,13 +3,13 @@
 use std::collections::HashMap;
 
 use fmi2::Experiment;
-use fmi2::description::Kind;
+use fmi2::description::{Kind, ModelDescription};
 
 use crate::error::SystemError;
 use crate::exchange::call;
 use crate::fault::FaultLine;
 use crate::order::Rows;
-use crate::scenario::Prepared;
+use crate::scenario::{Drive, Prepared};
 use crate::solve::{Components, Newton, Progress, Scale, Solver, components};
 use crate::system::{Port, System};
 use crate::value::Value;
@@ -19,7 +19,8 @@ const TOLERANCE: f64 = 1e-10;
 /// Most evaluations of a loop, and most passes through one of values that are no Reals.
 const EVALUATIONS: u32 = 100;
 
-/// Brings all slaves into initialization mode, solves the connections there, and ends it.
+/// Gives all slaves their settings, brings them into initialization mode, solves the connections
+/// there, and ends it. Settings are given after `fmi2SetupExperiment`, which some FMUs reset them in.
 pub(super) fn initialise(
     system: &mut System,
     experiment: &Experiment,
@@ -27,12 +28,42 @@ pub(super) fn initialise(
 ) -> Result<(), SystemError> {
     let start = experiment.start_time;
     for (name, slave) in &mut system.slaves {
-        slave
-            .setup_experiment(experiment)
-            .and_then(|()| slave.enter_initialization_mode())
-            .map_err(|source| call(name, start, source))?;
+        let experiment = told(experiment, slave.description());
+        slave.setup_experiment(&experiment).map_err(|source| call(name, start, source))?;
     }
+    system.apply_settings()?;
+    for (name, slave) in &mut system.slaves {
+        slave.enter_initialization_mode().map_err(|source| call(name, start, source))?;
+    }
+    system.repeat_settings();
     scenario.drives.write(system, start)?;
+    solve_connections(system, scenario, start)?;
+    for (name, slave) in &mut system.slaves {
+        slave.exit_initialization_mode().map_err(|source| call(name, start, source))?;
+    }
+    let connections = system.connections.iter().chain(&system.initial);
+    let driven = scenario.drives.iter().map(Drive::port);
+    let replaced: Vec<Port> = connections.map(|connection| connection.to).chain(driven).collect();
+    system.confirm_settings(&replaced)?;
+    system.confirm_start_values(&replaced);
+    Ok(())
+}
+
+/// What one FMU is told: the tolerance of its own `DefaultExperiment` where none is stated.
+fn told(experiment: &Experiment, description: &ModelDescription) -> Experiment {
+    let default = description.default_experiment.as_ref();
+    let default = default.and_then(|default| default.tolerance);
+    let sound = |tolerance: &f64| *tolerance > 0.0 && tolerance.is_finite();
+    Experiment { tolerance: experiment.tolerance.or(default.filter(sound)), ..*experiment }
+}
+
+/// Carries the connected outputs to their inputs in initialization mode, in the order of their
+/// dependencies.
+fn solve_connections(
+    system: &mut System,
+    scenario: &Prepared,
+    start: f64,
+) -> Result<(), SystemError> {
     let mut graph = Graph::new(system, &scenario.faults);
     for component in 0..graph.components.len() {
         let nodes = graph.components.nodes(component).to_vec();
@@ -44,9 +75,6 @@ pub(super) fn initialise(
                 graph.write(system, node, &value, start)?;
             }
         }
-    }
-    for (name, slave) in &mut system.slaves {
-        slave.exit_initialization_mode().map_err(|source| call(name, start, source))?;
     }
     Ok(())
 }

@@ -47,6 +47,18 @@ pub(super) struct Coupled {
     begin: Values,
     /// All slaves have directional derivatives.
     directional: bool,
+    /// A step whose iteration fails is made once.
+    falls_back: bool,
+    fallbacks: Fallbacks,
+}
+
+/// Steps whose iteration failed and that were made once instead.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Fallbacks {
+    /// How many.
+    pub count: u64,
+    /// Why the first one failed, with its time; empty where there is none.
+    pub first: String,
 }
 
 impl Coupled {
@@ -79,6 +91,8 @@ impl Coupled {
             column: zeros(),
             begin: Values::default(),
             directional,
+            falls_back: algorithm.fallback,
+            fallbacks: Fallbacks::default(),
         })
     }
 }
@@ -94,9 +108,30 @@ impl Simulation {
         let Some(mut coupled) = self.coupled.take() else {
             return self.sweep(time, size, never_back);
         };
-        let done = self.solve(&mut coupled, time, size);
+        let mut done = self.solve(&mut coupled, time, size);
+        if let Err(error) = &done
+            && coupled.falls_back
+            && is_recoverable(error)
+        {
+            coupled.fallbacks.add(error);
+            done = self.fall_back(&coupled, time, size);
+        }
         self.coupled = Some(coupled);
         done
+    }
+
+    /// The step made once, from where its iteration started.
+    #[cold]
+    fn fall_back(&mut self, coupled: &Coupled, time: f64, size: f64) -> Result<Swept, SystemError> {
+        self.restore_states(SLOT, time)?;
+        self.exchange.restore(&coupled.begin);
+        self.sweep(time, size, false)
+    }
+
+    /// The steps whose iteration failed and that were made once instead.
+    #[must_use]
+    pub fn fallbacks(&self) -> Option<&Fallbacks> {
+        self.coupled.as_ref().map(|coupled| &coupled.fallbacks)
     }
 
     fn solve(&mut self, coupled: &mut Coupled, time: f64, size: f64) -> Result<Swept, SystemError> {
@@ -187,6 +222,25 @@ impl Simulation {
             coupled.iteration.solver().set_column(column, &coupled.column);
         }
         Ok(())
+    }
+}
+
+impl Fallbacks {
+    #[cold]
+    fn add(&mut self, error: &SystemError) {
+        self.count += 1;
+        if self.first.is_empty() {
+            self.first = error.to_string();
+        }
+    }
+}
+
+/// Whether the slaves can go back after this error and make the step once.
+fn is_recoverable(error: &SystemError) -> bool {
+    match error {
+        SystemError::Coupling { .. } | SystemError::NotFinite { .. } => true,
+        SystemError::Call { source, .. } => source.leaves_the_instance_usable(),
+        _ => false,
     }
 }
 

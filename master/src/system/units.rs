@@ -17,6 +17,12 @@ impl System {
         Some((name, base))
     }
 
+    /// The unit of a variable; none where it has none or is dimensionless.
+    pub(super) fn dimension(&self, port: Port) -> Option<&str> {
+        let Kind::Real(real) = &self.variable(port).kind else { return None };
+        real.unit.as_deref().filter(|unit| !["", "1", "-"].contains(unit))
+    }
+
     /// Factor and offset from the unit of one variable to that of the other; none where they are
     /// the same or one of them has no unit.
     pub(super) fn conversion(

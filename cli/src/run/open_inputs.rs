@@ -1,0 +1,34 @@
+//! What stays unconnected where connections are made by names, and what to type for it.
+
+use master::{Port, System};
+
+/// Most inputs that are listed, and most outputs that are proposed for one.
+const INPUTS: usize = 20;
+const OUTPUTS: usize = 3;
+
+/// A line for each input without a connection: its start value counts unless it is connected. Empty
+/// where every input has a source.
+pub(super) fn list(system: &System) -> String {
+    let open = system.free_inputs();
+    let mut lines: Vec<_> = open.iter().take(INPUTS).map(|&input| line(system, input)).collect();
+    if open.len() > INPUTS {
+        lines.push(format!("  and {} more", open.len() - INPUTS));
+    }
+    if !lines.is_empty() {
+        lines.insert(0, "inputs that are not connected keep their start values:".to_owned());
+    }
+    lines.join("\n")
+}
+
+fn line(system: &System, input: Port) -> String {
+    let name = system.name(input);
+    let outputs = system.candidates(input);
+    if outputs.is_empty() {
+        return format!("  {name}: set it by --set {name}=VALUE");
+    }
+    let typed = |output: &Port| format!("--connect {}={name}", system.name(*output));
+    let proposed: Vec<_> = outputs.iter().take(OUTPUTS).map(typed).collect();
+    let more = outputs.len().saturating_sub(OUTPUTS);
+    let more = if more > 0 { format!(" ({more} more outputs fit)") } else { String::new() };
+    format!("  {name}: {}{more}", proposed.join(" or "))
+}

@@ -1,0 +1,61 @@
+//! What the slaves can do in fact: some promise more in their descriptions.
+
+use crate::algorithm::{Algorithm, Coupling};
+use crate::exchange::{Exchange, Refusal};
+use crate::slave::CallError;
+use crate::system::System;
+
+/// The connections of an initialised system. Derivatives of inputs and outputs that an FMU promises
+/// and refuses are not used, with a warning.
+pub(super) fn exchange(system: &mut System, algorithm: &Algorithm) -> Exchange {
+    let exchange = Exchange::new(system, algorithm, &[]);
+    let mut refusing = vec![Refusal::default(); system.slaves.len()];
+    for (slave, (name, instance)) in system.slaves.iter_mut().enumerate() {
+        let (outputs, inputs) = exchange.reals.try_derivatives(slave, instance.as_mut());
+        refusing[slave] = Refusal {
+            outputs: is_refused(name, outputs, "maxOutputDerivativeOrder", "outputs"),
+            inputs: is_refused(name, inputs, "canInterpolateInputs", "inputs"),
+        };
+    }
+    if refusing.iter().all(|refusal| *refusal == Refusal::default()) {
+        return exchange;
+    }
+    Exchange::new(system, algorithm, &refusing)
+}
+
+/// Whether an FMU refuses derivatives that `flag` promises. Any other failure comes again where the
+/// derivatives are needed.
+fn is_refused(name: &str, done: Result<(), CallError>, flag: &str, what: &str) -> bool {
+    let Err(error) = done else { return false };
+    let refused = error.leaves_the_instance_usable();
+    if refused {
+        tracing::warn!(
+            "{name}: {error}, although its {flag} promises it; the run does without derivatives of \
+             the {what} of {name}"
+        );
+    }
+    refused
+}
+
+/// `algorithm`, or where its iteration was chosen by default and the state of an FMU can in fact not
+/// be set: the one without iteration.
+pub(super) fn confirm_rollback(system: &mut System, algorithm: &Algorithm) -> Algorithm {
+    let mut confirmed = algorithm.clone();
+    let optional = algorithm.fallback
+        && algorithm.coupling != Coupling::Once
+        && !Algorithm { coupling: Coupling::Once, ..algorithm.clone() }.repeats();
+    if !optional {
+        return confirmed;
+    }
+    for (name, slave) in &mut system.slaves {
+        let done = slave.save_state(0).and_then(|()| slave.restore_state(0));
+        if let Err(error) = done {
+            tracing::warn!(
+                "{name}: {error}, although its canGetAndSetFMUstate is true; steps are not iterated"
+            );
+            confirmed.coupling = Coupling::Once;
+            break;
+        }
+    }
+    confirmed
+}
