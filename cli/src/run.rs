@@ -76,6 +76,7 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Prepared>> {
         by_unit: options.names_fmus_by_file(),
         log_calls: log_calls.as_ref(),
     };
+    let by_name = loaded.config.connections.is_none() && loaded.config.system.is_none();
     let mut assembled = assemble(&loaded, &making)?;
     let plan = plan(&mut loaded.config, &assembled)?;
     let system = std::mem::take(&mut assembled.system);
@@ -90,6 +91,10 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Prepared>> {
     check_saving(&config, &system)?;
     check_plot(&config, &system, &ports)?;
     println!("{}", connections(&system));
+    let open = if by_name { open_inputs::list(&system) } else { String::new() };
+    if !open.is_empty() {
+        println!("{open}");
+    }
     if options.explain {
         println!("{}", plan.explanation(&system));
     }

@@ -26,6 +26,10 @@ EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String 
     slave->now.u = 1;
     slave->t1 = 0.5;
     slave->n = 3;
+    if (is(slave, "other start values")) {
+        slave->t1 = 7;
+        slave->n = 8;
+    }
     slave->now.enumeration[INPUT] = slave->now.enumeration[OUTPUT] = 1;
     if (type != fmi2CoSimulation || misbehave(slave, "fmi2Instantiate") > fmi2Warning) {
         free(slave);
@@ -60,9 +64,12 @@ EXPORT fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance
                                       fmi2Real tolerance, fmi2Real start, fmi2Boolean has_stop,
                                       fmi2Real stop) {
     Slave *slave = c;
-    (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
+    (void)has_stop, (void)stop;
     demand(slave->now.state == INSTANTIATED);
     slave->now.time = start;
+    if (is(slave, "start at the tolerance")) {
+        slave->now.x = has_tolerance ? tolerance : -1;
+    }
     return misbehave(slave, "fmi2SetupExperiment");
 }
 

@@ -24,7 +24,15 @@
 
 enum { TEXT = 20000 };
 /* Value references: of every type 0 is the input and 1 the output, the others are parameters. */
-enum { INPUT, OUTPUT, FIRST_PARAMETER, ENUMERATION_INPUT = 10, ENUMERATION_OUTPUT };
+enum {
+    INPUT,
+    OUTPUT,
+    FIRST_PARAMETER,
+    ENUMERATION_INPUT = 10,
+    ENUMERATION_OUTPUT,
+    /* A Real that the FMU refuses to read, and is none the worse for. */
+    UNREADABLE = 20
+};
 
 typedef enum {
     INSTANTIATED,

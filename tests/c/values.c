@@ -44,6 +44,7 @@ EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference referenc
         case INPUT: values[k] = slave->now.u; break;
         case OUTPUT: values[k] = slave->now.x; break;
         case FIRST_PARAMETER: values[k] = slave->t1; break;
+        case UNREADABLE: say(slave, fmi2Error, "that cannot be read"); return fmi2Error;
         default: return refuse(slave, "there is no such Real");
         }
         if (references[k] == OUTPUT && due(slave) && is(slave, "not a number")) {
@@ -146,13 +147,22 @@ EXPORT fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference refere
     return misbehave(slave, "fmi2SetString");
 }
 
-/* ---- derivatives: none ---- */
+/* ---- derivatives: none, but of the output in behaviours that begin with "derivative" ---- */
+
+/* A function that the description promises is refused, which harms nothing. */
+static fmi2Status break_promise(const Slave *slave) {
+    say(slave, fmi2Error, "not implemented");
+    return fmi2Error;
+}
 
 EXPORT fmi2Status fmi2SetRealInputDerivatives(fmi2Component c,
                                               const fmi2ValueReference references[], size_t count,
                                               const fmi2Integer orders[],
                                               const fmi2Real values[]) {
     (void)references, (void)count, (void)orders, (void)values;
+    if (is(c, "derivative refused")) {
+        return break_promise(c);
+    }
     return refuse(c, "inputs have no derivatives");
 }
 
@@ -160,7 +170,18 @@ EXPORT fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c,
                                                const fmi2ValueReference references[],
                                                size_t count, const fmi2Integer orders[],
                                                fmi2Real values[]) {
-    (void)references, (void)count, (void)orders, (void)values;
+    const Slave *slave = c;
+    (void)references, (void)orders;
+    if (is(slave, "derivative refused")) {
+        return break_promise(slave);
+    }
+    if (is(slave, "derivative NaN until t1") || is(slave, "derivative infinite until t1")) {
+        double start = strstr(slave->behaviour, "NaN") != NULL ? NAN : INFINITY;
+        for (size_t k = 0; k < count; k++) {
+            values[k] = due(slave) ? slave->now.u : start;
+        }
+        return fmi2OK;
+    }
     return refuse(c, "outputs have no derivatives");
 }
 

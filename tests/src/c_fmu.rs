@@ -24,6 +24,10 @@ pub struct CFmu {
     definitions: Vec<String>,
     root_attributes: String,
     experiment: String,
+    /// More variables, as XML.
+    variables: String,
+    /// Units of u and y.
+    units: Option<[String; 2]>,
 }
 
 impl CFmu {
@@ -43,6 +47,8 @@ impl CFmu {
             definitions: Vec::new(),
             root_attributes: String::new(),
             experiment: String::new(),
+            variables: String::new(),
+            units: None,
         }
     }
 
@@ -77,6 +83,36 @@ impl CFmu {
     #[must_use]
     pub fn version(mut self, version: &str) -> Self {
         self.definitions.push(format!("-DVERSION=\"{version}\""));
+        self
+    }
+
+    /// The same with a local Real `hidden` that it refuses to read.
+    #[must_use]
+    pub fn with_unreadable_variable(mut self) -> Self {
+        self.variables = "<ScalarVariable name=\"hidden\" valueReference=\"20\"><Real/>\
+                          </ScalarVariable>\n"
+            .to_owned();
+        self
+    }
+
+    /// The same whose input u and output y have units.
+    #[must_use]
+    pub fn with_units(mut self, u: &str, y: &str) -> Self {
+        self.units = Some([u.to_owned(), y.to_owned()]);
+        self
+    }
+
+    /// The same that promises first derivatives of its outputs.
+    #[must_use]
+    pub fn promising_output_derivatives(mut self) -> Self {
+        self.flags.insert("maxOutputDerivativeOrder".to_owned(), "1".to_owned());
+        self
+    }
+
+    /// The same whose default experiment has these attributes.
+    #[must_use]
+    pub fn experiment(mut self, attributes: &str) -> Self {
+        self.experiment = format!("<DefaultExperiment {attributes}/>\n");
         self
     }
 
@@ -124,18 +160,28 @@ impl CFmu {
         let flags = flags.concat();
         let (behaviour, attributes) = (&self.behaviour, &self.root_attributes);
         let experiment = &self.experiment;
-        let variables = variables(behaviour);
+        let (mut variables, mut units) = (variables(behaviour), String::new());
+        if let Some(known) = &self.units {
+            let unit = |name: &String| format!("<Unit name=\"{name}\"/>");
+            units = format!(
+                "<UnitDefinitions>{}</UnitDefinitions>\n",
+                known.each_ref().map(unit).concat()
+            );
+            for (variable, name) in variables.iter_mut().zip(known) {
+                *variable = variable.replace("<Real", &format!("<Real unit=\"{name}\""));
+            }
+        }
         let output = |name| {
             let at = variables.iter().position(|variable| variable.contains(&quoted(name)));
             format!("<Unknown index=\"{}\" dependencies=\"\"/>\n", at.unwrap_or_default() + 1)
         };
         let outputs = ["y", "i_out", "b_out", "s_out", "e_out"].map(output).concat();
-        let variables = variables.concat();
+        let variables = variables.concat() + &self.variables;
         format!(
             "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
              <fmiModelDescription fmiVersion=\"2.0\" modelName=\"Slave\" guid=\"{behaviour}\"\
              {attributes}>\n<CoSimulation modelIdentifier=\"slave\"{flags}/>\n\
-             <TypeDefinitions><SimpleType name=\"Mode\"><Enumeration><Item name=\"off\" \
+             {units}<TypeDefinitions><SimpleType name=\"Mode\"><Enumeration><Item name=\"off\" \
              value=\"1\"/><Item name=\"on\" value=\"2\"/></Enumeration></SimpleType>\
              </TypeDefinitions>\n{experiment}<ModelVariables>\n{variables}</ModelVariables>\n\
              <ModelStructure><Outputs>\n{outputs}</Outputs></ModelStructure>\n\

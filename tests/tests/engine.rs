@@ -11,6 +11,8 @@ mod checkpoints;
 mod control;
 #[path = "engine/events.rs"]
 mod events;
+#[path = "engine/fallback.rs"]
+mod fallback;
 #[path = "engine/initial.rs"]
 mod initial;
 #[path = "engine/parts.rs"]

@@ -3,6 +3,11 @@
 //! `misbehaviour_isolated.rs`.
 #![forbid(unsafe_code)]
 
+#[path = "misbehaviour_run/promises.rs"]
+mod promises;
+#[path = "misbehaviour_run/settings.rs"]
+mod settings;
+
 use tests::c_fmu::CFmu;
 use tests::coupled::{ALL, Run, STEP, TO_T1, UNUSUAL};
 

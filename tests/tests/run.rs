@@ -8,6 +8,8 @@ mod configuration;
 mod ends;
 #[path = "run/files.rs"]
 mod files;
+#[path = "run/first_minute.rs"]
+mod first_minute;
 #[path = "run/library.rs"]
 mod library;
 #[path = "run/messages.rs"]

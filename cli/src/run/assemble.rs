@@ -1,5 +1,4 @@
 //! From a configuration to a system of connected FMUs.
-#![expect(clippy::print_stdout, reason = "the result of the command")]
 
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -12,7 +11,6 @@ use master::ssp::{self, Folders};
 use master::transformation::Transformation;
 use master::{CallError, CallLog, Failure, Fmu, Instance, Slave, System, isolate};
 
-use super::open_inputs;
 use crate::config::{Config, Loaded, Wire};
 
 /// A system, not yet initialised.
@@ -217,10 +215,6 @@ fn connect(
         tracing::warn!(
             "no output has the name of an input of another FMU, so nothing is connected"
         );
-    }
-    let open = open_inputs::list(system);
-    if !open.is_empty() {
-        println!("{open}");
     }
     Ok(())
 }

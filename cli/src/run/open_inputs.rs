@@ -9,7 +9,7 @@ const OUTPUTS: usize = 3;
 /// A line for each input without a connection: its start value counts unless it is connected. Empty
 /// where every input has a source.
 pub(super) fn list(system: &System) -> String {
-    let open = system.free_inputs();
+    let open = if system.slaves.len() > 1 { system.free_inputs() } else { Vec::new() };
     let mut lines: Vec<_> = open.iter().take(INPUTS).map(|&input| line(system, input)).collect();
     if open.len() > INPUTS {
         lines.push(format!("  and {} more", open.len() - INPUTS));

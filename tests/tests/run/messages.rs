@@ -72,12 +72,16 @@ fn misuse_is_refused_with_what_was_expected() {
         (&["--time-limit", "0"], &["--time-limit", "above 0"]),
         (&["--start-time", "5", "--stop-time", "4"], &["stop time", "4"]),
         (&["--relative-tolerance", "-1"], &["relative tolerance", "-1"]),
-        (&["--connect", "plant.x_p"], &["NAME=VALUE"]),
+        (&["--connect", "plant.x_p"], &["OUTPUT=INPUT", "--connect plant.y=controller.y"]),
+        (&["--connect", "plant.x_p:controller.x_p"], &["write --connect plant.x_p=controller.x_p"]),
+        (&["--tolerance", "0"], &["--tolerance", "above 0"]),
     ] {
         fails(&bench.coupled(options), 2, parts);
         assert!(!bench.path("out/results.csv").exists(), "{options:?}");
     }
-    fails(&run(&["run", "some.fmu"]), 2, &["some.fmu", "--fmu NAME=FMU"]);
+    fails(&run(&["run", "some.fmu"]), 2, &["some.fmu"]);
+    fails(&run(&["run", "some.txt"]), 2, &["some.txt", ".fmu", ".ssp"]);
+    fails(&run(&["run", "some.ssp", "b.fmu"]), 2, &["b.fmu", "--fmu NAME=FMU"]);
     fails(&run(&["run", "none.toml"]), 2, &["none.toml"]);
     fails(&run(&["run", "none.ssp"]), 2, &["none.ssp"]);
     fails(&bench.run(&["a.toml", "--plant", "b.fmu"]), 2, &["--plant"]);

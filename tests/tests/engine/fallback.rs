@@ -1,0 +1,153 @@
+//! Runs that an iteration or a step control cannot bring to their end.
+
+use fmi2::Experiment;
+use fmi2::description::ModelDescription;
+use master::{
+    Algorithm, CallError, Coupling, Simulation, Slave, StepControl, Stepped, System, SystemError,
+};
+
+use super::{puppet, until};
+
+const STEP: f64 = 0.125;
+const STOP: f64 = 1.0;
+
+/// y = f(u) at the end of each step.
+struct Direct {
+    description: ModelDescription,
+    function: fn(f64) -> f64,
+    u: f64,
+    y: f64,
+    kept: [(f64, f64); 3],
+}
+
+impl Direct {
+    /// One whose loop shows after the initialization only.
+    fn boxed(function: fn(f64) -> f64) -> Box<Self> {
+        let xml = r#"<fmiModelDescription fmiVersion="2.0" modelName="Direct" guid="direct">
+            <CoSimulation modelIdentifier="D" canGetAndSetFMUstate="true"/><ModelVariables>
+            <ScalarVariable name="u" valueReference="0" causality="input"><Real start="0"/>
+            </ScalarVariable><ScalarVariable name="y" valueReference="1" causality="output"><Real/>
+            </ScalarVariable></ModelVariables><ModelStructure>
+            <Outputs><Unknown index="2" dependencies="1"/></Outputs>
+            <InitialUnknowns><Unknown index="2" dependencies=""/></InitialUnknowns>
+            </ModelStructure></fmiModelDescription>"#;
+        let description = ModelDescription::parse(xml).unwrap();
+        Box::new(Self { description, function, u: 0.0, y: 0.0, kept: [(0.0, 0.0); 3] })
+    }
+}
+
+impl Slave for Direct {
+    fn description(&self) -> &ModelDescription {
+        &self.description
+    }
+    fn setup_experiment(&mut self, _: &Experiment) -> Result<(), CallError> {
+        Ok(())
+    }
+    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
+    fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
+    fn terminate(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
+    fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
+        for (value, &reference) in values.iter_mut().zip(references) {
+            *value = if reference == 0 { self.u } else { self.y };
+        }
+        Ok(())
+    }
+    fn set_real(&mut self, _: &[u32], values: &[f64]) -> Result<(), CallError> {
+        self.u = values[0];
+        Ok(())
+    }
+    fn do_step(&mut self, _: f64, _: f64, _: bool) -> Result<Stepped, CallError> {
+        self.y = (self.function)(self.u);
+        Ok(Stepped::Whole)
+    }
+    fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
+        self.kept[slot] = (self.u, self.y);
+        Ok(())
+    }
+    fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
+        (self.u, self.y) = self.kept[slot];
+        Ok(())
+    }
+}
+
+/// u = -sign(u) has no solution.
+fn relay_in_a_loop() -> System {
+    let mut system = System::default();
+    let relay = |u: f64| if u > 0.0 { -1.0 } else { 1.0 };
+    system.add("relay", Direct::boxed(relay)).unwrap();
+    system.add("gain", Direct::boxed(|u| u)).unwrap();
+    system.connect("relay.y", "gain.u").unwrap();
+    system.connect("gain.y", "relay.u").unwrap();
+    system
+}
+
+fn started(algorithm: &Algorithm) -> Simulation {
+    Simulation::new(relay_in_a_loop(), algorithm, &until(STOP)).unwrap()
+}
+
+fn outputs(simulation: &mut Simulation) -> Vec<f64> {
+    let slaves = simulation.system().slaves.iter_mut();
+    let read = |(_, slave): &mut (String, Box<dyn Slave>)| {
+        let mut value = [f64::NAN];
+        slave.get_real(&[1], &mut value).unwrap();
+        value[0]
+    };
+    slaves.map(read).collect()
+}
+
+/// The oracle is the run without iteration, step by step.
+#[test]
+fn a_loop_without_solution_falls_back_to_steps_made_once_and_counts_them() {
+    for coupling in [Coupling::Newton, Coupling::Anderson, Coupling::QuasiNewton] {
+        let once = Algorithm { coupling: Coupling::Once, ..Algorithm::new(STEP) };
+        let (mut once, mut iterated) = (
+            started(&once),
+            started(&Algorithm { coupling, fallback: true, ..Algorithm::new(STEP) }),
+        );
+        while !once.is_finished() {
+            once.step().unwrap();
+            iterated.step().unwrap();
+            assert_eq!(outputs(&mut once), outputs(&mut iterated), "{}", coupling.name());
+        }
+        assert!(iterated.is_finished());
+        let fallbacks = iterated.fallbacks().unwrap();
+        assert_eq!(fallbacks.count, 8, "{}", coupling.name());
+        assert!(fallbacks.first.contains("t = 0 s"), "{}", fallbacks.first);
+        assert_eq!(once.fallbacks(), None);
+    }
+}
+
+#[test]
+fn a_loop_without_solution_ends_a_run_whose_coupling_the_user_states() {
+    let stated = Algorithm { coupling: Coupling::Newton, ..Algorithm::new(STEP) };
+    let error = started(&stated).step().unwrap_err();
+    assert!(matches!(error, SystemError::Coupling { .. }), "{error}");
+}
+
+/// A signal that changes by far more than the tolerance in any step that is not smaller still.
+#[test]
+fn every_step_control_ends_a_hopeless_run_with_a_reason() {
+    for control in [StepControl::Doubling, StepControl::Embedded, StepControl::Increment] {
+        let noise = |time: f64| 1e6 * (1e12 * time).sin();
+        let (system, _) = puppet::system([noise, noise], puppet::whole);
+        let algorithm = Algorithm { control, smallest_step: 1e-6, ..Algorithm::new(1e-3) };
+        let mut simulation = Simulation::new(system, &algorithm, &until(STOP)).unwrap();
+        let mut steps = 0;
+        let error = loop {
+            match simulation.step() {
+                Ok(()) => steps += 1,
+                Err(error) => break error,
+            }
+            assert!(steps < 10_000, "{} goes on", control.name());
+        };
+        let named = matches!(error, SystemError::Stuck { .. } | SystemError::Crawl { .. });
+        assert!(named, "{}: {error}", control.name());
+        assert!(error.to_string().contains("smallest step"), "{error}");
+    }
+}

@@ -1,0 +1,86 @@
+//! FMUs that promise more in their descriptions than they keep.
+
+use super::*;
+
+/// Gauss-Seidel's lines from output derivatives, in place of the held inputs of [`Run`].
+const LINES: [&str; 4] = ["--method", "jacobi", "--course", "linear"];
+
+/// `a` behind a connection by lines, which b, without input derivatives, gets as their means.
+fn by_lines(a: &CFmu, more: &[&str]) -> Vec<String> {
+    let folder = tempfile::tempdir().unwrap_or_else(|error| panic!("{error}"));
+    let a = a.write(folder.path(), "a").display().to_string();
+    let b = CFmu::well_behaved().write(folder.path(), "b").display().to_string();
+    let out = folder.path().join("out").display().to_string();
+    let step = STEP.to_string();
+    let mut arguments = vec!["run", &a, &b, "--connect", "a.y=b.u", "--stop-time", "1", "--out"];
+    arguments.extend([&out, "--step", &step, "--record", "b.y"]);
+    arguments.extend(LINES);
+    arguments.extend(more);
+    let output = tests::run(&arguments);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(0), "{message}");
+    let text = std::fs::read_to_string(folder.path().join("out/results.csv")).unwrap_or_default();
+    let mut said: Vec<String> = message.lines().map(str::to_owned).collect();
+    said.extend(text.lines().skip(1).map(|line| line.split(',').nth(1).unwrap_or("").to_owned()));
+    said
+}
+
+/// a.y = t. Where a's derivative of 1 is used, b gets the mean of the line over the step, t + H/2,
+/// so that b.y = t^2/2; where it is not, b gets t.
+#[test]
+fn a_connection_is_held_while_its_output_derivative_is_not_finite_and_named_once() {
+    for (start, value) in [("NaN", "NaN"), ("infinite", "inf")] {
+        let fmu = CFmu::that(&format!("derivative {start} until t1"));
+        let lines = by_lines(&fmu.promising_output_derivatives(), &[]);
+        let (warning, rows) = lines.split_first().unwrap_or_else(|| panic!("no lines"));
+        for part in ["warning", "a.y", value, "fmi2GetRealOutputDerivatives", "held"] {
+            assert!(warning.contains(part), "{part:?} is not in {warning:?}");
+        }
+        assert_eq!(rows.len(), ALL);
+        let mut expected = 0.0;
+        for (row, found) in rows.iter().enumerate() {
+            assert_eq!(found.parse::<f64>().ok(), Some(expected), "{start}, row {row}");
+            let time = STEP * f64::from(u8::try_from(row).unwrap_or_default());
+            expected += STEP * if time < 0.5 { time } else { time + STEP / 2.0 };
+        }
+    }
+}
+
+#[test]
+fn derivatives_that_an_fmu_promises_and_refuses_are_done_without() {
+    let refusing = CFmu::that("derivative refused").promising_output_derivatives();
+    let refusing = refusing.flag("canInterpolateInputs", true);
+    let lines = by_lines(&refusing, &[]);
+    let (warning, rows) = lines.split_first().unwrap_or_else(|| panic!("no lines"));
+    for part in ["warning", "a", "fmi2GetRealOutputDerivatives", "maxOutputDerivativeOrder"] {
+        assert!(warning.contains(part), "{part:?} is not in {warning:?}");
+    }
+    assert_eq!(rows.len(), ALL);
+    let run = Run::of(
+        &[("b", &CFmu::well_behaved()), ("a", &refusing)],
+        &["--connect", "b.y=a.u", "--course", "limited"],
+    );
+    assert_eq!(run.status, Some(0), "{}", run.message);
+    run.says(&["fmi2SetRealInputDerivatives", "canInterpolateInputs"]);
+}
+
+#[test]
+fn a_variable_that_cannot_be_read_is_named_and_left_out_of_the_results() {
+    let fmu = CFmu::well_behaved().with_unreadable_variable();
+    for more in [&[][..], &["--isolate"]] {
+        let run = Run::of(&[("a", &fmu)], more);
+        assert_eq!(run.status, Some(0), "{}", run.message);
+        run.says(&["warning: a.hidden: fmi2GetReal returned fmi2Error", "left out"]);
+        assert_eq!(run.numbers("a.y"), run.numbers("time"));
+        assert_eq!(run.numbers("time").len(), ALL);
+    }
+}
+
+/// A state that the description promises and the FMU refuses: the iteration of the default algorithm
+/// is left out. The FMUs state no dependencies, so none is needed here, and nothing is said.
+#[test]
+fn fmus_that_refuse_their_state_run_by_default_where_no_state_is_needed() {
+    let fmu = CFmu::that("no way back");
+    let run = Run::of(&[("a", &fmu), ("b", &fmu)], &["--connect", "a.y=b.u"]);
+    assert_eq!((run.status, run.message.as_str()), (Some(0), ""));
+}
