@@ -130,10 +130,11 @@ fn a_loop_without_solution_ends_a_run_whose_coupling_the_user_states() {
     assert!(matches!(error, SystemError::Coupling { .. }), "{error}");
 }
 
-/// A signal that changes by far more than the tolerance in any step that is not smaller still.
+/// A signal that changes by far more than the tolerance in any step that is not smaller still. It is a
+/// function of time alone, so that steps made whole and in halves agree: doubling has nothing to do.
 #[test]
 fn every_step_control_ends_a_hopeless_run_with_a_reason() {
-    for control in [StepControl::Doubling, StepControl::Embedded, StepControl::Increment] {
+    for control in [StepControl::Embedded, StepControl::Increment] {
         let noise = |time: f64| 1e6 * (1e12 * time).sin();
         let (system, _) = puppet::system([noise, noise], puppet::whole);
         let algorithm = Algorithm { control, smallest_step: 1e-6, ..Algorithm::new(1e-3) };
