@@ -1,6 +1,7 @@
 /* An instance from fmi2Instantiate to fmi2FreeInstance. */
 #include "slave.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -60,9 +61,10 @@ EXPORT fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance
                                       fmi2Real tolerance, fmi2Real start, fmi2Boolean has_stop,
                                       fmi2Real stop) {
     Slave *slave = c;
-    (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
+    (void)has_tolerance, (void)tolerance;
     demand(slave->now.state == INSTANTIATED);
     slave->now.time = start;
+    slave->stop = has_stop ? stop : INFINITY;
     return misbehave(slave, "fmi2SetupExperiment");
 }
 

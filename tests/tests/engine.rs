@@ -13,6 +13,8 @@ mod control;
 mod events;
 #[path = "engine/initial.rs"]
 mod initial;
+#[path = "engine/last_step.rs"]
+mod last_step;
 #[path = "engine/parts.rs"]
 mod parts;
 #[path = "engine/puppet.rs"]
