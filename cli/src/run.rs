@@ -104,6 +104,9 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Prepared>> {
     let file = results_file(&config)?;
     interrupt::listen()?;
     let mut simulation = begin(system, &plan, scenario, saved.as_ref())?;
+    if let Some(early) = simulation.early_end() {
+        tracing::warn!("{early}");
+    }
     let mut recorder = Recorder::create(file, &mut simulation, &ports, plan.every, start)?;
     let due = saved.as_ref().and_then(|saved| saved.due(plan.every));
     if let (Some(recorder), Some(due)) = (&mut recorder, due) {

@@ -43,6 +43,6 @@ pub use linearise::{Linearisation, Linearise, LineariseError, linearise};
 pub use order::{Order, by_direct_dependencies};
 pub use probe::Probe;
 pub use readout::Readout;
-pub use simulation::{Checkpoint, Fallbacks, Simulation};
+pub use simulation::{Checkpoint, EarlyEnd, Fallbacks, Simulation};
 pub use slave::{Advance, Background, CallError, Failure, Slave, Stepped};
 pub use system::{Connection, Port, System};

@@ -25,13 +25,14 @@ use crate::system::{Port, System};
 use adaptive::Repetition;
 use control::Control;
 use events::Events;
-use grid::Grid;
+use grid::{Grid, size_between};
 use iterate::Coupled;
 use parallel::Parallel;
 use sweep::{Groups, Swept};
 use together::any_in_background;
 
 pub use checkpoint::Checkpoint;
+pub use grid::EarlyEnd;
 pub use iterate::Fallbacks;
 pub(crate) use parallel::Task;
 
@@ -42,6 +43,7 @@ pub struct Simulation {
     drives: Drives,
     order: Order,
     grid: Grid,
+    early_end: Option<EarlyEnd>,
     control: Control,
     coupled: Option<Coupled>,
     repetition: Repetition,
@@ -91,7 +93,8 @@ impl Simulation {
         mut scenario: Prepared,
     ) -> Result<Self, SystemError> {
         algorithm.check(&system)?;
-        let grid = Grid::new(&system, algorithm, experiment)?;
+        let multiples = grid::multiples(&system, algorithm)?;
+        let (grid, early_end) = Grid::new(&system, algorithm, &multiples, experiment)?;
         let order = by_direct_dependencies(&system);
         initial::initialise(&mut system, experiment, &mut scenario)?;
         let algorithm = &capabilities::confirm_rollback(&mut system, algorithm);
@@ -108,7 +111,6 @@ impl Simulation {
         exchange.commit(experiment.start_time);
         scenario.drives.commit(experiment.start_time);
         let groups = Groups::new(&system, algorithm.sweep, &order);
-        let multiples = grid::multiples(&system, algorithm)?;
         let control = Control::new(&system, &exchange.reals, algorithm)?;
         let coupled = Coupled::new(&system, &exchange.reals, algorithm, control.scale.clone());
         let background = any_in_background(&mut system);
@@ -120,6 +122,7 @@ impl Simulation {
             drives: scenario.drives,
             order,
             grid,
+            early_end,
             control,
             coupled,
             repetition: Repetition::default(),
@@ -150,6 +153,12 @@ impl Simulation {
     #[must_use]
     pub fn ended_by(&self) -> Option<&str> {
         self.ended.map(|slave| self.system.slaves[slave].0.as_str())
+    }
+
+    /// Why the run ends before its stop time, if it does.
+    #[must_use]
+    pub fn early_end(&self) -> Option<&EarlyEnd> {
+        self.early_end.as_ref()
     }
 
     /// The order of stepping.
@@ -239,8 +248,9 @@ impl Simulation {
             self.repetition = repetition;
             return done;
         }
-        let swept = self.sweep(time, end - time, true)?;
-        self.control.look_back(&self.exchange.reals, end - time);
+        let size = size_between(time, end);
+        let swept = self.sweep(time, size, true)?;
+        self.control.look_back(&self.exchange.reals, size);
         Ok((end, swept))
     }
 

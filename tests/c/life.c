@@ -1,6 +1,7 @@
 /* An instance from fmi2Instantiate to fmi2FreeInstance. */
 #include "slave.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -64,9 +65,9 @@ EXPORT fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance
                                       fmi2Real tolerance, fmi2Real start, fmi2Boolean has_stop,
                                       fmi2Real stop) {
     Slave *slave = c;
-    (void)has_stop, (void)stop;
     demand(slave->now.state == INSTANTIATED);
     slave->now.time = start;
+    slave->stop = has_stop ? stop : INFINITY;
     if (is(slave, "start at the tolerance")) {
         slave->now.x = has_tolerance ? tolerance : -1;
     }

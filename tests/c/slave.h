@@ -62,6 +62,8 @@ typedef struct {
     Values now;
     /* Parameters. */
     double t1;
+    /* The stop time of fmi2SetupExperiment. */
+    double stop;
     int n;
     char behaviour[100];
     const fmi2CallbackFunctions *functions;

@@ -60,6 +60,9 @@ EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size,
     if (fabs(time - now->time) > 1e-9) {
         return refuse(slave, "the step does not begin where the last one ended");
     }
+    if (is(slave, "refuse what is beyond the stop time") && time + size > slave->stop) {
+        return refuse(slave, "the step ends beyond the stop time");
+    }
     if (is(slave, "step of one size") && now->step != 0 && fabs(size - now->step) > 1e-9) {
         return refuse(slave, "the size of the step has changed");
     }

@@ -45,7 +45,7 @@ pub struct Run {
 }
 
 impl Run {
-    /// Couples `fmus` by name in steps of [`STEP`], to 1 s unless `more` says otherwise. An FMU whose
+    /// Couples `fmus` by name in steps of [`STEP`] to 1 s, unless `more` says otherwise. An FMU whose
     /// behaviour is the same as that of another one is given as the same file.
     ///
     /// # Panics
@@ -66,7 +66,10 @@ impl Run {
             arguments.extend(["--fmu".to_owned(), format!("{name}={}", path.display())]);
         }
         let step = STEP.to_string();
-        let mut fixed = vec!["--step", &step, "--method", "jacobi", "--course", "hold"];
+        let mut fixed = vec!["--method", "jacobi", "--course", "hold"];
+        if !more.contains(&"--step") {
+            fixed.extend(["--step", &step]);
+        }
         if !more.contains(&"--stop-time") {
             fixed.extend(["--stop-time", "1"]);
         }

@@ -15,6 +15,8 @@ mod events;
 mod fallback;
 #[path = "engine/initial.rs"]
 mod initial;
+#[path = "engine/last_step.rs"]
+mod last_step;
 #[path = "engine/parts.rs"]
 mod parts;
 #[path = "engine/puppet.rs"]

@@ -213,15 +213,36 @@ fn a_pending_step_that_fails_ends_the_run() {
     run.says(&["fmi2DoStep", "failed in the background"]);
 }
 
+/// Whole steps end at 20.000000000000004 s, as an FMU that adds them to their begins sees it.
 #[test]
-fn a_stop_time_that_an_fmu_of_equal_steps_cannot_reach_is_refused_before_the_run() {
+fn an_fmu_that_refuses_what_is_an_ulp_beyond_its_stop_time_runs_to_it() {
+    let strict = CFmu::that("refuse what is beyond the stop time");
+    let last = 19.990_000_000_000_002;
+    assert!(last + 0.01 > 20.0);
+    let long = ["--step", "0.01", "--stop-time", "20", "--record-every", "step"];
+    for more in [
+        &[][..],
+        &["--isolate"],
+        &["--every", "a=3"],
+        &["--step-control", "doubling"],
+        &["--coupling", "newton"],
+    ] {
+        let run = Run::of(&[("a", &strict)], &[&long[..], more].concat());
+        assert_eq!(run.status, Some(0), "{more:?}: {}", run.message);
+        assert_eq!(run.numbers("time").last(), Some(&20.0), "{more:?}");
+    }
+}
+
+#[test]
+fn an_fmu_of_equal_steps_ends_the_run_with_its_last_whole_step_and_the_command_says_so() {
     let rigid =
         CFmu::that("step of one size").flag("canHandleVariableCommunicationStepSize", false);
     Run::pair(&rigid, &[]).expect(0, ALL);
     let one = [("a", &rigid)];
     let run = Run::of(&one, &["--stop-time", "1.01"]);
-    assert_eq!(run.status, Some(2), "{}", run.message);
-    run.says(&["1.01", "a", "equal steps"]);
+    assert_eq!(run.status, Some(0), "{}", run.message);
+    run.says(&["warning", "a takes equal steps only", "stop time 1.01 s", "t = 1 s"]);
+    assert_eq!(run.numbers("time").last(), Some(&1.0));
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Steps whose size is chosen on the way.
 
 use super::Simulation;
+use super::grid::size_between;
 use super::sweep::Swept;
 use crate::algorithm::StepControl;
 use crate::error::SystemError;
@@ -29,7 +30,7 @@ impl Simulation {
         self.save_states(SLOT, time)?;
         self.exchange.save(&mut repetition.begin);
         loop {
-            let size = end - time;
+            let size = size_between(time, end);
             let (error, swept) = match self.control.kind {
                 StepControl::Doubling => self.halved(repetition, time, size)?,
                 _ => self.extrapolated(time, size)?,
@@ -71,7 +72,7 @@ impl Simulation {
         self.restore_states(SLOT, time)?;
         self.exchange.restore(&repetition.begin);
         let middle = time + 0.5 * size;
-        for (begin, size) in [(time, middle - time), (middle, time + size - middle)] {
+        for (begin, size) in [(time, middle - time), (middle, size_between(middle, time + size))] {
             let half = self.attempt(begin, size, false)?;
             if half.reached.is_some() || half.terminated.is_some() {
                 return Ok((0.0, half));

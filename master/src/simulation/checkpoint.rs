@@ -102,7 +102,7 @@ impl Simulation {
             .drives
             .restore(checkpoint.drives.clone())
             .map_err(|error| SystemError::Algorithm { what: error.to_string() })?;
-        (simulation.grid.time, simulation.grid.count) = (checkpoint.time, checkpoint.count);
+        simulation.grid.resume(checkpoint.time, checkpoint.count);
         simulation.ended = checkpoint.ended;
         simulation.control.size = checkpoint.size;
         simulation.control.controller = checkpoint.controller.clone();

@@ -1,6 +1,7 @@
 //! Steps that end where an FMU's output says so.
 
 use super::Simulation;
+use super::grid::size_between;
 use super::sweep::Swept;
 use crate::algorithm::EventSource;
 use crate::error::SystemError;
@@ -117,6 +118,6 @@ impl Simulation {
     fn again(&mut self, events: &Events, time: f64, end: f64) -> Result<Swept, SystemError> {
         self.restore_states(SLOT, time)?;
         self.exchange.restore(&events.begin);
-        self.attempt(time, end - time, false)
+        self.attempt(time, size_between(time, end), false)
     }
 }

@@ -1,15 +1,22 @@
 //! Communication points.
 
+use std::fmt;
+
 use fmi2::Experiment;
 
 use crate::algorithm::Algorithm;
 use crate::error::SystemError;
+use crate::slave::Slave;
 use crate::system::System;
+
+/// Part of a step that is rounding: what is left of a run by less is no step.
+const ROUNDING: f64 = 1e-6;
 
 /// Where the simulation is and where it goes.
 #[derive(Clone, Debug)]
 pub(super) struct Grid {
     start: f64,
+    /// Where the run ends in s.
     stop: Option<f64>,
     step: f64,
     /// Points of the grid passed.
@@ -18,13 +25,53 @@ pub(super) struct Grid {
     pub(super) time: f64,
 }
 
+/// A run that ends before its stop time: with the last whole step of an FMU that takes equal
+/// steps only.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EarlyEnd {
+    /// The FMU.
+    pub slave: String,
+    /// Its step in s.
+    pub step: f64,
+    /// The end of the run in s.
+    pub end: f64,
+    /// The stop time in s.
+    pub stop: f64,
+}
+
+impl fmt::Display for EarlyEnd {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { slave, step, end, stop } = self;
+        write!(
+            formatter,
+            "{slave} takes equal steps only (canHandleVariableCommunicationStepSize is false), and \
+             the stop time {stop} s is no multiple of its step {step} s: the run ends with the last \
+             whole step at t = {end} s"
+        )
+    }
+}
+
+/// Size in s of a step from `begin` to `end`: `begin + size`, as an FMU computes it, is `end` where
+/// a floating-point number gives that, else less. It is never more: an FMU may refuse what is an
+/// ulp beyond its stop time.
+#[inline]
+pub(super) fn size_between(begin: f64, end: f64) -> f64 {
+    let mut size = end - begin;
+    while begin + size > end {
+        size = size.next_down();
+    }
+    if begin + size < end && begin + size.next_up() <= end { size.next_up() } else { size }
+}
+
 impl Grid {
-    /// The grid of a run, which every slave can follow.
+    /// The grid of a run in the steps of `algorithm`, which every slave can follow; slaves make as
+    /// many steps of it at once as `multiples` says. With it the reason if it ends early.
     pub(super) fn new(
         system: &System,
         algorithm: &Algorithm,
+        multiples: &[u32],
         experiment: &Experiment,
-    ) -> Result<Self, SystemError> {
+    ) -> Result<(Self, Option<EarlyEnd>), SystemError> {
         let (start, stop, step) = (experiment.start_time, experiment.stop_time, algorithm.step);
         if !(step > 0.0 && step.is_finite()) {
             let (what, rule) = ("the communication step", "more than 0".to_owned());
@@ -36,41 +83,62 @@ impl Grid {
             let (what, rule) = ("the stop time", "more than the start time".to_owned());
             return Err(SystemError::Time { what, value: stop, rule });
         }
-        let grid = Self { start, stop, step, count: 0, time: start };
-        grid.check_rigid(system)?;
-        Ok(grid)
+        let mut grid = Self { start, stop, step, count: 0, time: start };
+        let early = stop.and_then(|stop| grid.last_whole_step(system, multiples, stop));
+        if let Some(early) = &early {
+            grid.stop = Some(early.end);
+        }
+        Ok((grid, early))
     }
 
-    /// Slaves that take equal steps only get equal steps.
-    fn check_rigid(&self, system: &System) -> Result<(), SystemError> {
-        let rigid = system.slaves.iter().find(|(_, slave)| {
+    /// Where the run ends because some slaves take equal steps only; none: at the stop time.
+    #[expect(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "2^53 steps take longer than anyone waits"
+    )]
+    fn last_whole_step(&self, system: &System, multiples: &[u32], stop: f64) -> Option<EarlyEnd> {
+        let is_rigid = |slave: &dyn Slave| {
             let flags = slave.description().co_simulation.as_ref();
             flags.is_some_and(|flags| !flags.can_handle_variable_communication_step_size)
-        });
-        let (Some((name, _)), Some(stop)) = (rigid, self.stop) else { return Ok(()) };
+        };
+        let rigid = || {
+            let all = system.slaves.iter().zip(multiples);
+            all.filter(|((_, slave), _)| is_rigid(slave.as_ref()))
+        };
         let steps = (stop - self.start) / self.step;
-        if (steps - steps.round()).abs() > 1e-6 {
-            let rule = format!(
-                "a multiple of the communication step {} s, as {name} takes equal steps only",
-                self.step
-            );
-            return Err(SystemError::Time { what: "the stop time", value: stop, rule });
-        }
-        Ok(())
+        let is_whole = (steps - steps.round()).abs() <= ROUNDING;
+        let most = if is_whole { steps.round() } else { steps.floor() } as u64;
+        // All of them meet at the multiples of all their steps.
+        let together = rigid().fold(1, |all, (_, &multiple)| least_common(all, multiple.into()));
+        let ends = |multiple: u64| is_whole && most.is_multiple_of(multiple);
+        let ((name, _), &multiple) = rigid().find(|(_, multiple)| !ends((**multiple).into()))?;
+        let whole = most - most % together;
+        Some(EarlyEnd {
+            slave: name.clone(),
+            step: f64::from(multiple) * self.step,
+            end: self.start + whole as f64 * self.step,
+            stop,
+        })
     }
 
     pub(super) fn is_finished(&self) -> bool {
         self.stop.is_some_and(|stop| self.time >= stop)
     }
 
-    /// End of a step of `size` s from now: the stop time where that is less, or so near that
-    /// nothing sensible would be left.
-    pub(super) fn end_of(&self, size: f64) -> f64 {
-        let end = self.time + size;
+    /// `end`, or the stop time where that is less or so near that nothing sensible of a step of
+    /// `size` s would be left.
+    fn limited(&self, end: f64, size: f64) -> f64 {
         match self.stop {
-            Some(stop) if end > stop - 1e-6 * size => stop,
+            Some(stop) if end > stop - ROUNDING * size => stop,
             _ => end,
         }
+    }
+
+    /// End of a step of `size` s from now.
+    pub(super) fn end_of(&self, size: f64) -> f64 {
+        self.limited(self.time + size, size)
     }
 
     /// End and size of the next step: H, or what is left where that is less.
@@ -78,13 +146,15 @@ impl Grid {
     pub(super) fn next(&self) -> (f64, f64) {
         let begin = self.start + self.count as f64 * self.step;
         let end = self.start + (self.count + 1) as f64 * self.step;
-        let rounding = 1e-6 * self.step;
-        // After an event the rest of the way to the grid.
-        let size = if self.time.total_cmp(&begin).is_eq() { self.step } else { end - self.time };
+        let on_grid = self.time.total_cmp(&begin).is_eq();
         match self.stop {
-            Some(stop) if end > stop + rounding => (stop, stop - self.time),
-            Some(stop) if end > stop - rounding => (stop, size),
-            _ => (end, size),
+            Some(stop) if end > stop - ROUNDING * self.step => {
+                let whole = on_grid && (self.time + self.step).total_cmp(&stop).is_eq();
+                (stop, if whole { self.step } else { size_between(self.time, stop) })
+            }
+            _ if on_grid => (end, self.step),
+            // After an event the rest of the way to the grid.
+            _ => (end, size_between(self.time, end)),
         }
     }
 
@@ -99,7 +169,7 @@ impl Grid {
             return 0.0;
         }
         let end = self.start + (self.count + u64::from(multiple)) as f64 * self.step;
-        self.stop.map_or(end, |stop| end.min(stop)) - time
+        size_between(time, self.limited(end, self.step))
     }
 
     /// The step to `end`, from [`Grid::next`], is done.
@@ -115,6 +185,24 @@ impl Grid {
         }
         self.time = end;
     }
+
+    /// Goes on from `time`, with so many points of the grid passed. The end of a run may have been
+    /// counted without being a point of the grid.
+    #[expect(clippy::cast_precision_loss, reason = "2^53 steps take longer than anyone waits")]
+    pub(super) fn resume(&mut self, time: f64, count: u64) {
+        let point = self.start + count as f64 * self.step;
+        let beyond = count > 0 && point > time + ROUNDING * self.step;
+        (self.time, self.count) = (time, if beyond { count - 1 } else { count });
+    }
+}
+
+/// The least common multiple of two numbers above 0, or the largest number.
+fn least_common(a: u64, b: u64) -> u64 {
+    let (mut divisor, mut rest) = (a, b);
+    while rest != 0 {
+        (divisor, rest) = (rest, divisor % rest);
+    }
+    (a / divisor).saturating_mul(b)
 }
 
 /// How many steps of the grid each slave makes at once.
@@ -139,3 +227,6 @@ pub(super) fn multiples(system: &System, algorithm: &Algorithm) -> Result<Vec<u3
         None => Ok(algorithm.multiples.clone()),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,6 +1,7 @@
 //! One step of all slaves, side by side or one after the other.
 
 use super::Simulation;
+use super::grid::size_between;
 use super::parallel::{Parallel, run};
 use crate::algorithm::Sweep;
 use crate::error::SystemError;
@@ -236,10 +237,11 @@ impl Simulation {
             }
             begin = reached;
             let (name, instance) = &mut self.system.slaves[slave];
-            done = instance.do_step(begin, end - begin, true).map_err(|mut source| {
-                source.messages.push(ADVICE.to_owned());
-                call(name, begin, source)
-            })?;
+            done =
+                instance.do_step(begin, size_between(begin, end), true).map_err(|mut source| {
+                    source.messages.push(ADVICE.to_owned());
+                    call(name, begin, source)
+                })?;
         }
         let what = format!(
             "returned fmi2Discard and came to {begin} s only, on the way from {time} to {end} s"

@@ -51,6 +51,24 @@ pub(crate) fn system(outputs: [Output; 2], way: Way) -> (System, Asked) {
     (system, asked)
 }
 
+/// The same with a puppet that takes equal steps only.
+pub(crate) fn rigid((mut system, asked): (System, Asked)) -> (System, Asked) {
+    let own = Arc::clone(&asked);
+    let mut description = system.slaves[0].1.description().clone();
+    let flags = description.co_simulation.as_mut().unwrap();
+    flags.can_handle_variable_communication_step_size = false;
+    let puppet = Puppet {
+        description,
+        time: 0.0,
+        kept: [0.0; 3],
+        outputs: [f64::sin; 2],
+        way: whole,
+        asked: own,
+    };
+    system.slaves[0].1 = Box::new(puppet);
+    (system, asked)
+}
+
 impl Slave for Puppet {
     fn description(&self) -> &ModelDescription {
         &self.description

@@ -1,0 +1,92 @@
+//! Sizes of steps to the ulp.
+#![expect(clippy::unwrap_used, clippy::float_cmp, reason = "tests; exact by construction")]
+
+use fmi2::Experiment;
+
+use super::{Grid, size_between};
+use crate::algorithm::Algorithm;
+use crate::system::System;
+
+/// The next of a reproducible sequence of random numbers.
+fn random(state: &mut u64) -> u64 {
+    *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+    *state >> 11
+}
+
+/// From 10^-exponent to 10^exponent.
+#[expect(clippy::cast_precision_loss, reason = "53 bits")]
+fn magnitude(state: &mut u64, exponent: f64) -> f64 {
+    let unit = random(state) as f64 / (1_u64 << 53) as f64;
+    10_f64.powf(exponent * (2.0 * unit - 1.0))
+}
+
+fn grid(step: f64, start: f64, stop: f64) -> Grid {
+    let experiment =
+        Experiment { start_time: start, stop_time: Some(stop), ..Experiment::default() };
+    Grid::new(&System::default(), &Algorithm::new(step), &[], &experiment).unwrap().0
+}
+
+#[test]
+fn a_step_ends_where_it_is_to_end_or_as_little_before_as_numbers_allow() {
+    let (mut state, mut exact) = (1, 0);
+    for _ in 0..100_000 {
+        let begin = magnitude(&mut state, 8.0) - magnitude(&mut state, 4.0);
+        let end = begin + magnitude(&mut state, 6.0);
+        if end == begin {
+            continue;
+        }
+        let size = size_between(begin, end);
+        assert!(begin + size <= end, "{begin} {end}");
+        assert!(begin + size == end || begin + size.next_up() > end, "{begin} {end}");
+        exact += i32::from(begin + size == end);
+    }
+    assert!(exact > 99_000, "{exact}");
+}
+
+#[test]
+fn no_step_ends_beyond_the_stop_time_and_the_last_one_ends_at_it() {
+    let mut state = 7;
+    let mut known = vec![(0.01, 0.0, 20.0), (0.1, 0.0, 0.3), (0.1, 0.7, 1.0), (0.3, 0.0, 1.0)];
+    known.extend((0..200).map(|_| {
+        let (step, start) = (magnitude(&mut state, 4.0), magnitude(&mut state, 2.0) - 1.0);
+        let steps = f64::from(u32::try_from(random(&mut state) % 500 + 1).unwrap());
+        (step, start, start + steps * step)
+    }));
+    let mut beyond = 0;
+    for (step, start, stop) in known {
+        let mut grid = grid(step, start, stop);
+        while !grid.is_finished() {
+            let (end, size) = grid.next();
+            assert!(grid.time + size <= stop, "{step} {start} {stop}: {}", grid.time);
+            let ulp = |time: f64| time.abs().next_up() - time.abs();
+            let rounding = 4.0 * ulp(start).max(ulp(stop));
+            assert!((grid.time + size - end).abs() <= rounding, "{step} {start} {stop}");
+            beyond += i32::from(grid.time + step > stop && end == stop);
+            if end < stop {
+                assert_eq!(size, step);
+            } else {
+                let longer = grid.time + size.next_up();
+                assert!(grid.time + size == stop || longer > stop, "{step} {start} {stop}");
+                assert_eq!(end, stop);
+            }
+            grid.advance(end);
+        }
+        assert_eq!(grid.time, stop);
+    }
+    assert!(beyond > 20, "whole steps would often have ended an ulp beyond: {beyond}");
+}
+
+#[test]
+fn a_run_that_goes_on_after_a_shorter_last_step_returns_to_the_grid() {
+    let mut first = grid(0.1, 0.0, 1.05);
+    while !first.is_finished() {
+        let (end, _) = first.next();
+        first.advance(end);
+    }
+    let mut second = grid(0.1, 0.0, 2.0);
+    second.resume(first.time, first.count);
+    let (end, size) = second.next();
+    assert_eq!((end, 1.05 + size), (1.1, 1.1));
+    second.advance(end);
+    assert_eq!(second.next(), (0.0 + 12.0 * 0.1, 0.1));
+}
