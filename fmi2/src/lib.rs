@@ -40,6 +40,7 @@ pub mod abi;
 pub mod call_order;
 pub mod description;
 pub mod documentation;
+mod fence;
 #[doc(hidden)]
 pub mod ffi;
 mod instance;

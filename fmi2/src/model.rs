@@ -40,7 +40,8 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
 
     /// The model as instantiated; its field values are the start values of the description.
     ///
-    /// `resources` is the FMU's `resources` folder.
+    /// `resources` is the FMU's `resources` folder. Where the importer names none, it is a path at which
+    /// nothing can be read, and an error of this function becomes one about `fmuResourceLocation`.
     ///
     /// # Errors
     ///
