@@ -11,7 +11,7 @@
 //!
 //! This is the one place with state outside of instances, because the hook gets no other argument
 //! than the panic: how many watches there are, and for each thread how deep it is inside fences and
-//! where its last panic happened. No result of a model depends on it.
+//! what its last panic was. No result of a model depends on it.
 
 use std::any::Any;
 use std::cell::Cell;
@@ -28,35 +28,43 @@ type Hook = Box<dyn Fn(&PanicHookInfo<'_>) + Send + Sync>;
 struct Fence {
     /// How many fences the thread is inside of.
     depth: Cell<u32>,
-    /// Where the last panic inside a fence happened. Without a destructor: one in thread-local
-    /// storage would keep the library loaded until the thread ends.
-    place: Cell<ManuallyDrop<Option<String>>>,
+    /// The last panic inside a fence. Without a destructor: one in thread-local storage would keep
+    /// the library loaded until the thread ends.
+    last: Cell<ManuallyDrop<Option<Panic>>>,
+}
+
+struct Panic {
+    /// File, line and column.
+    place: String,
+    text: String,
 }
 
 thread_local! {
     static FENCE: Fence = const {
-        Fence { depth: Cell::new(0), place: Cell::new(ManuallyDrop::new(None)) }
+        Fence { depth: Cell::new(0), last: Cell::new(ManuallyDrop::new(None)) }
     };
 }
 
 impl Fence {
-    /// Replaces the place of the last panic.
-    fn replace(&self, place: Option<String>) -> Option<String> {
-        ManuallyDrop::into_inner(self.place.replace(ManuallyDrop::new(place)))
+    /// Replaces the last panic.
+    fn replace(&self, panic: Option<Panic>) -> Option<Panic> {
+        ManuallyDrop::into_inner(self.last.replace(ManuallyDrop::new(panic)))
     }
 
     #[cold]
     fn failure(&self, payload: &dyn Any) -> Failure {
-        let text = payload
-            .downcast_ref::<&str>()
-            .copied()
-            .or_else(|| payload.downcast_ref::<String>().map(String::as_str))
-            .unwrap_or("no message");
-        Failure::Fatal(match self.replace(None) {
-            Some(place) => format!("the model panicked at {place}: {text}"),
+        let text = text(payload);
+        // Of `resume_unwind` the hook hears nothing; the last panic may be one that the model caught.
+        Failure::Fatal(match self.replace(None).filter(|last| last.text == text) {
+            Some(Panic { place, .. }) => format!("the model panicked at {place}: {text}"),
             None => format!("the model panicked: {text}"),
         })
     }
+}
+
+fn text(payload: &dyn Any) -> &str {
+    let text = payload.downcast_ref::<&str>().copied();
+    text.or_else(|| payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message")
 }
 
 /// Runs `body`, which is the model's code; a panic becomes [`Failure::Fatal`].
@@ -64,8 +72,6 @@ impl Fence {
 /// The message has the place of the panic while there is a [`Watch`].
 pub(crate) fn guarded<T>(body: impl FnOnce() -> Result<T, Failure>) -> Result<T, Failure> {
     FENCE.with(|fence| {
-        // A panic that the model caught itself.
-        drop(fence.replace(None));
         fence.depth.set(fence.depth.get() + 1);
         let done = catch_unwind(AssertUnwindSafe(body));
         fence.depth.set(fence.depth.get() - 1);
@@ -137,7 +143,8 @@ fn install() -> Installed {
         let inside = FENCE.with(|fence| {
             let inside = fence.depth.get() > 0;
             if inside {
-                drop(fence.replace(panic.location().map(ToString::to_string)));
+                let place = panic.location().map(ToString::to_string).unwrap_or_default();
+                drop(fence.replace(Some(Panic { place, text: text(panic.payload()).to_owned() })));
             }
             inside
         });

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Instance, Snapshot};
 use crate::abi::Status;
-use crate::call_order::{Function, InterfaceType, State};
+use crate::call_order::{Function, InterfaceType};
 use crate::description::Guid;
 use crate::ffi::{Callbacks, room_of};
 use crate::interface::Interface;

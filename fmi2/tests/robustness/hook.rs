@@ -5,6 +5,8 @@ use std::process::Command;
 use std::sync::{Arc, Mutex};
 use std::thread;
 
+use fmi2::abi::fmi2EventInfo;
+
 use crate::array::Array;
 use crate::importer::{HEARS, Importer};
 use crate::machine::{Mischief, Place, with_plan};
@@ -122,7 +124,7 @@ fn a_panic_outside_goes_to_the_hook_of_the_process() {
             exchange.let_the_logger_panic();
             // The message that the simulation ends comes from inside the call.
             assert_eq!(
-                exchange.new_discrete_states(&mut Array::right(vec![Default::default()])),
+                exchange.new_discrete_states(&mut Array::right(vec![fmi2EventInfo::default()])),
                 0
             );
         }

@@ -96,7 +96,7 @@ fn an_importer_integrates_the_states_it_was_given() {
     });
     assert_eq!(set(&mut instance, TORQUE, 3.0), Status::OK);
     ok(&mut instance, Function::GetDerivatives, |own| {
-        own.get_derivatives(room_of(&mut slopes)).unwrap()
+        own.get_derivatives(room_of(&mut slopes)).unwrap();
     });
     assert_eq!(slopes, [-2.0, 2.0 * 3.0 - 0.25_f64.sin() + 0.1 * 2.0]);
     let mut indicator = [0.0];
