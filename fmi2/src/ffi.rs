@@ -13,15 +13,17 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::abi::{
-    self, DescribeSink, Status, fmi2Boolean, fmi2CallbackFunctions, fmi2Component, fmi2Integer,
-    fmi2Status, fmi2String, fmi2Type,
+    self, DescribeSink, Status, fmi2Boolean, fmi2CallbackFunctions, fmi2Component, fmi2FMUstate,
+    fmi2Integer, fmi2Status, fmi2String, fmi2Type,
 };
 
 pub use entry::*;
+pub use exports::signature;
 
 use crate::call_order::{Function, InterfaceType};
-use crate::instance::{Instance, guarded};
-use crate::location::path_from_uri;
+use crate::fence::{Watch, guarded, outside};
+use crate::instance::Instance;
+use crate::location::{NO_FOLDER, path_from_uri};
 use crate::model::{Failure, Model};
 
 /// What an instance keeps of the importer's callbacks.
@@ -56,7 +58,7 @@ impl Callbacks {
         let c_string = |text: &str| CString::new(text.replace('\0', "")).unwrap_or_default();
         let (category, message) = (c_string(category), c_string(&message.replace('#', "##")));
         // SAFETY: the logger has this signature by the standard; all strings outlive the call.
-        unsafe {
+        outside(|| unsafe {
             logger(
                 self.functions.component_environment,
                 self.instance_name.as_ptr(),
@@ -65,7 +67,7 @@ impl Callbacks {
                 c"%s".as_ptr(),
                 message.as_ptr(),
             );
-        }
+        });
     }
 }
 
@@ -118,16 +120,43 @@ unsafe fn read<'a, T>(pointer: *const T, count: usize) -> Result<&'a [T], Failur
     Ok(unsafe { std::slice::from_raw_parts(pointer, count) })
 }
 
-/// `count` elements to write; a null pointer is fine when there are none.
-unsafe fn write<'a, T>(pointer: *mut T, count: usize) -> Result<&'a mut [T], Failure> {
+/// Room for `count` elements, which the importer need not have initialised; a null pointer is fine
+/// when there are none.
+unsafe fn room<'a, T>(pointer: *mut T, count: usize) -> Result<&'a mut [MaybeUninit<T>], Failure> {
     if count == 0 {
         return Ok(&mut []);
     }
     if pointer.is_null() || !pointer.is_aligned() || count > isize::MAX as usize / size_of::<T>() {
         return Err(missing("an array to write"));
     }
-    // SAFETY: not null, aligned, and the caller gives `count` elements.
-    Ok(unsafe { std::slice::from_raw_parts_mut(pointer, count) })
+    // SAFETY: not null, aligned, and the caller gives room for `count` elements, of which nothing is
+    // assumed.
+    Ok(unsafe { std::slice::from_raw_parts_mut(pointer.cast(), count) })
+}
+
+/// The room, filled with `value`.
+pub(crate) fn filled<T: Copy>(room: &mut [MaybeUninit<T>], value: T) -> &mut [T] {
+    for place in &mut *room {
+        place.write(value);
+    }
+    // SAFETY: every element was written.
+    unsafe { &mut *(std::ptr::from_mut(room) as *mut [T]) }
+}
+
+/// Values as room for others.
+#[cfg(test)]
+pub(crate) fn room_of<T: Copy>(values: &mut [T]) -> &mut [MaybeUninit<T>] {
+    // SAFETY: the tests hand this to functions that only write values.
+    unsafe { &mut *(std::ptr::from_mut(values) as *mut [MaybeUninit<T>]) }
+}
+
+/// The state of the importer behind `pointer`, which it has initialised (section 2.1.8).
+unsafe fn state_at<'a>(pointer: *mut fmi2FMUstate) -> Result<&'a mut fmi2FMUstate, Failure> {
+    if !pointer.is_aligned() {
+        return Err(missing("FMUstate"));
+    }
+    // SAFETY: null or aligned, and initialised by the importer.
+    unsafe { pointer.as_mut() }.ok_or_else(|| missing("FMUstate"))
 }
 
 unsafe fn text(pointer: fmi2String, what: &str) -> Result<String, Failure> {
@@ -147,7 +176,7 @@ unsafe fn texts(pointer: *const fmi2String, count: usize) -> Result<Vec<String>,
 
 unsafe fn put<T>(target: *mut T, value: T) -> Result<(), Failure> {
     // SAFETY: the caller gives a place for one value.
-    unsafe { write(target, 1)?[0] = value };
+    unsafe { room(target, 1)?[0].write(value) };
     Ok(())
 }
 
@@ -161,15 +190,15 @@ pub fn version<M: Model>() -> fmi2String {
     abi::VERSION.as_ptr()
 }
 
-/// The folder that `fmuResourceLocation` names; an empty path when it is null or empty.
+/// The folder that `fmuResourceLocation` names; [`NO_FOLDER`] when it is null or empty.
 unsafe fn resources(location: fmi2String) -> Result<PathBuf, Failure> {
     if location.is_null() {
-        return Ok(PathBuf::new());
+        return Ok(PathBuf::from(NO_FOLDER));
     }
     // SAFETY: not null, and zero-terminated by the standard.
     let uri = unsafe { text(location, "fmuResourceLocation")? };
     if uri.is_empty() {
-        return Ok(PathBuf::new());
+        return Ok(PathBuf::from(NO_FOLDER));
     }
     path_from_uri(&uri).map_err(|error| Failure::Error(format!("fmuResourceLocation: {error}")))
 }
@@ -184,7 +213,6 @@ pub unsafe fn instantiate<M: Model>(
     _visible: fmi2Boolean,
     _logging_on: fmi2Boolean,
 ) -> fmi2Component {
-    silence_panics();
     // SAFETY: the callbacks are readable during this call; only a copy is kept.
     let Ok([functions]) = (unsafe { read(functions, 1) }) else { return std::ptr::null_mut() };
     let mut callbacks = Callbacks { functions: *functions, instance_name: CString::default() };
@@ -253,10 +281,13 @@ pub unsafe fn describe<M: Model>(
     context: *mut c_void,
     sink: DescribeSink,
 ) -> fmi2Integer {
-    silence_panics();
+    let watch = Watch::new();
     // SAFETY: the caller gives a zero-terminated path.
-    let described = unsafe { text(resources, "resources") }
-        .and_then(|folder| guarded(|| description_of::<M>(Path::new(&folder))));
+    let described = unsafe { text(resources, "resources") }.and_then(|folder| {
+        let folder = if folder.is_empty() { NO_FOLDER } else { &folder };
+        guarded(|| description_of::<M>(Path::new(folder)))
+    });
+    drop(watch);
     let (status, answer) = match described {
         Ok(xml) => (0, xml),
         Err(failure) => (1, failure.to_string()),
@@ -264,10 +295,4 @@ pub unsafe fn describe<M: Model>(
     // SAFETY: the caller gives a sink that reads the text during the call.
     unsafe { sink(context, answer.as_ptr().cast(), answer.len()) };
     status
-}
-
-/// Keeps panics off stderr: their message goes to the importer's logger. The hook is that of the
-/// copy of the standard library inside the model's library, not the importer's.
-fn silence_panics() {
-    std::panic::set_hook(Box::new(|_| {}));
 }

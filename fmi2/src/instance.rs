@@ -2,12 +2,12 @@
 
 mod derivatives;
 mod exchange;
+mod layout;
 mod snapshot;
 #[cfg(test)]
 mod tests;
 mod values;
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -15,8 +15,9 @@ use serde::{Deserialize, Serialize};
 use crate::abi::Status;
 use crate::call_order::{Function, InterfaceType, State, allowed, may_discard};
 use crate::description::Guid;
+use crate::fence::{Watch, guarded};
 use crate::ffi::Callbacks;
-use crate::interface::{CATEGORIES, Interface};
+use crate::interface::{CATEGORIES, Interface, new_model};
 use crate::model::{Experiment, Failure, Model, Step};
 
 pub(crate) use snapshot::Snapshot;
@@ -53,6 +54,7 @@ pub(crate) struct Instance<M: Model> {
     strings: Vec<std::ffi::CString>,
     /// Space for `fmi2GetDirectionalDerivative`, once it was called.
     direction: Option<M>,
+    watch: Watch,
 }
 
 impl<M: Model> Core<M> {
@@ -98,8 +100,9 @@ impl<M: Model> Instance<M> {
         guid: &str,
         callbacks: Callbacks,
     ) -> Result<Self, Failure> {
-        guarded(|| {
-            let mut model = M::new(resources)?;
+        let watch = Watch::new();
+        let (core, fresh, interface) = guarded(|| {
+            let mut model = new_model::<M>(resources)?;
             let (interface, description) = Interface::new(&mut model)?;
             let offers_exchange = interface.event_indicators.is_some();
             if interface_type == InterfaceType::ModelExchange && !offers_exchange {
@@ -115,15 +118,17 @@ impl<M: Model> Instance<M> {
                     resources.display()
                 )));
             }
-            Ok(Self {
-                core: Core::new(model.clone(), interface_type),
-                fresh: model,
-                interface,
-                callbacks,
-                categories: None,
-                strings: Vec::new(),
-                direction: None,
-            })
+            Ok((Core::new(model.clone(), interface_type), model, interface))
+        })?;
+        Ok(Self {
+            core,
+            fresh,
+            interface,
+            callbacks,
+            categories: None,
+            strings: Vec::new(),
+            direction: None,
+            watch,
         })
     }
 
@@ -183,12 +188,13 @@ impl<M: Model> Instance<M> {
     /// Frees the instance. The models are dropped one by one, so that a destructor that panics
     /// meets no other one.
     pub(crate) fn free(self) {
-        let Self { core, fresh, direction, callbacks, categories, .. } = self;
+        let Self { core, fresh, direction, callbacks, categories, watch, .. } = self;
         let dropped = [dropped(core), dropped(fresh), dropped(direction)];
         if let Some(failure) = dropped.into_iter().find_map(Result::err) {
             let message = format!("fmi2FreeInstance: {failure}");
             log(&callbacks, categories.as_deref(), Status::Fatal, "logStatusFatal", &message);
         }
+        drop(watch);
     }
 
     /// Sends a message of a category that the importer wants to see.
@@ -283,9 +289,7 @@ impl<M: Model> Instance<M> {
         let end = start + size;
         core.before_stop(end)?;
         core.check()?;
-        if step.size > 0.0 {
-            core.model.step(&step)?;
-        }
+        core.model.step(&step)?;
         core.time = end;
         core.stale = false;
         if core.sloped {
@@ -340,6 +344,10 @@ fn slack(time: f64) -> f64 {
 ///
 /// Where `start` differs from `time` by rounding alone, the size is the one given, so that equal
 /// communication steps stay equal for the model.
+///
+/// Section 4.2.2 wants a step size greater than zero and a slave that then is at `start + size`. A
+/// step that does not reach a later number of 64 bits cannot end there, and is an error: importers
+/// continue after `fmi2OK` and some (FMPy) after `fmi2Discard`, and the model would stand still.
 fn communication_step(time: f64, start: f64, size: f64) -> Result<Step, Failure> {
     if !(size > 0.0 && size.is_finite()) {
         return Err(Failure::Error(format!(
@@ -353,21 +361,23 @@ fn communication_step(time: f64, start: f64, size: f64) -> Result<Step, Failure>
         )));
     }
     let rounding = 8.0 * f64::EPSILON * time.abs().max(start.abs());
-    if mismatch.abs() <= rounding {
-        Ok(Step { start, size })
+    let step = if mismatch.abs() <= rounding {
+        Step { start, size }
     } else {
-        Ok(Step { start: time, size: mismatch + size })
+        Step { start: time, size: mismatch + size }
+    };
+    let ends_later = start + size > time && step.size > 0.0;
+    if size < start.next_up() - start || !ends_later {
+        return Err(too_small(time, start, size));
     }
+    Ok(step)
 }
 
-/// Runs `body`; a panic becomes [`Failure::Fatal`].
-pub(crate) fn guarded<T>(body: impl FnOnce() -> Result<T, Failure>) -> Result<T, Failure> {
-    catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|payload| {
-        let text = payload
-            .downcast_ref::<&str>()
-            .copied()
-            .or_else(|| payload.downcast_ref::<String>().map(String::as_str))
-            .unwrap_or("no message");
-        Err(Failure::Fatal(format!("the model panicked: {text}")))
-    })
+#[cold]
+fn too_small(time: f64, start: f64, size: f64) -> Failure {
+    let smallest = start.max(time).next_up() - start;
+    Failure::Error(format!(
+        "communicationStepSize is {size:e} s, too small at currentCommunicationPoint = {start} s: \
+         the instance is at {time} s, and the smallest step to a later time is {smallest:e} s"
+    ))
 }

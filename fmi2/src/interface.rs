@@ -9,6 +9,7 @@ use crate::description::{
     Causality, Guid, Initial, IntegerType, Kind, ModelDescription, Problem, RealType,
     ScalarVariable, SimpleType, Unknown, Variability,
 };
+use crate::location::NO_FOLDER;
 use crate::model::{Failure, Model};
 use crate::unit::Unit;
 use crate::variable::{Access, Enumeration, Number, Variable};
@@ -324,7 +325,21 @@ fn define_type<M>(types: &mut Vec<SimpleType>, variable: &Variable<M>) -> Result
 /// What keeps the model from being made or described at all: [`Model::new`] failed, a unit that
 /// cannot be read, a reference to a variable that does not exist.
 pub fn describe<M: Model>(resources: &std::path::Path) -> Result<ModelDescription, Failure> {
-    Interface::new(&mut M::new(resources)?).map(|(_, description)| description)
+    Interface::new(&mut new_model::<M>(resources)?).map(|(_, description)| description)
+}
+
+/// [`Model::new`]; where the importer named no folder, its failure says so.
+pub(crate) fn new_model<M: Model>(resources: &std::path::Path) -> Result<M, Failure> {
+    M::new(resources).map_err(|failure| {
+        if resources != std::path::Path::new(NO_FOLDER) {
+            return failure;
+        }
+        let reason = failure.to_string().replace('\0', "");
+        Failure::Error(format!(
+            "fmuResourceLocation is null or empty, and this model needs its resources: expected \
+             the URI of their folder, such as file:///tmp/fmu/resources ({reason})"
+        ))
+    })
 }
 
 /// Which static rules of FMI 2.0.5 the variables of `M` break; none, if they are in order.

@@ -30,7 +30,7 @@
 //!
 //! What the model need not do: check pointers, the order of the calls, value references, limits,
 //! NaN; all of that is answered before the model is asked. A panic in the model becomes
-//! `fmi2Fatal` of that one instance, with a message.
+//! `fmi2Fatal` of that one instance, with a message that has file and line.
 //!
 //! The documentation of [`export!`] has a whole model; the folder `examples` of the repository has
 //! four more.
@@ -40,6 +40,7 @@ pub mod abi;
 pub mod call_order;
 pub mod description;
 pub mod documentation;
+mod fence;
 #[doc(hidden)]
 pub mod ffi;
 mod instance;

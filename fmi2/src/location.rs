@@ -11,6 +11,10 @@ const ENCODED: AsciiSet =
 /// The same for a path with a drive letter.
 const ENCODED_AFTER_DRIVE: AsciiSet = ENCODED.remove(b':');
 
+/// What a model gets as folder of its resources where the importer names none. Because of the first
+/// character no file has such a path, on no platform, and so the working directory is never read.
+pub(crate) const NO_FOLDER: &str = "\0(no fmuResourceLocation)";
+
 /// Why a path and a URI cannot be turned into each other.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LocationError {

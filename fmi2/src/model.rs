@@ -12,7 +12,9 @@ use crate::variable::Variable;
 ///
 /// The struct holds everything: parameters, inputs, outputs, states. A copy of it is the FMU state
 /// (`fmi2GetFMUstate`), its serialised form the serialised FMU state, so whatever decides how the
-/// model continues must be a field. [`Model::variables`] says which fields the importer sees.
+/// model continues must be a field. [`Model::variables`] says which fields the importer sees. A
+/// serialised state is read by builds whose fields have the same names, types and order, and refused
+/// by others.
 ///
 /// # Life of an instance
 ///
@@ -40,7 +42,8 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
 
     /// The model as instantiated; its field values are the start values of the description.
     ///
-    /// `resources` is the FMU's `resources` folder.
+    /// `resources` is the FMU's `resources` folder. Where the importer names none, it is a path at which
+    /// nothing can be read, and an error of this function becomes one about `fmuResourceLocation`.
     ///
     /// # Errors
     ///
@@ -207,7 +210,7 @@ pub struct Experiment {
 pub struct Step {
     /// Time at the begin, in s.
     pub start: f64,
-    /// Length in s, greater than zero.
+    /// Length in s: at least the distance from `start` to the next number of 64 bits.
     pub size: f64,
 }
 

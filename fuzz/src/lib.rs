@@ -22,7 +22,7 @@ mod targets;
 
 mod design;
 
-/// Runs a target and says why it failed: an instance of a model silences the messages of panics.
+/// Runs a target; where it panics, prints the message and ends the process.
 fn spoken(body: impl FnOnce()) {
     let Err(payload) = std::panic::catch_unwind(std::panic::AssertUnwindSafe(body)) else { return };
     let text = payload.downcast_ref::<String>().map(String::as_str);

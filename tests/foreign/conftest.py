@@ -57,6 +57,15 @@ def controller(unpacked):
     return unpacked["controller"]
 
 
+@pytest.fixture(scope="session")
+def hostile(aso_ftc, root, tmp_path_factory):
+    """HostileNames, whose module has the names of everything, and which panics on request."""
+    folder = tmp_path_factory.mktemp("hostile")
+    done = aso_ftc("pack", root / "tests" / "models" / "hostile-names", "--out", folder)
+    assert done.returncode == 0, done.stderr
+    return Fmu(extract(str(folder / "HostileNames.fmu"), str(folder / "unpacked")))
+
+
 @pytest.fixture(params=["plant", "controller"])
 def fmu(request, unpacked):
     """Each FMU of this workspace."""

@@ -3,6 +3,7 @@
 import ctypes
 import re
 import shutil
+from pathlib import Path
 from urllib.parse import quote
 
 import pytest
@@ -108,7 +109,6 @@ def test_every_form_of_a_resource_location_is_understood(controller, tmp_path):
 @pytest.mark.parametrize(
     "uri",
     [
-        "",
         "http://example.com/resources",
         "/tmp",
         "file://server/share",
@@ -117,8 +117,28 @@ def test_every_form_of_a_resource_location_is_understood(controller, tmp_path):
     ],
 )
 def test_a_location_that_is_no_local_file_is_refused(controller, uri):
-    message = refusal(controller, resources=uri)
-    assert "fmuResourceLocation" in message or "design.toml" in message
+    assert "fmuResourceLocation" in refusal(controller, resources=uri)
+
+
+def test_without_a_location_a_model_that_needs_resources_says_so_and_reads_no_other_folder(
+    controller, monkeypatch
+):
+    monkeypatch.chdir(controller.folder / "resources")
+    assert Path("design.toml").is_file()
+    said = refusal(controller, resources="")
+    assert "fmuResourceLocation is null or empty" in said and "file:///" in said
+    guid = controller.description.guid.encode()
+    with Instance(controller) as instance:
+        for location in (None, b""):
+            before = len(instance.messages)
+            arguments = (b"one", 1, guid, location, instance.callbacks, 0, 0)
+            assert not controller.library.fmi2Instantiate(*arguments)
+            assert len(instance.messages) == before + 1
+            message = instance.messages[-1]
+            assert message.status == ERROR
+            assert "fmuResourceLocation is null or empty" in message.text
+    status, said = describe(controller.library, "")
+    assert status == 1 and "fmuResourceLocation is null or empty" in said and "\0" not in said
 
 
 def test_a_model_without_resources_needs_no_location(plant):

@@ -6,13 +6,14 @@ import json
 import locale
 import os
 import signal
+import subprocess
 from concurrent.futures import ThreadPoolExecutor
 from math import nan
 from pathlib import Path
 
 import pytest
 
-from c_abi import ERROR, Fmu, Instance
+from c_abi import ERROR, FATAL, STANDARD_FUNCTIONS, Fmu, Instance
 from excitation import START, begun, drive, serialized
 
 HERE = Path(__file__).parent
@@ -134,6 +135,54 @@ def err_and_succeed(folder):
 def test_nothing_is_ever_printed(fmu, python):
     done = in_own_process(python, "err_and_succeed", fmu.folder)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def panic_in_a_step(folder):
+    """Prints status and message of panics in two threads, and what an instance beside them does."""
+    fmu = Fmu(folder)
+
+    def panic(_):
+        with Instance(fmu) as instance:
+            instance.start({"panics": 1})
+            status = instance.call("DoStep", 0.0, 0.5, 1)
+            return status, instance.last_message(), len(instance.messages)
+
+    with Instance(fmu) as calm, ThreadPoolExecutor(2) as pool:
+        calm.start({"u": 2.5})
+        found = list(pool.map(panic, range(20)))
+        calm.step(0.0, 0.5)
+        print(json.dumps([found, calm.get("y"), calm.get("steps")]))
+    _ctypes.dlclose(fmu.library._handle)
+
+
+def test_a_panic_is_one_message_with_file_and_line_and_nothing_on_stderr(hostile, python, root):
+    done = in_own_process(python, "panic_in_a_step", hostile.folder)
+    assert (done.returncode, done.stderr) == (0, "")
+    found, y, steps = json.loads(done.stdout)
+    assert (y, steps) == ([5.0], [1])
+    source = (root / "tests/models/hostile-names/src/model.rs").read_text(encoding="utf-8")
+    lines = [k for k, line in enumerate(source.splitlines(), 1) if "assert!(!self.panics" in line]
+    assert len(lines) == 1
+    for status, message, count in found:
+        assert (status, count) == (FATAL, 1)
+        assert message.startswith("fmi2DoStep: ") and f"model.rs:{lines[0]}:" in message
+        assert "as it was told" in message
+
+
+def test_a_library_exports_the_same_functions_whatever_its_module_defines(hostile, plant):
+    symbols = [
+        {line.split()[-1] for line in listed.splitlines()}
+        for fmu in (hostile, plant)
+        for listed in [
+            subprocess.run(
+                ["nm", "--dynamic", "--defined-only", fmu.path],
+                capture_output=True,
+                text=True,
+                check=True,
+            ).stdout
+        ]
+    ]
+    assert symbols[0] == symbols[1] == STANDARD_FUNCTIONS | {"fmuDescribe"}
 
 
 def settings_of_the_process():

@@ -1,7 +1,8 @@
 """Communication steps: their time and size, the stop time, what the status functions say."""
 
+import re
 from ctypes import c_int
-from math import inf, nan
+from math import inf, nan, nextafter
 
 import pytest
 
@@ -54,6 +55,32 @@ def test_a_communication_point_off_by_rounding_is_fine(fmu):
             time += 0.1
         assert time != 100.0
         assert instance.get("time") == [pytest.approx(100.0, abs=1e-9)]
+
+
+@pytest.mark.parametrize(("time", "size"), [(1e3, 1e-20), (1e9, 1e-8), (1.0, 1e-16), (-4.0, 1e-17)])
+def test_a_step_below_the_resolution_of_time_is_an_error_with_the_smallest_one(fmu, time, size):
+    smallest = nextafter(time, inf) - time
+    assert size < smallest
+    with Instance(fmu) as instance:
+        instance.start(start=time)
+        assert instance.call("DoStep", time, size, 1) == ERROR
+        said = instance.last_message()
+        numbers = {float(word) for word in re.findall(r"-?\d[\d.]*(?:e-?\d+)?", said)}
+        assert "communicationStepSize" in said and {time, size, smallest} <= numbers
+        assert instance.get("time") == [time]
+        instance.must("Reset")
+        instance.start(start=time)
+        instance.step(time, smallest)
+        assert instance.get("time") == [time + smallest]
+
+
+def test_a_step_that_ends_before_the_time_reached_is_an_error(fmu):
+    with Instance(fmu) as instance:
+        instance.start()
+        instance.step(0.0, 5e-10)
+        assert instance.call("DoStep", 0.0, 1e-10, 1) == ERROR
+        assert "the instance is at 0.0000000005 s" in instance.last_message()
+        assert instance.get("time") == [5e-10]
 
 
 def test_time_is_what_the_steps_add_up_to(fmu):

@@ -1,6 +1,6 @@
 //! The C functions that have an instance: what stands behind the door, one entry each.
 
-use super::{door, missing, put, read, texts, write};
+use super::{door, missing, put, read, room, state_at, texts};
 use crate::abi::{
     StatusKind, fmi2Boolean, fmi2Byte, fmi2Component, fmi2EventInfo, fmi2FMUstate, fmi2Integer,
     fmi2Real, fmi2Status, fmi2StatusKind, fmi2String, fmi2ValueReference,
@@ -37,13 +37,13 @@ behind_the_door! {
     terminate = Terminate(), instance => { instance.terminate(); Ok(()) };
     reset = Reset(), instance => { instance.reset(); Ok(()) };
     get_real = GetReal(vr: *const fmi2ValueReference, n: usize, value: *mut fmi2Real),
-        instance => instance.get_real(read(vr, n)?, write(value, n)?);
+        instance => instance.get_real(read(vr, n)?, room(value, n)?);
     get_integer = GetInteger(vr: *const fmi2ValueReference, n: usize, value: *mut fmi2Integer),
-        instance => instance.get_integer(read(vr, n)?, write(value, n)?);
+        instance => instance.get_integer(read(vr, n)?, room(value, n)?);
     get_boolean = GetBoolean(vr: *const fmi2ValueReference, n: usize, value: *mut fmi2Boolean),
-        instance => instance.get_boolean(read(vr, n)?, write(value, n)?);
+        instance => instance.get_boolean(read(vr, n)?, room(value, n)?);
     get_string = GetString(vr: *const fmi2ValueReference, n: usize, value: *mut fmi2String),
-        instance => instance.get_string(read(vr, n)?, write(value, n)?);
+        instance => instance.get_string(read(vr, n)?, room(value, n)?);
     set_real = SetReal(vr: *const fmi2ValueReference, n: usize, value: *const fmi2Real),
         instance => instance.set_real(read(vr, n)?, read(value, n)?);
     set_integer = SetInteger(vr: *const fmi2ValueReference, n: usize, value: *const fmi2Integer),
@@ -57,7 +57,7 @@ behind_the_door! {
     ), instance => instance.set_real_input_derivatives(read(vr, n)?, read(order, n)?, read(value, n)?);
     get_real_output_derivatives = GetRealOutputDerivatives(
         vr: *const fmi2ValueReference, n: usize, order: *const fmi2Integer, value: *mut fmi2Real
-    ), instance => instance.get_real_output_derivatives(read(vr, n)?, read(order, n)?, write(value, n)?);
+    ), instance => instance.get_real_output_derivatives(read(vr, n)?, read(order, n)?, room(value, n)?);
     do_step = DoStep(start: fmi2Real, size: fmi2Real, _no_set_fmu_state: fmi2Boolean),
         instance => instance.do_step(start, size);
     cancel_step = CancelStep(), _instance =>
@@ -69,12 +69,12 @@ behind_the_door! {
     ), instance => instance.get_directional_derivative(
         read(unknown, n_unknown)?,
         (read(known, n_known)?, read(known_delta, n_known)?),
-        write(unknown_delta, n_unknown)?,
+        room(unknown_delta, n_unknown)?,
     );
     enter_event_mode = EnterEventMode(), instance => instance.enter_event_mode();
     new_discrete_states = NewDiscreteStates(info: *mut fmi2EventInfo), instance => {
-        let [place] = write(info, 1)? else { return Err(missing("fmi2eventInfo")) };
-        *place = instance.new_discrete_states()?;
+        let place = room(info, 1)?;
+        place[0].write(instance.new_discrete_states()?);
         Ok(())
     };
     enter_continuous_time_mode = EnterContinuousTimeMode(), instance => {
@@ -92,15 +92,15 @@ behind_the_door! {
     set_continuous_states = SetContinuousStates(x: *const fmi2Real, n: usize),
         instance => instance.set_continuous_states(read(x, n)?);
     get_event_indicators = GetEventIndicators(z: *mut fmi2Real, n: usize),
-        instance => instance.get_event_indicators(write(z, n)?);
+        instance => instance.get_event_indicators(room(z, n)?);
     get_continuous_states = GetContinuousStates(x: *mut fmi2Real, n: usize),
-        instance => instance.get_continuous_states(write(x, n)?);
+        instance => instance.get_continuous_states(room(x, n)?);
     get_derivatives = GetDerivatives(derivatives: *mut fmi2Real, n: usize),
-        instance => instance.get_derivatives(write(derivatives, n)?);
+        instance => instance.get_derivatives(room(derivatives, n)?);
     get_nominals = GetNominalsOfContinuousStates(nominals: *mut fmi2Real, n: usize),
-        instance => instance.get_nominals(write(nominals, n)?);
+        instance => instance.get_nominals(room(nominals, n)?);
     get_fmu_state = GetFMUstate(state: *mut fmi2FMUstate), instance => {
-        let [place] = write(state, 1)? else { return Err(missing("FMUstate")) };
+        let place = state_at(state)?;
         if let Some(snapshot) = place.cast::<Snapshot<M>>().as_mut() {
             *snapshot = instance.snapshot();
         } else {
@@ -111,7 +111,7 @@ behind_the_door! {
     set_fmu_state = SetFMUstate(state: fmi2FMUstate), instance =>
         instance.restore(state.cast::<Snapshot<M>>().as_ref().ok_or_else(|| missing("FMUstate"))?);
     free_fmu_state = FreeFMUstate(state: *mut fmi2FMUstate), _instance => {
-        let [place] = write(state, 1)? else { return Err(missing("FMUstate")) };
+        let place = state_at(state)?;
         if !place.is_null() {
             let state = std::mem::replace(place, std::ptr::null_mut());
             drop(Box::from_raw(state.cast::<Snapshot<M>>()));
@@ -126,13 +126,13 @@ behind_the_door! {
     serialize_fmu_state = SerializeFMUstate(state: fmi2FMUstate, bytes: *mut fmi2Byte, size: usize),
         _instance => {
             let state = state.cast::<Snapshot<M>>().as_ref().ok_or_else(|| missing("FMUstate"))?;
-            state.write(write(bytes.cast::<u8>(), size)?)
+            state.write(room(bytes.cast::<u8>(), size)?)
         };
     de_serialize_fmu_state = DeSerializeFMUstate(
         bytes: *const fmi2Byte, size: usize, state: *mut fmi2FMUstate
     ), instance => {
         let snapshot = Snapshot::<M>::from_bytes(read(bytes.cast::<u8>(), size)?, instance.guid())?;
-        let [place] = write(state, 1)? else { return Err(missing("FMUstate")) };
+        let place = state_at(state)?;
         if let Some(old) = place.cast::<Snapshot<M>>().as_mut() {
             *old = snapshot;
         } else {

@@ -64,124 +64,141 @@
 #[macro_export]
 macro_rules! export {
     ($model:ty) => {
-        const _: () = assert!(
-            cfg!(panic = "unwind"),
+        #[cfg(not(panic = "unwind"))]
+        ::core::compile_error!(
             "an FMU needs panic = \"unwind\": an aborting panic takes the importer down"
         );
 
-        mod fmi2_entry_points {
-            use super::*;
-            use $crate::abi::*;
-            use $crate::ffi::*;
-
+        // A block and whole paths: no name of the model's module is imported, and none is defined in it.
+        const _: () = {
             $crate::entry_points! { $model;
                 fmi2GetTypesPlatform = types_platform() -> fmi2String;
                 fmi2GetVersion = version() -> fmi2String;
-                fmuDescribe = describe(resources: fmi2String, context: fmi2ComponentEnvironment,
-                    sink: DescribeSink) -> fmi2Integer;
-                fmi2Instantiate = instantiate(name: fmi2String, fmu_type: fmi2Type,
-                    guid: fmi2String, resource_location: fmi2String,
-                    functions: *const fmi2CallbackFunctions, visible: fmi2Boolean,
-                    logging_on: fmi2Boolean) -> fmi2Component;
-                fmi2FreeInstance = free_instance(c: fmi2Component) -> ();
-                fmi2SetDebugLogging = set_debug_logging(c: fmi2Component, on: fmi2Boolean,
-                    n: usize, categories: *const fmi2String) -> fmi2Status;
-                fmi2SetupExperiment = setup_experiment(c: fmi2Component,
-                    tolerance_defined: fmi2Boolean, tolerance: fmi2Real, start_time: fmi2Real,
-                    stop_time_defined: fmi2Boolean, stop_time: fmi2Real) -> fmi2Status;
-                fmi2EnterInitializationMode =
-                    enter_initialization_mode(c: fmi2Component) -> fmi2Status;
-                fmi2ExitInitializationMode =
-                    exit_initialization_mode(c: fmi2Component) -> fmi2Status;
-                fmi2Terminate = terminate(c: fmi2Component) -> fmi2Status;
-                fmi2Reset = reset(c: fmi2Component) -> fmi2Status;
-                fmi2GetReal = get_real(c: fmi2Component, vr: *const fmi2ValueReference, n: usize,
-                    value: *mut fmi2Real) -> fmi2Status;
-                fmi2GetInteger = get_integer(c: fmi2Component, vr: *const fmi2ValueReference,
-                    n: usize, value: *mut fmi2Integer) -> fmi2Status;
-                fmi2GetBoolean = get_boolean(c: fmi2Component, vr: *const fmi2ValueReference,
-                    n: usize, value: *mut fmi2Boolean) -> fmi2Status;
-                fmi2GetString = get_string(c: fmi2Component, vr: *const fmi2ValueReference,
-                    n: usize, value: *mut fmi2String) -> fmi2Status;
-                fmi2SetReal = set_real(c: fmi2Component, vr: *const fmi2ValueReference, n: usize,
-                    value: *const fmi2Real) -> fmi2Status;
-                fmi2SetInteger = set_integer(c: fmi2Component, vr: *const fmi2ValueReference,
-                    n: usize, value: *const fmi2Integer) -> fmi2Status;
-                fmi2SetBoolean = set_boolean(c: fmi2Component, vr: *const fmi2ValueReference,
-                    n: usize, value: *const fmi2Boolean) -> fmi2Status;
-                fmi2SetString = set_string(c: fmi2Component, vr: *const fmi2ValueReference,
-                    n: usize, value: *const fmi2String) -> fmi2Status;
-                fmi2GetFMUstate = get_fmu_state(c: fmi2Component, state: *mut fmi2FMUstate)
-                    -> fmi2Status;
-                fmi2SetFMUstate = set_fmu_state(c: fmi2Component, state: fmi2FMUstate)
-                    -> fmi2Status;
-                fmi2FreeFMUstate = free_fmu_state(c: fmi2Component, state: *mut fmi2FMUstate)
-                    -> fmi2Status;
-                fmi2SerializedFMUstateSize = serialized_fmu_state_size(c: fmi2Component,
-                    state: fmi2FMUstate, size: *mut usize) -> fmi2Status;
-                fmi2SerializeFMUstate = serialize_fmu_state(c: fmi2Component, state: fmi2FMUstate,
-                    bytes: *mut fmi2Byte, size: usize) -> fmi2Status;
-                fmi2DeSerializeFMUstate = de_serialize_fmu_state(c: fmi2Component,
-                    bytes: *const fmi2Byte, size: usize, state: *mut fmi2FMUstate) -> fmi2Status;
-                fmi2GetDirectionalDerivative = get_directional_derivative(c: fmi2Component,
-                    unknown: *const fmi2ValueReference, n_unknown: usize,
-                    known: *const fmi2ValueReference, n_known: usize,
-                    known_delta: *const fmi2Real, unknown_delta: *mut fmi2Real) -> fmi2Status;
-                fmi2EnterEventMode = enter_event_mode(c: fmi2Component) -> fmi2Status;
-                fmi2NewDiscreteStates = new_discrete_states(c: fmi2Component,
-                    info: *mut fmi2EventInfo) -> fmi2Status;
-                fmi2EnterContinuousTimeMode =
-                    enter_continuous_time_mode(c: fmi2Component) -> fmi2Status;
-                fmi2CompletedIntegratorStep = completed_integrator_step(c: fmi2Component,
-                    no_set_fmu_state: fmi2Boolean, enter_event_mode: *mut fmi2Boolean,
-                    terminate_simulation: *mut fmi2Boolean) -> fmi2Status;
-                fmi2SetTime = set_time(c: fmi2Component, time: fmi2Real) -> fmi2Status;
-                fmi2SetContinuousStates = set_continuous_states(c: fmi2Component,
-                    x: *const fmi2Real, n: usize) -> fmi2Status;
-                fmi2GetEventIndicators = get_event_indicators(c: fmi2Component,
-                    z: *mut fmi2Real, n: usize) -> fmi2Status;
-                fmi2GetContinuousStates = get_continuous_states(c: fmi2Component,
-                    x: *mut fmi2Real, n: usize) -> fmi2Status;
-                fmi2GetDerivatives = get_derivatives(c: fmi2Component,
-                    derivatives: *mut fmi2Real, n: usize) -> fmi2Status;
-                fmi2GetNominalsOfContinuousStates = get_nominals(c: fmi2Component,
-                    nominals: *mut fmi2Real, n: usize) -> fmi2Status;
-                fmi2SetRealInputDerivatives = set_real_input_derivatives(c: fmi2Component,
-                    vr: *const fmi2ValueReference, n: usize, order: *const fmi2Integer,
-                    value: *const fmi2Real) -> fmi2Status;
-                fmi2GetRealOutputDerivatives = get_real_output_derivatives(c: fmi2Component,
-                    vr: *const fmi2ValueReference, n: usize, order: *const fmi2Integer,
-                    value: *mut fmi2Real) -> fmi2Status;
-                fmi2DoStep = do_step(c: fmi2Component, start: fmi2Real, size: fmi2Real,
-                    no_set_fmu_state: fmi2Boolean) -> fmi2Status;
-                fmi2CancelStep = cancel_step(c: fmi2Component) -> fmi2Status;
-                fmi2GetStatus = get_status(c: fmi2Component, kind: fmi2StatusKind,
-                    value: *mut fmi2Status) -> fmi2Status;
-                fmi2GetRealStatus = get_real_status(c: fmi2Component, kind: fmi2StatusKind,
-                    value: *mut fmi2Real) -> fmi2Status;
-                fmi2GetIntegerStatus = get_integer_status(c: fmi2Component, kind: fmi2StatusKind,
-                    value: *mut fmi2Integer) -> fmi2Status;
-                fmi2GetBooleanStatus = get_boolean_status(c: fmi2Component, kind: fmi2StatusKind,
-                    value: *mut fmi2Boolean) -> fmi2Status;
-                fmi2GetStringStatus = get_string_status(c: fmi2Component, kind: fmi2StatusKind,
-                    value: *mut fmi2String) -> fmi2Status;
+                fmuDescribe = describe(fmi2_resources: fmi2String,
+                    fmi2_context: fmi2ComponentEnvironment, fmi2_sink: DescribeSink) -> fmi2Integer;
+                fmi2Instantiate = instantiate(fmi2_name: fmi2String, fmi2_fmu_type: fmi2Type,
+                    fmi2_guid: fmi2String, fmi2_resource_location: fmi2String,
+                    fmi2_functions: *const fmi2CallbackFunctions, fmi2_visible: fmi2Boolean,
+                    fmi2_logging_on: fmi2Boolean) -> fmi2Component;
+                fmi2FreeInstance = free_instance(fmi2_c: fmi2Component) -> void;
+                fmi2SetDebugLogging = set_debug_logging(fmi2_c: fmi2Component, fmi2_on: fmi2Boolean,
+                    fmi2_n: size_t, fmi2_categories: *const fmi2String) -> fmi2Status;
+                fmi2SetupExperiment = setup_experiment(fmi2_c: fmi2Component,
+                    fmi2_tolerance_defined: fmi2Boolean, fmi2_tolerance: fmi2Real,
+                    fmi2_start_time: fmi2Real, fmi2_stop_time_defined: fmi2Boolean,
+                    fmi2_stop_time: fmi2Real) -> fmi2Status;
+                fmi2EnterInitializationMode = enter_initialization_mode(
+                    fmi2_c: fmi2Component) -> fmi2Status;
+                fmi2ExitInitializationMode = exit_initialization_mode(
+                    fmi2_c: fmi2Component) -> fmi2Status;
+                fmi2Terminate = terminate(fmi2_c: fmi2Component) -> fmi2Status;
+                fmi2Reset = reset(fmi2_c: fmi2Component) -> fmi2Status;
+                fmi2GetReal = get_real(fmi2_c: fmi2Component, fmi2_vr: *const fmi2ValueReference,
+                    fmi2_n: size_t, fmi2_value: *mut fmi2Real) -> fmi2Status;
+                fmi2GetInteger = get_integer(fmi2_c: fmi2Component, fmi2_vr: *const fmi2ValueReference,
+                    fmi2_n: size_t, fmi2_value: *mut fmi2Integer) -> fmi2Status;
+                fmi2GetBoolean = get_boolean(fmi2_c: fmi2Component, fmi2_vr: *const fmi2ValueReference,
+                    fmi2_n: size_t, fmi2_value: *mut fmi2Boolean) -> fmi2Status;
+                fmi2GetString = get_string(fmi2_c: fmi2Component, fmi2_vr: *const fmi2ValueReference,
+                    fmi2_n: size_t, fmi2_value: *mut fmi2String) -> fmi2Status;
+                fmi2SetReal = set_real(fmi2_c: fmi2Component, fmi2_vr: *const fmi2ValueReference,
+                    fmi2_n: size_t, fmi2_value: *const fmi2Real) -> fmi2Status;
+                fmi2SetInteger = set_integer(fmi2_c: fmi2Component, fmi2_vr: *const fmi2ValueReference,
+                    fmi2_n: size_t, fmi2_value: *const fmi2Integer) -> fmi2Status;
+                fmi2SetBoolean = set_boolean(fmi2_c: fmi2Component, fmi2_vr: *const fmi2ValueReference,
+                    fmi2_n: size_t, fmi2_value: *const fmi2Boolean) -> fmi2Status;
+                fmi2SetString = set_string(fmi2_c: fmi2Component, fmi2_vr: *const fmi2ValueReference,
+                    fmi2_n: size_t, fmi2_value: *const fmi2String) -> fmi2Status;
+                fmi2GetFMUstate = get_fmu_state(fmi2_c: fmi2Component,
+                    fmi2_state: *mut fmi2FMUstate) -> fmi2Status;
+                fmi2SetFMUstate = set_fmu_state(fmi2_c: fmi2Component,
+                    fmi2_state: fmi2FMUstate) -> fmi2Status;
+                fmi2FreeFMUstate = free_fmu_state(fmi2_c: fmi2Component,
+                    fmi2_state: *mut fmi2FMUstate) -> fmi2Status;
+                fmi2SerializedFMUstateSize = serialized_fmu_state_size(fmi2_c: fmi2Component,
+                    fmi2_state: fmi2FMUstate, fmi2_size: *mut size_t) -> fmi2Status;
+                fmi2SerializeFMUstate = serialize_fmu_state(fmi2_c: fmi2Component,
+                    fmi2_state: fmi2FMUstate, fmi2_bytes: *mut fmi2Byte,
+                    fmi2_size: size_t) -> fmi2Status;
+                fmi2DeSerializeFMUstate = de_serialize_fmu_state(fmi2_c: fmi2Component,
+                    fmi2_bytes: *const fmi2Byte, fmi2_size: size_t,
+                    fmi2_state: *mut fmi2FMUstate) -> fmi2Status;
+                fmi2GetDirectionalDerivative = get_directional_derivative(fmi2_c: fmi2Component,
+                    fmi2_unknown: *const fmi2ValueReference, fmi2_n_unknown: size_t,
+                    fmi2_known: *const fmi2ValueReference, fmi2_n_known: size_t,
+                    fmi2_known_delta: *const fmi2Real, fmi2_unknown_delta: *mut fmi2Real) -> fmi2Status;
+                fmi2EnterEventMode = enter_event_mode(fmi2_c: fmi2Component) -> fmi2Status;
+                fmi2NewDiscreteStates = new_discrete_states(fmi2_c: fmi2Component,
+                    fmi2_info: *mut fmi2EventInfo) -> fmi2Status;
+                fmi2EnterContinuousTimeMode = enter_continuous_time_mode(
+                    fmi2_c: fmi2Component) -> fmi2Status;
+                fmi2CompletedIntegratorStep = completed_integrator_step(fmi2_c: fmi2Component,
+                    fmi2_no_set_fmu_state: fmi2Boolean, fmi2_enter_event_mode: *mut fmi2Boolean,
+                    fmi2_terminate_simulation: *mut fmi2Boolean) -> fmi2Status;
+                fmi2SetTime = set_time(fmi2_c: fmi2Component, fmi2_time: fmi2Real) -> fmi2Status;
+                fmi2SetContinuousStates = set_continuous_states(fmi2_c: fmi2Component,
+                    fmi2_x: *const fmi2Real, fmi2_n: size_t) -> fmi2Status;
+                fmi2GetEventIndicators = get_event_indicators(fmi2_c: fmi2Component,
+                    fmi2_z: *mut fmi2Real, fmi2_n: size_t) -> fmi2Status;
+                fmi2GetContinuousStates = get_continuous_states(fmi2_c: fmi2Component,
+                    fmi2_x: *mut fmi2Real, fmi2_n: size_t) -> fmi2Status;
+                fmi2GetDerivatives = get_derivatives(fmi2_c: fmi2Component,
+                    fmi2_derivatives: *mut fmi2Real, fmi2_n: size_t) -> fmi2Status;
+                fmi2GetNominalsOfContinuousStates = get_nominals(fmi2_c: fmi2Component,
+                    fmi2_nominals: *mut fmi2Real, fmi2_n: size_t) -> fmi2Status;
+                fmi2SetRealInputDerivatives = set_real_input_derivatives(fmi2_c: fmi2Component,
+                    fmi2_vr: *const fmi2ValueReference, fmi2_n: size_t, fmi2_order: *const fmi2Integer,
+                    fmi2_value: *const fmi2Real) -> fmi2Status;
+                fmi2GetRealOutputDerivatives = get_real_output_derivatives(fmi2_c: fmi2Component,
+                    fmi2_vr: *const fmi2ValueReference, fmi2_n: size_t, fmi2_order: *const fmi2Integer,
+                    fmi2_value: *mut fmi2Real) -> fmi2Status;
+                fmi2DoStep = do_step(fmi2_c: fmi2Component, fmi2_start: fmi2Real, fmi2_size: fmi2Real,
+                    fmi2_no_set_fmu_state: fmi2Boolean) -> fmi2Status;
+                fmi2CancelStep = cancel_step(fmi2_c: fmi2Component) -> fmi2Status;
+                fmi2GetStatus = get_status(fmi2_c: fmi2Component, fmi2_kind: fmi2StatusKind,
+                    fmi2_value: *mut fmi2Status) -> fmi2Status;
+                fmi2GetRealStatus = get_real_status(fmi2_c: fmi2Component, fmi2_kind: fmi2StatusKind,
+                    fmi2_value: *mut fmi2Real) -> fmi2Status;
+                fmi2GetIntegerStatus = get_integer_status(fmi2_c: fmi2Component,
+                    fmi2_kind: fmi2StatusKind, fmi2_value: *mut fmi2Integer) -> fmi2Status;
+                fmi2GetBooleanStatus = get_boolean_status(fmi2_c: fmi2Component,
+                    fmi2_kind: fmi2StatusKind, fmi2_value: *mut fmi2Boolean) -> fmi2Status;
+                fmi2GetStringStatus = get_string_status(fmi2_c: fmi2Component,
+                    fmi2_kind: fmi2StatusKind, fmi2_value: *mut fmi2String) -> fmi2Status;
             }
-        }
+        };
     };
 }
 
 /// One exported C function for each line, each a call of the generic function for the model.
+///
+/// The arguments have names with a prefix: a constant of the model called `n` would turn an argument
+/// `n` into a pattern that it has to match.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! entry_points {
     ($model:ty; $($name:ident =
-        $function:ident($($argument:ident: $type:ty),*) -> $result:ty;)*) => {
+        $function:ident($($argument:ident: $(*$access:tt)? $type:ident),*) -> $result:ident;)*) => {
         $(
             #[unsafe(no_mangle)]
-            unsafe extern "C" fn $name($($argument: $type),*) -> $result {
+            unsafe extern "C" fn $name(
+                $($argument: $(*$access)? $crate::ffi::signature::$type),*
+            ) -> $crate::ffi::signature::$result {
                 // SAFETY: the arguments are handed on as the importer gave them.
-                unsafe { $function::<$model>($($argument),*) }
+                unsafe { $crate::ffi::$function::<$model>($($argument),*) }
             }
         )*
     };
+}
+
+/// The types in the signatures of the C functions.
+pub mod signature {
+    #![expect(non_camel_case_types, reason = "the names of C")]
+
+    pub use crate::abi::*;
+
+    /// `size_t`.
+    pub type size_t = usize;
+    /// `void`.
+    pub type void = ();
 }

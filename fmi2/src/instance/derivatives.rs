@@ -1,5 +1,7 @@
 //! `fmi2GetDirectionalDerivative` of an instance (section 2.1.9).
 
+use std::mem::MaybeUninit;
+
 use super::Instance;
 use crate::call_order::State;
 use crate::description::{Causality, Initial, Variability};
@@ -22,7 +24,7 @@ impl<M: Model> Instance<M> {
         &mut self,
         unknowns: &[u32],
         (knowns, delta): (&[u32], &[f64]),
-        to: &mut [f64],
+        to: &mut [MaybeUninit<f64>],
     ) -> Result<(), Failure> {
         if !M::PROVIDES_DIRECTIONAL_DERIVATIVE {
             let message = "not offered: providesDirectionalDerivative is false";
@@ -60,7 +62,7 @@ impl<M: Model> Instance<M> {
         model.differentiate(&at, direction)?;
         for (&reference, value) in unknowns.iter().zip(to) {
             if let Some(slot) = self.interface.real(reference)? {
-                *value = *(slot.field)(direction);
+                value.write(*(slot.field)(direction));
             }
         }
         Ok(())

@@ -1,8 +1,11 @@
 //! The functions of model exchange (section 3.2).
 
+use std::mem::MaybeUninit;
+
 use super::{Instance, slack};
 use crate::abi::{Status, fmi2EventInfo};
 use crate::call_order::State;
+use crate::ffi::filled;
 use crate::model::{Failure, Model};
 
 /// Refuses an array whose length is not the one of the description.
@@ -93,40 +96,49 @@ impl<M: Model> Instance<M> {
     }
 
     /// `fmi2GetContinuousStates`.
-    pub(crate) fn get_continuous_states(&mut self, values: &mut [f64]) -> Result<(), Failure> {
+    pub(crate) fn get_continuous_states(
+        &mut self,
+        values: &mut [MaybeUninit<f64>],
+    ) -> Result<(), Failure> {
         length("states", values.len(), self.interface.states.len())?;
         self.refresh()?;
         for (state, value) in self.interface.states.iter().zip(values) {
-            *value = *(self.interface.reals[state.state].field)(&mut self.core.model);
+            value.write(*(self.interface.reals[state.state].field)(&mut self.core.model));
         }
         Ok(())
     }
 
     /// `fmi2GetDerivatives`.
-    pub(crate) fn get_derivatives(&mut self, values: &mut [f64]) -> Result<(), Failure> {
+    pub(crate) fn get_derivatives(
+        &mut self,
+        values: &mut [MaybeUninit<f64>],
+    ) -> Result<(), Failure> {
         length("derivatives", values.len(), self.interface.states.len())?;
         self.refresh()?;
         for (state, value) in self.interface.states.iter().zip(values) {
-            *value = *(self.interface.reals[state.derivative].field)(&mut self.core.model);
+            value.write(*(self.interface.reals[state.derivative].field)(&mut self.core.model));
         }
         Ok(())
     }
 
     /// `fmi2GetNominalsOfContinuousStates`.
-    pub(crate) fn get_nominals(&self, values: &mut [f64]) -> Result<(), Failure> {
+    pub(crate) fn get_nominals(&self, values: &mut [MaybeUninit<f64>]) -> Result<(), Failure> {
         length("nominal values", values.len(), self.interface.states.len())?;
         for (state, value) in self.interface.states.iter().zip(values) {
-            *value = state.nominal;
+            value.write(state.nominal);
         }
         Ok(())
     }
 
     /// `fmi2GetEventIndicators`.
-    pub(crate) fn get_event_indicators(&mut self, values: &mut [f64]) -> Result<(), Failure> {
+    pub(crate) fn get_event_indicators(
+        &mut self,
+        values: &mut [MaybeUninit<f64>],
+    ) -> Result<(), Failure> {
         let expected = self.interface.event_indicators.unwrap_or_default();
         length("event indicators", values.len(), expected)?;
         self.refresh()?;
-        self.core.model.event_indicators(self.core.time, values);
+        self.core.model.event_indicators(self.core.time, filled(values, 0.0));
         Ok(())
     }
 }

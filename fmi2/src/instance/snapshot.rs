@@ -1,14 +1,17 @@
 //! FMU states: copies of an instance's core, and their form as bytes.
 
+use std::mem::MaybeUninit;
+
+use super::layout::{Layout, layout};
 use super::{Core, Instance};
 use crate::call_order::{InterfaceType, State};
 use crate::description::Guid;
 use crate::model::{Failure, Model};
 
 /// First bytes of a serialised state; the last two digits are the version of the layout.
-const MAGIC: &[u8; 8] = b"FMI2ST02";
-/// Length of magic and GUID.
-const HEAD: usize = 24;
+const MAGIC: &[u8; 8] = b"FMI2ST03";
+/// Length of magic, GUID and layout.
+const HEAD: usize = MAGIC.len() + size_of::<Guid>() + size_of::<Layout>();
 /// Length of the checksum at the end.
 const CHECKSUM: usize = 4;
 
@@ -48,7 +51,7 @@ impl<M: Model> Instance<M> {
     }
 }
 
-fn failed(error: &postcard::Error) -> Failure {
+fn failed(error: &dyn std::fmt::Display) -> Failure {
     Failure::Error(format!("cannot serialize: {error}"))
 }
 
@@ -59,22 +62,31 @@ impl<M: Model> Snapshot<M> {
         core.map(|core| HEAD + core + CHECKSUM).map_err(|error| failed(&error))
     }
 
-    /// Writes the state to the begin of `bytes`: magic, GUID, core in postcard's little-endian
-    /// form, CRC-32 of all that.
-    pub(crate) fn write(&self, bytes: &mut [u8]) -> Result<(), Failure> {
-        let (found, needed) = (bytes.len(), self.size()?);
-        let Some(bytes) = bytes.get_mut(..needed) else {
+    /// Writes the state to the first bytes of `room`.
+    pub(crate) fn write(&self, room: &mut [MaybeUninit<u8>]) -> Result<(), Failure> {
+        let bytes = self.to_bytes()?;
+        let (found, needed) = (room.len(), bytes.len());
+        if found < needed {
             return Err(Failure::Error(format!("{found} bytes given, {needed} needed")));
-        };
-        let (content, sum) = bytes.split_at_mut(needed - CHECKSUM);
-        content[..MAGIC.len()].copy_from_slice(MAGIC);
-        content[MAGIC.len()..HEAD].copy_from_slice(&self.guid.0);
-        postcard::to_slice(&self.core, &mut content[HEAD..]).map_err(|error| failed(&error))?;
-        sum.copy_from_slice(&crc32fast::hash(content).to_le_bytes());
+        }
+        for (place, byte) in room.iter_mut().zip(bytes) {
+            place.write(byte);
+        }
         Ok(())
     }
 
-    /// The state in `bytes`; refused unless it is whole and of the FMU `guid`.
+    /// The state as bytes: magic, GUID, layout, core in postcard's little-endian form, CRC-32 of all
+    /// that.
+    pub(crate) fn to_bytes(&self) -> Result<Vec<u8>, Failure> {
+        let layout = layout(&self.core).map_err(|error| failed(&error))?;
+        let head = [MAGIC.as_slice(), &self.guid.0, &layout].concat();
+        let mut bytes = postcard::to_extend(&self.core, head).map_err(|error| failed(&error))?;
+        bytes.extend_from_slice(&crc32fast::hash(&bytes).to_le_bytes());
+        Ok(bytes)
+    }
+
+    /// The state in `bytes`; refused unless it is whole, of the FMU `guid`, and of a model with the
+    /// fields of `M`.
     pub(crate) fn from_bytes(bytes: &[u8], guid: Guid) -> Result<Self, Failure> {
         let refused = |reason: &str| Failure::Error(format!("serialized state: {reason}"));
         if !bytes.starts_with(&MAGIC[..6]) {
@@ -90,8 +102,20 @@ impl<M: Model> Snapshot<M> {
         let core = content[MAGIC.len()..]
             .strip_prefix(&guid.0)
             .ok_or_else(|| refused("of another FMU, its GUID differs"))?;
-        let (core, rest) = postcard::take_from_bytes::<Core<M>>(core)
-            .map_err(|error| refused(&error.to_string()))?;
+        let another_build = |reason: &dyn std::fmt::Display| {
+            refused(&format!(
+                "of another build of this FMU, whose model has fields of other names, types or order: \
+                 only a library with the same model can read it ({reason})"
+            ))
+        };
+        let (stored, core) = core
+            .split_first_chunk::<{ size_of::<Layout>() }>()
+            .ok_or_else(|| another_build(&"no layout"))?;
+        let (core, rest) =
+            postcard::take_from_bytes::<Core<M>>(core).map_err(|error| another_build(&error))?;
+        if layout(&core).map_err(|error| another_build(&error))? != *stored {
+            return Err(another_build(&"the layouts differ"));
+        }
         if !rest.is_empty() || !core.is_possible() {
             return Err(refused("no instance can be in that state"));
         }

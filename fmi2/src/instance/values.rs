@@ -1,8 +1,10 @@
 //! `fmi2GetXXX` and `fmi2SetXXX` of an instance.
 
 use std::ffi::CString;
+use std::mem::MaybeUninit;
 
 use super::{Core, Instance};
+use crate::abi::fmi2String;
 use crate::call_order::State;
 use crate::description::Causality;
 use crate::interface::{Interface, Slot};
@@ -111,33 +113,45 @@ impl<M: Model> Core<M> {
 
 impl<M: Model> Instance<M> {
     /// `fmi2GetReal`.
-    pub(crate) fn get_real(&mut self, from: &[u32], to: &mut [f64]) -> Result<(), Failure> {
+    pub(crate) fn get_real(
+        &mut self,
+        from: &[u32],
+        to: &mut [MaybeUninit<f64>],
+    ) -> Result<(), Failure> {
         self.refresh()?;
         for (&reference, value) in from.iter().zip(to) {
-            *value = match self.interface.real(reference)? {
+            value.write(match self.interface.real(reference)? {
                 Some(slot) => *(slot.field)(&mut self.core.model),
                 None => self.core.time,
-            };
+            });
         }
         Ok(())
     }
 
     /// `fmi2GetInteger`.
-    pub(crate) fn get_integer(&mut self, from: &[u32], to: &mut [i32]) -> Result<(), Failure> {
+    pub(crate) fn get_integer(
+        &mut self,
+        from: &[u32],
+        to: &mut [MaybeUninit<i32>],
+    ) -> Result<(), Failure> {
         self.refresh()?;
         for (&reference, value) in from.iter().zip(to) {
             let slot = slot(&self.interface.integers, reference, "Integer")?;
-            *value = *(slot.field)(&mut self.core.model);
+            value.write(*(slot.field)(&mut self.core.model));
         }
         Ok(())
     }
 
     /// `fmi2GetBoolean`.
-    pub(crate) fn get_boolean(&mut self, from: &[u32], to: &mut [i32]) -> Result<(), Failure> {
+    pub(crate) fn get_boolean(
+        &mut self,
+        from: &[u32],
+        to: &mut [MaybeUninit<i32>],
+    ) -> Result<(), Failure> {
         self.refresh()?;
         for (&reference, value) in from.iter().zip(to) {
             let slot = slot(&self.interface.booleans, reference, "Boolean")?;
-            *value = i32::from(*(slot.field)(&mut self.core.model));
+            value.write(i32::from(*(slot.field)(&mut self.core.model)));
         }
         Ok(())
     }
@@ -146,7 +160,7 @@ impl<M: Model> Instance<M> {
     pub(crate) fn get_string(
         &mut self,
         from: &[u32],
-        to: &mut [crate::abi::fmi2String],
+        to: &mut [MaybeUninit<fmi2String>],
     ) -> Result<(), Failure> {
         self.refresh()?;
         self.strings.clear();
@@ -156,7 +170,7 @@ impl<M: Model> Instance<M> {
             self.strings.push(CString::new(text).unwrap_or_default());
         }
         for (text, pointer) in self.strings.iter().zip(to) {
-            *pointer = text.as_ptr();
+            pointer.write(text.as_ptr());
         }
         Ok(())
     }
@@ -254,7 +268,7 @@ impl<M: Model> Instance<M> {
         &mut self,
         from: &[u32],
         orders: &[i32],
-        values: &mut [f64],
+        values: &mut [MaybeUninit<f64>],
     ) -> Result<(), Failure> {
         self.refresh()?;
         let highest = self.interface.max_output_derivative_order;
@@ -269,7 +283,8 @@ impl<M: Model> Instance<M> {
                     "{name}: order {order}, expected 1 to maxOutputDerivativeOrder = {highest}"
                 )));
             }
-            *value = of_order(slot, order).map_or(0.0, |field| *field(&mut self.core.model));
+            let field = of_order(slot, order);
+            value.write(field.map_or(0.0, |field| *field(&mut self.core.model)));
         }
         Ok(())
     }

@@ -30,6 +30,7 @@ pub(crate) struct Message {
 struct Ear {
     messages: RefCell<Vec<Message>>,
     component: Cell<fmi2Component>,
+    panics: Cell<bool>,
 }
 
 /// A logger as C has it, but for the dots: where variadic arguments are passed as all others are,
@@ -49,6 +50,9 @@ unsafe extern "C" fn receive(
     assert_eq!(format, c"%s");
     let [category, text] = [category, text].map(|each| each.to_string_lossy().into_owned());
     ear.messages.borrow_mut().push(Message { status, category, text });
+    if ear.panics.get() {
+        assert!(std::panic::catch_unwind(|| panic!("the importer's logger")).is_err());
+    }
     // A call from the logger is an error and nothing else: no message, nothing reset, nothing freed.
     let component = ear.component.get();
     // SAFETY: the component is null or its memory is there until the logger returns.
@@ -70,6 +74,10 @@ impl Saved {
 
     pub(crate) fn is_null(&self) -> bool {
         self.0.is_null()
+    }
+
+    pub(crate) fn raw(&self) -> fmi2FMUstate {
+        self.0
     }
 }
 
@@ -110,7 +118,8 @@ pub(crate) struct Order {
 impl Importer {
     pub(crate) fn new(order: &Order) -> Self {
         let messages = RefCell::default();
-        let ear = Box::new(Ear { messages, component: Cell::new(null_mut()) });
+        let (component, panics) = (Cell::new(null_mut()), Cell::new(false));
+        let ear = Box::new(Ear { messages, component, panics });
         // SAFETY: the same function, see `receive`.
         let logger = unsafe {
             std::mem::transmute::<
@@ -144,6 +153,15 @@ impl Importer {
 
     pub(crate) fn exists(&self) -> bool {
         !self.component.is_null()
+    }
+
+    pub(crate) fn component(&self) -> fmi2Component {
+        self.component
+    }
+
+    /// From now on the logger panics, and catches it.
+    pub(crate) fn let_the_logger_panic(&self) {
+        self.ear.panics.set(true);
     }
 
     /// The messages since the last call of this.

@@ -297,6 +297,7 @@ impl Model for Machine {
 
     fn event_indicators(&self, _: f64, indicators: &mut [f64]) {
         reach_infallible(Place::Indicators);
+        assert_eq!(indicators, [0.0], "the model sees nothing of the importer's memory");
         indicators[0] = self.x;
     }
 

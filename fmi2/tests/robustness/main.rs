@@ -8,6 +8,8 @@ mod calls;
 mod changes;
 mod choice;
 mod corpus;
+#[cfg(not(miri))]
+mod hook;
 mod importer;
 mod machine;
 mod mutations;
@@ -17,3 +19,4 @@ mod sequence;
 mod sequences;
 mod targets;
 mod threads;
+mod uninitialised;

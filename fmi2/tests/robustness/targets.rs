@@ -80,8 +80,8 @@ pub(crate) fn serialized_state(data: &[u8]) {
     assert!(state.is_null());
     assert_eq!(importer.get_fmu_state(Some(&mut state)), OK);
     let own = serialized(&importer, &state);
-    let header = "FMI2ST02".len() + 16;
-    let mut forged = [&own[..header], data].concat();
+    let (guid, layout) = (16, 8);
+    let mut forged = [&own[.."FMI2ST03".len() + guid + layout], data].concat();
     forged.extend_from_slice(&crc32fast::hash(&forged).to_le_bytes());
     let status = importer.de_serialize_fmu_state(&Array::right(forged), Some(&mut state));
     assert!([OK, ERROR].contains(&status));

@@ -8,6 +8,7 @@ use super::pendulum::{
 use crate::abi::Status;
 use crate::call_order::{Function, InterfaceType, State};
 use crate::description::{Causality, DependencyKind, Initial, Kind, Variability};
+use crate::ffi::room_of;
 use crate::instance::Instance;
 use crate::interface::{Interface, problems};
 use crate::model::{Failure, Model};
@@ -50,7 +51,7 @@ fn set_side(instance: &mut Instance<Pendulum>, value: i32) -> Status {
 fn directional(instance: &mut Instance<Pendulum>, unknown: u32, known: u32) -> Result<f64, Status> {
     let mut value = [f64::NAN];
     let status = instance.call(Function::GetDirectionalDerivative, |own| {
-        own.get_directional_derivative(&[unknown], (&[known], &[2.0]), &mut value)
+        own.get_directional_derivative(&[unknown], (&[known], &[2.0]), room_of(&mut value))
     });
     if status == Status::OK { Ok(value[0] / 2.0) } else { Err(status) }
 }
@@ -82,11 +83,11 @@ fn an_importer_integrates_the_states_it_was_given() {
     let mut instance = continuous();
     let (mut x, mut slopes, mut nominals) = ([0.0; 2], [0.0; 2], [0.0; 2]);
     ok(&mut instance, Function::GetContinuousStates, |own| {
-        own.get_continuous_states(&mut x).unwrap();
+        own.get_continuous_states(room_of(&mut x)).unwrap();
     });
     assert_eq!(x, [0.5, 0.0]);
     ok(&mut instance, Function::GetNominalsOfContinuousStates, |own| {
-        own.get_nominals(&mut nominals).unwrap();
+        own.get_nominals(room_of(&mut nominals)).unwrap();
     });
     assert_eq!(nominals, [0.25, 1.0]);
     ok(&mut instance, Function::SetTime, |own| own.set_time(0.5).unwrap());
@@ -94,11 +95,13 @@ fn an_importer_integrates_the_states_it_was_given() {
         own.set_continuous_states(&[0.25, -2.0]).unwrap();
     });
     assert_eq!(set(&mut instance, TORQUE, 3.0), Status::OK);
-    ok(&mut instance, Function::GetDerivatives, |own| own.get_derivatives(&mut slopes).unwrap());
+    ok(&mut instance, Function::GetDerivatives, |own| {
+        own.get_derivatives(room_of(&mut slopes)).unwrap();
+    });
     assert_eq!(slopes, [-2.0, 2.0 * 3.0 - 0.25_f64.sin() + 0.1 * 2.0]);
     let mut indicator = [0.0];
     ok(&mut instance, Function::GetEventIndicators, |own| {
-        own.get_event_indicators(&mut indicator).unwrap();
+        own.get_event_indicators(room_of(&mut indicator)).unwrap();
     });
     assert_eq!(indicator, [0.75]);
 }
@@ -117,7 +120,7 @@ fn an_event_may_change_states_announce_the_next_one_and_end_the_simulation() {
     });
     let mut x = [0.0; 2];
     ok(&mut instance, Function::GetContinuousStates, |own| {
-        own.get_continuous_states(&mut x).unwrap();
+        own.get_continuous_states(room_of(&mut x)).unwrap();
     });
     assert_eq!(x, [1.0, -4.0]);
     ok(&mut instance, Function::EnterContinuousTimeMode, Instance::enter_continuous_time_mode);
@@ -140,15 +143,23 @@ fn wrong_lengths_times_and_states_are_refused() {
             |own| own.set_continuous_states(&[1.0, f64::NAN]),
             Status::Discard,
         ),
-        (Function::GetDerivatives, |own| own.get_derivatives(&mut [0.0; 3]), Status::Error),
-        (Function::GetEventIndicators, |own| own.get_event_indicators(&mut []), Status::Error),
+        (
+            Function::GetDerivatives,
+            |own| own.get_derivatives(room_of(&mut [0.0; 3])),
+            Status::Error,
+        ),
+        (
+            Function::GetEventIndicators,
+            |own| own.get_event_indicators(room_of(&mut [])),
+            Status::Error,
+        ),
         (Function::SetTime, |own| own.set_time(f64::NAN), Status::Error),
         (Function::SetTime, |own| own.set_time(-1.0), Status::Error),
         (
             Function::GetDerivatives,
             |own| {
                 own.set_continuous_states(&[101.0, 0.0])?;
-                own.get_derivatives(&mut [0.0; 2])
+                own.get_derivatives(room_of(&mut [0.0; 2]))
             },
             Status::Discard,
         ),
@@ -252,9 +263,11 @@ fn the_loop_of_an_integrator_does_not_allocate() {
             instance.call(Function::SetTime, |own| own.set_time(time));
             instance
                 .call(Function::SetContinuousStates, |own| own.set_continuous_states(&[0.1, time]));
-            instance.call(Function::GetDerivatives, |own| own.get_derivatives(&mut slopes));
             instance
-                .call(Function::GetEventIndicators, |own| own.get_event_indicators(&mut indicator));
+                .call(Function::GetDerivatives, |own| own.get_derivatives(room_of(&mut slopes)));
+            instance.call(Function::GetEventIndicators, |own| {
+                own.get_event_indicators(room_of(&mut indicator))
+            });
             directional(&mut instance, HEIGHT, ANGLE).unwrap();
         }
         assert_eq!(slopes[0], 9.5);
@@ -275,7 +288,7 @@ fn an_integrator_may_look_past_stop_time_but_complete_no_step_there() {
             instance.core.experiment.stop_time = Some(2.0);
             ok(&mut instance, Function::SetTime, |own| own.set_time(time).unwrap());
             ok(&mut instance, Function::GetDerivatives, |own| {
-                own.get_derivatives(&mut [0.0; 2]).unwrap();
+                own.get_derivatives(room_of(&mut [0.0; 2])).unwrap();
             });
             assert_eq!(instance.call(function, body), expected, "{function:?} at {time}");
         }

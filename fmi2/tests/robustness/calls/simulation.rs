@@ -18,11 +18,14 @@ pub(super) fn do_step(call: &mut Call) -> Outcome {
         start = call.choice.of(&[core.time + 1.0, core.time - 0.1, f64::NAN, f64::INFINITY]);
     }
     if call.choice.rarely() {
-        step = call.choice.of(&[0.0, -0.25, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e-15]);
+        step =
+            call.choice.of(&[0.0, -0.25, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e-15, 1e-20]);
     }
     let status = call.importer.do_step(start, step);
     let end = start + step;
-    let fine = start == core.time && step > 0.0 && step.is_finite() && core.is_before_stop(end);
+    // A step that does not lead from one number to a later one would not be one.
+    let takes_time = step >= start.next_up() - start;
+    let fine = start == core.time && takes_time && step.is_finite() && core.is_before_stop(end);
     let half_way = start + 0.5 * step;
     let outcome = Outcome::if_fine(status, fine).with(move |core, _| core.time = end);
     Outcome { half_way, ..outcome }

@@ -1,0 +1,63 @@
+//! y = 2 u, and a panic on request.
+
+use std::path::Path;
+
+use fmi2::{About, Experiment, Failure, Model, Step, Variable};
+use serde::{Deserialize, Serialize};
+
+#[derive(Clone, Serialize, Deserialize)]
+pub(crate) struct HostileNames {
+    u: f64,
+    y: f64,
+    panics: bool,
+    steps: i32,
+}
+
+impl Model for HostileNames {
+    const IDENTIFIER: &'static str = "HostileNames";
+
+    fn about(&self) -> About {
+        About { description: "Names that others have, too".to_owned(), ..About::default() }
+    }
+
+    fn new(_resources: &Path) -> Result<Self, Failure> {
+        Ok(Self { u: 0.0, y: 0.0, panics: false, steps: 0 })
+    }
+
+    fn variables(&self) -> Vec<Variable<Self>> {
+        vec![
+            Variable::real("u", "Input", |own: &mut Self| &mut own.u).input(),
+            Variable::real("y", "Twice the input", |own: &mut Self| &mut own.y).output(&["u"]),
+            Variable::boolean("panics", "A step panics", |own: &mut Self| &mut own.panics).input(),
+            Variable::integer("steps", "Steps done", |own: &mut Self| &mut own.steps).output(&[]),
+        ]
+    }
+
+    fn initialize(&mut self, _experiment: &Experiment) -> Result<(), Failure> {
+        HostileNames::step(self);
+        Ok(())
+    }
+
+    fn update(&mut self, _time: f64) -> Result<(), Failure> {
+        HostileNames::step(self);
+        Ok(())
+    }
+
+    fn step(&mut self, _step: &Step) -> Result<(), Failure> {
+        assert!(!self.panics, "it panics, as it was told");
+        self.steps += 1;
+        HostileNames::step(self);
+        Ok(())
+    }
+}
+
+/// Functions called like those of the trait and of the C interface, with other arguments.
+impl HostileNames {
+    fn step(&mut self) {
+        self.y = HostileNames::reset(self.u);
+    }
+
+    fn reset(u: f64) -> f64 {
+        2.0 * u
+    }
+}
