@@ -68,7 +68,8 @@ def read(path):
         raise LeftOut(f"of FMI {version.split('-')[0]}")
     if root.find("CoSimulation") is None:
         raise LeftOut("that are for model exchange only")
-    if not any(name.startswith(f"binaries/{folder}/") for name in names for folder in HERE):
+    files = [name for name in names if not name.endswith("/")]
+    if not any(name.startswith(f"binaries/{folder}/") for name in files for folder in HERE):
         raise LeftOut("without a library for this platform")
     fmu = Fmu(path)
     experiment(fmu, root.find("DefaultExperiment"))
