@@ -1,16 +1,19 @@
 //! `aso-ftc check`: what an importer will stumble over.
 #![expect(clippy::print_stdout, reason = "the result of the command")]
 
+mod answer;
 mod archive;
 mod behaviour;
 pub(crate) mod binaries;
 mod description;
 mod finding;
+mod fold;
 mod heard;
 #[cfg(test)]
 mod tests;
 mod values;
 
+use std::collections::HashSet;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -21,6 +24,7 @@ use master::isolate::{self, IsolateError, Isolated, Package};
 use master::{Fmu, Instance};
 use serde::Serialize;
 
+use answer::{Answer, Here};
 use finding::Finding;
 
 pub(crate) use finding::Severity;
@@ -47,26 +51,33 @@ pub(crate) struct Options {
 #[derive(Serialize)]
 struct Report<'a> {
     fmu: &'a Path,
+    #[serde(flatten)]
+    answer: &'a Answer,
     errors: usize,
     warnings: usize,
     notes: usize,
     findings: &'a [Finding],
 }
 
-/// Prints each finding; true where none is an error.
+/// Prints whether the FMU runs, then what was found; true where no finding is an error.
 pub(crate) fn check(options: &Options) -> anyhow::Result<bool> {
-    let findings = findings(options)?;
+    let unpacked = Unpacked::open_whole(&options.fmu)?;
+    let (here, findings) = findings(options, &unpacked)?;
+    let answer = Answer::new(here, &findings);
     let count = |severity| findings.iter().filter(|own| own.severity == severity).count();
     let (errors, warnings) = (count(Severity::Error), count(Severity::Warning));
     let notes = count(Severity::Note);
     let fmu = &options.fmu;
     if options.json {
-        let report = Report { fmu, errors, warnings, notes, findings: &findings };
+        let findings = &findings;
+        let report = Report { fmu, answer: &answer, errors, warnings, notes, findings };
         println!("{}", serde_json::to_string_pretty(&report)?);
         return Ok(errors == 0);
     }
-    for finding in &findings {
-        println!("{finding}");
+    println!("{answer}");
+    let variables = unpacked.description.variables.iter().map(|own| own.name.as_str());
+    for line in fold::fold(&findings, &variables.collect::<HashSet<_>>()) {
+        println!("{line}");
     }
     let name = fmu.display();
     match (errors, warnings) {
@@ -76,31 +87,49 @@ pub(crate) fn check(options: &Options) -> anyhow::Result<bool> {
     Ok(errors == 0)
 }
 
-/// All findings, errors first.
-fn findings(options: &Options) -> anyhow::Result<Vec<Finding>> {
-    let unpacked = Unpacked::open_whole(&options.fmu)?;
+/// What came of the trial, and all findings: errors first, of these the ones that stop a tool.
+fn findings(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(Here, Vec<Finding>)> {
     let description = &unpacked.description;
     let mut findings = archive::check(&options.fmu, unpacked.entries(), description)?;
     findings.extend(description::check(description, &unpacked.warnings));
     let read = |path: &str| std::fs::read(unpacked.folder().join(path));
     findings.extend(binaries::check(&read, unpacked.entries(), description));
-    if can_run(&unpacked) && !options.no_run {
-        findings.extend(run(options, &unpacked)?);
-    }
-    findings.sort_by_key(|finding| (finding.severity, finding.part));
-    Ok(findings)
+    let here = match why_not(options, unpacked) {
+        Some(reason) => Here::NotTried { reason },
+        None => {
+            let (mut here, mut found) = run(options, unpacked)?;
+            let folder = format!("{}/", unpacked.folder().display());
+            if let Here::No { reason } = &mut here {
+                *reason = reason.replace(&folder, "");
+            }
+            for finding in &mut found {
+                finding.what = finding.what.replace(&folder, "");
+            }
+            findings.extend(found);
+            here
+        }
+    };
+    findings.sort_by_key(|finding| (finding.severity, finding.stops.is_empty(), finding.part));
+    Ok((here, findings))
 }
 
-/// Whether there is a library for this platform, and nothing else is needed.
-fn can_run(unpacked: &Unpacked) -> bool {
-    let simulation = unpacked.description.co_simulation.as_ref();
-    simulation.is_some_and(|own| {
-        !own.needs_execution_tool && unpacked.library(&own.model_identifier).is_ok()
-    })
+/// Why the FMU is not tried, if it is not.
+fn why_not(options: &Options, unpacked: &Unpacked) -> Option<String> {
+    if options.no_run {
+        return Some("--no-run".to_owned());
+    }
+    let Some(simulation) = &unpacked.description.co_simulation else {
+        return Some("it is for model exchange only".to_owned());
+    };
+    if simulation.needs_execution_tool {
+        let tool = unpacked.description.generation_tool.as_deref().unwrap_or("the exporting tool");
+        return Some(format!("it needs {tool} beside it (needsExecutionTool)"));
+    }
+    unpacked.library(&simulation.model_identifier).err().map(|error| error.to_string())
 }
 
 /// Tries the FMU: on Linux in processes of its own, which may crash or hang.
-fn run(options: &Options, unpacked: &Unpacked) -> anyhow::Result<Vec<Finding>> {
+fn run(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(Here, Vec<Finding>)> {
     let seconds = options.time_limit;
     let limit = Duration::try_from_secs_f64(seconds).ok().filter(|limit| !limit.is_zero());
     let limit = limit.with_context(|| {
@@ -133,7 +162,7 @@ fn isolated(
     options: &Options,
     unpacked: &Unpacked,
     limit: Duration,
-) -> anyhow::Result<Vec<Finding>> {
+) -> anyhow::Result<(Here, Vec<Finding>)> {
     let package = Package::open(unpacked.folder())?;
     let preload = options.preload.clone();
     let options = isolate::Options { time_limit: Some(limit), preload, ..Default::default() };

@@ -156,7 +156,7 @@ def test_stored_entries_of_a_stream_are_an_error(check, tmp_path, files):
     [
         ({"readme.txt": "x"}, "expected nothing but", "error"),
         ({"Resources/x": "x"}, "expected resources, in this case", "error"),
-        ({"documentation/index.html": None}, "expected index.html", "error"),
+        ({"documentation/index.html": None}, "expected index.html", "warning"),
         ({"model.png": "GIF89a"}, "expected a PNG", "warning"),
         ({"resources/a": "1", "resources/A": "2"}, "in upper and lower case only", "warning"),
         ({"resources/nul.txt": "1"}, "a name that Windows does not allow", "warning"),
@@ -178,6 +178,141 @@ def test_source_files_that_are_not_there_are_an_error(check, fmu, files):
     assert "sources/a.c" in the_one(findings, "archive", "SourceFiles")["what"]
     _, findings = check(fmu({"modelDescription.xml": with_sources, "sources/a.c": ""}), "--no-run")
     assert not [own for own in findings if "SourceFiles" in own["what"]]
+
+
+@pytest.mark.parametrize("name", ["./a.c", "sub/a.c", "sub\\a.c", "sources/a.c", "sub/../a.c", "./sub/./a.c"])
+def test_source_files_are_found_however_their_path_is_written(check, fmu, files, name):
+    xml = files["modelDescription.xml"].decode()
+    stated = rf'\1><SourceFiles><File name="{name}"/></SourceFiles></CoSimulation>'.replace("sub\\", "sub\\\\")
+    xml = re.sub(r"(<CoSimulation[^>]*)/>", stated, xml)
+    path = "sources/" + name.replace("\\", "/").replace("sub/../", "").replace("./", "").removeprefix("sources/")
+    _, findings = check(fmu({"modelDescription.xml": xml, path: ""}), "--no-run")
+    assert not [own for own in findings if "SourceFiles" in own["what"]], path
+    _, findings = check(fmu({"modelDescription.xml": xml, "sources/b.c": ""}), "--no-run")
+    assert the_one(findings, "archive", "SourceFiles")["severity"] == "error"
+
+
+def test_a_source_file_in_another_case_is_a_warning_and_one_outside_an_error(check, fmu, files):
+    xml = files["modelDescription.xml"].decode()
+    for name, severity, words in [("A.c", "warning", "SourceFiles"), ("../../a.c", "error", "a file in sources")]:
+        stated = rf'\1><SourceFiles><File name="{name}"/></SourceFiles></CoSimulation>'
+        changed = re.sub(r"(<CoSimulation[^>]*)/>", stated, xml)
+        _, findings = check(fmu({"modelDescription.xml": changed, "sources/a.c": ""}), "--no-run")
+        assert the_one(findings, "archive", words)["severity"] == severity
+
+
+def test_an_empty_folder_of_a_platform_is_a_note(check, fmu):
+    _, findings = check(fmu({"binaries/linux32/": ""}), "--no-run")
+    found = [own for own in findings if own["where"] == "binaries/linux32/"]
+    assert [own["severity"] for own in found] == ["note"], findings
+
+
+def answer(aso_ftc, path, *more):
+    done = aso_ftc("check", "--json", *more, path)
+    assert done.returncode in (0, 1), done
+    report = json.loads(done.stdout)
+    return report["here"], {own["tool"]: own["reason"] for own in report["not_in"]}
+
+
+def test_the_answer_comes_first_and_says_with_what_the_fmu_ran(aso_ftc, packed):
+    done = aso_ftc("check", packed["plant"])
+    first, second, *_ = done.stdout.splitlines()
+    assert re.fullmatch(r"runs in this master: yes, 10 steps of \S+ s from t = 0 s .* its own start values", first)
+    assert second == "no tool is known to refuse it"
+    here, tools = answer(aso_ftc, packed["plant"], "--no-run")
+    assert here == {"runs": "not-tried", "reason": "--no-run"} and not tools
+
+
+def validated(path):
+    """Whether FMPy's simulate_fmu takes the description by default."""
+    try:
+        read_model_description(str(path), validate=True)
+    except Exception:
+        return False
+    return True
+
+
+FMPY = "FMPy with validate=True, its default"
+LIBRARY = "FMI Library (libcosim, PyFMI)"
+
+
+@pytest.mark.parametrize(
+    "before, after, tools",
+    [
+        ("<ModelVariables>", '<ModelVariables colour="red">', {FMPY}),
+        (' unit="N"', ' unit="Newton"', {FMPY}),
+        ("<ModelVariables>", "<ModelVariables><!-- comment -->", set()),
+        (r'generationDateAndTime="[^"]*"', 'generationDateAndTime="2024-01-01T00:00:00+01:00"', set()),
+        ("<InitialUnknowns>.*?</InitialUnknowns>", "", set()),
+    ],
+)
+def test_fmpy_refuses_by_default_what_it_is_said_to_refuse(aso_ftc, fmu, files, before, after, tools):
+    xml, count = re.subn(before, after, files["modelDescription.xml"].decode(), flags=re.DOTALL)
+    if "generationDate" in before and not count:
+        xml, count = re.subn("<fmiModelDescription", f"<fmiModelDescription {after}", xml, count=1)
+    assert count
+    path = fmu({"modelDescription.xml": xml})
+    _, said = answer(aso_ftc, path, "--no-run")
+    assert set(said) == tools, said
+    assert validated(path) == (FMPY not in tools)
+
+
+def test_another_fmi_version_is_refused_by_fmpy_with_every_option(aso_ftc, fmu, files):
+    xml = files["modelDescription.xml"].decode().replace('fmiVersion="2.0"', 'fmiVersion="2.0.1"')
+    path = fmu({"modelDescription.xml": xml})
+    _, said = answer(aso_ftc, path, "--no-run")
+    assert "FMPy" in said, said
+    with pytest.raises(Exception, match="Unsupported FMI version"):
+        read_model_description(str(path), validate=False)
+
+
+def loads_in_libcosim(python, path):
+    program = "import sys\nfrom libcosimpy.CosimSlave import CosimLocalSlave\n"
+    program += "from libcosimpy.CosimExecution import CosimExecution\n"
+    program += "slave = CosimLocalSlave(sys.argv[1], 'x')\n"
+    program += "print('index', CosimExecution.from_step_size(10**7).add_local_slave(slave))"
+    return "index 0" in python("-c", program, path).stdout
+
+
+@pytest.mark.parametrize(
+    "function, tools", [("fmi2GetDirectionalDerivative", {"FMPy"}), ("fmi2DoStep", {"FMPy", LIBRARY})]
+)
+def test_a_missing_function_stops_the_tools_that_need_it(aso_ftc, python, fmu, files, function, tools):
+    xml = files["modelDescription.xml"].decode().replace(' providesDirectionalDerivative="true"', "")
+    name = library(files)
+    other = function[:-1] + "X"
+    code = files[name].replace(f"\0{function}\0".encode(), f"\0{other}\0".encode())
+    assert code != files[name]
+    path = fmu({"modelDescription.xml": xml, name: code})
+    _, said = answer(aso_ftc, path, "--no-run")
+    assert set(said) == tools, said
+    with pytest.raises(Exception):
+        fmpy.simulate_fmu(str(path), stop_time=0.01, validate=False)
+    assert loads_in_libcosim(python, path) == (LIBRARY not in tools)
+
+
+@pytest.mark.parametrize("identifier, tools", [("Friction-Pendulum", set()), ("1Pendulum", {LIBRARY})])
+def test_fmi_library_wants_an_identifier_that_begins_as_one_in_c(aso_ftc, python, fmu, files, identifier, tools):
+    xml = files["modelDescription.xml"].decode()
+    xml = xml.replace('modelIdentifier="FrictionPendulum"', f'modelIdentifier="{identifier}"')
+    name = library(files)
+    renamed = name.replace("FrictionPendulum", identifier)
+    path = fmu({"modelDescription.xml": xml, name: None, renamed: files[name]})
+    _, said = answer(aso_ftc, path, "--no-run")
+    assert set(said) == tools, said
+    assert loads_in_libcosim(python, path) == (LIBRARY not in tools)
+
+
+def test_equal_findings_are_one_line_with_a_count_and_all_are_in_the_json(aso_ftc, check, fmu, files):
+    xml = files["modelDescription.xml"].decode()
+    xml = re.sub(r' unit="[^"]*"', ' unit="?"', xml)
+    path = fmu({"modelDescription.xml": xml})
+    _, findings = check(path, "--no-run")
+    undefined = [own for own in findings if "which is not defined" in own["what"]]
+    assert len(undefined) > 2
+    lines = aso_ftc("check", "--no-run", path).stdout.splitlines()
+    (line,) = [own for own in lines if own.startswith("error") and "which is not defined" in own]
+    assert f"; and {len(undefined) - 1} more variables" in line, line
 
 
 def test_a_library_for_another_machine_is_an_error(check, fmu, files):

@@ -6,7 +6,10 @@ use std::path::PathBuf;
 
 use fmi2::Experiment;
 use fmi2::abi::Status;
-use master::{CallError, Failure, Fmu, FmuError, Instance, LoadError, Slave, Stepped};
+use master::linearise::{Differences, Method};
+use master::{
+    CallError, Failure, Fmu, FmuError, Instance, Linearise, LoadError, Slave, Stepped, linearise,
+};
 use tempfile::TempDir;
 use tests::c_fmu::CFmu;
 
@@ -261,4 +264,29 @@ fn parameters_choose_the_behaviour_of_a_built_library() {
     initialise(&mut slave).unwrap();
     let error = slave.terminate().unwrap_err();
     assert_eq!(error.to_string(), "fmi2Terminate returned fmi2Error: as it was told");
+}
+
+/// x' = u, of which the library refuses a second instance while there is one.
+#[test]
+fn an_fmu_that_allows_one_instance_is_linearised_by_steps() {
+    let once = CFmu::that("one instance only").flag("canBeInstantiatedOnlyOncePerProcess", true);
+    let fmu = open(&once);
+    let names = |name: &str| vec![name.to_owned()];
+    let request = Linearise {
+        inputs: names("u"),
+        outputs: names("y"),
+        states: names("y"),
+        at: vec![("u".to_owned(), "0".to_owned())],
+        step: Some(0.125),
+        ..Linearise::default()
+    };
+    for _ in 0..2 {
+        let plant = linearise(&fmu, &request).unwrap();
+        assert!(matches!(
+            plant.method,
+            Method::FiniteDifferences { how: Differences::OfSteps { .. }, .. }
+        ));
+        let (a, b) = (plant.matrices.a[(0, 0)], plant.matrices.b[(0, 0)]);
+        assert!(a.abs() < 1e-9 && (b - 1.0).abs() < 1e-9, "{a} {b}");
+    }
 }

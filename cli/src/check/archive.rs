@@ -36,7 +36,7 @@ pub(super) fn check(
 ) -> anyhow::Result<Vec<Finding>> {
     let mut findings = Findings::about(Part::Archive);
     if path.extension().is_none_or(|extension| extension != "fmu") {
-        let why = "FMPy and others open .fmu only.";
+        let why = "Tools that open files by their extension do not offer it.";
         findings.add(
             Error,
             path.display().to_string(),
@@ -159,10 +159,10 @@ fn top_level(names: &[String], findings: &mut Findings) {
 }
 
 fn documentation(names: &[String], findings: &mut Findings) {
-    let has = |path: &str| names.iter().any(|name| name.starts_with(path));
+    let has = |path: &str| names.iter().any(|name| name.starts_with(path) && !name.ends_with('/'));
     if has("documentation/") && !has("documentation/index.html") {
         let what = "expected index.html in it, the entry to the documentation";
-        findings.add(Error, "documentation", what, ("Tools have nothing to show.", SECTION));
+        findings.add(Warning, "documentation", what, ("Tools have nothing to show.", SECTION));
     }
     if !has("documentation/licenses/license.") {
         let what = "expected documentation/licenses/license.txt or .html, found neither";
@@ -172,24 +172,52 @@ fn documentation(names: &[String], findings: &mut Findings) {
 
 /// `SourceFiles` are in `sources`.
 fn sources(names: &[String], description: &ModelDescription, findings: &mut Findings) {
+    let there: HashSet<String> = names.iter().filter_map(|name| normal(name)).collect();
+    let lower: HashSet<String> = there.iter().map(|name| name.to_lowercase()).collect();
     for (interface, files) in [
         ("ModelExchange", description.model_exchange.as_ref().map(|own| &own.source_files)),
         ("CoSimulation", description.co_simulation.as_ref().map(|own| &own.source_files)),
     ] {
         for file in files.into_iter().flatten() {
-            let path = format!("sources/{file}");
-            if !names.contains(&path) {
-                let what =
-                    format!("expected {path}, which SourceFiles of {interface} names, found none");
-                findings.add(
-                    Error,
-                    "sources",
-                    what,
-                    ("It cannot be built for another platform.", "2.3"),
-                );
+            let path = normal(&format!("sources/{file}"));
+            // Some exporters write the folder, too.
+            let with_folder = normal(file).filter(|path| path.starts_with("sources/"));
+            let mut paths = path.iter().chain(&with_folder);
+            if paths.any(|path| there.contains(path)) {
+                continue;
+            }
+            let path = path.filter(|path| path.starts_with("sources/"));
+            let Some(path) = path else {
+                let what = format!("expected a file in sources, {interface} names {file:?}");
+                findings.add(Error, "sources", what, ("It cannot be built.", "2.3"));
+                continue;
+            };
+            let what =
+                format!("expected {path}, which SourceFiles of {interface} names, found none");
+            if lower.contains(&path.to_lowercase()) {
+                let why = "It is there in other upper and lower case: it cannot be built on Linux.";
+                findings.add(Warning, "sources", what, (why, "2.3"));
+            } else {
+                let why = "It cannot be built for another platform.";
+                findings.add(Error, "sources", what, (why, "2.3"));
             }
         }
     }
+}
+
+/// A path with slashes and without `.` and `..`; none where it leaves the archive.
+fn normal(path: &str) -> Option<String> {
+    let mut parts: Vec<&str> = Vec::new();
+    for part in path.split(['/', '\\']) {
+        match part {
+            "" | "." => {}
+            ".." => {
+                parts.pop()?;
+            }
+            part => parts.push(part),
+        }
+    }
+    Some(parts.join("/"))
 }
 
 fn picture<R: std::io::Read>(mut file: ZipFile<'_, R>, findings: &mut Findings) {

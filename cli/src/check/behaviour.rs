@@ -6,17 +6,18 @@ use fmi2::Experiment;
 use fmi2::description::ModelDescription;
 use master::{CallError, Failure, Slave, Stepped};
 
+use super::answer::Here;
 use super::finding::Severity::{Error, Note, Warning};
-use super::finding::{Finding, Findings, Part};
+use super::finding::{Finding, Findings, Part, Tool};
 use super::heard::Heard;
-use super::values::{Value, get, kept, outputs, start, unknown_reference};
+use super::values::{Value, distance, get, kept, outputs, start, unknown_reference};
 
 /// Steps of a trial.
 const STEPS: u32 = 10;
 /// Variables of one kind that are compared; the others are as they are.
 const LOOKED_AT: usize = 1000;
-/// Findings of one kind that are listed.
-const LISTED: usize = 10;
+/// A difference relative to a value's size that a solver makes which starts anew from a state.
+const ROUNDED: f64 = 1e-6;
 
 /// Messages of a trial from which on they are a flood: a hundred or so for each of its steps.
 const FLOOD: u64 = 10_000;
@@ -28,12 +29,13 @@ pub(super) type Make<'a, S> = dyn FnMut(&str, Option<S>) -> anyhow::Result<S> + 
 /// The outputs at each communication point of a trial, the start with them.
 type Course = Vec<Vec<Value>>;
 
-/// Tries the FMU of `description`, of which `make` gives instances.
+/// Tries the FMU of `description`, of which `make` gives instances: whether it runs, and what is found.
 pub(super) fn check<S: Slave>(
     description: &ModelDescription,
     make: &mut Make<'_, S>,
-) -> Vec<Finding> {
-    let mut trial = Trial { description, make, findings: Findings::about(Part::Behaviour) };
+) -> (Here, Vec<Finding>) {
+    let here = Here::No { reason: String::new() };
+    let mut trial = Trial { description, make, here, findings: Findings::about(Part::Behaviour) };
     let ((), told) = Heard::during(|| trial.run());
     trial.categories(&told.categories);
     if told.messages > FLOOD {
@@ -41,12 +43,14 @@ pub(super) fn check<S: Slave>(
         let why = "They slow every run down and bury what others say.";
         trial.findings.add(Warning, "logger", what, (why, "2.1.5"));
     }
-    trial.findings.all
+    (trial.here, trial.findings.all)
 }
 
 struct Trial<'a, S> {
     description: &'a ModelDescription,
     make: &'a mut Make<'a, S>,
+    /// What came of the first instance.
+    here: Here,
     findings: Findings,
 }
 
@@ -56,12 +60,13 @@ fn gone(error: &CallError) -> bool {
     matches!(error.failure, Killed(..) | Exited(_) | TimedOut(_) | Nonsense(_))
 }
 
+const ENDS_IT: &str =
+    "An importer that calls it in its own process ends with it, and loses its results.";
+
 /// What such an end does to an importer.
 fn harm(failure: &Failure) -> Option<&'static str> {
     match failure {
-        Failure::Killed(..) | Failure::Exited(_) => Some(
-            "An importer that calls it in its own process ends with it, and loses its results.",
-        ),
+        Failure::Killed(..) | Failure::Exited(_) => Some(ENDS_IT),
         Failure::TimedOut(_) => Some("An importer waits for it, perhaps for ever."),
         _ => None,
     }
@@ -69,7 +74,8 @@ fn harm(failure: &Failure) -> Option<&'static str> {
 
 impl<S: Slave> Trial<'_, S> {
     fn run(&mut self) {
-        let Some((first, slave)) = self.course("first", None) else { return };
+        let Some((first, slave)) = self.course("first", None) else { return self.stopped() };
+        self.ran(&first);
         if let Some((second, mut slave)) = self.course("second", Some(slave)) {
             if second != first {
                 self.differ(&first, &second);
@@ -81,6 +87,29 @@ impl<S: Slave> Trial<'_, S> {
         self.unknown_reference();
         self.past_the_end();
         self.states();
+    }
+
+    /// The first instance made its steps.
+    fn ran(&mut self, course: &Course) {
+        let steps = u32::try_from(course.len().saturating_sub(1)).unwrap_or(u32::MAX);
+        let in_part = self.findings.all.iter().rfind(|own| own.severity == Note);
+        self.here = Here::Yes {
+            steps,
+            step: self.step_size(),
+            start: self.start_time(),
+            tolerance: self.tolerance(),
+            but: in_part.filter(|_| steps < STEPS).map(|own| own.what.clone()),
+        };
+    }
+
+    /// The first instance failed: the last error says why.
+    fn stopped(&mut self) {
+        let mut errors = self.findings.all.iter_mut().filter(|own| own.severity == Error);
+        let Some(error) = errors.next_back() else { return };
+        self.here = Here::No { reason: format!("{}: {}", error.place, error.what) };
+        if error.why.as_ref().is_some_and(|why| why.starts_with(ENDS_IT)) {
+            error.stops.push(Tool::InProcess);
+        }
     }
 
     fn differ(&mut self, first: &Course, second: &Course) {
@@ -100,7 +129,7 @@ impl<S: Slave> Trial<'_, S> {
             }
         };
         let start_time = self.start_time();
-        let experiment = Experiment { start_time, stop_time, tolerance: None };
+        let experiment = Experiment { start_time, stop_time, tolerance: self.tolerance() };
         let done = slave
             .setup_experiment(&experiment)
             .and_then(|()| slave.enter_initialization_mode())
@@ -143,6 +172,10 @@ impl<S: Slave> Trial<'_, S> {
         }
     }
 
+    fn tolerance(&self) -> Option<f64> {
+        self.description.default_experiment.and_then(|own| own.tolerance)
+    }
+
     fn start_time(&self) -> f64 {
         self.description.default_experiment.and_then(|own| own.start_time).unwrap_or(0.0)
     }
@@ -172,8 +205,7 @@ impl<S: Slave> Trial<'_, S> {
             self.failed(&error, "after the last step", "4.2.4");
             return (!gone(&error)).then_some((course, slave));
         }
-        let read = outputs(self.description).next().map(|output| get(&mut slave, output));
-        match read {
+        match outputs(self.description).next().map(|output| get(&mut slave, output)) {
             Some(Err(error)) if gone(&error) => {
                 self.failed(&error, "after fmi2Terminate", "4.2.4");
                 return None;
@@ -220,7 +252,6 @@ impl<S: Slave> Trial<'_, S> {
 
     /// Compares start values; none where the process of the FMU ended meanwhile.
     fn start_values(&mut self, slave: &mut S) -> Option<()> {
-        let mut others = 0_usize;
         for variable in kept(self.description).take(LOOKED_AT) {
             let Some(stated) = start(variable) else { continue };
             let found = match get(slave, variable) {
@@ -232,21 +263,10 @@ impl<S: Slave> Trial<'_, S> {
                 Ok(found) => format!("the library starts with {found}, the XML says {stated}"),
                 Err(error) => format!("{error}"),
             };
-            others += 1;
-            if others <= LISTED {
-                let why =
-                    "Importers that do not set start values simulate another model than they show.";
-                self.findings.add(
-                    Error,
-                    format!("variable {}", variable.name),
-                    found,
-                    (why, "2.2.7"),
-                );
-            }
-        }
-        if others > LISTED {
-            let what = format!("{} more start values differ", others - LISTED);
-            self.findings.add(Error, "start values", what, ("", "2.2.7"));
+            let place = format!("variable {}", variable.name);
+            let why =
+                "Importers that do not set start values simulate another model than they show.";
+            self.findings.add(Error, place, found, (why, "2.2.7"));
         }
         Some(())
     }
@@ -256,14 +276,10 @@ impl<S: Slave> Trial<'_, S> {
             let step =
                 course.iter().position(|row| row.get(index).is_some_and(|own| !own.is_finite()));
             if let Some(step) = step {
+                let place = format!("variable {}", variable.name);
                 let what = format!("is no finite number after {step} steps");
                 let why = "Most masters carry it on to the end of the run.";
-                self.findings.add(
-                    Warning,
-                    format!("variable {}", variable.name),
-                    what,
-                    (why, "2.2.7"),
-                );
+                self.findings.add(Warning, place, what, (why, "2.2.7"));
             }
         }
     }
@@ -348,10 +364,15 @@ impl<S: Slave> Trial<'_, S> {
     /// Whether the steps could be made again.
     fn again(&mut self, slave: &mut S, first: &Course, function: &str) -> bool {
         let second = self.steps(slave, STEPS);
-        if second.as_ref().is_some_and(|second| second != first) {
-            let what = "the outputs after the state was restored differ from those before";
+        let apart = second.as_ref().map_or(0.0, |second| distance(first, second));
+        if apart > 0.0 {
+            let what = format!(
+                "the outputs after the state was restored differ from those before, by {apart:.1e} \
+                 of their size"
+            );
+            let severity = if apart > ROUNDED { Error } else { Warning };
             let why = "Masters that repeat a step, and optimisers, get wrong results.";
-            self.findings.add(Error, function, what, (why, "2.1.8"));
+            self.findings.add(severity, function, what, (why, "2.1.8"));
         }
         second.is_some()
     }

@@ -8,7 +8,7 @@ use fmi2::description::ModelDescription;
 use object::{Architecture, BinaryFormat, ImportFlags, NameOrOrdinal, Object as _};
 
 use super::finding::Severity::{Error, Note, Warning};
-use super::finding::{Finding, Findings, Part};
+use super::finding::{Finding, Findings, Part, Tool};
 
 const SECTION: &str = "2.3";
 
@@ -76,17 +76,61 @@ pub(crate) fn check(
         for (interfaces, identifier) in interfaces(description) {
             let path = format!("binaries/{name}/{identifier}{}", platform.suffix);
             if !names.contains(&path) {
-                let there =
-                    names.iter().filter(|own| own.starts_with(&format!("binaries/{name}/")));
-                let there: Vec<&str> = there.take(5).map(String::as_str).collect();
-                let what = format!("expected this library, found {}", there.join(", "));
-                findings.add(Error, path, what, ("Importers look for modelIdentifier.", SECTION));
+                missing(path, platform, names, &mut findings);
                 continue;
             }
+            let before = findings.all.len();
             library(read, &path, platform, (&interfaces, names), &mut findings);
+            for finding in &mut findings.all[before..] {
+                finding.stops = stops(finding, platform, &interfaces);
+            }
         }
     }
     findings.all
+}
+
+/// There is no library of the name that importers look for.
+fn missing(path: String, platform: &Platform, names: &[String], findings: &mut Findings) {
+    let folder = format!("binaries/{}/", platform.folder);
+    let mut there = names.iter().filter(|own| own.starts_with(&folder) && !own.ends_with('/'));
+    let there: Vec<&str> = there.by_ref().take(5).map(String::as_str).collect();
+    if there.is_empty() {
+        let why = "It is the same as no folder for this platform.";
+        return findings.add(Note, folder, "an empty folder", (why, SECTION));
+    }
+    let what = format!("expected this library, found {}", there.join(", "));
+    findings.add(Error, path, what, ("Importers look for modelIdentifier.", SECTION));
+    findings.stopping(&[Tool::Platform(platform.folder)]);
+}
+
+/// The functions without which FMI Library takes a flag for false.
+const BY_FLAG: [&str; 7] = [
+    "fmi2GetFMUstate",
+    "fmi2SetFMUstate",
+    "fmi2FreeFMUstate",
+    "fmi2SerializedFMUstateSize",
+    "fmi2SerializeFMUstate",
+    "fmi2DeSerializeFMUstate",
+    "fmi2GetDirectionalDerivative",
+];
+
+/// The tools that an error in a library stops: in co-simulation, where it has that.
+fn stops(finding: &Finding, platform: &Platform, interfaces: &[InterfaceType]) -> Vec<Tool> {
+    if finding.severity != Error {
+        return Vec::new();
+    }
+    let Some(lacking) = finding.what.strip_prefix("lacks ") else {
+        return vec![Tool::Platform(platform.folder)];
+    };
+    let simulation = [InterfaceType::CoSimulation];
+    let called = if interfaces.contains(&simulation[0]) { &simulation[..] } else { interfaces };
+    let called: BTreeSet<_> = wanted(called).collect();
+    let lacking: Vec<_> = lacking.split(", ").filter(|own| called.contains(own)).collect();
+    match lacking.iter().all(|own| BY_FLAG.contains(own)) {
+        _ if lacking.is_empty() => Vec::new(),
+        true => vec![Tool::Fmpy],
+        false => vec![Tool::Fmpy, Tool::FmiLibrary],
+    }
 }
 
 /// The names of the libraries, each with the interfaces that it serves.
@@ -196,13 +240,12 @@ fn functions(
     }
     let missing: Vec<_> = missing.into_iter().collect();
     let what = format!("lacks {}", missing.join(", "));
-    let why =
-        "Importers that look up all functions at once refuse it, for example FMPy and FMI Library.";
+    let why = "FMPy needs all functions; FMI Library all but those for states and directional derivatives.";
     findings.add(Error, path, what, (why, "2.1.1"));
 }
 
 /// Libraries that belong to the system, by the beginnings of their names in lower case.
-const SYSTEM: [&str; 48] = [
+const SYSTEM: [&str; 60] = [
     "libc.so",
     "libm.so",
     "libpthread.so",
@@ -251,6 +294,18 @@ const SYSTEM: [&str; 48] = [
     "opengl32",
     "normaliz",
     "cfgmgr32",
+    "wintrust",
+    "dhcpcsvc",
+    "wininet",
+    "winhttp",
+    "winspool",
+    "wldap32",
+    "wtsapi32",
+    "urlmon",
+    "dnsapi",
+    "ncrypt",
+    "gdiplus",
+    "pdh.dll",
 ];
 
 fn needs(file: &object::File<'_>, path: &str, names: &[String], findings: &mut Findings) {

@@ -2,59 +2,121 @@
 
 use fmi2::description::{ModelDescription, Warning};
 
-use super::finding::Severity::{Error, Note};
-use super::finding::{Finding, Findings, Part};
+use super::finding::Severity::Note;
+use super::finding::{Finding, Findings, Part, Severity, Tool};
 
 const FILE: &str = "modelDescription.xml";
 
-/// Who stumbles over a broken rule, by the words that the rule begins or ends with.
-const WHO: [(&str, &str); 9] = [
-    (
-        "InitialUnknowns",
-        "FMPy's validation and the FMU checker report it; few importers use the list.",
-    ),
-    ("Outputs", "Importers that order FMUs by their dependencies go wrong."),
-    ("which is not defined", "FMPy's validation refuses it."),
-    ("needs a start value", "FMPy's validation refuses it; FMI Library assumes zero."),
-    (
-        "generationDateAndTime",
-        "FMPy's schema refuses some of these dates; others show what is there.",
-    ),
-    ("no C identifier", "FMI Library (libcosim, PyFMI) refuses it."),
-    ("cannot be", "FMPy refuses combinations that are not in the table."),
-    ("dependenciesKind is not as long", "FMI Library (libcosim, PyFMI) refuses it."),
-    ("is there twice", "Which one is meant, importers decide differently."),
-];
+/// A rule that a description breaks, by words of the text: who stumbles over it, and which tools it stops.
+struct Rule {
+    words: &'static str,
+    why: &'static str,
+    stops: &'static [Tool],
+}
+
+const fn rule(words: &'static str, why: &'static str, stops: &'static [Tool]) -> Rule {
+    Rule { words, why, stops }
+}
+
+const RULES: [Rule; 15] = {
+    use Tool::{Fmpy, FmpyValidation};
+    let dates = "FMPy's schema refuses some of these dates; others show what is there.";
+    let validation = "fmpy.validation.validate_fmu reports it; few importers use the list.";
+    let refused = "FMPy's validation refuses it.";
+    [
+        rule("fmiVersion", "FMPy reads 2.0 only.", &[Fmpy]),
+        rule("generationDateAndTime", dates, &[]),
+        rule("no C identifier", "Tools that build from the sources make C names of it.", &[]),
+        rule("which is not defined", refused, &[FmpyValidation]),
+        rule(
+            "needs a start value",
+            "FMPy's validation refuses it; FMI Library assumes zero.",
+            &[FmpyValidation],
+        ),
+        rule("has a start value, which", refused, &[FmpyValidation]),
+        // FMPy takes it for the default.
+        rule("initial exact is not allowed for discrete input", "", &[]),
+        rule("initial exact is not allowed for continuous input", "", &[]),
+        rule("is not allowed for", refused, &[FmpyValidation]),
+        rule(
+            "cannot be stated",
+            "Importers that order FMUs by their dependencies may go wrong.",
+            &[],
+        ),
+        rule(
+            "cannot be",
+            "FMPy refuses combinations that are not in the table.",
+            &[FmpyValidation],
+        ),
+        rule("dependenciesKind", "FMI Library refuses some of these lists.", &[]),
+        rule("InitialUnknowns", validation, &[]),
+        rule("Outputs", "Importers that order FMUs by their dependencies go wrong.", &[]),
+        rule("is there twice", "Which one is meant, importers decide differently.", &[]),
+    ]
+};
+
+/// The tools that something stops which was read with a warning, and why.
+fn stops(warning: &Warning) -> (&'static [Tool], &'static str) {
+    if warning.place.contains("fmiVersion") {
+        return (&[Tool::Fmpy], "FMPy reads 2.0 only.");
+    }
+    if warning.by_schema {
+        let why =
+            "FMPy refuses what the schema does not allow, unless its validation is switched off.";
+        return (&[Tool::FmpyValidation], why);
+    }
+    if warning.expected.contains("than continuous") {
+        return (&[Tool::FmpyValidation], "FMPy's validation refuses it.");
+    }
+    (&[], "")
+}
 
 pub(super) fn check(description: &ModelDescription, warnings: &[Warning]) -> Vec<Finding> {
     let mut findings = Findings::about(Part::Description);
     for warning in warnings {
         let place = format!("{FILE}, {}: {}", warning.at, warning.place);
         let what = format!("expected {}, found {}", warning.expected, warning.found);
-        let why = if warning.by_schema {
-            "FMPy refuses what the schema does not allow, unless its validation is switched off."
-        } else if warning.section == "2.2.8" {
-            "FMI Library (libcosim, PyFMI) refuses a ModelStructure with such an error."
-        } else {
-            ""
-        };
+        let (tools, why) = stops(warning);
         let why =
             format!("{why}{}Here {}.", if why.is_empty() { "" } else { " " }, warning.assumed);
-        findings.add(Error, place, what, (&why, warning.section));
+        findings.add(Severity::Error, place, what, (&why, warning.section));
+        findings.stopping(tools);
     }
     for problem in description.problems() {
-        let who = WHO.iter().find(|(words, _)| problem.text.contains(words));
-        findings.add(Error, FILE, problem.text, (who.map_or("", |(_, why)| why), problem.section));
+        let rule = RULES.iter().find(|rule| problem.text.contains(rule.words));
+        // "should be", says the standard.
+        let advice = problem.text.starts_with("generationDateAndTime");
+        let severity = if advice { Severity::Warning } else { Severity::Error };
+        let why = rule.map_or("", |rule| rule.why);
+        findings.add(severity, FILE, problem.text, (why, problem.section));
+        findings.stopping(rule.map_or(&[], |rule| rule.stops));
     }
+    identifiers(description, &mut findings);
     notes(description, &mut findings);
     findings.all
+}
+
+/// FMI Library looks at the first character only.
+fn identifiers(description: &ModelDescription, findings: &mut Findings) {
+    let exchange = description.model_exchange.iter().map(|own| &own.model_identifier);
+    let simulation = description.co_simulation.iter().map(|own| &own.model_identifier);
+    for identifier in exchange.chain(simulation) {
+        let stated = format!("modelIdentifier {identifier:?} is no C identifier");
+        let first = identifier.chars().next();
+        if !first.is_some_and(|first| first.is_ascii_alphabetic() || first == '_') {
+            let own = findings.all.iter_mut().filter(|own| own.what == stated);
+            own.for_each(|own| own.stops = vec![Tool::FmiLibrary]);
+        }
+    }
 }
 
 /// What the standard leaves open and users stumble over.
 fn notes(description: &ModelDescription, findings: &mut Findings) {
     let experiment = description.default_experiment.unwrap_or_default();
-    if experiment.stop_time.is_none() || experiment.step_size.is_none() {
-        let what = "no stopTime and stepSize in DefaultExperiment";
+    let stated = [("stopTime", experiment.stop_time), ("stepSize", experiment.step_size)];
+    let absent: Vec<_> = stated.iter().filter(|own| own.1.is_none()).map(|own| own.0).collect();
+    if !absent.is_empty() {
+        let what = format!("no {} in DefaultExperiment", absent.join(" and no "));
         let why =
             "FMPy, OMSimulator and fmusim take them where the user states none; others guess.";
         findings.add(Note, FILE, what, (why, "2.2.5"));

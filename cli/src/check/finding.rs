@@ -5,7 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 /// How much a finding weighs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Severity {
     /// Breaks the standard, or an importer refuses the FMU.
@@ -17,7 +17,7 @@ pub(crate) enum Severity {
 }
 
 /// Which part of the FMU a finding is about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Part {
     /// The ZIP archive and its files.
@@ -28,6 +28,39 @@ pub(crate) enum Part {
     Binaries,
     /// What the library of this platform does.
     Behaviour,
+}
+
+/// A tool, or a way of calling an FMU, that a finding is known to stop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(crate) enum Tool {
+    /// FMPy, with every option.
+    Fmpy,
+    /// FMPy's `simulate_fmu` by default.
+    FmpyValidation,
+    /// FMI Library of Modelon, by which libcosim and `PyFMI` read FMUs.
+    FmiLibrary,
+    /// Importers that call the FMU in their own process.
+    InProcess,
+    /// Importers on a platform, by the name of its folder.
+    Platform(&'static str),
+}
+
+impl fmt::Display for Tool {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Tool::Fmpy => formatter.write_str("FMPy"),
+            Tool::FmpyValidation => formatter.write_str("FMPy with validate=True, its default"),
+            Tool::FmiLibrary => formatter.write_str("FMI Library (libcosim, PyFMI)"),
+            Tool::InProcess => formatter.write_str("importers that call it in their own process"),
+            Tool::Platform(folder) => write!(formatter, "importers on {folder}"),
+        }
+    }
+}
+
+impl Serialize for Tool {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
 }
 
 /// One finding.
@@ -44,23 +77,38 @@ pub(crate) struct Finding {
     pub(crate) why: Option<String>,
     /// Section of FMI 2.0.5.
     pub(crate) section: Option<&'static str>,
+    /// The tools in which the FMU does not run because of it.
+    pub(crate) stops: Vec<Tool>,
+}
+
+impl fmt::Display for Severity {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Severity::Error => "error",
+            Severity::Warning => "warning",
+            Severity::Note => "note",
+        })
+    }
+}
+
+impl Finding {
+    /// Writes it as people read it, with `more` after what was found.
+    pub(crate) fn write(&self, formatter: &mut fmt::Formatter<'_>, more: &str) -> fmt::Result {
+        let Self { severity, place, what, section, why, .. } = self;
+        write!(formatter, "{severity}: {place}: {what}{more}")?;
+        if let Some(section) = section {
+            write!(formatter, " (section {section})")?;
+        }
+        match why {
+            Some(why) => write!(formatter, "\n    {why}"),
+            None => Ok(()),
+        }
+    }
 }
 
 impl fmt::Display for Finding {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let severity = match self.severity {
-            Severity::Error => "error",
-            Severity::Warning => "warning",
-            Severity::Note => "note",
-        };
-        write!(formatter, "{severity}: {}: {}", self.place, self.what)?;
-        if let Some(section) = self.section {
-            write!(formatter, " (section {section})")?;
-        }
-        match &self.why {
-            Some(why) => write!(formatter, "\n    {why}"),
-            None => Ok(()),
-        }
+        self.write(formatter, "")
     }
 }
 
@@ -90,6 +138,14 @@ impl Findings {
             what: what.into(),
             why: (!why.is_empty()).then(|| why.to_owned()),
             section: (!section.is_empty()).then_some(section),
+            stops: Vec::new(),
         });
+    }
+
+    /// Says which tools the last finding stops.
+    pub(crate) fn stopping(&mut self, tools: &[Tool]) {
+        if let Some(last) = self.all.last_mut() {
+            last.stops.extend(tools);
+        }
     }
 }

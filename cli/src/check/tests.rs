@@ -5,12 +5,13 @@ use fmi2::abi::Status;
 use fmi2::description::ModelDescription;
 use master::{CallError, Failure, Slave, Stepped};
 
+use super::answer::{Answer, Here};
 use super::behaviour;
 use super::finding::{Finding, Severity};
 
 const XML: &str = r#"<fmiModelDescription fmiVersion="2.0" modelName="Sum" guid="g">
 <CoSimulation modelIdentifier="Sum" canGetAndSetFMUstate="true" canSerializeFMUstate="true"/>
-<DefaultExperiment startTime="0" stopTime="1" stepSize="0.125"/>
+<DefaultExperiment startTime="0" stopTime="1" tolerance="1e-5" stepSize="0.125"/>
 <ModelVariables>
 <ScalarVariable name="u" valueReference="1" causality="input"><Real start="2"/></ScalarVariable>
 <ScalarVariable name="y" valueReference="2" causality="output"><Real/></ScalarVariable>
@@ -28,6 +29,7 @@ enum Fault {
     Nan,
     EachOtherwise,
     LostState,
+    RoundedState,
     NoState,
     ReadAfterTheEnd,
     Step,
@@ -120,8 +122,10 @@ impl Slave for Sum {
     }
 
     fn restore_state(&mut self, _: usize) -> Result<(), CallError> {
-        if self.fault != Fault::LostState {
-            self.y = self.saved;
+        match self.fault {
+            Fault::LostState => {}
+            Fault::RoundedState => self.y = self.saved * (1.0 + 1e-9),
+            _ => self.y = self.saved,
         }
         Ok(())
     }
@@ -139,6 +143,10 @@ impl Slave for Sum {
 }
 
 fn findings(fault: Fault) -> Vec<Finding> {
+    tried(fault).1
+}
+
+fn tried(fault: Fault) -> (Here, Vec<Finding>) {
     let description = ModelDescription::parse(XML).unwrap();
     let mut number = 0;
     let mut make = |_: &str, _: Option<Sum>| -> anyhow::Result<Sum> {
@@ -174,6 +182,7 @@ fn each_fault_is_found_with_its_section() {
         (Fault::EachOtherwise, Warning, "fmi2DoStep", "has other outputs, from step 1", "2.1"),
         (Fault::LostState, Error, "fmi2SetFMUstate", "differ from those before", "2.1.8"),
         (Fault::LostState, Error, "fmi2DeSerializeFMUstate", "differ", "2.1.8"),
+        (Fault::RoundedState, Warning, "fmi2SetFMUstate", "by 1.0e-9 of their size", "2.1.8"),
         (Fault::NoState, Error, "fmi2GetFMUstate", "canGetAndSetFMUstate is true", "2.1.8"),
         (Fault::ReadAfterTheEnd, Warning, "fmi2GetReal", "after fmi2Terminate", "4.2.4"),
         (Fault::Step, Error, "fmi2DoStep", "at t = 0.625 s", "4.2.2"),
@@ -196,10 +205,23 @@ fn a_finding_says_what_where_why_and_by_which_section() {
 }
 
 #[test]
+fn the_answer_says_what_was_run_or_why_it_failed() {
+    let (here, _) = tried(Fault::Nothing);
+    let expected =
+        "yes, 10 steps of 0.125 s from t = 0 s with tolerance 1e-5 and its own start values";
+    assert_eq!(here.to_string(), expected);
+    let (here, all) = tried(Fault::Step);
+    assert_eq!(here.to_string(), "no: fmi2DoStep: returned fmi2Error at t = 0.625 s");
+    let answer = Answer::new(here, &all).to_string();
+    assert!(answer.ends_with("no other tool is known to refuse it"), "{answer}");
+}
+
+#[test]
 fn what_cannot_be_instantiated_is_one_finding() {
     let description = ModelDescription::parse(XML).unwrap();
     let mut make = |_: &str, _: Option<Sum>| -> anyhow::Result<Sum> { anyhow::bail!("no licence") };
-    let all = behaviour::check(&description, &mut make);
+    let (here, all) = behaviour::check(&description, &mut make);
+    assert_eq!(here, Here::No { reason: "fmi2Instantiate: no licence".to_owned() });
     assert!(all.iter().all(|own| own.place == "fmi2Instantiate" && own.what == "no licence"));
     assert_eq!(all.len(), 1, "{all:#?}");
 }

@@ -35,9 +35,36 @@ impl Value {
         }
     }
 
+    /// The difference relative to the larger of the two.
+    fn apart(&self, other: &Value) -> f64 {
+        match (self, other) {
+            _ if self == other => 0.0,
+            (Value::Real(one), Value::Real(other)) => {
+                let (one, other) = (f64::from_bits(*one), f64::from_bits(*other));
+                let relative = (one - other).abs() / one.abs().max(other.abs());
+                if one == other {
+                    0.0
+                } else {
+                    Some(relative).filter(|own| !own.is_nan()).unwrap_or(f64::INFINITY)
+                }
+            }
+            _ => f64::INFINITY,
+        }
+    }
+
     pub(super) fn is_finite(&self) -> bool {
         !matches!(self, Value::Real(bits) if !f64::from_bits(*bits).is_finite())
     }
+}
+
+/// The largest difference between two courses of outputs relative to the size of the value; infinite
+/// where they are of another length, or values differ that are not numbers.
+pub(super) fn distance(one: &[Vec<Value>], other: &[Vec<Value>]) -> f64 {
+    if one.len() != other.len() {
+        return f64::INFINITY;
+    }
+    let pairs = one.iter().flatten().zip(other.iter().flatten());
+    pairs.map(|(one, other)| one.apart(other)).fold(0.0, f64::max)
 }
 
 /// Reads one variable.

@@ -1,5 +1,8 @@
 //! A co-simulation instance that is stepped again and again from the operating point.
 
+use std::cell::RefCell;
+use std::rc::Rc;
+
 use nalgebra::DMatrix;
 
 use super::differences::{Side, extrapolate, reach};
@@ -20,9 +23,10 @@ const DRIFT: f64 = 1e-6;
 /// Heights of the pulses whose responses are extrapolated to the height zero, each half of the last.
 const HEIGHTS: usize = 3;
 
-/// The instance, its saved state, and what is set and read.
+/// The instance, which is at its saved state before each run, and what is set and read.
 pub(super) struct Bench<'p> {
-    component: Component,
+    /// Shared by the benches of all step sizes: an FMU may allow one instance only.
+    component: Rc<RefCell<Component>>,
     parts: &'p Parts<'p>,
     states: &'p [Part],
     inputs: Vec<u32>,
@@ -56,7 +60,25 @@ impl<'p> Bench<'p> {
         let inputs = parts.inputs.iter().map(|part| part.reference).collect();
         let readings = states.iter().chain(&parts.outputs).map(|part| part.reference).collect();
         let (start, rest) = (request.start_time, DMatrix::zeros(0, 0));
+        let component = Rc::new(RefCell::new(component));
         Ok(Self { component, parts, states, inputs, readings, x, u, y, start, step, rest })
+    }
+
+    /// The same instance with another step.
+    pub(super) fn with_step(&self, step: f64) -> Self {
+        Self {
+            component: Rc::clone(&self.component),
+            parts: self.parts,
+            states: self.states,
+            inputs: self.inputs.clone(),
+            readings: self.readings.clone(),
+            x: self.x.clone(),
+            u: self.u.clone(),
+            y: self.y.clone(),
+            start: self.start,
+            step,
+            rest: DMatrix::zeros(0, 0),
+        }
     }
 
     /// The typical size of a change of reading `k`: states, then outputs.
@@ -74,11 +96,12 @@ impl<'p> Bench<'p> {
         count: usize,
         deviation: impl Fn(usize, usize) -> f64,
     ) -> Result<DMatrix<f64>, LineariseError> {
-        self.component.restore_state(0)?;
+        let mut component = self.component.borrow_mut();
+        component.restore_state(0)?;
         let mut course = DMatrix::zeros(count + 1, self.readings.len());
         let mut row = vec![0.0; self.readings.len()];
         for step in 0..=count {
-            self.component.get_real(&self.readings, &mut row)?;
+            component.get_real(&self.readings, &mut row)?;
             for (column, &value) in row.iter().enumerate() {
                 if !value.is_finite() {
                     let part = self.states.iter().chain(&self.parts.outputs).nth(column);
@@ -90,9 +113,9 @@ impl<'p> Bench<'p> {
             if step < count {
                 let value = |(input, u): (usize, &f64)| u + deviation(step, input);
                 let values: Vec<f64> = self.u.iter().enumerate().map(value).collect();
-                self.component.set_real(&self.inputs, &values)?;
+                component.set_real(&self.inputs, &values)?;
                 let time = self.start + index(step) * self.step;
-                self.component.do_step(time, self.step, false)?;
+                component.do_step(time, self.step, false)?;
             }
         }
         Ok(course)

@@ -87,10 +87,9 @@ pub(super) fn of_steps(
     request: &Linearise,
     step: f64,
 ) -> Result<Found, LineariseError> {
-    let mut benches = Vec::with_capacity(MULTIPLES.len());
-    for multiple in MULTIPLES {
-        benches.push(Bench::new(fmu, parts, states, request, multiple * step)?);
-    }
+    let bench = Bench::new(fmu, parts, states, request, step)?;
+    let mut benches: Vec<_> =
+        MULTIPLES.iter().map(|multiple| bench.with_step(multiple * step)).collect();
     let mut count = FEWEST.max(2 * (states.len() + 1));
     let mut best: Option<Found> = None;
     let mut refusal = None;

@@ -9,6 +9,13 @@ use serde::{Deserialize, Serialize};
 /// preserving minmax optimality", ACM Trans. Math. Softw. 47, with `kappa_1 = 0.2 / (b - a)`, `kappa_2 = 2`,
 /// `n_0 = 1`): superlinear where the function is smooth, and never more than one value above what
 /// bisection needs, `ceil(log2((b - a) / width)) + 1`.
+///
+/// A value that is not a number has no sign and does not move the bracket. The search then bisects
+/// between the bracket's left time and the first such time, then, where no change of sign is found
+/// there, between the last such time and the right one. Where neither part has a change of sign, the
+/// bracket stays as wide as the gap between them: [`ask`](Self::ask) ends, the signs at
+/// [`before`](Self::before) and [`after`](Self::after) still differ. This takes at most
+/// `ceil(log2((b - a) / width))` more values for each part.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bracket {
     left: (f64, f64),
@@ -17,6 +24,8 @@ pub struct Bracket {
     truncation: f64,
     /// Half the width that bisection would have reached, had it one value more.
     radius: f64,
+    /// The first and the last time within the bracket at which the value is not a number.
+    gap: Option<(f64, f64)>,
 }
 
 impl Bracket {
@@ -36,15 +45,21 @@ impl Bracket {
         let width = if width > least { width } else { least };
         let halvings = (whole / width).log2().ceil().max(0.0);
         let radius = 0.5 * width * (halvings + 1.0).exp2();
-        Some(Self { left, right, width, truncation: 0.2 / whole, radius })
+        Some(Self { left, right, width, truncation: 0.2 / whole, radius, gap: None })
     }
 
-    /// Where to evaluate next; none where the change of sign is known to the width.
+    /// Where to evaluate next; none where the change of sign is known to the width, or to a gap whose
+    /// values are not numbers.
     #[must_use]
     pub fn ask(&self) -> Option<f64> {
         let ((a, fa), (b, fb)) = (self.left, self.right);
         if b - a <= self.width {
             return None;
+        }
+        if let Some((first, last)) = self.gap {
+            let sides = [(a, first), (last, b)];
+            let side = sides.into_iter().find(|(from, to)| to - from > self.width)?;
+            return Some(side.0 + 0.5 * (side.1 - side.0));
         }
         let middle = a + 0.5 * (b - a);
         let secant = a + (b - a) * (fa / (fa - fb));
@@ -59,23 +74,30 @@ impl Bracket {
         Some(if inside { projected } else { middle })
     }
 
-    /// The value at the time asked for. Not a number leaves all as it is but the patience.
+    /// Takes the value at the time asked for.
     pub fn tell(&mut self, time: f64, value: f64) {
+        if value.is_nan() {
+            let (first, last) = self.gap.unwrap_or((time, time));
+            self.gap = Some((first.min(time), last.max(time)));
+            return;
+        }
         self.radius *= 0.5;
         if (value > 0.0) == (self.right.1 > 0.0) {
             self.right = (time, value);
         } else {
             self.left = (time, value);
         }
+        let within = |(first, last): &(f64, f64)| *first > self.left.0 && *last < self.right.0;
+        self.gap = self.gap.filter(within);
     }
 
-    /// The last time known before the change of sign.
+    /// The last time known to be before the change of sign.
     #[must_use]
     pub fn before(&self) -> f64 {
         self.left.0
     }
 
-    /// The first time known after it: where a step has to end so that the event has happened.
+    /// The first time known to be after it: where a step has to end so that the event has happened.
     #[must_use]
     pub fn after(&self) -> f64 {
         self.right.0
@@ -157,11 +179,50 @@ mod tests {
     fn a_width_that_doubles_cannot_resolve_ends_too() {
         let (found, count) = locate(|t| t - 1000.5, 1000.0, 1001.0, 0.0);
         assert!(found.after() - found.before() < 1e-12 && count < 60);
-        let gap = |t| {
-            let late = if t < 1001.0 { f64::NAN } else { -1.0 };
-            if t < 1000.3 { 1.0 } else { late }
-        };
-        let (_, count) = locate(gap, 1000.0, 1001.0, 0.0);
-        assert!(count < 60);
+    }
+
+    /// A function that is not a number between two times and elsewhere 1 before `root`, -1 after it.
+    fn broken(from: f64, to: f64, root: f64) -> impl Fn(f64) -> f64 {
+        move |t| {
+            let sign = if t < root { 1.0 } else { -1.0 };
+            if t > from && t < to { f64::NAN } else { sign }
+        }
+    }
+
+    #[test]
+    fn a_root_beside_a_gap_of_nan_is_found() {
+        for (from, to, root) in
+            [(0.4, 0.6, 0.3), (0.4, 0.6, 0.7), (0.1, 0.9, 0.95), (0.499, 0.501, 0.4985)]
+        {
+            let (found, count) = locate(broken(from, to, root), 0.0, 1.0, 1e-9);
+            assert!(found.before() < root && root <= found.after(), "{found:?}");
+            assert!(found.after() - found.before() <= 1e-9, "{found:?}");
+            assert!(count <= 3 * 31, "{count}");
+        }
+    }
+
+    #[test]
+    fn a_root_within_a_gap_of_nan_is_known_to_the_gap() {
+        let function = broken(0.4, 0.6, 0.5);
+        let (found, count) = locate(&function, 0.0, 1.0, 1e-9);
+        assert!((found.before() - 0.4).abs() <= 1e-9, "{found:?}");
+        assert!((found.after() - 0.6).abs() <= 1e-9, "{found:?}");
+        assert!(function(found.before()) > 0.0 && function(found.after()) < 0.0);
+        assert!(count <= 3 * 31, "{count}");
+    }
+
+    #[test]
+    fn values_that_are_all_nan_end_the_search_and_leave_the_bracket() {
+        let mut bracket = Bracket::new((0.0, 1.0), (1.0, -1.0), 1e-9).unwrap();
+        let mut count = 0;
+        while let Some(time) = bracket.ask() {
+            bracket.tell(time, f64::NAN);
+            count += 1;
+        }
+        assert!(count <= 2 * 31, "{count}");
+        assert_eq!(
+            [bracket.before(), bracket.after()].map(f64::to_bits),
+            [0.0, 1.0].map(f64::to_bits)
+        );
     }
 }

@@ -1,0 +1,133 @@
+//! Findings that say the same of several variables or files, as one line.
+
+use std::collections::{HashMap, HashSet};
+use std::fmt;
+
+use super::finding::{Finding, Part, Severity, Tool};
+
+/// A finding, and how many others say the same of something else.
+pub(super) struct Folded<'a> {
+    pub(super) first: &'a Finding,
+    pub(super) more: usize,
+    /// What the others are about, in the plural.
+    others: &'static str,
+}
+
+impl fmt::Display for Folded<'_> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let more = match self.more {
+            0 => String::new(),
+            more => format!("; and {more} more {}", self.others),
+        };
+        self.first.write(formatter, &more)
+    }
+}
+
+/// What findings of one line have in common.
+type Key<'a> = (Severity, Part, String, String, Option<String>, Option<&'static str>, &'a [Tool]);
+
+/// One line for each kind of finding, in the order of the first ones. Two are of one kind where they
+/// differ in names of variables, quoted texts, paths and numbers only.
+pub(super) fn fold<'a>(findings: &'a [Finding], variables: &HashSet<&str>) -> Vec<Folded<'a>> {
+    let mut lines: Vec<Folded<'a>> = Vec::new();
+    let mut known: HashMap<Key<'a>, usize> = HashMap::new();
+    for finding in findings {
+        let mut names = false;
+        // A version or a count in a library says something that is different for each.
+        let numbers = finding.part != Part::Binaries;
+        let place = kind(&finding.place, variables, true, &mut names);
+        let what = kind(&finding.what, variables, numbers, &mut names);
+        let why = finding.why.as_ref().map(|why| kind(why, variables, numbers, &mut names));
+        let Finding { severity, part, section, stops, .. } = finding;
+        let key = (*severity, *part, place, what, why, *section, stops.as_slice());
+        if let Some(&line) = known.get(&key) {
+            lines[line].more += 1;
+            continue;
+        }
+        known.insert(key, lines.len());
+        let others = match part {
+            _ if names => "variables",
+            Part::Archive | Part::Binaries => "files",
+            Part::Description | Part::Behaviour => "places",
+        };
+        lines.push(Folded { first: finding, more: 0, others });
+    }
+    lines
+}
+
+/// The text without what distinguishes findings of one kind; `names` becomes true where that is the
+/// name of a variable.
+fn kind(text: &str, variables: &HashSet<&str>, numbers: bool, names: &mut bool) -> String {
+    let mut kept = String::with_capacity(text.len());
+    // Every second part is within quotation marks.
+    for (index, part) in text.split('"').enumerate() {
+        if index % 2 == 1 {
+            kept.push('"');
+            continue;
+        }
+        for word in part.split_inclusive(' ') {
+            let bare = word.trim_end_matches([' ', ',', ':', ';', '.']);
+            if variables.contains(bare) {
+                *names = true;
+            } else if !(bare.contains('/') || numbers && bare.parse::<f64>().is_ok()) {
+                kept.push_str(word);
+            }
+        }
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::finding::Findings;
+    use super::*;
+
+    fn lines(findings: &Findings) -> Vec<String> {
+        let variables = HashSet::from(["x", "der(x)", "tank.h[1]"]);
+        fold(&findings.all, &variables).iter().map(ToString::to_string).collect()
+    }
+
+    #[test]
+    fn the_same_of_several_variables_is_one_line_with_the_first_and_a_count() {
+        let mut findings = Findings::about(Part::Description);
+        for name in ["x", "tank.h[1]", "der(x)"] {
+            let what = format!("InitialUnknowns lacks variable {name}");
+            findings.add(Severity::Error, "xml", what, ("Few use it.", "2.2.8"));
+        }
+        findings.add(Severity::Error, "xml", "Outputs lacks variable x", ("", "2.2.8"));
+        let expected = [
+            "error: xml: InitialUnknowns lacks variable x; and 2 more variables (section 2.2.8)\n    \
+             Few use it.",
+            "error: xml: Outputs lacks variable x (section 2.2.8)",
+        ];
+        assert_eq!(lines(&findings), expected);
+    }
+
+    #[test]
+    fn paths_quoted_texts_and_numbers_do_not_keep_findings_apart_but_versions_of_libraries_do() {
+        let mut findings = Findings::about(Part::Archive);
+        for name in ["sources/a.c", "sources/b.c"] {
+            findings.add(Severity::Error, "sources", format!("expected {name}"), ("", ""));
+        }
+        assert_eq!(lines(&findings), ["error: sources: expected sources/a.c; and 1 more files"]);
+        let mut findings = Findings::about(Part::Binaries);
+        for version in ["2.14", "2.34"] {
+            findings.add(
+                Severity::Note,
+                "binaries/a.so",
+                format!("needs glibc {version}"),
+                ("", ""),
+            );
+        }
+        assert_eq!(lines(&findings).len(), 2);
+    }
+
+    #[test]
+    fn a_finding_that_stops_a_tool_is_not_folded_into_one_that_does_not() {
+        let mut findings = Findings::about(Part::Description);
+        findings.add(Severity::Error, "xml", "variable x is odd", ("", ""));
+        findings.add(Severity::Error, "xml", "variable der(x) is odd", ("", ""));
+        findings.stopping(&[Tool::FmiLibrary]);
+        assert_eq!(lines(&findings).len(), 2);
+    }
+}
