@@ -8,6 +8,7 @@
 pub mod algorithm;
 pub mod assembly;
 mod choose;
+pub mod crash;
 mod error;
 mod exchange;
 pub mod fault;
