@@ -29,6 +29,8 @@ fn end(ending: &Ending) -> u8 {
              an error of the run"
         );
     }
+    // A panic here is about memory that the FMU wrote over: it is told below as what it leads to.
+    std::panic::set_hook(Box::new(|_| {}));
     for (path, kept) in run::keep_results() {
         match kept {
             Ok(()) => tracing::error!("the results up to there are in {}", path.display()),

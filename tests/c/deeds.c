@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 enum { FLOOD = 1000000, LONG = 1000000, LEAK = 1 << 16 };
@@ -88,6 +89,22 @@ static void meddle(const char *deed) {
     } else if (strcmp(deed, "divide by zero") == 0) {
         volatile int zero = 0;
         zero = 7 / zero;
+    } else if (strcmp(deed, "fork") == 0) {
+        /* Children that end as processes do are no end of this one. */
+        int exited = 0, killed = 0;
+        pid_t first = fork();
+        if (first == 0) {
+            exit(5);
+        }
+        pid_t second = fork();
+        if (second == 0) {
+            abort();
+        }
+        waitpid(first, &exited, 0);
+        waitpid(second, &killed, 0);
+        if (!WIFEXITED(exited) || WEXITSTATUS(exited) != 5 || !WIFSIGNALED(killed)) {
+            abort();
+        }
     } else if (strcmp(deed, "hang") == 0) {
         for (;;) {
             usleep(1000);

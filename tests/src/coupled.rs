@@ -18,7 +18,7 @@ pub const ALL: usize = 17;
 /// Rows of one that ends at the last successful step, to t1.
 pub const TO_T1: usize = 9;
 /// Behaviour that is unusual and harms nobody.
-pub const UNUSUAL: [&str; 14] = [
+pub const UNUSUAL: [&str; 15] = [
     "as it should",
     "pend",
     "warn everywhere",
@@ -32,6 +32,7 @@ pub const UNUSUAL: [&str; 14] = [
     "names in fmi2DoStep",
     "long message in fmi2DoStep",
     "print in fmi2DoStep",
+    "fork in fmi2DoStep",
     "leak in fmi2DoStep",
 ];
 

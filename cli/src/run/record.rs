@@ -1,5 +1,7 @@
 //! Rows of results, read from the FMUs and written as the run goes.
 
+use std::io;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError, Weak};
 use std::time::Duration;
@@ -108,7 +110,7 @@ pub(crate) fn keep_results() -> Vec<(PathBuf, Result<(), ResultsError>)> {
     files.iter().filter_map(|file| keep(file)).collect()
 }
 
-/// Ends the file where the thread that writes it lets go of it in time.
+/// Hands the rows over where the thread that writes it lets go of it in time.
 fn keep(file: &Mutex<Recording>) -> Option<(PathBuf, Result<(), ResultsError>)> {
     for _ in 0..TRIES {
         let mut recording = match file.try_lock() {
@@ -119,8 +121,14 @@ fn keep(file: &Mutex<Recording>) -> Option<(PathBuf, Result<(), ResultsError>)> 
                 continue;
             }
         };
-        let sink = recording.sink.take()?;
-        return Some((recording.path.clone(), sink.finish()));
+        let (path, mut sink) = (recording.path.clone(), recording.sink.take()?);
+        // The FMU may have written over what the sink needs.
+        let kept = catch_unwind(AssertUnwindSafe(|| sink.flush()));
+        std::mem::forget(sink);
+        let damaged = || io::Error::other("the FMU wrote over memory that is not its own");
+        let lost = |_| Err(ResultsError::Write { path: path.clone(), source: damaged() });
+        let kept = kept.unwrap_or_else(lost);
+        return Some((path, kept));
     }
     None
 }

@@ -7,7 +7,7 @@
 use std::io;
 use std::mem::MaybeUninit;
 use std::ptr::null_mut;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicI32, AtomicUsize, Ordering};
 use std::time::Duration;
 
 use libc::{c_int, c_void, siginfo_t};
@@ -31,6 +31,15 @@ const SHORT: &[u8] = b"error: an FMU crashed, and its crash cannot be reported i
 /// The thread that runs the program's last function.
 static KEEPER: AtomicUsize = AtomicUsize::new(0);
 
+/// The process that is watched: what an FMU forks is not.
+static PROCESS: AtomicI32 = AtomicI32::new(0);
+
+/// Whether this is a process that an FMU forked off.
+fn is_forked() -> bool {
+    // SAFETY: no conditions.
+    unsafe { libc::getpid() != PROCESS.load(Ordering::Relaxed) }
+}
+
 /// The calling thread is the one that runs the program's last function.
 pub(super) fn keep() {
     KEEPER.store(this_thread(), Ordering::Relaxed);
@@ -44,6 +53,8 @@ fn this_thread() -> usize {
 /// Installs the handlers, for all threads; the calling one gets a stack for them. A file that grows
 /// beyond a limit (`ulimit -f`) is an error of the write from now on, not a signal.
 pub(super) fn install() -> io::Result<()> {
+    // SAFETY: no conditions.
+    PROCESS.store(unsafe { libc::getpid() }, Ordering::Relaxed);
     let stack = Box::leak(vec![0_u8; STACK].into_boxed_slice());
     let stack = libc::stack_t { ss_sp: stack.as_mut_ptr().cast(), ss_flags: 0, ss_size: STACK };
     // SAFETY: the memory is never freed.
@@ -67,6 +78,14 @@ fn check(result: c_int) -> io::Result<()> {
 }
 
 extern "C" fn on_signal(signal: c_int, _: *mut siginfo_t, _: *mut c_void) {
+    if is_forked() {
+        // SAFETY: no handler of ours; the signal comes when this one returns.
+        unsafe {
+            libc::signal(signal, libc::SIG_DFL);
+            libc::raise(signal);
+        }
+        return;
+    }
     begin(signal, last_of_this_thread());
     wait();
 }
@@ -88,7 +107,7 @@ pub(super) fn leave(status: c_int) -> ! {
 
 /// `exit` was called: by the program at its end, or by an FMU.
 fn exit_called(status: c_int) {
-    if DONE.load(Ordering::Relaxed) {
+    if DONE.load(Ordering::Relaxed) || is_forked() {
         return;
     }
     STATUS.store(status, Ordering::Relaxed);
