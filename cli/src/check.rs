@@ -1,5 +1,4 @@
 //! `aso-ftc check`: what an importer will stumble over.
-#![expect(clippy::print_stdout, reason = "the result of the command")]
 
 mod answer;
 mod archive;

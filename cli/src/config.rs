@@ -1,6 +1,7 @@
 //! `system.toml`: what a run is told. The command line puts its own over it.
 
 mod every;
+mod memory;
 mod ordered;
 mod tables;
 
@@ -12,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 pub(crate) use every::Every;
+pub(crate) use memory::Memory;
 pub(crate) use ordered::{Ordered, Settings};
 pub(crate) use tables::{Experiment, Isolation, Results, Saving, Wire};
 

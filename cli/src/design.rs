@@ -1,5 +1,4 @@
 //! `aso-ftc design`: from a plant file to a designed controller, its report and its FMU.
-#![expect(clippy::print_stdout, reason = "the result of the command")]
 
 mod analysis;
 mod certificate;

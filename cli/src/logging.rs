@@ -55,7 +55,8 @@ struct StandardError;
 
 impl Write for StandardError {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        bars().suspend(|| io::stderr().write_all(bytes))?;
+        // Where standard error is closed nobody is left to be told of it.
+        let _ = bars().suspend(|| io::stderr().write_all(bytes));
         Ok(bytes.len())
     }
 

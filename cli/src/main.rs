@@ -5,9 +5,13 @@
 //! was interrupted.
 #![forbid(unsafe_code)]
 
+#[macro_use]
+mod output;
+
 mod check;
 mod claims;
 mod config;
+mod crash;
 mod design;
 mod figure;
 mod logging;
@@ -58,6 +62,13 @@ fn main() -> ExitCode {
     if !matches!(verb, Verb::Run(_)) {
         logging::begin(0, false);
     }
+    crash::watch();
+    let status = perform(verb);
+    master::crash::done();
+    status
+}
+
+fn perform(verb: Verb) -> ExitCode {
     let done = match verb {
         Verb::Reproduce(options) => reproduce::reproduce(&options),
         Verb::Pack(options) => pack::pack(&options),

@@ -1,5 +1,4 @@
 //! `aso-ftc new`: writes a crate with a small model, which is packed as it is.
-#![expect(clippy::print_stdout, reason = "the result of the command")]
 
 use std::fs;
 use std::path::{Path, PathBuf};

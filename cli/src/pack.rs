@@ -1,5 +1,4 @@
 //! `aso-ftc pack`: builds the library of a crate that uses `fmi2` and packs it into an FMU.
-#![expect(clippy::print_stdout, reason = "the result of the command")]
 
 mod binaries;
 mod library;

@@ -1,5 +1,4 @@
 //! `aso-ftc reproduce`: the paper's experiment, from the sources to the figures.
-#![expect(clippy::print_stdout, reason = "the result of the command")]
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,4 @@
 //! `aso-ftc run`: couples FMUs, and what all runs share.
-#![expect(clippy::print_stdout, reason = "the result of the command")]
 
 mod advance;
 mod assemble;
@@ -26,9 +25,10 @@ use advance::Saver;
 use advance::Tally;
 pub(crate) use advance::{Beside, Ended};
 pub(crate) use assemble::{Making, assemble};
+pub(crate) use interrupt::STATUS as INTERRUPTED;
 pub(crate) use options::{AlgorithmOptions, Options, setting};
 use plan::{Plan, plan};
-pub(crate) use record::{Recorder, select};
+pub(crate) use record::{Recorder, keep_results, select};
 use saved::Saved;
 
 /// Most connections that are listed.
@@ -38,6 +38,9 @@ const LISTED: usize = 20;
 /// its way, 2 it did not begin, 130 it was interrupted.
 pub(crate) fn run(options: &Options) -> ExitCode {
     logging::begin(options.verbose, options.log_json);
+    if let Err(error) = interrupt::listen() {
+        tracing::warn!("{}", logging::sentence(&error));
+    }
     match prepare(options) {
         Ok(None) => ExitCode::SUCCESS,
         Ok(Some(prepared)) => prepared.go(),
@@ -102,7 +105,6 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Prepared>> {
     let units = units(&system, &ports);
     let start = plan.experiment.start_time;
     let file = results_file(&config)?;
-    interrupt::listen()?;
     let mut simulation = begin(system, &plan, scenario, saved.as_ref())?;
     if let Some(early) = simulation.early_end() {
         tracing::warn!("{early}");

@@ -3,6 +3,7 @@
 mod archive;
 mod paths;
 mod read;
+mod temporary;
 mod write;
 
 use std::io;
@@ -11,6 +12,7 @@ use std::path::PathBuf;
 use crate::description::ParseError;
 
 pub use read::{Unpacked, unpack_archive};
+pub use temporary::{TemporaryFolder, remove_temporary_folders};
 pub use write::Package;
 
 /// Name of the file that describes an FMU, at the root of the archive.

@@ -1,17 +1,18 @@
 //! FMUs: an opened archive, and its instances as [`Slave`]s.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use fmi2::Experiment;
-use fmi2::description::ModelDescription;
+use fmi2::description::{Kind, ModelDescription};
 use fmi2::location::{LocationError, file_uri};
 use fmi2::package::{PackageError, Unpacked};
 
 use crate::error::LoadError;
-use crate::library::{Component, Interface, Library};
+use crate::library::{Component, Interface, Library, Names};
 use crate::slave::{CallError, Slave, Stepped};
 
 /// Why an FMU could not be opened or instantiated.
@@ -81,6 +82,8 @@ struct Content {
     unpacked: Unpacked,
     /// Whether there has been an instance.
     instantiated: AtomicBool,
+    /// Positions of variables by type and value reference, made when a message needs one.
+    names: OnceLock<HashMap<(char, u32), usize>>,
 }
 
 impl Fmu {
@@ -119,9 +122,8 @@ impl Fmu {
             open_library(description, &library, Interface::CoSimulation)
         });
         let library = library.transpose()?;
-        Ok(Self {
-            content: Arc::new(Content { library, unpacked, instantiated: AtomicBool::new(false) }),
-        })
+        let (instantiated, names) = (AtomicBool::new(false), OnceLock::new());
+        Ok(Self { content: Arc::new(Content { library, unpacked, instantiated, names }) })
     }
 
     /// The model description.
@@ -147,6 +149,23 @@ impl Fmu {
         Ok(Instance { component, fmu: self.clone() })
     }
 
+    /// The names of the variables, for messages: of an alias the one that is declared first.
+    fn names(&self) -> Names {
+        let content = self.content.clone();
+        Arc::new(move |kind, reference| {
+            let variables = &content.unpacked.description.variables;
+            let by_reference = content.names.get_or_init(|| {
+                let mut found = HashMap::new();
+                for (position, variable) in variables.iter().enumerate() {
+                    let key = (letter(&variable.kind), variable.value_reference);
+                    found.entry(key).or_insert(position);
+                }
+                found
+            });
+            by_reference.get(&(kind, reference)).map(|position| variables[*position].name.clone())
+        })
+    }
+
     /// An instance for `interface`, by its C functions.
     pub(crate) fn component(
         &self,
@@ -164,8 +183,19 @@ impl Fmu {
             _ => return Err(FmuError::NoInterface { path: unpacked.folder().to_owned() }),
         };
         let resources = file_uri(&unpacked.resources())?;
-        let made = library.instantiate(interface, name, &description.guid, &resources);
+        let names = self.names();
+        let made = library.instantiate(interface, name, &description.guid, &resources, names);
         made.map_err(|error| explained(description, error))
+    }
+}
+
+/// The letter by which messages name a type (section 2.1.5).
+fn letter(kind: &Kind) -> char {
+    match kind {
+        Kind::Real(_) => 'r',
+        Kind::Integer(_) | Kind::Enumeration(_) => 'i',
+        Kind::Boolean(_) => 'b',
+        Kind::String(_) => 's',
     }
 }
 

@@ -19,6 +19,10 @@ mod line;
 #[cfg(target_os = "linux")]
 mod log;
 #[cfg(target_os = "linux")]
+mod memory;
+#[cfg(target_os = "linux")]
+mod output;
+#[cfg(target_os = "linux")]
 mod perform;
 #[cfg(target_os = "linux")]
 mod process;
@@ -41,7 +45,7 @@ use std::time::Duration;
 
 use fmi2::package::{PackageError, Unpacked};
 
-use crate::slave::CallError;
+use crate::slave::{CallError, Failure};
 
 #[cfg(not(target_os = "linux"))]
 pub use elsewhere::{Isolated, worker};
@@ -53,11 +57,19 @@ pub use worker::worker;
 /// The first argument of a program that is to be a worker.
 pub const WORKER: &str = "--fmu-worker";
 
+/// The environment variable by which a process knows that it is to be a worker: the number of the
+/// process that started it.
+#[cfg(target_os = "linux")]
+const STARTED_BY: &str = "FMU_WORKER_STARTED_BY";
+
 /// How FMUs are isolated.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
     /// How long each call may take; its process is ended then. None: as long as it takes.
     pub time_limit: Option<Duration>,
+    /// Most bytes of address space that the process of each FMU may take, the program in it included
+    /// (`RLIMIT_AS`). None: no limit of its own.
+    pub memory_limit: Option<u64>,
     /// Libraries to load before that of the FMU, as [`crate::preload`] does.
     pub preload: Vec<OsString>,
     /// Whether `fmi2SetDebugLogging` is called where the FMU has it.
@@ -98,6 +110,26 @@ pub enum IsolateError {
         /// What the operating system said.
         source: io::Error,
     },
+    /// The program was started and did not become a worker.
+    #[error(
+        "{}, started for {instance} as `{WORKER}`, did not become a worker: it {failure}; its `main` \
+         has to begin with a call of `master::isolate::worker()` where its first argument is {WORKER}",
+        executable.display()
+    )]
+    NoWorker {
+        /// The program.
+        executable: PathBuf,
+        /// The instance.
+        instance: String,
+        /// What it did instead.
+        failure: Failure,
+    },
+    /// This process was started to be a worker and starts others.
+    #[error(
+        "this process was started as `{WORKER}` to run one FMU and did not become a worker; `main` has \
+         to begin with a call of `master::isolate::worker()` where the first argument is {WORKER}"
+    )]
+    InWorker,
     /// The worker could not load a library that was to be loaded before that of the FMU.
     #[error("{reason}")]
     Preload {
@@ -131,6 +163,21 @@ pub enum IsolateError {
 impl From<PackageError> for IsolateError {
     fn from(error: PackageError) -> Self {
         IsolateError::Package(Box::new(error))
+    }
+}
+
+#[cfg(target_os = "linux")]
+impl IsolateError {
+    /// The same; where the FMU was refused, with the limit of memory, which may be why.
+    fn with_limit(mut self, limit: Option<u64>) -> Self {
+        use std::fmt::Write as _;
+        if let (Self::Refused { reason, .. } | Self::Preload { reason }, Some(limit)) =
+            (&mut self, limit)
+        {
+            // Writing to a String does not fail.
+            let _ = write!(reason, "; its process has a memory limit of {limit} bytes");
+        }
+        self
     }
 }
 

@@ -9,6 +9,7 @@ pub mod algorithm;
 pub mod assembly;
 mod call_log;
 mod choose;
+pub mod crash;
 mod error;
 mod exchange;
 pub mod fault;

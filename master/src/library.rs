@@ -3,6 +3,7 @@
 #![expect(unsafe_code, reason = "the boundary to C")]
 
 mod calls;
+mod foreign;
 mod functions;
 mod log;
 mod states;
@@ -20,9 +21,11 @@ use fmi2::abi::{
 };
 use libloading::Library as Handle;
 
+use crate::crash::Place;
 use crate::error::LoadError;
 use crate::slave::{CallError, Failure};
 use functions::Functions;
+pub(crate) use log::Names;
 use log::Sink;
 
 const PYTHON: &str = "\nThe library expects Python to be in the process already, as those that \
@@ -33,9 +36,29 @@ fn reason(error: &libloading::Error) -> String {
     std::error::Error::source(error).map_or_else(|| error.to_string(), ToString::to_string)
 }
 
-fn load(path: &Path) -> Result<Handle, LoadError> {
+/// Opens a library.
+#[cfg(not(windows))]
+fn open(path: &Path) -> Result<Handle, libloading::Error> {
     // SAFETY: runs the initialisers of the library, which is what the user asked for.
-    unsafe { Handle::new(path) }.map_err(|error| {
+    unsafe { Handle::new(path) }
+}
+
+/// Opens a library; those that it needs are looked for in its folder first.
+#[cfg(windows)]
+fn open(path: &Path) -> Result<Handle, libloading::Error> {
+    use libloading::os::windows::{LOAD_WITH_ALTERED_SEARCH_PATH, Library};
+    // The flag is for absolute paths, written with the separators of Windows.
+    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    // SAFETY: runs the initialisers of the library, which is what the user asked for.
+    unsafe { Library::load_with_flags(path, LOAD_WITH_ALTERED_SEARCH_PATH) }.map(Handle::from)
+}
+
+fn load(path: &Path) -> Result<Handle, LoadError> {
+    let place = Place::new(&path.display().to_string());
+    place.enter(&"loading the library");
+    let opened = open(path);
+    place.leave();
+    opened.map_err(|error| {
         let message = reason(&error);
         let python = message
             .split("undefined symbol: ")
@@ -153,14 +176,17 @@ impl Library {
         name: &str,
         guid: &str,
         resources: &str,
+        names: Names,
     ) -> Result<Component, LoadError> {
-        let sink = Arc::new(Sink::new(name));
+        let place = Place::new(name);
+        let sink = Sink::new(&place, names);
         let callbacks = callbacks(&sink);
         let (c_name, c_guid, c_resources) = (c_string(name), c_string(guid), c_string(resources));
         let kind = match interface {
             Interface::ModelExchange => MODEL_EXCHANGE,
             Interface::CoSimulation => CO_SIMULATION,
         };
+        place.enter(&"fmi2Instantiate");
         // SAFETY: terminated strings, callbacks that outlive the instance.
         let pointer = self.functions.instantiate.map_or(std::ptr::null_mut(), |function| unsafe {
             function(
@@ -173,14 +199,16 @@ impl Library {
                 0,
             )
         });
+        place.leave();
         let component = Component {
             hot: Hot {
                 pointer,
                 set_real: self.functions.set_real,
                 do_step: self.functions.do_step,
                 get_real: self.functions.get_real,
-                sink: sink.clone(),
+                place: place.clone(),
             },
+            place,
             pointer,
             functions: self.functions,
             sink,
@@ -226,13 +254,15 @@ struct Hot {
     set_real: Option<functions::SetReal>,
     do_step: Option<functions::DoStep>,
     get_real: Option<functions::GetReal>,
-    sink: Arc<Sink>,
+    place: Arc<Place>,
 }
 
 /// An instance, freed with its last use; the library stays loaded as long.
 pub(crate) struct Component {
     /// What [`Component::pass`] needs.
     hot: Hot,
+    /// Where the instance is, for reports of its crash.
+    place: Arc<Place>,
     pointer: fmi2Component,
     /// Those of the library, at hand.
     functions: Functions,
@@ -266,8 +296,10 @@ impl Drop for Component {
             self.free_state(&mut state);
         }
         if let Some(free_instance) = self.functions.free_instance {
+            self.place.enter(&"fmi2FreeInstance");
             // SAFETY: the instance is alive and not used again.
             unsafe { free_instance(self.pointer) };
+            self.place.leave();
         }
     }
 }
@@ -275,6 +307,7 @@ impl Drop for Component {
 impl Component {
     #[inline]
     fn check(&self, function: &'static str, status: fmi2Status) -> Result<(), CallError> {
+        self.place.leave();
         if status == Status::OK as fmi2Status || status == Status::Warning as fmi2Status {
             return Ok(());
         }

@@ -1,18 +1,17 @@
-/* The logger that FMUs call: formats the message and hands it to the receiver in Rust. */
+/* The logger that FMUs call: formats the message and hands everything to the receiver in Rust.
+ *
+ * Nothing that the FMU hands over as its environment or as a name is looked into here. */
 #include <stdarg.h>
 #include <stdio.h>
 
-struct sink {
-    void (*receive)(struct sink *sink, int status, const char *category, const char *text);
-};
+void master_receive(void *environment, const char *instance, int status, const char *category,
+                    const char *text);
 
 void master_logger(void *environment, const char *instance, int status, const char *category,
                    const char *message, ...) {
-    struct sink *sink = environment;
     char text[4096];
     va_list arguments;
-    (void)instance;
-    if (sink == NULL || message == NULL) {
+    if (message == NULL) {
         return;
     }
     va_start(arguments, message);
@@ -20,5 +19,5 @@ void master_logger(void *environment, const char *instance, int status, const ch
         text[0] = '\0';
     }
     va_end(arguments);
-    sink->receive(sink, status, category, text);
+    master_receive(environment, instance, status, category, text);
 }

@@ -65,7 +65,7 @@ pub struct Row<'a> {
 
 /// A place that takes the rows of a run, one after another. One that is dropped without
 /// [`Sink::finish`] keeps every row that it was given, as far as the disk allows.
-pub trait Sink {
+pub trait Sink: Send {
     /// Takes the values at `time` in s. CSV allocates nothing here; Parquet does where it hands a
     /// block of rows over.
     ///
@@ -113,6 +113,16 @@ pub enum ResultsError {
         expected: usize,
         /// Values in the row.
         found: usize,
+    },
+    /// Another process, or another sink of this one, writes to the file.
+    #[error(
+        "{}: another run writes its results to this file, expected one that ends first, or another \
+         folder or file (--out, --results)",
+        path.display()
+    )]
+    InUse {
+        /// The file.
+        path: PathBuf,
     },
     /// The file cannot be made or has no more room.
     #[error("cannot write {}: {source}", path.display())]
@@ -185,7 +195,8 @@ impl Format {
 ///
 /// # Errors
 ///
-/// [`ResultsError::Format`], [`ResultsError::Duplicate`], [`ResultsError::Write`].
+/// [`ResultsError::Format`], [`ResultsError::Duplicate`], [`ResultsError::InUse`],
+/// [`ResultsError::Write`].
 pub fn create(path: &Path, columns: &[Column]) -> Result<Box<dyn Sink>, ResultsError> {
     Ok(match Format::of(path)? {
         Format::Csv => Box::new(CsvSink::create(path, columns)?),
@@ -237,13 +248,50 @@ impl Widths {
     }
 }
 
-/// An empty file in a folder that is made where it is missing.
+/// An empty file in a folder that is made where it is missing. It is this process's alone as long as
+/// it is open.
 fn create_file(path: &Path) -> Result<File, ResultsError> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    folder
-        .map_or(Ok(()), fs::create_dir_all)
-        .and_then(|()| File::create(path))
-        .map_err(|source| ResultsError::Write { path: path.to_owned(), source })
+    let failed = |source| ResultsError::Write { path: path.to_owned(), source };
+    folder.map_or(Ok(()), fs::create_dir_all).map_err(failed)?;
+    let file = open_alone(path).map_err(failed)?;
+    let file = file.ok_or_else(|| ResultsError::InUse { path: path.to_owned() })?;
+    let length = file.metadata().map_err(failed)?.len();
+    if length > 0 {
+        tracing::info!("{}: replaces the results of an earlier run", path.display());
+        file.set_len(0).map_err(failed)?;
+    }
+    Ok(file)
+}
+
+/// Opens a file for writing, its content as it is; none where another process has it open so. The
+/// lock ends with the process, however that ends.
+#[cfg(not(windows))]
+fn open_alone(path: &Path) -> io::Result<Option<File>> {
+    let file = File::options().write(true).create(true).truncate(false).open(path)?;
+    // A device or a pipe may be for many.
+    if !file.metadata()?.is_file() {
+        return Ok(Some(file));
+    }
+    match file.try_lock() {
+        // A file system without locks cannot tell.
+        Ok(()) | Err(fs::TryLockError::Error(_)) => Ok(Some(file)),
+        Err(fs::TryLockError::WouldBlock) => Ok(None),
+    }
+}
+
+/// As on other systems; readers may open the file, writers may not.
+#[cfg(windows)]
+fn open_alone(path: &Path) -> io::Result<Option<File>> {
+    use std::os::windows::fs::OpenOptionsExt as _;
+    const FILE_SHARE_READ: u32 = 1;
+    const ERROR_SHARING_VIOLATION: i32 = 32;
+    let mut options = File::options();
+    options.write(true).create(true).truncate(false).share_mode(FILE_SHARE_READ);
+    match options.open(path) {
+        Err(error) if error.raw_os_error() == Some(ERROR_SHARING_VIOLATION) => Ok(None),
+        opened => opened.map(Some),
+    }
 }
 
 #[cfg(test)]

@@ -339,6 +339,8 @@ pub enum Failure {
     Exited(i32),
     /// It did not return within this time in s; its process was ended.
     TimedOut(f64),
+    /// Its process crashed after it had not been given memory beyond this limit in bytes.
+    OutOfMemory(u64),
     /// It answered something impossible: what.
     Nonsense(String),
 }
@@ -359,6 +361,10 @@ impl fmt::Display for Failure {
                 write!(formatter, "ended its process with exit status {status}")
             }
             Failure::TimedOut(seconds) => write!(formatter, "did not return within {seconds} s"),
+            Failure::OutOfMemory(limit) => write!(
+                formatter,
+                "crashed: it needs more memory than the limit of {limit} bytes for its process"
+            ),
             Failure::Nonsense(what) => formatter.write_str(what),
         }
     }

@@ -19,8 +19,7 @@ mod xml;
 use std::collections::HashSet;
 use std::path::Path;
 
-use fmi2::package::Unpacked;
-use tempfile::TempDir;
+use fmi2::package::{TemporaryFolder, Unpacked};
 
 pub use error::SspError;
 pub use read::{read_ssb, read_ssd, read_ssm, read_ssv};
@@ -53,7 +52,7 @@ pub struct Opened {
 #[derive(Debug)]
 pub struct Folders {
     _fmus: Vec<Unpacked>,
-    _packages: Vec<TempDir>,
+    _packages: Vec<TemporaryFolder>,
 }
 
 /// Reads the SSP archive at `path`, or an SSD file beside its FMUs, or a folder with a file

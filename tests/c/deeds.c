@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 enum { FLOOD = 1000000, LONG = 1000000, LEAK = 1 << 16 };
@@ -49,10 +50,27 @@ static void talk(const Slave *slave, const char *deed) {
     } else if (strcmp(deed, "specifiers") == 0) {
         f->logger(f->componentEnvironment, "%s%n", fmi2Warning, "%s%n", "%d%% of %s at %.3f %s", 7,
                   "%s%n", 0.125, "\xff\xfe");
+    } else if (strcmp(deed, "no environment") == 0) {
+        f->logger(NULL, slave->name, fmi2Warning, "logAll", "message %d of %s", 1, "nobody");
+    } else if (strcmp(deed, "another environment") == 0) {
+        /* Nothing here can be looked into but the message. */
+        f->logger((void *)8, (const char *)16, fmi2Warning, (const char *)24, "message %d", 2);
+        f->logger((void *)slave, slave->name, fmi2Warning, "logAll", "message %d", 3);
+    } else if (strcmp(deed, "names") == 0) {
+        f->logger(f->componentEnvironment, slave->name, fmi2Warning, "logAll",
+                  "#r0#, #b1# and #r77# are ##%d", 4);
     } else if (strcmp(deed, "print") == 0) {
         printf("printed by an FMU\n");
         fflush(stdout);
     }
+}
+
+/* Calls itself for ever. */
+static int fill_stack(int depth) {
+    volatile char frame[4096];
+    static volatile int for_ever = 1;
+    memset((void *)frame, depth, sizeof frame);
+    return for_ever ? fill_stack(depth + 1) + frame[0] : 0;
 }
 
 /* What the FMU does to the process that it is in. */
@@ -66,6 +84,27 @@ static void meddle(const char *deed) {
         exit(3);
     } else if (strcmp(deed, "exit 0") == 0) {
         exit(0);
+    } else if (strcmp(deed, "overflow the stack") == 0) {
+        fill_stack(1);
+    } else if (strcmp(deed, "divide by zero") == 0) {
+        volatile int zero = 0;
+        zero = 7 / zero;
+    } else if (strcmp(deed, "fork") == 0) {
+        /* Children that end as processes do are no end of this one. */
+        int exited = 0, killed = 0;
+        pid_t first = fork();
+        if (first == 0) {
+            exit(5);
+        }
+        pid_t second = fork();
+        if (second == 0) {
+            abort();
+        }
+        waitpid(first, &exited, 0);
+        waitpid(second, &killed, 0);
+        if (!WIFEXITED(exited) || WEXITSTATUS(exited) != 5 || !WIFSIGNALED(killed)) {
+            abort();
+        }
     } else if (strcmp(deed, "hang") == 0) {
         for (;;) {
             usleep(1000);

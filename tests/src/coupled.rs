@@ -18,7 +18,7 @@ pub const ALL: usize = 17;
 /// Rows of one that ends at the last successful step, to t1.
 pub const TO_T1: usize = 9;
 /// Behaviour that is unusual and harms nobody.
-pub const UNUSUAL: [&str; 11] = [
+pub const UNUSUAL: [&str; 15] = [
     "as it should",
     "pend",
     "warn everywhere",
@@ -27,8 +27,12 @@ pub const UNUSUAL: [&str; 11] = [
     "no message in fmi2DoStep",
     "no name in fmi2DoStep",
     "specifiers in fmi2DoStep",
+    "no environment in fmi2DoStep",
+    "another environment in fmi2DoStep",
+    "names in fmi2DoStep",
     "long message in fmi2DoStep",
     "print in fmi2DoStep",
+    "fork in fmi2DoStep",
     "leak in fmi2DoStep",
 ];
 

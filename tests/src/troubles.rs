@@ -33,6 +33,9 @@ pub enum Trouble {
     StopEarly,
     HangWithChild,
     AnswerWrongTurn,
+    LeaveWithChild,
+    TakeMemory,
+    PrintFlood,
 }
 
 /// The unpacked FMU, compiled once for this process.

@@ -339,11 +339,12 @@ fn what_cannot_be_isolated_is_refused_by_name() {
     let error = isolate::open(troubles(), "one", &wrong).err().unwrap().to_string();
     assert!(error.contains("no/such/program") && error.contains("one"), "{error}");
     let other = Options { executable: Some("/bin/true".into()), ..options() };
-    let IsolateError::Call { source, .. } = isolate::open(troubles(), "one", &other).err().unwrap()
-    else {
-        panic!()
+    let error = isolate::open(troubles(), "one", &other).err().unwrap();
+    let text = error.to_string();
+    let IsolateError::NoWorker { failure: Failure::Exited(0), .. } = error else {
+        panic!("{text}");
     };
-    assert_eq!(source.failure, Failure::Exited(0));
+    assert!(text.contains("master::isolate::worker()") && text.contains("--fmu-worker"), "{text}");
     let preload = Options { preload: vec!["libno-such.so".into()], ..options() };
     let error = isolate::open(troubles(), "one", &preload).err().unwrap().to_string();
     assert!(error.contains("libno-such.so"), "{error}");

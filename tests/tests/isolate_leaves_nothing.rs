@@ -8,8 +8,8 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use master::Slave as _;
 use master::isolate::{self, Isolated, Options};
+use master::{Failure, Slave as _};
 use tests::{Trouble, command, troubles};
 
 /// Set in the processes that the tests start, to the part they have.
@@ -115,6 +115,95 @@ fn kill_master(name: &str, part: &str) {
         assert!(begin.elapsed() < Duration::from_secs(20), "the worker of the {part} master lives");
         std::thread::sleep(Duration::from_millis(5));
     }
+}
+
+/// The group of processes that a process is in, of those that run.
+fn group(process: u32) -> Vec<String> {
+    let processes = std::fs::read_dir("/proc").unwrap().flatten();
+    let stats =
+        processes.filter_map(|entry| std::fs::read_to_string(entry.path().join("stat")).ok());
+    let in_group = |stat: &String| {
+        // After the name in brackets: state, parent, group.
+        let fields: Vec<_> = stat.rsplit(") ").next().unwrap_or("").split(' ').collect();
+        fields.get(2) == Some(&process.to_string().as_str()) && fields.first() != Some(&"Z")
+    };
+    stats.filter(in_group).collect()
+}
+
+#[test]
+fn what_an_fmu_started_ends_with_it_even_where_it_ends_by_itself() {
+    let mut slave = open(None);
+    let process = slave.process_id();
+    let error = step(&mut slave, Trouble::LeaveWithChild).unwrap_err();
+    assert_eq!(error.failure, Failure::Exited(3));
+    let begin = Instant::now();
+    while !group(process).is_empty() {
+        assert!(begin.elapsed() < Duration::from_secs(20), "{:?} is left", group(process));
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+#[test]
+fn memory_beyond_the_limit_is_the_reason_of_the_crash() {
+    let executable = Some(command().to_owned());
+    let limit = 1 << 30;
+    let options = Options { executable, memory_limit: Some(limit), ..Options::default() };
+    let mut slave = isolate::open(troubles(), "one", &options).unwrap();
+    step(&mut slave, Trouble::None).unwrap();
+    let error = step(&mut slave, Trouble::TakeMemory).unwrap_err();
+    assert_eq!(error.failure, Failure::OutOfMemory(limit));
+    assert!(error.to_string().contains("limit of 1073741824 bytes"), "{error}");
+    // A crash for another reason is none of the limit.
+    let mut slave = isolate::open(troubles(), "one", &options).unwrap();
+    let error = step(&mut slave, Trouble::CrashInStep).unwrap_err();
+    assert!(matches!(error.failure, Failure::Killed(11, _)), "{error}");
+    let tight = Options { memory_limit: Some(4 << 20), ..options };
+    let error = isolate::open(troubles(), "one", &tight).err().unwrap().to_string();
+    assert!(error.contains("4194304 bytes"), "{error}");
+}
+
+#[test]
+fn a_program_that_is_no_worker_starts_itself_once_and_says_what_it_lacks() {
+    let name = "a_program_that_is_no_worker_starts_itself_once_and_says_what_it_lacks";
+    let folder = tempfile::tempdir().unwrap();
+    let (log, script) = (folder.path().join("starts"), folder.path().join("program"));
+    if let Some(part) = part() {
+        // The program: each start leaves a line.
+        let executable = Some(Path::new(&part).to_owned());
+        let options = Options { executable, ..Options::default() };
+        let error = isolate::open(troubles(), "one", &options).err().unwrap();
+        println!("said: {error}");
+        return;
+    }
+    let this = std::env::current_exe().unwrap();
+    let text = format!(
+        "#!/bin/sh\necho start >> '{}'\nexec '{}' --exact {name} --nocapture >&2\n",
+        log.display(),
+        this.display()
+    );
+    std::fs::write(&script, text).unwrap();
+    let mode = std::os::unix::fs::PermissionsExt::from_mode(0o755);
+    std::fs::set_permissions(&script, mode).unwrap();
+    let done = again(name, &script.display().to_string()).output().unwrap();
+    let said = String::from_utf8_lossy(&done.stdout) + String::from_utf8_lossy(&done.stderr);
+    assert!(said.contains("did not become a worker"), "{said}");
+    assert!(said.contains("master::isolate::worker()"), "{said}");
+    assert_eq!(std::fs::read_to_string(&log).unwrap(), "start\n", "{said}");
+}
+
+#[test]
+fn of_what_an_fmu_prints_without_end_a_part_is_passed_on() {
+    let name = "of_what_an_fmu_prints_without_end_a_part_is_passed_on";
+    if part().is_some() {
+        step(&mut open(None), Trouble::PrintFlood).unwrap();
+        return;
+    }
+    let done = again(name, "printer").output().unwrap();
+    let said = String::from_utf8_lossy(&done.stderr);
+    assert!(done.status.success(), "{said}");
+    let lines = said.lines().filter(|line| line.starts_with("again and again")).count();
+    // Of 40 MB, 1 MiB.
+    assert!((20_000..32_000).contains(&lines), "{lines} lines");
 }
 
 #[test]

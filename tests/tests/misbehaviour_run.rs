@@ -1,6 +1,6 @@
 //! FMUs in C under `aso-ftc run`, in its own process: unusual ones run, and where one fails the
-//! message, the exit status and the results so far are right. Crashes are in
-//! `misbehaviour_isolated.rs`.
+//! message, the exit status and the results so far are right, even where it takes the process with
+//! it. The same in processes of their own is in `misbehaviour_isolated.rs`.
 #![forbid(unsafe_code)]
 
 #[path = "misbehaviour_run/promises.rs"]
@@ -262,4 +262,92 @@ fn several_instances_of_one_fmu_run_side_by_side() {
     assert_eq!(time.len(), ALL);
     assert_eq!((run.numbers("a.y"), run.numbers("b.y")), (time.clone(), time.clone()));
     assert_eq!(run.numbers("c.y"), time.iter().map(|time| -2.0 * time).collect::<Vec<_>>());
+}
+
+#[test]
+fn messages_with_a_foreign_environment_or_none_are_those_of_the_fmu_that_is_called() {
+    for isolate in [&[][..], &["--isolate"]] {
+        let run = Run::pair(&CFmu::that("no environment in fmi2DoStep"), isolate);
+        run.expect(0, ALL);
+        run.says(&["warning: a, t = 0.5 s, logAll: message 1 of nobody"]);
+        let run = Run::pair(&CFmu::that("another environment in fmi2DoStep"), isolate);
+        run.expect(0, ALL);
+        run.says(&["warning: a, t = 0.5 s: message 2", "warning: a, t = 0.5 s, logAll: message 3"]);
+        let run = Run::pair(&CFmu::that("no environment in fmi2Instantiate"), isolate);
+        run.expect(0, ALL);
+        run.says(&["warning: a, t = 0 s, logAll: message 1 of nobody"]);
+    }
+}
+
+#[test]
+fn value_references_in_messages_become_the_names_of_the_variables() {
+    for isolate in [&[][..], &["--isolate"]] {
+        let run = Run::pair(&CFmu::that("names in fmi2DoStep"), isolate);
+        run.says(&["logAll: u, b_out and #r77# are #4"]);
+    }
+}
+
+/// What an FMU can do to its process, and the word for it in the report.
+const ENDS: [(&str, &str); 6] = [
+    ("crash", "SIGSEGV"),
+    ("abort", "SIGABRT"),
+    ("exit 0", "exit"),
+    ("exit 3", "exit"),
+    ("overflow the stack", "SIGSEGV"),
+    ("divide by zero", "SIGFPE"),
+];
+
+#[test]
+#[cfg(unix)]
+fn an_fmu_that_ends_the_process_is_named_with_call_and_time_and_the_rows_stay() {
+    for (deed, word) in ENDS {
+        let run = Run::pair(&CFmu::that(&format!("{deed} in fmi2DoStep")), &[]);
+        run.expect(1, TO_T1);
+        run.says(&["error: a at t = 0.5 s: fmi2DoStep", word, "out/results.csv", "--isolate"]);
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn an_fmu_that_ends_the_process_after_the_last_step_takes_no_row_with_it() {
+    for function in ["fmi2Terminate", "fmi2FreeInstance"] {
+        for (deed, word) in ENDS {
+            let run = Run::pair(&CFmu::that(&format!("{deed} in {function}")), &[]);
+            run.expect(1, ALL);
+            run.says(&["error: a at t = ", function, word]);
+        }
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn an_fmu_that_ends_the_process_before_the_first_step_is_named_with_the_call() {
+    for function in ["fmi2Instantiate", "fmi2EnterInitializationMode", "fmi2SetReal"] {
+        for (deed, word) in ENDS {
+            let fmu = CFmu::that(&format!("{deed} in {function}"));
+            let run = Run::pair(&fmu, &["--set", "a.u=1"]);
+            assert_eq!(run.status, Some(1), "{}", run.message);
+            run.says(&["error: a at t = 0 s: ", function, word]);
+        }
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn an_fmu_that_corrupts_the_heap_of_all_is_named_with_call_and_time() {
+    for function in ["fmi2DoStep", "fmi2Terminate"] {
+        let run = Run::pair(&CFmu::that(&format!("corrupt the heap in {function}")), &[]);
+        assert_eq!(run.status, Some(1), "{}", run.message);
+        assert!(!run.message.contains("panicked"), "{}", run.message);
+        run.says(&["a at t = ", function, "SIG", "--isolate"]);
+    }
+}
+
+#[test]
+fn a_time_limit_without_isolation_says_what_it_cannot_do() {
+    let run = Run::pair(&CFmu::well_behaved(), &["--time-limit", "5"]);
+    run.expect(0, ALL);
+    run.says(&["warning: --time-limit without --isolate cannot end a call that hangs"]);
+    let run = Run::pair(&CFmu::well_behaved(), &["--isolate", "--time-limit", "5"]);
+    assert_eq!(run.message, "");
 }

@@ -15,6 +15,10 @@ mod library;
 #[path = "run/messages.rs"]
 mod messages;
 
+#[cfg(unix)]
+#[path = "run/process.rs"]
+mod process;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

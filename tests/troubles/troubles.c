@@ -35,6 +35,9 @@ enum trouble {
     STOP_EARLY,
     HANG_WITH_CHILD,
     ANSWER_WRONG_TURN,
+    LEAVE_WITH_CHILD,
+    TAKE_MEMORY,
+    PRINT_FLOOD,
 };
 struct values {
     double u, y, reached;
@@ -238,6 +241,21 @@ static int in_step(struct instance *i, double time, double size) {
             execlp("sleep", "sleep", "1000", (char *)NULL);
         }
         be_silent_for_ever();
+        break;
+    case LEAVE_WITH_CHILD:
+        if (fork() == 0) {
+            execlp("sleep", "sleep", "1000", (char *)NULL);
+        }
+        _exit(3);
+    case TAKE_MEMORY:
+        for (;;) {
+            memset(malloc(1 << 24), 1, 1 << 24);
+        }
+    case PRINT_FLOOD:
+        for (int k = 0; k < 1 << 20; k++) {
+            printf("again and again and again, line %d\n", k);
+        }
+        fflush(stdout);
         break;
     case FLOOD:
         for (int k = 0; k < 1000000; k++) {

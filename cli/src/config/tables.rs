@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
-use super::Every;
+use super::{Every, Memory};
 use crate::design::document::Place;
 
 /// Where, and what is wrong there.
@@ -101,6 +101,9 @@ pub(crate) struct Isolation {
     /// How long a call may take, in s of the clock on the wall.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) time_limit: Option<Spanned<f64>>,
+    /// Most memory that each process may take.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) memory_limit: Option<Memory>,
 }
 
 impl Isolation {

@@ -44,6 +44,7 @@ plot-file = "a.png"
 [isolation]
 isolate = true
 time-limit = 3
+memory-limit = "1536 MiB"
 
 [checkpoint]
 file = "state"
@@ -131,6 +132,7 @@ fn errors_say_line_column_and_what_was_expected() {
         ("[results]\nevery = 0", ["system.toml:2:9", "found 0", "above 0"]),
         ("[results]\nevery = 'often'", ["system.toml:2:9", "often", "\"step\""]),
         ("[isolation]\ntime-limit = -1", ["system.toml:2:14", "time-limit", "above 0"]),
+        ("[isolation]\nmemory-limit = '2 gigs'", ["system.toml:2:16", "2 gigs", "2GiB"]),
         ("[checkpoint]\nevery = 1", ["system.toml:2:9", "every", "file"]),
         ("[[connections]]\nfrom = 'a.y'", ["system.toml:1:1", "missing field", "to"]),
         ("[fmus]\na = 1", ["system.toml:2:5", "integer", "path"]),

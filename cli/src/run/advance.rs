@@ -100,7 +100,12 @@ impl<'a> Beside<'a> {
                 save_at = begin + (saved + 1.0) * interval;
             }
         }
+        interrupt::notice();
         self.save(simulation)?;
+        // An FMU may take the process with it from here on.
+        if let Some(recorder) = &mut self.recorder {
+            recorder.flush()?;
+        }
         simulation.terminate()?;
         simulation.free()?;
         Ok(match simulation.ended_by() {

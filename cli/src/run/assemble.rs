@@ -97,7 +97,20 @@ fn instantiate(
     let limit = config.isolation.time_limit.as_ref().map(|limit| *limit.get_ref());
     let time_limit = limit.map(Duration::try_from_secs_f64).transpose().context("time-limit")?;
     let preload = config.preload.iter().map(Into::into).collect();
-    let isolation = isolate::Options { time_limit, preload, logging, executable: None };
+    let memory_limit = config.isolation.memory_limit.map(|memory| memory.0);
+    if config.isolation.isolate != Some(true) {
+        if memory_limit.is_some() {
+            bail!("--memory-limit is for FMUs in processes of their own, expected --isolate");
+        }
+        if time_limit.is_some() {
+            tracing::warn!(
+                "--time-limit without --isolate cannot end a call that hangs: it is for answers that \
+                 are pending only"
+            );
+        }
+    }
+    let isolation =
+        isolate::Options { time_limit, memory_limit, preload, logging, executable: None };
     let mut opening = Opening { isolation, opened: HashMap::new(), isolated: HashMap::new() };
     let mut system = System::default();
     for element in elements {

@@ -7,7 +7,7 @@ use master::{Coupling, Course, StepControl, Sweep, Wanted};
 use toml::Spanned;
 
 use super::saved::Saved;
-use crate::config::{Config, Every, Loaded, Wire};
+use crate::config::{Config, Every, Loaded, Memory, Wire};
 
 /// Where results go unless told otherwise.
 const OUT: &str = "results/run";
@@ -122,9 +122,14 @@ pub(crate) struct Options {
     /// Run each FMU in a process of its own
     #[arg(long)]
     isolate: bool,
-    /// How long a call of an FMU may take: with --isolate any call, else an answer that is pending
+    /// How long a call of an FMU may take, with --isolate; without it only an answer that is pending
+    /// has a limit, and a call that hangs is not ended
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     time_limit: Option<f64>,
+    /// Most memory (address space) for the process of each FMU, in bytes or as in 512MiB, 2GiB; needs
+    /// --isolate
+    #[arg(long, value_name = "BYTES", value_parser = str::parse::<Memory>)]
+    memory_limit: Option<Memory>,
     /// Load a shared library first, its symbols visible to the FMUs; may be repeated
     #[arg(long, value_name = "LIBRARY")]
     preload: Vec<String>,
@@ -228,6 +233,7 @@ impl Options {
         put(&mut config.experiment.tolerance, placed(self.tolerance));
         put(&mut config.isolation.isolate, self.isolate.then_some(true));
         put(&mut config.isolation.time_limit, placed(self.time_limit));
+        put(&mut config.isolation.memory_limit, self.memory_limit);
         put(&mut config.checkpoint.file, self.checkpoint.clone());
         put(&mut config.checkpoint.every, placed(self.checkpoint_every));
         self.put_results(config, saved.as_ref());

@@ -1,17 +1,36 @@
 //! Rows of results, read from the FMUs and written as the run goes.
 
-use std::path::Path;
+use std::io;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError, Weak};
+use std::time::Duration;
 
 use anyhow::Context;
 use fmi2::description::{Causality, Kind};
-use master::results::{self, Column, ColumnKind, Decimation, Due, Row, Selection, Sink};
+use master::results::{
+    self, Column, ColumnKind, Decimation, Due, ResultsError, Row, Selection, Sink,
+};
 use master::{Port, Readout, Simulation, System};
 
 use crate::config::Every;
 
+/// The files that recorders write to.
+static FILES: Mutex<Vec<Weak<Mutex<Recording>>>> = Mutex::new(Vec::new());
+/// How often, and how long, the end of the process tries to take a file from the thread that has it.
+const TRIES: u32 = 50;
+const PAUSE: Duration = Duration::from_millis(10);
+
+/// A file of results as it is written; the end of the process takes it over.
+struct Recording {
+    path: PathBuf,
+    /// None after the end of the file.
+    sink: Option<Box<dyn Sink>>,
+}
+
 /// What is recorded, how often, and where to.
 pub(crate) struct Recorder {
-    sink: Box<dyn Sink>,
+    recording: Arc<Mutex<Recording>>,
     due: Due,
     readout: Readout,
 }
@@ -34,7 +53,12 @@ impl Recorder {
         let system = simulation.system();
         let columns: Vec<_> = ports.iter().map(|&port| column(system, port)).collect();
         let (due, readout) = (Due::new(decimation, start), simulation.readout(&ports));
-        Ok(Some(Self { sink: results::create(path, &columns)?, due, readout }))
+        let sink = Some(results::create(path, &columns)?);
+        let recording = Arc::new(Mutex::new(Recording { path: path.to_owned(), sink }));
+        let mut files = FILES.lock().unwrap_or_else(PoisonError::into_inner);
+        files.retain(|file| file.strong_count() > 0);
+        files.push(Arc::downgrade(&recording));
+        Ok(Some(Self { recording, due, readout }))
     }
 
     /// Goes on with the rows of a run that was resumed.
@@ -57,17 +81,20 @@ impl Recorder {
     fn record(&mut self, simulation: &mut Simulation, time: f64) -> anyhow::Result<()> {
         simulation.read(&mut self.readout)?;
         let Readout { reals, integers, booleans, strings, .. } = &self.readout;
-        Ok(self.sink.row(time, &Row { reals, integers, booleans, strings })?)
+        let row = Row { reals, integers, booleans, strings };
+        let mut recording = lock(&self.recording);
+        Ok(recording.sink.as_mut().map_or(Ok(()), |sink| sink.row(time, &row))?)
     }
 
     /// Hands all rows over; the file is whole.
     pub(crate) fn flush(&mut self) -> anyhow::Result<()> {
-        Ok(self.sink.flush()?)
+        Ok(lock(&self.recording).sink.as_mut().map_or(Ok(()), |sink| sink.flush())?)
     }
 
     /// Ends the file.
     pub(crate) fn finish(self) -> anyhow::Result<()> {
-        Ok(self.sink.finish()?)
+        let sink = lock(&self.recording).sink.take();
+        Ok(sink.map_or(Ok(()), Sink::finish)?)
     }
 }
 
@@ -79,6 +106,43 @@ fn readable(system: &mut System, ports: &[Port], time: f64) -> anyhow::Result<Ve
     }
     let kept = ports.iter().filter(|port| refused.iter().all(|(refused, _)| refused != *port));
     Ok(kept.copied().collect())
+}
+
+fn lock(recording: &Mutex<Recording>) -> MutexGuard<'_, Recording> {
+    recording.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Hands the rows of all open files over, for a process that is about to end: the files, and what
+/// became of them. No recorder writes another row.
+pub(crate) fn keep_results() -> Vec<(PathBuf, Result<(), ResultsError>)> {
+    let files = match FILES.try_lock() {
+        Ok(files) => files.iter().filter_map(Weak::upgrade).collect(),
+        Err(_) => Vec::new(),
+    };
+    files.iter().filter_map(|file| keep(file)).collect()
+}
+
+/// Hands the rows over where the thread that writes it lets go of it in time.
+fn keep(file: &Mutex<Recording>) -> Option<(PathBuf, Result<(), ResultsError>)> {
+    for _ in 0..TRIES {
+        let mut recording = match file.try_lock() {
+            Ok(recording) => recording,
+            Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
+            Err(TryLockError::WouldBlock) => {
+                std::thread::sleep(PAUSE);
+                continue;
+            }
+        };
+        let (path, mut sink) = (recording.path.clone(), recording.sink.take()?);
+        // The FMU may have written over what the sink needs.
+        let kept = catch_unwind(AssertUnwindSafe(|| sink.flush()));
+        std::mem::forget(sink);
+        let damaged = || io::Error::other("the FMU wrote over memory that is not its own");
+        let lost = |_| Err(ResultsError::Write { path: path.clone(), source: damaged() });
+        let kept = kept.unwrap_or_else(lost);
+        return Some((path, kept));
+    }
+    None
 }
 
 fn column(system: &System, port: Port) -> Column {

@@ -4,10 +4,8 @@ use std::fs;
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
-use tempfile::TempDir;
-
 use super::archive::Archive;
-use super::{DESCRIPTION, PackageError, file_error, platforms};
+use super::{DESCRIPTION, PackageError, TemporaryFolder, file_error, platforms};
 use crate::description::{ModelDescription, Warning};
 
 /// The folders of `binaries` that the standard names.
@@ -34,7 +32,7 @@ const PLATFORMS: [&str; 15] = [
 pub struct Unpacked {
     folder: PathBuf,
     /// Removes the folder at the end, if it was made for this.
-    temporary: Option<TempDir>,
+    temporary: Option<TemporaryFolder>,
     /// The entries of the archive, if there was one.
     names: Vec<String>,
     /// What `modelDescription.xml` says.
@@ -95,7 +93,7 @@ impl Unpacked {
     /// The folder with `modelDescription.xml`; an absolute path.
     #[must_use]
     pub fn folder(&self) -> &Path {
-        self.temporary.as_ref().map_or(&self.folder, TempDir::path)
+        self.temporary.as_ref().map_or(&self.folder, TemporaryFolder::path)
     }
 
     /// The names of all entries of the archive, those of folders with a slash at their end; none where
@@ -179,16 +177,15 @@ fn is_needed(name: &str) -> bool {
 /// # Errors
 ///
 /// [`PackageError`] as for [`Unpacked::open`], whatever is in the archive.
-pub fn unpack_archive(path: &Path) -> Result<TempDir, PackageError> {
+pub fn unpack_archive(path: &Path) -> Result<TemporaryFolder, PackageError> {
     let mut archive = Archive::open(path)?;
     let folder = folder()?;
     archive.unpack(folder.path(), |_| true)?;
     Ok(folder)
 }
 
-fn folder() -> Result<TempDir, PackageError> {
-    let folder = tempfile::Builder::new().prefix("fmu-").tempdir();
-    folder.map_err(file_error("create a folder in", std::env::temp_dir()))
+fn folder() -> Result<TemporaryFolder, PackageError> {
+    TemporaryFolder::new().map_err(file_error("create a folder in", std::env::temp_dir()))
 }
 
 fn describe(folder: &Path, path: &Path) -> Result<(ModelDescription, Vec<Warning>), PackageError> {

@@ -19,8 +19,14 @@ macro_rules! commands {
 
             /// The function that it is about.
             pub(super) fn function(self) -> &'static str {
+                self.name()
+            }
+
+            /// The same, with a place of its own.
+            #[inline]
+            pub(super) fn name(self) -> &'static &'static str {
                 match self {
-                    $(Command::$command => $function,)*
+                    $(Command::$command => &$function,)*
                 }
             }
         }
@@ -124,7 +130,9 @@ pub(super) fn write_error(error: &CallError, writer: &mut Writer<'_>) {
         Failure::Panicked(text) => (4, 0, text),
         Failure::Nonsense(text) => (5, 0, text),
         // What happens to a process it cannot tell itself.
-        Failure::Killed(..) | Failure::Exited(_) => (5, 0, "ended a process of its own"),
+        Failure::Killed(..) | Failure::Exited(_) | Failure::OutOfMemory(_) => {
+            (5, 0, "ended a process of its own")
+        }
     };
     writer.put(kind);
     writer.put(number);

@@ -14,7 +14,9 @@ use super::line::{Line, Seen, Side};
 use super::log::Inbox;
 use super::process::Process;
 use super::words::{Reader, Writer};
+use super::worker::refuse_in_worker;
 use super::{IsolateError, Options};
+use crate::crash::Place;
 use crate::slave::{CallError, Failure};
 
 /// Longest sleep between two looks at the messages and at the clock.
@@ -23,6 +25,8 @@ const SLICE: Duration = Duration::from_millis(100);
 const ENDING: Duration = Duration::from_secs(2);
 /// How long `fmi2FreeInstance` may take where the calls have no limit.
 const FREEING: Duration = Duration::from_secs(10);
+/// How long a process may take to become a worker.
+const ATTACHING: Duration = Duration::from_secs(20);
 /// Most bytes that a worker may answer.
 const MOST: usize = u32::MAX as usize;
 
@@ -33,6 +37,8 @@ pub struct Isolated {
     line: Line,
     process: Process,
     inbox: Inbox,
+    /// Where the instance is, for the end of this process in the midst of a call.
+    pub(super) place: Arc<Place>,
     /// The last turn that this side knows of: odd while the worker acts.
     turn: u64,
     /// When the worker was asked for what is not waited for yet, where that matters.
@@ -42,7 +48,9 @@ pub struct Isolated {
     /// `fmi2FreeInstance` has been called.
     freed: bool,
     time_limit: Option<Duration>,
+    memory_limit: Option<u64>,
     slice: Duration,
+    started: Instant,
     /// The unpacked FMU: removed when no instance needs it.
     pub(super) package: Arc<Unpacked>,
 }
@@ -59,6 +67,7 @@ impl Isolated {
             move |source| IsolateError::System { what, instance, source }
         };
         let count = package.description.variables.len();
+        refuse_in_worker()?;
         let (shared, memory) = Shared::create(count).map_err(system("no shared memory"))?;
         let (here, there) = UnixStream::pair().map_err(system("no connection"))?;
         let slice = options.time_limit.map_or(SLICE, |limit| (limit / 8).min(SLICE));
@@ -67,23 +76,37 @@ impl Isolated {
         here.set_write_timeout(Some(slice)).map_err(system("no time limit"))?;
         let executable = options.executable.clone().map_or_else(std::env::current_exe, Ok);
         let executable = executable.map_err(system("no program"))?;
-        let process = Process::start(&executable, there, memory).map_err(|source| {
-            IsolateError::Start { executable, instance: name.to_owned(), source }
+        let process = Process::start(&executable, name, there, memory).map_err(|source| {
+            let (executable, instance) = (executable.clone(), name.to_owned());
+            IsolateError::Start { executable, instance, source }
         })?;
         let mut isolated = Self {
             line: Line::new(Arc::new(shared), here, Side::Master),
             process,
             inbox: Inbox::new(name),
+            place: Place::new(name),
             turn: 0,
             asked: None,
             ended: None,
             freed: false,
             time_limit: options.time_limit,
+            memory_limit: options.memory_limit,
             slice,
+            started: Instant::now(),
             package,
         };
         let opened = isolated.open(name, options);
-        made(name, opened).map(|()| isolated)
+        if let (Err(CallError { failure, .. }), false) = (&opened, isolated.is_attached()) {
+            let (instance, failure) = (name.to_owned(), failure.clone());
+            return Err(IsolateError::NoWorker { executable, instance, failure });
+        }
+        let made = made(name, opened).map(|()| isolated);
+        made.map_err(|error| error.with_limit(options.memory_limit))
+    }
+
+    /// Whether the other process has become a worker.
+    fn is_attached(&self) -> bool {
+        self.line.shared.attached().load(Ordering::Relaxed) != 0
     }
 
     /// Frees the instance and makes one called `name` in its place, in the same process with the same
@@ -99,6 +122,7 @@ impl Isolated {
         };
         let done = self.call(Command::Renew, write, outcome);
         self.inbox.rename(name);
+        self.place = Place::new(name);
         made(name, done)
     }
 
@@ -109,6 +133,7 @@ impl Isolated {
             writer.put_bytes(package.folder().as_os_str().as_bytes());
             writer.put_bytes(name.as_bytes());
             writer.put(options.logging);
+            writer.put(options.memory_limit.unwrap_or(0));
             writer.put(options.preload.len());
             for library in &options.preload {
                 writer.put_bytes(library.as_bytes());
@@ -154,6 +179,7 @@ impl Isolated {
         }
         shared.command().store(command.to_word(), Ordering::Relaxed);
         shared.place().store(command.to_word(), Ordering::Relaxed);
+        self.place.enter(command.name());
         self.turn = self.turn.wrapping_add(1);
         self.line.post(self.turn);
         Ok(())
@@ -186,6 +212,7 @@ impl Isolated {
         if let Err(failure) = self.wait() {
             return Err(self.lose(command, failure));
         }
+        self.place.leave();
         self.inbox.empty(&self.line.shared);
         let mut reader = Reader::new(self.line.shared.area());
         let answer = match reader.take() {
@@ -229,6 +256,9 @@ impl Isolated {
         // The first look comes one slice after the begin.
         let now = Instant::now();
         let begin = *begin.get_or_insert(now.checked_sub(self.slice).unwrap_or(now));
+        if !self.is_attached() && self.started.elapsed() > ATTACHING {
+            return Err(Failure::TimedOut(ATTACHING.as_secs_f64()));
+        }
         match self.time_limit {
             Some(limit) if now.duration_since(begin) >= limit => {
                 Err(Failure::TimedOut(limit.as_secs_f64()))
@@ -241,10 +271,17 @@ impl Isolated {
     #[cold]
     fn lose(&mut self, command: Command, failure: Failure) -> CallError {
         self.process.kill();
+        self.place.leave();
         let shared = &self.line.shared;
         self.inbox.empty(shared);
         let place = shared.place().load(Ordering::Relaxed);
         let function = function_at(place).unwrap_or(command.function());
+        let failure = match self.memory_limit {
+            Some(limit) if shared.no_memory().load(Ordering::Relaxed) != 0 => {
+                Failure::OutOfMemory(limit)
+            }
+            _ => failure,
+        };
         self.ended = Some(failure.clone());
         CallError { function, failure, messages: self.inbox.take() }
     }

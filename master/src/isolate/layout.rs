@@ -17,6 +17,8 @@ const LOG_HEAD: usize = 5 * APART;
 const LOG_DROPPED: usize = 5 * APART + 1;
 const LOG_TAIL: usize = 6 * APART;
 const MARK: usize = 7 * APART;
+const ATTACHED: usize = 7 * APART + 1;
+const NO_MEMORY: usize = 7 * APART + 2;
 const AREA: usize = 8 * APART;
 
 /// Words of the ring of messages: 256 KiB.
@@ -27,7 +29,7 @@ const LEAST: usize = 1 << 13;
 /// variable is input and output.
 const FOR_EACH: usize = 16;
 /// What [`MARK`] holds: "fmu" and the version of this layout.
-const MARKED: u64 = 0x666d_7500_0000_0001;
+const MARKED: u64 = 0x666d_7500_0000_0002;
 
 /// The shared memory by its parts.
 pub(super) struct Shared {
@@ -105,6 +107,16 @@ impl Shared {
     #[inline]
     pub(super) fn log_dropped(&self) -> &AtomicU64 {
         self.word(LOG_DROPPED)
+    }
+
+    /// Not 0 once a worker serves.
+    pub(super) fn attached(&self) -> &AtomicU64 {
+        self.word(ATTACHED)
+    }
+
+    /// Not 0 where the FMU crashed after an allocation had failed.
+    pub(super) fn no_memory(&self) -> &AtomicU64 {
+        self.word(NO_MEMORY)
     }
 
     /// Arguments, then results.

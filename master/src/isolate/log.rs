@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use std::fmt::{self, Write as _};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
 
 use tracing::field::{Field, Visit};
 use tracing::span::{Attributes, Id, Record};
@@ -20,6 +21,11 @@ const CATEGORY: usize = 256;
 const TEXT: usize = 4096;
 /// Most messages that are kept for an error.
 const KEPT: usize = 10;
+/// Most messages that are passed on in [`WINDOW`], and bytes of messages in all.
+const MESSAGES: u32 = 1000;
+const BYTES: usize = 16 << 20;
+/// How often the count of the others is told.
+const WINDOW: Duration = Duration::from_secs(1);
 /// Words before the bytes of a message: lengths, time.
 const HEAD: usize = 2;
 /// The levels as they are numbered in the ring.
@@ -132,6 +138,58 @@ impl Visit for Message {
     }
 }
 
+/// How much an FMU may say.
+struct Quota {
+    since: Instant,
+    messages: u32,
+    bytes: usize,
+    /// Messages that nobody has been told of.
+    lost: u64,
+}
+
+impl Default for Quota {
+    fn default() -> Self {
+        Self { since: Instant::now(), messages: 0, bytes: 0, lost: 0 }
+    }
+}
+
+impl Quota {
+    /// Whether another message of that many bytes is passed on; one that is not is counted.
+    fn admits(&mut self, instance: &str, bytes: usize) -> bool {
+        self.tell_late(instance);
+        let admitted = self.messages < MESSAGES && self.bytes + bytes <= BYTES;
+        if admitted {
+            self.messages += 1;
+            self.bytes += bytes;
+        } else {
+            self.lost += 1;
+        }
+        admitted
+    }
+
+    /// Begins a new window where one is over, and tells the count of the messages lost in it.
+    fn tell_late(&mut self, instance: &str) {
+        // The clock is looked at where the count could be told or has to begin anew.
+        if (self.lost > 0 || self.messages == MESSAGES) && self.since.elapsed() >= WINDOW {
+            (self.since, self.messages) = (Instant::now(), 0);
+            self.tell(instance);
+        }
+    }
+
+    fn tell(&mut self, instance: &str) {
+        let count = std::mem::take(&mut self.lost);
+        if count > 0 {
+            tracing::warn!(target: "fmu", instance, lost = count, "{count} more messages came too fast and are lost");
+        }
+    }
+}
+
+impl Drop for Inbox {
+    fn drop(&mut self) {
+        self.quota.tell(&self.instance);
+    }
+}
+
 /// Receives the messages in the master.
 #[derive(Default)]
 pub(super) struct Inbox {
@@ -139,17 +197,21 @@ pub(super) struct Inbox {
     /// Words read so far.
     tail: u64,
     dropped: u64,
+    quota: Quota,
     /// The last messages since they were last asked for.
     kept: VecDeque<String>,
 }
 
 impl Inbox {
     pub(super) fn new(instance: &str) -> Self {
-        Self { instance: instance.to_owned(), ..Self::default() }
+        let mut inbox = Self::default();
+        instance.clone_into(&mut inbox.instance);
+        inbox
     }
 
     /// From now on the messages are those of this instance.
     pub(super) fn rename(&mut self, instance: &str) {
+        self.quota.tell(&self.instance);
         instance.clone_into(&mut self.instance);
     }
 
@@ -172,7 +234,9 @@ impl Inbox {
                 self.tail = head;
                 break;
             };
-            say(&self.instance, level, &message);
+            if self.quota.admits(&self.instance, message.text.len()) {
+                say(&self.instance, level, &message);
+            }
             if self.kept.len() == KEPT {
                 self.kept.pop_front();
             }
@@ -182,10 +246,8 @@ impl Inbox {
         let dropped = shared.log_dropped().load(Ordering::Relaxed);
         let count = dropped.wrapping_sub(self.dropped);
         self.dropped = dropped;
-        if count > 0 {
-            let instance = self.instance.as_str();
-            tracing::warn!(target: "fmu", instance, lost = count, "{count} more messages came too fast and are lost");
-        }
+        self.quota.lost += count;
+        self.quota.tell_late(&self.instance);
     }
 
     /// The message at the tail, which goes on to the next one; none where there cannot be one.
@@ -291,6 +353,19 @@ mod tests {
         forward.send(Level::INFO, &message("after"));
         inbox.empty(&shared);
         assert_eq!(inbox.take(), ["after"]);
+    }
+
+    #[test]
+    fn of_messages_that_come_too_fast_so_many_are_passed_on_and_the_others_counted() {
+        let mut quota = Quota::default();
+        let admitted = (0..5000).filter(|_| quota.admits("one", 100)).count();
+        assert_eq!((admitted, quota.lost), (1000, 4000));
+        quota.since = quota.since.checked_sub(WINDOW).unwrap();
+        assert!(quota.admits("one", 100), "the next second");
+        assert_eq!(quota.lost, 0, "it has been told");
+        let mut quota = Quota::default();
+        let admitted = (0..100).filter(|_| quota.admits("one", 1 << 20)).count();
+        assert_eq!((admitted, quota.lost), (16, 84));
     }
 
     #[test]

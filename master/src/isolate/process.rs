@@ -1,4 +1,4 @@
-//! The process of a worker: start, end, and what it ended of.
+//! The process of a worker: start, end, and why it ended.
 
 use std::fs::File;
 use std::io;
@@ -9,30 +9,43 @@ use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-use rustix::process::{Pid, Signal, kill_process_group};
+use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
 
-use super::WORKER;
+use super::output::Output;
+use super::{STARTED_BY, WORKER};
 use crate::slave::Failure;
 
 /// Between two looks whether the process has ended.
 const PAUSE: Duration = Duration::from_millis(1);
 
-/// The process of one worker, which does not outlive this.
+/// The process of one worker, which does not outlive this, and neither do those that it started,
+/// unless they left its process group.
 pub(super) struct Process {
     child: Child,
+    output: Output,
+    /// How it ended, once that is known.
+    ended: Option<Failure>,
 }
 
 impl Process {
     /// Starts `executable` as a worker: the connection is its standard input, the shared memory its
     /// standard output, until it has taken both over. Signals of the terminal are not for it.
-    pub(super) fn start(executable: &Path, socket: UnixStream, memory: File) -> io::Result<Self> {
+    pub(super) fn start(
+        executable: &Path,
+        instance: &str,
+        socket: UnixStream,
+        memory: File,
+    ) -> io::Result<Self> {
+        let (output, errors) = Output::new(instance)?;
         let child = Command::new(executable)
             .arg(WORKER)
+            .env(STARTED_BY, std::process::id().to_string())
             .stdin(OwnedFd::from(socket))
             .stdout(Stdio::from(memory))
+            .stderr(Stdio::from(errors))
             .process_group(0)
             .spawn()?;
-        Ok(Self { child })
+        Ok(Self { child, output, ended: None })
     }
 
     /// Its number.
@@ -40,9 +53,20 @@ impl Process {
         self.child.id()
     }
 
+    fn pid(&self) -> Option<Pid> {
+        i32::try_from(self.child.id()).ok().and_then(Pid::from_raw)
+    }
+
     /// How it ended, if it has.
     pub(super) fn ended(&mut self) -> Option<Failure> {
-        self.child.try_wait().ok().flatten().map(failure)
+        let pid = self.pid()?;
+        if self.ended.is_none() {
+            // The process is left a zombie: until it is gone its number means its group only.
+            let options = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
+            waitid(WaitId::Pid(pid), options).ok().flatten()?;
+            self.end_group();
+        }
+        self.ended.clone()
     }
 
     /// How it ended, if it does within `patience`.
@@ -59,14 +83,22 @@ impl Process {
 
     /// Ends it, and the processes that it started.
     pub(super) fn kill(&mut self) {
-        if let (None, Ok(id)) = (self.ended(), i32::try_from(self.child.id())) {
-            if let Some(id) = Pid::from_raw(id) {
-                // Fails where the process has just ended.
-                let _ = kill_process_group(id, Signal::KILL);
-            }
-            let _ = self.child.kill();
-            let _ = self.child.wait();
+        if self.ended.is_none() {
+            self.end_group();
         }
+    }
+
+    /// Ends what there is of its group, then takes note of its own end.
+    fn end_group(&mut self) {
+        if let Some(pid) = self.pid() {
+            // Fails where nothing of the group is alive.
+            let _ = kill_process_group(pid, Signal::KILL);
+        }
+        let _ = self.child.kill();
+        if let Ok(status) = self.child.wait() {
+            self.ended = Some(failure(status));
+        }
+        self.output.finish();
     }
 }
 

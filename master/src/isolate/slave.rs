@@ -45,6 +45,7 @@ impl Isolated {
 impl Background for Isolated {
     #[inline]
     fn begin_advance(&mut self, step: &Advance<'_>) -> Result<(), CallError> {
+        self.place.set_time(step.time);
         self.post(Command::Advance, |writer| {
             writer.put(step.time);
             writer.put(step.size);
@@ -81,6 +82,7 @@ impl Slave for Isolated {
     }
 
     fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError> {
+        self.place.set_time(experiment.start_time);
         let write = |writer: &mut Writer<'_>| {
             writer.put(experiment.start_time);
             for optional in [experiment.stop_time, experiment.tolerance] {
@@ -176,6 +178,7 @@ impl Slave for Isolated {
     }
 
     fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<Stepped, CallError> {
+        self.place.set_time(time);
         let write = |writer: &mut Writer<'_>| {
             writer.put(time);
             writer.put(size);

@@ -8,14 +8,13 @@ use std::os::unix::ffi::OsStrExt as _;
 use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, poll};
-use rustix::process::{Signal, getppid, kill_current_process_group};
+use rustix::process::{Pid, Signal, getppid, kill_current_process_group};
 use rustix::stdio::{dup2_stdin, dup2_stdout};
 
-use super::WorkerError;
 use super::command::{
     Command, DONE, INSTANTIATED, LOADING, NOT_PRELOADED, REFUSED, place, write_error,
 };
@@ -24,8 +23,12 @@ use super::line::{Line, Seen, Side};
 use super::log::Forward;
 use super::perform::Work;
 use super::words::{Reader, Writer};
+use super::{IsolateError, STARTED_BY, WorkerError, memory};
 use crate::slave::{CallError, Failure};
 use crate::{Fmu, FmuError, Instance};
+
+/// This process has become a worker.
+static IS_WORKER: AtomicBool = AtomicBool::new(false);
 
 /// Between two looks whether the master is there, where the connection cannot tell.
 const LOOK: Duration = Duration::from_millis(100);
@@ -37,6 +40,7 @@ const LOOK: Duration = Duration::from_millis(100);
 ///
 /// [`WorkerError`]: not started by a master, or lost in memory that the FMU wrote over.
 pub fn worker() -> Result<(), WorkerError> {
+    IS_WORKER.store(true, Ordering::Relaxed);
     let alone = |what| move |source| WorkerError::Alone { what, source };
     let memory = stdout().as_fd().try_clone_to_owned().map_err(alone("no shared memory"))?;
     let shared = Shared::attach(&File::from(memory)).map_err(alone("no shared memory"))?;
@@ -48,7 +52,19 @@ pub fn worker() -> Result<(), WorkerError> {
     end_with_master(&socket).map_err(alone("no watch over the connection"))?;
     // Fails only where one is set already, which then hears the messages instead.
     let _ = tracing::subscriber::set_global_default(Forward::new(shared.clone()));
+    shared.attached().store(1, Ordering::Relaxed);
     serve(&mut Line::new(shared, socket, Side::Worker))
+}
+
+/// A program that does not know of workers starts itself as one, does the same again, and would do
+/// so without end.
+pub(super) fn refuse_in_worker() -> Result<(), IsolateError> {
+    let started_by = std::env::var(STARTED_BY).ok().and_then(|number| number.parse().ok());
+    let parent = getppid().map(Pid::as_raw_pid);
+    if started_by.is_some() && started_by == parent && !IS_WORKER.load(Ordering::Relaxed) {
+        return Err(IsolateError::InWorker);
+    }
+    Ok(())
 }
 
 /// Nothing to read from standard input; output goes where errors go.
@@ -137,6 +153,14 @@ fn open(
     reader.take_bytes(&mut folder)?;
     let name = reader.take_text()?;
     let logging: bool = reader.take()?;
+    let limit: u64 = reader.take()?;
+    if limit > 0
+        && let Err(error) = memory::limit(shared, limit)
+    {
+        let what = format!("cannot limit its memory to {limit} bytes: {error}");
+        let failure = Failure::Nonsense(what);
+        return Some(Err(CallError { function: LOADING, failure, messages: Vec::new() }));
+    }
     let mut preload = Vec::new();
     for _ in 0..reader.take::<usize>()? {
         let mut library = Vec::new();

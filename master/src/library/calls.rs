@@ -8,11 +8,15 @@ use fmi2::abi::{fmi2Boolean, fmi2EventInfo};
 use super::{Component, c_string};
 use crate::slave::{CallError, absent};
 
-/// The function of that field, or the error that it is missing.
+/// The function of that field, which is called next, or the error that it is missing.
+/// [`Component::check`] takes note of its return.
 macro_rules! function {
     ($self:ident.$field:ident, $name:expr) => {
         match $self.functions.$field {
-            Some(function) => function,
+            Some(function) => {
+                $self.place.enter(&$name);
+                function
+            }
             None => return Err(absent($name)),
         }
     };
@@ -78,11 +82,11 @@ pub(super) fn same_length<A, B>(references: &[A], values: &[B]) -> usize {
 impl Component {
     /// `fmi2SetDebugLogging` of all categories.
     pub(crate) fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
-        let name = "fmi2SetDebugLogging";
-        let function = function!(self.set_debug_logging, name);
+        const NAME: &str = "fmi2SetDebugLogging";
+        let function = function!(self.set_debug_logging, NAME);
         // SAFETY: the instance is alive; no categories.
         let status = unsafe { function(self.pointer, on.into(), 0, std::ptr::null()) };
-        self.check(name, status)
+        self.check(NAME, status)
     }
 
     /// `fmi2SetupExperiment`.
@@ -90,14 +94,14 @@ impl Component {
         let (tolerance, stop) = (e.tolerance.unwrap_or(0.0), e.stop_time.unwrap_or(0.0));
         let (has_tolerance, has_stop) =
             (fmi2Boolean::from(e.tolerance.is_some()), fmi2Boolean::from(e.stop_time.is_some()));
-        let name = "fmi2SetupExperiment";
-        let function = function!(self.setup_experiment, name);
-        self.sink.set_time(e.start_time);
+        const NAME: &str = "fmi2SetupExperiment";
+        let function = function!(self.setup_experiment, NAME);
+        self.place.set_time(e.start_time);
         // SAFETY: the instance is alive.
         let status = unsafe {
             function(self.pointer, has_tolerance, tolerance, e.start_time, has_stop, stop)
         };
-        self.check(name, status)
+        self.check(NAME, status)
     }
 
     /// `fmi2SetString`.
@@ -106,15 +110,15 @@ impl Component {
         references: &[u32],
         values: &[String],
     ) -> Result<(), CallError> {
-        let name = "fmi2SetString";
-        let function = function!(self.set_string, name);
+        const NAME: &str = "fmi2SetString";
+        let function = function!(self.set_string, NAME);
         let count = same_length(references, values);
         let values: Vec<_> = values.iter().map(|value| c_string(value)).collect();
         let pointers: Vec<_> = values.iter().map(|value| value.as_ptr()).collect();
         // SAFETY: the instance is alive; as many references as terminated strings.
         let status =
             unsafe { function(self.pointer, references.as_ptr(), count, pointers.as_ptr()) };
-        self.check(name, status)
+        self.check(NAME, status)
     }
 
     /// `fmi2GetString`.
@@ -123,14 +127,15 @@ impl Component {
         references: &[u32],
         values: &mut [String],
     ) -> Result<(), CallError> {
-        let name = "fmi2GetString";
-        let function = function!(self.get_string, name);
+        const NAME: &str = "fmi2GetString";
+        let function = function!(self.get_string, NAME);
         let count = same_length(references, values);
         let mut pointers = vec![std::ptr::null(); count];
         // SAFETY: the instance is alive; as many references as places for pointers.
         let status =
             unsafe { function(self.pointer, references.as_ptr(), count, pointers.as_mut_ptr()) };
-        self.check(name, status)?;
+        self.check(NAME, status)?;
+        self.place.enter(&NAME);
         for (value, pointer) in values.iter_mut().zip(pointers) {
             value.clear();
             // SAFETY: the FMU gives null or terminated strings, which live until the next call.
@@ -139,17 +144,18 @@ impl Component {
                 value.push_str(&text.to_string_lossy());
             }
         }
+        self.place.leave();
         Ok(())
     }
 
     /// `fmi2NewDiscreteStates`.
     pub(crate) fn new_discrete_states(&mut self) -> Result<fmi2EventInfo, CallError> {
-        let name = "fmi2NewDiscreteStates";
+        const NAME: &str = "fmi2NewDiscreteStates";
         let mut info = fmi2EventInfo::default();
-        let function = function!(self.new_discrete_states, name);
+        let function = function!(self.new_discrete_states, NAME);
         // SAFETY: the instance is alive; one structure to write to.
         let status = unsafe { function(self.pointer, &raw mut info) };
-        self.check(name, status)?;
+        self.check(NAME, status)?;
         Ok(info)
     }
 
@@ -161,8 +167,8 @@ impl Component {
         seed: &[f64],
         changes: &mut [f64],
     ) -> Result<(), CallError> {
-        let name = "fmi2GetDirectionalDerivative";
-        let function = function!(self.get_directional_derivative, name);
+        const NAME: &str = "fmi2GetDirectionalDerivative";
+        let function = function!(self.get_directional_derivative, NAME);
         let (unknown, known) = (same_length(unknowns, changes), same_length(knowns, seed));
         // SAFETY: the instance is alive; arrays that belong together are equally long.
         let status = unsafe {
@@ -176,6 +182,6 @@ impl Component {
                 changes.as_mut_ptr(),
             )
         };
-        self.check(name, status)
+        self.check(NAME, status)
     }
 }

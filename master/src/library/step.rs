@@ -26,9 +26,10 @@ impl Component {
         never_back: bool,
     ) -> Result<Stepped, CallError> {
         let function = function!(self.do_step, NAME);
-        self.sink.set_time(time);
+        self.place.set_time(time);
         // SAFETY: the instance is alive.
         let status = unsafe { function(self.pointer, time, size, never_back.into()) };
+        self.place.leave();
         if status == Status::OK as fmi2Status || status == Status::Warning as fmi2Status {
             return Ok(Stepped::Whole);
         }
@@ -52,6 +53,7 @@ impl Component {
         if !inputs.is_empty() {
             let Some(function) = hot.set_real else { return Err(absent(SET)) };
             let count = same_length(inputs, values);
+            hot.place.enter(&SET);
             // SAFETY: the instance is alive; as many references as values.
             let status = unsafe { function(hot.pointer, inputs.as_ptr(), count, values.as_ptr()) };
             if !usual(status) {
@@ -59,7 +61,8 @@ impl Component {
             }
         }
         let Some(function) = hot.do_step else { return Err(absent(NAME)) };
-        hot.sink.set_time(time);
+        hot.place.set_time(time);
+        hot.place.enter(&NAME);
         // SAFETY: the instance is alive.
         let status = unsafe { function(hot.pointer, time, size, never_back.into()) };
         if !usual(status) {
@@ -69,6 +72,7 @@ impl Component {
         if !outputs.is_empty() {
             let Some(function) = hot.get_real else { return Err(absent(GET)) };
             let count = same_length(outputs, results);
+            hot.place.enter(&GET);
             // SAFETY: the instance is alive; as many references as values.
             let status =
                 unsafe { function(hot.pointer, outputs.as_ptr(), count, results.as_mut_ptr()) };
@@ -76,6 +80,7 @@ impl Component {
                 self.check(GET, status)?;
             }
         }
+        self.place.leave();
         Ok(Stepped::Whole)
     }
 
@@ -136,38 +141,43 @@ impl Component {
 
     /// `fmi2CancelStep`: only then may the instance be freed (section 4.2.4).
     fn cancel(&mut self) {
+        self.place.enter(&"fmi2CancelStep");
         // SAFETY: the instance is alive.
         let canceled = self
             .functions
             .cancel_step
             .is_some_and(|function| unsafe { function(self.pointer) == Status::OK as fmi2Status });
+        self.place.leave();
         self.abandoned = !canceled;
     }
 
     fn status(&mut self, kind: StatusKind) -> Result<fmi2Status, CallError> {
-        let name = "fmi2GetStatus";
-        let (function, mut value) = (function!(self.get_status, name), 0);
+        const NAME: &str = "fmi2GetStatus";
+        let mut value = 0;
+        let function = function!(self.get_status, NAME);
         // SAFETY: the instance is alive; one place to write to.
         let status = unsafe { function(self.pointer, kind as i32, &raw mut value) };
-        self.check(name, status)?;
+        self.check(NAME, status)?;
         Ok(value)
     }
 
     fn real_status(&mut self, kind: StatusKind) -> Result<f64, CallError> {
-        let name = "fmi2GetRealStatus";
-        let (function, mut value) = (function!(self.get_real_status, name), f64::NAN);
+        const NAME: &str = "fmi2GetRealStatus";
+        let mut value = f64::NAN;
+        let function = function!(self.get_real_status, NAME);
         // SAFETY: the instance is alive; one place to write to.
         let status = unsafe { function(self.pointer, kind as i32, &raw mut value) };
-        self.check(name, status)?;
+        self.check(NAME, status)?;
         Ok(value)
     }
 
     fn boolean_status(&mut self, kind: StatusKind) -> Result<bool, CallError> {
-        let name = "fmi2GetBooleanStatus";
-        let (function, mut value) = (function!(self.get_boolean_status, name), 0);
+        const NAME: &str = "fmi2GetBooleanStatus";
+        let mut value = 0;
+        let function = function!(self.get_boolean_status, NAME);
         // SAFETY: the instance is alive; one place to write to.
         let status = unsafe { function(self.pointer, kind as i32, &raw mut value) };
-        self.check(name, status)?;
+        self.check(NAME, status)?;
         Ok(value != 0)
     }
 }

@@ -37,7 +37,8 @@ const PAGE: usize = 1 << 20;
 /// Rows gather in a block of bounded size, which becomes a row group. Every hand-over, of a full
 /// block or of one that is still filling, writes the row group with a footer behind it in one
 /// piece over the footer before: the file is readable after each. A block that is still filling
-/// is written again by the next one.
+/// is written again by the next one. Where the disk has no room for a hand-over the file is what it
+/// was after the last one.
 #[derive(Debug)]
 pub struct ParquetSink {
     path: PathBuf,
@@ -91,12 +92,11 @@ impl ParquetSink {
         if rows == self.written && !self.block.is_full() {
             return Ok(());
         }
-        let group = self.encode().map_err(|source| write_error(&self.path, source))?;
-        let size = self.bytes.len() as u64;
-        self.footer
-            .append(&mut self.bytes, Some(group.clone()))
-            .map_err(|source| write_error(&self.path, source))?;
-        self.write()?;
+        let (group, size) = self.compose(rows)?;
+        if let Err(error) = self.write() {
+            self.go_back();
+            return Err(error);
+        }
         self.written = rows;
         if self.block.is_full() {
             self.footer.keep(group);
@@ -107,14 +107,48 @@ impl ParquetSink {
         Ok(())
     }
 
-    /// The block as a row group, in `bytes`.
-    fn encode(&mut self) -> Result<RowGroupMetaData, ParquetError> {
+    /// Puts the first `rows` of the block as a row group into `bytes`, and the footer behind it: the
+    /// group and its size.
+    fn compose(&mut self, rows: usize) -> Result<(RowGroupMetaData, u64), ResultsError> {
+        let group = self.encode(rows).map_err(|source| write_error(&self.path, source))?;
+        let size = self.bytes.len() as u64;
+        let done = self.footer.append(&mut self.bytes, Some(group.clone()));
+        done.map_err(|source| write_error(&self.path, source))?;
+        Ok((group, size))
+    }
+
+    /// Makes the file what it was before a hand-over that failed: its end has been written over. What
+    /// is written had its place in the file, and needs no more of the disk. Where even that fails the
+    /// row groups of full blocks are left, with a footer that is shorter than any before.
+    fn go_back(&mut self) {
+        let _ = self.file.set_len(self.length);
+        let composed = match self.written {
+            0 => {
+                self.bytes.clear();
+                self.footer.append(&mut self.bytes, None).is_ok()
+            }
+            rows => self.compose(rows).is_ok(),
+        };
+        if composed && self.write().is_ok() {
+            return;
+        }
+        let _ = self.file.set_len(self.end);
+        self.bytes.clear();
+        if self.footer.append(&mut self.bytes, None).is_ok() {
+            // The error that led here is the one that is told.
+            let _ = self.write();
+        }
+        self.written = 0;
+    }
+
+    /// The first `rows` of the block as a row group, in `bytes`.
+    fn encode(&mut self, rows: usize) -> Result<RowGroupMetaData, ParquetError> {
         self.bytes.clear();
         let mut bytes = TrackedWrite::new(std::mem::take(&mut self.bytes));
         let schema = self.footer.schema();
         let mut group =
             SerializedRowGroupWriter::new(schema, self.properties.clone(), &mut bytes, 0, None);
-        let mut reader = self.block.reader();
+        let mut reader = self.block.reader(rows);
         while let Some(mut column) = group.next_column()? {
             match column.untyped() {
                 ColumnWriter::DoubleColumnWriter(writer) => {

@@ -105,3 +105,21 @@ fn a_full_disk_is_an_error_with_the_name_of_the_file() {
         assert!(matches!(&error, ResultsError::Write { path: named, .. } if *named == path));
     }
 }
+
+#[test]
+fn a_file_that_is_being_written_is_refused_to_others_and_free_after_its_end() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["a.csv", "a.parquet"] {
+        let path = folder.path().join(name);
+        let mut first = create(&path, &mixed()).unwrap();
+        (0..3).for_each(|k| give(first.as_mut(), k));
+        first.flush().unwrap();
+        let before = fs::read(&path).unwrap();
+        let Err(error) = create(&path, &mixed()) else { panic!("{name} is written twice") };
+        assert!(matches!(error, ResultsError::InUse { .. }) && error.to_string().contains(name));
+        assert_eq!(fs::read(&path).unwrap(), before, "{name} is as it was");
+        first.finish().unwrap();
+        create(&path, &mixed()).unwrap().finish().unwrap();
+        assert!(fs::read(&path).unwrap().len() < before.len(), "{name} is replaced");
+    }
+}

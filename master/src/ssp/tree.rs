@@ -5,8 +5,7 @@ use std::path::PathBuf;
 use std::rc::Rc;
 
 use fmi2::description::{ModelDescription, Position, ScalarVariable};
-use fmi2::package::Unpacked;
-use tempfile::TempDir;
+use fmi2::package::{TemporaryFolder, Unpacked};
 
 use super::conversion::Measure;
 use super::source::Base;
@@ -21,7 +20,7 @@ pub(super) struct Tree {
     /// Each FMU once, however many components it has.
     pub(super) fmus: Vec<Unpacked>,
     /// Unpacked SSPs.
-    pub(super) folders: Vec<TempDir>,
+    pub(super) folders: Vec<TemporaryFolder>,
 }
 
 /// A system, a component, a signal dictionary, or a reference to one.

@@ -103,31 +103,6 @@ fn an_fmu_that_cannot_save_its_state_is_told_before_the_run() {
 }
 
 #[test]
-fn a_second_signal_ends_a_run_whose_fmu_hangs() {
-    let bench = Bench::new();
-    let fmu = CFmu::that("hang in fmi2DoStep").write(bench.folder.path(), "a");
-    let fmu = format!("a={}", fmu.display());
-    let more = ["--fmu", &fmu, "--stop-time", "1", "--step", "0.25", "--out", "out"];
-    let mut child = bench.command(&more).stdout(Stdio::null()).spawn().unwrap();
-    let begin = Instant::now();
-    while !fs::read_to_string(bench.path("out/results.csv")).is_ok_and(|text| !text.is_empty()) {
-        assert!(begin.elapsed() < Duration::from_secs(60), "there is no file");
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    // The signals may come before the process hears them or before it hangs; at the end there have
-    // been two.
-    let status = loop {
-        let _ = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
-        std::thread::sleep(Duration::from_millis(50));
-        if let Some(status) = child.try_wait().unwrap() {
-            break status;
-        }
-        assert!(begin.elapsed() < Duration::from_secs(60), "it does not end");
-    };
-    assert_eq!(status.code(), Some(130));
-}
-
-#[test]
 fn bad_checkpoints_are_refused() {
     let bench = Bench::new();
     bench.coupled_well(&["--stop-time", "0.1", "--checkpoint", "state"]);

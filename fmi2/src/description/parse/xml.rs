@@ -76,11 +76,11 @@ struct Tree<'a> {
 }
 
 impl<'a> Tree<'a> {
-    fn start(&mut self, element: Element<'a>) -> Result<(), ParseError> {
-        if self.open.len() == DEPTH {
-            return Err(limit(element.at, "levels of nested elements", DEPTH));
+    /// An element at `at`, or `inner` levels below there, is not too deep.
+    fn go_down(&self, at: Position, inner: usize) -> Result<(), ParseError> {
+        if self.open.len() + inner >= DEPTH {
+            return Err(limit(at, "levels of nested elements", DEPTH));
         }
-        self.open.push(element);
         Ok(())
     }
 
@@ -118,6 +118,7 @@ impl<'a> Tree<'a> {
         offset: usize,
         at: Position,
     ) -> Result<Element<'a>, ParseError> {
+        self.go_down(at, 0)?;
         self.elements += 1;
         if self.elements > ELEMENTS {
             return Err(limit(at, "elements", ELEMENTS));
@@ -165,12 +166,12 @@ pub(super) fn read(text: &str) -> Result<Element<'_>, ParseError> {
             }
             Ok(Event::DocType(_)) => return Err(ParseError::Doctype { at }),
             Ok(Event::Start(tag)) if is_annotation(&tag) => {
-                let skipped = reader.read_to_end(tag.name());
-                skipped.map_err(|error| ParseError::Xml { at, found: error.to_string() })?;
+                tree.go_down(at, 0)?;
+                skip(&mut reader, &tree, at)?;
             }
             Ok(Event::Start(tag)) => {
                 let element = tree.element(&tag, text, offset, at)?;
-                tree.start(element)?;
+                tree.open.push(element);
             }
             Ok(Event::Empty(tag)) => {
                 let element = tree.element(&tag, text, offset, at)?;
@@ -181,6 +182,29 @@ pub(super) fn read(text: &str) -> Result<Element<'_>, ParseError> {
             Ok(_) => {}
         }
     }
+}
+
+/// Skips the content of an element that begins at `at`, up to its end.
+fn skip(reader: &mut Reader<&[u8]>, tree: &Tree<'_>, at: Position) -> Result<(), ParseError> {
+    let mut inner = 1;
+    while inner > 0 {
+        match reader.read_event() {
+            Err(error) => return Err(ParseError::Xml { at, found: error.to_string() }),
+            Ok(Event::DocType(_)) => return Err(ParseError::Doctype { at }),
+            Ok(Event::Start(_)) => {
+                tree.go_down(at, inner)?;
+                inner += 1;
+            }
+            Ok(Event::Empty(_)) => tree.go_down(at, inner)?,
+            Ok(Event::End(_)) => inner -= 1,
+            Ok(Event::Eof) => {
+                let found = "the end of the file inside an annotation".to_owned();
+                return Err(ParseError::Xml { at, found });
+            }
+            Ok(_) => {}
+        }
+    }
+    Ok(())
 }
 
 fn is_annotation(tag: &BytesStart<'_>) -> bool {

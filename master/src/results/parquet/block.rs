@@ -90,15 +90,17 @@ impl Block {
         self.rows += 1;
     }
 
-    /// Gives the columns one after another.
-    pub(super) fn reader(&self) -> Reader<'_> {
-        Reader { block: self, reals: 0, integers: 0, booleans: 0, strings: 0 }
+    /// Gives the first `rows` of the columns one after another.
+    pub(super) fn reader(&self, rows: usize) -> Reader<'_> {
+        let rows = rows.min(self.rows);
+        Reader { block: self, rows, reals: 0, integers: 0, booleans: 0, strings: 0 }
     }
 }
 
 /// The next column of each kind.
 pub(super) struct Reader<'a> {
     block: &'a Block,
+    rows: usize,
     reals: usize,
     integers: usize,
     booleans: usize,
@@ -107,22 +109,22 @@ pub(super) struct Reader<'a> {
 
 impl Reader<'_> {
     pub(super) fn reals(&mut self) -> &[f64] {
-        column(&self.block.reals, &mut self.reals, self.block)
+        column(&self.block.reals, &mut self.reals, self.block, self.rows)
     }
 
     pub(super) fn integers(&mut self) -> &[i32] {
-        column(&self.block.integers, &mut self.integers, self.block)
+        column(&self.block.integers, &mut self.integers, self.block, self.rows)
     }
 
     pub(super) fn booleans(&mut self) -> &[bool] {
-        column(&self.block.booleans, &mut self.booleans, self.block)
+        column(&self.block.booleans, &mut self.booleans, self.block, self.rows)
     }
 
     pub(super) fn strings(&mut self) -> Vec<ByteArray> {
         let first = self.strings;
         self.strings += 1;
         let ends = &self.block.ends;
-        (0..self.block.rows)
+        (0..self.rows)
             .map(|row| {
                 let place = row * self.block.strings + first;
                 let start = if place == 0 { 0 } else { ends[place - 1] };
@@ -132,8 +134,8 @@ impl Reader<'_> {
     }
 }
 
-fn column<'a, T>(values: &'a [T], next: &mut usize, block: &Block) -> &'a [T] {
+fn column<'a, T>(values: &'a [T], next: &mut usize, block: &Block, rows: usize) -> &'a [T] {
     let start = *next * (block.room + PADDING);
     *next += 1;
-    &values[start..start + block.rows]
+    &values[start..start + rows]
 }

@@ -6,8 +6,7 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use fmi2::package::{Unpacked, unpack_archive};
-use tempfile::TempDir;
+use fmi2::package::{TemporaryFolder, Unpacked, unpack_archive};
 
 use crate::ssp::error::SspError;
 use crate::ssp::read::{read_ssb, read_ssd, read_ssm, read_ssv};
@@ -46,13 +45,13 @@ pub(super) struct Files {
     mappings: HashMap<PathBuf, Rc<ParameterMapping>>,
     fmu_indices: HashMap<PathBuf, usize>,
     archives: HashMap<PathBuf, PathBuf>,
-    folders: Vec<TempDir>,
+    folders: Vec<TemporaryFolder>,
     pub(super) fmus: Vec<Unpacked>,
 }
 
 impl Files {
     /// What must live as long as the files are used.
-    pub(super) fn finish(self) -> (Vec<Unpacked>, Vec<TempDir>) {
+    pub(super) fn finish(self) -> (Vec<Unpacked>, Vec<TemporaryFolder>) {
         (self.fmus, self.folders)
     }
 

@@ -139,3 +139,21 @@ fn every_truncation_of_a_file_is_an_error_and_no_panic() {
     }
     ModelDescription::parse(&whole).unwrap();
 }
+
+#[test]
+fn elements_nest_64_levels_deep_and_no_deeper_in_annotations_too() {
+    let is_too_deep = |text: String| {
+        let error = ModelDescription::parse(text).unwrap_err();
+        matches!(error, ParseError::Limit { what: "levels of nested elements", limit: 64, .. })
+    };
+    let nested = |around: &str, levels: usize, inner: &str| {
+        let closed = format!("{}{inner}{}", "<a>".repeat(levels), "</a>".repeat(levels));
+        format!("<fmiModelDescription><{around}>{closed}</{around}></fmiModelDescription>")
+    };
+    for around in ["b", "VendorAnnotations", "Annotations"] {
+        assert!(!is_too_deep(nested(around, 62, "")), "{around}");
+        assert!(!is_too_deep(nested(around, 61, "<c/>")), "{around}");
+        assert!(is_too_deep(nested(around, 63, "")), "{around}");
+        assert!(is_too_deep(nested(around, 62, "<c/>")), "{around}");
+    }
+}

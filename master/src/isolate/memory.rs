@@ -1,0 +1,52 @@
+//! The limit of a worker's memory, and the crash that follows an allocation that failed.
+#![expect(unsafe_code, reason = "signal handlers")]
+
+use std::io;
+use std::mem::MaybeUninit;
+use std::ptr::null_mut;
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, OnceLock};
+
+use libc::{c_int, c_void, siginfo_t};
+use rustix::process::{Resource, Rlimit, setrlimit};
+
+use super::layout::Shared;
+
+/// Where a crash is noted.
+static SHARED: OnceLock<Arc<Shared>> = OnceLock::new();
+
+/// Limits the address space of this process. A crash after a failed allocation is noted from now on.
+pub(super) fn limit(shared: &Arc<Shared>, bytes: u64) -> io::Result<()> {
+    if SHARED.set(shared.clone()).is_ok() {
+        for signal in [libc::SIGSEGV, libc::SIGBUS, libc::SIGABRT] {
+            note_crash(signal)?;
+        }
+    }
+    let limit = Rlimit { current: Some(bytes), maximum: Some(bytes) };
+    Ok(setrlimit(Resource::As, limit)?)
+}
+
+fn note_crash(signal: c_int) -> io::Result<()> {
+    // SAFETY: all zero is a value of this structure.
+    let mut action: libc::sigaction = unsafe { MaybeUninit::zeroed().assume_init() };
+    let handler: extern "C" fn(c_int, *mut siginfo_t, *mut c_void) = on_signal;
+    action.sa_sigaction = handler as usize;
+    // The handler is left for the default, which ends the process as the crash would have.
+    action.sa_flags = libc::SA_SIGINFO | libc::SA_ONSTACK | libc::SA_RESETHAND;
+    // SAFETY: the handler has the signature of SA_SIGINFO, and uses atomics only.
+    let result = unsafe { libc::sigaction(signal, &raw const action, null_mut()) };
+    if result == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
+}
+
+/// `malloc` leaves ENOMEM in `errno`, which calls that succeed do not change: the crash is most likely
+/// the use of what was not given.
+extern "C" fn on_signal(signal: c_int, _: *mut siginfo_t, _: *mut c_void) {
+    if io::Error::last_os_error().raw_os_error() == Some(libc::ENOMEM)
+        && let Some(shared) = SHARED.get()
+    {
+        shared.no_memory().store(1, Ordering::Relaxed);
+    }
+    // An invalid access happens again on return; a signal that was sent does not.
+    // SAFETY: no conditions.
+    unsafe { libc::raise(signal) };
+}

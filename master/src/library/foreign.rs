@@ -1,0 +1,68 @@
+//! Texts behind pointers of an FMU that need not be pointers to texts.
+#![expect(unsafe_code, reason = "the boundary to C")]
+
+use std::ffi::c_char;
+
+/// Most bytes of a text.
+const MOST: usize = 1024;
+
+/// The text at `pointer`, as much of it as can be read; none for null and where there is no memory.
+pub(super) fn text(pointer: *const c_char) -> Option<String> {
+    if pointer.is_null() {
+        return None;
+    }
+    let bytes = read(pointer.cast());
+    bytes.map(|bytes| String::from_utf8_lossy(&bytes).into_owned())
+}
+
+/// The kernel copies: it refuses where there is no memory. What can be read of the next bytes ends
+/// at a page that cannot.
+#[cfg(target_os = "linux")]
+fn read(pointer: *const u8) -> Option<Vec<u8>> {
+    const PAGE: usize = 4096;
+    let mut bytes = [0_u8; MOST];
+    let mut length = 0;
+    while length < MOST {
+        let start = pointer.wrapping_add(length);
+        let count = (PAGE - start.addr() % PAGE).min(MOST - length);
+        let local = libc::iovec { iov_base: bytes[length..].as_mut_ptr().cast(), iov_len: count };
+        let remote = libc::iovec { iov_base: start.cast_mut().cast(), iov_len: count };
+        // SAFETY: `count` bytes to write to; the kernel checks those that are read.
+        let done = unsafe {
+            libc::process_vm_readv(libc::getpid(), &raw const local, 1, &raw const remote, 1, 0)
+        };
+        let copied = usize::try_from(done).ok().filter(|copied| *copied > 0);
+        let Some(copied) = copied else { break };
+        if let Some(end) = bytes[length..length + copied].iter().position(|byte| *byte == 0) {
+            return Some(bytes[..length + end].to_vec());
+        }
+        length += copied;
+    }
+    (length > 0).then(|| bytes[..length].to_vec())
+}
+
+/// Without a kernel that copies the text is trusted.
+#[cfg(not(target_os = "linux"))]
+fn read(pointer: *const u8) -> Option<Vec<u8>> {
+    // SAFETY: the FMU's promise by the standard: terminated.
+    let text = unsafe { std::ffi::CStr::from_ptr(pointer.cast()) }.to_bytes();
+    Some(text[..text.len().min(MOST)].to_vec())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texts_are_read_up_to_their_end_and_bad_pointers_give_none() {
+        assert_eq!(text(c"tank".as_ptr()), Some("tank".to_owned()));
+        assert_eq!(text(c"".as_ptr()), Some(String::new()));
+        assert_eq!(text(std::ptr::null()), None);
+        let long = std::ffi::CString::new("x".repeat(5000)).unwrap();
+        assert_eq!(text(long.as_ptr()).map(|text| text.len()), Some(MOST));
+        #[cfg(target_os = "linux")]
+        for address in [1_usize, 8, 0xffff_ffff_ffff_0000] {
+            assert_eq!(text(std::ptr::without_provenance(address)), None);
+        }
+    }
+}

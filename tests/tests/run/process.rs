@@ -1,0 +1,186 @@
+//! The process of a run: signals, what others do beside it, what it leaves behind.
+
+use std::path::Path;
+use std::process::{Child, Stdio};
+use std::time::{Duration, Instant};
+
+use master::results::Table;
+use tests::c_fmu::CFmu;
+
+use super::*;
+
+/// Longest that something may take that is to happen soon.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Writes the FMU and gives the argument by which it is `a`.
+fn a(bench: &Bench, behaviour: &str) -> String {
+    format!("a={}", CFmu::that(behaviour).write(bench.folder.path(), "a").display())
+}
+
+fn until(what: &str, mut is_so: impl FnMut() -> bool) {
+    let begin = Instant::now();
+    while !is_so() {
+        assert!(begin.elapsed() < PATIENCE, "{what}");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// Starts a run of one FMU that hangs in its step from 0.5 s on, and waits until it does.
+fn hanging(bench: &Bench, temporary: &Path, more: &[&str]) -> Child {
+    let fmu = a(bench, "hang in fmi2DoStep");
+    let arguments = ["--fmu", &fmu, "--stop-time", "1", "--step", "0.25", "--out", "out"];
+    let mut command = bench.command(&[&arguments[..], more].concat());
+    command.env("TMPDIR", temporary).stdout(Stdio::null()).stderr(Stdio::piped());
+    let child = command.spawn().unwrap();
+    let results = bench.path("out/results.csv");
+    until("there is no file", || fs::metadata(&results).is_ok_and(|file| file.len() > 0));
+    // Into the step that hangs.
+    std::thread::sleep(Duration::from_millis(300));
+    child
+}
+
+fn signal(child: &Child, signal: &str) {
+    let kill = Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
+    assert!(kill.success());
+}
+
+/// Processes whose parent is that one.
+fn children(parent: u32) -> Vec<String> {
+    let processes = fs::read_dir("/proc").into_iter().flatten().flatten();
+    let is_child = |stat: &String| {
+        let fields: Vec<_> = stat.rsplit(") ").next().unwrap_or("").split(' ').collect();
+        fields.get(1) == Some(&parent.to_string().as_str())
+    };
+    let stat = |path: &Path| fs::read_to_string(path.join("stat")).ok();
+    processes
+        .filter(|entry| stat(&entry.path()).is_some_and(|stat| is_child(&stat)))
+        .map(|entry| entry.path().display().to_string())
+        .collect()
+}
+
+#[test]
+fn one_signal_ends_a_run_whose_fmu_hangs_with_its_call_and_its_rows() {
+    for (kind, isolate) in [("-INT", &[][..]), ("-TERM", &[]), ("-INT", &["--isolate"])] {
+        let (bench, temporary) = (Bench::new(), tempfile::tempdir().unwrap());
+        let child = hanging(&bench, temporary.path(), isolate);
+        let workers = children(child.id());
+        assert_eq!(workers.len(), isolate.len());
+        let begin = Instant::now();
+        signal(&child, kind);
+        let output = child.wait_with_output().unwrap();
+        // One second by itself; this machine may be busy.
+        assert!(begin.elapsed() < Duration::from_secs(5), "{:?}", begin.elapsed());
+        let parts =
+            ["interrupted", "a at t = 0.5 s: fmi2DoStep does not return", "out/results.csv"];
+        fails(&output, 130, &parts);
+        assert_eq!(whole_rows(&bench.read("out/results.csv")), 3, "0, 0.25 and 0.5 s");
+        let left: Vec<_> = fs::read_dir(temporary.path()).unwrap().flatten().collect();
+        assert!(left.is_empty(), "{left:?}");
+        for worker in &workers {
+            until("the worker is left", || !Path::new(worker).exists());
+        }
+    }
+}
+
+#[test]
+fn a_second_signal_ends_a_run_at_once() {
+    let (bench, temporary) = (Bench::new(), tempfile::tempdir().unwrap());
+    let mut child = hanging(&bench, temporary.path(), &[]);
+    signal(&child, "-INT");
+    std::thread::sleep(Duration::from_millis(50));
+    signal(&child, "-INT");
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+}
+
+#[test]
+fn a_signal_ends_a_run_whose_fmu_hangs_before_the_first_step() {
+    let bench = Bench::new();
+    let fmu = a(&bench, "hang in fmi2EnterInitializationMode");
+    let arguments = ["--fmu", &fmu, "--stop-time", "1", "--step", "0.25", "--out", "out"];
+    let child = bench.command(&arguments).stderr(Stdio::piped()).spawn().unwrap();
+    std::thread::sleep(Duration::from_millis(500));
+    signal(&child, "-INT");
+    let output = child.wait_with_output().unwrap();
+    fails(&output, 130, &["a at t = 0 s: fmi2EnterInitializationMode does not return"]);
+}
+
+#[test]
+fn a_second_run_into_the_same_file_is_refused_and_the_first_goes_on() {
+    let (bench, temporary) = (Bench::new(), tempfile::tempdir().unwrap());
+    let mut first = hanging(&bench, temporary.path(), &[]);
+    let before = bench.read("out/results.csv");
+    let other = format!("b={}", CFmu::well_behaved().write(bench.folder.path(), "b").display());
+    let second = ["--fmu", &other, "--stop-time", "1", "--step", "0.25", "--out", "out"];
+    fails(&bench.run(&second), 2, &["out/results.csv: another run writes", "--out"]);
+    let elsewhere = [&second[..], &["--results", "out/other.csv"]].concat();
+    printed(&bench.run(&elsewhere));
+    assert!(bench.read("out/results.csv").starts_with(&before));
+    first.kill().unwrap();
+    first.wait().unwrap();
+    // A run that was killed locks nothing.
+    printed(&bench.run(&second));
+    assert_eq!(whole_rows(&bench.read("out/results.csv")), 5);
+}
+
+#[test]
+fn what_a_killed_run_leaves_in_the_temporary_folder_is_removed_by_the_next_one() {
+    let (bench, temporary) = (Bench::new(), tempfile::tempdir().unwrap());
+    let left = || fs::read_dir(temporary.path()).unwrap().count();
+    let mut killed = hanging(&bench, temporary.path(), &[]);
+    assert_eq!(left(), 1);
+    killed.kill().unwrap();
+    killed.wait().unwrap();
+    assert_eq!(left(), 1, "nobody can remove it at once");
+    let fmu = a(&bench, "crash in fmi2DoStep");
+    let mut next = bench.command(&["--fmu", &fmu, "--stop-time", "1", "--step", "0.25"]);
+    let output = next.env("TMPDIR", temporary.path()).output().unwrap();
+    fails(&output, 1, &["fmi2DoStep crashed"]);
+    assert_eq!(left(), 0, "neither that of the killed run nor that of this one, which crashed");
+}
+
+#[test]
+fn closed_standard_streams_end_nothing() {
+    let bench = Bench::new();
+    let fmu = a(&bench, "another environment in fmi2DoStep");
+    for close in [">&-", "2>&-", ">&- 2>&-", "| true", "2>&1 | true"] {
+        let _ = fs::remove_dir_all(bench.path("out"));
+        let command = tests::command().display();
+        let line = format!(
+            "{{ sleep 0.1; '{command}' run --fmu '{fmu}' --stop-time 1 --step 0.25 --out out; \
+             echo $? > status; }} {close}"
+        );
+        let mut shell = Command::new("sh");
+        shell.current_dir(bench.folder.path()).args(["-c", &line]).stderr(Stdio::piped());
+        let output = shell.output().unwrap();
+        assert_eq!(bench.read("status").trim(), "0", "{close}: {}", said(&output));
+        assert!(!said(&output).contains("panicked"), "{}", said(&output));
+        assert_eq!(whole_rows(&bench.read("out/results.csv")), 5, "{close}");
+    }
+}
+
+#[test]
+fn where_there_is_no_more_room_the_results_are_a_readable_prefix() {
+    let fmu = CFmu::well_behaved();
+    for (format, least) in [("csv", 1000), ("parquet", 65_536)] {
+        let bench = Bench::new();
+        let path = fmu.write(bench.folder.path(), "a");
+        let (command, fmu) = (tests::command().display(), path.display());
+        // The limit is in units of 512 or 1024 bytes: 2 or 4 MiB.
+        let line = format!(
+            "ulimit -f 4096; exec '{command}' run --fmu 'a={fmu}' --stop-time 4 --step 0.00001 \
+             --record-every step --record a.y --out out --format {format}"
+        );
+        let mut shell = Command::new("sh");
+        let output = shell.current_dir(bench.folder.path()).args(["-c", &line]).output().unwrap();
+        fails(&output, 1, &["cannot write", &format!("out/results.{format}")]);
+        let table = Table::open(&bench.path(&format!("out/results.{format}"))).unwrap();
+        let mut rows = 0_u32;
+        let visited = table.visit(&[1], &mut |time: f64, values: &[f64]| {
+            let expected = f64::from(rows) * 1e-5;
+            assert!((time - expected).abs() < 1e-9 && (values[0] - time).abs() < 1e-6, "{time}");
+            rows += 1;
+        });
+        visited.unwrap();
+        assert!(rows >= least && rows < 400_000, "{rows} rows");
+    }
+}
