@@ -57,7 +57,7 @@ pub(crate) struct AlgorithmOptions {
 #[derive(clap::Args)]
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(crate) struct Options {
-    /// An SSP archive, an SSD file beside its FMUs, or a system.toml
+    /// An SSP archive, an SSD or OspSystemStructure.xml beside its FMUs, or a system.toml
     #[arg(value_name = "SYSTEM", conflicts_with_all = ["plant", "controller", "resume"])]
     system: Option<PathBuf>,
     /// Add an FMU, or put another in the place of one of the system; may be repeated
@@ -219,12 +219,15 @@ impl Options {
         let mut config = Config::default();
         match &self.system {
             Some(path) if has_ending(path, "toml") => return Ok((Loaded::read(path)?, None)),
-            Some(path) if path.is_dir() || has_ending(path, "ssp") || has_ending(path, "ssd") => {
+            Some(path)
+                if path.is_dir()
+                    || ["ssp", "ssd", "xml"].iter().any(|ending| has_ending(path, ending)) =>
+            {
                 config.system = Some(path.clone());
             }
             Some(path) => bail!(
-                "{}: expected a system: an .ssp, an .ssd or a .toml; FMUs are given by --fmu \
-                 NAME=FMU",
+                "{}: expected a system: an .ssp, an .ssd, an OspSystemStructure.xml or a .toml; \
+                 FMUs are given by --fmu NAME=FMU",
                 path.display()
             ),
             None if self.fmus.is_empty() => {
