@@ -2,11 +2,14 @@
 
 use crate::description::{ParseError, Position, read_xml};
 
-/// An element: its attributes and child elements. Text is not used by FMI 2.0 and SSP 1.0.
+/// An element: its attributes, child elements and text, which FMI 2.0 and SSP do not use.
 #[derive(Debug)]
 pub struct Element {
     /// Name with its prefix, as it stands in the file.
     pub name: String,
+    /// The first text that is more than white space, without that around it. References to
+    /// characters and entities are not resolved.
+    pub text: String,
     /// Names and values, in order.
     pub attributes: Vec<(String, String)>,
     /// Child elements, in order.
@@ -16,9 +19,6 @@ pub struct Element {
 }
 
 /// Reads the one root element of a file in UTF-8 or ISO-8859-1.
-///
-/// Elements called `VendorAnnotations` or `Annotations`, without a prefix, are skipped with all that
-/// is in them.
 ///
 /// # Errors
 ///

@@ -1,7 +1,8 @@
 //! What to couple, as plain data: read from an SSP, a `system.toml` or the command line.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use crate::function::Function;
 use crate::transformation::Transformation;
 
 /// FMUs by name, the connections between them, settings, times.
@@ -11,6 +12,8 @@ pub struct Assembly {
     pub name: Option<String>,
     /// The FMUs, in the order in which they are instantiated.
     pub elements: Vec<Element>,
+    /// Functions that are computed between the steps, by name.
+    pub functions: Vec<(String, Function)>,
     /// The connections.
     pub links: Vec<Link>,
     /// Start time in s, where it is stated.
@@ -26,8 +29,18 @@ pub struct Element {
     pub name: String,
     /// The archive, or a folder with the unpacked FMU.
     pub fmu: PathBuf,
+    /// Name of the FMU for the user, where `fmu` is an unpacked copy: `system.ssp/resources/m.fmu`.
+    pub shown: Option<PathBuf>,
     /// Values before the initialization, in this order; later ones win.
     pub settings: Vec<Setting>,
+}
+
+impl Element {
+    /// The name of the FMU for the user.
+    #[must_use]
+    pub fn shown(&self) -> &Path {
+        self.shown.as_deref().unwrap_or(&self.fmu)
+    }
 }
 
 /// A value for a variable before the initialization.

@@ -102,6 +102,21 @@ impl Fmu {
         Ok(fmu)
     }
 
+    /// As [`Fmu::open`], without warnings about what is odd in the FMU.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`Fmu::open`].
+    pub fn open_quietly(path: &Path) -> Result<Self, FmuError> {
+        let unpacked =
+            if path.is_dir() { Unpacked::in_folder(path)? } else { Unpacked::open(path)? };
+        let fmu = Self::load(path, unpacked)?;
+        if fmu.content.library.is_none() {
+            return Err(FmuError::NoCoSimulation { path: path.to_owned() });
+        }
+        Ok(fmu)
+    }
+
     /// As [`Fmu::open`] for an FMU to [`crate::linearise()`], where model exchange alone will do.
     ///
     /// # Errors
@@ -110,9 +125,16 @@ impl Fmu {
     pub fn open_any(path: &Path) -> Result<Self, FmuError> {
         let unpacked =
             if path.is_dir() { Unpacked::in_folder(path)? } else { Unpacked::open(path)? };
+        for warning in &unpacked.archive_warnings {
+            tracing::warn!("{}: {warning}", path.display());
+        }
         for warning in &unpacked.warnings {
             tracing::warn!("{}: {warning}", path.display());
         }
+        Self::load(path, unpacked)
+    }
+
+    fn load(path: &Path, unpacked: Unpacked) -> Result<Self, FmuError> {
         let description = &unpacked.description;
         if description.co_simulation.is_none() && description.model_exchange.is_none() {
             return Err(FmuError::NoInterface { path: path.to_owned() });

@@ -16,6 +16,7 @@ pub mod fault;
 #[cfg(feature = "fmi")]
 pub mod fmi_crate;
 mod fmu;
+pub mod function;
 pub mod isolate;
 mod library;
 pub mod linearise;

@@ -16,6 +16,12 @@ pub trait Slave {
     /// The model description that the instance belongs to.
     fn description(&self) -> &ModelDescription;
 
+    /// Whether the outputs follow from the inputs alone: then it is stepped when its inputs are known,
+    /// in Jacobi's method after all others.
+    fn is_function(&self) -> bool {
+        false
+    }
+
     /// `fmi2SetDebugLogging` of all categories.
     ///
     /// # Errors

@@ -1,4 +1,5 @@
-//! System Structure and Parameterization (SSP 1.0.1): SSD, SSV, SSM and SSB files and SSP archives.
+//! System Structure and Parameterization (SSP 1.0.1 and 2.0): SSD, SSV, SSM and SSB files and SSP
+//! archives; and the files `OspSystemStructure.xml` of the Open Simulation Platform.
 //!
 //! [`open`] makes an [`Assembly`] of a file, [`write()`] makes an SSP of an assembly. [`read_ssd`] and
 //! its like only read.
@@ -7,9 +8,11 @@ mod conversion;
 mod error;
 mod flatten;
 mod load;
+mod osp;
 mod parameters;
 mod read;
 mod render;
+mod schema;
 mod source;
 pub mod structure;
 mod tree;
@@ -42,6 +45,9 @@ pub struct Opened {
     pub experiment: DefaultExperiment,
     /// Elements with the step in s that an annotation `osp:StepSizeHint` proposes.
     pub steps: Vec<(String, f64)>,
+    /// Whether the file asks for libcosim's fixed-step algorithm: all FMUs step from the same values,
+    /// inputs are held, and nothing is repeated.
+    pub fixed_step: bool,
     /// What is odd about the files and does not hinder a run, a sentence each.
     pub warnings: Vec<String>,
     /// Removes what was unpacked when it is dropped: libraries must be unloaded before.
@@ -56,7 +62,8 @@ pub struct Folders {
 }
 
 /// Reads the SSP archive at `path`, or an SSD file beside its FMUs, or a folder with a file
-/// `SystemStructure.ssd`; unpacks the FMUs and flattens the systems.
+/// `SystemStructure.ssd`; unpacks the FMUs and flattens the systems. A file `.xml`, or a folder with an
+/// `OspSystemStructure.xml` only, is read as one of libcosim, with its functions and variable groups.
 ///
 /// Nested systems, other SSDs and SSPs become part of the assembly: names are joined by dots, without
 /// that of the root system. Along a connection through systems, units are converted and
@@ -67,6 +74,10 @@ pub struct Folders {
 ///
 /// [`SspError`] with file, line and column.
 pub fn open(path: &Path) -> Result<Opened, SspError> {
+    let is_xml = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("xml"));
+    if is_xml || osp::is_folder_with_one(path) {
+        return osp::open(path);
+    }
     open_variant(path, None)
 }
 
@@ -76,8 +87,8 @@ pub fn open(path: &Path) -> Result<Opened, SspError> {
 ///
 /// Those of [`open`].
 pub fn open_variant(path: &Path, variant: Option<&str>) -> Result<Opened, SspError> {
-    let (tree, document) = load::load(path, variant)?;
-    let mut warnings = Vec::new();
+    let (mut tree, document) = load::load(path, variant)?;
+    let mut warnings = std::mem::take(&mut tree.warnings);
     check_connectors(&tree, &mut warnings);
     let flow = Flow::new(&tree, &mut warnings)?;
     let links = flow.links(&tree, &mut warnings)?;
@@ -93,6 +104,7 @@ pub fn open_variant(path: &Path, variant: Option<&str>) -> Result<Opened, SspErr
         elements.push(Element {
             name: node.path.clone(),
             fmu: tree.fmus[fmu].folder().to_owned(),
+            shown: Some(tree.shown[fmu].clone()),
             settings: settings.remove(&index).unwrap_or_default(),
         });
         steps.extend(node.step_size.map(|size| (node.path.clone(), size)));
@@ -101,11 +113,15 @@ pub fn open_variant(path: &Path, variant: Option<&str>) -> Result<Opened, SspErr
         name: Some(document.structure.name.clone()),
         elements,
         links,
+        functions: Vec::new(),
         start_time: experiment.start_time,
         stop_time: experiment.stop_time,
     };
+    // What this program writes has the step in the way of libcosim, but asks for no algorithm.
+    let is_own = document.structure.generation_tool.as_deref() == Some(write::TOOL);
+    let fixed_step = experiment.step_size.is_some() && !is_own;
     let folders = Folders { _fmus: tree.fmus, _packages: tree.folders };
-    Ok(Opened { assembly, experiment, steps, warnings, folders })
+    Ok(Opened { assembly, experiment, steps, fixed_step, warnings, folders })
 }
 
 /// What the connectors of the FMUs say against the FMUs.
@@ -115,13 +131,18 @@ fn check_connectors(tree: &Tree, warnings: &mut Vec<String>) {
         for connector in &node.connectors {
             let vertex = Vertex { node: index, connector: connector.name.clone() };
             let name = tree.name(&vertex);
+            let kind = connector.kind_of_value.as_ref();
+            if let Some(words) = kind.and_then(Type::beyond_fmi2) {
+                warnings.push(format!("{name} is {words}, which FMI 2.0 does not have: skipped"));
+                continue;
+            }
             let Some(variable) = tree.variable(&vertex) else {
                 warnings.push(format!("{name}: the FMU has no such variable"));
                 continue;
             };
             let (stated, own) = tree.measures(&vertex);
             warnings.extend(contradiction(&stated, &own).map(|text| format!("{name}: {text}")));
-            let stated = connector.kind_of_value.as_ref().map(element);
+            let stated = connector.kind_of_value.as_ref().and_then(element);
             let own = variable.kind.element();
             if let Some(stated) = stated.filter(|stated| *stated != own) {
                 warnings.push(format!(
@@ -132,14 +153,14 @@ fn check_connectors(tree: &Tree, warnings: &mut Vec<String>) {
     }
 }
 
-/// The name of the element that states a type.
-fn element(kind: &Type) -> &'static str {
+/// The name of the element that states a type of FMI 2.0.
+fn element(kind: &Type) -> Option<&'static str> {
     match kind {
-        Type::Real(_) => "Real",
-        Type::Integer => "Integer",
-        Type::Boolean => "Boolean",
-        Type::String => "String",
-        Type::Enumeration(_) => "Enumeration",
-        Type::Binary => "Binary",
+        Type::Real(_) => Some("Real"),
+        Type::Integer => Some("Integer"),
+        Type::Boolean => Some("Boolean"),
+        Type::String => Some("String"),
+        Type::Enumeration(_) => Some("Enumeration"),
+        Type::Binary | Type::Clock | Type::Array(_) | Type::Clocked(_) => None,
     }
 }

@@ -4,6 +4,7 @@
 use fmi2::Experiment;
 use fmi2::abi::Status;
 use fmi2::description::ModelDescription;
+use master::function::Function;
 use master::{
     Algorithm, CallError, Course, Failure, Simulation, Slave, Stepped, Sweep, System,
     by_direct_dependencies,
@@ -244,4 +245,76 @@ fn an_input_takes_one_source_only() {
     let mut system = ring();
     let message = system.connect("a.y", "a.u").unwrap_err().to_string();
     assert_eq!(message, "a.u is connected twice, to b.y and to a.y");
+}
+
+/// x' = x + 2 by an integrator that gets the sum of its own output and of a constant.
+fn with_sum() -> System {
+    let mut system = System::default();
+    let sum = Function::Sum { inputs: 2 };
+    system.add("sum", Box::new(sum.slave())).unwrap();
+    system.add("a", Integrator::boxed(1.0, 1.0, false)).unwrap();
+    system.add("constant", Integrator::boxed(1.0, 2.0, false)).unwrap();
+    system.connect("a.y", "sum.in[0]").unwrap();
+    system.connect("constant.y", "sum.in[1]").unwrap();
+    system.connect("sum.out", "a.u").unwrap();
+    system
+}
+
+#[test]
+fn a_function_is_computed_between_the_steps_whatever_the_order_of_the_slaves() {
+    for method in [JACOBI, GAUSS_SEIDEL_HOLD] {
+        let mut simulation = start(with_sum(), method, None);
+        let mut x = 1.0;
+        for _ in 0..5 {
+            simulation.step().unwrap();
+            x += 0.5 * (x + 2.0);
+            let mut found = [0.0; 2];
+            simulation.system().slaves[1].1.get_real(&[2], &mut found[..1]).unwrap();
+            simulation.system().slaves[0].1.get_real(&[2], &mut found[1..]).unwrap();
+            // A function that were a step late would give another x from the second step on.
+            assert_eq!(found, [x, x + 2.0], "{method:?}");
+        }
+    }
+}
+
+#[test]
+fn a_function_that_follows_the_course_of_its_inputs_reaches_the_values_of_the_end() {
+    let mut simulation = start(with_sum(), (Sweep::GaussSeidel, Course::Linear), None);
+    for _ in 0..3 {
+        simulation.step().unwrap();
+        let mut found = [0.0; 3];
+        simulation.system().slaves[0].1.get_real(&[2], &mut found[..1]).unwrap();
+        simulation.system().slaves[1].1.get_real(&[2], &mut found[1..2]).unwrap();
+        simulation.system().slaves[2].1.get_real(&[2], &mut found[2..]).unwrap();
+        let sum: f64 = found[1] + found[2];
+        assert!((found[0] - sum).abs() <= 1e-12 * sum.abs(), "{found:?}");
+    }
+}
+
+#[test]
+fn a_vector_sum_adds_component_by_component_and_keeps_its_state() {
+    let mut slave = Function::VectorSum { inputs: 3, dimension: 2 }.slave();
+    let names: Vec<_> = slave.description().variables.iter().map(|v| v.name.clone()).collect();
+    let expected = "in[0][0] in[0][1] in[1][0] in[1][1] in[2][0] in[2][1] out[0] out[1]";
+    assert_eq!(names.join(" "), expected);
+    assert_eq!(slave.description().problems(), []);
+    slave.set_real(&[0, 1, 2, 3, 4, 5], &[1.0, 10.0, 2.0, 20.0, 4.0, 40.0]).unwrap();
+    let mut sums = [0.0; 2];
+    slave.get_real(&[6, 7], &mut sums).unwrap();
+    assert_eq!(sums, [7.0, 70.0]);
+    let mut changes = [0.0; 2];
+    slave.directional_derivative(&[6, 7], &[0, 3, 5], &[1.0, 2.0, 3.0], &mut changes).unwrap();
+    assert_eq!(changes, [1.0, 5.0]);
+    let bytes = slave.serialize_state().unwrap();
+    slave.save_state(0).unwrap();
+    slave.set_real(&[0], &[100.0]).unwrap();
+    slave.restore_state(0).unwrap();
+    slave.get_real(&[6, 7], &mut sums).unwrap();
+    assert_eq!(sums, [7.0, 70.0]);
+    slave.set_real(&[0], &[100.0]).unwrap();
+    slave.deserialize_state(&bytes).unwrap();
+    slave.get_real(&[6, 7], &mut sums).unwrap();
+    assert_eq!(sums, [7.0, 70.0]);
+    assert!(slave.deserialize_state(&bytes[1..]).is_err());
+    assert!(slave.get_real(&[8], &mut sums).is_err());
 }

@@ -65,6 +65,10 @@ pub(super) fn check(
 /// How one entry is packed and called.
 fn entry<R: std::io::Read>(entry: &ZipFile<'_, R>, findings: &mut Findings) {
     let Ok(name) = entry.name().map(std::borrow::Cow::into_owned) else { return };
+    if name.contains('\\') || name.split('/').any(|part| part == ".") {
+        let what = "a path with backslashes or parts that are a dot";
+        findings.add(Error, &name, what, ("Importers on Linux do not find the file.", SECTION));
+    }
     if entry.version_needed() > 20 {
         let needed = f64::from(entry.version_needed()) / 10.0;
         let what = format!("needs version {needed:.1} of ZIP, expected at most 2.0");

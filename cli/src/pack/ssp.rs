@@ -27,7 +27,7 @@ pub(super) fn write(fmus: &[Packed], out: &Path) -> anyhow::Result<PathBuf> {
     let elements = NAMES.iter().zip(fmus).map(|(name, packed)| Element {
         name: (*name).to_owned(),
         fmu: packed.path.clone(),
-        settings: Vec::new(),
+        ..Element::default()
     });
     let end = |element: &str, variable: &str| Terminal {
         element: element.to_owned(),
@@ -43,6 +43,7 @@ pub(super) fn write(fmus: &[Packed], out: &Path) -> anyhow::Result<PathBuf> {
         name: Some("InvertedPendulum".to_owned()),
         elements: elements.collect(),
         links: links.into(),
+        functions: Vec::new(),
         start_time: Some(0.0),
         stop_time: Some(STOP_TIME),
     };

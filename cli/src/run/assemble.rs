@@ -4,14 +4,15 @@ use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use anyhow::{Context, bail};
-use master::assembly::{Assembly, Element, Link, Terminal};
+use anyhow::{Context, anyhow, bail};
+use master::assembly::{Element, Link, Terminal};
 use master::ssp::structure::DefaultExperiment;
-use master::ssp::{self, Folders};
+use master::ssp::{self, Folders, Opened};
 use master::transformation::Transformation;
 use master::{CallError, CallLog, Failure, Fmu, Instance, Slave, System, isolate};
 
 use crate::config::{Config, Loaded, Wire};
+use crate::logging;
 
 /// A system, not yet initialised.
 pub(crate) struct Assembled {
@@ -20,6 +21,8 @@ pub(crate) struct Assembled {
     pub(crate) experiment: DefaultExperiment,
     /// FMUs with the step in s that an SSP proposes.
     pub(crate) steps: Vec<(String, f64)>,
+    /// Whether it asks for libcosim's fixed-step algorithm.
+    pub(crate) fixed_step: bool,
     /// What an SSP was unpacked to: is to outlive the system.
     pub(crate) folders: Option<Folders>,
 }
@@ -43,10 +46,14 @@ pub(crate) fn assemble(loaded: &Loaded, making: &Making<'_>) -> anyhow::Result<A
             master::preload(library.as_ref())?;
         }
     }
-    let (mut assembly, experiment, steps, folders) = base(config)?;
+    let opened = config.system.as_deref().map(open).transpose()?;
+    let (mut assembly, experiment, steps, fixed_step, folders) = match opened {
+        Some(own) => (own.assembly, own.experiment, own.steps, own.fixed_step, Some(own.folders)),
+        None => Default::default(),
+    };
     for (name, path) in &config.fmus.0 {
         match assembly.elements.iter_mut().find(|element| element.name == *name) {
-            Some(element) => element.fmu.clone_from(path),
+            Some(element) => (element.fmu, element.shown) = (path.clone(), None),
             None => assembly.elements.push(element(name, path)),
         }
     }
@@ -54,6 +61,9 @@ pub(crate) fn assemble(loaded: &Loaded, making: &Making<'_>) -> anyhow::Result<A
         bail!("there is no FMU in the system, expected `system` or an entry of [fmus]");
     }
     let mut system = instantiate(&assembly.elements, config, making)?;
+    for (name, function) in &assembly.functions {
+        system.add(name, Box::new(function.slave()))?;
+    }
     connect(&mut system, loaded, &assembly.links, making.by_unit)?;
     for element in &assembly.elements {
         for setting in &element.settings {
@@ -66,25 +76,26 @@ pub(crate) fn assemble(loaded: &Loaded, making: &Making<'_>) -> anyhow::Result<A
         let set = system.set(name, &value.to_string());
         set.map_err(|error| loaded.point(place, error))?;
     }
-    Ok(Assembled { system, experiment, steps, folders })
+    Ok(Assembled { system, experiment, steps, fixed_step, folders })
 }
 
-type Base = (Assembly, DefaultExperiment, Vec<(String, f64)>, Option<Folders>);
-
 /// The system that the configuration begins with.
-fn base(config: &Config) -> anyhow::Result<Base> {
-    let Some(path) = &config.system else {
-        return Ok((Assembly::default(), DefaultExperiment::default(), Vec::new(), None));
-    };
+fn open(path: &Path) -> anyhow::Result<Opened> {
     let opened = ssp::open(path)?;
+    let folder = path.parent().unwrap_or(path).to_string_lossy();
     for warning in &opened.warnings {
-        tracing::warn!("{}: {warning}", path.display());
+        // What is about a file of the system names it.
+        if !folder.is_empty() && warning.starts_with(&*folder) {
+            tracing::warn!("{warning}");
+        } else {
+            tracing::warn!("{}: {warning}", path.display());
+        }
     }
-    Ok((opened.assembly, opened.experiment, opened.steps, Some(opened.folders)))
+    Ok(opened)
 }
 
 fn element(name: &str, path: &Path) -> Element {
-    Element { name: name.to_owned(), fmu: path.to_owned(), settings: Vec::new() }
+    Element { name: name.to_owned(), fmu: path.to_owned(), ..Element::default() }
 }
 
 /// Instantiates the FMUs.
@@ -142,7 +153,8 @@ impl<'a> Opening<'a> {
             Some(package) => package.clone(),
             None => isolate::Package::open(&element.fmu).with_context(|| element.name.clone())?,
         };
-        let slave = package.instantiate(&element.name, &self.isolation)?;
+        let slave = package.instantiate(&element.name, &self.isolation);
+        let slave = slave.map_err(|error| as_shown(error.into(), element))?;
         self.isolated.insert(&element.fmu, package);
         Ok(slave)
     }
@@ -151,15 +163,37 @@ impl<'a> Opening<'a> {
     fn here(&mut self, element: &'a Element) -> anyhow::Result<Instance> {
         let fmu = match self.opened.get(&element.fmu) {
             Some(fmu) => fmu.clone(),
-            None => Fmu::open(&element.fmu).with_context(|| element.name.clone())?,
+            None => open_fmu(element)?,
         };
-        let mut slave = fmu.instantiate(&element.name)?;
+        let slave = fmu.instantiate(&element.name);
+        let mut slave = slave.map_err(|error| as_shown(error.into(), element))?;
         self.opened.insert(&element.fmu, fmu);
         slave.set_time_limit(self.isolation.time_limit);
         if self.isolation.logging {
             switch_logging_on(&element.name, &mut slave);
         }
         Ok(slave)
+    }
+}
+
+/// Opens the FMU of an element. What is odd about an FMU of an SSP was said when the SSP was opened.
+fn open_fmu(element: &Element) -> anyhow::Result<Fmu> {
+    let opened = match &element.shown {
+        Some(_) => Fmu::open_quietly(&element.fmu),
+        None => Fmu::open(&element.fmu),
+    };
+    opened.with_context(|| element.name.clone()).map_err(|error| as_shown(error, element))
+}
+
+/// An error about an FMU that was unpacked from an SSP, with the name that the user knows.
+fn as_shown(error: anyhow::Error, element: &Element) -> anyhow::Error {
+    match &element.shown {
+        Some(shown) => {
+            let unpacked = element.fmu.display().to_string();
+            let sentence = logging::sentence(&error);
+            anyhow!(sentence.replace(&unpacked, &shown.display().to_string()))
+        }
+        None => error,
     }
 }
 

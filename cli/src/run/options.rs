@@ -58,8 +58,8 @@ pub(crate) struct AlgorithmOptions {
 #[derive(clap::Args)]
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(crate) struct Options {
-    /// An SSP archive, an SSD file beside its FMUs, or a system.toml; or FMUs, which get the names of
-    /// their files
+    /// An SSP archive, an SSD or OspSystemStructure.xml beside its FMUs, or a system.toml; or FMUs,
+    /// which get the names of their files
     #[arg(value_name = "SYSTEM|FMU", conflicts_with_all = ["plant", "controller", "resume"])]
     inputs: Vec<PathBuf>,
     /// Add an FMU, or put another in the place of one of the system; may be repeated
@@ -256,11 +256,15 @@ impl Options {
                 }
             }
             [path] if has_ending(path, "toml") => return Ok((Loaded::read(path)?, None)),
-            [path] if path.is_dir() || has_ending(path, "ssp") || has_ending(path, "ssd") => {
+            [path]
+                if path.is_dir()
+                    || ["ssp", "ssd", "xml"].iter().any(|ending| has_ending(path, ending)) =>
+            {
                 config.system = Some(path.clone());
             }
             [path] => bail!(
-                "{}: expected a system, that is an .ssp, an .ssd or a .toml, or an .fmu",
+                "{}: expected a system, that is an .ssp, an .ssd, an OspSystemStructure.xml or a .toml, \
+                 or an .fmu",
                 path.display()
             ),
             [_, _, ..] => bail!(

@@ -2,7 +2,9 @@
 
 use anyhow::bail;
 use fmi2::Experiment;
-use master::{Algorithm, Coupling, StepControl, System, Wanted, by_direct_dependencies, choose};
+use master::{
+    Algorithm, Coupling, Course, StepControl, Sweep, System, Wanted, by_direct_dependencies, choose,
+};
 use toml::Spanned;
 
 use super::assemble::Assembled;
@@ -30,6 +32,7 @@ pub(super) struct Plan {
 pub(super) fn plan(config: &mut Config, assembled: &Assembled) -> anyhow::Result<Plan> {
     let system = &assembled.system;
     let mut reasons = Vec::new();
+    propose_algorithm(&mut config.algorithm, assembled, &mut reasons);
     propose_steps(&mut config.algorithm, assembled, &mut reasons);
     check_step(&config.algorithm)?;
     let (start, stop) = times(config, assembled, &mut reasons)?;
@@ -79,6 +82,22 @@ fn check_step(wanted: &Wanted) -> anyhow::Result<()> {
     }
 }
 
+/// Takes of libcosim's algorithm what is not stated, where the system structure asks for it.
+fn propose_algorithm(wanted: &mut Wanted, assembled: &Assembled, reasons: &mut Vec<String>) {
+    if !assembled.fixed_step {
+        return;
+    }
+    let open = wanted.method.is_none() || wanted.course.is_none() || wanted.coupling.is_none();
+    wanted.method.get_or_insert(Sweep::Jacobi);
+    wanted.course.get_or_insert(Course::Hold);
+    wanted.coupling.get_or_insert(Coupling::Once);
+    if open {
+        let sentence = "the system structure asks for libcosim's fixed steps: jacobi, course hold, \
+             coupling once, where nothing else is stated";
+        reasons.push(sentence.to_owned());
+    }
+}
+
 /// Takes steps that an SSP proposes where nothing else is said.
 fn propose_steps(wanted: &mut Wanted, assembled: &Assembled, reasons: &mut Vec<String>) {
     let sound = |step: &f64| *step > 0.0 && step.is_finite();
@@ -94,7 +113,8 @@ fn propose_steps(wanted: &mut Wanted, assembled: &Assembled, reasons: &mut Vec<S
         && wanted.coupling.is_none_or(|coupling| coupling == Coupling::Once)
         && wanted.next_event.is_empty()
         && wanted.crossing.is_empty()
-        && by_direct_dependencies(&assembled.system).looped.is_empty();
+        && (wanted.coupling.is_some()
+            || by_direct_dependencies(&assembled.system).looped.is_empty());
     let Some(step) = wanted.step.filter(|_| plain && wanted.every.is_empty()) else { return };
     for (name, proposed) in hints {
         let multiple = (proposed / step).round();

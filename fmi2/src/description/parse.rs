@@ -22,7 +22,7 @@ pub(crate) fn read_xml(bytes: &[u8]) -> Result<crate::xml::Element, ParseError> 
         return Err(ParseError::Length { limit: ModelDescription::MOST_BYTES });
     }
     let (text, _) = encoding::decode(bytes)?;
-    Ok(xml::read(&text)?.into_owned())
+    Ok(xml::read_but(&text, |_| false)?.into_owned())
 }
 
 /// A place in an XML file; both numbers count from 1, columns in characters.

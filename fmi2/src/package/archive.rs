@@ -58,8 +58,11 @@ impl<R: Seek> Seek for Metered<R> {
 pub(super) struct Archive {
     zip: ZipArchive<Metered<BufReader<File>>>,
     path: PathBuf,
-    /// All names, those of folders with a slash at their end; in the order of the archive.
+    /// All names, those of folders with a slash at their end; in the order of the archive. Empty for
+    /// an entry that is the root folder itself.
     names: Vec<String>,
+    /// Names that were read as other ones: how many, and the first with its reading.
+    renamed: Option<(usize, String, String)>,
     capacity: u64,
 }
 
@@ -74,7 +77,8 @@ impl Archive {
         let zip = ZipArchive::new(reader).map_err(wrong)?;
         left.set(u64::MAX);
         let capacity = BASE.saturating_add(RATIO.saturating_mul(length)).min(CAPACITY);
-        let mut archive = Self { zip, path: path.to_owned(), names: Vec::new(), capacity };
+        let (path, names) = (path.to_owned(), Vec::new());
+        let mut archive = Self { zip, path, names, renamed: None, capacity };
         archive.look()?;
         Ok(archive)
     }
@@ -89,17 +93,25 @@ impl Archive {
         let mut total = 0_u64;
         for index in 0..self.zip.len() {
             let entry = self.zip.by_index_data(index).map_err(|error| self.wrong(error))?;
-            let name = entry.name().map_err(|error| self.wrong(error))?.into_owned();
-            let rule = paths::unsafe_to_unpack(&name);
+            let stated = entry.name().map_err(|error| self.wrong(error))?.into_owned();
+            let name = paths::normalised(&stated);
+            let rule = (!name.is_empty()).then(|| paths::unsafe_to_unpack(&name)).flatten();
             let rule = rule.or(entry.is_symlink().then_some("a file or a folder, not a link"));
             if let Some(expected) = rule {
-                return Err(PackageError::Entry { entry: name, expected });
+                return Err(PackageError::Entry { entry: stated, expected });
             }
             total = total.saturating_add(entry.size());
+            if name != stated {
+                let (count, ..) = self.renamed.get_or_insert((0, stated, name.clone()));
+                *count += 1;
+            }
             self.names.push(name);
         }
         if total > self.capacity {
             return Err(self.limit(self.capacity, "bytes"));
+        }
+        if self.renamed.is_some() && has_duplicates(&self.names) {
+            return Err(self.wrong(ZipError::InvalidArchive(DUPLICATE.into())));
         }
         if let Some(name) = file_and_folder(&self.names) {
             let expected = "a file or a folder of that name, not both";
@@ -113,6 +125,20 @@ impl Archive {
 
     pub(super) fn names(&self) -> &[String] {
         &self.names
+    }
+
+    /// What breaks the rules for the paths of entries and was read all the same: a sentence each.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        let sentence = |(count, stated, read): &(usize, String, String)| {
+            let entries = if *count == 1 { "entry has" } else { "entries have" };
+            let example =
+                if read.is_empty() { "skipped".to_owned() } else { format!("read as {read:?}") };
+            format!(
+                "{count} {entries} a path with backslashes or . in the archive, for example \
+                 {stated:?}: {example}"
+            )
+        };
+        self.renamed.iter().map(sentence).collect()
     }
 
     /// Unpacks into `folder` the entries that are `wanted`.
@@ -134,6 +160,9 @@ impl Archive {
         use std::fs;
         let mut left = capacity;
         for (index, name) in self.names.iter().enumerate().filter(|(_, name)| wanted(name)) {
+            if name.is_empty() {
+                continue;
+            }
             let target = folder.join(name);
             if name.ends_with('/') {
                 fs::create_dir_all(&target).map_err(file_error("create", &target))?;
@@ -162,6 +191,15 @@ impl Archive {
     fn limit(&self, limit: u64, unit: &'static str) -> PackageError {
         PackageError::Limit { path: self.path.clone(), limit, unit }
     }
+}
+
+/// Whether two names are equal; a folder may be stated twice.
+fn has_duplicates(names: &[String]) -> bool {
+    let mut seen = HashSet::new();
+    names
+        .iter()
+        .filter(|name| !name.is_empty() && !name.ends_with('/'))
+        .any(|name| !seen.insert(name))
 }
 
 /// A name that is a file's and a folder's.

@@ -12,6 +12,18 @@ const FOLDERS: [&str; 6] =
 const LENGTH: usize = 1024;
 const DEPTH: usize = 64;
 
+/// The path that `path` means: with forward slashes, and without the parts `.` that name a folder
+/// itself. Whatever leads out of the folder stays as it is. Empty for the root folder.
+pub(super) fn normalised(path: &str) -> String {
+    let path = path.replace('\\', "/");
+    let (inner, end) = path.strip_suffix('/').map_or((path.as_str(), ""), |inner| (inner, "/"));
+    let parts: Vec<&str> = inner.split('/').filter(|part| *part != ".").collect();
+    if parts.is_empty() {
+        return String::new();
+    }
+    parts.join("/") + end
+}
+
 /// What is wrong with `path` if it could lead out of the folder it is unpacked into: the rule.
 pub(super) fn unsafe_to_unpack(path: &str) -> Option<&'static str> {
     if path.contains('\\') {

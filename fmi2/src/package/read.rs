@@ -39,12 +39,15 @@ pub struct Unpacked {
     pub description: ModelDescription,
     /// What in it breaks the standard and was read all the same.
     pub warnings: Vec<Warning>,
+    /// The same of the archive: a sentence each.
+    pub archive_warnings: Vec<String>,
 }
 
 impl Unpacked {
     /// Unpacks what a simulation can need of the archive at `path` into a new temporary folder, which
     /// lives as long as the result. A library loaded from it must be closed before. Left out are
-    /// documentation, sources, pictures and the libraries of other platforms.
+    /// documentation, sources, pictures and the libraries of other platforms. Backslashes in paths are
+    /// read as slashes and parts `.` are skipped, with a sentence in [`Unpacked::archive_warnings`].
     ///
     /// # Errors
     ///
@@ -74,9 +77,10 @@ impl Unpacked {
         let temporary = folder()?;
         archive.unpack(temporary.path(), wanted)?;
         let (description, warnings) = describe(temporary.path(), path)?;
-        let names = archive.names().to_vec();
-        let folder = temporary.path().to_owned();
-        Ok(Unpacked { folder, temporary: Some(temporary), names, description, warnings })
+        let archive_warnings = archive.warnings();
+        let names = archive.names().iter().filter(|name| !name.is_empty()).cloned().collect();
+        let (folder, temporary) = (temporary.path().to_owned(), Some(temporary));
+        Ok(Unpacked { folder, temporary, names, description, warnings, archive_warnings })
     }
 
     /// Uses the FMU that is already unpacked in `folder`.
@@ -87,7 +91,8 @@ impl Unpacked {
     pub fn in_folder(folder: &Path) -> Result<Self, PackageError> {
         let folder = folder.canonicalize().map_err(file_error("open", folder))?;
         let (description, warnings) = describe(&folder, &folder)?;
-        Ok(Unpacked { folder, temporary: None, names: Vec::new(), description, warnings })
+        let (names, archive_warnings) = (Vec::new(), Vec::new());
+        Ok(Unpacked { folder, temporary: None, names, description, warnings, archive_warnings })
     }
 
     /// The folder with `modelDescription.xml`; an absolute path.
@@ -172,16 +177,17 @@ fn is_needed(name: &str) -> bool {
     }
 }
 
-/// Unpacks the ZIP archive at `path` (an FMU, or an SSP) into a new temporary folder.
+/// Unpacks the ZIP archive at `path` (an FMU, or an SSP) into a new temporary folder: the folder, and
+/// what in the archive breaks the rules for paths and was read all the same, a sentence each.
 ///
 /// # Errors
 ///
 /// [`PackageError`] as for [`Unpacked::open`], whatever is in the archive.
-pub fn unpack_archive(path: &Path) -> Result<TemporaryFolder, PackageError> {
+pub fn unpack_archive(path: &Path) -> Result<(TemporaryFolder, Vec<String>), PackageError> {
     let mut archive = Archive::open(path)?;
     let folder = folder()?;
     archive.unpack(folder.path(), |_| true)?;
-    Ok(folder)
+    Ok((folder, archive.warnings()))
 }
 
 fn folder() -> Result<TemporaryFolder, PackageError> {

@@ -218,9 +218,22 @@ fn opened(bytes: &[u8]) -> Result<Unpacked, PackageError> {
 
 #[test]
 fn archives_that_lead_out_of_their_folder_are_refused() {
-    for name in
-        ["../x", "/x", "a/../../x", "a\\..\\x", "a\\x", "C:/x", "./x", "a//x", "..", "a\u{0}b"]
-    {
+    for name in [
+        "../x",
+        "/x",
+        "a/../../x",
+        "a\\..\\x",
+        "..\\x",
+        "\\x",
+        "C:/x",
+        "C:\\x",
+        "a//x",
+        "..",
+        "./..",
+        "./../x",
+        "a/./../../x",
+        "a\u{0}b",
+    ] {
         let bytes = raw::archive(&[(DESCRIPTION, XML, 0o100_644), (name, "", 0o100_644)]);
         let error = opened(&bytes).unwrap_err();
         assert!(
@@ -231,6 +244,35 @@ fn archives_that_lead_out_of_their_folder_are_refused() {
     let link = raw::archive(&[(DESCRIPTION, XML, 0o100_644), ("resources", "/etc", 0o120_777)]);
     let error = opened(&link).unwrap_err();
     assert!(error.to_string().contains("not a link"), "{error}");
+}
+
+#[test]
+fn backslashes_and_dots_in_paths_are_read_and_named_in_a_warning() {
+    let library = library_entry();
+    let backslashes = format!(".\\{}", library.replace('/', "\\"));
+    let dotted = format!("./{DESCRIPTION}");
+    let unpacked = opened(&raw::archive(&[
+        ("./", "", 0o40_755),
+        (&dotted, XML, 0o100_644),
+        (&backslashes, "a library", 0o100_755),
+        ("resources\\deep\\", "", 0o40_755),
+        ("resources/plain.txt", "", 0o100_644),
+    ]))
+    .unwrap();
+    assert_eq!(fs::read(unpacked.library("M").unwrap()).unwrap(), b"a library");
+    assert!(unpacked.resources().join("deep").is_dir());
+    let names = [DESCRIPTION, &library, "resources/deep/", "resources/plain.txt"];
+    assert_eq!(unpacked.entries(), names);
+    assert_eq!(
+        unpacked.archive_warnings,
+        ["4 entries have a path with backslashes or . in the archive, for example \"./\": skipped"]
+    );
+    let twice = [(DESCRIPTION, XML, 0o100_644), (dotted.as_str(), XML, 0o100_644)];
+    let error = opened(&raw::archive(&twice)).unwrap_err();
+    assert!(matches!(error, PackageError::Archive { .. }), "{error}");
+    let both = [(DESCRIPTION, XML, 0o100_644), ("a", "", 0o100_644), ("a\\b", "", 0o100_644)];
+    let error = opened(&raw::archive(&both)).unwrap_err();
+    assert!(matches!(error, PackageError::Entry { .. }), "{error}");
 }
 
 #[test]

@@ -138,7 +138,7 @@ pub(crate) fn package(data: &[u8]) {
         drop(unpacked);
         assert!(!inside.exists());
     }
-    if let Ok(unpacked) = unpack_archive(&path) {
+    if let Ok((unpacked, _)) = unpack_archive(&path) {
         let limit = (64 << 20) + 100 * data.len() as u64;
         assert!(size(unpacked.path()) <= limit);
     }

@@ -78,6 +78,8 @@ pub(super) struct Layout {
     pub(super) offsets: Vec<f64>,
     pub(super) held: Vec<bool>,
     pub(super) input_ports: Vec<Port>,
+    /// For each slave, whether it is a function, which takes the values of the end of a step.
+    pub(super) functions: Vec<bool>,
     /// For each slave, whether all its inputs are outputs as they are.
     pub(super) plain: Vec<bool>,
     /// For each output: its port, its slave, and where its derivatives of first and second order
@@ -98,7 +100,8 @@ pub(super) struct Layout {
 impl Layout {
     pub(super) fn new(system: &System, algorithm: &Algorithm, refusing: &[Refusal]) -> Self {
         let count = system.slaves.len();
-        let mut layout = Self { plain: vec![true; count], ..Self::default() };
+        let functions = system.slaves.iter().map(|(_, slave)| slave.is_function()).collect();
+        let mut layout = Self { plain: vec![true; count], functions, ..Self::default() };
         layout.lanes.resize_with(count, Lane::default);
         layout.collect_outputs(system);
         layout.collect_inputs(system);

@@ -177,11 +177,11 @@ impl Reals {
     fn place(&mut self, slave: usize, k: usize, position: usize, time: f64, size: f64) {
         let (layout, lane) = (&self.layout, &self.layout.lanes[slave]);
         let source = layout.sources[k] as usize;
-        let known = self.is_known(source);
+        let known = self.is_known(slave, source);
         let course = if layout.held[k] {
             Polynomial::held(self.trace.latest[source])
         } else {
-            self.polynomial(source, time)
+            self.polynomial(slave, source, time)
         };
         let value = match (lane.input_order, self.course) {
             (0, Course::Limited) if known => course.end(size),
@@ -216,21 +216,26 @@ impl Reals {
         }
     }
 
-    /// Whether the source of that output has stepped beyond the begin of the current step.
-    fn is_known(&self, output: usize) -> bool {
+    /// Whether the slave gets what an output reached in the current step, where its source has stepped.
+    fn sees_end(&self, slave: usize) -> bool {
+        self.sweep == Sweep::GaussSeidel || self.layout.functions[slave]
+    }
+
+    /// Whether the source of that output has stepped beyond the begin of the current step, for `slave`.
+    fn is_known(&self, slave: usize, output: usize) -> bool {
         let stepped = self.trace.spans[self.layout.owners[output] as usize].stepped;
-        self.assumes || (stepped && self.sweep == Sweep::GaussSeidel)
+        self.assumes || (stepped && self.sees_end(slave))
     }
 
     /// What is known of an output over the last step of its slave.
-    pub(super) fn known(&self, output: usize, span: &Span) -> Known {
+    pub(super) fn known(&self, slave: usize, output: usize, span: &Span) -> Known {
         let (layout, trace) = (&self.layout, &self.trace);
         let derivative = |place: Option<u32>| place.map(|k| trace.begin_derivatives[k as usize]);
         Known {
             earlier: trace.earlier[output],
             before: trace.before[output],
             begin: trace.begin[output],
-            end: if self.assumes && !(span.stepped && self.sweep == Sweep::GaussSeidel) {
+            end: if self.assumes && !(span.stepped && self.sees_end(slave)) {
                 self.assumed[output]
             } else {
                 trace.latest[output]
@@ -244,11 +249,11 @@ impl Reals {
     }
 
     /// The course of an output from `time` on.
-    fn polynomial(&self, output: usize, time: f64) -> Polynomial {
+    fn polynomial(&self, slave: usize, output: usize, time: f64) -> Polynomial {
         let (layout, trace) = (&self.layout, &self.trace);
         let span = &trace.spans[layout.owners[output] as usize];
-        let known = self.known(output, span);
-        let course = if self.is_known(output) {
+        let known = self.known(slave, output, span);
+        let course = if self.is_known(slave, output) {
             known.interpolated(self.course)
         } else {
             known.extrapolated(self.course)
@@ -289,6 +294,7 @@ impl Reals {
         self.simple
             && self.sweep == Sweep::Jacobi
             && self.layout.plain.iter().all(|plain| *plain)
+            && !self.layout.functions.contains(&true)
             && self.layout.from_integers.is_empty()
     }
 

@@ -36,12 +36,18 @@ pub(super) struct Groups {
 }
 
 impl Groups {
-    /// Jacobi: all slaves are one group. Gauss-Seidel: neighbours in the order of stepping are one
+    /// Jacobi: all slaves are one group, but for functions, which come after them one by one.
+    /// Gauss-Seidel: neighbours in the order of stepping are one
     /// where none is connected to another, as then it makes no difference.
     pub(super) fn new(system: &System, sweep: Sweep, order: &Order) -> Self {
         let count = system.slaves.len();
         if sweep == Sweep::Jacobi {
-            return Self { sequence: (0..count).collect(), begins: vec![0, count] };
+            let is_function = |slave: &usize| system.slaves[*slave].1.is_function();
+            let mut sequence: Vec<usize> = (0..count).filter(|slave| !is_function(slave)).collect();
+            let first = sequence.len();
+            sequence.extend(order.sequence.iter().copied().filter(is_function));
+            let begins = [0].into_iter().chain(first..=count).collect();
+            return Self { sequence, begins };
         }
         let mut neighbours = vec![Vec::new(); count];
         for connection in &system.connections {

@@ -6,7 +6,7 @@ use fmi2::description::{Causality, Position};
 
 use super::conversion::{Measure, Way};
 use super::error::{SspError, meaning};
-use super::structure::{Connection, ConnectorKind, Conversion, End};
+use super::structure::{Connection, ConnectorKind, Conversion, End, Type};
 use super::tree::{Content, Tree, Vertex};
 use crate::assembly::{Link, Terminal};
 use crate::transformation::Transformation;
@@ -36,29 +36,44 @@ struct Side {
 
 impl Side {
     fn gives(&self) -> bool {
-        use ConnectorKind::{CalculatedParameter, Inout, Input, Output, Parameter};
+        use ConnectorKind::{Input, Parameter, StructuralParameter, Unspecified};
         match self.kind {
-            Input | Parameter => self.of_system,
-            Output | CalculatedParameter | Inout => !self.of_system,
+            Unspecified => true,
+            Input | Parameter | StructuralParameter => self.of_system,
+            _ => !self.of_system,
         }
     }
 
     fn takes(&self) -> bool {
-        use ConnectorKind::{CalculatedParameter, Inout, Input, Output, Parameter};
+        use ConnectorKind::{CalculatedParameter, Constant, Local, Output, Unspecified};
         match self.kind {
-            Output | CalculatedParameter => self.of_system,
-            Input | Parameter | Inout => !self.of_system,
+            Unspecified => true,
+            Output | CalculatedParameter | Local | Constant => self.of_system,
+            _ => !self.of_system,
         }
     }
 
-    fn is_parameter(&self) -> bool {
-        matches!(self.kind, ConnectorKind::Parameter | ConnectorKind::CalculatedParameter)
+    /// How often values at the connector may change: never, before the run, or while it runs.
+    fn rate(&self, as_source: bool) -> u32 {
+        use ConnectorKind::{CalculatedParameter, Constant, Parameter, StructuralParameter};
+        match self.kind {
+            ConnectorKind::Unspecified => {
+                if as_source {
+                    0
+                } else {
+                    2
+                }
+            }
+            Constant | StructuralParameter => 0,
+            Parameter | CalculatedParameter => 1,
+            _ => 2,
+        }
     }
 
-    /// The table of section 5.3.2.1.
+    /// The tables of section 5.3.2.1, of SSP 1.0 and 2.0.
     fn leads_to(&self, other: &Side) -> bool {
         let both = (self.kind, other.kind) == (ConnectorKind::Inout, ConnectorKind::Inout);
-        self.gives() && other.takes() && !both && (self.is_parameter() || !other.is_parameter())
+        self.gives() && other.takes() && !both && self.rate(true) <= other.rate(false)
     }
 
     fn words(&self) -> String {
@@ -222,6 +237,14 @@ fn side(tree: &Tree, system: usize, end: &End, warnings: &mut Vec<String>) -> Re
         }
     };
     let vertex = tree.vertex(node, &end.connector);
+    let connector = tree.connector(vertex.node, &vertex.connector);
+    let kind = connector.and_then(|connector| connector.kind_of_value.as_ref());
+    if let Some(words) = kind.and_then(Type::beyond_fmi2) {
+        let name = tree.name(&vertex);
+        return Err(format!(
+            "{name} is {words}, which FMI 2.0 does not have, so it cannot be connected"
+        ));
+    }
     let stated = tree.connector(node, &end.connector).map(|connector| connector.kind);
     let of_system = end.element.is_none();
     let Some(variable) = tree.variable(&vertex) else {
@@ -236,13 +259,16 @@ fn side(tree: &Tree, system: usize, end: &End, warnings: &mut Vec<String>) -> Re
     };
     let own = kind_of(variable.causality);
     let name = tree.name(&vertex);
+    let stated = stated.filter(|kind| *kind != ConnectorKind::Unspecified || own.is_none());
     match (stated, own) {
         (Some(stated), Some(own)) if stated != own => warnings.push(format!(
             "{name} is {} in the system structure and {} in the FMU",
             stated.as_str(),
             own.as_str()
         )),
-        (None, _) => warnings.push(format!("{name} is connected, but is no connector")),
+        (None, _) if connector.is_none() => {
+            warnings.push(format!("{name} is connected, but is no connector"));
+        }
         _ => {}
     }
     let causality = variable.causality.as_str();

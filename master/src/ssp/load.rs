@@ -1,12 +1,13 @@
 //! Files to a [`Tree`].
 
-mod files;
+pub(super) mod files;
 
 use std::collections::HashMap;
 use std::path::Path;
 use std::rc::Rc;
 
 use fmi2::description::Position;
+use fmi2::package::Unpacked;
 
 use super::error::{SspError, meaning};
 use super::source::{Base, Target};
@@ -15,7 +16,7 @@ use super::structure::{
     Element, ElementBase, Implementation, ParameterBinding, System,
 };
 use super::tree::{Binding, Content, Document, File, Node, Tree};
-use files::Files;
+use files::{Files, Finished};
 
 /// Deepest nesting of systems, over all files.
 const DEPTH: usize = 64;
@@ -40,11 +41,13 @@ pub(super) fn load(path: &Path, variant: Option<&str>) -> Result<(Tree, Rc<Docum
         path: path.to_owned(),
         shown: path.to_owned(),
         fragment: variant.map(str::to_owned),
+        doubt: None,
     })?;
     let place = Place { parent: None, path: String::new(), depth: 0, outer: None };
     loader.system(&document.structure.system, &document, place)?;
     let Loader { mut tree, files, .. } = loader;
-    (tree.fmus, tree.folders) = files.finish();
+    let Finished { fmus, shown, folders, warnings } = files.finish();
+    tree = Tree { fmus, shown, folders, warnings, ..tree };
     Ok((tree, document))
 }
 
@@ -143,7 +146,16 @@ impl Loader {
             let system = system.ok_or_else(|| here(format!("no system has the id {id:?}")))?;
             return self.system(system, document, place);
         }
+        if component.source.is_empty() {
+            let name = &place.path;
+            let sentence = format!("{name} has no source: it is nothing but its connectors");
+            self.files.warnings.push(here(sentence).to_string());
+            return self.add(&component.base, place, file);
+        }
         let target = file.base.resolve(&component.source).map_err(here)?;
+        if let Some(doubt) = &target.doubt {
+            self.files.warnings.push(here(format!("{}: {doubt}", place.path)).to_string());
+        }
         if component.content == Kind::Fmu {
             return self.fmu(component, &target, file, place);
         }
@@ -167,18 +179,16 @@ impl Loader {
             let sentence = format!("{}: {sentence}", component.base.name);
             meaning(component.base.at.0, sentence).in_file(&file.shown)
         };
-        if component.implementation == Implementation::ModelExchange {
-            return Err(here("model exchange is wanted, and only co-simulation can be run"));
-        }
         let index = self.files.fmu(target)?;
         let fmu = &self.files.fmus[index];
-        let shown = target.shown.display();
-        let Some(flags) = &fmu.description.co_simulation else {
-            return Err(here(&format!("{shown} offers no co-simulation")));
-        };
-        // Only here is it known which libraries the archive has.
-        fmu.library(&flags.model_identifier).map_err(|error| here(&format!("{shown}: {error}")))?;
-        let inside = Base::archive(fmu.folder(), &target.shown);
+        check_runnable(fmu).map_err(|why| here(&format!("{}: {why}", target.shown.display())))?;
+        let stated = component.implementation;
+        if matches!(stated, Implementation::ModelExchange | Implementation::ScheduledExecution) {
+            let sentence = "the system structure asks for another implementation than \
+                 co-simulation, which is all that can be run: its co-simulation is taken";
+            self.files.warnings.push(here(sentence).to_string());
+        }
+        let inside = Base::archive(self.files.fmus[index].folder(), &target.shown);
         let node = self.add(&component.base, place, file)?;
         let bindings = self.bindings(&component.base.bindings, file, Some(&inside))?;
         let added = &mut self.tree.nodes[node];
@@ -195,7 +205,7 @@ impl Loader {
     ) -> Result<usize, SspError> {
         let here = |sentence| meaning(source.at.0, sentence).in_file(&file.shown);
         let (dictionary, shown) =
-            Files::dictionary(&source.content, file).map_err(|error| error.or(here))?;
+            self.files.dictionary(&source.content, file).map_err(|error| error.or(here))?;
         let connectors = dictionary.entries.iter().map(|(name, kind)| Connector {
             name: name.clone(),
             kind: ConnectorKind::Inout,
@@ -263,6 +273,16 @@ impl Loader {
         }
         Ok(loaded)
     }
+}
+
+/// Why the FMU cannot run here, a sentence; it is known before the library is loaded.
+pub(super) fn check_runnable(fmu: &Unpacked) -> Result<(), String> {
+    let Some(flags) = &fmu.description.co_simulation else {
+        return Err(
+            "the FMU offers model exchange only, and only co-simulation can be run".to_owned()
+        );
+    };
+    fmu.library(&flags.model_identifier).map(|_| ()).map_err(|error| error.to_string())
 }
 
 /// The system with that `id`, at any depth.

@@ -2,7 +2,7 @@
 
 mod value;
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use fmi2::description::{Causality, Initial, Kind, ScalarVariable, Variability};
 
@@ -63,6 +63,7 @@ impl Applied<'_> {
     fn bind(&mut self, node: usize, binding: &Binding) -> Result<(), SspError> {
         let mut unmatched = Vec::new();
         let values = &binding.values;
+        self.warn_repeated(values);
         match &binding.mapping {
             None => {
                 for parameter in &values.parameters {
@@ -93,7 +94,38 @@ impl Applied<'_> {
         Ok(())
     }
 
+    /// Names that occur twice with different values; the last one counts.
+    fn warn_repeated(&mut self, values: &ParameterSet) {
+        let mut known: HashMap<&str, &Parameter> = HashMap::new();
+        let mut repeated = BTreeSet::new();
+        for parameter in &values.parameters {
+            let before = known.insert(&parameter.name, parameter);
+            if before.is_some_and(|before| before.value != parameter.value) {
+                repeated.insert(parameter.name.as_str());
+            }
+        }
+        if let Some(first) = repeated.first() {
+            let rest = repeated.len() - 1;
+            let more = if rest > 0 { format!(" and {rest} more") } else { String::new() };
+            let set = &values.name;
+            self.warnings.push(format!(
+                "parameter set {set:?} has different values for {first}{more}: the last one counts"
+            ));
+        }
+    }
+
     fn warn_unmatched(&mut self, values: &ParameterSet, node: usize, names: &[String]) {
+        let (names, nameless): (Vec<&str>, Vec<&str>) =
+            names.iter().map(String::as_str).partition(|name| !name.is_empty());
+        let set = &values.name;
+        if !nameless.is_empty() {
+            let count = nameless.len();
+            let text = format!("parameter set {set:?}: {count} names are empty: ignored");
+            self.warnings.push(text);
+        }
+        if names.is_empty() {
+            return;
+        }
         let owner = match self.tree.nodes[node].path.as_str() {
             "" => "the system".to_owned(),
             path => path.to_owned(),
@@ -101,7 +133,6 @@ impl Applied<'_> {
         let rest = names.len().saturating_sub(NAMED);
         let more = if rest > 0 { format!(" and {rest} more") } else { String::new() };
         let names = names[..names.len() - rest].join(", ");
-        let set = &values.name;
         self.warnings.push(format!("parameter set {set:?}: {owner} has no {names}{more}: ignored"));
     }
 

@@ -4,6 +4,7 @@ mod definitions;
 mod system;
 
 use super::error::SspError;
+use super::schema;
 use super::structure::{
     MappingEntry, Parameter, ParameterMapping, ParameterSet, ParameterValue, Place,
     SignalDictionary, SystemStructure,
@@ -13,22 +14,14 @@ use definitions::{conversion, definitions, value_type};
 
 /// Reads an SSD file.
 ///
-/// Accepted is what version 1.0 and later minor versions have in common; geometry and annotations
-/// are skipped, but for the step sizes of `com.opensimulationplatform`.
+/// Versions 1.x and 2.x are accepted; geometry, metadata and annotations are skipped, but for the step
+/// sizes of `com.opensimulationplatform`.
 ///
 /// # Errors
 ///
 /// [`SspError`] with line and column, what is expected and what was found.
 pub fn read_ssd(bytes: &[u8]) -> Result<SystemStructure, SspError> {
-    let root = xml::read(bytes, "SystemStructureDescription", "SystemStructureDescription")?;
-    let system = root.child("System")?;
-    let system = system.ok_or_else(|| root.wrong("an element System", "none"))?;
-    Ok(SystemStructure {
-        name: root.required("name")?.to_owned(),
-        system: system::system(system)?,
-        definitions: definitions(&root)?,
-        experiment: root.child("DefaultExperiment")?.map(system::experiment).transpose()?,
-    })
+    ssd(bytes).map(|(read, _)| read)
 }
 
 /// Reads an SSV file.
@@ -37,7 +30,7 @@ pub fn read_ssd(bytes: &[u8]) -> Result<SystemStructure, SspError> {
 ///
 /// As for [`read_ssd`].
 pub fn read_ssv(bytes: &[u8]) -> Result<ParameterSet, SspError> {
-    parameter_set(&xml::read(bytes, "SystemStructureParameterValues", "ParameterSet")?)
+    ssv(bytes).map(|(read, _)| read)
 }
 
 /// Reads an SSM file.
@@ -46,7 +39,7 @@ pub fn read_ssv(bytes: &[u8]) -> Result<ParameterSet, SspError> {
 ///
 /// As for [`read_ssd`].
 pub fn read_ssm(bytes: &[u8]) -> Result<ParameterMapping, SspError> {
-    parameter_mapping(&xml::read(bytes, "SystemStructureParameterMapping", "ParameterMapping")?)
+    ssm(bytes).map(|(read, _)| read)
 }
 
 /// Reads an SSB file.
@@ -55,7 +48,44 @@ pub fn read_ssm(bytes: &[u8]) -> Result<ParameterMapping, SspError> {
 ///
 /// As for [`read_ssd`].
 pub fn read_ssb(bytes: &[u8]) -> Result<SignalDictionary, SspError> {
-    signal_dictionary(&xml::read(bytes, "SystemStructureSignalDictionary", "SignalDictionary")?)
+    ssb(bytes).map(|(read, _)| read)
+}
+
+/// What was read, and a sentence with its place for everything that is wrong or not understood.
+type Read<T> = Result<(T, Vec<String>), SspError>;
+
+/// As [`read_ssd`], with warnings.
+pub(super) fn ssd(bytes: &[u8]) -> Read<SystemStructure> {
+    let name = "SystemStructureDescription";
+    let (root, warnings) = xml::read(bytes, name, name)?;
+    let system = root.child("System")?;
+    let system = system.ok_or_else(|| root.wrong("an element System", "none"))?;
+    let structure = SystemStructure {
+        name: root.required("name")?.to_owned(),
+        system: system::system(system)?,
+        definitions: definitions(&root)?,
+        experiment: root.child("DefaultExperiment")?.map(system::experiment).transpose()?,
+        generation_tool: root.text("generationTool"),
+    };
+    Ok((structure, warnings))
+}
+
+/// As [`read_ssv`], with warnings.
+pub(super) fn ssv(bytes: &[u8]) -> Read<ParameterSet> {
+    let (root, warnings) = xml::read(bytes, "SystemStructureParameterValues", "ParameterSet")?;
+    Ok((parameter_set(&root)?, warnings))
+}
+
+/// As [`read_ssm`], with warnings.
+pub(super) fn ssm(bytes: &[u8]) -> Read<ParameterMapping> {
+    let (root, warnings) = xml::read(bytes, "SystemStructureParameterMapping", "ParameterMapping")?;
+    Ok((parameter_mapping(&root)?, warnings))
+}
+
+/// As [`read_ssb`], with warnings.
+pub(super) fn ssb(bytes: &[u8]) -> Read<SignalDictionary> {
+    let (root, warnings) = xml::read(bytes, "SystemStructureSignalDictionary", "SignalDictionary")?;
+    Ok((signal_dictionary(&root)?, warnings))
 }
 
 fn parameter_set(node: &Node) -> Result<ParameterSet, SspError> {
@@ -63,7 +93,6 @@ fn parameter_set(node: &Node) -> Result<ParameterSet, SspError> {
         return Err(node.wrong("an element Parameters", "none"));
     }
     let parameters = node.list("Parameters", "Parameter", parameter)?;
-    node.unique("parameters", parameters.iter().map(|each| each.name.as_str()))?;
     let name = node.required("name")?.to_owned();
     Ok(ParameterSet { name, parameters, definitions: definitions(node)? })
 }
@@ -80,16 +109,38 @@ fn parameter(node: &Node) -> Result<Parameter, SspError> {
 
 /// The value that an element is, if it is one.
 fn parameter_value(node: &Node) -> Result<Option<ParameterValue>, SspError> {
+    if let Some(values) = array(node)? {
+        return Ok(Some(ParameterValue::Array(node.name.clone(), values)));
+    }
     let text = || Ok::<_, SspError>(node.required("value")?.to_owned());
     Ok(Some(match node.name.as_str() {
-        "Real" => ParameterValue::Real(node.needed("value", Node::number)?, node.text("unit")),
+        "Real" | "Float64" | "Float32" => {
+            ParameterValue::Real(node.needed("value", Node::number)?, node.stated("unit"))
+        }
         "Integer" => ParameterValue::Integer(node.needed("value", Node::integer)?),
+        "Int8" | "UInt8" | "Int16" | "UInt16" | "Int32" | "UInt32" | "Int64" | "UInt64" => {
+            let value = node.needed("value", Node::long)?;
+            i32::try_from(value).map_or(ParameterValue::Long(value), ParameterValue::Integer)
+        }
         "Boolean" => ParameterValue::Boolean(node.needed("value", Node::boolean)?),
         "String" => ParameterValue::String(text()?),
         "Enumeration" => ParameterValue::Enumeration(text()?, node.text("name")),
         "Binary" => ParameterValue::Binary(text()?),
         _ => return Ok(None),
     }))
+}
+
+/// The values of an array of SSP 2.0: several in one attribute, texts in elements `Value`.
+fn array(node: &Node) -> Result<Option<Vec<String>>, SspError> {
+    if matches!(node.name.as_str(), "String" | "Enumeration" | "Binary") {
+        let values = node.children_named("Value").map(|value| value.required("value"));
+        let values: Vec<String> =
+            values.map(|value| value.map(str::to_owned)).collect::<Result<_, SspError>>()?;
+        return Ok(Some(values).filter(|values| !values.is_empty()));
+    }
+    let is_type = schema::TYPES.contains(&node.name.as_str());
+    let values = node.words("value").map(str::to_owned).collect::<Vec<_>>();
+    Ok(Some(values).filter(|values| is_type && values.len() > 1))
 }
 
 fn parameter_mapping(node: &Node) -> Result<ParameterMapping, SspError> {

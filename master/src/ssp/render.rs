@@ -5,10 +5,10 @@ mod tag;
 use fmi2::unit::BaseUnit;
 
 use super::structure::{
-    Component, Connection, Connector, Content, Conversion, DefaultExperiment, Definitions,
-    DictionarySource, Element, ElementBase, End, Implementation, MappingEntry, Parameter,
-    ParameterBinding, ParameterMapping, ParameterSet, ParameterValue, SignalDictionary, Source,
-    System, SystemStructure, Transformation, Type,
+    Component, Connection, Connector, ConnectorKind, Content, Conversion, DefaultExperiment,
+    Definitions, DictionarySource, Dimension, Element, ElementBase, End, Implementation,
+    MappingEntry, Parameter, ParameterBinding, ParameterMapping, ParameterSet, ParameterValue,
+    SignalDictionary, Source, System, SystemStructure, Transformation, Type,
 };
 use tag::Tag;
 
@@ -16,11 +16,11 @@ use tag::Tag;
 #[must_use]
 pub fn render_ssd(structure: &SystemStructure) -> String {
     let mut root = Tag::root("ssd:SystemStructureDescription")
-        .with("version", "1.0")
         .with("name", &structure.name)
+        .maybe("generationTool", structure.generation_tool.as_deref())
         .add(system(&structure.system));
     root = definitions(root, "ssd", &structure.definitions);
-    root.maybe_add(structure.experiment.as_ref().map(experiment)).render()
+    root.maybe_add(structure.experiment.as_ref().map(experiment)).versioned().render()
 }
 
 /// The SSV file.
@@ -73,13 +73,17 @@ fn component(component: &Component) -> Tag {
         Implementation::Any => None,
         Implementation::CoSimulation => Some("CoSimulation"),
         Implementation::ModelExchange => Some("ModelExchange"),
+        Implementation::ScheduledExecution => Some("ScheduledExecution"),
     };
+    let source = Some(component.source.as_str()).filter(|source| !source.is_empty());
+    let newer = source.is_none() || implementation == Some("ScheduledExecution");
     let hint =
         component.step_size.map(|size| Tag::new("osp:StepSizeHint").with("value", number(size)));
     base(Tag::new("ssd:Component"), &component.base)
         .with("type", content)
-        .with("source", &component.source)
+        .maybe("source", source)
         .maybe("implementation", implementation)
+        .newer(newer)
         .maybe_add(hint.map(annotation))
 }
 
@@ -89,10 +93,33 @@ fn annotation(content: Tag) -> Tag {
 }
 
 fn connector(connector: &Connector) -> Tag {
-    Tag::new("ssd:Connector")
+    use ConnectorKind::{CalculatedParameter, Inout, Input, Output, Parameter};
+    let kind = connector.kind;
+    let is_old = matches!(kind, Input | Output | Parameter | CalculatedParameter | Inout);
+    let tag = Tag::new("ssd:Connector")
         .with("name", &connector.name)
-        .with("kind", connector.kind.as_str())
-        .maybe_add(connector.kind_of_value.as_ref().map(value_type))
+        .with("kind", kind.as_str())
+        .newer(!is_old);
+    match &connector.kind_of_value {
+        Some(kind) => of_type(tag, kind),
+        None => tag,
+    }
+}
+
+/// With the elements that state the type.
+fn of_type(tag: Tag, kind: &Type) -> Tag {
+    match kind {
+        Type::Array(sizes) => sizes.iter().fold(tag, |tag, size| {
+            let dimension = Tag::new("ssc:Dimension").newer(true);
+            tag.add(match size {
+                Dimension::Size(size) => dimension.with("size", size.to_string()),
+                Dimension::Connector(name) => dimension.with("sizeConnector", name),
+                Dimension::Open => dimension,
+            })
+        }),
+        Type::Clocked(clock) => tag.add(Tag::new("ssd:Clock").with("name", clock).newer(true)),
+        kind => tag.add(value_type(kind)),
+    }
 }
 
 fn value_type(kind: &Type) -> Tag {
@@ -103,6 +130,7 @@ fn value_type(kind: &Type) -> Tag {
         Type::String => Tag::new("ssc:String"),
         Type::Enumeration(name) => Tag::new("ssc:Enumeration").with("name", name),
         Type::Binary => Tag::new("ssc:Binary"),
+        Type::Clock | Type::Array(_) | Type::Clocked(_) => Tag::new("ssc:Clock").newer(true),
     }
 }
 
@@ -182,17 +210,17 @@ fn dictionary(dictionary: &DictionarySource) -> Tag {
 }
 
 fn signal_dictionary(tag: Tag, dictionary: &SignalDictionary) -> Tag {
-    let tag = dictionary.entries.iter().fold(tag.with("version", "1.0"), |tag, (name, kind)| {
-        tag.add(Tag::new("ssb:DictionaryEntry").with("name", name).add(value_type(kind)))
+    let tag = dictionary.entries.iter().fold(tag, |tag, (name, kind)| {
+        tag.add(of_type(Tag::new("ssb:DictionaryEntry").with("name", name), kind))
     });
-    definitions(tag, "ssb", &dictionary.definitions)
+    definitions(tag, "ssb", &dictionary.definitions).versioned()
 }
 
 fn parameter_set(tag: Tag, set: &ParameterSet) -> Tag {
     let parameters = set.parameters.iter().map(parameter);
     let list = parameters.fold(Tag::new("ssv:Parameters"), Tag::add);
-    let tag = tag.with("version", "1.0").with("name", &set.name).add(list);
-    definitions(tag, "ssv", &set.definitions)
+    let tag = tag.with("name", &set.name).add(list);
+    definitions(tag, "ssv", &set.definitions).versioned()
 }
 
 fn parameter(parameter: &Parameter) -> Tag {
@@ -207,17 +235,32 @@ fn parameter(parameter: &Parameter) -> Tag {
             Tag::new("ssv:Enumeration").with("value", item).maybe("name", name.as_deref())
         }
         ParameterValue::Binary(digits) => Tag::new("ssv:Binary").with("value", digits),
+        ParameterValue::Long(value) => {
+            Tag::new("ssv:Int64").with("value", value.to_string()).newer(true)
+        }
+        ParameterValue::Array(kind, values) => array(kind, values),
     };
     Tag::new("ssv:Parameter").with("name", &parameter.name).add(value)
 }
 
+/// Numbers stand in one attribute, texts in elements of their own.
+fn array(kind: &str, values: &[String]) -> Tag {
+    let tag = Tag::new(&format!("ssv:{kind}")).newer(true);
+    if matches!(kind, "String" | "Enumeration" | "Binary") {
+        let values = values.iter().map(|value| Tag::new("ssv:Value").with("value", value));
+        return values.fold(tag, Tag::add);
+    }
+    tag.with("value", values.join(" "))
+}
+
 fn parameter_mapping(tag: Tag, mapping: &ParameterMapping) -> Tag {
-    mapping.entries.iter().fold(tag.with("version", "1.0"), |tag, entry: &MappingEntry| {
+    let entries = mapping.entries.iter().fold(tag, |tag, entry: &MappingEntry| {
         let row = Tag::new("ssm:MappingEntry")
             .with("source", &entry.source)
             .with("target", &entry.target);
         tag.add(conversion(row, &entry.conversion))
-    })
+    });
+    entries.versioned()
 }
 
 /// `Enumerations` and `Units` of the namespace of the file, with content of the common one.

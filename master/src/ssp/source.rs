@@ -6,7 +6,7 @@ use fmi2::location::path_from_uri;
 use percent_encoding::percent_decode_str;
 
 /// The folder that relative URIs of a file start from.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Base {
     /// The folder, or below it after [`Base::below`].
     pub(super) folder: PathBuf,
@@ -25,6 +25,15 @@ pub(super) struct Target {
     pub(super) shown: PathBuf,
     /// What follows `#`.
     pub(super) fragment: Option<String>,
+    /// What the URI asks for and does not get: a sentence.
+    pub(super) doubt: Option<String>,
+}
+
+impl Target {
+    /// A file without a fragment.
+    pub(super) fn new(path: PathBuf, shown: PathBuf) -> Self {
+        Target { path, shown, fragment: None, doubt: None }
+    }
 }
 
 impl Base {
@@ -45,7 +54,16 @@ impl Base {
     }
 
     /// The file that `uri` names, or what is wrong with it: a sentence.
+    ///
+    /// For `proxyfmu://HOST?file=URI`, which libcosim and Ecos run in another process or on another
+    /// machine, it is the file itself, with a doubt.
     pub(super) fn resolve(&self, uri: &str) -> Result<Target, String> {
+        if let Some(file) = proxied(uri) {
+            let target = self.resolve(file)?;
+            let doubt =
+                format!("{uri} is taken for the file {file}, which runs here without proxyfmu");
+            return Ok(Target { doubt: Some(doubt), ..target });
+        }
         let (path, fragment) = match uri.split_once('#') {
             Some((path, fragment)) => (path, Some(decoded(fragment)?)),
             None => (uri, None),
@@ -61,17 +79,17 @@ impl Base {
             }
             self.refuse_absolute(uri)?;
             let path = path_from_uri(path).map_err(|error| error.to_string())?;
-            return Ok(Target { shown: path.clone(), path, fragment });
+            return Ok(Target { shown: path.clone(), path, fragment, doubt: None });
         }
         let decoded = decoded(path)?;
         if decoded.starts_with('/') {
             self.refuse_absolute(uri)?;
             let path = PathBuf::from(decoded);
-            return Ok(Target { shown: path.clone(), path, fragment });
+            return Ok(Target { shown: path.clone(), path, fragment, doubt: None });
         }
         let (folder, shown) = (self.walk(&self.folder, &decoded), self.walk(&self.shown, &decoded));
         match (folder, shown) {
-            (Some(path), Some(shown)) => Ok(Target { path, shown, fragment }),
+            (Some(path), Some(shown)) => Ok(Target { path, shown, fragment, doubt: None }),
             _ => Err(format!("{uri:?} leads out of the archive")),
         }
     }
@@ -106,6 +124,13 @@ impl Base {
         }
         Some(path)
     }
+}
+
+/// The URI of the file in `proxyfmu://localhost?file=a.fmu`.
+fn proxied(uri: &str) -> Option<&str> {
+    let scheme = scheme(uri).filter(|scheme| scheme.eq_ignore_ascii_case("proxyfmu"))?;
+    let (_, query) = uri[scheme.len()..].split_once('?')?;
+    query.split('&').find_map(|part| part.strip_prefix("file="))
 }
 
 fn decoded(text: &str) -> Result<String, String> {
@@ -154,7 +179,7 @@ mod tests {
                 assert!(found.unwrap_err().contains("the scheme f"), "{uri}");
                 continue;
             }
-            let expected = Target { path: path.into(), shown: shown.into(), fragment: None };
+            let expected = Target::new(path.into(), shown.into());
             assert_eq!(found, Ok(expected), "{uri}");
         }
         let found = archive().resolve("sub.ssp#Variant%20B.ssd").unwrap();
@@ -174,6 +199,17 @@ mod tests {
     }
 
     #[test]
+    fn the_file_of_a_proxy_is_taken_itself_with_a_doubt() {
+        let found = disk().resolve("proxyfmu://localhost?file=../f%20g/a.fmu").unwrap();
+        assert_eq!(found.path, Path::new("/data/s/../f g/a.fmu"));
+        assert!(found.doubt.unwrap().ends_with("which runs here without proxyfmu"));
+        let found = disk().resolve("proxyfmu://h:9090?a=b&file=file:///a.fmu").unwrap();
+        assert_eq!(found.path, Path::new("/a.fmu"));
+        let sentence = archive().resolve("proxyfmu://localhost?file=../../a").unwrap_err();
+        assert!(sentence.ends_with("leads out of the archive"), "{sentence}");
+    }
+
+    #[test]
     fn a_file_on_disk_may_name_others_anywhere_on_disk_but_not_elsewhere() {
         let path = |uri| disk().resolve(uri).unwrap().path;
         assert_eq!(path("../fmi2/a.fmu"), Path::new("/data/s/../fmi2/a.fmu"));
@@ -182,6 +218,7 @@ mod tests {
         for (uri, words) in [
             ("https://x.org/a.fmu", "the scheme https"),
             ("a.fmu?x=1", "a query"),
+            ("proxyfmu://localhost", "the scheme proxyfmu"),
             ("a%00b", "a NUL"),
             ("%ff", "not UTF-8"),
         ] {

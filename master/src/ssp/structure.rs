@@ -1,10 +1,14 @@
-//! The content of SSD, SSV, SSM and SSB files (SSP 1.0.1, sections 4 to 8) as plain data.
+//! The content of SSD, SSV, SSM and SSB files (SSP 1.0.1 and 2.0, sections 4 to 8) as plain data.
 //!
 //! Geometry, graphical elements and annotations are left out, but for the step sizes that the
 //! annotations of the Open Simulation Platform give.
 
+mod kinds;
+
 use fmi2::description::Position;
 use fmi2::unit::BaseUnit;
+
+pub use kinds::{ConnectorKind, Dimension, ParameterValue, Type};
 
 /// `SystemStructureDescription`, the root element of an SSD file.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -17,6 +21,8 @@ pub struct SystemStructure {
     pub definitions: Definitions,
     /// `DefaultExperiment`.
     pub experiment: Option<DefaultExperiment>,
+    /// `generationTool`.
+    pub generation_tool: Option<String>,
 }
 
 /// The definitions that hold within one file (section 4.4).
@@ -132,7 +138,7 @@ pub struct Component {
     pub base: ElementBase,
     /// `type`.
     pub content: Content,
-    /// `source`, a URI.
+    /// `source`, a URI; empty where there is none (SSP 2.0): the component has connectors only.
     pub source: String,
     /// `implementation`.
     pub implementation: Implementation,
@@ -162,6 +168,8 @@ pub enum Implementation {
     CoSimulation,
     /// `ModelExchange`.
     ModelExchange,
+    /// `ScheduledExecution` (SSP 2.0), of FMI 3.0.
+    ScheduledExecution,
 }
 
 /// `SignalDictionaryReference` (section 5.5).
@@ -202,52 +210,6 @@ pub struct Connector {
     pub kind: ConnectorKind,
     /// Type, where it is stated.
     pub kind_of_value: Option<Type>,
-}
-
-/// `kind` of a connector.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ConnectorKind {
-    /// `input`.
-    Input,
-    /// `output`.
-    Output,
-    /// `parameter`.
-    Parameter,
-    /// `calculatedParameter`.
-    CalculatedParameter,
-    /// `inout`, of references to signal dictionaries.
-    Inout,
-}
-
-impl ConnectorKind {
-    /// The spelling of the standard.
-    #[must_use]
-    pub fn as_str(self) -> &'static str {
-        match self {
-            ConnectorKind::Input => "input",
-            ConnectorKind::Output => "output",
-            ConnectorKind::Parameter => "parameter",
-            ConnectorKind::CalculatedParameter => "calculatedParameter",
-            ConnectorKind::Inout => "inout",
-        }
-    }
-}
-
-/// Type of a connector or of an entry of a signal dictionary (section 4.5.1).
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Type {
-    /// `Real` with its `unit`.
-    Real(Option<String>),
-    /// `Integer`.
-    Integer,
-    /// `Boolean`.
-    Boolean,
-    /// `String`.
-    String,
-    /// `Enumeration` with its `name`.
-    Enumeration(String),
-    /// `Binary`, which FMI 2.0 does not have.
-    Binary,
 }
 
 /// `Connection` (section 5.3.2). Which end is the source follows from the kinds of the connectors.
@@ -353,23 +315,6 @@ pub struct Parameter {
     pub name: String,
     /// The value.
     pub value: ParameterValue,
-}
-
-/// Value of a parameter.
-#[derive(Clone, Debug, PartialEq)]
-pub enum ParameterValue {
-    /// `Real` with its `unit`.
-    Real(f64, Option<String>),
-    /// `Integer`.
-    Integer(i32),
-    /// `Boolean`.
-    Boolean(bool),
-    /// `String`.
-    String(String),
-    /// `Enumeration`: name of an item, and `name` of the enumeration.
-    Enumeration(String, Option<String>),
-    /// `Binary`, which FMI 2.0 does not have, in hexadecimal digits.
-    Binary(String),
 }
 
 /// `ParameterMapping`, the root element of an SSM file (section 7).

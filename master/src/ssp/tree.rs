@@ -19,8 +19,12 @@ pub(super) struct Tree {
     pub(super) nodes: Vec<Node>,
     /// Each FMU once, however many components it has.
     pub(super) fmus: Vec<Unpacked>,
+    /// Their names for the user.
+    pub(super) shown: Vec<PathBuf>,
     /// Unpacked SSPs.
     pub(super) folders: Vec<TemporaryFolder>,
+    /// What is odd about the files.
+    pub(super) warnings: Vec<String>,
 }
 
 /// A system, a component, a signal dictionary, or a reference to one.

@@ -22,6 +22,8 @@ use archive::Archive;
 
 /// Name of every parameter set: Ecos applies the sets of one name, and only when told that name.
 const SETTINGS: &str = "settings";
+/// `generationTool` of what is written.
+pub(super) const TOOL: &str = "aso-ftc";
 
 /// Writes `assembly` as the SSP archive `target`, whose folder is created.
 ///
@@ -35,6 +37,9 @@ const SETTINGS: &str = "settings";
 /// [`SspError`] for an element or variable that does not exist, a setting that is not of the type of
 /// its variable, or a file that cannot be read or written.
 pub fn write(assembly: &Assembly, step_size: Option<f64>, target: &Path) -> Result<(), SspError> {
+    if let Some((name, _)) = assembly.functions.first() {
+        return Err(missing(name, "an FMU", "a function, which SSP does not have"));
+    }
     let mut writer = Writing::default();
     let ends = assembly.links.iter().flat_map(|link| [&link.from, &link.to]);
     let linked = ends.map(|end| (end.element.as_str(), end.variable.as_str())).collect();
@@ -54,6 +59,7 @@ pub fn write(assembly: &Assembly, step_size: Option<f64>, target: &Path) -> Resu
             stop_time: assembly.stop_time,
             step_size,
         }),
+        generation_tool: Some(TOOL.to_owned()),
     };
     writer.archive.write(&render_ssd(&structure), target)
 }

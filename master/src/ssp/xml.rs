@@ -7,9 +7,12 @@ use fmi2::description::Position;
 use fmi2::xml;
 
 use super::error::SspError;
+use super::schema;
 
-/// All namespaces of SSP 1.0 begin so.
+/// All namespaces of SSP 1.0 and 2.0 begin so.
 const NAMESPACE: &str = "http://ssp-standard.org/SSP1/";
+/// The usual prefixes of these namespaces, which are known even where they are not declared.
+const PREFIXES: [&str; 5] = ["ssd", "ssc", "ssv", "ssm", "ssb"];
 /// Largest file that is read.
 const CAPACITY: usize = 64 << 20;
 /// Most tags that are read, which bounds the memory that a file of short tags takes.
@@ -30,8 +33,9 @@ pub(super) struct Node {
     pub(super) at: Position,
 }
 
-/// Reads a file whose root element is `root` of the namespace that ends in `space`.
-pub(super) fn read(bytes: &[u8], space: &str, root: &str) -> Result<Node, SspError> {
+/// Reads a file whose root element is `root` of the namespace that ends in `space`; and what in it
+/// breaks a rule or is not understood, a sentence with its place each.
+pub(super) fn read(bytes: &[u8], space: &str, root: &str) -> Result<(Node, Vec<String>), SspError> {
     if bytes.len() > CAPACITY {
         return Err(SspError::Limit { limit: CAPACITY, what: "bytes" });
     }
@@ -42,9 +46,10 @@ pub(super) fn read(bytes: &[u8], space: &str, root: &str) -> Result<Node, SspErr
     let wanted = format!("{NAMESPACE}{space}");
     let mut scope = Scope::default();
     scope.open(&element);
-    let found = scope.space(&element)?.unwrap_or_default();
+    let found = scope.space(&element).unwrap_or_default().to_owned();
     let local = element.name.rsplit(':').next().unwrap_or_default().to_owned();
-    if *found != wanted || local != root {
+    let is_root = found == wanted || (found.is_empty() && scope.assumes(&element));
+    if !is_root || local != root {
         return Err(SspError::Content {
             at: element.at,
             found: format!("namespace {found:?}"),
@@ -54,47 +59,63 @@ pub(super) fn read(bytes: &[u8], space: &str, root: &str) -> Result<Node, SspErr
     }
     let node = scope.node(element)?;
     node.version()?;
-    Ok(node)
+    let mut warnings: Vec<String> = scope.undeclared.into_iter().map(undeclared).collect();
+    schema::check(&node, &mut warnings);
+    Ok((node, warnings))
+}
+
+fn undeclared((prefix, at): (String, Position)) -> String {
+    let assumed = if PREFIXES.contains(&prefix.as_str()) {
+        "taken for the one of SSP"
+    } else {
+        "taken for one that is not of SSP"
+    };
+    format!("{at}: the prefix {prefix}: is used without xmlns:{prefix}; it is {assumed}")
 }
 
 /// The namespaces that are declared where the reader is, by prefix, the innermost last.
 #[derive(Default)]
-struct Scope(HashMap<String, Vec<String>>);
+struct Scope {
+    spaces: HashMap<String, Vec<String>>,
+    /// Prefixes that are used without a declaration, and where first.
+    undeclared: Vec<(String, Position)>,
+}
 
 impl Scope {
     /// Adds what `element` declares.
     fn open(&mut self, element: &xml::Element) {
         for (prefix, space) in declarations(&element.attributes) {
-            self.0.entry(prefix.to_owned()).or_default().push(space.to_owned());
+            self.spaces.entry(prefix.to_owned()).or_default().push(space.to_owned());
         }
     }
 
     /// Takes back what an element with these attributes declared.
     fn close(&mut self, attributes: &[(String, String)]) {
         for (prefix, _) in declarations(attributes) {
-            self.0.get_mut(prefix).map(Vec::pop);
+            self.spaces.get_mut(prefix).map(Vec::pop);
         }
     }
 
-    /// The namespace of an element whose declarations were added; none without a prefix and a
-    /// default.
-    fn space(&self, element: &xml::Element) -> Result<Option<&str>, SspError> {
-        let prefix = element.name.split_once(':').map_or("", |(prefix, _)| prefix);
-        match self.0.get(prefix).and_then(|spaces| spaces.last()) {
-            Some(space) => Ok(Some(space)),
-            None if prefix.is_empty() => Ok(None),
-            None => Err(SspError::Content {
-                at: element.at,
-                element: element.name.clone(),
-                expected: format!("a declaration xmlns:{prefix}"),
-                found: "none".to_owned(),
-            }),
-        }
+    /// The namespace of an element whose declarations were added; none without a declaration.
+    fn space(&self, element: &xml::Element) -> Option<&str> {
+        let spaces = self.spaces.get(prefix(element))?;
+        spaces.last().map(String::as_str)
+    }
+
+    /// Whether the element has no namespace, but a prefix that is known for one of SSP.
+    fn assumes(&self, element: &xml::Element) -> bool {
+        self.space(element).is_none() && PREFIXES.contains(&prefix(element))
     }
 
     fn node(&mut self, element: xml::Element) -> Result<Node, SspError> {
         self.open(&element);
-        let own = self.space(&element)?.is_some_and(|space| space.starts_with(NAMESPACE));
+        let space = self.space(&element);
+        let own = space.is_some_and(|space| space.starts_with(NAMESPACE)) || self.assumes(&element);
+        let prefix = prefix(&element);
+        let is_known = space.is_some() || prefix.is_empty();
+        if !is_known && !self.undeclared.iter().any(|(known, _)| known == prefix) {
+            self.undeclared.push((prefix.to_owned(), element.at));
+        }
         let children = element.children.into_iter().map(|child| self.node(child));
         let children = children.collect::<Result<Vec<Node>, SspError>>()?;
         self.close(&element.attributes);
@@ -103,6 +124,10 @@ impl Scope {
         node.characters()?;
         Ok(node)
     }
+}
+
+fn prefix(element: &xml::Element) -> &str {
+    element.name.split_once(':').map_or("", |(prefix, _)| prefix)
 }
 
 /// Prefixes and namespaces that attributes declare; an empty prefix for the default.
@@ -138,13 +163,21 @@ impl Node {
         Ok(())
     }
 
-    /// Every root element has a version; 1.x can be read (section 2.2).
+    /// Every root element has a version; 1.x and 2.x can be read (section 2.2).
     fn version(&self) -> Result<(), SspError> {
-        let version = self.required("version")?;
-        if version.strip_prefix("1.").is_some_and(|minor| !minor.is_empty()) {
+        let version = self.required("version")?.trim_matches(WHITE_SPACE);
+        if let Some(("1" | "2", minor)) = version.split_once('.')
+            && !minor.is_empty()
+        {
             return Ok(());
         }
-        Err(self.wrong("version 1.0", format!("{version:?}")))
+        Err(self.wrong("version 1.0 or 2.0", format!("{version:?}")))
+    }
+
+    /// Names of the attributes, without those of XML itself and of other namespaces.
+    pub(super) fn attribute_names(&self) -> impl Iterator<Item = &str> {
+        let names = self.attributes.iter().map(|(name, _)| name.as_str());
+        names.filter(|name| *name != "xmlns" && !name.contains(':'))
     }
 
     pub(super) fn attribute(&self, name: &str) -> Option<&str> {
@@ -154,6 +187,11 @@ impl Node {
 
     pub(super) fn text(&self, name: &str) -> Option<String> {
         self.attribute(name).map(str::to_owned)
+    }
+
+    /// An attribute that says something: an empty one is as good as none.
+    pub(super) fn stated(&self, name: &str) -> Option<String> {
+        self.text(name).filter(|text| !text.is_empty())
     }
 
     pub(super) fn required(&self, name: &str) -> Result<&str, SspError> {
@@ -175,6 +213,17 @@ impl Node {
         value
             .map(|text| read(text.trim_matches(WHITE_SPACE)).ok_or_else(|| wrong(text)))
             .transpose()
+    }
+
+    /// The values of an attribute that is a list, as arrays of SSP 2.0 are.
+    pub(super) fn words(&self, name: &str) -> impl Iterator<Item = &str> {
+        let value = self.attribute(name).unwrap_or_default();
+        value.split(WHITE_SPACE).filter(|word| !word.is_empty())
+    }
+
+    /// `xs:long` or `xs:unsignedLong`.
+    pub(super) fn long(&self, name: &str) -> Result<Option<i128>, SspError> {
+        self.parsed(name, "an integer", |text| i128::from_str(text).ok())
     }
 
     /// A finite `xs:double`.
@@ -235,14 +284,14 @@ impl Node {
     }
 
     /// What `read` makes of each child of the child called `list`; none if there is no such list.
+    /// Several lists of one name count as one, with a warning of [`schema::check`].
     pub(super) fn list<T>(
         &self,
         list: &str,
         item: &str,
         read: impl Fn(&Node) -> Result<T, SspError>,
     ) -> Result<Vec<T>, SspError> {
-        let list = self.child(list)?;
-        list.map_or(Ok(Vec::new()), |list| list.children_named(item).map(read).collect())
+        self.children_named(list).flat_map(|list| list.children_named(item)).map(read).collect()
     }
 
     /// Fails at the first name that two of `names` have.

@@ -104,12 +104,15 @@ const UNITS: &str = r#"<UnitDefinitions>
 
 /// The XML of an FMU, one variable for each line `name causality type [attributes of the type]`.
 pub(crate) fn description(model: &str, lines: &str) -> String {
-    let mut variables = String::new();
+    let (mut variables, mut outputs) = (String::new(), String::new());
     for (reference, line) in lines.lines().map(str::trim).filter(|l| !l.is_empty()).enumerate() {
         let mut words = line.splitn(4, ' ');
         let (name, causality, kind) =
             (words.next().unwrap(), words.next().unwrap(), words.next().unwrap());
         let attributes = words.next().unwrap_or_default();
+        if causality == "output" {
+            let _ = write!(outputs, r#"<Unknown index="{}"/>"#, reference + 1);
+        }
         let variability = match (causality, kind) {
             ("parameter" | "calculatedParameter", _) => "fixed",
             (_, "Real") => "continuous",
@@ -128,8 +131,11 @@ pub(crate) fn description(model: &str, lines: &str) -> String {
             r#"<ScalarVariable name="{name}" valueReference="{reference}" causality="{causality}" variability="{variability}"><{kind} {start} {attributes}/></ScalarVariable>"#
         );
     }
+    if !outputs.is_empty() {
+        outputs = format!("<Outputs>{outputs}</Outputs>");
+    }
     format!(
-        r#"<?xml version="1.0" encoding="UTF-8"?><fmiModelDescription fmiVersion="2.0" modelName="{model}" guid="g"><CoSimulation modelIdentifier="{model}"/>{UNITS}<ModelVariables>{variables}</ModelVariables><ModelStructure/></fmiModelDescription>"#
+        r#"<?xml version="1.0" encoding="UTF-8"?><fmiModelDescription fmiVersion="2.0" modelName="{model}" guid="g"><CoSimulation modelIdentifier="{model}"/>{UNITS}<ModelVariables>{variables}</ModelVariables><ModelStructure>{outputs}</ModelStructure></fmiModelDescription>"#
     )
 }
 

@@ -181,12 +181,10 @@ fn what_cannot_be_found_or_run_is_said_with_its_place() {
     let bench = Bench::new();
     fmus(&bench);
     bench.file("half.fmu", "PK");
-    let exchange = r#"<ssd:Component name="a" source="a.fmu" implementation="ModelExchange"/>"#;
     let web = component("a", "https://x.org/a.fmu", "", "");
     for (elements, expected) in [
         (component("a", "none.fmu", "", ""), "none.fmu"),
         (component("a", "half.fmu", "", ""), "is no ZIP archive that can be used"),
-        (exchange.to_owned(), "a: model exchange is wanted, and only co-simulation can be run"),
         (web, "has the scheme https, expected a relative path or file:"),
         (
             "<ssd:Oops/>".to_owned(),
@@ -196,6 +194,9 @@ fn what_cannot_be_found_or_run_is_said_with_its_place() {
         let text = bench.refusal(&root(&elements, ""), "");
         assert!(text.contains(expected), "{text}");
     }
+    let exchange = r#"<ssd:Component name="a" source="a.fmu" implementation="ModelExchange"/>"#;
+    let warnings = bench.open(&root(exchange, ""), "").unwrap().warnings.join("\n");
+    assert!(warnings.contains("a: the system structure asks for another"), "{warnings}");
     let missing = bench.path("Nothing.ssd");
     assert!(open(&missing).unwrap_err().to_string().starts_with("cannot read"));
 }

@@ -51,7 +51,7 @@ fn what_is_wrong_with_a_file_is_said_with_line_column_and_expectation() {
         ),
         (
             "<a:b version='1.0'/>".to_owned(),
-            "line 1, column 1: <a:b>: expected a declaration xmlns:a, found none",
+            "line 1, column 1: <a:b>: expected the root element SystemStructureDescription of the namespace \"http://ssp-standard.org/SSP1/SystemStructureDescription\", found namespace \"\"",
         ),
         (
             "<SystemStructureDescription/>".to_owned(),
@@ -62,8 +62,8 @@ fn what_is_wrong_with_a_file_is_said_with_line_column_and_expectation() {
             "line 1, column 1: expected no document type declaration, found <!DOCTYPE",
         ),
         (
-            ssd("", "").replace("version=\"1.0\"\n", "version=\"2.0\"\n"),
-            "line 2, column 1: <SystemStructureDescription>: expected version 1.0, found \"2.0\"",
+            ssd("", "").replace("version=\"1.0\"\n", "version=\"3.0\"\n"),
+            "line 2, column 1: <SystemStructureDescription>: expected version 1.0 or 2.0, found \"3.0\"",
         ),
         (
             ssd("", "<ssd:DefaultExperiment startTime='3' stopTime='2'/>"),
@@ -90,8 +90,8 @@ fn what_is_wrong_with_a_component_is_said_with_line_column_and_expectation() {
     };
     refused(&[
         (
-            component("name='a'", ""),
-            "line 9, column 39: <Component>: expected the attribute source, found none",
+            component("name='a' source=''", ""),
+            "line 9, column 39: <Component>: expected the path of a file in the attribute source, found nothing",
         ),
         (
             component("name='' source='a'", ""),
@@ -106,7 +106,7 @@ fn what_is_wrong_with_a_component_is_said_with_line_column_and_expectation() {
                 "name='a' source='a'",
                 "<ssd:Connectors>\n<ssd:Connector name='y' kind='out'/></ssd:Connectors>",
             ),
-            "line 10, column 1: <Connector>: expected the kind input, output, parameter, calculatedParameter or inout, found \"out\"",
+            "line 10, column 1: <Connector>: expected one of the kinds input, output, parameter, calculatedParameter, inout, structuralParameter, constant, local, unspecified, found \"out\"",
         ),
         (
             component(
@@ -139,10 +139,6 @@ fn parameter_sets_mappings_and_dictionaries_say_what_they_miss() {
         (
             "<ssv:Parameter name='a'><ssv:Integer value='3000000000'/></ssv:Parameter>",
             "found \"3000000000\"",
-        ),
-        (
-            "<ssv:Parameter name='a'><ssv:Boolean value='1'/></ssv:Parameter><ssv:Parameter name='a'><ssv:Boolean value='0'/></ssv:Parameter>",
-            "expected parameters of different names, found two called \"a\"",
         ),
     ] {
         let text = read_ssv(ssv(parameters).as_bytes()).unwrap_err().to_string();

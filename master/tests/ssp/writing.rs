@@ -166,6 +166,7 @@ fn structure() -> SystemStructure {
             stop_time: Some(100.0),
             step_size: Some(1e-3),
         }),
+        generation_tool: Some("tool".into()),
     }
 }
 
@@ -196,10 +197,16 @@ fn assembly(bench: &Bench) -> Assembly {
     let values = [("p", "1"), ("g", "2"), ("t", " x "), ("k", "1"), ("p", "0.3")];
     Assembly {
         name: Some("Pair".into()),
+        functions: vec![],
         elements: vec![
-            Fmu { name: "a".into(), fmu: a.clone(), settings: vec![] },
-            Fmu { name: "my b".into(), fmu: b, settings: values.map(setting).into() },
-            Fmu { name: "again".into(), fmu: a, settings: vec![] },
+            Fmu { name: "a".into(), fmu: a.clone(), ..Fmu::default() },
+            Fmu {
+                name: "my b".into(),
+                fmu: b,
+                settings: values.map(setting).into(),
+                ..Fmu::default()
+            },
+            Fmu { name: "again".into(), fmu: a, ..Fmu::default() },
         ],
         links: vec![
             link(
@@ -232,6 +239,8 @@ fn an_assembly_comes_back_from_its_ssp_and_the_bytes_are_always_the_same() {
     );
     assert_eq!((opened.assembly.start_time, opened.assembly.stop_time), (Some(1.0), Some(3.0)));
     assert_eq!(opened.experiment.step_size, Some(0.5));
+    // The step is there for libcosim: what is written here asks for no algorithm.
+    assert!(!opened.fixed_step);
     assert_eq!(opened.warnings, [""; 0]);
     let names: Vec<_> = opened.assembly.elements.iter().map(|each| each.name.as_str()).collect();
     assert_eq!(names, ["a", "my b", "again"]);
@@ -314,4 +323,14 @@ fn the_samples_for_the_schemas_are_what_is_written() {
         }
         assert_eq!(fs::read_to_string(&path).unwrap(), text, "{name} is stale");
     }
+}
+
+#[test]
+fn functions_which_ssp_does_not_have_are_not_written() {
+    let bench = Bench::new();
+    let sum = master::function::Function::Sum { inputs: 2 };
+    let functions = vec![("s".into(), sum)];
+    let with_one = Assembly { functions, ..assembly(&bench) };
+    let text = write(&with_one, None, &bench.path("x.ssp")).unwrap_err().to_string();
+    assert_eq!(text, "s: expected an FMU, found a function, which SSP does not have");
 }

@@ -154,7 +154,7 @@ fn an_ssp_gives_the_same_bytes_as_its_fmus_named_one_by_one() {
     let element = |name: &str, file: &str| master::assembly::Element {
         name: name.to_owned(),
         fmu: fmu(file).into(),
-        settings: Vec::new(),
+        ..Default::default()
     };
     let assembly = master::assembly::Assembly {
         name: Some("pendulum".to_owned()),
@@ -162,6 +162,7 @@ fn an_ssp_gives_the_same_bytes_as_its_fmus_named_one_by_one() {
             element("plant", "FrictionPendulum"),
             element("controller", "AsoController"),
         ],
+        functions: Vec::new(),
         links: links.collect(),
         start_time: Some(0.0),
         stop_time: Some(0.5),

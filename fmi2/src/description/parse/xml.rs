@@ -18,10 +18,12 @@ const ELEMENTS: usize = 3_000_000;
 /// Most attributes of all elements together.
 const ALL_ATTRIBUTES: usize = 12_000_000;
 
-/// An element: its attributes and child elements. Text is not used by FMI 2.0.
+/// An element: its attributes, child elements and text, which FMI 2.0 does not use.
 #[derive(Debug)]
 pub(super) struct Element<'a> {
     pub(super) name: &'a str,
+    /// The first text that is more than white space, as it stands in the file.
+    text: &'a str,
     pub(super) attributes: Vec<(&'a str, Cow<'a, str>)>,
     pub(super) children: Vec<Element<'a>>,
     /// Where it begins.
@@ -34,6 +36,7 @@ impl Element<'_> {
         let attributes = self.attributes.into_iter();
         crate::xml::Element {
             name: self.name.to_owned(),
+            text: self.text.to_owned(),
             attributes: attributes
                 .map(|(name, value)| (name.to_owned(), value.into_owned()))
                 .collect(),
@@ -101,6 +104,13 @@ impl<'a> Tree<'a> {
         Ok(())
     }
 
+    fn text(&mut self, text: &'a str) {
+        let text = text.trim();
+        if let Some(element) = self.open.last_mut().filter(|element| element.text.is_empty()) {
+            element.text = text;
+        }
+    }
+
     fn finish(self, at: Position) -> Result<Element<'a>, ParseError> {
         if let Some(element) = self.open.last() {
             let found = format!("the end of the file inside <{}>", element.name);
@@ -143,7 +153,7 @@ impl<'a> Tree<'a> {
         if self.attributes > ALL_ATTRIBUTES {
             return Err(limit(at, "attributes in all", ALL_ATTRIBUTES));
         }
-        Ok(Element { name, attributes, children: Vec::new(), at })
+        Ok(Element { name, text: "", attributes, children: Vec::new(), at })
     }
 }
 
@@ -151,8 +161,16 @@ fn limit(at: Position, what: &'static str, limit: usize) -> ParseError {
     ParseError::Limit { at, what, limit }
 }
 
-/// Reads the one root element of `text`. Annotations are skipped.
+/// Reads the one root element of `text`. Annotations of FMI are skipped.
 pub(super) fn read(text: &str) -> Result<Element<'_>, ParseError> {
+    read_but(text, is_annotation)
+}
+
+/// Reads the one root element of `text`, without the elements that are `skipped`.
+pub(super) fn read_but(
+    text: &str,
+    skipped: impl Fn(&BytesStart<'_>) -> bool,
+) -> Result<Element<'_>, ParseError> {
     let mut reader = Reader::from_str(text);
     let mut place = Place { text: text.as_bytes(), offset: 0, at: Position::START };
     let mut tree = Tree::default();
@@ -165,7 +183,7 @@ pub(super) fn read(text: &str) -> Result<Element<'_>, ParseError> {
                 return Err(ParseError::Xml { at, found: error.to_string() });
             }
             Ok(Event::DocType(_)) => return Err(ParseError::Doctype { at }),
-            Ok(Event::Start(tag)) if is_annotation(&tag) => {
+            Ok(Event::Start(tag)) if skipped(&tag) => {
                 tree.go_down(at, 0)?;
                 skip(&mut reader, &tree, at)?;
             }
@@ -178,6 +196,9 @@ pub(super) fn read(text: &str) -> Result<Element<'_>, ParseError> {
                 tree.add(element)?;
             }
             Ok(Event::End(_)) => tree.end()?,
+            Ok(Event::Text(part)) => {
+                tree.text(text.get(offset..offset + part.len()).unwrap_or_default());
+            }
             Ok(Event::Eof) => return tree.finish(at),
             Ok(_) => {}
         }

@@ -6,10 +6,10 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use fmi2::package::{TemporaryFolder, Unpacked, unpack_archive};
+use fmi2::package::{PackageError, TemporaryFolder, Unpacked, unpack_archive};
 
 use crate::ssp::error::SspError;
-use crate::ssp::read::{read_ssb, read_ssd, read_ssm, read_ssv};
+use crate::ssp::read;
 use crate::ssp::source::{Base, Target};
 use crate::ssp::structure::{ParameterMapping, ParameterSet, SignalDictionary, Source};
 use crate::ssp::tree::{Document, File};
@@ -39,20 +39,32 @@ impl Missing {
 
 /// What has been read so far, by path.
 #[derive(Default)]
-pub(super) struct Files {
+pub(in crate::ssp) struct Files {
     documents: HashMap<PathBuf, Rc<Document>>,
     values: HashMap<PathBuf, Rc<ParameterSet>>,
     mappings: HashMap<PathBuf, Rc<ParameterMapping>>,
     fmu_indices: HashMap<PathBuf, usize>,
     archives: HashMap<PathBuf, PathBuf>,
     folders: Vec<TemporaryFolder>,
-    pub(super) fmus: Vec<Unpacked>,
+    pub(in crate::ssp) fmus: Vec<Unpacked>,
+    /// Names of the FMUs for the user.
+    shown: Vec<PathBuf>,
+    /// What is odd about the files, a sentence each, which names the file.
+    pub(in crate::ssp) warnings: Vec<String>,
+}
+
+/// What must live as long as the files are used, and what is to be said of them.
+pub(in crate::ssp) struct Finished {
+    pub(in crate::ssp) fmus: Vec<Unpacked>,
+    pub(in crate::ssp) shown: Vec<PathBuf>,
+    pub(in crate::ssp) folders: Vec<TemporaryFolder>,
+    pub(in crate::ssp) warnings: Vec<String>,
 }
 
 impl Files {
-    /// What must live as long as the files are used.
-    pub(super) fn finish(self) -> (Vec<Unpacked>, Vec<TemporaryFolder>) {
-        (self.fmus, self.folders)
+    pub(in crate::ssp) fn finish(self) -> Finished {
+        let Files { fmus, shown, folders, warnings, .. } = self;
+        Finished { fmus, shown, folders, warnings }
     }
 
     /// The SSD at a path that the user gave, or the one called `fragment` in an SSP.
@@ -60,11 +72,7 @@ impl Files {
         let is_ssd = target.path.extension().is_some_and(|extension| extension == "ssd");
         if target.path.is_dir() {
             let name = target.fragment.as_deref().unwrap_or(DEFAULT);
-            let inner = Target {
-                path: target.path.join(name),
-                shown: target.shown.join(name),
-                fragment: None,
-            };
+            let inner = Target::new(target.path.join(name), target.shown.join(name));
             return self.document(&inner);
         }
         let outside = Base { folder: PathBuf::new(), shown: PathBuf::new(), archive: None };
@@ -81,7 +89,7 @@ impl Files {
         if !archive {
             return self.ssd(target, base.below(target));
         }
-        let folder = self.unpacked(&target.path)?;
+        let folder = self.unpacked(target)?;
         let base = Base::archive(&folder, &target.shown);
         let name = target.fragment.as_deref().unwrap_or(DEFAULT);
         if name.contains('/') {
@@ -89,8 +97,7 @@ impl Files {
             let what = target.shown.display().to_string();
             return Err(SspError::Missing { what, expected: expected.to_owned(), found });
         }
-        let inner =
-            Target { path: folder.join(name), shown: target.shown.join(name), fragment: None };
+        let inner = Target::new(folder.join(name), target.shown.join(name));
         if !inner.path.is_file() {
             let found = definitions_in(&folder);
             let what = target.shown.display().to_string();
@@ -104,7 +111,7 @@ impl Files {
             return Ok(known.clone());
         }
         let shown = target.shown.clone();
-        let structure = read_file(target, read_ssd)?;
+        let structure = self.read(target, read::ssd)?;
         let definitions = structure.definitions.clone();
         let file = Rc::new(File { shown, base, definitions });
         let document = Rc::new(Document { structure, file });
@@ -113,29 +120,36 @@ impl Files {
     }
 
     /// The folder of an SSP.
-    fn unpacked(&mut self, path: &Path) -> Result<PathBuf, SspError> {
-        if let Some(known) = self.archives.get(path) {
+    fn unpacked(&mut self, target: &Target) -> Result<PathBuf, SspError> {
+        if let Some(known) = self.archives.get(&target.path) {
             return Ok(known.clone());
         }
-        let folder = unpack_archive(path)?;
+        let unpacked = unpack_archive(&target.path);
+        let (folder, warnings) = unpacked.map_err(|error| as_shown(error, target))?;
+        self.warn(&target.shown, warnings);
         let place = folder.path().to_owned();
         self.folders.push(folder);
-        self.archives.insert(path.to_owned(), place.clone());
+        self.archives.insert(target.path.clone(), place.clone());
         Ok(place)
     }
 
+    fn warn(&mut self, shown: &Path, sentences: impl IntoIterator<Item = String>) {
+        let sentences = sentences.into_iter();
+        self.warnings.extend(sentences.map(|text| format!("{}: {text}", shown.display())));
+    }
+
     /// Index of the FMU, an archive or a folder.
-    pub(super) fn fmu(&mut self, target: &Target) -> Result<usize, SspError> {
+    pub(in crate::ssp) fn fmu(&mut self, target: &Target) -> Result<usize, SspError> {
         if let Some(known) = self.fmu_indices.get(&target.path) {
             return Ok(*known);
         }
         let path = &target.path;
         let unpacked = if path.is_dir() { Unpacked::in_folder(path) } else { Unpacked::open(path) };
-        let unpacked = unpacked.map_err(|error| SspError::In {
-            file: target.shown.clone(),
-            reason: Box::new(error.into()),
-        })?;
+        let unpacked = unpacked.map_err(|error| as_shown(error, target))?;
+        self.warn(&target.shown, unpacked.archive_warnings.clone());
+        self.warn(&target.shown, unpacked.warnings.iter().map(ToString::to_string));
         self.fmus.push(unpacked);
+        self.shown.push(target.shown.clone());
         self.fmu_indices.insert(path.clone(), self.fmus.len() - 1);
         Ok(self.fmus.len() - 1)
     }
@@ -146,7 +160,17 @@ impl Files {
         file: &File,
         component: Option<&Base>,
     ) -> Result<Rc<ParameterSet>, Missing> {
-        cached(&mut self.values, source, file, component, read_ssv)
+        match wanted(source, file, component)? {
+            Wanted::Inline(content) => Ok(Rc::new(content)),
+            Wanted::File(target) => match self.values.get(&target.path) {
+                Some(known) => Ok(known.clone()),
+                None => {
+                    let content = Rc::new(self.read(&target, read::ssv).map_err(Missing::Content)?);
+                    self.values.insert(target.path, content.clone());
+                    Ok(content)
+                }
+            },
+        }
     }
 
     pub(super) fn mapping(
@@ -155,11 +179,40 @@ impl Files {
         file: &File,
         component: Option<&Base>,
     ) -> Result<Rc<ParameterMapping>, Missing> {
-        cached(&mut self.mappings, source, file, component, read_ssm)
+        match wanted(source, file, component)? {
+            Wanted::Inline(content) => Ok(Rc::new(content)),
+            Wanted::File(target) => match self.mappings.get(&target.path) {
+                Some(known) => Ok(known.clone()),
+                None => {
+                    let content = Rc::new(self.read(&target, read::ssm).map_err(Missing::Content)?);
+                    self.mappings.insert(target.path, content.clone());
+                    Ok(content)
+                }
+            },
+        }
+    }
+
+    /// The content of a file; what is odd about it becomes a warning.
+    pub(in crate::ssp) fn read<T>(
+        &mut self,
+        target: &Target,
+        read: impl Fn(&[u8]) -> Result<(T, Vec<String>), SspError>,
+    ) -> Result<T, SspError> {
+        let failed = |source| {
+            let (action, path) = ("read", target.shown.clone());
+            SspError::File { action, path, source }
+        };
+        let file = fs::File::open(&target.path).map_err(failed)?;
+        let mut bytes = Vec::new();
+        file.take(CAPACITY + 1).read_to_end(&mut bytes).map_err(failed)?;
+        let (content, warnings) = read(&bytes).map_err(|error| error.in_file(&target.shown))?;
+        self.warn(&target.shown, warnings);
+        Ok(content)
     }
 
     /// The dictionary and the name of the file that it stands in.
     pub(super) fn dictionary(
+        &mut self,
         source: &Source<SignalDictionary>,
         file: &File,
     ) -> Result<(SignalDictionary, PathBuf), Missing> {
@@ -167,22 +220,26 @@ impl Files {
             Source::Inline(dictionary) => Ok((dictionary.clone(), file.shown.clone())),
             Source::File { uri, .. } => {
                 let target = file.base.resolve(uri).map_err(Missing::Reference)?;
-                let read = read_file(&target, read_ssb).map_err(Missing::Content)?;
+                let read = self.read(&target, read::ssb).map_err(Missing::Content)?;
                 Ok((read, target.shown))
             }
         }
     }
 }
 
-fn cached<T: Clone>(
-    known: &mut HashMap<PathBuf, Rc<T>>,
+/// What a source holds, or the file that it names.
+enum Wanted<T> {
+    Inline(T),
+    File(Target),
+}
+
+fn wanted<T: Clone>(
     source: &Source<T>,
     file: &File,
     component: Option<&Base>,
-    read: fn(&[u8]) -> Result<T, SspError>,
-) -> Result<Rc<T>, Missing> {
+) -> Result<Wanted<T>, Missing> {
     let (uri, in_component) = match source {
-        Source::Inline(content) => return Ok(Rc::new(content.clone())),
+        Source::Inline(content) => return Ok(Wanted::Inline(content.clone())),
         Source::File { uri, in_component } => (uri, *in_component),
     };
     let base = match (in_component, component) {
@@ -193,24 +250,25 @@ fn cached<T: Clone>(
             return Err(Missing::Reference(sentence.to_owned()));
         }
     };
-    let target = base.resolve(uri).map_err(Missing::Reference)?;
-    if let Some(known) = known.get(&target.path) {
-        return Ok(known.clone());
-    }
-    let content = Rc::new(read_file(&target, read).map_err(Missing::Content)?);
-    known.insert(target.path, content.clone());
-    Ok(content)
+    base.resolve(uri).map(Wanted::File).map_err(Missing::Reference)
 }
 
-fn read_file<T>(target: &Target, read: fn(&[u8]) -> Result<T, SspError>) -> Result<T, SspError> {
-    let failed = |source| {
-        let (action, path) = ("read", target.shown.clone());
-        SspError::File { action, path, source }
+/// The error of an archive by the name that the user knows, not by that of its unpacked copy.
+fn as_shown(error: PackageError, target: &Target) -> SspError {
+    let path = target.shown.clone();
+    let is_itself = |named: &Path| named == target.path;
+    let error = match error {
+        PackageError::File { action, path: named, source } if is_itself(&named) => {
+            PackageError::File { action, path, source }
+        }
+        PackageError::Archive { source, .. } => PackageError::Archive { path, source },
+        PackageError::Limit { limit, unit, .. } => PackageError::Limit { path, limit, unit },
+        PackageError::Description { source, .. } => PackageError::Description { path, source },
+        error => {
+            return SspError::In { file: path, reason: Box::new(error.into()) };
+        }
     };
-    let file = fs::File::open(&target.path).map_err(failed)?;
-    let mut bytes = Vec::new();
-    file.take(CAPACITY + 1).read_to_end(&mut bytes).map_err(failed)?;
-    read(&bytes).map_err(|error| error.in_file(&target.shown))
+    error.into()
 }
 
 /// The SSD files at the root of an unpacked SSP.

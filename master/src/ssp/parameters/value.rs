@@ -25,6 +25,8 @@ pub(super) enum Number {
     /// An item of an enumeration, and its number where the file defines it.
     Item(String, Option<i32>),
     Binary,
+    /// What FMI 2.0 does not have, in words.
+    Foreign(String),
 }
 
 impl Value {
@@ -47,6 +49,13 @@ impl Value {
                 (Number::Item(item.clone(), number_of(item, measure.items.as_deref())), measure)
             }
             ParameterValue::Binary(_) => (Number::Binary, Measure::default()),
+            ParameterValue::Long(value) => {
+                (Number::Foreign(format!("{value}, of more than 32 bits")), Measure::default())
+            }
+            ParameterValue::Array(_, values) => {
+                let words = format!("an array of {} elements", values.len());
+                (Number::Foreign(words), Measure::default())
+            }
         };
         Value { number, measure }
     }
@@ -159,6 +168,7 @@ impl Number {
             Number::Text(text) => text.clone(),
             Number::Item(item, _) => item.clone(),
             Number::Binary => "binary data".to_owned(),
+            Number::Foreign(words) => words.clone(),
         }
     }
 }

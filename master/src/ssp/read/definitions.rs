@@ -6,7 +6,9 @@ use std::hash::Hash;
 use fmi2::unit::BaseUnit;
 
 use crate::ssp::error::SspError;
-use crate::ssp::structure::{Conversion, Definitions, Enumeration, Transformation, Type, Unit};
+use crate::ssp::structure::{
+    Conversion, Definitions, Dimension, Enumeration, Transformation, Type, Unit,
+};
 use crate::ssp::xml::Node;
 
 pub(super) fn definitions(root: &Node) -> Result<Definitions, SspError> {
@@ -41,17 +43,20 @@ fn unit(node: &Node) -> Result<Unit, SspError> {
     Ok(Unit { name: node.required("name")?.to_owned(), base })
 }
 
-/// The type that one of the children is.
+/// The type that one of the children is; what FMI 2.0 does not have in words.
 pub(super) fn value_type(node: &Node) -> Result<Option<Type>, SspError> {
     let mut found = None;
     for child in node.own_children() {
         let kind = match child.name.as_str() {
-            "Real" => Type::Real(child.text("unit")),
-            "Integer" => Type::Integer,
+            "Real" | "Float64" | "Float32" => Type::Real(child.stated("unit")),
+            "Integer" | "Int8" | "UInt8" | "Int16" | "UInt16" | "Int32" | "UInt32" | "Int64"
+            | "UInt64" => Type::Integer,
             "Boolean" => Type::Boolean,
             "String" => Type::String,
             "Enumeration" => Type::Enumeration(child.required("name")?.to_owned()),
             "Binary" => Type::Binary,
+            // Another element Clock has the name of a clock.
+            "Clock" if child.attribute("name").is_none() => Type::Clock,
             _ => continue,
         };
         if found.is_some() {
@@ -59,7 +64,30 @@ pub(super) fn value_type(node: &Node) -> Result<Option<Type>, SspError> {
         }
         found = Some(kind);
     }
-    Ok(found)
+    Ok(array(node)?.or_else(|| clocked(node)).or(found))
+}
+
+/// The type of an array; none where its dimensions have one element.
+fn array(node: &Node) -> Result<Option<Type>, SspError> {
+    let dimensions = node.children_named("Dimension").map(|dimension| {
+        let expected = "a size of at least 0 and below 2^64";
+        let size = dimension.long("size")?.map(u64::try_from).transpose();
+        let size = size.map_err(|_| dimension.wrong(expected, "another one"))?;
+        Ok(match (size, dimension.text("sizeConnector")) {
+            (Some(size), _) => Dimension::Size(size),
+            (None, Some(connector)) => Dimension::Connector(connector),
+            (None, None) => Dimension::Open,
+        })
+    });
+    let dimensions = dimensions.collect::<Result<Vec<_>, SspError>>()?;
+    let is_one = dimensions.iter().all(|dimension| *dimension == Dimension::Size(1));
+    Ok((!is_one).then_some(Type::Array(dimensions)))
+}
+
+/// The type of a connector that belongs to a clock.
+fn clocked(node: &Node) -> Option<Type> {
+    let clock = node.children_named("Clock").find_map(|clock| clock.attribute("name"))?;
+    Some(Type::Clocked(clock.to_owned()))
 }
 
 /// The transformation that one of the children is, and `suppressUnitConversion`.

@@ -58,6 +58,8 @@ fn component(node: &Node) -> Result<Component, SspError> {
         None | Some("application/x-fmu-sharedlibrary") => Content::Fmu,
         Some("application/x-ssp-definition") => Content::Definition,
         Some("application/x-ssp-package") => Content::Package,
+        // What has no source is nothing but its connectors, whatever it will be.
+        Some(_) if node.attribute("source").is_none() => Content::Fmu,
         Some(other) => {
             let expected = "the type application/x-fmu-sharedlibrary, application/x-ssp-definition \
                  or application/x-ssp-package";
@@ -68,8 +70,10 @@ fn component(node: &Node) -> Result<Component, SspError> {
         None | Some("any") => Implementation::Any,
         Some("CoSimulation") => Implementation::CoSimulation,
         Some("ModelExchange") => Implementation::ModelExchange,
+        Some("ScheduledExecution") => Implementation::ScheduledExecution,
         Some(other) => {
-            let expected = "the implementation any, CoSimulation or ModelExchange";
+            let expected =
+                "the implementation any, CoSimulation, ModelExchange or ScheduledExecution";
             return Err(node.wrong(expected, format!("{other:?}")));
         }
     };
@@ -78,10 +82,18 @@ fn component(node: &Node) -> Result<Component, SspError> {
     Ok(Component {
         base: base(node)?,
         content,
-        source: node.required("source")?.to_owned(),
+        source: source_of(node)?,
         implementation,
         step_size: step_size.filter(|size| *size > 0.0),
     })
+}
+
+/// The source of a component; empty where it has none.
+fn source_of(node: &Node) -> Result<String, SspError> {
+    match node.attribute("source") {
+        Some("") => Err(node.wrong("the path of a file in the attribute source", "nothing")),
+        source => Ok(source.unwrap_or_default().to_owned()),
+    }
 }
 
 fn dictionary_reference(node: &Node) -> Result<DictionaryReference, SspError> {
@@ -90,25 +102,27 @@ fn dictionary_reference(node: &Node) -> Result<DictionaryReference, SspError> {
 }
 
 fn connector(node: &Node) -> Result<Connector, SspError> {
-    let kind = match node.required("kind")? {
-        "input" => ConnectorKind::Input,
-        "output" => ConnectorKind::Output,
-        "parameter" => ConnectorKind::Parameter,
-        "calculatedParameter" => ConnectorKind::CalculatedParameter,
-        "inout" => ConnectorKind::Inout,
-        other => {
-            let expected = "the kind input, output, parameter, calculatedParameter or inout";
-            return Err(node.wrong(expected, format!("{other:?}")));
-        }
-    };
+    let stated = node.required("kind")?;
+    let kind = ConnectorKind::ALL.into_iter().find(|kind| kind.as_str() == stated);
+    let kind = kind.ok_or_else(|| {
+        let names = ConnectorKind::ALL.map(ConnectorKind::as_str).join(", ");
+        node.wrong(format!("one of the kinds {names}"), format!("{stated:?}"))
+    })?;
     let name = node.required("name")?.to_owned();
     Ok(Connector { name, kind, kind_of_value: value_type(node)? })
 }
 
 fn connection(node: &Node) -> Result<Connection, SspError> {
+    if let Some(name) =
+        ["startIndices", "endIndices"].into_iter().find(|name| node.attribute(name).is_some())
+    {
+        let expected = "a connection of scalars, as FMI 2.0 has no arrays";
+        return Err(node.wrong(expected, format!("the attribute {name}")));
+    }
     let end = |element: &str, connector: &str| {
         let connector = node.required(connector)?.to_owned();
-        Ok::<_, SspError>(End { element: node.text(element), connector })
+        // Some tools write an empty name for the system around the connection.
+        Ok::<_, SspError>(End { element: node.stated(element), connector })
     };
     Ok(Connection {
         start: end("startElement", "startConnector")?,

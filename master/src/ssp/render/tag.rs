@@ -20,11 +20,14 @@ pub(super) struct Tag {
     name: String,
     attributes: Vec<(String, String)>,
     children: Vec<Tag>,
+    /// Whether something in it is of SSP 2.0 only.
+    newer: bool,
 }
 
 impl Tag {
     pub(super) fn new(name: &str) -> Self {
-        Tag { name: name.to_owned(), attributes: Vec::new(), children: Vec::new() }
+        let (name, attributes, children) = (name.to_owned(), Vec::new(), Vec::new());
+        Tag { name, attributes, children, newer: false }
     }
 
     /// With the declarations of all prefixes.
@@ -46,7 +49,23 @@ impl Tag {
     }
 
     pub(super) fn add(mut self, child: Tag) -> Self {
+        self.newer |= child.newer;
         self.children.push(child);
+        self
+    }
+
+    /// Marks an element that SSP 1.0 does not have, if it is one.
+    pub(super) fn newer(mut self, is_newer: bool) -> Self {
+        self.newer |= is_newer;
+        self
+    }
+
+    /// The attribute `version`, the first one: the lowest that has all that was added.
+    pub(super) fn versioned(mut self) -> Self {
+        let version = if self.newer { "2.0" } else { "1.0" };
+        let is_space = |(name, _): &&(String, String)| name.starts_with("xmlns");
+        let place = self.attributes.iter().take_while(is_space).count();
+        self.attributes.insert(place, ("version".to_owned(), version.to_owned()));
         self
     }
 
