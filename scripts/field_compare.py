@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import re
 import shutil
 import sys
 import tempfile
@@ -18,7 +19,7 @@ CHAINED_STEPS = 20
 # The verdicts of each question, the best first. docs/field.md explains them.
 QUESTIONS = {
     "defaults": ["ok", "only aso-ftc", "neither", "lost", "crashed"],
-    "values": ["bits", "close", "times", "only aso-ftc", "neither", "differ", "lost", "crashed"],
+    "values": ["bits", "close", "steps", "times", "only aso-ftc", "neither", "differ", "lost", "crashed"],
     "chained": ["same", "not judged", "differ", "lost"],
     "set": ["kept", "not judged", "lost"],
     "check": ["agrees", "finds more", "finds less", "not judged", "failed"],
@@ -114,7 +115,27 @@ class Trial:
         if other:
             return other
         rows = numpy.load(self.folder / "timed.npy", allow_pickle=True)
-        return compared(rows, columns(results), self.fmu.step)
+        found = compared(rows, columns(results), self.fmu.step)
+        return self.replayed(found) if found["verdict"] == "differ" else found
+
+    def replayed(self, found):
+        """Where values differ: do they still, when FMPy's functions take the step sizes of aso-ftc?"""
+        log = self.folder / "calls.txt"
+        options = [*self.timed(self.stop, *self.fmu.compared), "--log-calls", log]
+        ended, results = self.ours("replayed", *options)
+        if ended.status != 0:
+            return found
+        steps = [
+            [float(text) for text in match.groups()]
+            for match in re.finditer(r"^m fmi2DoStep\(([^,]+), ([^,]+), true\)", log.read_text(), re.MULTILINE)
+        ]
+        calls = self.file("calls", {"names": self.fmu.compared, "steps": steps})
+        theirs = self.fmpy("replay", repr(self.stop), repr(self.fmu.step), calls)
+        if "error" in theirs:
+            return found
+        rows = numpy.load(self.folder / "replay.npy", allow_pickle=True)
+        same = compared(rows, columns(results), self.fmu.step)["verdict"] in ("bits", "close")
+        return verdict("steps", found["detail"]) if same else found
 
     def chained(self):
         """Connected to another FMU, with the default algorithm: are the results those of the FMU alone?"""

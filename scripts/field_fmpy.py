@@ -4,6 +4,7 @@
     field_fmpy.py defaults FMU OUT
     field_fmpy.py timed FMU OUT STOP STEP NAMES     (the rows to OUT with the suffix .npy)
     field_fmpy.py set FMU OUT STOP STEP VALUES      (NAMES and VALUES: JSON files)
+    field_fmpy.py replay FMU OUT STOP STEP CALLS    (the steps of another importer: times and sizes; rows as of timed)
 """
 
 import json
@@ -13,6 +14,7 @@ from pathlib import Path
 import fmpy
 import fmpy.validation
 import numpy
+from fmpy.fmi2 import FMU2Slave
 
 COMMON = {"fmi_type": "CoSimulation", "validate": False}
 
@@ -35,6 +37,39 @@ def timed(fmu, out, stop, step, names):
     return {"reached": float(rows["time"][-1])}
 
 
+def replay(fmu, out, stop, chosen):
+    """Makes the calls of another importer by FMPy's functions; the rows are of the time that each step ends at."""
+    description = fmpy.read_model_description(fmu, validate=False)
+    variables = [v for name in chosen["names"] for v in description.modelVariables if v.name == name]
+    experiment = description.defaultExperiment
+    tolerance = experiment and experiment.tolerance
+    slave = FMU2Slave(
+        guid=description.guid,
+        unzipDirectory=fmpy.extract(fmu),
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        instanceName="m",
+    )
+    slave.instantiate()
+    start = chosen["steps"][0][0]
+    slave.setupExperiment(tolerance=tolerance and float(tolerance), startTime=start, stopTime=stop)
+    slave.enterInitializationMode()
+    slave.exitInitializationMode()
+    getters = {"Real": slave.getReal, "Boolean": slave.getBoolean, "String": slave.getString}
+
+    def row(time):
+        values = [getters.get(v.type, slave.getInteger)([v.valueReference])[0] for v in variables]
+        return (time, *values)
+
+    rows = [row(start)]
+    for time, size in chosen["steps"]:
+        slave.doStep(currentCommunicationPoint=time, communicationStepSize=size)
+        rows.append(row(time + size))
+    kinds = {"Real": "f8", "Boolean": "?", "String": "O"}
+    columns = [("time", "f8"), *((v.name, kinds.get(v.type, "i4")) for v in variables)]
+    numpy.save(Path(out).with_suffix(".npy"), numpy.array(rows, dtype=columns))
+    return {"reached": rows[-1][0]}
+
+
 def kept(fmu, stop, step, values):
     """Simulates with start values; says which of them are in the first row."""
     rows = fmpy.simulate_fmu(
@@ -53,6 +88,7 @@ def main():
         "validate": lambda: validate(fmu),
         "defaults": lambda: defaults(fmu),
         "timed": lambda: timed(fmu, out, *numbers, chosen),
+        "replay": lambda: replay(fmu, out, numbers[0], chosen),
         "set": lambda: kept(fmu, *numbers, chosen),
     }
     try:

@@ -363,6 +363,10 @@ impl Slave for Instance {
         self.component.pass(inputs, span, never_back, outputs)
     }
 
+    fn take_warning(&mut self) -> bool {
+        self.component.take_warning()
+    }
+
     fn in_thread(&mut self) -> Option<&mut (dyn Slave + Send)> {
         Some(self)
     }

@@ -9,6 +9,7 @@ mod log;
 mod states;
 mod step;
 
+use std::cell::Cell;
 use std::ffi::{CStr, CString, OsStr, c_char, c_int, c_void};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -215,6 +216,7 @@ impl Library {
             saved: Vec::new(),
             time_limit: None,
             abandoned: false,
+            warned: Cell::new(false),
             callbacks,
             library: self.clone(),
         };
@@ -274,6 +276,8 @@ pub(crate) struct Component {
     pub(crate) time_limit: Option<Duration>,
     /// It is still busy with a step that could not be canceled, and may not be freed.
     abandoned: bool,
+    /// A call has returned `fmi2Warning`.
+    warned: Cell<bool>,
     callbacks: Arc<fmi2CallbackFunctions>,
     library: Arc<Library>,
 }
@@ -308,7 +312,7 @@ impl Component {
     #[inline]
     fn check(&self, function: &'static str, status: fmi2Status) -> Result<(), CallError> {
         self.place.leave();
-        if status == Status::OK as fmi2Status || status == Status::Warning as fmi2Status {
+        if status == Status::OK as fmi2Status || self.is_warning(status) {
             return Ok(());
         }
         if status == Status::Fatal as fmi2Status {
@@ -317,6 +321,22 @@ impl Component {
         let failure =
             Status::from_c(status).map_or(Failure::UnknownStatus(status), Failure::Status);
         Err(self.failed(function, failure))
+    }
+
+    /// Whether that is `fmi2Warning`, which is noted.
+    #[inline]
+    fn is_warning(&self, status: fmi2Status) -> bool {
+        let warning = status == Status::Warning as fmi2Status;
+        if warning {
+            self.warned.set(true);
+        }
+        warning
+    }
+
+    /// Whether a call has returned `fmi2Warning` since this was last asked; calls by
+    /// [`Component::pass`] do not count.
+    pub(crate) fn take_warning(&mut self) -> bool {
+        self.warned.take()
     }
 
     #[cold]

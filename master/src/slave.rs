@@ -187,7 +187,8 @@ pub trait Slave {
         self.advance(&mut Advance::held(inputs, (time, size), never_back, outputs))
     }
 
-    /// Whether a call has returned `fmi2Warning` since this was last asked, where that is known.
+    /// Whether a call has returned `fmi2Warning` since this was last asked; false where that is not
+    /// known, as of an instance in another process.
     fn take_warning(&mut self) -> bool {
         false
     }

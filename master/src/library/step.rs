@@ -30,7 +30,7 @@ impl Component {
         // SAFETY: the instance is alive.
         let status = unsafe { function(self.pointer, time, size, never_back.into()) };
         self.place.leave();
-        if status == Status::OK as fmi2Status || status == Status::Warning as fmi2Status {
+        if status == Status::OK as fmi2Status || self.is_warning(status) {
             return Ok(Stepped::Whole);
         }
         self.unfinished(status, time, size)
