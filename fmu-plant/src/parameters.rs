@@ -95,6 +95,22 @@ impl Parameters {
         require("delta", p.stribeck_exponent, p.stribeck_exponent > 0.0, positive)
     }
 
+    /// No change of any parameter, as a direction.
+    pub(crate) const ZERO: Self = Self {
+        cart_mass: 0.0,
+        pendulum_mass: 0.0,
+        inertia: 0.0,
+        length: 0.0,
+        cart_damping: 0.0,
+        pendulum_damping: 0.0,
+        gravity: 0.0,
+        coulomb: 0.0,
+        static_friction: 0.0,
+        stribeck_velocity: 0.0,
+        stribeck_exponent: 0.0,
+        linearised: false,
+    };
+
     /// The same parameters, each with its component of a direction.
     pub(crate) fn along(&self, direction: &Self) -> Parameters<Dual64> {
         let dual = |part: fn(&Self) -> f64| Dual64::new(part(self), part(direction));

@@ -29,9 +29,12 @@ pub(crate) struct FrictionPendulum {
     /// Holds the states and the regime.
     motion: Motion,
     tolerance: Tolerance,
-    /// The force `u + f_a` in N that friction and slope belong to.
+    /// The force `u + f_a` in N that friction and slope belong to, and its derivative in N/s.
     force: f64,
+    force_rate: f64,
     f_fric: f64,
+    /// The derivative of `f_fric` in N/s; only `friction_rate` knows when it is up to date.
+    f_fric_rate: f64,
     /// The derivative of the states.
     slope: [f64; 4],
     regime: i32,
@@ -49,11 +52,29 @@ fn refused(refusal: &Refusal) -> Failure {
 }
 
 impl FrictionPendulum {
-    /// Outputs and derivatives from the motion, under `force` in N.
-    fn show(&mut self, force: f64) {
-        let response = self.motion.response(&self.parameters, force);
-        (self.force, self.f_fric, self.slope) = (force, response.friction, response.slope);
+    /// Outputs and derivatives from the motion at `time`, under a force of that time.
+    fn show(&mut self, force: &Force, time: f64) {
+        (self.force, self.force_rate) = (force.at(time), force.rate_at(time));
+        let response = self.motion.response(&self.parameters, self.force);
+        (self.f_fric, self.slope) = (response.friction, response.slope);
         self.regime = self.motion.regime().number();
+    }
+
+    /// The derivative of the friction with respect to time in N/s, along the motion in the present
+    /// regime.
+    ///
+    /// Zero where it is infinite: at the break-away of a cart whose friction has `delta` below one.
+    fn friction_rate(&mut self) -> &mut f64 {
+        let state = self.motion.state();
+        let response = Response::new(
+            &self.parameters.along(&Parameters::ZERO),
+            self.motion.regime(),
+            &std::array::from_fn(|k| Dual64::new(state[k], self.slope[k])),
+            Dual64::new(self.force, self.force_rate),
+        );
+        let rate = response.friction.eps;
+        self.f_fric_rate = if rate.is_finite() { rate } else { 0.0 };
+        &mut self.f_fric_rate
     }
 }
 
@@ -87,7 +108,9 @@ impl Model for FrictionPendulum {
             motion: Motion::default(),
             tolerance: Tolerance::default(),
             force: 0.0,
+            force_rate: 0.0,
             f_fric: 0.0,
+            f_fric_rate: 0.0,
             slope: [0.0; 4],
             regime: 0,
         })
@@ -106,10 +129,10 @@ impl Model for FrictionPendulum {
             Some(relative) => Tolerance::new(relative).map_err(|refusal| refused(&refusal))?,
             None => Tolerance::default(),
         };
-        let force = self.u + self.f_a;
-        let motion = Motion::start(&self.parameters, self.initial, force);
+        let force = force(self, experiment.start_time);
+        let motion = Motion::start(&self.parameters, self.initial, force.value);
         self.motion = motion.map_err(|refusal| refused(&refusal))?;
-        self.show(force);
+        self.show(&force, force.start);
         Ok(())
     }
 
@@ -118,12 +141,12 @@ impl Model for FrictionPendulum {
         let Self { motion, parameters, tolerance, .. } = self;
         let done = motion.advance(parameters, &force, step.start, step.size, tolerance);
         let reached = done.as_ref().map_or_else(crate::motion::Failure::time, |()| step.end());
-        self.show(force.at(reached));
+        self.show(&force, reached);
         done.map_err(|failure| Failure::Incomplete { time: reached, message: failure.to_string() })
     }
 
-    fn update(&mut self, _time: f64) -> Result<(), Failure> {
-        self.show(self.u + self.f_a);
+    fn update(&mut self, time: f64) -> Result<(), Failure> {
+        self.show(&force(self, time), time);
         Ok(())
     }
 
@@ -160,10 +183,10 @@ impl Model for FrictionPendulum {
         }
     }
 
-    fn event(&mut self, _time: f64) -> Result<Event, Failure> {
-        let force = self.u + self.f_a;
-        let values_of_continuous_states_changed = self.motion.settle(&self.parameters, force);
-        self.show(force);
+    fn event(&mut self, time: f64) -> Result<Event, Failure> {
+        let force = force(self, time);
+        let values_of_continuous_states_changed = self.motion.settle(&self.parameters, force.value);
+        self.show(&force, time);
         Ok(Event { values_of_continuous_states_changed, ..Event::default() })
     }
 }

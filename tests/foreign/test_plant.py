@@ -147,6 +147,23 @@ def test_friction_at_rest_is_what_balances_the_other_forces(plant):
                 instance.step(k * 1e-3, 1e-3)
 
 
+def test_the_slope_of_the_friction_is_its_difference_quotient_held_and_sliding(plant):
+    apart, begin = 1e-5, 4e-3
+    for start, regime in (({"theta_0": 0.1, "omega_0": 0.4}, 0), ({"v_p_0": -0.2}, -1)):
+
+        def after(duration):
+            with Instance(plant) as instance:
+                instance.start(start | {"u": 3.0})
+                instance.set_slopes(u=50.0)
+                instance.step(0.0, duration)
+                assert instance.get("regime") == [regime]
+                return instance.get("f_fric")[0], instance.slopes_of("f_fric")[0]
+
+        change = after(begin + apart)[0] - after(begin - apart)[0]
+        assert after(begin)[1] == pytest.approx(change / (2 * apart), rel=1e-6)
+        assert abs(change) > 1e-4
+
+
 def test_friction_of_a_sliding_cart_follows_the_law_of_stribeck(plant):
     with Instance(plant) as instance:
         instance.start({"v_p_0": 0.6, "theta_0": 0.3, "delta": 1.3, "u": 10.0})

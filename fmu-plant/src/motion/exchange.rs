@@ -1,4 +1,10 @@
 //! The motion as an importer integrates it: event indicators, and what an event changes.
+//!
+//! An importer finds an event to within its own accuracy: at the event the velocity is small, but of
+//! either sign and rarely zero. And where the velocity of the cart dies out exponentially, as it does
+//! in a closed loop whose feedback balances the friction, it changes its sign by rounding only, if
+//! at all. So what the cart does follows from the stored regime, from a velocity that counts as
+//! rest, and from the sign of the acceleration, never from the sign of the velocity alone.
 
 use super::Motion;
 use crate::dynamics::Force;
@@ -12,40 +18,112 @@ pub(crate) const INDICATORS: usize = 3;
 /// The velocity in m/s that is of the order of one: its nominal value.
 pub(crate) const NOMINAL_VELOCITY: f64 = 0.1;
 
-/// How far an indicator lies above its margin, so that a margin of zero is no event.
-const SHIFT: f64 = 1e-10;
+/// The acceleration in m/s² that is of the order of one.
+const NOMINAL_ACCELERATION: f64 = 1.0;
+
+/// A cart that slides at most this fast, in m/s, and becomes slower has stopped.
+const REST: f64 = 1e-8 * NOMINAL_VELOCITY;
+
+/// The same in event mode: the importer may have located the stop a little too early.
+const LANDING: f64 = 10.0 * REST;
+
+/// How far the force on a held cart exceeds the static friction at its break-away, as part of
+/// the static friction.
+const EXCESS: f64 = 1e-8;
+
+/// The plant at an instant as an importer sees it.
+struct Instant<'a> {
+    plant: Plant,
+    motion: &'a Motion,
+    /// The force in N that is of the order of one.
+    nominal: f64,
+    /// How far in N the force on a held cart exceeds the static friction at its break-away.
+    ///
+    /// More than the damping of a cart that counts as stopped: what stopped is held.
+    excess: f64,
+}
+
+impl<'a> Instant<'a> {
+    fn new(motion: &'a Motion, parameters: &Parameters, force: f64) -> Self {
+        let limit = parameters.static_friction;
+        let nominal = if limit > 0.0 { limit } else { 1.0 };
+        Self {
+            plant: Plant::new(parameters, Force::constant(force)),
+            motion,
+            nominal,
+            excess: EXCESS * nominal + 2.0 * LANDING * parameters.cart_damping,
+        }
+    }
+
+    /// Velocity in m/s and acceleration in m/s² of a sliding cart in its direction.
+    fn sliding(&self) -> [f64; 2] {
+        let Motion { state, regime, .. } = self.motion;
+        let slope = self.plant.derivative(*regime, 0.0, state);
+        [state[2], slope[2]].map(|part| regime.sign() * part)
+    }
+
+    /// The friction in N that is left before a cart at rest breaks away in this direction.
+    fn held(&self, direction: Regime) -> f64 {
+        self.plant.margin(Regime::Stick, direction, 0.0, &self.motion.state)
+    }
+
+    /// What a cart at rest does: it moves where the force exceeds the static friction by half of
+    /// what is needed in continuous-time mode, so that a break-away located a little too early
+    /// happens, too.
+    fn regime_at_rest(&self) -> Regime {
+        let leaves = |direction: &Regime| self.held(*direction) < -0.5 * self.excess;
+        [Regime::Forward, Regime::Backward].into_iter().find(leaves).unwrap_or(Regime::Stick)
+    }
+
+    /// Whether a sliding cart has stopped, as event mode sees it.
+    fn has_stopped(&self) -> bool {
+        let [velocity, acceleration] = self.sliding();
+        velocity <= -REST || (velocity <= LANDING && acceleration <= 0.0)
+    }
+}
 
 impl Motion {
-    /// The margins to the next event in the present regime, each relative to its nominal value and
-    /// shifted by 1e-10: of a sliding cart the velocity in its direction before it stops, of a held
-    /// one the friction that is left before it breaks away forward and backward. Those not in use
-    /// are one.
+    /// How far the next event is away in the present regime; what is not in use is one.
+    ///
+    /// First the stop of a sliding cart: with the velocity `v` and the acceleration `a` in its
+    /// direction, each relative to its nominal value, `max(v - r, min(a, v + r))` with `r` = 1e-8.
+    /// Not positive are a velocity of at most `r` that falls, and one below `-r`: a cart that has
+    /// just broken away, at `v = 0`, has `a > 0`. Then the friction that is left before a held cart
+    /// breaks away forward and backward, relative to the static friction, and more by `EXCESS`.
     ///
     /// After [`Motion::settle`] under the same force all are positive.
     #[must_use]
     pub fn indicators(&self, parameters: &Parameters, force: f64) -> [f64; INDICATORS] {
-        let plant = Plant::new(parameters, Force::constant(force));
-        let shifted = |direction, nominal: f64| {
-            plant.margin(self.regime, direction, 0.0, &self.state) / nominal + SHIFT
-        };
-        if self.regime != Regime::Stick {
-            return [shifted(self.regime, NOMINAL_VELOCITY), 1.0, 1.0];
+        let now = Instant::new(self, parameters, force);
+        if self.regime == Regime::Stick {
+            let left = |direction| (now.held(direction) + now.excess) / now.nominal;
+            return [1.0, left(Regime::Forward), left(Regime::Backward)];
         }
-        let limit = parameters.static_friction;
-        let nominal = if limit > 0.0 { limit } else { 1.0 };
-        [1.0, shifted(Regime::Forward, nominal), shifted(Regime::Backward, nominal)]
+        let [velocity, acceleration] = now.sliding();
+        let [falls, turned] = [-REST, REST].map(|shift| (velocity + shift) / NOMINAL_VELOCITY);
+        [falls.max(turned.min(acceleration / NOMINAL_ACCELERATION)), 1.0, 1.0]
     }
 
     /// Decides the regime at an event; true if that changed the state.
     ///
-    /// A sliding cart whose velocity has changed its sign has stopped: the velocity becomes zero.
-    /// At rest the balancing force decides whether the cart is held.
+    /// A sliding cart that has stopped gets the velocity zero; there, the balancing force decides whether
+    /// it is held, goes on or goes back. A held cart that has a velocity was given one.
     pub fn settle(&mut self, parameters: &Parameters, force: f64) -> bool {
-        let stops = self.regime.sign() * self.state[2] < 0.0;
-        if stops {
+        let now = Instant::new(self, parameters, force);
+        let velocity = self.state[2];
+        if self.regime == Regime::Stick {
+            if velocity.abs() > REST {
+                self.regime = now.plant.regime(0.0, &self.state);
+                return false;
+            }
+        } else if !now.has_stopped() {
+            return false;
+        }
+        self.regime = now.regime_at_rest();
+        let moved = velocity != 0.0;
+        if moved {
             self.state[2] = 0.0;
         }
-        self.regime = Plant::new(parameters, Force::constant(force)).regime(0.0, &self.state);
-        stops
+        moved
     }
 }

@@ -3,6 +3,7 @@
 use super::*;
 
 mod events;
+mod exchange;
 mod reference;
 
 /// A cart that does not feel its pendulum, with the friction `level` at every speed.

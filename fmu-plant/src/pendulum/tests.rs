@@ -6,6 +6,7 @@ use crate::friction::Regime;
 mod derivatives;
 mod exchange;
 mod knowns;
+mod rates;
 mod structure;
 
 /// The model initialised after a change of parameters, start values and inputs.

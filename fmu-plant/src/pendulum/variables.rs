@@ -130,7 +130,8 @@ fn outputs() -> Vec<Variable<FrictionPendulum>> {
         })
         .output(&DEPENDS)
         .unit("N")
-        .initially(FRICTION_INITIALLY),
+        .initially(FRICTION_INITIALLY)
+        .derivative(FrictionPendulum::friction_rate),
     );
     let text = "Sliding backward (-1), sticking (0), sliding forward (1)";
     all.push(Variable::integer("regime", text, |model: &mut FrictionPendulum| &mut model.regime));
