@@ -164,6 +164,14 @@ pub struct DefaultExperiment {
     pub step_size: Option<f64>,
 }
 
+impl DefaultExperiment {
+    /// The tolerance, where it is one that an FMU can be told: finite and above 0.
+    #[must_use]
+    pub fn usable_tolerance(&self) -> Option<f64> {
+        self.tolerance.filter(|tolerance| *tolerance > 0.0 && tolerance.is_finite())
+    }
+}
+
 /// `ScalarVariable`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ScalarVariable {

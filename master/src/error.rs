@@ -222,16 +222,21 @@ pub enum SystemError {
     },
     /// The steps have become too small to get on.
     #[error(
-        "{steps} steps in a row were no longer than the smallest step, {smallest} s, and the run is \
-         at t = {time} s only; a larger relative tolerance, a larger smallest step or fixed steps help"
+        "at t = {time} s the last {steps} steps were {length:.1e} s long together, near the smallest \
+         step of {smallest} s: {left:.0e} more would be needed to the stop time; a larger relative \
+         tolerance, a larger smallest step or fixed steps help"
     )]
     Crawl {
-        /// Steps.
+        /// Steps that were looked at.
         steps: u32,
+        /// Their length together in s.
+        length: f64,
         /// Smallest step in s.
         smallest: f64,
         /// Time reached in s.
         time: f64,
+        /// Steps that are left at this pace.
+        left: f64,
     },
     /// The algorithm makes no sense for this system.
     #[error("{what}")]

@@ -225,7 +225,8 @@ impl Simulation {
         self.exchange.commit(self.grid.time);
         self.drives.commit(self.grid.time);
         if self.varies && !self.is_finished() {
-            self.control.count_small(self.grid.time, self.grid.time - begin)?;
+            let (time, stop) = (self.grid.time, self.grid.stop());
+            self.control.check_pace(time, time - begin, stop)?;
         }
         Ok(())
     }

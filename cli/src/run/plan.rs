@@ -2,6 +2,7 @@
 
 use anyhow::bail;
 use fmi2::Experiment;
+use fmi2::description::DefaultExperiment;
 use master::{
     Algorithm, Coupling, Course, StepControl, Sweep, System, Wanted, by_direct_dependencies, choose,
 };
@@ -65,7 +66,7 @@ fn explain_tolerances(system: &System, stated: Option<f64>, reasons: &mut Vec<St
     }
     for (name, slave) in &system.slaves {
         let default = slave.description().default_experiment.as_ref();
-        if let Some(tolerance) = default.and_then(|default| default.tolerance) {
+        if let Some(tolerance) = default.and_then(DefaultExperiment::usable_tolerance) {
             reasons
                 .push(format!("tolerance {tolerance:e} for {name}: that of its DefaultExperiment"));
         }

@@ -1,7 +1,7 @@
 //! An instance at the operating point.
 
 use fmi2::Experiment;
-use fmi2::description::Causality;
+use fmi2::description::{Causality, DefaultExperiment};
 
 use super::parts::{Part, Parts, Setting, State};
 use super::{Linearise, LineariseError};
@@ -22,7 +22,9 @@ pub(super) fn initialised(
     request: &Linearise,
 ) -> Result<Component, LineariseError> {
     let mut component = fmu.component(interface, "linearise")?;
-    let experiment = Experiment { start_time: request.start_time, ..Experiment::default() };
+    let default = fmu.description().default_experiment.as_ref();
+    let tolerance = default.and_then(DefaultExperiment::usable_tolerance);
+    let experiment = Experiment { start_time: request.start_time, stop_time: None, tolerance };
     component.setup_experiment(&experiment)?;
     let settable = parts.settings.iter().filter(|setting| setting.settable);
     for setting in settable.clone().filter(|setting| !setting.is_input) {

@@ -24,9 +24,9 @@ pub(super) struct Control {
     pub(super) controller: Controller,
     /// The next step in s.
     pub(super) size: f64,
-    /// The smallest step in s, and how many of the last steps were no longer.
+    /// The smallest step in s, and the steps since the pace was last looked at, with their length.
     pub(super) smallest: f64,
-    pub(super) small: u32,
+    pub(super) paced: (u32, f64),
     pub(super) scale: Scale,
     /// For each bond the outputs at the other ends of its connections.
     bonds: Vec<(usize, usize)>,
@@ -37,8 +37,12 @@ pub(super) struct Control {
     states: Vec<Bond>,
 }
 
-/// Steps of the smallest size in a row that end a run: it would not reach its stop time.
-const SMALL_STEPS: u32 = 1000;
+/// Steps after which their pace is looked at.
+const PACED: u32 = 1000;
+/// Mean size of these steps in smallest steps up to which a run may be hopeless, and the steps that are
+/// left to the stop time from which it is.
+const SMALL: f64 = 10.0;
+const HOPELESS: f64 = 1e7;
 
 /// Magnitude of a variable: its `nominal`, else 1.
 pub(super) fn nominal(system: &System, port: Port) -> f64 {
@@ -88,7 +92,7 @@ impl Control {
             controller,
             size: algorithm.step,
             smallest: algorithm.smallest_step,
-            small: 0,
+            paced: (0, 0.0),
             scale: Scale::new(relative, absolute, nominals),
             bonds,
             order: i32::from(order),
@@ -160,21 +164,28 @@ impl Control {
         }
     }
 
-    /// A step of `size` s to `time` is done.
+    /// A step of `size` s to `time` is done, and the run is to end at `stop`, in s.
     ///
     /// # Errors
     ///
-    /// Where it is one of too many in a row that are as small as the smallest.
-    pub(super) fn count_small(&mut self, time: f64, size: f64) -> Result<(), SystemError> {
-        if size > 2.0 * self.smallest {
-            self.small = 0;
+    /// Where the last steps are so near the smallest that the run will not come to its end.
+    pub(super) fn check_pace(
+        &mut self,
+        time: f64,
+        size: f64,
+        stop: Option<f64>,
+    ) -> Result<(), SystemError> {
+        self.paced = (self.paced.0 + 1, self.paced.1 + size);
+        if self.paced.0 < PACED {
             return Ok(());
         }
-        self.small += 1;
-        if self.small < SMALL_STEPS {
+        let (steps, length) = std::mem::take(&mut self.paced);
+        let (mean, smallest) = (length / f64::from(steps), self.smallest);
+        let left = stop.map_or(0.0, |stop| (stop - time) / mean);
+        if mean > SMALL * smallest || left < HOPELESS {
             return Ok(());
         }
-        Err(SystemError::Crawl { steps: self.small, smallest: self.smallest, time })
+        Err(SystemError::Crawl { steps, length, smallest, time, left })
     }
 
     /// After an event the past says nothing.

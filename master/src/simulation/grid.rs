@@ -136,6 +136,11 @@ impl Grid {
         }
     }
 
+    /// The stop time in s.
+    pub(super) fn stop(&self) -> Option<f64> {
+        self.stop
+    }
+
     /// End of a step of `size` s from now.
     pub(super) fn end_of(&self, size: f64) -> f64 {
         self.limited(self.time + size, size)

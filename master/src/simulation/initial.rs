@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use fmi2::Experiment;
-use fmi2::description::{Kind, ModelDescription};
+use fmi2::description::{DefaultExperiment, Kind, ModelDescription};
 
 use crate::error::SystemError;
 use crate::exchange::call;
@@ -52,9 +52,8 @@ pub(super) fn initialise(
 /// What one FMU is told: the tolerance of its own `DefaultExperiment` where none is stated.
 fn told(experiment: &Experiment, description: &ModelDescription) -> Experiment {
     let default = description.default_experiment.as_ref();
-    let default = default.and_then(|default| default.tolerance);
-    let sound = |tolerance: &f64| *tolerance > 0.0 && tolerance.is_finite();
-    Experiment { tolerance: experiment.tolerance.or(default.filter(sound)), ..*experiment }
+    let default = default.and_then(DefaultExperiment::usable_tolerance);
+    Experiment { tolerance: experiment.tolerance.or(default), ..*experiment }
 }
 
 /// Carries the connected outputs to their inputs in initialization mode, in the order of their

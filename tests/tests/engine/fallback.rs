@@ -137,7 +137,7 @@ fn every_step_control_ends_a_hopeless_run_with_a_reason() {
     for control in [StepControl::Embedded, StepControl::Increment] {
         let noise = |time: f64| 1e6 * (1e12 * time).sin();
         let (system, _) = puppet::system([noise, noise], puppet::whole);
-        let algorithm = Algorithm { control, smallest_step: 1e-6, ..Algorithm::new(1e-3) };
+        let algorithm = Algorithm { control, smallest_step: 1e-9, ..Algorithm::new(1e-3) };
         let mut simulation = Simulation::new(system, &algorithm, &until(STOP)).unwrap();
         let mut steps = 0;
         let error = loop {
