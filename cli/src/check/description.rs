@@ -91,23 +91,8 @@ pub(super) fn check(description: &ModelDescription, warnings: &[Warning]) -> Vec
         findings.add(severity, FILE, problem.text, (why, problem.section));
         findings.stopping(rule.map_or(&[], |rule| rule.stops));
     }
-    identifiers(description, &mut findings);
     notes(description, &mut findings);
     findings.all
-}
-
-/// FMI Library looks at the first character only.
-fn identifiers(description: &ModelDescription, findings: &mut Findings) {
-    let exchange = description.model_exchange.iter().map(|own| &own.model_identifier);
-    let simulation = description.co_simulation.iter().map(|own| &own.model_identifier);
-    for identifier in exchange.chain(simulation) {
-        let stated = format!("modelIdentifier {identifier:?} is no C identifier");
-        let first = identifier.chars().next();
-        if !first.is_some_and(|first| first.is_ascii_alphabetic() || first == '_') {
-            let own = findings.all.iter_mut().filter(|own| own.what == stated);
-            own.for_each(|own| own.stops = vec![Tool::FmiLibrary]);
-        }
-    }
 }
 
 /// What the standard leaves open and users stumble over.
