@@ -43,6 +43,16 @@ impl ser::Error for Refusal {
 
 type Done = Result<(), Refusal>;
 
+/// Up to eight bytes as a number.
+const fn number(bytes: &[u8]) -> u64 {
+    let (mut number, mut k) = (0, 0);
+    while k < bytes.len() {
+        number = number << 8 | bytes[k] as u64;
+        k += 1;
+    }
+    number
+}
+
 /// A serialiser that hashes what it is told of the types.
 struct Walk(u64);
 
@@ -58,7 +68,7 @@ impl Walk {
     /// Adds a word, with its length.
     fn word(&mut self, word: &str) {
         for eight in word.as_bytes().chunks(8) {
-            self.add(eight.iter().fold(0, |number, byte| number << 8 | u64::from(*byte)));
+            self.add(number(eight));
         }
         self.add(word.len() as u64);
     }
@@ -77,10 +87,13 @@ impl Walk {
     }
 }
 
-/// Types without a part.
+/// Types without a part: their names are short, and known to the compiler.
 macro_rules! plain {
     ($($function:ident $type:ty;)*) => {
-        $(fn $function(self, _: $type) -> Done { self.word(stringify!($type)); Ok(()) })*
+        $(fn $function(self, _: $type) -> Done {
+            self.add(const { number(stringify!($type).as_bytes()) });
+            Ok(())
+        })*
     };
 }
 
