@@ -23,7 +23,7 @@ use crate::plot;
 use advance::Saver;
 pub(crate) use advance::{Beside, Ended};
 pub(crate) use assemble::assemble;
-pub(crate) use interrupt::STATUS as INTERRUPTED;
+pub(crate) use interrupt::{STATUS as INTERRUPTED, has_begun};
 pub(crate) use options::{AlgorithmOptions, Options, setting};
 use plan::{Plan, plan};
 pub(crate) use record::{Recorder, keep_results, select};
