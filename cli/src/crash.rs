@@ -6,8 +6,9 @@ use master::crash::{self, Cause, Ending};
 
 use crate::run;
 
-/// Exit status of a run that is lost.
+/// Exit status of a run that is lost, and of one that has not begun.
 const LOST: u8 = 1;
+const NOT_BEGUN: u8 = 2;
 
 /// From now on such an end is reported, and the results so far are kept.
 pub(crate) fn watch() {
@@ -38,5 +39,11 @@ fn end(ending: &Ending) -> u8 {
         }
     }
     remove_temporary_folders();
-    if interrupted { run::INTERRUPTED } else { LOST }
+    if interrupted {
+        run::INTERRUPTED
+    } else if run::has_begun() {
+        LOST
+    } else {
+        NOT_BEGUN
+    }
 }

@@ -25,7 +25,7 @@ use advance::Saver;
 use advance::Tally;
 pub(crate) use advance::{Beside, Ended};
 pub(crate) use assemble::{Making, assemble};
-pub(crate) use interrupt::STATUS as INTERRUPTED;
+pub(crate) use interrupt::{STATUS as INTERRUPTED, has_begun};
 pub(crate) use options::{AlgorithmOptions, Options, setting};
 use plan::{Plan, plan};
 pub(crate) use record::{Recorder, keep_results, select};

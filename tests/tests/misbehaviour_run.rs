@@ -326,7 +326,7 @@ fn an_fmu_that_ends_the_process_before_the_first_step_is_named_with_the_call() {
         for (deed, word) in ENDS {
             let fmu = CFmu::that(&format!("{deed} in {function}"));
             let run = Run::pair(&fmu, &["--set", "a.u=1"]);
-            assert_eq!(run.status, Some(1), "{}", run.message);
+            assert_eq!(run.status, Some(2), "{}", run.message);
             run.says(&["error: a at t = 0 s: ", function, word]);
         }
     }

@@ -76,6 +76,7 @@ impl<'a> Beside<'a> {
         simulation: &mut Simulation,
         mut watch: impl FnMut(&mut Simulation) -> Result<(), SystemError>,
     ) -> anyhow::Result<Ended> {
+        interrupt::begin();
         let begin = simulation.time();
         let mut progress = Progress::new(begin, self.stop);
         let interval = self.saver.and_then(|saver| saver.interval);

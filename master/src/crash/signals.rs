@@ -4,10 +4,11 @@
 //! `unpark`, which is an atomic exchange and one call of the kernel.
 #![expect(unsafe_code, reason = "signal handlers")]
 
+use std::cell::Cell;
 use std::io;
 use std::mem::MaybeUninit;
 use std::ptr::null_mut;
-use std::sync::atomic::{AtomicI32, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicI32, Ordering};
 use std::time::Duration;
 
 use libc::{c_int, c_void, siginfo_t};
@@ -28,8 +29,10 @@ const STACK: usize = 1 << 16;
 /// What is said where the program's last function cannot say more.
 const SHORT: &[u8] = b"error: an FMU crashed, and its crash cannot be reported in full\n";
 
-/// The thread that runs the program's last function.
-static KEEPER: AtomicUsize = AtomicUsize::new(0);
+thread_local! {
+    /// Whether this thread runs the program's last function.
+    static IS_KEEPER: Cell<bool> = const { Cell::new(false) };
+}
 
 /// The process that is watched: what an FMU forks is not.
 static PROCESS: AtomicI32 = AtomicI32::new(0);
@@ -42,12 +45,7 @@ fn is_forked() -> bool {
 
 /// The calling thread is the one that runs the program's last function.
 pub(super) fn keep() {
-    KEEPER.store(this_thread(), Ordering::Relaxed);
-}
-
-fn this_thread() -> usize {
-    // SAFETY: no conditions.
-    unsafe { libc::pthread_self() as usize }
+    IS_KEEPER.set(true);
 }
 
 /// Installs the handlers, for all threads; the calling one gets a stack for them. A file that grows
@@ -92,7 +90,7 @@ extern "C" fn on_signal(signal: c_int, _: *mut siginfo_t, _: *mut c_void) {
 
 /// Waits for the program's last function, which ends the process; it may itself have crashed.
 fn wait() -> ! {
-    if this_thread() != KEEPER.load(Ordering::Relaxed) {
+    if !IS_KEEPER.try_with(Cell::get).unwrap_or(false) {
         std::thread::sleep(PATIENCE + Duration::from_secs(1));
     }
     // SAFETY: `SHORT.len()` bytes to read.

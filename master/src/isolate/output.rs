@@ -40,7 +40,7 @@ impl Output {
 /// What is beyond the limit is read, so that the worker is not held up, and counted.
 fn pass_on(mut reader: PipeReader, instance: &str) {
     let (mut room, mut lost) = (MOST, 0_u64);
-    let mut bytes = [0; 1 << 16];
+    let mut bytes = vec![0; 1 << 16];
     loop {
         let count = match reader.read(&mut bytes) {
             Ok(0) => break,

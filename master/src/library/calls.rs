@@ -91,10 +91,10 @@ impl Component {
 
     /// `fmi2SetupExperiment`.
     pub(crate) fn setup_experiment(&mut self, e: &fmi2::Experiment) -> Result<(), CallError> {
+        const NAME: &str = "fmi2SetupExperiment";
         let (tolerance, stop) = (e.tolerance.unwrap_or(0.0), e.stop_time.unwrap_or(0.0));
         let (has_tolerance, has_stop) =
             (fmi2Boolean::from(e.tolerance.is_some()), fmi2Boolean::from(e.stop_time.is_some()));
-        const NAME: &str = "fmi2SetupExperiment";
         let function = function!(self.setup_experiment, NAME);
         self.place.set_time(e.start_time);
         // SAFETY: the instance is alive.

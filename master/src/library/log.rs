@@ -86,16 +86,13 @@ fn with_names(text: &str, name: &dyn Fn(char, u32) -> Option<String>) -> String 
             let kind = inner.chars().next().filter(|kind| "ribs".contains(*kind))?;
             Some((name(kind, inner[1..].parse().ok()?)?, after))
         });
-        match variable {
-            Some((name, after)) => {
-                done.push_str(&name);
-                rest = after;
-            }
-            None => {
-                done.push('#');
-                rest = after;
-            }
-        }
+        rest = if let Some((name, after)) = variable {
+            done.push_str(&name);
+            after
+        } else {
+            done.push('#');
+            after
+        };
     }
     done.push_str(rest);
     done
@@ -109,12 +106,12 @@ fn find(is_wanted: impl Fn(&Sink) -> bool) -> Option<Arc<Sink>> {
 
 /// A message with an environment that is no sink's: of the instance whose call this thread is in, or
 /// else of the instance of that name.
-fn hear_stranger(instance: Option<String>, status: c_int, category: &str, text: &str) {
+fn hear_stranger(instance: Option<&str>, status: c_int, category: &str, text: &str) {
     let sink = find(|sink| sink.place.is_at(last_of_this_thread()))
-        .or_else(|| find(|sink| Some(sink.place.instance()) == instance.as_deref()));
+        .or_else(|| find(|sink| Some(sink.place.instance()) == instance));
     match sink {
         Some(sink) => sink.hear(status, category, text),
-        None => say(instance.as_deref().unwrap_or("an FMU"), None, status, category, text),
+        None => say(instance.unwrap_or("an FMU"), None, status, category, text),
     }
 }
 
@@ -136,7 +133,7 @@ unsafe extern "C" fn master_receive(
     let text = unsafe { CStr::from_ptr(text) }.to_string_lossy();
     let Some(sink) = find(|sink| std::ptr::from_ref(sink).addr() == environment.addr()) else {
         let category = foreign::text(category).unwrap_or_default();
-        return hear_stranger(foreign::text(instance), status, &category, &text);
+        return hear_stranger(foreign::text(instance).as_deref(), status, &category, &text);
     };
     // SAFETY: of an FMU that does as the standard says: terminated or null.
     let category = unsafe { category.as_ref().map(|category| CStr::from_ptr(category)) };
