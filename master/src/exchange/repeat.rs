@@ -88,7 +88,7 @@ impl Reals {
     pub(crate) fn extrapolation_errors(&self, size: f64, errors: &mut [f64]) {
         for (output, error) in errors.iter_mut().enumerate() {
             let owner = self.layout.owners[output] as usize;
-            let mut known = self.known(owner, output, &self.trace.spans[owner]);
+            let mut known = self.known(owner, output, &self.trace.spans[owner], f64::INFINITY);
             known.size = size;
             *error = self.trace.latest[output] - known.extrapolated(self.course).end(size);
         }
