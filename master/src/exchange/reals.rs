@@ -231,14 +231,14 @@ impl Reals {
     }
 
     /// What is known of an output over the last step of its slave.
-    pub(super) fn known(&self, slave: usize, output: usize, span: &Span, end: f64) -> Known {
+    pub(super) fn known(&self, output: usize, span: &Span) -> Known {
         let (layout, trace) = (&self.layout, &self.trace);
         let derivative = |place: Option<u32>| place.map(|k| trace.begin_derivatives[k as usize]);
         Known {
             earlier: trace.earlier[output],
             before: trace.before[output],
             begin: trace.begin[output],
-            end: if self.assumes && !(span.stepped && self.sees_end(slave, span, end)) {
+            end: if self.assumes && !(span.stepped && self.sweep == Sweep::GaussSeidel) {
                 self.assumed[output]
             } else {
                 trace.latest[output]
@@ -255,7 +255,7 @@ impl Reals {
     fn polynomial(&self, slave: usize, output: usize, (time, size): (f64, f64)) -> Polynomial {
         let (layout, trace) = (&self.layout, &self.trace);
         let span = &trace.spans[layout.owners[output] as usize];
-        let known = self.known(slave, output, span, time + size);
+        let known = self.known(output, span);
         let course = if self.is_known(slave, output, time + size) {
             known.interpolated(self.course)
         } else {
