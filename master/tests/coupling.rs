@@ -278,6 +278,28 @@ fn a_function_is_computed_between_the_steps_whatever_the_order_of_the_slaves() {
 }
 
 #[test]
+fn a_function_of_a_slower_slave_gets_what_that_slave_has_reached_and_not_what_lies_ahead() {
+    // The slow one is x' = 3, the fast one x' = the sum of its own output and the slow one's.
+    let mut system = with_sum();
+    system.add("three", Integrator::boxed(1.0, 3.0, false)).unwrap();
+    system.connect("three.y", "constant.u").unwrap();
+    let mut algorithm = Algorithm::fixed(Sweep::Jacobi, Course::Hold, 0.5);
+    algorithm.multiples = vec![1, 1, 2, 1];
+    let mut simulation = Simulation::new(system, &algorithm, &Experiment::default()).unwrap();
+    let (mut x, mut slow) = (1.0, 2.0);
+    for step in 0..6 {
+        simulation.step().unwrap();
+        x += 0.5 * (x + slow);
+        if step % 2 == 1 {
+            slow += 3.0;
+        }
+        let mut found = [0.0];
+        simulation.system().slaves[1].1.get_real(&[2], &mut found).unwrap();
+        assert_eq!(found, [x], "{step}");
+    }
+}
+
+#[test]
 fn a_function_that_follows_the_course_of_its_inputs_reaches_the_values_of_the_end() {
     let mut simulation = start(with_sum(), (Sweep::GaussSeidel, Course::Linear), None);
     for _ in 0..3 {

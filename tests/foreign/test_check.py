@@ -130,6 +130,17 @@ def test_compression_that_importers_cannot_read_is_refused(aso_ftc, fmu):
         assert "expected compression by deflate, or none" in done.stderr, (name, done)
 
 
+def test_paths_with_backslashes_are_an_error_and_the_fmu_is_read_all_the_same(check, fmu, files):
+    name = library(files)
+    path = fmu({name: None, name.replace("/", "\\"): files[name]})
+    status, findings = check(path, "--no-run")
+    assert status == 1
+    found = the_one(findings, "archive", "backslashes")
+    assert found["severity"] == "error" and found["where"] == name.replace("/", "\\")
+    # The library is found: it is only its path that is wrong.
+    assert not [own for own in findings if own["part"] == "binaries" and own["severity"] == "error"]
+
+
 def test_stored_entries_of_a_stream_are_an_error(check, tmp_path, files):
     path = tmp_path / "Stream.fmu"
 

@@ -12,6 +12,9 @@ use crate::fault::FaultLine;
 use crate::slave::{Advance, CallError, Slave, Stepped};
 use crate::system::{Port, System};
 
+/// Part of a step by which times may miss each other: their rounding.
+const ROUNDING: f64 = 1e-9;
+
 /// The connected Reals of a system.
 #[derive(Debug)]
 pub(crate) struct Reals {
@@ -177,11 +180,11 @@ impl Reals {
     fn place(&mut self, slave: usize, k: usize, position: usize, time: f64, size: f64) {
         let (layout, lane) = (&self.layout, &self.layout.lanes[slave]);
         let source = layout.sources[k] as usize;
-        let known = self.is_known(slave, source);
+        let known = self.is_known(slave, source, time + size);
         let course = if layout.held[k] {
             Polynomial::held(self.trace.latest[source])
         } else {
-            self.polynomial(slave, source, time)
+            self.polynomial(slave, source, (time, size))
         };
         let value = match (lane.input_order, self.course) {
             (0, Course::Limited) if known => course.end(size),
@@ -216,26 +219,29 @@ impl Reals {
         }
     }
 
-    /// Whether the slave gets what an output reached in the current step, where its source has stepped.
-    fn sees_end(&self, slave: usize) -> bool {
-        self.sweep == Sweep::GaussSeidel || self.layout.functions[slave]
+    /// Whether the slave gets what its source reached in the current step, once that has stepped: in
+    /// Jacobi's method a function does, at the `end` of its step, where the source's step ends by then.
+    fn sees_end(&self, slave: usize, span: &Span, end: f64) -> bool {
+        let is_there = || span.begin + span.size <= end + ROUNDING * span.size;
+        self.sweep == Sweep::GaussSeidel || (self.layout.functions[slave] && is_there())
     }
 
-    /// Whether the source of that output has stepped beyond the begin of the current step, for `slave`.
-    fn is_known(&self, slave: usize, output: usize) -> bool {
-        let stepped = self.trace.spans[self.layout.owners[output] as usize].stepped;
-        self.assumes || (stepped && self.sees_end(slave))
+    /// Whether the source of that output has stepped beyond the begin of the current step, for a
+    /// `slave` that steps to `end`.
+    fn is_known(&self, slave: usize, output: usize, end: f64) -> bool {
+        let span = &self.trace.spans[self.layout.owners[output] as usize];
+        self.assumes || (span.stepped && self.sees_end(slave, span, end))
     }
 
     /// What is known of an output over the last step of its slave.
-    pub(super) fn known(&self, slave: usize, output: usize, span: &Span) -> Known {
+    pub(super) fn known(&self, output: usize, span: &Span) -> Known {
         let (layout, trace) = (&self.layout, &self.trace);
         let derivative = |place: Option<u32>| place.map(|k| trace.begin_derivatives[k as usize]);
         Known {
             earlier: trace.earlier[output],
             before: trace.before[output],
             begin: trace.begin[output],
-            end: if self.assumes && !(span.stepped && self.sees_end(slave)) {
+            end: if self.assumes && !(span.stepped && self.sweep == Sweep::GaussSeidel) {
                 self.assumed[output]
             } else {
                 trace.latest[output]
@@ -249,11 +255,11 @@ impl Reals {
     }
 
     /// The course of an output from `time` on.
-    fn polynomial(&self, slave: usize, output: usize, time: f64) -> Polynomial {
+    fn polynomial(&self, slave: usize, output: usize, (time, size): (f64, f64)) -> Polynomial {
         let (layout, trace) = (&self.layout, &self.trace);
         let span = &trace.spans[layout.owners[output] as usize];
-        let known = self.known(slave, output, span);
-        let course = if self.is_known(slave, output) {
+        let known = self.known(output, span);
+        let course = if self.is_known(slave, output, time + size) {
             known.interpolated(self.course)
         } else {
             known.extrapolated(self.course)

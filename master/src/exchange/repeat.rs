@@ -87,8 +87,8 @@ impl Reals {
     /// How far the extrapolation of each output over the last step of `size` s was off, into `errors`.
     pub(crate) fn extrapolation_errors(&self, size: f64, errors: &mut [f64]) {
         for (output, error) in errors.iter_mut().enumerate() {
-            let owner = self.layout.owners[output] as usize;
-            let mut known = self.known(owner, output, &self.trace.spans[owner]);
+            let span = &self.trace.spans[self.layout.owners[output] as usize];
+            let mut known = self.known(output, span);
             known.size = size;
             *error = self.trace.latest[output] - known.extrapolated(self.course).end(size);
         }

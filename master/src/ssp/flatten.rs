@@ -55,15 +55,11 @@ impl Side {
 
     /// How often values at the connector may change: never, before the run, or while it runs.
     fn rate(&self, as_source: bool) -> u32 {
-        use ConnectorKind::{CalculatedParameter, Constant, Parameter, StructuralParameter};
+        use ConnectorKind::{
+            CalculatedParameter, Constant, Parameter, StructuralParameter, Unspecified,
+        };
         match self.kind {
-            ConnectorKind::Unspecified => {
-                if as_source {
-                    0
-                } else {
-                    2
-                }
-            }
+            Unspecified if as_source => 0,
             Constant | StructuralParameter => 0,
             Parameter | CalculatedParameter => 1,
             _ => 2,

@@ -126,7 +126,7 @@ impl Opening {
         let ticks = |time: f64| (time / TICK).round();
         let multiple = (ticks(stated) / ticks(base)).floor().max(1.0);
         let step = multiple * base;
-        if ticks(step) != ticks(stated) {
+        if (ticks(step) - ticks(stated)).abs() >= 1.0 {
             self.files.warnings.push(format!(
                 "{at}: {} steps every {step} s, a multiple of the base step {base} s, instead of \
                  {stated} s",
@@ -248,13 +248,10 @@ impl Opening {
         let functions = &self.assembly.functions;
         let function = functions.iter().find(|(name, _)| *name == end.owner);
         let (_, function) = function.ok_or_else(|| format!("no function {:?}", end.owner))?;
-        match function.signal(&end.name) {
-            Some(causality) => Ok(causality == Causality::Output),
-            None => {
-                let names = format!("{}, ... or {}", function.input(0, 0), function.output(0));
-                Err(unknown(&names))
-            }
-        }
+        let causality = function.signal(&end.name).ok_or_else(|| {
+            unknown(&format!("{}, ... or {}", function.input(0, 0), function.output(0)))
+        })?;
+        Ok(causality == Causality::Output)
     }
 
     /// Makes links of linear transformations, and names what the functions lack.

@@ -150,8 +150,7 @@ fn content(name: &str) -> Option<(Names, &'static [&'static str])> {
             (&[&TRANSFORMATIONS, &COMMON], &["source", "target", "suppressUnitConversion"])
         }
         "ParameterSet" => (&[&["Parameters", "Enumerations", "Units"], &COMMON], &TOP),
-        "Parameter" => (&[&TYPES, &["Dimension"], &COMMON], &["name"]),
-        "DictionaryEntry" => (&[&TYPES, &["Dimension"], &COMMON], &["name"]),
+        "Parameter" | "DictionaryEntry" => (&[&TYPES, &["Dimension"], &COMMON], &["name"]),
         "Unit" => (&[&["BaseUnit"], &COMMON], &["name"]),
         "Enumeration" => (&[&["Item"], &["Value"], &COMMON], &["name", "value"]),
         "DefaultExperiment" => (&[&COMMON], &["startTime", "stopTime"]),

@@ -45,15 +45,15 @@ fn signal(function: &str, name: &str) -> String {
     format!(r#"<Signal function="{function}" name="{name}"/>"#)
 }
 
-fn connection(kind: &str, ends: [String; 2]) -> String {
+fn connection(kind: &str, ends: &[String; 2]) -> String {
     format!("<{kind}Connection>{}</{kind}Connection>", ends.concat())
 }
 
 #[test]
 fn simulators_initial_values_and_times_are_read_and_connections_run_from_outputs_to_inputs() {
     let bench = bench();
-    let connections = connection("Variable", [variable("a", "y"), variable("b", "y")])
-        + &connection("Variable", [variable("a", "v"), variable("b", "v")]);
+    let connections = connection("Variable", &[variable("a", "y"), variable("b", "y")])
+        + &connection("Variable", &[variable("a", "v"), variable("b", "v")]);
     let path = bench.file("OspSystemStructure.xml", osp(PAIR, "", &connections));
     for path in [path, bench.path("")] {
         let opened = open(&path).unwrap();
@@ -73,10 +73,10 @@ fn simulators_initial_values_and_times_are_read_and_connections_run_from_outputs
 fn functions_are_linear_connections_and_sums() {
     let functions = r#"<LinearTransformation name="f" factor="0.1" offset="2"/>
 <Sum name="s" inputCount="2"/>"#;
-    let connections = connection("Signal", [variable("a", "y"), signal("f", "in")])
-        + &connection("Signal", [signal("f", "out"), variable("b", "y")])
-        + &connection("Signal", [variable("a", "y"), signal("s", "in[1]")])
-        + &connection("Signal", [variable("b", "n"), signal("s", "out")]);
+    let connections = connection("Signal", &[variable("a", "y"), signal("f", "in")])
+        + &connection("Signal", &[signal("f", "out"), variable("b", "y")])
+        + &connection("Signal", &[variable("a", "y"), signal("s", "in[1]")])
+        + &connection("Signal", &[variable("b", "n"), signal("s", "out")]);
     let bench = bench();
     let path = bench.file("System.xml", osp(PAIR, functions, &connections));
     let opened = open(&path).unwrap();
@@ -95,8 +95,8 @@ fn groups_beside_the_fmu_or_the_structure_are_connected_in_their_order_at_any_de
     let group = |simulator: &str, name: &str| {
         format!(r#"<VariableGroup simulator="{simulator}" name="{name}"/>"#)
     };
-    let port = connection("VariableGroup", [group("b", "port"), group("a", "port")]);
-    let inner = connection("VariableGroup", [group("a", "inner"), group("b", "inner")]);
+    let port = connection("VariableGroup", &[group("b", "port"), group("a", "port")]);
+    let inner = connection("VariableGroup", &[group("a", "inner"), group("b", "inner")]);
     for (connections, expected) in
         [(&port, &["a.y -> b.y", "b.v -> a.v"][..]), (&inner, &["a.y -> b.y"])]
     {
@@ -104,8 +104,8 @@ fn groups_beside_the_fmu_or_the_structure_are_connected_in_their_order_at_any_de
         assert_eq!(links(&open(&path).unwrap().assembly), expected);
     }
     let signals = |name: &str| format!(r#"<SignalGroup function="s" name="{name}"/>"#);
-    let connections = connection("SignalGroup", [group("a", "both"), signals("in[0]")])
-        + &connection("SignalGroup", [signals("out"), group("b", "both")]);
+    let connections = connection("SignalGroup", &[group("a", "both"), signals("in[0]")])
+        + &connection("SignalGroup", &[signals("out"), group("b", "both")]);
     let functions = r#"<VectorSum name="s" inputCount="1" dimension="2"/>"#;
     let path = bench.file("System.xml", osp(PAIR, functions, &connections));
     let expected = ["a.y -> s.in[0][0]", "a.n -> s.in[0][1]", "s.out[0] -> b.y", "s.out[1] -> b.n"];
@@ -117,9 +117,10 @@ fn what_cannot_be_followed_is_refused_with_its_place() {
     let bench = bench();
     let group = |simulator: &str| format!(r#"<VariableGroup simulator="{simulator}" name="g"/>"#);
     let sum = r#"<Sum name="s" inputCount="2"/>"#;
-    let variables = |a: &str, b: &str| connection("Variable", [variable("a", a), variable("b", b)]);
+    let variables =
+        |a: &str, b: &str| connection("Variable", &[variable("a", a), variable("b", b)]);
     let on = |function: &str, name: &str| {
-        connection("Signal", [variable("a", "y"), signal(function, name)])
+        connection("Signal", &[variable("a", "y"), signal(function, name)])
     };
     for (functions, connections, expected) in [
         ("", variables("y", "none"), "line 9, column 14: the FMU has no variable b.none"),
@@ -133,7 +134,7 @@ fn what_cannot_be_followed_is_refused_with_its_place() {
         ),
         (
             "",
-            connection("VariableGroup", [group("a"), group("b")]),
+            connection("VariableGroup", &[group("a"), group("b")]),
             "line 9, column 14: a has no variable group \"g\", expected one in a_OspModelDescription.xml beside its FMU or beside the system structure",
         ),
         (

@@ -160,17 +160,16 @@ impl Files {
         file: &File,
         component: Option<&Base>,
     ) -> Result<Rc<ParameterSet>, Missing> {
-        match wanted(source, file, component)? {
-            Wanted::Inline(content) => Ok(Rc::new(content)),
-            Wanted::File(target) => match self.values.get(&target.path) {
-                Some(known) => Ok(known.clone()),
-                None => {
-                    let content = Rc::new(self.read(&target, read::ssv).map_err(Missing::Content)?);
-                    self.values.insert(target.path, content.clone());
-                    Ok(content)
-                }
-            },
+        let target = match wanted(source, file, component)? {
+            Wanted::Inline(content) => return Ok(Rc::new(content)),
+            Wanted::File(target) => target,
+        };
+        if let Some(known) = self.values.get(&target.path) {
+            return Ok(known.clone());
         }
+        let content = Rc::new(self.read(&target, read::ssv).map_err(Missing::Content)?);
+        self.values.insert(target.path, content.clone());
+        Ok(content)
     }
 
     pub(super) fn mapping(
@@ -179,17 +178,16 @@ impl Files {
         file: &File,
         component: Option<&Base>,
     ) -> Result<Rc<ParameterMapping>, Missing> {
-        match wanted(source, file, component)? {
-            Wanted::Inline(content) => Ok(Rc::new(content)),
-            Wanted::File(target) => match self.mappings.get(&target.path) {
-                Some(known) => Ok(known.clone()),
-                None => {
-                    let content = Rc::new(self.read(&target, read::ssm).map_err(Missing::Content)?);
-                    self.mappings.insert(target.path, content.clone());
-                    Ok(content)
-                }
-            },
+        let target = match wanted(source, file, component)? {
+            Wanted::Inline(content) => return Ok(Rc::new(content)),
+            Wanted::File(target) => target,
+        };
+        if let Some(known) = self.mappings.get(&target.path) {
+            return Ok(known.clone());
         }
+        let content = Rc::new(self.read(&target, read::ssm).map_err(Missing::Content)?);
+        self.mappings.insert(target.path, content.clone());
+        Ok(content)
     }
 
     /// The content of a file; what is odd about it becomes a warning.
