@@ -75,10 +75,13 @@ impl<'a> Instant<'a> {
         [Regime::Forward, Regime::Backward].into_iter().find(leaves).unwrap_or(Regime::Stick)
     }
 
-    /// Whether a sliding cart has stopped, as event mode sees it.
+    /// Whether a sliding cart has stopped, as event mode sees it: a slow one would not leave its rest
+    /// in this direction.
+    ///
+    /// The acceleration of the indicator is not asked: at an event it may have either sign.
     fn has_stopped(&self) -> bool {
-        let [velocity, acceleration] = self.sliding();
-        velocity <= -REST || (velocity <= LANDING && acceleration <= 0.0)
+        let [velocity, _] = self.sliding();
+        velocity <= -REST || (velocity <= LANDING && self.regime_at_rest() != self.motion.regime)
     }
 }
 

@@ -106,3 +106,16 @@ fn an_event_for_another_reason_leaves_a_moving_cart_alone() {
         }
     }
 }
+
+#[test]
+fn a_stop_found_where_the_acceleration_changes_its_sign_is_a_stop_at_either_side() {
+    let p = sliding_block(MASS, LEVEL);
+    for (excess, due) in [(1e-9, false), (1e-14, false), (-1e-14, true), (-1e-9, true)] {
+        let mut motion = sliding_at(&p, 1e-13);
+        let force = LEVEL + excess;
+        assert_eq!(is_due(&motion, &p, force), due, "{excess}");
+        assert!(motion.settle(&p, force), "{excess}");
+        assert_eq!((motion.regime(), motion.state()[2].to_bits()), (Regime::Stick, 0));
+        assert!(!is_due(&motion, &p, force) && !motion.settle(&p, force));
+    }
+}
