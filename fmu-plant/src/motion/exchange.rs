@@ -27,9 +27,9 @@ const REST: f64 = 1e-8 * NOMINAL_VELOCITY;
 /// The same in event mode: the importer may have located the stop a little too early.
 const LANDING: f64 = 10.0 * REST;
 
-/// How far the force on a held cart exceeds the static friction at its break-away, as part of
-/// the static friction.
-const EXCESS: f64 = 1e-8;
+/// How far the force on a held cart exceeds the static friction at its break-away, as part of the
+/// static friction: more than an importer's integration errors, which would free the cart at once.
+const EXCESS: f64 = 1e-6;
 
 /// The plant at an instant as an importer sees it.
 struct Instant<'a> {

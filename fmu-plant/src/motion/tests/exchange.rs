@@ -63,9 +63,9 @@ fn a_break_away_located_a_little_early_happens_and_goes_on() {
     let held = start(&p, [0.0; 4], &Force::constant(0.0));
     for direction in [1.0, -1.0] {
         for (excess, due, breaks) in [
-            (1e-9, false, false),
-            (0.999e-8, false, true),
-            (1.001e-8, true, true),
+            (1e-7, false, false),
+            (0.999e-6, false, true),
+            (1.001e-6, true, true),
             (1.0, true, true),
         ] {
             let mut motion = held.clone();
