@@ -27,9 +27,9 @@ const REST: f64 = 1e-8 * NOMINAL_VELOCITY;
 /// The same in event mode: the importer may have located the stop a little too early.
 const LANDING: f64 = 10.0 * REST;
 
-/// How far the force on a held cart exceeds the static friction at its break-away, as part of
-/// the static friction.
-const EXCESS: f64 = 1e-8;
+/// How far the force on a held cart exceeds the static friction at its break-away, as part of the
+/// static friction: more than an importer's integration errors, which would free the cart at once.
+const EXCESS: f64 = 1e-6;
 
 /// The plant at an instant as an importer sees it.
 struct Instant<'a> {
@@ -75,10 +75,13 @@ impl<'a> Instant<'a> {
         [Regime::Forward, Regime::Backward].into_iter().find(leaves).unwrap_or(Regime::Stick)
     }
 
-    /// Whether a sliding cart has stopped, as event mode sees it.
+    /// Whether a sliding cart has stopped, as event mode sees it: a slow one would not leave its rest
+    /// in this direction.
+    ///
+    /// The acceleration of the indicator is not asked: at an event it may have either sign.
     fn has_stopped(&self) -> bool {
-        let [velocity, acceleration] = self.sliding();
-        velocity <= -REST || (velocity <= LANDING && acceleration <= 0.0)
+        let [velocity, _] = self.sliding();
+        velocity <= -REST || (velocity <= LANDING && self.regime_at_rest() != self.motion.regime)
     }
 }
 

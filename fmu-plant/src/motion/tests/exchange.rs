@@ -63,9 +63,9 @@ fn a_break_away_located_a_little_early_happens_and_goes_on() {
     let held = start(&p, [0.0; 4], &Force::constant(0.0));
     for direction in [1.0, -1.0] {
         for (excess, due, breaks) in [
-            (1e-9, false, false),
-            (0.999e-8, false, true),
-            (1.001e-8, true, true),
+            (1e-7, false, false),
+            (0.999e-6, false, true),
+            (1.001e-6, true, true),
             (1.0, true, true),
         ] {
             let mut motion = held.clone();
@@ -104,5 +104,18 @@ fn an_event_for_another_reason_leaves_a_moving_cart_alone() {
             let before = motion.clone();
             assert!(!motion.settle(&p, force) && motion == before, "{velocity} {force}");
         }
+    }
+}
+
+#[test]
+fn a_stop_found_where_the_acceleration_changes_its_sign_is_a_stop_at_either_side() {
+    let p = sliding_block(MASS, LEVEL);
+    for (excess, due) in [(1e-9, false), (1e-14, false), (-1e-14, true), (-1e-9, true)] {
+        let mut motion = sliding_at(&p, 1e-13);
+        let force = LEVEL + excess;
+        assert_eq!(is_due(&motion, &p, force), due, "{excess}");
+        assert!(motion.settle(&p, force), "{excess}");
+        assert_eq!((motion.regime(), motion.state()[2].to_bits()), (Regime::Stick, 0));
+        assert!(!is_due(&motion, &p, force) && !motion.settle(&p, force));
     }
 }
