@@ -123,7 +123,7 @@ impl Run {
         let experiment = Experiment { start_time: 0.0, stop_time, tolerance: None };
         let mut simulation = Simulation::new(system, algorithm, &experiment)?;
         let (file, every) = (options.out.join(RESULTS), options.record_every);
-        let recorder = Recorder::create(&file, simulation.system(), &ports, every, 0.0)?;
+        let recorder = Recorder::create(&file, &mut simulation, &ports, every, 0.0)?;
         Ok(Self { simulation, recorder, watch })
     }
 

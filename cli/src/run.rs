@@ -8,6 +8,7 @@ mod options;
 mod plan;
 mod progress;
 mod record;
+mod resume;
 mod saved;
 
 use std::path::{Path, PathBuf};
@@ -94,7 +95,10 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Prepared>> {
     if let Some(early) = simulation.early_end() {
         tracing::warn!("{early}");
     }
-    let mut recorder = Recorder::create(file, simulation.system(), &ports, plan.every, start)?;
+    let mut recorder = Recorder::create(file, &mut simulation, &ports, plan.every, start)?;
+    if let (Some(recorder), Some(saved)) = (&mut recorder, &saved) {
+        recorder.restore(&mut simulation, saved.slow())?;
+    }
     let due = saved.as_ref().and_then(|saved| saved.due(plan.every));
     if let (Some(recorder), Some(due)) = (&mut recorder, due) {
         recorder.set_due(due);
@@ -120,12 +124,10 @@ fn begin(
     saved: Option<&Saved>,
 ) -> anyhow::Result<Simulation> {
     let Plan { algorithm, experiment, .. } = plan;
-    Ok(match saved {
-        Some(saved) => {
-            Simulation::resume(system, algorithm, experiment, scenario, saved.checkpoint())?
-        }
-        None => Simulation::with_scenario(system, algorithm, experiment, scenario)?,
-    })
+    let Some(saved) = saved else {
+        return Ok(Simulation::with_scenario(system, algorithm, experiment, scenario)?);
+    };
+    resume::resume(system, plan, scenario, saved.checkpoint())
 }
 
 /// What is done to the system while it runs.
@@ -231,11 +233,17 @@ impl Prepared {
         let status = match &ended {
             Ended::AtStop => 0,
             Ended::ByFmu(name) => {
-                tracing::warn!("{name} asked for the end of the simulation at t = {time} s");
+                let asked = self.simulation.ended_at().unwrap_or(time);
+                let ending = apart(asked, time);
+                tracing::warn!(
+                    "{name} asked for the end of the simulation at t = {asked} s{ending}"
+                );
                 0
             }
             Ended::Interrupted => {
-                tracing::error!("the run was interrupted at t = {time} s");
+                let more = self.saver.as_ref().map(|saver| resume::hint(&saver.path, &self.here));
+                let more = more.unwrap_or_default();
+                tracing::error!("the run was interrupted at t = {time} s{more}");
                 interrupt::STATUS
             }
             Ended::Lost(error) => {
@@ -275,4 +283,15 @@ impl Prepared {
         }
         Ok(())
     }
+}
+
+/// Where results end before the time at which an FMU asked for the end, all in s.
+fn apart(asked: f64, end: f64) -> String {
+    if asked <= end {
+        return String::new();
+    }
+    format!(
+        "; the results end at t = {end} s, the last time that all FMUs have in common (with \
+         --rollback, which needs FMUs that can go back, they end at {asked} s)"
+    )
 }

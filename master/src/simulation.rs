@@ -30,6 +30,7 @@ use sweep::{Groups, Swept};
 use together::any_in_background;
 
 pub use checkpoint::Checkpoint;
+use checkpoint::Origin;
 pub use grid::EarlyEnd;
 pub(crate) use parallel::Task;
 
@@ -41,6 +42,7 @@ pub struct Simulation {
     order: Order,
     grid: Grid,
     early_end: Option<EarlyEnd>,
+    origin: Origin,
     control: Control,
     coupled: Option<Coupled>,
     repetition: Repetition,
@@ -57,8 +59,8 @@ pub struct Simulation {
     passes: bool,
     /// Whether some slaves step in the background.
     background: bool,
-    /// The slave that asked for the end of the simulation.
-    ended: Option<usize>,
+    /// The slave that asked for the end of the simulation, and when.
+    ended: Option<(usize, f64)>,
 }
 
 impl Simulation {
@@ -82,14 +84,28 @@ impl Simulation {
     ///
     /// Those of [`Simulation::new`]; where a fault is on no connection.
     pub fn with_scenario(
+        system: System,
+        algorithm: &Algorithm,
+        experiment: &Experiment,
+        scenario: Prepared,
+    ) -> Result<Self, SystemError> {
+        Self::begin(system, algorithm, experiment, experiment.stop_time, scenario)
+    }
+
+    /// As [`Simulation::with_scenario`], to end at the time `stop`; the slaves are told the one of
+    /// `experiment`.
+    fn begin(
         mut system: System,
         algorithm: &Algorithm,
         experiment: &Experiment,
+        stop: Option<f64>,
         mut scenario: Prepared,
     ) -> Result<Self, SystemError> {
         algorithm.check(&system)?;
         let multiples = grid::multiples(&system, algorithm)?;
-        let (grid, early_end) = Grid::new(&system, algorithm, &multiples, experiment)?;
+        let span = (experiment.start_time, stop);
+        let (grid, early_end) = Grid::new(&system, algorithm.step, &multiples, span)?;
+        let origin = Origin::new(&system, algorithm, experiment);
         let mut exchange = Exchange::new(&system, algorithm);
         let order = by_direct_dependencies(&system);
         exchange.set_faults(&system, &scenario.faults)?;
@@ -117,6 +133,7 @@ impl Simulation {
             order,
             grid,
             early_end,
+            origin,
             control,
             coupled,
             repetition: Repetition::default(),
@@ -145,13 +162,32 @@ impl Simulation {
     /// The FMU that asked for the end of the simulation (`fmi2Terminated`).
     #[must_use]
     pub fn ended_by(&self) -> Option<&str> {
-        self.ended.map(|slave| self.system.slaves[slave].0.as_str())
+        self.ended.map(|(slave, _)| self.system.slaves[slave].0.as_str())
+    }
+
+    /// The time in s for which it asked. It is later than [`Simulation::time`] where other FMUs have
+    /// gone beyond it and cannot go back: the run then ends at the last communication point, and
+    /// what the FMUs give is of different times.
+    #[must_use]
+    pub fn ended_at(&self) -> Option<f64> {
+        self.ended.map(|(_, time)| time)
     }
 
     /// Why the run ends before its stop time, if it does.
     #[must_use]
     pub fn early_end(&self) -> Option<&EarlyEnd> {
         self.early_end.as_ref()
+    }
+
+    /// The slaves that make several steps at once.
+    pub(crate) fn slow_slaves(&self) -> impl Iterator<Item = usize> {
+        (0..self.multiples.len()).filter(|&slave| self.multiples[slave] != 1)
+    }
+
+    /// Begin and end in s of the last step of a slave that has gone beyond [`Simulation::time`], as it
+    /// makes several steps at once.
+    pub(crate) fn step_beyond(&self, slave: usize) -> Option<(f64, f64)> {
+        self.exchange.reals.beyond(slave, self.grid.time)
     }
 
     /// The order of stepping.
@@ -172,6 +208,7 @@ impl Simulation {
     /// Where an FMU does not finish the step or an output is not finite; the simulation then
     /// stands at the begin of the step in some slaves and at its end in others.
     pub fn step(&mut self) -> Result<(), SystemError> {
+        let begin = self.grid.time;
         let swept = match (self.events.take(), self.control.kind) {
             (None, StepControl::Fixed) if !self.repeats => {
                 let (end, size) = self.grid.next();
@@ -191,22 +228,34 @@ impl Simulation {
             }
         };
         if let Some((slave, reached)) = swept.terminated {
-            self.ended = Some(slave);
-            self.grid.time = reached;
+            self.end_early(slave, (begin, reached));
         }
-        self.exchange.commit(self.grid.time);
-        self.drives.commit(self.grid.time);
+        if self.grid.time > begin {
+            self.exchange.commit(self.grid.time);
+            self.drives.commit(self.grid.time);
+        }
         Ok(())
     }
 
-    /// Where the next step would end; steps that are not fixed end where a signal bends.
+    /// A slave asked for the end at the time that it reached in the step from `begin`. The time of the
+    /// run is then that of all slaves: the one reached where all could end there, else `begin`.
+    #[cold]
+    fn end_early(&mut self, slave: usize, (begin, reached): (f64, f64)) {
+        self.ended = Some((slave, reached));
+        let alone = self.system.slaves.len() == 1;
+        self.grid.time = if alone || self.repeats { reached } else { begin };
+    }
+
+    /// Where the next step would end; steps that are not fixed end where a signal bends and where a
+    /// fault begins or ends.
     fn planned(&self) -> f64 {
         if self.control.kind == StepControl::Fixed {
             return self.grid.next().0;
         }
         let end = self.grid.end_of(self.control.size);
         let least = self.grid.time + 1e-9 * self.control.size;
-        self.drives.next_break(least).map_or(end, |bend| end.min(bend))
+        let breaks = [self.drives.next_break(least), self.exchange.next_break(least)];
+        breaks.into_iter().flatten().fold(end, f64::min)
     }
 
     /// A step from `time` to `end` or, where it cannot or must not be as long, not as far.
@@ -230,6 +279,10 @@ impl Simulation {
         let limit = next.unwrap_or(planned);
         self.watch(events, time)?;
         let (mut end, mut swept) = self.stretch(time, limit)?;
+        if swept.terminated.is_some() {
+            self.grid.reach(end);
+            return Ok(swept);
+        }
         let crossing = self.locate(events, time, end)?;
         let happened = crossing.is_some() || (next.is_some() && end >= limit);
         if let Some(crossing) = crossing {

@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::Context;
 use fmi2::description::{Causality, Kind};
 use master::results::{self, Column, ColumnKind, Decimation, Due, Row, Selection, Sink};
-use master::{Port, Readout, Simulation, System};
+use master::{Port, Readout, Simulation, SlowState, SlowValues, System};
 
 use crate::config::Every;
 
@@ -14,13 +14,14 @@ pub(crate) struct Recorder {
     sink: Box<dyn Sink>,
     due: Due,
     readout: Readout,
+    slow: SlowValues,
 }
 
 impl Recorder {
     /// A recorder of `ports` into the file at `path`; none where nothing is to be recorded.
     pub(crate) fn create(
         path: &Path,
-        system: &System,
+        simulation: &mut Simulation,
         ports: &[Port],
         every: Every,
         start: f64,
@@ -30,9 +31,11 @@ impl Recorder {
             Every::Step => Decimation::All,
             Every::Seconds(seconds) => Decimation::Every(seconds),
         };
+        let slow = SlowValues::new(simulation, ports);
+        let system = simulation.system();
         let columns: Vec<_> = ports.iter().map(|&port| column(system, port)).collect();
         let (due, readout) = (Due::new(decimation, start), Readout::new(system, ports));
-        Ok(Some(Self { sink: results::create(path, &columns)?, due, readout }))
+        Ok(Some(Self { sink: results::create(path, &columns)?, due, readout, slow }))
     }
 
     /// Goes on with the rows of a run that was resumed.
@@ -49,11 +52,32 @@ impl Recorder {
     #[inline]
     pub(crate) fn sample(&mut self, simulation: &mut Simulation) -> anyhow::Result<()> {
         let time = simulation.time();
-        if self.due.at(time) { self.record(simulation.system(), time) } else { Ok(()) }
+        if self.due.at(time) { self.record(simulation, time) } else { Ok(()) }
     }
 
-    fn record(&mut self, system: &mut System, time: f64) -> anyhow::Result<()> {
-        self.readout.read(system, time)?;
+    /// Before a step: see [`SlowValues::before_step`].
+    #[inline]
+    pub(crate) fn before_step(&mut self, simulation: &mut Simulation) -> anyhow::Result<()> {
+        Ok(self.slow.before_step(simulation)?)
+    }
+
+    /// What a checkpoint holds of the recording.
+    pub(crate) fn slow_state(&self, simulation: &mut Simulation) -> SlowState {
+        self.slow.state(simulation.system())
+    }
+
+    /// Goes on with the recording of a run that was resumed.
+    pub(crate) fn restore(
+        &mut self,
+        simulation: &mut Simulation,
+        state: &SlowState,
+    ) -> anyhow::Result<()> {
+        Ok(self.slow.restore(simulation, state)?)
+    }
+
+    fn record(&mut self, simulation: &mut Simulation, time: f64) -> anyhow::Result<()> {
+        self.readout.read(simulation.system(), time)?;
+        self.slow.apply(simulation, &mut self.readout);
         let Readout { reals, integers, booleans, strings, .. } = &self.readout;
         Ok(self.sink.row(time, &Row { reals, integers, booleans, strings })?)
     }
