@@ -88,27 +88,19 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Prepared>> {
     }
     warn_of_loop(&plan, &system);
     let units = units(&system, &ports);
-    let start = plan.experiment.start_time;
     let file = results_file(&config)?;
     interrupt::listen()?;
     let mut simulation = begin(system, &plan, scenario, saved.as_ref())?;
     if let Some(early) = simulation.early_end() {
         tracing::warn!("{early}");
     }
-    let mut recorder = Recorder::create(file, &mut simulation, &ports, plan.every, start)?;
-    if let (Some(recorder), Some(saved)) = (&mut recorder, &saved) {
-        recorder.restore(&mut simulation, saved.slow())?;
-    }
-    let due = saved.as_ref().and_then(|saved| saved.due(plan.every));
-    if let (Some(recorder), Some(due)) = (&mut recorder, due) {
-        recorder.set_due(due);
-    }
+    let (recorder, resumed) = record(&mut simulation, file, &ports, &plan, saved.as_ref())?;
     Ok(Some(Prepared {
         simulation,
         recorder,
         saver: saver(&config, text, plan.every),
         stop: plan.stop,
-        resumed: due.is_some(),
+        resumed,
         config,
         here,
         units,
@@ -128,6 +120,26 @@ fn begin(
         return Ok(Simulation::with_scenario(system, algorithm, experiment, scenario)?);
     };
     resume::resume(system, plan, scenario, saved.checkpoint())
+}
+
+/// The recorder, and whether it goes on with the rows of the checkpoint.
+fn record(
+    simulation: &mut Simulation,
+    file: &Path,
+    ports: &[Port],
+    plan: &Plan,
+    saved: Option<&Saved>,
+) -> anyhow::Result<(Option<Recorder>, bool)> {
+    let start = plan.experiment.start_time;
+    let mut recorder = Recorder::create(file, simulation, ports, plan.every, start)?;
+    let due = saved.and_then(|saved| saved.due(plan.every));
+    if let (Some(recorder), Some(saved)) = (&mut recorder, saved) {
+        recorder.restore(simulation, saved.slow())?;
+        if let Some(due) = due {
+            recorder.set_due(due);
+        }
+    }
+    Ok((recorder, due.is_some()))
 }
 
 /// What is done to the system while it runs.

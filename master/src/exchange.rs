@@ -32,8 +32,6 @@ pub(crate) struct Exchange {
     strings: Channel<String>,
     /// Whether there are connections of other types than Real.
     discrete: bool,
-    /// Whether some slaves make several steps at once.
-    several: bool,
     allow_nan: bool,
     /// Whether there are faults on connections.
     faulty: bool,
@@ -76,8 +74,7 @@ impl Exchange {
             && booleans.latest.is_empty()
             && strings.latest.is_empty());
         let allow_nan = algorithm.allow_nan;
-        let several = algorithm.multiples.iter().any(|&multiple| multiple != 1);
-        Self { reals, integers, booleans, strings, discrete, several, allow_nan, faulty: false }
+        Self { reals, integers, booleans, strings, discrete, allow_nan, faulty: false }
     }
 
     /// Puts faults on connections, by their inputs.
@@ -134,7 +131,7 @@ impl Exchange {
     /// Before a step of `slave` from `time` over `size`: what it reached is where it begins.
     pub(crate) fn shift(&mut self, slave: usize, time: f64, size: f64) {
         self.reals.shift(slave, time, size);
-        if self.several && self.discrete {
+        if self.discrete && self.reals.several {
             self.integers.shift(slave);
             self.booleans.shift(slave);
             self.strings.shift(slave);

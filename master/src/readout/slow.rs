@@ -38,8 +38,11 @@ struct Place {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SlowState {
     names: Vec<String>,
-    values: Vec<(Vec<f64>, Vec<i32>, Vec<i32>, Vec<String>)>,
+    values: Vec<Begins>,
 }
+
+/// Those of one slave, by type.
+type Begins = (Vec<f64>, Vec<i32>, Vec<i32>, Vec<String>);
 
 impl SlowValues {
     /// For a [`Readout`] of `ports`.
