@@ -110,15 +110,7 @@ impl Simulation {
         let order = by_direct_dependencies(&system);
         exchange.set_faults(&system, &scenario.faults)?;
         initial::initialise(&mut system, experiment, &mut scenario)?;
-        for slave in 0..system.slaves.len() {
-            exchange.read(&mut system, slave, experiment.start_time)?;
-        }
-        if algorithm.course == Course::Quadratic {
-            let first = (experiment.start_time, algorithm.step);
-            exchange.derive_at_start(&mut system, first)?;
-        }
-        exchange.reals.forget();
-        exchange.commit(experiment.start_time);
+        read_at_start(&mut system, &mut exchange, algorithm, experiment.start_time)?;
         scenario.drives.commit(experiment.start_time);
         let groups = Groups::new(&system, algorithm.sweep, &order);
         let control = Control::new(&system, &exchange.reals, algorithm)?;
@@ -329,4 +321,22 @@ impl Simulation {
         }
         first
     }
+}
+
+/// Reads all connected outputs at the time `start` in s, which have no past.
+fn read_at_start(
+    system: &mut System,
+    exchange: &mut Exchange,
+    algorithm: &Algorithm,
+    start: f64,
+) -> Result<(), SystemError> {
+    for slave in 0..system.slaves.len() {
+        exchange.read(system, slave, start)?;
+    }
+    if algorithm.course == Course::Quadratic {
+        exchange.derive_at_start(system, (start, algorithm.step))?;
+    }
+    exchange.reals.forget();
+    exchange.commit(start);
+    Ok(())
 }
