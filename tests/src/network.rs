@@ -161,9 +161,7 @@ impl Network {
             readout.read(simulation.system(), time)?;
             slow.apply(&simulation, &mut readout);
             let found = DVector::from_column_slice(&readout.reals);
-            let error = (found - exact).iter().fold(0.0, |most: f64, part| {
-                if part.is_nan() { f64::INFINITY } else { most.max(part.abs()) }
-            });
+            let error = largest(&(found - exact));
             // A slave with a step of its own is on its way.
             if !run.points.is_multiple_of(common) {
                 run.between = run.between.max(if time > 0.5 * stop { error } else { 0.0 });
@@ -177,4 +175,11 @@ impl Network {
         run.calls = calls.load(Ordering::Relaxed);
         Ok(run)
     }
+}
+
+/// The largest magnitude; infinity where one is no number.
+fn largest(errors: &DVector<f64>) -> f64 {
+    errors.iter().fold(0.0, |most: f64, part| {
+        if part.is_nan() { f64::INFINITY } else { most.max(part.abs()) }
+    })
 }
