@@ -8,6 +8,7 @@ mod options;
 mod plan;
 mod progress;
 mod record;
+mod resume;
 mod saved;
 
 use std::path::{Path, PathBuf};
@@ -103,23 +104,18 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Prepared>> {
     }
     warn_of_loop(&plan, &system);
     let units = units(&system, &ports);
-    let start = plan.experiment.start_time;
     let file = results_file(&config)?;
     let mut simulation = begin(system, &plan, scenario, saved.as_ref())?;
     if let Some(early) = simulation.early_end() {
         tracing::warn!("{early}");
     }
-    let mut recorder = Recorder::create(file, &mut simulation, &ports, plan.every, start)?;
-    let due = saved.as_ref().and_then(|saved| saved.due(plan.every));
-    if let (Some(recorder), Some(due)) = (&mut recorder, due) {
-        recorder.set_due(due);
-    }
+    let (recorder, resumed) = record(&mut simulation, file, &ports, &plan, saved.as_ref())?;
     Ok(Some(Prepared {
         simulation,
         recorder,
         saver: saver(&config, text, plan.every),
         stop: plan.stop,
-        resumed: due.is_some(),
+        resumed,
         config,
         here,
         units,
@@ -139,12 +135,30 @@ fn begin(
     saved: Option<&Saved>,
 ) -> anyhow::Result<Simulation> {
     let Plan { algorithm, experiment, .. } = plan;
-    Ok(match saved {
-        Some(saved) => {
-            Simulation::resume(system, algorithm, experiment, scenario, saved.checkpoint())?
+    let Some(saved) = saved else {
+        return Ok(Simulation::with_scenario(system, algorithm, experiment, scenario)?);
+    };
+    resume::resume(system, plan, scenario, saved.checkpoint())
+}
+
+/// The recorder, and whether it goes on with the rows of the checkpoint.
+fn record(
+    simulation: &mut Simulation,
+    file: &Path,
+    ports: &[Port],
+    plan: &Plan,
+    saved: Option<&Saved>,
+) -> anyhow::Result<(Option<Recorder>, bool)> {
+    let start = plan.experiment.start_time;
+    let mut recorder = Recorder::create(file, simulation, ports, plan.every, start)?;
+    let due = saved.and_then(|saved| saved.due(plan.every));
+    if let (Some(recorder), Some(saved)) = (&mut recorder, saved) {
+        recorder.restore(simulation, saved.slow())?;
+        if let Some(due) = due {
+            recorder.set_due(due);
         }
-        None => Simulation::with_scenario(system, algorithm, experiment, scenario)?,
-    })
+    }
+    Ok((recorder, due.is_some()))
 }
 
 /// What is done to the system while it runs.
@@ -266,11 +280,17 @@ impl Prepared {
         let status = match &ended {
             Ended::AtStop => 0,
             Ended::ByFmu(name) => {
-                tracing::warn!("{name} asked for the end of the simulation at t = {time} s");
+                let asked = self.simulation.ended_at().unwrap_or(time);
+                let ending = apart(asked, time);
+                tracing::warn!(
+                    "{name} asked for the end of the simulation at t = {asked} s{ending}"
+                );
                 0
             }
             Ended::Interrupted => {
-                tracing::error!("the run was interrupted at t = {time} s");
+                let more = self.saver.as_ref().map(|saver| resume::hint(&saver.path, &self.here));
+                let more = more.unwrap_or_default();
+                tracing::error!("the run was interrupted at t = {time} s{more}");
                 interrupt::STATUS
             }
             Ended::Lost(error) => {
@@ -324,4 +344,15 @@ impl Prepared {
         }
         Ok(())
     }
+}
+
+/// Where results end before the time at which an FMU asked for the end, all in s.
+fn apart(asked: f64, end: f64) -> String {
+    if asked <= end {
+        return String::new();
+    }
+    format!(
+        "; the results end at t = {end} s, the last time that all FMUs have in common (with \
+         --rollback, which needs FMUs that can go back, they end at {asked} s)"
+    )
 }

@@ -207,6 +207,16 @@ pub enum SystemError {
         /// How the iteration ended.
         why: String,
     },
+    /// A run cannot go on from a checkpoint with another setting.
+    #[error("the checkpoint was taken with {name} {taken}; {name} {given} is not possible")]
+    Resume {
+        /// Name of the setting.
+        name: &'static str,
+        /// Its value in the run of the checkpoint.
+        taken: String,
+        /// Its value now.
+        given: String,
+    },
     /// The smallest step is not small enough.
     #[error(
         "the smallest step, {size} s at t = {time} s, still has an error of {error:.1e} times the \

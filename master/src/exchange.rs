@@ -2,7 +2,9 @@
 
 mod course;
 mod discrete;
+mod faulty;
 mod layout;
+mod multirate;
 mod pass;
 mod reals;
 mod repeat;
@@ -43,6 +45,10 @@ pub(crate) struct Values {
     integers: Vec<i32>,
     booleans: Vec<i32>,
     strings: Vec<String>,
+    /// Values at the begins of the last steps.
+    begin_integers: Vec<i32>,
+    begin_booleans: Vec<i32>,
+    begin_strings: Vec<String>,
 }
 
 impl Values {
@@ -100,9 +106,23 @@ impl Exchange {
     pub(crate) fn commit(&mut self, time: f64) {
         if self.faulty {
             self.reals.commit(time);
-            self.integers.commit(time);
-            self.booleans.commit(time);
+            let ahead = |slave| self.reals.is_beyond(slave, time);
+            self.integers.commit(time, ahead);
+            self.booleans.commit(time, ahead);
         }
+    }
+
+    /// The first time past `after`, both in s, at which a fault on a connection begins or ends.
+    pub(crate) fn next_break(&self, after: f64) -> Option<f64> {
+        if !self.faulty {
+            return None;
+        }
+        let breaks = [
+            self.reals.next_break(after),
+            self.integers.next_break(after),
+            self.booleans.next_break(after),
+        ];
+        breaks.into_iter().flatten().reduce(f64::min)
     }
 
     /// The faults, for a checkpoint.
@@ -113,15 +133,22 @@ impl Exchange {
     /// Before a step of `slave` from `time` over `size`: what it reached is where it begins.
     pub(crate) fn shift(&mut self, slave: usize, time: f64, size: f64) {
         self.reals.shift(slave, time, size);
+        if self.discrete && self.reals.several {
+            self.integers.shift(slave);
+            self.booleans.shift(slave);
+            self.strings.shift(slave);
+        }
     }
 
     /// The inputs of `slave` for a step from `time` over `size`.
     pub(crate) fn gather(&mut self, slave: usize, time: f64, size: f64) {
         self.reals.gather(slave, time, size);
         if self.discrete {
-            self.integers.gather(slave, time);
-            self.booleans.gather(slave, time);
-            self.strings.gather(slave, time);
+            let limit = self.reals.seen_at(time, size);
+            let ahead = |source| self.reals.is_beyond(source, limit);
+            self.integers.gather(slave, time, ahead);
+            self.booleans.gather(slave, time, ahead);
+            self.strings.gather(slave, time, ahead);
         }
     }
 
@@ -318,6 +345,9 @@ impl Exchange {
         values.integers.clone_from(&self.integers.latest);
         values.booleans.clone_from(&self.booleans.latest);
         values.strings.clone_from(&self.strings.latest);
+        values.begin_integers.clone_from(&self.integers.begin);
+        values.begin_booleans.clone_from(&self.booleans.begin);
+        values.begin_strings.clone_from(&self.strings.begin);
     }
 
     /// Back to the values kept.
@@ -326,6 +356,9 @@ impl Exchange {
         self.integers.latest.clone_from(&values.integers);
         self.booleans.latest.clone_from(&values.booleans);
         self.strings.latest.clone_from(&values.strings);
+        self.integers.begin.clone_from(&values.begin_integers);
+        self.booleans.begin.clone_from(&values.begin_booleans);
+        self.strings.begin.clone_from(&values.begin_strings);
     }
 }
 

@@ -44,7 +44,7 @@ pub use library::{Interface, describe, preload};
 pub use linearise::{Linearisation, Linearise, LineariseError, linearise};
 pub use order::{Order, by_direct_dependencies};
 pub use probe::Probe;
-pub use readout::Readout;
+pub use readout::{Readout, SlowState, SlowValues};
 pub use simulation::{Checkpoint, EarlyEnd, Fallbacks, Simulation};
 pub use slave::{Advance, Background, CallError, Failure, Slave, Stepped};
 pub use system::{Connection, Port, System};

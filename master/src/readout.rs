@@ -1,5 +1,7 @@
 //! Reading chosen variables of a system, each as its type has it, for results.
 
+mod slow;
+
 use std::ops::Range;
 
 use fmi2::description::Kind;
@@ -10,10 +12,12 @@ use crate::results::Row;
 use crate::scenario::{DriveKind, Drives, integer};
 use crate::slave::{CallError, Slave};
 use crate::system::{Port, System};
+pub use slow::{SlowState, SlowValues};
 
 /// Values of chosen variables, in arrays by type: each in the order of the variables of that type.
 #[derive(Debug, Default)]
 pub struct Readout {
+    ports: Vec<Port>,
     reads: Vec<Read>,
     /// Values of Reals.
     pub reals: Vec<f64>,
@@ -59,7 +63,7 @@ impl Readout {
     /// A readout of `ports`, in that order.
     #[must_use]
     pub fn new(system: &System, ports: &[Port]) -> Self {
-        let mut readout = Self::default();
+        let mut readout = Self { ports: ports.to_vec(), ..Self::default() };
         for &port in ports {
             let variable = system.variable(port);
             let kind = ReadKind::of(&variable.kind);

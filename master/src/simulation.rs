@@ -32,6 +32,7 @@ use sweep::{Groups, Swept};
 use together::any_in_background;
 
 pub use checkpoint::Checkpoint;
+use checkpoint::Origin;
 pub use grid::EarlyEnd;
 pub use iterate::Fallbacks;
 pub(crate) use parallel::Task;
@@ -44,6 +45,7 @@ pub struct Simulation {
     order: Order,
     grid: Grid,
     early_end: Option<EarlyEnd>,
+    origin: Origin,
     control: Control,
     coupled: Option<Coupled>,
     repetition: Repetition,
@@ -62,8 +64,8 @@ pub struct Simulation {
     passes: bool,
     /// Whether some slaves step in the background.
     background: bool,
-    /// The slave that asked for the end of the simulation.
-    ended: Option<usize>,
+    /// The slave that asked for the end of the simulation, and when.
+    ended: Option<(usize, f64)>,
 }
 
 impl Simulation {
@@ -87,28 +89,34 @@ impl Simulation {
     ///
     /// Those of [`Simulation::new`]; where a fault is on no connection.
     pub fn with_scenario(
+        system: System,
+        algorithm: &Algorithm,
+        experiment: &Experiment,
+        scenario: Prepared,
+    ) -> Result<Self, SystemError> {
+        Self::begin(system, algorithm, experiment, experiment.stop_time, scenario)
+    }
+
+    /// As [`Simulation::with_scenario`], to end at the time `stop`; the slaves are told the one of
+    /// `experiment`.
+    fn begin(
         mut system: System,
         algorithm: &Algorithm,
         experiment: &Experiment,
+        stop: Option<f64>,
         mut scenario: Prepared,
     ) -> Result<Self, SystemError> {
         algorithm.check(&system)?;
         let multiples = grid::multiples(&system, algorithm)?;
-        let (grid, early_end) = Grid::new(&system, algorithm, &multiples, experiment)?;
+        let span = (experiment.start_time, stop);
+        let (grid, early_end) = Grid::new(&system, algorithm.step, &multiples, span)?;
+        let origin = Origin::new(&system, algorithm, experiment);
         let order = by_direct_dependencies(&system);
         initial::initialise(&mut system, experiment, &mut scenario)?;
         let algorithm = &capabilities::confirm_rollback(&mut system, algorithm);
         let mut exchange = capabilities::exchange(&mut system, algorithm);
         exchange.set_faults(&system, &scenario.faults)?;
-        for slave in 0..system.slaves.len() {
-            exchange.read(&mut system, slave, experiment.start_time)?;
-        }
-        if algorithm.course == Course::Quadratic {
-            let first = (experiment.start_time, algorithm.step);
-            exchange.derive_at_start(&mut system, first)?;
-        }
-        exchange.reals.forget();
-        exchange.commit(experiment.start_time);
+        read_at_start(&mut system, &mut exchange, algorithm, experiment.start_time)?;
         scenario.drives.commit(experiment.start_time);
         let groups = Groups::new(&system, algorithm.sweep, &order);
         let control = Control::new(&system, &exchange.reals, algorithm)?;
@@ -123,6 +131,7 @@ impl Simulation {
             order,
             grid,
             early_end,
+            origin,
             control,
             coupled,
             repetition: Repetition::default(),
@@ -152,13 +161,32 @@ impl Simulation {
     /// The FMU that asked for the end of the simulation (`fmi2Terminated`).
     #[must_use]
     pub fn ended_by(&self) -> Option<&str> {
-        self.ended.map(|slave| self.system.slaves[slave].0.as_str())
+        self.ended.map(|(slave, _)| self.system.slaves[slave].0.as_str())
+    }
+
+    /// The time in s for which it asked. It is later than [`Simulation::time`] where other FMUs have
+    /// gone beyond it and cannot go back: the run then ends at the last communication point, and
+    /// what the FMUs give is of different times.
+    #[must_use]
+    pub fn ended_at(&self) -> Option<f64> {
+        self.ended.map(|(_, time)| time)
     }
 
     /// Why the run ends before its stop time, if it does.
     #[must_use]
     pub fn early_end(&self) -> Option<&EarlyEnd> {
         self.early_end.as_ref()
+    }
+
+    /// The slaves that make several steps at once.
+    pub(crate) fn slow_slaves(&self) -> impl Iterator<Item = usize> {
+        (0..self.multiples.len()).filter(|&slave| self.multiples[slave] != 1)
+    }
+
+    /// Begin and end in s of the last step of a slave that has gone beyond [`Simulation::time`], as it
+    /// makes several steps at once.
+    pub(crate) fn step_beyond(&self, slave: usize) -> Option<(f64, f64)> {
+        self.exchange.reals.beyond(slave, self.grid.time)
     }
 
     /// The order of stepping.
@@ -219,11 +247,12 @@ impl Simulation {
             }
         };
         if let Some((slave, reached)) = swept.terminated {
-            self.ended = Some(slave);
-            self.grid.time = reached;
+            self.end_early(slave, (begin, reached));
         }
-        self.exchange.commit(self.grid.time);
-        self.drives.commit(self.grid.time);
+        if self.grid.time > begin {
+            self.exchange.commit(self.grid.time);
+            self.drives.commit(self.grid.time);
+        }
         if self.varies && !self.is_finished() {
             let (time, stop) = (self.grid.time, self.grid.stop());
             self.control.check_pace(time, time - begin, stop)?;
@@ -231,14 +260,25 @@ impl Simulation {
         Ok(())
     }
 
-    /// Where the next step would end; steps that are not fixed end where a signal bends.
+    /// A slave asked for the end at the time that it reached in the step from `begin`. The time of the
+    /// run is then that of all slaves: the one reached where all could end there, else `begin`.
+    #[cold]
+    fn end_early(&mut self, slave: usize, (begin, reached): (f64, f64)) {
+        self.ended = Some((slave, reached));
+        let alone = self.system.slaves.len() == 1;
+        self.grid.time = if alone || self.repeats { reached } else { begin };
+    }
+
+    /// Where the next step would end; steps that are not fixed end where a signal bends and where a
+    /// fault begins or ends.
     fn planned(&self) -> f64 {
         if self.control.kind == StepControl::Fixed {
             return self.grid.next().0;
         }
         let end = self.grid.end_of(self.control.size);
         let least = self.grid.time + 1e-9 * self.control.size;
-        self.drives.next_break(least).map_or(end, |bend| end.min(bend))
+        let breaks = [self.drives.next_break(least), self.exchange.next_break(least)];
+        breaks.into_iter().flatten().fold(end, f64::min)
     }
 
     /// A step from `time` to `end` or, where it cannot or must not be as long, not as far.
@@ -262,6 +302,10 @@ impl Simulation {
         let limit = next.unwrap_or(planned);
         self.watch(events, time)?;
         let (mut end, mut swept) = self.stretch(time, limit)?;
+        if swept.terminated.is_some() {
+            self.grid.reach(end);
+            return Ok(swept);
+        }
         let crossing = self.locate(events, time, end)?;
         let happened = crossing.is_some() || (next.is_some() && end >= limit);
         if let Some(crossing) = crossing {
@@ -308,4 +352,22 @@ impl Simulation {
         }
         first
     }
+}
+
+/// Reads all connected outputs at the time `start` in s, which have no past.
+fn read_at_start(
+    system: &mut System,
+    exchange: &mut Exchange,
+    algorithm: &Algorithm,
+    start: f64,
+) -> Result<(), SystemError> {
+    for slave in 0..system.slaves.len() {
+        exchange.read(system, slave, start)?;
+    }
+    if algorithm.course == Course::Quadratic {
+        exchange.derive_at_start(system, (start, algorithm.step))?;
+    }
+    exchange.reals.forget();
+    exchange.commit(start);
+    Ok(())
 }

@@ -5,6 +5,8 @@
 mod ahead;
 #[path = "engine/background.rs"]
 mod background;
+#[path = "engine/breaks.rs"]
+mod breaks;
 #[path = "engine/checkpoints.rs"]
 mod checkpoints;
 #[path = "engine/control.rs"]
@@ -17,6 +19,8 @@ mod fallback;
 mod initial;
 #[path = "engine/last_step.rs"]
 mod last_step;
+#[path = "engine/multirate.rs"]
+mod multirate;
 #[path = "engine/parts.rs"]
 mod parts;
 #[path = "engine/puppet.rs"]

@@ -185,8 +185,16 @@ fn a_step_that_is_discarded_half_way_ends_the_run_where_there_is_no_other_way() 
 fn an_fmu_that_wants_the_simulation_to_end_ends_it_in_order() {
     let run = Run::pair(&CFmu::that("end at t1"), &MIDDLE);
     run.expect(0, TO_T1);
-    run.says(&["a", "0.53125"]);
-    assert!(run.numbers("time").iter().all(|time| *time <= 0.53125));
+    // b is beyond: the last row is that of the last time that both had.
+    run.says(&["a asked for the end", "t = 0.53125 s", "the results end at t = 0.5 s"]);
+    assert_eq!(run.numbers("time").len(), TO_T1);
+    let run = Run::pair(&CFmu::that("end at t1"), &[&MIDDLE[..], &["--rollback"]].concat());
+    run.expect(0, TO_T1);
+    let last = |name: &str| run.numbers(name)[TO_T1..].to_vec();
+    let b = run.numbers("b.y")[TO_T1 - 1] + 0.03125 * 0.5;
+    assert_eq!([last("time"), last("a.y"), last("b.y")], [vec![0.53125], vec![0.53125], vec![b]]);
+    let run = Run::of(&[("a", &CFmu::that("end at t1"))], &MIDDLE);
+    assert_eq!(run.numbers("time").last(), Some(&0.53125), "it is alone: {}", run.message);
 }
 
 #[test]

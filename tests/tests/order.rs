@@ -144,6 +144,30 @@ fn slaves_at_steps_of_their_own_keep_the_order() {
     }
 }
 
+/// Rows between the ends of a slave's own steps have its values on the line between these ends, which
+/// is of order 2; the slave that steps first, too, is read on its way and not at its end.
+#[test]
+fn what_is_read_of_a_slave_on_its_way_is_of_its_time() {
+    for (problem, network) in both() {
+        for sweep in SWEEPS {
+            for multiples in [vec![1, 4], vec![4, 1]] {
+                for (course, expected) in [(Course::Hold, 1.0), (Course::Linear, 2.0)] {
+                    let errors = [1.0 / 512.0, 1.0 / 1024.0].map(|step| {
+                        let multiples = multiples.clone();
+                        let algorithm =
+                            Algorithm { multiples, ..Algorithm::fixed(sweep, course, step) };
+                        network.run(ABLE, &algorithm, STOP).unwrap().between
+                    });
+                    let order = (errors[0] / errors[1]).log2();
+                    let label = format!("{problem}, {} {}", sweep.name(), course.name());
+                    println!("{label} {multiples:?}: {errors:?}, order {order:.2}");
+                    assert!((order - expected).abs() < 0.25, "{label} {multiples:?}: {order}");
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn iterated_coupling_is_of_the_order_of_its_course() {
     for (problem, network) in both() {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use master::{Simulation, SystemError};
+use master::{Simulation, SlowState, SystemError};
 
 use super::interrupt;
 use super::progress::Progress;
@@ -87,11 +87,18 @@ impl<'a> Beside<'a> {
             self.sample(simulation)?;
         }
         while !simulation.is_finished() && !interrupt::is_raised() {
+            if let Some(recorder) = &mut self.recorder {
+                recorder.before_step(simulation)?;
+            }
+            let before = simulation.time();
             simulation.step()?;
             self.tally.steps += 1;
             watch(simulation)?;
-            self.sample(simulation)?;
             let time = simulation.time();
+            // An end that an FMU asked for may be one that the others have not reached together.
+            if time > before {
+                self.sample(simulation)?;
+            }
             progress.show(time);
             if let Some(interval) = interval
                 && time >= save_at
@@ -124,13 +131,12 @@ impl<'a> Beside<'a> {
     /// Saves a checkpoint, behind the rows that belong to it.
     fn save(&mut self, simulation: &mut Simulation) -> anyhow::Result<()> {
         let Some(saver) = self.saver else { return Ok(()) };
-        let due = match &mut self.recorder {
-            Some(recorder) => {
-                recorder.flush()?;
-                Some((saver.every, recorder.due().clone()))
-            }
-            None => None,
-        };
-        Saved::new(&saver.text, simulation.checkpoint()?, due).write(&saver.path)
+        let (mut due, mut slow) = (None, SlowState::default());
+        if let Some(recorder) = &mut self.recorder {
+            recorder.flush()?;
+            due = Some((saver.every, recorder.due().clone()));
+            slow = recorder.slow_state(simulation);
+        }
+        Saved::new(&saver.text, simulation.checkpoint()?, due, slow).write(&saver.path)
     }
 }

@@ -11,7 +11,7 @@ use fmi2::description::{Causality, Kind};
 use master::results::{
     self, Column, ColumnKind, Decimation, Due, ResultsError, Row, Selection, Sink,
 };
-use master::{Port, Readout, Simulation, System};
+use master::{Port, Readout, Simulation, SlowState, SlowValues, System};
 
 use crate::config::Every;
 
@@ -33,6 +33,7 @@ pub(crate) struct Recorder {
     recording: Arc<Mutex<Recording>>,
     due: Due,
     readout: Readout,
+    slow: SlowValues,
 }
 
 impl Recorder {
@@ -50,6 +51,7 @@ impl Recorder {
             Every::Seconds(seconds) => Decimation::Every(seconds),
         };
         let ports = readable(simulation.system(), ports, start)?;
+        let slow = SlowValues::new(simulation, &ports);
         let system = simulation.system();
         let columns: Vec<_> = ports.iter().map(|&port| column(system, port)).collect();
         let (due, readout) = (Due::new(decimation, start), simulation.readout(&ports));
@@ -58,7 +60,7 @@ impl Recorder {
         let mut files = FILES.lock().unwrap_or_else(PoisonError::into_inner);
         files.retain(|file| file.strong_count() > 0);
         files.push(Arc::downgrade(&recording));
-        Ok(Some(Self { recording, due, readout }))
+        Ok(Some(Self { recording, due, readout, slow }))
     }
 
     /// Goes on with the rows of a run that was resumed.
@@ -78,8 +80,29 @@ impl Recorder {
         if self.due.at(time) { self.record(simulation, time) } else { Ok(()) }
     }
 
+    /// Before a step: see [`SlowValues::before_step`].
+    #[inline]
+    pub(crate) fn before_step(&mut self, simulation: &mut Simulation) -> anyhow::Result<()> {
+        Ok(self.slow.before_step(simulation)?)
+    }
+
+    /// What a checkpoint holds of the recording.
+    pub(crate) fn slow_state(&self, simulation: &mut Simulation) -> SlowState {
+        self.slow.state(simulation.system())
+    }
+
+    /// Goes on with the recording of a run that was resumed.
+    pub(crate) fn restore(
+        &mut self,
+        simulation: &mut Simulation,
+        state: &SlowState,
+    ) -> anyhow::Result<()> {
+        Ok(self.slow.restore(simulation, state)?)
+    }
+
     fn record(&mut self, simulation: &mut Simulation, time: f64) -> anyhow::Result<()> {
         simulation.read(&mut self.readout)?;
+        self.slow.apply(simulation, &mut self.readout);
         let Readout { reals, integers, booleans, strings, .. } = &self.readout;
         let row = Row { reals, integers, booleans, strings };
         let mut recording = lock(&self.recording);

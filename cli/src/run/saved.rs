@@ -3,15 +3,17 @@
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use master::Checkpoint;
 use master::results::Due;
+use master::{Checkpoint, SlowState};
 use serde::{Deserialize, Serialize};
 
 use crate::config::{self, Config, Every};
 use crate::whole_file;
 
 /// What a file of this kind and version begins with; four bytes of CRC-32 of the rest follow.
-const MAGIC: &[u8; 16] = b"aso-ftc-state-1\n";
+const MAGIC: &[u8; 16] = b"aso-ftc-state-2\n";
+/// What files of this kind and of every version begin with.
+const KIND: &[u8] = b"aso-ftc-state-";
 
 /// A run as it stands.
 #[derive(Serialize, Deserialize)]
@@ -21,12 +23,18 @@ pub(super) struct Saved {
     checkpoint: Checkpoint,
     /// How often rows are recorded, and when the next one is; none where nothing is recorded.
     due: Option<(String, Due)>,
+    slow: SlowState,
 }
 
 impl Saved {
-    pub(super) fn new(text: &str, checkpoint: Checkpoint, due: Option<(Every, Due)>) -> Self {
+    pub(super) fn new(
+        text: &str,
+        checkpoint: Checkpoint,
+        due: Option<(Every, Due)>,
+        slow: SlowState,
+    ) -> Self {
         let due = due.map(|(every, due)| (every.to_string(), due));
-        Self { text: text.to_owned(), checkpoint, due }
+        Self { text: text.to_owned(), checkpoint, due, slow }
     }
 
     /// Writes the file: whole or not at all.
@@ -45,7 +53,7 @@ impl Saved {
         let Some((sum, content)) =
             bytes.strip_prefix(MAGIC).and_then(|rest| rest.split_first_chunk::<4>())
         else {
-            bail!("{shown}: expected a checkpoint of this version of aso-ftc");
+            bail!(unreadable(path, &bytes));
         };
         if crc32fast::hash(content) != u32::from_le_bytes(*sum) {
             bail!("{shown}: the checkpoint is damaged: its checksum does not fit");
@@ -65,6 +73,11 @@ impl Saved {
         (*text == every.to_string()).then_some(due)
     }
 
+    /// What the recording knows of FMUs that make several steps at once.
+    pub(super) fn slow(&self) -> &SlowState {
+        &self.slow
+    }
+
     /// The simulation.
     pub(super) fn checkpoint(&self) -> &Checkpoint {
         &self.checkpoint
@@ -74,4 +87,18 @@ impl Saved {
     pub(super) fn time(&self) -> f64 {
         self.checkpoint.time()
     }
+}
+
+/// Why the bytes of a file are no checkpoint for this version.
+fn unreadable(path: &Path, bytes: &[u8]) -> String {
+    let shown = path.display();
+    let version = bytes.strip_prefix(KIND).filter(|_| !bytes.starts_with(MAGIC));
+    let Some(version) = version.and_then(|rest| rest.first()) else {
+        return format!("{shown}: expected a checkpoint of this version of aso-ftc");
+    };
+    format!(
+        "{shown}: found a checkpoint of format {}, expected format 2: another version of aso-ftc \
+         wrote it. Resume it with that version, or repeat the run from its start with --checkpoint",
+        char::from(*version)
+    )
 }

@@ -85,6 +85,8 @@ pub(crate) struct Channel<T> {
     faults: Vec<Option<FaultLine>>,
     /// Values of the outputs.
     pub(crate) latest: Vec<T>,
+    /// Their values at the begins of the last steps, where slaves make several steps at once.
+    pub(crate) begin: Vec<T>,
     /// What the inputs get.
     values: Vec<T>,
 }
@@ -127,6 +129,7 @@ impl<T: Clone + Default> Channel<T> {
             input_ports: inputs.iter().map(|connection| connection.to).collect(),
             faults: vec![None; inputs.len()],
             latest: vec![T::default(); outputs.len()],
+            begin: vec![T::default(); outputs.len()],
             values: vec![T::default(); inputs.len()],
             output_ports: outputs,
         }
@@ -148,16 +151,39 @@ impl<T: Clone + Default> Channel<T> {
         true
     }
 
-    /// Tells the faults the undisturbed values at `time`, which is reached for good.
-    pub(crate) fn commit(&mut self, time: f64) {
-        for (k, fault) in self.faults.iter_mut().enumerate() {
-            if let Some(fault) = fault {
+    /// Tells the faults the undisturbed values at `time`, which is reached for good; those of slaves
+    /// that are `ahead` of it have not changed yet.
+    pub(crate) fn commit(&mut self, time: f64, ahead: impl Fn(usize) -> bool) {
+        for k in 0..self.faults.len() {
+            if self.faults[k].is_some() {
                 let mut value = T::default();
-                let latest = &self.latest[self.sources[k]];
-                (self.access.map)(latest, &self.transformations[k], &mut value);
-                fault.commit(time, (self.access.number)(&value));
+                (self.access.map)(self.source(k, &ahead), &self.transformations[k], &mut value);
+                let number = (self.access.number)(&value);
+                if let Some(fault) = &mut self.faults[k] {
+                    fault.commit(time, number);
+                }
             }
         }
+    }
+
+    /// The first time past `after` at which a fault begins or ends.
+    pub(crate) fn next_break(&self, after: f64) -> Option<f64> {
+        let faults = self.faults.iter().flatten();
+        faults.filter_map(|fault| fault.next_break(after)).reduce(f64::min)
+    }
+
+    /// The value that the input at index `k` is connected to: that at the begin of its slave's last
+    /// step where the slave is `ahead`.
+    fn source(&self, k: usize, ahead: impl Fn(usize) -> bool) -> &T {
+        let source = self.sources[k];
+        let slave = self.output_ports[source].slave;
+        if ahead(slave) { &self.begin[source] } else { &self.latest[source] }
+    }
+
+    /// The slave will step: what was its end is its begin.
+    pub(crate) fn shift(&mut self, slave: usize) {
+        let range = self.lanes[slave].output_range.clone();
+        self.begin[range.clone()].clone_from_slice(&self.latest[range]);
     }
 
     /// The faults, for a checkpoint.
@@ -165,11 +191,14 @@ impl<T: Clone + Default> Channel<T> {
         self.faults.iter_mut().flatten()
     }
 
-    /// The inputs of `slave` from the values of now, for a step from `time`.
-    pub(crate) fn gather(&mut self, slave: usize, time: f64) {
+    /// The inputs of `slave` from the values of now, for a step from `time`; those of slaves that are
+    /// `ahead` have not changed yet.
+    pub(crate) fn gather(&mut self, slave: usize, time: f64, ahead: impl Fn(usize) -> bool) {
         for k in self.lanes[slave].input_range.clone() {
-            let latest = &self.latest[self.sources[k]];
-            (self.access.map)(latest, &self.transformations[k], &mut self.values[k]);
+            let source = self.sources[k];
+            let is_ahead = ahead(self.output_ports[source].slave);
+            let value = if is_ahead { &self.begin[source] } else { &self.latest[source] };
+            (self.access.map)(value, &self.transformations[k], &mut self.values[k]);
             if let Some(fault) = &self.faults[k] {
                 self.values[k] = (self.access.disturb)(fault, time, &self.values[k]);
             }

@@ -20,11 +20,13 @@ const ROUNDING: f64 = 1e-9;
 pub(crate) struct Reals {
     pub(super) layout: Layout,
     /// Faults by input; empty where there are none at all.
-    faults: Vec<Option<FaultLine>>,
+    pub(super) faults: Vec<Option<FaultLine>>,
     pub(super) course: Course,
     pub(super) sweep: Sweep,
     /// Every input is held and all slaves step together: the latest values are all it takes.
-    simple: bool,
+    pub(super) simple: bool,
+    /// Some slaves make several steps at once.
+    pub(super) several: bool,
     pub(crate) trace: Trace,
     /// Values of the outputs at the end of the step, assumed by an iteration.
     pub(super) assumed: Vec<f64>,
@@ -69,6 +71,7 @@ impl Reals {
                 && algorithm.coupling == Coupling::Once
                 && algorithm.control == StepControl::Fixed
                 && algorithm.multiples.iter().all(|&multiple| multiple == 1),
+            several: algorithm.multiples.iter().any(|&multiple| multiple != 1),
             layout,
             trace,
         }
@@ -99,32 +102,6 @@ impl Reals {
         &self.layout.from_integers
     }
 
-    /// Puts a fault on the way to an input; false where there is no such connected input.
-    pub(crate) fn set_fault(&mut self, input: Port, fault: &FaultLine) -> bool {
-        let Some(k) = self.layout.input_ports.iter().position(|&port| port == input) else {
-            return false;
-        };
-        self.simple = false;
-        self.faults.resize(self.layout.sources.len(), None);
-        self.faults[k] = Some(fault.clone());
-        true
-    }
-
-    /// Tells the faults the undisturbed values at `time`, which is reached for good.
-    pub(crate) fn commit(&mut self, time: f64) {
-        for (k, fault) in self.faults.iter_mut().enumerate() {
-            if let Some(fault) = fault {
-                let value = self.trace.latest[self.layout.sources[k] as usize];
-                fault.commit(time, self.layout.factors[k] * value + self.layout.offsets[k]);
-            }
-        }
-    }
-
-    /// The faults, for a checkpoint.
-    pub(crate) fn faults(&mut self) -> impl Iterator<Item = &mut FaultLine> {
-        self.faults.iter_mut().flatten()
-    }
-
     /// The slave will step from `time` over `size`: what was its end is its begin.
     pub(crate) fn shift(&mut self, slave: usize, time: f64, size: f64) {
         if self.simple {
@@ -141,6 +118,11 @@ impl Reals {
         trace.begin[range.clone()].copy_from_slice(&trace.latest[range]);
         let derivatives = &trace.derivatives[derived.clone()];
         trace.begin_derivatives[derived].copy_from_slice(derivatives);
+        for &(port, output) in &self.layout.from_integers {
+            if port.slave == slave {
+                trace.begin[output] = trace.latest[output];
+            }
+        }
     }
 
     /// Values of now have no past: the course of inputs begins anew.
@@ -181,8 +163,10 @@ impl Reals {
         let (layout, lane) = (&self.layout, &self.layout.lanes[slave]);
         let source = layout.sources[k] as usize;
         let known = self.is_known(slave, source, time + size);
-        let course = if layout.held[k] {
-            Polynomial::held(self.trace.latest[source])
+        let seen_at = self.seen_at(time, size);
+        let ahead = self.several && known && self.course == Course::Hold;
+        let course = if layout.held[k] || ahead {
+            Polynomial::held(self.value_at(source, seen_at))
         } else {
             self.polynomial(slave, source, (time, size))
         };

@@ -26,6 +26,11 @@ impl Default for Span {
 }
 
 impl Span {
+    /// Whether there was a step.
+    pub(super) fn has_size(&self) -> bool {
+        self.size < NEVER
+    }
+
     /// No step was before now.
     pub(super) fn forget(&mut self) {
         (self.size, self.last_size, self.earlier_size) = (NEVER, NEVER, NEVER);

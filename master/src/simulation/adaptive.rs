@@ -35,8 +35,13 @@ impl Simulation {
                 StepControl::Doubling => self.halved(repetition, time, size)?,
                 _ => self.extrapolated(time, size)?,
             };
-            if swept.terminated.is_some() {
-                return Ok((end, swept));
+            if let Some((slave, reached)) = swept.terminated {
+                self.restore_states(SLOT, time)?;
+                self.exchange.restore(&repetition.begin);
+                if reached > time {
+                    self.attempt(time, size_between(time, reached), false)?;
+                }
+                return Ok((reached, Swept { terminated: Some((slave, reached)), reached: None }));
             }
             // A step in part has no error to judge.
             end = if let Some(reached) = swept.reached {

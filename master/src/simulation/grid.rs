@@ -2,8 +2,6 @@
 
 use std::fmt;
 
-use fmi2::Experiment;
-
 use crate::algorithm::Algorithm;
 use crate::error::SystemError;
 use crate::slave::Slave;
@@ -64,15 +62,15 @@ pub(super) fn size_between(begin: f64, end: f64) -> f64 {
 }
 
 impl Grid {
-    /// The grid of a run in the steps of `algorithm`, which every slave can follow; slaves make as
-    /// many steps of it at once as `multiples` says. With it the reason if it ends early.
+    /// The grid of a run from start to stop time in steps of `step` s, which every slave can follow;
+    /// slaves make as many steps of it at once as `multiples` says. With it the reason if it ends
+    /// early.
     pub(super) fn new(
         system: &System,
-        algorithm: &Algorithm,
+        step: f64,
         multiples: &[u32],
-        experiment: &Experiment,
+        (start, stop): (f64, Option<f64>),
     ) -> Result<(Self, Option<EarlyEnd>), SystemError> {
-        let (start, stop, step) = (experiment.start_time, experiment.stop_time, algorithm.step);
         if !(step > 0.0 && step.is_finite()) {
             let (what, rule) = ("the communication step", "more than 0".to_owned());
             return Err(SystemError::Time { what, value: step, rule });
@@ -163,17 +161,13 @@ impl Grid {
         }
     }
 
-    /// Size of the step from `time` of a slave that makes `multiple` steps of the grid at once: the
-    /// size of the common step where that is one, 0 where it has gone on already.
+    /// Size of the step from `time` of a slave that makes `multiple` steps of the grid at once: to
+    /// the next point whose number is a multiple.
     #[expect(clippy::cast_precision_loss, reason = "2^53 steps take longer than anyone waits")]
-    pub(super) fn size_of(&self, multiple: u32, time: f64, size: f64) -> f64 {
-        if multiple == 1 {
-            return size;
-        }
-        if !self.count.is_multiple_of(u64::from(multiple)) {
-            return 0.0;
-        }
-        let end = self.start + (self.count + u64::from(multiple)) as f64 * self.step;
+    pub(super) fn size_of(&self, multiple: u32, time: f64) -> f64 {
+        let multiple = u64::from(multiple);
+        let number = (self.count / multiple + 1) * multiple;
+        let end = self.start + number as f64 * self.step;
         size_between(time, self.limited(end, self.step))
     }
 

@@ -103,7 +103,11 @@ impl Simulation {
     ) -> Result<Swept, SystemError> {
         let mut swept = Swept::default();
         for slave in 0..self.multiples.len() {
-            self.sizes[slave] = self.grid.size_of(self.multiples[slave], time, size);
+            self.sizes[slave] = match self.multiples[slave] {
+                1 => size,
+                _ if self.exchange.reals.is_beyond(slave, time) => 0.0,
+                multiple => self.grid.size_of(multiple, time),
+            };
             if self.sizes[slave] > 0.0 {
                 self.exchange.shift(slave, time, self.sizes[slave]);
             }

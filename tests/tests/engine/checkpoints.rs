@@ -107,17 +107,39 @@ fn chosen_steps_go_on_bit_by_bit() {
 }
 
 #[test]
-fn a_checkpoint_of_another_algorithm_is_refused() {
+fn a_checkpoint_of_another_step_or_algorithm_is_refused_by_name() {
     let network = problems::two_masses(20.0, 0.5);
     let system = || network.system(ABLE, &Arc::default());
-    let mut one = Simulation::new(system(), &Algorithm::new(0.01), &until(1.0)).unwrap();
+    let iterated = Algorithm { coupling: Coupling::Anderson, ..Algorithm::new(0.01) };
+    let mut one = Simulation::new(system(), &iterated, &until(1.0)).unwrap();
     one.step().unwrap();
     let checkpoint = one.checkpoint().unwrap();
-    let other = Algorithm { control: StepControl::Doubling, ..Algorithm::new(0.01) };
-    let refused =
-        Simulation::resume(system(), &other, &until(1.0), Prepared::default(), &checkpoint);
-    let message = refused.err().unwrap().to_string();
-    assert!(message.contains("another algorithm"), "{message}");
+    let resume = |algorithm: &Algorithm, experiment: &fmi2::Experiment| {
+        let none = Prepared::default();
+        let resumed = Simulation::resume(system(), algorithm, experiment, none, &checkpoint);
+        resumed.err().map(|error| error.to_string())
+    };
+    let refused = |other: Algorithm, said: &str| {
+        let message = resume(&other, &until(1.0)).unwrap();
+        assert_eq!(message, format!("the checkpoint was taken with {said} is not possible"));
+    };
+    let base = || iterated.clone();
+    refused(Algorithm { step: 0.02, ..base() }, "step 0.01 s; step 0.02 s");
+    let control = StepControl::Doubling;
+    refused(Algorithm { control, ..base() }, "step-control fixed; step-control doubling");
+    let sweep = Sweep::Jacobi;
+    refused(Algorithm { sweep, ..base() }, "method gauss-seidel; method jacobi");
+    refused(Algorithm { course: Course::Hold, ..base() }, "course limited; course hold");
+    let coupling = Coupling::Newton;
+    refused(Algorithm { coupling, ..base() }, "coupling anderson; coupling newton");
+    refused(Algorithm { iterations: 7, ..base() }, "iterations 50; iterations 7");
+    let once = Algorithm { coupling: Coupling::Once, ..base() };
+    refused(once, "coupling anderson; coupling once");
+    let later = fmi2::Experiment { start_time: 0.5, ..until(1.0) };
+    let message = resume(&base(), &later).unwrap();
+    assert!(message.contains("start-time 0 s; start-time 0.5 s"), "{message}");
+    // What changes no state may be another one.
+    assert_eq!(resume(&Algorithm { jobs: 2, ..base() }, &until(2.0)), None);
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! Slaves that stop on the way, and outputs that are no numbers.
 
-use master::{Algorithm, Coupling, Course, Simulation, StepControl, Stepped, Sweep};
+use master::{Algorithm, Coupling, Course, Readout, Simulation, StepControl, Stepped, Sweep};
 
-use crate::puppet::{system, whole};
+use crate::puppet::{add_clock, system, whole};
 use crate::until;
 
 /// Stops at 0.35 s, to be asked again.
@@ -86,20 +86,41 @@ fn a_step_in_part_does_not_make_the_next_one_longer() {
     assert!(longest <= free * 1.000_001, "{longest} {free}");
 }
 
+/// Where a run with a second puppet, whose output is the time, ends; both outputs there.
+fn ended(algorithm: &Algorithm) -> (f64, Vec<f64>) {
+    let (mut system, _) = system([|time| time; 2], ends);
+    add_clock(&mut system, "q");
+    let mut simulation = Simulation::new(system, algorithm, &until(1.0)).unwrap();
+    while !simulation.is_finished() {
+        simulation.step().unwrap();
+    }
+    assert_eq!((simulation.ended_by(), simulation.ended_at()), (Some("p"), Some(0.35)));
+    let ports = ["p.y", "q.y"].map(|name| simulation.system().port(name).unwrap());
+    let mut readout = Readout::new(simulation.system(), &ports);
+    readout.read(simulation.system(), 0.35).unwrap();
+    simulation.terminate().unwrap();
+    (simulation.time(), readout.reals)
+}
+
 #[test]
-fn a_slave_that_asks_for_the_end_ends_the_run_at_its_time() {
+fn a_slave_that_asks_for_the_end_ends_the_run_at_its_time_where_all_can_go_back() {
     for algorithm in [
-        Algorithm::fixed(Sweep::Jacobi, Course::Hold, 0.25),
+        Algorithm { rollback: true, ..Algorithm::new(0.25) },
+        Algorithm { rollback: true, ..Algorithm::fixed(Sweep::Jacobi, Course::Hold, 0.25) },
         Algorithm { coupling: Coupling::Newton, ..Algorithm::new(0.25) },
         Algorithm { control: StepControl::Doubling, ..Algorithm::new(0.25) },
+        Algorithm { control: StepControl::Embedded, ..Algorithm::new(0.25) },
     ] {
-        let (system, _) = system([|time| time; 2], ends);
-        let mut simulation = Simulation::new(system, &algorithm, &until(1.0)).unwrap();
-        while !simulation.is_finished() {
-            simulation.step().unwrap();
-        }
-        assert_eq!((simulation.time(), simulation.ended_by()), (0.35, Some("p")));
-        simulation.terminate().unwrap();
+        assert_eq!(ended(&algorithm), (0.35, vec![0.35; 2]));
+    }
+}
+
+/// The time of the run is one that all slaves have had: its row was that of the step before.
+#[test]
+fn a_slave_that_asks_for_the_end_ends_the_run_at_the_last_common_point_where_others_are_beyond() {
+    for sweep in [Sweep::Jacobi, Sweep::GaussSeidel] {
+        let (time, outputs) = ended(&Algorithm::fixed(sweep, Course::Hold, 0.25));
+        assert_eq!((time, outputs), (0.25, vec![0.35, 0.5]));
     }
 }
 

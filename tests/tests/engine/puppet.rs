@@ -51,6 +51,20 @@ pub(crate) fn system(outputs: [Output; 2], way: Way) -> (System, Asked) {
     (system, asked)
 }
 
+/// Adds another puppet, which comes to the end of its steps and whose y is the time.
+pub(crate) fn add_clock(system: &mut System, name: &str) {
+    let description = system.slaves[0].1.description().clone();
+    let clock = Puppet {
+        description,
+        time: 0.0,
+        kept: [0.0; 3],
+        outputs: [|time| time; 2],
+        way: whole,
+        asked: Asked::default(),
+    };
+    system.add(name, Box::new(clock)).unwrap();
+}
+
 /// The same with a puppet that takes equal steps only.
 pub(crate) fn rigid((mut system, asked): (System, Asked)) -> (System, Asked) {
     let own = Arc::clone(&asked);

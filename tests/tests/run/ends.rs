@@ -31,6 +31,7 @@ fn an_interrupted_run_leaves_whole_rows_and_says_where_it_stopped() {
         let bench = Bench::new();
         let output = interrupted(&bench, signal, "1e6", &[]);
         fails(&output, 130, &["the run was interrupted at t = "]);
+        assert!(!said(&output).contains("--resume"), "there is no checkpoint to go on from");
         let text = bench.read("out/results.csv");
         let rows = whole_rows(&text);
         let message = said(&output);
@@ -46,7 +47,12 @@ fn an_interrupted_run_goes_on_as_if_it_had_not_been() {
     let (bench, whole) = (Bench::new(), Bench::new());
     let output = interrupted(&bench, "-INT", "400", &["--checkpoint", "state"]);
     fails(&output, 130, &["interrupted"]);
-    let printed = printed(&bench.run(&["--resume", "state"]));
+    let message = said(&output);
+    let line = message.split("; to go on: ").nth(1).unwrap().lines().next().unwrap();
+    assert!(line.ends_with(" run --resume state"), "{line}");
+    let mut shell = Command::new("sh");
+    let resumed = shell.current_dir(bench.folder.path()).args(["-c", line]).output().unwrap();
+    let printed = printed(&resumed);
     let file = printed.lines().find(|line| line.contains("results-from-")).unwrap();
     let (first, second) = (bench.read("out/results.csv"), bench.read(file));
     let (head, rows) = second.split_once('\n').unwrap();
@@ -99,7 +105,28 @@ fn an_fmu_that_cannot_save_its_state_is_told_before_the_run() {
         &["a cannot take part in a checkpoint", "canSerializeFMUstate"],
     );
     printed(&bench.run(&options));
-    fails(&bench.run(&options[..2]), 2, &["no stop time", "--stop-time"]);
+    fails(&bench.run(&options[..2]), 0, &["stop time 1 s", "--stop-time"]);
+}
+
+/// The FMU refuses steps beyond the stop time that it was told.
+#[test]
+fn a_resumed_run_tells_the_fmus_their_first_stop_time_and_says_where_another_one_is_later() {
+    let bench = Bench::new();
+    let strict = CFmu::that("refuse what is beyond the stop time");
+    let fmu = format!("a={}", strict.write(bench.folder.path(), "a").display());
+    let times = ["--stop-time", "1", "--step", "0.0625", "--out", "out"];
+    let run = bench.run(&[&["--fmu", &fmu, "--checkpoint", "state"][..], &times].concat());
+    fails(&run, 0, &[]);
+    fails(&bench.run(&["--resume", "state"]), 0, &["t = 1 s, which is the end of the run"]);
+    let later = bench.run(&["--resume", "state", "--stop-time", "2"]);
+    let warning = "the stop time 2 s is later than 1 s, which the FMUs were told";
+    fails(&later, 1, &[warning, "the step ends beyond the stop time"]);
+    let other = CFmu::well_behaved().write(bench.folder.path(), "b");
+    let fmu = format!("b={}", other.display());
+    fails(&bench.run(&[&["--fmu", &fmu, "--checkpoint", "b.state"][..], &times].concat()), 0, &[]);
+    fails(&bench.run(&["--resume", "b.state", "--stop-time", "2"]), 0, &[warning]);
+    let rows = bench.read("out/results-from-1.csv");
+    assert!(rows.lines().last().unwrap().starts_with("2.0,"), "{rows}");
 }
 
 #[test]
@@ -117,7 +144,14 @@ fn bad_checkpoints_are_refused() {
     fails(&bench.run(&["--resume", "bad"]), 2, &["bad: expected a checkpoint"]);
     fails(&bench.run(&["--resume", "none"]), 2, &["none"]);
     let other = ["--resume", "state", "--course", "hold", "--coupling", "anderson"];
-    fails(&bench.run(&other), 2, &["checkpoint", "another algorithm"]);
+    let refused = "resume: the checkpoint was taken with course limited; --course hold is not";
+    fails(&bench.run(&other), 2, &[refused]);
+    let other = ["--resume", "state", "--step", "0.002"];
+    let refused = "resume: the checkpoint was taken with step 0.001 s; --step 0.002 s is not";
+    fails(&bench.run(&other), 2, &[refused]);
+    fs::write(bench.path("old"), b"aso-ftc-state-1\nof former times").unwrap();
+    let parts = ["old: found a checkpoint of format 1, expected format 2", "from its start"];
+    fails(&bench.run(&["--resume", "old"]), 2, &parts);
     let swapped = format!("controller={}", fmu("FrictionPendulum"));
     let output = bench.run(&["--resume", "state", "--fmu", &swapped]);
     assert_eq!(output.status.code(), Some(2), "{}", said(&output));

@@ -2,6 +2,7 @@
 
 use master::results::Table as Results;
 use tests::Table;
+use tests::c_fmu::CFmu;
 
 use super::*;
 
@@ -43,6 +44,58 @@ fn a_long_run_has_ten_thousand_intervals_and_a_short_one_every_step() {
     assert_eq!((time.len(), time[10_000]), (10_001 - 1_666 + 1_666, 25.0));
     bench.coupled_well(&["--stop-time", "10", "--record", "plant.x_p"]);
     assert_eq!(Table::read(&bench.path("out/results.csv")).column("time").len(), 10_001);
+}
+
+/// The output y of `a`, whose input is 1, is the time; its other outputs take over the inputs with
+/// each of its steps of 0.25 s.
+#[test]
+fn rows_on_the_way_of_an_fmu_with_a_multiple_of_the_step_have_the_values_of_their_time() {
+    let bench = Bench::new();
+    let file = CFmu::well_behaved().write(bench.folder.path(), "slave");
+    let [a, b] = ["a", "b"].map(|name| format!("{name}={}", file.display()));
+    let fmus = ["--fmu", &a, "--fmu", &b, "--connect", "a.y=b.u", "--connect", "a.i_out=b.i_in"];
+    let set = ["--set", "a.i_in=7", "--set", "a.b_in=true", "--set", "a.s_in=word"];
+    let times = ["--step", "0.0625", "--stop-time", "1", "--every", "a=4", "--course", "hold"];
+    for (method, seen) in [("jacobi", 0.0), ("gauss-seidel", 0.0625)] {
+        let more = ["--method", method, "--out", "out"];
+        let names = ["a.y", "b.y", "a.i_out", "a.b_out"];
+        let record: Vec<_> = names.iter().flat_map(|name| ["--record", name]).collect();
+        printed(&bench.run(&[&fmus[..], &set, &times, &more, &record].concat()));
+        let table = Table::read(&bench.path("out/results.csv"));
+        let time = table.column("time");
+        assert_eq!((time.len(), table.column("a.y")), (17, time.clone()), "{method}");
+        let held = |from: usize| (0..17).map(move |row| f64::from(u8::from(row >= from)));
+        assert_eq!(table.column("a.b_out"), held(4).collect::<Vec<_>>(), "{method}");
+        let whole: Vec<_> = held(4).map(|part| 7.0 * part).collect();
+        assert_eq!(table.column("a.i_out"), whole, "{method}");
+        // b gets the value of a at the begin of a's step, or at the end of its own.
+        let mut sum = 0.0;
+        for (row, y) in table.column("b.y").into_iter().enumerate() {
+            assert_eq!(y, sum, "{method}: row {row}");
+            let begin = if seen > 0.0 { time[row] } else { (4.0 * time[row]).floor() / 4.0 };
+            sum += 0.0625 * (begin + seen);
+        }
+    }
+}
+
+#[test]
+fn rows_on_the_way_of_an_fmu_are_the_same_after_a_checkpoint_there() {
+    let bench = Bench::new();
+    let write = |fmu: CFmu, name: &str| {
+        format!("{name}={}", fmu.write(bench.folder.path(), name).display())
+    };
+    let (a, b) = (write(CFmu::well_behaved(), "a"), write(CFmu::that("fail in fmi2DoStep"), "b"));
+    let fmus = ["--fmu", &a, "--fmu", &b, "--connect", "a.y=b.u", "--set", "b.t1=0.875"];
+    let times = ["--step", "0.0625", "--stop-time", "2", "--every", "a=8", "--out", "out"];
+    let saving = ["--checkpoint", "state", "--checkpoint-every", "0.5625"];
+    let ended = "the run ended early, after t = 0.875 s";
+    fails(&bench.run(&[&fmus[..], &times, &saving].concat()), 1, &[ended]);
+    fails(&bench.run(&["--resume", "state"]), 1, &[ended]);
+    let (first, second) =
+        (bench.read("out/results.csv"), bench.read("out/results-from-0.5625.csv"));
+    let (first, second): (Vec<_>, Vec<_>) = (first.lines().collect(), second.lines().collect());
+    assert!(second[1].starts_with("0.625,") && second.len() == 6, "{second:?}");
+    assert_eq!(&second[1..], &first[first.len() - 5..]);
 }
 
 #[test]

@@ -58,7 +58,12 @@ fn each_option_of_the_algorithm_does_what_the_algorithm_of_the_library_does() {
         bench.coupled_well(&more);
         let written = written(&bench.path("out/results.csv"));
         let settings = [("plant.x_p_0", "0.1")];
-        assert_eq!(written, computed(closed_loop(&settings), &algorithm, 0.3), "{options:?}");
+        // Between the points where all FMUs meet, the probe reads one on its way at its own end.
+        let common = algorithm.multiples.iter().max().map_or(1, |&multiple| multiple as usize);
+        let computed = computed(closed_loop(&settings), &algorithm, 0.3);
+        assert_eq!(written.len(), computed.len(), "{options:?}");
+        let meeting = |rows: &[[f64; 5]]| rows.iter().step_by(common).copied().collect::<Vec<_>>();
+        assert_eq!(meeting(&written), meeting(&computed), "{options:?}");
         seen.push(written);
     }
     let same = |one: usize, other: usize| seen[one] == seen[other];

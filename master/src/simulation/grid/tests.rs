@@ -1,10 +1,7 @@
 //! Sizes of steps to the ulp.
 #![expect(clippy::unwrap_used, clippy::float_cmp, reason = "tests; exact by construction")]
 
-use fmi2::Experiment;
-
 use super::{Grid, size_between};
-use crate::algorithm::Algorithm;
 use crate::system::System;
 
 /// The next of a reproducible sequence of random numbers.
@@ -21,9 +18,7 @@ fn magnitude(state: &mut u64, exponent: f64) -> f64 {
 }
 
 fn grid(step: f64, start: f64, stop: f64) -> Grid {
-    let experiment =
-        Experiment { start_time: start, stop_time: Some(stop), ..Experiment::default() };
-    Grid::new(&System::default(), &Algorithm::new(step), &[], &experiment).unwrap().0
+    Grid::new(&System::default(), step, &[], (start, Some(stop))).unwrap().0
 }
 
 #[test]

@@ -1,0 +1,91 @@
+//! How a run was started: what a run that goes on from its checkpoint has in common with it.
+
+use fmi2::Experiment;
+use serde::{Deserialize, Serialize};
+
+use crate::algorithm::{Algorithm, Coupling, StepControl};
+use crate::error::SystemError;
+use crate::system::System;
+
+/// Start time, told stop time, and the settings of the algorithm that the state depends on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(in crate::simulation) struct Origin {
+    /// The stop time in s that the FMUs got by `fmi2SetupExperiment`.
+    pub(in crate::simulation) stop_time: Option<f64>,
+    /// Names and values with their units.
+    settings: Vec<(String, String)>,
+}
+
+impl Origin {
+    pub(in crate::simulation) fn new(
+        system: &System,
+        algorithm: &Algorithm,
+        experiment: &Experiment,
+    ) -> Self {
+        let settings = settings(system, algorithm, experiment).into_iter();
+        Self {
+            stop_time: experiment.stop_time,
+            settings: settings.map(|(name, value)| (name.to_owned(), value)).collect(),
+        }
+    }
+
+    /// Refuses other settings.
+    pub(in crate::simulation) fn expect(
+        &self,
+        system: &System,
+        algorithm: &Algorithm,
+        experiment: &Experiment,
+    ) -> Result<(), SystemError> {
+        for (name, given) in settings(system, algorithm, experiment) {
+            let known = self.settings.iter().find(|(known, _)| known == name);
+            if let Some((_, taken)) = known.filter(|(_, taken)| *taken != given) {
+                return Err(SystemError::Resume { name, taken: taken.clone(), given });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The settings, by the names of the configuration file: those that choose what is calculated before
+/// those of a choice.
+fn settings(
+    system: &System,
+    algorithm: &Algorithm,
+    experiment: &Experiment,
+) -> Vec<(&'static str, String)> {
+    let seconds = |value: f64| format!("{value} s");
+    let mut all = vec![
+        ("start-time", seconds(experiment.start_time)),
+        ("step", seconds(algorithm.step)),
+        ("method", algorithm.sweep.name().to_owned()),
+        ("course", algorithm.course.name().to_owned()),
+        ("coupling", algorithm.coupling.name().to_owned()),
+        ("step-control", algorithm.control.name().to_owned()),
+        ("every", multiples(system, &algorithm.multiples)),
+    ];
+    let iterated = algorithm.coupling != Coupling::Once;
+    let chosen = algorithm.control != StepControl::Fixed;
+    if iterated || chosen {
+        all.push(("relative-tolerance", algorithm.relative_tolerance.to_string()));
+        all.push(("absolute-tolerance", algorithm.absolute_tolerance.to_string()));
+    }
+    if iterated {
+        all.push(("iterations", algorithm.iterations.to_string()));
+    }
+    if chosen {
+        all.push(("smallest-step", seconds(algorithm.smallest_step)));
+        all.push(("largest-step", seconds(algorithm.largest_step)));
+        let name = |bond: &crate::algorithm::PowerBond| {
+            format!("{} and {}", system.name(bond.first), system.name(bond.second))
+        };
+        let bonds: Vec<_> = algorithm.bonds.iter().map(name).collect();
+        all.push(("power-bonds", bonds.join(", ")));
+    }
+    all
+}
+
+fn multiples(system: &System, multiples: &[u32]) -> String {
+    let slaves = system.slaves.iter().zip(multiples).filter(|(_, multiple)| **multiple != 1);
+    let all: Vec<_> = slaves.map(|((name, _), multiple)| format!("{name}={multiple}")).collect();
+    if all.is_empty() { "none".to_owned() } else { all.join(", ") }
+}
