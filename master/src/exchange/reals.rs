@@ -307,28 +307,6 @@ impl Reals {
         all_finite(&self.trace.latest)
     }
 
-    /// Asks a slave for the derivatives of its connected outputs, and gives its connected inputs
-    /// derivatives of 0.
-    pub(crate) fn try_derivatives(
-        &self,
-        slave: usize,
-        instance: &mut dyn Slave,
-    ) -> (Result<(), CallError>, Result<(), CallError>) {
-        let lane = &self.layout.lanes[slave];
-        let (mut outputs, mut inputs) = (Ok(()), Ok(()));
-        if !lane.derived_outputs.is_empty() {
-            let mut values = vec![0.0; lane.derived_outputs.len()];
-            let (references, orders) = (&lane.derived_outputs, &lane.output_orders);
-            outputs = instance.get_output_derivatives(references, orders, &mut values);
-        }
-        if !lane.derived_inputs.is_empty() {
-            let values = vec![0.0; lane.derived_inputs.len()];
-            inputs =
-                instance.set_input_derivatives(&lane.derived_inputs, &lane.input_orders, &values);
-        }
-        (outputs, inputs)
-    }
-
     /// Reads the connected outputs of a slave and their derivatives.
     pub(crate) fn read(&mut self, slave: usize, instance: &mut dyn Slave) -> Result<(), CallError> {
         let (lane, trace) = (&self.layout.lanes[slave], &mut self.trace);

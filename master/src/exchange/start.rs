@@ -35,6 +35,28 @@ impl Exchange {
 }
 
 impl Reals {
+    /// Asks a slave for the derivatives of its connected outputs, and gives its connected inputs
+    /// derivatives of 0.
+    pub(crate) fn try_derivatives(
+        &self,
+        slave: usize,
+        instance: &mut dyn Slave,
+    ) -> (Result<(), CallError>, Result<(), CallError>) {
+        let lane = &self.layout.lanes[slave];
+        let (mut outputs, mut inputs) = (Ok(()), Ok(()));
+        if !lane.derived_outputs.is_empty() {
+            let mut values = vec![0.0; lane.derived_outputs.len()];
+            let (references, orders) = (&lane.derived_outputs, &lane.output_orders);
+            outputs = instance.get_output_derivatives(references, orders, &mut values);
+        }
+        if !lane.derived_inputs.is_empty() {
+            let values = vec![0.0; lane.derived_inputs.len()];
+            inputs =
+                instance.set_input_derivatives(&lane.derived_inputs, &lane.input_orders, &values);
+        }
+        (outputs, inputs)
+    }
+
     /// Tells `slave` the gathered derivatives of its inputs before its first step: derivatives of
     /// outputs that depend directly on inputs are made of them.
     fn set_derivatives(&self, slave: usize, instance: &mut dyn Slave) -> Result<(), CallError> {
