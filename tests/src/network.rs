@@ -179,7 +179,10 @@ impl Network {
 
 /// The largest magnitude; infinity where one is no number.
 fn largest(errors: &DVector<f64>) -> f64 {
-    errors.iter().fold(0.0, |most: f64, part| {
-        if part.is_nan() { f64::INFINITY } else { most.max(part.abs()) }
-    })
+    errors.iter().fold(
+        0.0,
+        |most: f64, part| {
+            if part.is_nan() { f64::INFINITY } else { most.max(part.abs()) }
+        },
+    )
 }
