@@ -17,7 +17,7 @@ use std::sync::atomic::{AtomicBool, AtomicI32, AtomicUsize, Ordering};
 use std::thread::Thread;
 use std::time::Duration;
 
-pub(crate) use place::{Place, last_of_this_thread};
+pub(crate) use place::{Place, Slot, last_of_this_thread};
 
 /// How long the program's last function may take.
 const PATIENCE: Duration = Duration::from_secs(5);

@@ -22,7 +22,7 @@ use fmi2::abi::{
 };
 use libloading::Library as Handle;
 
-use crate::crash::Place;
+use crate::crash::{Place, Slot};
 use crate::error::LoadError;
 use crate::slave::{CallError, Failure};
 use functions::Functions;
@@ -207,7 +207,7 @@ impl Library {
                 set_real: self.functions.set_real,
                 do_step: self.functions.do_step,
                 get_real: self.functions.get_real,
-                place: place.clone(),
+                place: place.slot(),
             },
             place,
             pointer,
@@ -256,7 +256,7 @@ struct Hot {
     set_real: Option<functions::SetReal>,
     do_step: Option<functions::DoStep>,
     get_real: Option<functions::GetReal>,
-    place: Arc<Place>,
+    place: &'static Slot,
 }
 
 /// An instance, freed with its last use; the library stays loaded as long.

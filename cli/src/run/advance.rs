@@ -111,9 +111,7 @@ impl<'a> Beside<'a> {
         interrupt::notice();
         self.save(simulation)?;
         // An FMU may take the process with it from here on.
-        if let Some(recorder) = &mut self.recorder {
-            recorder.flush()?;
-        }
+        self.recorder.as_mut().map_or(Ok(()), |recorder| recorder.flush())?;
         simulation.terminate()?;
         simulation.free()?;
         Ok(match simulation.ended_by() {

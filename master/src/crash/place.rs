@@ -2,14 +2,21 @@
 #![expect(unsafe_code, reason = "names of functions are kept by address")]
 
 use std::cell::Cell;
+use std::ops::Deref;
 use std::ptr;
-use std::sync::atomic::{AtomicPtr, AtomicU64, Ordering};
-use std::sync::{Arc, PoisonError, RwLock, TryLockError, Weak};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicU8, AtomicU64, AtomicUsize, Ordering};
 
 use super::Call;
 
-/// The places of all instances of this process.
-static PLACES: RwLock<Vec<Weak<Place>>> = RwLock::new(Vec::new());
+/// Most instances that are told apart in reports.
+const MOST: usize = 4096;
+/// Bytes of an instance's name that reports show.
+const NAME: usize = 96;
+
+/// Where the instances are. No part of the heap, which an FMU may write over before it crashes; the
+/// last one is shared by the instances for which there is no other.
+static SLOTS: [Slot; MOST] = [const { Slot::new() }; MOST];
 
 thread_local! {
     /// Address of the place that this thread entered last; a signal handler reads it.
@@ -17,30 +24,65 @@ thread_local! {
 }
 
 /// Where one instance is. Entering and leaving a function are a few stores.
-pub(crate) struct Place {
+pub(crate) struct Slot {
+    taken: AtomicBool,
     /// The function that the instance is in; null between the calls.
     function: AtomicPtr<&'static str>,
     /// Bits of the time at which the instance is, in s.
     time: AtomicU64,
+    /// Name of the instance, and how many bytes it has.
+    name: [AtomicU8; NAME],
+    length: AtomicUsize,
+}
+
+/// The slot of an instance, for as long as it lives.
+pub(crate) struct Place {
+    slot: &'static Slot,
     instance: String,
 }
 
 impl Place {
     /// The place of a new instance.
     pub(crate) fn new(instance: &str) -> Arc<Self> {
-        let place = Arc::new(Self {
-            function: AtomicPtr::new(ptr::null_mut()),
-            time: AtomicU64::new(0),
-            instance: instance.to_owned(),
-        });
-        let mut places = PLACES.write().unwrap_or_else(PoisonError::into_inner);
-        places.push(Arc::downgrade(&place));
-        place
+        let free = SLOTS.iter().find(|slot| !slot.taken.swap(true, Ordering::AcqRel));
+        let slot = free.unwrap_or(&SLOTS[MOST - 1]);
+        let bytes = instance.as_bytes();
+        for (place, byte) in slot.name.iter().zip(bytes) {
+            place.store(*byte, Ordering::Relaxed);
+        }
+        slot.length.store(bytes.len().min(NAME), Ordering::Relaxed);
+        slot.time.store(0, Ordering::Relaxed);
+        Arc::new(Self { slot, instance: instance.to_owned() })
+    }
+
+    /// What outlives the instance.
+    pub(crate) fn slot(&self) -> &'static Slot {
+        self.slot
     }
 
     /// The name of the instance.
     pub(crate) fn instance(&self) -> &str {
         &self.instance
+    }
+}
+
+impl Deref for Place {
+    type Target = Slot;
+
+    fn deref(&self) -> &Slot {
+        self.slot
+    }
+}
+
+impl Slot {
+    const fn new() -> Self {
+        Self {
+            taken: AtomicBool::new(false),
+            function: AtomicPtr::new(ptr::null_mut()),
+            time: AtomicU64::new(0),
+            name: [const { AtomicU8::new(0) }; NAME],
+            length: AtomicUsize::new(0),
+        }
     }
 
     /// The calling thread is about to call this function of the instance.
@@ -72,10 +114,14 @@ impl Place {
         let function = self.function.load(Ordering::Relaxed);
         // SAFETY: null, or the address of a static reference that `enter` was given.
         let function = *unsafe { function.as_ref() }?;
-        Some(Call { instance: self.instance.clone(), function, time: self.time() })
+        let length = self.length.load(Ordering::Relaxed).min(NAME);
+        let name: Vec<u8> =
+            self.name[..length].iter().map(|byte| byte.load(Ordering::Relaxed)).collect();
+        let instance = String::from_utf8_lossy(&name).into_owned();
+        Some(Call { instance, function, time: self.time() })
     }
 
-    /// Whether that is the address of this place.
+    /// Whether that is the address of this slot.
     pub(crate) fn is_at(&self, address: usize) -> bool {
         ptr::from_ref(self).addr() == address
     }
@@ -83,8 +129,8 @@ impl Place {
 
 impl Drop for Place {
     fn drop(&mut self) {
-        let mut places = PLACES.write().unwrap_or_else(PoisonError::into_inner);
-        places.retain(|place| place.strong_count() > 0);
+        self.slot.leave();
+        self.slot.taken.store(false, Ordering::Release);
     }
 }
 
@@ -97,15 +143,8 @@ pub(crate) fn last_of_this_thread() -> usize {
 /// The call that the instance at that place is in; where there is no such place or call, the calls
 /// that all instances are in.
 pub(super) fn calls(address: usize) -> Vec<Call> {
-    let places: Vec<Arc<Place>> = match PLACES.try_read() {
-        Ok(places) => places.iter().filter_map(Weak::upgrade).collect(),
-        Err(TryLockError::Poisoned(poisoned)) => {
-            poisoned.into_inner().iter().filter_map(Weak::upgrade).collect()
-        }
-        Err(TryLockError::WouldBlock) => return Vec::new(),
-    };
-    let own = places.iter().find(|place| place.is_at(address)).and_then(|place| place.call());
-    own.map_or_else(|| places.iter().filter_map(|place| place.call()).collect(), |call| vec![call])
+    let own = SLOTS.iter().find(|slot| slot.is_at(address)).and_then(Slot::call);
+    own.map_or_else(|| SLOTS.iter().filter_map(Slot::call).collect(), |call| vec![call])
 }
 
 #[cfg(test)]

@@ -20,7 +20,8 @@ fn by_lines(a: &CFmu, more: &[&str]) -> Vec<String> {
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(0), "{message}");
     let text = std::fs::read_to_string(folder.path().join("out/results.csv")).unwrap_or_default();
-    let mut said: Vec<String> = message.lines().map(str::to_owned).collect();
+    let warnings = message.lines().filter(|line| line.starts_with("warning"));
+    let mut said: Vec<String> = warnings.map(str::to_owned).collect();
     said.extend(text.lines().skip(1).map(|line| line.split(',').nth(1).unwrap_or("").to_owned()));
     said
 }
@@ -52,7 +53,7 @@ fn derivatives_that_an_fmu_promises_and_refuses_are_done_without() {
     let refusing = refusing.flag("canInterpolateInputs", true);
     let lines = by_lines(&refusing, &[]);
     let (warning, rows) = lines.split_first().unwrap_or_else(|| panic!("no lines"));
-    for part in ["warning", "a", "fmi2GetRealOutputDerivatives", "maxOutputDerivativeOrder"] {
+    for part in ["a: fmi2GetRealOutputDerivatives", "fmi2Error", "maxOutputDerivativeOrder"] {
         assert!(warning.contains(part), "{part:?} is not in {warning:?}");
     }
     assert_eq!(rows.len(), ALL);

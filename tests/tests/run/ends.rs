@@ -86,11 +86,11 @@ fn a_lost_run_keeps_its_rows_and_its_checkpoints() {
 #[test]
 fn an_output_that_is_no_number_ends_the_run_unless_allowed() {
     let bench = Bench::new();
-    let more = ["--set", "plant.linearised=true", "--set", "plant.theta_0=1e300"];
+    let more = ["--set", "plant.linearised=true", "--set", "plant.theta_0=1e308"];
     let output = bench.coupled(&more);
-    fails(&output, 2, &["controller.u is NaN at t = 0 s, expected a finite number"]);
+    fails(&output, 1, &["controller.u is ", ", expected a finite number"]);
     let allowed = bench.coupled(&[&more[..], &["--allow-nan"]].concat());
-    assert!(!said(&allowed).contains("controller.u is NaN"), "{}", said(&allowed));
+    assert!(!said(&allowed).contains("expected a finite number"), "{}", said(&allowed));
 }
 
 #[test]

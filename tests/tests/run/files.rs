@@ -135,7 +135,8 @@ fn many_connections_are_counted_rather_than_listed() {
     let arguments: Vec<_> = fmus.iter().chain(&wires).map(String::as_str).collect();
     let more = ["--stop-time", "0.01", "--record", "p23.f_a", "--record", "p22.f_fric"];
     let printed = printed(&bench.run(&[&arguments[..], &more].concat()));
-    assert_eq!(printed.lines().count(), 20 + 1 + 1, "{printed}");
+    // The connections, how many more, how far the run came, the file.
+    assert_eq!(printed.lines().count(), 20 + 1 + 1 + 1, "{printed}");
     assert!(
         printed.contains("p0.f_fric -> p1.f_a\n") && printed.contains("and 3 more connections")
     );

@@ -105,11 +105,12 @@ fn the_log_of_calls_has_every_call_of_a_run() {
 #[test]
 fn the_log_of_calls_tells_warnings_from_ok() {
     let bench = Bench::new();
-    let fmu = CFmu::that("warn in fmi2DoStep").write(bench.folder.path(), "a");
+    let fmu = CFmu::that("warn everywhere").write(bench.folder.path(), "a");
     let path = fmu.display().to_string();
     printed(&bench.run(&[&path, "--step", "0.5", "--stop-time", "1", "--log-calls", "calls.txt"]));
     let calls = bench.read("calls.txt");
-    assert!(calls.contains("a fmi2DoStep(0.0, 0.5, true) -> fmi2OK\n"), "{calls}");
+    assert!(calls.contains("a fmi2DoStep(0.0, 0.5, true) -> fmi2Warning\n"), "{calls}");
+    assert!(calls.contains("a fmi2GetReal([1]) -> fmi2Warning [0.0]\n"), "{calls}");
     assert!(calls.contains("a fmi2DoStep(0.5, 0.5, true) -> fmi2Warning\n"), "{calls}");
 }
 
