@@ -58,7 +58,8 @@ impl Base {
     /// For `proxyfmu://HOST?file=URI`, which libcosim and Ecos run in another process or on another
     /// machine, it is the file itself, with a doubt.
     pub(super) fn resolve(&self, uri: &str) -> Result<Target, String> {
-        if let Some(file) = proxied(uri) {
+        // One proxy in another is nothing that a file can mean.
+        if let Some(file) = proxied(uri).filter(|file| proxied(file).is_none()) {
             let target = self.resolve(file)?;
             let doubt =
                 format!("{uri} is taken for the file {file}, which runs here without proxyfmu");
@@ -81,15 +82,18 @@ impl Base {
             let path = path_from_uri(path).map_err(|error| error.to_string())?;
             return Ok(Target { shown: path.clone(), path, fragment, doubt: None });
         }
-        let decoded = decoded(path)?;
+        let stated = decoded(path)?;
+        let decoded = stated.replace('\\', "/");
+        let sentence = || format!("{uri:?} has backslashes, which are taken for slashes");
+        let doubt = (decoded != stated).then(sentence);
         if decoded.starts_with('/') {
             self.refuse_absolute(uri)?;
             let path = PathBuf::from(decoded);
-            return Ok(Target { shown: path.clone(), path, fragment, doubt: None });
+            return Ok(Target { shown: path.clone(), path, fragment, doubt });
         }
         let (folder, shown) = (self.walk(&self.folder, &decoded), self.walk(&self.shown, &decoded));
         match (folder, shown) {
-            (Some(path), Some(shown)) => Ok(Target { path, shown, fragment, doubt: None }),
+            (Some(path), Some(shown)) => Ok(Target { path, shown, fragment, doubt }),
             _ => Err(format!("{uri:?} leads out of the archive")),
         }
     }
@@ -210,6 +214,18 @@ mod tests {
     }
 
     #[test]
+    fn backslashes_are_taken_for_slashes_with_a_doubt() {
+        let found = archive().resolve("..\\b c\\d.fmu").unwrap();
+        assert_eq!(found.path, Path::new("/tmp/x/b c/d.fmu"));
+        assert!(found.doubt.unwrap().ends_with("has backslashes, which are taken for slashes"));
+        for uri in ["..\\..\\a", "..%5c..%5Ca", "b\\../..\\../a"] {
+            let sentence = archive().resolve(uri).unwrap_err();
+            assert!(sentence.ends_with("leads out of the archive"), "{sentence}");
+        }
+        assert!(archive().resolve("\\etc").unwrap_err().contains("is absolute"));
+    }
+
+    #[test]
     fn a_file_on_disk_may_name_others_anywhere_on_disk_but_not_elsewhere() {
         let path = |uri| disk().resolve(uri).unwrap().path;
         assert_eq!(path("../fmi2/a.fmu"), Path::new("/data/s/../fmi2/a.fmu"));
@@ -219,6 +235,7 @@ mod tests {
             ("https://x.org/a.fmu", "the scheme https"),
             ("a.fmu?x=1", "a query"),
             ("proxyfmu://localhost", "the scheme proxyfmu"),
+            ("proxyfmu://a?file=proxyfmu://b?file=c.fmu", "a query"),
             ("a%00b", "a NUL"),
             ("%ff", "not UTF-8"),
         ] {

@@ -204,6 +204,7 @@ impl Files {
         let mut bytes = Vec::new();
         file.take(CAPACITY + 1).read_to_end(&mut bytes).map_err(failed)?;
         let (content, warnings) = read(&bytes).map_err(|error| error.in_file(&target.shown))?;
+        self.warn(&target.shown, target.doubt.clone());
         self.warn(&target.shown, warnings);
         Ok(content)
     }
