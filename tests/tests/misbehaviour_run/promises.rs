@@ -57,12 +57,17 @@ fn derivatives_that_an_fmu_promises_and_refuses_are_done_without() {
         assert!(warning.contains(part), "{part:?} is not in {warning:?}");
     }
     assert_eq!(rows.len(), ALL);
-    let run = Run::of(
-        &[("b", &CFmu::well_behaved()), ("a", &refusing)],
-        &["--connect", "b.y=a.u", "--course", "limited"],
-    );
-    assert_eq!(run.status, Some(0), "{}", run.message);
-    run.says(&["fmi2SetRealInputDerivatives", "canInterpolateInputs"]);
+    // The other way round: a is behind the connection.
+    let folder = tempfile::tempdir().unwrap_or_else(|error| panic!("{error}"));
+    let a = refusing.write(folder.path(), "a").display().to_string();
+    let b = CFmu::well_behaved().write(folder.path(), "b").display().to_string();
+    let out = folder.path().join("out").display().to_string();
+    let output = tests::run(&["run", &a, &b, "--connect", "b.y=a.u", "--out", &out]);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(0), "{message}");
+    for part in ["a: fmi2SetRealInputDerivatives", "canInterpolateInputs"] {
+        assert!(message.contains(part), "{part:?} is not in {message:?}");
+    }
 }
 
 #[test]
