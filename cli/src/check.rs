@@ -93,20 +93,19 @@ fn findings(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(Here, Vec
     findings.extend(description::check(description, &unpacked.warnings));
     let read = |path: &str| std::fs::read(unpacked.folder().join(path));
     findings.extend(binaries::check(&read, unpacked.entries(), description));
-    let here = match why_not(options, unpacked) {
-        Some(reason) => Here::NotTried { reason },
-        None => {
-            let (mut here, mut found) = run(options, unpacked)?;
-            let folder = format!("{}/", unpacked.folder().display());
-            if let Here::No { reason } = &mut here {
-                *reason = reason.replace(&folder, "");
-            }
-            for finding in &mut found {
-                finding.what = finding.what.replace(&folder, "");
-            }
-            findings.extend(found);
-            here
+    let here = if let Some(reason) = why_not(options, unpacked) {
+        Here::NotTried { reason }
+    } else {
+        let (mut here, mut found) = run(options, unpacked)?;
+        let folder = format!("{}/", unpacked.folder().display());
+        if let Here::No { reason } = &mut here {
+            *reason = reason.replace(&folder, "");
         }
+        for finding in &mut found {
+            finding.what = finding.what.replace(&folder, "");
+        }
+        findings.extend(found);
+        here
     };
     findings.sort_by_key(|finding| (finding.severity, finding.stops.is_empty(), finding.part));
     Ok((here, findings))

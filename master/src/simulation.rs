@@ -51,8 +51,6 @@ pub struct Simulation {
     repetition: Repetition,
     /// Steps are repeated: every slave can go back.
     repeats: bool,
-    /// Steps differ in size.
-    varies: bool,
     events: Option<Events>,
     groups: Groups,
     parallel: Option<Parallel>,
@@ -136,7 +134,6 @@ impl Simulation {
             coupled,
             repetition: Repetition::default(),
             repeats: algorithm.repeats(),
-            varies: algorithm.control != StepControl::Fixed || !algorithm.events.is_empty(),
             events: Events::new(&algorithm.events),
             parallel: Parallel::new(algorithm.jobs, groups.len())?,
             groups,
@@ -253,7 +250,8 @@ impl Simulation {
             self.exchange.commit(self.grid.time);
             self.drives.commit(self.grid.time);
         }
-        if self.varies && !self.is_finished() {
+        let varies = self.control.kind != StepControl::Fixed || self.events.is_some();
+        if varies && !self.is_finished() {
             let (time, stop) = (self.grid.time, self.grid.stop());
             self.control.check_pace(time, time - begin, stop)?;
         }

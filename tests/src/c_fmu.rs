@@ -89,9 +89,9 @@ impl CFmu {
     /// The same with a local Real `hidden` that it refuses to read.
     #[must_use]
     pub fn with_unreadable_variable(mut self) -> Self {
-        self.variables = "<ScalarVariable name=\"hidden\" valueReference=\"20\"><Real/>\
-                          </ScalarVariable>\n"
-            .to_owned();
+        self.variables.push_str(
+            "<ScalarVariable name=\"hidden\" valueReference=\"20\"><Real/></ScalarVariable>\n",
+        );
         self
     }
 

@@ -42,7 +42,8 @@ impl Value {
             (Value::Real(one), Value::Real(other)) => {
                 let (one, other) = (f64::from_bits(*one), f64::from_bits(*other));
                 let relative = (one - other).abs() / one.abs().max(other.abs());
-                if one == other {
+                // Zeros of both signs are equal.
+                if (one - other).abs() <= 0.0 {
                     0.0
                 } else {
                     Some(relative).filter(|own| !own.is_nan()).unwrap_or(f64::INFINITY)

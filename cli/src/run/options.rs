@@ -87,8 +87,8 @@ pub(crate) struct Options {
     /// start]
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     stop_time: Option<f64>,
-    /// Relative tolerance that the solvers inside the FMUs are told [default: that of each FMU's
-    /// DefaultExperiment]; the tolerance of the coupling is --relative-tolerance
+    /// Relative tolerance that the solvers inside the FMUs are told [default: that of the default
+    /// experiment of each FMU]; the tolerance of the coupling is --relative-tolerance
     #[arg(long, value_name = "FRACTION", allow_negative_numbers = true)]
     tolerance: Option<f64>,
     #[command(flatten)]

@@ -36,7 +36,7 @@ pub(super) fn plan(config: &mut Config, assembled: &Assembled) -> anyhow::Result
     propose_algorithm(&mut config.algorithm, assembled, &mut reasons);
     propose_steps(&mut config.algorithm, assembled, &mut reasons);
     check_step(&config.algorithm)?;
-    let (start, stop) = times(config, assembled, &mut reasons)?;
+    let (start, stop) = times(config, assembled, &mut reasons);
     let chosen = choose(system, &config.algorithm, stop - start)?;
     reasons.extend(chosen.reasons);
     let algorithm = chosen.algorithm;
@@ -139,11 +139,7 @@ fn count(multiple: f64) -> u32 {
 }
 
 /// Start and stop time in s: stated, of the system structure, or of the FMUs.
-fn times(
-    config: &Config,
-    assembled: &Assembled,
-    reasons: &mut Vec<String>,
-) -> anyhow::Result<(f64, f64)> {
+fn times(config: &Config, assembled: &Assembled, reasons: &mut Vec<String>) -> (f64, f64) {
     let stated = |time: &Option<Spanned<f64>>| time.as_ref().map(|time| *time.get_ref());
     let defaults = || {
         let slaves = assembled.system.slaves.iter();
@@ -165,7 +161,7 @@ fn times(
         }
     });
     if let Some(stop) = stated(&config.experiment.stop_time).or(assembled.experiment.stop_time) {
-        return Ok((start, stop));
+        return (start, stop);
     }
     let latest = defaults()
         .filter_map(|(name, one)| Some((name, one.stop_time?)))
@@ -179,12 +175,12 @@ fn times(
         );
         tracing::warn!("{reason}; --stop-time SECONDS sets it");
         reasons.push(reason);
-        return Ok((start, stop));
+        return (start, stop);
     };
     reasons.push(format!(
         "stop time {stop} s: the latest stopTime of a DefaultExperiment, that of {name}"
     ));
-    Ok((start, stop))
+    (start, stop)
 }
 
 /// Each communication point, unless these would be very many.

@@ -1,5 +1,5 @@
 //! Sizes of steps to the ulp.
-#![expect(clippy::unwrap_used, clippy::float_cmp, reason = "tests; exact by construction")]
+#![expect(clippy::float_cmp, reason = "tests; exact by construction")]
 
 use super::{Grid, size_between};
 use crate::system::System;
