@@ -62,8 +62,12 @@ impl Slave for Integrator {
         Ok(())
     }
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
-        assert_eq!(references, [2]);
-        values[0] = if self.direct { self.u } else { self.x };
+        values[0] = match references {
+            [1] => self.u,
+            [2] if self.direct => self.u,
+            [2] => self.x,
+            _ => panic!("there is no {references:?}"),
+        };
         Ok(())
     }
     fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), CallError> {

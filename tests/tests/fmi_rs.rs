@@ -19,7 +19,7 @@ use fmi_rs::sim::fmi2::{
 };
 use fmi2::Experiment;
 use fmi2::description::{Causality, Initial};
-use master::{Algorithm, Course, Fmu, Slave, Sweep, System};
+use master::{Algorithm, Course, Fmu, Simulation, Slave, Sweep, System};
 
 const FILES: [&str; 2] = ["FrictionPendulum.fmu", "AsoController.fmu"];
 const STEP: f64 = 1e-3;
@@ -245,11 +245,10 @@ fn own_slave(file: &str, settings: &[(&str, &str)]) -> Box<dyn Slave> {
     for (name, value) in settings {
         system.set(&format!("alone.{name}"), value).unwrap();
     }
-    let (_, mut slave) = system.slaves.remove(0);
-    slave.setup_experiment(&Experiment::default()).unwrap();
-    slave.enter_initialization_mode().unwrap();
-    slave.exit_initialization_mode().unwrap();
-    slave
+    // Initialises the slave with its settings.
+    let algorithm = Algorithm::new(1e-3);
+    let mut simulation = Simulation::new(system, &algorithm, &Experiment::default()).unwrap();
+    simulation.system().slaves.remove(0).1
 }
 
 #[test]

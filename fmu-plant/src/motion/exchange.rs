@@ -31,6 +31,9 @@ const LANDING: f64 = 10.0 * REST;
 /// static friction: more than an importer's integration errors, which would free the cart at once.
 const EXCESS: f64 = 1e-6;
 
+/// The same in N where there is no static friction: a force of zero is no event.
+const FREE: f64 = 1e-10;
+
 /// The plant at an instant as an importer sees it.
 struct Instant<'a> {
     plant: Plant,
@@ -41,17 +44,22 @@ struct Instant<'a> {
     ///
     /// More than the damping of a cart that counts as stopped: what stopped is held.
     excess: f64,
+    /// There is static friction: a cart can be held.
+    holds: bool,
 }
 
 impl<'a> Instant<'a> {
     fn new(motion: &'a Motion, parameters: &Parameters, force: f64) -> Self {
         let limit = parameters.static_friction;
-        let nominal = if limit > 0.0 { limit } else { 1.0 };
+        let holds = limit > 0.0;
+        let nominal = if holds { limit } else { 1.0 };
+        let excess = EXCESS * nominal + 2.0 * LANDING * parameters.cart_damping;
         Self {
             plant: Plant::new(parameters, Force::constant(force)),
             motion,
             nominal,
-            excess: EXCESS * nominal + 2.0 * LANDING * parameters.cart_damping,
+            excess: if holds { excess } else { FREE },
+            holds,
         }
     }
 
@@ -81,7 +89,8 @@ impl<'a> Instant<'a> {
     /// The acceleration of the indicator is not asked: at an event it may have either sign.
     fn has_stopped(&self) -> bool {
         let [velocity, _] = self.sliding();
-        velocity <= -REST || (velocity <= LANDING && self.regime_at_rest() != self.motion.regime)
+        let rests = || self.regime_at_rest() != self.motion.regime;
+        velocity <= -REST || (self.holds && velocity <= LANDING && rests())
     }
 }
 
@@ -91,7 +100,7 @@ impl Motion {
     /// First the stop of a sliding cart: with the velocity `v` and the acceleration `a` in its
     /// direction, each relative to its nominal value, `max(v - r, min(a, v + r))` with `r` = 1e-8.
     /// Not positive are a velocity of at most `r` that falls, and one below `-r`: a cart that has
-    /// just broken away, at `v = 0`, has `a > 0`. Then the friction that is left before a held cart
+    /// just broken away, at `v = 0`, has `a > 0`. Without static friction `v + r`. Then the friction that is left before a held cart
     /// breaks away forward and backward, relative to the static friction, and more by `EXCESS`.
     ///
     /// After [`Motion::settle`] under the same force all are positive.
@@ -104,7 +113,12 @@ impl Motion {
         }
         let [velocity, acceleration] = now.sliding();
         let [falls, turned] = [-REST, REST].map(|shift| (velocity + shift) / NOMINAL_VELOCITY);
-        [falls.max(turned.min(acceleration / NOMINAL_ACCELERATION)), 1.0, 1.0]
+        let stop = if now.holds {
+            falls.max(turned.min(acceleration / NOMINAL_ACCELERATION))
+        } else {
+            turned
+        };
+        [stop, 1.0, 1.0]
     }
 
     /// Decides the regime at an event; true if that changed the state.

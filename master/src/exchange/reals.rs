@@ -163,7 +163,9 @@ impl Reals {
         let (layout, lane) = (&self.layout, &self.layout.lanes[slave]);
         let source = layout.sources[k] as usize;
         let known = self.is_known(slave, source, time + size);
-        let seen_at = self.seen_at(time, size);
+        // A function takes what its sources have at the end of its step.
+        let is_function = known && layout.functions[slave];
+        let seen_at = if is_function { time + size } else { self.seen_at(time, size) };
         let ahead = self.several && known && self.course == Course::Hold;
         let course = if layout.held[k] || ahead {
             Polynomial::held(self.value_at(source, seen_at))
