@@ -93,8 +93,8 @@ fn findings(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(Here, Vec
     findings.extend(description::check(description, &unpacked.warnings));
     let read = |path: &str| std::fs::read(unpacked.folder().join(path));
     findings.extend(binaries::check(&read, unpacked.entries(), description));
-    let here = if let Some(reason) = why_not(options, unpacked) {
-        Here::NotTried { reason }
+    let here = if let Some(here) = without_trial(options, unpacked) {
+        here
     } else {
         let (mut here, mut found) = run(options, unpacked)?;
         let folder = format!("{}/", unpacked.folder().display());
@@ -111,19 +111,21 @@ fn findings(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(Here, Vec
     Ok((here, findings))
 }
 
-/// Why the FMU is not tried, if it is not.
-fn why_not(options: &Options, unpacked: &Unpacked) -> Option<String> {
+/// The answer where the FMU is not tried.
+fn without_trial(options: &Options, unpacked: &Unpacked) -> Option<Here> {
     if options.no_run {
-        return Some("--no-run".to_owned());
+        return Some(Here::NotTried { reason: "--no-run".to_owned() });
     }
     let Some(simulation) = &unpacked.description.co_simulation else {
-        return Some("it is for model exchange only".to_owned());
+        return Some(Here::No { reason: "it is for model exchange only".to_owned() });
     };
     if simulation.needs_execution_tool {
         let tool = unpacked.description.generation_tool.as_deref().unwrap_or("the exporting tool");
-        return Some(format!("it needs {tool} beside it (needsExecutionTool)"));
+        let reason = format!("it needs {tool} beside it (needsExecutionTool)");
+        return Some(Here::NotTried { reason });
     }
-    unpacked.library(&simulation.model_identifier).err().map(|error| error.to_string())
+    let refused = unpacked.library(&simulation.model_identifier).err()?;
+    Some(Here::No { reason: refused.to_string() })
 }
 
 /// Tries the FMU: on Linux in processes of its own, which may crash or hang.

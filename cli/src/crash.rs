@@ -9,10 +9,12 @@ use crate::run;
 /// Exit status of a run that is lost, and of one that has not begun.
 const LOST: u8 = 1;
 const NOT_BEGUN: u8 = 2;
+const ADVICE: &str = "with --isolate each FMU has a process of its own, and what it does to it is an \
+                      error of the run";
 
 /// From now on such an end is reported, and the results so far are kept.
 pub(crate) fn watch() {
-    if let Err(error) = crash::watch(end) {
+    if let Err(error) = crash::watch(ADVICE, end) {
         tracing::warn!("crashes of FMUs cannot be reported: {error}");
     }
 }
@@ -25,10 +27,7 @@ fn end(ending: &Ending) -> u8 {
     } else if interrupted {
         tracing::error!("the run was interrupted: {ending}");
     } else {
-        tracing::error!(
-            "{ending}; with --isolate each FMU has a process of its own, and what it does to it is \
-             an error of the run"
-        );
+        tracing::error!("{ending}; {ADVICE}");
     }
     // A panic here is about memory that the FMU wrote over: it is told below as what it leads to.
     std::panic::set_hook(Box::new(|_| {}));

@@ -10,13 +10,14 @@ mod place;
 #[cfg(unix)]
 mod signals;
 
-use std::fmt;
+use std::fmt::{self, Write as _};
 use std::io;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicUsize, Ordering};
 use std::thread::Thread;
 use std::time::Duration;
 
+pub use place::Name;
 pub(crate) use place::{Place, Slot, last_of_this_thread};
 
 /// How long the program's last function may take.
@@ -37,11 +38,14 @@ static PLACE: AtomicUsize = AtomicUsize::new(0);
 /// The thread that runs the program's last function.
 static KEEPER: OnceLock<Thread> = OnceLock::new();
 
+/// What is advised where the program's last function cannot say it.
+static ADVICE: OnceLock<&'static str> = OnceLock::new();
+
 /// A call of a function of an FMU.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Call {
     /// The instance.
-    pub instance: String,
+    pub instance: Name,
     /// The function of the standard, or what else was being done.
     pub function: &'static str,
     /// Time in s at which the instance was.
@@ -68,25 +72,35 @@ pub struct Ending {
     pub calls: Vec<Call>,
 }
 
+impl fmt::Display for Call {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{} at t = {} s: {}", self.instance, self.time, self.function)
+    }
+}
+
 impl fmt::Display for Ending {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut separator = "";
-        for Call { instance, function, time } in &self.calls {
-            write!(formatter, "{separator}{instance} at t = {time} s: {function}")?;
-            separator = ", or ";
+        tell(formatter, self.calls.iter().cloned(), self.cause)
+    }
+}
+
+/// Writes how the process comes to its end, without the heap.
+fn tell(out: &mut impl fmt::Write, calls: impl Iterator<Item = Call>, cause: Cause) -> fmt::Result {
+    let mut told = false;
+    for call in calls {
+        write!(out, "{}{call}", if told { ", or " } else { "" })?;
+        told = true;
+    }
+    if !told {
+        out.write_str("outside of the calls of FMUs the program or a thread of an FMU")?;
+    }
+    match cause {
+        Cause::Signal(signal) => {
+            write!(out, " crashed with signal {signal} ({})", signal_text(signal))
         }
-        if self.calls.is_empty() {
-            formatter
-                .write_str("outside of the calls of FMUs the program or a thread of an FMU")?;
-        }
-        match self.cause {
-            Cause::Signal(signal) => {
-                write!(formatter, " crashed with signal {signal} ({})", signal_text(signal))
-            }
-            Cause::Exit(Some(status)) => write!(formatter, " ended the process by exit({status})"),
-            Cause::Exit(None) => formatter.write_str(" ended the process by exit"),
-            Cause::GivenUp => formatter.write_str(" does not return"),
-        }
+        Cause::Exit(Some(status)) => write!(out, " ended the process by exit({status})"),
+        Cause::Exit(None) => out.write_str(" ended the process by exit"),
+        Cause::GivenUp => out.write_str(" does not return"),
     }
 }
 
@@ -103,15 +117,21 @@ fn signal_text(_: i32) -> &'static str {
 
 /// From now on a fatal signal and an unexpected `exit` in this process call `last` in a thread of
 /// its own, and the process ends with the status that it returns. Signals are watched on Unix; on
-/// other systems only [`give_up`] calls it. The first call counts.
+/// other systems only [`give_up`] calls it. Where `last` itself crashes, because the FMU wrote over
+/// the memory of the program, standard error gets one line about the end, with `advice`. The first
+/// call counts.
 ///
 /// # Errors
 ///
 /// Where the thread or the signal handlers are refused.
-pub fn watch(last: impl FnOnce(&Ending) -> u8 + Send + 'static) -> io::Result<()> {
+pub fn watch(
+    advice: &'static str,
+    last: impl FnOnce(&Ending) -> u8 + Send + 'static,
+) -> io::Result<()> {
     if KEEPER.get().is_some() {
         return Ok(());
     }
+    ADVICE.get_or_init(|| advice);
     let keep = move || {
         #[cfg(unix)]
         signals::keep();
@@ -131,15 +151,51 @@ pub fn watch(last: impl FnOnce(&Ending) -> u8 + Send + 'static) -> io::Result<()
 
 /// What is known of the end.
 fn ending() -> Ending {
-    let cause = match CAUSE.load(Ordering::Acquire) {
+    Ending { cause: cause(), calls: place::calls(PLACE.load(Ordering::Relaxed)).collect() }
+}
+
+/// What ends the process.
+fn cause() -> Cause {
+    match CAUSE.load(Ordering::Acquire) {
         EXIT if cfg!(all(target_os = "linux", target_env = "gnu")) => {
             Cause::Exit(Some(STATUS.load(Ordering::Relaxed)))
         }
         EXIT => Cause::Exit(None),
         GIVEN_UP => Cause::GivenUp,
         signal => Cause::Signal(signal),
-    };
-    Ending { cause, calls: place::calls(PLACE.load(Ordering::Relaxed)) }
+    }
+}
+
+/// A line for standard error that is written without the heap; what is beyond its end is cut.
+struct Line {
+    bytes: [u8; 1024],
+    length: usize,
+}
+
+impl fmt::Write for Line {
+    fn write_str(&mut self, part: &str) -> fmt::Result {
+        for byte in part.bytes() {
+            *self.bytes.get_mut(self.length).ok_or(fmt::Error)? = byte;
+            self.length += 1;
+        }
+        Ok(())
+    }
+}
+
+/// What is said where the program's last function does not come to its end.
+fn last_words() -> Line {
+    let mut line = Line { bytes: [b'\n'; 1024], length: 0 };
+    // A line that is too long is cut.
+    let _ = write_last_words(&mut line);
+    line.length = (line.length + 1).min(line.bytes.len());
+    line
+}
+
+fn write_last_words(line: &mut Line) -> fmt::Result {
+    line.write_str("error: ")?;
+    tell(line, place::calls(PLACE.load(Ordering::Relaxed)), cause())?;
+    line.write_str(", and this program could not end in order: the last results may be lost; ")?;
+    line.write_str(ADVICE.get().copied().unwrap_or_default())
 }
 
 /// Hands the end over to the thread of [`watch`]. Nothing here allocates or takes a lock: signal
@@ -173,7 +229,7 @@ pub fn done() {
 /// The calls of FMUs that have not returned.
 #[must_use]
 pub fn calls() -> Vec<Call> {
-    place::calls(0)
+    place::calls(0).collect()
 }
 
 /// Ends the process at once: no destructor runs, neither of this program nor of an FMU.

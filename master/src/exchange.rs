@@ -144,8 +144,9 @@ impl Exchange {
     pub(crate) fn gather(&mut self, slave: usize, time: f64, size: f64) {
         self.reals.gather(slave, time, size);
         if self.discrete {
-            let limit = self.reals.seen_at(time, size);
-            let ahead = |source| self.reals.is_beyond(source, limit);
+            let ahead = |source| {
+                self.reals.is_beyond(source, self.reals.seen_at(slave, source, time, size))
+            };
             self.integers.gather(slave, time, ahead);
             self.booleans.gather(slave, time, ahead);
             self.strings.gather(slave, time, ahead);

@@ -234,6 +234,11 @@ def test_the_answer_comes_first_and_says_with_what_the_fmu_ran(aso_ftc, packed):
     assert here == {"runs": "not-tried", "reason": "--no-run"} and not tools
 
 
+def test_an_fmu_without_a_library_for_this_platform_is_said_not_to_run_here(aso_ftc, fmu, files):
+    here, _ = answer(aso_ftc, fmu({library(files): None, "binaries/darwin64/a.dylib": ""}))
+    assert here["runs"] == "no" and "linux64" in here["reason"]
+
+
 def validated(path):
     """Whether FMPy's simulate_fmu takes the description by default."""
     try:

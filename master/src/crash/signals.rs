@@ -1,7 +1,7 @@
 //! Signals and `exit`: the parts that the operating system calls.
 //!
-//! The handlers do only what is safe in a signal handler: atomics, `nanosleep`, `write`, `_exit`, and
-//! `unpark`, which is an atomic exchange and one call of the kernel.
+//! The handlers do only what is safe in a signal handler: atomics, `nanosleep`, `write`, `_exit`,
+//! formatting on the stack, and `unpark`, which is an atomic exchange and one call of the kernel.
 #![expect(unsafe_code, reason = "signal handlers")]
 
 use std::cell::Cell;
@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use libc::{c_int, c_void, siginfo_t};
 
-use super::{DONE, EXIT, PATIENCE, STATUS, begin, last_of_this_thread};
+use super::{DONE, EXIT, PATIENCE, STATUS, begin, last_of_this_thread, last_words};
 
 /// The signals that end a process, each with its name.
 pub(super) const FATAL: [(c_int, &str); 6] = [
@@ -26,8 +26,6 @@ pub(super) const FATAL: [(c_int, &str); 6] = [
 ];
 /// Bytes of the stack on which the handler runs where the thread's own has overflowed.
 const STACK: usize = 1 << 16;
-/// What is said where the program's last function cannot say more.
-const SHORT: &[u8] = b"error: an FMU crashed, and its crash cannot be reported in full\n";
 
 thread_local! {
     /// Whether this thread runs the program's last function.
@@ -93,8 +91,9 @@ fn wait() -> ! {
     if !IS_KEEPER.try_with(Cell::get).unwrap_or(false) {
         std::thread::sleep(PATIENCE + Duration::from_secs(1));
     }
-    // SAFETY: `SHORT.len()` bytes to read.
-    unsafe { libc::write(libc::STDERR_FILENO, SHORT.as_ptr().cast(), SHORT.len()) };
+    let line = last_words();
+    // SAFETY: `line.length` bytes to read.
+    unsafe { libc::write(libc::STDERR_FILENO, line.bytes.as_ptr().cast(), line.length) };
     leave(1)
 }
 

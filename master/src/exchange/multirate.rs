@@ -1,7 +1,6 @@
 //! Slaves that make several steps at once: what others see of them on the way.
 
 use super::reals::Reals;
-use crate::algorithm::Sweep;
 
 /// Part of a step that is rounding.
 const ROUNDING: f64 = 1e-6;
@@ -23,10 +22,10 @@ impl Reals {
         self.several && self.beyond(slave, time).is_some()
     }
 
-    /// The time for which a held input is asked in a step from `time` over `size`: its end where
-    /// slaves that have stepped before are seen there.
-    pub(super) fn seen_at(&self, time: f64, size: f64) -> f64 {
-        if self.sweep == Sweep::GaussSeidel { time + size } else { time }
+    /// The time for which a held input of `slave` asks the slave `source`, in a step from `time` over
+    /// `size`: its end where the slave sees that, else its begin.
+    pub(crate) fn seen_at(&self, slave: usize, source: usize, time: f64, size: f64) -> f64 {
+        if self.sees_end(slave, source, time + size) { time + size } else { time }
     }
 
     /// The value of an output at `time`: the latest, or the one on the way of a slave that has gone

@@ -163,9 +163,7 @@ impl Reals {
         let (layout, lane) = (&self.layout, &self.layout.lanes[slave]);
         let source = layout.sources[k] as usize;
         let known = self.is_known(slave, source, time + size);
-        // A function takes what its sources have at the end of its step.
-        let is_function = known && layout.functions[slave];
-        let seen_at = if is_function { time + size } else { self.seen_at(time, size) };
+        let seen_at = self.seen_at(slave, layout.owners[source] as usize, time, size);
         let ahead = self.several && known && self.course == Course::Hold;
         let course = if layout.held[k] || ahead {
             Polynomial::held(self.value_at(source, seen_at))
@@ -205,9 +203,10 @@ impl Reals {
         }
     }
 
-    /// Whether the slave gets what its source reached in the current step, once that has stepped: in
-    /// Jacobi's method a function does, at the `end` of its step, where the source's step ends by then.
-    fn sees_end(&self, slave: usize, span: &Span, end: f64) -> bool {
+    /// Whether `slave` gets what the slave `source` reached in the current step, once that has stepped:
+    /// in Jacobi's method a function does, at the `end` of its step, where the source's ends by then.
+    pub(super) fn sees_end(&self, slave: usize, source: usize, end: f64) -> bool {
+        let span = &self.trace.spans[source];
         let is_there = || span.begin + span.size <= end + ROUNDING * span.size;
         self.sweep == Sweep::GaussSeidel || (self.layout.functions[slave] && is_there())
     }
@@ -215,8 +214,8 @@ impl Reals {
     /// Whether the source of that output has stepped beyond the begin of the current step, for a
     /// `slave` that steps to `end`.
     fn is_known(&self, slave: usize, output: usize, end: f64) -> bool {
-        let span = &self.trace.spans[self.layout.owners[output] as usize];
-        self.assumes || (span.stepped && self.sees_end(slave, span, end))
+        let source = self.layout.owners[output] as usize;
+        self.assumes || (self.trace.spans[source].stepped && self.sees_end(slave, source, end))
     }
 
     /// What is known of an output over the last step of its slave.
