@@ -1,4 +1,4 @@
-"""Writes control/tests/data/faults.txt: invariant zeros, distances, sampled plants and loss of effectiveness by SciPy.
+"""Writes crates/control/tests/data/faults.txt: invariant zeros, distances, sampled plants and loss of effectiveness by SciPy.
 
 * zeros: finite generalised eigenvalues of the system pencil, scipy.linalg.eig (QZ);
 * distances: the smallest singular value of [A - s I, B] minimised over a grid of the plane, then by Nelder and Mead,
@@ -160,7 +160,7 @@ def main():
     ramps = np.block([[np.zeros((2, 2)), np.eye(2)], [np.zeros((2, 4))]])
     data.update(ramp_a=a, ramp_b=b, ramp_f_a=f_a, ramp=sampled(a, b, np.hstack([f_a, 0 * f_a]), ramps, 0.25))
     loss(data)
-    default = Path(__file__).resolve().parent.parent / "control" / "tests" / "data" / "faults.txt"
+    default = Path(__file__).resolve().parent.parent / "crates" / "control" / "tests" / "data" / "faults.txt"
     path = Path(sys.argv[1]) if len(sys.argv) > 1 else default
     with path.open("w") as file:
         file.write(f"# scripts/reference_faults.py: numpy {np.__version__}, scipy {scipy.__version__}\n")

@@ -1,4 +1,4 @@
-"""Writes control/tests/data/lmi.txt: norms and best bounds by other methods than the tested one.
+"""Writes crates/control/tests/data/lmi.txt: norms and best bounds by other methods than the tested one.
 
 Norms: H-infinity by bisection on the imaginary eigenvalues of the Hamiltonian (Boyd and Balakrishnan, 1990), of a sampled
 system after the bilinear map; generalised H2 by Lyapunov equations. Best H-infinity bounds of a state feedback: bisection
@@ -207,7 +207,7 @@ def main():
     for cases in (norm_cases, synthesis_cases, radius_cases):
         for found in cases(random):
             lines += found
-    target = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "control/tests/data/lmi.txt"
+    target = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "crates/control/tests/data/lmi.txt"
     target.write_text("\n".join(lines) + "\n")
 
 

@@ -1,4 +1,4 @@
-"""Writes control/tests/claims/placement_reference.txt: what scipy's place_poles reaches on many systems.
+"""Writes crates/control/tests/claims/placement_reference.txt: what scipy's place_poles reaches on many systems.
 
 Each line: kind; n; m; A by rows; B by rows; wanted eigenvalues (real parts, then imaginary parts); the lowest condition
 number of the eigenvectors of length one over KNV0 and YT and several bounds on their iterations; how it was reached;
@@ -116,7 +116,7 @@ def line(kind, a, b, wanted, reached):
 
 def main():
     warnings.simplefilter("ignore")
-    default = ROOT / "control" / "tests" / "claims" / "placement_reference.txt"
+    default = ROOT / "crates" / "control" / "tests" / "claims" / "placement_reference.txt"
     path = Path(sys.argv[1]) if len(sys.argv) > 1 else default
     found = [(*system, best(*system[1:])) for system in [*named(), *random_systems()]]
     lines = [line(*system) for system in found if np.isfinite(system[-1][0])]

@@ -1,4 +1,4 @@
-"""Writes control/tests/data/response.txt: norms, singular values and fault responses by python-control and mpmath.
+"""Writes crates/control/tests/data/response.txt: norms, singular values and fault responses by python-control and mpmath.
 
 Kind "norms": H-infinity norm and H2 norm of random systems by python-control with SLICOT, the largest singular value
 on a few frequencies by numpy. Kind "peak": peak-to-peak gains. Kind "loop": the pendulum with its controller
@@ -142,7 +142,7 @@ def write_loop(file):
 def main():
     mp.mp.dps = 40
     random = np.random.default_rng(SEED)
-    default = ROOT / "control" / "tests" / "data" / "response.txt"
+    default = ROOT / "crates" / "control" / "tests" / "data" / "response.txt"
     with (Path(sys.argv[1]) if len(sys.argv) > 1 else default).open("w") as file:
         file.write(f"# scripts/reference_response.py: python-control {control.__version__}, slycot {slycot.__version__}, mpmath {mp.__version__}\n")
         write_norms(file, random)

@@ -1,4 +1,4 @@
-"""Writes control/tests/data/riccati.txt: Riccati and discrete Lyapunov equations, holds, by SciPy and mpmath.
+"""Writes crates/control/tests/data/riccati.txt: Riccati and discrete Lyapunov equations, holds, by SciPy and mpmath.
 
 Each Riccati solution is SciPy's (solve_continuous_are, solve_discrete_are), polished by Newton's method with 60 digits,
 and beside it stands how far SciPy's own was from it, entries relative to sqrt(P[i,i] P[j,j]). Discrete Lyapunov
@@ -180,7 +180,7 @@ def write_holds(file, random):
 def main():
     mp.mp.dps = 60
     random = np.random.default_rng(SEED)
-    default = ROOT / "control" / "tests" / "data" / "riccati.txt"
+    default = ROOT / "crates" / "control" / "tests" / "data" / "riccati.txt"
     with (Path(sys.argv[1]) if len(sys.argv) > 1 else default).open("w") as file:
         file.write(f"# scripts/reference_riccati.py: scipy {scipy.__version__}, numpy {np.__version__}, mpmath {mp.__version__}\n")
         write_riccati(file, random)

@@ -97,7 +97,7 @@ fn quoted(text: &str) -> String {
 fn clone() -> Option<PathBuf> {
     let places = [std::env::current_exe().ok(), std::env::current_dir().ok()];
     let folders = places.iter().flatten().flat_map(|place| place.ancestors());
-    folders.map(|folder| folder.join("fmi2")).find(|folder| is_fmi2(folder))
+    folders.map(|folder| folder.join("crates/fmi2")).find(|folder| is_fmi2(folder))
 }
 
 fn is_fmi2(folder: &Path) -> bool {

@@ -1,23 +1,23 @@
-//! The fuzz targets: those of `fmi2/tests/robustness` and of `master/tests/robustness`, one for the
+//! The fuzz targets: those of `crates/fmi2/tests/robustness` and of `crates/master/tests/robustness`, one for the
 //! controller's design file and one for `system.toml`.
 
-#[path = "../../fmi2/tests/robustness/array.rs"]
+#[path = "../../crates/fmi2/tests/robustness/array.rs"]
 mod array;
-#[path = "../../fmi2/tests/robustness/calls/mod.rs"]
+#[path = "../../crates/fmi2/tests/robustness/calls/mod.rs"]
 mod calls;
-#[path = "../../fmi2/tests/robustness/choice.rs"]
+#[path = "../../crates/fmi2/tests/robustness/choice.rs"]
 mod choice;
-#[path = "../../fmi2/tests/robustness/importer.rs"]
+#[path = "../../crates/fmi2/tests/robustness/importer.rs"]
 mod importer;
-#[path = "../../fmi2/tests/robustness/machine.rs"]
+#[path = "../../crates/fmi2/tests/robustness/machine.rs"]
 mod machine;
-#[path = "../../master/tests/robustness/targets.rs"]
+#[path = "../../crates/master/tests/robustness/targets.rs"]
 mod master_files;
-#[path = "../../fmi2/tests/robustness/prediction.rs"]
+#[path = "../../crates/fmi2/tests/robustness/prediction.rs"]
 mod prediction;
-#[path = "../../fmi2/tests/robustness/sequence.rs"]
+#[path = "../../crates/fmi2/tests/robustness/sequence.rs"]
 mod sequence;
-#[path = "../../fmi2/tests/robustness/targets.rs"]
+#[path = "../../crates/fmi2/tests/robustness/targets.rs"]
 mod targets;
 
 mod design;
@@ -49,15 +49,15 @@ targets! {
     call_sequence: targets::call_sequence;
     /// See `design.rs`.
     design_file: design::design_file;
-    /// See `master/tests/robustness/targets.rs`.
+    /// See `crates/master/tests/robustness/targets.rs`.
     system_structure: master_files::system_structure;
-    /// See `master/tests/robustness/targets.rs`.
+    /// See `crates/master/tests/robustness/targets.rs`.
     parameter_values: master_files::parameter_values;
-    /// See `master/tests/robustness/targets.rs`.
+    /// See `crates/master/tests/robustness/targets.rs`.
     parameter_mapping: master_files::parameter_mapping;
-    /// See `master/tests/robustness/targets.rs`.
+    /// See `crates/master/tests/robustness/targets.rs`.
     signal_dictionary: master_files::signal_dictionary;
-    /// See `master/tests/robustness/targets.rs`.
+    /// See `crates/master/tests/robustness/targets.rs`.
     signal_table: master_files::signal_table;
     /// See `cli/src/config/tests/target.rs`.
     system_toml: command::system_toml;

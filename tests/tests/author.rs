@@ -213,7 +213,7 @@ fn bad_names_and_existing_folders_are_refused_and_nothing_is_left() {
 #[test]
 fn a_new_crate_depends_on_the_fmi2_that_it_is_told() {
     let folder = tempfile::tempdir().unwrap();
-    let own = root().join("fmi2").display().to_string();
+    let own = root().join("crates/fmi2").display().to_string();
     let url = "https://example.org/fmi2.git";
     let kinds = [("a", None, "path", own.as_str()), ("b", Some(url), "git", url)];
     let mut files = BTreeSet::new();

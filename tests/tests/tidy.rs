@@ -39,10 +39,10 @@ fn name(path: &Path) -> String {
 #[test]
 fn the_mathematics_depends_on_neither_fmi_nor_files() {
     let manifest: toml::Table =
-        fs::read_to_string(root().join("control/Cargo.toml")).unwrap().parse().unwrap();
+        fs::read_to_string(root().join("crates/control/Cargo.toml")).unwrap().parse().unwrap();
     let dependencies: Vec<_> = manifest["dependencies"].as_table().unwrap().keys().collect();
     assert_eq!(dependencies, ["clarabel", "libm", "nalgebra", "thiserror"]);
-    for file in files(&root().join("control/src"), "rs") {
+    for file in files(&root().join("crates/control/src"), "rs") {
         let text = fs::read_to_string(&file).unwrap();
         for word in ["std::fs", "std::io", "std::net", "std::env", "println!", "eprintln!"] {
             assert!(!text.contains(word), "{} uses {word}", name(&file));
@@ -53,7 +53,7 @@ fn the_mathematics_depends_on_neither_fmi_nor_files() {
 #[test]
 fn nothing_uses_the_models_and_nothing_uses_the_command() {
     for member in
-        ["control", "lapack", "fmi2", "fmu-plant", "fmu-controller", "master", "cli", "tests"]
+        ["crates/control", "crates/lapack", "crates/fmi2", "crates/master", "cli", "tests"]
     {
         let manifest: toml::Table =
             fs::read_to_string(root().join(member).join("Cargo.toml")).unwrap().parse().unwrap();
@@ -71,34 +71,34 @@ fn nothing_uses_the_models_and_nothing_uses_the_command() {
 #[test]
 fn unsafe_code_stands_at_the_boundaries_only() {
     let allowed = [
-        "fmi2/src/ffi.rs",
-        "fmi2/src/ffi/entry.rs",
-        "fmi2/src/ffi/exports.rs",
-        "master/src/library.rs",
+        "crates/fmi2/src/ffi.rs",
+        "crates/fmi2/src/ffi/entry.rs",
+        "crates/fmi2/src/ffi/exports.rs",
+        "crates/master/src/library.rs",
         // Signal handlers, and what they read.
-        "master/src/crash/place.rs",
-        "master/src/crash/signals.rs",
-        "master/src/isolate/memory.rs",
+        "crates/master/src/crash/place.rs",
+        "crates/master/src/crash/signals.rs",
+        "crates/master/src/isolate/memory.rs",
         // A mapping of shared memory becomes a slice of atomics.
-        "master/src/isolate/region.rs",
+        "crates/master/src/isolate/region.rs",
         // The C side of BLAS and LAPACK, and its tests.
-        "lapack/src/memory.rs",
-        "lapack/src/products.rs",
-        "lapack/src/routines.rs",
-        "lapack/src/symbols.rs",
-        "lapack/tests/definitions/products.rs",
-        "lapack/tests/definitions/singular.rs",
-        "lapack/tests/definitions/solvers.rs",
-        "lapack/tests/definitions/spectrum.rs",
-        "master/src/library/calls.rs",
-        "master/src/library/foreign.rs",
-        "master/src/library/functions.rs",
-        "master/src/library/log.rs",
-        "master/src/library/states.rs",
-        "master/src/library/step.rs",
+        "crates/lapack/src/memory.rs",
+        "crates/lapack/src/products.rs",
+        "crates/lapack/src/routines.rs",
+        "crates/lapack/src/symbols.rs",
+        "crates/lapack/tests/definitions/products.rs",
+        "crates/lapack/tests/definitions/singular.rs",
+        "crates/lapack/tests/definitions/solvers.rs",
+        "crates/lapack/tests/definitions/spectrum.rs",
+        "crates/master/src/library/calls.rs",
+        "crates/master/src/library/foreign.rs",
+        "crates/master/src/library/functions.rs",
+        "crates/master/src/library/log.rs",
+        "crates/master/src/library/states.rs",
+        "crates/master/src/library/step.rs",
         // Importers of their own, to call the C functions as no safe one would.
-        "fmi2/tests/robustness/importer.rs",
-        "fmi2/tests/robustness/uninitialised.rs",
+        "crates/fmi2/tests/robustness/importer.rs",
+        "crates/fmi2/tests/robustness/uninitialised.rs",
         "fuzz/src/design.rs",
     ];
     for file in files(&root(), "rs") {

@@ -1,8 +1,8 @@
 //! No `system.toml` does any harm, whatever is in it.
 
-#[path = "../../../../fmi2/tests/robustness/changes.rs"]
+#[path = "../../../../crates/fmi2/tests/robustness/changes.rs"]
 mod changes;
-#[path = "../../../../fmi2/tests/robustness/corpus.rs"]
+#[path = "../../../../crates/fmi2/tests/robustness/corpus.rs"]
 mod corpus;
 #[path = "target.rs"]
 mod target;

@@ -15,7 +15,7 @@ use fmi2::Experiment;
 use master::algorithm::{Algorithm, Course, Sweep};
 use master::{Fmu, Simulation, Slave, System};
 
-#[path = "../../tests/speed/lag.rs"]
+#[path = "../../../tests/speed/lag.rs"]
 mod lag;
 
 /// Communication step in s.

@@ -31,7 +31,7 @@ use master::results::{Column, ColumnKind, create};
 use master::{Fmu, Readout, Simulation, System};
 use rustix::time::{ClockId, clock_gettime};
 
-#[path = "../../tests/speed/lag.rs"]
+#[path = "../../../tests/speed/lag.rs"]
 #[expect(dead_code, reason = "the rings are for the benchmark beside this")]
 mod lag;
 
