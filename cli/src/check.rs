@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context as _, anyhow};
-use fmi2::package::Unpacked;
+use fmu_description::package::Unpacked;
 use master::isolate::{self, IsolateError, Isolated, Package};
 use master::{Fmu, Instance};
 use serde::Serialize;

@@ -1,7 +1,7 @@
 //! The end of the command where an FMU forces it: by a crash, by `exit`, by a call that does not
 //! return after the command was told to end.
 
-use fmi2::package::remove_temporary_folders;
+use fmu_description::package::remove_temporary_folders;
 use master::crash::{self, Cause, Ending};
 
 use crate::run;

@@ -10,7 +10,7 @@ const README: &str = include_str!("new/readme.md");
 const MODEL: &str = include_str!("new/model.rs");
 
 /// Names that Rust, the template, cargo or Windows have for something else.
-const TAKEN: &str = "about alloc aux clone con core default deserialize err experiment failure fmi2 \
+const TAKEN: &str = "about alloc aux clone con core default deserialize err experiment failure fmu \
     into model none nul ok option path prn result self send serde serialize some std step string \
     test variable vec";
 
@@ -21,10 +21,10 @@ pub(crate) struct Options {
     /// Folder to be made for it [default: ./NAME]
     #[arg(long, value_name = "FOLDER")]
     path: Option<PathBuf>,
-    /// The crate fmi2: its folder, or the URL of a git repository [default: the one in the clone
+    /// The crate fmu: its folder, or the URL of a git repository [default: the one in the clone
     /// that this program was built in or is called in]
-    #[arg(long, value_name = "SOURCE")]
-    fmi2: Option<String>,
+    #[arg(long, alias = "fmi2", value_name = "SOURCE")]
+    fmu: Option<String>,
 }
 
 /// Writes the crate, all of it or nothing.
@@ -37,7 +37,7 @@ pub(crate) fn new(options: &Options) -> anyhow::Result<bool> {
     let manifest = MANIFEST
         .replace("@crate@", &options.name)
         .replace("@model@", &model)
-        .replace("@fmi2@", &dependency(options.fmi2.as_deref())?);
+        .replace("@fmu@", &dependency(options.fmu.as_deref())?);
     let files = [
         ("Cargo.toml", manifest),
         ("src/lib.rs", MODEL.replace("NewModel", &model)),
@@ -71,7 +71,7 @@ fn identifier(name: &str) -> anyhow::Result<String> {
     Ok(identifier)
 }
 
-/// What stands behind `fmi2 =` in the manifest.
+/// What stands behind `fmu =` in the manifest.
 fn dependency(source: Option<&str>) -> anyhow::Result<String> {
     if let Some(url) = source.filter(|source| source.contains("://") || source.contains('@')) {
         return Ok(format!("{{ git = {} }}", quoted(url)));
@@ -79,12 +79,12 @@ fn dependency(source: Option<&str>) -> anyhow::Result<String> {
     let folder = match source {
         Some(folder) => std::path::absolute(folder)?,
         None => clone().context(
-            "expected --fmi2 SOURCE: this program is neither in a clone that has fmi2 nor called \
+            "expected --fmu SOURCE: this program is neither in a clone that has fmu nor called \
              in one",
         )?,
     };
-    if !is_fmi2(&folder) {
-        bail!("{} is not the folder of the crate fmi2", folder.display());
+    if !is_fmu(&folder) {
+        bail!("{} is not the folder of the crate fmu", folder.display());
     }
     Ok(format!("{{ path = {} }}", quoted(&folder.display().to_string())))
 }
@@ -93,17 +93,16 @@ fn quoted(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }
 
-/// The folder of fmi2 in the clone with this program, or else in that with the current folder.
+/// The folder of fmu in the clone with this program, or else in that with the current folder.
 fn clone() -> Option<PathBuf> {
     let places = [std::env::current_exe().ok(), std::env::current_dir().ok()];
     let folders = places.iter().flatten().flat_map(|place| place.ancestors());
-    folders.map(|folder| folder.join("crates/fmi2")).find(|folder| is_fmi2(folder))
+    folders.map(|folder| folder.join("crates/fmu")).find(|folder| is_fmu(folder))
 }
 
-fn is_fmi2(folder: &Path) -> bool {
+fn is_fmu(folder: &Path) -> bool {
     let manifest = fs::read_to_string(folder.join("Cargo.toml")).unwrap_or_default();
-    let name =
-        |manifest: toml::Table| Some(manifest.get("package")?.get("name")? == &"fmi2".into());
+    let name = |manifest: toml::Table| Some(manifest.get("package")?.get("name")? == &"fmu".into());
     manifest.parse().ok().and_then(name).unwrap_or(false)
 }
 

@@ -1,4 +1,4 @@
-//! `aso-ftc pack`: builds the library of a crate that uses `fmi2` and packs it into an FMU.
+//! `aso-ftc pack`: builds the library of a crate that uses `fmu` and packs it into an FMU.
 
 mod binaries;
 mod library;
@@ -10,9 +10,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use fmi2::description::ModelDescription;
-use fmi2::documentation::page;
-use fmi2::package::Package;
+use fmu_description::ModelDescription;
+use fmu_description::documentation::page;
+use fmu_description::package::Package;
 
 use crate::figure::rasterise;
 use crate::whole_file;
@@ -27,7 +27,7 @@ const DRAWING: &str = "model.svg";
 
 #[derive(clap::Args)]
 pub(crate) struct Options {
-    /// Folders of crates that end in `fmi2::export!`, in or outside of this workspace [default:
+    /// Folders of crates that end in `fmu::export!`, in or outside of this workspace [default:
     /// the plant and the controller of this workspace]
     ///
     /// Into the FMU go, beside the library: `resources`; `documentation`, with an index.html made
@@ -162,7 +162,7 @@ fn own_library(
     library: &library::Library,
     description: &ModelDescription,
 ) -> anyhow::Result<(String, Vec<u8>)> {
-    let (platform, suffix) = (fmi2::package::platforms(), std::env::consts::DLL_SUFFIX);
+    let (platform, suffix) = (fmu_description::package::platforms(), std::env::consts::DLL_SUFFIX);
     let platform = platform.first().context("FMI has no name for this platform")?;
     let path = format!("binaries/{platform}/{}{suffix}", description.model_name);
     Ok((path, read(&library.file)?))

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use fmi2::Experiment;
+use fmu_description::Experiment;
 use master::results::Table;
 use master::{Algorithm, Probe, Simulation, System, SystemError, Wanted, choose};
 

@@ -6,7 +6,7 @@ use anyhow::{Context, bail};
 use control::aso::{Estimator, FaultyPlant, Gains};
 use control::eigen::eigenvalues;
 use control::theorem1::{Certificate, certify};
-use fmi2::description::Kind;
+use fmu_description::Kind;
 use master::{Probe, System};
 use nalgebra::DMatrix;
 use serde::Serialize;

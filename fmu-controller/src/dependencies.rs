@@ -8,7 +8,7 @@
 //! A sampled controller changes its outputs at samples only (`fmi2DoStep`, `fmi2NewDiscreteStates`),
 //! so at a point in time they depend on nothing. Its initial values are those of sample 0.
 
-use fmi2::description::DependencyKind::{self, Dependent, Discrete, Fixed};
+use fmu::description::DependencyKind::{self, Dependent, Discrete, Fixed};
 
 use crate::design::{Design, Estimator};
 use crate::loss::Loss;

@@ -16,4 +16,4 @@ mod variables;
 
 use controller::AsoController;
 
-fmi2::export!(AsoController);
+fmu::export!(AsoController);

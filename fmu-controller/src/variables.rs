@@ -2,8 +2,8 @@
 
 mod parameters;
 
-use fmi2::Variable;
-use fmi2::unit::Unit;
+use fmu::Variable;
+use fmu::description::unit::Unit;
 
 use crate::controller::AsoController;
 use crate::dependencies::Group;
@@ -192,7 +192,7 @@ mod tests {
             let slope = per_second(Some(&unit.to_owned())).unwrap();
             assert_eq!(slope, wanted);
             let [of, per] = [unit, &slope].map(|unit| Unit::parse(unit).unwrap().base.unwrap());
-            assert_eq!(fmi2::unit::BaseUnit { s: of.s - 1, ..of }, per);
+            assert_eq!(fmu::description::unit::BaseUnit { s: of.s - 1, ..of }, per);
         }
     }
 

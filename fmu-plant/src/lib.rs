@@ -14,4 +14,4 @@ pub mod response;
 
 use pendulum::FrictionPendulum;
 
-fmi2::export!(FrictionPendulum);
+fmu::export!(FrictionPendulum);

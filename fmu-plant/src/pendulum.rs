@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use fmi2::description::DefaultExperiment;
-use fmi2::{About, At, Event, Experiment, Failure, Model, ModelExchange, Step, Variable};
+use fmu::description::DefaultExperiment;
+use fmu::{About, At, Event, Experiment, Failure, Model, ModelExchange, Step, Variable};
 use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 

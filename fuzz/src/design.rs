@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use std::ptr::null_mut;
 
 use controller as _;
-use fmi2::abi::{DescribeSink, fmi2CallbackFunctions, fmi2Component, fmi2String};
-use fmi2::description::{Causality, Kind, ModelDescription};
+use fmu_description::abi::{DescribeSink, fmi2CallbackFunctions, fmi2Component, fmi2String};
+use fmu_description::{Causality, Kind, ModelDescription};
 
 unsafe extern "C" {
     fn fmuDescribe(resources: *const c_char, context: *mut c_void, sink: DescribeSink) -> c_int;
@@ -74,7 +74,7 @@ pub(crate) fn design_file(data: &[u8]) {
 
 /// Instantiates, initialises and steps the controller.
 fn live(description: &ModelDescription, folder: &Path) {
-    let uri = fmi2::location::file_uri(folder).expect("a URI");
+    let uri = fmu_description::location::file_uri(folder).expect("a URI");
     let [uri, guid] =
         [&uri, &description.guid].map(|text| CString::new(text.as_str()).expect("no NUL"));
     let callbacks = fmi2CallbackFunctions {

@@ -1,23 +1,23 @@
-//! The fuzz targets: those of `crates/fmi2/tests/robustness` and of `crates/master/tests/robustness`, one for the
+//! The fuzz targets: those of `crates/fmu/tests/robustness` and of `crates/master/tests/robustness`, one for the
 //! controller's design file and one for `system.toml`.
 
-#[path = "../../crates/fmi2/tests/robustness/array.rs"]
+#[path = "../../crates/fmu/tests/robustness/array.rs"]
 mod array;
-#[path = "../../crates/fmi2/tests/robustness/calls/mod.rs"]
+#[path = "../../crates/fmu/tests/robustness/calls/mod.rs"]
 mod calls;
-#[path = "../../crates/fmi2/tests/robustness/choice.rs"]
+#[path = "../../crates/fmu/tests/robustness/choice.rs"]
 mod choice;
-#[path = "../../crates/fmi2/tests/robustness/importer.rs"]
+#[path = "../../crates/fmu/tests/robustness/importer.rs"]
 mod importer;
-#[path = "../../crates/fmi2/tests/robustness/machine.rs"]
+#[path = "../../crates/fmu/tests/robustness/machine.rs"]
 mod machine;
 #[path = "../../crates/master/tests/robustness/targets.rs"]
 mod master_files;
-#[path = "../../crates/fmi2/tests/robustness/prediction.rs"]
+#[path = "../../crates/fmu/tests/robustness/prediction.rs"]
 mod prediction;
-#[path = "../../crates/fmi2/tests/robustness/sequence.rs"]
+#[path = "../../crates/fmu/tests/robustness/sequence.rs"]
 mod sequence;
-#[path = "../../crates/fmi2/tests/robustness/targets.rs"]
+#[path = "../../crates/fmu/tests/robustness/targets.rs"]
 mod targets;
 
 mod design;

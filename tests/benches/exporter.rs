@@ -17,8 +17,8 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::Duration;
 
 use criterion::Criterion;
-use fmi2::description::{Causality, Kind, ModelDescription};
-use fmi2::package::Unpacked;
+use fmu_description::package::Unpacked;
+use fmu_description::{Causality, Kind, ModelDescription};
 use tests::root;
 
 /// The crates in `tests/models`.

@@ -10,8 +10,8 @@ mod linux {
     use std::path::Path;
     use std::time::{Duration, Instant};
 
-    use fmi2::Experiment;
-    use fmi2::description::{Causality, Kind, ModelDescription};
+    use fmu_description::Experiment;
+    use fmu_description::{Causality, Kind, ModelDescription};
     use master::assembly::{Link, Terminal};
     use master::isolate::{self, Isolated, Options};
     use master::transformation::Transformation;

@@ -36,7 +36,7 @@ def cells():
     find: a step is never in progress or canceled when DoStep has returned, and only a panic of the
     model is fatal."""
     for kind, (file, states) in TABLES.items():
-        path = ROOT / "crates" / "fmi2" / "src" / "call_order" / file
+        path = ROOT / "crates" / "fmu-description" / "src" / "call_order" / file
         with path.open() as lines:
             table = {row.pop("function").removeprefix("fmi2"): row for row in csv.DictReader(lines)}
         for name in FUNCTIONS:

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use fmi2::package::{Package, platforms};
+use fmu_description::package::{Package, platforms};
 
 /// Builds the FMU with `ports` inputs `u0`, `u1`, ... and as many outputs `y0`, `y1`, ...;
 /// `folder/Lag<ports>.fmu`.

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Mutex;
 
-use fmi2::package::{Package, platforms};
+use fmu_description::package::{Package, platforms};
 
 use crate::root;
 

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use fmi2::Experiment;
+use fmu_description::Experiment;
 use master::Slave as _;
 use master::isolate::{self, Isolated, Options};
 

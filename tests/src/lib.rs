@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
-use fmi2::Experiment;
+use fmu_description::Experiment;
 use master::{Algorithm, Fmu, Probe, Simulation, System};
 
 /// The folder of the workspace.

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use fmi2::Experiment;
+use fmu_description::Experiment;
 use master::{Algorithm, Port, Readout, Simulation, SlowValues, System, SystemError};
 use nalgebra::{DMatrix, DVector};
 

@@ -50,7 +50,7 @@ pub fn troubles() -> &'static Path {
         let name = format!("troubles-{}", std::process::id());
         let (folder, sources) = (root().join("target/test-fmus").join(name), root());
         let sources = sources.join("tests/troubles");
-        let platform = fmi2::package::platforms().first().copied().unwrap_or("none");
+        let platform = fmu_description::package::platforms().first().copied().unwrap_or("none");
         let library = folder.join("binaries").join(platform);
         let failed = |what: &str| panic!("{} cannot be {what}", folder.display());
         std::fs::create_dir_all(&library).unwrap_or_else(|_| failed("made"));

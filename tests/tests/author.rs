@@ -7,8 +7,8 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
-use fmi2::description::ModelDescription;
-use fmi2::package::Unpacked;
+use fmu_description::ModelDescription;
+use fmu_description::package::Unpacked;
 use tests::{command, root};
 
 const EXAMPLES: [&str; 4] = ["van-der-pol", "bouncing-ball", "pid", "lookup-table"];
@@ -56,7 +56,7 @@ fn a_model_is_one_file_of_fewer_than_60_lines() {
     for example in EXAMPLES.into_iter().filter(|example| *example != "van-der-pol") {
         let path = root().join("examples").join(example).join("src/lib.rs");
         let text = fs::read_to_string(&path).unwrap();
-        let export = text.lines().position(|line| line.starts_with("fmi2::export!")).unwrap();
+        let export = text.lines().position(|line| line.starts_with("fmu::export!")).unwrap();
         assert!(export + 1 < 60, "{example}: the export line is line {}", export + 1);
         assert!(text.contains("#![forbid(unsafe_code)]"), "{example}");
     }
@@ -195,11 +195,11 @@ fn bad_names_and_existing_folders_are_refused_and_nothing_is_left() {
     {
         refuses(place, &["new", "--", name], &["gives no identifier", "heat-pump"]);
     }
-    for name in ["serde", "fmi2", "self", "con", "model"] {
+    for name in ["serde", "fmu", "self", "con", "model"] {
         refuses(place, &["new", name], &[name, "taken"]);
     }
     refuses(place, &["new", &"long".repeat(20)], &["80 characters", "at most 64"]);
-    refuses(place, &["new", "pump", "--fmi2", "nowhere"], &["nowhere", "crate fmi2"]);
+    refuses(place, &["new", "pump", "--fmu", "nowhere"], &["nowhere", "crate fmu"]);
     assert_eq!(fs::read_dir(place).unwrap().count(), 0);
     fs::create_dir(place.join("pump")).unwrap();
     fs::write(place.join("file"), "mine").unwrap();
@@ -211,22 +211,22 @@ fn bad_names_and_existing_folders_are_refused_and_nothing_is_left() {
 }
 
 #[test]
-fn a_new_crate_depends_on_the_fmi2_that_it_is_told() {
+fn a_new_crate_depends_on_the_fmu_that_it_is_told() {
     let folder = tempfile::tempdir().unwrap();
-    let own = root().join("crates/fmi2").display().to_string();
-    let url = "https://example.org/fmi2.git";
+    let own = root().join("crates/fmu").display().to_string();
+    let url = "https://example.org/fmu.git";
     let kinds = [("a", None, "path", own.as_str()), ("b", Some(url), "git", url)];
     let mut files = BTreeSet::new();
     for (name, source, key, expected) in kinds {
         let mut arguments = vec!["new", name, "--path"];
         let target = format!("deep/down/{name}");
         arguments.push(&target);
-        arguments.extend(source.iter().flat_map(|source| ["--fmi2", source]));
+        arguments.extend(source.iter().flat_map(|source| ["--fmu", source]));
         let output = run_in(folder.path(), &arguments);
         assert!(output.status.success(), "{}", message(&output));
         let manifest = fs::read_to_string(folder.path().join(&target).join("Cargo.toml")).unwrap();
         let manifest: toml::Table = manifest.parse().unwrap();
-        assert_eq!(manifest["dependencies"]["fmi2"][key].as_str(), Some(expected));
+        assert_eq!(manifest["dependencies"]["fmu"][key].as_str(), Some(expected));
         files.extend(
             fs::read_dir(folder.path().join(&target))
                 .unwrap()

@@ -32,7 +32,7 @@ mod stepping;
 #[path = "engine/typed.rs"]
 mod typed;
 
-use fmi2::Experiment;
+use fmu_description::Experiment;
 
 /// From 0 to `stop` s.
 fn until(stop: f64) -> Experiment {

@@ -7,9 +7,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use fmi2::Experiment;
-use fmi2::description::Causality;
-use fmi2::package::{Package, platforms};
+use fmu_description::Causality;
+use fmu_description::Experiment;
+use fmu_description::package::{Package, platforms};
 use master::fmi_crate::{FmiCrateError, FmiSlave};
 use master::{
     Algorithm, Course, Failure, Fmu, FmuError, LoadError, Probe, Simulation, Slave, Sweep, System,

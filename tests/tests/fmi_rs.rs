@@ -17,8 +17,8 @@ use fmi_rs::sim::fmi2::recorder::Recorder;
 use fmi_rs::sim::fmi2::{
     SimulationSettings, Trajectories, VariableValue, cs, parse_variable_value, set_variable_value,
 };
-use fmi2::Experiment;
-use fmi2::description::{Causality, Initial};
+use fmu_description::Experiment;
+use fmu_description::{Causality, Initial};
 use master::{Algorithm, Course, Fmu, Simulation, Slave, Sweep, System};
 
 const FILES: [&str; 2] = ["FrictionPendulum.fmu", "AsoController.fmu"];

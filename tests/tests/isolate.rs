@@ -5,9 +5,9 @@
 
 use std::time::{Duration, Instant};
 
-use fmi2::Experiment;
-use fmi2::abi::Status;
-use fmi2::description::{Causality, Kind, ModelDescription};
+use fmu_description::Experiment;
+use fmu_description::abi::Status;
+use fmu_description::{Causality, Kind, ModelDescription};
 use master::isolate::{self, IsolateError, Isolated, Options};
 use master::{Advance, CallError, Failure, Fmu, Slave, Stepped};
 use tests::isolated::{limited, options, ready};

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
-use fmi2::package::{Package, Unpacked};
+use fmu_description::package::{Package, Unpacked};
 use master::linearise::{Disagreement, Method};
 use master::{Fmu, Interface, Linearisation, Linearise, LineariseError, linearise};
 use nalgebra::DMatrix;

@@ -4,8 +4,8 @@
 
 use std::path::PathBuf;
 
-use fmi2::Experiment;
-use fmi2::abi::Status;
+use fmu_description::Experiment;
+use fmu_description::abi::Status;
 use master::linearise::{Differences, Method};
 use master::{
     CallError, Failure, Fmu, FmuError, Instance, Linearise, LoadError, Slave, Stepped, linearise,

@@ -4,8 +4,8 @@
 
 use std::time::Duration;
 
-use fmi2::Experiment;
-use fmi2::abi::Status;
+use fmu_description::Experiment;
+use fmu_description::abi::Status;
 use master::{CallError, Failure, Fmu, Instance, Slave, Stepped};
 use tests::c_fmu::CFmu;
 

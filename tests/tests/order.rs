@@ -230,7 +230,7 @@ fn a_loop_of_gain_1_has_no_solution_and_is_refused_with_the_names_of_its_outputs
     let refused = master::Simulation::new(
         network.system(ABLE, &calls),
         &algorithm,
-        &fmi2::Experiment::default(),
+        &fmu_description::Experiment::default(),
     );
     let error = refused.err().unwrap();
     assert!(matches!(error, SystemError::Loop { .. }));

@@ -6,8 +6,8 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::process::Command;
 
-use fmi2::description::{Causality, ModelDescription};
-use fmi2::package::Unpacked;
+use fmu_description::package::Unpacked;
+use fmu_description::{Causality, ModelDescription};
 use tests::{dist, root, run};
 
 const MODELS: [&str; 2] = ["FrictionPendulum", "AsoController"];
@@ -43,7 +43,7 @@ fn every_variable_is_described_and_every_signal_of_the_plant_has_a_unit() {
     }
     let plant = unpacked("FrictionPendulum").description;
     for variable in &plant.variables {
-        if let fmi2::description::Kind::Real(real) = &variable.kind {
+        if let fmu_description::Kind::Real(real) = &variable.kind {
             assert!(real.unit.is_some(), "{}", variable.name);
         }
     }

@@ -71,9 +71,9 @@ fn nothing_uses_the_models_and_nothing_uses_the_command() {
 #[test]
 fn unsafe_code_stands_at_the_boundaries_only() {
     let allowed = [
-        "crates/fmi2/src/ffi.rs",
-        "crates/fmi2/src/ffi/entry.rs",
-        "crates/fmi2/src/ffi/exports.rs",
+        "crates/fmu/src/ffi.rs",
+        "crates/fmu/src/ffi/entry.rs",
+        "crates/fmu/src/ffi/exports.rs",
         "crates/master/src/library.rs",
         // Signal handlers, and what they read.
         "crates/master/src/crash/place.rs",
@@ -97,8 +97,8 @@ fn unsafe_code_stands_at_the_boundaries_only() {
         "crates/master/src/library/states.rs",
         "crates/master/src/library/step.rs",
         // Importers of their own, to call the C functions as no safe one would.
-        "crates/fmi2/tests/robustness/importer.rs",
-        "crates/fmi2/tests/robustness/uninitialised.rs",
+        "crates/fmu/tests/robustness/importer.rs",
+        "crates/fmu/tests/robustness/uninitialised.rs",
         "fuzz/src/design.rs",
     ];
     for file in files(&root(), "rs") {

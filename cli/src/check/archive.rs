@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-use fmi2::description::ModelDescription;
+use fmu_description::ModelDescription;
 use zip::CompressionMethod;
 use zip::read::ZipFile;
 

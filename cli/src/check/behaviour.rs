@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use fmi2::Experiment;
-use fmi2::description::ModelDescription;
+use fmu_description::Experiment;
+use fmu_description::ModelDescription;
 use master::{CallError, Failure, Slave, Stepped};
 
 use super::answer::Here;

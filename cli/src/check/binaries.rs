@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 use std::io;
 
-use fmi2::call_order::{Function, InterfaceType, State, allowed};
-use fmi2::description::ModelDescription;
+use fmu_description::ModelDescription;
+use fmu_description::call_order::{Function, InterfaceType, State, allowed};
 use object::{Architecture, BinaryFormat, ImportFlags, NameOrOrdinal, Object as _};
 
 use super::finding::Severity::{Error, Note, Warning};

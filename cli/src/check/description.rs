@@ -1,6 +1,6 @@
 //! `modelDescription.xml`: what was read with a warning, and the rules on what was read.
 
-use fmi2::description::{ModelDescription, Warning};
+use fmu_description::{ModelDescription, Warning};
 
 use super::finding::Severity::Note;
 use super::finding::{Finding, Findings, Part, Severity, Tool};

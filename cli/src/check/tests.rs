@@ -1,8 +1,8 @@
 //! The behaviour of slaves that do one thing wrong.
 
-use fmi2::Experiment;
-use fmi2::abi::Status;
-use fmi2::description::ModelDescription;
+use fmu_description::Experiment;
+use fmu_description::ModelDescription;
+use fmu_description::abi::Status;
 use master::{CallError, Failure, Slave, Stepped};
 
 use super::answer::{Answer, Here};

@@ -1,6 +1,6 @@
 //! The values of the variables of a slave, and those that the XML promises.
 
-use fmi2::description::{Causality, Kind, ModelDescription, ScalarVariable, Variability};
+use fmu_description::{Causality, Kind, ModelDescription, ScalarVariable, Variability};
 use master::{CallError, Slave};
 
 /// A value of any type, comparable by its bits.

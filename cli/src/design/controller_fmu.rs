@@ -4,9 +4,9 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use fmi2::description::ModelDescription;
-use fmi2::documentation::page;
-use fmi2::package::{Package, Unpacked};
+use fmu_description::ModelDescription;
+use fmu_description::documentation::page;
+use fmu_description::package::{Package, Unpacked};
 
 use crate::pack::{FRAGMENT, describe};
 
@@ -51,7 +51,7 @@ impl ControllerFmu {
             let path = entry?.path();
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
             match name.as_str() {
-                fmi2::package::DESCRIPTION => {}
+                fmu_description::package::DESCRIPTION => {}
                 _ if path.is_dir() => package.add_folder(&name, &path)?,
                 _ => package.add(name, fs::read(&path)?),
             }

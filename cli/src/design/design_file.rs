@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use control::Domain;
 use control::aso::{FaultyPlant, Gains};
-use fmi2::unit::Unit;
+use fmu_description::unit::Unit;
 use nalgebra::DMatrix;
 use serde::Serialize;
 

@@ -5,8 +5,8 @@ use control::eigen::eigenvalues;
 use control::faults::{Entry, loss_tolerance};
 use control::placement::Quality;
 use control::{Domain, Error};
-use fmi2::description::{ModelDescription, ScalarVariable};
-use fmi2::documentation::texts;
+use fmu_description::documentation::texts;
+use fmu_description::{ModelDescription, ScalarVariable};
 use nalgebra::{Complex, DMatrix};
 
 use super::analysis::Loops;

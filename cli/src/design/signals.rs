@@ -1,6 +1,6 @@
 //! The signals of a plant file: states, actuators, measurements, faults.
 
-use fmi2::unit::Unit;
+use fmu_description::unit::Unit;
 
 use super::document::{Entry, Place, PlaceError, Table};
 

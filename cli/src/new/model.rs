@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use fmi2::{About, Experiment, Failure, Model, Step, Variable};
+use fmu::{About, Experiment, Failure, Model, Step, Variable};
 use serde::{Deserialize, Serialize};
 
 /// Everything that decides how the model goes on is a field: the state of the FMU is a copy of it.
@@ -87,7 +87,7 @@ impl Model for NewModel {
     }
 }
 
-fmi2::export!(NewModel);
+fmu::export!(NewModel);
 
 #[cfg(test)]
 mod tests {
@@ -96,7 +96,7 @@ mod tests {
     #[test]
     fn the_variables_keep_the_rules_of_the_standard() {
         assert_eq!(
-            fmi2::problems::<NewModel>(Path::new("resources")),
+            fmu::problems::<NewModel>(Path::new("resources")),
             Ok(vec![])
         );
     }

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use fmi2::description::ModelDescription;
+use fmu_description::ModelDescription;
 
 use super::read;
 use crate::check::{Severity, binaries};

@@ -42,7 +42,7 @@ pub(super) fn build(folder: &Path, locked: bool, others: &[&str]) -> anyhow::Res
     let manifest = folder.join("Cargo.toml");
     let manifest = manifest.display();
     if !folder.join("Cargo.toml").is_file() {
-        bail!("there is no {manifest}: expected the folder of a crate that uses fmi2");
+        bail!("there is no {manifest}: expected the folder of a crate that uses fmu");
     }
     let toolchain = Toolchain::of(&folder)?;
     let metadata = metadata(&folder, &toolchain.host, locked)?;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use cargo_metadata::Package as Crate;
-use fmi2::package::Package;
+use fmu_description::package::Package;
 
 use super::library::Library;
 use super::read;

@@ -12,7 +12,7 @@ use cyclonedx_bom::models::dependency::{Dependencies, Dependency};
 use cyclonedx_bom::models::license::{LicenseChoice, Licenses};
 use cyclonedx_bom::models::metadata::Metadata;
 use cyclonedx_bom::prelude::{SpdxExpression, Validate as _};
-use fmi2::description::ModelDescription;
+use fmu_description::ModelDescription;
 
 use super::library::Library;
 

@@ -1,8 +1,8 @@
 //! What a configuration leaves open, decided by the system: algorithm, times, how often to record.
 
 use anyhow::bail;
-use fmi2::Experiment;
-use fmi2::description::DefaultExperiment;
+use fmu_description::DefaultExperiment;
+use fmu_description::Experiment;
 use master::{
     Algorithm, Coupling, Course, StepControl, Sweep, System, Wanted, by_direct_dependencies, choose,
 };

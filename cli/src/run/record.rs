@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError, Weak};
 use std::time::Duration;
 
 use anyhow::Context;
-use fmi2::description::{Causality, Kind};
+use fmu_description::{Causality, Kind};
 use master::results::{
     self, Column, ColumnKind, Decimation, Due, ResultsError, Row, Selection, Sink,
 };

@@ -11,7 +11,7 @@ use std::path::Path;
 
 use anyhow::Context;
 use criterion::{BenchmarkId, Criterion};
-use fmi2::Experiment;
+use fmu_description::Experiment;
 use master::algorithm::{Algorithm, Course, Sweep};
 use master::{Fmu, Simulation, Slave, System};
 

@@ -24,8 +24,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context, bail};
-use fmi2::Experiment;
-use fmi2::description::Causality;
+use fmu_description::Causality;
+use fmu_description::Experiment;
 use master::algorithm::{Algorithm, Course, Sweep};
 use master::results::{Column, ColumnKind, create};
 use master::{Fmu, Readout, Simulation, System};

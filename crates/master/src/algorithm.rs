@@ -1,6 +1,6 @@
 //! Master algorithms: what can be chosen, by name.
 
-use fmi2::description::CoSimulation;
+use fmu_description::CoSimulation;
 use serde::{Deserialize, Serialize};
 
 use crate::error::SystemError;

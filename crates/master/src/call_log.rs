@@ -6,8 +6,8 @@ use std::io::{self, Write as _};
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
-use fmi2::Experiment;
-use fmi2::description::ModelDescription;
+use fmu_description::Experiment;
+use fmu_description::ModelDescription;
 
 use crate::slave::{CallError, Slave, Stepped};
 

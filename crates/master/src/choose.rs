@@ -7,7 +7,7 @@ use crate::error::SystemError;
 use crate::order::by_direct_dependencies;
 use crate::slave::Slave;
 use crate::system::System;
-use fmi2::description::CoSimulation;
+use fmu_description::CoSimulation;
 
 /// Communication step in s where neither the user nor an FMU states one, for runs of up to
 /// [`STEPS`] steps.

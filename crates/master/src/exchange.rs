@@ -12,7 +12,7 @@ mod start;
 mod tasks;
 mod trace;
 
-use fmi2::description::Kind;
+use fmu_description::Kind;
 use serde::{Deserialize, Serialize};
 
 use crate::algorithm::Algorithm;

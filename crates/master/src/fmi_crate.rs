@@ -16,9 +16,9 @@ use std::path::{Path, PathBuf};
 use fmi::fmi2::Fmi2Error;
 use fmi::fmi2::import::Fmi2Import;
 use fmi::fmi2::instance::{CoSimulation as _, Common, InstanceCS};
-use fmi2::Experiment;
-use fmi2::abi::Status;
-use fmi2::description::ModelDescription;
+use fmu_description::Experiment;
+use fmu_description::ModelDescription;
+use fmu_description::abi::Status;
 
 use crate::fmu::{Fmu, FmuError};
 use crate::slave::{CallError, Failure, Slave, Stepped};

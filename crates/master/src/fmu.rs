@@ -6,10 +6,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
-use fmi2::Experiment;
-use fmi2::description::{Kind, ModelDescription};
-use fmi2::location::{LocationError, file_uri};
-use fmi2::package::{PackageError, Unpacked};
+use fmu_description::Experiment;
+use fmu_description::location::{LocationError, file_uri};
+use fmu_description::package::{PackageError, Unpacked};
+use fmu_description::{Kind, ModelDescription};
 
 use crate::error::LoadError;
 use crate::library::{Component, Interface, Library, Names};

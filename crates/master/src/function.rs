@@ -1,7 +1,7 @@
 //! Functions between FMUs: sums of connected values, computed between the steps.
 
-use fmi2::Experiment;
-use fmi2::description::{
+use fmu_description::Experiment;
+use fmu_description::{
     Causality, CoSimulation, Kind, ModelDescription, ModelStructure, RealType, ScalarVariable,
     Unknown, Variability,
 };

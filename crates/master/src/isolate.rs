@@ -43,7 +43,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use fmi2::package::{PackageError, Unpacked};
+use fmu_description::package::{PackageError, Unpacked};
 
 use crate::slave::{CallError, Failure};
 

@@ -16,7 +16,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use fmi2::abi::{
+use fmu_description::abi::{
     CO_SIMULATION, DESCRIBE, DescribeSink, MODEL_EXCHANGE, Status, fmi2CallbackFunctions,
     fmi2Component, fmi2FMUstate, fmi2Status,
 };
@@ -99,7 +99,7 @@ pub fn preload(library: &OsStr) -> Result<(), LoadError> {
     }
 }
 
-/// Asks the library at `path`, which `fmi2::export!` made, for its model description.
+/// Asks the library at `path`, which `fmu::export!` made, for its model description.
 ///
 /// # Errors
 ///
@@ -114,7 +114,7 @@ pub fn describe(path: &Path, resources: &Path) -> Result<String, LoadError> {
     }
     type Describe = unsafe extern "C" fn(*const c_char, *mut c_void, DescribeSink) -> c_int;
     let handle = load(path)?;
-    // SAFETY: `fmi2::export!` gives this name this signature.
+    // SAFETY: `fmu::export!` gives this name this signature.
     let describe = unsafe { handle.get::<Describe>(DESCRIBE.as_bytes()) }
         .map_err(|_| LoadError::Missing { path: path.to_owned(), function: DESCRIBE.to_owned() })?;
     let folder = c_string(&resources.display().to_string());

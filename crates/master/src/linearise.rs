@@ -22,7 +22,7 @@ mod point;
 mod result;
 mod steps;
 
-use fmi2::description::{Causality, Kind, ModelDescription, Variability};
+use fmu_description::{Causality, Kind, ModelDescription, Variability};
 
 pub use error::LineariseError;
 pub use result::{Differences, Disagreement, Linearisation, Matrices, Method, Signal};

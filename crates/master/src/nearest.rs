@@ -1,6 +1,6 @@
 //! Variables whose names are near to one that does not exist.
 
-use fmi2::description::ModelDescription;
+use fmu_description::ModelDescription;
 
 /// Most edits between two names that are near each other.
 const EDITS: usize = 2;

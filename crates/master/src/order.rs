@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use fmi2::description::{ModelDescription, Unknown};
+use fmu_description::{ModelDescription, Unknown};
 
 use crate::solve::components;
 use crate::system::System;

@@ -1,6 +1,6 @@
 //! Reading chosen variables of a system, each as a number.
 
-use fmi2::description::Kind;
+use fmu_description::Kind;
 
 use crate::error::SystemError;
 use crate::exchange::call;

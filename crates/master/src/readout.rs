@@ -4,7 +4,7 @@ mod slow;
 
 use std::ops::Range;
 
-use fmi2::description::Kind;
+use fmu_description::Kind;
 
 use crate::error::SystemError;
 use crate::exchange::call;

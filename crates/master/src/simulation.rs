@@ -12,7 +12,7 @@ mod parallel;
 mod sweep;
 mod together;
 
-use fmi2::Experiment;
+use fmu_description::Experiment;
 
 use crate::algorithm::{Algorithm, Course, StepControl};
 use crate::error::SystemError;

@@ -2,9 +2,9 @@
 
 use std::fmt;
 
-use fmi2::Experiment;
-use fmi2::abi::Status;
-use fmi2::description::ModelDescription;
+use fmu_description::Experiment;
+use fmu_description::ModelDescription;
+use fmu_description::abi::Status;
 
 /// An instance of a co-simulation FMU, by the functions of FMI 2.0.5, sections 2.1 and 4.2.
 ///

@@ -22,7 +22,7 @@ mod xml;
 use std::collections::HashSet;
 use std::path::Path;
 
-use fmi2::package::{TemporaryFolder, Unpacked};
+use fmu_description::package::{TemporaryFolder, Unpacked};
 
 pub use error::SspError;
 pub use read::{read_ssb, read_ssd, read_ssm, read_ssv};

@@ -7,7 +7,7 @@ mod units;
 
 use std::collections::HashMap;
 
-use fmi2::description::{Causality, ModelDescription, ScalarVariable};
+use fmu_description::{Causality, ModelDescription, ScalarVariable};
 
 use crate::assembly::{Link, Terminal};
 use crate::error::SystemError;

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use fmi2::description::{IntegerType, Kind, SimpleType};
+use fmu_description::{IntegerType, Kind, SimpleType};
 
 use crate::fault::FaultLine;
 

@@ -1,9 +1,9 @@
 //! The master algorithms on slaves of a few lines, against answers computed by hand.
 #![expect(clippy::unwrap_used, clippy::float_cmp, reason = "tests; exact by construction")]
 
-use fmi2::Experiment;
-use fmi2::abi::Status;
-use fmi2::description::ModelDescription;
+use fmu_description::Experiment;
+use fmu_description::ModelDescription;
+use fmu_description::abi::Status;
 use master::function::Function;
 use master::{
     Algorithm, CallError, Course, Failure, Simulation, Slave, Stepped, Sweep, System,

@@ -1,7 +1,7 @@
 //! A ball that bounces: h' = v, v' = g; where it hits the ground, v becomes -e v.
 #![forbid(unsafe_code)]
 
-use fmi2::{About, Failure, Model, Step, Variable};
+use fmu::{About, Failure, Model, Step, Variable};
 
 #[derive(Clone, serde::Serialize, serde::Deserialize)]
 struct BouncingBall {
@@ -52,6 +52,6 @@ impl Model for BouncingBall {
     }
 }
 
-fmi2::export!(BouncingBall);
+fmu::export!(BouncingBall);
 #[cfg(test)]
 mod tests;

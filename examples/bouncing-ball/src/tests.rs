@@ -6,5 +6,5 @@ use super::BouncingBall;
 
 #[test]
 fn the_variables_keep_the_rules_of_the_standard() {
-    assert_eq!(fmi2::problems::<BouncingBall>(Path::new("resources")), Ok(vec![]));
+    assert_eq!(fmu::problems::<BouncingBall>(Path::new("resources")), Ok(vec![]));
 }

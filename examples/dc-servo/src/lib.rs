@@ -9,8 +9,8 @@ mod variables;
 use std::array::from_fn;
 use std::path::Path;
 
-use fmi2::description::DefaultExperiment;
-use fmi2::{About, At, Event, Experiment, Failure, Model, ModelExchange, Step, Variable};
+use fmu::description::DefaultExperiment;
+use fmu::{About, At, Event, Experiment, Failure, Model, ModelExchange, Step, Variable};
 use num_dual::Dual64;
 
 use motion::Motion;
@@ -197,6 +197,6 @@ impl Model for DcServo {
     }
 }
 
-fmi2::export!(DcServo);
+fmu::export!(DcServo);
 #[cfg(test)]
 mod tests;

@@ -44,7 +44,7 @@ fn close(found: f64, expected: f64, bound: f64) {
 
 #[test]
 fn the_variables_keep_the_rules_of_the_standard() {
-    assert_eq!(fmi2::problems::<DcServo>(Path::new("resources")), Ok(vec![]));
+    assert_eq!(fmu::problems::<DcServo>(Path::new("resources")), Ok(vec![]));
 }
 
 #[test]

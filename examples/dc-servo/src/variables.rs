@@ -1,7 +1,7 @@
 //! The variables of the servo.
 
-use fmi2::Variable;
-use fmi2::description::DependencyKind;
+use fmu::Variable;
+use fmu::description::DependencyKind;
 
 use crate::DcServo;
 use crate::motor::COUNT;

@@ -1,7 +1,7 @@
 //! Linear interpolation in `resources/table.csv`: an input, and outputs as many as it has columns.
 #![forbid(unsafe_code)]
 
-use fmi2::{About, Failure, Model, Step, Variable as V};
+use fmu::{About, Failure, Model, Step, Variable as V};
 
 #[derive(Clone, serde::Serialize, serde::Deserialize)]
 struct LookupTable {
@@ -51,6 +51,6 @@ impl Model for LookupTable {
     }
 }
 
-fmi2::export!(LookupTable);
+fmu::export!(LookupTable);
 #[cfg(test)]
 mod tests;

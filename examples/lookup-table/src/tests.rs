@@ -6,5 +6,5 @@ use super::LookupTable;
 
 #[test]
 fn the_variables_keep_the_rules_of_the_standard() {
-    assert_eq!(fmi2::problems::<LookupTable>(Path::new("resources")), Ok(vec![]));
+    assert_eq!(fmu::problems::<LookupTable>(Path::new("resources")), Ok(vec![]));
 }

@@ -2,7 +2,7 @@
 #![forbid(unsafe_code)]
 
 mod law;
-use fmi2::{About, Enumeration, Experiment, Failure, Model, Step, Variable as V};
+use fmu::{About, Enumeration, Experiment, Failure, Model, Step, Variable as V};
 
 #[derive(Clone, serde::Serialize, serde::Deserialize)]
 struct Pid {
@@ -56,6 +56,6 @@ impl Model for Pid {
     }
 }
 
-fmi2::export!(Pid);
+fmu::export!(Pid);
 #[cfg(test)]
 mod tests;

@@ -6,5 +6,5 @@ use super::Pid;
 
 #[test]
 fn the_variables_keep_the_rules_of_the_standard() {
-    assert_eq!(fmi2::problems::<Pid>(Path::new("resources")), Ok(vec![]));
+    assert_eq!(fmu::problems::<Pid>(Path::new("resources")), Ok(vec![]));
 }

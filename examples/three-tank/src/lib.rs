@@ -8,8 +8,8 @@ mod variables;
 use std::array::from_fn;
 use std::path::Path;
 
-use fmi2::description::DefaultExperiment;
-use fmi2::{About, At, Event, Experiment, Failure, Model, ModelExchange, Step, Variable};
+use fmu::description::DefaultExperiment;
+use fmu::{About, At, Event, Experiment, Failure, Model, ModelExchange, Step, Variable};
 use num_dual::Dual64;
 
 use flows::{BIAS, COUNT, H_MAX, ONSET, Q_MAX, Tanks};
@@ -171,6 +171,6 @@ impl Model for ThreeTank {
     }
 }
 
-fmi2::export!(ThreeTank);
+fmu::export!(ThreeTank);
 #[cfg(test)]
 mod tests;

@@ -40,7 +40,7 @@ const CLOSED: [(&str, f64); 3] = [("mu_13", 0.0), ("mu_32", 0.0), ("mu_20", 0.0)
 
 #[test]
 fn the_variables_keep_the_rules_of_the_standard() {
-    assert_eq!(fmi2::problems::<ThreeTank>(Path::new("resources")), Ok(vec![]));
+    assert_eq!(fmu::problems::<ThreeTank>(Path::new("resources")), Ok(vec![]));
 }
 
 #[test]

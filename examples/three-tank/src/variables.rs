@@ -1,7 +1,7 @@
 //! The variables of the three tanks.
 
-use fmi2::Variable;
-use fmi2::description::DependencyKind;
+use fmu::Variable;
+use fmu::description::DependencyKind;
 
 use crate::ThreeTank;
 use crate::flows::COUNT;

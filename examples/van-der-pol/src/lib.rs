@@ -4,8 +4,8 @@
 
 use std::path::Path;
 
-use fmi2::description::{DefaultExperiment, DependencyKind::Dependent};
-use fmi2::{About, At, Failure, Model, ModelExchange, Step, Variable};
+use fmu::description::{DefaultExperiment, DependencyKind::Dependent};
+use fmu::{About, At, Failure, Model, ModelExchange, Step, Variable};
 
 /// Longest step of the forward Euler method, in s.
 const LONGEST: f64 = 0.01;
@@ -78,6 +78,6 @@ impl Model for VanDerPol {
     }
 }
 
-fmi2::export!(VanDerPol);
+fmu::export!(VanDerPol);
 #[cfg(test)]
 mod tests;

@@ -6,5 +6,5 @@ use super::VanDerPol;
 
 #[test]
 fn the_variables_keep_the_rules_of_the_standard() {
-    assert_eq!(fmi2::problems::<VanDerPol>(Path::new("resources")), Ok(vec![]));
+    assert_eq!(fmu::problems::<VanDerPol>(Path::new("resources")), Ok(vec![]));
 }

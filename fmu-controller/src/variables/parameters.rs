@@ -1,6 +1,6 @@
 //! The parameters: activation, initial estimates, filter, operating point, limits, matrices.
 
-use fmi2::Variable;
+use fmu::Variable;
 
 use super::with_unit;
 use crate::controller::AsoController;

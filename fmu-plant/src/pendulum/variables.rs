@@ -1,7 +1,7 @@
 //! The variables of the friction pendulum.
 
-use fmi2::Variable;
-use fmi2::description::DependencyKind;
+use fmu::Variable;
+use fmu::description::DependencyKind;
 
 use super::FrictionPendulum;
 use crate::motion::exchange::NOMINAL_VELOCITY;

@@ -2,9 +2,9 @@
 
 use std::sync::{Arc, Mutex};
 
-use fmi2::Experiment;
-use fmi2::abi::Status;
-use fmi2::description::ModelDescription;
+use fmu_description::Experiment;
+use fmu_description::ModelDescription;
+use fmu_description::abi::Status;
 use master::{Advance, Background, CallError, Failure, Slave, Stepped, System};
 
 type Done = Result<(), CallError>;

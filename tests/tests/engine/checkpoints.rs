@@ -114,7 +114,7 @@ fn a_checkpoint_of_another_step_or_algorithm_is_refused_by_name() {
     let mut one = Simulation::new(system(), &iterated, &until(1.0)).unwrap();
     one.step().unwrap();
     let checkpoint = one.checkpoint().unwrap();
-    let resume = |algorithm: &Algorithm, experiment: &fmi2::Experiment| {
+    let resume = |algorithm: &Algorithm, experiment: &fmu_description::Experiment| {
         let none = Prepared::default();
         let resumed = Simulation::resume(system(), algorithm, experiment, none, &checkpoint);
         resumed.err().map(|error| error.to_string())
@@ -135,7 +135,7 @@ fn a_checkpoint_of_another_step_or_algorithm_is_refused_by_name() {
     refused(Algorithm { iterations: 7, ..base() }, "iterations 50; iterations 7");
     let once = Algorithm { coupling: Coupling::Once, ..base() };
     refused(once, "coupling anderson; coupling once");
-    let later = fmi2::Experiment { start_time: 0.5, ..until(1.0) };
+    let later = fmu_description::Experiment { start_time: 0.5, ..until(1.0) };
     let message = resume(&base(), &later).unwrap();
     assert!(message.contains("start-time 0 s; start-time 0.5 s"), "{message}");
     // What changes no state may be another one.

@@ -1,7 +1,7 @@
 //! Runs that an iteration or a step control cannot bring to their end.
 
-use fmi2::Experiment;
-use fmi2::description::ModelDescription;
+use fmu_description::Experiment;
+use fmu_description::ModelDescription;
 use master::{
     Algorithm, CallError, Coupling, Simulation, Slave, StepControl, Stepped, System, SystemError,
 };

@@ -2,8 +2,8 @@
 
 use std::sync::{Arc, Mutex};
 
-use fmi2::Experiment;
-use fmi2::description::ModelDescription;
+use fmu_description::Experiment;
+use fmu_description::ModelDescription;
 use master::{CallError, Slave, Stepped, System};
 use tests::linear::{ABLE, Block, Linear};
 

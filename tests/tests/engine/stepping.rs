@@ -14,7 +14,10 @@ const ALL: [Course; 4] = [Course::Hold, Course::Limited, Course::Linear, Course:
 fn time_is_the_start_and_so_many_steps_to_the_bit() {
     for coupling in [Coupling::Once, Coupling::Newton] {
         let network = problems::coupled_oscillators();
-        let experiment = fmi2::Experiment { start_time: 0.3, ..fmi2::Experiment::default() };
+        let experiment = fmu_description::Experiment {
+            start_time: 0.3,
+            ..fmu_description::Experiment::default()
+        };
         let algorithm = Algorithm { coupling, ..Algorithm::new(0.001) };
         let system = network.system(ABLE, &Arc::default());
         let mut simulation = Simulation::new(system, &algorithm, &experiment).unwrap();

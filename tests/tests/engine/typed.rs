@@ -1,7 +1,7 @@
 //! A slave with variables of all types, which allocates nothing.
 
-use fmi2::Experiment;
-use fmi2::description::ModelDescription;
+use fmu_description::Experiment;
+use fmu_description::ModelDescription;
 use master::{CallError, Slave, Stepped, System};
 
 type Done = Result<(), CallError>;

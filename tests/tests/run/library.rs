@@ -87,7 +87,10 @@ fn step_control_and_tolerances_reach_the_engine() {
     let system = closed_loop(&[]);
     let ports: Vec<_> = NAMES.iter().map(|name| system.port(name).unwrap()).collect();
     let mut probe = Probe::new(&system, &ports);
-    let experiment = fmi2::Experiment { stop_time: Some(0.2), ..fmi2::Experiment::default() };
+    let experiment = fmu_description::Experiment {
+        stop_time: Some(0.2),
+        ..fmu_description::Experiment::default()
+    };
     let mut simulation = Simulation::new(system, &algorithm, &experiment).unwrap();
     assert_eq!(written, rows(&mut simulation, &mut probe, 0.2));
     let sizes: Vec<_> = written.windows(2).map(|pair| pair[1][0] - pair[0][0]).collect();

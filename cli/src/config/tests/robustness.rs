@@ -1,8 +1,8 @@
 //! No `system.toml` does any harm, whatever is in it.
 
-#[path = "../../../../crates/fmi2/tests/robustness/changes.rs"]
+#[path = "../../../../crates/fmu/tests/robustness/changes.rs"]
 mod changes;
-#[path = "../../../../crates/fmi2/tests/robustness/corpus.rs"]
+#[path = "../../../../crates/fmu/tests/robustness/corpus.rs"]
 mod corpus;
 #[path = "target.rs"]
 mod target;

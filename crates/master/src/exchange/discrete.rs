@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use fmi2::description::Kind;
+use fmu_description::Kind;
 
 use crate::fault::FaultLine;
 use crate::slave::{CallError, Slave};

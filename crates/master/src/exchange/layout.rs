@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use fmi2::description::Kind;
+use fmu_description::Kind;
 
 use crate::algorithm::{Algorithm, Course};
 use crate::slave::Advance;

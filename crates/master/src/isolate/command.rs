@@ -1,6 +1,6 @@
 //! What the master asks of a worker, and how an error comes back.
 
-use fmi2::abi::Status;
+use fmu_description::abi::Status;
 
 use super::words::{Reader, Writer};
 use crate::slave::{CallError, Failure};

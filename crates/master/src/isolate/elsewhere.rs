@@ -3,9 +3,9 @@
 use std::convert::Infallible;
 use std::sync::Arc;
 
-use fmi2::Experiment;
-use fmi2::description::ModelDescription;
-use fmi2::package::Unpacked;
+use fmu_description::Experiment;
+use fmu_description::ModelDescription;
+use fmu_description::package::Unpacked;
 
 use super::{IsolateError, Options, WorkerError};
 use crate::slave::{CallError, Slave, Stepped};

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use fmi2::package::Unpacked;
+use fmu_description::package::Unpacked;
 
 use super::command::{Command, DONE, FAILED, INSTANTIATED, NOT_PRELOADED, function_at, read_error};
 use super::layout::Shared;

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::Ordering;
 
-use fmi2::Experiment;
+use fmu_description::Experiment;
 
 use super::command::{Command, DONE};
 use super::layout::Shared;

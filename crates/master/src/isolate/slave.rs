@@ -1,7 +1,7 @@
 //! The functions of the standard, each one round trip to the worker.
 
-use fmi2::Experiment;
-use fmi2::description::ModelDescription;
+use fmu_description::Experiment;
+use fmu_description::ModelDescription;
 
 use super::command::Command;
 use super::isolated::Isolated;

@@ -3,7 +3,7 @@
 
 use std::ffi::CStr;
 
-use fmi2::abi::{fmi2Boolean, fmi2EventInfo};
+use fmu_description::abi::{fmi2Boolean, fmi2EventInfo};
 
 use super::{Component, c_string};
 use crate::slave::{CallError, absent};
@@ -90,7 +90,10 @@ impl Component {
     }
 
     /// `fmi2SetupExperiment`.
-    pub(crate) fn setup_experiment(&mut self, e: &fmi2::Experiment) -> Result<(), CallError> {
+    pub(crate) fn setup_experiment(
+        &mut self,
+        e: &fmu_description::Experiment,
+    ) -> Result<(), CallError> {
         const NAME: &str = "fmi2SetupExperiment";
         let (tolerance, stop) = (e.tolerance.unwrap_or(0.0), e.stop_time.unwrap_or(0.0));
         let (has_tolerance, has_stop) =

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use fmi2::abi::{
+use fmu_description::abi::{
     fmi2Boolean, fmi2Byte, fmi2CallbackFunctions, fmi2Component, fmi2EventInfo, fmi2FMUstate,
     fmi2Integer, fmi2Real, fmi2Status, fmi2StatusKind, fmi2String, fmi2Type, fmi2ValueReference,
 };

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use std::ffi::{CStr, c_char, c_int, c_void};
 use std::sync::{Arc, Mutex, PoisonError, RwLock, Weak};
 
-use fmi2::abi::{Status, fmi2CallbackLogger};
+use fmu_description::abi::{Status, fmi2CallbackLogger};
 
 use super::foreign;
 use crate::crash::{Place, last_of_this_thread};

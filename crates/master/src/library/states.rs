@@ -3,7 +3,7 @@
 
 use std::ptr::null_mut;
 
-use fmi2::abi::fmi2FMUstate;
+use fmu_description::abi::fmi2FMUstate;
 
 use super::Component;
 use super::calls::function;

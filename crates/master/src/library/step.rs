@@ -3,7 +3,7 @@
 
 use std::time::{Duration, Instant};
 
-use fmi2::abi::{Status, StatusKind, fmi2Status};
+use fmu_description::abi::{Status, StatusKind, fmi2Status};
 
 use super::Component;
 use super::calls::{function, same_length};

@@ -1,6 +1,6 @@
 //! Names of the request, resolved: which variable has which part.
 
-use fmi2::description::{
+use fmu_description::{
     Causality, Initial, Kind, ModelDescription, RealType, ScalarVariable, Variability,
 };
 

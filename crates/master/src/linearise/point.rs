@@ -1,7 +1,7 @@
 //! An instance at the operating point.
 
-use fmi2::Experiment;
-use fmi2::description::{Causality, DefaultExperiment};
+use fmu_description::Experiment;
+use fmu_description::{Causality, DefaultExperiment};
 
 use super::parts::{Part, Parts, Setting, State};
 use super::{Linearise, LineariseError};

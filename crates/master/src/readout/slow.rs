@@ -1,6 +1,6 @@
 //! Values of slaves that make several steps at once, at the communication points on their way.
 
-use fmi2::description::{Causality, Kind, Variability};
+use fmu_description::{Causality, Kind, Variability};
 use serde::{Deserialize, Serialize};
 
 use super::{ReadKind, Readout};

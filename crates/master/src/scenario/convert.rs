@@ -1,7 +1,7 @@
 //! Units of stated values.
 
-use fmi2::description::{Kind, ModelDescription, ScalarVariable};
-use fmi2::unit::{BaseUnit, Unit};
+use fmu_description::unit::{BaseUnit, Unit};
+use fmu_description::{Kind, ModelDescription, ScalarVariable};
 
 use super::Reason;
 

@@ -1,6 +1,6 @@
 //! Variables that follow signals while a simulation runs.
 
-use fmi2::description::Kind;
+use fmu_description::Kind;
 use serde::{Deserialize, Serialize};
 
 use crate::error::SystemError;

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::path::PathBuf;
 
-use fmi2::unit::UnitError;
+use fmu_description::unit::UnitError;
 
 use crate::error::SystemError;
 use crate::fault::FaultError;

@@ -1,6 +1,6 @@
 //! Faults on connections, resolved.
 
-use fmi2::description::{Causality, Kind};
+use fmu_description::{Causality, Kind};
 use serde_spanned::Spanned;
 
 use super::convert::Conversion;

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use fmi2::description::{Kind, ModelDescription, ScalarVariable};
+use fmu_description::{Kind, ModelDescription, ScalarVariable};
 use serde::de::{Error, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use fmi2::description::{Causality, Kind, ModelDescription, ScalarVariable, Variability};
+use fmu_description::{Causality, Kind, ModelDescription, ScalarVariable, Variability};
 use serde_spanned::Spanned;
 
 use super::drive::{Course, Drive, DriveKind, Drives};

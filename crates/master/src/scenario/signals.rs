@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use fmi2::description::Kind;
+use fmu_description::Kind;
 use serde_spanned::Spanned;
 
 use super::convert::Conversion;

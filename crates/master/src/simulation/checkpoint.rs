@@ -2,7 +2,7 @@
 
 mod origin;
 
-use fmi2::Experiment;
+use fmu_description::Experiment;
 use serde::{Deserialize, Serialize};
 
 use super::Simulation;

@@ -7,7 +7,7 @@ use crate::error::SystemError;
 use crate::exchange::Reals;
 use crate::solve::{Bond, EnergyControl, ErrorControl, ForwardControl, Scale, SizeBounds, Verdict};
 use crate::system::{Port, System};
-use fmi2::description::Kind;
+use fmu_description::Kind;
 
 /// The state of the step control: what a run that goes on later needs.
 #[derive(Clone, Debug, Serialize, Deserialize)]

@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use fmi2::Experiment;
-use fmi2::description::{DefaultExperiment, Kind, ModelDescription};
+use fmu_description::Experiment;
+use fmu_description::{DefaultExperiment, Kind, ModelDescription};
 
 use crate::error::SystemError;
 use crate::exchange::call;

@@ -8,7 +8,7 @@ use crate::exchange::{Reals, Values, call};
 use crate::solve::{Anderson, Newton, Progress, QuasiNewton, Scale, Solver};
 use crate::system::System;
 
-use fmi2::description::CoSimulation;
+use fmu_description::CoSimulation;
 use serde::{Deserialize, Serialize};
 
 /// The slot of FMU states that an iteration begins each evaluation with.

@@ -2,8 +2,8 @@
 
 use std::borrow::Cow;
 
-use fmi2::description::{Kind, ModelDescription, ScalarVariable};
-use fmi2::unit::BaseUnit;
+use fmu_description::unit::BaseUnit;
+use fmu_description::{Kind, ModelDescription, ScalarVariable};
 
 use super::structure::{Conversion, Definitions, Transformation as Stated, Type};
 use crate::transformation::Transformation;

@@ -3,8 +3,8 @@
 use std::io;
 use std::path::PathBuf;
 
-use fmi2::description::{ParseError, Position};
-use fmi2::package::PackageError;
+use fmu_description::package::PackageError;
+use fmu_description::{ParseError, Position};
 
 /// What is wrong with an SSP, SSD, SSV, SSM or SSB file.
 #[derive(Debug, thiserror::Error)]

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use fmi2::description::{Causality, Position};
+use fmu_description::{Causality, Position};
 
 use super::conversion::{Measure, Way};
 use super::error::{SspError, meaning};

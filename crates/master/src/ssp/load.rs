@@ -6,8 +6,8 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::rc::Rc;
 
-use fmi2::description::Position;
-use fmi2::package::Unpacked;
+use fmu_description::Position;
+use fmu_description::package::Unpacked;
 
 use super::error::{SspError, meaning};
 use super::source::{Base, Target};

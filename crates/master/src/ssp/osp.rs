@@ -6,7 +6,7 @@ mod groups;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use fmi2::description::{Causality, ModelDescription, Position};
+use fmu_description::{Causality, ModelDescription, Position};
 
 use super::error::{SspError, meaning};
 use super::load::check_runnable;

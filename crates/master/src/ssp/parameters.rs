@@ -4,7 +4,7 @@ mod value;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use fmi2::description::{Causality, Initial, Kind, ScalarVariable, Variability};
+use fmu_description::{Causality, Initial, Kind, ScalarVariable, Variability};
 
 use super::error::{SspError, meaning};
 use super::flatten::Flow;

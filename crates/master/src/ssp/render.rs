@@ -2,7 +2,7 @@
 
 mod tag;
 
-use fmi2::unit::BaseUnit;
+use fmu_description::unit::BaseUnit;
 
 use super::structure::{
     Component, Connection, Connector, ConnectorKind, Content, Conversion, DefaultExperiment,

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use fmi2::description::Position;
+use fmu_description::Position;
 
 use super::xml::Node;
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use fmi2::location::path_from_uri;
+use fmu_description::location::path_from_uri;
 use percent_encoding::percent_decode_str;
 
 /// The folder that relative URIs of a file start from.

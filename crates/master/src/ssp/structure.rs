@@ -5,8 +5,8 @@
 
 mod kinds;
 
-use fmi2::description::Position;
-use fmi2::unit::BaseUnit;
+use fmu_description::Position;
+use fmu_description::unit::BaseUnit;
 
 pub use kinds::{ConnectorKind, Dimension, ParameterValue, Type};
 

@@ -4,8 +4,8 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::rc::Rc;
 
-use fmi2::description::{ModelDescription, Position, ScalarVariable};
-use fmi2::package::{TemporaryFolder, Unpacked};
+use fmu_description::package::{TemporaryFolder, Unpacked};
+use fmu_description::{ModelDescription, Position, ScalarVariable};
 
 use super::conversion::Measure;
 use super::source::Base;

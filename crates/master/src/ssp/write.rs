@@ -5,8 +5,8 @@ mod archive;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
-use fmi2::description::{Causality, Kind, ModelDescription, ScalarVariable};
-use fmi2::package::Unpacked;
+use fmu_description::package::Unpacked;
+use fmu_description::{Causality, Kind, ModelDescription, ScalarVariable};
 
 use super::error::SspError;
 use super::flatten::kind_of;

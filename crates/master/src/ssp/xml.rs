@@ -3,8 +3,8 @@
 use std::collections::{HashMap, HashSet};
 use std::str::FromStr;
 
-use fmi2::description::Position;
-use fmi2::xml;
+use fmu_description::Position;
+use fmu_description::xml;
 
 use super::error::SspError;
 use super::schema;

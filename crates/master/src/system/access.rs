@@ -1,6 +1,6 @@
 //! Single values of variables, whatever their type.
 
-use fmi2::description::Kind;
+use fmu_description::Kind;
 
 use super::{Port, System};
 use crate::slave::CallError;

@@ -1,6 +1,6 @@
 //! Whether two variables can be connected, and what happens to values between them.
 
-use fmi2::description::{Causality, Kind};
+use fmu_description::{Causality, Kind};
 
 use super::{Connection, Port, System, units};
 use crate::error::SystemError;

@@ -1,6 +1,6 @@
 //! Values that the user sets before the run: kept here, handed to the FMUs when they are initialised.
 
-use fmi2::description::{Causality, Initial, Variability};
+use fmu_description::{Causality, Initial, Variability};
 
 use super::{Port, System};
 use crate::error::SystemError;

@@ -1,7 +1,7 @@
 //! Conversion between units of the same base.
 
-use fmi2::description::Kind;
-use fmi2::unit::BaseUnit;
+use fmu_description::Kind;
+use fmu_description::unit::BaseUnit;
 
 use super::{Port, System};
 use crate::error::SystemError;

@@ -1,9 +1,9 @@
 //! No file that the master reads does any harm, whatever is in it.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
-#[path = "../../../fmi2/tests/robustness/changes.rs"]
+#[path = "../../../fmu/tests/robustness/changes.rs"]
 mod changes;
-#[path = "../../../fmi2/tests/robustness/corpus.rs"]
+#[path = "../../../fmu/tests/robustness/corpus.rs"]
 mod corpus;
 mod targets;
 

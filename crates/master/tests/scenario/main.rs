@@ -10,8 +10,8 @@ use std::cell::RefCell;
 use std::path::Path;
 use std::rc::Rc;
 
-use fmi2::Experiment;
-use fmi2::description::ModelDescription;
+use fmu_description::Experiment;
+use fmu_description::ModelDescription;
 use master::scenario::{Prepared, Scenario, ScenarioError, Setup};
 use master::{CallError, Slave, Stepped, System};
 

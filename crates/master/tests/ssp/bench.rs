@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use fmi2::package::{Package, platforms};
+use fmu_description::package::{Package, platforms};
 use master::assembly::{Assembly, Link};
 use master::ssp::{Opened, SspError, open};
 use master::transformation::Transformation;

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use fmi2::unit::BaseUnit;
+use fmu_description::unit::BaseUnit;
 use master::assembly::{Assembly, Element as Fmu, Link, Setting, Terminal};
 use master::ssp::structure::{
     Component, Connection, Connector, ConnectorKind, Content, Conversion, DefaultExperiment,

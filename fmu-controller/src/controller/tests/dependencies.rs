@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use fmi2::description::DependencyKind::{self, Constant, Dependent, Discrete, Fixed};
+use fmu::description::DependencyKind::{self, Constant, Dependent, Discrete, Fixed};
 
 use super::sized::{
     FREE, LIMITED, SAMPLED, Shape, initial_knowns, inputs, sized, states, unknowns, values,

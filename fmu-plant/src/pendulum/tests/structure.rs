@@ -32,7 +32,7 @@ const SHIFTS: [f64; 4] = [-0.4, -1e-3, 1e-3, 0.4];
 
 #[test]
 fn no_rule_of_the_description_is_broken() {
-    assert_eq!(fmi2::problems::<FrictionPendulum>(Path::new("")).unwrap(), []);
+    assert_eq!(fmu::problems::<FrictionPendulum>(Path::new("")).unwrap(), []);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use fmi2::{About, Experiment, Failure, Model, Step, Variable};
+use fmu::{About, Experiment, Failure, Model, Step, Variable};
 use serde::{Deserialize, Serialize};
 
 /// `x' = -k x`, `x(0) = 1`, one step of Euler's method in each communication step.
@@ -51,4 +51,4 @@ impl Model for Dahlquist {
     }
 }
 
-fmi2::export!(Dahlquist);
+fmu::export!(Dahlquist);

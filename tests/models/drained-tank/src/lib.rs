@@ -3,9 +3,9 @@
 
 use std::path::Path;
 
-use fmi2::description::DefaultExperiment;
-use fmi2::description::DependencyKind::Dependent;
-use fmi2::{About, At, Failure, Model, ModelExchange, Step, Variable};
+use fmu::description::DefaultExperiment;
+use fmu::description::DependencyKind::Dependent;
+use fmu::{About, At, Failure, Model, ModelExchange, Step, Variable};
 use serde::{Deserialize, Serialize};
 
 /// Longest step of the Runge-Kutta method, in s.
@@ -132,4 +132,4 @@ impl Model for DrainedTank {
     }
 }
 
-fmi2::export!(DrainedTank);
+fmu::export!(DrainedTank);

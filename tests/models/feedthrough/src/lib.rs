@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use fmi2::{About, Enumeration, Experiment, Failure, Model, Step, Variable};
+use fmu::{About, Enumeration, Experiment, Failure, Model, Step, Variable};
 use serde::{Deserialize, Serialize};
 
 /// Outputs that are their inputs. A step does nothing else.
@@ -102,4 +102,4 @@ impl Feedthrough {
     }
 }
 
-fmi2::export!(Feedthrough);
+fmu::export!(Feedthrough);

@@ -1,4 +1,4 @@
-//! A model whose module defines what `fmi2::export!` could stumble over: names of the standard library's
+//! A model whose module defines what `fmu::export!` could stumble over: names of the standard library's
 //! prelude, of primitive types, of the crate's own types, functions and macros, and of arguments.
 #![forbid(unsafe_code)]
 #![expect(dead_code, unused_macros, reason = "the names alone matter")]
@@ -60,4 +60,4 @@ macro_rules! entry_points {
     };
 }
 
-::fmi2::export!(model::HostileNames);
+::fmu::export!(model::HostileNames);

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use fmi2::{About, Experiment, Failure, Model, Step, Variable};
+use fmu::{About, Experiment, Failure, Model, Step, Variable};
 use serde::{Deserialize, Serialize};
 
 #[derive(Clone, Serialize, Deserialize)]

@@ -1,6 +1,6 @@
 //! How a run was started: what a run that goes on from its checkpoint has in common with it.
 
-use fmi2::Experiment;
+use fmu_description::Experiment;
 use serde::{Deserialize, Serialize};
 
 use crate::algorithm::{Algorithm, Coupling, StepControl};

@@ -6,7 +6,7 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use fmi2::package::{PackageError, TemporaryFolder, Unpacked, unpack_archive};
+use fmu_description::package::{PackageError, TemporaryFolder, Unpacked, unpack_archive};
 
 use crate::ssp::error::SspError;
 use crate::ssp::read;

@@ -2,8 +2,8 @@
 
 use std::str::FromStr;
 
-use fmi2::description::Position;
-use fmi2::xml::{self, Element};
+use fmu_description::Position;
+use fmu_description::xml::{self, Element};
 
 use crate::assembly::Setting;
 use crate::function::Function as Sum;

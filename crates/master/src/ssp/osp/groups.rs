@@ -1,6 +1,6 @@
 //! Variable groups, which `NAME_OspModelDescription.xml` states for the FMU with that model name.
 
-use fmi2::xml::{self, Element};
+use fmu_description::xml::{self, Element};
 
 use super::document::{attribute, local};
 use crate::ssp::error::SspError;

@@ -1,6 +1,6 @@
 //! The value of a parameter on its way to a variable.
 
-use fmi2::description::Kind;
+use fmu_description::Kind;
 
 use crate::ssp::conversion::{Measure, Way};
 use crate::ssp::structure::{

@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::hash::Hash;
 
-use fmi2::unit::BaseUnit;
+use fmu_description::unit::BaseUnit;
 
 use crate::ssp::error::SspError;
 use crate::ssp::structure::{

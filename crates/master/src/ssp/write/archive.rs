@@ -5,7 +5,7 @@ use std::fs;
 use std::io::{self, Cursor, Write as _};
 use std::path::Path;
 
-use fmi2::package::{PackageError, Unpacked};
+use fmu_description::package::{PackageError, Unpacked};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, System, ZipWriter};
 

@@ -1,0 +1,194 @@
+//! Which function may be called in which state: the tables of FMI 2.0.5, sections 3.2.3 and 4.2.4.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Causality, Initial, Variability};
+
+/// `fmi2Type`: for which of the two interfaces an instance was made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum InterfaceType {
+    /// `fmi2ModelExchange`.
+    ModelExchange,
+    /// `fmi2CoSimulation`.
+    CoSimulation,
+}
+
+macro_rules! states {
+    ($($(#[$doc:meta])* $name:ident,)*) => {
+        /// State of an instance.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+        pub enum State { $($(#[$doc])* $name,)* }
+
+        impl State {
+            /// Every state, in the order of the tables.
+            pub const EVERY: [State; [$(stringify!($name)),*].len()] = [$(State::$name),*];
+
+            /// The state as a set of states.
+            pub const fn bit(self) -> u16 {
+                1 << self as u16
+            }
+        }
+    };
+}
+
+states! {
+    /// After `fmi2Instantiate` or `fmi2Reset`.
+    Instantiated,
+    /// After `fmi2EnterInitializationMode`.
+    InitializationMode,
+    /// Model exchange: after `fmi2ExitInitializationMode` or `fmi2EnterEventMode`.
+    EventMode,
+    /// Model exchange: after `fmi2EnterContinuousTimeMode`.
+    ContinuousTimeMode,
+    /// Co-simulation: after `fmi2ExitInitializationMode` or a completed step.
+    StepComplete,
+    /// Co-simulation: while `fmi2DoStep` runs.
+    StepInProgress,
+    /// Co-simulation: after `fmi2DoStep` returned `fmi2Discard`.
+    StepFailed,
+    /// Co-simulation: after `fmi2CancelStep`.
+    StepCanceled,
+    /// After `fmi2Terminate`.
+    Terminated,
+    /// After a function returned `fmi2Error`.
+    Error,
+    /// After a function returned `fmi2Fatal`.
+    Fatal,
+}
+
+const I: u16 = State::Instantiated.bit();
+const M: u16 = State::InitializationMode.bit();
+const V: u16 = State::EventMode.bit();
+const N: u16 = State::ContinuousTimeMode.bit();
+const C: u16 = State::StepComplete.bit();
+const P: u16 = State::StepInProgress.bit();
+const F: u16 = State::StepFailed.bit();
+const K: u16 = State::StepCanceled.bit();
+const T: u16 = State::Terminated.bit();
+const E: u16 = State::Error.bit();
+/// Every state in which an instance is at rest.
+const ALL: u16 = I | M | V | N | C | F | K | T | E;
+/// The states in which values can be read.
+const READ: u16 = ALL & !I;
+
+macro_rules! functions {
+    ($($name:ident: $exchange:expr, $simulation:expr;)*) => {
+        /// A function of the standard that works on an instance.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum Function { $(#[doc = concat!("`fmi2", stringify!($name), "`")] $name,)* }
+
+        impl Function {
+            /// Every function, in the order of the tables.
+            pub const EVERY: &[Function] = &[$(Function::$name,)*];
+
+            /// The name in the C ABI.
+            #[must_use]
+            pub fn name(self) -> &'static str {
+                match self { $(Function::$name => concat!("fmi2", stringify!($name)),)* }
+            }
+
+            /// The states in which it may be called, by interface.
+            fn states(self, interface: InterfaceType) -> u16 {
+                match (self, interface) {
+                    $((Function::$name, InterfaceType::ModelExchange) => $exchange,
+                    (Function::$name, InterfaceType::CoSimulation) => $simulation,)*
+                }
+            }
+        }
+    };
+}
+
+// A row: function: states in model exchange, states in co-simulation.
+functions! {
+    SetDebugLogging: ALL, ALL | P;
+    FreeInstance: ALL, ALL;
+    SetupExperiment: I, I;
+    EnterInitializationMode: I, I;
+    ExitInitializationMode: M, M;
+    Terminate: V | N, C | F;
+    Reset: ALL, ALL;
+    GetReal: READ, READ;
+    GetInteger: READ, READ;
+    GetBoolean: READ, READ;
+    GetString: READ, READ;
+    SetReal: I | M | V | N, I | M | C;
+    SetInteger: I | M | V, I | M | C;
+    SetBoolean: I | M | V, I | M | C;
+    SetString: I | M | V, I | M | C;
+    GetFMUstate: ALL, ALL;
+    SetFMUstate: ALL, ALL;
+    FreeFMUstate: ALL, ALL;
+    SerializedFMUstateSize: ALL, ALL;
+    SerializeFMUstate: ALL, ALL;
+    DeSerializeFMUstate: ALL, ALL;
+    GetDirectionalDerivative: READ, READ;
+    EnterEventMode: V | N, 0;
+    NewDiscreteStates: V, 0;
+    EnterContinuousTimeMode: V, 0;
+    CompletedIntegratorStep: N, 0;
+    SetTime: V | N, 0;
+    SetContinuousStates: N, 0;
+    GetEventIndicators: READ, 0;
+    GetContinuousStates: READ, 0;
+    GetDerivatives: READ, 0;
+    GetNominalsOfContinuousStates: ALL, 0;
+    SetRealInputDerivatives: 0, I | M | C;
+    GetRealOutputDerivatives: 0, C | F | K | T | E;
+    DoStep: 0, C;
+    CancelStep: 0, P;
+    GetStatus: 0, C | P | F | T;
+    GetRealStatus: 0, C | P | F | T;
+    GetIntegerStatus: 0, C | P | F | T;
+    GetBooleanStatus: 0, C | P | F | T;
+    GetStringStatus: 0, C | P | F | T;
+}
+
+/// Whether `function` may return `fmi2Discard`: section 2.1.3 lists them.
+#[must_use]
+pub fn may_discard(interface: InterfaceType, function: Function) -> bool {
+    use Function as F;
+    match function {
+        F::SetReal | F::SetInteger | F::SetBoolean | F::SetString => true,
+        F::SetContinuousStates
+        | F::GetReal
+        | F::GetDerivatives
+        | F::GetContinuousStates
+        | F::GetEventIndicators => interface == InterfaceType::ModelExchange,
+        F::DoStep
+        | F::GetStatus
+        | F::GetRealStatus
+        | F::GetIntegerStatus
+        | F::GetBooleanStatus
+        | F::GetStringStatus => interface == InterfaceType::CoSimulation,
+        _ => false,
+    }
+}
+
+/// Whether `function` may be called in `state` of an instance made for `interface`.
+///
+/// Conditions on single variables (the numbers in the cells) are tested where values are set.
+#[must_use]
+pub fn allowed(interface: InterfaceType, function: Function, state: State) -> bool {
+    function.states(interface) & state.bit() != 0
+}
+
+/// The states in which a variable may be set: conditions 1, 3 and 6 of section 4.2.4, 4 and 5 of
+/// 3.2.3; inputs also before initialization mode, as importers do.
+pub fn settable(
+    (causality, variability): (Causality, Variability),
+    initial: Option<Initial>,
+    is_state: bool,
+) -> u16 {
+    let at_the_start = match initial {
+        Some(Initial::Exact) if variability != Variability::Constant => I | M,
+        Some(Initial::Approx) => I,
+        _ => 0,
+    };
+    let at_points = match (causality, variability) {
+        (Causality::Input, Variability::Continuous) => I | M | V | N | C,
+        (Causality::Input, _) => I | M | V | C,
+        (Causality::Parameter, Variability::Tunable) => V | C,
+        _ => 0,
+    };
+    at_the_start | at_points | if is_state { N } else { 0 }
+}

@@ -1,0 +1,313 @@
+//! Model description to XML.
+
+mod tag;
+
+use quick_xml::events::{BytesDecl, BytesEnd, Event};
+use quick_xml::writer::Writer;
+
+use super::{
+    CoSimulation, DefaultExperiment, IntegerType, Kind, LogCategory, ModelDescription,
+    ModelExchange, ModelStructure, RealType, ScalarVariable, SimpleType, Unknown,
+};
+use crate::unit::{BaseUnit, Unit};
+use tag::Tag;
+pub(super) use tag::is_xml;
+
+impl ModelDescription {
+    /// Renders `modelDescription.xml` as the schema of FMI 2.0.5 orders it.
+    ///
+    /// UTF-8, two blanks of indentation, numbers in the shortest form that reads back to the same
+    /// bits, lists absent when empty, flags absent when false. All text is escaped; characters
+    /// that XML 1.0 cannot hold (control characters) become U+FFFD.
+    ///
+    /// Numbers must be finite: FMI knows no infinity, and the text for one would not be accepted
+    /// by an importer. [`ModelDescription::problems`] reports such numbers. For a description
+    /// without problems the result validates against `fmi2ModelDescription.xsd`.
+    ///
+    /// ```
+    /// use fmu_description::ModelDescription;
+    /// let description = ModelDescription {
+    ///     fmi_version: "2.0".to_owned(),
+    ///     model_name: "A & B".to_owned(),
+    ///     ..ModelDescription::default()
+    /// };
+    /// assert!(description.to_xml().contains("modelName=\"A &amp; B\""));
+    /// ```
+    #[must_use]
+    pub fn to_xml(&self) -> String {
+        let mut output = Output { writer: Writer::new_with_indent(Vec::new(), b' ', 2) };
+        output.event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)));
+        output.root(self);
+        let mut bytes = output.writer.into_inner();
+        bytes.push(b'\n');
+        String::from_utf8_lossy(&bytes).into_owned()
+    }
+}
+
+struct Output {
+    writer: Writer<Vec<u8>>,
+}
+
+impl Output {
+    fn event(&mut self, event: Event<'_>) {
+        self.writer.write_event(event).expect("a vector takes all bytes");
+    }
+
+    fn empty(&mut self, tag: Tag<'_>) {
+        self.event(Event::Empty(tag.0));
+    }
+
+    fn around(&mut self, tag: Tag<'_>, content: impl FnOnce(&mut Self)) {
+        let end = BytesEnd::new(tag.0.name().as_ref().to_owned());
+        self.event(Event::Start(tag.0));
+        content(self);
+        self.event(Event::End(end));
+    }
+
+    /// A list, absent when it is empty.
+    fn list<T>(&mut self, name: &str, items: &[T], item: impl Fn(&mut Self, &T)) {
+        if !items.is_empty() {
+            self.around(Tag::new(name), |output| {
+                for own in items {
+                    item(output, own);
+                }
+            });
+        }
+    }
+
+    fn root(&mut self, description: &ModelDescription) {
+        let naming = description.structured_names.then_some("structured");
+        let date = description.generation_date_and_time.as_ref();
+        let tag = Tag::new("fmiModelDescription")
+            .with("fmiVersion", &description.fmi_version)
+            .with("modelName", &description.model_name)
+            .with("guid", &description.guid)
+            .maybe("description", description.description.as_ref())
+            .maybe("author", description.author.as_ref())
+            .maybe("version", description.version.as_ref())
+            .maybe("copyright", description.copyright.as_ref())
+            .maybe("license", description.license.as_ref())
+            .maybe("generationTool", description.generation_tool.as_ref())
+            .maybe("generationDateAndTime", date)
+            .maybe("variableNamingConvention", naming)
+            .maybe("numberOfEventIndicators", description.number_of_event_indicators.as_ref());
+        self.around(tag, |output| {
+            if let Some(model_exchange) = &description.model_exchange {
+                output.model_exchange(model_exchange);
+            }
+            if let Some(co_simulation) = &description.co_simulation {
+                output.co_simulation(co_simulation);
+            }
+            output.list("UnitDefinitions", &description.units, Self::unit);
+            output.list("TypeDefinitions", &description.types, Self::simple_type);
+            output.list("LogCategories", &description.log_categories, Self::category);
+            if let Some(experiment) = &description.default_experiment {
+                output.experiment(experiment);
+            }
+            output.around(Tag::new("ModelVariables"), |output| {
+                description.variables.iter().for_each(|variable| output.variable(variable));
+            });
+            output.structure(&description.structure);
+        });
+    }
+
+    fn model_exchange(&mut self, flags: &ModelExchange) {
+        let no_completed_step = &flags.completed_integrator_step_not_needed;
+        let only_once = &flags.can_be_instantiated_only_once_per_process;
+        let own_memory = &flags.can_not_use_memory_management_functions;
+        let derivatives = &flags.provides_directional_derivative;
+        self.interface(
+            Tag::new("ModelExchange")
+                .with("modelIdentifier", &flags.model_identifier)
+                .unless_default("needsExecutionTool", &flags.needs_execution_tool)
+                .unless_default("completedIntegratorStepNotNeeded", no_completed_step)
+                .unless_default("canBeInstantiatedOnlyOncePerProcess", only_once)
+                .unless_default("canNotUseMemoryManagementFunctions", own_memory)
+                .unless_default("canGetAndSetFMUstate", &flags.can_get_and_set_fmu_state)
+                .unless_default("canSerializeFMUstate", &flags.can_serialize_fmu_state)
+                .unless_default("providesDirectionalDerivative", derivatives),
+            &flags.source_files,
+        );
+    }
+
+    /// An interface with its source files.
+    fn interface(&mut self, tag: Tag<'_>, files: &[String]) {
+        if files.is_empty() {
+            return self.empty(tag);
+        }
+        self.around(tag, |output| {
+            output.around(Tag::new("SourceFiles"), |output| {
+                for file in files {
+                    output.empty(Tag::new("File").with("name", file));
+                }
+            });
+        });
+    }
+
+    fn co_simulation(&mut self, flags: &CoSimulation) {
+        let variable_step = &flags.can_handle_variable_communication_step_size;
+        let only_once = &flags.can_be_instantiated_only_once_per_process;
+        let own_memory = &flags.can_not_use_memory_management_functions;
+        self.interface(
+            Tag::new("CoSimulation")
+                .with("modelIdentifier", &flags.model_identifier)
+                .unless_default("needsExecutionTool", &flags.needs_execution_tool)
+                .unless_default("canHandleVariableCommunicationStepSize", variable_step)
+                .unless_default("canInterpolateInputs", &flags.can_interpolate_inputs)
+                .unless_default("maxOutputDerivativeOrder", &flags.max_output_derivative_order)
+                .unless_default("canRunAsynchronuously", &flags.can_run_asynchronuously)
+                .unless_default("canBeInstantiatedOnlyOncePerProcess", only_once)
+                .unless_default("canNotUseMemoryManagementFunctions", own_memory)
+                .unless_default("canGetAndSetFMUstate", &flags.can_get_and_set_fmu_state)
+                .unless_default("canSerializeFMUstate", &flags.can_serialize_fmu_state)
+                .unless_default(
+                    "providesDirectionalDerivative",
+                    &flags.provides_directional_derivative,
+                ),
+            &flags.source_files,
+        );
+    }
+
+    fn unit(&mut self, unit: &Unit) {
+        let tag = Tag::new("Unit").with("name", &unit.name);
+        if unit.base.is_none() && unit.display_units.is_empty() {
+            return self.empty(tag);
+        }
+        self.around(tag, |output| {
+            if let Some(base) = &unit.base {
+                output.base_unit(base);
+            }
+            for display in &unit.display_units {
+                let tag = Tag::new("DisplayUnit").with("name", &display.name);
+                output.empty(conversion(tag, display.factor, display.offset));
+            }
+        });
+    }
+
+    fn base_unit(&mut self, base: &BaseUnit) {
+        let exponents = BaseUnit::EXPONENTS.into_iter().zip(base.exponents());
+        let tag = exponents.fold(Tag::new("BaseUnit"), |tag, (name, exponent)| {
+            tag.unless_default(name, &exponent)
+        });
+        self.empty(conversion(tag, base.factor, base.offset));
+    }
+
+    fn simple_type(&mut self, own: &SimpleType) {
+        let tag = Tag::new("SimpleType")
+            .with("name", &own.name)
+            .maybe("description", own.description.as_ref());
+        self.around(tag, |output| {
+            let element = Tag::new(own.kind.element());
+            match &own.kind {
+                Kind::Real(real) => output.empty(real_limits(element, real)),
+                Kind::Integer(integer) => output.empty(integer_limits(element, integer)),
+                Kind::Boolean(_) | Kind::String(_) => output.empty(element),
+                Kind::Enumeration(integer) => {
+                    let element = element.maybe("quantity", integer.quantity.as_ref());
+                    output.around(element, |output| {
+                        for (name, value) in &own.items {
+                            output.empty(Tag::new("Item").with("name", name).with("value", value));
+                        }
+                    });
+                }
+            }
+        });
+    }
+
+    fn category(&mut self, category: &LogCategory) {
+        self.empty(
+            Tag::new("Category")
+                .with("name", &category.name)
+                .maybe("description", category.description.as_ref()),
+        );
+    }
+
+    fn experiment(&mut self, experiment: &DefaultExperiment) {
+        self.empty(
+            Tag::new("DefaultExperiment")
+                .maybe("startTime", experiment.start_time.as_ref())
+                .maybe("stopTime", experiment.stop_time.as_ref())
+                .maybe("tolerance", experiment.tolerance.as_ref())
+                .maybe("stepSize", experiment.step_size.as_ref()),
+        );
+    }
+
+    fn variable(&mut self, variable: &ScalarVariable) {
+        let tag = Tag::new("ScalarVariable")
+            .with("name", &variable.name)
+            .with("valueReference", &variable.value_reference)
+            .maybe("description", variable.description.as_ref())
+            .with("causality", variable.causality.as_str())
+            .with("variability", variable.variability.as_str())
+            .maybe("initial", variable.initial.map(super::Initial::as_str));
+        self.around(tag, |output| {
+            let element = Tag::new(variable.kind.element());
+            output.empty(match &variable.kind {
+                Kind::Real(real) => {
+                    let element = element.maybe("declaredType", real.declared_type.as_ref());
+                    real_limits(element, real)
+                        .maybe("start", real.start.as_ref())
+                        .maybe("derivative", real.derivative.as_ref())
+                        .unless_default("reinit", &real.reinit)
+                }
+                Kind::Integer(integer) | Kind::Enumeration(integer) => {
+                    let element = element.maybe("declaredType", integer.declared_type.as_ref());
+                    integer_limits(element, integer).maybe("start", integer.start.as_ref())
+                }
+                Kind::Boolean(start) => element.maybe("start", start.as_ref()),
+                Kind::String(start) => element.maybe("start", start.as_ref()),
+            });
+        });
+    }
+
+    fn structure(&mut self, structure: &ModelStructure) {
+        if *structure == ModelStructure::default() {
+            return self.empty(Tag::new("ModelStructure"));
+        }
+        self.around(Tag::new("ModelStructure"), |output| {
+            output.list("Outputs", &structure.outputs, Self::unknown);
+            output.list("Derivatives", &structure.derivatives, Self::unknown);
+            output.list("InitialUnknowns", &structure.initial_unknowns, Self::unknown);
+        });
+    }
+
+    fn unknown(&mut self, unknown: &Unknown) {
+        let dependencies = unknown
+            .dependencies
+            .as_ref()
+            .map(|indices| indices.iter().map(u32::to_string).collect::<Vec<_>>().join(" "));
+        let kinds = unknown
+            .kinds
+            .as_ref()
+            .map(|kinds| kinds.iter().map(|kind| kind.as_str()).collect::<Vec<_>>().join(" "));
+        self.empty(
+            Tag::new("Unknown")
+                .with("index", &unknown.index)
+                .maybe("dependencies", dependencies.as_ref())
+                .maybe("dependenciesKind", kinds.as_ref()),
+        );
+    }
+}
+
+fn conversion(tag: Tag<'_>, factor: f64, offset: f64) -> Tag<'_> {
+    let other = Some(&factor).filter(|factor| (**factor - 1.0).abs() > 0.0);
+    tag.maybe("factor", other).unless_default("offset", &offset)
+}
+
+fn real_limits<'a>(tag: Tag<'a>, real: &RealType) -> Tag<'a> {
+    tag.maybe("quantity", real.quantity.as_ref())
+        .maybe("unit", real.unit.as_ref())
+        .maybe("displayUnit", real.display_unit.as_ref())
+        .maybe("min", real.min.as_ref())
+        .maybe("max", real.max.as_ref())
+        .maybe("nominal", real.nominal.as_ref())
+}
+
+fn integer_limits<'a>(tag: Tag<'a>, integer: &IntegerType) -> Tag<'a> {
+    tag.maybe("quantity", integer.quantity.as_ref())
+        .maybe("min", integer.min.as_ref())
+        .maybe("max", integer.max.as_ref())
+}
+
+#[cfg(test)]
+mod tests;

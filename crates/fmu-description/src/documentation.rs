@@ -1,0 +1,341 @@
+//! `documentation/index.html` of an FMU: what a reader needs to use the model.
+
+use std::borrow::Cow;
+
+use crate::description::{
+    CoSimulation, DefaultExperiment, Kind, ModelDescription, ModelExchange, ScalarVariable,
+    SimpleType,
+};
+
+const STYLE: &str = "body { font: 16px/1.5 sans-serif; max-width: 72rem; margin: 2rem auto; \
+padding: 0 1rem; color: #222; background: #fff; } h1, h2 { line-height: 1.2; } \
+table { border-collapse: collapse; margin: 1rem 0; } \
+th, td { border: 1px solid #ccc; padding: .2rem .6rem; text-align: left; vertical-align: top; } \
+th { background: #f2f2f2; } code { font-family: monospace; white-space: pre-wrap; }";
+
+/// The page about a model: its description, `model_html` with the equations in the author's words,
+/// the variables, the default experiment, the capabilities and the licence.
+///
+/// One self-contained file without scripts, well-formed both as HTML and as XML if `model_html` is.
+/// Everything from `description` is escaped; `model_html` is the author's HTML fragment and goes in
+/// as it is.
+///
+/// ```
+/// use fmu_description::{ModelDescription, documentation};
+/// let description = ModelDescription { model_name: "a < b".to_owned(), ..Default::default() };
+/// let page = documentation::page(&description, "<p>x\u{2032} = <i>u</i></p>");
+/// assert!(page.contains("<h1>a &lt; b</h1>") && page.contains("<i>u</i>"));
+/// ```
+#[must_use]
+pub fn page(description: &ModelDescription, model_html: &str) -> String {
+    let title = escaped(&description.model_name);
+    let experiment = description.default_experiment.as_ref().map(experiment);
+    let simulation = description.co_simulation.as_ref().map(co_simulation);
+    let exchange = description.model_exchange.as_ref();
+    let exchange = exchange.map(|own| model_exchange(own, description));
+    let sections = [
+        format!("<h1>{title}</h1>\n"),
+        paragraph(description.description.as_deref()),
+        facts(description),
+        section("Model", model_html),
+        section("Variables", &variables(description)),
+        section("Log categories", &log_categories(description)),
+        section("Default experiment", &experiment.unwrap_or_default()),
+        section("Co-simulation interface", &simulation.unwrap_or_default()),
+        section("Model-exchange interface", &exchange.unwrap_or_default()),
+        section("Licence", &paragraph(description.license.as_deref())),
+    ];
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n\
+         <title>{title}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n{}</body>\n</html>\n",
+        sections.concat()
+    )
+}
+
+fn escaped(text: &str) -> Cow<'_, str> {
+    quick_xml::escape::escape(text)
+}
+
+/// A section with a heading; nothing if it is empty.
+fn section(heading: &str, content: &str) -> String {
+    if content.trim().is_empty() {
+        return String::new();
+    }
+    format!("<h2>{heading}</h2>\n{content}\n")
+}
+
+/// Text in a paragraph, its line breaks kept.
+fn paragraph(text: Option<&str>) -> String {
+    let text = text.filter(|text| !text.trim().is_empty());
+    text.map(|text| format!("<p>{}</p>\n", escaped(text).replace('\n', "<br/>\n")))
+        .unwrap_or_default()
+}
+
+/// A table with a header row; nothing if it has no other row. Cells are HTML.
+fn table(header: &[&str], rows: &[Vec<String>]) -> String {
+    if rows.is_empty() {
+        return String::new();
+    }
+    let cells = |row: &Vec<String>| {
+        let cells = row.iter().map(|cell| format!("<td>{cell}</td>"));
+        format!("<tr>{}</tr>\n", cells.collect::<Vec<_>>().concat())
+    };
+    let names: Vec<String> = header.iter().map(|name| format!("<th>{name}</th>")).collect();
+    let head =
+        if names.is_empty() { String::new() } else { format!("<tr>{}</tr>\n", names.concat()) };
+    let body: Vec<String> = rows.iter().map(cells).collect();
+    format!("<table>\n{head}{}</table>\n", body.concat())
+}
+
+fn facts(description: &ModelDescription) -> String {
+    let facts = [
+        ("Version", description.version.as_deref()),
+        ("Author", description.author.as_deref()),
+        ("Copyright", description.copyright.as_deref()),
+        ("Made by", description.generation_tool.as_deref()),
+        ("Made at", description.generation_date_and_time.as_deref()),
+        ("GUID", Some(description.guid.as_str()).filter(|guid| !guid.is_empty())),
+    ];
+    let rows: Vec<Vec<String>> = facts
+        .iter()
+        .filter_map(|(name, value)| Some(vec![(*name).to_owned(), escaped((*value)?).into_owned()]))
+        .collect();
+    table(&[], &rows)
+}
+
+fn variables(description: &ModelDescription) -> String {
+    let header =
+        ["Name", "Causality", "Variability", "Type", "Unit", "Start", "Min", "Max", "Description"];
+    let row = |variable: &ScalarVariable| {
+        let (unit, [start, min, max]) = texts(&variable.kind, &description.types);
+        vec![
+            code(&variable.name),
+            variable.causality.as_str().to_owned(),
+            variable.variability.as_str().to_owned(),
+            type_name(&variable.kind),
+            escaped(&unit).into_owned(),
+            code(&start),
+            code(&min),
+            code(&max),
+            escaped(variable.description.as_deref().unwrap_or_default()).into_owned(),
+        ]
+    };
+    let rows: Vec<Vec<String>> = description.variables.iter().map(row).collect();
+    table(&header, &rows)
+}
+
+fn code(text: &str) -> String {
+    if text.is_empty() { String::new() } else { format!("<code>{}</code>", escaped(text)) }
+}
+
+fn type_name(kind: &Kind) -> String {
+    match kind {
+        Kind::Enumeration(own) => {
+            let name = own.declared_type.as_deref().unwrap_or_default();
+            format!("Enumeration {}", escaped(name))
+        }
+        other => other.element().to_owned(),
+    }
+}
+
+/// Unit, and start, min and max as text; empty where there is none.
+///
+/// `types` are those of the description, in which an enumeration finds the names of its items.
+#[must_use]
+pub fn texts(kind: &Kind, types: &[SimpleType]) -> (String, [String; 3]) {
+    let none = String::new;
+    match kind {
+        Kind::Real(own) => {
+            let number = |value: Option<f64>| value.map_or_else(none, |value| format!("{value:?}"));
+            let unit = own.unit.clone().unwrap_or_default();
+            (unit, [number(own.start), number(own.min), number(own.max)])
+        }
+        Kind::Integer(own) => {
+            let number = |value: Option<i32>| value.map_or_else(none, |value| value.to_string());
+            (none(), [number(own.start), number(own.min), number(own.max)])
+        }
+        Kind::Enumeration(own) => {
+            let declared =
+                types.iter().find(|other| Some(&other.name) == own.declared_type.as_ref());
+            let items = declared.map_or(&[][..], |own| &own.items);
+            let item = |value: Option<i32>| {
+                let Some(value) = value else { return none() };
+                let item = items.iter().find(|(_, own)| *own == value);
+                item.map_or_else(|| value.to_string(), |(name, _)| format!("{value} ({name})"))
+            };
+            (none(), [item(own.start), item(own.min), item(own.max)])
+        }
+        Kind::Boolean(start) => {
+            (none(), [start.map_or_else(none, |start| start.to_string()), none(), none()])
+        }
+        Kind::String(start) => {
+            let text = start.as_ref().map_or_else(none, |start| format!("\"{start}\""));
+            (none(), [text, none(), none()])
+        }
+    }
+}
+
+fn log_categories(description: &ModelDescription) -> String {
+    let rows: Vec<Vec<String>> = description
+        .log_categories
+        .iter()
+        .map(|own| {
+            let text = own.description.as_deref().unwrap_or_default();
+            vec![code(&own.name), escaped(text).into_owned()]
+        })
+        .collect();
+    table(&["Category", "Messages"], &rows)
+}
+
+fn experiment(own: &DefaultExperiment) -> String {
+    let rows: Vec<Vec<String>> = [
+        ("Start time in s", own.start_time),
+        ("Stop time in s", own.stop_time),
+        ("Relative tolerance", own.tolerance),
+        ("Step size in s", own.step_size),
+    ]
+    .iter()
+    .filter_map(|(name, value)| Some(vec![(*name).to_owned(), code(&format!("{:?}", (*value)?))]))
+    .collect();
+    table(&[], &rows)
+}
+
+fn flag(value: bool) -> &'static str {
+    if value { "yes" } else { "no" }
+}
+
+fn attributes(rows: &[(&str, &str)]) -> String {
+    let row = |(name, value): &(&str, &str)| vec![code(name), escaped(value).into_owned()];
+    table(&[], &rows.iter().map(row).collect::<Vec<_>>())
+}
+
+fn co_simulation(own: &CoSimulation) -> String {
+    let order = own.max_output_derivative_order.to_string();
+    let variable_step = flag(own.can_handle_variable_communication_step_size);
+    let only_once = flag(own.can_be_instantiated_only_once_per_process);
+    let own_memory = flag(own.can_not_use_memory_management_functions);
+    attributes(&[
+        ("modelIdentifier", own.model_identifier.as_str()),
+        ("needsExecutionTool", flag(own.needs_execution_tool)),
+        ("canHandleVariableCommunicationStepSize", variable_step),
+        ("canInterpolateInputs", flag(own.can_interpolate_inputs)),
+        ("maxOutputDerivativeOrder", &order),
+        ("canRunAsynchronuously", flag(own.can_run_asynchronuously)),
+        ("canBeInstantiatedOnlyOncePerProcess", only_once),
+        ("canNotUseMemoryManagementFunctions", own_memory),
+        ("canGetAndSetFMUstate", flag(own.can_get_and_set_fmu_state)),
+        ("canSerializeFMUstate", flag(own.can_serialize_fmu_state)),
+        ("providesDirectionalDerivative", flag(own.provides_directional_derivative)),
+    ])
+}
+
+fn model_exchange(own: &ModelExchange, description: &ModelDescription) -> String {
+    let states = description.structure.derivatives.len().to_string();
+    let indicators = description.number_of_event_indicators.unwrap_or_default().to_string();
+    let only_once = flag(own.can_be_instantiated_only_once_per_process);
+    let own_memory = flag(own.can_not_use_memory_management_functions);
+    attributes(&[
+        ("modelIdentifier", own.model_identifier.as_str()),
+        ("continuous states", &states),
+        ("numberOfEventIndicators", &indicators),
+        ("needsExecutionTool", flag(own.needs_execution_tool)),
+        ("completedIntegratorStepNotNeeded", flag(own.completed_integrator_step_not_needed)),
+        ("canBeInstantiatedOnlyOncePerProcess", only_once),
+        ("canNotUseMemoryManagementFunctions", own_memory),
+        ("canGetAndSetFMUstate", flag(own.can_get_and_set_fmu_state)),
+        ("canSerializeFMUstate", flag(own.can_serialize_fmu_state)),
+        ("providesDirectionalDerivative", flag(own.provides_directional_derivative)),
+    ])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::description::sample;
+    use quick_xml::events::Event;
+    use quick_xml::reader::Reader;
+
+    /// The texts of a page, element by element, as an XML reader sees them.
+    fn texts(page: &str) -> Vec<String> {
+        let mut reader = Reader::from_str(page);
+        let (mut texts, mut depth) = (vec![String::new()], 0);
+        loop {
+            match reader.read_event().unwrap() {
+                Event::Start(_) => {
+                    depth += 1;
+                    texts.push(String::new());
+                }
+                Event::End(_) => {
+                    depth -= 1;
+                    texts.push(String::new());
+                }
+                Event::Text(text) => texts.last_mut().unwrap().push_str(&text.xml10_content()),
+                Event::GeneralRef(reference) => {
+                    let escaped = format!("&{};", reference.xml10_content());
+                    let text = quick_xml::escape::unescape(&escaped).unwrap().into_owned();
+                    texts.last_mut().unwrap().push_str(&text);
+                }
+                Event::Eof => break,
+                _ => {}
+            }
+        }
+        assert_eq!(depth, 0, "every element is closed");
+        texts
+    }
+
+    #[test]
+    fn the_page_shows_everything_about_every_variable() {
+        let description = sample::complete();
+        let page = page(&description, "<p id=\"own\">x' = u</p>");
+        let texts = texts(&page);
+        let shows = |text: &str| texts.iter().any(|own| own == text);
+        for variable in &description.variables {
+            assert!(shows(&variable.name), "{}", variable.name);
+        }
+        for text in [
+            "Sample.<Model> & \"quotes\"",
+            "MIT",
+            "A. Author",
+            "a state",
+            "rad",
+            "calculatedParameter",
+            "tunable",
+            "0.25",
+            "-3.5",
+            "-1 (off)",
+            "\"two\nlines <&> \"'\r\t\"",
+            "canInterpolateInputs",
+            "completedIntegratorStepNotNeeded",
+            "sample_me",
+            "yes",
+            "logStatusError",
+            "1e-9",
+            "100.0",
+        ] {
+            assert!(shows(text), "{text:?}");
+        }
+        assert!(page.contains("<p id=\"own\">x' = u</p>"));
+    }
+
+    #[test]
+    fn text_cannot_become_markup() {
+        let evil = "</title><script>alert('x')</script>";
+        let mut description = sample::complete();
+        description.model_name = evil.into();
+        description.license = Some(evil.into());
+        description.guid = evil.into();
+        description.variables[0].name = evil.into();
+        description.variables[1].description = Some(evil.into());
+        description.log_categories[0].name = evil.into();
+        let page = page(&description, "");
+        assert!(!page.contains("<script"), "{page}");
+        assert!(texts(&page).iter().filter(|text| *text == evil).count() >= 6);
+    }
+
+    #[test]
+    fn an_empty_description_gives_a_page_without_empty_sections() {
+        let page = page(&ModelDescription::default(), "");
+        assert!(!page.contains("<h2>") && !page.contains("<table>"), "{page}");
+    }
+}

@@ -1,0 +1,14 @@
+//! The arguments of `fmi2SetupExperiment`.
+
+use serde::{Deserialize, Serialize};
+
+/// The arguments of `fmi2SetupExperiment`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Experiment {
+    /// `startTime` in s.
+    pub start_time: f64,
+    /// `stopTime` in s, where defined: no step goes past it.
+    pub stop_time: Option<f64>,
+    /// `tolerance`, relative, where defined.
+    pub tolerance: Option<f64>,
+}

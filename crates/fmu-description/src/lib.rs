@@ -1,0 +1,27 @@
+//! Model descriptions and archives of FMUs (FMI 2.0): read, check, write, pack, unpack.
+//!
+//! Use this crate to look at an FMU, to check it or to make one, without running it:
+//!
+//! * [`ModelDescription::read`] parses `modelDescription.xml` as leniently as other importers do and
+//!   returns a [`Warning`] for each defect; [`ModelDescription::problems`] lists the rules of the
+//!   standard that a description breaks; [`ModelDescription::to_xml`] writes one.
+//! * `package` (feature `package`) unpacks and writes `.fmu` archives.
+//! * [`unit`] derives base units from names, [`location`] converts paths to `fmuResourceLocation` and
+//!   back, [`documentation`] writes the documentation page of a model.
+//!
+//! To run an FMU use `fmu-import`; to write a model use `fmu`.
+#![forbid(unsafe_code)]
+
+pub mod abi;
+pub mod call_order;
+mod description;
+pub mod documentation;
+mod experiment;
+pub mod location;
+#[cfg(feature = "package")]
+pub mod package;
+pub mod unit;
+pub mod xml;
+
+pub use description::*;
+pub use experiment::Experiment;

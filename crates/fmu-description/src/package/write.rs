@@ -1,0 +1,170 @@
+//! Writing an FMU.
+
+use std::collections::HashSet;
+use std::fs;
+use std::io::{Cursor, Write as _};
+use std::path::Path;
+
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, System, ZipWriter};
+
+use super::{DESCRIPTION, PackageError, file_error, paths};
+
+/// Bytes that fit into an archive without Zip64, with room for its directory.
+const CAPACITY: u64 = 1 << 31;
+/// Entries that fit into an archive without Zip64.
+const ENTRIES: u64 = 65_000;
+
+/// An FMU to be written.
+///
+/// The archive depends on nothing but what is added: entries are sorted, with
+/// `modelDescription.xml` first, all are deflated, dated 1980-01-01 and of mode 0644 (0755 in
+/// `binaries`). There are no directory entries, data descriptors or Zip64 records.
+///
+/// ```no_run
+/// use fmu_description::package::Package;
+/// let mut package = Package::new("<fmiModelDescription ...".to_owned());
+/// package.add("binaries/linux64/Model.so", std::fs::read("libmodel.so")?);
+/// package.write("dist/Model.fmu".as_ref())?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Package {
+    description: String,
+    entries: Vec<(String, Vec<u8>)>,
+}
+
+impl Package {
+    /// An FMU with `description_xml` as its `modelDescription.xml` and nothing else yet.
+    #[must_use]
+    pub fn new(description_xml: String) -> Self {
+        Package { description: description_xml, entries: Vec::new() }
+    }
+
+    /// Adds a file; `path` is relative to the root, with forward slashes.
+    pub fn add(&mut self, path: impl Into<String>, bytes: impl Into<Vec<u8>>) {
+        self.entries.push((path.into(), bytes.into()));
+    }
+
+    /// Adds all files in `folder` and below, under `path`.
+    ///
+    /// # Errors
+    ///
+    /// [`PackageError::File`] if one cannot be read, [`PackageError::Entry`] for a symbolic link
+    /// or a name that is not Unicode.
+    pub fn add_folder(&mut self, path: &str, folder: &Path) -> Result<(), PackageError> {
+        for entry in fs::read_dir(folder).map_err(file_error("read", folder))? {
+            let entry = entry.map_err(file_error("read", folder))?;
+            let file_type = entry.file_type().map_err(file_error("read", entry.path()))?;
+            let inner = format!("{path}/{}", entry.file_name().to_string_lossy());
+            if entry.file_name().to_str().is_none() || file_type.is_symlink() {
+                let expected = "a file with a Unicode name, not a link";
+                return Err(PackageError::Entry { entry: inner, expected });
+            }
+            if file_type.is_dir() {
+                self.add_folder(&inner, &entry.path())?;
+            } else {
+                self.add(inner, fs::read(entry.path()).map_err(file_error("read", entry.path()))?);
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes the archive to `target`, whose extension must be `fmu`, and creates its folder.
+    /// The file is replaced as a whole or not at all.
+    ///
+    /// # Errors
+    ///
+    /// [`PackageError`] if the FMU breaks a rule of section 2.3 (paths, duplicates ignoring case,
+    /// neither `binaries` nor `sources`, `documentation` without `index.html`), is too large, or
+    /// the file cannot be written.
+    pub fn write(&self, target: &Path) -> Result<(), PackageError> {
+        if target.extension().is_none_or(|extension| extension != "fmu") {
+            let found = target.display().to_string();
+            return Err(PackageError::Missing {
+                expected: "a file name ending in .fmu".into(),
+                found,
+            });
+        }
+        self.check(target)?;
+        let bytes = self
+            .archive()
+            .map_err(|source| PackageError::Archive { path: target.to_owned(), source })?;
+        let folder = match target.parent() {
+            Some(parent) if parent != Path::new("") => parent,
+            _ => Path::new("."),
+        };
+        fs::create_dir_all(folder).map_err(file_error("create", folder))?;
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".packing-").suffix(".fmu");
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt as _;
+            builder.permissions(fs::Permissions::from_mode(0o666));
+        }
+        let mut file =
+            builder.tempfile_in(folder).map_err(file_error("create a file in", folder))?;
+        file.write_all(&bytes).map_err(file_error("write", file.path()))?;
+        let persisted = file.persist(target);
+        persisted.map_err(|failure| file_error("write", target)(failure.error))?;
+        Ok(())
+    }
+
+    fn check(&self, target: &Path) -> Result<(), PackageError> {
+        let mut seen = HashSet::new();
+        for (path, _) in &self.entries {
+            let entry = path.clone();
+            if let Some(expected) = paths::unsuitable(path) {
+                return Err(PackageError::Entry { entry, expected });
+            }
+            if !seen.insert(path.to_ascii_lowercase()) {
+                let expected = "a path that no other entry has, in upper or lower case";
+                return Err(PackageError::Entry { entry, expected });
+            }
+        }
+        let has_folder = |name: &str| self.entries.iter().any(|(path, _)| path.starts_with(name));
+        for (holds, expected, found) in [
+            (has_folder("binaries/") || has_folder("sources/"), "binaries or sources", "neither"),
+            (
+                !has_folder("documentation/") || seen.contains("documentation/index.html"),
+                "documentation/index.html",
+                "documentation without it",
+            ),
+        ] {
+            if !holds {
+                let (expected, found) = (expected.to_owned(), found.to_owned());
+                return Err(PackageError::Missing { expected, found });
+            }
+        }
+        let bytes = |text: &[u8]| u64::try_from(text.len()).unwrap_or(u64::MAX);
+        let sizes = self.entries.iter().map(|(_, content)| bytes(content));
+        let total = sizes.fold(bytes(self.description.as_bytes()), u64::saturating_add);
+        let count = u64::try_from(self.entries.len()).unwrap_or(u64::MAX);
+        for (found, limit, unit) in [(total, CAPACITY, "bytes"), (count, ENTRIES, "files")] {
+            if found > limit {
+                return Err(PackageError::Limit { path: target.to_owned(), limit, unit });
+            }
+        }
+        Ok(())
+    }
+
+    fn archive(&self) -> zip::result::ZipResult<Vec<u8>> {
+        let mut entries: Vec<(&str, &[u8])> =
+            self.entries.iter().map(|(path, bytes)| (path.as_str(), bytes.as_slice())).collect();
+        entries.sort_unstable();
+        entries.insert(0, (DESCRIPTION, self.description.as_bytes()));
+        let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+        for (path, bytes) in entries {
+            let mode = if path.starts_with("binaries/") { 0o755 } else { 0o644 };
+            let options = SimpleFileOptions::default()
+                .compression_method(CompressionMethod::Deflated)
+                .last_modified_time(DateTime::default())
+                .system(System::Unix)
+                .unix_permissions(mode)
+                .large_file(false);
+            archive.start_file(path, options)?;
+            archive.write_all(bytes)?;
+        }
+        Ok(archive.finish()?.into_inner())
+    }
+}

@@ -1,0 +1,190 @@
+//! Units with their SI base units (FMI 2.0.5, section 2.2.2).
+
+mod expression;
+mod names;
+
+use serde::Serialize;
+
+use expression::Cursor;
+
+/// Degrees in a radian, 180 / pi.
+const DEGREES_PER_RADIAN: f64 = 57.295_779_513_082_32;
+
+/// `Unit`: a name, its conversion to SI base units and the units to display it in.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Unit {
+    /// `name`, unique in `UnitDefinitions`.
+    pub name: String,
+    /// `BaseUnit`; without it nothing is known but the name.
+    pub base: Option<BaseUnit>,
+    /// `DisplayUnit`s.
+    pub display_units: Vec<DisplayUnit>,
+}
+
+/// `BaseUnit`: exponents of the base units, and `base = factor * unit + offset`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct BaseUnit {
+    /// Exponent of the kilogram.
+    pub kg: i32,
+    /// Exponent of the metre.
+    pub m: i32,
+    /// Exponent of the second.
+    pub s: i32,
+    /// Exponent of the ampere.
+    pub a: i32,
+    /// Exponent of the kelvin.
+    pub k: i32,
+    /// Exponent of the mole.
+    pub mol: i32,
+    /// Exponent of the candela.
+    pub cd: i32,
+    /// Exponent of the radian, which FMI counts as a base unit.
+    pub rad: i32,
+    /// `factor`, not zero.
+    pub factor: f64,
+    /// `offset`, in base units.
+    pub offset: f64,
+}
+
+impl Default for BaseUnit {
+    /// The dimensionless unit 1.
+    fn default() -> Self {
+        BaseUnit::from_exponents([0; 8], 1.0, 0.0)
+    }
+}
+
+impl BaseUnit {
+    /// What the exponents are called in XML, in the order of [`BaseUnit::exponents`].
+    pub const EXPONENTS: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
+
+    /// Of exponents in the order of [`BaseUnit::EXPONENTS`].
+    #[must_use]
+    pub fn from_exponents(exponents: [i32; 8], factor: f64, offset: f64) -> Self {
+        let [kg, m, s, a, k, mol, cd, rad] = exponents;
+        BaseUnit { kg, m, s, a, k, mol, cd, rad, factor, offset }
+    }
+
+    /// The exponents in the order of [`BaseUnit::EXPONENTS`].
+    #[must_use]
+    pub fn exponents(&self) -> [i32; 8] {
+        [self.kg, self.m, self.s, self.a, self.k, self.mol, self.cd, self.rad]
+    }
+
+    /// Factor and offset from values in this unit to values in `other`, as `base = factor * unit +
+    /// offset` holds for both; none where they measure different quantities.
+    #[must_use]
+    pub fn conversion(&self, other: &BaseUnit) -> Option<(f64, f64)> {
+        let factor = self.factor / other.factor;
+        let offset = (self.offset - other.offset) / other.factor;
+        (self.exponents() == other.exponents()).then_some((factor, offset))
+    }
+}
+
+/// `DisplayUnit`: `display = factor * unit + offset`, the other way round than in [`BaseUnit`].
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DisplayUnit {
+    /// `name`, unique within its unit.
+    pub name: String,
+    /// `factor`, not zero.
+    pub factor: f64,
+    /// `offset`, in display units.
+    pub offset: f64,
+}
+
+/// Why an expression is not a unit. Columns count characters from 1.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum UnitError {
+    /// A name that is no unit.
+    #[error(
+        "unit {expression:?}, column {column}: expected a unit such as kg, m, s, rad, N, J, W, Pa, \
+         degC or %, with or without an SI prefix, found {name:?}"
+    )]
+    UnknownName {
+        /// The whole expression.
+        expression: String,
+        /// Where the name starts.
+        column: usize,
+        /// The name.
+        name: String,
+    },
+    /// A character where something else must stand.
+    #[error("unit {expression:?}, column {column}: expected {expected}, found {found}")]
+    Syntax {
+        /// The whole expression.
+        expression: String,
+        /// Where it stops being a unit.
+        column: usize,
+        /// What may stand there.
+        expected: &'static str,
+        /// What stands there.
+        found: String,
+    },
+    /// A scale with an offset as part of a larger expression, where it has no meaning.
+    #[error(
+        "unit {expression:?}, column {column}: {name} has an offset and can only stand alone, \
+         expected a unit without one, such as K"
+    )]
+    Offset {
+        /// The whole expression.
+        expression: String,
+        /// Where the name starts.
+        column: usize,
+        /// The name.
+        name: String,
+    },
+    /// A factor too large or too small for a double.
+    #[error(
+        "unit {expression:?}: expected a conversion factor from 1e-300 to 1e300, found {found}"
+    )]
+    Magnitude {
+        /// The whole expression.
+        expression: String,
+        /// The factor.
+        found: String,
+    },
+}
+
+impl Unit {
+    /// Reads a unit expression and finds its conversion to SI base units.
+    ///
+    /// `expression` is a product of units separated by `.`, `*` or a blank, each with an optional
+    /// integer exponent (`m2`, `m^2`, `s-1`), and any number of divisions by one unit (`m/s`) or by
+    /// a product in parentheses (`J/(kg.K)`). `""` and `"1"` are dimensionless. The name of the
+    /// result is the expression, unchanged. SI prefixes stand before metric units (`km`, `us`).
+    /// `Hz` is a revolution per second, 2 pi rad/s, as in the table of section 2.2.2.
+    ///
+    /// `rad` is also displayed in `deg`, `rad/s` in `deg/s`.
+    ///
+    /// The factor is rounded a few times at most: powers of ten are collected and applied once.
+    ///
+    /// # Errors
+    ///
+    /// [`UnitError`] names the place and what is expected there.
+    ///
+    /// ```
+    /// let unit = fmu_description::unit::Unit::parse("km/h")?;
+    /// let base = unit.base.expect("a known unit has a base unit");
+    /// assert_eq!((base.m, base.s, base.factor), (1, -1, 1000.0 / 3600.0));
+    /// # Ok::<(), fmu_description::unit::UnitError>(())
+    /// ```
+    pub fn parse(expression: &str) -> Result<Unit, UnitError> {
+        let base = Cursor::new(expression).unit()?;
+        Ok(Unit { name: expression.to_owned(), base: Some(base), display_units: displays(&base) })
+    }
+}
+
+/// Degrees for angles and angular velocities in radians.
+fn displays(base: &BaseUnit) -> Vec<DisplayUnit> {
+    let radian = BaseUnit { rad: 1, ..BaseUnit::default() };
+    let name = if *base == radian {
+        "deg"
+    } else if *base == (BaseUnit { s: -1, ..radian }) {
+        "deg/s"
+    } else {
+        return Vec::new();
+    };
+    vec![DisplayUnit { name: name.to_owned(), factor: DEGREES_PER_RADIAN, offset: 0.0 }]
+}
+
+#[cfg(test)]
+mod tests;

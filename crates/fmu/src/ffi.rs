@@ -1,0 +1,298 @@
+//! The C ABI of an exported model: the one place of the crate where pointers are followed.
+//!
+//! Every entry point that has an instance goes through `door`; what stands behind it is safe.
+#![expect(unsafe_code, reason = "the boundary to C")]
+
+mod entry;
+mod exports;
+
+use std::cell::UnsafeCell;
+use std::ffi::{CStr, CString, c_char, c_void};
+use std::mem::MaybeUninit;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use fmu_description::abi::{
+    self, DescribeSink, Status, fmi2Boolean, fmi2CallbackFunctions, fmi2Component, fmi2FMUstate,
+    fmi2Integer, fmi2Status, fmi2String, fmi2Type,
+};
+
+pub use entry::*;
+pub use exports::signature;
+
+use crate::fence::{Watch, guarded, outside};
+use crate::instance::Instance;
+use crate::model::{Failure, Model};
+use fmu_description::call_order::{Function, InterfaceType};
+use fmu_description::location::{NO_FOLDER, path_from_uri};
+
+/// What an instance keeps of the importer's callbacks.
+#[derive(Clone)]
+pub(crate) struct Callbacks {
+    functions: fmi2CallbackFunctions,
+    instance_name: CString,
+}
+
+// SAFETY: the standard has the environment's callbacks usable from whatever thread calls the FMU;
+// the instance only hands the environment pointer back.
+unsafe impl Send for Callbacks {}
+
+impl Callbacks {
+    /// No importer behind it.
+    #[cfg(test)]
+    pub(crate) fn silent() -> Self {
+        let functions = fmi2CallbackFunctions {
+            logger: None,
+            allocate_memory: None,
+            free_memory: None,
+            step_finished: None,
+            component_environment: std::ptr::null_mut(),
+        };
+        Self { functions, instance_name: CString::default() }
+    }
+
+    /// Hands a message to the importer's logger, once formatted: the format string is `%s`, and
+    /// `#`, by which the standard marks value references, is doubled.
+    pub(crate) fn log(&self, status: Status, category: &str, message: &str) {
+        let Some(logger) = self.functions.logger else { return };
+        let c_string = |text: &str| CString::new(text.replace('\0', "")).unwrap_or_default();
+        let (category, message) = (c_string(category), c_string(&message.replace('#', "##")));
+        // SAFETY: the logger has this signature by the standard; all strings outlive the call.
+        outside(|| unsafe {
+            logger(
+                self.functions.component_environment,
+                self.instance_name.as_ptr(),
+                status as fmi2Status,
+                category.as_ptr(),
+                c"%s".as_ptr(),
+                message.as_ptr(),
+            );
+        });
+    }
+}
+
+/// What `fmi2Component` points to: an instance that one call at a time may use.
+struct Component<M: Model> {
+    busy: AtomicBool,
+    instance: UnsafeCell<Instance<M>>,
+}
+
+/// Null check, one call at a time, then call order, panic fence, error to message and status: see
+/// [`Instance::call`].
+///
+/// A call of an instance from inside another one, from a callback, is answered by `fmi2Error` and
+/// nothing else happens: to a synchronous slave that is the state stepInProgress. Calls from
+/// several threads at once, which section 2.1 forbids, are mostly, but not surely, found: a locked
+/// exchange would double the cost of reading one value.
+unsafe fn door<M: Model>(
+    component: fmi2Component,
+    function: Function,
+    body: impl FnOnce(&mut Instance<M>) -> Result<(), Failure>,
+) -> fmi2Status {
+    // SAFETY: a component that is not null is one that `instantiate` made for this `M`.
+    let Some(component) = (unsafe { component.cast::<Component<M>>().as_ref() }) else {
+        return Status::Error as fmi2Status;
+    };
+    if component.busy.load(Ordering::Relaxed) {
+        return Status::Error as fmi2Status;
+    }
+    component.busy.store(true, Ordering::Relaxed);
+    // SAFETY: one thread at a time uses an instance (section 2.1), and as `busy` was not set, that
+    // thread is not inside another call.
+    let status = unsafe { &mut *component.instance.get() }.call(function, body);
+    component.busy.store(false, Ordering::Relaxed);
+    status as fmi2Status
+}
+
+fn missing(what: &str) -> Failure {
+    Failure::Error(format!("{what} is null or misaligned"))
+}
+
+/// `count` elements to read; a null pointer is fine when there are none.
+unsafe fn read<'a, T>(pointer: *const T, count: usize) -> Result<&'a [T], Failure> {
+    if count == 0 {
+        return Ok(&[]);
+    }
+    if pointer.is_null() || !pointer.is_aligned() || count > isize::MAX as usize / size_of::<T>() {
+        return Err(missing("an array to read"));
+    }
+    // SAFETY: not null, aligned, and the caller gives `count` elements.
+    Ok(unsafe { std::slice::from_raw_parts(pointer, count) })
+}
+
+/// Room for `count` elements, which the importer need not have initialised; a null pointer is fine
+/// when there are none.
+unsafe fn room<'a, T>(pointer: *mut T, count: usize) -> Result<&'a mut [MaybeUninit<T>], Failure> {
+    if count == 0 {
+        return Ok(&mut []);
+    }
+    if pointer.is_null() || !pointer.is_aligned() || count > isize::MAX as usize / size_of::<T>() {
+        return Err(missing("an array to write"));
+    }
+    // SAFETY: not null, aligned, and the caller gives room for `count` elements, of which nothing is
+    // assumed.
+    Ok(unsafe { std::slice::from_raw_parts_mut(pointer.cast(), count) })
+}
+
+/// The room, filled with `value`.
+pub(crate) fn filled<T: Copy>(room: &mut [MaybeUninit<T>], value: T) -> &mut [T] {
+    for place in &mut *room {
+        place.write(value);
+    }
+    // SAFETY: every element was written.
+    unsafe { &mut *(std::ptr::from_mut(room) as *mut [T]) }
+}
+
+/// Values as room for others.
+#[cfg(test)]
+pub(crate) fn room_of<T: Copy>(values: &mut [T]) -> &mut [MaybeUninit<T>] {
+    // SAFETY: the tests hand this to functions that only write values.
+    unsafe { &mut *(std::ptr::from_mut(values) as *mut [MaybeUninit<T>]) }
+}
+
+/// The state of the importer behind `pointer`, which it has initialised (section 2.1.8).
+unsafe fn state_at<'a>(pointer: *mut fmi2FMUstate) -> Result<&'a mut fmi2FMUstate, Failure> {
+    if !pointer.is_aligned() {
+        return Err(missing("FMUstate"));
+    }
+    // SAFETY: null or aligned, and initialised by the importer.
+    unsafe { pointer.as_mut() }.ok_or_else(|| missing("FMUstate"))
+}
+
+unsafe fn text(pointer: fmi2String, what: &str) -> Result<String, Failure> {
+    if pointer.is_null() {
+        return Err(missing(what));
+    }
+    // SAFETY: not null, and zero-terminated by the standard.
+    let text = unsafe { CStr::from_ptr(pointer) };
+    let utf8 = text.to_str().map_err(|_| Failure::Error(format!("{what} is not UTF-8")))?;
+    Ok(utf8.to_owned())
+}
+
+unsafe fn texts(pointer: *const fmi2String, count: usize) -> Result<Vec<String>, Failure> {
+    // SAFETY: the caller gives `count` strings.
+    unsafe { read(pointer, count)?.iter().map(|&each| text(each, "a string")).collect() }
+}
+
+unsafe fn put<T>(target: *mut T, value: T) -> Result<(), Failure> {
+    // SAFETY: the caller gives a place for one value.
+    unsafe { room(target, 1)?[0].write(value) };
+    Ok(())
+}
+
+#[must_use]
+pub fn types_platform<M: Model>() -> fmi2String {
+    abi::TYPES_PLATFORM.as_ptr()
+}
+
+#[must_use]
+pub fn version<M: Model>() -> fmi2String {
+    abi::VERSION.as_ptr()
+}
+
+/// The folder that `fmuResourceLocation` names; [`NO_FOLDER`] when it is null or empty.
+unsafe fn resources(location: fmi2String) -> Result<PathBuf, Failure> {
+    if location.is_null() {
+        return Ok(PathBuf::from(NO_FOLDER));
+    }
+    // SAFETY: not null, and zero-terminated by the standard.
+    let uri = unsafe { text(location, "fmuResourceLocation")? };
+    if uri.is_empty() {
+        return Ok(PathBuf::from(NO_FOLDER));
+    }
+    path_from_uri(&uri).map_err(|error| Failure::Error(format!("fmuResourceLocation: {error}")))
+}
+
+#[must_use]
+pub unsafe fn instantiate<M: Model>(
+    instance_name: fmi2String,
+    fmu_type: fmi2Type,
+    guid: fmi2String,
+    resource_location: fmi2String,
+    functions: *const fmi2CallbackFunctions,
+    _visible: fmi2Boolean,
+    _logging_on: fmi2Boolean,
+) -> fmi2Component {
+    // SAFETY: the callbacks are readable during this call; only a copy is kept.
+    let Ok([functions]) = (unsafe { read(functions, 1) }) else { return std::ptr::null_mut() };
+    let mut callbacks = Callbacks { functions: *functions, instance_name: CString::default() };
+    // SAFETY: strings as the standard demands them.
+    let made = unsafe { text(instance_name, "instanceName") }.and_then(|name| {
+        callbacks.instance_name = CString::new(name).unwrap_or_default();
+        if callbacks.instance_name.is_empty() {
+            return Err(Failure::Error("instanceName is empty".to_owned()));
+        }
+        let interface_type = match fmu_type {
+            abi::MODEL_EXCHANGE => InterfaceType::ModelExchange,
+            abi::CO_SIMULATION => InterfaceType::CoSimulation,
+            other => {
+                return Err(Failure::Error(format!(
+                    "fmuType is {other}, expected fmi2ModelExchange (0) or fmi2CoSimulation (1)"
+                )));
+            }
+        };
+        // SAFETY: strings as the standard demands them.
+        let (guid, folder) = unsafe { (text(guid, "fmuGUID")?, resources(resource_location)?) };
+        Instance::<M>::new(interface_type, &folder, &guid, callbacks.clone())
+    });
+    match made {
+        Ok(instance) => {
+            let instance = UnsafeCell::new(instance);
+            Box::into_raw(Box::new(Component { busy: AtomicBool::new(false), instance })).cast()
+        }
+        Err(failure) => {
+            let message = format!("fmi2Instantiate: {failure}");
+            callbacks.log(Status::Error, "logStatusError", &message);
+            std::ptr::null_mut()
+        }
+    }
+}
+
+/// Frees the instance; during another call of it (stepInProgress) nothing.
+pub unsafe fn free_instance<M: Model>(component: fmi2Component) {
+    let component = component.cast::<Component<M>>();
+    // SAFETY: a component that is not null is one that `instantiate` made for this `M`.
+    let Some(shared) = (unsafe { component.as_ref() }) else { return };
+    if !shared.busy.load(Ordering::Relaxed) {
+        shared.busy.store(true, Ordering::Relaxed);
+        // SAFETY: not in use and, by the standard, freed once. `busy` lasts until the message about
+        // a destructor that panics is out, in case the logger calls the instance.
+        unsafe {
+            shared.instance.get().read().free();
+            drop(Box::from_raw(component.cast::<MaybeUninit<Component<M>>>()));
+        }
+    }
+}
+
+/// The description of `M`, which must break no rule of the standard.
+fn description_of<M: Model>(resources: &Path) -> Result<String, Failure> {
+    let description = crate::interface::describe::<M>(resources)?;
+    let problems = description.problems();
+    if problems.is_empty() {
+        return Ok(description.to_xml());
+    }
+    let list: Vec<_> = problems.iter().map(ToString::to_string).collect();
+    Err(Failure::Error(format!("the model's variables break rules: {}", list.join("; "))))
+}
+
+/// [`abi::DESCRIBE`]: gives the model description, or why there is none, to `sink`.
+pub unsafe fn describe<M: Model>(
+    resources: *const c_char,
+    context: *mut c_void,
+    sink: DescribeSink,
+) -> fmi2Integer {
+    let watch = Watch::new();
+    // SAFETY: the caller gives a zero-terminated path.
+    let described = unsafe { text(resources, "resources") }.and_then(|folder| {
+        let folder = if folder.is_empty() { NO_FOLDER } else { &folder };
+        guarded(|| description_of::<M>(Path::new(folder)))
+    });
+    drop(watch);
+    let (status, answer) = match described {
+        Ok(xml) => (0, xml),
+        Err(failure) => (1, failure.to_string()),
+    };
+    // SAFETY: the caller gives a sink that reads the text during the call.
+    unsafe { sink(context, answer.as_ptr().cast(), answer.len()) };
+    status
+}

@@ -1,0 +1,167 @@
+//! The C functions that have an instance: what stands behind the door, one entry each.
+
+use super::{door, missing, put, read, room, state_at, texts};
+use crate::Experiment;
+use crate::instance::Snapshot;
+use crate::model::{Failure, Model};
+use fmu_description::abi::{
+    StatusKind, fmi2Boolean, fmi2Byte, fmi2Component, fmi2EventInfo, fmi2FMUstate, fmi2Integer,
+    fmi2Real, fmi2Status, fmi2StatusKind, fmi2String, fmi2ValueReference,
+};
+use fmu_description::call_order::Function;
+
+/// Defines functions that pass through the door: C arguments, then what happens behind it.
+macro_rules! behind_the_door {
+    ($($name:ident = $function:ident($($argument:ident: $type:ty),*), $instance:ident => $body:expr;)*) => {
+        $(pub unsafe fn $name<M: Model>(component: fmi2Component, $($argument: $type),*) -> fmi2Status {
+            // SAFETY: pointers and lengths are as the standard demands them; null is handled.
+            unsafe { door::<M>(component, Function::$function, |$instance| $body) }
+        })*
+    };
+}
+
+behind_the_door! {
+    set_debug_logging = SetDebugLogging(_on: fmi2Boolean, n: usize, categories: *const fmi2String),
+        instance => instance.set_debug_logging(texts(categories, n)?);
+    setup_experiment = SetupExperiment(
+        tolerance_defined: fmi2Boolean, tolerance: fmi2Real, start_time: fmi2Real,
+        stop_time_defined: fmi2Boolean, stop_time: fmi2Real
+    ), instance => instance.setup_experiment(Experiment {
+        start_time,
+        stop_time: (stop_time_defined != 0).then_some(stop_time),
+        tolerance: (tolerance_defined != 0).then_some(tolerance),
+    });
+    enter_initialization_mode = EnterInitializationMode(),
+        instance => instance.enter_initialization_mode();
+    exit_initialization_mode = ExitInitializationMode(),
+        instance => instance.exit_initialization_mode();
+    terminate = Terminate(), instance => { instance.terminate(); Ok(()) };
+    reset = Reset(), instance => { instance.reset(); Ok(()) };
+    get_real = GetReal(vr: *const fmi2ValueReference, n: usize, value: *mut fmi2Real),
+        instance => instance.get_real(read(vr, n)?, room(value, n)?);
+    get_integer = GetInteger(vr: *const fmi2ValueReference, n: usize, value: *mut fmi2Integer),
+        instance => instance.get_integer(read(vr, n)?, room(value, n)?);
+    get_boolean = GetBoolean(vr: *const fmi2ValueReference, n: usize, value: *mut fmi2Boolean),
+        instance => instance.get_boolean(read(vr, n)?, room(value, n)?);
+    get_string = GetString(vr: *const fmi2ValueReference, n: usize, value: *mut fmi2String),
+        instance => instance.get_string(read(vr, n)?, room(value, n)?);
+    set_real = SetReal(vr: *const fmi2ValueReference, n: usize, value: *const fmi2Real),
+        instance => instance.set_real(read(vr, n)?, read(value, n)?);
+    set_integer = SetInteger(vr: *const fmi2ValueReference, n: usize, value: *const fmi2Integer),
+        instance => instance.set_integer(read(vr, n)?, read(value, n)?);
+    set_boolean = SetBoolean(vr: *const fmi2ValueReference, n: usize, value: *const fmi2Boolean),
+        instance => instance.set_boolean(read(vr, n)?, read(value, n)?);
+    set_string = SetString(vr: *const fmi2ValueReference, n: usize, value: *const fmi2String),
+        instance => instance.set_string(read(vr, n)?, &texts(value, n)?);
+    set_real_input_derivatives = SetRealInputDerivatives(
+        vr: *const fmi2ValueReference, n: usize, order: *const fmi2Integer, value: *const fmi2Real
+    ), instance => instance.set_real_input_derivatives(read(vr, n)?, read(order, n)?, read(value, n)?);
+    get_real_output_derivatives = GetRealOutputDerivatives(
+        vr: *const fmi2ValueReference, n: usize, order: *const fmi2Integer, value: *mut fmi2Real
+    ), instance => instance.get_real_output_derivatives(read(vr, n)?, read(order, n)?, room(value, n)?);
+    do_step = DoStep(start: fmi2Real, size: fmi2Real, _no_set_fmu_state: fmi2Boolean),
+        instance => instance.do_step(start, size);
+    cancel_step = CancelStep(), _instance =>
+        Err(Failure::Error("no step is pending: every step is finished on return".to_owned()));
+    get_directional_derivative = GetDirectionalDerivative(
+        unknown: *const fmi2ValueReference, n_unknown: usize,
+        known: *const fmi2ValueReference, n_known: usize,
+        known_delta: *const fmi2Real, unknown_delta: *mut fmi2Real
+    ), instance => instance.get_directional_derivative(
+        read(unknown, n_unknown)?,
+        (read(known, n_known)?, read(known_delta, n_known)?),
+        room(unknown_delta, n_unknown)?,
+    );
+    enter_event_mode = EnterEventMode(), instance => instance.enter_event_mode();
+    new_discrete_states = NewDiscreteStates(info: *mut fmi2EventInfo), instance => {
+        let place = room(info, 1)?;
+        place[0].write(instance.new_discrete_states()?);
+        Ok(())
+    };
+    enter_continuous_time_mode = EnterContinuousTimeMode(), instance => {
+        instance.enter_continuous_time_mode();
+        Ok(())
+    };
+    completed_integrator_step = CompletedIntegratorStep(
+        _no_set_fmu_state: fmi2Boolean, enter: *mut fmi2Boolean, terminate: *mut fmi2Boolean
+    ), instance => {
+        instance.completed_integrator_step()?;
+        put(enter, 0)?;
+        put(terminate, 0)
+    };
+    set_time = SetTime(time: fmi2Real), instance => instance.set_time(time);
+    set_continuous_states = SetContinuousStates(x: *const fmi2Real, n: usize),
+        instance => instance.set_continuous_states(read(x, n)?);
+    get_event_indicators = GetEventIndicators(z: *mut fmi2Real, n: usize),
+        instance => instance.get_event_indicators(room(z, n)?);
+    get_continuous_states = GetContinuousStates(x: *mut fmi2Real, n: usize),
+        instance => instance.get_continuous_states(room(x, n)?);
+    get_derivatives = GetDerivatives(derivatives: *mut fmi2Real, n: usize),
+        instance => instance.get_derivatives(room(derivatives, n)?);
+    get_nominals = GetNominalsOfContinuousStates(nominals: *mut fmi2Real, n: usize),
+        instance => instance.get_nominals(room(nominals, n)?);
+    get_fmu_state = GetFMUstate(state: *mut fmi2FMUstate), instance => {
+        let place = state_at(state)?;
+        if let Some(snapshot) = place.cast::<Snapshot<M>>().as_mut() {
+            *snapshot = instance.snapshot();
+        } else {
+            *place = Box::into_raw(Box::new(instance.snapshot())).cast();
+        }
+        Ok(())
+    };
+    set_fmu_state = SetFMUstate(state: fmi2FMUstate), instance =>
+        instance.restore(state.cast::<Snapshot<M>>().as_ref().ok_or_else(|| missing("FMUstate"))?);
+    free_fmu_state = FreeFMUstate(state: *mut fmi2FMUstate), _instance => {
+        let place = state_at(state)?;
+        if !place.is_null() {
+            let state = std::mem::replace(place, std::ptr::null_mut());
+            drop(Box::from_raw(state.cast::<Snapshot<M>>()));
+        }
+        Ok(())
+    };
+    serialized_fmu_state_size = SerializedFMUstateSize(state: fmi2FMUstate, size: *mut usize),
+        _instance => {
+            let state = state.cast::<Snapshot<M>>().as_ref().ok_or_else(|| missing("FMUstate"))?;
+            put(size, state.size()?)
+        };
+    serialize_fmu_state = SerializeFMUstate(state: fmi2FMUstate, bytes: *mut fmi2Byte, size: usize),
+        _instance => {
+            let state = state.cast::<Snapshot<M>>().as_ref().ok_or_else(|| missing("FMUstate"))?;
+            state.write(room(bytes.cast::<u8>(), size)?)
+        };
+    de_serialize_fmu_state = DeSerializeFMUstate(
+        bytes: *const fmi2Byte, size: usize, state: *mut fmi2FMUstate
+    ), instance => {
+        let snapshot = Snapshot::<M>::from_bytes(read(bytes.cast::<u8>(), size)?, instance.guid())?;
+        let place = state_at(state)?;
+        if let Some(old) = place.cast::<Snapshot<M>>().as_mut() {
+            *old = snapshot;
+        } else {
+            *place = Box::into_raw(Box::new(snapshot)).cast();
+        }
+        Ok(())
+    };
+    get_status = GetStatus(kind: fmi2StatusKind, _value: *mut fmi2Status),
+        _instance => Err(unavailable(kind));
+    get_real_status = GetRealStatus(kind: fmi2StatusKind, value: *mut fmi2Real), instance =>
+        if kind == StatusKind::LastSuccessfulTime as fmi2StatusKind {
+            put(value, instance.last_successful_time())
+        } else {
+            Err(unavailable(kind))
+        };
+    get_integer_status = GetIntegerStatus(kind: fmi2StatusKind, _value: *mut fmi2Integer),
+        _instance => Err(unavailable(kind));
+    get_boolean_status = GetBooleanStatus(kind: fmi2StatusKind, value: *mut fmi2Boolean),
+        instance => if kind == StatusKind::Terminated as fmi2StatusKind {
+            put(value, instance.wants_to_end().into())
+        } else {
+            Err(unavailable(kind))
+        };
+    get_string_status = GetStringStatus(kind: fmi2StatusKind, _value: *mut fmi2String),
+        _instance => Err(unavailable(kind));
+}
+
+/// A status that a synchronous slave cannot give is answered by `fmi2Discard` (section 4.2.3).
+fn unavailable(kind: fmi2StatusKind) -> Failure {
+    Failure::Discard(format!("no step is pending, the status kind {kind} cannot be given"))
+}

@@ -1,0 +1,384 @@
+//! One instance of a model: the state machine behind the C ABI, in safe Rust.
+
+mod derivatives;
+mod exchange;
+mod layout;
+mod snapshot;
+#[cfg(test)]
+mod tests;
+mod values;
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::Experiment;
+use crate::fence::{Watch, guarded};
+use crate::ffi::Callbacks;
+use crate::interface::{CATEGORIES, Interface, new_model};
+use crate::model::{Failure, Model, Step};
+use fmu_description::Guid;
+use fmu_description::abi::Status;
+use fmu_description::call_order::{Function, InterfaceType, State, allowed, may_discard};
+
+pub(crate) use snapshot::Snapshot;
+
+/// What an FMU state consists of: everything that decides how the instance continues.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(bound = "")]
+#[expect(clippy::struct_excessive_bools, reason = "four facts that are independent")]
+pub(crate) struct Core<M: Model> {
+    model: M,
+    interface_type: InterfaceType,
+    state: State,
+    /// The last step ended because the model wants the simulation to end.
+    terminated: bool,
+    experiment: Experiment,
+    time: f64,
+    /// Something was set since the model last computed its outputs.
+    stale: bool,
+    /// A parameter was set since [`Model::check`] last passed.
+    unchecked: bool,
+    /// An input derivative was set for the coming step.
+    sloped: bool,
+}
+
+/// An instance: the model with its state, and what does not belong to the FMU state.
+pub(crate) struct Instance<M: Model> {
+    core: Core<M>,
+    fresh: M,
+    interface: Interface<M>,
+    callbacks: Callbacks,
+    /// Log categories that `fmi2SetDebugLogging` chose; all of them when none.
+    categories: Option<Vec<String>>,
+    /// The strings that the last `fmi2GetString` handed out.
+    strings: Vec<std::ffi::CString>,
+    /// Space for `fmi2GetDirectionalDerivative`, once it was called.
+    direction: Option<M>,
+    watch: Watch,
+}
+
+impl<M: Model> Core<M> {
+    fn new(model: M, interface_type: InterfaceType) -> Self {
+        Self {
+            model,
+            interface_type,
+            state: State::Instantiated,
+            terminated: false,
+            experiment: Experiment::default(),
+            time: 0.0,
+            stale: true,
+            unchecked: true,
+            sloped: false,
+        }
+    }
+}
+
+impl<M: Model> Core<M> {
+    /// Refuses a time past `stopTime`, where that is defined (section 2.1.6).
+    fn before_stop(&self, time: f64) -> Result<(), Failure> {
+        match self.experiment.stop_time.filter(|stop| time > stop + slack(*stop)) {
+            Some(stop) => Err(Failure::Error(format!("{time} s is past stopTime {stop} s"))),
+            None => Ok(()),
+        }
+    }
+
+    /// Has the model check its parameters, where one was set since.
+    fn check(&mut self) -> Result<(), Failure> {
+        if self.unchecked {
+            self.model.check()?;
+            self.unchecked = false;
+        }
+        Ok(())
+    }
+}
+
+impl<M: Model> Instance<M> {
+    /// `fmi2Instantiate`: reads the resources and compares the GUID.
+    pub(crate) fn new(
+        interface_type: InterfaceType,
+        resources: &Path,
+        guid: &str,
+        callbacks: Callbacks,
+    ) -> Result<Self, Failure> {
+        let watch = Watch::new();
+        let (core, fresh, interface) = guarded(|| {
+            let mut model = new_model::<M>(resources)?;
+            let (interface, description) = Interface::new(&mut model)?;
+            let offers_exchange = interface.event_indicators.is_some();
+            if interface_type == InterfaceType::ModelExchange && !offers_exchange {
+                let message =
+                    "fmuType is fmi2ModelExchange, and this FMU offers co-simulation only";
+                return Err(Failure::Error(message.to_owned()));
+            }
+            if guid != description.guid {
+                let (name, own) = (M::IDENTIFIER, description.guid);
+                return Err(Failure::Error(format!(
+                    "the GUID is {guid}, but this library of {name} with the resources in {} \
+                     describes itself with {own}",
+                    resources.display()
+                )));
+            }
+            Ok((Core::new(model.clone(), interface_type), model, interface))
+        })?;
+        Ok(Self {
+            core,
+            fresh,
+            interface,
+            callbacks,
+            categories: None,
+            strings: Vec::new(),
+            direction: None,
+            watch,
+        })
+    }
+
+    /// The way of every call: order, fence, state afterwards, message, status.
+    pub(crate) fn call(
+        &mut self,
+        function: Function,
+        body: impl FnOnce(&mut Self) -> Result<(), Failure>,
+    ) -> Status {
+        let state = self.core.state;
+        if state == State::Fatal {
+            return Status::Fatal;
+        }
+        let done = if allowed(self.core.interface_type, function, state) {
+            guarded(|| body(self))
+        } else {
+            Err(Failure::Error(format!("may not be called in the state {state:?}")))
+        };
+        match done {
+            Ok(()) => Status::OK,
+            Err(failure) => self.fail(function, &failure),
+        }
+    }
+
+    #[cold]
+    fn fail(&mut self, function: Function, failure: &Failure) -> Status {
+        let (status, category) = match failure {
+            Failure::Fatal(_) => (Status::Fatal, "logStatusFatal"),
+            Failure::Discard(_) | Failure::Incomplete { .. } | Failure::Terminated { .. }
+                if may_discard(self.core.interface_type, function) =>
+            {
+                (Status::Discard, "logStatusDiscard")
+            }
+            _ => (Status::Error, "logStatusError"),
+        };
+        match status {
+            Status::Discard if function == Function::DoStep => self.stop_half_way(failure),
+            Status::Error => self.core.state = State::Error,
+            Status::Fatal => self.core.state = State::Fatal,
+            _ => {}
+        }
+        self.log(status, category, &format!("{}: {failure}", function.name()));
+        status
+    }
+
+    /// The step ended before its end: at the time that the model says, if it can be.
+    fn stop_half_way(&mut self, failure: &Failure) {
+        self.core.state = State::StepFailed;
+        self.core.terminated = matches!(failure, Failure::Terminated { .. });
+        if let Failure::Incomplete { time, .. } | Failure::Terminated { time, .. } = failure
+            && time.is_finite()
+        {
+            self.core.time = self.core.time.max(*time);
+        }
+    }
+
+    /// Frees the instance. The models are dropped one by one, so that a destructor that panics
+    /// meets no other one.
+    pub(crate) fn free(self) {
+        let Self { core, fresh, direction, callbacks, categories, watch, .. } = self;
+        let dropped = [dropped(core), dropped(fresh), dropped(direction)];
+        if let Some(failure) = dropped.into_iter().find_map(Result::err) {
+            let message = format!("fmi2FreeInstance: {failure}");
+            log(&callbacks, categories.as_deref(), Status::Fatal, "logStatusFatal", &message);
+        }
+        drop(watch);
+    }
+
+    /// Sends a message of a category that the importer wants to see.
+    fn log(&self, status: Status, category: &str, message: &str) {
+        log(&self.callbacks, self.categories.as_deref(), status, category, message);
+    }
+
+    /// `fmi2SetDebugLogging`. Messages that belong to a status are sent whether debug logging is on
+    /// or off (section 2.1.3); naming categories restricts them to those.
+    pub(crate) fn set_debug_logging(&mut self, categories: Vec<String>) -> Result<(), Failure> {
+        let known = CATEGORIES.map(|(name, _)| name);
+        if let Some(unknown) = categories.iter().find(|name| !known.contains(&name.as_str())) {
+            return Err(Failure::Error(format!(
+                "{unknown} is no log category of this FMU; it has {}",
+                known.join(", ")
+            )));
+        }
+        self.categories = (!categories.is_empty()).then_some(categories);
+        Ok(())
+    }
+
+    /// `fmi2SetupExperiment`.
+    pub(crate) fn setup_experiment(&mut self, experiment: Experiment) -> Result<(), Failure> {
+        let Experiment { start_time, stop_time, tolerance } = experiment;
+        if !start_time.is_finite() {
+            return Err(Failure::Error(format!("startTime is {start_time}, expected a time in s")));
+        }
+        if let Some(stop) = stop_time.filter(|stop| stop.is_nan() || *stop < start_time) {
+            return Err(Failure::Error(format!(
+                "stopTime is {stop}, expected at least startTime = {start_time}"
+            )));
+        }
+        if let Some(value) = tolerance.filter(|value| !(*value > 0.0 && value.is_finite())) {
+            return Err(Failure::Error(format!("tolerance is {value}, expected more than 0")));
+        }
+        self.core.experiment = experiment;
+        self.core.time = start_time;
+        Ok(())
+    }
+
+    /// `fmi2EnterInitializationMode`.
+    pub(crate) fn enter_initialization_mode(&mut self) -> Result<(), Failure> {
+        self.core.state = State::InitializationMode;
+        self.core.stale = true;
+        self.refresh()
+    }
+
+    /// `fmi2ExitInitializationMode`.
+    pub(crate) fn exit_initialization_mode(&mut self) -> Result<(), Failure> {
+        self.refresh()?;
+        self.core.state = match self.core.interface_type {
+            InterfaceType::ModelExchange => State::EventMode,
+            InterfaceType::CoSimulation => State::StepComplete,
+        };
+        Ok(())
+    }
+
+    /// `fmi2Terminate`.
+    pub(crate) fn terminate(&mut self) {
+        self.core.state = State::Terminated;
+    }
+
+    /// `fmi2Reset`: as after `fmi2Instantiate`.
+    pub(crate) fn reset(&mut self) {
+        self.core = Core::new(self.fresh.clone(), self.core.interface_type);
+        self.strings.clear();
+    }
+
+    /// Brings the outputs up to date with what was set.
+    fn refresh(&mut self) -> Result<(), Failure> {
+        let core = &mut self.core;
+        if core.stale {
+            match core.state {
+                State::InitializationMode => {
+                    core.check()?;
+                    core.model.initialize(&core.experiment)?;
+                }
+                State::StepComplete | State::EventMode | State::ContinuousTimeMode => {
+                    core.model.update(core.time)?;
+                }
+                _ => {}
+            }
+            core.stale = false;
+        }
+        Ok(())
+    }
+
+    /// `fmi2DoStep`.
+    pub(crate) fn do_step(&mut self, start: f64, size: f64) -> Result<(), Failure> {
+        let core = &mut self.core;
+        let step = communication_step(core.time, start, size)?;
+        let end = start + size;
+        core.before_stop(end)?;
+        core.check()?;
+        core.model.step(&step)?;
+        core.time = end;
+        core.stale = false;
+        if core.sloped {
+            core.sloped = false;
+            self.interface.clear_input_derivatives(&mut core.model);
+        }
+        Ok(())
+    }
+
+    /// `fmi2GetRealStatus(fmi2LastSuccessfulTime)`.
+    pub(crate) fn last_successful_time(&self) -> f64 {
+        self.core.time
+    }
+
+    /// `fmi2GetBooleanStatus(fmi2Terminated)`.
+    pub(crate) fn wants_to_end(&self) -> bool {
+        self.core.terminated
+    }
+
+    /// The GUID of the description that this instance was made for.
+    pub(crate) fn guid(&self) -> Guid {
+        self.interface.guid
+    }
+}
+
+/// Drops `value`; its destructor may panic.
+fn dropped<T>(value: T) -> Result<(), Failure> {
+    guarded(|| {
+        drop(value);
+        Ok(())
+    })
+}
+
+fn log(
+    callbacks: &Callbacks,
+    chosen: Option<&[String]>,
+    status: Status,
+    category: &str,
+    message: &str,
+) {
+    if chosen.is_none_or(|names| names.iter().any(|name| name == category)) {
+        callbacks.log(status, category, message);
+    }
+}
+
+/// Times closer than this (in s) are the same: importers add up their step size, with rounding.
+fn slack(time: f64) -> f64 {
+    1e-9 * time.abs().max(1.0)
+}
+
+/// The step from the instance's `time` to `start + size`.
+///
+/// Where `start` differs from `time` by rounding alone, the size is the one given, so that equal
+/// communication steps stay equal for the model.
+///
+/// Section 4.2.2 wants a step size greater than zero and a slave that then is at `start + size`. A
+/// step that does not reach a later number of 64 bits cannot end there, and is an error: importers
+/// continue after `fmi2OK` and some (FMPy) after `fmi2Discard`, and the model would stand still.
+fn communication_step(time: f64, start: f64, size: f64) -> Result<Step, Failure> {
+    if !(size > 0.0 && size.is_finite()) {
+        return Err(Failure::Error(format!(
+            "communicationStepSize is {size} s, expected more than 0"
+        )));
+    }
+    let mismatch = start - time;
+    if mismatch.is_nan() || mismatch.abs() > slack(time) {
+        return Err(Failure::Error(format!(
+            "currentCommunicationPoint is {start} s, but the instance is at {time} s"
+        )));
+    }
+    let rounding = 8.0 * f64::EPSILON * time.abs().max(start.abs());
+    let step = if mismatch.abs() <= rounding {
+        Step { start, size }
+    } else {
+        Step { start: time, size: mismatch + size }
+    };
+    let ends_later = start + size > time && step.size > 0.0;
+    if size < start.next_up() - start || !ends_later {
+        return Err(too_small(time, start, size));
+    }
+    Ok(step)
+}
+
+#[cold]
+fn too_small(time: f64, start: f64, size: f64) -> Failure {
+    let smallest = start.max(time).next_up() - start;
+    Failure::Error(format!(
+        "communicationStepSize is {size:e} s, too small at currentCommunicationPoint = {start} s: \
+         the instance is at {time} s, and the smallest step to a later time is {smallest:e} s"
+    ))
+}

@@ -1,0 +1,77 @@
+//! `fmi2GetDirectionalDerivative` of an instance (section 2.1.9).
+
+use std::mem::MaybeUninit;
+
+use super::Instance;
+use crate::interface::Slot;
+use crate::model::{At, Failure, Model};
+use fmu_description::call_order::State;
+use fmu_description::{Causality, Initial, Variability};
+
+/// Whether the variable is a known of the equations solved now.
+fn is_known<M>(slot: &Slot<M, f64>, initializing: bool) -> bool {
+    if initializing {
+        let exact = slot.initial == Some(Initial::Exact);
+        slot.causality == Causality::Input || exact && slot.variability != Variability::Constant
+    } else {
+        slot.causality == Causality::Input || slot.is_state
+    }
+}
+
+impl<M: Model> Instance<M> {
+    /// `fmi2GetDirectionalDerivative`: `to` = (dh/dv) `delta` for the unknowns h and the knowns v.
+    pub(crate) fn get_directional_derivative(
+        &mut self,
+        unknowns: &[u32],
+        (knowns, delta): (&[u32], &[f64]),
+        to: &mut [MaybeUninit<f64>],
+    ) -> Result<(), Failure> {
+        if !M::PROVIDES_DIRECTIONAL_DERIVATIVE {
+            let message = "not offered: providesDirectionalDerivative is false";
+            return Err(Failure::Error(message.to_owned()));
+        }
+        self.refresh()?;
+        let initializing = self.core.state == State::InitializationMode;
+        for &reference in unknowns {
+            let slot = self.interface.real(reference)?;
+            let is_unknown = slot.is_some_and(|slot| {
+                if initializing { slot.is_initial_unknown } else { slot.is_unknown }
+            });
+            if !is_unknown {
+                return Err(no_part("unknown", slot, self.core.state));
+            }
+        }
+        let model = &self.core.model;
+        let direction = self.direction.get_or_insert_with(|| model.clone());
+        for slot in &self.interface.reals {
+            *(slot.field)(direction) = 0.0;
+        }
+        let mut delta_time = 0.0;
+        for (&reference, &delta) in knowns.iter().zip(delta) {
+            match self.interface.real(reference)? {
+                None => delta_time += delta,
+                Some(slot) if is_known(slot, initializing) => *(slot.field)(direction) += delta,
+                slot => return Err(no_part("known", slot, self.core.state)),
+            }
+        }
+        let at = if initializing {
+            At::Initialization
+        } else {
+            At::Point { time: self.core.time, delta_time }
+        };
+        model.differentiate(&at, direction)?;
+        for (&reference, value) in unknowns.iter().zip(to) {
+            if let Some(slot) = self.interface.real(reference)? {
+                value.write(*(slot.field)(direction));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn no_part<M>(part: &str, slot: Option<&Slot<M, f64>>, state: State) -> Failure {
+    let name = slot.map_or("time", |slot| &slot.name);
+    Failure::Error(format!(
+        "{name} is no {part} of the equations in the state {state:?} (ModelStructure)"
+    ))
+}

@@ -1,0 +1,144 @@
+//! The functions of model exchange (section 3.2).
+
+use std::mem::MaybeUninit;
+
+use super::{Instance, slack};
+use crate::ffi::filled;
+use crate::model::{Failure, Model};
+use fmu_description::abi::{Status, fmi2EventInfo};
+use fmu_description::call_order::State;
+
+/// Refuses an array whose length is not the one of the description.
+fn length(what: &str, found: usize, expected: usize) -> Result<(), Failure> {
+    if found == expected {
+        return Ok(());
+    }
+    Err(Failure::Error(format!("{found} {what} given, expected {expected}")))
+}
+
+impl<M: Model> Instance<M> {
+    /// `fmi2EnterEventMode`.
+    pub(crate) fn enter_event_mode(&mut self) -> Result<(), Failure> {
+        self.core.before_stop(self.core.time)?;
+        self.core.state = State::EventMode;
+        self.core.stale = true;
+        Ok(())
+    }
+
+    /// `fmi2CompletedIntegratorStep`.
+    pub(crate) fn completed_integrator_step(&self) -> Result<(), Failure> {
+        self.core.before_stop(self.core.time)
+    }
+
+    /// `fmi2NewDiscreteStates`.
+    pub(crate) fn new_discrete_states(&mut self) -> Result<fmi2EventInfo, Failure> {
+        let core = &mut self.core;
+        core.check()?;
+        let event = core.model.event(core.time)?;
+        core.stale = true;
+        if let Some(reason) = &event.terminate_simulation {
+            let message = format!("the simulation ends at t = {} s: {reason}", self.core.time);
+            self.log(Status::OK, "logEvents", &message);
+        }
+        Ok(fmi2EventInfo {
+            new_discrete_states_needed: event.new_discrete_states_needed.into(),
+            terminate_simulation: event.terminate_simulation.is_some().into(),
+            nominals_of_continuous_states_changed: 0,
+            values_of_continuous_states_changed: event.values_of_continuous_states_changed.into(),
+            next_event_time_defined: event.next_event_time.is_some().into(),
+            next_event_time: event.next_event_time.unwrap_or_default(),
+        })
+    }
+
+    /// `fmi2EnterContinuousTimeMode`.
+    pub(crate) fn enter_continuous_time_mode(&mut self) {
+        self.core.state = State::ContinuousTimeMode;
+        self.core.stale = true;
+    }
+
+    /// `fmi2SetTime`. In event mode only where there is no continuous state (condition 8).
+    ///
+    /// An integrator may look past `stopTime` on its way; a step or an event there is refused.
+    pub(crate) fn set_time(&mut self, time: f64) -> Result<(), Failure> {
+        if self.core.state == State::EventMode && !self.interface.states.is_empty() {
+            let message = "in EventMode only an FMU without continuous states may be given a time";
+            return Err(Failure::Error(message.to_owned()));
+        }
+        if !time.is_finite() {
+            return Err(Failure::Error(format!("time is {time}, expected a time in s")));
+        }
+        let start = self.core.experiment.start_time;
+        if time < start - slack(start) {
+            return Err(Failure::Error(format!("{time} s is before startTime {start} s")));
+        }
+        self.core.time = time;
+        self.core.stale = true;
+        Ok(())
+    }
+
+    /// `fmi2SetContinuousStates`: all or none.
+    pub(crate) fn set_continuous_states(&mut self, values: &[f64]) -> Result<(), Failure> {
+        let states = &self.interface.states;
+        length("states", values.len(), states.len())?;
+        for (state, value) in states.iter().zip(values) {
+            if !value.is_finite() {
+                let name = &self.interface.reals[state.state].name;
+                return Err(Failure::Discard(format!(
+                    "state {name} = {value}, expected a finite number"
+                )));
+            }
+        }
+        for (state, value) in states.iter().zip(values) {
+            *(self.interface.reals[state.state].field)(&mut self.core.model) = *value;
+        }
+        self.core.stale = true;
+        Ok(())
+    }
+
+    /// `fmi2GetContinuousStates`.
+    pub(crate) fn get_continuous_states(
+        &mut self,
+        values: &mut [MaybeUninit<f64>],
+    ) -> Result<(), Failure> {
+        length("states", values.len(), self.interface.states.len())?;
+        self.refresh()?;
+        for (state, value) in self.interface.states.iter().zip(values) {
+            value.write(*(self.interface.reals[state.state].field)(&mut self.core.model));
+        }
+        Ok(())
+    }
+
+    /// `fmi2GetDerivatives`.
+    pub(crate) fn get_derivatives(
+        &mut self,
+        values: &mut [MaybeUninit<f64>],
+    ) -> Result<(), Failure> {
+        length("derivatives", values.len(), self.interface.states.len())?;
+        self.refresh()?;
+        for (state, value) in self.interface.states.iter().zip(values) {
+            value.write(*(self.interface.reals[state.derivative].field)(&mut self.core.model));
+        }
+        Ok(())
+    }
+
+    /// `fmi2GetNominalsOfContinuousStates`.
+    pub(crate) fn get_nominals(&self, values: &mut [MaybeUninit<f64>]) -> Result<(), Failure> {
+        length("nominal values", values.len(), self.interface.states.len())?;
+        for (state, value) in self.interface.states.iter().zip(values) {
+            value.write(state.nominal);
+        }
+        Ok(())
+    }
+
+    /// `fmi2GetEventIndicators`.
+    pub(crate) fn get_event_indicators(
+        &mut self,
+        values: &mut [MaybeUninit<f64>],
+    ) -> Result<(), Failure> {
+        let expected = self.interface.event_indicators.unwrap_or_default();
+        length("event indicators", values.len(), expected)?;
+        self.refresh()?;
+        self.core.model.event_indicators(self.core.time, filled(values, 0.0));
+        Ok(())
+    }
+}

@@ -1,0 +1,301 @@
+//! `fmi2GetXXX` and `fmi2SetXXX` of an instance.
+
+use std::ffi::CString;
+use std::mem::MaybeUninit;
+
+use super::{Core, Instance};
+use crate::interface::{Interface, Slot};
+use crate::model::{Failure, Model};
+use fmu_description::Causality;
+use fmu_description::abi::fmi2String;
+use fmu_description::call_order::State;
+
+/// The slot with value reference `reference`.
+fn slot<'a, M, T>(
+    slots: &'a [Slot<M, T>],
+    reference: u32,
+    kind: &str,
+) -> Result<&'a Slot<M, T>, Failure> {
+    slots.get(reference as usize).ok_or_else(|| {
+        Failure::Error(format!("no {kind} variable has the value reference {reference}"))
+    })
+}
+
+impl<M> Interface<M> {
+    /// The Real with value reference `reference`; `None` for time.
+    pub(super) fn real(&self, reference: u32) -> Result<Option<&Slot<M, f64>>, Failure> {
+        match reference.checked_sub(1) {
+            None => Ok(None),
+            Some(position) => self.reals.get(position as usize).map(Some).ok_or_else(|| {
+                Failure::Error(format!("no Real variable has the value reference {reference}"))
+            }),
+        }
+    }
+
+    /// Sets the derivatives of all inputs to zero.
+    pub(crate) fn clear_input_derivatives(&self, model: &mut M) {
+        for slot in self.reals.iter().filter(|slot| slot.causality == Causality::Input) {
+            for field in &slot.derivatives {
+                *field(model) = 0.0;
+            }
+        }
+    }
+}
+
+/// Whether the variable may be set now.
+fn settable<M, T>(slot: &Slot<M, T>, state: State) -> Result<(), Failure> {
+    if slot.settable & state.bit() != 0 {
+        return Ok(());
+    }
+    let (name, variability) = (&slot.name, slot.variability.as_str());
+    let causality = slot.causality.as_str();
+    Err(Failure::Error(format!(
+        "{name} ({causality}, {variability}) may not be set in the state {state:?}"
+    )))
+}
+
+/// Whether `value` is one that the variable can take: its range is finite.
+fn acceptable<M>(slot: &Slot<M, f64>, value: f64) -> Result<(), Failure> {
+    let (min, max) = slot.range;
+    if min <= value && value <= max {
+        return Ok(());
+    }
+    let name = &slot.name;
+    if !value.is_finite() {
+        return Err(Failure::Discard(format!("{name} = {value}, expected a finite number")));
+    }
+    Err(Failure::Discard(format!("{name} = {value}, expected {min} to {max}")))
+}
+
+/// Whether the Integer or Enumeration can take `value`.
+fn acceptable_integer<M>(slot: &Slot<M, i32>, value: i32) -> Result<(), Failure> {
+    let (min, max) = slot.range;
+    let name = &slot.name;
+    if f64::from(value) < min || f64::from(value) > max {
+        return Err(Failure::Discard(format!("{name} = {value}, expected {min} to {max}")));
+    }
+    if !slot.items.is_empty() && !slot.items.contains(&value) {
+        let items = &slot.items;
+        return Err(Failure::Discard(format!("{name} = {value}, expected one of {items:?}")));
+    }
+    Ok(())
+}
+
+impl<M: Model> Core<M> {
+    fn touched<T>(&mut self, slot: &Slot<M, T>) {
+        self.stale = true;
+        self.unchecked |= slot.causality == Causality::Parameter;
+    }
+
+    /// Sets all of `values` or, where one cannot be set, none.
+    fn set<T, V>(
+        &mut self,
+        slots: &[Slot<M, T>],
+        references: &[u32],
+        values: &[V],
+        assign: impl Fn(&mut T, &V),
+        accept: impl Fn(&Slot<M, T>, &V) -> Result<(), Failure>,
+        kind: &str,
+    ) -> Result<(), Failure> {
+        for (&reference, value) in references.iter().zip(values) {
+            let slot = slot(slots, reference, kind)?;
+            settable(slot, self.state)?;
+            accept(slot, value)?;
+        }
+        for (&reference, value) in references.iter().zip(values) {
+            let slot = slot(slots, reference, kind)?;
+            assign((slot.field)(&mut self.model), value);
+            self.touched(slot);
+        }
+        Ok(())
+    }
+}
+
+impl<M: Model> Instance<M> {
+    /// `fmi2GetReal`.
+    pub(crate) fn get_real(
+        &mut self,
+        from: &[u32],
+        to: &mut [MaybeUninit<f64>],
+    ) -> Result<(), Failure> {
+        self.refresh()?;
+        for (&reference, value) in from.iter().zip(to) {
+            value.write(match self.interface.real(reference)? {
+                Some(slot) => *(slot.field)(&mut self.core.model),
+                None => self.core.time,
+            });
+        }
+        Ok(())
+    }
+
+    /// `fmi2GetInteger`.
+    pub(crate) fn get_integer(
+        &mut self,
+        from: &[u32],
+        to: &mut [MaybeUninit<i32>],
+    ) -> Result<(), Failure> {
+        self.refresh()?;
+        for (&reference, value) in from.iter().zip(to) {
+            let slot = slot(&self.interface.integers, reference, "Integer")?;
+            value.write(*(slot.field)(&mut self.core.model));
+        }
+        Ok(())
+    }
+
+    /// `fmi2GetBoolean`.
+    pub(crate) fn get_boolean(
+        &mut self,
+        from: &[u32],
+        to: &mut [MaybeUninit<i32>],
+    ) -> Result<(), Failure> {
+        self.refresh()?;
+        for (&reference, value) in from.iter().zip(to) {
+            let slot = slot(&self.interface.booleans, reference, "Boolean")?;
+            value.write(i32::from(*(slot.field)(&mut self.core.model)));
+        }
+        Ok(())
+    }
+
+    /// `fmi2GetString`: the pointers stay valid until the next call.
+    pub(crate) fn get_string(
+        &mut self,
+        from: &[u32],
+        to: &mut [MaybeUninit<fmi2String>],
+    ) -> Result<(), Failure> {
+        self.refresh()?;
+        self.strings.clear();
+        for &reference in from {
+            let slot = slot(&self.interface.strings, reference, "String")?;
+            let text = (slot.field)(&mut self.core.model).replace('\0', "\u{fffd}");
+            self.strings.push(CString::new(text).unwrap_or_default());
+        }
+        for (text, pointer) in self.strings.iter().zip(to) {
+            pointer.write(text.as_ptr());
+        }
+        Ok(())
+    }
+
+    /// `fmi2SetReal`: all values or none.
+    pub(crate) fn set_real(&mut self, to: &[u32], values: &[f64]) -> Result<(), Failure> {
+        let Self { core, interface, .. } = self;
+        let reals = interface.reals.as_slice();
+        let slot = |reference: u32| reals.get((reference as usize).wrapping_sub(1));
+        let now = core.state.bit();
+        let mut parameters = false;
+        for (&reference, &value) in to.iter().zip(values) {
+            let takes = |slot: &&Slot<M, f64>| {
+                slot.settable & now != 0 && slot.range.0 <= value && value <= slot.range.1
+            };
+            let Some(slot) = slot(reference).filter(takes) else {
+                return self.refuse(to, values);
+            };
+            parameters |= slot.causality == Causality::Parameter;
+        }
+        core.stale = true;
+        core.unchecked |= parameters;
+        for (&reference, value) in to.iter().zip(values) {
+            if let Some(slot) = slot(reference) {
+                let field = (slot.field)(&mut core.model);
+                *field = *value;
+            }
+        }
+        Ok(())
+    }
+
+    /// Says why `values` cannot be set.
+    #[cold]
+    fn refuse(&self, to: &[u32], values: &[f64]) -> Result<(), Failure> {
+        for (&reference, &value) in to.iter().zip(values) {
+            let slot = self.interface.real(reference)?.ok_or_else(time_is_given)?;
+            settable(slot, self.core.state)?;
+            acceptable(slot, value)?;
+        }
+        Ok(())
+    }
+
+    /// `fmi2SetInteger`: all values or none.
+    pub(crate) fn set_integer(&mut self, to: &[u32], values: &[i32]) -> Result<(), Failure> {
+        let accept = |slot: &Slot<M, i32>, value: &i32| acceptable_integer(slot, *value);
+        self.core.set(&self.interface.integers, to, values, i32::clone_from, accept, "Integer")
+    }
+
+    /// `fmi2SetBoolean`: all values or none.
+    pub(crate) fn set_boolean(&mut self, to: &[u32], values: &[i32]) -> Result<(), Failure> {
+        let assign = |field: &mut bool, value: &i32| *field = *value != 0;
+        self.core.set(&self.interface.booleans, to, values, assign, |_, _| Ok(()), "Boolean")
+    }
+
+    /// `fmi2SetString`: all values or none.
+    pub(crate) fn set_string(&mut self, to: &[u32], values: &[String]) -> Result<(), Failure> {
+        let accept = |_: &Slot<M, String>, _: &String| Ok(());
+        self.core.set(&self.interface.strings, to, values, String::clone_from, accept, "String")
+    }
+
+    /// `fmi2SetRealInputDerivatives`. Orders above those that the model uses have no effect.
+    pub(crate) fn set_real_input_derivatives(
+        &mut self,
+        to: &[u32],
+        orders: &[i32],
+        values: &[f64],
+    ) -> Result<(), Failure> {
+        for ((&reference, &order), &value) in to.iter().zip(orders).zip(values) {
+            let slot = self.interface.real(reference)?.ok_or_else(time_is_given)?;
+            let name = &slot.name;
+            if slot.causality != Causality::Input {
+                return Err(Failure::Error(format!("{name} is no input")));
+            }
+            if order < 1 {
+                return Err(Failure::Error(format!("{name}: order {order}, expected 1 or more")));
+            }
+            if !value.is_finite() {
+                return Err(Failure::Discard(format!(
+                    "derivative {order} of {name} = {value}, expected a finite number"
+                )));
+            }
+        }
+        for ((&reference, &order), &value) in to.iter().zip(orders).zip(values) {
+            let slot = self.interface.real(reference)?;
+            if let Some(field) = slot.and_then(|slot| of_order(slot, order)) {
+                *field(&mut self.core.model) = value;
+                self.core.sloped = true;
+            }
+        }
+        Ok(())
+    }
+
+    /// `fmi2GetRealOutputDerivatives`.
+    pub(crate) fn get_real_output_derivatives(
+        &mut self,
+        from: &[u32],
+        orders: &[i32],
+        values: &mut [MaybeUninit<f64>],
+    ) -> Result<(), Failure> {
+        self.refresh()?;
+        let highest = self.interface.max_output_derivative_order;
+        for ((&reference, &order), value) in from.iter().zip(orders).zip(values) {
+            let slot = self.interface.real(reference)?.ok_or_else(time_is_given)?;
+            let name = &slot.name;
+            if slot.causality != Causality::Output {
+                return Err(Failure::Error(format!("{name} is no output")));
+            }
+            if u32::try_from(order).map_or(true, |order| order < 1 || order > highest) {
+                return Err(Failure::Error(format!(
+                    "{name}: order {order}, expected 1 to maxOutputDerivativeOrder = {highest}"
+                )));
+            }
+            let field = of_order(slot, order);
+            value.write(field.map_or(0.0, |field| *field(&mut self.core.model)));
+        }
+        Ok(())
+    }
+}
+
+/// The field of the derivative of that order, where the model has one.
+fn of_order<M>(slot: &Slot<M, f64>, order: i32) -> Option<&crate::variable::Field<M, f64>> {
+    let position = usize::try_from(order).ok()?.checked_sub(1)?;
+    slot.derivatives.get(position)
+}
+
+fn time_is_given() -> Failure {
+    Failure::Error("time is the independent variable, neither input nor output".to_owned())
+}

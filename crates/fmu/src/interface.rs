@@ -1,0 +1,354 @@
+//! The variables of one model by value reference, and the description rendered from them.
+
+mod general;
+mod slot;
+mod structure;
+
+use crate::model::{Failure, Model};
+use crate::variable::{Access, Enumeration, Number, Variable};
+use fmu_description::call_order::settable;
+use fmu_description::location::NO_FOLDER;
+use fmu_description::unit::Unit;
+use fmu_description::{
+    Causality, Guid, Initial, IntegerType, Kind, ModelDescription, Problem, RealType,
+    ScalarVariable, SimpleType, Unknown, Variability,
+};
+
+pub(crate) use general::CATEGORIES;
+use slot::Blank;
+pub(crate) use slot::Slot;
+
+/// A continuous state: positions among the Reals, and the scale of its error.
+pub(crate) struct ContinuousState {
+    pub(crate) state: usize,
+    pub(crate) derivative: usize,
+    pub(crate) nominal: f64,
+}
+
+/// The variables of a model, by base type and value reference.
+pub(crate) struct Interface<M> {
+    /// Value reference 0 is time and has no slot: the Real with reference `r` is `reals[r - 1]`.
+    pub(crate) reals: Vec<Slot<M, f64>>,
+    pub(crate) integers: Vec<Slot<M, i32>>,
+    pub(crate) booleans: Vec<Slot<M, bool>>,
+    pub(crate) strings: Vec<Slot<M, String>>,
+    pub(crate) states: Vec<ContinuousState>,
+    /// None without `fmi2ModelExchange`.
+    pub(crate) event_indicators: Option<usize>,
+    pub(crate) max_output_derivative_order: u32,
+    pub(crate) guid: Guid,
+}
+
+/// Type and value reference of a variable.
+type Filed = (Kind, u32);
+
+impl<M: Model> Interface<M> {
+    /// Sorts the variables of `model` by type and describes them, start values included.
+    pub(crate) fn new(model: &mut M) -> Result<(Self, ModelDescription), Failure> {
+        let variables = model.variables();
+        let mut description = general::general::<M>(model);
+        description.structure = structure::structure(&variables)?;
+        let mut interface = Self {
+            reals: Vec::new(),
+            integers: Vec::new(),
+            booleans: Vec::new(),
+            strings: Vec::new(),
+            states: Vec::new(),
+            event_indicators: model.model_exchange().map(|own| own.event_indicators),
+            max_output_derivative_order: 0,
+            guid: Guid([0; 16]),
+        };
+        description.variables.push(time());
+        for variable in &variables {
+            define_unit(&mut description.units, variable)?;
+            define_type(&mut description.types, variable)?;
+            description.variables.push(described(&variables, variable)?);
+        }
+        let states = structure::states(&variables)?;
+        interface.file_all(model, variables, &mut description)?;
+        interface.states = states
+            .into_iter()
+            .map(|(state, derivative)| continuous_state(&description, state, derivative))
+            .collect::<Result<_, _>>()?;
+        interface.mark(&description);
+        if let Some(co_simulation) = &mut description.co_simulation {
+            co_simulation.max_output_derivative_order = interface.max_output_derivative_order;
+            co_simulation.can_interpolate_inputs = interface
+                .reals
+                .iter()
+                .any(|slot| slot.causality == Causality::Input && !slot.derivatives.is_empty());
+        }
+        interface.guid = Guid::of(&description);
+        description.guid = interface.guid.to_string();
+        Ok((interface, description))
+    }
+
+    /// Marks the states and the unknowns of `ModelStructure`.
+    fn mark(&mut self, description: &ModelDescription) {
+        for state in &self.states {
+            let slot = &mut self.reals[state.state];
+            slot.is_state = true;
+            slot.settable = settable((slot.causality, slot.variability), slot.initial, true);
+        }
+        let real = |row: &Unknown| {
+            let own = &description.variables[row.index as usize - 1];
+            matches!(own.kind, Kind::Real(_)).then(|| own.value_reference as usize - 1)
+        };
+        let structure = &description.structure;
+        for position in structure.outputs.iter().chain(&structure.derivatives).filter_map(real) {
+            self.reals[position].is_unknown = true;
+        }
+        for position in structure.initial_unknowns.iter().filter_map(real) {
+            self.reals[position].is_initial_unknown = true;
+        }
+    }
+
+    /// Gives each variable its slot, value reference and type; aliases get those of their variable.
+    fn file_all(
+        &mut self,
+        model: &mut M,
+        variables: Vec<Variable<M>>,
+        description: &mut ModelDescription,
+    ) -> Result<(), Failure> {
+        let mut aliases = Vec::new();
+        for (position, variable) in variables.into_iter().enumerate() {
+            let name = variable.name.clone();
+            if let Access::Alias(of) = variable.access {
+                aliases.push((position + 1, of));
+                continue;
+            }
+            let (kind, value_reference) = self
+                .file(model, variable)
+                .map_err(|reason| Failure::Error(format!("variable {name}: {reason}")))?;
+            let own = &mut description.variables[position + 1];
+            keep_derivative(&mut own.kind, kind);
+            own.value_reference = value_reference;
+        }
+        for (index, of) in aliases {
+            let target =
+                description.variable(&of).map(|own| (own.kind.clone(), own.value_reference));
+            let Some((kind, value_reference)) = target else { continue };
+            let own = &mut description.variables[index];
+            let constant = own.variability == Variability::Constant;
+            keep_derivative(&mut own.kind, if constant { kind } else { without_start(kind) });
+            own.value_reference = value_reference;
+        }
+        Ok(())
+    }
+
+    /// Files the variable under the next value reference of its type; its type, with the field's
+    /// value as start where one is given.
+    fn file(&mut self, model: &mut M, variable: Variable<M>) -> Result<Filed, String> {
+        let start_given = variable.initial != Some(Initial::Calculated);
+        if variable.causality == Causality::Output {
+            let order = u32::try_from(variable.derivatives.len()).unwrap_or(u32::MAX);
+            self.max_output_derivative_order = self.max_output_derivative_order.max(order);
+        }
+        let (number, reinit) = (variable.number.clone(), variable.reinit);
+        let enumeration = variable.enumeration.clone();
+        let (blank, access) = Blank::of(variable);
+        Ok(match access {
+            Access::Real(field) => {
+                let start = start_given.then(|| *field(model));
+                let real = RealType { start, reinit, ..real(number) };
+                (Kind::Real(real), blank.fill(&mut self.reals, field) + 1)
+            }
+            Access::Integer(field) => {
+                let start = start_given.then(|| *field(model));
+                let kind = match enumeration {
+                    Some(Enumeration { name, .. }) => Kind::Enumeration(IntegerType {
+                        declared_type: Some(name),
+                        start,
+                        ..IntegerType::default()
+                    }),
+                    None => Kind::Integer(IntegerType { start, ..integer(number)? }),
+                };
+                (kind, blank.fill(&mut self.integers, field))
+            }
+            Access::Boolean(field) => {
+                let start = start_given.then(|| *field(model));
+                (Kind::Boolean(start), blank.fill(&mut self.booleans, field))
+            }
+            Access::String(field) => {
+                let start = start_given.then(|| field(model).clone());
+                (Kind::String(start), blank.fill(&mut self.strings, field))
+            }
+            Access::Alias(of) => return Err(format!("it is an alias of {of}")),
+        })
+    }
+}
+
+fn real(number: Number) -> RealType {
+    RealType {
+        quantity: number.quantity,
+        unit: number.unit,
+        display_unit: number.display_unit,
+        min: number.min,
+        max: number.max,
+        nominal: number.nominal,
+        ..RealType::default()
+    }
+}
+
+fn integer(number: Number) -> Result<IntegerType, String> {
+    let bound = |value: Option<f64>| match value {
+        None => Ok(None),
+        #[expect(clippy::cast_possible_truncation, reason = "tested before")]
+        Some(value) if value.fract() == 0.0 && value.abs() <= f64::from(i32::MAX) => {
+            Ok(Some(value as i32))
+        }
+        Some(value) => Err(format!("limit {value}, expected a 32-bit integer")),
+    };
+    let (min, max) = (bound(number.min)?, bound(number.max)?);
+    Ok(IntegerType { quantity: number.quantity, min, max, ..IntegerType::default() })
+}
+
+/// The state at position `state` of the variables, with its derivative.
+fn continuous_state(
+    description: &ModelDescription,
+    state: usize,
+    derivative: usize,
+) -> Result<ContinuousState, Failure> {
+    let slot = |position: usize| {
+        let own = &description.variables[position + 1];
+        match &own.kind {
+            Kind::Real(real) => Ok((own.value_reference as usize - 1, real.nominal)),
+            _ => Err(Failure::Error(format!(
+                "{} is no Real, but a state or its derivative",
+                own.name
+            ))),
+        }
+    };
+    let ((state, nominal), (derivative, _)) = (slot(state)?, slot(derivative)?);
+    Ok(ContinuousState { state, derivative, nominal: nominal.unwrap_or(1.0) })
+}
+
+/// Replaces the type but for the attribute `derivative`, which is known before the type.
+fn keep_derivative(place: &mut Kind, mut kind: Kind) {
+    if let (Kind::Real(RealType { derivative, .. }), Kind::Real(new)) = (&*place, &mut kind) {
+        new.derivative = *derivative;
+    }
+    *place = kind;
+}
+
+fn without_start(kind: Kind) -> Kind {
+    match kind {
+        Kind::Real(own) => Kind::Real(RealType { start: None, reinit: false, ..own }),
+        Kind::Integer(own) => Kind::Integer(IntegerType { start: None, ..own }),
+        Kind::Enumeration(own) => Kind::Enumeration(IntegerType { start: None, ..own }),
+        Kind::Boolean(_) => Kind::Boolean(None),
+        Kind::String(_) => Kind::String(None),
+    }
+}
+
+/// The variable without type and value reference.
+fn described<M>(
+    variables: &[Variable<M>],
+    variable: &Variable<M>,
+) -> Result<ScalarVariable, Failure> {
+    let (mut variability, mut initial) = (variable.variability, variable.initial);
+    if let Access::Alias(of) = &variable.access {
+        let target = structure::find(variables, &variable.name, of)?;
+        if let Access::Alias(_) = variables[target].access {
+            let name = &variable.name;
+            return Err(Failure::Error(format!("{name} is an alias of {of}, itself an alias")));
+        }
+        variability = variables[target].variability;
+        if variability == Variability::Constant {
+            initial = Some(Initial::Exact);
+        }
+    }
+    let state = variable.derivative_of.as_ref();
+    let state = state.map(|of| structure::find(variables, &variable.name, of)).transpose()?;
+    Ok(ScalarVariable {
+        name: variable.name.clone(),
+        value_reference: 0,
+        description: Some(variable.description.clone()),
+        causality: variable.causality,
+        variability,
+        initial,
+        kind: Kind::Real(RealType {
+            derivative: state.map(structure::index),
+            ..RealType::default()
+        }),
+    })
+}
+
+/// The independent variable, value reference 0 of the Reals.
+fn time() -> ScalarVariable {
+    ScalarVariable {
+        name: "time".to_owned(),
+        value_reference: 0,
+        description: Some("Simulation time".to_owned()),
+        causality: Causality::Independent,
+        variability: Variability::Continuous,
+        initial: None,
+        kind: Kind::Real(RealType { unit: Some("s".to_owned()), ..RealType::default() }),
+    }
+}
+
+fn define_unit<M>(units: &mut Vec<Unit>, variable: &Variable<M>) -> Result<(), Failure> {
+    let Some(name) = &variable.number.unit else { return Ok(()) };
+    if units.iter().all(|unit| unit.name != *name) {
+        let unit = Unit::parse(name)
+            .map_err(|error| Failure::Error(format!("variable {}: {error}", variable.name)))?;
+        units.push(unit);
+    }
+    Ok(())
+}
+
+fn define_type<M>(types: &mut Vec<SimpleType>, variable: &Variable<M>) -> Result<(), Failure> {
+    let Some(Enumeration { name, items }) = &variable.enumeration else { return Ok(()) };
+    match types.iter().find(|known| known.name == *name) {
+        Some(known) if known.items == *items => {}
+        Some(_) => {
+            return Err(Failure::Error(format!(
+                "variable {}: its enumeration {name} has other items elsewhere",
+                variable.name
+            )));
+        }
+        None => types.push(SimpleType {
+            name: name.clone(),
+            description: None,
+            kind: Kind::Enumeration(IntegerType::default()),
+            items: items.clone(),
+        }),
+    }
+    Ok(())
+}
+
+/// The model description of `M` with the resources in a folder: what packing writes as
+/// `modelDescription.xml`.
+///
+/// # Errors
+///
+/// What keeps the model from being made or described at all: [`Model::new`] failed, a unit that
+/// cannot be read, a reference to a variable that does not exist.
+pub fn describe<M: Model>(resources: &std::path::Path) -> Result<ModelDescription, Failure> {
+    Interface::new(&mut new_model::<M>(resources)?).map(|(_, description)| description)
+}
+
+/// [`Model::new`]; where the importer named no folder, its failure says so.
+pub(crate) fn new_model<M: Model>(resources: &std::path::Path) -> Result<M, Failure> {
+    M::new(resources).map_err(|failure| {
+        if resources != std::path::Path::new(NO_FOLDER) {
+            return failure;
+        }
+        let reason = failure.to_string().replace('\0', "");
+        Failure::Error(format!(
+            "fmuResourceLocation is null or empty, and this model needs its resources: expected \
+             the URI of their folder, such as file:///tmp/fmu/resources ({reason})"
+        ))
+    })
+}
+
+/// Which static rules of FMI 2.0.5 the variables of `M` break; none, if they are in order.
+///
+/// The first test of a model: a description with problems is not packed either.
+///
+/// # Errors
+///
+/// As [`describe`].
+pub fn problems<M: Model>(resources: &std::path::Path) -> Result<Vec<Problem>, Failure> {
+    describe::<M>(resources).map(|description| description.problems())
+}

@@ -1,0 +1,58 @@
+//! The general part of a model description.
+
+use crate::model::Model;
+use fmu_description::unit::Unit;
+use fmu_description::{CoSimulation, LogCategory, ModelDescription, ModelExchange};
+
+/// Log categories of every exported FMU: standardized names of section 2.2.4.
+pub(crate) const CATEGORIES: [(&str, &str); 4] = [
+    ("logEvents", "Events at which the model wants the simulation to end"),
+    ("logStatusDiscard", "Calls that were refused without harm"),
+    ("logStatusError", "Calls that failed; the instance has to be reset or restored"),
+    ("logStatusFatal", "Calls after which the instance is lost"),
+];
+
+pub(super) fn general<M: Model>(model: &M) -> ModelDescription {
+    let about = model.about();
+    let text = |text: String| (!text.is_empty()).then_some(text);
+    let exchange = model.model_exchange();
+    let indicators = exchange.map(|own| u32::try_from(own.event_indicators).unwrap_or(u32::MAX));
+    ModelDescription {
+        fmi_version: "2.0".to_owned(),
+        model_name: M::IDENTIFIER.to_owned(),
+        description: text(about.description),
+        author: text(about.author),
+        version: text(about.version),
+        license: text(about.license),
+        generation_tool: Some(concat!("fmi2 ", env!("CARGO_PKG_VERSION")).to_owned()),
+        structured_names: true,
+        number_of_event_indicators: indicators,
+        model_exchange: exchange.map(|_| ModelExchange {
+            model_identifier: M::IDENTIFIER.to_owned(),
+            completed_integrator_step_not_needed: true,
+            can_not_use_memory_management_functions: true,
+            can_get_and_set_fmu_state: true,
+            can_serialize_fmu_state: true,
+            provides_directional_derivative: M::PROVIDES_DIRECTIONAL_DERIVATIVE,
+            ..ModelExchange::default()
+        }),
+        co_simulation: Some(CoSimulation {
+            model_identifier: M::IDENTIFIER.to_owned(),
+            can_handle_variable_communication_step_size: true,
+            can_not_use_memory_management_functions: true,
+            can_get_and_set_fmu_state: true,
+            can_serialize_fmu_state: true,
+            provides_directional_derivative: M::PROVIDES_DIRECTIONAL_DERIVATIVE,
+            ..CoSimulation::default()
+        }),
+        log_categories: CATEGORIES
+            .map(|(name, description)| LogCategory {
+                name: name.to_owned(),
+                description: Some(description.to_owned()),
+            })
+            .to_vec(),
+        units: Unit::parse("s").into_iter().collect(),
+        default_experiment: Some(about.default_experiment),
+        ..ModelDescription::default()
+    }
+}

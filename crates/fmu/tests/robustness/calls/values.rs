@@ -1,0 +1,175 @@
+//! `fmi2GetXXX`, `fmi2SetXXX`, `fmi2GetDirectionalDerivative`.
+
+use fmu::call_order::State;
+
+use super::{Call, Outcome, together};
+use crate::array::Array;
+use crate::choice::{Choice, usable};
+use crate::prediction::{Core, DISCARD, ERROR, OK, Values};
+
+/// References of variables of a type that has `count`, most of them such that `fit`.
+fn references(choice: &mut Choice, count: u32, fit: impl Fn(u32) -> bool) -> Array<u32> {
+    let length = choice.count();
+    choice.array(length, |choice| choice.reference(count, &fit))
+}
+
+fn any(_: u32) -> bool {
+    true
+}
+
+/// The verdict on arrays, then on each element.
+fn verdict(arrays: &[bool], elements: impl IntoIterator<Item = u8>) -> u8 {
+    if arrays.iter().all(|fine| *fine) { together(elements) } else { ERROR }
+}
+
+fn fine(holds: bool) -> u8 {
+    if holds { OK } else { ERROR }
+}
+
+/// A value that comes where the variable can be set.
+fn set(settable: bool, accepted: bool) -> u8 {
+    match (settable, accepted) {
+        (false, _) => ERROR,
+        (true, false) => DISCARD,
+        (true, true) => OK,
+    }
+}
+
+/// Whether discrete inputs can be set.
+fn between(core: &Core) -> bool {
+    use State as S;
+    let here = [S::Instantiated, S::InitializationMode, S::EventMode, S::StepComplete];
+    here.contains(&core.state)
+}
+
+/// Whether a kept value differs from the one that came.
+fn differs<T: PartialEq>(pairs: impl IntoIterator<Item = (Option<T>, T)>) -> bool {
+    pairs.into_iter().any(|(kept, got)| kept.is_some_and(|kept| kept != got))
+}
+
+pub(super) fn get_real(call: &mut Call) -> Outcome {
+    let vr = references(&mut call.choice, 9, any);
+    let mut values = call.choice.array(vr.items.len(), |_| 77.0);
+    let status = call.importer.get_real(&vr, &mut values);
+    let elements = vr.items.iter().map(|own| fine(*own < 9));
+    let kept = |own: &u32| match Values::place_of_real(*own) {
+        None => (*own == 0).then_some(call.core.time),
+        Some(place) => Some(call.core.values.reals[place]),
+    };
+    let wrong = differs(vr.items.iter().map(kept).zip(values.items.iter().copied()));
+    Outcome::new(status, verdict(&[usable(&vr), usable(&values)], elements))
+        .claim(!wrong, || format!("{vr:?} reads {values:?}"))
+}
+
+pub(super) fn set_real(call: &mut Call) -> Outcome {
+    let vr = references(&mut call.choice, 9, |own| call.core.settable_real(own));
+    let values = call.choice.array(vr.items.len(), Choice::real);
+    let status = call.importer.set_real(&vr, &values);
+    let (core, mut set_values) = (call.core, Vec::new());
+    let elements = vr.items.iter().zip(&values.items).map(|(&own, &value)| {
+        if let Some(place) = Values::place_of_real(own) {
+            set_values.push((place, value));
+        }
+        let in_range = own != 5 || (-10.0..=10.0).contains(&value);
+        set(core.settable_real(own), value.is_finite() && in_range)
+    });
+    let verdict = verdict(&[usable(&vr), usable(&values)], elements);
+    Outcome::new(status, verdict).with(move |core, _| {
+        for (place, value) in set_values {
+            core.values.reals[place] = value;
+        }
+    })
+}
+
+pub(super) fn get_integer(call: &mut Call) -> Outcome {
+    let vr = references(&mut call.choice, 3, any);
+    let mut values = call.choice.array(vr.items.len(), |_| 77);
+    let status = call.importer.get_integer(&vr, &mut values);
+    let elements = vr.items.iter().map(|own| fine(*own < 3));
+    let kept = |own: &u32| call.core.values.integers.get(*own as usize).copied();
+    let wrong = differs(vr.items.iter().map(kept).zip(values.items.iter().copied()));
+    Outcome::new(status, verdict(&[usable(&vr), usable(&values)], elements))
+        .claim(!wrong, || format!("{vr:?} reads {values:?}"))
+}
+
+pub(super) fn set_integer(call: &mut Call) -> Outcome {
+    let vr = references(&mut call.choice, 3, |own| own < 2);
+    let values =
+        call.choice.array(vr.items.len(), |choice| choice.either(&[1, 2], &[-5, 6, i32::MIN]));
+    let status = call.importer.set_integer(&vr, &values);
+    let pairs: Vec<_> = vr.items.iter().copied().zip(values.items.iter().copied()).collect();
+    let elements = pairs.iter().map(|(own, value)| {
+        let accepted = if *own == 0 { (-5..=5).contains(value) } else { [1, 2].contains(value) };
+        set(*own < 2 && between(call.core), accepted)
+    });
+    let verdict = verdict(&[usable(&vr), usable(&values)], elements);
+    Outcome::new(status, verdict).with(move |core, _| {
+        for (own, value) in pairs {
+            core.values.integers[own as usize] = value;
+        }
+    })
+}
+
+pub(super) fn get_boolean(call: &mut Call) -> Outcome {
+    let vr = references(&mut call.choice, 2, any);
+    let mut values = call.choice.array(vr.items.len(), |_| 77);
+    let status = call.importer.get_boolean(&vr, &mut values);
+    let elements = vr.items.iter().map(|own| fine(*own < 2));
+    let kept = |own: &u32| (*own == 0).then_some(i32::from(call.core.values.on));
+    let wrong = differs(vr.items.iter().map(kept).zip(values.items.iter().copied()));
+    Outcome::new(status, verdict(&[usable(&vr), usable(&values)], elements))
+        .claim(!wrong, || format!("{vr:?} reads {values:?}"))
+}
+
+pub(super) fn set_boolean(call: &mut Call) -> Outcome {
+    let vr = references(&mut call.choice, 2, |own| own == 0);
+    let values = call.choice.array(vr.items.len(), |choice| choice.of(&[0, 1, 2, -1]));
+    let status = call.importer.set_boolean(&vr, &values);
+    let last = values.items.last().map(|value| *value != 0);
+    let elements = vr.items.iter().map(|own| fine(*own == 0 && between(call.core)));
+    let verdict = verdict(&[usable(&vr), usable(&values)], elements);
+    Outcome::new(status, verdict)
+        .with(move |core, _| core.values.on = last.unwrap_or(core.values.on))
+}
+
+pub(super) fn get_string(call: &mut Call) -> Outcome {
+    let vr = references(&mut call.choice, 3, any);
+    let shape = call.choice.shape();
+    let (status, got) = call.importer.get_string(&vr, shape);
+    let elements = vr.items.iter().map(|own| fine(*own < 3));
+    let kept = |own: &u32| call.core.values.strings.get(*own as usize).cloned();
+    let wrong = differs(vr.items.iter().map(kept).zip(got));
+    let values = Array::<u32> { items: vr.items.clone(), shape };
+    Outcome::new(status, verdict(&[usable(&vr), usable(&values)], elements))
+        .claim(!wrong, || format!("{vr:?} reads something else"))
+}
+
+pub(super) fn set_string(call: &mut Call) -> Outcome {
+    let vr = references(&mut call.choice, 3, |own| own < 2);
+    let texts = call.choice.array(vr.items.len(), Choice::text);
+    let status = call.importer.set_string(&vr, &texts);
+    let as_text = |own: &Option<std::ffi::CString>| Some(own.as_ref()?.to_str().ok()?.to_owned());
+    let read: Vec<_> = texts.items.iter().map(as_text).collect();
+    let pairs: Vec<_> = vr.items.iter().copied().zip(read).collect();
+    let elements =
+        pairs.iter().map(|(own, text)| fine(*own < 2 && text.is_some() && between(call.core)));
+    let verdict = verdict(&[usable(&vr), usable(&texts)], elements);
+    Outcome::new(status, verdict).with(move |core, _| {
+        for (own, text) in pairs {
+            core.values.strings[own as usize] = text.unwrap_or_default();
+        }
+    })
+}
+
+pub(super) fn get_directional_derivative(call: &mut Call) -> Outcome {
+    let choice = &mut call.choice;
+    let unknowns = references(choice, 9, |own| call.core.is_unknown(own));
+    let mut to = choice.array(unknowns.items.len(), |_| 77.0);
+    let knowns = references(choice, 9, |own| call.core.is_known(own));
+    let delta = choice.array(knowns.items.len(), Choice::real);
+    let status = call.importer.get_directional_derivative((&unknowns, &mut to), (&knowns, &delta));
+    let elements = unknowns.items.iter().map(|own| fine(call.core.is_unknown(*own)));
+    let elements = elements.chain(knowns.items.iter().map(|own| fine(call.core.is_known(*own))));
+    let arrays = [usable(&unknowns), usable(&to), usable(&knowns), usable(&delta)];
+    Outcome::new(status, verdict(&arrays, elements))
+}

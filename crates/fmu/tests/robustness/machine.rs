@@ -1,0 +1,323 @@
+//! A model with a variable of every type and role, for both interfaces, that misbehaves on demand.
+//!
+//! x' = q (u - x), y = p x + u.
+
+use std::cell::Cell;
+use std::path::Path;
+
+use fmu::{
+    About, At, Enumeration, Event, Experiment, Failure, Model, ModelExchange, Step, Variable,
+};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+/// Where the model's code runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Place {
+    New,
+    About,
+    Variables,
+    Exchange,
+    Field,
+    Check,
+    Initialize,
+    Step,
+    Update,
+    Differentiate,
+    Indicators,
+    Event,
+    Clone,
+    Drop,
+    Serialize,
+    Deserialize,
+}
+
+impl Place {
+    pub(crate) const EVERY: [Place; 16] = [
+        Place::New,
+        Place::About,
+        Place::Variables,
+        Place::Exchange,
+        Place::Field,
+        Place::Check,
+        Place::Initialize,
+        Place::Step,
+        Place::Update,
+        Place::Differentiate,
+        Place::Indicators,
+        Place::Event,
+        Place::Clone,
+        Place::Drop,
+        Place::Serialize,
+        Place::Deserialize,
+    ];
+}
+
+/// What the model does there instead of its work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Mischief {
+    Panic,
+    Discard,
+    Incomplete,
+    Terminated,
+    Error,
+    Fatal,
+}
+
+impl Mischief {
+    pub(crate) const EVERY: [Mischief; 6] = [
+        Mischief::Panic,
+        Mischief::Discard,
+        Mischief::Incomplete,
+        Mischief::Terminated,
+        Mischief::Error,
+        Mischief::Fatal,
+    ];
+}
+
+thread_local! {
+    static PLAN: Cell<Option<(Place, Mischief)>> = const { Cell::new(None) };
+    static HAPPENED: Cell<bool> = const { Cell::new(false) };
+    static ALIVE: Cell<isize> = const { Cell::new(0) };
+}
+
+/// Runs `work` while the models of this thread follow `plan`; whether they came to it.
+pub(crate) fn with_plan<T>(plan: Option<(Place, Mischief)>, work: impl FnOnce() -> T) -> (T, bool) {
+    HAPPENED.set(false);
+    PLAN.set(plan);
+    let done = work();
+    PLAN.set(None);
+    (done, happened())
+}
+
+/// Whether the models of this thread came to what the plan says.
+pub(crate) fn happened() -> bool {
+    HAPPENED.get()
+}
+
+/// How many models exist in this thread.
+pub(crate) fn alive() -> isize {
+    ALIVE.get()
+}
+
+/// The model's code reaches `place`.
+fn reach(place: Place, time: f64) -> Result<(), Failure> {
+    let Some((_, mischief)) = PLAN.get().filter(|(planned, _)| *planned == place) else {
+        return Ok(());
+    };
+    HAPPENED.set(true);
+    let message = || "100 % mischief #1".to_owned();
+    Err(match mischief {
+        Mischief::Panic => panic!("100 % mischief #1"),
+        Mischief::Discard => Failure::Discard(message()),
+        Mischief::Incomplete => Failure::Incomplete { time, message: message() },
+        Mischief::Terminated => Failure::Terminated { time, message: message() },
+        Mischief::Error => Failure::Error(message()),
+        Mischief::Fatal => Failure::Fatal(message()),
+    })
+}
+
+/// The same where the code has no way to fail but a panic.
+fn reach_infallible(place: Place) {
+    if PLAN.get() == Some((place, Mischief::Panic)) {
+        HAPPENED.set(true);
+        panic!("100 % mischief #1");
+    }
+}
+
+/// Sees the model come and go.
+struct Witness;
+
+impl Witness {
+    fn new() -> Self {
+        ALIVE.set(ALIVE.get() + 1);
+        Self
+    }
+}
+
+impl Clone for Witness {
+    fn clone(&self) -> Self {
+        reach_infallible(Place::Clone);
+        Self::new()
+    }
+}
+
+impl Drop for Witness {
+    fn drop(&mut self) {
+        ALIVE.set(ALIVE.get() - 1);
+        reach_infallible(Place::Drop);
+    }
+}
+
+impl Serialize for Witness {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        reach_infallible(Place::Serialize);
+        serializer.serialize_unit()
+    }
+}
+
+impl<'de> Deserialize<'de> for Witness {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        reach_infallible(Place::Deserialize);
+        <()>::deserialize(deserializer).map(|()| Self::new())
+    }
+}
+
+#[derive(Clone, Serialize, Deserialize)]
+pub(crate) struct Machine {
+    u: f64,
+    u_slope: f64,
+    x: f64,
+    x_slope: f64,
+    y: f64,
+    y_slope: f64,
+    p: f64,
+    q: f64,
+    guess: f64,
+    half: f64,
+    n: i32,
+    side: i32,
+    count: i32,
+    on: bool,
+    positive: bool,
+    label: String,
+    word: String,
+    said: String,
+    witness: Witness,
+}
+
+/// Value references of the Reals; 0 is time.
+pub(crate) mod real {
+    pub(crate) const U: u32 = 1;
+}
+
+macro_rules! field {
+    ($name:ident) => {
+        |machine: &mut Self| {
+            reach_infallible(Place::Field);
+            &mut machine.$name
+        }
+    };
+}
+
+impl Model for Machine {
+    const IDENTIFIER: &'static str = "Machine";
+    const PROVIDES_DIRECTIONAL_DERIVATIVE: bool = true;
+
+    fn about(&self) -> About {
+        reach_infallible(Place::About);
+        About::default()
+    }
+
+    fn new(_: &Path) -> Result<Self, Failure> {
+        reach(Place::New, 0.0)?;
+        Ok(Self {
+            u: 0.0,
+            u_slope: 0.0,
+            x: 1.0,
+            x_slope: 0.0,
+            y: 0.0,
+            y_slope: 0.0,
+            p: 2.0,
+            q: 0.5,
+            guess: 3.0,
+            half: 0.0,
+            n: 0,
+            side: 1,
+            count: 0,
+            on: false,
+            positive: false,
+            label: "100 %".to_owned(),
+            word: String::new(),
+            said: String::new(),
+            witness: Witness::new(),
+        })
+    }
+
+    fn variables(&self) -> Vec<Variable<Self>> {
+        reach_infallible(Place::Variables);
+        let sides = Enumeration::new("Side", [("left", 1), ("right", 2)]);
+        vec![
+            Variable::real("u", "", field!(u)).input().derivative(field!(u_slope)),
+            Variable::real("x", "", field!(x)).output(&["x"]).exact(),
+            Variable::real("der(x)", "", field!(x_slope)).derivative_of("x"),
+            Variable::real("y", "", field!(y)).output(&["u", "x"]).derivative(field!(y_slope)),
+            Variable::real("p", "", field!(p)).range(-10.0, 10.0).parameter(),
+            Variable::real("q", "", field!(q)).tunable(),
+            Variable::real("guess", "", field!(guess)).approximate(),
+            Variable::real("half", "", field!(half)).calculated_parameter(),
+            Variable::integer("n", "", field!(n)).range(-5.0, 5.0).input(),
+            Variable::enumeration("side", "", sides, field!(side)).tunable(),
+            Variable::integer("count", "", field!(count)),
+            Variable::boolean("on", "", field!(on)).input(),
+            Variable::boolean("positive", "", field!(positive)).output(&["x"]),
+            Variable::string("label", "", field!(label)).tunable(),
+            Variable::string("word", "", field!(word)).input(),
+            Variable::string("said", "", field!(said)).output(&["x"]),
+        ]
+    }
+
+    fn check(&self) -> Result<(), Failure> {
+        reach(Place::Check, 0.0)
+    }
+
+    fn initialize(&mut self, experiment: &Experiment) -> Result<(), Failure> {
+        reach(Place::Initialize, experiment.start_time)?;
+        self.half = 0.5 * self.p;
+        self.count = 0;
+        self.compute();
+        Ok(())
+    }
+
+    fn step(&mut self, step: &Step) -> Result<(), Failure> {
+        reach(Place::Step, step.start + 0.5 * step.size)?;
+        self.x += step.size * self.q * (self.u + 0.5 * step.size * self.u_slope - self.x);
+        self.count = self.count.wrapping_add(1);
+        self.compute();
+        Ok(())
+    }
+
+    fn update(&mut self, time: f64) -> Result<(), Failure> {
+        reach(Place::Update, time)?;
+        self.compute();
+        Ok(())
+    }
+
+    fn differentiate(&self, _: &At, direction: &mut Self) -> Result<(), Failure> {
+        reach(Place::Differentiate, 0.0)?;
+        direction.half = 0.5 * direction.p;
+        direction.x_slope = self.q * (direction.u - direction.x);
+        direction.y = self.p * direction.x + direction.u;
+        Ok(())
+    }
+
+    fn model_exchange(&self) -> Option<ModelExchange> {
+        reach_infallible(Place::Exchange);
+        Some(ModelExchange { event_indicators: 1 })
+    }
+
+    fn event_indicators(&self, _: f64, indicators: &mut [f64]) {
+        reach_infallible(Place::Indicators);
+        assert_eq!(indicators, [0.0], "the model sees nothing of the importer's memory");
+        indicators[0] = self.x;
+    }
+
+    fn event(&mut self, time: f64) -> Result<Event, Failure> {
+        reach(Place::Event, time)?;
+        let late = time > 50.0;
+        Ok(Event {
+            terminate_simulation: late.then(|| "late".to_owned()),
+            next_event_time: Some(time + 1.0),
+            ..Event::default()
+        })
+    }
+}
+
+impl Machine {
+    fn compute(&mut self) {
+        self.x_slope = self.q * (self.u - self.x);
+        self.y = self.p * self.x + self.u;
+        self.y_slope = self.p * self.x_slope + self.u_slope;
+        self.positive = self.x > 0.0;
+        self.said = format!("{} {}", self.label, self.positive);
+    }
+}

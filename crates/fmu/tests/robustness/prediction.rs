@@ -1,0 +1,183 @@
+//! What the standard says an instance of [`Machine`](crate::machine::Machine) answers: a statement
+//! of its own, from the tables of sections 3.2.3 and 4.2.4 and the text.
+
+use std::sync::OnceLock;
+
+use fmu::call_order::{Function, State};
+
+use crate::machine::Mischief;
+
+/// Sets of statuses, as bits.
+pub(crate) const OK: u8 = 1;
+pub(crate) const DISCARD: u8 = 1 << 2;
+pub(crate) const ERROR: u8 = 1 << 3;
+pub(crate) const FATAL: u8 = 1 << 4;
+
+const EXCHANGE: &str = include_str!("../../../fmu-description/src/call_order/section_3_2_3.csv");
+const SIMULATION: &str = include_str!("../../../fmu-description/src/call_order/section_4_2_4.csv");
+
+/// Entries of a table, by function and state.
+type Table = Vec<[bool; State::EVERY.len()]>;
+
+fn read(text: &str) -> Table {
+    let head: Vec<_> = text.lines().next().unwrap_or_default().split(',').collect();
+    let row = |function: &Function| {
+        let row = text.lines().find(|line| line.split(',').next() == Some(function.name()));
+        State::EVERY.map(|state| {
+            let name = format!("{state:?}");
+            let column = head.iter().position(|own| *own == name);
+            let cell = column.zip(row).and_then(|(column, row)| row.split(',').nth(column));
+            cell.is_some_and(|cell| cell != "-")
+        })
+    };
+    Function::EVERY.iter().map(row).collect()
+}
+
+/// Whether the table of the interface has an entry for the function in that state.
+pub(crate) fn in_table(exchange: bool, function: Function, state: State) -> bool {
+    static TABLES: OnceLock<[Table; 2]> = OnceLock::new();
+    let tables = TABLES.get_or_init(|| [SIMULATION, EXCHANGE].map(read));
+    tables[usize::from(exchange)][function as usize][state as usize]
+}
+
+/// Whether the function may return `fmi2Discard` (section 2.1.3).
+fn may_discard(exchange: bool, function: Function) -> bool {
+    use Function as F;
+    match function {
+        F::SetReal | F::SetInteger | F::SetBoolean | F::SetString => true,
+        F::SetContinuousStates
+        | F::GetReal
+        | F::GetDerivatives
+        | F::GetContinuousStates
+        | F::GetEventIndicators => exchange,
+        F::DoStep
+        | F::GetStatus
+        | F::GetRealStatus
+        | F::GetIntegerStatus
+        | F::GetBooleanStatus
+        | F::GetStringStatus => !exchange,
+        _ => false,
+    }
+}
+
+/// What was set, and so is read back.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Values {
+    /// u, p, q, guess.
+    pub(crate) reals: [f64; 4],
+    /// n, side.
+    pub(crate) integers: [i32; 2],
+    pub(crate) on: bool,
+    /// label, word.
+    pub(crate) strings: [String; 2],
+}
+
+impl Values {
+    /// Where the Real is kept; x is not, the model changes it.
+    pub(crate) fn place_of_real(reference: u32) -> Option<usize> {
+        [1, 5, 6, 7].iter().position(|own| *own == reference)
+    }
+
+    fn new() -> Self {
+        Self {
+            reals: [0.0, 2.0, 0.5, 3.0],
+            integers: [0, 1],
+            on: false,
+            strings: ["100 %".to_owned(), String::new()],
+        }
+    }
+}
+
+/// What an FMU state consists of.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Core {
+    pub(crate) exchange: bool,
+    pub(crate) state: State,
+    pub(crate) start: f64,
+    pub(crate) stop: Option<f64>,
+    pub(crate) time: f64,
+    pub(crate) ended: bool,
+    pub(crate) values: Values,
+}
+
+impl Core {
+    pub(crate) fn new(exchange: bool) -> Self {
+        let values = Values::new();
+        let state = State::Instantiated;
+        Self { exchange, state, start: 0.0, stop: None, time: 0.0, ended: false, values }
+    }
+
+    /// The statuses that the call may have: `verdict` is what its arguments deserve.
+    pub(crate) fn statuses(
+        &self,
+        function: Function,
+        verdict: u8,
+        mischief: Option<Mischief>,
+    ) -> u8 {
+        if self.state == State::Fatal {
+            return FATAL;
+        }
+        if !in_table(self.exchange, function, self.state) {
+            return ERROR;
+        }
+        match mischief {
+            None if verdict & DISCARD != 0 && !may_discard(self.exchange, function) => ERROR,
+            None => verdict,
+            Some(Mischief::Panic | Mischief::Fatal) => FATAL,
+            Some(Mischief::Error) => ERROR,
+            Some(_) if may_discard(self.exchange, function) => DISCARD,
+            Some(_) => ERROR,
+        }
+    }
+
+    /// The states in which a function has gone wrong, where it did.
+    pub(crate) fn after(&mut self, function: Function, status: u8, mischief: Option<Mischief>) {
+        match status {
+            DISCARD if function == Function::DoStep => {
+                self.state = State::StepFailed;
+                self.ended = mischief == Some(Mischief::Terminated);
+            }
+            ERROR => self.state = State::Error,
+            FATAL => self.state = State::Fatal,
+            _ => {}
+        }
+    }
+
+    /// Whether a step may end there: `stopTime`, where it is defined, is not passed (section 2.1.6).
+    pub(crate) fn is_before_stop(&self, time: f64) -> bool {
+        self.stop.is_none_or(|stop| time <= stop + 1e-9 * stop.abs().max(1.0))
+    }
+
+    /// Whether the Real may be set now: the variables of `machine.rs` by section 2.2.7 and the
+    /// conditions of the tables.
+    pub(crate) fn settable_real(&self, reference: u32) -> bool {
+        use State as S;
+        let early = matches!(self.state, S::Instantiated | S::InitializationMode);
+        let event = matches!(self.state, S::EventMode | S::StepComplete);
+        let continuous = self.state == S::ContinuousTimeMode;
+        match reference {
+            1 => true,
+            2 => early || continuous,
+            5 => early,
+            6 => early || event,
+            7 => self.state == S::Instantiated,
+            _ => false,
+        }
+    }
+
+    /// Whether the Real is an unknown of the equations solved in this state.
+    pub(crate) fn is_unknown(&self, reference: u32) -> bool {
+        match self.state {
+            State::InitializationMode => [3, 4, 8].contains(&reference),
+            _ => [2, 3, 4].contains(&reference),
+        }
+    }
+
+    /// Whether the Real is a known of the equations solved in this state.
+    pub(crate) fn is_known(&self, reference: u32) -> bool {
+        match self.state {
+            State::InitializationMode => [0, 1, 2, 5, 6].contains(&reference),
+            _ => [0, 1, 2].contains(&reference),
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! Random sequences of calls.
+
+use fmu::call_order::Function;
+use proptest::collection::vec;
+use proptest::prelude::*;
+use proptest::test_runner::{Config, TestRunner};
+
+use crate::calls::CALLS;
+use crate::importer::{Importer, describe};
+use crate::machine::{Mischief, Place, with_plan};
+use crate::sequence::{FREE, HOSTILE, ILLEGAL, LENGTH, run};
+use crate::targets::order;
+
+/// Bytes for up to `calls` calls; `first` says which instance and whether calls may be illegal.
+fn bytes(first: impl Strategy<Value = u8>, calls: usize) -> impl Strategy<Value = Vec<u8>> {
+    let call = (first, any::<[u8; LENGTH - 1]>()).prop_map(|(first, rest)| {
+        let mut call = vec![first];
+        call.extend(rest);
+        call
+    });
+    vec(call, 1..calls).prop_map(|calls| calls.concat())
+}
+
+fn hold(cases: u32, strategy: &impl Strategy<Value = Vec<u8>>) {
+    // What is made once for the whole process is made before memory is counted.
+    run(&[0; 3 * LENGTH]).unwrap();
+    // The panic hook belongs to all instances: with this one it is neither made nor freed meanwhile.
+    let _instance = Importer::new(&order(1));
+    let cases = if cfg!(miri) { 3 } else { cases };
+    let config = Config { cases, failure_persistence: None, ..Config::default() };
+    let done = TestRunner::new(config).run(strategy, |bytes| {
+        let mut done = Ok(0);
+        let memory = allocation_counter::measure(|| done = run(&bytes));
+        let memory = (memory.count_current, memory.bytes_current);
+        prop_assert!(done.is_ok(), "{done:?}");
+        // What a function returns is lost to Rust while a destructor of its locals panics.
+        let lossy = done.is_ok_and(|reached| reached & (1 << Place::Drop as u32) != 0);
+        prop_assert!(lossy || memory == (0, 0), "{memory:?} blocks and bytes are left");
+        Ok(())
+    });
+    assert_eq!(done, Ok(()));
+}
+
+#[test]
+fn every_sequence_of_calls_is_answered_as_the_standard_says_and_leaves_no_memory() {
+    hold(4000, &bytes(any::<u8>(), 60));
+}
+
+#[test]
+fn long_lives_are_answered_as_the_standard_says() {
+    hold(200, &bytes(0..HOSTILE, 600));
+}
+
+/// Whether the model can fail there by anything but a panic.
+fn is_fallible(place: Place) -> bool {
+    use Place as P;
+    let fallible =
+        [P::New, P::Check, P::Initialize, P::Step, P::Update, P::Differentiate, P::Event];
+    fallible.contains(&place)
+}
+
+/// The bytes of one call: who, which, and the plan of the model.
+fn call(who: u8, which: u8, plan: [u8; 3]) -> [u8; LENGTH] {
+    let mut call = [0; LENGTH];
+    call[..2].copy_from_slice(&[who, which]);
+    call[2..5].copy_from_slice(&plan);
+    call
+}
+
+/// `fmi2Instantiate` for one interface.
+fn instantiate(instance: u8, exchange: bool) -> [u8; LENGTH] {
+    let mut call = call(instance, 0, [0; 3]);
+    call[3] = u8::from(!exchange);
+    call
+}
+
+/// One call of `function` with harmless arguments, legal or not.
+fn plain(instance: u8, function: Function, plan: [u8; 3]) -> [u8; LENGTH] {
+    let which = CALLS.iter().position(|(own, _)| *own == function);
+    call(ILLEGAL | instance, which.map_or(FREE, |which| u8::try_from(which).unwrap()), plan)
+}
+
+/// The calls by which an instance comes to each state, after `fmi2Instantiate`.
+fn ways(exchange: bool) -> Vec<Vec<Function>> {
+    use Function as F;
+    let on = |more: &[F]| [&[F::EnterInitializationMode, F::ExitInitializationMode], more].concat();
+    let own = if exchange {
+        on(&[F::EnterContinuousTimeMode, F::SetContinuousStates])
+    } else {
+        on(&[F::SetRealInputDerivatives, F::DoStep, F::GetDirectionalDerivative])
+    };
+    vec![
+        vec![],
+        vec![F::EnterInitializationMode],
+        on(&[F::GetFMUstate, F::SerializeFMUstate, F::SetReal]),
+        own,
+        on(&[F::Terminate]),
+        on(&[F::CancelStep]),
+    ]
+}
+
+#[test]
+fn a_model_that_panics_or_fails_anywhere_is_answered_and_heard_of_while_another_one_goes_on() {
+    let (mut reached, mut number) = (0, 0_u32);
+    let every = CALLS.iter().map(|(function, _)| *function).chain([Function::FreeInstance]);
+    let plans = (0..Place::EVERY.len()).flat_map(|place| {
+        let mischief =
+            if is_fallible(Place::EVERY[place]) { 0..Mischief::EVERY.len() } else { 0..1 };
+        mischief.map(move |mischief| [0xff, place, mischief].map(|own| u8::try_from(own).unwrap()))
+    });
+    for plan in plans {
+        reached |= run(&call(0, 0, plan)).unwrap();
+        for (exchange, function) in every.clone().flat_map(|own| [(true, own), (false, own)]) {
+            for way in ways(exchange) {
+                number += 1;
+                if cfg!(miri) && !number.is_multiple_of(2999) {
+                    continue;
+                }
+                let mut calls = vec![instantiate(0, exchange), instantiate(1, exchange)];
+                calls.extend(way.iter().map(|own| plain(0, *own, [0; 3])));
+                calls.push(plain(0, function, plan));
+                calls.extend(ways(exchange)[3].iter().map(|own| plain(1, *own, [0; 3])));
+                match run(&calls.concat()) {
+                    Ok(places) => reached |= places,
+                    Err(what) => panic!("{what}: {plan:?}, {function:?} after {way:?}"),
+                }
+            }
+        }
+    }
+    assert!(cfg!(miri) || reached == (1 << Place::EVERY.len()) - 1, "{reached:b}");
+}
+
+#[test]
+fn a_model_that_panics_while_it_is_described_is_heard_of() {
+    for place in Place::EVERY {
+        let (described, happened) = with_plan(Some((place, Mischief::Panic)), describe);
+        match described {
+            Ok(xml) => assert!(!happened && xml.contains("<ModelStructure>")),
+            Err(message) => assert!(happened && message.contains("100 % mischief #1"), "{message}"),
+        }
+    }
+}
