@@ -19,8 +19,8 @@ use std::time::Duration;
 
 use anyhow::{Context as _, anyhow};
 use fmu_description::package::Unpacked;
-use master::isolate::{self, IsolateError, Isolated, Package};
-use master::{Fmu, Instance};
+use fmu_import::isolate::{self, IsolateError, Isolated, Package};
+use fmu_import::{Fmu, Instance};
 use serde::Serialize;
 
 use answer::{Answer, Here};
@@ -139,7 +139,7 @@ fn run(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(Here, Vec<Find
         return isolated(options, unpacked, limit);
     }
     for library in &options.preload {
-        master::preload(library)?;
+        fmu_import::preload(library)?;
     }
     let mut fmu = None;
     let mut make = |name: &str, before: Option<Instance>| -> anyhow::Result<Instance> {

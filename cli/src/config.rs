@@ -8,8 +8,8 @@ mod tables;
 use std::path::{Path, PathBuf};
 
 use master::Wanted;
-use master::scenario::Scenario;
 use serde::{Deserialize, Serialize};
+use study::scenario::Scenario;
 use toml::Spanned;
 
 pub(crate) use every::Every;

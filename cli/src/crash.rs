@@ -2,7 +2,7 @@
 //! return after the command was told to end.
 
 use fmu_description::package::remove_temporary_folders;
-use master::crash::{self, Cause, Ending};
+use fmu_import::crash::{self, Cause, Ending};
 
 use crate::run;
 

@@ -64,7 +64,7 @@ fn main() -> ExitCode {
     }
     crash::watch();
     let status = perform(verb);
-    master::crash::done();
+    fmu_import::crash::done();
     status
 }
 

@@ -174,7 +174,7 @@ pub(crate) fn describe(
     resources: &Path,
     name: &dyn std::fmt::Display,
 ) -> anyhow::Result<(String, ModelDescription)> {
-    let xml = master::describe(file, resources)
+    let xml = fmu_import::describe(file, resources)
         .with_context(|| format!("the library of {name} does not describe itself"))?;
     let (description, warnings) = ModelDescription::read(xml.as_bytes())
         .with_context(|| format!("the model description of {name}"))?;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, bail, ensure};
-use master::results::{Column, ColumnKind, Selection, Table};
+use results::{Column, ColumnKind, Selection, Table};
 
 use crate::figure::{Figure, Ink, Panel, Series, rasterise};
 use crate::whole_file;
@@ -66,7 +66,7 @@ fn curves(
     }
     ensure!(!positions.is_empty(), "{}: no variable to plot", results.display());
     let envelopes = table.envelopes(&positions)?;
-    let curve = |(position, envelope): (usize, master::results::Envelope)| {
+    let curve = |(position, envelope): (usize, results::Envelope)| {
         let column = &table.columns()[position];
         let (time, values) = envelope.samples();
         let (time, values) = if stepwise(column) { stairs(&time, &values) } else { (time, values) };

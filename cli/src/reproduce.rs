@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use fmu_description::Experiment;
-use master::results::Table;
 use master::{Algorithm, Probe, Simulation, System, SystemError, Wanted, choose};
+use results::Table;
 
 use crate::claims::{Claim, Measurement, WATCHED, table};
 use crate::config::{Config, Every, Loaded};

@@ -15,9 +15,11 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, bail};
-use master::results::Selection;
-use master::scenario::{Prepared as Scenario, Setup};
-use master::{CallLog, Coupling, Port, Simulation, System, by_direct_dependencies};
+use fmu_import::CallLog;
+use master::Scenario;
+use master::{Coupling, Port, Simulation, System, by_direct_dependencies};
+use results::Selection;
+use study::scenario::Setup;
 
 use crate::config::{Config, Every, Loaded};
 use crate::logging;
@@ -65,7 +67,7 @@ struct Prepared {
     /// Units by variable, for the plot.
     units: Vec<(String, String)>,
     /// Outlives the simulation.
-    _folders: Option<master::ssp::Folders>,
+    _folders: Option<ssp::Folders>,
 }
 
 /// Everything before the first step; nothing where only the configuration was asked for.
@@ -172,11 +174,11 @@ fn scenario(loaded: &Loaded, system: &System, plan: &Plan) -> anyhow::Result<Sce
     let folder = Path::new("");
     let setup = Setup { folder, start: plan.experiment.start_time, step: plan.algorithm.step };
     let resolved = loaded.config.scenario.resolve(system, &setup);
-    let scenario = resolved.map_err(|error| loaded.point(&error.place.clone(), error))?;
-    for (file, column) in &scenario.unused {
+    let prepared = resolved.map_err(|error| loaded.point(&error.place.clone(), error))?;
+    for (file, column) in &prepared.unused {
         tracing::info!("{}: the column {column:?} drives nothing", file.display());
     }
-    Ok(scenario)
+    Ok(prepared.scenario)
 }
 
 fn results_file(config: &Config) -> anyhow::Result<&Path> {

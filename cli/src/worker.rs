@@ -2,14 +2,14 @@
 
 use std::process::ExitCode;
 
-use master::isolate::WORKER;
+use fmu_import::isolate::WORKER;
 
 /// Serves the master that started this process as a worker; none where no master did.
 pub(crate) fn worker() -> Option<ExitCode> {
     if std::env::args_os().nth(1)? != WORKER {
         return None;
     }
-    Some(match master::isolate::worker() {
+    Some(match fmu_import::isolate::worker() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             let cause = std::error::Error::source(&error);

@@ -1,4 +1,4 @@
-//! The fuzz targets: those of `crates/fmu/tests/robustness` and of `crates/master/tests/robustness`, one for the
+//! The fuzz targets: those of `crates/fmu/tests/robustness` and of `crates/study/tests/robustness`, one for the
 //! controller's design file and one for `system.toml`.
 
 #[path = "../../crates/fmu/tests/robustness/array.rs"]
@@ -11,7 +11,7 @@ mod choice;
 mod importer;
 #[path = "../../crates/fmu/tests/robustness/machine.rs"]
 mod machine;
-#[path = "../../crates/master/tests/robustness/targets.rs"]
+#[path = "../../crates/study/tests/robustness/targets.rs"]
 mod master_files;
 #[path = "../../crates/fmu/tests/robustness/prediction.rs"]
 mod prediction;
@@ -49,15 +49,15 @@ targets! {
     call_sequence: targets::call_sequence;
     /// See `design.rs`.
     design_file: design::design_file;
-    /// See `crates/master/tests/robustness/targets.rs`.
+    /// See `crates/study/tests/robustness/targets.rs`.
     system_structure: master_files::system_structure;
-    /// See `crates/master/tests/robustness/targets.rs`.
+    /// See `crates/study/tests/robustness/targets.rs`.
     parameter_values: master_files::parameter_values;
-    /// See `crates/master/tests/robustness/targets.rs`.
+    /// See `crates/study/tests/robustness/targets.rs`.
     parameter_mapping: master_files::parameter_mapping;
-    /// See `crates/master/tests/robustness/targets.rs`.
+    /// See `crates/study/tests/robustness/targets.rs`.
     signal_dictionary: master_files::signal_dictionary;
-    /// See `crates/master/tests/robustness/targets.rs`.
+    /// See `crates/study/tests/robustness/targets.rs`.
     signal_table: master_files::signal_table;
     /// See `cli/src/config/tests/target.rs`.
     system_toml: command::system_toml;

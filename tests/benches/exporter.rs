@@ -253,7 +253,7 @@ fn main() {
     for model in MODELS {
         let (prefix, suffix) = (std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
         let library = libraries.join(format!("{prefix}{model}{suffix}"));
-        let xml = master::describe(&library, Path::new("")).unwrap();
+        let xml = fmu_import::describe(&library, Path::new("")).unwrap();
         let own = ModelDescription::parse(xml.as_bytes()).unwrap();
         let mut subjects = vec![Subject::new(&host, &library, &own, &own)];
         for fmu in references.iter().filter(|fmu| fmu.description.model_name == own.model_name) {

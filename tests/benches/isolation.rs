@@ -12,13 +12,14 @@ mod linux {
 
     use fmu_description::Experiment;
     use fmu_description::{Causality, Kind, ModelDescription};
-    use master::assembly::{Link, Terminal};
-    use master::isolate::{self, Isolated, Options};
-    use master::transformation::Transformation;
+    use fmu_import::Fmu;
+    use fmu_import::isolate::{self, Isolated, Options};
+    use master::Transformation;
     use master::{
-        Advance, Algorithm, Background as _, CallError, Course, Fmu, Simulation, Slave, Stepped,
-        Sweep, System,
+        Advance, Algorithm, Background as _, CallError, Course, Simulation, Slave, Stepped, Sweep,
+        System,
     };
+    use ssp::{Link, Terminal};
     use tests::{dist, troubles};
 
     /// Steps of one sample, and samples.
@@ -143,7 +144,8 @@ mod linux {
             let (from, to) = (end(position, output), end((position + 1) % count, input));
             // A position goes to a force: only the calls matter.
             let transformation = Transformation::Identity;
-            system.link(&Link { from, to, transformation, units_settled: true }).unwrap();
+            study::link(&mut system, &Link { from, to, transformation, units_settled: true })
+                .unwrap();
         }
         let algorithm = Algorithm::fixed(Sweep::Jacobi, Course::Hold, SIZE);
         let mut simulation = Simulation::new(system, &algorithm, &Experiment::default()).unwrap();
@@ -215,9 +217,10 @@ mod linux {
 fn main() {
     #[cfg(target_os = "linux")]
     {
-        let worker = std::env::args().nth(1).is_some_and(|first| first == master::isolate::WORKER);
+        let worker =
+            std::env::args().nth(1).is_some_and(|first| first == fmu_import::isolate::WORKER);
         if worker {
-            master::isolate::worker().unwrap();
+            fmu_import::isolate::worker().unwrap();
         } else {
             linux::main();
         }

@@ -23,8 +23,8 @@ def test_the_packed_system_structure_follows_the_schema(package):
 
 @pytest.mark.parametrize("name", SAMPLES)
 def test_files_with_everything_that_can_be_written_follow_the_schemas(root, name):
-    """crates/master/tests/ssp/writing.rs holds these files and what is written together."""
-    path = root / "crates" / "master" / "tests" / "ssp" / "data" / name
+    """crates/ssp/tests/ssp/writing.rs holds these files and what is written together."""
+    path = root / "crates" / "ssp" / "tests" / "ssp" / "data" / name
     assert problems(path.read_bytes(), path.suffix) == []
 
 

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use fmu_description::Experiment;
+use fmu_import::isolate::{self, Isolated, Options};
 use master::Slave as _;
-use master::isolate::{self, Isolated, Options};
 
 use crate::{command, troubles};
 

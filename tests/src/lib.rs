@@ -17,7 +17,8 @@ use std::process::{Command, Output};
 use std::sync::OnceLock;
 
 use fmu_description::Experiment;
-use master::{Algorithm, Fmu, Probe, Simulation, System};
+use fmu_import::Fmu;
+use master::{Algorithm, Probe, Simulation, System};
 
 /// The folder of the workspace.
 #[must_use]

@@ -123,7 +123,8 @@ fn another_table_gives_the_same_library_other_variables() {
     let library = fmu.library("LookupTable").unwrap();
     let names = |table: &str| {
         fs::write(folder.path().join("table.csv"), table).unwrap();
-        let xml = master::describe(&library, folder.path()).map_err(|error| error.to_string())?;
+        let xml =
+            fmu_import::describe(&library, folder.path()).map_err(|error| error.to_string())?;
         let description = ModelDescription::parse(xml.as_bytes()).unwrap();
         let names = description.variables.iter().skip(1).map(|variable| variable.name.clone());
         Ok(names.collect::<Vec<_>>())

@@ -10,10 +10,9 @@ use std::process::Command;
 use fmu_description::Causality;
 use fmu_description::Experiment;
 use fmu_description::package::{Package, platforms};
+use fmu_import::{Fmu, FmuError, LoadError};
 use master::fmi_crate::{FmiCrateError, FmiSlave};
-use master::{
-    Algorithm, Course, Failure, Fmu, FmuError, LoadError, Probe, Simulation, Slave, Sweep, System,
-};
+use master::{Algorithm, Course, Failure, Probe, Simulation, Slave, Sweep, System};
 
 const PENDULUM: &str = "FrictionPendulum.fmu";
 

@@ -19,7 +19,8 @@ use fmi_rs::sim::fmi2::{
 };
 use fmu_description::Experiment;
 use fmu_description::{Causality, Initial};
-use master::{Algorithm, Course, Fmu, Simulation, Slave, Sweep, System};
+use fmu_import::Fmu;
+use master::{Algorithm, Course, Simulation, Slave, Sweep, System};
 
 const FILES: [&str; 2] = ["FrictionPendulum.fmu", "AsoController.fmu"];
 const STEP: f64 = 1e-3;

@@ -8,8 +8,9 @@ use std::time::{Duration, Instant};
 use fmu_description::Experiment;
 use fmu_description::abi::Status;
 use fmu_description::{Causality, Kind, ModelDescription};
-use master::isolate::{self, IsolateError, Isolated, Options};
-use master::{Advance, CallError, Failure, Fmu, Slave, Stepped};
+use fmu_import::Fmu;
+use fmu_import::isolate::{self, IsolateError, Isolated, Options};
+use master::{Advance, CallError, Failure, Slave, Stepped};
 use tests::isolated::{limited, options, ready};
 use tests::{Trouble, dist, troubles};
 
@@ -344,7 +345,10 @@ fn what_cannot_be_isolated_is_refused_by_name() {
     let IsolateError::NoWorker { failure: Failure::Exited(0), .. } = error else {
         panic!("{text}");
     };
-    assert!(text.contains("master::isolate::worker()") && text.contains("--fmu-worker"), "{text}");
+    assert!(
+        text.contains("fmu_import::isolate::worker()") && text.contains("--fmu-worker"),
+        "{text}"
+    );
     let preload = Options { preload: vec!["libno-such.so".into()], ..options() };
     let error = isolate::open(troubles(), "one", &preload).err().unwrap().to_string();
     assert!(error.contains("libno-such.so"), "{error}");

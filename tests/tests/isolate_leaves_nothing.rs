@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use master::isolate::{self, Isolated, Options};
+use fmu_import::isolate::{self, Isolated, Options};
 use master::{Failure, Slave as _};
 use tests::{Trouble, command, troubles};
 
@@ -187,7 +187,7 @@ fn a_program_that_is_no_worker_starts_itself_once_and_says_what_it_lacks() {
     let done = again(name, &script.display().to_string()).output().unwrap();
     let said = String::from_utf8_lossy(&done.stdout) + String::from_utf8_lossy(&done.stderr);
     assert!(said.contains("did not become a worker"), "{said}");
-    assert!(said.contains("master::isolate::worker()"), "{said}");
+    assert!(said.contains("fmu_import::isolate::worker()"), "{said}");
     assert_eq!(std::fs::read_to_string(&log).unwrap(), "start\n", "{said}");
 }
 

@@ -7,8 +7,9 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use fmu_description::package::{Package, Unpacked};
-use master::linearise::{Disagreement, Method};
-use master::{Fmu, Interface, Linearisation, Linearise, LineariseError, linearise};
+use fmu_import::{Fmu, Interface};
+use linearise::{Disagreement, Method};
+use linearise::{Linearisation, Linearise, LineariseError, linearise};
 use nalgebra::DMatrix;
 use tests::{dist, root, run};
 

@@ -6,10 +6,10 @@ use std::path::PathBuf;
 
 use fmu_description::Experiment;
 use fmu_description::abi::Status;
-use master::linearise::{Differences, Method};
-use master::{
-    CallError, Failure, Fmu, FmuError, Instance, Linearise, LoadError, Slave, Stepped, linearise,
-};
+use fmu_import::{Fmu, FmuError, Instance, LoadError};
+use linearise::{Differences, Method};
+use linearise::{Linearise, linearise};
+use master::{CallError, Failure, Slave, Stepped};
 use tempfile::TempDir;
 use tests::c_fmu::CFmu;
 

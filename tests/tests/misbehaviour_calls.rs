@@ -6,7 +6,8 @@ use std::time::Duration;
 
 use fmu_description::Experiment;
 use fmu_description::abi::Status;
-use master::{CallError, Failure, Fmu, Instance, Slave, Stepped};
+use fmu_import::{Fmu, Instance};
+use master::{CallError, Failure, Slave, Stepped};
 use tests::c_fmu::CFmu;
 
 const PART: Stepped = Stepped::Part { reached: 0.5, terminated: false };

@@ -50,19 +50,59 @@ fn the_mathematics_depends_on_neither_fmi_nor_files() {
     }
 }
 
+/// The folders of our libraries, each with those that it may use.
+const ARROWS: [(&str, &[&str]); 11] = [
+    ("lapack", &[]),
+    ("control", &["lapack"]),
+    ("fmu-description", &[]),
+    ("fmu", &["fmu-description"]),
+    ("slave", &["fmu-description"]),
+    ("fmu-import", &["fmu-description", "slave"]),
+    ("linearise", &["fmu-description", "fmu-import", "slave"]),
+    ("ssp", &["fmu-description", "slave"]),
+    ("results", &[]),
+    ("master", &["fmu-description", "slave"]),
+    ("study", &["fmu-description", "fmu-import", "master", "results", "slave", "ssp"]),
+];
+
+fn manifest(folder: &Path) -> toml::Table {
+    fs::read_to_string(folder.join("Cargo.toml")).unwrap().parse().unwrap()
+}
+
 #[test]
-fn nothing_uses_the_models_and_nothing_uses_the_command() {
-    for member in
-        ["crates/control", "crates/lapack", "crates/fmi2", "crates/master", "cli", "tests"]
-    {
-        let manifest: toml::Table =
-            fs::read_to_string(root().join(member).join("Cargo.toml")).unwrap().parse().unwrap();
+fn the_libraries_use_each_other_along_the_arrows_only() {
+    let mut folders: Vec<String> = fs::read_dir(root().join("crates"))
+        .unwrap()
+        .map(|item| item.unwrap().file_name().into_string().unwrap())
+        .collect();
+    folders.sort();
+    let mut known: Vec<&str> = ARROWS.iter().map(|(folder, _)| *folder).collect();
+    known.sort_unstable();
+    assert_eq!(folders, known);
+    for (folder, allowed) in ARROWS {
+        let manifest = manifest(&root().join("crates").join(folder));
+        let dependencies = manifest["dependencies"].as_table().unwrap().keys();
+        for ours in dependencies.filter(|name| known.contains(&name.as_str())) {
+            assert!(allowed.contains(&ours.as_str()), "crates/{folder} uses {ours}");
+        }
+    }
+}
+
+#[test]
+fn nothing_but_the_tests_uses_a_model_or_the_command() {
+    let folders = ARROWS.iter().map(|(folder, _)| root().join("crates").join(folder));
+    for folder in folders.chain([root().join("cli"), root().join("tests")]) {
+        let manifest = manifest(&folder);
         for section in ["dependencies", "dev-dependencies", "build-dependencies"] {
             let Some(dependencies) = manifest.get(section).and_then(toml::Value::as_table) else {
                 continue;
             };
             for forbidden in ["fmu-plant", "fmu-controller", "aso-ftc"] {
-                assert!(!dependencies.contains_key(forbidden), "{member} uses {forbidden}");
+                assert!(
+                    !dependencies.contains_key(forbidden),
+                    "{} uses {forbidden}",
+                    name(&folder)
+                );
             }
         }
     }
@@ -74,13 +114,13 @@ fn unsafe_code_stands_at_the_boundaries_only() {
         "crates/fmu/src/ffi.rs",
         "crates/fmu/src/ffi/entry.rs",
         "crates/fmu/src/ffi/exports.rs",
-        "crates/master/src/library.rs",
+        "crates/fmu-import/src/library.rs",
         // Signal handlers, and what they read.
-        "crates/master/src/crash/place.rs",
-        "crates/master/src/crash/signals.rs",
-        "crates/master/src/isolate/memory.rs",
+        "crates/fmu-import/src/crash/place.rs",
+        "crates/fmu-import/src/crash/signals.rs",
+        "crates/fmu-import/src/isolate/memory.rs",
         // A mapping of shared memory becomes a slice of atomics.
-        "crates/master/src/isolate/region.rs",
+        "crates/fmu-import/src/isolate/region.rs",
         // The C side of BLAS and LAPACK, and its tests.
         "crates/lapack/src/memory.rs",
         "crates/lapack/src/products.rs",
@@ -90,12 +130,12 @@ fn unsafe_code_stands_at_the_boundaries_only() {
         "crates/lapack/tests/definitions/singular.rs",
         "crates/lapack/tests/definitions/solvers.rs",
         "crates/lapack/tests/definitions/spectrum.rs",
-        "crates/master/src/library/calls.rs",
-        "crates/master/src/library/foreign.rs",
-        "crates/master/src/library/functions.rs",
-        "crates/master/src/library/log.rs",
-        "crates/master/src/library/states.rs",
-        "crates/master/src/library/step.rs",
+        "crates/fmu-import/src/library/calls.rs",
+        "crates/fmu-import/src/library/foreign.rs",
+        "crates/fmu-import/src/library/functions.rs",
+        "crates/fmu-import/src/library/log.rs",
+        "crates/fmu-import/src/library/states.rs",
+        "crates/fmu-import/src/library/step.rs",
         // Importers of their own, to call the C functions as no safe one would.
         "crates/fmu/tests/robustness/importer.rs",
         "crates/fmu/tests/robustness/uninitialised.rs",

@@ -1,7 +1,8 @@
 //! The plant as a linear system with faults, out of the plant file's matrices or its FMU.
 
 use control::faults::{Entry, Fault as Model, FaultKind};
-use master::{Fmu, Linearisation, Linearise, LineariseError, linearise};
+use fmu_import::Fmu;
+use linearise::{Linearisation, Linearise, LineariseError, linearise};
 use nalgebra::{DMatrix, DVector};
 
 use super::plant_file::{self, PlantFile};
@@ -85,12 +86,12 @@ fn on_signals(fault: &Fault, b: &DMatrix<f64>, p: usize) -> Model {
 /// The FMU of the file as a linear plant.
 fn linearised(file: &PlantFile<'_>, own: &plant_file::PlantFmu) -> anyhow::Result<LinearPlant> {
     let (model, found) = linearisation(file, own)?;
-    let known = |signal: &master::linearise::Signal| Signal {
+    let known = |signal: &linearise::Signal| Signal {
         unit: signal.unit.clone(),
         operating: Some(signal.value),
         ..Signal::named(signal.name.clone())
     };
-    let merged = |own: &[Signal], found: &[master::linearise::Signal]| {
+    let merged = |own: &[Signal], found: &[linearise::Signal]| {
         own.iter().zip(found).map(|(own, found)| own.clone().or(known(found))).collect()
     };
     refuse_feedthrough(file, &found.matrices.d, &found.matrices.c)?;
@@ -210,7 +211,7 @@ fn refuse_feedthrough(
 fn entry(
     file: &PlantFile<'_>,
     fault: &Fault,
-    found: &master::linearise::Matrices,
+    found: &linearise::Matrices,
     at: usize,
 ) -> anyhow::Result<Entry> {
     let (states, measurements) = (column(&found.f, at), column(&found.g, at));

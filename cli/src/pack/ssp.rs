@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use master::assembly::{Assembly, Element, Link, Terminal};
-use master::ssp;
-use master::transformation::Transformation;
+use master::Transformation;
+
+use ssp::{Assembly, Element, Link, Terminal};
 
 use super::Packed;
 

@@ -1,7 +1,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use master::results::{Row, create};
+use results::{Row, create};
 use resvg::tiny_skia::Pixmap;
 use resvg::usvg::roxmltree::Document;
 

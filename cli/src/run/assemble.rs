@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, anyhow, bail};
-use master::assembly::{Element, Link, Terminal};
-use master::ssp::structure::DefaultExperiment;
-use master::ssp::{self, Folders, Opened};
-use master::transformation::Transformation;
-use master::{CallError, CallLog, Failure, Fmu, Instance, Slave, System, isolate};
+use fmu_import::{CallLog, Fmu, Instance, isolate};
+use master::Transformation;
+use master::{CallError, Failure, Slave, System};
+use ssp::structure::DefaultExperiment;
+use ssp::{self, Folders, Opened};
+use ssp::{Element, Link, Terminal};
 
 use crate::config::{Config, Loaded, Wire};
 use crate::logging;
@@ -43,7 +44,7 @@ pub(crate) fn assemble(loaded: &Loaded, making: &Making<'_>) -> anyhow::Result<A
     let config = &loaded.config;
     if config.isolation.isolate != Some(true) {
         for library in &config.preload {
-            master::preload(library.as_ref())?;
+            fmu_import::preload(library.as_ref())?;
         }
     }
     let opened = config.system.as_deref().map(open).transpose()?;
@@ -67,8 +68,7 @@ pub(crate) fn assemble(loaded: &Loaded, making: &Making<'_>) -> anyhow::Result<A
     connect(&mut system, loaded, &assembly.links, making.by_unit)?;
     for element in &assembly.elements {
         for setting in &element.settings {
-            let (element, variable) = (element.name.clone(), setting.variable.clone());
-            let port = system.terminal(&Terminal { element, variable })?;
+            let port = system.terminal(&element.name, &setting.variable)?;
             system.set_port(port, &setting.value)?;
         }
     }
@@ -240,10 +240,10 @@ fn connect(
         ));
     }
     for link in links.iter().filter(|link| !taken.contains(&link.to)) {
-        system.link(link)?;
+        study::link(system, link)?;
     }
     for (place, link) in &own {
-        system.link(link).map_err(|error| loaded.point(place, error))?;
+        study::link(system, link).map_err(|error| loaded.point(place, error))?;
     }
     let alone = config.connections.is_none() && config.system.is_none();
     if alone && system.slaves.len() > 1 { connect_unstated(system, by_unit) } else { Ok(()) }

@@ -6,7 +6,7 @@ use std::thread;
 use std::time::Duration;
 
 use anyhow::Context;
-use master::crash;
+use fmu_import::crash;
 
 /// Exit status of a run that was interrupted.
 pub(crate) const STATUS: u8 = 130;

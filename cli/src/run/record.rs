@@ -8,10 +8,8 @@ use std::time::Duration;
 
 use anyhow::Context;
 use fmu_description::{Causality, Kind};
-use master::results::{
-    self, Column, ColumnKind, Decimation, Due, ResultsError, Row, Selection, Sink,
-};
 use master::{Port, Readout, Simulation, SlowState, SlowValues, System};
+use results::{self, Column, ColumnKind, Decimation, Due, ResultsError, Row, Selection, Sink};
 
 use crate::config::Every;
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::anyhow;
-use master::scenario::Prepared as Scenario;
+use master::Scenario;
 use master::{Checkpoint, Simulation, System, SystemError};
 
 use super::plan::Plan;

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use master::results::Due;
 use master::{Checkpoint, SlowState};
+use results::Due;
 use serde::{Deserialize, Serialize};
 
 use crate::config::{self, Config, Every};

@@ -20,6 +20,7 @@ mod experiment;
 pub mod location;
 #[cfg(feature = "package")]
 pub mod package;
+pub mod similar;
 pub mod unit;
 pub mod xml;
 

@@ -1,6 +1,6 @@
 //! What a communication step costs: through `Simulation`, and by the same calls without it.
 //!
-//!     cargo bench --package master --bench step
+//!     cargo bench --package cosim-master --bench step
 //!
 //! The FMUs are those of `tests/speed`: a pair, 20 and 1000 in a ring. Beside each simulation stand
 //! the calls that it makes, on the same instances' interface, with plain copying of connected values
@@ -12,8 +12,9 @@ use std::path::Path;
 use anyhow::Context;
 use criterion::{BenchmarkId, Criterion};
 use fmu_description::Experiment;
+use fmu_import::Fmu;
 use master::algorithm::{Algorithm, Course, Sweep};
-use master::{Fmu, Simulation, Slave, System};
+use master::{Simulation, Slave, System};
 
 #[path = "../../../tests/speed/lag.rs"]
 mod lag;

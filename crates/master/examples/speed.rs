@@ -26,9 +26,10 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 use fmu_description::Causality;
 use fmu_description::Experiment;
+use fmu_import::Fmu;
 use master::algorithm::{Algorithm, Course, Sweep};
-use master::results::{Column, ColumnKind, create};
-use master::{Fmu, Readout, Simulation, System};
+use master::{Readout, Simulation, System};
+use results::{Column, ColumnKind, Row, create};
 use rustix::time::{ClockId, clock_gettime};
 
 #[path = "../../../tests/speed/lag.rs"]
@@ -87,7 +88,9 @@ fn run(path: &Path, step: f64, steps: u64, results: Option<&Path>) -> anyhow::Re
         if let Some(sink) = &mut sink {
             let time = simulation.time();
             readout.read(simulation.system(), time)?;
-            sink.row(time, &readout.row())?;
+            let Readout { reals, integers, booleans, strings, .. } = &readout;
+            let row = Row { reals, integers, booleans, strings };
+            sink.row(time, &row)?;
         }
     }
     if let Some(sink) = sink {

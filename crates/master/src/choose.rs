@@ -5,9 +5,9 @@ use serde::{Deserialize, Serialize};
 use crate::algorithm::{Algorithm, Coupling, Course, EventSource, PowerBond, StepControl, Sweep};
 use crate::error::SystemError;
 use crate::order::by_direct_dependencies;
-use crate::slave::Slave;
 use crate::system::System;
 use fmu_description::CoSimulation;
+use slave::Slave;
 
 /// Communication step in s where neither the user nor an FMU states one, for runs of up to
 /// [`STEPS`] steps.

@@ -19,11 +19,11 @@ use crate::algorithm::Algorithm;
 use crate::error::SystemError;
 use crate::fault::FaultLine;
 use crate::simulation::Task;
-use crate::slave::{CallError, Slave, Stepped};
 use crate::system::{Port, System};
 use discrete::{BOOLEANS, Channel, INTEGERS, STRINGS};
 pub(crate) use layout::Refusal;
 pub(crate) use reals::{Reals, Trace};
+use slave::{CallError, Slave, Stepped};
 
 /// The connections of a system, ready to be carried out.
 pub(crate) struct Exchange {

@@ -8,6 +8,8 @@ pub use draw::{Draw, Spread};
 
 use serde::{Deserialize, Serialize};
 
+use slave::Value;
+
 use crate::signal::{Sample, reached};
 use stage::Stage;
 
@@ -180,6 +182,18 @@ impl FaultLine {
     #[must_use]
     pub fn apply_boolean(&self, time: f64, value: i32) -> i32 {
         i32::from(self.apply(time, f64::from(i32::from(value != 0))) != 0.0)
+    }
+
+    /// Changes a value of any type as it is at `time` in s; a String stays.
+    pub(crate) fn disturb(&self, time: f64, value: &mut Value) {
+        match value {
+            Value::Real(value) => *value = self.apply(time, *value),
+            Value::Integer(value) => *value = self.apply_integer(time, *value),
+            Value::Boolean(value) => {
+                *value = self.apply_boolean(time, i32::from(*value)) != 0;
+            }
+            Value::String(_) => {}
+        }
     }
 
     /// Takes note of the undisturbed `value` at the communication point `time`, in s, that the

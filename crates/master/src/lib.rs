@@ -1,50 +1,34 @@
-//! Couples co-simulation FMUs: loads them, connects their variables, advances them together.
+//! Couples slaves: connects their variables and advances them together.
 //!
-//! [`Fmu::open`] and [`Fmu::instantiate`] give a [`Slave`]; a [`System`] holds slaves and
-//! connections; a [`Simulation`] initialises and steps it; a [`Probe`] reads what is of interest.
-//! [`linearise()`] gives the matrices of an FMU about an operating point.
-#![deny(unsafe_code)]
+//! A [`System`] holds slaves and connections; a [`Simulation`] initialises and steps it by an
+//! [`Algorithm`]; a [`Probe`] or a [`Readout`] reads what is of interest. [`drive`] makes variables
+//! follow signals, [`fault`] disturbs connections.
+//!
+//! The crate reads no files and loads no libraries: `fmu-import` turns FMUs into slaves, `study` runs
+//! what a file asks for.
+#![forbid(unsafe_code)]
 
 pub mod algorithm;
-pub mod assembly;
-mod call_log;
 mod choose;
-pub mod crash;
+pub mod drive;
 mod error;
 mod exchange;
 pub mod fault;
-#[cfg(feature = "fmi")]
-pub mod fmi_crate;
-mod fmu;
-pub mod function;
-pub mod isolate;
-mod library;
-pub mod linearise;
-mod nearest;
 mod order;
 mod probe;
 mod readout;
-pub mod results;
-pub mod scenario;
 pub mod signal;
 mod simulation;
-mod slave;
 pub mod solve;
-pub mod ssp;
 mod system;
-pub mod transformation;
-mod value;
 
 pub use algorithm::{Algorithm, Coupling, Course, StepControl, Sweep};
-pub use call_log::{CallLog, LoggedSlave};
 pub use choose::{Chosen, Wanted, choose};
-pub use error::{LoadError, SystemError};
-pub use fmu::{Fmu, FmuError, Instance};
-pub use library::{Interface, describe, preload};
-pub use linearise::{Linearisation, Linearise, LineariseError, linearise};
+pub use drive::Scenario;
+pub use error::SystemError;
 pub use order::{Order, by_direct_dependencies};
 pub use probe::Probe;
 pub use readout::{Readout, SlowState, SlowValues};
 pub use simulation::{Checkpoint, EarlyEnd, Fallbacks, Simulation};
-pub use slave::{Advance, Background, CallError, Failure, Slave, Stepped};
+pub use slave::{Advance, Background, CallError, Failure, Slave, Stepped, Transformation};
 pub use system::{Connection, Port, System};

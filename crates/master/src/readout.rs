@@ -6,12 +6,11 @@ use std::ops::Range;
 
 use fmu_description::Kind;
 
+use crate::drive::{DriveKind, Drives, integer};
 use crate::error::SystemError;
 use crate::exchange::call;
-use crate::results::Row;
-use crate::scenario::{DriveKind, Drives, integer};
-use crate::slave::{CallError, Slave};
 use crate::system::{Port, System};
+use slave::{CallError, Slave};
 pub use slow::{SlowState, SlowValues};
 
 /// Values of chosen variables, in arrays by type: each in the order of the variables of that type.
@@ -129,17 +128,6 @@ impl Readout {
             ReadKind::String => self.strings.len(),
         };
         length - 1
-    }
-
-    /// The values as a row of results.
-    #[must_use]
-    pub fn row(&self) -> Row<'_> {
-        Row {
-            reals: &self.reals,
-            integers: &self.integers,
-            booleans: &self.booleans,
-            strings: &self.strings,
-        }
     }
 
     /// Reads all values.

@@ -1,6 +1,5 @@
 //! Signals over time, for what no output is connected to.
 
-pub mod table;
 mod track;
 
 pub use track::{Between, Track, TrackError};

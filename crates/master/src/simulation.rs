@@ -15,12 +15,11 @@ mod together;
 use fmu_description::Experiment;
 
 use crate::algorithm::{Algorithm, Course, StepControl};
+use crate::drive::{Drives, Scenario};
 use crate::error::SystemError;
 use crate::exchange::{Exchange, call};
 use crate::order::{Order, by_direct_dependencies};
 use crate::readout::Readout;
-use crate::scenario::{Drives, Prepared};
-use crate::slave::{CallError, Failure};
 use crate::system::{Port, System};
 use adaptive::Repetition;
 use control::Control;
@@ -28,6 +27,7 @@ use events::Events;
 use grid::{Grid, size_between};
 use iterate::Coupled;
 use parallel::Parallel;
+use slave::{CallError, Failure};
 use sweep::{Groups, Swept};
 use together::any_in_background;
 
@@ -78,7 +78,7 @@ impl Simulation {
         algorithm: &Algorithm,
         experiment: &Experiment,
     ) -> Result<Self, SystemError> {
-        Self::with_scenario(system, algorithm, experiment, Prepared::default())
+        Self::with_scenario(system, algorithm, experiment, Scenario::default())
     }
 
     /// As [`Simulation::new`], with variables that follow signals and faults on connections.
@@ -90,7 +90,7 @@ impl Simulation {
         system: System,
         algorithm: &Algorithm,
         experiment: &Experiment,
-        scenario: Prepared,
+        scenario: Scenario,
     ) -> Result<Self, SystemError> {
         Self::begin(system, algorithm, experiment, experiment.stop_time, scenario)
     }
@@ -102,7 +102,7 @@ impl Simulation {
         algorithm: &Algorithm,
         experiment: &Experiment,
         stop: Option<f64>,
-        mut scenario: Prepared,
+        mut scenario: Scenario,
     ) -> Result<Self, SystemError> {
         algorithm.check(&system)?;
         let multiples = grid::multiples(&system, algorithm)?;

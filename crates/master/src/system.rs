@@ -9,12 +9,11 @@ use std::collections::HashMap;
 
 use fmu_description::{Causality, ModelDescription, ScalarVariable};
 
-use crate::assembly::{Link, Terminal};
 use crate::error::SystemError;
-use crate::nearest::nearest;
-use crate::slave::Slave;
-use crate::transformation::Transformation;
-use crate::value::Value;
+use fmu_description::similar::nearest;
+use slave::Slave;
+use slave::Transformation;
+use slave::Value;
 
 /// One end of a connection: slave by position, variable by position in its description.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -109,19 +108,19 @@ impl System {
         Err(self.unknown_slave(name, slave))
     }
 
-    /// The port at the end of a link.
+    /// The port of the variable `variable` of the slave `slave`.
     ///
     /// # Errors
     ///
     /// Where slave or variable do not exist.
-    pub fn terminal(&self, terminal: &Terminal) -> Result<Port, SystemError> {
-        let name = terminal.to_string();
-        let Some(&slave) = self.names.get(&terminal.element) else {
-            return Err(self.unknown_slave(&name, &terminal.element));
+    pub fn terminal(&self, slave: &str, variable: &str) -> Result<Port, SystemError> {
+        let name = format!("{slave}.{variable}");
+        let Some(&position) = self.names.get(slave) else {
+            return Err(self.unknown_slave(&name, slave));
         };
-        match self.variables[slave].get(&terminal.variable) {
-            Some(&variable) => Ok(Port { slave, variable }),
-            None => Err(unknown(&name, &terminal.variable, self.slaves[slave].1.description())),
+        match self.variables[position].get(variable) {
+            Some(&variable) => Ok(Port { slave: position, variable }),
+            None => Err(unknown(&name, variable, self.slaves[position].1.description())),
         }
     }
 
@@ -150,17 +149,7 @@ impl System {
     /// Where one does not exist, causality, type or unit do not fit, or the input has a source.
     pub fn connect(&mut self, from: &str, to: &str) -> Result<(), SystemError> {
         let (from, to) = (self.port(from)?, self.port(to)?);
-        self.join(from, to, Transformation::Identity, false)
-    }
-
-    /// Makes the connection that `link` describes.
-    ///
-    /// # Errors
-    ///
-    /// As [`System::connect`], and where the transformation does not fit the types.
-    pub fn link(&mut self, link: &Link) -> Result<(), SystemError> {
-        let (from, to) = (self.terminal(&link.from)?, self.terminal(&link.to)?);
-        self.join(from, to, link.transformation.clone(), link.units_settled)
+        self.connect_ports(from, to, Transformation::Identity, false)
     }
 
     /// Connects each output to the inputs of other slaves that have its name and no source yet;
@@ -179,7 +168,7 @@ impl System {
             let Some(same) = inputs.get(&self.variable(from).name) else { continue };
             for &to in same {
                 if from.slave != to.slave && !self.sources.contains_key(&to) {
-                    self.join(from, to, Transformation::Identity, false)?;
+                    self.connect_ports(from, to, Transformation::Identity, false)?;
                 }
             }
         }
@@ -205,7 +194,7 @@ impl System {
             }
             let from = sources.iter().position(|other| other == unit).map(|at| outputs[at]);
             if let Some(from) = from.filter(|from| from.slave != to.slave) {
-                self.join(from, to, Transformation::Identity, false)?;
+                self.connect_ports(from, to, Transformation::Identity, false)?;
             }
         }
         Ok(self.connections[before..].to_vec())

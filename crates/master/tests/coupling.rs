@@ -4,11 +4,11 @@
 use fmu_description::Experiment;
 use fmu_description::ModelDescription;
 use fmu_description::abi::Status;
-use master::function::Function;
 use master::{
     Algorithm, CallError, Course, Failure, Simulation, Slave, Stepped, Sweep, System,
     by_direct_dependencies,
 };
+use ssp::Function;
 
 const JACOBI: (Sweep, Course) = (Sweep::Jacobi, Course::Hold);
 const GAUSS_SEIDEL: (Sweep, Course) = (Sweep::GaussSeidel, Course::Limited);

@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use master::scenario::{Scenario, Setup};
 use master::{Algorithm, Simulation, StepControl};
+use study::scenario::{Scenario, Setup};
 use tests::linear::ABLE;
 use tests::problems;
 
@@ -31,7 +31,7 @@ fn chosen_steps_end_where_a_fault_on_a_connection_begins_and_ends() {
         let algorithm = Algorithm { control, relative_tolerance: 1e-2, ..Algorithm::new(0.01) };
         let file: File = toml::from_str(FAULT).unwrap();
         let setup = Setup { folder: Path::new("."), start: 0.0, step: 0.01 };
-        let scenario = file.scenario.resolve(&system, &setup).unwrap();
+        let scenario = file.scenario.resolve(&system, &setup).unwrap().scenario;
         let mut simulation =
             Simulation::with_scenario(system, &algorithm, &until(1.0), scenario).unwrap();
         let mut times = Vec::new();

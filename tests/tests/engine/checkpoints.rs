@@ -4,8 +4,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use master::algorithm::PowerBond;
-use master::scenario::{Prepared, Scenario, Setup};
 use master::{Algorithm, Checkpoint, Coupling, Course, Simulation, StepControl, Sweep, System};
+use study::scenario::{Scenario, Setup};
 use tests::linear::{ABLE, Abilities};
 use tests::network::Network;
 use tests::problems;
@@ -26,13 +26,13 @@ struct File {
     scenario: Scenario,
 }
 
-fn prepared(text: &str, system: &System) -> Prepared {
+fn prepared(text: &str, system: &System) -> master::Scenario {
     if text.is_empty() {
-        return Prepared::default();
+        return master::Scenario::default();
     }
     let file: File = toml::from_str(text).unwrap();
     let setup = Setup { folder: Path::new("."), start: 0.0, step: 0.01 };
-    file.scenario.resolve(system, &setup).unwrap()
+    file.scenario.resolve(system, &setup).unwrap().scenario
 }
 
 /// Times and outputs of `steps` steps, as bits.
@@ -115,7 +115,7 @@ fn a_checkpoint_of_another_step_or_algorithm_is_refused_by_name() {
     one.step().unwrap();
     let checkpoint = one.checkpoint().unwrap();
     let resume = |algorithm: &Algorithm, experiment: &fmu_description::Experiment| {
-        let none = Prepared::default();
+        let none = master::Scenario::default();
         let resumed = Simulation::resume(system(), algorithm, experiment, none, &checkpoint);
         resumed.err().map(|error| error.to_string())
     };
@@ -152,8 +152,13 @@ fn a_run_that_was_ended_by_a_slave_stays_ended() {
     }
     let checkpoint = run.checkpoint().unwrap();
     let (system, _) = crate::puppet::system([f64::sin; 2], crate::parts::ends);
-    let resumed =
-        Simulation::resume(system, &algorithm, &until(1.0), Prepared::default(), &checkpoint);
+    let resumed = Simulation::resume(
+        system,
+        &algorithm,
+        &until(1.0),
+        master::Scenario::default(),
+        &checkpoint,
+    );
     let resumed = resumed.unwrap();
     assert!(resumed.is_finished());
     assert_eq!(resumed.ended_by(), Some("p"));

@@ -1,7 +1,6 @@
 //! The last step of a run: an FMU may refuse what is an ulp beyond its stop time.
 
 use master::algorithm::EventSource;
-use master::scenario::Prepared;
 use master::{Algorithm, Coupling, Course, Simulation, StepControl, Sweep, System};
 
 use crate::puppet::{Asked, rigid, system, whole};
@@ -69,7 +68,7 @@ fn no_step_ends_an_ulp_beyond_the_stop_time_of_a_run_that_was_resumed() {
             }
             let checkpoint = first.checkpoint().unwrap();
             let (system, asked) = new();
-            let none = Prepared::default();
+            let none = master::Scenario::default();
             let resumed = Simulation::resume(system, &algorithm, &until(stop), none, &checkpoint);
             let mut simulation = resumed.unwrap();
             while !simulation.is_finished() {

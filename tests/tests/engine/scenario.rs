@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use master::scenario::{Scenario, Setup};
 use master::{Algorithm, Course, Simulation, StepControl, Sweep, System};
+use study::scenario::{Scenario, Setup};
 use tests::linear::{ABLE, Block};
 use tests::network::Network;
 
@@ -26,7 +26,7 @@ fn simulate(text: &str, algorithm: &Algorithm) -> Simulation {
     let system: System = network().system(ABLE, &Arc::default());
     let file: File = toml::from_str(text).unwrap();
     let setup = Setup { folder: Path::new("."), start: 0.0, step: algorithm.step };
-    let prepared = file.scenario.resolve(&system, &setup).unwrap();
+    let prepared = file.scenario.resolve(&system, &setup).unwrap().scenario;
     Simulation::with_scenario(system, algorithm, &until(2.0), prepared).unwrap()
 }
 

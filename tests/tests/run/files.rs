@@ -1,6 +1,6 @@
 //! What is recorded and drawn, and where it goes.
 
-use master::results::Table as Results;
+use results::Table as Results;
 use tests::Table;
 use tests::c_fmu::CFmu;
 

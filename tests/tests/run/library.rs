@@ -1,8 +1,8 @@
 //! What is written is what the library computes.
 
-use master::assembly::{Link, Terminal};
-use master::transformation::Transformation;
+use master::Transformation;
 use master::{Algorithm, Coupling, Course, Probe, Simulation, StepControl, Sweep, System};
+use ssp::{Link, Terminal};
 use tests::{Table, closed_loop, simulation};
 
 use super::*;
@@ -121,7 +121,7 @@ fn a_connection_of_the_file_has_its_factor_and_offset() {
         transformation: Transformation::Linear { factor: -0.5, offset: 0.25 },
         units_settled: true,
     };
-    system.link(&link).unwrap();
+    study::link(&mut system, &link).unwrap();
     let written = written(&bench.path("out/results.csv"));
     assert_eq!(written, computed(system, &Algorithm::new(0.001), 0.4));
     assert!(written.last().unwrap()[4] != 0.0, "the estimate is at work");
@@ -159,12 +159,12 @@ fn an_ssp_gives_the_same_bytes_as_its_fmus_named_one_by_one() {
         let (from, to) = (terminal(connection.from), terminal(connection.to));
         Link { from, to, transformation: Transformation::Identity, units_settled: false }
     });
-    let element = |name: &str, file: &str| master::assembly::Element {
+    let element = |name: &str, file: &str| ssp::Element {
         name: name.to_owned(),
         fmu: fmu(file).into(),
         ..Default::default()
     };
-    let assembly = master::assembly::Assembly {
+    let assembly = ssp::Assembly {
         name: Some("pendulum".to_owned()),
         elements: vec![
             element("plant", "FrictionPendulum"),
@@ -175,7 +175,7 @@ fn an_ssp_gives_the_same_bytes_as_its_fmus_named_one_by_one() {
         start_time: Some(0.0),
         stop_time: Some(0.5),
     };
-    master::ssp::write(&assembly, None, &packed.path("pendulum.ssp")).unwrap();
+    ssp::write(&assembly, None, &packed.path("pendulum.ssp")).unwrap();
     printed(&packed.run(&["pendulum.ssp", "--out", "out"]));
     assert_eq!(named.read("out/results.csv"), packed.read("out/results.csv"));
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
-use master::results::Table;
+use results::Table;
 use tests::c_fmu::CFmu;
 
 use super::*;

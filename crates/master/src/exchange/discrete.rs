@@ -6,9 +6,9 @@ use std::ops::Range;
 use fmu_description::Kind;
 
 use crate::fault::FaultLine;
-use crate::slave::{CallError, Slave};
 use crate::system::{Connection, Port, System};
-use crate::transformation::Transformation;
+use slave::Transformation;
+use slave::{CallError, Slave};
 
 type Get<T> = fn(&mut dyn Slave, &[u32], &mut [T]) -> Result<(), CallError>;
 type Set<T> = fn(&mut dyn Slave, &[u32], &[T]) -> Result<(), CallError>;

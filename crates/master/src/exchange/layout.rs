@@ -6,9 +6,9 @@ use std::ops::Range;
 use fmu_description::Kind;
 
 use crate::algorithm::{Algorithm, Course};
-use crate::slave::Advance;
 use crate::system::{Port, System};
-use crate::transformation::Transformation;
+use slave::Advance;
+use slave::Transformation;
 
 /// Derivatives that a slave refuses although its description promises them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

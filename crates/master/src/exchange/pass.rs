@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::slave::{CallError, Slave, Stepped};
+use slave::{CallError, Slave, Stepped};
 
 /// Where the values of one slave stand among those of all.
 #[derive(Clone, Debug)]

@@ -9,8 +9,8 @@ pub(crate) use super::trace::Trace;
 use crate::algorithm::{Algorithm, Coupling, Course, StepControl, Sweep};
 use crate::error::SystemError;
 use crate::fault::FaultLine;
-use crate::slave::{Advance, CallError, Slave, Stepped};
 use crate::system::{Port, System};
+use slave::{Advance, CallError, Slave, Stepped};
 
 /// Part of a step by which times may miss each other: their rounding.
 const ROUNDING: f64 = 1e-9;

@@ -4,8 +4,8 @@ use super::course::Known;
 use super::layout::Lane;
 use super::reals::Reals;
 use crate::algorithm::Course;
-use crate::slave::CallError;
 use crate::system::System;
+use slave::CallError;
 
 impl Reals {
     /// Order of convergence of the course as the slaves can follow it: a mean that is held is of order

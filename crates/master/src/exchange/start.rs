@@ -3,8 +3,8 @@
 use super::{Exchange, call};
 use crate::error::SystemError;
 use crate::exchange::Reals;
-use crate::slave::{CallError, Slave};
 use crate::system::System;
+use slave::{CallError, Slave};
 
 /// Passes for the derivatives at the start: first derivatives through two slaves, second through one.
 const PASSES: usize = 3;

@@ -2,8 +2,8 @@
 
 use super::reals::Reals;
 use crate::simulation::Task;
-use crate::slave::{Advance, CallError, Slave, Stepped, finish};
 use crate::system::System;
+use slave::{Advance, CallError, Slave, Stepped, finish};
 
 impl Reals {
     /// The second half of [`Reals::advance`].

@@ -2,8 +2,8 @@
 
 use crate::algorithm::{Algorithm, Coupling};
 use crate::exchange::{Exchange, Refusal};
-use crate::slave::CallError;
 use crate::system::System;
+use slave::CallError;
 
 /// The connections of an initialised system. Derivatives of inputs and outputs that an FMU promises
 /// and refuses are not used, with a warning.

@@ -9,10 +9,10 @@ use super::Simulation;
 use super::control::Controller;
 use super::iterate::Iteration;
 use crate::algorithm::Algorithm;
+use crate::drive::{DriveState, Scenario};
 use crate::error::SystemError;
 use crate::exchange::{Values, call};
 use crate::fault::FaultLine;
-use crate::scenario::{DriveState, Prepared};
 use crate::system::System;
 pub(super) use origin::Origin;
 
@@ -98,7 +98,7 @@ impl Simulation {
         system: System,
         algorithm: &Algorithm,
         experiment: &Experiment,
-        scenario: Prepared,
+        scenario: Scenario,
         checkpoint: &Checkpoint,
     ) -> Result<Self, SystemError> {
         let origin = &checkpoint.origin;

@@ -8,7 +8,7 @@ use crate::error::SystemError;
 use crate::exchange::{Values, call};
 use crate::solve::Bracket;
 use crate::system::Port;
-use crate::value::Value;
+use slave::Value;
 
 /// The slot of FMU states from which crossings are located.
 const SLOT: usize = 2;

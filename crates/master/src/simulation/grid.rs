@@ -4,8 +4,8 @@ use std::fmt;
 
 use crate::algorithm::Algorithm;
 use crate::error::SystemError;
-use crate::slave::Slave;
 use crate::system::System;
+use slave::Slave;
 
 /// Part of a step that is rounding: what is left of a run by less is no step.
 const ROUNDING: f64 = 1e-6;

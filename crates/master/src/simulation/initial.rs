@@ -5,14 +5,14 @@ use std::collections::HashMap;
 use fmu_description::Experiment;
 use fmu_description::{DefaultExperiment, Kind, ModelDescription};
 
+use crate::drive::{Drive, Scenario};
 use crate::error::SystemError;
 use crate::exchange::call;
 use crate::fault::FaultLine;
 use crate::order::Rows;
-use crate::scenario::{Drive, Prepared};
 use crate::solve::{Components, Newton, Progress, Scale, Solver, components};
 use crate::system::{Port, System};
-use crate::value::Value;
+use slave::Value;
 
 /// Tolerance of the values in a loop, relative and in nominal values.
 const TOLERANCE: f64 = 1e-10;
@@ -24,7 +24,7 @@ const EVALUATIONS: u32 = 100;
 pub(super) fn initialise(
     system: &mut System,
     experiment: &Experiment,
-    scenario: &mut Prepared,
+    scenario: &mut Scenario,
 ) -> Result<(), SystemError> {
     let start = experiment.start_time;
     for (name, slave) in &mut system.slaves {
@@ -60,7 +60,7 @@ fn told(experiment: &Experiment, description: &ModelDescription) -> Experiment {
 /// dependencies.
 fn solve_connections(
     system: &mut System,
-    scenario: &Prepared,
+    scenario: &Scenario,
     start: f64,
 ) -> Result<(), SystemError> {
     let mut graph = Graph::new(system, &scenario.faults);
@@ -144,7 +144,7 @@ impl<'a> Graph<'a> {
             let to = connection.to;
             let mut value = system.transformed(value, &connection.transformation, to);
             if let Some(fault) = self.faults.get(&to) {
-                value.disturb(fault, time);
+                fault.disturb(time, &mut value);
             }
             system
                 .set_value(to, &value)

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::error::SystemError;
-use crate::slave::{Advance, CallError, Slave, Stepped};
+use slave::{Advance, CallError, Slave, Stepped};
 
 /// Steps that are measured one way and the other.
 const TRIALS: u32 = 16;

@@ -7,8 +7,8 @@ use crate::algorithm::Sweep;
 use crate::error::SystemError;
 use crate::exchange::call;
 use crate::order::Order;
-use crate::slave::{CallError, Failure, Stepped};
 use crate::system::System;
+use slave::{CallError, Failure, Stepped};
 
 /// Most attempts of a slave to come to the end of a step that it makes in parts.
 const PARTS: u32 = 1000;

@@ -3,9 +3,9 @@
 use fmu_description::Kind;
 
 use super::{Port, System};
-use crate::slave::CallError;
-use crate::transformation::Transformation;
-use crate::value::Value;
+use slave::CallError;
+use slave::Transformation;
+use slave::Value;
 
 impl System {
     /// Reads the variable at `port`.

@@ -4,12 +4,17 @@ use fmu_description::{Causality, Kind};
 
 use super::{Connection, Port, System, units};
 use crate::error::SystemError;
-use crate::transformation::Transformation;
+use slave::Transformation;
 
 impl System {
     /// Connects an output to an input, or an output or a calculated parameter to a parameter, which
-    /// then gets its value in initialization mode.
-    pub(super) fn join(
+    /// then gets its value in initialization mode. With `units_settled` the units of the two are left
+    /// alone; otherwise units that differ are converted.
+    ///
+    /// # Errors
+    ///
+    /// Where causality, type, unit or transformation do not fit, or the input has a source.
+    pub fn connect_ports(
         &mut self,
         from: Port,
         to: Port,

@@ -4,7 +4,7 @@ use fmu_description::{Causality, Initial, Variability};
 
 use super::{Port, System};
 use crate::error::SystemError;
-use crate::value::Value;
+use slave::Value;
 
 /// A value for a variable.
 #[derive(Clone, Debug)]

@@ -5,7 +5,7 @@ use fmu_description::unit::BaseUnit;
 
 use super::{Port, System};
 use crate::error::SystemError;
-use crate::transformation::Transformation;
+use slave::Transformation;
 
 impl System {
     /// Name and base of a variable's unit, where it has one.

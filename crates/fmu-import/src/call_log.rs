@@ -1,0 +1,292 @@
+//! FMI calls written to a file, one line each: instance, function, arguments, results, status.
+
+use std::fmt::{Debug, Write as _};
+use std::fs::File;
+use std::io::{self, Write as _};
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+
+use fmu_description::Experiment;
+use fmu_description::ModelDescription;
+
+use slave::{CallError, Slave, Stepped};
+
+/// A file that FMI calls are written to.
+///
+/// A call is written before it is made and its status behind it, unbuffered: after a crash the last
+/// line names the function that crashed.
+#[derive(Clone, Debug)]
+pub struct CallLog {
+    file: Arc<Mutex<File>>,
+}
+
+impl CallLog {
+    /// Makes the file at `path` anew.
+    ///
+    /// # Errors
+    ///
+    /// Where it cannot be written.
+    pub fn create(path: &Path) -> io::Result<Self> {
+        Ok(Self { file: Arc::new(Mutex::new(File::create(path)?)) })
+    }
+
+    /// `slave`, whose calls are written from now on with the name of its instance.
+    #[must_use]
+    pub fn listen(&self, instance: &str, slave: Box<dyn Slave>) -> LoggedSlave {
+        let logged = LoggedSlave { log: self.clone(), instance: instance.to_owned(), slave };
+        let guid = &logged.slave.description().guid;
+        logged.line(&format!("fmi2Instantiate({instance:?}, fmi2CoSimulation, {guid:?})"));
+        logged
+    }
+
+    /// A debugging aid does not end a run: what cannot be written is missing from the file.
+    fn write(&self, text: &str) {
+        if let Ok(mut file) = self.file.lock() {
+            let _ = file.write_all(text.as_bytes());
+        }
+    }
+}
+
+/// A slave whose calls are written to a [`CallLog`].
+pub struct LoggedSlave {
+    log: CallLog,
+    instance: String,
+    slave: Box<dyn Slave>,
+}
+
+impl LoggedSlave {
+    fn line(&self, call: &str) {
+        self.log.write(&format!("{} {call} -> fmi2OK\n", self.instance));
+    }
+
+    /// Writes `function(arguments)`, makes the call, and writes what came of it.
+    fn call<T>(
+        &mut self,
+        (function, arguments): (&str, String),
+        call: impl FnOnce(&mut dyn Slave) -> Result<T, CallError>,
+        results: impl FnOnce(&T) -> String,
+    ) -> Result<T, CallError> {
+        self.begin(function, &arguments);
+        let done = call(self.slave.as_mut());
+        let results = done.as_ref().map(results).unwrap_or_default();
+        self.end(&done, &results);
+        done
+    }
+
+    fn begin(&self, function: &str, arguments: &str) {
+        self.log.write(&format!("{} {function}({arguments})", self.instance));
+    }
+
+    fn end<T>(&mut self, done: &Result<T, CallError>, results: &str) {
+        let warned = self.slave.take_warning();
+        let status = match done {
+            Ok(_) if warned => "fmi2Warning".to_owned(),
+            Ok(_) => "fmi2OK".to_owned(),
+            Err(error) => error.failure.to_string().replace("returned ", ""),
+        };
+        self.log.write(&format!(" -> {status}{results}\n"));
+    }
+
+    fn get<T: Debug>(
+        &mut self,
+        function: &str,
+        references: &[u32],
+        values: &mut [T],
+        get: impl FnOnce(&mut dyn Slave, &mut [T]) -> Result<(), CallError>,
+    ) -> Result<(), CallError> {
+        let arguments = format!("{references:?}");
+        let call = |slave: &mut dyn Slave| get(slave, values).map(|()| format!("{values:?}"));
+        self.call((function, arguments), call, |values| format!(" {values}")).map(|_| ())
+    }
+
+    fn set<T: Debug>(
+        &mut self,
+        function: &str,
+        references: &[u32],
+        values: &[T],
+        set: impl FnOnce(&mut dyn Slave) -> Result<(), CallError>,
+    ) -> Result<(), CallError> {
+        self.plain(function, format!("{references:?}, {values:?}"), set)
+    }
+
+    fn plain(
+        &mut self,
+        function: &str,
+        arguments: String,
+        call: impl FnOnce(&mut dyn Slave) -> Result<(), CallError>,
+    ) -> Result<(), CallError> {
+        self.call((function, arguments), call, |()| String::new())
+    }
+}
+
+impl Drop for LoggedSlave {
+    fn drop(&mut self) {
+        // The instance is freed after this.
+        self.log.write(&format!("{} fmi2FreeInstance()\n", self.instance));
+    }
+}
+
+impl Slave for LoggedSlave {
+    fn description(&self) -> &ModelDescription {
+        self.slave.description()
+    }
+
+    fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
+        self.plain("fmi2SetDebugLogging", on.to_string(), |slave| slave.set_debug_logging(on))
+    }
+
+    fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError> {
+        let mut arguments = String::new();
+        let Experiment { start_time, stop_time, tolerance } = experiment;
+        // Writing to a String cannot fail.
+        let _ = match tolerance {
+            Some(tolerance) => write!(arguments, "tolerance {tolerance:?}, "),
+            None => write!(arguments, "no tolerance, "),
+        };
+        let _ = write!(arguments, "start time {start_time:?}, ");
+        let _ = match stop_time {
+            Some(stop) => write!(arguments, "stop time {stop:?}"),
+            None => write!(arguments, "no stop time"),
+        };
+        let call = |slave: &mut dyn Slave| slave.setup_experiment(experiment);
+        self.plain("fmi2SetupExperiment", arguments, call)
+    }
+
+    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
+        let call = |slave: &mut dyn Slave| slave.enter_initialization_mode();
+        self.plain("fmi2EnterInitializationMode", String::new(), call)
+    }
+
+    fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
+        let call = |slave: &mut dyn Slave| slave.exit_initialization_mode();
+        self.plain("fmi2ExitInitializationMode", String::new(), call)
+    }
+
+    fn terminate(&mut self) -> Result<(), CallError> {
+        self.plain("fmi2Terminate", String::new(), |slave| slave.terminate())
+    }
+
+    fn free(&mut self) -> Result<(), CallError> {
+        self.slave.free()
+    }
+
+    fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
+        self.get("fmi2GetReal", references, values, |slave, values| {
+            slave.get_real(references, values)
+        })
+    }
+
+    fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), CallError> {
+        self.set("fmi2SetReal", references, values, |slave| slave.set_real(references, values))
+    }
+
+    fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
+        self.get("fmi2GetInteger", references, values, |slave, values| {
+            slave.get_integer(references, values)
+        })
+    }
+
+    fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
+        self.set("fmi2SetInteger", references, values, |slave| {
+            slave.set_integer(references, values)
+        })
+    }
+
+    fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
+        self.get("fmi2GetBoolean", references, values, |slave, values| {
+            slave.get_boolean(references, values)
+        })
+    }
+
+    fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
+        self.set("fmi2SetBoolean", references, values, |slave| {
+            slave.set_boolean(references, values)
+        })
+    }
+
+    fn get_string(&mut self, references: &[u32], values: &mut [String]) -> Result<(), CallError> {
+        self.get("fmi2GetString", references, values, |slave, values| {
+            slave.get_string(references, values)
+        })
+    }
+
+    fn set_string(&mut self, references: &[u32], values: &[String]) -> Result<(), CallError> {
+        self.set("fmi2SetString", references, values, |slave| slave.set_string(references, values))
+    }
+
+    fn set_input_derivatives(
+        &mut self,
+        references: &[u32],
+        orders: &[i32],
+        values: &[f64],
+    ) -> Result<(), CallError> {
+        let arguments = format!("{references:?}, orders {orders:?}, {values:?}");
+        self.plain("fmi2SetRealInputDerivatives", arguments, |slave| {
+            slave.set_input_derivatives(references, orders, values)
+        })
+    }
+
+    fn get_output_derivatives(
+        &mut self,
+        references: &[u32],
+        orders: &[i32],
+        values: &mut [f64],
+    ) -> Result<(), CallError> {
+        let arguments = format!("{references:?}, orders {orders:?}");
+        let call = |slave: &mut dyn Slave| {
+            let done = slave.get_output_derivatives(references, orders, values);
+            done.map(|()| format!(" {values:?}"))
+        };
+        self.call(("fmi2GetRealOutputDerivatives", arguments), call, String::clone).map(|_| ())
+    }
+
+    fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<Stepped, CallError> {
+        self.begin("fmi2DoStep", &format!("{time:?}, {size:?}, {never_back}"));
+        let done = self.slave.do_step(time, size, never_back);
+        if let Ok(Stepped::Part { reached, terminated }) = done {
+            self.log.write(&format!(
+                " -> fmi2Discard fmi2LastSuccessfulTime {reached:?}, fmi2Terminated {terminated}\n"
+            ));
+        } else {
+            self.end(&done, "");
+        }
+        done
+    }
+
+    fn directional_derivative(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        changes: &mut [f64],
+    ) -> Result<(), CallError> {
+        let arguments = format!("{unknowns:?}, {knowns:?}, {seed:?}");
+        let call = |slave: &mut dyn Slave| {
+            let done = slave.directional_derivative(unknowns, knowns, seed, changes);
+            done.map(|()| format!(" {changes:?}"))
+        };
+        self.call(("fmi2GetDirectionalDerivative", arguments), call, String::clone).map(|_| ())
+    }
+
+    fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
+        let call = |slave: &mut dyn Slave| slave.save_state(slot);
+        self.plain("fmi2GetFMUstate", format!("state {slot}"), call)
+    }
+
+    fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
+        let call = |slave: &mut dyn Slave| slave.restore_state(slot);
+        self.plain("fmi2SetFMUstate", format!("state {slot}"), call)
+    }
+
+    fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
+        let call = |slave: &mut dyn Slave| slave.serialize_state();
+        self.call(("fmi2SerializeFMUstate", String::new()), call, |bytes| {
+            format!(" {} bytes", bytes.len())
+        })
+    }
+
+    fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
+        let call = |slave: &mut dyn Slave| slave.deserialize_state(bytes);
+        self.plain("fmi2DeSerializeFMUstate", format!("{} bytes", bytes.len()), call)
+    }
+}

@@ -1,0 +1,244 @@
+//! What the master asks of a worker, and how an error comes back.
+
+use fmu_description::abi::Status;
+
+use super::words::{Reader, Writer};
+use slave::{CallError, Failure};
+
+/// Defines the commands, each with the function that its errors name.
+macro_rules! commands {
+    ($($command:ident = $function:literal,)*) => {
+        /// What a worker can be asked.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub(super) enum Command {
+            $($command,)*
+        }
+
+        impl Command {
+            const ALL: &[Command] = &[$(Command::$command,)*];
+
+            /// The function that it is about.
+            pub(super) fn function(self) -> &'static str {
+                self.name()
+            }
+
+            /// The same, with a place of its own.
+            #[inline]
+            pub(super) fn name(self) -> &'static &'static str {
+                match self {
+                    $(Command::$command => &$function,)*
+                }
+            }
+        }
+
+        /// The functions that a worker can be in, or fail in.
+        const FUNCTIONS: &[&str] = &[
+            $($function,)*
+            LOADING,
+            "fmi2GetStatus",
+            "fmi2GetRealStatus",
+            "fmi2GetBooleanStatus",
+            "fmi2SerializedFMUstateSize",
+        ];
+    };
+}
+
+/// Where a worker is before there is an instance.
+pub(super) const LOADING: &str = "loading the library";
+
+commands! {
+    Open = "fmi2Instantiate",
+    SetDebugLogging = "fmi2SetDebugLogging",
+    SetupExperiment = "fmi2SetupExperiment",
+    EnterInitializationMode = "fmi2EnterInitializationMode",
+    ExitInitializationMode = "fmi2ExitInitializationMode",
+    Terminate = "fmi2Terminate",
+    GetReal = "fmi2GetReal",
+    SetReal = "fmi2SetReal",
+    GetInteger = "fmi2GetInteger",
+    SetInteger = "fmi2SetInteger",
+    GetBoolean = "fmi2GetBoolean",
+    SetBoolean = "fmi2SetBoolean",
+    GetString = "fmi2GetString",
+    SetString = "fmi2SetString",
+    SetInputDerivatives = "fmi2SetRealInputDerivatives",
+    GetOutputDerivatives = "fmi2GetRealOutputDerivatives",
+    DoStep = "fmi2DoStep",
+    DirectionalDerivative = "fmi2GetDirectionalDerivative",
+    SaveState = "fmi2GetFMUstate",
+    RestoreState = "fmi2SetFMUstate",
+    SerializeState = "fmi2SerializeFMUstate",
+    DeserializeState = "fmi2DeSerializeFMUstate",
+    Advance = "fmi2DoStep",
+    // Bytes that belong to the next command, or to the last answer.
+    Bring = "the transfer of data to it",
+    Fetch = "the transfer of data from it",
+    Free = "fmi2FreeInstance",
+    // Frees the instance and makes another one.
+    Renew = "fmi2Instantiate",
+}
+
+impl Command {
+    pub(super) fn to_word(self) -> u64 {
+        self as u64
+    }
+
+    pub(super) fn from_word(word: u64) -> Option<Self> {
+        Self::ALL.get(usize::try_from(word).ok()?).copied()
+    }
+}
+
+/// The place of a function among those that a worker can be in; one too large where it is none.
+pub(super) fn place(function: &str) -> u64 {
+    let known = FUNCTIONS.iter().position(|known| *known == function);
+    known.unwrap_or(FUNCTIONS.len()) as u64
+}
+
+/// The function at that place.
+pub(super) fn function_at(place: u64) -> Option<&'static str> {
+    FUNCTIONS.get(usize::try_from(place).ok()?).copied()
+}
+
+/// How an answer begins where results follow.
+pub(super) const DONE: u64 = 0;
+/// How an answer begins where a [`CallError`] follows.
+pub(super) const FAILED: u64 = 1;
+
+/// What came of an instantiation: there is an instance, the FMU does not load or instantiate, a
+/// library to be loaded before it does not load. A reason follows the last two.
+pub(super) const INSTANTIATED: u64 = 0;
+pub(super) const REFUSED: u64 = 1;
+pub(super) const NOT_PRELOADED: u64 = 2;
+
+/// Most bytes of one text of an error.
+const TEXT: usize = 8192;
+
+/// As much of `text` as an error takes with it.
+fn clipped(text: &str) -> &[u8] {
+    &text.as_bytes()[..text.len().min(TEXT)]
+}
+
+/// Writes an error; messages that do not fit are left out, the last ones go first.
+pub(super) fn write_error(error: &CallError, writer: &mut Writer<'_>) {
+    writer.put(FAILED);
+    writer.put(place(error.function));
+    let (kind, number, text): (u64, u64, &str) = match &error.failure {
+        Failure::Status(status) => (0, *status as u64, ""),
+        Failure::UnknownStatus(status) => (1, i64::from(*status).cast_unsigned(), ""),
+        Failure::Absent => (2, 0, ""),
+        Failure::TimedOut(seconds) => (3, seconds.to_bits(), ""),
+        Failure::Panicked(text) => (4, 0, text),
+        Failure::Nonsense(text) => (5, 0, text),
+        // What happens to a process it cannot tell itself.
+        Failure::Killed(..) | Failure::Exited(_) | Failure::OutOfMemory(_) => {
+            (5, 0, "ended a process of its own")
+        }
+    };
+    writer.put(kind);
+    writer.put(number);
+    writer.put_bytes(clipped(text));
+    let mut room = writer.room().saturating_sub(1);
+    let needs = |message: &String| 1 + clipped(message).len().div_ceil(8);
+    let fitting = error.messages.iter().rev().take_while(|message| {
+        let fits = needs(message) <= room;
+        room = room.saturating_sub(needs(message));
+        fits
+    });
+    let first = error.messages.len() - fitting.count();
+    let messages = &error.messages[first..];
+    writer.put(messages.len());
+    for message in messages {
+        writer.put_bytes(clipped(message));
+    }
+}
+
+/// Reads what [`write_error`] wrote after its first word, for a failure of `command`.
+pub(super) fn read_error(command: Command, reader: &mut Reader<'_>) -> Option<CallError> {
+    let function = function_at(reader.take()?).unwrap_or(command.function());
+    let (kind, number): (u64, u64) = (reader.take()?, reader.take()?);
+    let text = reader.take_text()?;
+    let status = i32::try_from(number.cast_signed());
+    let failure = match kind {
+        0 => Failure::Status(Status::from_c(status.ok()?)?),
+        1 => Failure::UnknownStatus(status.ok()?),
+        2 => Failure::Absent,
+        3 => Failure::TimedOut(f64::from_bits(number)),
+        4 => Failure::Panicked(text),
+        5 => Failure::Nonsense(text),
+        _ => return None,
+    };
+    let mut messages = Vec::new();
+    for _ in 0..reader.take::<usize>()? {
+        messages.push(reader.take_text()?);
+    }
+    Some(CallError { function, failure, messages })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicU64, Ordering};
+
+    use super::*;
+
+    fn area(words: usize) -> Vec<AtomicU64> {
+        (0..words).map(|_| AtomicU64::new(0)).collect()
+    }
+
+    fn error(failure: Failure, messages: &[&str]) -> CallError {
+        let messages = messages.iter().map(|text| (*text).to_owned()).collect();
+        CallError { function: "fmi2GetRealStatus", failure, messages }
+    }
+
+    fn through(error: &CallError, area: &[AtomicU64]) -> CallError {
+        let mut writer = Writer::new(area);
+        write_error(error, &mut writer);
+        assert!(writer.fits());
+        let mut reader = Reader::new(area);
+        assert_eq!(reader.take(), Some(FAILED));
+        read_error(Command::DoStep, &mut reader).unwrap()
+    }
+
+    #[test]
+    fn errors_pass_unchanged() {
+        let failures = [
+            Failure::Status(Status::Fatal),
+            Failure::UnknownStatus(-77),
+            Failure::Absent,
+            Failure::TimedOut(0.25),
+            Failure::Panicked("index 4".to_owned()),
+            Failure::Nonsense("returned fmi2Discard".to_owned()),
+        ];
+        for failure in failures {
+            let error = error(failure, &["first", "", "zweite Äußerung"]);
+            assert_eq!(through(&error, &area(64)), error);
+        }
+    }
+
+    #[test]
+    fn of_too_many_messages_the_last_ones_pass() {
+        let error = error(Failure::Absent, &["aaaaaaaaaaaaaaaaaaaaaaaaa", "bb", "cc"]);
+        assert_eq!(through(&error, &area(10)).messages, ["bb", "cc"]);
+    }
+
+    #[test]
+    fn random_words_give_an_error_or_none_and_no_panic() {
+        let area = area(40);
+        let mut state = 1_u64;
+        for _ in 0..20_000 {
+            for word in &area {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                let narrow = state >> (state >> 58);
+                word.store(narrow, Ordering::Relaxed);
+            }
+            let _ = read_error(Command::GetReal, &mut Reader::new(&area));
+        }
+    }
+
+    #[test]
+    fn every_command_has_its_number() {
+        for command in Command::ALL {
+            assert_eq!(Command::from_word(command.to_word()), Some(*command));
+        }
+        assert_eq!(Command::from_word(u64::MAX), None);
+    }
+}

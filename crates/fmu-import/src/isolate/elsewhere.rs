@@ -1,0 +1,75 @@
+//! What stands for isolation where there is none: nothing can be made of it.
+
+use std::convert::Infallible;
+use std::sync::Arc;
+
+use fmu_description::Experiment;
+use fmu_description::ModelDescription;
+use fmu_description::package::Unpacked;
+
+use super::{IsolateError, Options, WorkerError};
+use slave::{CallError, Slave, Stepped};
+
+/// An instance in a process of its own: there is none on this operating system.
+#[derive(Debug)]
+pub struct Isolated {
+    never: Infallible,
+}
+
+impl Isolated {
+    pub(super) fn start(_: Arc<Unpacked>, name: &str, _: &Options) -> Result<Self, IsolateError> {
+        Err(IsolateError::Platform { instance: name.to_owned() })
+    }
+
+    /// Makes another instance in its place: there is none.
+    ///
+    /// # Errors
+    ///
+    /// None, as there is nothing to call this on.
+    pub fn renew(&mut self, _: &str, _: &Options) -> Result<(), IsolateError> {
+        match self.never {}
+    }
+}
+
+/// Refuses to be a worker.
+///
+/// # Errors
+///
+/// Always [`WorkerError::Platform`].
+pub fn worker() -> Result<(), WorkerError> {
+    Err(WorkerError::Platform)
+}
+
+impl Slave for Isolated {
+    fn description(&self) -> &ModelDescription {
+        match self.never {}
+    }
+
+    fn setup_experiment(&mut self, _: &Experiment) -> Result<(), CallError> {
+        match self.never {}
+    }
+
+    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
+        match self.never {}
+    }
+
+    fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
+        match self.never {}
+    }
+
+    fn terminate(&mut self) -> Result<(), CallError> {
+        match self.never {}
+    }
+
+    fn get_real(&mut self, _: &[u32], _: &mut [f64]) -> Result<(), CallError> {
+        match self.never {}
+    }
+
+    fn set_real(&mut self, _: &[u32], _: &[f64]) -> Result<(), CallError> {
+        match self.never {}
+    }
+
+    fn do_step(&mut self, _: f64, _: f64, _: bool) -> Result<Stepped, CallError> {
+        match self.never {}
+    }
+}

@@ -1,0 +1,387 @@
+//! Messages of an FMU on their way to the master: a ring in the shared memory, which outlives the
+//! worker. Where it is full, messages are counted instead.
+
+use std::collections::VecDeque;
+use std::fmt::{self, Write as _};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use tracing::field::{Field, Visit};
+use tracing::span::{Attributes, Id, Record};
+use tracing::{Event, Level, Metadata, Subscriber};
+
+use super::layout::Shared;
+use slave::CallError;
+
+/// `target` of the events that an instance's messages are.
+const TARGET: &str = "fmu";
+/// Most bytes of a category and of a text.
+const CATEGORY: usize = 256;
+const TEXT: usize = 4096;
+/// Most messages that are kept for an error.
+const KEPT: usize = 10;
+/// Most messages that are passed on in [`WINDOW`], and bytes of messages in all.
+const MESSAGES: u32 = 1000;
+const BYTES: usize = 16 << 20;
+/// How often the count of the others is told.
+const WINDOW: Duration = Duration::from_secs(1);
+/// Words before the bytes of a message: lengths, time.
+const HEAD: usize = 2;
+/// The levels as they are numbered in the ring.
+const LEVELS: [Level; 5] = [Level::ERROR, Level::WARN, Level::INFO, Level::DEBUG, Level::TRACE];
+
+/// Sends the messages that [`tracing`] gets in the worker.
+pub(super) struct Forward {
+    shared: Arc<Shared>,
+    /// Words written so far.
+    head: Mutex<u64>,
+}
+
+impl Forward {
+    pub(super) fn new(shared: Arc<Shared>) -> Self {
+        Self { shared, head: Mutex::new(0) }
+    }
+
+    fn send(&self, level: Level, message: &Message) {
+        let Ok(mut head) = self.head.lock() else { return };
+        let ring = self.shared.ring();
+        let (category, text) = (clip(&message.category, CATEGORY), clip(&message.text, TEXT));
+        let needed = HEAD + category.len().div_ceil(8) + text.len().div_ceil(8);
+        let used = head.wrapping_sub(self.shared.log_tail().load(Ordering::Acquire));
+        let free = usize::try_from(used).ok().and_then(|used| ring.len().checked_sub(used));
+        if free.is_none_or(|free| free < needed) {
+            self.shared.log_dropped().fetch_add(1, Ordering::Relaxed);
+            return;
+        }
+        let level = LEVELS.iter().position(|known| *known == level).unwrap_or(0) as u64;
+        let lengths = level | (category.len() as u64) << 8 | (text.len() as u64) << 32;
+        let mut put = |word: u64| {
+            at(ring, *head).store(word, Ordering::Relaxed);
+            *head = head.wrapping_add(1);
+        };
+        put(lengths);
+        put(message.time.to_bits());
+        for bytes in [category, text] {
+            for chunk in bytes.chunks(8) {
+                let mut word = [0; 8];
+                word[..chunk.len()].copy_from_slice(chunk);
+                put(u64::from_le_bytes(word));
+            }
+        }
+        self.shared.log_head().store(*head, Ordering::Release);
+    }
+}
+
+/// The word of the ring at a count of words; the length of the ring is a power of two.
+#[expect(clippy::cast_possible_truncation, reason = "the remainder is below the length")]
+fn at(ring: &[AtomicU64], count: u64) -> &AtomicU64 {
+    &ring[(count % ring.len() as u64) as usize]
+}
+
+fn clip(text: &str, length: usize) -> &[u8] {
+    &text.as_bytes()[..text.len().min(length)]
+}
+
+impl Subscriber for Forward {
+    fn enabled(&self, metadata: &Metadata<'_>) -> bool {
+        metadata.is_event() && metadata.target() == TARGET
+    }
+
+    fn new_span(&self, _: &Attributes<'_>) -> Id {
+        Id::from_u64(1)
+    }
+
+    fn record(&self, _: &Id, _: &Record<'_>) {}
+
+    fn record_follows_from(&self, _: &Id, _: &Id) {}
+
+    fn event(&self, event: &Event<'_>) {
+        let mut message = Message::default();
+        event.record(&mut message);
+        self.send(*event.metadata().level(), &message);
+    }
+
+    fn enter(&self, _: &Id) {}
+
+    fn exit(&self, _: &Id) {}
+}
+
+/// What there is to a message.
+#[derive(Debug, Default, PartialEq)]
+struct Message {
+    category: String,
+    time: f64,
+    text: String,
+}
+
+impl Visit for Message {
+    fn record_f64(&mut self, field: &Field, value: f64) {
+        if field.name() == "time" {
+            self.time = value;
+        }
+    }
+
+    fn record_str(&mut self, field: &Field, value: &str) {
+        match field.name() {
+            "category" => value.clone_into(&mut self.category),
+            "message" => value.clone_into(&mut self.text),
+            _ => {}
+        }
+    }
+
+    fn record_debug(&mut self, field: &Field, value: &dyn fmt::Debug) {
+        if field.name() == "message" {
+            // Writing to a String does not fail.
+            let _ = write!(self.text, "{value:?}");
+        }
+    }
+}
+
+/// How much an FMU may say.
+struct Quota {
+    since: Instant,
+    messages: u32,
+    bytes: usize,
+    /// Messages that nobody has been told of.
+    lost: u64,
+}
+
+impl Default for Quota {
+    fn default() -> Self {
+        Self { since: Instant::now(), messages: 0, bytes: 0, lost: 0 }
+    }
+}
+
+impl Quota {
+    /// Whether another message of that many bytes is passed on; one that is not is counted.
+    fn admits(&mut self, instance: &str, bytes: usize) -> bool {
+        self.tell_late(instance);
+        let admitted = self.messages < MESSAGES && self.bytes + bytes <= BYTES;
+        if admitted {
+            self.messages += 1;
+            self.bytes += bytes;
+        } else {
+            self.lost += 1;
+        }
+        admitted
+    }
+
+    /// Begins a new window where one is over, and tells the count of the messages lost in it.
+    fn tell_late(&mut self, instance: &str) {
+        // The clock is looked at where the count could be told or has to begin anew.
+        if (self.lost > 0 || self.messages == MESSAGES) && self.since.elapsed() >= WINDOW {
+            (self.since, self.messages) = (Instant::now(), 0);
+            self.tell(instance);
+        }
+    }
+
+    fn tell(&mut self, instance: &str) {
+        let count = std::mem::take(&mut self.lost);
+        if count > 0 {
+            tracing::warn!(target: "fmu", instance, lost = count, "{count} more messages came too fast and are lost");
+        }
+    }
+}
+
+impl Drop for Inbox {
+    fn drop(&mut self) {
+        self.quota.tell(&self.instance);
+    }
+}
+
+/// Receives the messages in the master.
+#[derive(Default)]
+pub(super) struct Inbox {
+    instance: String,
+    /// Words read so far.
+    tail: u64,
+    dropped: u64,
+    quota: Quota,
+    /// The last messages since they were last asked for.
+    kept: VecDeque<String>,
+}
+
+impl Inbox {
+    pub(super) fn new(instance: &str) -> Self {
+        let mut inbox = Self::default();
+        instance.clone_into(&mut inbox.instance);
+        inbox
+    }
+
+    /// From now on the messages are those of this instance.
+    pub(super) fn rename(&mut self, instance: &str) {
+        self.quota.tell(&self.instance);
+        instance.clone_into(&mut self.instance);
+    }
+
+    /// Hands over what has come to [`tracing`].
+    #[inline]
+    pub(super) fn empty(&mut self, shared: &Shared) {
+        if shared.log_head().load(Ordering::Acquire) != self.tail
+            || shared.log_dropped().load(Ordering::Relaxed) != self.dropped
+        {
+            self.hear(shared);
+        }
+    }
+
+    #[cold]
+    fn hear(&mut self, shared: &Shared) {
+        let head = shared.log_head().load(Ordering::Acquire);
+        while self.tail != head {
+            let Some((level, message)) = self.next(shared.ring(), head) else {
+                // Not what a worker writes: nothing up to `head` can be trusted.
+                self.tail = head;
+                break;
+            };
+            if self.quota.admits(&self.instance, message.text.len()) {
+                say(&self.instance, level, &message);
+            }
+            if self.kept.len() == KEPT {
+                self.kept.pop_front();
+            }
+            self.kept.push_back(message.text);
+        }
+        shared.log_tail().store(self.tail, Ordering::Release);
+        let dropped = shared.log_dropped().load(Ordering::Relaxed);
+        let count = dropped.wrapping_sub(self.dropped);
+        self.dropped = dropped;
+        self.quota.lost += count;
+        self.quota.tell_late(&self.instance);
+    }
+
+    /// The message at the tail, which goes on to the next one; none where there cannot be one.
+    fn next(&mut self, ring: &[AtomicU64], head: u64) -> Option<(Level, Message)> {
+        let available = head.wrapping_sub(self.tail);
+        if available > ring.len() as u64 || available < HEAD as u64 {
+            return None;
+        }
+        let word = |offset: u64| at(ring, self.tail.wrapping_add(offset)).load(Ordering::Relaxed);
+        let (lengths, time) = (word(0), f64::from_bits(word(1)));
+        let level = *LEVELS.get(usize::try_from(lengths & 0xff).ok()?)?;
+        let category = (lengths >> 8) & 0xff_ffff;
+        let text = lengths >> 32;
+        let mut next = HEAD as u64;
+        let mut bytes = |length: u64| {
+            let mut bytes = Vec::new();
+            if next + length.div_ceil(8) > available {
+                return None;
+            }
+            for _ in 0..length.div_ceil(8) {
+                bytes.extend_from_slice(&word(next).to_le_bytes());
+                next += 1;
+            }
+            bytes.truncate(usize::try_from(length).ok()?);
+            Some(String::from_utf8_lossy(&bytes).into_owned())
+        };
+        let message = Message { category: bytes(category)?, time, text: bytes(text)? };
+        self.tail = self.tail.wrapping_add(next);
+        Some((level, message))
+    }
+
+    /// The last messages since this was last asked.
+    pub(super) fn take(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.kept).into()
+    }
+
+    /// Says what no caller is there to be told.
+    pub(super) fn complain(&self, error: &CallError) {
+        let instance = self.instance.as_str();
+        tracing::warn!(target: "fmu", instance, "{error}");
+    }
+
+    /// Forgets the messages of calls that went well.
+    #[inline]
+    pub(super) fn forget(&mut self) {
+        if !self.kept.is_empty() {
+            self.kept.clear();
+        }
+    }
+}
+
+/// Says a message as the FMU's instance in this process would.
+fn say(instance: &str, level: Level, Message { category, time, text }: &Message) {
+    let category = category.as_str();
+    match level {
+        Level::ERROR => tracing::error!(target: "fmu", instance, category, time, "{text}"),
+        Level::WARN => tracing::warn!(target: "fmu", instance, category, time, "{text}"),
+        Level::INFO => tracing::info!(target: "fmu", instance, category, time, "{text}"),
+        Level::DEBUG => tracing::debug!(target: "fmu", instance, category, time, "{text}"),
+        Level::TRACE => tracing::trace!(target: "fmu", instance, category, time, "{text}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn message(text: &str) -> Message {
+        Message { category: "logAll".to_owned(), time: 1.25, text: text.to_owned() }
+    }
+
+    fn pair() -> (Arc<Shared>, Forward, Inbox) {
+        let shared = Arc::new(Shared::create(1).unwrap().0);
+        (shared.clone(), Forward::new(shared), Inbox::new("one"))
+    }
+
+    #[test]
+    fn messages_pass_through_the_ring_however_often_it_goes_round() {
+        let (shared, forward, mut inbox) = pair();
+        for count in 0..20_000 {
+            let sent = message(&format!("number {count}{}", "ä".repeat(count % 50)));
+            forward.send(Level::WARN, &sent);
+            let head = shared.log_head().load(Ordering::Acquire);
+            assert_eq!(inbox.next(shared.ring(), head), Some((Level::WARN, sent)));
+            assert_eq!(inbox.tail, head);
+            shared.log_tail().store(inbox.tail, Ordering::Release);
+        }
+        assert_eq!(shared.log_dropped().load(Ordering::Relaxed), 0);
+    }
+
+    #[test]
+    fn a_flood_is_counted_where_it_does_not_fit_and_the_last_ten_heard_are_kept() {
+        let (shared, forward, mut inbox) = pair();
+        for count in 0..100_000 {
+            forward.send(Level::INFO, &message(&count.to_string()));
+        }
+        let dropped = shared.log_dropped().load(Ordering::Relaxed);
+        let words = 2 + 1 + 1;
+        assert_eq!(100_000 - dropped, shared.ring().len() as u64 / words);
+        inbox.empty(&shared);
+        assert_eq!(inbox.dropped, dropped);
+        assert_eq!(inbox.take().last(), Some(&(100_000 - dropped - 1).to_string()));
+        forward.send(Level::INFO, &message("after"));
+        inbox.empty(&shared);
+        assert_eq!(inbox.take(), ["after"]);
+    }
+
+    #[test]
+    fn of_messages_that_come_too_fast_so_many_are_passed_on_and_the_others_counted() {
+        let mut quota = Quota::default();
+        let admitted = (0..5000).filter(|_| quota.admits("one", 100)).count();
+        assert_eq!((admitted, quota.lost), (1000, 4000));
+        quota.since = quota.since.checked_sub(WINDOW).unwrap();
+        assert!(quota.admits("one", 100), "the next second");
+        assert_eq!(quota.lost, 0, "it has been told");
+        let mut quota = Quota::default();
+        let admitted = (0..100).filter(|_| quota.admits("one", 1 << 20)).count();
+        assert_eq!((admitted, quota.lost), (16, 84));
+    }
+
+    #[test]
+    fn a_ring_full_of_anything_is_survived() {
+        let (shared, _, mut inbox) = pair();
+        let mut state = 7_u64;
+        for _ in 0..200 {
+            for word in shared.ring() {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                word.store(state >> (state >> 58), Ordering::Relaxed);
+            }
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            shared.log_head().store(state >> (state >> 58), Ordering::Relaxed);
+            inbox.empty(&shared);
+            assert!(inbox.kept.len() <= KEPT);
+            assert_eq!(shared.log_tail().load(Ordering::Relaxed), inbox.tail);
+        }
+    }
+}

@@ -1,0 +1,352 @@
+//! The shared library of an FMU: loading, symbols, calls. This file and its folder are the one place
+//! of the crate where C is called and pointers are handed out.
+#![expect(unsafe_code, reason = "the boundary to C")]
+
+mod calls;
+mod foreign;
+mod functions;
+mod log;
+mod states;
+mod step;
+
+use std::cell::Cell;
+use std::ffi::{CStr, CString, OsStr, c_char, c_int, c_void};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use fmu_description::abi::{
+    CO_SIMULATION, DESCRIBE, DescribeSink, MODEL_EXCHANGE, Status, fmi2CallbackFunctions,
+    fmi2Component, fmi2FMUstate, fmi2Status,
+};
+use libloading::Library as Handle;
+
+use crate::crash::{Place, Slot};
+use crate::error::LoadError;
+use functions::Functions;
+pub(crate) use log::Names;
+use log::Sink;
+use slave::{CallError, Failure};
+
+const PYTHON: &str = "\nThe library expects Python to be in the process already, as those that \
+    PythonFMU exports do: load it first with --preload, for example --preload libpython3.11.so.1.0";
+
+/// What the operating system says.
+fn reason(error: &libloading::Error) -> String {
+    std::error::Error::source(error).map_or_else(|| error.to_string(), ToString::to_string)
+}
+
+/// Opens a library.
+#[cfg(not(windows))]
+fn open(path: &Path) -> Result<Handle, libloading::Error> {
+    // SAFETY: runs the initialisers of the library, which is what the user asked for.
+    unsafe { Handle::new(path) }
+}
+
+/// Opens a library; those that it needs are looked for in its folder first.
+#[cfg(windows)]
+fn open(path: &Path) -> Result<Handle, libloading::Error> {
+    use libloading::os::windows::{LOAD_WITH_ALTERED_SEARCH_PATH, Library};
+    // The flag is for absolute paths, written with the separators of Windows.
+    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    // SAFETY: runs the initialisers of the library, which is what the user asked for.
+    unsafe { Library::load_with_flags(path, LOAD_WITH_ALTERED_SEARCH_PATH) }.map(Handle::from)
+}
+
+fn load(path: &Path) -> Result<Handle, LoadError> {
+    let place = Place::new(&path.display().to_string());
+    place.enter(&"loading the library");
+    let opened = open(path);
+    place.leave();
+    opened.map_err(|error| {
+        let message = reason(&error);
+        let python = message
+            .split("undefined symbol: ")
+            .nth(1)
+            .is_some_and(|symbol| symbol.trim_start_matches('_').starts_with("Py"));
+        let hint = if python { PYTHON } else { "" };
+        LoadError::Refused { path: path.to_owned(), message, hint }
+    })
+}
+
+/// Loads `library` for the rest of the process, on Unix with its symbols visible to all that come
+/// later.
+///
+/// # Errors
+///
+/// [`LoadError::Refused`] where the operating system does not find or accept it.
+pub fn preload(library: &OsStr) -> Result<(), LoadError> {
+    #[cfg(unix)]
+    // SAFETY: runs the initialisers of the library, which is what the user asked for.
+    let opened = unsafe {
+        use libloading::os::unix::{Library, RTLD_GLOBAL, RTLD_NOW};
+        Library::open(Some(library), RTLD_NOW | RTLD_GLOBAL)
+    };
+    #[cfg(not(unix))]
+    // SAFETY: runs the initialisers of the library, which is what the user asked for.
+    let opened = unsafe { Handle::new(library) };
+    match opened {
+        Ok(handle) => {
+            std::mem::forget(handle);
+            Ok(())
+        }
+        Err(error) => Err(LoadError::Refused {
+            path: PathBuf::from(library),
+            message: reason(&error),
+            hint: "",
+        }),
+    }
+}
+
+/// Asks the library at `path`, which `fmu::export!` made, for its model description.
+///
+/// # Errors
+///
+/// Where it cannot be loaded, was not made by `fmi2`, or refuses `resources`.
+pub fn describe(path: &Path, resources: &Path) -> Result<String, LoadError> {
+    unsafe extern "C" fn sink(context: *mut c_void, text: *const c_char, length: usize) {
+        // SAFETY: `context` is the buffer below; the library gives `length` bytes.
+        unsafe {
+            let text = std::slice::from_raw_parts(text.cast::<u8>(), length);
+            (*context.cast::<Vec<u8>>()).extend_from_slice(text);
+        }
+    }
+    type Describe = unsafe extern "C" fn(*const c_char, *mut c_void, DescribeSink) -> c_int;
+    let handle = load(path)?;
+    // SAFETY: `fmu::export!` gives this name this signature.
+    let describe = unsafe { handle.get::<Describe>(DESCRIBE.as_bytes()) }
+        .map_err(|_| LoadError::Missing { path: path.to_owned(), function: DESCRIBE.to_owned() })?;
+    let folder = c_string(&resources.display().to_string());
+    let mut text = Vec::<u8>::new();
+    // SAFETY: a terminated path, and a sink that fits its context.
+    let status = unsafe { describe(folder.as_ptr(), (&raw mut text).cast(), sink) };
+    let text = String::from_utf8_lossy(&text).into_owned();
+    if status == 0 {
+        Ok(text)
+    } else {
+        Err(LoadError::Describe { path: path.to_owned(), message: text })
+    }
+}
+
+fn c_string(text: &str) -> CString {
+    CString::new(text.replace('\0', "")).unwrap_or_default()
+}
+
+/// `fmi2Type`: what an instance is made for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Interface {
+    /// `fmi2ModelExchange`: the master integrates the states.
+    ModelExchange,
+    /// `fmi2CoSimulation`: the FMU integrates its states.
+    CoSimulation,
+}
+
+impl Interface {
+    fn to_c(self) -> c_int {
+        match self {
+            Interface::ModelExchange => MODEL_EXCHANGE,
+            Interface::CoSimulation => CO_SIMULATION,
+        }
+    }
+}
+
+/// A loaded library with the functions of FMI 2.0.
+pub(crate) struct Library {
+    functions: Functions,
+    path: PathBuf,
+    /// An instance returned `fmi2Fatal`: no function of any may be called again (section 2.1.3).
+    corrupted: AtomicBool,
+    _handle: Handle,
+}
+
+impl Library {
+    /// Loads the library and resolves the functions: those of `interface` must be there.
+    pub(crate) fn open(path: &Path, interface: Interface) -> Result<Self, LoadError> {
+        let handle = load(path)?;
+        let functions = Functions::load(&handle);
+        // SAFETY: takes no argument and returns a static string.
+        let version = functions
+            .get_version
+            .and_then(|function| unsafe { function().as_ref().map(|text| CStr::from_ptr(text)) });
+        let found = version.map(CStr::to_string_lossy).unwrap_or_default();
+        if functions.get_version.is_some() && !found.starts_with("2.") {
+            let found = found.into_owned();
+            return Err(LoadError::Version { path: path.to_owned(), found });
+        }
+        functions.demand(interface, path)?;
+        let corrupted = AtomicBool::new(false);
+        Ok(Self { functions, path: path.to_owned(), corrupted, _handle: handle })
+    }
+
+    /// `fmi2Instantiate` for `interface`.
+    pub(crate) fn instantiate(
+        self: &Arc<Self>,
+        interface: Interface,
+        name: &str,
+        guid: &str,
+        resources: &str,
+        names: Names,
+    ) -> Result<Component, LoadError> {
+        let place = Place::new(name);
+        let sink = Sink::new(&place, names);
+        let callbacks = callbacks(&sink);
+        let (c_name, c_guid, c_resources) = (c_string(name), c_string(guid), c_string(resources));
+        let kind = interface.to_c();
+        place.enter(&"fmi2Instantiate");
+        // SAFETY: terminated strings, callbacks that outlive the instance.
+        let pointer = self.functions.instantiate.map_or(std::ptr::null_mut(), |function| unsafe {
+            function(
+                c_name.as_ptr(),
+                kind,
+                c_guid.as_ptr(),
+                c_resources.as_ptr(),
+                Arc::as_ptr(&callbacks),
+                0,
+                0,
+            )
+        });
+        place.leave();
+        let component = Component {
+            hot: Hot {
+                pointer,
+                set_real: self.functions.set_real,
+                do_step: self.functions.do_step,
+                get_real: self.functions.get_real,
+                place: place.slot(),
+            },
+            place,
+            pointer,
+            functions: self.functions,
+            sink,
+            saved: Vec::new(),
+            time_limit: None,
+            abandoned: false,
+            warned: Cell::new(false),
+            callbacks,
+            library: self.clone(),
+        };
+        if pointer.is_null() { Err(self.not_instantiated(name, &component)) } else { Ok(component) }
+    }
+
+    /// The error of an instance that the FMU did not make.
+    fn not_instantiated(&self, name: &str, component: &Component) -> LoadError {
+        let messages = component.sink.take();
+        let reason =
+            if messages.is_empty() { "it gave no reason".to_owned() } else { messages.join("; ") };
+        LoadError::Instantiate { path: self.path.clone(), instance: name.to_owned(), reason }
+    }
+}
+
+/// What an instance is given to call; `sink` receives its messages.
+#[expect(clippy::arc_with_non_send_sync, reason = "`Component` says why it may be sent")]
+fn callbacks(sink: &Arc<Sink>) -> Arc<fmi2CallbackFunctions> {
+    Arc::new(fmi2CallbackFunctions {
+        logger: Some(log::logger()),
+        allocate_memory: Some(calloc),
+        free_memory: Some(free),
+        step_finished: None,
+        component_environment: Arc::as_ptr(sink).cast_mut().cast(),
+    })
+}
+
+unsafe extern "C" {
+    fn calloc(count: usize, size: usize) -> *mut c_void;
+    fn free(pointer: *mut c_void);
+}
+
+/// What a step takes, in one line of the processor's cache.
+#[repr(C, align(64))]
+struct Hot {
+    pointer: fmi2Component,
+    set_real: Option<functions::SetReal>,
+    do_step: Option<functions::DoStep>,
+    get_real: Option<functions::GetReal>,
+    place: &'static Slot,
+}
+
+/// An instance, freed with its last use; the library stays loaded as long.
+pub struct Component {
+    /// What [`Component::pass`] needs.
+    hot: Hot,
+    /// Where the instance is, for reports of its crash.
+    place: Arc<Place>,
+    pointer: fmi2Component,
+    /// Those of the library, at hand.
+    functions: Functions,
+    /// Shared with the FMU, which has its address.
+    sink: Arc<Sink>,
+    /// FMU states by slot; null where there is none.
+    saved: Vec<fmi2FMUstate>,
+    /// How long an answer of `fmi2Pending` is waited for; none: as long as it takes.
+    pub(crate) time_limit: Option<Duration>,
+    /// It is still busy with a step that could not be canceled, and may not be freed.
+    abandoned: bool,
+    /// A call has returned `fmi2Warning`.
+    warned: Cell<bool>,
+    callbacks: Arc<fmi2CallbackFunctions>,
+    library: Arc<Library>,
+}
+
+// SAFETY: an instance may be used from any thread, by one at a time (FMI 2.0.5, section 2.1); the
+// pointers are to the instance, its states, and what is shared with it through `Arc`.
+unsafe impl Send for Component {}
+
+impl Drop for Component {
+    fn drop(&mut self) {
+        if self.pointer.is_null() {
+            return;
+        }
+        if self.abandoned || self.library.corrupted.load(Ordering::Relaxed) {
+            // Whatever it may still use stays: library, callbacks and the receiver of messages.
+            std::mem::forget((self.library.clone(), self.callbacks.clone(), self.sink.clone()));
+            return;
+        }
+        for mut state in std::mem::take(&mut self.saved) {
+            self.free_state(&mut state);
+        }
+        if let Some(free_instance) = self.functions.free_instance {
+            self.place.enter(&"fmi2FreeInstance");
+            // SAFETY: the instance is alive and not used again.
+            unsafe { free_instance(self.pointer) };
+            self.place.leave();
+        }
+    }
+}
+
+impl Component {
+    #[inline]
+    fn check(&self, function: &'static str, status: fmi2Status) -> Result<(), CallError> {
+        self.place.leave();
+        if status == Status::OK as fmi2Status || self.is_warning(status) {
+            return Ok(());
+        }
+        if status == Status::Fatal as fmi2Status {
+            self.library.corrupted.store(true, Ordering::Relaxed);
+        }
+        let failure =
+            Status::from_c(status).map_or(Failure::UnknownStatus(status), Failure::Status);
+        Err(self.failed(function, failure))
+    }
+
+    /// Whether that is `fmi2Warning`, which is noted.
+    #[inline]
+    fn is_warning(&self, status: fmi2Status) -> bool {
+        let warning = status == Status::Warning as fmi2Status;
+        if warning {
+            self.warned.set(true);
+        }
+        warning
+    }
+
+    /// Whether a call has returned `fmi2Warning` since this was last asked; calls by
+    /// [`Component::pass`] do not count.
+    pub fn take_warning(&mut self) -> bool {
+        self.warned.take()
+    }
+
+    #[cold]
+    fn failed(&self, function: &'static str, failure: Failure) -> CallError {
+        CallError { function, failure, messages: self.sink.take() }
+    }
+}

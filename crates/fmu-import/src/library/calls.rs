@@ -1,0 +1,184 @@
+//! What can be asked of an instance, one method for each function of the standard.
+#![expect(unsafe_code, reason = "the boundary to C")]
+
+use std::ffi::CStr;
+
+use fmu_description::abi::{fmi2Boolean, fmi2EventInfo};
+
+use super::{Component, c_string};
+use slave::{CallError, absent};
+
+/// The function of that field, which is called next, or the error that it is missing.
+/// [`Component::check`] takes note of its return.
+macro_rules! function {
+    ($self:ident.$field:ident, $name:expr) => {
+        match $self.functions.$field {
+            Some(function) => {
+                $self.place.enter(&$name);
+                function
+            }
+            None => return Err(absent($name)),
+        }
+    };
+}
+pub(super) use function;
+
+/// Defines a method for each function: its arguments, and the C arguments made of them.
+macro_rules! calls {
+    ($($method:ident($($argument:ident: $type:ty),*) = $name:literal($($c:expr),*);)*) => {
+        impl Component {
+            $(#[doc = concat!("Calls `", $name, "`.")]
+            #[inline]
+            pub fn $method(&mut self, $($argument: $type),*) -> Result<(), CallError> {
+                let function = function!(self.$method, $name);
+                // SAFETY: the instance is alive; slices that belong together are equally long.
+                let status = unsafe { function(self.pointer, $($c),*) };
+                self.check($name, status)
+            })*
+        }
+    };
+}
+
+calls! {
+    enter_initialization_mode() = "fmi2EnterInitializationMode"();
+    exit_initialization_mode() = "fmi2ExitInitializationMode"();
+    terminate() = "fmi2Terminate"();
+    get_real(references: &[u32], values: &mut [f64]) =
+        "fmi2GetReal"(references.as_ptr(), same_length(references, values), values.as_mut_ptr());
+    set_real(references: &[u32], values: &[f64]) =
+        "fmi2SetReal"(references.as_ptr(), same_length(references, values), values.as_ptr());
+    get_integer(references: &[u32], values: &mut [i32]) =
+        "fmi2GetInteger"(references.as_ptr(), same_length(references, values), values.as_mut_ptr());
+    set_integer(references: &[u32], values: &[i32]) =
+        "fmi2SetInteger"(references.as_ptr(), same_length(references, values), values.as_ptr());
+    get_boolean(references: &[u32], values: &mut [i32]) =
+        "fmi2GetBoolean"(references.as_ptr(), same_length(references, values), values.as_mut_ptr());
+    set_boolean(references: &[u32], values: &[i32]) =
+        "fmi2SetBoolean"(references.as_ptr(), same_length(references, values), values.as_ptr());
+    set_real_input_derivatives(references: &[u32], orders: &[i32], values: &[f64]) =
+        "fmi2SetRealInputDerivatives"(references.as_ptr(), same_length(references, values),
+            orders[..references.len()].as_ptr(), values.as_ptr());
+    get_real_output_derivatives(references: &[u32], orders: &[i32], values: &mut [f64]) =
+        "fmi2GetRealOutputDerivatives"(references.as_ptr(), same_length(references, values),
+            orders[..references.len()].as_ptr(), values.as_mut_ptr());
+    enter_event_mode() = "fmi2EnterEventMode"();
+    enter_continuous_time_mode() = "fmi2EnterContinuousTimeMode"();
+    set_continuous_states(values: &[f64]) =
+        "fmi2SetContinuousStates"(values.as_ptr(), values.len());
+    get_continuous_states(values: &mut [f64]) =
+        "fmi2GetContinuousStates"(values.as_mut_ptr(), values.len());
+    get_derivatives(values: &mut [f64]) =
+        "fmi2GetDerivatives"(values.as_mut_ptr(), values.len());
+    get_nominals(values: &mut [f64]) =
+        "fmi2GetNominalsOfContinuousStates"(values.as_mut_ptr(), values.len());
+}
+
+/// The length that both slices have.
+#[inline]
+pub(super) fn same_length<A, B>(references: &[A], values: &[B]) -> usize {
+    assert_eq!(references.len(), values.len(), "references and values are equally many");
+    references.len()
+}
+
+impl Component {
+    /// `fmi2SetDebugLogging` of all categories.
+    pub fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
+        const NAME: &str = "fmi2SetDebugLogging";
+        let function = function!(self.set_debug_logging, NAME);
+        // SAFETY: the instance is alive; no categories.
+        let status = unsafe { function(self.pointer, on.into(), 0, std::ptr::null()) };
+        self.check(NAME, status)
+    }
+
+    /// `fmi2SetupExperiment`.
+    pub fn setup_experiment(&mut self, e: &fmu_description::Experiment) -> Result<(), CallError> {
+        const NAME: &str = "fmi2SetupExperiment";
+        let (tolerance, stop) = (e.tolerance.unwrap_or(0.0), e.stop_time.unwrap_or(0.0));
+        let (has_tolerance, has_stop) =
+            (fmi2Boolean::from(e.tolerance.is_some()), fmi2Boolean::from(e.stop_time.is_some()));
+        let function = function!(self.setup_experiment, NAME);
+        self.place.set_time(e.start_time);
+        // SAFETY: the instance is alive.
+        let status = unsafe {
+            function(self.pointer, has_tolerance, tolerance, e.start_time, has_stop, stop)
+        };
+        self.check(NAME, status)
+    }
+
+    /// `fmi2SetString`.
+    pub fn set_string(&mut self, references: &[u32], values: &[String]) -> Result<(), CallError> {
+        const NAME: &str = "fmi2SetString";
+        let function = function!(self.set_string, NAME);
+        let count = same_length(references, values);
+        let values: Vec<_> = values.iter().map(|value| c_string(value)).collect();
+        let pointers: Vec<_> = values.iter().map(|value| value.as_ptr()).collect();
+        // SAFETY: the instance is alive; as many references as terminated strings.
+        let status =
+            unsafe { function(self.pointer, references.as_ptr(), count, pointers.as_ptr()) };
+        self.check(NAME, status)
+    }
+
+    /// `fmi2GetString`.
+    pub fn get_string(
+        &mut self,
+        references: &[u32],
+        values: &mut [String],
+    ) -> Result<(), CallError> {
+        const NAME: &str = "fmi2GetString";
+        let function = function!(self.get_string, NAME);
+        let count = same_length(references, values);
+        let mut pointers = vec![std::ptr::null(); count];
+        // SAFETY: the instance is alive; as many references as places for pointers.
+        let status =
+            unsafe { function(self.pointer, references.as_ptr(), count, pointers.as_mut_ptr()) };
+        self.check(NAME, status)?;
+        self.place.enter(&NAME);
+        for (value, pointer) in values.iter_mut().zip(pointers) {
+            value.clear();
+            // SAFETY: the FMU gives null or terminated strings, which live until the next call.
+            let text = unsafe { pointer.as_ref().map(|text| CStr::from_ptr(text)) };
+            if let Some(text) = text {
+                value.push_str(&text.to_string_lossy());
+            }
+        }
+        self.place.leave();
+        Ok(())
+    }
+
+    /// `fmi2NewDiscreteStates`.
+    pub fn new_discrete_states(&mut self) -> Result<fmi2EventInfo, CallError> {
+        const NAME: &str = "fmi2NewDiscreteStates";
+        let mut info = fmi2EventInfo::default();
+        let function = function!(self.new_discrete_states, NAME);
+        // SAFETY: the instance is alive; one structure to write to.
+        let status = unsafe { function(self.pointer, &raw mut info) };
+        self.check(NAME, status)?;
+        Ok(info)
+    }
+
+    /// `fmi2GetDirectionalDerivative`.
+    pub fn directional_derivative(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        changes: &mut [f64],
+    ) -> Result<(), CallError> {
+        const NAME: &str = "fmi2GetDirectionalDerivative";
+        let function = function!(self.get_directional_derivative, NAME);
+        let (unknown, known) = (same_length(unknowns, changes), same_length(knowns, seed));
+        // SAFETY: the instance is alive; arrays that belong together are equally long.
+        let status = unsafe {
+            function(
+                self.pointer,
+                unknowns.as_ptr(),
+                unknown,
+                knowns.as_ptr(),
+                known,
+                seed.as_ptr(),
+                changes.as_mut_ptr(),
+            )
+        };
+        self.check(NAME, status)
+    }
+}

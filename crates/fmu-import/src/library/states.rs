@@ -1,0 +1,96 @@
+//! FMU states: kept in numbered slots, as bytes.
+#![expect(unsafe_code, reason = "the boundary to C")]
+
+use std::ptr::null_mut;
+
+use fmu_description::abi::fmi2FMUstate;
+
+use super::Component;
+use super::calls::function;
+use slave::{CallError, Failure, absent};
+
+impl Component {
+    /// `fmi2GetFMUstate` into a slot.
+    pub fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
+        const NAME: &str = "fmi2GetFMUstate";
+        let function = function!(self.get_state, NAME);
+        if self.saved.len() <= slot {
+            self.saved.resize(slot + 1, null_mut());
+        }
+        // SAFETY: the instance is alive; the state is null or its own.
+        let status = unsafe { function(self.pointer, &raw mut self.saved[slot]) };
+        self.check(NAME, status)
+    }
+
+    /// `fmi2SetFMUstate` from a slot.
+    pub fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
+        const NAME: &str = "fmi2SetFMUstate";
+        let state = self.saved.get(slot).copied().unwrap_or(null_mut());
+        if state.is_null() {
+            let what = format!("was asked for the state of slot {slot}, which is empty");
+            return Err(self.failed(NAME, Failure::Nonsense(what)));
+        }
+        self.set_state(state)
+    }
+
+    fn set_state(&mut self, state: fmi2FMUstate) -> Result<(), CallError> {
+        const NAME: &str = "fmi2SetFMUstate";
+        let function = function!(self.set_state, NAME);
+        // SAFETY: the instance is alive; the state is its own.
+        let status = unsafe { function(self.pointer, state) };
+        self.check(NAME, status)
+    }
+
+    /// Frees a state of the instance.
+    pub(super) fn free_state(&mut self, state: &mut fmi2FMUstate) {
+        if let (Some(function), false) = (self.functions.free_state, state.is_null()) {
+            self.place.enter(&"fmi2FreeFMUstate");
+            // SAFETY: the instance is alive, the state is its own.
+            unsafe { function(self.pointer, &raw mut *state) };
+            self.place.leave();
+            *state = null_mut();
+        }
+    }
+
+    /// `fmi2SerializeFMUstate` of the state of now.
+    pub fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
+        const NAME: &str = "fmi2GetFMUstate";
+        let function = function!(self.get_state, NAME);
+        let mut state = null_mut();
+        // SAFETY: the instance is alive; one state to write to.
+        let status = unsafe { function(self.pointer, &raw mut state) };
+        let bytes = self.check(NAME, status).and_then(|()| self.serialized(state));
+        self.free_state(&mut state);
+        bytes
+    }
+
+    fn serialized(&mut self, state: fmi2FMUstate) -> Result<Vec<u8>, CallError> {
+        const SIZE: &str = "fmi2SerializedFMUstateSize";
+        const NAME: &str = "fmi2SerializeFMUstate";
+        let mut size = 0;
+        let function = function!(self.serialized_state_size, SIZE);
+        // SAFETY: the instance is alive, the state is its own.
+        let status = unsafe { function(self.pointer, state, &raw mut size) };
+        self.check(SIZE, status)?;
+        let function = function!(self.serialize_state, NAME);
+        let mut bytes = vec![0_u8; size];
+        // SAFETY: the instance is alive, the state is its own; `size` bytes to write to.
+        let status =
+            unsafe { function(self.pointer, state, bytes.as_mut_ptr().cast(), bytes.len()) };
+        self.check(NAME, status)?;
+        Ok(bytes)
+    }
+
+    /// `fmi2DeSerializeFMUstate`, and on to that state.
+    pub fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
+        const NAME: &str = "fmi2DeSerializeFMUstate";
+        let mut state = null_mut();
+        let function = function!(self.deserialize_state, NAME);
+        // SAFETY: the instance is alive; `bytes.len()` bytes to read, one state to write to.
+        let status =
+            unsafe { function(self.pointer, bytes.as_ptr().cast(), bytes.len(), &raw mut state) };
+        let done = self.check(NAME, status).and_then(|()| self.set_state(state));
+        self.free_state(&mut state);
+        done
+    }
+}

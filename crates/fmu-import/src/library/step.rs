@@ -1,0 +1,183 @@
+//! `fmi2DoStep` and what its answers ask for.
+#![expect(unsafe_code, reason = "the boundary to C")]
+
+use std::time::{Duration, Instant};
+
+use fmu_description::abi::{Status, StatusKind, fmi2Status};
+
+use super::Component;
+use super::calls::{function, same_length};
+use slave::{CallError, Failure, Stepped, absent};
+
+const NAME: &str = "fmi2DoStep";
+const SET: &str = "fmi2SetReal";
+const GET: &str = "fmi2GetReal";
+
+/// Longest pause between two questions whether a pending step is done.
+const PAUSE: Duration = Duration::from_millis(1);
+
+impl Component {
+    /// `fmi2DoStep` from `time` over `size`.
+    #[inline]
+    pub fn do_step(
+        &mut self,
+        time: f64,
+        size: f64,
+        never_back: bool,
+    ) -> Result<Stepped, CallError> {
+        let function = function!(self.do_step, NAME);
+        self.place.set_time(time);
+        // SAFETY: the instance is alive.
+        let status = unsafe { function(self.pointer, time, size, never_back.into()) };
+        self.place.leave();
+        if status == Status::OK as fmi2Status || self.is_warning(status) {
+            return Ok(Stepped::Whole);
+        }
+        self.unfinished(status, time, size)
+    }
+
+    /// [`slave::Slave::pass`]: the three calls of C one after the other, their statuses
+    /// looked at without a detour. An answer out of the ordinary is left to the methods of its
+    /// own.
+    #[inline]
+    pub fn pass(
+        &mut self,
+        (inputs, values): (&[u32], &[f64]),
+        (time, size): (f64, f64),
+        never_back: bool,
+        (outputs, results): (&[u32], &mut [f64]),
+    ) -> Result<Stepped, CallError> {
+        let hot = &self.hot;
+        let usual =
+            |status| status == Status::OK as fmi2Status || status == Status::Warning as fmi2Status;
+        if !inputs.is_empty() {
+            let Some(function) = hot.set_real else { return Err(absent(SET)) };
+            let count = same_length(inputs, values);
+            hot.place.enter(&SET);
+            // SAFETY: the instance is alive; as many references as values.
+            let status = unsafe { function(hot.pointer, inputs.as_ptr(), count, values.as_ptr()) };
+            if !usual(status) {
+                self.check(SET, status)?;
+            }
+        }
+        let Some(function) = hot.do_step else { return Err(absent(NAME)) };
+        hot.place.set_time(time);
+        hot.place.enter(&NAME);
+        // SAFETY: the instance is alive.
+        let status = unsafe { function(hot.pointer, time, size, never_back.into()) };
+        if !usual(status) {
+            let done = self.unfinished(status, time, size)?;
+            return self.read_part(outputs, results, done);
+        }
+        if !outputs.is_empty() {
+            let Some(function) = hot.get_real else { return Err(absent(GET)) };
+            let count = same_length(outputs, results);
+            hot.place.enter(&GET);
+            // SAFETY: the instance is alive; as many references as values.
+            let status =
+                unsafe { function(hot.pointer, outputs.as_ptr(), count, results.as_mut_ptr()) };
+            if !usual(status) {
+                self.check(GET, status)?;
+            }
+        }
+        self.place.leave();
+        Ok(Stepped::Whole)
+    }
+
+    /// Reads the outputs after a step that was not done at once.
+    #[cold]
+    fn read_part(
+        &mut self,
+        outputs: &[u32],
+        results: &mut [f64],
+        done: Stepped,
+    ) -> Result<Stepped, CallError> {
+        if !outputs.is_empty() {
+            self.get_real(outputs, results)?;
+        }
+        Ok(done)
+    }
+
+    /// What a step that did not answer `fmi2OK` came to.
+    #[cold]
+    fn unfinished(
+        &mut self,
+        mut status: fmi2Status,
+        time: f64,
+        size: f64,
+    ) -> Result<Stepped, CallError> {
+        let (begin, mut pause) = (Instant::now(), Duration::from_micros(1));
+        while status == Status::Pending as fmi2Status {
+            if let Some(limit) = self.time_limit.filter(|limit| begin.elapsed() > *limit) {
+                self.cancel();
+                return Err(self.failed(NAME, Failure::TimedOut(limit.as_secs_f64())));
+            }
+            std::thread::sleep(pause);
+            pause = (2 * pause).min(PAUSE);
+            status = self.status(StatusKind::DoStepStatus)?;
+        }
+        if status != Status::Discard as fmi2Status {
+            return self.check(NAME, status).map(|()| Stepped::Whole);
+        }
+        let reached = match self.real_status(StatusKind::LastSuccessfulTime) {
+            Ok(reached) => reached,
+            Err(CallError { messages, .. }) => {
+                let failure = Failure::Status(Status::Discard);
+                return Err(CallError { function: NAME, failure, messages });
+            }
+        };
+        let terminated = self.boolean_status(StatusKind::Terminated).unwrap_or(false);
+        let rounding = 1e-9 * (size.abs() + time.abs());
+        if !(reached >= time - rounding && reached <= time + size + rounding) {
+            let what = format!(
+                "returned fmi2Discard with the last successful time {reached} s, expected one \
+                 from {time} to {} s",
+                time + size
+            );
+            return Err(self.failed(NAME, Failure::Nonsense(what)));
+        }
+        Ok(Stepped::Part { reached, terminated })
+    }
+
+    /// `fmi2CancelStep`: only then may the instance be freed (section 4.2.4).
+    fn cancel(&mut self) {
+        self.place.enter(&"fmi2CancelStep");
+        // SAFETY: the instance is alive.
+        let canceled = self
+            .functions
+            .cancel_step
+            .is_some_and(|function| unsafe { function(self.pointer) == Status::OK as fmi2Status });
+        self.place.leave();
+        self.abandoned = !canceled;
+    }
+
+    fn status(&mut self, kind: StatusKind) -> Result<fmi2Status, CallError> {
+        const NAME: &str = "fmi2GetStatus";
+        let mut value = 0;
+        let function = function!(self.get_status, NAME);
+        // SAFETY: the instance is alive; one place to write to.
+        let status = unsafe { function(self.pointer, kind as i32, &raw mut value) };
+        self.check(NAME, status)?;
+        Ok(value)
+    }
+
+    fn real_status(&mut self, kind: StatusKind) -> Result<f64, CallError> {
+        const NAME: &str = "fmi2GetRealStatus";
+        let mut value = f64::NAN;
+        let function = function!(self.get_real_status, NAME);
+        // SAFETY: the instance is alive; one place to write to.
+        let status = unsafe { function(self.pointer, kind as i32, &raw mut value) };
+        self.check(NAME, status)?;
+        Ok(value)
+    }
+
+    fn boolean_status(&mut self, kind: StatusKind) -> Result<bool, CallError> {
+        const NAME: &str = "fmi2GetBooleanStatus";
+        let mut value = 0;
+        let function = function!(self.get_boolean_status, NAME);
+        // SAFETY: the instance is alive; one place to write to.
+        let status = unsafe { function(self.pointer, kind as i32, &raw mut value) };
+        self.check(NAME, status)?;
+        Ok(value != 0)
+    }
+}

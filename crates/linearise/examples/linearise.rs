@@ -1,0 +1,73 @@
+//! Linearises an FMU and prints matrices, operating point and method as TOML.
+//!
+//! Usage: linearise FMU [preload=LIBRARY] [inputs=A,B] [faults=..] [outputs=..] [states=..]
+//! [step=SECONDS] [at.NAME=VALUE ...] [typical.NAME=SIZE ...]
+#![forbid(unsafe_code)]
+#![expect(clippy::print_stdout, reason = "the result")]
+
+use std::error::Error;
+use std::process::ExitCode;
+
+use fmu_import::{Fmu, preload};
+use linearise::Signal;
+use linearise::{Linearise, linearise};
+
+fn list(text: &str) -> Vec<String> {
+    text.split(',').filter(|name| !name.is_empty()).map(str::to_owned).collect()
+}
+
+fn print(key: &str, signals: &[Signal]) {
+    for signal in signals {
+        println!("{key}.{:?} = {:?}", signal.name, signal.value);
+    }
+}
+
+fn main() -> ExitCode {
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let path = arguments.next().ok_or("the first argument is the FMU")?;
+    let mut request = Linearise::default();
+    for argument in arguments {
+        let (key, value) = argument.split_once('=').ok_or("expected key=value")?;
+        match key.split_once('.').unwrap_or((key, "")) {
+            ("preload", _) => preload(value.as_ref())?,
+            ("inputs", _) => request.inputs = list(value),
+            ("faults", _) => request.faults = list(value),
+            ("outputs", _) => request.outputs = list(value),
+            ("states", _) => request.states = list(value),
+            ("step", _) => request.step = Some(value.parse()?),
+            ("at", name) => request.at.push((name.to_owned(), value.to_owned())),
+            ("typical", name) => request.typical.push((name.to_owned(), value.parse()?)),
+            _ => return Err(format!("{key:?} is no key").into()),
+        }
+    }
+    let found = linearise(&Fmu::open_any(path.as_ref())?, &request)?;
+    let own = &found.matrices;
+    let matrices =
+        [("A", &own.a), ("B", &own.b), ("F", &own.f), ("C", &own.c), ("D", &own.d), ("G", &own.g)];
+    for (name, matrix) in matrices {
+        let rows: Vec<Vec<f64>> =
+            matrix.row_iter().map(|row| row.iter().copied().collect()).collect();
+        println!("{name} = {rows:?}");
+    }
+    println!("rates = {:?}", found.rates);
+    println!("residual = {:?}", found.residual);
+    println!("method = {:?}", found.method.to_string());
+    if let Some(error) = found.relative_error() {
+        println!("relative_error = {error:?}");
+    }
+    print("x_0", &found.states);
+    print("u_0", &found.inputs);
+    print("f_0", &found.faults);
+    print("y_0", &found.outputs);
+    Ok(())
+}

@@ -1,0 +1,64 @@
+//! The Jacobian by `fmi2GetDirectionalDerivative`.
+
+use nalgebra::DMatrix;
+
+use super::LineariseError;
+use super::parts::{Parts, State};
+use super::point::row_name;
+use fmu_import::Component;
+
+/// Derivatives of the states' derivatives and of the outputs with respect to states and inputs.
+///
+/// A row whose variable is itself a state or an input is known without asking.
+pub(super) fn jacobian(
+    component: &mut Component,
+    parts: &Parts,
+    states: &[State],
+) -> Result<DMatrix<f64>, LineariseError> {
+    let columns = states.iter().map(|state| &state.part).chain(&parts.inputs);
+    let knowns: Vec<u32> = columns.map(|part| part.reference).collect();
+    let rates = states.iter().map(|state| state.derivative);
+    let rows: Vec<u32> = rates.chain(parts.outputs.iter().map(|part| part.reference)).collect();
+    let asked: Vec<usize> = (0..rows.len()).filter(|&row| !knowns.contains(&rows[row])).collect();
+    listed(parts, states, &rows, &asked)?;
+    let unknowns: Vec<u32> = asked.iter().map(|&row| rows[row]).collect();
+    let mut jacobian =
+        DMatrix::from_fn(rows.len(), knowns.len(), |i, j| f64::from(rows[i] == knowns[j]));
+    let mut values = vec![0.0; unknowns.len()];
+    for (column, &known) in knowns.iter().enumerate() {
+        if !unknowns.is_empty() {
+            component.directional_derivative(&unknowns, &[known], &[1.0], &mut values)?;
+        }
+        for (&row, &value) in asked.iter().zip(&values) {
+            if !value.is_finite() {
+                let name = format!("the derivative of {}", row_name(states, parts, row));
+                return Err(LineariseError::NotFinite { name, value });
+            }
+            jacobian[(row, column)] = value;
+        }
+    }
+    Ok(jacobian)
+}
+
+/// Directional derivatives exist for what `Outputs` and `Derivatives` list.
+fn listed(
+    parts: &Parts,
+    states: &[State],
+    rows: &[u32],
+    asked: &[usize],
+) -> Result<(), LineariseError> {
+    let variables = &parts.description.variables;
+    let listed = parts.description.structure.outputs.iter().filter_map(|unknown| {
+        Some(variables.get((unknown.index as usize).checked_sub(1)?)?.value_reference)
+    });
+    let listed: Vec<u32> = listed.collect();
+    let is_rate = |reference: &u32| states.iter().any(|state| state.derivative == *reference);
+    let missing = asked.iter().find(|&&row| !listed.contains(&rows[row]) && !is_rate(&rows[row]));
+    let Some(&row) = missing else { return Ok(()) };
+    Err(LineariseError::Role {
+        name: row_name(states, parts, row),
+        found: "a variable that ModelStructure does not list: it has no directional derivative"
+            .to_owned(),
+        expected: "an output, a state or the derivative of one",
+    })
+}

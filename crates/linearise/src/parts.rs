@@ -1,0 +1,231 @@
+//! Names of the request, resolved: which variable has which part.
+
+use fmu_description::{
+    Causality, Initial, Kind, ModelDescription, RealType, ScalarVariable, Variability,
+};
+
+use super::{Linearise, LineariseError};
+use fmu_description::similar::nearest;
+use slave::Value;
+
+/// A Real variable that is a state, an input or an output.
+#[derive(Clone, Debug)]
+pub(super) struct Part {
+    pub(super) name: String,
+    pub(super) reference: u32,
+    pub(super) unit: Option<String>,
+    pub(super) min: f64,
+    pub(super) max: f64,
+    /// The typical size of a change, from the request or `nominal`.
+    pub(super) typical: Option<f64>,
+}
+
+impl Part {
+    /// The typical size of a change about `value`: as given, else the value itself, else one.
+    pub(super) fn scale(&self, value: f64) -> f64 {
+        let own = if value == 0.0 { 1.0 } else { value.abs() };
+        self.typical.unwrap_or(own)
+    }
+}
+
+/// A continuous state and the variable that is its derivative.
+#[derive(Clone, Debug)]
+pub(super) struct State {
+    pub(super) part: Part,
+    pub(super) derivative: u32,
+}
+
+/// One entry of the operating point.
+#[derive(Clone, Debug)]
+pub(super) struct Setting {
+    pub(super) name: String,
+    pub(super) text: String,
+    pub(super) reference: u32,
+    pub(super) value: Value,
+    pub(super) is_input: bool,
+    /// It may be set as a start value, or is an input.
+    pub(super) settable: bool,
+}
+
+/// Everything that the request names.
+pub(super) struct Parts<'a> {
+    pub(super) description: &'a ModelDescription,
+    /// The controlled inputs, then the faults.
+    pub(super) inputs: Vec<Part>,
+    /// How many of the inputs are controlled.
+    pub(super) controlled: usize,
+    pub(super) outputs: Vec<Part>,
+    pub(super) settings: Vec<Setting>,
+}
+
+impl<'a> Parts<'a> {
+    pub(super) fn of(
+        description: &'a ModelDescription,
+        request: &Linearise,
+    ) -> Result<Self, LineariseError> {
+        distinct(request.inputs.iter().chain(&request.faults), "inputs and faults")?;
+        distinct(&request.outputs, "outputs")?;
+        distinct(&request.states, "states")?;
+        distinct(request.at.iter().map(|(name, _)| name), "values of the operating point")?;
+        distinct(request.typical.iter().map(|(name, _)| name), "typical sizes")?;
+        let part = |name: &String, allowed: &[Causality], expected| {
+            let variable = find(description, name)?;
+            part(description, request, variable, allowed, expected)
+        };
+        let inputs = request.inputs.iter().chain(&request.faults);
+        let inputs = inputs.map(|name| part(name, &[Causality::Input], "an input"));
+        let readable = [Causality::Output, Causality::Local];
+        let outputs = request.outputs.iter().map(|name| part(name, &readable, "an output"));
+        for (name, size) in &request.typical {
+            find(description, name)?;
+            if !(size.is_finite() && *size > 0.0) {
+                let what = format!("the typical size of {name}");
+                let expected = "a finite number above zero";
+                return Err(LineariseError::Number { what, value: *size, expected });
+            }
+        }
+        Ok(Self {
+            description,
+            inputs: inputs.collect::<Result<_, _>>()?,
+            controlled: request.inputs.len(),
+            outputs: outputs.collect::<Result<_, _>>()?,
+            settings: settings(description, request)?,
+        })
+    }
+
+    /// The continuous states in the order of `Derivatives`.
+    pub(super) fn states(&self, request: &Linearise) -> Result<Vec<State>, LineariseError> {
+        let variables = &self.description.variables;
+        let at = |index: u32| variables.get((index as usize).checked_sub(1)?);
+        let mut states = Vec::new();
+        for unknown in &self.description.structure.derivatives {
+            let derivative = at(unknown.index);
+            let of = derivative.and_then(|variable| match &variable.kind {
+                Kind::Real(real) => at(real.derivative?),
+                _ => None,
+            });
+            let (Some(derivative), Some(state)) = (derivative, of) else {
+                let index = unknown.index;
+                let text = format!("the variable {index} is not the derivative of a state");
+                return Err(LineariseError::Structure { text });
+            };
+            let allowed = [Causality::Output, Causality::Local];
+            let part = part(self.description, request, state, &allowed, "a state")?;
+            states.push(State { part, derivative: derivative.value_reference });
+        }
+        Ok(states)
+    }
+
+    /// The variables that the request names as states.
+    pub(super) fn named_states(&self, request: &Linearise) -> Result<Vec<Part>, LineariseError> {
+        let allowed = [Causality::Output, Causality::Local];
+        let named = request.states.iter().map(|name| {
+            let variable = find(self.description, name)?;
+            part(self.description, request, variable, &allowed, "a state")
+        });
+        named.collect()
+    }
+}
+
+fn distinct<'n>(
+    names: impl IntoIterator<Item = &'n String>,
+    list: &'static str,
+) -> Result<(), LineariseError> {
+    let mut seen = Vec::new();
+    for name in names {
+        if seen.contains(&name) {
+            return Err(LineariseError::Twice { name: name.clone(), list });
+        }
+        seen.push(name);
+    }
+    Ok(())
+}
+
+pub(super) fn find<'a>(
+    description: &'a ModelDescription,
+    name: &str,
+) -> Result<&'a ScalarVariable, LineariseError> {
+    description.variable(name).ok_or_else(|| LineariseError::UnknownVariable {
+        model: description.model_name.clone(),
+        name: name.to_owned(),
+        nearest: nearest(description, name),
+    })
+}
+
+/// The variable as a part, if it is a continuous Real of one of the causalities.
+fn part(
+    description: &ModelDescription,
+    request: &Linearise,
+    variable: &ScalarVariable,
+    allowed: &[Causality],
+    expected: &'static str,
+) -> Result<Part, LineariseError> {
+    let name = variable.name.clone();
+    let role =
+        |found: String, expected| LineariseError::Role { name: name.clone(), found, expected };
+    if !allowed.contains(&variable.causality) {
+        let found = format!("a variable of causality {}", variable.causality.as_str());
+        return Err(role(found, expected));
+    }
+    let Kind::Real(real) = &variable.kind else {
+        return Err(role(format!("a variable of type {}", variable.kind.element()), "a Real"));
+    };
+    if variable.variability != Variability::Continuous {
+        let found = format!("a variable of variability {}", variable.variability.as_str());
+        return Err(role(found, "a continuous one"));
+    }
+    let given = request.typical.iter().find(|(known, _)| *known == name).map(|(_, size)| *size);
+    let usable = |size: &f64| size.is_finite() && *size > 0.0;
+    let nominal = attribute(description, real, |real| real.nominal).filter(usable);
+    Ok(Part {
+        reference: variable.value_reference,
+        unit: attribute(description, real, |real| real.unit.clone()),
+        min: attribute(description, real, |real| real.min).unwrap_or(f64::NEG_INFINITY),
+        max: attribute(description, real, |real| real.max).unwrap_or(f64::INFINITY),
+        typical: given.or(nominal),
+        name,
+    })
+}
+
+/// An attribute of the variable, or else of its declared type.
+fn attribute<T>(
+    description: &ModelDescription,
+    real: &RealType,
+    of: impl Fn(&RealType) -> Option<T>,
+) -> Option<T> {
+    of(real).or_else(|| {
+        let declared = real.declared_type.as_ref()?;
+        let declared = description.types.iter().find(|known| known.name == *declared)?;
+        let Kind::Real(real) = &declared.kind else { return None };
+        of(real)
+    })
+}
+
+fn settings(
+    description: &ModelDescription,
+    request: &Linearise,
+) -> Result<Vec<Setting>, LineariseError> {
+    let setting = |(name, text): &(String, String)| {
+        let variable = find(description, name)?;
+        let wrong = |expected: String| {
+            let (name, text) = (name.clone(), text.clone());
+            LineariseError::Value { name, text, expected }
+        };
+        let value = Value::parse(&variable.kind, &description.types, text).map_err(wrong)?;
+        if matches!(value, Value::Real(value) if !value.is_finite()) {
+            return Err(wrong("a finite number".to_owned()));
+        }
+        let at_start = variable.variability != Variability::Constant
+            && matches!(variable.initial_in_force(), Some(Initial::Exact | Initial::Approx));
+        let is_input = variable.causality == Causality::Input;
+        Ok(Setting {
+            name: name.clone(),
+            text: text.clone(),
+            reference: variable.value_reference,
+            value,
+            is_input,
+            settable: is_input || at_start,
+        })
+    };
+    request.at.iter().map(setting).collect()
+}

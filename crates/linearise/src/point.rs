@@ -1,0 +1,250 @@
+//! An instance at the operating point.
+
+use fmu_description::Experiment;
+use fmu_description::{Causality, DefaultExperiment};
+
+use super::parts::{Part, Parts, Setting, State};
+use super::{Linearise, LineariseError};
+use fmu_import::Fmu;
+use fmu_import::{Component, Interface};
+use slave::CallError;
+use slave::Value;
+
+/// Calls of `fmi2NewDiscreteStates` at one event.
+const EVENT_ITERATIONS: usize = 1000;
+
+/// An instance that has left initialization mode, with the values of the operating point; states
+/// that have no start value are not set yet.
+pub(super) fn initialised(
+    fmu: &Fmu,
+    interface: Interface,
+    parts: &Parts,
+    request: &Linearise,
+) -> Result<Component, LineariseError> {
+    let mut component = fmu.component(interface, "linearise")?;
+    let default = fmu.description().default_experiment.as_ref();
+    let tolerance = default.and_then(DefaultExperiment::usable_tolerance);
+    let experiment = Experiment { start_time: request.start_time, stop_time: None, tolerance };
+    component.setup_experiment(&experiment)?;
+    let settable = parts.settings.iter().filter(|setting| setting.settable);
+    for setting in settable.clone().filter(|setting| !setting.is_input) {
+        set(&mut component, setting)?;
+    }
+    component.enter_initialization_mode()?;
+    for setting in settable.filter(|setting| setting.is_input) {
+        set(&mut component, setting)?;
+    }
+    component.exit_initialization_mode()?;
+    Ok(component)
+}
+
+fn set(component: &mut Component, setting: &Setting) -> Result<(), LineariseError> {
+    let to = [setting.reference];
+    let done = match &setting.value {
+        Value::Real(value) => component.set_real(&to, &[*value]),
+        Value::Integer(value) => component.set_integer(&to, &[*value]),
+        Value::Boolean(value) => component.set_boolean(&to, &[i32::from(*value)]),
+        Value::String(value) => {
+            component.set_string(&[setting.reference], std::slice::from_ref(value))
+        }
+    };
+    done.map_err(|source| refused(&setting.name, &setting.text, source))
+}
+
+fn refused(name: &str, value: &impl ToString, source: CallError) -> LineariseError {
+    LineariseError::Refused { name: name.to_owned(), value: value.to_string(), source }
+}
+
+/// Refuses settings that have no way into the FMU but those of `states`.
+pub(super) fn all_settable(parts: &Parts, states: &[State]) -> Result<(), LineariseError> {
+    let is_state = |name: &String| states.iter().any(|state| state.part.name == *name);
+    let lost = |setting: &&Setting| !setting.settable && !is_state(&setting.name);
+    let Some(setting) = parts.settings.iter().find(lost) else { return Ok(()) };
+    let variable = super::parts::find(parts.description, &setting.name)?;
+    let causality = variable.causality;
+    let expected = match causality {
+        Causality::Local | Causality::Output => {
+            "one with a start value, or an FMU for model exchange if it is a state: \
+             set the parameter that it starts from"
+        }
+        _ => "a parameter, an input, a start value or a state",
+    };
+    let found = format!("a variable of causality {} that cannot be set", causality.as_str());
+    Err(LineariseError::Role { name: setting.name.clone(), found, expected })
+}
+
+/// Reads Reals; each must be finite.
+pub(super) fn read<'p>(
+    component: &mut Component,
+    parts: impl Iterator<Item = &'p Part> + Clone,
+) -> Result<Vec<f64>, LineariseError> {
+    let references: Vec<u32> = parts.clone().map(|part| part.reference).collect();
+    let mut values = vec![0.0; references.len()];
+    if !references.is_empty() {
+        component.get_real(&references, &mut values)?;
+    }
+    for (part, &value) in parts.zip(&values) {
+        finite(&part.name, value)?;
+    }
+    Ok(values)
+}
+
+fn finite(name: &str, value: f64) -> Result<f64, LineariseError> {
+    if value.is_finite() {
+        return Ok(value);
+    }
+    Err(LineariseError::NotFinite { name: name.to_owned(), value })
+}
+
+/// What to change about the operating point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Known {
+    State(usize),
+    Input(usize),
+}
+
+/// A model exchange instance in continuous-time mode at the operating point.
+pub(super) struct Equations<'p> {
+    pub(super) component: Component,
+    pub(super) parts: &'p Parts<'p>,
+    pub(super) states: &'p [State],
+    pub(super) x: Vec<f64>,
+    pub(super) u: Vec<f64>,
+    inputs: Vec<u32>,
+    outputs: Vec<u32>,
+    /// There is an FMU state to return to.
+    returns: bool,
+}
+
+impl<'p> Equations<'p> {
+    pub(super) fn at(
+        fmu: &Fmu,
+        parts: &'p Parts<'p>,
+        states: &'p [State],
+        request: &Linearise,
+    ) -> Result<Self, LineariseError> {
+        let mut component = initialised(fmu, Interface::ModelExchange, parts, request)?;
+        settle(&mut component)?;
+        let mut x = vec![0.0; states.len()];
+        component.get_continuous_states(&mut x)?;
+        if place(parts, states, &mut x) {
+            set_states(&mut component, states, &x)?;
+            component.enter_event_mode()?;
+            settle(&mut component)?;
+            let mut reached = x.clone();
+            component.get_continuous_states(&mut reached)?;
+            for (state, (&wanted, &found)) in states.iter().zip(x.iter().zip(&reached)) {
+                if (wanted - found).abs() > 1e-12 * state.part.scale(wanted) {
+                    let name = state.part.name.clone();
+                    return Err(LineariseError::Moved { name, wanted, found });
+                }
+            }
+        }
+        let u = read(&mut component, parts.inputs.iter())?;
+        let flags = fmu.description().model_exchange.as_ref();
+        let returns = flags.is_some_and(|flags| flags.can_get_and_set_fmu_state);
+        if returns {
+            component.save_state(0)?;
+        }
+        let references = |parts: &[Part]| parts.iter().map(|part| part.reference).collect();
+        let (inputs, outputs) = (references(&parts.inputs), references(&parts.outputs));
+        Ok(Self { component, parts, states, x, u, inputs, outputs, returns })
+    }
+
+    /// `nominal` of each state as the FMU says it now; 1 stands for unknown.
+    pub(super) fn nominals(&mut self) -> Vec<f64> {
+        let mut nominals = vec![1.0; self.states.len()];
+        let told = self.component.get_nominals(&mut nominals);
+        if told.is_err() { vec![1.0; self.states.len()] } else { nominals }
+    }
+
+    /// Derivatives and outputs with one known at `value`, all others at the operating point.
+    pub(super) fn evaluate(
+        &mut self,
+        change: Option<(Known, f64)>,
+    ) -> Result<Vec<f64>, LineariseError> {
+        if self.returns {
+            self.component.restore_state(0)?;
+        }
+        let (mut x, mut u) = (self.x.clone(), self.u.clone());
+        let mut changed = None;
+        match change {
+            Some((Known::State(k), value)) => {
+                x[k] = value;
+                changed = Some((&self.states[k].part.name, value));
+            }
+            Some((Known::Input(k), value)) => {
+                u[k] = value;
+                changed = Some((&self.parts.inputs[k].name, value));
+            }
+            None => {}
+        }
+        let mut values = vec![0.0; self.states.len() + self.outputs.len()];
+        let (derivatives, outputs) = values.split_at_mut(self.states.len());
+        let component = &mut self.component;
+        let done = component
+            .set_continuous_states(&x)
+            .and_then(|()| if u.is_empty() { Ok(()) } else { component.set_real(&self.inputs, &u) })
+            .and_then(|()| component.get_derivatives(derivatives));
+        let done = match done {
+            Ok(()) if !outputs.is_empty() => component.get_real(&self.outputs, outputs),
+            done => done,
+        };
+        done.map_err(|source| match changed {
+            Some((name, value)) => refused(name, &value, source),
+            None => LineariseError::Call(source),
+        })?;
+        for (row, &value) in values.iter().enumerate() {
+            finite(&row_name(self.states, self.parts, row), value)?;
+        }
+        Ok(values)
+    }
+}
+
+/// The name of a row of the Jacobian: the derivative of a state, or an output.
+pub(super) fn row_name(states: &[State], parts: &Parts, row: usize) -> String {
+    match states.get(row) {
+        Some(state) => format!("der({})", state.part.name),
+        None => parts.outputs[row - states.len()].name.clone(),
+    }
+}
+
+/// Puts the states of the operating point among the values; whether there are any.
+fn place(parts: &Parts, states: &[State], x: &mut [f64]) -> bool {
+    let mut any = false;
+    for (state, value) in states.iter().zip(x) {
+        let setting = parts.settings.iter().find(|setting| setting.name == state.part.name);
+        if let Some(Value::Real(wanted)) = setting.map(|setting| &setting.value) {
+            *value = *wanted;
+            any = true;
+        }
+    }
+    any
+}
+
+fn set_states(
+    component: &mut Component,
+    states: &[State],
+    x: &[f64],
+) -> Result<(), LineariseError> {
+    component.set_continuous_states(x).map_err(|source| {
+        let names: Vec<_> = states.iter().map(|state| state.part.name.as_str()).collect();
+        let values: Vec<_> = x.iter().map(f64::to_string).collect();
+        refused(&names.join(", "), &values.join(", "), source)
+    })
+}
+
+/// From event mode to continuous-time mode.
+fn settle(component: &mut Component) -> Result<(), LineariseError> {
+    for _ in 0..EVENT_ITERATIONS {
+        let info = component.new_discrete_states()?;
+        if info.terminate_simulation != 0 {
+            return Err(LineariseError::Ended);
+        }
+        if info.new_discrete_states_needed == 0 {
+            component.enter_continuous_time_mode()?;
+            return Ok(());
+        }
+    }
+    Err(LineariseError::EndlessEvents { iterations: EVENT_ITERATIONS })
+}

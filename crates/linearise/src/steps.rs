@@ -1,0 +1,326 @@
+//! The Jacobian from communication steps: pulses of the inputs from a saved FMU state, a step map
+//! fitted to what they do, and its logarithm.
+
+use nalgebra::DMatrix;
+
+use super::bench::{Bench, Record, index};
+use super::differences::{Side, extrapolate};
+use super::fit::{Directions, least_squares};
+use super::logarithm::logarithm_of_one_plus;
+use super::parts::{Part, Parts};
+use super::result::relative_error;
+use super::{Linearise, LineariseError};
+use fmu_import::Fmu;
+
+/// Steps of the record: the first trial at least, and the last.
+const FEWEST: usize = 8;
+const MOST: usize = 512;
+/// Relative error of the answer that is good enough.
+const ENOUGH: f64 = 1e-8;
+/// The largest relative error of an answer.
+const ALLOWED: f64 = 0.1;
+const INACCURATE: LineariseError =
+    LineariseError::Inaccurate { relative: f64::INFINITY, allowed: ALLOWED };
+/// The degree in time of the coefficients where the operating point drifts.
+const DEGREE: usize = 2;
+/// The least contrast of the directions that is accepted.
+const LEAST: f64 = 1e-8;
+/// The step map is found for these multiples of the step, and extrapolated to the step zero.
+const MULTIPLES: [f64; 3] = [4.0, 2.0, 1.0];
+/// The part of the response to a new course of the inputs that may be missed.
+const MISSED: f64 = 1e-2;
+
+/// What the steps tell.
+pub(super) struct Found {
+    pub(super) x: Vec<f64>,
+    pub(super) u: Vec<f64>,
+    pub(super) y: Vec<f64>,
+    /// x' at the operating point.
+    pub(super) rates: Vec<f64>,
+    pub(super) jacobian: DMatrix<f64>,
+    pub(super) errors: DMatrix<f64>,
+    /// Steps of the record.
+    pub(super) count: usize,
+    /// Height of each input's pulse.
+    pub(super) heights: Vec<f64>,
+    /// The part of the response to a new course of the inputs that was missed.
+    pub(super) missed: f64,
+    /// Largest of the errors, relative to its row.
+    relative: f64,
+}
+
+/// [A, B, x'; C, D, 0] of one step size, and the standard deviations.
+struct Map {
+    values: DMatrix<f64>,
+    deviations: DMatrix<f64>,
+}
+
+/// The step map: x[k+1] - x[k] = `change` [x; u], y = `outputs` [x; u].
+struct Discrete {
+    change: DMatrix<f64>,
+    outputs: DMatrix<f64>,
+    /// What belongs to the powers of time in both; no columns where nothing drifts.
+    powers: [DMatrix<f64>; 2],
+    deviations: DMatrix<f64>,
+}
+
+impl Discrete {
+    /// `change` or `outputs` times [x; u] at a part of the record.
+    fn times(&self, which: usize, part: f64, known: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut product = [&self.change, &self.outputs][which] * known;
+        let (powers, width) = (&self.powers[which], known.nrows());
+        let mut power = part;
+        for first in (0..powers.ncols()).step_by(width) {
+            product += powers.columns(first, width) * known * power;
+            power *= part;
+        }
+        product
+    }
+}
+
+/// Linearises by steps of `step` s and its multiples, with records of growing length until the
+/// errors are small: a short one sees little of slow states, a long one drifts.
+pub(super) fn of_steps(
+    fmu: &Fmu,
+    parts: &Parts,
+    states: &[Part],
+    request: &Linearise,
+    step: f64,
+) -> Result<Found, LineariseError> {
+    let bench = Bench::new(fmu, parts, states, request, step)?;
+    let mut benches: Vec<_> =
+        MULTIPLES.iter().map(|multiple| bench.with_step(multiple * step)).collect();
+    let mut count = FEWEST.max(2 * (states.len() + 1));
+    let mut best: Option<Found> = None;
+    let mut refusal = None;
+    while count <= MOST {
+        match of_count(&mut benches, parts, states, count) {
+            Ok(found) if best.as_ref().is_none_or(|known| found.relative < known.relative) => {
+                let enough = found.relative < ENOUGH;
+                best = Some(found);
+                if enough {
+                    break;
+                }
+            }
+            Err(error) if refusal.as_ref().is_none_or(is_about_length) => {
+                refusal = Some(error);
+            }
+            Ok(_) | Err(_) => {}
+        }
+        count *= 2;
+    }
+    best.ok_or_else(|| refusal.unwrap_or_else(|| unreachable(None, parts, states)))
+}
+
+/// Whether a record of another length may do.
+fn is_about_length(refusal: &LineariseError) -> bool {
+    matches!(refusal, LineariseError::Unreachable { .. })
+}
+
+/// The same by records of `count` steps; the last bench has the shortest step.
+fn of_count(
+    benches: &mut [Bench],
+    parts: &Parts,
+    states: &[Part],
+    count: usize,
+) -> Result<Found, LineariseError> {
+    let Some((bench, longer)) = benches.split_last_mut() else {
+        return Err(unreachable(None, parts, states));
+    };
+    let record = bench.record(count)?;
+    let directions = Directions::of(&record.before);
+    if directions.contrast < LEAST {
+        return Err(unreachable(Some(directions), parts, states));
+    }
+    let discrete = fit(&record, parts, states, degree(&record)).ok_or(INACCURATE)?;
+    let missed = missed(bench, &discrete, &record, count)?;
+    if missed.is_nan() || missed > MISSED {
+        return Err(LineariseError::NotStates { missed, allowed: MISSED });
+    }
+    let maps = maps(bench, longer, &record, count, parts, states)?;
+    let (values, errors) = at_step_zero(&maps);
+    let (n, columns) = (states.len(), values.ncols() - 1);
+    let (jacobian, errors) =
+        (values.columns(0, columns).into_owned(), errors.columns(0, columns).into_owned());
+    let scales = super::scales(states, &bench.x, &parts.inputs, &bench.u);
+    let relative = relative_error(&errors, &jacobian, &scales);
+    if relative.is_nan() || relative > ALLOWED {
+        return Err(LineariseError::Inaccurate { relative, allowed: ALLOWED });
+    }
+    Ok(Found {
+        rates: (0..n).map(|k| values[(k, columns)]).collect(),
+        relative,
+        jacobian,
+        errors,
+        count,
+        heights: record.pulses.iter().map(|pulse| pulse.1).collect(),
+        missed,
+        x: bench.x.clone(),
+        u: bench.u.clone(),
+        y: bench.y.clone(),
+    })
+}
+
+fn unreachable(directions: Option<Directions>, parts: &Parts, states: &[Part]) -> LineariseError {
+    let names: Vec<&Part> = states.iter().chain(&parts.inputs).collect();
+    let weak = directions.map(|directions| directions.weak(LEAST)).unwrap_or_default();
+    LineariseError::Unreachable {
+        rank: names.len() - weak.len(),
+        expected: names.len(),
+        names: weak.iter().map(|&column| names[column].name.clone()).collect(),
+    }
+}
+
+/// The continuous systems of all step sizes that have one, the shortest last; at least two.
+fn maps(
+    bench: &Bench,
+    longer: &mut [Bench],
+    record: &Record,
+    count: usize,
+    parts: &Parts,
+    states: &[Part],
+) -> Result<Vec<Map>, LineariseError> {
+    let mut maps = Vec::new();
+    for bench in longer {
+        // A longer step may be too long for the FMU or for a logarithm.
+        match bench.record(count).map(|record| map(bench, &record, parts, states)) {
+            Ok(Some(map)) => maps.push(map),
+            _ => maps.clear(),
+        }
+    }
+    let (step, map) = (bench.step, map(bench, record, parts, states));
+    maps.push(map.ok_or(LineariseError::NoLogarithm { step })?);
+    if maps.len() < 2 {
+        return Err(LineariseError::NoLogarithm { step: 2.0 * step });
+    }
+    Ok(maps)
+}
+
+/// The degree of the polynomials of time that the coefficients are.
+fn degree(record: &Record) -> usize {
+    if record.drifts { DEGREE } else { 0 }
+}
+
+/// The continuous system of a record; where the operating point drifts, what the last degree of
+/// the polynomials changes counts as an error.
+fn map(bench: &Bench, record: &Record, parts: &Parts, states: &[Part]) -> Option<Map> {
+    let of = |degree| continuous(bench, &fit(record, parts, states, degree)?, record);
+    let degree = degree(record);
+    let mut map = of(degree)?;
+    if degree > 0 {
+        map.deviations += (&map.values - of(degree - 1)?.values).abs();
+    }
+    Some(map)
+}
+
+fn fit(record: &Record, parts: &Parts, states: &[Part], degree: usize) -> Option<Discrete> {
+    let width = record.before.ncols();
+    let (state_noise, output_noise) = record.noise.split_at(states.len());
+    let change = least_squares(&record.for_change(degree), &record.change, state_noise)?;
+    let outputs = least_squares(&record.for_outputs(degree), &record.outputs, output_noise)?;
+    let at_zero = |of: &DMatrix<f64>| of.rows(0, width).transpose();
+    let powers = |of: &DMatrix<f64>| of.rows(width, of.nrows() - width).transpose();
+    let mut discrete = Discrete {
+        change: at_zero(&change.solution),
+        outputs: at_zero(&outputs.solution),
+        powers: [powers(&change.solution), powers(&outputs.solution)],
+        deviations: DMatrix::zeros(states.len() + parts.outputs.len(), width),
+    };
+    let deviations = &mut discrete.deviations;
+    deviations.rows_mut(0, states.len()).copy_from(&at_zero(&change.deviations));
+    let mut below = deviations.rows_mut(states.len(), parts.outputs.len());
+    below.copy_from(&at_zero(&outputs.deviations));
+    for (row, output) in parts.outputs.iter().enumerate() {
+        if let Some(state) = states.iter().position(|part| part.reference == output.reference) {
+            discrete.outputs.row_mut(row).fill(0.0);
+            discrete.outputs[(row, state)] = 1.0;
+            discrete.powers[1].row_mut(row).fill(0.0);
+            discrete.deviations.row_mut(states.len() + row).fill(0.0);
+        }
+    }
+    Some(discrete)
+}
+
+/// The system whose exact step the map is: [A, B, x'] = log([Phi, Gamma, g; 0, I]) / h, where g is
+/// the drift over one step; in units of the typical sizes.
+fn continuous(bench: &Bench, discrete: &Discrete, record: &Record) -> Option<Map> {
+    let (n, width) = discrete.change.shape();
+    let mut scales: Vec<f64> = (0..n).map(|k| bench.scale(k)).collect();
+    scales.extend(record.pulses.iter().map(|pulse| pulse.1));
+    scales.push(1.0);
+    let drift = bench.drift();
+    let entry = |i: usize, j: usize| if j < width { discrete.change[(i, j)] } else { drift[i] };
+    let scaled = DMatrix::from_fn(width + 1, width + 1, |i, j| {
+        if i < n { entry(i, j) * scales[j] / scales[i] } else { 0.0 }
+    });
+    let logarithm = logarithm_of_one_plus(&scaled)?;
+    let (p, h) = (discrete.outputs.nrows(), bench.step);
+    let values = DMatrix::from_fn(n + p, width + 1, |i, j| match (i < n, j < width) {
+        (true, _) => logarithm[(i, j)] * scales[i] / scales[j] / h,
+        (false, true) => discrete.outputs[(i - n, j)],
+        (false, false) => 0.0,
+    });
+    let deviations = DMatrix::from_fn(n + p, width + 1, |i, j| {
+        let scale = if i < n { 1.0 / h } else { 1.0 };
+        if j < width { discrete.deviations[(i, j)] * scale } else { 0.0 }
+    });
+    Some(Map { values, deviations })
+}
+
+/// Extrapolates each entry to the step zero: an FMU that steps exactly gives the same for every step, one
+/// that integrates with order q errs by the power q of the step.
+fn at_step_zero(maps: &[Map]) -> (DMatrix<f64>, DMatrix<f64>) {
+    let (rows, columns) = maps[0].values.shape();
+    let mut values = DMatrix::zeros(rows, columns);
+    let mut errors = DMatrix::zeros(rows, columns);
+    for i in 0..rows {
+        for j in 0..columns {
+            let entries: Vec<f64> = maps.iter().map(|map| map.values[(i, j)]).collect();
+            let noise = |level: usize| maps[level].deviations[(i, j)];
+            (values[(i, j)], errors[(i, j)]) = extrapolate(&entries, noise, 2.0, |order| order);
+        }
+    }
+    (values, errors)
+}
+
+/// The largest difference between the FMU and the map in their response to all inputs at once, on
+/// and off in the order of Thue and Morse, relative to the response of each reading.
+fn missed(
+    bench: &mut Bench,
+    discrete: &Discrete,
+    record: &Record,
+    count: usize,
+) -> Result<f64, LineariseError> {
+    let n = discrete.change.nrows();
+    let shape = |step: usize, input: usize| {
+        let (side, height) = record.pulses[input];
+        let on = (step / 2 + input).count_ones().is_multiple_of(2);
+        let sign = if side == Side::Below { -1.0 } else { 1.0 };
+        if on { 0.5 * sign * height } else { 0.0 }
+    };
+    let both = record.pulses.iter().all(|(side, _)| *side == Side::Both);
+    let side = if both { Side::Both } else { Side::Above };
+    let (found, _) = bench.response(count, 2, (side, 1.0), shape)?;
+    let mut state = DMatrix::zeros(n, 1);
+    let mut expected = DMatrix::zeros(count + 1, found.ncols());
+    for step in 0..count {
+        let with_inputs = |state: &DMatrix<f64>| {
+            let inputs = (0..record.pulses.len()).map(|input| shape(step, input));
+            DMatrix::from_iterator(discrete.change.ncols(), 1, state.iter().copied().chain(inputs))
+        };
+        let part = |step: usize| index(step) / index(count);
+        state += discrete.times(0, part(step), &with_inputs(&state));
+        let outputs = discrete.times(1, part(step + 1), &with_inputs(&state));
+        for (column, value) in state.iter().chain(outputs.iter()).enumerate() {
+            expected[(step + 1, column)] = *value;
+        }
+    }
+    let sizes: Vec<f64> =
+        (0..found.ncols()).map(|k| found.column(k).amax() / bench.scale(k)).collect();
+    let least = 1e-6 * sizes.iter().fold(0.0_f64, |largest, &size| largest.max(size));
+    let relative = (0..found.ncols()).map(|k| {
+        let difference = (found.column(k) - expected.column(k)).amax() / bench.scale(k);
+        difference / sizes[k].max(least).max(f64::MIN_POSITIVE)
+    });
+    Ok(relative.fold(0.0, f64::max))
+}

@@ -1,0 +1,128 @@
+//! The footer: schema, units, and where the row groups lie.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use ::parquet::basic::{LogicalType, Repetition, Type as Physical};
+use ::parquet::errors::ParquetError;
+use ::parquet::file::metadata::{
+    FileMetaData, KeyValue, ParquetMetaData, ParquetMetaDataWriter, RowGroupMetaData,
+};
+use ::parquet::schema::types::{SchemaDescPtr, SchemaDescriptor, Type, TypePtr};
+
+use super::{Column, ColumnKind, TIME};
+
+/// Key of the units: a JSON object from name to unit.
+const UNITS: &str = "units";
+/// Key under which pandas looks for the attributes of a table.
+const PANDAS: &str = "PANDAS_ATTRS";
+/// Version of the format in the footer.
+const VERSION: i32 = 1;
+
+/// What the footer says, for any number of row groups.
+#[derive(Debug)]
+pub(super) struct Footer {
+    schema: SchemaDescPtr,
+    metadata: Vec<KeyValue>,
+    groups: Vec<RowGroupMetaData>,
+}
+
+impl Footer {
+    pub(super) fn new(columns: &[Column]) -> Result<Self, ParquetError> {
+        let mut fields = vec![field(TIME, ColumnKind::Real)?];
+        for column in columns {
+            fields.push(field(&column.name, column.kind)?);
+        }
+        let schema = Type::group_type_builder("results").with_fields(fields).build()?;
+        let mut units = BTreeMap::from([(TIME, "s")]);
+        units.extend(
+            columns.iter().filter_map(|one| Some((one.name.as_str(), one.unit.as_deref()?))),
+        );
+        let json = |value: serde_json::Value| value.to_string();
+        let metadata = vec![
+            KeyValue::new(UNITS.to_owned(), json(serde_json::json!(units))),
+            KeyValue::new(PANDAS.to_owned(), json(serde_json::json!({ UNITS: units }))),
+        ];
+        let schema = Arc::new(SchemaDescriptor::new(Arc::new(schema)));
+        Ok(Self { schema, metadata, groups: Vec::new() })
+    }
+
+    pub(super) fn schema(&self) -> SchemaDescPtr {
+        self.schema.clone()
+    }
+
+    /// Holds a row group for this and all later footers.
+    pub(super) fn keep(&mut self, group: RowGroupMetaData) {
+        self.groups.push(group);
+    }
+
+    /// Appends the footer of the row groups so far and one more.
+    pub(super) fn append(
+        &mut self,
+        bytes: &mut Vec<u8>,
+        last: Option<RowGroupMetaData>,
+    ) -> Result<(), ParquetError> {
+        let kept = self.groups.len();
+        let mut groups = std::mem::take(&mut self.groups);
+        groups.extend(last);
+        let rows = groups.iter().map(RowGroupMetaData::num_rows).sum();
+        let file = FileMetaData::new(
+            VERSION,
+            rows,
+            Some(concat!("aso-ftc ", env!("CARGO_PKG_VERSION")).to_owned()),
+            Some(self.metadata.clone()),
+            self.schema.clone(),
+            None,
+        );
+        let all = ParquetMetaData::new(file, groups);
+        let done = ParquetMetaDataWriter::new(bytes, &all).finish();
+        self.groups = all.into_builder().take_row_groups();
+        self.groups.truncate(kept);
+        done
+    }
+}
+
+/// A column without nulls.
+fn field(name: &str, kind: ColumnKind) -> Result<TypePtr, ParquetError> {
+    let (physical, logical) = match kind {
+        ColumnKind::Real => (Physical::DOUBLE, None),
+        ColumnKind::Integer => (Physical::INT32, None),
+        ColumnKind::Boolean => (Physical::BOOLEAN, None),
+        ColumnKind::String => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+    };
+    let built = Type::primitive_type_builder(name, physical)
+        .with_repetition(Repetition::REQUIRED)
+        .with_logical_type(logical)
+        .build()?;
+    Ok(Arc::new(built))
+}
+
+/// A row group that was written from offset 0 on, as it is `by` bytes further on.
+pub(super) fn moved(group: &RowGroupMetaData, by: u64) -> Result<RowGroupMetaData, ParquetError> {
+    let by = i64::try_from(by).map_err(|error| ParquetError::General(error.to_string()))?;
+    let columns = group.columns().iter().map(|column| {
+        let dictionary = column.dictionary_page_offset().map(|offset| offset + by);
+        let data = column.data_page_offset() + by;
+        let builder = column.clone().into_builder();
+        builder.set_data_page_offset(data).set_dictionary_page_offset(dictionary).build()
+    });
+    let columns = columns.collect::<Result<Vec<_>, _>>()?;
+    // The writer's ordinal would be that of a file with this one row group.
+    RowGroupMetaData::builder(group.schema_descr_ptr())
+        .set_num_rows(group.num_rows())
+        .set_total_byte_size(group.total_byte_size())
+        .set_column_metadata(columns)
+        .set_file_offset(by)
+        .build()
+}
+
+/// The units that a footer states, by name.
+pub(crate) fn units(metadata: &FileMetaData) -> BTreeMap<String, String> {
+    metadata
+        .key_value_metadata()
+        .into_iter()
+        .flatten()
+        .find(|entry| entry.key == UNITS)
+        .and_then(|entry| serde_json::from_str(entry.value.as_deref()?).ok())
+        .unwrap_or_default()
+}

@@ -1,0 +1,160 @@
+//! Parquet without nesting.
+
+use std::fs::File;
+use std::path::Path;
+
+use ::parquet::basic::Type as Physical;
+use ::parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+use ::parquet::data_type::DataType;
+use ::parquet::errors::ParquetError;
+use ::parquet::file::reader::{FileReader, SerializedFileReader};
+
+use super::{Column, ResultsError, Visitor, unreadable};
+use crate::ColumnKind;
+use crate::parquet::units;
+
+/// Rows read at once.
+const ROWS: usize = 8192;
+
+fn open(path: &Path) -> Result<SerializedFileReader<File>, ResultsError> {
+    let file = File::open(path).map_err(|error| unreadable(path, &error))?;
+    SerializedFileReader::new(file).map_err(|error| unreadable(path, &error))
+}
+
+pub(super) fn columns(path: &Path) -> Result<Vec<Column>, ResultsError> {
+    let reader = open(path)?;
+    let file = reader.metadata().file_metadata();
+    let mut units = units(file);
+    file.schema_descr()
+        .columns()
+        .iter()
+        .map(|column| {
+            let name = column.path().parts().join(".");
+            if column.max_rep_level() > 0 || column.path().parts().len() > 1 {
+                return Err(unreadable(path, &format!("{name} is nested, expected plain columns")));
+            }
+            let kind = match column.physical_type() {
+                Physical::DOUBLE | Physical::FLOAT => ColumnKind::Real,
+                Physical::INT32 | Physical::INT64 => ColumnKind::Integer,
+                Physical::BOOLEAN => ColumnKind::Boolean,
+                _ => ColumnKind::String,
+            };
+            Ok(Column { unit: units.remove(&name), name, kind })
+        })
+        .collect()
+}
+
+pub(super) fn visit(
+    path: &Path,
+    columns: &[Column],
+    wanted: &[usize],
+    visitor: &mut Visitor<'_>,
+) -> Result<(), ResultsError> {
+    if let Some(text) = wanted.iter().find(|place| columns[**place].kind == ColumnKind::String) {
+        let name = columns[*text].name.clone();
+        return Err(ResultsError::Text { path: path.to_owned(), name });
+    }
+    let reader = open(path)?;
+    let length = std::fs::metadata(path).map_err(|error| unreadable(path, &error))?.len();
+    for group in 0..reader.num_row_groups() {
+        check_places(&reader, group, wanted, length)
+            .and_then(|()| visit_group(&reader, group, wanted, visitor))
+            .map_err(|error| unreadable(path, &error))?;
+    }
+    Ok(())
+}
+
+/// That the footer places the columns inside the file: the crate panics where it does not.
+fn check_places(
+    reader: &SerializedFileReader<File>,
+    group: usize,
+    wanted: &[usize],
+    length: u64,
+) -> Result<(), ParquetError> {
+    let group = reader.metadata().row_group(group);
+    for position in wanted {
+        let column = group.columns().get(*position);
+        let inside = column.is_some_and(|column| {
+            let data = column.data_page_offset();
+            let start = column.dictionary_page_offset().unwrap_or(data);
+            let end = start.checked_add(column.compressed_size());
+            let end = end.and_then(|end| u64::try_from(end).ok());
+            start >= 0
+                && data >= 0
+                && column.compressed_size() >= 0
+                && end.is_some_and(|end| end <= length)
+        });
+        if !inside {
+            return Err(ParquetError::General("a column lies outside the file".to_owned()));
+        }
+    }
+    Ok(())
+}
+
+fn visit_group(
+    reader: &SerializedFileReader<File>,
+    group: usize,
+    wanted: &[usize],
+    visitor: &mut Visitor<'_>,
+) -> Result<(), ParquetError> {
+    let group = reader.get_row_group(group)?;
+    let mut readers = wanted
+        .iter()
+        .map(|position| group.get_column_reader(*position))
+        .collect::<Result<Vec<_>, _>>()?;
+    let mut cells = vec![Vec::with_capacity(ROWS); wanted.len()];
+    let mut row = vec![0.0; wanted.len()];
+    loop {
+        for (reader, cells) in readers.iter_mut().zip(&mut cells) {
+            read(reader, cells)?;
+        }
+        let rows = cells[0].len();
+        if cells.iter().any(|cells| cells.len() != rows) {
+            return Err(ParquetError::General("its columns differ in length".to_owned()));
+        }
+        if rows == 0 {
+            return Ok(());
+        }
+        for place in 0..rows {
+            for (value, cells) in row.iter_mut().zip(&cells) {
+                *value = cells[place];
+            }
+            visitor(row[0], &row[1..]);
+        }
+    }
+}
+
+/// The next cells of a column, as numbers.
+fn read(reader: &mut ColumnReader, cells: &mut Vec<f64>) -> Result<(), ParquetError> {
+    match reader {
+        ColumnReader::DoubleColumnReader(reader) => batch(reader, cells, |value| *value),
+        ColumnReader::FloatColumnReader(reader) => batch(reader, cells, |value| f64::from(*value)),
+        ColumnReader::Int32ColumnReader(reader) => batch(reader, cells, |value| f64::from(*value)),
+        #[expect(clippy::cast_precision_loss, reason = "beyond 2^53 a drawing shows no difference")]
+        ColumnReader::Int64ColumnReader(reader) => batch(reader, cells, |value| *value as f64),
+        ColumnReader::BoolColumnReader(reader) => {
+            batch(reader, cells, |value| f64::from(u8::from(*value)))
+        }
+        _ => Err(ParquetError::General("a column without numbers".to_owned())),
+    }
+}
+
+fn batch<T: DataType>(
+    reader: &mut ColumnReaderImpl<T>,
+    cells: &mut Vec<f64>,
+    number: impl Fn(&T::T) -> f64,
+) -> Result<(), ParquetError> {
+    let (mut levels, mut values) = (Vec::new(), Vec::with_capacity(ROWS));
+    reader.read_records(ROWS, Some(&mut levels), None, &mut values)?;
+    cells.clear();
+    if levels.is_empty() {
+        cells.extend(values.iter().map(number));
+    } else {
+        let mut values = values.iter();
+        let cell = |level: &i16| {
+            if *level > 0 { values.next().map_or(f64::NAN, &number) } else { f64::NAN }
+        };
+        cells.extend(levels.iter().map(cell));
+    }
+    Ok(())
+}

@@ -1,0 +1,228 @@
+//! Which variables are recorded or drawn.
+
+/// Most names that an error lists.
+const SHOWN: usize = 5;
+
+/// Variables by name or pattern: those that one of `include` meets and none of `exclude`.
+///
+/// A pattern that is the name of a variable, letter by letter, means that variable. Otherwise `*`
+/// stands for any number of letters, points among them, and `?` for one. Everything else stands
+/// for itself, brackets too: they are part of FMI's names, as in `x_hat[1]`.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Selection {
+    /// Without any, all variables.
+    pub include: Vec<String>,
+    /// What is left out of them.
+    pub exclude: Vec<String>,
+}
+
+/// Why variables cannot be chosen.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum SelectionError {
+    /// A pattern without any variable.
+    #[error("no variable is called {pattern:?}{near}")]
+    Nothing {
+        /// As it was given.
+        pattern: String,
+        /// What there is instead, as part of the sentence.
+        near: String,
+    },
+    /// Every variable that was included was excluded again.
+    #[error("no variable is left: all that are included are excluded too")]
+    Empty,
+}
+
+impl Selection {
+    /// Positions of the chosen among `names`: pattern by pattern in the order of `include`, within
+    /// a pattern in the order of `names`, none twice. Cost: patterns times names.
+    ///
+    /// # Errors
+    ///
+    /// [`SelectionError`]: a pattern that meets no name, or nothing that is left.
+    pub fn choose<N: AsRef<str>>(&self, names: &[N]) -> Result<Vec<usize>, SelectionError> {
+        let mut open = vec![true; names.len()];
+        for pattern in &self.exclude {
+            for position in met(pattern, names)? {
+                open[position] = false;
+            }
+        }
+        let mut chosen = Vec::new();
+        let mut take = |position: usize| {
+            if std::mem::replace(&mut open[position], false) {
+                chosen.push(position);
+            }
+        };
+        if self.include.is_empty() {
+            (0..names.len()).for_each(take);
+        } else {
+            for pattern in &self.include {
+                met(pattern, names)?.into_iter().for_each(&mut take);
+            }
+        }
+        if chosen.is_empty() && !names.is_empty() { Err(SelectionError::Empty) } else { Ok(chosen) }
+    }
+}
+
+/// The names that a pattern meets: at least one.
+fn met<N: AsRef<str>>(pattern: &str, names: &[N]) -> Result<Vec<usize>, SelectionError> {
+    if let Some(same) = names.iter().position(|name| name.as_ref() == pattern) {
+        return Ok(vec![same]);
+    }
+    let pieces: Vec<char> = pattern.chars().collect();
+    let found: Vec<usize> = names
+        .iter()
+        .enumerate()
+        .filter(|(_, name)| meets(&pieces, name.as_ref()))
+        .map(|(position, _)| position)
+        .collect();
+    if found.is_empty() {
+        return Err(SelectionError::Nothing {
+            pattern: pattern.to_owned(),
+            near: near(pattern, names),
+        });
+    }
+    Ok(found)
+}
+
+/// Whether the whole name is what the pattern says. Goes back to the last `*` only, so the cost is
+/// at most the product of both lengths.
+fn meets(pattern: &[char], name: &str) -> bool {
+    let name: Vec<char> = name.chars().collect();
+    let (mut at, mut letter) = (0, 0);
+    let mut star: Option<(usize, usize)> = None;
+    while letter < name.len() {
+        match pattern.get(at) {
+            Some('*') => {
+                star = Some((at, letter));
+                at += 1;
+            }
+            Some(wanted) if *wanted == '?' || *wanted == name[letter] => {
+                at += 1;
+                letter += 1;
+            }
+            _ => match star {
+                Some((place, taken)) => {
+                    star = Some((place, taken + 1));
+                    (at, letter) = (place + 1, taken + 1);
+                }
+                None => return false,
+            },
+        }
+    }
+    pattern[at..].iter().all(|rest| *rest == '*')
+}
+
+/// Most edits between two similar names.
+const EDITS: usize = 2;
+
+/// Up to five of `names` that contain `name`, are contained in it or differ by two edits.
+fn similar<'a>(names: impl Iterator<Item = &'a str>, name: &str) -> Vec<&'a str> {
+    let edits = |known: &str| strsim::levenshtein(&known.to_lowercase(), &name.to_lowercase());
+    let near = |known: &&str| {
+        known.to_lowercase().contains(&name.to_lowercase())
+            || name.to_lowercase().contains(&known.to_lowercase())
+            || edits(known) <= EDITS
+    };
+    let mut found: Vec<_> = names.filter(near).collect();
+    found.sort_by_key(|known| edits(known));
+    found.truncate(5);
+    found
+}
+
+/// Names that may be meant: like the pattern without its wildcards, or where there are none such,
+/// the first ones.
+fn near<N: AsRef<str>>(pattern: &str, names: &[N]) -> String {
+    let plain: String = pattern.chars().filter(|letter| !"*?".contains(*letter)).collect();
+    let all = || names.iter().map(AsRef::as_ref);
+    let similar = similar(all(), &plain);
+    let count = names.len();
+    match similar.is_empty() {
+        false => format!(", near it are {}", similar.join(", ")),
+        true if count == 0 => ", there are none at all".to_owned(),
+        true => {
+            let first: Vec<&str> = all().take(SHOWN).collect();
+            let more =
+                if count > SHOWN { format!(" and {} more", count - SHOWN) } else { String::new() };
+            format!(", there are {}{more}", first.join(", "))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NAMES: [&str; 7] = [
+        "plant.x_p",
+        "plant.theta",
+        "ctrl.x_hat[1]",
+        "ctrl.x_hat[2]",
+        "ctrl.inner.y",
+        "der(plant.theta)",
+        "'a*b'",
+    ];
+
+    fn chosen(include: &[&str], exclude: &[&str]) -> Result<Vec<&'static str>, SelectionError> {
+        let owned = |texts: &[&str]| texts.iter().map(|text| (*text).to_owned()).collect();
+        let selection = Selection { include: owned(include), exclude: owned(exclude) };
+        Ok(selection.choose(&NAMES)?.into_iter().map(|position| NAMES[position]).collect())
+    }
+
+    #[test]
+    fn nothing_stated_chooses_everything_in_its_order() {
+        assert_eq!(chosen(&[], &[]).unwrap(), NAMES);
+    }
+
+    #[test]
+    fn names_come_in_the_order_asked_for_and_once() {
+        let wanted = ["plant.theta", "plant.x_p", "plant.*"];
+        assert_eq!(chosen(&wanted, &[]).unwrap(), ["plant.theta", "plant.x_p"]);
+    }
+
+    #[test]
+    fn brackets_stand_for_themselves_beside_wildcards() {
+        assert_eq!(chosen(&["ctrl.x_hat[1]"], &[]).unwrap(), ["ctrl.x_hat[1]"]);
+        assert_eq!(chosen(&["*.x_hat[?]"], &[]).unwrap(), ["ctrl.x_hat[1]", "ctrl.x_hat[2]"]);
+        assert_eq!(chosen(&["*[2]"], &[]).unwrap(), ["ctrl.x_hat[2]"]);
+    }
+
+    #[test]
+    fn a_star_crosses_points_and_a_question_mark_is_one_letter() {
+        assert_eq!(chosen(&["ctrl.*y"], &[]).unwrap(), ["ctrl.inner.y"]);
+        assert!(chosen(&["plant.x_?p"], &[]).is_err());
+        assert_eq!(chosen(&["plant.?_p"], &[]).unwrap(), ["plant.x_p"]);
+        assert_eq!(chosen(&["*theta*"], &[]).unwrap(), ["plant.theta", "der(plant.theta)"]);
+    }
+
+    #[test]
+    fn a_name_with_a_star_in_it_means_that_name() {
+        assert_eq!(chosen(&["'a*b'"], &[]).unwrap(), ["'a*b'"]);
+    }
+
+    #[test]
+    fn what_is_excluded_is_left_out() {
+        let kept = ["plant.x_p", "ctrl.inner.y", "'a*b'"];
+        assert_eq!(chosen(&[], &["*theta*", "*.x_hat[*]"]).unwrap(), kept);
+        assert_eq!(chosen(&["plant.*"], &["plant.*"]), Err(SelectionError::Empty));
+    }
+
+    #[test]
+    fn a_pattern_without_a_variable_is_refused_with_names_near_it() {
+        let message = |include| chosen(&[include], &[]).unwrap_err().to_string();
+        assert_eq!(
+            message("plant.x_q"),
+            "no variable is called \"plant.x_q\", near it are plant.x_p"
+        );
+        assert!(message("plant.tehta").contains("plant.theta"), "{}", message("plant.tehta"));
+        assert!(message("*.inner.z").contains("ctrl.inner.y"), "{}", message("*.inner.z"));
+        let strange = message("motor.*");
+        assert!(strange.contains("there are plant.x_p") && strange.contains("2 more"), "{strange}");
+        assert!(chosen(&[], &["motor.*"]).is_err(), "an exclusion is held to the same");
+    }
+
+    #[test]
+    fn many_stars_cost_no_more_than_the_product_of_the_lengths() {
+        let pattern: Vec<char> = "*a".repeat(200).chars().chain(['b']).collect();
+        assert!(!meets(&pattern, &"a".repeat(5000)));
+    }
+}

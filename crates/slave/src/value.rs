@@ -1,0 +1,95 @@
+//! The value of a variable, read from text.
+
+use std::fmt;
+
+use fmu_description::{IntegerType, Kind, SimpleType};
+
+/// Relative difference of a Real that an FMU may make of a value that it is given.
+const NEAR: f64 = 1e-9;
+
+/// A value of one of the types of the standard; an Enumeration is an Integer.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// Real.
+    Real(f64),
+    /// Integer or Enumeration.
+    Integer(i32),
+    /// Boolean.
+    Boolean(bool),
+    /// String.
+    String(String),
+}
+
+impl Value {
+    /// What `text` spells for a variable of that kind, or what was expected. An item of an
+    /// enumeration may be given by its name in `types`.
+    #[must_use]
+    pub fn parse(kind: &Kind, types: &[SimpleType], text: &str) -> Result<Self, String> {
+        let trimmed = text.trim();
+        match kind {
+            Kind::Real(_) => trimmed.parse().map(Value::Real).map_err(|_| "a number".to_owned()),
+            Kind::Integer(_) => {
+                trimmed.parse().map(Value::Integer).map_err(|_| "an integer".to_owned())
+            }
+            Kind::Enumeration(integer) => enumeration(integer, types, trimmed),
+            Kind::Boolean(_) => match trimmed {
+                "true" | "1" => Ok(Value::Boolean(true)),
+                "false" | "0" => Ok(Value::Boolean(false)),
+                _ => Err("true or false".to_owned()),
+            },
+            Kind::String(_) => Ok(Value::String(text.to_owned())),
+        }
+    }
+}
+
+impl Value {
+    /// The start value in a description, where there is a number or a Boolean.
+    #[must_use]
+    pub fn start(kind: &Kind) -> Option<Self> {
+        match kind {
+            Kind::Real(real) => real.start.map(Value::Real),
+            Kind::Integer(integer) | Kind::Enumeration(integer) => {
+                integer.start.map(Value::Integer)
+            }
+            Kind::Boolean(start) => start.map(Value::Boolean),
+            Kind::String(_) => None,
+        }
+    }
+
+    /// Whether `found`, read from an FMU, is this value: Reals but for a relative difference of 1e-9.
+    #[must_use]
+    pub fn is_near(&self, found: &Self) -> bool {
+        match (self, found) {
+            (Value::Real(value), Value::Real(found)) => {
+                value.total_cmp(found).is_eq()
+                    || (found - value).abs() <= NEAR * value.abs()
+                    || value.is_nan() && found.is_nan()
+            }
+            _ => self == found,
+        }
+    }
+}
+
+impl fmt::Display for Value {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Value::Real(value) => value.fmt(formatter),
+            Value::Integer(value) => value.fmt(formatter),
+            Value::Boolean(value) => value.fmt(formatter),
+            Value::String(value) => write!(formatter, "{value:?}"),
+        }
+    }
+}
+
+fn enumeration(kind: &IntegerType, types: &[SimpleType], text: &str) -> Result<Value, String> {
+    if let Ok(number) = text.parse() {
+        return Ok(Value::Integer(number));
+    }
+    let declared = types.iter().find(|known| Some(&known.name) == kind.declared_type.as_ref());
+    let items = declared.map(|declared| declared.items.as_slice()).unwrap_or_default();
+    if let Some((_, number)) = items.iter().find(|(name, _)| name == text) {
+        return Ok(Value::Integer(*number));
+    }
+    let names: Vec<_> = items.iter().map(|(name, _)| name.as_str()).collect();
+    Err(format!("an integer or one of the items {}", names.join(", ")))
+}

@@ -1,0 +1,225 @@
+//! Units and transformations: what becomes of a value on its way (SSP 1.0.1, section 4.5.2).
+
+use std::borrow::Cow;
+
+use fmu_description::unit::BaseUnit;
+use fmu_description::{Kind, ModelDescription, ScalarVariable};
+
+use super::structure::{Conversion, Definitions, Transformation as Stated, Type};
+use slave::Transformation;
+
+/// Relative difference of factors below which units of one name are the same unit, written with
+/// fewer digits.
+const SAME_FACTOR: f64 = 1e-6;
+
+/// What is known of the values at a connector.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Measure {
+    /// The unit: its name and its definition.
+    pub(super) unit: Option<(String, Option<BaseUnit>)>,
+    /// Items of the enumeration.
+    pub(super) items: Option<Vec<(String, i32)>>,
+}
+
+impl Measure {
+    /// Of a type that is stated in a file with these definitions.
+    pub(super) fn stated(kind: Option<&Type>, definitions: &Definitions) -> Self {
+        match kind {
+            Some(Type::Real(Some(unit))) => Measure::unit(unit, definitions),
+            Some(Type::Enumeration(name)) => {
+                let known = definitions.enumerations.iter().find(|each| each.name == *name);
+                Measure { unit: None, items: known.map(|each| each.items.clone()) }
+            }
+            _ => Measure::default(),
+        }
+    }
+
+    /// Of a unit that `definitions` may define.
+    pub(super) fn unit(name: &str, definitions: &Definitions) -> Self {
+        let base = definitions.units.iter().find(|unit| unit.name == name).map(|unit| unit.base);
+        Measure { unit: Some((name.to_owned(), base)), items: None }
+    }
+
+    /// Of a variable, by the description of its FMU.
+    pub(super) fn of_variable(variable: &ScalarVariable, description: &ModelDescription) -> Self {
+        match &variable.kind {
+            Kind::Real(real) => {
+                let unit = real.unit.as_ref().map(|name| {
+                    let known = description.units.iter().find(|unit| unit.name == *name);
+                    (name.clone(), known.and_then(|unit| unit.base))
+                });
+                Measure { unit, items: None }
+            }
+            Kind::Enumeration(kind) => {
+                let wanted = kind.declared_type.as_ref();
+                let known = description.types.iter().find(|each| Some(&each.name) == wanted);
+                Measure { unit: None, items: known.map(|each| each.items.clone()) }
+            }
+            _ => Measure::default(),
+        }
+    }
+
+    /// What is stated here, the rest from `other`.
+    pub(super) fn or(self, other: Measure) -> Self {
+        Measure { unit: self.unit.or(other.unit), items: self.items.or(other.items) }
+    }
+
+    fn name(&self) -> &str {
+        self.unit.as_ref().map_or("no unit", |(name, _)| name)
+    }
+}
+
+/// Factor and offset from values in `from` to values in `to`: `base = factor * unit + offset` holds
+/// for both. Values without a unit, or with units of one name, are left alone. None where a
+/// definition is missing; a sentence where the units measure different quantities.
+pub(super) fn between(from: &Measure, to: &Measure) -> Result<Option<(f64, f64)>, String> {
+    const SAME: (f64, f64) = (1.0, 0.0);
+    let (Some((from_name, from_base)), Some((to_name, to_base))) = (&from.unit, &to.unit) else {
+        return Ok(Some(SAME));
+    };
+    let same_name = from_name == to_name;
+    let (Some(source), Some(target)) = (from_base, to_base) else {
+        return Ok(same_name.then_some(SAME));
+    };
+    let Some((factor, offset)) = source.conversion(target) else {
+        return if same_name {
+            Ok(Some(SAME))
+        } else {
+            Err(format!("{from_name} and {to_name} are units of different quantities"))
+        };
+    };
+    let nearly_one = (factor - 1.0).abs() < SAME_FACTOR && offset.abs() < SAME_FACTOR;
+    Ok(Some(if same_name && nearly_one { SAME } else { (factor, offset) }))
+}
+
+/// A value on its way: what is known of it, and what has become of it so far.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Way {
+    pub(super) measure: Measure,
+    pub(super) transformation: Transformation,
+    /// Conversions that could not be made.
+    pub(super) doubts: Vec<String>,
+}
+
+impl Way {
+    /// From a place where `measure` holds.
+    pub(super) fn from(measure: Measure) -> Self {
+        Way { measure, ..Way::default() }
+    }
+
+    /// One connection further, to a place of which `there` is known: first the units are converted,
+    /// unless that is suppressed, then the transformation is applied.
+    pub(super) fn over(self, conversion: &Conversion, there: Measure) -> Result<Way, String> {
+        let (mut transformation, mut doubts) = (self.transformation, self.doubts);
+        if !conversion.suppress_units {
+            match between(&self.measure, &there)? {
+                Some((factor, offset)) => {
+                    transformation = then(transformation, linear(factor, offset))?;
+                }
+                None => doubts.push(format!(
+                    "{} is not converted to {}: a definition is missing",
+                    self.measure.name(),
+                    there.name()
+                )),
+            }
+        }
+        let stated = conversion.transformation.as_ref();
+        if let Some(stated) = stated {
+            let stated = resolve(stated, &self.measure, &there)?;
+            transformation = then(transformation, stated)?;
+        }
+        // After a suppressed conversion the old unit says nothing.
+        let kept = if conversion.suppress_units { None } else { self.measure.unit };
+        let items = if stated.is_some() { None } else { self.measure.items };
+        let measure = there.or(Measure { unit: kept, items });
+        Ok(Way { measure, transformation, doubts })
+    }
+}
+
+fn linear(factor: f64, offset: f64) -> Transformation {
+    if (factor, offset) == (1.0, 0.0) {
+        Transformation::Identity
+    } else {
+        Transformation::Linear { factor, offset }
+    }
+}
+
+/// The transformation with the names of items as numbers.
+fn resolve(stated: &Stated, here: &Measure, there: &Measure) -> Result<Transformation, String> {
+    Ok(match stated {
+        Stated::Linear { factor, offset } => linear(*factor, *offset),
+        Stated::Boolean(pairs) => {
+            let mapped = |value| pairs.iter().find(|(source, _)| *source == value);
+            Transformation::Boolean {
+                from_false: mapped(false).is_some_and(|(_, target)| *target),
+                from_true: mapped(true).is_none_or(|(_, target)| *target),
+            }
+        }
+        Stated::Integer(pairs) => Transformation::Integer(pairs.clone()),
+        Stated::Enumeration(pairs) => {
+            let number = |items: &Measure, name: &str| {
+                let items = items.items.as_deref().unwrap_or_default();
+                let found = items.iter().find(|(item, _)| item == name);
+                found.map(|(_, value)| *value).ok_or_else(|| {
+                    let items: Vec<&str> = items.iter().map(|(item, _)| item.as_str()).collect();
+                    format!("expected an item of {}, found {name:?}", listed(&items))
+                })
+            };
+            let pairs = pairs
+                .iter()
+                .map(|(source, target)| Ok((number(here, source)?, number(there, target)?)));
+            Transformation::Integer(pairs.collect::<Result<_, String>>()?)
+        }
+    })
+}
+
+fn listed<'a>(items: &[&'a str]) -> Cow<'a, str> {
+    if items.is_empty() {
+        return "an enumeration, which neither the connector nor the FMU states".into();
+    }
+    format!("the enumeration {}", items.join(", ")).into()
+}
+
+/// First `first`, then `second`.
+pub(super) fn then(
+    first: Transformation,
+    second: Transformation,
+) -> Result<Transformation, String> {
+    use Transformation::{Boolean, Identity, Integer, Linear};
+    Ok(match (first, second) {
+        (Identity, other) | (other, Identity) => other,
+        (Linear { factor: f, offset: o }, Linear { factor, offset }) => {
+            linear(factor * f, factor * o + offset)
+        }
+        (Boolean { from_false: low, from_true: high }, Boolean { from_false, from_true }) => {
+            let second = |value| if value { from_true } else { from_false };
+            Boolean { from_false: second(low), from_true: second(high) }
+        }
+        (Integer(first), Integer(second)) => {
+            let mut sources: Vec<i32> = first.iter().chain(&second).map(|pair| pair.0).collect();
+            sources.sort_unstable();
+            sources.dedup();
+            let pairs =
+                sources.into_iter().map(|source| (source, mapped(&second, mapped(&first, source))));
+            Integer(pairs.filter(|(source, target)| source != target).collect())
+        }
+        _ => return Err("transformations of different types follow each other".to_owned()),
+    })
+}
+
+/// The target of `value`; unchanged where there is none.
+fn mapped(pairs: &[(i32, i32)], value: i32) -> i32 {
+    pairs.iter().find(|(source, _)| *source == value).map_or(value, |(_, target)| *target)
+}
+
+/// What the units say of a connector whose file states another one than its FMU.
+pub(super) fn contradiction(stated: &Measure, own: &Measure) -> Option<String> {
+    match between(stated, own) {
+        Ok(Some((factor, offset))) if (factor, offset) == (1.0, 0.0) => None,
+        _ => Some(format!(
+            "the unit is {} in the system structure and {} in the FMU: the former is taken",
+            stated.name(),
+            own.name()
+        )),
+    }
+}

@@ -1,0 +1,170 @@
+//! System Structure and Parameterization (SSP 1.0.1 and 2.0): SSD, SSV, SSM and SSB files and SSP
+//! archives; and the files `OspSystemStructure.xml` of the Open Simulation Platform.
+//!
+//! [`open`] makes an [`Assembly`] of a file, [`write()`] makes an SSP of an assembly. [`read_ssd`] and
+//! its like only read.
+#![forbid(unsafe_code)]
+
+mod assembly;
+mod conversion;
+mod error;
+mod flatten;
+mod function;
+mod load;
+mod osp;
+mod parameters;
+mod read;
+mod render;
+mod schema;
+mod source;
+pub mod structure;
+mod tree;
+mod write;
+mod xml;
+
+use std::collections::HashSet;
+use std::path::Path;
+
+use fmu_description::package::{TemporaryFolder, Unpacked};
+
+pub use assembly::{Assembly, Element, Link, Setting, Terminal};
+pub use error::SspError;
+pub use function::{Function, FunctionSlave};
+pub use read::{read_ssb, read_ssd, read_ssm, read_ssv};
+pub use render::{render_ssb, render_ssd, render_ssm, render_ssv};
+pub use write::write;
+
+use conversion::contradiction;
+use flatten::Flow;
+use structure::{DefaultExperiment, Type};
+use tree::{Content, Tree, Vertex};
+
+/// A system structure, ready to be coupled.
+#[derive(Debug)]
+pub struct Opened {
+    /// The FMUs, their settings and their connections. The paths of the FMUs are folders with
+    /// unpacked ones, and hold as long as [`Opened::folders`] lives.
+    pub assembly: Assembly,
+    /// `DefaultExperiment`; nothing where the file has none.
+    pub experiment: DefaultExperiment,
+    /// Elements with the step in s that an annotation `osp:StepSizeHint` proposes.
+    pub steps: Vec<(String, f64)>,
+    /// Whether the file asks for libcosim's fixed-step algorithm: all FMUs step from the same values,
+    /// inputs are held, and nothing is repeated.
+    pub fixed_step: bool,
+    /// What is odd about the files and does not hinder a run, a sentence each.
+    pub warnings: Vec<String>,
+    /// Removes what was unpacked when it is dropped: libraries must be unloaded before.
+    pub folders: Folders,
+}
+
+/// Unpacked archives.
+#[derive(Debug)]
+pub struct Folders {
+    _fmus: Vec<Unpacked>,
+    _packages: Vec<TemporaryFolder>,
+}
+
+/// Reads the SSP archive at `path`, or an SSD file beside its FMUs, or a folder with a file
+/// `SystemStructure.ssd`; unpacks the FMUs and flattens the systems. A file `.xml`, or a folder with an
+/// `OspSystemStructure.xml` only, is read as one of libcosim, with its functions and variable groups.
+///
+/// Nested systems, other SSDs and SSPs become part of the assembly: names are joined by dots, without
+/// that of the root system. Along a connection through systems, units are converted and
+/// transformations applied connection by connection. Parameter bindings of outer systems win over
+/// those of inner ones, later ones over earlier ones.
+///
+/// # Errors
+///
+/// [`SspError`] with file, line and column.
+pub fn open(path: &Path) -> Result<Opened, SspError> {
+    let is_xml = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("xml"));
+    if is_xml || osp::is_folder_with_one(path) {
+        return osp::open(path);
+    }
+    open_variant(path, None)
+}
+
+/// As [`open`], with the SSD called `variant` at the root of the SSP.
+///
+/// # Errors
+///
+/// Those of [`open`].
+pub fn open_variant(path: &Path, variant: Option<&str>) -> Result<Opened, SspError> {
+    let (mut tree, document) = load::load(path, variant)?;
+    let mut warnings = std::mem::take(&mut tree.warnings);
+    check_connectors(&tree, &mut warnings);
+    let flow = Flow::new(&tree, &mut warnings)?;
+    let links = flow.links(&tree, &mut warnings)?;
+    let mut settings = parameters::settings(&tree, &flow, &mut warnings)?;
+    let experiment = document.structure.experiment.unwrap_or_default();
+    let (mut elements, mut steps, mut names) = (Vec::new(), Vec::new(), HashSet::new());
+    for (index, node) in tree.nodes.iter().enumerate() {
+        let Content::Fmu(fmu) = node.content else { continue };
+        if !names.insert(node.path.as_str()) {
+            let sentence = format!("two components have the hierarchical name {}", node.path);
+            return Err(error::meaning(node.at, sentence).in_file(&node.file.shown));
+        }
+        elements.push(Element {
+            name: node.path.clone(),
+            fmu: tree.fmus[fmu].folder().to_owned(),
+            shown: Some(tree.shown[fmu].clone()),
+            settings: settings.remove(&index).unwrap_or_default(),
+        });
+        steps.extend(node.step_size.map(|size| (node.path.clone(), size)));
+    }
+    let assembly = Assembly {
+        name: Some(document.structure.name.clone()),
+        elements,
+        links,
+        functions: Vec::new(),
+        start_time: experiment.start_time,
+        stop_time: experiment.stop_time,
+    };
+    // What this program writes has the step in the way of libcosim, but asks for no algorithm.
+    let is_own = document.structure.generation_tool.as_deref() == Some(write::TOOL);
+    let fixed_step = experiment.step_size.is_some() && !is_own;
+    let folders = Folders { _fmus: tree.fmus, _packages: tree.folders };
+    Ok(Opened { assembly, experiment, steps, fixed_step, warnings, folders })
+}
+
+/// What the connectors of the FMUs say against the FMUs.
+fn check_connectors(tree: &Tree, warnings: &mut Vec<String>) {
+    for (index, node) in tree.nodes.iter().enumerate() {
+        let Content::Fmu(_) = node.content else { continue };
+        for connector in &node.connectors {
+            let vertex = Vertex { node: index, connector: connector.name.clone() };
+            let name = tree.name(&vertex);
+            let kind = connector.kind_of_value.as_ref();
+            if let Some(words) = kind.and_then(Type::beyond_fmi2) {
+                warnings.push(format!("{name} is {words}, which FMI 2.0 does not have: skipped"));
+                continue;
+            }
+            let Some(variable) = tree.variable(&vertex) else {
+                warnings.push(format!("{name}: the FMU has no such variable"));
+                continue;
+            };
+            let (stated, own) = tree.measures(&vertex);
+            warnings.extend(contradiction(&stated, &own).map(|text| format!("{name}: {text}")));
+            let stated = connector.kind_of_value.as_ref().and_then(element);
+            let own = variable.kind.element();
+            if let Some(stated) = stated.filter(|stated| *stated != own) {
+                warnings.push(format!(
+                    "{name} is of type {stated} in the system structure and {own} in the FMU"
+                ));
+            }
+        }
+    }
+}
+
+/// The name of the element that states a type of FMI 2.0.
+fn element(kind: &Type) -> Option<&'static str> {
+    match kind {
+        Type::Real(_) => Some("Real"),
+        Type::Integer => Some("Integer"),
+        Type::Boolean => Some("Boolean"),
+        Type::String => Some("String"),
+        Type::Enumeration(_) => Some("Enumeration"),
+        Type::Binary | Type::Clock | Type::Array(_) | Type::Clocked(_) => None,
+    }
+}

@@ -1,0 +1,282 @@
+//! Every file once, however often it is referred to.
+
+use std::collections::HashMap;
+use std::fs;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+
+use fmu_description::package::{PackageError, TemporaryFolder, Unpacked, unpack_archive};
+
+use crate::error::SspError;
+use crate::read;
+use crate::source::{Base, Target};
+use crate::structure::{ParameterMapping, ParameterSet, SignalDictionary, Source};
+use crate::tree::{Document, File};
+
+/// Name of the default SSD in an SSP (section 3).
+const DEFAULT: &str = "SystemStructure.ssd";
+/// Largest XML file that is read.
+const CAPACITY: u64 = 64 << 20;
+
+/// Why something that an SSD refers to is not there.
+pub(super) enum Missing {
+    /// The reference itself is wrong; the sentence belongs to the place where it stands.
+    Reference(String),
+    /// What it refers to is wrong.
+    Content(SspError),
+}
+
+impl Missing {
+    /// The error, with `here` for a sentence about the reference.
+    pub(super) fn or(self, here: impl Fn(String) -> SspError) -> SspError {
+        match self {
+            Missing::Reference(sentence) => here(sentence),
+            Missing::Content(error) => error,
+        }
+    }
+}
+
+/// What has been read so far, by path.
+#[derive(Default)]
+pub(crate) struct Files {
+    documents: HashMap<PathBuf, Rc<Document>>,
+    values: HashMap<PathBuf, Rc<ParameterSet>>,
+    mappings: HashMap<PathBuf, Rc<ParameterMapping>>,
+    fmu_indices: HashMap<PathBuf, usize>,
+    archives: HashMap<PathBuf, PathBuf>,
+    folders: Vec<TemporaryFolder>,
+    pub(crate) fmus: Vec<Unpacked>,
+    /// Names of the FMUs for the user.
+    shown: Vec<PathBuf>,
+    /// What is odd about the files, a sentence each, which names the file.
+    pub(crate) warnings: Vec<String>,
+}
+
+/// What must live as long as the files are used, and what is to be said of them.
+pub(crate) struct Finished {
+    pub(crate) fmus: Vec<Unpacked>,
+    pub(crate) shown: Vec<PathBuf>,
+    pub(crate) folders: Vec<TemporaryFolder>,
+    pub(crate) warnings: Vec<String>,
+}
+
+impl Files {
+    pub(crate) fn finish(self) -> Finished {
+        let Files { fmus, shown, folders, warnings, .. } = self;
+        Finished { fmus, shown, folders, warnings }
+    }
+
+    /// The SSD at a path that the user gave, or the one called `fragment` in an SSP.
+    pub(super) fn document(&mut self, target: &Target) -> Result<Rc<Document>, SspError> {
+        let is_ssd = target.path.extension().is_some_and(|extension| extension == "ssd");
+        if target.path.is_dir() {
+            let name = target.fragment.as_deref().unwrap_or(DEFAULT);
+            let inner = Target::new(target.path.join(name), target.shown.join(name));
+            return self.document(&inner);
+        }
+        let outside = Base { folder: PathBuf::new(), shown: PathBuf::new(), archive: None };
+        self.referred(target, &outside, !is_ssd)
+    }
+
+    /// The SSD that a component refers to.
+    pub(super) fn referred(
+        &mut self,
+        target: &Target,
+        base: &Base,
+        archive: bool,
+    ) -> Result<Rc<Document>, SspError> {
+        if !archive {
+            return self.ssd(target, base.below(target));
+        }
+        let folder = self.unpacked(target)?;
+        let base = Base::archive(&folder, &target.shown);
+        let name = target.fragment.as_deref().unwrap_or(DEFAULT);
+        if name.contains('/') {
+            let (expected, found) = ("the name of an SSD at the root of the SSP", name.to_owned());
+            let what = target.shown.display().to_string();
+            return Err(SspError::Missing { what, expected: expected.to_owned(), found });
+        }
+        let inner = Target::new(folder.join(name), target.shown.join(name));
+        if !inner.path.is_file() {
+            let found = definitions_in(&folder);
+            let what = target.shown.display().to_string();
+            return Err(SspError::Missing { what, expected: format!("{name} at its root"), found });
+        }
+        self.ssd(&inner, base)
+    }
+
+    fn ssd(&mut self, target: &Target, base: Base) -> Result<Rc<Document>, SspError> {
+        if let Some(known) = self.documents.get(&target.path) {
+            return Ok(known.clone());
+        }
+        let shown = target.shown.clone();
+        let structure = self.read(target, read::ssd)?;
+        let definitions = structure.definitions.clone();
+        let file = Rc::new(File { shown, base, definitions });
+        let document = Rc::new(Document { structure, file });
+        self.documents.insert(target.path.clone(), document.clone());
+        Ok(document)
+    }
+
+    /// The folder of an SSP.
+    fn unpacked(&mut self, target: &Target) -> Result<PathBuf, SspError> {
+        if let Some(known) = self.archives.get(&target.path) {
+            return Ok(known.clone());
+        }
+        let unpacked = unpack_archive(&target.path);
+        let (folder, warnings) = unpacked.map_err(|error| as_shown(error, target))?;
+        self.warn(&target.shown, warnings);
+        let place = folder.path().to_owned();
+        self.folders.push(folder);
+        self.archives.insert(target.path.clone(), place.clone());
+        Ok(place)
+    }
+
+    fn warn(&mut self, shown: &Path, sentences: impl IntoIterator<Item = String>) {
+        let sentences = sentences.into_iter();
+        self.warnings.extend(sentences.map(|text| format!("{}: {text}", shown.display())));
+    }
+
+    /// Index of the FMU, an archive or a folder.
+    pub(crate) fn fmu(&mut self, target: &Target) -> Result<usize, SspError> {
+        if let Some(known) = self.fmu_indices.get(&target.path) {
+            return Ok(*known);
+        }
+        let path = &target.path;
+        let unpacked = if path.is_dir() { Unpacked::in_folder(path) } else { Unpacked::open(path) };
+        let unpacked = unpacked.map_err(|error| as_shown(error, target))?;
+        self.warn(&target.shown, unpacked.archive_warnings.clone());
+        self.warn(&target.shown, unpacked.warnings.iter().map(ToString::to_string));
+        self.fmus.push(unpacked);
+        self.shown.push(target.shown.clone());
+        self.fmu_indices.insert(path.clone(), self.fmus.len() - 1);
+        Ok(self.fmus.len() - 1)
+    }
+
+    pub(super) fn values(
+        &mut self,
+        source: &Source<ParameterSet>,
+        file: &File,
+        component: Option<&Base>,
+    ) -> Result<Rc<ParameterSet>, Missing> {
+        let target = match wanted(source, file, component)? {
+            Wanted::Inline(content) => return Ok(Rc::new(content)),
+            Wanted::File(target) => target,
+        };
+        if let Some(known) = self.values.get(&target.path) {
+            return Ok(known.clone());
+        }
+        let content = Rc::new(self.read(&target, read::ssv).map_err(Missing::Content)?);
+        self.values.insert(target.path, content.clone());
+        Ok(content)
+    }
+
+    pub(super) fn mapping(
+        &mut self,
+        source: &Source<ParameterMapping>,
+        file: &File,
+        component: Option<&Base>,
+    ) -> Result<Rc<ParameterMapping>, Missing> {
+        let target = match wanted(source, file, component)? {
+            Wanted::Inline(content) => return Ok(Rc::new(content)),
+            Wanted::File(target) => target,
+        };
+        if let Some(known) = self.mappings.get(&target.path) {
+            return Ok(known.clone());
+        }
+        let content = Rc::new(self.read(&target, read::ssm).map_err(Missing::Content)?);
+        self.mappings.insert(target.path, content.clone());
+        Ok(content)
+    }
+
+    /// The content of a file; what is odd about it becomes a warning.
+    pub(crate) fn read<T>(
+        &mut self,
+        target: &Target,
+        read: impl Fn(&[u8]) -> Result<(T, Vec<String>), SspError>,
+    ) -> Result<T, SspError> {
+        let failed = |source| {
+            let (action, path) = ("read", target.shown.clone());
+            SspError::File { action, path, source }
+        };
+        let file = fs::File::open(&target.path).map_err(failed)?;
+        let mut bytes = Vec::new();
+        file.take(CAPACITY + 1).read_to_end(&mut bytes).map_err(failed)?;
+        let (content, warnings) = read(&bytes).map_err(|error| error.in_file(&target.shown))?;
+        self.warn(&target.shown, target.doubt.clone());
+        self.warn(&target.shown, warnings);
+        Ok(content)
+    }
+
+    /// The dictionary and the name of the file that it stands in.
+    pub(super) fn dictionary(
+        &mut self,
+        source: &Source<SignalDictionary>,
+        file: &File,
+    ) -> Result<(SignalDictionary, PathBuf), Missing> {
+        match source {
+            Source::Inline(dictionary) => Ok((dictionary.clone(), file.shown.clone())),
+            Source::File { uri, .. } => {
+                let target = file.base.resolve(uri).map_err(Missing::Reference)?;
+                let read = self.read(&target, read::ssb).map_err(Missing::Content)?;
+                Ok((read, target.shown))
+            }
+        }
+    }
+}
+
+/// What a source holds, or the file that it names.
+enum Wanted<T> {
+    Inline(T),
+    File(Target),
+}
+
+fn wanted<T: Clone>(
+    source: &Source<T>,
+    file: &File,
+    component: Option<&Base>,
+) -> Result<Wanted<T>, Missing> {
+    let (uri, in_component) = match source {
+        Source::Inline(content) => return Ok(Wanted::Inline(content.clone())),
+        Source::File { uri, in_component } => (uri, *in_component),
+    };
+    let base = match (in_component, component) {
+        (false, _) => &file.base,
+        (true, Some(base)) => base,
+        (true, None) => {
+            let sentence = "a system has no component that sourceBase could mean";
+            return Err(Missing::Reference(sentence.to_owned()));
+        }
+    };
+    base.resolve(uri).map(Wanted::File).map_err(Missing::Reference)
+}
+
+/// The error of an archive by the name that the user knows, not by that of its unpacked copy.
+fn as_shown(error: PackageError, target: &Target) -> SspError {
+    let path = target.shown.clone();
+    let is_itself = |named: &Path| named == target.path;
+    let error = match error {
+        PackageError::File { action, path: named, source } if is_itself(&named) => {
+            PackageError::File { action, path, source }
+        }
+        PackageError::Archive { source, .. } => PackageError::Archive { path, source },
+        PackageError::Limit { limit, unit, .. } => PackageError::Limit { path, limit, unit },
+        PackageError::Description { source, .. } => PackageError::Description { path, source },
+        error => {
+            return SspError::In { file: path, reason: Box::new(error.into()) };
+        }
+    };
+    error.into()
+}
+
+/// The SSD files at the root of an unpacked SSP.
+fn definitions_in(folder: &Path) -> String {
+    let names = fs::read_dir(folder).into_iter().flatten().flatten();
+    let is_ssd = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "ssd");
+    let names = names.map(|entry| PathBuf::from(entry.file_name())).filter(is_ssd);
+    let mut names: Vec<String> = names.map(|name| name.display().to_string()).collect();
+    names.sort();
+    names.truncate(10);
+    if names.is_empty() { "no SSD".to_owned() } else { names.join(", ") }
+}

@@ -1,0 +1,299 @@
+//! `OspSystemStructure.xml`, the system structure of the Open Simulation Platform (libcosim).
+
+mod document;
+mod groups;
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use fmu_description::{Causality, ModelDescription, Position};
+
+use super::error::{SspError, meaning};
+use super::load::check_runnable;
+use super::load::files::{Files, Finished};
+use super::source::{Base, Target};
+use super::structure::DefaultExperiment;
+use super::{Folders, Opened};
+use crate::assembly::{Assembly, Element, Link, Terminal};
+use document::{Connection, Document, End, Kind, Simulator};
+use groups::Group;
+use slave::Transformation;
+
+/// Name of the file in a folder.
+const DEFAULT: &str = "OspSystemStructure.xml";
+/// The unit of time of libcosim in s: steps are whole multiples of it.
+const TICK: f64 = 1e-9;
+
+/// Whether `path` is a folder with such a file, and without an SSD.
+pub(super) fn is_folder_with_one(path: &Path) -> bool {
+    path.join(DEFAULT).is_file() && !path.join("SystemStructure.ssd").is_file()
+}
+
+/// Reads the file at `path`, or the one in the folder `path`, with the FMUs that it names.
+pub(super) fn open(path: &Path) -> Result<Opened, SspError> {
+    let path = if path.is_dir() { path.join(DEFAULT) } else { path.to_owned() };
+    let outside = Base { folder: PathBuf::new(), shown: PathBuf::new(), archive: None };
+    let target = Target::new(path.clone(), path.clone());
+    let mut opening = Opening { base: outside.below(&target), ..Opening::default() };
+    let document = opening.files.read(&target, document::read)?;
+    opening.add(&document).map_err(|error| error.in_file(&path))?;
+    let Opening { files, assembly, steps, .. } = opening;
+    let Finished { fmus, folders, warnings, .. } = files.finish();
+    let experiment = DefaultExperiment {
+        start_time: document.start,
+        stop_time: document.stop,
+        step_size: Some(document.step),
+    };
+    let folders = Folders { _fmus: fmus, _packages: folders };
+    Ok(Opened { assembly, experiment, steps, fixed_step: true, warnings, folders })
+}
+
+/// A file on its way to an assembly.
+#[derive(Default)]
+struct Opening {
+    base: Base,
+    files: Files,
+    assembly: Assembly,
+    steps: Vec<(String, f64)>,
+    /// Index of the FMU of each simulator among those of `files`, and the groups of its variables.
+    simulators: HashMap<String, (usize, Vec<Group>)>,
+    /// Each linear transformation: factor, offset, its source and its targets.
+    linear: Vec<(String, Linear)>,
+}
+
+#[derive(Default)]
+struct Linear {
+    factor: f64,
+    offset: f64,
+    source: Option<Terminal>,
+    targets: Vec<Terminal>,
+}
+
+impl Opening {
+    fn add(&mut self, document: &Document) -> Result<(), SspError> {
+        for simulator in &document.simulators {
+            self.simulator(simulator, document.step)?;
+        }
+        for function in &document.functions {
+            let name = function.name.clone();
+            match &function.kind {
+                Kind::Sum(sum) => self.assembly.functions.push((name, sum.clone())),
+                Kind::Linear { factor, offset } => {
+                    let (factor, offset) = (*factor, *offset);
+                    self.linear.push((name, Linear { factor, offset, ..Linear::default() }));
+                }
+            }
+        }
+        for connection in &document.connections {
+            self.connection(connection).map_err(|sentence| meaning(connection.at, sentence))?;
+        }
+        self.finish_functions();
+        let (start, stop) = (document.start, document.stop);
+        (self.assembly.start_time, self.assembly.stop_time) = (start, stop);
+        Ok(())
+    }
+
+    fn simulator(&mut self, simulator: &Simulator, step: f64) -> Result<(), SspError> {
+        let Simulator { name, at, .. } = simulator;
+        let here = |sentence: String| meaning(*at, format!("{name}: {sentence}"));
+        let target = self.base.resolve(&simulator.source).map_err(here)?;
+        if let Some(doubt) = &target.doubt {
+            self.files.warnings.push(format!("{at}: {name}: {doubt}"));
+        }
+        let index = self.files.fmu(&target)?;
+        let fmu = &self.files.fmus[index];
+        let shown = target.shown.clone();
+        check_runnable(fmu).map_err(|why| here(format!("{}: {why}", shown.display())))?;
+        self.assembly.elements.push(Element {
+            name: name.clone(),
+            fmu: fmu.folder().to_owned(),
+            shown: Some(shown),
+            settings: simulator.settings.clone(),
+        });
+        let model = fmu.description.model_name.clone();
+        let groups = self.groups(&target, &model)?;
+        if self.simulators.insert(name.clone(), (index, groups)).is_some() {
+            return Err(meaning(*at, format!("two simulators are called {name}")));
+        }
+        self.step(simulator, step, *at);
+        Ok(())
+    }
+
+    /// The step of a simulator: as in libcosim the largest multiple of the base step that is not
+    /// longer than what is stated.
+    fn step(&mut self, simulator: &Simulator, base: f64, at: Position) {
+        let Some(stated) = simulator.step_size.filter(|stated| *stated > 0.0) else { return };
+        let ticks = |time: f64| (time / TICK).round();
+        let multiple = (ticks(stated) / ticks(base)).floor().max(1.0);
+        let step = multiple * base;
+        if (ticks(step) - ticks(stated)).abs() >= 1.0 {
+            self.files.warnings.push(format!(
+                "{at}: {} steps every {step} s, a multiple of the base step {base} s, instead of \
+                 {stated} s",
+                simulator.name
+            ));
+        }
+        self.steps.push((simulator.name.clone(), step));
+    }
+
+    /// The variable groups of an FMU: of a file beside it, or beside the system structure.
+    fn groups(&mut self, fmu: &Target, model: &str) -> Result<Vec<Group>, SspError> {
+        let name = format!("{model}_OspModelDescription.xml");
+        let beside = [self.base.below(fmu), self.base.clone()];
+        let files = beside.map(|base| Target::new(base.folder.join(&name), base.shown.join(&name)));
+        match files.iter().find(|file| file.path.is_file()) {
+            Some(file) => self.files.read(file, groups::read),
+            None => Ok(Vec::new()),
+        }
+    }
+
+    fn connection(&mut self, connection: &Connection) -> Result<(), String> {
+        let [first, second] = &connection.ends;
+        if !connection.groups {
+            return self.join(first, second);
+        }
+        let ends: Vec<[End; 2]> = match (first.is_signal, second.is_signal) {
+            (false, false) => {
+                let (here, there) = (self.group(first)?, self.group(second)?);
+                let pairs = here.pairs(there)?.into_iter();
+                pairs.map(|[a, b]| [first.named(a), second.named(b)]).collect()
+            }
+            (true, _) => self.signals(first, second)?,
+            (false, true) => self.signals(second, first)?,
+        };
+        ends.iter().try_for_each(|[first, second]| self.join(first, second))
+    }
+
+    fn group(&self, end: &End) -> Result<&Group, String> {
+        let (index, groups) = self.known(&end.owner)?;
+        groups::find(groups, &end.name).ok_or_else(|| {
+            let model = &self.files.fmus[*index].description.model_name;
+            format!(
+                "{} has no variable group {:?}, expected one in {model}_OspModelDescription.xml \
+                 beside its FMU or beside the system structure",
+                end.owner, end.name
+            )
+        })
+    }
+
+    /// The components of a group of signals, `in[0]` or `out`, with the variables of a group.
+    fn signals(&self, signals: &End, variables: &End) -> Result<Vec<[End; 2]>, String> {
+        let group = self.group(variables)?;
+        let components = (0..group.variables.len()).map(|k| {
+            let name = format!("{}[{k}]", signals.name);
+            [signals.named(&name), variables.named(&group.variables[k])]
+        });
+        Ok(components.collect())
+    }
+
+    fn known(&self, simulator: &str) -> Result<&(usize, Vec<Group>), String> {
+        let known = self.simulators.get(simulator);
+        known.ok_or_else(|| format!("there is no simulator {simulator:?}"))
+    }
+
+    fn description(&self, simulator: &str) -> Result<&ModelDescription, String> {
+        self.known(simulator).map(|(index, _)| &self.files.fmus[*index].description)
+    }
+
+    /// Connects two variables, or a variable and a signal, in the direction of the values.
+    fn join(&mut self, first: &End, second: &End) -> Result<(), String> {
+        let (source, target) = match (self.gives(first)?, self.gives(second)?) {
+            (true, false) => (first, second),
+            (false, true) => (second, first),
+            (gives, _) => {
+                let role = if gives { "outputs" } else { "inputs" };
+                return Err(format!("{first} and {second} are both {role}"));
+            }
+        };
+        let linear = |end: &End| {
+            let of_linear = |(name, _): &(String, Linear)| end.is_signal && *name == end.owner;
+            self.linear.iter().position(of_linear)
+        };
+        match (linear(source), linear(target)) {
+            (Some(k), _) => self.linear[k].1.targets.push(target.terminal()),
+            (None, Some(k)) => self.linear[k].1.source = Some(source.terminal()),
+            (None, None) => {
+                let (from, to) = (source.terminal(), target.terminal());
+                self.link(from, to, Transformation::Identity);
+            }
+        }
+        Ok(())
+    }
+
+    /// libcosim converts no units.
+    fn link(&mut self, from: Terminal, to: Terminal, transformation: Transformation) {
+        self.assembly.links.push(Link { from, to, transformation, units_settled: true });
+    }
+
+    /// Whether values come from this end of a connection.
+    fn gives(&self, end: &End) -> Result<bool, String> {
+        if end.is_signal {
+            return self.signal_gives(end);
+        }
+        let variable = self.description(&end.owner)?.variable(&end.name);
+        let variable = variable.ok_or_else(|| format!("the FMU has no variable {end}"))?;
+        let causality = variable.causality;
+        Ok(matches!(causality, Causality::Output | Causality::CalculatedParameter))
+    }
+
+    fn signal_gives(&self, end: &End) -> Result<bool, String> {
+        let unknown = |names: &str| format!("{end} is no signal of the function, expected {names}");
+        if self.linear.iter().any(|(name, _)| *name == end.owner) {
+            return match end.name.as_str() {
+                "in" => Ok(false),
+                "out" => Ok(true),
+                _ => Err(unknown("in or out")),
+            };
+        }
+        let functions = &self.assembly.functions;
+        let function = functions.iter().find(|(name, _)| *name == end.owner);
+        let (_, function) = function.ok_or_else(|| format!("no function {:?}", end.owner))?;
+        let causality = function.signal(&end.name).ok_or_else(|| {
+            unknown(&format!("{}, ... or {}", function.input(0, 0), function.output(0)))
+        })?;
+        Ok(causality == Causality::Output)
+    }
+
+    /// Makes links of linear transformations, and names what the functions lack.
+    fn finish_functions(&mut self) {
+        for (name, linear) in std::mem::take(&mut self.linear) {
+            let Linear { factor, offset, source, targets } = linear;
+            match source {
+                Some(source) => {
+                    for target in targets {
+                        let transformation = Transformation::Linear { factor, offset };
+                        self.link(source.clone(), target, transformation);
+                    }
+                }
+                None => self.files.warnings.push(format!(
+                    "the function {name} has no input, so nothing is connected to its output"
+                )),
+            }
+        }
+        let links = &self.assembly.links;
+        for (name, function) in &self.assembly.functions {
+            let is_driven = |input: &String| {
+                links.iter().any(|link| link.to.element == *name && link.to.variable == *input)
+            };
+            let missing: Vec<String> =
+                function.inputs().filter(|input| !is_driven(input)).take(5).collect();
+            if !missing.is_empty() {
+                self.files.warnings.push(format!(
+                    "the function {name}: {} is connected to nothing and counts as 0",
+                    missing.join(", ")
+                ));
+            }
+        }
+    }
+}
+
+impl End {
+    /// Another variable or signal of the same owner.
+    fn named(&self, name: &str) -> End {
+        End { name: name.to_owned(), ..self.clone() }
+    }
+
+    fn terminal(&self) -> Terminal {
+        Terminal { element: self.owner.clone(), variable: self.name.clone() }
+    }
+}

@@ -1,0 +1,174 @@
+//! The value of a parameter on its way to a variable.
+
+use fmu_description::Kind;
+
+use crate::conversion::{Measure, Way};
+use crate::structure::{
+    Conversion, Definitions, Parameter, ParameterValue, Transformation as Stated, Type,
+};
+use slave::Transformation;
+
+/// A value and what is known of its unit or its enumeration.
+#[derive(Clone, Debug)]
+pub(super) struct Value {
+    pub(super) number: Number,
+    measure: Measure,
+}
+
+/// A value alone.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Number {
+    Real(f64),
+    Integer(i32),
+    Boolean(bool),
+    Text(String),
+    /// An item of an enumeration, and its number where the file defines it.
+    Item(String, Option<i32>),
+    Binary,
+    /// What FMI 2.0 does not have, in words.
+    Foreign(String),
+}
+
+impl Value {
+    pub(super) fn new(number: Number, measure: Measure) -> Self {
+        Value { number, measure }
+    }
+
+    pub(super) fn of(parameter: &Parameter, definitions: &Definitions) -> Self {
+        let (number, measure) = match &parameter.value {
+            ParameterValue::Real(value, unit) => {
+                let unit = unit.as_ref().map(|unit| Measure::unit(unit, definitions));
+                (Number::Real(*value), unit.unwrap_or_default())
+            }
+            ParameterValue::Integer(value) => (Number::Integer(*value), Measure::default()),
+            ParameterValue::Boolean(value) => (Number::Boolean(*value), Measure::default()),
+            ParameterValue::String(text) => (Number::Text(text.clone()), Measure::default()),
+            ParameterValue::Enumeration(item, name) => {
+                let kind = name.as_ref().map(|name| Type::Enumeration(name.clone()));
+                let measure = Measure::stated(kind.as_ref(), definitions);
+                (Number::Item(item.clone(), number_of(item, measure.items.as_deref())), measure)
+            }
+            ParameterValue::Binary(_) => (Number::Binary, Measure::default()),
+            ParameterValue::Long(value) => {
+                (Number::Foreign(format!("{value}, of more than 32 bits")), Measure::default())
+            }
+            ParameterValue::Array(_, values) => {
+                let words = format!("an array of {} elements", values.len());
+                (Number::Foreign(words), Measure::default())
+            }
+        };
+        Value { number, measure }
+    }
+
+    pub(super) fn measure(&self) -> &Measure {
+        &self.measure
+    }
+
+    /// First the unit, then the transformation of a mapping; and what could not be done.
+    pub(super) fn converted(
+        self,
+        conversion: &Conversion,
+        there: Measure,
+    ) -> Result<(Value, Vec<String>), String> {
+        // Names of items need no numbers.
+        if let (Some(Stated::Enumeration(pairs)), Number::Item(item, _)) =
+            (&conversion.transformation, &self.number)
+        {
+            let target = pairs.iter().find(|(source, _)| source == item);
+            let number = target
+                .map_or(self.number.clone(), |(_, target)| Number::Item(target.clone(), None));
+            return Ok((Value::new(number, there), Vec::new()));
+        }
+        let way = Way::from(self.measure).over(conversion, there)?;
+        let number = self.number.transformed(&way.transformation)?;
+        Ok((Value::new(number, way.measure), way.doubts))
+    }
+}
+
+fn number_of(item: &str, items: Option<&[(String, i32)]>) -> Option<i32> {
+    items?.iter().find(|(name, _)| name == item).map(|(_, value)| *value)
+}
+
+impl Number {
+    pub(super) fn transformed(&self, transformation: &Transformation) -> Result<Number, String> {
+        Ok(match (transformation, self) {
+            (Transformation::Identity, _) => self.clone(),
+            (Transformation::Linear { factor, offset }, Number::Real(value)) => {
+                Number::Real(factor * value + offset)
+            }
+            (Transformation::Linear { factor, offset }, Number::Integer(value)) => {
+                Number::Real(factor * f64::from(*value) + offset)
+            }
+            (
+                Transformation::Integer(pairs),
+                Number::Integer(value) | Number::Item(_, Some(value)),
+            ) => {
+                let target = pairs.iter().find(|(source, _)| source == value);
+                Number::Integer(target.map_or(*value, |(_, target)| *target))
+            }
+            (Transformation::Boolean { from_false, from_true }, Number::Boolean(value)) => {
+                Number::Boolean(if *value { *from_true } else { *from_false })
+            }
+            _ => {
+                return Err(format!(
+                    "the transformation is not for a value such as {}",
+                    self.spelt()
+                ));
+            }
+        })
+    }
+
+    /// The value that `transformation` makes this one of.
+    pub(super) fn before(&self, transformation: &Transformation) -> Result<Number, String> {
+        match (transformation, self) {
+            (Transformation::Identity, _) => Ok(self.clone()),
+            (Transformation::Linear { factor, offset }, Number::Real(value)) if *factor != 0.0 => {
+                Ok(Number::Real((value - offset) / factor))
+            }
+            _ => Err("the transformation on the way has no inverse".to_owned()),
+        }
+    }
+
+    /// The value as the text of a setting of a variable of that kind.
+    pub(super) fn text(
+        &self,
+        kind: &Kind,
+        items: Option<&[(String, i32)]>,
+    ) -> Result<String, String> {
+        let wrong =
+            || format!("expected a value of type {}, found {}", kind.element(), self.spelt());
+        match (kind, self) {
+            (Kind::Real(_), Number::Real(_) | Number::Integer(_))
+            | (Kind::Integer(_) | Kind::Enumeration(_), Number::Integer(_))
+            | (Kind::Boolean(_), Number::Boolean(_))
+            | (Kind::String(_), Number::Text(_)) => Ok(self.spelt()),
+            (Kind::Integer(_), Number::Real(value))
+                if value.fract() == 0.0 && value.abs() < 2e9 =>
+            {
+                Ok(format!("{value:.0}"))
+            }
+            (Kind::Integer(_), Number::Item(_, Some(value))) => Ok(value.to_string()),
+            (Kind::Enumeration(_), Number::Item(item, own)) => {
+                let number = number_of(item, items).or(if items.is_none() { *own } else { None });
+                number.map(|number| number.to_string()).ok_or_else(|| {
+                    let names = items.unwrap_or_default().iter().map(|(name, _)| name.as_str());
+                    let names: Vec<&str> = names.collect();
+                    format!("expected an item of {}, found {item:?}", names.join(", "))
+                })
+            }
+            _ => Err(wrong()),
+        }
+    }
+
+    pub(super) fn spelt(&self) -> String {
+        match self {
+            Number::Real(value) => format!("{value:?}"),
+            Number::Integer(value) => value.to_string(),
+            Number::Boolean(value) => value.to_string(),
+            Number::Text(text) => text.clone(),
+            Number::Item(item, _) => item.clone(),
+            Number::Binary => "binary data".to_owned(),
+            Number::Foreign(words) => words.clone(),
+        }
+    }
+}

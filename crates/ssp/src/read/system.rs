@@ -1,0 +1,215 @@
+//! Systems and what they hold (section 5).
+
+use super::definitions::{conversion, value_type};
+use super::{parameter_mapping, parameter_set, signal_dictionary};
+use crate::error::SspError;
+use crate::structure::{
+    Component, Connection, Connector, ConnectorKind, Content, DefaultExperiment,
+    DictionaryReference, DictionarySource, Element, ElementBase, End, Implementation,
+    ParameterBinding, Place, Source, System,
+};
+use crate::xml::Node;
+
+/// `type` of the annotations of libcosim, which Ecos reads too.
+const OPEN_SIMULATION_PLATFORM: &str = "com.opensimulationplatform";
+
+pub(super) fn system(node: &Node) -> Result<System, SspError> {
+    let mut elements = Vec::new();
+    for child in node.child("Elements")?.into_iter().flat_map(Node::own_children) {
+        elements.push(match child.name.as_str() {
+            "Component" => Element::Component(component(child)?),
+            "System" => Element::System(system(child)?),
+            "SignalDictionaryReference" => Element::Dictionary(dictionary_reference(child)?),
+            other => {
+                let expected = "Component, System and SignalDictionaryReference";
+                return Err(node.wrong(expected, format!("{other} at {}", child.at)));
+            }
+        });
+    }
+    node.unique("elements", elements.iter().map(|element| element.base().name.as_str()))?;
+    let dictionaries = node.list("SignalDictionaries", "SignalDictionary", dictionary)?;
+    node.unique("signal dictionaries", dictionaries.iter().map(|each| each.name.as_str()))?;
+    Ok(System {
+        base: base(node)?,
+        elements,
+        connections: node.list("Connections", "Connection", connection)?,
+        dictionaries,
+    })
+}
+
+fn base(node: &Node) -> Result<ElementBase, SspError> {
+    let name = node.required("name")?.to_owned();
+    if name.is_empty() {
+        return Err(node.wrong("a name", "an empty one"));
+    }
+    let connectors = node.list("Connectors", "Connector", connector)?;
+    node.unique("connectors", connectors.iter().map(|each| each.name.as_str()))?;
+    Ok(ElementBase {
+        name,
+        id: node.text("id"),
+        connectors,
+        bindings: node.list("ParameterBindings", "ParameterBinding", binding)?,
+        at: Place(node.at),
+    })
+}
+
+fn component(node: &Node) -> Result<Component, SspError> {
+    let content = match node.attribute("type") {
+        None | Some("application/x-fmu-sharedlibrary") => Content::Fmu,
+        Some("application/x-ssp-definition") => Content::Definition,
+        Some("application/x-ssp-package") => Content::Package,
+        // What has no source is nothing but its connectors, whatever it will be.
+        Some(_) if node.attribute("source").is_none() => Content::Fmu,
+        Some(other) => {
+            let expected = "the type application/x-fmu-sharedlibrary, application/x-ssp-definition \
+                 or application/x-ssp-package";
+            return Err(node.wrong(expected, format!("{other:?}")));
+        }
+    };
+    let implementation = match node.attribute("implementation") {
+        None | Some("any") => Implementation::Any,
+        Some("CoSimulation") => Implementation::CoSimulation,
+        Some("ModelExchange") => Implementation::ModelExchange,
+        Some("ScheduledExecution") => Implementation::ScheduledExecution,
+        Some(other) => {
+            let expected =
+                "the implementation any, CoSimulation, ModelExchange or ScheduledExecution";
+            return Err(node.wrong(expected, format!("{other:?}")));
+        }
+    };
+    let hint = annotation(node)?.and_then(|content| content.any_child("StepSizeHint"));
+    let step_size = hint.map(|hint| hint.number("value")).transpose()?.flatten();
+    Ok(Component {
+        base: base(node)?,
+        content,
+        source: source_of(node)?,
+        implementation,
+        step_size: step_size.filter(|size| *size > 0.0),
+    })
+}
+
+/// The source of a component; empty where it has none.
+fn source_of(node: &Node) -> Result<String, SspError> {
+    match node.attribute("source") {
+        Some("") => Err(node.wrong("the path of a file in the attribute source", "nothing")),
+        source => Ok(source.unwrap_or_default().to_owned()),
+    }
+}
+
+fn dictionary_reference(node: &Node) -> Result<DictionaryReference, SspError> {
+    let dictionary = node.required("dictionary")?.to_owned();
+    Ok(DictionaryReference { base: base(node)?, dictionary })
+}
+
+fn connector(node: &Node) -> Result<Connector, SspError> {
+    let stated = node.required("kind")?;
+    let kind = ConnectorKind::ALL.into_iter().find(|kind| kind.as_str() == stated);
+    let kind = kind.ok_or_else(|| {
+        let names = ConnectorKind::ALL.map(ConnectorKind::as_str).join(", ");
+        node.wrong(format!("one of the kinds {names}"), format!("{stated:?}"))
+    })?;
+    let name = node.required("name")?.to_owned();
+    Ok(Connector { name, kind, kind_of_value: value_type(node)? })
+}
+
+fn connection(node: &Node) -> Result<Connection, SspError> {
+    if let Some(name) =
+        ["startIndices", "endIndices"].into_iter().find(|name| node.attribute(name).is_some())
+    {
+        let expected = "a connection of scalars, as FMI 2.0 has no arrays";
+        return Err(node.wrong(expected, format!("the attribute {name}")));
+    }
+    let end = |element: &str, connector: &str| {
+        let connector = node.required(connector)?.to_owned();
+        // Some tools write an empty name for the system around the connection.
+        Ok::<_, SspError>(End { element: node.stated(element), connector })
+    };
+    Ok(Connection {
+        start: end("startElement", "startConnector")?,
+        end: end("endElement", "endConnector")?,
+        conversion: conversion(node)?,
+        at: Place(node.at),
+    })
+}
+
+fn binding(node: &Node) -> Result<ParameterBinding, SspError> {
+    media_type(node, "application/x-ssp-parameter-set")?;
+    let inline = node.child("ParameterValues")?;
+    let mapping = node.child("ParameterMapping")?;
+    Ok(ParameterBinding {
+        prefix: node.text("prefix").unwrap_or_default(),
+        values: source(node, inline, "ParameterSet", parameter_set)?,
+        mapping: mapping
+            .map(|mapping| {
+                media_type(mapping, "application/x-ssp-parameter-mapping")?;
+                source(mapping, Some(mapping), "ParameterMapping", parameter_mapping)
+            })
+            .transpose()?,
+        at: Place(node.at),
+    })
+}
+
+fn dictionary(node: &Node) -> Result<DictionarySource, SspError> {
+    media_type(node, "application/x-ssp-signal-dictionary")?;
+    Ok(DictionarySource {
+        name: node.required("name")?.to_owned(),
+        content: source(node, Some(node), "SignalDictionary", signal_dictionary)?,
+        at: Place(node.at),
+    })
+}
+
+fn media_type(node: &Node, known: &str) -> Result<(), SspError> {
+    match node.attribute("type") {
+        Some(other) if other != known => {
+            Err(node.wrong(format!("the type {known}"), format!("{other:?}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The file that `source` names, or what `inline` holds.
+fn source<T>(
+    node: &Node,
+    inline: Option<&Node>,
+    content: &str,
+    read: impl Fn(&Node) -> Result<T, SspError>,
+) -> Result<Source<T>, SspError> {
+    let in_component = match node.attribute("sourceBase") {
+        None | Some("SSD") => false,
+        Some("component") => true,
+        Some(other) => {
+            return Err(node.wrong("the sourceBase SSD or component", format!("{other:?}")));
+        }
+    };
+    let inline = inline.map(|inline| inline.child(content)).transpose()?.flatten();
+    match (node.attribute("source").filter(|uri| !uri.is_empty()), inline) {
+        (Some(uri), None) => Ok(Source::File { uri: uri.to_owned(), in_component }),
+        (None, Some(inline)) => Ok(Source::Inline(read(inline)?)),
+        (Some(_), Some(_)) => Err(node.wrong("a source or content", "both")),
+        (None, None) => Err(node.wrong(format!("a source or an element {content}"), "neither")),
+    }
+}
+
+pub(super) fn experiment(node: &Node) -> Result<DefaultExperiment, SspError> {
+    let algorithm = annotation(node)?.and_then(|content| content.any_child("Algorithm"));
+    let fixed = algorithm.and_then(|algorithm| algorithm.any_child("FixedStepAlgorithm"));
+    let step_size = fixed.map(|fixed| fixed.number("baseStepSize")).transpose()?.flatten();
+    let experiment = DefaultExperiment {
+        start_time: node.number("startTime")?,
+        stop_time: node.number("stopTime")?,
+        step_size: step_size.filter(|size| *size > 0.0),
+    };
+    if let (Some(start), Some(stop)) = (experiment.start_time, experiment.stop_time)
+        && stop < start
+    {
+        return Err(node.wrong(format!("a stopTime of at least {start}"), stop.to_string()));
+    }
+    Ok(experiment)
+}
+
+/// The annotation of the Open Simulation Platform.
+fn annotation(node: &Node) -> Result<Option<&Node>, SspError> {
+    let list = node.child("Annotations")?.into_iter().flat_map(Node::own_children);
+    let is_theirs = |each: &&Node| each.attribute("type") == Some(OPEN_SIMULATION_PLATFORM);
+    Ok(list.into_iter().find(is_theirs))
+}

@@ -1,0 +1,137 @@
+//! The ZIP archive of an SSP (SSP 1.0.1, section 3).
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::{self, Cursor, Write as _};
+use std::path::Path;
+
+use fmu_description::package::{PackageError, Unpacked};
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, System, ZipWriter};
+
+use crate::error::SspError;
+
+/// Bytes that fit into an archive without Zip64, with room for its directory.
+const CAPACITY: usize = 1 << 31;
+
+/// Files below `resources`, by path in the archive.
+#[derive(Default)]
+pub(super) struct Archive {
+    entries: BTreeMap<String, Vec<u8>>,
+}
+
+impl Archive {
+    /// Adds a file to `resources` under `name` or, where that is taken, one like it, and gives its
+    /// path. Only characters are used that a URI and every file system leave alone: importers are
+    /// known that do not decode URIs.
+    pub(super) fn add(&mut self, name: &str, bytes: Vec<u8>) -> String {
+        let plain = |character: char| {
+            if character.is_ascii_alphanumeric() || "._-".contains(character) {
+                character
+            } else {
+                '_'
+            }
+        };
+        let name: String = name.chars().map(plain).collect();
+        let (stem, extension) = name.rsplit_once('.').unwrap_or((&name, ""));
+        let taken = |path: &str| self.entries.keys().any(|known| known.eq_ignore_ascii_case(path));
+        let first = format!("resources/{name}");
+        let further = (2..).map(|number| format!("resources/{stem}_{number}.{extension}"));
+        let path = std::iter::once(first).chain(further).find(|path| !taken(path));
+        let path = path.unwrap_or_default();
+        self.entries.insert(path.clone(), bytes);
+        path
+    }
+
+    /// Adds the FMU at `path`: an archive as it is, a folder packed.
+    pub(super) fn add_fmu(&mut self, path: &Path, fmu: &Unpacked) -> Result<String, SspError> {
+        let name = &fmu.description.model_name;
+        if path.is_dir() {
+            let mut entries = BTreeMap::new();
+            collect(fmu.folder(), "", &mut entries)?;
+            let bytes = zip(
+                path,
+                &entries
+                    .iter()
+                    .map(|(path, bytes)| (path.as_str(), bytes.as_slice()))
+                    .collect::<Vec<_>>(),
+            )?;
+            return Ok(self.add(&format!("{name}.fmu"), bytes));
+        }
+        let stem = path.file_stem().map_or(name.clone(), |stem| stem.to_string_lossy().into());
+        Ok(self.add(&format!("{stem}.fmu"), fs::read(path).map_err(failed("read", path))?))
+    }
+
+    /// Writes the archive with `ssd` as its system structure, as a whole or not at all.
+    pub(super) fn write(&self, ssd: &str, target: &Path) -> Result<(), SspError> {
+        let mut entries = vec![("SystemStructure.ssd", ssd.as_bytes())];
+        entries.extend(self.entries.iter().map(|(path, bytes)| (path.as_str(), bytes.as_slice())));
+        let bytes = zip(target, &entries)?;
+        let folder = match target.parent() {
+            Some(parent) if parent != Path::new("") => parent,
+            _ => Path::new("."),
+        };
+        fs::create_dir_all(folder).map_err(failed("create", folder))?;
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".packing-").suffix(".ssp");
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt as _;
+            builder.permissions(fs::Permissions::from_mode(0o666));
+        }
+        let mut file = builder.tempfile_in(folder).map_err(failed("create a file in", folder))?;
+        file.write_all(&bytes).map_err(failed("write", file.path()))?;
+        let persisted = file.persist(target);
+        persisted.map_err(|failure| failed("write", target)(failure.error))?;
+        Ok(())
+    }
+}
+
+fn failed(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> SspError {
+    let path = path.to_owned();
+    move |source| SspError::File { action, path, source }
+}
+
+/// All files in `folder` and below; links are left out.
+fn collect(
+    folder: &Path,
+    prefix: &str,
+    entries: &mut BTreeMap<String, Vec<u8>>,
+) -> Result<(), SspError> {
+    for item in fs::read_dir(folder).map_err(failed("read", folder))? {
+        let item = item.map_err(failed("read", folder))?;
+        let kind = item.file_type().map_err(failed("read", &item.path()))?;
+        let name = format!("{prefix}{}", item.file_name().to_string_lossy());
+        if kind.is_dir() {
+            collect(&item.path(), &format!("{name}/"), entries)?;
+        } else if kind.is_file() {
+            let bytes = fs::read(item.path()).map_err(failed("read", &item.path()))?;
+            entries.insert(name, bytes);
+        }
+    }
+    Ok(())
+}
+
+/// The entries in the order given, dated 1980-01-01; FMUs, which are compressed, are stored.
+fn zip(target: &Path, entries: &[(&str, &[u8])]) -> Result<Vec<u8>, SspError> {
+    let total = entries.iter().fold(0_usize, |sum, (_, bytes)| sum.saturating_add(bytes.len()));
+    if total > CAPACITY {
+        return Err(SspError::Limit { limit: CAPACITY, what: "bytes in an archive" });
+    }
+    let wrong = |source| SspError::from(PackageError::Archive { path: target.to_owned(), source });
+    let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+    for (path, bytes) in entries {
+        let is_fmu = Path::new(path).extension().is_some_and(|extension| extension == "fmu");
+        let method = if is_fmu { CompressionMethod::Stored } else { CompressionMethod::Deflated };
+        let mode = if path.starts_with("binaries/") { 0o755 } else { 0o644 };
+        let options = SimpleFileOptions::default()
+            .compression_method(method)
+            .last_modified_time(DateTime::default())
+            .system(System::Unix)
+            .unix_permissions(mode)
+            .large_file(false);
+        archive.start_file(*path, options).map_err(wrong)?;
+        archive.write_all(bytes).map_err(|error| wrong(error.into()))?;
+    }
+    Ok(archive.finish().map_err(wrong)?.into_inner())
+}

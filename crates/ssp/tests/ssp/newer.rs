@@ -1,0 +1,215 @@
+//! SSP 2.0, and what other tools write against the rules.
+
+use std::fs;
+use std::io::Write as _;
+
+use ssp::structure::{ConnectorKind, Dimension, Element, ParameterValue, Type};
+use ssp::{open, read_ssd, read_ssv, render_ssd, render_ssv};
+use zip::ZipWriter;
+use zip::write::SimpleFileOptions;
+
+use crate::bench::{Bench, component, connection, links, root, settings, ssd, ssv};
+
+/// The same text as SSP 2.0.
+fn newer(text: &str) -> String {
+    text.replace("version=\"1.0\"\n", "version=\"2.0\"\n")
+        .replace("\"set\" version=\"1.0\"", "\"set\" version=\"2.0\"")
+}
+
+fn fmus(bench: &Bench) {
+    bench.fmu("a.fmu", "y output Real\nn output Integer\np parameter Real\nq parameter Integer");
+    bench.fmu("b.fmu", "u input Real\nn input Integer");
+}
+
+#[test]
+fn the_types_of_ssp_2_are_those_of_fmi_2_where_both_have_them() {
+    let bench = Bench::new();
+    fmus(&bench);
+    let parameters = r#"<ssv:Parameter name="p"><ssv:Float64 value="2.5"/></ssv:Parameter>
+<ssv:Parameter name="q"><ssv:UInt64 value="7"/></ssv:Parameter>"#;
+    bench.file("p.ssv", newer(&ssv(parameters)));
+    let bindings =
+        r#"<ssd:ParameterBindings><ssd:ParameterBinding source="p.ssv"/></ssd:ParameterBindings>"#;
+    let one = r#"<ssc:Float64/><ssc:Dimension size="1"/>"#;
+    let meta = r#"<ssc:MetaData kind="quality" type="text/plain" source="m.txt"/>
+<ssc:Signature role="authenticity" type="x" source="s"/>"#;
+    let elements = component(
+        "a",
+        "a.fmu",
+        &format!("y output {one}\nn output <ssc:Int16/>"),
+        &(bindings.to_owned() + meta),
+    ) + &component("b", "b.fmu", "u unspecified\nn input <ssc:UInt8/>", "");
+    let connections = connection("b.u", "a.y", "", "") + &connection("a.n", "b.n", "", "");
+    let path = bench.file("System.ssd", newer(&ssd(&root(&elements, &connections), "")));
+    let opened = open(&path).unwrap();
+    assert_eq!(links(&opened.assembly), ["a.y -> b.u", "a.n -> b.n"]);
+    assert_eq!(settings(&opened.assembly), ["a.p = 2.5", "a.q = 7"]);
+    let warnings = opened.warnings.join("\n");
+    assert!(warnings.contains("the signature of <Component> is not verified"), "{warnings}");
+    assert_eq!(opened.warnings.len(), 1, "{warnings}");
+}
+
+#[test]
+fn what_fmi_2_does_not_have_is_named_and_refused_where_it_is_connected() {
+    let bench = Bench::new();
+    fmus(&bench);
+    let array = r#"<ssc:Real/><ssc:Dimension size="3"/><ssc:Dimension sizeConnector="m"/>"#;
+    for (kind, words) in [
+        (array, "an array of 3 x m elements"),
+        ("<ssc:Clock intervalVariability='constant'/>", "a clock"),
+        ("<ssc:Real/><ssd:Clock name='c'/>", "a value of the clock c"),
+        ("<ssc:Binary/>", "a binary value"),
+    ] {
+        let elements = component("a", "a.fmu", &format!("y output {kind}"), "")
+            + &component("b", "b.fmu", "u input", "");
+        let opened = bench.open(&root(&elements, ""), "").unwrap();
+        let expected = format!("a.y is {words}, which FMI 2.0 does not have: skipped");
+        assert_eq!(opened.warnings, [expected]);
+        let text = bench.refusal(&root(&elements, &connection("a.y", "b.u", "", "")), "");
+        let expected =
+            format!("a.y is {words}, which FMI 2.0 does not have, so it cannot be connected");
+        assert!(text.ends_with(&expected), "{text}");
+    }
+    let elements = component("a", "a.fmu", "", "") + &component("b", "b.fmu", "", "");
+    let part = connection("a.y", "b.u", "", "startIndices=\"1\"");
+    let text = bench.refusal(&root(&elements, &part), "");
+    let expected = "expected a connection of scalars, as FMI 2.0 has no arrays, found the attribute startIndices";
+    assert!(text.ends_with(expected), "{text}");
+    for (value, words) in [
+        (r#"<ssv:Real value="1 2 3"/>"#, "an array of 3 elements"),
+        (
+            r#"<ssv:UInt64 value="18446744073709551615"/>"#,
+            "18446744073709551615, of more than 32 bits",
+        ),
+    ] {
+        bench.file("p.ssv", ssv(&format!(r#"<ssv:Parameter name="p">{value}</ssv:Parameter>"#)));
+        let bindings = r#"<ssd:ParameterBindings><ssd:ParameterBinding source="p.ssv"/></ssd:ParameterBindings>"#;
+        let text = bench.refusal(&root(&component("a", "a.fmu", "", bindings), ""), "");
+        assert!(text.ends_with(&format!("expected a value of type Real, found {words}")), "{text}");
+    }
+}
+
+#[test]
+fn a_component_without_a_source_is_its_connectors_only() {
+    let bench = Bench::new();
+    fmus(&bench);
+    let idea = r#"<ssd:Component name="idea" type="text/x-modelica"><ssd:Connectors><ssd:Connector name="y" kind="output"/></ssd:Connectors></ssd:Component>"#;
+    let elements = idea.to_owned() + &component("b", "b.fmu", "u input", "");
+    let opened = bench.open(&root(&elements, &connection("idea.y", "b.u", "", "")), "").unwrap();
+    assert!(links(&opened.assembly).is_empty());
+    let warnings = opened.warnings.join("\n");
+    assert!(
+        warnings.contains("idea has no source: it is nothing but its connectors"),
+        "{warnings}"
+    );
+    assert!(warnings.contains("b.u is connected to idea.y, which nothing drives"), "{warnings}");
+}
+
+#[test]
+fn what_is_of_ssp_2_is_written_as_ssp_2_and_reads_back() {
+    let connectors = "c constant\ns structuralParameter\nl local\nx unspecified\n\
+        a output <ssc:Dimension size=\"2\"/><ssc:Dimension/>\nk input <ssc:Clock/>\n\
+        t input <ssd:Clock name=\"k\"/>";
+    let text = newer(&ssd(&root(&component("a", "a.fmu", connectors, ""), ""), ""));
+    let structure = read_ssd(text.as_bytes()).unwrap();
+    let Element::Component(read) = &structure.system.elements[0] else { panic!("no component") };
+    assert_eq!(read.base.connectors[1].kind, ConnectorKind::StructuralParameter);
+    let expected = Type::Array(vec![Dimension::Size(2), Dimension::Open]);
+    assert_eq!(read.base.connectors[4].kind_of_value, Some(expected));
+    let written = render_ssd(&structure);
+    assert!(written.contains("version=\"2.0\""), "{written}");
+    assert_eq!(read_ssd(written.as_bytes()).unwrap(), structure);
+    let values = r#"<ssv:Parameter name="a"><ssv:Boolean value="true false"/></ssv:Parameter>
+<ssv:Parameter name="b"><ssv:String><ssv:Value value="x y"/><ssv:Value value="z"/></ssv:String></ssv:Parameter>
+<ssv:Parameter name="c"><ssv:Int64 value="-9000000000"/></ssv:Parameter>"#;
+    let set = read_ssv(ssv(values).as_bytes()).unwrap();
+    assert_eq!(set.parameters[2].value, ParameterValue::Long(-9_000_000_000));
+    let words = ["x y".to_owned(), "z".to_owned()];
+    assert_eq!(set.parameters[1].value, ParameterValue::Array("String".to_owned(), words.into()));
+    let written = render_ssv(&set);
+    assert!(written.contains("version=\"2.0\""), "{written}");
+    assert_eq!(read_ssv(written.as_bytes()).unwrap(), set);
+}
+
+#[test]
+fn an_undeclared_prefix_and_empty_elements_are_read_with_a_warning() {
+    let bench = Bench::new();
+    fmus(&bench);
+    let step = r#"<ssd:DefaultExperiment><ssd:Annotations><ssc:Annotation type="com.opensimulationplatform"><osp:Algorithm><osp:FixedStepAlgorithm baseStepSize="1e-3"/></osp:Algorithm></ssc:Annotation></ssd:Annotations></ssd:DefaultExperiment>"#;
+    let own = r#"<ssd:Connectors><ssd:Connector name="out" kind="output"/></ssd:Connectors>"#;
+    let connections =
+        r#"<ssd:Connection startElement="a" startConnector="y" endElement="" endConnector="out"/>"#;
+    let system = own.to_owned() + &root(&component("a", "a.fmu", "y output", ""), connections);
+    let text = ssd(&system, step);
+    let text =
+        text.replace(" xmlns:osp=\"http://opensimulationplatform.com/SSP/OSPAnnotations\"", "");
+    let opened = open(&bench.file("System.ssd", text)).unwrap();
+    assert_eq!(opened.experiment.step_size, Some(1e-3));
+    assert!(opened.fixed_step);
+    let warnings = opened.warnings.join("\n");
+    assert!(warnings.contains("the prefix osp: is used without xmlns:osp"), "{warnings}");
+    assert_eq!(opened.warnings.len(), 1, "{warnings}");
+}
+
+#[test]
+fn elements_and_attributes_that_the_standard_does_not_have_are_named() {
+    let bench = Bench::new();
+    fmus(&bench);
+    let twice = r#"<ssd:Connectors><ssd:Connector name="n" kind="output"/></ssd:Connectors>"#;
+    let extra = twice.to_owned() + "<ssd:Colour/><ssd:Colour/>";
+    let elements = component("a", "a.fmu", "y output", &extra)
+        .replace("<ssd:Component ", "<ssd:Component colour='red' ");
+    let opened = bench.open(&root(&elements, ""), "").unwrap();
+    let warnings = opened.warnings.join("\n");
+    for expected in [
+        "<Component> has the attribute \"colour\", which is skipped",
+        "<Component> has the element <Colour>, which is skipped (2 times)",
+        "<Component> has a second element <Connectors>: both are read",
+    ] {
+        assert!(warnings.contains(expected), "{warnings}");
+    }
+}
+
+#[test]
+fn two_values_of_one_parameter_are_named_and_the_last_one_counts() {
+    let bench = Bench::new();
+    fmus(&bench);
+    let value = |value: &str| {
+        format!(r#"<ssv:Parameter name="p"><ssv:Real value="{value}"/></ssv:Parameter>"#)
+    };
+    bench.file("p.ssv", ssv(&(value("1") + &value("2"))));
+    let bindings =
+        r#"<ssd:ParameterBindings><ssd:ParameterBinding source="p.ssv"/></ssd:ParameterBindings>"#;
+    let opened = bench.open(&root(&component("a", "a.fmu", "", bindings), ""), "").unwrap();
+    assert_eq!(settings(&opened.assembly), ["a.p = 2.0"]);
+    let expected = "parameter set \"set\" has different values for p: the last one counts";
+    assert_eq!(opened.warnings, [expected]);
+}
+
+#[test]
+fn archives_with_backslashes_are_read_and_messages_name_files_by_their_place_in_the_archive() {
+    let bench = Bench::new();
+    let fmu = fs::read(bench.fmu("a.fmu", "y output Real")).unwrap();
+    let path = bench.path("x.ssp");
+    let write = |fmu: &[u8]| {
+        let mut archive = ZipWriter::new(fs::File::create(&path).unwrap());
+        let elements = component("a", "resources/a.fmu", "y output", "");
+        for (name, bytes) in [
+            ("resources\\a.fmu", fmu),
+            ("./SystemStructure.ssd", ssd(&root(&elements, ""), "").as_bytes()),
+        ] {
+            archive.start_file(name, SimpleFileOptions::default()).unwrap();
+            archive.write_all(bytes).unwrap();
+        }
+        archive.finish().unwrap();
+    };
+    write(&fmu);
+    let opened = open(&path).unwrap();
+    let shown = path.join("resources/a.fmu");
+    assert_eq!(opened.assembly.elements[0].shown(), shown);
+    let expected = "x.ssp: 2 entries have a path with backslashes or . in the archive";
+    assert!(opened.warnings[0].contains(expected), "{:?}", opened.warnings);
+    write(b"no archive");
+    let text = open(&path).unwrap_err().to_string();
+    assert_eq!(text, format!("{} is no ZIP archive that can be used", shown.display()));
+}

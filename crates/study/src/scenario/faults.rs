@@ -1,0 +1,276 @@
+//! Faults on connections, resolved.
+
+use fmu_description::{Causality, Kind};
+use serde_spanned::Spanned;
+
+use super::convert::Conversion;
+use super::literal::is_integer;
+use super::resolve::{Resolver, Target, at, finite, only, positive, require};
+use super::signals::conversion;
+use super::{
+    Delay, Disturbed, Dropout, Literal, Noise, Quantisation, Reason, Saturation, ScenarioError,
+};
+use master::Port;
+use master::fault::{Draw, Fault, FaultLine, Lost, Spread, Window};
+
+/// Kinds of a fault.
+const KINDS: &str = "bias, gain, drift, stuck, dropout, delay, quantisation, saturation, noise, \
+                     inversion";
+/// Kinds for variables that are no Reals.
+const OF_INTEGERS: &str = "bias, stuck, dropout, delay or saturation";
+const OF_BOOLEANS: &str = "stuck, dropout, delay or inversion";
+const OF_ENUMERATIONS: &str = "stuck, dropout or delay";
+const OF_REALS: &str = "any kind but inversion";
+
+/// The faults of one input, with the first entry among them.
+struct Way<'a> {
+    port: Port,
+    entry: &'a Spanned<Disturbed>,
+    path: String,
+    faults: Vec<(Window, Fault)>,
+}
+
+impl<'a> Resolver<'a> {
+    /// `[[scenario.fault]]`. Faults on driven variables go to their drives, the others come back.
+    pub(super) fn faults(
+        &mut self,
+        entries: &'a [Spanned<Disturbed>],
+    ) -> Result<Vec<(Port, FaultLine)>, ScenarioError> {
+        let mut ways: Vec<Way<'a>> = Vec::new();
+        for (index, entry) in entries.iter().enumerate() {
+            let path = format!("scenario.fault[{}]", index + 1);
+            let stated = &entry.get_ref().connection;
+            let target = self.way(stated.get_ref()).map_err(at(stated, &path))?;
+            let port = target.port;
+            let position = ways.iter().position(|way| way.port == port).unwrap_or_else(|| {
+                ways.push(Way { port, entry, path: path.clone(), faults: Vec::new() });
+                ways.len() - 1
+            });
+            let place = ways[position].faults.len() as u64;
+            let reader = Reader { target, start: self.setup.start, place };
+            let fault = reader.fault(entry.get_ref()).map_err(at(entry, &path))?;
+            ways[position].faults.push(fault);
+        }
+        let mut lines = Vec::new();
+        for Way { port, entry, path, faults } in ways {
+            let line = FaultLine::new(faults, self.setup.step)
+                .map_err(|error| at(entry, &path)(error.into()))?;
+            match self.drives.iter_mut().find(|(drive, _)| drive.port() == port) {
+                Some((drive, _)) => drive.set_faults(line),
+                None => lines.push((port, line)),
+            }
+        }
+        Ok(lines)
+    }
+
+    /// The input of a connection, or of a signal.
+    fn way(&self, stated: &str) -> Result<Target<'a>, Reason> {
+        let (source, input) = match stated.split_once('=') {
+            Some((source, input)) => (Some(source.trim()), input.trim()),
+            None => (None, stated.trim()),
+        };
+        let target = self.target(input)?;
+        let found = self.names.source(target.port);
+        if found.is_none() && self.driver(target.port).is_none() {
+            let found = match target.variable.causality {
+                Causality::Input => "an input without a source",
+                Causality::Output => "an output",
+                _ => "no input",
+            };
+            return Err(Reason::NoConnection { name: target.name, found });
+        }
+        if let Some(source) = source {
+            let wanted = self.names.port(source)?;
+            if found != Some(wanted) {
+                let found =
+                    found.map_or_else(|| "a signal".to_owned(), |port| self.names.name(port));
+                let stated = self.names.name(wanted);
+                return Err(Reason::OtherSource { target: target.name, found, stated });
+            }
+        }
+        Ok(target)
+    }
+}
+
+/// Reads the entries for one input.
+struct Reader<'a> {
+    target: Target<'a>,
+    start: f64,
+    /// How many faults there are before it.
+    place: u64,
+}
+
+impl Reader<'_> {
+    fn fault(&self, entry: &Disturbed) -> Result<(Window, Fault), Reason> {
+        let kinds = [
+            ("bias", entry.bias.is_some()),
+            ("gain", entry.gain.is_some()),
+            ("drift", entry.drift.is_some()),
+            ("stuck", entry.stuck.is_some()),
+            ("dropout", entry.dropout.is_some()),
+            ("delay", entry.delay.is_some()),
+            ("quantisation", entry.quantisation.is_some()),
+            ("saturation", entry.saturation.is_some()),
+            ("noise", entry.noise.is_some()),
+            ("inversion", entry.inversion.is_some()),
+        ];
+        self.expect_fit(only(&kinds, KINDS)?)?;
+        let unit = conversion(entry.unit.as_ref(), &self.target)?;
+        let (window, fault) = self.body(entry, unit)?;
+        finite("from", window.from)?;
+        if let Some(until) = window.until {
+            let right = until.is_finite() && until > window.from;
+            require("until", until, right, "a time after from")?;
+        }
+        Ok((window, fault))
+    }
+
+    fn body(&self, entry: &Disturbed, unit: Conversion) -> Result<(Window, Fault), Reason> {
+        let start = self.start;
+        if let Some(bias) = entry.bias.as_ref().map(Spanned::get_ref) {
+            let value = unit.relative(finite("value", bias.value)?);
+            return Ok((bias.window(start), Fault::Bias(self.whole("value", value)?)));
+        }
+        if let Some(gain) = entry.gain.as_ref().map(Spanned::get_ref) {
+            return Ok((gain.window(start), Fault::Gain(finite("factor", gain.factor)?)));
+        }
+        if let Some(drift) = entry.drift.as_ref().map(Spanned::get_ref) {
+            let rate = unit.relative(finite("rate", drift.rate)?);
+            return Ok((drift.window(start), Fault::Drift(rate)));
+        }
+        if let Some(stuck) = entry.stuck.as_ref().map(Spanned::get_ref) {
+            let value = self.value(stuck.value.as_ref(), unit)?;
+            return Ok((stuck.window(start), Fault::Stuck(value)));
+        }
+        if let Some(dropout) = entry.dropout.as_ref().map(Spanned::get_ref) {
+            return Ok((dropout.window(start), self.dropout(dropout, unit)?));
+        }
+        if let Some(delay) = entry.delay.as_ref().map(Spanned::get_ref) {
+            return Ok((delay.window(start), self.delay(delay, unit)?));
+        }
+        if let Some(quantisation) = entry.quantisation.as_ref().map(Spanned::get_ref) {
+            return Ok((quantisation.window(start), levels(quantisation, unit)?));
+        }
+        if let Some(saturation) = entry.saturation.as_ref().map(Spanned::get_ref) {
+            return Ok((saturation.window(start), self.saturation(saturation, unit)?));
+        }
+        if let Some(noise) = entry.noise.as_ref().map(Spanned::get_ref) {
+            return Ok((noise.window(start), self.noise(noise, unit)?));
+        }
+        match entry.inversion.as_ref().map(Spanned::get_ref) {
+            Some(inversion) => Ok((inversion.window(start), Fault::Inversion)),
+            None => Err(Reason::Kinds { found: Vec::new(), expected: KINDS }),
+        }
+    }
+
+    /// Refuses a kind that makes no sense for the type of the input.
+    fn expect_fit(&self, what: &'static str) -> Result<(), Reason> {
+        let anywhere = ["stuck", "dropout", "delay"].contains(&what);
+        let (fits, expected) = match self.target.variable.kind {
+            Kind::Real(_) => (what != "inversion", OF_REALS),
+            Kind::Integer(_) => (anywhere || ["bias", "saturation"].contains(&what), OF_INTEGERS),
+            Kind::Boolean(_) => (anywhere || what == "inversion", OF_BOOLEANS),
+            Kind::Enumeration(_) => (anywhere, OF_ENUMERATIONS),
+            Kind::String(_) => (false, "an input of another type"),
+        };
+        if fits {
+            return Ok(());
+        }
+        let kind = self.target.variable.kind.element();
+        Err(Reason::Unfit { what, name: self.target.name.clone(), kind, expected })
+    }
+
+    /// A number that is whole where the input is no Real.
+    fn whole(&self, what: &'static str, number: f64) -> Result<f64, Reason> {
+        let fits = self.target.is_real() || is_integer(number);
+        require(what, number, fits, "a whole number, as the input is an Integer")
+    }
+
+    /// A value of the type of the input.
+    fn value(&self, value: Option<&Literal>, unit: Conversion) -> Result<Option<f64>, Reason> {
+        let Some(value) = value else { return Ok(None) };
+        let refused = |expected| Reason::Value {
+            name: self.target.name.clone(),
+            found: value.to_string(),
+            expected,
+        };
+        let number = value.number(self.target.variable, self.target.description);
+        Ok(Some(unit.absolute(number.map_err(refused)?)))
+    }
+
+    fn draw(&self, seed: u64, every: Option<f64>) -> Result<Draw, Reason> {
+        let every = every.map(|every| positive("every", every)).transpose()?;
+        Ok(Draw::new(seed, &self.target.name, self.place, every))
+    }
+
+    fn dropout(&self, dropout: &Dropout, unit: Conversion) -> Result<Fault, Reason> {
+        let Dropout { period, lost, probability, every, seed, .. } = *dropout;
+        let members = |expected| Reason::Members { what: "dropout", expected };
+        let lost = match (period, lost, probability) {
+            (None, None, None) => Lost::All,
+            (Some(period), Some(part), None) => {
+                positive("period", period)?;
+                let fits = part > 0.0 && part < period;
+                require("lost", part, fits, "a time above 0 and below the period")?;
+                Lost::Periodic { period, part }
+            }
+            (None, None, Some(probability)) => {
+                let fits = (0.0..=1.0).contains(&probability);
+                require("probability", probability, fits, "a number from 0 to 1")?;
+                Lost::Random { probability, draw: self.draw(seed.unwrap_or(0), every)? }
+            }
+            _ => return Err(members("period and lost, or probability, or none of them")),
+        };
+        if probability.is_none() && (every.is_some() || seed.is_some()) {
+            return Err(members("every and seed only with probability"));
+        }
+        Ok(Fault::Dropout { lost, instead: self.value(dropout.value.as_ref(), unit)? })
+    }
+
+    fn delay(&self, delay: &Delay, unit: Conversion) -> Result<Fault, Reason> {
+        let seconds = positive("seconds", delay.seconds)?;
+        let initial = self.value(delay.initial.as_ref(), unit)?;
+        Ok(Fault::Delay { seconds, hold: delay.hold || !self.target.is_real(), initial })
+    }
+
+    fn saturation(&self, saturation: &Saturation, unit: Conversion) -> Result<Fault, Reason> {
+        let bound = |what, bound: Option<f64>| {
+            let bound = bound.map(|bound| finite(what, bound)).transpose()?;
+            bound.map(|bound| self.whole(what, unit.absolute(bound))).transpose()
+        };
+        let (one, other) = (bound("min", saturation.min)?, bound("max", saturation.max)?);
+        // A unit of negative factor turns the two around.
+        let (lowest, highest) = if unit.factor < 0.0 { (other, one) } else { (one, other) };
+        match (saturation.min, saturation.max) {
+            (None, None) => {
+                Err(Reason::Members { what: "saturation", expected: "min or max or both" })
+            }
+            (Some(min), Some(max)) if min > max => {
+                Err(Reason::Number { what: "max", found: max, expected: "a number not below min" })
+            }
+            _ => Ok(Fault::Saturation { lowest, highest }),
+        }
+    }
+
+    fn noise(&self, noise: &Noise, unit: Conversion) -> Result<Fault, Reason> {
+        let spread = match (noise.deviation, noise.amplitude) {
+            (Some(deviation), None) => {
+                Spread::Normal(unit.relative(positive("deviation", deviation)?).abs())
+            }
+            (None, Some(amplitude)) => {
+                Spread::Uniform(unit.relative(positive("amplitude", amplitude)?).abs())
+            }
+            _ => {
+                let expected = "deviation (normal) or amplitude (uniform)";
+                return Err(Reason::Members { what: "noise", expected });
+            }
+        };
+        Ok(Fault::Noise { spread, draw: self.draw(noise.seed, noise.every)? })
+    }
+}
+
+fn levels(quantisation: &Quantisation, unit: Conversion) -> Result<Fault, Reason> {
+    let step = unit.relative(positive("step", quantisation.step)?).abs();
+    let offset = unit.absolute(finite("offset", quantisation.offset)?);
+    Ok(Fault::Quantisation { step, offset })
+}

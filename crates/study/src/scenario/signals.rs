@@ -1,0 +1,281 @@
+//! Settings, signals and tables, resolved.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use fmu_description::Kind;
+use serde_spanned::Spanned;
+
+use super::convert::Conversion;
+use super::literal::{Literal, is_integer};
+use super::resolve::{Resolver, Target, at, finite, only, positive, require};
+use super::{Columns, Csv, Driven, Ramp, Reason, ScenarioError, Set, Sine};
+use crate::table::Table;
+use master::Port;
+use master::SystemError;
+use master::drive::Following;
+use master::signal::{Between, Signal, Track};
+
+/// Kinds of a signal.
+const KINDS: &str = "constant, steps, points, ramp, sine, csv";
+/// Most names in a message.
+const MOST_NAMES: usize = 10;
+
+/// The settings of one variable.
+struct Settings<'a> {
+    target: Target<'a>,
+    path: String,
+    entry: &'a Spanned<Set>,
+    points: Vec<(f64, f64)>,
+    texts: Vec<String>,
+}
+
+impl<'a> Resolver<'a> {
+    /// `[[scenario.set]]`.
+    pub(super) fn settings(&mut self, entries: &'a [Spanned<Set>]) -> Result<(), ScenarioError> {
+        let mut variables: Vec<Settings<'a>> = Vec::new();
+        let mut positions: BTreeMap<(usize, usize), usize> = BTreeMap::new();
+        for (index, entry) in entries.iter().enumerate() {
+            let path = format!("scenario.set[{}]", index + 1);
+            let set = entry.get_ref();
+            let target = self.free(set.variable.get_ref()).map_err(at(&set.variable, &path))?;
+            finite("at", set.at).map_err(at(entry, &path))?;
+            let Port { slave, variable } = target.port;
+            let position = *positions.entry((slave, variable)).or_insert_with(|| {
+                let (points, texts) = (Vec::new(), Vec::new());
+                variables.push(Settings { target, path: path.clone(), entry, points, texts });
+                variables.len() - 1
+            });
+            let Settings { target, points, texts, .. } = &mut variables[position];
+            let value = conversion(set.unit.as_ref(), target)
+                .and_then(|conversion| encode(set.value.get_ref(), target, conversion, texts))
+                .map_err(at(&set.value, &path))?;
+            // Plus zero, as minus zero is the same time.
+            points.push((set.at + 0.0, value));
+        }
+        for Settings { target, path, entry, points, texts } in variables {
+            let course = settings_course(points, texts).map_err(at(entry, &path))?;
+            self.add(&target, course, &path).map_err(at(entry, &path))?;
+        }
+        Ok(())
+    }
+
+    /// `[[scenario.signal]]`.
+    pub(super) fn signal(&mut self, entry: &Driven, path: &str) -> Result<(), Reason> {
+        let target = self.free(entry.variable.get_ref())?;
+        let kinds = [
+            ("constant", entry.constant.is_some()),
+            ("steps", entry.steps.is_some()),
+            ("points", entry.points.is_some()),
+            ("ramp", entry.ramp.is_some()),
+            ("sine", entry.sine.is_some()),
+            ("csv", entry.csv.is_some()),
+        ];
+        let kind = only(&kinds, KINDS)?;
+        if ["points", "ramp", "sine"].contains(&kind) && !target.is_real() {
+            return Err(unfit(kind, &target, "constant, steps or csv"));
+        }
+        let conversion = conversion(entry.unit.as_ref(), &target)?;
+        let mut texts = Vec::new();
+        let signal = if let Some(value) = &entry.constant {
+            Signal::Constant(encode(value.get_ref(), &target, conversion, &mut texts)?)
+        } else if let Some(steps) = &entry.steps {
+            held_steps(steps.get_ref(), &target, conversion, &mut texts)?
+        } else if let Some(points) = &entry.points {
+            scaled(track(points.get_ref().iter().copied(), Between::Line)?, conversion)
+        } else if let Some(ramp) = &entry.ramp {
+            scaled(ramp_signal(ramp.get_ref())?, conversion)
+        } else if let Some(sine) = &entry.sine {
+            scaled(sine_signal(sine.get_ref(), self.setup.start)?, conversion)
+        } else if let Some(csv) = &entry.csv {
+            scaled(self.column(csv.get_ref(), &target)?, conversion)
+        } else {
+            return Err(Reason::Kinds { found: Vec::new(), expected: KINDS });
+        };
+        self.add(&target, Following { signal, begin: f64::NEG_INFINITY, texts }, path)
+    }
+
+    fn column(&mut self, csv: &Csv, target: &Target<'_>) -> Result<Signal, Reason> {
+        let (path, table) = self.file(csv.file.get_ref())?;
+        let own = &target.variable.name;
+        let name = match &csv.column {
+            Some(column) => column.get_ref().clone(),
+            None if table.column(&target.name).is_some() => target.name.clone(),
+            None => own.clone(),
+        };
+        if table.column(&name).is_none() {
+            return Err(Reason::Column { path, name, known: some(&table.names) });
+        }
+        column_signal(&path, &table, &name, target, csv.hold)
+    }
+
+    /// `[[scenario.table]]`; what the first `others` drives drive, it leaves to them.
+    pub(super) fn table(
+        &mut self,
+        entry: &Columns,
+        path: &str,
+        others: usize,
+    ) -> Result<(), Reason> {
+        let (file, table) = self.file(entry.csv.get_ref())?;
+        let mut used = false;
+        for column in &table.names {
+            let name = match &entry.element {
+                Some(element) => format!("{}.{column}", element.get_ref()),
+                None => column.clone(),
+            };
+            match self.free(&name) {
+                Ok(target) => {
+                    used = true;
+                    let known = &self.drives[..others];
+                    if known.iter().all(|(drive, _)| drive.port() != target.port) {
+                        let signal = column_signal(&file, &table, column, &target, false)?;
+                        let texts = Vec::new();
+                        let course = Following { signal, begin: f64::NEG_INFINITY, texts };
+                        self.add(&target, course, path)?;
+                        continue;
+                    }
+                }
+                Err(Reason::Name(error @ SystemError::UnknownSlave { .. }))
+                    if entry.element.is_some() =>
+                {
+                    return Err(error.into());
+                }
+                Err(_) => {}
+            }
+            self.unused.push((file.clone(), column.clone()));
+        }
+        if used {
+            return Ok(());
+        }
+        let known = some(&table.names);
+        let expected = match &entry.element {
+            Some(element) => format!("a free input of {}", element.get_ref()),
+            None => "slave.variable of a free input".to_owned(),
+        };
+        Err(Reason::NoColumn { path: file, expected, known })
+    }
+}
+
+/// Some of the names of a file.
+fn some(names: &[String]) -> String {
+    let more = if names.len() > MOST_NAMES { ", .." } else { "" };
+    format!("{}{more}", names[..names.len().min(MOST_NAMES)].join(", "))
+}
+
+fn unfit(what: &'static str, target: &Target<'_>, expected: &'static str) -> Reason {
+    let kind = target.variable.kind.element();
+    Reason::Unfit { what, name: target.name.clone(), kind, expected }
+}
+
+pub(super) fn conversion(
+    unit: Option<&Spanned<String>>,
+    target: &Target<'_>,
+) -> Result<Conversion, Reason> {
+    let stated = unit.map(|unit| unit.get_ref().as_str());
+    Conversion::find(stated, &target.name, target.variable, target.description)
+}
+
+/// A value as a number; that of a String is its position among `texts`.
+#[expect(clippy::cast_precision_loss, reason = "a position")]
+fn encode(
+    value: &Literal,
+    target: &Target<'_>,
+    conversion: Conversion,
+    texts: &mut Vec<String>,
+) -> Result<f64, Reason> {
+    let refused = |expected: String| Reason::Value {
+        name: target.name.clone(),
+        found: value.to_string(),
+        expected,
+    };
+    if let Kind::String(_) = target.variable.kind {
+        let Literal::Text(text) = value else {
+            return Err(refused("a text in quotes".to_owned()));
+        };
+        texts.push(text.clone());
+        return Ok((texts.len() - 1) as f64);
+    }
+    let number = value.number(target.variable, target.description).map_err(refused)?;
+    Ok(conversion.absolute(number))
+}
+
+/// Settings in the order of their times; of several at one time the last one stated.
+fn settings_course(mut points: Vec<(f64, f64)>, texts: Vec<String>) -> Result<Following, Reason> {
+    points.reverse();
+    points.sort_by(|one, other| one.0.total_cmp(&other.0));
+    points.dedup_by(|later, first| later.0 <= first.0);
+    let begin = points.first().map_or(f64::NEG_INFINITY, |&(time, _)| time);
+    Ok(Following { signal: track(points.into_iter(), Between::Hold)?, begin, texts })
+}
+
+fn held_steps(
+    steps: &[(f64, Spanned<Literal>)],
+    target: &Target<'_>,
+    conversion: Conversion,
+    texts: &mut Vec<String>,
+) -> Result<Signal, Reason> {
+    let mut points = Vec::with_capacity(steps.len());
+    for (time, value) in steps {
+        points.push((*time, encode(value.get_ref(), target, conversion, texts)?));
+    }
+    if points.windows(2).any(|pair| (pair[1].0 - pair[0].0) == 0.0) {
+        return Err(Reason::Members { what: "steps", expected: "each time once" });
+    }
+    track(points.into_iter(), Between::Hold)
+}
+
+fn track(points: impl Iterator<Item = (f64, f64)>, between: Between) -> Result<Signal, Reason> {
+    let (times, values): (Vec<_>, Vec<_>) = points.unzip();
+    Ok(Signal::Track(Track::new(times.into(), values.into(), between)?))
+}
+
+fn ramp_signal(ramp: &Ramp) -> Result<Signal, Reason> {
+    let (from, until) = (finite("from", ramp.from)?, finite("until", ramp.until)?);
+    require("until", until, until > from, "a time after from")?;
+    let (begin, end) = (finite("begin", ramp.begin)?, finite("end", ramp.end)?);
+    Ok(Signal::Ramp { from, until, begin, end })
+}
+
+fn sine_signal(sine: &Sine, start: f64) -> Result<Signal, Reason> {
+    Ok(Signal::Sine {
+        amplitude: finite("amplitude", sine.amplitude)?,
+        frequency: positive("frequency", sine.frequency)?,
+        phase: finite("phase", sine.phase)?,
+        offset: finite("offset", sine.offset)?,
+        from: finite("from", sine.from.unwrap_or(start))?,
+    })
+}
+
+/// A column as FMPy takes it: lines for continuous Reals, else held.
+fn column_signal(
+    path: &Path,
+    table: &Table,
+    name: &str,
+    target: &Target<'_>,
+    hold: bool,
+) -> Result<Signal, Reason> {
+    let Some(values) = table.column(name) else {
+        let (path, name) = (path.to_owned(), name.to_owned());
+        return Err(Reason::Column { path, name, known: some(&table.names) });
+    };
+    let (fits, expected): (fn(f64) -> bool, _) = match target.variable.kind {
+        Kind::Real(_) => (f64::is_finite, "a finite number"),
+        Kind::Integer(_) | Kind::Enumeration(_) => (is_integer, "an Integer of 32 bits"),
+        Kind::Boolean(_) => (|value| [0.0, 1.0].contains(&value), "0 or 1"),
+        Kind::String(_) => return Err(unfit("csv", target, "constant or steps")),
+    };
+    if let Some(row) = values.iter().position(|&value| !fits(value)) {
+        let found = format!("{} in row {} of {}", values[row], row + 1, path.display());
+        let expected = expected.to_owned();
+        return Err(Reason::Value { name: target.name.clone(), found, expected });
+    }
+    let between = if hold || !target.is_continuous() { Between::Hold } else { Between::Line };
+    Ok(Signal::Track(Track::new(table.times.clone(), values.clone(), between)?))
+}
+
+fn scaled(signal: Signal, conversion: Conversion) -> Signal {
+    if conversion == Conversion::NONE {
+        return signal;
+    }
+    signal.scaled(conversion.factor, conversion.offset)
+}

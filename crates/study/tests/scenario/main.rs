@@ -1,0 +1,161 @@
+//! Scenarios as they stand in a file, on slaves that write down what they are told.
+#![expect(clippy::unwrap_used, clippy::float_cmp, reason = "tests; exact by construction")]
+
+mod drives;
+mod examples;
+mod faults;
+mod refusals;
+
+use std::cell::RefCell;
+use std::path::Path;
+use std::rc::Rc;
+
+use fmu_description::Experiment;
+use fmu_description::ModelDescription;
+use master::{CallError, Slave, Stepped, System};
+use study::scenario::{Prepared, Scenario, ScenarioError, Setup};
+
+/// What a slave was told: function, value references, values.
+type Told = Rc<RefCell<Vec<String>>>;
+
+/// Writes down what is set.
+struct Listener {
+    description: ModelDescription,
+    told: Told,
+}
+
+impl Listener {
+    fn note(&self, function: &str, references: &[u32], values: impl std::fmt::Debug) {
+        self.told.borrow_mut().push(format!("{function} {references:?} {values:?}"));
+    }
+}
+
+impl Slave for Listener {
+    fn description(&self) -> &ModelDescription {
+        &self.description
+    }
+    fn setup_experiment(&mut self, _: &Experiment) -> Result<(), CallError> {
+        Ok(())
+    }
+    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
+    fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
+    fn terminate(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
+    fn get_real(&mut self, _: &[u32], values: &mut [f64]) -> Result<(), CallError> {
+        values.fill(0.0);
+        Ok(())
+    }
+    fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), CallError> {
+        self.note("real", references, values);
+        Ok(())
+    }
+    fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
+        self.note("integer", references, values);
+        Ok(())
+    }
+    fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
+        self.note("boolean", references, values);
+        Ok(())
+    }
+    fn set_string(&mut self, references: &[u32], values: &[String]) -> Result<(), CallError> {
+        self.note("string", references, values);
+        Ok(())
+    }
+    fn set_input_derivatives(
+        &mut self,
+        references: &[u32],
+        orders: &[i32],
+        values: &[f64],
+    ) -> Result<(), CallError> {
+        assert!(orders.iter().all(|&order| order == 1));
+        self.note("derivative", references, values);
+        Ok(())
+    }
+    fn do_step(&mut self, _: f64, _: f64, _: bool) -> Result<Stepped, CallError> {
+        Ok(Stepped::Whole)
+    }
+}
+
+fn variable(name: &str, reference: u32, attributes: &str, kind: &str) -> String {
+    format!(
+        r#"<ScalarVariable name="{name}" valueReference="{reference}" {attributes}>{kind}</ScalarVariable>"#
+    )
+}
+
+/// A slave with a variable of each sort; `interpolates` is `canInterpolateInputs`.
+fn listener(interpolates: bool) -> (Box<dyn Slave>, Told) {
+    let (input, discrete) = ("causality=\"input\"", "causality=\"input\" variability=\"discrete\"");
+    let parameter = |variability| format!("causality=\"parameter\" variability=\"{variability}\"");
+    let variables = [
+        variable("force", 1, input, r#"<Real start="0" unit="N"/>"#),
+        variable("angle", 2, input, r#"<Real start="0" declaredType="Angle"/>"#),
+        variable("level", 3, discrete, r#"<Real start="0"/>"#),
+        variable("count", 4, discrete, r#"<Integer start="0"/>"#),
+        variable("gear", 5, discrete, r#"<Enumeration start="1" declaredType="Gear"/>"#),
+        variable("on", 6, discrete, r#"<Boolean start="false"/>"#),
+        variable("mode", 7, discrete, r#"<String start="idle"/>"#),
+        variable("F_c", 8, &parameter("tunable"), r#"<Real start="5" unit="N"/>"#),
+        variable("mass", 9, &parameter("fixed"), r#"<Real start="1" unit="kg"/>"#),
+        variable("y", 10, "causality=\"output\"", "<Real/>"),
+        variable("n", 11, "causality=\"output\" variability=\"discrete\"", "<Integer/>"),
+        variable("temperature", 12, input, r#"<Real start="0" unit="degC"/>"#),
+    ]
+    .concat();
+    let xml = format!(
+        r#"<fmiModelDescription fmiVersion="2.0" modelName="Listener" guid="g">
+        <CoSimulation modelIdentifier="L" canInterpolateInputs="{interpolates}"/>
+        <UnitDefinitions>
+        <Unit name="N"><BaseUnit kg="1" m="1" s="-2"/></Unit>
+        <Unit name="kg"><BaseUnit kg="1"/></Unit>
+        <Unit name="rad"><BaseUnit rad="1"/></Unit>
+        <Unit name="degC"><BaseUnit K="1" offset="273.15"/></Unit>
+        </UnitDefinitions>
+        <TypeDefinitions><SimpleType name="Gear"><Enumeration>
+        <Item name="reverse" value="-1"/><Item name="first" value="1"/><Item name="second" value="2"/>
+        </Enumeration></SimpleType>
+        <SimpleType name="Angle"><Real unit="rad"/></SimpleType></TypeDefinitions>
+        <ModelVariables>{variables}</ModelVariables><ModelStructure><Outputs>
+        <Unknown index="10"/><Unknown index="11"/></Outputs></ModelStructure>
+        </fmiModelDescription>"#
+    );
+    let told = Told::default();
+    let description = ModelDescription::parse(xml).unwrap();
+    (Box::new(Listener { description, told: told.clone() }), told)
+}
+
+/// `plant`, which takes input derivatives, and `ctrl`, which does not; `ctrl.force`, `ctrl.count` and
+/// `ctrl.angle` are connected.
+fn system() -> (System, Told, Told) {
+    let ((plant, plant_told), (ctrl, ctrl_told)) = (listener(true), listener(false));
+    let mut system = System::default();
+    system.add("plant", plant).unwrap();
+    system.add("ctrl", ctrl).unwrap();
+    system.connect("plant.y", "ctrl.force").unwrap();
+    system.connect("plant.y", "ctrl.angle").unwrap();
+    system.connect("plant.n", "ctrl.count").unwrap();
+    (system, plant_told, ctrl_told)
+}
+
+/// A whole file.
+#[derive(serde::Deserialize, serde::Serialize)]
+struct Document {
+    scenario: Scenario,
+}
+
+fn scenario(text: &str) -> Scenario {
+    toml::from_str::<Document>(text).unwrap_or_else(|error| panic!("{error}\n{text}")).scenario
+}
+
+/// Start at 0 s, steps of 0.5 s.
+fn setup(folder: &Path) -> Setup<'_> {
+    Setup { folder, start: 0.0, step: 0.5 }
+}
+
+fn resolve(text: &str) -> Result<Prepared, ScenarioError> {
+    scenario(text).resolve(&system().0, &setup(Path::new(".")))
+}
