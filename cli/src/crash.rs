@@ -31,7 +31,7 @@ fn end(ending: &Ending) -> u8 {
     }
     // A panic here is about memory that the FMU wrote over: it is told below as what it leads to.
     std::panic::set_hook(Box::new(|_| {}));
-    for (path, kept) in run::keep_results() {
+    for (path, kept) in study::keep_results() {
         match kept {
             Ok(()) => tracing::error!("the results up to there are in {}", path.display()),
             Err(error) => tracing::error!("the last rows are lost: {error}"),

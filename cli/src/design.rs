@@ -1,34 +1,11 @@
 //! `aso-ftc design`: from a plant file to a designed controller, its report and its FMU.
 
-mod analysis;
-mod certificate;
-mod checks;
-mod controller_fmu;
-mod design_file;
-mod designed;
-pub(crate) mod document;
-mod gains;
-mod linear_plant;
-mod page;
-mod plant_file;
-mod report;
-mod reporting;
-mod signals;
-#[cfg(test)]
-mod tests;
-mod wanted;
-
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-
-use crate::whole_file::Pending;
-use controller_fmu::{Content, ControllerFmu};
-use designed::Designed;
-use document::{Source, Table};
-use plant_file::PlantFile;
-use report::Report;
+use design::Report;
+use files::whole::Pending;
 
 #[derive(clap::Args)]
 pub(crate) struct Options {
@@ -53,26 +30,13 @@ pub(crate) struct Options {
 
 /// Designs the controller and writes what was asked for; whether all checks hold.
 pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
-    let source = Source::read(&options.plant)?;
-    let parsed = source.parse()?;
-    let file = PlantFile::read(&source, &Table::whole(&source, &parsed))?;
-    let designed = designed::design(&file)?;
-    let description = description(&file, &designed);
-    let design = designed.file(&file, &description)?;
-    let mut report = reporting::report(&file, &designed, description)
-        .with_context(|| format!("the design for {} cannot be examined", file.name()))?;
-    let mut fmu = None;
-    if options.fmu.is_some() {
-        let content = Content { design: &design, plant: source.text() };
-        let made = ControllerFmu::new(&options.from, &content)?;
-        report.interface = reporting::interface(&made.description);
-        fmu = Some(made);
-    }
-    let page = page::page(&report);
+    let mut made = design::design(&options.plant)?;
+    let fmu = options.fmu.is_some().then(|| made.fmu(&options.from)).transpose()?;
+    let page = made.page();
     let beside = options.out.parent().unwrap_or(Path::new("")).join("report.html");
     let page_path = options.report.clone().unwrap_or(beside);
     let mut written = vec![&options.out, &page_path];
-    let files = [(&options.out, &design), (&page_path, &page)];
+    let files = [(&options.out, &made.file), (&page_path, &page)];
     let pending = files
         .into_iter()
         .map(|(path, text)| Pending::new(path, text.as_bytes()).with_context(|| unwritten(path)))
@@ -86,27 +50,20 @@ pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
     }
     if options.json {
         let mut output = std::io::stdout().lock();
-        serde_json::to_writer_pretty(&mut output, &report).context("cannot print the report")?;
+        serde_json::to_writer_pretty(&mut output, &made.report)
+            .context("cannot print the report")?;
         writeln!(output)?;
     } else {
-        summarise(&report);
+        summarise(&made.report);
         for path in written {
             println!("{}", path.display());
         }
     }
-    Ok(report.checks.iter().all(|check| check.holds))
+    Ok(made.holds())
 }
 
 fn unwritten(path: &Path) -> String {
     format!("cannot write {}", path.display())
-}
-
-/// The user's sentence, or one that names the plant.
-fn description(file: &PlantFile<'_>, designed: &Designed) -> String {
-    let faults: Vec<_> = designed.linear.faults.iter().map(|fault| fault.name.as_str()).collect();
-    file.description.clone().unwrap_or_else(|| {
-        format!("Fault-tolerant controller that estimates and compensates {}", faults.join(", "))
-    })
 }
 
 /// What a reader wants to know first.

@@ -10,10 +10,8 @@ mod output;
 
 mod check;
 mod claims;
-mod config;
 mod crash;
 mod design;
-mod figure;
 mod logging;
 mod new;
 mod pack;
@@ -23,7 +21,6 @@ mod reproduce;
 mod run;
 mod scenario;
 mod summary;
-mod whole_file;
 mod worker;
 
 use std::process::ExitCode;

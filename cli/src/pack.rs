@@ -14,15 +14,14 @@ use fmu_description::ModelDescription;
 use fmu_description::documentation::page;
 use fmu_description::package::Package;
 
-use crate::figure::rasterise;
-use crate::whole_file;
+use figure::rasterise;
 
 /// The models of this workspace.
 const MODELS: [&str; 2] = ["fmu-plant", "fmu-controller"];
 
 /// The equations of a model and its picture; the packer makes index.html and model.png of them. The
 /// equations stay in the FMU, so that index.html can be made anew for another design.
-pub(crate) const FRAGMENT: &str = "model.html";
+const FRAGMENT: &str = fmu_description::documentation::FRAGMENT;
 const DRAWING: &str = "model.svg";
 
 #[derive(clap::Args)]
@@ -132,7 +131,8 @@ fn pack_crate(folder: &Path, packing: &Packing<'_>) -> anyhow::Result<Packed> {
     let others = packing.binaries.map_or(Ok(Vec::new()), binaries::targets)?;
     let library = library::build(folder, packing.locked, &others)?;
     let resources = folder.join("resources");
-    let (xml, description) = describe(&library.file, &resources, &library.package.name)?;
+    let (xml, description) =
+        fmu_import::described(&library.file, &resources, &library.package.name)?;
     let mut package = Package::new(xml.clone());
     let identifier = &description.model_name;
     let libraries = match packing.binaries {
@@ -151,7 +151,7 @@ fn pack_crate(folder: &Path, packing: &Packing<'_>) -> anyhow::Result<Packed> {
     if packing.sbom {
         let bill = sbom::bill(&description, &library, packing.binaries.is_some())?;
         let target = path.with_extension("cdx.json");
-        whole_file::write(&target, &bill)
+        files::whole::write(&target, &bill)
             .with_context(|| format!("cannot write {}", target.display()))?;
     }
     Ok(Packed { path, xml, description })
@@ -166,25 +166,6 @@ fn own_library(
     let platform = platform.first().context("FMI has no name for this platform")?;
     let path = format!("binaries/{platform}/{}{suffix}", description.model_name);
     Ok((path, read(&library.file)?))
-}
-
-/// What the library at `file` says of itself with `resources`; `name` is for messages.
-pub(crate) fn describe(
-    file: &Path,
-    resources: &Path,
-    name: &dyn std::fmt::Display,
-) -> anyhow::Result<(String, ModelDescription)> {
-    let xml = fmu_import::describe(file, resources)
-        .with_context(|| format!("the library of {name} does not describe itself"))?;
-    let (description, warnings) = ModelDescription::read(xml.as_bytes())
-        .with_context(|| format!("the model description of {name}"))?;
-    let problems = description.problems();
-    let warnings = warnings.iter().map(ToString::to_string);
-    let problems: Vec<String> = warnings.chain(problems.iter().map(ToString::to_string)).collect();
-    if !problems.is_empty() {
-        bail!("the variables of {name} break rules of FMI 2.0.5:\n{}", problems.join("\n"));
-    }
-    Ok((xml, description))
 }
 
 fn read(path: &Path) -> anyhow::Result<Vec<u8>> {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::figure::{Figure, FigureError, Ink, Panel, Series};
+use figure::{Figure, FigureError, Ink, Panel, Series};
 
 /// The transient of the activation is over after this many seconds.
 const SETTLING: f64 = 20.0;

@@ -5,8 +5,7 @@ use std::path::Path;
 use anyhow::{Context, bail, ensure};
 use results::{Column, ColumnKind, Selection, Table};
 
-use crate::figure::{Figure, Ink, Panel, Series, rasterise};
-use crate::whole_file;
+use figure::{Figure, Ink, Panel, Series, rasterise};
 
 /// Colours in the order of the curves of a panel, and so the most curves that a panel has.
 const INKS: [Ink; 7] =
@@ -43,7 +42,7 @@ pub(crate) fn plot_with_units(
     let title = results.file_name().unwrap_or_default().to_string_lossy();
     let svg = Figure { title: &title, panels: panels(&curves) }.svg()?;
     let bytes = if ending == "png" { rasterise(&svg)? } else { svg.into_bytes() };
-    whole_file::write(out, &bytes).with_context(|| format!("cannot write {}", out.display()))
+    files::whole::write(out, &bytes).with_context(|| format!("cannot write {}", out.display()))
 }
 
 /// Reads what is to be drawn.

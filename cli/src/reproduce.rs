@@ -4,14 +4,14 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use fmu_description::Experiment;
-use master::{Algorithm, Probe, Simulation, System, SystemError, Wanted, choose};
+use master::{Probe, Simulation, System, SystemError};
 use results::Table;
+use toml::Spanned;
 
 use crate::claims::{Claim, Measurement, WATCHED, table};
-use crate::config::{Config, Every, Loaded};
-use crate::logging;
-use crate::run::{AlgorithmOptions, Beside, Ended, Making, Recorder, assemble, select, setting};
+use study::{Config, Ended, Every, Loaded, Making, Prepared};
+
+use crate::run::{AlgorithmOptions, advance, setting};
 use crate::scenario::Scenario;
 use crate::summary::{Certified, Summary};
 use crate::{pack, paper_figures, summary};
@@ -53,44 +53,43 @@ pub(crate) fn reproduce(options: &Options) -> anyhow::Result<bool> {
     }
     pack::pack_into(&pack::workspace()?, &options.dist)?;
     let settings = settings(options);
-    let system = assemble(&experiment(options, &settings), &Making::default())?.system;
-    let mut wanted = Wanted { step: Some(STEP), ..Wanted::default() };
-    options.algorithm.apply(&mut wanted);
-    let algorithm = choose(&system, &wanted, options.stop_time)?.algorithm;
     std::fs::create_dir_all(&options.out)
         .with_context(|| format!("cannot make the folder {}", options.out.display()))?;
-    let mut run = Run::new(options, system, &algorithm)?;
-    let ended = run.advance(options)?;
+    let prepared = Prepared::new(experiment(options, &settings), &Making::default())?;
+    let mut watch = Watch::new(&prepared.system)?;
+    let mut run = prepared.start(None)?;
+    let ended = advance(&mut run, |simulation| watch.add(simulation));
+    run.finish()?;
     let lost = match ended {
-        Ended::Lost(error) => Some(logging::sentence(&error)),
+        Ended::Lost(error) => Some(error.sentence()),
         Ended::ByFmu(name) => Some(format!("{name} asked for the end of the simulation")),
         Ended::AtStop | Ended::Interrupted => None,
     };
     let reached = run.simulation.time();
-    let claims = run.watch.claims(reached, lost.is_some());
-    let certified = Certified::of(run.simulation.system(), run.watch.fault_bound())?;
+    let claims = watch.claims(reached, lost.is_some());
+    let certified = Certified::of(run.simulation.system(), watch.fault_bound())?;
     let written = Summary {
         scenario: options.scenario.name(),
-        method: algorithm.sweep.name(),
-        course: algorithm.course.name(),
-        communication_step: algorithm.step,
+        method: run.plan.algorithm.sweep.name(),
+        course: run.plan.algorithm.course.name(),
+        communication_step: run.plan.algorithm.step,
         stop_time: options.stop_time,
         reached,
         lost: lost.as_deref(),
-        fell: run.watch.fell(),
+        fell: watch.fell(),
         settings: settings.iter().map(|(name, value)| format!("{name}={value}")).collect(),
         claims: &claims,
         design: &certified,
     };
     let columns = columns(&options.out.join(RESULTS))?;
     let column = |name: &str| columns.get(name).map(Vec::as_slice);
-    paper_figures::write(&column, run.watch.t_on(), &options.out)?;
+    paper_figures::write(&column, watch.t_on(), &options.out)?;
     summary::write(&written, &options.out.join("summary.json"))?;
     report(options, &written);
     Ok(claims.iter().all(|claim| claim.holds != Some(false)))
 }
 
-/// Plant and controller with these settings.
+/// Plant and controller with these settings, recorded and stepped as the options say.
 fn experiment(options: &Options, settings: &[(String, String)]) -> Loaded {
     let mut config = Config::default();
     for (name, file) in [("plant", "FrictionPendulum.fmu"), ("controller", "AsoController.fmu")] {
@@ -99,40 +98,17 @@ fn experiment(options: &Options, settings: &[(String, String)]) -> Loaded {
     for (name, value) in settings {
         config.settings.push(name.clone(), value.clone());
     }
+    config.algorithm.step = Some(STEP);
+    options.algorithm.apply(&mut config.algorithm);
+    config.experiment.stop_time = Some(Spanned::new(0..0, options.stop_time));
+    config.results.file = Some(options.out.join(RESULTS));
+    config.results.every = Some(options.record_every);
     Loaded { config, source: None }
 }
 
 /// Those of the scenario, then those of the command line.
 fn settings(options: &Options) -> Vec<(String, String)> {
     options.scenario.settings().into_iter().chain(options.settings.iter().cloned()).collect()
-}
-
-/// The experiment under way.
-struct Run {
-    simulation: Simulation,
-    recorder: Option<Recorder>,
-    watch: Watch,
-}
-
-impl Run {
-    fn new(options: &Options, system: System, algorithm: &Algorithm) -> anyhow::Result<Self> {
-        let watch = Watch::new(&system)?;
-        let ports = select(&system, &[], &[])?;
-        let stop_time = Some(options.stop_time);
-        let experiment = Experiment { start_time: 0.0, stop_time, tolerance: None };
-        let mut simulation = Simulation::new(system, algorithm, &experiment)?;
-        let (file, every) = (options.out.join(RESULTS), options.record_every);
-        let recorder = Recorder::create(&file, &mut simulation, &ports, every, 0.0)?;
-        Ok(Self { simulation, recorder, watch })
-    }
-
-    fn advance(&mut self, options: &Options) -> anyhow::Result<Ended> {
-        let mut beside = Beside::recording(self.recorder.as_mut(), options.stop_time);
-        let watch = &mut self.watch;
-        let ended = beside.advance(&mut self.simulation, |simulation| watch.add(simulation));
-        self.recorder.take().map_or(Ok(()), Recorder::finish)?;
-        Ok(ended)
-    }
 }
 
 /// The columns of a file of results that the figures need, by name.

@@ -1,38 +1,25 @@
-//! `aso-ftc run`: couples FMUs, and what all runs share.
+//! `aso-ftc run`: couples FMUs.
 
-mod advance;
-mod assemble;
 mod interrupt;
 mod open_inputs;
 mod options;
-mod plan;
 mod progress;
-mod record;
-mod resume;
-mod saved;
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, bail};
 use fmu_import::CallLog;
-use master::Scenario;
-use master::{Coupling, Port, Simulation, System, by_direct_dependencies};
+use master::{Coupling, Port, Simulation, System, SystemError, by_direct_dependencies};
 use results::Selection;
-use study::scenario::Setup;
+use study::{Config, Ended, Every, Making, Plan, Prepared, Run, Tally};
 
-use crate::config::{Config, Every, Loaded};
 use crate::logging;
 use crate::plot;
-use advance::Saver;
-use advance::Tally;
-pub(crate) use advance::{Beside, Ended};
-pub(crate) use assemble::{Making, assemble};
 pub(crate) use interrupt::{STATUS as INTERRUPTED, has_begun};
 pub(crate) use options::{AlgorithmOptions, Options, setting};
-use plan::{Plan, plan};
-pub(crate) use record::{Recorder, keep_results, select};
-use saved::Saved;
+use progress::Progress;
 
 /// Most connections that are listed.
 const LISTED: usize = 20;
@@ -46,7 +33,7 @@ pub(crate) fn run(options: &Options) -> ExitCode {
     }
     match prepare(options) {
         Ok(None) => ExitCode::SUCCESS,
-        Ok(Some(prepared)) => prepared.go(),
+        Ok(Some(started)) => started.go(),
         Err(error) => {
             tracing::error!("{}", logging::sentence(&error));
             ExitCode::from(2)
@@ -54,28 +41,20 @@ pub(crate) fn run(options: &Options) -> ExitCode {
     }
 }
 
-/// A run that can begin.
-struct Prepared {
-    simulation: Simulation,
-    recorder: Option<Recorder>,
-    saver: Option<Saver>,
-    stop: f64,
-    resumed: bool,
-    config: Config,
-    /// The current folder at the begin.
+/// A run that has started.
+struct Started {
+    run: Run,
+    /// The current folder at the start.
     here: PathBuf,
     /// Units by variable, for the plot.
     units: Vec<(String, String)>,
-    /// Outlives the simulation.
-    _folders: Option<ssp::Folders>,
 }
 
 /// Everything before the first step; nothing where only the configuration was asked for.
-fn prepare(options: &Options) -> anyhow::Result<Option<Prepared>> {
-    let (mut loaded, saved) = options.load()?;
+fn prepare(options: &Options) -> anyhow::Result<Option<Started>> {
+    let (loaded, saved) = options.load()?;
     // An FMU may change the current folder.
     let here = std::env::current_dir().context("the current folder")?;
-    loaded.config.make_absolute().context("the current folder")?;
     let log_calls = options.log_calls.as_deref().map(open_call_log).transpose()?;
     let making = Making {
         logging: options.verbose > 0,
@@ -83,38 +62,17 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Prepared>> {
         log_calls: log_calls.as_ref(),
     };
     let by_name = loaded.config.connections.is_none() && loaded.config.system.is_none();
-    let mut assembled = assemble(&loaded, &making)?;
-    let plan = plan(&mut loaded.config, &assembled)?;
-    let system = std::mem::take(&mut assembled.system);
-    let scenario = scenario(&loaded, &system, &plan)?;
-    let config = loaded.config;
-    let text = config.render()?;
+    let prepared = Prepared::new(loaded, &making)?;
     if options.print_config {
-        print!("{text}");
+        print!("{}", prepared.config.render()?);
         return Ok(None);
     }
-    let ports = select(&system, &config.results.record, &config.results.exclude)?;
-    check_saving(&config, &system)?;
-    check_plot(&config, &system, &ports)?;
-    describe(options, &system, &plan, by_name);
-    let units = units(&system, &ports);
-    let file = results_file(&config)?;
-    let mut simulation = begin(system, &plan, scenario, saved.as_ref())?;
-    if let Some(early) = simulation.early_end() {
-        tracing::warn!("{early}");
-    }
-    let (recorder, resumed) = record(&mut simulation, file, &ports, &plan, saved.as_ref())?;
-    Ok(Some(Prepared {
-        simulation,
-        recorder,
-        saver: saver(&config, text, plan.every),
-        stop: plan.stop,
-        resumed,
-        config,
-        here,
-        units,
-        _folders: assembled.folders,
-    }))
+    let Prepared { config, system, plan, ports, .. } = &prepared;
+    check_plot(config, system, ports)?;
+    describe(options, system, plan, by_name);
+    let units = units(system, ports);
+    let run = prepared.start(saved.as_ref())?;
+    Ok(Some(Started { run, here, units }))
 }
 
 /// Prints what is connected and, where connections are made `by_name`, what is not.
@@ -134,72 +92,25 @@ fn open_call_log(path: &Path) -> anyhow::Result<CallLog> {
     CallLog::create(path).with_context(|| format!("cannot write {}", path.display()))
 }
 
-/// The system initialised, or where the checkpoint left it.
-fn begin(
-    system: System,
-    plan: &Plan,
-    scenario: Scenario,
-    saved: Option<&Saved>,
-) -> anyhow::Result<Simulation> {
-    let Plan { algorithm, experiment, .. } = plan;
-    let Some(saved) = saved else {
-        return Ok(Simulation::with_scenario(system, algorithm, experiment, scenario)?);
-    };
-    resume::resume(system, plan, scenario, saved.checkpoint())
-}
-
-/// The recorder, and whether it goes on with the rows of the checkpoint.
-fn record(
-    simulation: &mut Simulation,
-    file: &Path,
-    ports: &[Port],
-    plan: &Plan,
-    saved: Option<&Saved>,
-) -> anyhow::Result<(Option<Recorder>, bool)> {
-    let start = plan.experiment.start_time;
-    let mut recorder = Recorder::create(file, simulation, ports, plan.every, start)?;
-    let due = saved.and_then(|saved| saved.due(plan.every));
-    if let (Some(recorder), Some(saved)) = (&mut recorder, saved) {
-        recorder.restore(simulation, saved.slow())?;
-        if let Some(due) = due {
-            recorder.set_due(due);
+/// Advances `run` to its end with a bar of progress, or to the step at which a signal comes; `watch`
+/// sees the start and every step.
+pub(crate) fn advance(
+    run: &mut Run,
+    mut watch: impl FnMut(&mut Simulation) -> Result<(), SystemError>,
+) -> Ended {
+    interrupt::begin();
+    let mut progress = Progress::new(run.simulation.time(), run.plan.stop);
+    let ended = run.advance(|simulation| {
+        watch(simulation)?;
+        progress.show(simulation.time());
+        let raised = interrupt::is_raised();
+        if raised || simulation.is_finished() {
+            interrupt::notice();
         }
-    }
-    Ok((recorder, due.is_some()))
-}
-
-/// What is done to the system while it runs.
-fn scenario(loaded: &Loaded, system: &System, plan: &Plan) -> anyhow::Result<Scenario> {
-    // Its paths already begin beside the file.
-    let folder = Path::new("");
-    let setup = Setup { folder, start: plan.experiment.start_time, step: plan.algorithm.step };
-    let resolved = loaded.config.scenario.resolve(system, &setup);
-    let prepared = resolved.map_err(|error| loaded.point(&error.place.clone(), error))?;
-    for (file, column) in &prepared.unused {
-        tracing::info!("{}: the column {column:?} drives nothing", file.display());
-    }
-    Ok(prepared.scenario)
-}
-
-fn results_file(config: &Config) -> anyhow::Result<&Path> {
-    config.results.file.as_deref().context("no file for the results")
-}
-
-/// A checkpoint that cannot be saved is better known before the run than after it.
-fn check_saving(config: &Config, system: &System) -> anyhow::Result<()> {
-    if config.checkpoint.file.is_none() {
-        return Ok(());
-    }
-    let unable = system.slaves.iter().find(|(_, slave)| {
-        let flags = slave.description().co_simulation.as_ref();
-        !flags.is_some_and(|flags| flags.can_serialize_fmu_state)
+        Ok(if raised { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
     });
-    match unable {
-        Some((name, _)) => {
-            bail!("{name} cannot take part in a checkpoint: its canSerializeFMUstate is false")
-        }
-        None => Ok(()),
-    }
+    interrupt::notice();
+    ended
 }
 
 /// What cannot be drawn is better known before the run than after it.
@@ -218,11 +129,6 @@ fn check_plot(config: &Config, system: &System, ports: &[Port]) -> anyhow::Resul
     let names: Vec<_> = ports.iter().map(|&port| system.name(port)).collect();
     let selection = Selection { include: results.plot.clone(), exclude: Vec::new() };
     selection.choose(&names).context("plot").map(|_| ())
-}
-
-fn saver(config: &Config, text: String, every: Every) -> Option<Saver> {
-    let interval = config.checkpoint.every.as_ref().map(|every| *every.get_ref());
-    config.checkpoint.file.clone().map(|path| Saver { path, interval, text, every })
 }
 
 /// The connections, the first ones by name.
@@ -264,30 +170,23 @@ fn summary(tally: Tally, begin: f64, time: f64) -> String {
 }
 
 fn units(system: &System, ports: &[Port]) -> Vec<(String, String)> {
-    let unit = |port: &Port| Some((system.name(*port), record::unit(system, *port)?));
+    let unit = |port: &Port| Some((system.name(*port), study::unit(system, *port)?));
     ports.iter().filter_map(unit).collect()
 }
 
-impl Prepared {
+impl Started {
     fn go(mut self) -> ExitCode {
-        let begin = self.simulation.time();
-        let mut beside = Beside {
-            recorder: self.recorder.as_mut(),
-            saver: self.saver.as_ref(),
-            stop: self.stop,
-            resumed: self.resumed,
-            tally: Tally::default(),
-        };
-        let ended = beside.advance(&mut self.simulation, |_| Ok(()));
-        let tally = beside.tally;
-        let time = self.simulation.time();
+        let begin = self.run.simulation.time();
+        let ended = advance(&mut self.run, |_| Ok(()));
+        let tally = self.run.tally();
+        let time = self.run.simulation.time();
         println!("{}", summary(tally, begin, time));
         self.warn_of_fallbacks(tally);
         let written = self.write(&ended);
         let status = match &ended {
             Ended::AtStop => 0,
             Ended::ByFmu(name) => {
-                let asked = self.simulation.ended_at().unwrap_or(time);
+                let asked = self.run.simulation.ended_at().unwrap_or(time);
                 let ending = apart(asked, time);
                 tracing::warn!(
                     "{name} asked for the end of the simulation at t = {asked} s{ending}"
@@ -295,13 +194,13 @@ impl Prepared {
                 0
             }
             Ended::Interrupted => {
-                let more = self.saver.as_ref().map(|saver| resume::hint(&saver.path, &self.here));
+                let more = self.run.checkpoint_file().map(|path| resume_hint(path, &self.here));
                 let more = more.unwrap_or_default();
                 tracing::error!("the run was interrupted at t = {time} s{more}");
                 interrupt::STATUS
             }
             Ended::Lost(error) => {
-                let error = logging::sentence(error);
+                let error = error.sentence();
                 tracing::error!("the run ended early, after t = {time} s: {error}");
                 1
             }
@@ -314,7 +213,8 @@ impl Prepared {
     }
 
     fn warn_of_fallbacks(&self, tally: Tally) {
-        let Some(fallbacks) = self.simulation.fallbacks().filter(|known| known.count > 0) else {
+        let Some(fallbacks) = self.run.simulation.fallbacks().filter(|known| known.count > 0)
+        else {
             return;
         };
         tracing::warn!(
@@ -332,22 +232,22 @@ impl Prepared {
         let written = |path: &Path| {
             println!("{}", path.strip_prefix(&self.here).unwrap_or(path).display());
         };
-        if let Some(recorder) = self.recorder.take() {
-            recorder.finish()?;
-            let file = results_file(&self.config)?;
+        let results = &self.run.config.results;
+        let picture = results.plot_file.clone().filter(|_| !results.plot.is_empty());
+        let plotted = results.plot.clone();
+        if let Some(file) = self.run.finish()? {
             written(file);
-            let results = &self.config.results;
-            if let (false, Some(picture)) = (results.plot.is_empty(), &results.plot_file) {
+            if let Some(picture) = picture {
                 let unit = |name: &str| {
                     let known = self.units.iter().find(|(known, _)| known == name);
                     known.map(|(_, unit)| unit.clone())
                 };
-                plot::plot_with_units(file, &results.plot, &unit, picture)?;
-                written(picture);
+                plot::plot_with_units(file, &plotted, &unit, &picture)?;
+                written(&picture);
             }
         }
-        if let (Some(saver), false) = (&self.saver, matches!(ended, Ended::Lost(_))) {
-            written(&saver.path);
+        if let (Some(file), false) = (self.run.checkpoint_file(), matches!(ended, Ended::Lost(_))) {
+            written(file);
         }
         Ok(())
     }
@@ -362,4 +262,25 @@ fn apart(asked: f64, end: f64) -> String {
         "; the results end at t = {end} s, the last time that all FMUs have in common (with \
          --rollback, which needs FMUs that can go back, they end at {asked} s)"
     )
+}
+
+/// The end of a sentence: the command line that goes on from the checkpoint at `path`, as seen from
+/// the folder `here`.
+fn resume_hint(path: &Path, here: &Path) -> String {
+    let command = std::env::args().next().unwrap_or_else(|| "aso-ftc".to_owned());
+    let path = path.strip_prefix(here).unwrap_or(path).display().to_string();
+    format!("; to go on: {} run --resume {}", quoted(&command), quoted(&path))
+}
+
+/// An argument as a shell takes it: in quotation marks where it has other letters than those of
+/// common paths.
+fn quoted(argument: &str) -> String {
+    let plain = |letter: char| letter.is_alphanumeric() || "-_./:+@%=,".contains(letter);
+    if !argument.is_empty() && argument.chars().all(plain) {
+        argument.to_owned()
+    } else if cfg!(windows) {
+        format!("\"{argument}\"")
+    } else {
+        format!("'{}'", argument.replace('\'', "'\\''"))
+    }
 }

@@ -12,7 +12,6 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 
 use crate::claims::Claim;
-use crate::whole_file;
 
 /// The design parameter alpha of (12); it cancels in delta.
 const ALPHA: f64 = 1.0;
@@ -165,5 +164,5 @@ fn read_matrix(system: &mut System, name: &str) -> anyhow::Result<DMatrix<f64>> 
 /// Writes `value` as JSON to `path`: whole or not at all.
 pub(crate) fn write(value: &impl Serialize, path: &Path) -> anyhow::Result<()> {
     let text = serde_json::to_vec_pretty(value)?;
-    whole_file::write(path, &text).with_context(|| format!("cannot write {}", path.display()))
+    files::whole::write(path, &text).with_context(|| format!("cannot write {}", path.display()))
 }

@@ -51,7 +51,7 @@ fn the_mathematics_depends_on_neither_fmi_nor_files() {
 }
 
 /// The folders of our libraries, each with those that it may use.
-const ARROWS: [(&str, &[&str]); 11] = [
+const ARROWS: [(&str, &[&str]); 14] = [
     ("lapack", &[]),
     ("control", &["lapack"]),
     ("fmu-description", &[]),
@@ -62,7 +62,10 @@ const ARROWS: [(&str, &[&str]); 11] = [
     ("ssp", &["fmu-description", "slave"]),
     ("results", &[]),
     ("master", &["fmu-description", "slave"]),
-    ("study", &["fmu-description", "fmu-import", "master", "results", "slave", "ssp"]),
+    ("files", &[]),
+    ("figure", &["files"]),
+    ("study", &["files", "fmu-description", "fmu-import", "master", "results", "slave", "ssp"]),
+    ("design", &["control", "figure", "files", "fmu-description", "fmu-import", "linearise"]),
 ];
 
 fn manifest(folder: &Path) -> toml::Table {

@@ -6,8 +6,7 @@ use anyhow::{Context, bail};
 use master::{Coupling, Course, StepControl, Sweep, Wanted};
 use toml::Spanned;
 
-use super::saved::Saved;
-use crate::config::{Config, Every, Loaded, Memory, Wire};
+use study::{Config, Every, Loaded, Memory, Saved, Wire};
 
 /// Where results go unless told otherwise.
 const OUT: &str = "results/run";
@@ -237,7 +236,7 @@ impl Options {
         put(&mut config.checkpoint.file, self.checkpoint.clone());
         put(&mut config.checkpoint.every, placed(self.checkpoint_every));
         self.put_results(config, saved.as_ref());
-        config.check_numbers()?;
+        check_numbers(config)?;
         Ok((loaded, saved))
     }
 
@@ -375,25 +374,23 @@ fn has_ending(path: &Path, ending: &str) -> bool {
     path.extension().is_some_and(|found| found.eq_ignore_ascii_case(ending))
 }
 
-impl Config {
-    /// Refuses numbers of the command line that make no sense; those of a file were looked at with
-    /// their place.
-    fn check_numbers(&self) -> anyhow::Result<()> {
-        let above = [
-            ("--tolerance", &self.experiment.tolerance),
-            ("--time-limit", &self.isolation.time_limit),
-            ("--checkpoint-every", &self.checkpoint.every),
-        ];
-        for (name, value) in above {
-            if let Some(value) = value.as_ref().map(Spanned::get_ref)
-                && !(*value > 0.0 && value.is_finite())
-            {
-                bail!("{name} is {value}, expected a finite number above 0");
-            }
+/// Refuses numbers of the command line that make no sense; those of a file were looked at with
+/// their place.
+fn check_numbers(config: &Config) -> anyhow::Result<()> {
+    let above = [
+        ("--tolerance", &config.experiment.tolerance),
+        ("--time-limit", &config.isolation.time_limit),
+        ("--checkpoint-every", &config.checkpoint.every),
+    ];
+    for (name, value) in above {
+        if let Some(value) = value.as_ref().map(Spanned::get_ref)
+            && !(*value > 0.0 && value.is_finite())
+        {
+            bail!("{name} is {value}, expected a finite number above 0");
         }
-        if self.checkpoint.every.is_some() {
-            self.checkpoint.file.as_ref().context("--checkpoint-every needs --checkpoint FILE")?;
-        }
-        Ok(())
     }
+    if config.checkpoint.every.is_some() {
+        config.checkpoint.file.as_ref().context("--checkpoint-every needs --checkpoint FILE")?;
+    }
+    Ok(())
 }

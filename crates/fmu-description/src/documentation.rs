@@ -13,6 +13,9 @@ table { border-collapse: collapse; margin: 1rem 0; } \
 th, td { border: 1px solid #ccc; padding: .2rem .6rem; text-align: left; vertical-align: top; } \
 th { background: #f2f2f2; } code { font-family: monospace; white-space: pre-wrap; }";
 
+/// Name of the author's part of the page, among the files of `documentation/`.
+pub const FRAGMENT: &str = "model.html";
+
 /// The page about a model: its description, `model_html` with the equations in the author's words,
 /// the variables, the default experiment, the capabilities and the licence.
 ///

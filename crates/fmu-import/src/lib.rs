@@ -9,12 +9,14 @@
 
 mod call_log;
 pub mod crash;
+mod described;
 mod error;
 mod fmu;
 pub mod isolate;
 mod library;
 
 pub use call_log::{CallLog, LoggedSlave};
+pub use described::{DescriptionError, described};
 pub use error::LoadError;
 pub use fmu::{Fmu, FmuError, Instance};
 pub use library::{Component, Interface, describe, preload};

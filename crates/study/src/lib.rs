@@ -1,8 +1,38 @@
 //! Runs what a file asks for: `system.toml`, SSP, scenarios with signals and faults.
+//!
+//! [`Loaded::read`] reads a `system.toml`; [`Prepared::new`] loads and connects the FMUs and decides what
+//! the file leaves open; [`Prepared::start`] initialises them; [`Run::advance`] steps to the end and
+//! writes the results. The command `aso-ftc run` is a thin face of this crate.
 #![forbid(unsafe_code)]
 
+#[cfg(feature = "load")]
+mod assemble;
+pub mod config;
+mod error;
 mod link;
+#[cfg(feature = "load")]
+mod plan;
+#[cfg(feature = "load")]
+mod record;
+#[cfg(feature = "load")]
+mod resume;
+#[cfg(feature = "load")]
+mod run;
+#[cfg(feature = "load")]
+mod saved;
 pub mod scenario;
 pub mod table;
 
+#[cfg(feature = "load")]
+pub use assemble::{Assembled, Making, assemble};
+pub use config::{Config, Every, Loaded, Memory, Wire};
+pub use error::Error;
 pub use link::link;
+#[cfg(feature = "load")]
+pub use plan::{Plan, plan};
+#[cfg(feature = "load")]
+pub use record::{Recorder, keep_results, select, unit};
+#[cfg(feature = "load")]
+pub use run::{Ended, Prepared, Run, Tally};
+#[cfg(feature = "load")]
+pub use saved::Saved;

@@ -1,0 +1,75 @@
+//! The controller FMU of a design, made from a packed one: other resources, described anew.
+
+use std::fs;
+use std::path::Path;
+
+use fmu_description::ModelDescription;
+use fmu_description::documentation::{FRAGMENT, page};
+use fmu_description::package::{Package, Unpacked};
+use fmu_import::described;
+
+use crate::Error;
+
+/// The files that make a controller FMU another one.
+pub(crate) struct Content<'a> {
+    /// `resources/design.toml`.
+    pub(crate) design: &'a str,
+    /// The plant file, for the documentation.
+    pub(crate) plant: &'a str,
+}
+
+/// A controller FMU that is not written yet.
+pub struct ControllerFmu {
+    pub(crate) description: ModelDescription,
+    package: Package,
+}
+
+impl ControllerFmu {
+    /// Puts `content` into the FMU `base` and lets its library describe itself.
+    pub(crate) fn new(base: &Path, content: &Content<'_>) -> Result<Self, Error> {
+        let unpacked = Unpacked::open_whole(base).map_err(|error| {
+            let what = format!("cannot open {}, the packed controller", base.display());
+            Error::from(error).within(what)
+        })?;
+        let design = unpacked.resources().join("design.toml");
+        if !design.is_file() {
+            return Err(Error::Invalid(format!(
+                "{} has no resources/design.toml; expected an AsoController.fmu as `aso-ftc pack` \
+                 makes it",
+                base.display()
+            )));
+        }
+        fs::write(&design, content.design).map_err(Error::file("write", &design))?;
+        let identifier = unpacked.description.co_simulation.as_ref();
+        let identifier = identifier.map(|interface| interface.model_identifier.clone());
+        let library = unpacked.library(&identifier.unwrap_or_default())?;
+        let (xml, description) =
+            described(&library, &unpacked.resources(), &base.display().to_string())?;
+        let mut package = Package::new(xml);
+        let documentation = unpacked.folder().join("documentation");
+        let fragment = fs::read_to_string(documentation.join(FRAGMENT)).unwrap_or_default();
+        let index = documentation.join("index.html");
+        fs::write(&index, page(&description, &fragment)).map_err(Error::file("write", &index))?;
+        let plant = documentation.join("plant.toml");
+        fs::write(&plant, content.plant).map_err(Error::file("write", &plant))?;
+        let folder = unpacked.folder();
+        for entry in fs::read_dir(folder).map_err(Error::file("read", folder))? {
+            let path = entry.map_err(Error::file("read", folder))?.path();
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            match name.as_str() {
+                fmu_description::package::DESCRIPTION => {}
+                _ if path.is_dir() => package.add_folder(&name, &path)?,
+                _ => package.add(name, fs::read(&path).map_err(Error::file("read", &path))?),
+            }
+        }
+        Ok(Self { description, package })
+    }
+
+    /// Writes it to `path`, with `report` in its documentation: whole or not at all.
+    pub fn write(mut self, path: &Path, report: &str) -> Result<(), Error> {
+        self.package.add("documentation/report.html", report);
+        self.package
+            .write(path)
+            .map_err(|error| Error::from(error).within(format!("cannot write {}", path.display())))
+    }
+}

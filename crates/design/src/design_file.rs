@@ -1,0 +1,195 @@
+//! `design.toml`: what the controller FMU reads.
+
+use control::Domain;
+use control::aso::{FaultyPlant, Gains};
+use fmu_description::unit::Unit;
+use nalgebra::DMatrix;
+use serde::Serialize;
+
+use super::designed::{Designed, fault_names};
+use super::plant_file::PlantFile;
+use super::reporting::estimator;
+use super::signals::{Entrance, Signal};
+
+/// Everything in the file but the matrices.
+#[derive(Serialize)]
+pub(crate) struct DesignFile<'a> {
+    pub(crate) description: &'a str,
+    pub(crate) t_on: f64,
+    pub(crate) monitor: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) sample_time: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) estimator: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) filter: Option<Vec<f64>>,
+    pub(crate) experiment: Experiment,
+    pub(crate) states: Vec<Entry>,
+    pub(crate) actuators: Vec<Entry>,
+    pub(crate) measurements: Vec<Entry>,
+    pub(crate) faults: Vec<Entry>,
+}
+
+/// The experiment that importers run by default, times in s.
+#[derive(Serialize)]
+pub(crate) struct Experiment {
+    pub(crate) stop_time: f64,
+    pub(crate) step_size: f64,
+}
+
+/// A signal.
+#[derive(Serialize, Default)]
+pub(crate) struct Entry {
+    pub(crate) name: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) unit: Option<String>,
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub(crate) description: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) limits: Option<[f64; 2]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) operating: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) loss_of: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) least_command: Option<f64>,
+}
+
+impl Designed {
+    /// The text of the design file.
+    pub(crate) fn file(
+        &self,
+        file: &PlantFile<'_>,
+        description: &str,
+    ) -> Result<String, crate::Error> {
+        let linear = &self.linear;
+        let at_origin = self.signals().all(|signal| signal.operating.unwrap_or(0.0) == 0.0);
+        let entry = |signal: &Signal| Entry {
+            name: signal.name.clone(),
+            unit: signal.unit.clone(),
+            description: signal.description.clone(),
+            limits: signal.limits,
+            operating: signal.operating.filter(|_| !at_origin),
+            ..Entry::default()
+        };
+        let entries = |signals: &[Signal]| signals.iter().map(entry).collect::<Vec<_>>();
+        let sampled = match self.domain {
+            Domain::Continuous => None,
+            Domain::Sampled { period } => Some(period),
+        };
+        let mut states = entries(&linear.states);
+        if self.filter.is_some() {
+            states.extend(linear.measurements.iter().map(|signal| Entry {
+                name: format!("filtered {}", signal.name),
+                ..entry(signal)
+            }));
+        }
+        let head = DesignFile {
+            description,
+            t_on: file.t_on,
+            monitor: file.monitor,
+            sample_time: sampled,
+            estimator: sampled.map(|_| estimator(self.gains.estimator)),
+            filter: self.filter.clone(),
+            experiment: self.experiment(file)?,
+            states,
+            actuators: entries(&linear.actuators),
+            measurements: entries(&linear.measurements),
+            faults: self.fault_entries(),
+        };
+        let FaultyPlant { a, b, c, f_a, a_f } = &self.plant;
+        let mut matrices = vec![("A", a), ("B", b), ("C", c), ("F_a", f_a)];
+        if self.extended.plant.a_f.amax() > 0.0 {
+            matrices.push(("A_f", a_f));
+        }
+        let Gains { k_x, k_f, l_x, l_f, .. } = &self.gains;
+        matrices.extend([("K_x", k_x), ("K_f", k_f), ("L_x", l_x), ("L_f", l_f)]);
+        head.render(&matrices)
+    }
+
+    fn signals(&self) -> impl Iterator<Item = &Signal> {
+        let linear = &self.linear;
+        linear.states.iter().chain(&linear.actuators).chain(&linear.measurements)
+    }
+
+    /// The faults, then the rates of ramps: one entry per column of F_a.
+    fn fault_entries(&self) -> Vec<Entry> {
+        let mut all: Vec<_> = fault_names(&self.linear, &self.extended)
+            .into_iter()
+            .map(|name| Entry { name, ..Entry::default() })
+            .collect();
+        for (fault, channel) in self.linear.faults.iter().zip(&self.extended.channels) {
+            let own = &mut all[channel.estimate];
+            own.unit.clone_from(&fault.unit);
+            own.description.clone_from(&fault.description);
+            if let Entrance::Loss { actuator, least_command } = fault.entrance {
+                own.loss_of = Some(self.linear.actuators[actuator].name.clone());
+                own.least_command = Some(least_command);
+            }
+            if let Some(rate) = channel.rate {
+                all[rate].unit = fault.unit.as_deref().and_then(per_second);
+                all[rate].description = format!("rate of {}", fault.name);
+            }
+        }
+        all
+    }
+
+    /// As stated; else about ten times the slowest time constant of the feedback in 2000 steps, or in
+    /// steps of the sample time.
+    fn experiment(&self, file: &PlantFile<'_>) -> Result<Experiment, control::Error> {
+        let slowest = self.slowest()?;
+        let stop_time = file.stop_time.unwrap_or_else(|| round(10.0 / slowest));
+        let step_size = file.step_size.unwrap_or(match self.domain {
+            Domain::Continuous => round(stop_time / 2000.0),
+            Domain::Sampled { period } => period,
+        });
+        Ok(Experiment { stop_time, step_size })
+    }
+}
+
+/// The unit per second, where it can be written.
+fn per_second(unit: &str) -> Option<String> {
+    let slope = format!("{unit}/s");
+    Unit::parse(&slope).is_ok().then_some(slope)
+}
+
+/// The nearest of 1, 2, 5 times a power of ten, on the logarithmic scale.
+fn round(x: f64) -> f64 {
+    let exponent = x.log10().floor();
+    let part = x.log10() - exponent;
+    let distance = |factor: &f64| (factor.log10() - part).abs();
+    let factors = [1.0, 2.0, 5.0, 10.0].into_iter();
+    let factor = factors.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(1.0);
+    // A division rounds 0.1, 0.01 and so on to the nearest double; a product does not.
+    if exponent < 0.0 { factor / 10_f64.powf(-exponent) } else { factor * 10_f64.powf(exponent) }
+}
+
+impl DesignFile<'_> {
+    /// The text of the file: scalars, `matrices` with a row on each line, tables.
+    pub(crate) fn render(
+        &self,
+        matrices: &[(&str, &DMatrix<f64>)],
+    ) -> Result<String, crate::Error> {
+        let unwritable = |error: toml::ser::Error| crate::Error::Invalid(error.to_string());
+        let all = toml::Table::try_from(self).map_err(unwritable)?;
+        let is_table = |value: &toml::Value| {
+            value.as_array().map_or(value.is_table(), |list| list.iter().any(toml::Value::is_table))
+        };
+        let (tables, scalars): (toml::Table, toml::Table) =
+            all.into_iter().partition(|(_, value)| is_table(value));
+        let mut text = "# Written by aso-ftc design.\n\n".to_owned();
+        text += &toml::to_string(&scalars).map_err(unwritable)?;
+        for (name, matrix) in matrices {
+            text += &format!("\n{name} = [\n");
+            for row in matrix.row_iter() {
+                let entries: Vec<_> =
+                    row.iter().map(|entry| format!("{:?}", entry + 0.0)).collect();
+                text += &format!("    [{}],\n", entries.join(", "));
+            }
+            text += "]\n";
+        }
+        text += "\n";
+        text += &toml::to_string(&tables).map_err(unwritable)?;
+        Ok(text)
+    }
+}

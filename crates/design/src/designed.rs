@@ -1,0 +1,291 @@
+//! From the plant file to the gains.
+
+use super::gains::{FeedbackProblem, Found, Refusal, feedback, observer};
+use super::linear_plant::LinearPlant;
+use super::plant_file::PlantFile;
+use super::wanted::Request;
+use control::aso::{Estimator, FaultyPlant, Gains};
+use control::controller::{Controller, instability};
+use control::detectability::{Detectability, detectability};
+use control::distance::{Distance, from_uncontrollable};
+use control::faults::ExtendedPlant;
+use control::rank::{Rank, controllability};
+use control::sampled;
+use control::{Domain, Error};
+use files::PlaceError;
+use nalgebra::DMatrix;
+
+/// Where errors about faults point.
+const FAULTS: [&str; 3] = ["faults", "F_a", "actuator_faults"];
+
+/// A designed controller with all that led to it.
+pub(crate) struct Designed {
+    pub(crate) linear: LinearPlant,
+    /// With fault models and measurement filter, in continuous time.
+    pub(crate) extended: ExtendedPlant,
+    pub(crate) domain: Domain,
+    /// What the observer runs: the extended plant, sampled for a sampled design.
+    pub(crate) plant: FaultyPlant,
+    /// The measurement filter as the controller runs it.
+    pub(crate) filter: Option<Vec<f64>>,
+    pub(crate) gains: Gains,
+    pub(crate) feedback: Found,
+    pub(crate) observer: Found,
+    pub(crate) controllability: Rank,
+    pub(crate) distance: Distance,
+    pub(crate) detectability: Detectability,
+    /// The part of the faults' effect on the states that the compensation cannot cancel, relative.
+    pub(crate) cancellation_residual: f64,
+    /// The linear controller, from measurements to commands.
+    pub(crate) controller: Controller,
+    /// Largest real part of the eigenvalues of the loop, or largest modulus less one; below zero.
+    pub(crate) instability: f64,
+    /// The same of the observer's error while the faults are not estimated, where that happens.
+    pub(crate) instability_before: Option<f64>,
+}
+
+/// Designs what `file` wants.
+pub(crate) fn design(file: &PlantFile<'_>) -> Result<Designed, crate::Error> {
+    let linear = LinearPlant::of(file)?;
+    let filter = file.filter.as_deref().unwrap_or_default();
+    let LinearPlant { a, b, c, models, .. } = &linear;
+    let extended = ExtendedPlant::new(a, b, c, models, filter)
+        .map_err(|error| file.error(&["A"], error.to_string()))?;
+    let (controllability, distance) = check_controllable(file, &linear)?;
+    let detectability = check_detectable(file, &linear, &extended)?;
+    let (domain, plant) = in_domain(file, &extended)?;
+    let (feedback, observer) = wanted(file, &extended, (&plant, c), domain)?;
+    let n = plant.a.nrows();
+    let gains = Gains {
+        estimator: estimator(file),
+        k_x: feedback.gain.clone().resize_horizontally(n, 0.0),
+        k_f: sampled::compensation_gain(&extended, domain)?,
+        l_x: observer.gain.rows(0, n).into(),
+        l_f: -observer.gain.rows(n, plant.f_a.ncols()),
+    };
+    let controller = Controller::of(&plant, &gains)?;
+    let whole = controller.closed_loop(&plant, &vec![1.0; plant.b.ncols()])?;
+    Ok(Designed {
+        cancellation_residual: cancellation_residual(&extended)?,
+        instability_before: if file.t_on > 0.0 && !file.monitor {
+            Some(instability(&gains.error_dynamics_of_states(&plant), domain)?)
+        } else {
+            None
+        },
+        instability: instability(&whole, domain)?,
+        filter: sampled::filter(&extended, domain),
+        linear,
+        extended,
+        domain,
+        plant,
+        gains,
+        feedback,
+        observer,
+        controllability,
+        distance,
+        detectability,
+        controller,
+    })
+}
+
+fn estimator(file: &PlantFile<'_>) -> Estimator {
+    match file.sampling {
+        Some(sampling) if sampling.current => Estimator::Current,
+        _ => Estimator::Prediction,
+    }
+}
+
+/// The plant that the observer runs: sampled for a sampled design.
+fn in_domain(
+    file: &PlantFile<'_>,
+    extended: &ExtendedPlant,
+) -> Result<(Domain, FaultyPlant), PlaceError> {
+    let Some(sampling) = file.sampling else {
+        return Ok((Domain::Continuous, extended.plant.clone()));
+    };
+    let period = sampling.period;
+    let refuse =
+        |error: Error| file.error(&["sample_time"], format!("sampled each {period} s: {error}"));
+    let plant = sampled::sample(extended, period).map_err(refuse)?;
+    plant.check_observer_exists().map_err(refuse)?;
+    Ok((Domain::Sampled { period }, plant))
+}
+
+/// The gains of feedback and observer for the plant in its domain; `c` is that of the plant alone.
+fn wanted(
+    file: &PlantFile<'_>,
+    extended: &ExtendedPlant,
+    (plant, c): (&FaultyPlant, &DMatrix<f64>),
+    domain: Domain,
+) -> Result<(Found, Found), PlaceError> {
+    let n = extended.states;
+    let problem = FeedbackProblem {
+        a: &plant.a.view((0, 0), (n, n)).into(),
+        b: &plant.b.rows(0, n).into(),
+        c,
+        f_a: &plant.f_a.rows(0, n).into(),
+    };
+    let feedback = feedback(&file.feedback.wanted, &problem, domain)
+        .map_err(|refusal| refused(file, &file.feedback, refusal, n, "states"))?;
+    let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
+    let pair = (&a_0, &c_0, plant.f_a.ncols());
+    let observer = observer(&file.observer.wanted, pair, domain, estimator(file));
+    let observer = observer.map_err(|refusal| {
+        let meaning = "states, filters, faults and rates of ramps";
+        refused(file, &file.observer, refusal, a_0.nrows(), meaning)
+    })?;
+    Ok((feedback, observer))
+}
+
+/// The part of the faults' effect on the plant's states that the compensation leaves, relative.
+fn cancellation_residual(extended: &ExtendedPlant) -> Result<f64, Error> {
+    let ExtendedPlant { plant, states, .. } = extended;
+    let left = &plant.b * plant.compensation_gain()? + &plant.f_a;
+    let whole = plant.f_a.rows(0, *states).norm();
+    Ok(if whole > 0.0 { left.rows(0, *states).norm() / whole } else { 0.0 })
+}
+
+fn check_controllable(
+    file: &PlantFile<'_>,
+    linear: &LinearPlant,
+) -> Result<(Rank, Distance), crate::Error> {
+    let refuse = |error: Error| file.error(&["B", "actuators"], error.to_string());
+    let rank = controllability(&linear.a, &linear.b).map_err(refuse)?;
+    if !rank.is_full() {
+        let message = format!(
+            "the commands {} reach {} of {} states only",
+            names(linear.actuators.iter().map(|signal| signal.name.as_str())),
+            rank.rank,
+            rank.n
+        );
+        return Err(file.error(&["B", "actuators"], message).into());
+    }
+    Ok((rank, from_uncontrollable(&linear.a, &linear.b).map_err(refuse)?))
+}
+
+/// The augmented observer exists, or an error that names the faults and the measurements.
+fn check_detectable(
+    file: &PlantFile<'_>,
+    linear: &LinearPlant,
+    extended: &ExtendedPlant,
+) -> Result<Detectability, crate::Error> {
+    let found = detectability(&extended.plant, Domain::Continuous)
+        .map_err(|error| file.error(&FAULTS, error.to_string()))?;
+    let measurements = names(linear.measurements.iter().map(|signal| signal.name.as_str()));
+    if !found.observability.is_full() {
+        let message = format!(
+            "the measurements {measurements} show {} of {} states only",
+            found.observability.rank, found.observability.n
+        );
+        return Err(file.error(&["C", "measurements"], message).into());
+    }
+    let fault_names = fault_names(linear, extended);
+    if let Some(&unseen) = found.invisible().first() {
+        let message = format!(
+            "fault `{}` cannot be seen from the measurements {measurements}",
+            fault_names[unseen]
+        );
+        return Err(at_fault(file, linear, unseen, message).into());
+    }
+    if let Some(hidden) = found.hidden.first() {
+        let faults = hidden.faults();
+        let states: Vec<_> = hidden.states().iter().map(|&at| state_name(linear, at)).collect();
+        let mut hiding = faults.iter().map(|&fault| fault_names[fault].as_str());
+        // Without a state, the first fault is hidden by the others.
+        let (told, from): (Vec<_>, String) = match states.as_slice() {
+            [] => (hiding.by_ref().take(1).collect(), hiding.collect::<Vec<_>>().join(", ")),
+            states => (hiding.collect(), format!("a movement of {}", states.join(", "))),
+        };
+        let message = format!(
+            "{} of {} independent courses of faults and states are seen: the measurements \
+             {measurements} cannot tell a {} of {} from {}",
+            hidden.rank,
+            hidden.expected,
+            if hidden.at.norm() > 0.0 { "change" } else { "constant value" },
+            told.join(", "),
+            from,
+        );
+        return Err(at_fault(file, linear, faults[0], message).into());
+    }
+    extended
+        .plant
+        .check_observer_exists()
+        .map_err(|error| file.error(&FAULTS, error.to_string()))?;
+    Ok(found)
+}
+
+/// Points at the entry of the fault behind column `column` of F_a.
+fn at_fault(
+    file: &PlantFile<'_>,
+    linear: &LinearPlant,
+    column: usize,
+    message: String,
+) -> PlaceError {
+    match linear.faults.get(column) {
+        Some(fault) => file.error_at(&fault.place, message),
+        None => file.error(&FAULTS, message),
+    }
+}
+
+/// The faults, then the rates of ramps.
+pub(crate) fn fault_names(linear: &LinearPlant, extended: &ExtendedPlant) -> Vec<String> {
+    let mut all: Vec<_> = linear.faults.iter().map(|fault| fault.name.clone()).collect();
+    all.resize(extended.plant.f_a.ncols(), String::new());
+    for (fault, channel) in linear.faults.iter().zip(&extended.channels) {
+        if let Some(rate) = channel.rate {
+            all[rate] = format!("{}_rate", fault.name);
+        }
+    }
+    all
+}
+
+/// A state, or the filter of a measurement.
+fn state_name(linear: &LinearPlant, state: usize) -> &str {
+    let n = linear.states.len();
+    let signal = linear.states.get(state).or_else(|| linear.measurements.get(state - n));
+    signal.map_or("", |signal| signal.name.as_str())
+}
+
+fn names<'a>(list: impl Iterator<Item = &'a str>) -> String {
+    list.collect::<Vec<_>>().join(", ")
+}
+
+/// Why a gain was refused, at the place in the file that wants it.
+fn refused(
+    file: &PlantFile<'_>,
+    request: &Request,
+    refusal: Refusal,
+    order: usize,
+    meaning: &str,
+) -> PlaceError {
+    let message = match refusal {
+        Refusal::Conflict(message) => message,
+        Refusal::Control(Error::PoleCount { found, .. }) => {
+            format!("expected {order} eigenvalues, one for each of the {meaning}, found {found}")
+        }
+        Refusal::Control(error) => error.to_string(),
+    };
+    match &request.other {
+        Some((name, place)) if message.starts_with(&format!("{name} ")) => {
+            file.error_at(place, message)
+        }
+        _ => file.error_at(&request.place, message),
+    }
+}
+
+impl Designed {
+    /// The dynamics of the plant under exact state feedback, n x n.
+    pub(crate) fn fed_back(&self) -> DMatrix<f64> {
+        let n = self.extended.states;
+        self.plant.a.view((0, 0), (n, n)) + self.plant.b.rows(0, n) * self.gains.k_x.columns(0, n)
+    }
+
+    /// The decay rate of its slowest eigenvalue, 1/s.
+    pub(crate) fn slowest(&self) -> Result<f64, Error> {
+        let rate = -instability(&self.fed_back(), self.domain)?;
+        Ok(match self.domain {
+            Domain::Continuous => rate,
+            Domain::Sampled { period } => -(-rate).ln_1p() / period,
+        })
+    }
+}

@@ -1,0 +1,48 @@
+//! Matrices in a plant file.
+
+use files::{Entry, PlaceError};
+use nalgebra::DMatrix;
+
+/// Reads matrices.
+pub(crate) trait MatrixEntry {
+    /// A matrix: a list of rows of the same length.
+    fn matrix(&self) -> Result<DMatrix<f64>, PlaceError>;
+
+    /// A matrix of this shape; `meaning` names its rows and columns.
+    fn shaped(&self, shape: (usize, usize), meaning: &str) -> Result<DMatrix<f64>, PlaceError>;
+}
+
+impl MatrixEntry for Entry<'_> {
+    fn matrix(&self) -> Result<DMatrix<f64>, PlaceError> {
+        let rows = self.list()?;
+        let mut values = Vec::new();
+        let mut columns = None;
+        for row in &rows {
+            let numbers = row.numbers()?;
+            let expected = *columns.get_or_insert(numbers.len());
+            if numbers.len() != expected {
+                let found = numbers.len();
+                let message = format!("expected {expected} entries as in row 1, found {found}");
+                return Err(row.error(message));
+            }
+            values.extend(numbers);
+        }
+        match columns {
+            None | Some(0) => Err(self.error("expected at least one row and one column")),
+            Some(columns) => Ok(DMatrix::from_row_slice(rows.len(), columns, &values)),
+        }
+    }
+
+    fn shaped(
+        &self,
+        (rows, columns): (usize, usize),
+        meaning: &str,
+    ) -> Result<DMatrix<f64>, PlaceError> {
+        let matrix = self.matrix()?;
+        if matrix.shape() == (rows, columns) {
+            return Ok(matrix);
+        }
+        let found = format!("{}x{}", matrix.nrows(), matrix.ncols());
+        Err(self.error(format!("expected {rows}x{columns} ({meaning}), found {found}")))
+    }
+}

@@ -1,0 +1,148 @@
+//! The frame of a figure: axes, grid, labels. Colours and sizes of text are those of the page.
+
+use maud::{Markup, PreEscaped, html};
+
+use figure::axis::Axis;
+use figure::trace;
+
+const LEFT: f64 = 66.0;
+const RIGHT: f64 = 14.0;
+const TOP: f64 = 10.0;
+const BOTTOM: f64 = 48.0;
+
+/// The outer size of a figure, in its own units.
+#[derive(Clone, Copy)]
+pub(super) struct Size {
+    pub(super) width: f64,
+    pub(super) height: f64,
+}
+
+impl Size {
+    /// Where the horizontal axis begins and ends.
+    pub(super) fn horizontal(self) -> (f64, f64) {
+        (LEFT, self.width - RIGHT)
+    }
+
+    /// Where the vertical axis begins, below, and ends.
+    pub(super) fn vertical(self) -> (f64, f64) {
+        (self.height - BOTTOM, TOP)
+    }
+}
+
+/// A pair of axes.
+pub(super) struct Chart<'a> {
+    /// Identifier on the page.
+    pub(super) id: &'a str,
+    pub(super) title: &'a str,
+    /// What there is to see, for those who do not see it.
+    pub(super) description: &'a str,
+    pub(super) size: Size,
+    pub(super) x: Axis,
+    pub(super) y: Axis,
+    pub(super) x_label: &'a str,
+    pub(super) y_label: &'a str,
+}
+
+impl Chart<'_> {
+    /// The figure; `content` stays inside the frame.
+    pub(super) fn draw(&self, content: &Markup) -> Markup {
+        let Size { width, height } = self.size;
+        let (title, description) = (format!("{}-title", self.id), format!("{}-what", self.id));
+        let window = format!("{}-window", self.id);
+        let ((left, right), (bottom, top)) = (self.x.pixels(), self.y.pixels());
+        html! {
+            svg viewBox={ "0 0 " (width) " " (height) } role="img"
+                aria-labelledby={ (title) " " (description) } {
+                title id=(title) { (self.title) }
+                desc id=(description) { (self.description) }
+                clipPath id=(window) {
+                    rect x=(left) y=(top) width=(right - left) height=(bottom - top) {}
+                }
+                (self.grid())
+                g clip-path={ "url(#" (window) ")" } { (content) }
+                rect.frame x=(left) y=(top) width=(right - left) height=(bottom - top) {}
+                (self.labels())
+            }
+        }
+    }
+
+    fn grid(&self) -> Markup {
+        let ((left, right), (bottom, top)) = (self.x.pixels(), self.y.pixels());
+        html! {
+            @for (at, label) in self.x.ticks() {
+                (line((self.x.place(at), top), (self.x.place(at), bottom), "grid"))
+                text.tick.middle x=(tenth(self.x.place(at))) y=(bottom + 16.0) { (label) }
+            }
+            @for (at, label) in self.y.ticks() {
+                (line((left, self.y.place(at)), (right, self.y.place(at)), "grid"))
+                text.tick.end x=(left - 6.0) y=(tenth(self.y.place(at) + 4.0)) { (label) }
+            }
+        }
+    }
+
+    fn labels(&self) -> Markup {
+        let ((left, right), (bottom, top)) = (self.x.pixels(), self.y.pixels());
+        let (center, middle) = (f64::midpoint(left, right), f64::midpoint(top, bottom));
+        html! {
+            text.label.middle x=(center) y=(bottom + 37.0) { (self.x_label) }
+            @if !self.y_label.is_empty() { text.label.middle x="13" y=(middle) transform={ "rotate(-90 13 " (middle) ")" } {
+                (self.y_label)
+            } }
+        }
+    }
+
+    /// A curve. A value without a place leaves a gap.
+    pub(super) fn curve(&self, xs: &[f64], ys: &[f64], class: &str) -> Markup {
+        html! { path.curve.(class) d=(trace::path(xs, ys, &self.x, &self.y)) {} }
+    }
+
+    /// A line through points in any order; one without a place divides it.
+    pub(super) fn outline(&self, points: &[(f64, f64)], class: &str) -> Markup {
+        let place =
+            |(x, y): &(f64, f64)| format!("{:.1} {:.1}", self.x.place(*x), self.y.place(*y));
+        let strokes = points.split(|point| point.0.is_nan()).filter(|part| !part.is_empty());
+        let stroke = |part: &[(f64, f64)]| {
+            let mut places: Vec<_> = part.iter().map(place).collect();
+            places.dedup();
+            format!("M{}", places.join(" "))
+        };
+        html! { path.(class) d=(strokes.map(stroke).collect::<String>()) {} }
+    }
+
+    /// A line from below to above.
+    pub(super) fn upright(&self, at: f64, class: &str) -> Markup {
+        let ((bottom, top), x) = (self.y.pixels(), self.x.place(at));
+        html! { @if self.x.contains(at) { (line((x, top), (x, bottom), class)) } }
+    }
+
+    /// A line from left to right.
+    pub(super) fn level(&self, at: f64, class: &str) -> Markup {
+        let ((left, right), y) = (self.x.pixels(), self.y.place(at));
+        html! { @if self.y.contains(at) { (line((left, y), (right, y), class)) } }
+    }
+}
+
+pub(super) fn line((x1, y1): (f64, f64), (x2, y2): (f64, f64), class: &str) -> Markup {
+    html! { line.(class) x1=(tenth(x1)) y1=(tenth(y1)) x2=(tenth(x2)) y2=(tenth(y2)) {} }
+}
+
+/// A coordinate in a figure.
+pub(super) fn tenth(value: f64) -> PreEscaped<String> {
+    PreEscaped(format!("{value:.1}"))
+}
+
+/// What the lines and signs of a figure mean: a sample of each and its name.
+pub(super) fn legend(entries: &[(Markup, String)]) -> Markup {
+    html! {
+        ul.legend {
+            @for (sample, name) in entries {
+                li { svg.sample viewBox="0 0 30 18" aria-hidden="true" { (sample) } " " (name) }
+            }
+        }
+    }
+}
+
+/// A line in a legend.
+pub(super) fn line_sample(class: &str) -> Markup {
+    line((1.0, 9.0), (29.0, 9.0), class)
+}

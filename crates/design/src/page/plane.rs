@@ -1,0 +1,120 @@
+//! The plane in which eigenvalues lie, and what they say there.
+
+use nalgebra::Complex;
+
+use crate::report::{Loop, Report};
+
+/// An eigenvalue: real and imaginary part.
+pub(super) type Pole = [f64; 2];
+
+/// The s-plane of a continuous loop, or the z-plane of one that is sampled with this period in s.
+#[derive(Clone, Copy)]
+pub(super) enum Plane {
+    Continuous,
+    Sampled(f64),
+}
+
+impl Plane {
+    pub(super) fn of(report: &Report) -> Self {
+        let sampled = report.sampling.as_ref();
+        sampled.map_or(Self::Continuous, |sampled| Self::Sampled(sampled.sample_time))
+    }
+
+    pub(super) fn unit(self) -> &'static str {
+        match self {
+            Self::Continuous => " (1/s)",
+            Self::Sampled(_) => " (z-plane)",
+        }
+    }
+
+    pub(super) fn is_stable(self, pole: Pole) -> bool {
+        match self {
+            Self::Continuous => pole[0] < 0.0,
+            Self::Sampled(_) => pole[0].hypot(pole[1]) < 1.0,
+        }
+    }
+
+    /// The eigenvalue of the continuous system whose samples move like that, 1/s.
+    pub(super) fn rate(self, [re, im]: Pole) -> Pole {
+        match self {
+            Self::Continuous => [re, im],
+            Self::Sampled(period) => [re.hypot(im).ln() / period, im.atan2(re) / period],
+        }
+    }
+
+    /// Where an eigenvalue of a continuous system comes to lie.
+    pub(super) fn place(self, [re, im]: Pole) -> Pole {
+        match self {
+            Self::Continuous => [re, im],
+            Self::Sampled(period) => {
+                let z = (Complex::new(re, im) * period).exp();
+                [z.re, z.im]
+            }
+        }
+    }
+}
+
+/// A wanted eigenvalue and a reached one.
+type Pair = (Option<Pole>, Option<Pole>);
+
+impl Loop {
+    /// The real part, 1/s, of the slowest eigenvalue.
+    pub(super) fn slowest(&self, plane: Plane) -> Option<f64> {
+        self.eigenvalues.iter().map(|pole| plane.rate(*pole)[0]).max_by(f64::total_cmp)
+    }
+
+    pub(super) fn is_stable(&self, plane: Plane) -> bool {
+        self.eigenvalues.iter().all(|pole| plane.is_stable(*pole))
+    }
+
+    /// Each wanted eigenvalue beside the nearest reached one that is left, then the reached ones
+    /// that were not asked for.
+    pub(super) fn pairs(&self) -> Vec<Pair> {
+        let mut left = self.eigenvalues.clone();
+        let mut pairs = Vec::new();
+        for wanted in &self.wanted {
+            let distance = |pole: &Pole| (pole[0] - wanted[0]).hypot(pole[1] - wanted[1]);
+            let nearest =
+                (0..left.len()).min_by(|a, b| distance(&left[*a]).total_cmp(&distance(&left[*b])));
+            pairs.push((Some(*wanted), nearest.map(|index| left.remove(index))));
+        }
+        pairs.extend(left.into_iter().map(|pole| (None, Some(pole))));
+        pairs
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_eigenvalue_comes_back_from_the_z_plane() {
+        let plane = Plane::Sampled(0.01);
+        for pole in [[-3.0, 4.0], [-300.0, -200.0], [0.0, 0.0], [2.0, 1.0]] {
+            let back = plane.rate(plane.place(pole));
+            assert!((back[0] - pole[0]).hypot(back[1] - pole[1]) < 1e-9, "{pole:?}: {back:?}");
+            assert_eq!(plane.is_stable(plane.place(pole)), pole[0] < 0.0);
+        }
+    }
+
+    #[test]
+    fn each_wanted_eigenvalue_stands_beside_the_nearest_reached_one() {
+        let system = Loop {
+            matrix: String::new(),
+            method: String::new(),
+            wanted: vec![[-1.0, 2.0], [-1.0, -2.0], [-5.0, 0.0]],
+            eigenvalues: vec![[-5.1, 0.0], [-1.1, -2.0], [-9.0, 0.0], [-1.1, 2.0]],
+            condition: Some(1.0),
+            balanced_condition: Some(1.0),
+            pole_error: None,
+            region: None,
+        };
+        let expected = [
+            (Some([-1.0, 2.0]), Some([-1.1, 2.0])),
+            (Some([-1.0, -2.0]), Some([-1.1, -2.0])),
+            (Some([-5.0, 0.0]), Some([-5.1, 0.0])),
+            (None, Some([-9.0, 0.0])),
+        ];
+        assert_eq!(system.pairs(), expected);
+    }
+}

@@ -1,0 +1,270 @@
+//! A large sampled design with names that no page must trip over, and a bare one.
+
+use std::f64::consts::PI;
+
+use crate::report::{
+    Bound, Certificate, Check, Curve, Effectiveness, FreeP, Frequency, Loop, Matrix, Norm, Plant,
+    Region, Report, Sampled, Signal, StepResponse, Theorem1, Ultimate, Variable,
+};
+
+pub(super) const MARKUP: &str = "</code></pre><script>alert(1)</script>";
+pub(super) const QUOTES: &str = "a\" onload=\"x' & <b>";
+const PERIOD: f64 = 1e-3;
+
+/// Numbers of all magnitudes, the same every time.
+struct Numbers(u64);
+
+impl Numbers {
+    fn next(&mut self) -> f64 {
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        let digits = f64::from(u32::try_from(self.0 >> 32).unwrap()) / f64::from(u32::MAX) - 0.5;
+        let power = i32::try_from(self.0 >> 20 & 15).unwrap() - 7;
+        digits * 10_f64.powi(power)
+    }
+
+    fn matrix(&mut self, name: &str, rows: usize, columns: usize) -> Matrix {
+        Matrix {
+            name: name.to_owned(),
+            meaning: format!("for {QUOTES}"),
+            rows: (1..=rows).map(|k| format!("z{k} <{k}>")).collect(),
+            columns: (1..=columns).map(|k| format!("ζ{k} & 'q'")).collect(),
+            values: (0..rows).map(|_| (0..columns).map(|_| self.next()).collect()).collect(),
+        }
+    }
+
+    fn signals(&mut self, kind: &str, count: usize) -> Vec<Signal> {
+        (1..=count)
+            .map(|k| Signal {
+                name: format!("{kind}{k} {QUOTES}"),
+                unit: (k > 1).then(|| "µm/√s <".to_owned()),
+                description: format!("température {MARKUP}"),
+                operating: self.next(),
+                notes: "at most 3 & at least 1".to_owned(),
+            })
+            .collect()
+    }
+}
+
+fn sampled_loop(matrix: &str, rates: &[[f64; 2]], region: Option<Region>) -> Loop {
+    let place = |[re, im]: &[f64; 2]| {
+        let (sine, cosine) = (im * PERIOD).sin_cos();
+        [(re * PERIOD).exp() * cosine, (re * PERIOD).exp() * sine]
+    };
+    let eigenvalues: Vec<_> = rates.iter().map(place).collect();
+    Loop {
+        matrix: matrix.to_owned(),
+        method: format!("weights {QUOTES}"),
+        wanted: if region.is_some() { Vec::new() } else { eigenvalues.clone() },
+        eigenvalues,
+        condition: Some(1.234_567_89e3),
+        balanced_condition: Some(f64::INFINITY),
+        pole_error: None,
+        region,
+    }
+}
+
+fn curve(index: u32) -> Curve {
+    let times: Vec<f64> = (0..=400).map(|k| f64::from(k) * PERIOD).collect();
+    let wave = |time: &f64| (-time * 20.0).exp() * (time * f64::from(index) * 30.0 * PI).sin();
+    Curve {
+        name: format!("error {index} {QUOTES}"),
+        unit: (index != 2).then(|| MARKUP.to_owned()),
+        peak: 0.987_654_321,
+        peak_time: 0.012_345,
+        settling_time: 0.1357,
+        values: times.iter().map(wave).collect(),
+        times,
+    }
+}
+
+fn frequency(count: u32) -> Frequency {
+    let frequencies: Vec<f64> = (0..=100).map(|k| 10_f64.powf(f64::from(k) / 25.0)).collect();
+    let value = |order: u32, w: &f64| 1.0 / (1.0 + w / 10_f64.powf(f64::from(order)));
+    Frequency {
+        name: format!("faults to estimates {QUOTES}"),
+        singular_values: (0..count)
+            .map(|k| frequencies.iter().map(|w| value(4 - k, w)).collect())
+            .collect(),
+        frequencies,
+    }
+}
+
+fn certificate(numbers: &mut Numbers) -> Certificate {
+    Certificate {
+        printed: Err(format!("the design is sampled {MARKUP}")),
+        free: Ok(FreeP {
+            decay: 12.345_678_9,
+            decay_margin: 2.5e-9,
+            delta: 0.012_345_678_9,
+            p: numbers.matrix("", 13, 13).values,
+            margin: 1.5e-9,
+        }),
+        ultimate: Ok(Ultimate {
+            rate: 3.25,
+            radius: 0.0625,
+            peaks: vec![0.03125, 0.015_625],
+            margin: 1.25e-9,
+        }),
+        norms: vec![Norm {
+            name: "H∞ <".to_owned(),
+            from: QUOTES.to_owned(),
+            to: MARKUP.to_owned(),
+            value: 3.333_333_3e-4,
+            method: "bisection & eigenvalues".to_owned(),
+        }],
+    }
+}
+
+fn region() -> Region {
+    Region {
+        decay: Some(3.25),
+        disc_center: Some(-400.0),
+        disc_radius: Some(398.5),
+        sector: Some(45.5),
+    }
+}
+
+fn interface() -> Vec<Variable> {
+    (1..=40)
+        .map(|k| Variable {
+            name: format!("L_x[{k},1] {QUOTES}"),
+            causality: "parameter".to_owned(),
+            variability: "tunable".to_owned(),
+            unit: (k == 1).then(|| "N·m".to_owned()),
+            start: Some(format!("{MARKUP} {k}")),
+            description: QUOTES.to_owned(),
+        })
+        .collect()
+}
+
+fn plant(numbers: &mut Numbers) -> Plant {
+    let mut extremes = numbers.matrix(MARKUP, 2, 3);
+    extremes.values = vec![vec![-0.0, f64::MAX, 5e-324], vec![0.1 + 0.2, -1e16, f64::MIN_POSITIVE]];
+    Plant {
+        origin: format!("Linearised from Plant.fmu {MARKUP}"),
+        states: numbers.signals("x", 10),
+        actuators: numbers.signals("u", 3),
+        measurements: numbers.signals("y", 8),
+        faults: numbers.signals("f", 3),
+        matrices: vec![
+            numbers.matrix("A", 10, 10),
+            numbers.matrix("C'", 10, 8),
+            numbers.matrix("1x1", 1, 1),
+            extremes,
+        ],
+        eigenvalues: vec![[1e-17, 0.0], [0.5, 2.0], [0.5, -2.0], [-3.0, 0.0]],
+    }
+}
+
+fn bare_plant() -> Plant {
+    let signal = |name: &str| Signal {
+        name: name.to_owned(),
+        unit: None,
+        description: String::new(),
+        operating: 0.0,
+        notes: String::new(),
+    };
+    Plant {
+        origin: String::new(),
+        states: vec![signal("x1")],
+        actuators: vec![signal("u1")],
+        measurements: vec![signal("y1")],
+        faults: vec![signal("f1")],
+        matrices: Vec::new(),
+        eigenvalues: vec![[0.0, 0.0]],
+    }
+}
+
+/// A sampled design with everything in it.
+pub(super) fn hostile() -> Report {
+    let mut numbers = Numbers(7);
+    let rates = [[-4.0, 3.0], [-4.0, -3.0], [-60.0, 0.0], [-300.0, 200.0], [-300.0, -200.0]];
+    let check = |condition: &str, holds, value| Check {
+        condition: format!("{condition} {QUOTES}"),
+        holds,
+        value,
+        explanation: MARKUP.to_owned(),
+    };
+    Report {
+        description: format!("Tanks «Überlauf» {MARKUP}"),
+        plant_file: format!("C:\\plants\\{QUOTES}.toml"),
+        plant: plant(&mut numbers),
+        checks: vec![check("observable", true, None), check("detectable", false, Some(2.75e-13))],
+        gains: vec![numbers.matrix("L_x", 10, 8), numbers.matrix("L_f", 3, 8)],
+        feedback: sampled_loop("Φ + Γ K_x", &rates, Some(region())),
+        observer: sampled_loop("Φ_0 - L C_0", &rates[2..], None),
+        sampling: Some(Sampled { sample_time: PERIOD, estimator: "current".to_owned() }),
+        certificate: certificate(&mut numbers),
+        bounds: (1..=3)
+            .map(|k| Bound {
+                fault: format!("f{k} {QUOTES}"),
+                error: MARKUP.to_owned(),
+                unit: None,
+                gain_of_fault: numbers.next(),
+                gain_of_rate: numbers.next(),
+                largest: (k == 2).then_some(4.321e-5),
+            })
+            .collect(),
+        steps: (1..=3)
+            .map(|k| StepResponse {
+                fault: format!("f{k} {QUOTES}"),
+                unit: None,
+                size: 0.375,
+                rate: Some(12.25),
+                curves: (1..=5).map(curve).collect(),
+            })
+            .collect(),
+        frequency: vec![frequency(3), frequency(1)],
+        effectiveness: vec![Effectiveness {
+            actuator: QUOTES.to_owned(),
+            largest_stable_loss: 0.625_125,
+        }],
+        assumptions: vec![format!("linear {MARKUP}"), "bell \u{7} and nul \0".to_owned()],
+        interface: interface(),
+    }
+}
+
+/// A scalar plant of which next to nothing is known.
+pub(super) fn bare() -> Report {
+    let system = |pole: f64| Loop {
+        matrix: "a".to_owned(),
+        method: "given".to_owned(),
+        wanted: Vec::new(),
+        eigenvalues: vec![[pole, 0.0]],
+        condition: None,
+        balanced_condition: None,
+        pole_error: None,
+        region: None,
+    };
+    Report {
+        description: String::new(),
+        plant_file: "plant.toml".to_owned(),
+        plant: bare_plant(),
+        checks: Vec::new(),
+        gains: Vec::new(),
+        feedback: system(-1.5),
+        observer: system(-20.25),
+        sampling: None,
+        certificate: Certificate {
+            printed: Ok(Theorem1 {
+                alpha: 1.0,
+                beta: 2.5,
+                p: vec![vec![0.5]],
+                smallest_eigenvalue: 0.5,
+                largest_eigenvalue: 0.5,
+                residual: 1.25e-16,
+                delta: 0.75,
+            }),
+            free: Err("not asked for".to_owned()),
+            ultimate: Err("without \"rate_bound\"".to_owned()),
+            norms: Vec::new(),
+        },
+        bounds: Vec::new(),
+        steps: Vec::new(),
+        frequency: Vec::new(),
+        effectiveness: Vec::new(),
+        assumptions: Vec::new(),
+        interface: Vec::new(),
+    }
+}

@@ -1,0 +1,373 @@
+//! The plant file: what the user states of the plant and wants of the controller.
+
+use crate::matrix::MatrixEntry as _;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use nalgebra::DMatrix;
+
+use super::signals::{Entrance, Fault, Signal, all_actuator_faults, faults, signals};
+use super::wanted::{Request, request};
+use files::{Entry, Place, PlaceError, Source, Table};
+
+/// A plant file, read and checked in itself.
+pub(crate) struct PlantFile<'a> {
+    source: &'a Source,
+    /// Where the entries of the file are, for errors that show up later.
+    places: BTreeMap<&'static str, Place>,
+    pub(crate) description: Option<String>,
+    /// Start of the compensation, s.
+    pub(crate) t_on: f64,
+    /// Whether the faults are estimated while they are not compensated.
+    pub(crate) monitor: bool,
+    pub(crate) model: Model,
+    pub(crate) actuators: Vec<Signal>,
+    pub(crate) measurements: Vec<Signal>,
+    pub(crate) faults: Vec<Fault>,
+    pub(crate) sampling: Option<Sampling>,
+    /// Rates of the measurement filter, 1/s, one per measurement.
+    pub(crate) filter: Option<Vec<f64>>,
+    pub(crate) feedback: Request,
+    pub(crate) observer: Request,
+    pub(crate) stop_time: Option<f64>,
+    pub(crate) step_size: Option<f64>,
+}
+
+/// Where the plant's matrices come from.
+pub(crate) enum Model {
+    /// The file states them.
+    Matrices {
+        a: DMatrix<f64>,
+        b: DMatrix<f64>,
+        c: DMatrix<f64>,
+        f_a: Option<DMatrix<f64>>,
+        states: Vec<Signal>,
+    },
+    /// An FMU is linearised.
+    Fmu(PlantFmu),
+}
+
+/// The FMU of a plant, and where it is linearised.
+pub(crate) struct PlantFmu {
+    pub(crate) path: PathBuf,
+    /// Values of its variables at the operating point.
+    pub(crate) operating_point: Vec<(String, f64)>,
+    /// States, for an FMU that cannot name them itself.
+    pub(crate) states: Vec<String>,
+}
+
+/// How the controller samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Sampling {
+    /// Sample time, s.
+    pub(crate) period: f64,
+    /// Whether the command uses the newest measurement (current estimator), or only those before.
+    pub(crate) current: bool,
+}
+
+const KEYS: [&str; 21] = [
+    "description",
+    "t_on",
+    "monitor",
+    "plant",
+    "operating_point",
+    "A",
+    "B",
+    "C",
+    "F_a",
+    "actuator_faults",
+    "states",
+    "actuators",
+    "measurements",
+    "faults",
+    "sample_time",
+    "estimator",
+    "filter",
+    "feedback",
+    "observer",
+    "experiment",
+    "D",
+];
+/// Entries that errors of the design point at.
+const PLACES: [&str; 15] = [
+    "A",
+    "B",
+    "C",
+    "F_a",
+    "actuator_faults",
+    "plant",
+    "operating_point",
+    "states",
+    "actuators",
+    "measurements",
+    "faults",
+    "sample_time",
+    "filter",
+    "feedback",
+    "observer",
+];
+
+impl<'a> PlantFile<'a> {
+    /// Reads the whole file.
+    pub(crate) fn read(source: &'a Source, file: &Table<'a>) -> Result<Self, PlaceError> {
+        file.allow(&KEYS)?;
+        let place = |key: &&'static str| Some((*key, file.get(key)?.place));
+        let (model, [actuators, measurements]) = match file.get("plant") {
+            Some(plant) => linearised(source, file, &plant)?,
+            None => stated(file)?,
+        };
+        let faults = all_faults(file, &actuators, &measurements)?;
+        let sampling = sampling(file)?;
+        let sampled = sampling.is_some();
+        let wanted = |key: &str, weights, meaning: &str| {
+            request(&file.require(key, meaning)?.table()?, weights, sampled)
+        };
+        let experiment = file.get("experiment").map(|entry| entry.table()).transpose()?;
+        if let Some(table) = &experiment {
+            table.allow(&["stop_time", "step_size"])?;
+        }
+        let time = |key: &str| {
+            let entry = experiment.as_ref().and_then(|table| table.get(key));
+            entry.map(|entry| entry.positive()).transpose()
+        };
+        let found = Self {
+            source,
+            places: PLACES.iter().filter_map(place).collect(),
+            description: file
+                .get("description")
+                .map(|e| e.text().map(str::to_owned))
+                .transpose()?,
+            t_on: file.get("t_on").map_or(Ok(0.0), |entry| entry.number())?,
+            monitor: file.get("monitor").map_or(Ok(false), |entry| entry.flag())?,
+            filter: filter(file, &measurements, &faults)?,
+            feedback: wanted("feedback", ["Q", "R"], "what is wanted of A + B K_x")?,
+            observer: wanted("observer", ["W", "V"], "what is wanted of A_0 - L C_0")?,
+            stop_time: time("stop_time")?,
+            step_size: time("step_size")?,
+            model,
+            actuators,
+            measurements,
+            faults,
+            sampling,
+        };
+        found.check_columns(file)?;
+        Ok(found)
+    }
+
+    /// The name of the file, without its folder.
+    pub(crate) fn name(&self) -> String {
+        self.source.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+    }
+
+    /// An error that points at the first of `keys` that the file has, else at its beginning.
+    pub(crate) fn error(&self, keys: &[&str], message: impl Into<String>) -> PlaceError {
+        let place = keys.iter().find_map(|key| self.places.get(key)).cloned().unwrap_or(0..0);
+        self.source.error(&place, message)
+    }
+
+    /// An error that points at `place`.
+    pub(crate) fn error_at(&self, place: &Place, message: impl Into<String>) -> PlaceError {
+        self.source.error(place, message)
+    }
+
+    /// The columns of F_a are those of the faults that enter nowhere else.
+    fn check_columns(&self, file: &Table<'_>) -> Result<(), PlaceError> {
+        let columns = |fault: &&Fault| matches!(fault.entrance, Entrance::Column(_));
+        let wanted = self.faults.iter().filter(columns).count();
+        if let Some(fault) = self.faults.iter().find(columns) {
+            let Model::Matrices { f_a, .. } = &self.model else {
+                let message = format!(
+                    "fault `{}`: expected `actuator`, `sensor`, `loss_of` or `input`, as the plant \
+                     is an FMU",
+                    fault.name
+                );
+                return Err(self.error_at(&fault.place, message));
+            };
+            let Some(f_a) = f_a else {
+                let message = format!(
+                    "fault `{}`: expected `actuator`, `sensor` or `loss_of`, or a matrix F_a with \
+                     a column for it",
+                    fault.name
+                );
+                return Err(self.error_at(&fault.place, message));
+            };
+            if f_a.ncols() == wanted {
+                return Ok(());
+            }
+        }
+        match file.get("F_a") {
+            None => Ok(()),
+            Some(entry) => {
+                let found = entry.matrix()?.ncols();
+                let message = format!("expected {wanted} columns, one per fault, found {found}");
+                Err(entry.error(message))
+            }
+        }
+    }
+}
+
+/// The plant is an FMU.
+fn linearised(
+    source: &Source,
+    file: &Table<'_>,
+    plant: &Entry<'_>,
+) -> Result<(Model, [Vec<Signal>; 2]), PlaceError> {
+    for key in ["A", "B", "C", "D", "F_a"] {
+        if let Some(entry) = file.get(key) {
+            return Err(entry.error("an FMU is the plant; its matrices are not stated"));
+        }
+    }
+    let folder = source.path.parent().map(PathBuf::from).unwrap_or_default();
+    let mut operating_point = Vec::new();
+    if let Some(entry) = file.get("operating_point") {
+        for (name, value) in entry.table()?.entries() {
+            operating_point.push((name.to_owned(), value.number()?));
+        }
+    }
+    let states = file.get("states").map(|entry| signals(&entry, false)).transpose()?;
+    let model = Model::Fmu(PlantFmu {
+        path: folder.join(plant.text()?),
+        operating_point,
+        states: states.unwrap_or_default().into_iter().map(|signal| signal.name).collect(),
+    });
+    let actuators = file.require("actuators", "the inputs of the FMU that the controller sets")?;
+    let meaning = "the outputs of the FMU that the controller reads";
+    let measurements = file.require("measurements", meaning)?;
+    Ok((model, [signals(&actuators, true)?, signals(&measurements, false)?]))
+}
+
+/// The file states the plant's matrices.
+fn stated(file: &Table<'_>) -> Result<(Model, [Vec<Signal>; 2]), PlaceError> {
+    if let Some(entry) = file.get("operating_point") {
+        let advice = "it belongs to `plant`; with matrices, `operating` in each signal says it";
+        return Err(entry.error(advice));
+    }
+    let meaning = "the plant x' = A x + B u + F_a f_a, y = C x; or `plant`, an FMU";
+    let entry = file.require("A", meaning)?;
+    let n = entry.matrix()?.nrows();
+    let a = entry.shaped((n, n), "states x states")?;
+    let b = file.require("B", meaning)?;
+    let b = b.shaped((n, b.matrix()?.ncols()), "states x actuators")?;
+    let c = file.require("C", meaning)?;
+    let c = c.shaped((c.matrix()?.nrows(), n), "measurements x states")?;
+    if let Some(entry) = file.get("D") {
+        let d = entry.shaped((c.nrows(), b.ncols()), "measurements x actuators")?;
+        if d.amax() > 0.0 {
+            return Err(entry.error("the observer is for y = C x, so D must be zero"));
+        }
+    }
+    let f_a = file.get("F_a").map(|entry| {
+        let columns = entry.matrix()?.ncols();
+        entry.shaped((n, columns), "states x faults")
+    });
+    let states = counted(file, "states", "x", (n, "states, the rows of A"))?;
+    let actuators = counted(file, "actuators", "u", (b.ncols(), "actuators, the columns of B"))?;
+    let measurements =
+        counted(file, "measurements", "y", (c.nrows(), "measurements, the rows of C"))?;
+    let model = Model::Matrices { a, b, c, f_a: f_a.transpose()?, states };
+    Ok((model, [actuators, measurements]))
+}
+
+/// The signals under `key`, `letter` and a number for those that the file does not name.
+fn counted(
+    file: &Table<'_>,
+    key: &str,
+    letter: &str,
+    (count, meaning): (usize, &str),
+) -> Result<Vec<Signal>, PlaceError> {
+    let Some(entry) = file.get(key) else {
+        return Ok((1..=count).map(|k| Signal::named(format!("{letter}{k}"))).collect());
+    };
+    let found = signals(&entry, key == "actuators")?;
+    if found.len() == count {
+        return Ok(found);
+    }
+    Err(entry.error(format!("expected {count} {meaning}, found {}", found.len())))
+}
+
+/// `actuator_faults = "all"`, and those under `[[faults]]`.
+fn all_faults(
+    file: &Table<'_>,
+    actuators: &[Signal],
+    measurements: &[Signal],
+) -> Result<Vec<Fault>, PlaceError> {
+    let mut found = Vec::new();
+    if let Some(entry) = file.get("actuator_faults") {
+        match entry.text()? {
+            "all" => found.extend(all_actuator_faults(actuators, &entry.place)),
+            other => return Err(entry.error(format!("expected \"all\", found {other:?}"))),
+        }
+    }
+    if let Some(entry) = file.get("faults") {
+        found.extend(faults(&entry, actuators, measurements)?);
+    } else if let Some(entry) = file.get("F_a") {
+        let unnamed = |k: usize| Fault {
+            name: format!("f{k}"),
+            entrance: Entrance::Column(k - 1),
+            ..Fault::constant(&entry.place)
+        };
+        found.extend((1..=entry.matrix()?.ncols()).map(unnamed));
+    }
+    if found.is_empty() {
+        let message =
+            "no fault is stated: expected `F_a`, `actuator_faults = \"all\"` or [[faults]]";
+        return Err(file.source.error(&file.place, message));
+    }
+    Ok(found)
+}
+
+fn sampling(file: &Table<'_>) -> Result<Option<Sampling>, PlaceError> {
+    let estimator = file.get("estimator");
+    let Some(entry) = file.get("sample_time") else {
+        return match estimator {
+            Some(entry) => Err(entry.error("the design has no `sample_time`")),
+            None => Ok(None),
+        };
+    };
+    let current = match &estimator {
+        None => true,
+        Some(entry) => match entry.text()? {
+            "current" => true,
+            "prediction" => false,
+            other => {
+                let expected = "expected \"current\" or \"prediction\"";
+                return Err(entry.error(format!("{expected}, found {other:?}")));
+            }
+        },
+    };
+    Ok(Some(Sampling { period: entry.positive()?, current }))
+}
+
+/// The rates of the measurement filter that sensor faults need.
+fn filter(
+    file: &Table<'_>,
+    measurements: &[Signal],
+    faults: &[Fault],
+) -> Result<Option<Vec<f64>>, PlaceError> {
+    let sensor = faults.iter().find(|fault| matches!(fault.entrance, Entrance::Sensor(_)));
+    match (file.get("filter"), sensor) {
+        (None, None) => Ok(None),
+        (None, Some(fault)) => {
+            let name = &fault.name;
+            let message = format!(
+                "sensor fault `{name}` needs `filter`: the rates, in 1/s, of the filter that the \
+                 measurements pass"
+            );
+            Err(file.source.error(&fault.place, message))
+        }
+        (Some(entry), None) => Err(entry.error("no fault enters a sensor, so none is needed")),
+        (Some(entry), Some(_)) if !entry.is_list() => {
+            Ok(Some(vec![entry.positive()?; measurements.len()]))
+        }
+        (Some(entry), Some(_)) => {
+            let members = entry.list()?;
+            let (expected, found) = (measurements.len(), members.len());
+            if found != expected {
+                let message =
+                    format!("expected {expected} rates, one per measurement, found {found}");
+                return Err(entry.error(message));
+            }
+            members.iter().map(Entry::positive).collect::<Result<_, _>>().map(Some)
+        }
+    }
+}

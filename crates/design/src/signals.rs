@@ -1,0 +1,289 @@
+//! The signals of a plant file: states, actuators, measurements, faults.
+
+use fmu_description::unit::Unit;
+
+use files::{Entry, Place, PlaceError, Table};
+
+/// A state, an actuator or a measurement.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Signal {
+    pub(crate) name: String,
+    pub(crate) unit: Option<String>,
+    pub(crate) description: String,
+    /// Its value at the operating point, where the file states one.
+    pub(crate) operating: Option<f64>,
+    /// The smallest and the largest value, of an actuator.
+    pub(crate) limits: Option<[f64; 2]>,
+}
+
+impl Signal {
+    /// A signal of which only the name is known.
+    pub(crate) fn named(name: String) -> Self {
+        Self { name, unit: None, description: String::new(), operating: None, limits: None }
+    }
+
+    /// The same, with what `other` knows where this one says nothing.
+    pub(crate) fn or(self, other: Self) -> Self {
+        Self {
+            unit: self.unit.or(other.unit),
+            operating: self.operating.or(other.operating),
+            ..self
+        }
+    }
+}
+
+/// How a fault changes in time, as the observer assumes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Course {
+    /// f' = 0.
+    Constant,
+    /// f'' = 0.
+    Ramp,
+}
+
+/// Where a fault enters the plant.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Entrance {
+    /// Column of F_a, from 0.
+    Column(usize),
+    /// It adds to the command of this actuator, from 0.
+    Actuator(usize),
+    /// It adds to this measurement, from 0.
+    Sensor(usize),
+    /// This actuator, from 0, loses a part of its command; the part is estimated where the command is well above `least_command`.
+    Loss { actuator: usize, least_command: f64 },
+    /// This input of the plant's FMU.
+    Input(String),
+}
+
+/// A fault.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Fault {
+    pub(crate) name: String,
+    pub(crate) unit: Option<String>,
+    pub(crate) description: String,
+    pub(crate) course: Course,
+    pub(crate) entrance: Entrance,
+    /// Largest absolute value.
+    pub(crate) bound: Option<f64>,
+    /// Largest absolute rate, per s.
+    pub(crate) rate_bound: Option<f64>,
+    /// Largest sudden change.
+    pub(crate) step: Option<f64>,
+    pub(crate) place: Place,
+}
+
+const SIGNAL: [&str; 4] = ["name", "unit", "description", "operating"];
+const ACTUATOR: [&str; 5] = ["name", "unit", "description", "operating", "limits"];
+const FAULT: [&str; 12] = [
+    "name",
+    "unit",
+    "description",
+    "kind",
+    "actuator",
+    "sensor",
+    "loss_of",
+    "least_command",
+    "input",
+    "bound",
+    "rate_bound",
+    "step",
+];
+
+/// The signals under `key`: texts that are names, or tables.
+pub(crate) fn signals(entry: &Entry<'_>, limited: bool) -> Result<Vec<Signal>, PlaceError> {
+    let members = entry.list()?;
+    if members.is_empty() {
+        return Err(entry.error("expected at least one"));
+    }
+    let mut found: Vec<Signal> = Vec::with_capacity(members.len());
+    for member in &members {
+        let signal = signal(member, limited)?;
+        if found.iter().any(|other| other.name == signal.name) {
+            return Err(member.error(format!("the name `{}` is there twice", signal.name)));
+        }
+        found.push(signal);
+    }
+    Ok(found)
+}
+
+fn signal(entry: &Entry<'_>, limited: bool) -> Result<Signal, PlaceError> {
+    if entry.is_text() {
+        return Ok(Signal::named(name(entry)?));
+    }
+    let table = entry.table()?;
+    table.allow(if limited { &ACTUATOR } else { &SIGNAL })?;
+    Ok(Signal {
+        name: name(&table.require("name", "the name of the signal")?)?,
+        unit: unit(&table)?,
+        description: description(&table)?,
+        operating: table.get("operating").map(|entry| entry.number()).transpose()?,
+        limits: table.get("limits").map(|entry| limits(&entry)).transpose()?,
+    })
+}
+
+fn name(entry: &Entry<'_>) -> Result<String, PlaceError> {
+    match entry.text()? {
+        "" => Err(entry.error("expected a name, found an empty text")),
+        name => Ok(name.to_owned()),
+    }
+}
+
+fn description(table: &Table<'_>) -> Result<String, PlaceError> {
+    let text = table.get("description").map(|entry| entry.text().map(str::to_owned));
+    Ok(text.transpose()?.unwrap_or_default())
+}
+
+fn unit(table: &Table<'_>) -> Result<Option<String>, PlaceError> {
+    let Some(entry) = table.get("unit") else {
+        return Ok(None);
+    };
+    let text = entry.text()?;
+    match Unit::parse(text) {
+        Ok(_) => Ok(Some(text.to_owned())),
+        Err(error) => Err(entry.error(error)),
+    }
+}
+
+fn limits(entry: &Entry<'_>) -> Result<[f64; 2], PlaceError> {
+    match entry.numbers()?.as_slice() {
+        &[low, high] if low < high => Ok([low, high]),
+        &[low, high] => Err(entry.error(format!("expected lower < upper, found {low} and {high}"))),
+        other => {
+            Err(entry.error(format!("expected 2 numbers, lower and upper, found {}", other.len())))
+        }
+    }
+}
+
+/// The faults under `[[faults]]`; those that say nothing else take the columns of F_a in turn.
+pub(crate) fn faults(
+    entry: &Entry<'_>,
+    actuators: &[Signal],
+    measurements: &[Signal],
+) -> Result<Vec<Fault>, PlaceError> {
+    let members = entry.list()?;
+    if members.is_empty() {
+        return Err(entry.error("expected at least one fault"));
+    }
+    let mut found: Vec<Fault> = Vec::with_capacity(members.len());
+    for member in &members {
+        let columns = found.iter().filter(|fault| matches!(fault.entrance, Entrance::Column(_)));
+        let fault = fault(member, actuators, measurements, columns.count())?;
+        if found.iter().any(|other| other.name == fault.name) {
+            return Err(member.error(format!("the name `{}` is there twice", fault.name)));
+        }
+        found.push(fault);
+    }
+    Ok(found)
+}
+
+fn fault(
+    entry: &Entry<'_>,
+    actuators: &[Signal],
+    measurements: &[Signal],
+    column: usize,
+) -> Result<Fault, PlaceError> {
+    let table = entry.table()?;
+    table.allow(&FAULT)?;
+    let number = |key: &str| table.get(key).map(|entry| entry.positive()).transpose();
+    let entrance = entrance(&table, actuators, measurements, column)?;
+    let own_unit = unit(&table)?;
+    let unit = own_unit.or_else(|| match entrance {
+        Entrance::Actuator(at) | Entrance::Loss { actuator: at, .. } => actuators[at].unit.clone(),
+        Entrance::Sensor(at) => measurements[at].unit.clone(),
+        Entrance::Column(_) | Entrance::Input(_) => None,
+    });
+    Ok(Fault {
+        name: name(&table.require("name", "the name of the fault")?)?,
+        unit,
+        description: description(&table)?,
+        course: course(&table)?,
+        entrance,
+        bound: number("bound")?,
+        rate_bound: number("rate_bound")?,
+        step: number("step")?,
+        place: entry.place.clone(),
+    })
+}
+
+fn course(table: &Table<'_>) -> Result<Course, PlaceError> {
+    let Some(entry) = table.get("kind") else {
+        return Ok(Course::Constant);
+    };
+    match entry.text()? {
+        "constant" => Ok(Course::Constant),
+        "ramp" => Ok(Course::Ramp),
+        other => Err(entry.error(format!("expected \"constant\" or \"ramp\", found {other:?}"))),
+    }
+}
+
+fn entrance(
+    table: &Table<'_>,
+    actuators: &[Signal],
+    measurements: &[Signal],
+    column: usize,
+) -> Result<Entrance, PlaceError> {
+    let keys = ["actuator", "sensor", "loss_of", "input"];
+    let stated: Vec<_> = keys.iter().filter_map(|key| table.get(key)).collect();
+    if let [_, second, ..] = stated.as_slice() {
+        return Err(second.error(format!("a fault has only one of {}", keys.join(", "))));
+    }
+    let least_command = table.get("least_command");
+    if let Some(actuator) = table.get("loss_of") {
+        let at = position(&actuator, actuators, "actuator")?;
+        let meaning = "the command, in its unit, below which no loss of effectiveness is estimated";
+        let least_command = table.require("least_command", meaning)?.positive()?;
+        return Ok(Entrance::Loss { actuator: at, least_command });
+    }
+    if let Some(entry) = least_command {
+        return Err(entry.error("this belongs to a fault with `loss_of`"));
+    }
+    if let Some(actuator) = table.get("actuator") {
+        return Ok(Entrance::Actuator(position(&actuator, actuators, "actuator")?));
+    }
+    if let Some(sensor) = table.get("sensor") {
+        return Ok(Entrance::Sensor(position(&sensor, measurements, "measurement")?));
+    }
+    match table.get("input") {
+        Some(input) => Ok(Entrance::Input(name(&input)?)),
+        None => Ok(Entrance::Column(column)),
+    }
+}
+
+/// Which of `signals` the entry names.
+fn position(entry: &Entry<'_>, signals: &[Signal], what: &str) -> Result<usize, PlaceError> {
+    let text = entry.text()?;
+    signals.iter().position(|signal| signal.name == text).ok_or_else(|| {
+        let names: Vec<_> = signals.iter().map(|signal| signal.name.as_str()).collect();
+        entry.error(format!("no {what} is named {text:?}; there are {}", names.join(", ")))
+    })
+}
+
+/// One fault on each actuator.
+pub(crate) fn all_actuator_faults(actuators: &[Signal], place: &Place) -> Vec<Fault> {
+    let fault = |(at, actuator): (usize, &Signal)| Fault {
+        name: format!("f_{}", actuator.name),
+        unit: actuator.unit.clone(),
+        description: format!("fault of {}", actuator.name),
+        entrance: Entrance::Actuator(at),
+        ..Fault::constant(place)
+    };
+    actuators.iter().enumerate().map(fault).collect()
+}
+
+impl Fault {
+    /// A constant fault on the first column of F_a of which nothing else is known.
+    pub(crate) fn constant(place: &Place) -> Self {
+        Self {
+            name: String::new(),
+            unit: None,
+            description: String::new(),
+            course: Course::Constant,
+            entrance: Entrance::Column(0),
+            bound: None,
+            rate_bound: None,
+            step: None,
+            place: place.clone(),
+        }
+    }
+}

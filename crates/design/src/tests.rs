@@ -1,0 +1,249 @@
+//! What a plant file may say, and where errors in it point.
+
+use std::path::Path;
+
+use nalgebra::Complex;
+
+use super::checks::checks;
+use super::designed::design;
+use super::plant_file::{Model, PlantFile};
+use super::signals::{Course, Entrance};
+use super::wanted::{Region, Wanted};
+use files::{Source, Table};
+
+const MASS: &str = r#"A = [[0, 1], [0, 0]]
+B = [[0], [1]]
+C = [[1, 0]]
+actuator_faults = "all"
+feedback.eigenvalues = [-1, -2]
+observer.eigenvalues = [-5, { re = -6, im = 2.5 }]
+"#;
+
+/// What is replaced in `MASS`, by what, and a part of the error.
+const REFUSALS: [(&str, &str, &str); 34] = [
+    (
+        "A = [[0, 1], [0, 0]]",
+        "A = [[0, 1], [0]]",
+        "1:14: A[2]: expected 2 entries as in row 1, found 1",
+    ),
+    ("A = [[0, 1], [0, 0]]", "A = [[0, 1]]", "1:5: A: expected 1x1 (states x states), found 1x2"),
+    ("[0, 0]]", "[0, nan]]", "1:18: A[2][2]: expected a finite number, found nan"),
+    ("[0], [1]", "[0], [1], [2]", "2:5: B: expected 2x1 (states x actuators), found 3x1"),
+    ("[[1, 0]]", "[[1, 0, 0]]", "3:5: C: expected 1x2 (measurements x states), found 1x3"),
+    ("C = ", "D = [[1]]\nC = ", "3:5: D: the observer is for y = C x, so D must be zero"),
+    ("\"all\"", "\"both\"", "4:19: actuator_faults: expected \"all\", found \"both\""),
+    ("observer", "obsever", "6:1: unknown entry `obsever`; did you mean `observer`?"),
+    ("feedback", "something", "5:1: unknown entry `something`; expected one of description, "),
+    (
+        "feedback.eigenvalues = [-1, -2]",
+        "",
+        "1:1: `feedback` is missing: what is wanted of A + B K_x",
+    ),
+    (
+        "feedback.eigenvalues = [-1, -2]",
+        "feedback.Q = [1, 1]",
+        "`feedback.R` is missing: the weight of",
+    ),
+    (
+        "feedback.eigenvalues = [-1, -2]",
+        "feedback.h_infinity = \"least\"",
+        "5:23: feedback.h_infinity: \"least\" needs a `region` with a disc",
+    ),
+    (
+        "feedback.eigenvalues = [-1, -2]",
+        "sample_time = 1\nfeedback.region = { decay = 1, sector = 30 }",
+        "6:41: feedback.region.sector: a sampled design has a region by `decay` only",
+    ),
+    (
+        "feedback.eigenvalues = [-1, -2]",
+        "feedback.region = {}",
+        "5:19: feedback.region: expected at least one of decay",
+    ),
+    (
+        "feedback.eigenvalues = [-1, -2]",
+        "feedback.region = { sector = 95 }",
+        "expected less than 90 degrees, found 95",
+    ),
+    ("feedback.", "feedback.Q = [1, 1]\nfeedback.", "5:14: feedback.Q: only one of eigenvalues, "),
+    (
+        "feedback.",
+        "feedback.sampled_",
+        "5:32: feedback.sampled_eigenvalues: the design has no `sample_time`",
+    ),
+    ("im = 2.5", "im = -2.5", "expected a number above 0, found -2.5"),
+    ("C = ", "sample_time = 0\nC = ", "3:15: sample_time: expected a number above 0, found 0"),
+    ("C = ", "estimator = \"current\"\nC = ", "3:13: estimator: the design has no `sample_time`"),
+    ("C = ", "filter = 3\nC = ", "3:10: filter: no fault enters a sensor, so none is needed"),
+    ("C = ", "F_a = [[0], [1]]\nfaults = []\nC = ", "4:10: faults: expected at least one fault"),
+    (
+        "C = ",
+        "faults = [{ name = \"f\" }]\nC = ",
+        "3:11: fault `f`: expected `actuator`, `sensor` or `loss_of`, or a matrix F_a",
+    ),
+    (
+        "C = ",
+        "F_a = [[0, 1], [1, 0]]\nfaults = [{ name = \"f\" }]\nC = ",
+        "3:7: F_a: expected 1 columns, one per fault, found 2",
+    ),
+    (
+        "C = ",
+        "faults = [{ name = \"f\", sensor = \"y\" }]\nC = ",
+        "no measurement is named \"y\"; there are y1",
+    ),
+    (
+        "C = ",
+        "faults = [{ name = \"f\", sensor = \"y1\" }]\nC = ",
+        "3:11: sensor fault `f` needs `filter`",
+    ),
+    (
+        "C = ",
+        "faults = [{ name = \"f\", loss_of = \"u1\" }]\nC = ",
+        "`faults[1].least_command` is missing: the command, in its unit",
+    ),
+    (
+        "C = ",
+        "faults = [{ name = \"f\", sensor = \"y1\", loss_of = \"u1\" }]\nC = ",
+        "a fault has only one of actuator, sensor, loss_of, input",
+    ),
+    ("C = ", "states = [\"p\", \"p\"]\nC = ", "3:16: states[2]: the name `p` is there twice"),
+    ("C = ", "states = [\"p\"]\nC = ", "3:10: states: expected 2 states, the rows of A, found 1"),
+    (
+        "C = ",
+        "actuators = [{ name = \"u\", limits = [2, 1] }]\nC = ",
+        "expected lower < upper, found 2 and 1",
+    ),
+    ("C = ", "actuators = [{ name = \"u\", unit = \"N m!\" }]\nC = ", "actuators[1].unit: "),
+    ("C = ", "operating_point = { x = 1 }\nC = ", "3:19: operating_point: it belongs to `plant`"),
+    ("C = ", "plant = \"P.fmu\"\nC = ", "1:5: A: an FMU is the plant; its matrices are not stated"),
+];
+
+fn read<T>(text: &str, look: impl Fn(&PlantFile<'_>) -> T) -> Result<T, String> {
+    let source = Source::new(Path::new("plant.toml"), text.to_owned());
+    let parsed = source.parse().map_err(|error| error.to_string())?;
+    let file = PlantFile::read(&source, &Table::whole(&source, &parsed));
+    file.map(|file| look(&file)).map_err(|error| error.to_string())
+}
+
+/// The first line of the error for `MASS` with `from` replaced by `to`.
+fn refusal(from: &str, to: &str) -> String {
+    assert!(MASS.contains(from), "{from}");
+    let message = read(&MASS.replacen(from, to, 1), |_| ()).unwrap_err();
+    message.lines().next().unwrap().to_owned()
+}
+
+#[test]
+fn signals_that_are_not_named_get_a_letter_and_a_number() {
+    let names = read(MASS, |file| {
+        let Model::Matrices { states, .. } = &file.model else { panic!("matrices") };
+        let signals = states.iter().chain(&file.actuators).chain(&file.measurements);
+        let faults = file.faults.iter().map(|fault| fault.name.clone());
+        signals.map(|signal| signal.name.clone()).chain(faults).collect::<Vec<_>>()
+    });
+    assert_eq!(names.unwrap(), ["x1", "x2", "u1", "y1", "f_u1"]);
+}
+
+#[test]
+fn a_pair_of_complex_eigenvalues_counts_twice() {
+    let wanted = read(MASS, |file| file.observer.wanted.clone()).unwrap();
+    let pair = [Complex::new(-6.0, 2.5), Complex::new(-6.0, -2.5)];
+    assert_eq!(wanted, Wanted::Eigenvalues(vec![Complex::new(-5.0, 0.0), pair[0], pair[1]]));
+}
+
+#[test]
+fn an_error_shows_the_line_and_underlines_the_value() {
+    let message = read(&MASS.replace("[0, 0]]", "[0, zero]]"), |_| ()).unwrap_err();
+    let lines: Vec<_> = message.lines().collect();
+    assert!(lines[0].starts_with("plant.toml:1:18: "), "{message}");
+    let message = read(&MASS.replace("[0], [1]", "[0], [\"ü\"]"), |_| ()).unwrap_err();
+    let expected = "plant.toml:2:12: B[2][1]: expected a number, found the text \"ü\"\n  \
+                    |\n2 | B = [[0], [\"ü\"]]\n  |            ^^^";
+    assert_eq!(message, expected);
+}
+
+#[test]
+fn each_error_says_where_and_what_was_expected_and_found() {
+    for (from, to, expected) in REFUSALS {
+        let message = refusal(from, to);
+        assert!(message.contains(expected), "{to}: {message}");
+        assert!(message.starts_with("plant.toml:"), "{message}");
+    }
+}
+
+#[test]
+fn faults_enter_where_the_file_says() {
+    let more = r#"
+filter = [50]
+F_a = [[1], [1]]
+[[faults]]
+name = "own"
+[[faults]]
+name = "sensor"
+sensor = "y1"
+kind = "ramp"
+[[faults]]
+name = "loss"
+loss_of = "u1"
+least_command = 0.1
+bound = 1
+"#;
+    let faults = read(&(MASS.to_owned() + more), |file| file.faults.clone()).unwrap();
+    let entrances: Vec<_> = faults.iter().map(|fault| fault.entrance.clone()).collect();
+    let loss = Entrance::Loss { actuator: 0, least_command: 0.1 };
+    assert_eq!(entrances, [Entrance::Actuator(0), Entrance::Column(0), Entrance::Sensor(0), loss]);
+    assert_eq!(faults[2].course, Course::Ramp);
+    assert_eq!((faults[3].bound, faults[3].rate_bound), (Some(1.0), None));
+}
+
+#[test]
+fn a_region_is_wanted_alone_or_with_a_norm() {
+    let region = Region { decay: Some(3.0), disc: Some((-10.0, 9.0)), sector: Some(45.0) };
+    let text = "region = { decay = 3, disc = { center = -10, radius = 9 }, sector = 45 }";
+    let alone = MASS.replace("feedback.eigenvalues = [-1, -2]", &format!("feedback.{text}"));
+    assert_eq!(read(&alone, |file| file.feedback.wanted.clone()).unwrap(), Wanted::Region(region));
+    let norm = alone.replace("feedback.region", "feedback.h_infinity = \"least\"\nfeedback.region");
+    let wanted = Wanted::HInfinity { bound: None, region };
+    assert_eq!(read(&norm, |file| file.feedback.wanted.clone()).unwrap(), wanted);
+}
+
+#[test]
+fn an_fmu_stands_for_the_matrices_and_lies_beside_the_file() {
+    let text = r#"
+plant = "Plant.fmu"
+actuators = ["u"]
+measurements = [{ name = "phi", unit = "rad" }]
+operating_point = { "tau.c" = 0, phi = 0.5 }
+faults = [{ name = "f", input = "tau_f" }]
+feedback.Q = [1, 1]
+feedback.R = [[2]]
+observer.region = { decay = 20 }
+"#;
+    let (path, point) = read(text, |file| {
+        let Model::Fmu(own) = &file.model else { panic!("an FMU") };
+        (own.path.clone(), own.operating_point.clone())
+    })
+    .unwrap();
+    assert_eq!(path, Path::new("Plant.fmu"));
+    assert_eq!(point, [("phi".to_owned(), 0.5), ("tau.c".to_owned(), 0.0)]);
+}
+
+/// The pendulum sampled at 5 ms by a prediction estimator of a ramp; without estimating the friction
+/// its observer has the spectral radius 1.082 (numpy), and the pendulum falls at once.
+#[test]
+fn an_observer_that_is_unstable_before_t_on_fails_a_check_unless_it_estimates_from_the_start() {
+    let pendulum = include_str!("../../../fmu-controller/pendulum.toml")
+        .replace("bound = 30.0", "kind = \"ramp\"\nbound = 30.0")
+        .replace("-3000.0]", "-3000.0, -2500.0]")
+        .replace("t_on = 40.0", "t_on = 40.0\nsample_time = 0.005\nestimator = \"prediction\"");
+    let failed = |text: &str| {
+        read(text, |file| {
+            let checks = checks(&design(file).unwrap());
+            let failed = checks.into_iter().filter(|check| !check.holds);
+            failed.map(|check| (check.condition, check.value.unwrap())).collect::<Vec<_>>()
+        })
+        .unwrap()
+    };
+    let [(condition, value)] = &failed(&pendulum)[..] else { panic!("one check fails") };
+    assert!(condition.contains("before t_on"), "{condition}");
+    assert!((value - 0.082).abs() < 5e-4, "{value}");
+    assert!(failed(&pendulum.replace("monitor = false", "monitor = true")).is_empty());
+}

@@ -1,0 +1,215 @@
+//! What a plant file wants of feedback and observer.
+
+use crate::matrix::MatrixEntry as _;
+use nalgebra::{Complex, DMatrix};
+
+use files::{Entry, Place, PlaceError, Table};
+
+/// What is wanted of a gain.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Wanted {
+    /// These eigenvalues of the continuous loop, 1/s; a sampled one gets e^(p T).
+    Eigenvalues(Vec<Complex<f64>>),
+    /// These eigenvalues of the sampled loop.
+    SampledEigenvalues(Vec<Complex<f64>>),
+    /// Eigenvalues in a region.
+    Region(Region),
+    /// The least integral of x'Q x + u'R u, or the least variance for noise of intensity W and V.
+    Weights { states: DMatrix<f64>, channels: DMatrix<f64> },
+    /// The least H-infinity norm, or one below a bound; eigenvalues in a region as well.
+    HInfinity { bound: Option<f64>, region: Region },
+}
+
+/// A region of the left half plane; the intersection of what is stated.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Region {
+    /// Real parts below minus this, 1/s.
+    pub(crate) decay: Option<f64>,
+    /// Centre and radius, 1/s.
+    pub(crate) disc: Option<(f64, f64)>,
+    /// Largest angle from the negative real axis, in degrees.
+    pub(crate) sector: Option<f64>,
+}
+
+/// What is wanted, and where the file says so.
+#[derive(Clone, Debug)]
+pub(crate) struct Request {
+    pub(crate) wanted: Wanted,
+    pub(crate) place: Place,
+    /// Of the second weight and its name.
+    pub(crate) other: Option<(String, Place)>,
+}
+
+const KEYS: [&str; 4] = ["eigenvalues", "sampled_eigenvalues", "region", "h_infinity"];
+
+/// Reads `[feedback]` (weights Q, R) or `[observer]` (weights W, V).
+pub(crate) fn request(
+    table: &Table<'_>,
+    weights: [&str; 2],
+    sampled: bool,
+) -> Result<Request, PlaceError> {
+    let mut known = KEYS.to_vec();
+    known.extend(weights);
+    table.allow(&known)?;
+    let region = table.get("region");
+    if let Some(entry) = region.as_ref().filter(|_| sampled) {
+        refuse_unsampled(entry)?;
+    }
+    let Some(one) = only_one(table, weights[0])? else {
+        let Some(entry) = region else {
+            let message = format!("expected one of {}", known.join(", "));
+            return Err(table.source.error(&table.place, message));
+        };
+        let wanted = Wanted::Region(self::region(&entry)?);
+        return Ok(Request { wanted, place: entry.place, other: None });
+    };
+    if one.name.ends_with(".h_infinity") {
+        let region = region.as_ref().map(self::region).transpose()?.unwrap_or_default();
+        let wanted = Wanted::HInfinity { bound: bound(&one, region)?, region };
+        return Ok(Request { wanted, place: one.place, other: None });
+    }
+    if let Some(entry) = region {
+        return Err(entry.error("a region goes alone or with `h_infinity`"));
+    }
+    if one.name.ends_with(".eigenvalues") {
+        let wanted = Wanted::Eigenvalues(stable(&one, false)?);
+        return Ok(Request { wanted, place: one.place, other: None });
+    }
+    if one.name.ends_with(".sampled_eigenvalues") {
+        if !sampled {
+            return Err(one.error("the design has no `sample_time`"));
+        }
+        let wanted = Wanted::SampledEigenvalues(stable(&one, true)?);
+        return Ok(Request { wanted, place: one.place, other: None });
+    }
+    let other = table.require(weights[1], "the weight of the other signals")?;
+    let wanted = Wanted::Weights { states: weight(&one)?, channels: weight(&other)? };
+    let other = Some((weights[1].to_owned(), other.place));
+    Ok(Request { wanted, place: one.place, other })
+}
+
+/// The shape of a disc or a sector is lost between the planes of s and z; a decay rate is not.
+fn refuse_unsampled(region: &Entry<'_>) -> Result<(), PlaceError> {
+    let table = region.table()?;
+    match ["disc", "sector"].iter().find_map(|key| table.get(key)) {
+        Some(entry) => Err(entry.error("a sampled design has a region by `decay` only")),
+        None => Ok(()),
+    }
+}
+
+/// The one method that the table states beside a region.
+fn only_one<'a>(table: &Table<'a>, weight: &str) -> Result<Option<Entry<'a>>, PlaceError> {
+    let keys = ["eigenvalues", "sampled_eigenvalues", "h_infinity", weight];
+    let mut stated = keys.iter().filter_map(|key| table.get(key));
+    let first = stated.next();
+    match stated.next() {
+        Some(second) => {
+            let keys = keys.join(", ");
+            Err(second.error(format!("only one of {keys} can be wanted")))
+        }
+        None => Ok(first),
+    }
+}
+
+/// Eigenvalues of a stable loop.
+fn stable(entry: &Entry<'_>, sampled: bool) -> Result<Vec<Complex<f64>>, PlaceError> {
+    let found = eigenvalues(entry)?;
+    let unstable =
+        |value: &&Complex<f64>| if sampled { value.norm() >= 1.0 } else { value.re >= 0.0 };
+    match found.iter().find(unstable) {
+        None => Ok(found),
+        Some(value) => {
+            let rule = if sampled { "a modulus below 1" } else { "a real part below 0" };
+            let shown = if value.im == 0.0 { value.re.to_string() } else { value.to_string() };
+            Err(entry
+                .error(format!("the loop would not be stable: expected {rule}, found {shown}")))
+        }
+    }
+}
+
+/// Numbers, or `{ re = -3.0, im = 4.0 }` for a pair of complex conjugates.
+fn eigenvalues(entry: &Entry<'_>) -> Result<Vec<Complex<f64>>, PlaceError> {
+    let mut found = Vec::new();
+    for member in entry.list()? {
+        if !member.is_table() {
+            found.push(Complex::new(member.number()?, 0.0));
+            continue;
+        }
+        let table = member.table()?;
+        table.allow(&["re", "im"])?;
+        let re = table.require("re", "the real part")?.number()?;
+        let im = table.require("im", "the imaginary part")?.positive()?;
+        found.extend([Complex::new(re, im), Complex::new(re, -im)]);
+    }
+    Ok(found)
+}
+
+fn region(entry: &Entry<'_>) -> Result<Region, PlaceError> {
+    let table = entry.table()?;
+    table.allow(&["decay", "disc", "sector"])?;
+    let decay = table.get("decay").map(|entry| entry.positive()).transpose()?;
+    let sector = table.get("sector").map(|entry| angle(&entry)).transpose()?;
+    let disc = table.get("disc").map(|entry| disc(&entry)).transpose()?;
+    if decay.is_none() && sector.is_none() && disc.is_none() {
+        return Err(entry.error("expected at least one of decay, disc, sector"));
+    }
+    Ok(Region { decay, disc, sector })
+}
+
+/// An angle between 0 and 90 degrees.
+fn angle(entry: &Entry<'_>) -> Result<f64, PlaceError> {
+    match entry.positive()? {
+        degrees if degrees < 90.0 => Ok(degrees),
+        degrees => Err(entry.error(format!("expected less than 90 degrees, found {degrees}"))),
+    }
+}
+
+fn disc(entry: &Entry<'_>) -> Result<(f64, f64), PlaceError> {
+    let table = entry.table()?;
+    table.allow(&["center", "radius"])?;
+    let center = table.require("center", "a point of the real axis, 1/s")?;
+    let radius = table.require("radius", "in 1/s")?.positive()?;
+    match center.number()? {
+        number if number < radius => Ok((number, radius)),
+        number => Err(center.error(format!(
+            "the disc from {} to {} does not reach the left half plane",
+            number - radius,
+            number + radius
+        ))),
+    }
+}
+
+/// A bound of the norm, or the text "least".
+fn bound(entry: &Entry<'_>, region: Region) -> Result<Option<f64>, PlaceError> {
+    if !entry.is_text() {
+        return entry.positive().map(Some);
+    }
+    match entry.text()? {
+        "least" if region.disc.is_some() => Ok(None),
+        "least" => Err(entry.error(
+            "\"least\" needs a `region` with a disc: without one, ever larger gains lower the norm \
+             without end",
+        )),
+        other => Err(entry.error(format!("expected a number or \"least\", found {other:?}"))),
+    }
+}
+
+/// A symmetric matrix, or a list of numbers for a diagonal one.
+fn weight(entry: &Entry<'_>) -> Result<DMatrix<f64>, PlaceError> {
+    let members = entry.list()?;
+    if members.iter().any(Entry::is_list) {
+        let matrix = entry.matrix()?;
+        if matrix.is_square() && matrix == matrix.transpose() {
+            return Ok(matrix);
+        }
+        return Err(entry.error("expected a symmetric matrix"));
+    }
+    let mut diagonal = Vec::with_capacity(members.len());
+    for member in &members {
+        match member.number()? {
+            number if number >= 0.0 => diagonal.push(number),
+            number => return Err(member.error(format!("expected no less than 0, found {number}"))),
+        }
+    }
+    Ok(DMatrix::from_diagonal(&diagonal.into()))
+}

@@ -1,0 +1,290 @@
+//! From values to places on the page, and the round numbers along an axis.
+
+/// Beyond this magnitude a value is only "very large": sums of two such values stay finite.
+const HUGE: f64 = 1e300;
+
+/// How values are spread along an axis.
+#[derive(Debug, Clone, Copy)]
+enum Scale {
+    Linear,
+    /// All decades are equally long; only values above zero have a place.
+    Logarithmic,
+    /// Linear up to this magnitude; beyond it, on both sides, decades of that length.
+    Symmetric(f64),
+}
+
+impl Scale {
+    fn stretch(self, value: f64) -> f64 {
+        match self {
+            Self::Linear => value,
+            Self::Logarithmic => value.log10(),
+            Self::Symmetric(knee) => {
+                let size = (value / knee).abs();
+                value.signum() * if size <= 1.0 { size } else { 1.0 + size.log10() }
+            }
+        }
+    }
+}
+
+/// An axis from an interval of values to an interval of the page.
+#[derive(Debug)]
+pub struct Axis {
+    scale: Scale,
+    low: f64,
+    high: f64,
+    pixels: (f64, f64),
+    /// About as many ticks as look well.
+    ticks: u8,
+}
+
+impl Axis {
+    /// The axis ends where the interval ends; one that is empty or not finite becomes usable.
+    pub fn exact((low, high): (f64, f64), pixels: (f64, f64), ticks: u8) -> Self {
+        let (low, high) = if low <= high && low.is_finite() && high.is_finite() {
+            (low.clamp(-HUGE, HUGE), high.clamp(-HUGE, HUGE))
+        } else {
+            (0.0, 1.0)
+        };
+        let size = low.abs().max(high.abs());
+        let widening = if high - low > 1e-9 * size {
+            0.0
+        } else if size > 0.0 {
+            0.1 * size
+        } else {
+            1.0
+        };
+        let (low, high) = (low - widening, high + widening);
+        Self { scale: Scale::Linear, low, high, pixels, ticks }
+    }
+
+    /// An axis of decades between two values above zero; others become usable.
+    pub fn logarithmic((low, high): (f64, f64), pixels: (f64, f64), ticks: u8) -> Self {
+        let usable = low > 0.0 && low < high && high < HUGE;
+        let (low, high) = if usable { (low, high) } else { (0.1, 10.0) };
+        Self { scale: Scale::Logarithmic, low, high, pixels, ticks }
+    }
+
+    /// An axis that is linear between minus and plus `knee`, with decades beyond.
+    pub fn symmetric(ends: (f64, f64), knee: f64, pixels: (f64, f64), ticks: u8) -> Self {
+        Self { scale: Scale::Symmetric(knee), ..Self::exact(ends, pixels, ticks) }
+    }
+
+    /// An axis with some air around finite values, up to a cap of their magnitude.
+    pub fn around(
+        values: impl Iterator<Item = f64>,
+        cap: Option<f64>,
+        pixels: (f64, f64),
+        ticks: u8,
+    ) -> Self {
+        let cap = cap.unwrap_or(HUGE).abs();
+        let ends = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+            let value = value.clamp(-cap, cap);
+            (low.min(value), high.max(value))
+        });
+        let tight = Self::exact(ends, pixels, ticks);
+        let air = 0.06 * (tight.high - tight.low);
+        Self { low: tight.low - air, high: tight.high + air, ..tight }
+    }
+
+    /// The range of the values.
+    pub fn range(&self) -> (f64, f64) {
+        (self.low, self.high)
+    }
+
+    /// The positions of both ends of the range.
+    pub fn pixels(&self) -> (f64, f64) {
+        self.pixels
+    }
+
+    /// Whether a value is in the range.
+    pub fn contains(&self, value: f64) -> bool {
+        (self.low..=self.high).contains(&value)
+    }
+
+    /// The place of a value on the page; a value far outside stops one axis length outside.
+    pub fn place(&self, value: f64) -> f64 {
+        let [low, high, value] = [self.low, self.high, value].map(|end| self.scale.stretch(end));
+        let share = (value - low) / (high - low);
+        let (first, last) = self.pixels;
+        first + share.clamp(-1.0, 2.0) * (last - first)
+    }
+
+    /// Round values inside the axis, with their labels.
+    pub fn ticks(&self) -> Vec<(f64, String)> {
+        match self.scale {
+            Scale::Linear => self.multiples(),
+            Scale::Logarithmic => {
+                let decades = (self.high / self.low).log10();
+                let factors: &[f64] = if decades < 2.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+                powers((self.low, self.high), factors, self.stride(decades))
+            }
+            Scale::Symmetric(knee) => {
+                let decades = |end: f64| (end / knee).max(1.0).log10();
+                let stride = self.stride(decades(-self.low) + decades(self.high));
+                let negative = powers((knee.max(-self.high), -self.low), &[1.0], stride);
+                negative
+                    .into_iter()
+                    .rev()
+                    .map(|(value, label)| (-value, format!("\u{2212}{label}")))
+                    .chain(self.contains(0.0).then(|| (0.0, "0".to_owned())))
+                    .chain(powers((knee.max(self.low), self.high), &[1.0], stride))
+                    .collect()
+            }
+        }
+    }
+
+    /// How many decades from one tick to the next.
+    fn stride(&self, decades: f64) -> i32 {
+        let most = f64::from(self.ticks);
+        (1..=300).find(|stride| decades <= most * f64::from(*stride)).unwrap_or(300)
+    }
+
+    /// Multiples of 1, 2 or 5 times a power of ten.
+    fn multiples(&self) -> Vec<(f64, String)> {
+        let span = self.high - self.low;
+        let step = round_step(span / f64::from(self.ticks));
+        let first = ((self.low - 1e-9 * span) / step).ceil();
+        std::iter::successors(Some(first), |count| Some(count + 1.0))
+            .map(|count| count * step)
+            .take_while(|value| *value <= self.high + 1e-9 * span)
+            .take(2 * usize::from(self.ticks))
+            .map(|value| (value, label(value, step, self.low.abs().max(self.high.abs()))))
+            .collect()
+    }
+}
+
+/// The factors times each power of ten whose exponent is a multiple of `stride`, from `low` to
+/// `high`, with their labels.
+fn powers((low, high): (f64, f64), factors: &[f64], stride: i32) -> Vec<(f64, String)> {
+    (-300..=300)
+        .filter(|power| power % stride == 0)
+        .flat_map(|power| factors.iter().map(move |factor| (*factor, power)))
+        .map(|(factor, power)| (factor * 10_f64.powi(power), power_label(factor, power)))
+        .filter(|(value, _)| (0.999 * low..=1.001 * high).contains(value))
+        .collect()
+}
+
+/// A factor times a power of ten, as in 0.02, 500 or 2·10⁻⁵.
+fn power_label(factor: f64, power: i32) -> String {
+    if (-3..=3).contains(&power) {
+        let decimals = usize::try_from(-power).unwrap_or(0);
+        return format!("{:.decimals$}", factor * 10_f64.powi(power));
+    }
+    let raise = |sign| match sign {
+        '-' => '⁻',
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        digit => char::from_u32(digit as u32 - '0' as u32 + '⁰' as u32).unwrap_or(digit),
+    };
+    let raised: String = power.to_string().chars().map(raise).collect();
+    if factor > 1.0 { format!("{factor}·10{raised}") } else { format!("10{raised}") }
+}
+
+/// The nearest of 1, 2, 5 times a power of ten, above or at `wanted`.
+fn round_step(wanted: f64) -> f64 {
+    let power = 10_f64.powf(wanted.log10().floor());
+    let factor = [1.0, 2.0, 5.0].into_iter().find(|factor| factor * power >= 0.999 * wanted);
+    factor.unwrap_or(10.0) * power
+}
+
+/// The digits that tell neighbouring ticks apart, with a true minus sign.
+fn label(value: f64, step: f64, largest: f64) -> String {
+    if value.abs() < 0.5 * step {
+        return "0".to_owned();
+    }
+    let text = if largest >= 1e6 || step < 1e-4 {
+        let digits = value.abs().log10().floor() - step.log10().floor();
+        let digits = (1_u8..12).find(|count| f64::from(*count) >= digits).unwrap_or(12);
+        format!("{value:.*e}", usize::from(digits))
+    } else {
+        let decimals = (0_u8..6).find(|decimals| {
+            let scaled = step * 10_f64.powi(i32::from(*decimals));
+            scaled > 0.5 && (scaled - scaled.round()).abs() < 1e-6
+        });
+        format!("{value:.*}", usize::from(decimals.unwrap_or(6)))
+    };
+    text.replace('-', "\u{2212}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_few_round_numbers_inside_the_axis() {
+        for (low, high) in [
+            (0.0, 100.0),
+            (-0.1654, 0.1699),
+            (59.99, 66.01),
+            (-1.06e-3, 1.1e-3),
+            (-1e300, 1e300),
+            (3.0, 3.0),
+            (0.0, 0.0),
+            (1e5, 1e5 + 1.0),
+            (-1e7, -1e7 + 3.0),
+            (f64::NAN, 1.0),
+        ] {
+            let axis = Axis::exact((low, high), (0.0, 100.0), 5);
+            let ticks = axis.ticks();
+            assert!((2..=8).contains(&ticks.len()), "{low} to {high}: {ticks:?}");
+            let step = ticks[1].0 - ticks[0].0;
+            let mantissa: f64 = format!("{step:.3e}").split('e').next().unwrap().parse().unwrap();
+            assert!([1.0, 2.0, 5.0].contains(&mantissa), "{low} to {high}: step {step}");
+            for (value, label) in &ticks {
+                assert!(axis.contains(*value) || (value - low).abs() < 1e-6 * step);
+                let read: f64 = label.replace('\u{2212}', "-").parse().unwrap();
+                assert!((read - value).abs() <= 1e-3 * step, "{label} stands at {value}");
+            }
+        }
+    }
+
+    #[test]
+    fn labels_have_the_digits_of_the_step_and_no_more() {
+        let labels = |low, high| -> Vec<String> {
+            let axis = Axis::exact((low, high), (0.0, 1.0), 5);
+            axis.ticks().into_iter().map(|(_, label)| label).collect()
+        };
+        assert_eq!(labels(-0.2, 0.2), ["\u{2212}0.2", "\u{2212}0.1", "0", "0.1", "0.2"]);
+        assert_eq!(labels(0.0, 100.0), ["0", "20", "40", "60", "80", "100"]);
+    }
+
+    fn texts(axis: &Axis) -> Vec<String> {
+        axis.ticks().into_iter().map(|(_, label)| label.replace('\u{2212}', "-")).collect()
+    }
+
+    #[test]
+    fn decades_are_equally_long_and_carry_powers_of_ten() {
+        let axis = Axis::logarithmic((1e-4, 1e2), (0.0, 600.0), 7);
+        for power in -4..=2 {
+            let place = axis.place(10_f64.powi(power));
+            assert!((place - 100.0 * f64::from(power + 4)).abs() < 1e-9, "{power}: {place}");
+        }
+        assert_eq!(texts(&axis), ["10⁻⁴", "0.001", "0.01", "0.1", "1", "10", "100"]);
+        let many = Axis::logarithmic((1e-12, 1e4), (0.0, 1.0), 7);
+        assert_eq!(texts(&many), ["10⁻¹²", "10⁻⁹", "10⁻⁶", "0.001", "1", "1000"]);
+        let few = Axis::logarithmic((3.0, 60.0), (0.0, 1.0), 7);
+        assert_eq!(texts(&few), ["5", "10", "20", "50"]);
+        assert!(axis.place(f64::NAN).is_nan() && axis.place(-1.0).is_nan());
+    }
+
+    #[test]
+    fn a_symmetric_axis_is_linear_near_zero_with_decades_on_both_sides() {
+        let axis = Axis::symmetric((-1e4, 10.0), 1.0, (0.0, 700.0), 9);
+        for (value, place) in
+            [(-1e4, 0.0), (-10.0, 300.0), (-0.5, 450.0), (0.0, 500.0), (10.0, 700.0)]
+        {
+            assert!((axis.place(value) - place).abs() < 1e-9, "{value}");
+        }
+        assert_eq!(texts(&axis), ["-10⁴", "-1000", "-100", "-10", "-1", "0", "1", "10"]);
+    }
+
+    #[test]
+    fn an_axis_stops_at_its_cap() {
+        let values = [0.5, -1e300, 0.2];
+        let axis = Axis::around(values.into_iter(), Some(2.0), (0.0, 1.0), 5);
+        let (low, high) = axis.range();
+        assert!((-2.5..-2.0).contains(&low) && (0.5..1.0).contains(&high), "{low} {high}");
+        assert!(!axis.contains(-1e300));
+    }
+}

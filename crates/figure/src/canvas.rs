@@ -1,0 +1,172 @@
+//! The page: SVG elements, and their rasterisation.
+
+use std::sync::Arc;
+
+use resvg::tiny_skia::{Pixmap, Transform};
+use resvg::usvg::fontdb::{Database, Source};
+use resvg::usvg::{Options, Tree};
+
+use super::FigureError;
+
+/// Pixels of the PNG per page unit.
+const SCALE: f32 = 2.0;
+const FONTS: &str = "DejaVu Sans, Verdana, Helvetica, Arial, sans-serif";
+
+/// A place on the page: to the right, and down.
+type Place = (f64, f64);
+
+/// Which part of a text stands at its place.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Anchor {
+    Start,
+    Middle,
+    End,
+}
+
+impl Anchor {
+    fn code(self) -> &'static str {
+        match self {
+            Self::Start => "start",
+            Self::Middle => "middle",
+            Self::End => "end",
+        }
+    }
+}
+
+/// A page under construction, white at first.
+#[derive(Debug)]
+pub(super) struct Canvas {
+    elements: Vec<String>,
+    windows: usize,
+}
+
+/// A part of the page that clips what is drawn in it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Window(usize);
+
+impl Canvas {
+    pub(super) fn new(width: f64, height: f64, title: &str) -> Self {
+        let elements = vec![
+            format!(
+                r#"<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}" font-family="{FONTS}" role="img">"#
+            ),
+            format!("<title>{}</title>", escape(title)),
+            format!(r##"<rect width="{width}" height="{height}" fill="#ffffff"/>"##),
+        ];
+        Self { elements, windows: 0 }
+    }
+
+    pub(super) fn finish(mut self) -> String {
+        self.elements.push("</svg>\n".to_owned());
+        self.elements.join("\n")
+    }
+
+    pub(super) fn line(&mut self, from: Place, to: Place, colour: &str, width: &str, dash: &str) {
+        let ((x1, y1), (x2, y2)) = (from, to);
+        self.elements.push(format!(
+            r#"<line x1="{x1:.1}" y1="{y1:.1}" x2="{x2:.1}" y2="{y2:.1}" stroke="{colour}" stroke-width="{width}" stroke-dasharray="{dash}"/>"#
+        ));
+    }
+
+    pub(super) fn frame(&mut self, from: Place, to: Place, colour: &str) {
+        let ((x, y), (width, height)) = (from, (to.0 - from.0, to.1 - from.1));
+        self.elements.push(format!(
+            r#"<rect x="{x:.1}" y="{y:.1}" width="{width:.1}" height="{height:.1}" fill="none" stroke="{colour}" stroke-width="1.2"/>"#
+        ));
+    }
+
+    pub(super) fn window(&mut self, from: Place, to: Place) -> Window {
+        self.windows += 1;
+        let ((x, y), (width, height)) = (from, (to.0 - from.0, to.1 - from.1));
+        self.elements.push(format!(
+            r#"<clipPath id="window{}"><rect x="{x:.1}" y="{y:.1}" width="{width:.1}" height="{height:.1}"/></clipPath>"#,
+            self.windows
+        ));
+        Window(self.windows)
+    }
+
+    pub(super) fn curve(&mut self, window: Window, path: &str, colour: &str, width: &str) {
+        if path.is_empty() {
+            return;
+        }
+        self.elements.push(format!(
+            r#"<path clip-path="url(#window{})" d="{path}" fill="none" stroke="{colour}" stroke-width="{width}" stroke-linejoin="round" stroke-linecap="round"/>"#,
+            window.0
+        ));
+    }
+
+    pub(super) fn text(&mut self, at: Place, anchor: Anchor, size: f64, colour: &str, text: &str) {
+        self.put_text(at, anchor, size, colour, text, "");
+    }
+
+    /// Text that reads from below to above.
+    pub(super) fn upward_text(&mut self, (x, y): Place, size: f64, colour: &str, text: &str) {
+        let turn = format!(r#" transform="rotate(-90 {x:.1} {y:.1})""#);
+        self.put_text((x, y), Anchor::Middle, size, colour, text, &turn);
+    }
+
+    fn put_text(
+        &mut self,
+        (x, y): Place,
+        anchor: Anchor,
+        size: f64,
+        colour: &str,
+        text: &str,
+        attributes: &str,
+    ) {
+        if text.is_empty() {
+            return;
+        }
+        self.elements.push(format!(
+            r#"<text x="{x:.1}" y="{y:.1}" text-anchor="{}" font-size="{size}" fill="{colour}"{attributes}>{}</text>"#,
+            anchor.code(),
+            escape(text)
+        ));
+    }
+}
+
+/// A generous guess: the viewer of an SVG chooses the font.
+pub(super) fn text_width(text: &str, size: f64) -> f64 {
+    text.chars().map(|_| 0.58 * size).sum()
+}
+
+/// Width of a number in the font that is linked in, whose digits are broader than its letters.
+pub(super) fn digits_width(text: &str, size: f64) -> f64 {
+    text.chars().map(|_| 0.64 * size).sum()
+}
+
+/// Text as XML content; characters that XML cannot hold become spaces.
+fn escape(text: &str) -> String {
+    text.chars()
+        .map(|letter| match letter {
+            '&' => "&amp;".to_owned(),
+            '<' => "&lt;".to_owned(),
+            '>' => "&gt;".to_owned(),
+            control if control.is_control() => " ".to_owned(),
+            plain => plain.to_string(),
+        })
+        .collect()
+}
+
+/// The PNG of an SVG, two pixels for each of its units. All text is set in the font that is
+/// linked in, whatever font it asks for.
+///
+/// # Errors
+///
+/// [`FigureError::Pixels`]: not an SVG, or one without area.
+pub fn rasterise(svg: &str) -> Result<Vec<u8>, FigureError> {
+    let failed = |reason: &dyn std::fmt::Display| FigureError::Pixels(reason.to_string());
+    let mut fonts = Database::new();
+    fonts.load_font_source(Source::Binary(Arc::new(dejavu::sans::regular())));
+    // A font that is not known becomes the serif one.
+    fonts.set_serif_family("DejaVu Sans");
+    fonts.set_sans_serif_family("DejaVu Sans");
+    let options = Options { fontdb: Arc::new(fonts), ..Options::default() };
+    let tree = Tree::from_str(svg, &options).map_err(|reason| failed(&reason))?;
+    let size =
+        tree.size().to_int_size().scale_by(SCALE).ok_or_else(|| failed(&"the page has no area"))?;
+    let mut pixels =
+        Pixmap::new(size.width(), size.height()).ok_or_else(|| failed(&"the page is too large"))?;
+    resvg::render(&tree, Transform::from_scale(SCALE, SCALE), &mut pixels.as_mut());
+    pixels.encode_png().map_err(|reason| failed(&reason))
+}

@@ -1,0 +1,330 @@
+//! Line plots of time series: one SVG, and a PNG rasterised from that SVG.
+//!
+//! The text of the PNG is set in a font that is linked into the program, so a figure looks the
+//! same on a machine without fonts.
+
+pub mod axis;
+mod canvas;
+mod legend;
+pub mod trace;
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use axis::Axis;
+use canvas::{Anchor, Canvas};
+use legend::Entry;
+
+pub use canvas::rasterise;
+
+/// Width of a figure in SVG units; the PNG has twice as many pixels.
+const WIDTH: f64 = 1000.0;
+
+/// Least room to the left of the frames: for the label of the axis and those of its ticks.
+const LEFT: f64 = 100.0;
+const RIGHT: f64 = 22.0;
+const TITLE_HEIGHT: f64 = 40.0;
+const LEGEND_HEIGHT: f64 = 32.0;
+const PLOT_HEIGHT: f64 = 168.0;
+const TICK_HEIGHT: f64 = 26.0;
+const LABEL_HEIGHT: f64 = 24.0;
+const GAP: f64 = 12.0;
+
+const TITLE_SIZE: f64 = 20.0;
+const TEXT_SIZE: f64 = 16.0;
+
+const TEXT: &str = "#222222";
+const FRAME: &str = "#444444";
+const GRID: &str = "#e2e2e2";
+
+const LIMIT_DASH: &str = "7 4";
+const MARK_DASH: &str = "4 3";
+
+/// Panels below each other under one title.
+#[derive(Debug)]
+pub struct Figure<'a> {
+    /// The title.
+    pub title: &'a str,
+    /// The panels, from top to bottom.
+    pub panels: Vec<Panel<'a>>,
+}
+
+/// One pair of axes. Labels carry the unit, as in "time in s".
+#[derive(Debug, Default)]
+pub struct Panel<'a> {
+    /// Text below the axis; an empty one takes no space.
+    pub x_label: &'a str,
+    /// Text beside the vertical axis.
+    pub y_label: &'a str,
+    /// Part of the time axis that is shown; without it, all finite times.
+    pub x_range: Option<(f64, f64)>,
+    /// The vertical axis follows the data up to this magnitude; what lies beyond leaves the frame,
+    /// and the legend says so.
+    pub y_cap: Option<f64>,
+    /// The curves; later ones cover earlier ones.
+    pub series: Vec<Series<'a>>,
+    /// Moments in time: vertical dashed lines with a text.
+    pub marks: Vec<(f64, &'a str)>,
+    /// Height of the frame, where it is another than usual.
+    pub frame_height: Option<f64>,
+    /// A magnitude that is claimed: thin lines at plus and minus it, named in the legend.
+    pub limit: Option<(f64, &'a str)>,
+}
+
+/// A curve. A value that is not finite leaves a gap.
+#[derive(Debug)]
+pub struct Series<'a> {
+    /// Name in the legend.
+    pub label: &'a str,
+    /// The times in s.
+    pub time: &'a [f64],
+    /// As long as `time`.
+    pub values: &'a [f64],
+    /// The colour.
+    pub ink: Ink,
+    /// A broad curve stays visible below a later one that covers it.
+    pub broad: bool,
+}
+
+/// Line colours that differ for the colour-blind too (Okabe and Ito, 2008).
+#[derive(Debug, Clone, Copy)]
+pub enum Ink {
+    /// Blue.
+    Blue,
+    /// Sky blue.
+    Sky,
+    /// Vermilion.
+    Vermilion,
+    /// Bluish green.
+    Green,
+    /// Orange.
+    Orange,
+    /// Reddish purple.
+    Purple,
+    /// Black.
+    Black,
+}
+
+impl Ink {
+    fn code(self) -> &'static str {
+        match self {
+            Self::Blue => "#0072b2",
+            Self::Sky => "#56b4e9",
+            Self::Vermilion => "#d55e00",
+            Self::Green => "#009e73",
+            Self::Orange => "#e69f00",
+            Self::Purple => "#cc79a7",
+            Self::Black => "#000000",
+        }
+    }
+}
+
+impl Series<'_> {
+    fn width(&self) -> &'static str {
+        if self.broad { "5" } else { "1.8" }
+    }
+}
+
+/// Why a figure was not written.
+#[derive(Debug, thiserror::Error)]
+pub enum FigureError {
+    /// Times and values of a curve differ in number.
+    #[error("curve {label:?}: {times} times, but {values} values")]
+    Lengths {
+        /// Name of the curve.
+        label: String,
+        /// How many times there are.
+        times: usize,
+        /// How many values there are.
+        values: usize,
+    },
+    /// The file cannot be written.
+    #[error("cannot write {}: {source}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: io::Error,
+    },
+    /// The drawing cannot be turned into pixels.
+    #[error("cannot turn the drawing into pixels: {0}")]
+    Pixels(String),
+}
+
+impl Figure<'_> {
+    /// Writes `stem`.svg and `stem`.png, each whole or not at all; makes the folder if it is not
+    /// there. The same figure gives the same bytes.
+    ///
+    /// # Errors
+    ///
+    /// [`FigureError`]: a curve with unequal lengths, or a file that cannot be written.
+    pub fn write(&self, stem: &Path) -> Result<(), FigureError> {
+        let svg = self.svg()?;
+        let png = rasterise(&svg)?;
+        write_whole(&with_ending(stem, ".svg"), svg.as_bytes())?;
+        write_whole(&with_ending(stem, ".png"), &png)
+    }
+
+    /// The drawing as SVG text.
+    ///
+    /// # Errors
+    ///
+    /// [`FigureError::Lengths`].
+    pub fn svg(&self) -> Result<String, FigureError> {
+        for series in self.panels.iter().flat_map(|panel| &panel.series) {
+            if series.time.len() != series.values.len() {
+                return Err(FigureError::Lengths {
+                    label: series.label.to_owned(),
+                    times: series.time.len(),
+                    values: series.values.len(),
+                });
+            }
+        }
+        // One for all, so that equal times stand below each other.
+        let left = self.panels.iter().map(Panel::left).fold(LEFT, f64::max);
+        let heights: Vec<f64> = self.panels.iter().map(|panel| panel.height(left)).collect();
+        let height = TITLE_HEIGHT + heights.iter().sum::<f64>();
+        let mut canvas = Canvas::new(WIDTH, height, self.title);
+        canvas.text((WIDTH / 2.0, 30.0), Anchor::Middle, TITLE_SIZE, TEXT, self.title);
+        let mut top = TITLE_HEIGHT;
+        for (panel, height) in self.panels.iter().zip(heights) {
+            panel.draw(&mut canvas, left, top);
+            top += height;
+        }
+        Ok(canvas.finish())
+    }
+}
+
+impl Panel<'_> {
+    fn height(&self, left: f64) -> f64 {
+        let label = if self.x_label.is_empty() { 0.0 } else { LABEL_HEIGHT };
+        self.legend_height(left) + self.frame_height() + TICK_HEIGHT + label + GAP
+    }
+
+    fn frame_height(&self) -> f64 {
+        self.frame_height.unwrap_or(PLOT_HEIGHT)
+    }
+
+    fn legend_height(&self, left: f64) -> f64 {
+        LEGEND_HEIGHT + legend::height(&self.legend(&self.horizontal(left)), left)
+    }
+
+    /// Where the frame has to begin for the labels of the ticks to stay beside that of the axis.
+    fn left(&self) -> f64 {
+        let vertical = self.vertical(self.horizontal(LEFT).range(), (PLOT_HEIGHT, 0.0));
+        let width = |(_, label): (f64, String)| canvas::digits_width(&label, TEXT_SIZE);
+        36.0 + vertical.ticks().into_iter().map(width).fold(0.0, f64::max)
+    }
+
+    fn horizontal(&self, left: f64) -> Axis {
+        let (start, end) = self.x_range.unwrap_or_else(|| self.times());
+        Axis::exact((start, end), (left, WIDTH - RIGHT), 10)
+    }
+
+    fn vertical(&self, times: (f64, f64), pixels: (f64, f64)) -> Axis {
+        let limit = self.limit.into_iter().flat_map(|(size, _)| [size, -size]);
+        Axis::around(self.values_between(times).chain(limit), self.y_cap, pixels, 7)
+    }
+
+    fn draw(&self, canvas: &mut Canvas, left: f64, top: f64) {
+        let top = top + self.legend_height(left);
+        let (right, bottom) = (WIDTH - RIGHT, top + self.frame_height());
+        let horizontal = self.horizontal(left);
+        let visible = self.values_between(horizontal.range());
+        let vertical = self.vertical(horizontal.range(), (bottom, top));
+
+        self.draw_grid(canvas, &horizontal, &vertical);
+        if let Some((size, _)) = self.limit {
+            for level in [size, -size] {
+                let y = vertical.place(level);
+                canvas.line((left, y), (right, y), FRAME, "1.2", LIMIT_DASH);
+            }
+        }
+        let window = canvas.window((left, top), (right, bottom));
+        for series in &self.series {
+            let path = trace::path(series.time, series.values, &horizontal, &vertical);
+            canvas.curve(window, &path, series.ink.code(), series.width());
+        }
+        for (at, _) in self.visible_marks(&horizontal) {
+            let x = horizontal.place(*at);
+            canvas.line((x, top), (x, bottom), TEXT, "1.5", MARK_DASH);
+        }
+        canvas.frame((left, top), (right, bottom), FRAME);
+        let outside = visible.clone().any(|value| !vertical.contains(value));
+        legend::draw(canvas, &self.legend(&horizontal), left, top - 10.0);
+        if outside {
+            let end = (right, top - 10.0);
+            canvas.text(end, Anchor::End, TEXT_SIZE, TEXT, "a curve leaves the frame");
+        }
+        if visible.count() == 0 {
+            let middle = (f64::midpoint(left, right), f64::midpoint(top, bottom) - 20.0);
+            canvas.text(middle, Anchor::Middle, TEXT_SIZE, TEXT, "no finite data");
+        }
+    }
+
+    fn times(&self) -> (f64, f64) {
+        let times =
+            self.series.iter().flat_map(|series| series.time).filter(|time| time.is_finite());
+        times.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &time| {
+            (low.min(time), high.max(time))
+        })
+    }
+
+    /// The finite values of all curves inside a stretch of time.
+    fn values_between(&self, (start, end): (f64, f64)) -> impl Iterator<Item = f64> + Clone {
+        self.series
+            .iter()
+            .flat_map(|series| series.time.iter().zip(series.values))
+            .filter(move |(time, value)| (start..=end).contains(*time) && value.is_finite())
+            .map(|(_, value)| *value)
+    }
+
+    fn draw_grid(&self, canvas: &mut Canvas, horizontal: &Axis, vertical: &Axis) {
+        let ((left, right), (bottom, top)) = (horizontal.pixels(), vertical.pixels());
+        for (at, label) in horizontal.ticks() {
+            let x = horizontal.place(at);
+            canvas.line((x, top), (x, bottom), GRID, "1", "none");
+            let inside = WIDTH - 0.5 * canvas::digits_width(&label, TEXT_SIZE);
+            let place = (x.min(inside), bottom + 20.0);
+            canvas.text(place, Anchor::Middle, TEXT_SIZE, TEXT, &label);
+        }
+        for (at, label) in vertical.ticks() {
+            let y = vertical.place(at);
+            canvas.line((left, y), (right, y), GRID, "1", "none");
+            canvas.text((left - 8.0, y + 5.5), Anchor::End, TEXT_SIZE, TEXT, &label);
+        }
+        let below = (f64::midpoint(left, right), bottom + TICK_HEIGHT + LABEL_HEIGHT - 8.0);
+        canvas.text(below, Anchor::Middle, TEXT_SIZE, TEXT, self.x_label);
+        canvas.upward_text((20.0, f64::midpoint(top, bottom)), TEXT_SIZE, TEXT, self.y_label);
+    }
+
+    fn visible_marks(&self, horizontal: &Axis) -> impl Iterator<Item = &(f64, &str)> {
+        self.marks.iter().filter(|(at, _)| horizontal.contains(*at))
+    }
+
+    fn legend(&self, horizontal: &Axis) -> Vec<Entry<'_>> {
+        let entry = |colour, width, dash, label| Entry { colour, width, dash, label };
+        let curves = self
+            .series
+            .iter()
+            .map(|series| entry(series.ink.code(), series.width(), "none", series.label));
+        let limit = self.limit.map(|(_, label)| entry(FRAME, "1.2", LIMIT_DASH, label));
+        let marks =
+            self.visible_marks(horizontal).map(|(_, label)| entry(TEXT, "1.5", MARK_DASH, label));
+        curves.chain(limit).chain(marks).collect()
+    }
+}
+
+fn with_ending(stem: &Path, ending: &str) -> PathBuf {
+    let mut name = stem.as_os_str().to_owned();
+    name.push(ending);
+    PathBuf::from(name)
+}
+
+fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), FigureError> {
+    files::whole::write(path, bytes)
+        .map_err(|source| FigureError::Write { path: path.to_owned(), source })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,258 @@
+//! A TOML file whose every value knows its place, so that an error can point at it.
+
+use std::fmt;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// The text of a file.
+pub struct Source {
+    /// Where it is.
+    pub path: PathBuf,
+    text: String,
+}
+
+/// A place in a [`Source`], in bytes.
+pub type Place = Range<usize>;
+
+/// An error with the line that it points at.
+#[derive(Debug)]
+pub struct PlaceError {
+    path: PathBuf,
+    line: usize,
+    column: usize,
+    length: usize,
+    shown: String,
+    message: String,
+}
+
+impl std::error::Error for PlaceError {}
+
+impl fmt::Display for PlaceError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { line, column, length, shown, message, .. } = self;
+        writeln!(f, "{}:{line}:{column}: {message}", self.path.display())?;
+        let margin = line.to_string().len();
+        let (indent, underline) = (" ".repeat(column - 1), "^".repeat(*length));
+        write!(f, "{:margin$} |\n{line} | {shown}\n{:margin$} | {indent}{underline}", "", "")
+    }
+}
+
+impl Source {
+    /// Reads the file.
+    ///
+    /// # Errors
+    ///
+    /// Where the file cannot be read as UTF-8.
+    pub fn read(path: &Path) -> std::io::Result<Self> {
+        Ok(Self::new(path, std::fs::read_to_string(path)?))
+    }
+
+    /// The whole text.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// A file of this text.
+    pub fn new(path: &Path, text: String) -> Self {
+        Self { path: path.to_owned(), text }
+    }
+
+    /// The tables and values of the file.
+    pub fn parse(&self) -> Result<Spanned<DeTable<'_>>, PlaceError> {
+        DeTable::parse(&self.text).map_err(|error| {
+            let end = self.text.len();
+            self.error(&error.span().unwrap_or(end..end), error.message())
+        })
+    }
+
+    /// An error that points at `place`.
+    pub fn error(&self, place: &Place, message: impl Into<String>) -> PlaceError {
+        let start = place.start.min(self.text.len());
+        let line_start = self.text[..start].rfind('\n').map_or(0, |newline| newline + 1);
+        let shown = self.text[line_start..].lines().next().unwrap_or("").to_owned();
+        let column = self.text[line_start..start].chars().count();
+        let end = place.end.clamp(start, line_start + shown.len().max(start - line_start));
+        PlaceError {
+            path: self.path.clone(),
+            line: self.text[..start].matches('\n').count() + 1,
+            column: column + 1,
+            length: self.text[start..end].chars().count().max(1),
+            shown,
+            message: message.into(),
+        }
+    }
+}
+
+/// A table of the file, its name as in messages; empty for the whole file.
+#[derive(Clone)]
+pub struct Table<'a> {
+    /// The file.
+    pub source: &'a Source,
+    name: String,
+    /// Its place in the text.
+    pub place: Place,
+    entries: &'a DeTable<'a>,
+}
+
+/// A value of the file, its name as in messages.
+#[derive(Clone)]
+pub struct Entry<'a> {
+    /// The file.
+    pub source: &'a Source,
+    /// Its name, `table.key` or `list[1]`.
+    pub name: String,
+    /// Its place in the text.
+    pub place: Place,
+    value: &'a DeValue<'a>,
+}
+
+impl<'a> Table<'a> {
+    /// The whole file, as parsed from `source`.
+    pub fn whole(source: &'a Source, parsed: &'a Spanned<DeTable<'a>>) -> Self {
+        Self { source, name: String::new(), place: 0..0, entries: parsed.get_ref() }
+    }
+
+    fn path(&self, key: &str) -> String {
+        if self.name.is_empty() { key.to_owned() } else { format!("{}.{key}", self.name) }
+    }
+
+    /// Refuses entries that are not in `known`.
+    pub fn allow(&self, known: &[&str]) -> Result<(), PlaceError> {
+        let unknown = self.entries.keys().find(|key| !known.contains(&key.get_ref().as_ref()));
+        let Some(key) = unknown else {
+            return Ok(());
+        };
+        let found = key.get_ref();
+        let near = known.iter().min_by_key(|name| strsim::damerau_levenshtein(name, found));
+        let near = near.filter(|name| strsim::damerau_levenshtein(name, found) <= 3);
+        let advice = match near {
+            Some(name) => format!("did you mean `{name}`?"),
+            None => format!("expected one of {}", known.join(", ")),
+        };
+        let message = format!("unknown entry `{}`; {advice}", self.path(found));
+        Err(self.source.error(&key.span(), message))
+    }
+
+    /// The entry `key`, if it is there.
+    pub fn get(&self, key: &str) -> Option<Entry<'a>> {
+        let (_, value) = self.entries.iter().find(|(name, _)| name.get_ref() == key)?;
+        Some(self.entry(key, value))
+    }
+
+    fn entry(&self, key: &str, value: &'a Spanned<DeValue<'a>>) -> Entry<'a> {
+        let (source, name) = (self.source, self.path(key));
+        Entry { source, name, place: value.span(), value: value.get_ref() }
+    }
+
+    /// The entry `key`; `meaning` is for the message when it is missing.
+    pub fn require(&self, key: &str, meaning: &str) -> Result<Entry<'a>, PlaceError> {
+        self.get(key).ok_or_else(|| {
+            let message = format!("`{}` is missing: {meaning}", self.path(key));
+            self.source.error(&self.place, message)
+        })
+    }
+
+    /// Every entry with its key.
+    pub fn entries(&self) -> impl Iterator<Item = (&'a str, Entry<'a>)> {
+        self.entries.iter().map(|(key, value)| {
+            let key = key.get_ref().as_ref();
+            (key, self.entry(key, value))
+        })
+    }
+}
+
+impl<'a> Entry<'a> {
+    /// An error that points at this value and begins with its name.
+    pub fn error(&self, message: impl fmt::Display) -> PlaceError {
+        self.source.error(&self.place, format!("{}: {message}", self.name))
+    }
+
+    fn expected(&self, what: &str) -> PlaceError {
+        self.error(format!("expected {what}, found {}", self.kind()))
+    }
+
+    /// What it is, with its article.
+    fn kind(&self) -> String {
+        match self.value {
+            DeValue::String(text) => format!("the text {text:?}"),
+            DeValue::Array(_) => "a list".to_owned(),
+            DeValue::Table(_) => "a table".to_owned(),
+            DeValue::Boolean(flag) => format!("{flag}"),
+            other => format!("a value of type {}", other.type_str()),
+        }
+    }
+
+    /// A finite number.
+    pub fn number(&self) -> Result<f64, PlaceError> {
+        let text = match self.value {
+            DeValue::Integer(integer) => integer.as_str(),
+            DeValue::Float(float) => float.as_str(),
+            _ => return Err(self.expected("a number")),
+        };
+        match text.parse::<f64>() {
+            Ok(number) if number.is_finite() => Ok(number),
+            Ok(_) => Err(self.error(format!("expected a finite number, found {text}"))),
+            Err(_) => Err(self.error(format!("expected a decimal number, found {text}"))),
+        }
+    }
+
+    /// A finite number above zero.
+    pub fn positive(&self) -> Result<f64, PlaceError> {
+        match self.number()? {
+            number if number > 0.0 => Ok(number),
+            number => Err(self.error(format!("expected a number above 0, found {number}"))),
+        }
+    }
+
+    /// A text.
+    pub fn text(&self) -> Result<&'a str, PlaceError> {
+        self.value.as_str().ok_or_else(|| self.expected("a text in quotes"))
+    }
+
+    /// True or false.
+    pub fn flag(&self) -> Result<bool, PlaceError> {
+        self.value.as_bool().ok_or_else(|| self.expected("true or false"))
+    }
+
+    /// A table.
+    pub fn table(&self) -> Result<Table<'a>, PlaceError> {
+        let entries = self.value.as_table().ok_or_else(|| self.expected("a table"))?;
+        let (source, name, place) = (self.source, self.name.clone(), self.place.clone());
+        Ok(Table { source, name, place, entries })
+    }
+
+    /// The members of a list.
+    pub fn list(&self) -> Result<Vec<Entry<'a>>, PlaceError> {
+        let members = self.value.as_array().ok_or_else(|| self.expected("a list"))?;
+        let member = |(position, value): (usize, &'a Spanned<DeValue<'a>>)| Entry {
+            source: self.source,
+            name: format!("{}[{}]", self.name, position + 1),
+            place: value.span(),
+            value: value.get_ref(),
+        };
+        Ok(members.iter().enumerate().map(member).collect())
+    }
+
+    /// Whether it is a list.
+    pub fn is_list(&self) -> bool {
+        self.value.is_array()
+    }
+
+    /// Whether it is a text.
+    pub fn is_text(&self) -> bool {
+        self.value.is_str()
+    }
+
+    /// Whether it is a table.
+    pub fn is_table(&self) -> bool {
+        self.value.is_table()
+    }
+
+    /// Finite numbers.
+    pub fn numbers(&self) -> Result<Vec<f64>, PlaceError> {
+        self.list()?.iter().map(Entry::number).collect()
+    }
+}

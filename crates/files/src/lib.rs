@@ -1,0 +1,10 @@
+//! Input files whose errors point at the place, and output files that are written whole or not at all.
+//!
+//! [`document`] reads TOML by hand-written rules: each value knows its name and its place in the text.
+//! [`whole`] writes a file beside its target and renames it.
+#![forbid(unsafe_code)]
+
+pub mod document;
+pub mod whole;
+
+pub use document::{Entry, Place, PlaceError, Source, Table};

@@ -1,0 +1,63 @@
+//! What the library of a model says of itself.
+
+use std::path::Path;
+
+use fmu_description::{ModelDescription, ParseError};
+
+use crate::error::LoadError;
+use crate::library::describe;
+
+/// Why the description that a library gives of itself cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DescriptionError {
+    /// The library does not describe itself.
+    #[error("the library of {name} does not describe itself")]
+    None {
+        /// Name of the model for the user.
+        name: String,
+        /// The reason.
+        source: LoadError,
+    },
+    /// The text is no model description.
+    #[error("the model description of {name}")]
+    Unreadable {
+        /// Name of the model for the user.
+        name: String,
+        /// The reason.
+        source: ParseError,
+    },
+    /// It breaks rules of the standard.
+    #[error("the variables of {name} break rules of FMI 2.0.5:\n{}", problems.join("\n"))]
+    Rules {
+        /// Name of the model for the user.
+        name: String,
+        /// The rules, each with its section.
+        problems: Vec<String>,
+    },
+}
+
+/// The model description that the library at `file`, made by the crate `fmu`, gives of itself with
+/// the folder `resources`: as XML and as data. `name` is for messages.
+///
+/// # Errors
+///
+/// [`DescriptionError`].
+pub fn described(
+    file: &Path,
+    resources: &Path,
+    name: &str,
+) -> Result<(String, ModelDescription), DescriptionError> {
+    let xml = describe(file, resources)
+        .map_err(|source| DescriptionError::None { name: name.to_owned(), source })?;
+    let (description, warnings) = ModelDescription::read(xml.as_bytes())
+        .map_err(|source| DescriptionError::Unreadable { name: name.to_owned(), source })?;
+    let warnings = warnings.iter().map(ToString::to_string);
+    let rules = description.problems();
+    let problems: Vec<String> = warnings.chain(rules.iter().map(ToString::to_string)).collect();
+    if problems.is_empty() {
+        Ok((xml, description))
+    } else {
+        Err(DescriptionError::Rules { name: name.to_owned(), problems })
+    }
+}

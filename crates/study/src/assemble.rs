@@ -1,0 +1,277 @@
+//! From a configuration to a system of connected FMUs.
+
+use crate::error::Error;
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use fmu_import::{CallLog, Fmu, Instance, isolate};
+use master::Transformation;
+use master::{CallError, Failure, Slave, System};
+use ssp::structure::DefaultExperiment;
+use ssp::{self, Folders, Opened};
+use ssp::{Element, Link, Terminal};
+
+use crate::config::{Config, Loaded, Wire};
+use crate::link::link as link_ports;
+
+/// A system, not yet initialised.
+pub struct Assembled {
+    /// The FMUs and their connections.
+    pub system: System,
+    /// What an SSP says of times and steps.
+    pub experiment: DefaultExperiment,
+    /// FMUs with the step in s that an SSP proposes.
+    pub steps: Vec<(String, f64)>,
+    /// Whether it asks for libcosim's fixed-step algorithm.
+    pub fixed_step: bool,
+    /// What an SSP was unpacked to: is to outlive the system.
+    pub folders: Option<Folders>,
+}
+
+/// What the command line adds to the configuration.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Making<'a> {
+    /// FMUs log everything.
+    pub logging: bool,
+    /// Free outputs and inputs of equal units are connected.
+    pub by_unit: bool,
+    /// Where FMI calls are written.
+    pub log_calls: Option<&'a CallLog>,
+}
+
+/// Loads and connects what the configuration names, and makes its settings.
+pub fn assemble(loaded: &Loaded, making: &Making<'_>) -> Result<Assembled, Error> {
+    let config = &loaded.config;
+    if config.isolation.isolate != Some(true) {
+        for library in &config.preload {
+            fmu_import::preload(library.as_ref())?;
+        }
+    }
+    let opened = config.system.as_deref().map(open).transpose()?;
+    let (mut assembly, experiment, steps, fixed_step, folders) = match opened {
+        Some(own) => (own.assembly, own.experiment, own.steps, own.fixed_step, Some(own.folders)),
+        None => Default::default(),
+    };
+    for (name, path) in &config.fmus.0 {
+        match assembly.elements.iter_mut().find(|element| element.name == *name) {
+            Some(element) => (element.fmu, element.shown) = (path.clone(), None),
+            None => assembly.elements.push(element(name, path)),
+        }
+    }
+    if assembly.elements.is_empty() {
+        return Err(Error::Invalid(format!(
+            "there is no FMU in the system, expected `system` or an entry of [fmus]"
+        )));
+    }
+    let mut system = instantiate(&assembly.elements, config, making)?;
+    for (name, function) in &assembly.functions {
+        system.add(name, Box::new(function.slave()))?;
+    }
+    connect(&mut system, loaded, &assembly.links, making.by_unit)?;
+    for element in &assembly.elements {
+        for setting in &element.settings {
+            let port = system.terminal(&element.name, &setting.variable)?;
+            system.set_port(port, &setting.value)?;
+        }
+    }
+    for (name, value, place) in &config.settings.0 {
+        let set = system.set(name, &value.to_string());
+        set.map_err(|error| loaded.point(place, error))?;
+    }
+    Ok(Assembled { system, experiment, steps, fixed_step, folders })
+}
+
+/// The system that the configuration begins with.
+fn open(path: &Path) -> Result<Opened, Error> {
+    let opened = ssp::open(path)?;
+    let folder = path.parent().unwrap_or(path).to_string_lossy();
+    for warning in &opened.warnings {
+        // What is about a file of the system names it.
+        if !folder.is_empty() && warning.starts_with(&*folder) {
+            tracing::warn!("{warning}");
+        } else {
+            tracing::warn!("{}: {warning}", path.display());
+        }
+    }
+    Ok(opened)
+}
+
+fn element(name: &str, path: &Path) -> Element {
+    Element { name: name.to_owned(), fmu: path.to_owned(), ..Element::default() }
+}
+
+/// Instantiates the FMUs.
+fn instantiate(
+    elements: &[Element],
+    config: &Config,
+    making: &Making<'_>,
+) -> Result<System, Error> {
+    let logging = making.logging;
+    let limit = config.isolation.time_limit.as_ref().map(|limit| *limit.get_ref());
+    let time_limit = limit.map(Duration::try_from_secs_f64).transpose();
+    let time_limit = time_limit.map_err(|error| Error::Invalid(format!("time-limit: {error}")))?;
+    let preload = config.preload.iter().map(Into::into).collect();
+    let memory_limit = config.isolation.memory_limit.map(|memory| memory.0);
+    if config.isolation.isolate != Some(true) {
+        if memory_limit.is_some() {
+            return Err(Error::Invalid(format!(
+                "--memory-limit is for FMUs in processes of their own, expected --isolate"
+            )));
+        }
+        if time_limit.is_some() {
+            tracing::warn!(
+                "--time-limit without --isolate cannot end a call that hangs: it is for answers that \
+                 are pending only"
+            );
+        }
+    }
+    let isolation =
+        isolate::Options { time_limit, memory_limit, preload, logging, executable: None };
+    let mut opening = Opening { isolation, opened: HashMap::new(), isolated: HashMap::new() };
+    let mut system = System::default();
+    for element in elements {
+        let slave: Box<dyn Slave> = if config.isolation.isolate == Some(true) {
+            Box::new(opening.isolated(element)?)
+        } else {
+            Box::new(opening.here(element)?)
+        };
+        let slave = match making.log_calls {
+            Some(log) => Box::new(log.listen(&element.name, slave)),
+            None => slave,
+        };
+        system.add(&element.name, slave)?;
+    }
+    Ok(system)
+}
+
+/// FMUs on their way into the system; one that several elements use is unpacked once.
+struct Opening<'a> {
+    isolation: isolate::Options,
+    opened: HashMap<&'a PathBuf, Fmu>,
+    isolated: HashMap<&'a PathBuf, isolate::Package>,
+}
+
+impl<'a> Opening<'a> {
+    /// An instance in a process of its own.
+    fn isolated(&mut self, element: &'a Element) -> Result<isolate::Isolated, Error> {
+        let package = match self.isolated.get(&element.fmu) {
+            Some(package) => package.clone(),
+            None => {
+                let opened = isolate::Package::open(&element.fmu);
+                opened.map_err(|error| Error::from(error).within(&element.name))?
+            }
+        };
+        let slave = package.instantiate(&element.name, &self.isolation);
+        let slave = slave.map_err(|error| as_shown(error.into(), element))?;
+        self.isolated.insert(&element.fmu, package);
+        Ok(slave)
+    }
+
+    /// An instance in this process.
+    fn here(&mut self, element: &'a Element) -> Result<Instance, Error> {
+        let fmu = match self.opened.get(&element.fmu) {
+            Some(fmu) => fmu.clone(),
+            None => open_fmu(element)?,
+        };
+        let slave = fmu.instantiate(&element.name);
+        let mut slave = slave.map_err(|error| as_shown(error.into(), element))?;
+        self.opened.insert(&element.fmu, fmu);
+        slave.set_time_limit(self.isolation.time_limit);
+        if self.isolation.logging {
+            switch_logging_on(&element.name, &mut slave);
+        }
+        Ok(slave)
+    }
+}
+
+/// Opens the FMU of an element. What is odd about an FMU of an SSP was said when the SSP was opened.
+fn open_fmu(element: &Element) -> Result<Fmu, Error> {
+    let opened = match &element.shown {
+        Some(_) => Fmu::open_quietly(&element.fmu),
+        None => Fmu::open(&element.fmu),
+    };
+    opened.map_err(|error| as_shown(Error::from(error).within(&element.name), element))
+}
+
+/// An error about an FMU that was unpacked from an SSP, with the name that the user knows.
+fn as_shown(error: Error, element: &Element) -> Error {
+    match &element.shown {
+        Some(shown) => {
+            let unpacked = element.fmu.display().to_string();
+            Error::Invalid(error.sentence().replace(&unpacked, &shown.display().to_string()))
+        }
+        None => error,
+    }
+}
+
+fn switch_logging_on(name: &str, slave: &mut dyn Slave) {
+    match slave.set_debug_logging(true) {
+        Ok(()) | Err(CallError { failure: Failure::Absent, .. }) => {}
+        Err(error) => tracing::warn!("{name}: {error}"),
+    }
+}
+
+/// Makes the connections: those of the configuration go before `links` to the same inputs.
+/// Where none are stated, equal names are connected, and `by_unit` also equal units.
+fn connect(
+    system: &mut System,
+    loaded: &Loaded,
+    links: &[Link],
+    by_unit: bool,
+) -> Result<(), Error> {
+    let config = &loaded.config;
+    let mut taken = HashSet::new();
+    let mut own = Vec::new();
+    for wire in config.connections.iter().flatten() {
+        let Wire { from, to, factor, offset } = wire.get_ref();
+        let port = |name: &toml::Spanned<String>| {
+            system.port(name.get_ref()).map_err(|error| loaded.point(&name.span(), error))
+        };
+        let (from, to) = (port(from)?, port(to)?);
+        let terminal = |port: master::Port| Terminal {
+            element: system.slaves[port.slave].0.clone(),
+            variable: system.variable(port).name.clone(),
+        };
+        let stated = factor.is_some() || offset.is_some();
+        let linear =
+            Transformation::Linear { factor: factor.unwrap_or(1.0), offset: offset.unwrap_or(0.0) };
+        taken.insert(terminal(to));
+        own.push((
+            wire.span(),
+            Link {
+                from: terminal(from),
+                to: terminal(to),
+                transformation: if stated { linear } else { Transformation::Identity },
+                units_settled: stated,
+            },
+        ));
+    }
+    for link in links.iter().filter(|link| !taken.contains(&link.to)) {
+        link_ports(system, link)?;
+    }
+    for (place, link) in &own {
+        link_ports(system, link).map_err(|error| loaded.point(place, error))?;
+    }
+    let alone = config.connections.is_none() && config.system.is_none();
+    if alone && system.slaves.len() > 1 { connect_unstated(system, by_unit) } else { Ok(()) }
+}
+
+/// Connects equal names, and `by_unit` also equal units.
+fn connect_unstated(system: &mut System, by_unit: bool) -> Result<(), Error> {
+    let by_name = system.connect_equal_names()?;
+    let by_unit = if by_unit { system.connect_equal_units()? } else { Vec::new() };
+    for connection in &by_unit {
+        let (from, to) = (system.name(connection.from), system.name(connection.to));
+        tracing::warn!(
+            "{from} and {to} are connected because no other free output and input have their unit; \
+             --connect states connections instead"
+        );
+    }
+    if by_name + by_unit.len() == 0 {
+        tracing::warn!(
+            "no output has the name of an input of another FMU, so nothing is connected"
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,102 @@
+//! How often a row is recorded.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::de::{Error, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+/// At each communication point.
+const STEP: &str = "step";
+/// Not at all.
+const NEVER: &str = "never";
+const EXPECTED: &str = "seconds above 0, \"step\" (each communication point) or \"never\"";
+
+/// When a row is recorded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Every {
+    /// At intervals of so many seconds, at the first communication point not before each.
+    Seconds(f64),
+    /// At each communication point.
+    Step,
+    /// Never: there are no results.
+    Never,
+}
+
+impl Every {
+    fn seconds(value: f64) -> Result<Self, String> {
+        if value > 0.0 && value.is_finite() {
+            Ok(Self::Seconds(value))
+        } else {
+            Err(format!("expected {EXPECTED}, found {value}"))
+        }
+    }
+}
+
+impl FromStr for Every {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            STEP => Ok(Self::Step),
+            NEVER => Ok(Self::Never),
+            _ => match text.parse() {
+                Ok(value) => Self::seconds(value),
+                Err(_) => Err(format!("expected {EXPECTED}, found {text:?}")),
+            },
+        }
+    }
+}
+
+impl fmt::Display for Every {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Seconds(seconds) => write!(formatter, "{seconds}"),
+            Self::Step => formatter.write_str(STEP),
+            Self::Never => formatter.write_str(NEVER),
+        }
+    }
+}
+
+impl Serialize for Every {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Seconds(seconds) => serializer.serialize_f64(*seconds),
+            Self::Step => serializer.serialize_str(STEP),
+            Self::Never => serializer.serialize_str(NEVER),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Every {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(EveryVisitor)
+    }
+}
+
+struct EveryVisitor;
+
+impl Visitor<'_> for EveryVisitor {
+    type Value = Every;
+
+    fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(EXPECTED)
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "seconds are a double")]
+    fn visit_i64<E: Error>(self, value: i64) -> Result<Every, E> {
+        Every::seconds(value as f64).map_err(E::custom)
+    }
+
+    fn visit_f64<E: Error>(self, value: f64) -> Result<Every, E> {
+        Every::seconds(value).map_err(E::custom)
+    }
+
+    fn visit_str<E: Error>(self, value: &str) -> Result<Every, E> {
+        match value {
+            STEP => Ok(Every::Step),
+            NEVER => Ok(Every::Never),
+            _ => Err(E::custom(format!("expected {EXPECTED}, found {value:?}"))),
+        }
+    }
+}

@@ -1,0 +1,158 @@
+//! The small tables of `system.toml`.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+use toml::Spanned;
+
+use super::{Every, Memory};
+use files::Place;
+
+/// Where, and what is wrong there.
+type Wrong = (Place, String);
+
+/// An entry of `[[connections]]`: `to = factor from + offset`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Wire {
+    /// The output, `slave.variable`.
+    pub from: Spanned<String>,
+    /// The input, `slave.variable`.
+    pub to: Spanned<String>,
+    /// A factor. Where it or an offset is stated, units are not converted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub factor: Option<f64>,
+    /// An offset, in the unit of the input.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub offset: Option<f64>,
+}
+
+impl Wire {
+    /// One of the command line.
+    pub fn new(from: String, to: String) -> Spanned<Self> {
+        let text = |text| Spanned::new(0..0, text);
+        Spanned::new(0..0, Self { from: text(from), to: text(to), factor: None, offset: None })
+    }
+
+    pub(super) fn check(&self, place: &Place) -> Result<(), Wrong> {
+        let numbers = [("factor", self.factor), ("offset", self.offset)];
+        match numbers.iter().find(|(_, number)| number.is_some_and(|value| !value.is_finite())) {
+            Some((name, _)) => Err((place.clone(), format!("{name}: expected a finite number"))),
+            None => Ok(()),
+        }
+    }
+}
+
+/// `[experiment]`: what the FMUs are told.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct Experiment {
+    /// Start time in s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub start_time: Option<Spanned<f64>>,
+    /// Stop time in s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stop_time: Option<Spanned<f64>>,
+    /// Relative tolerance for solvers inside the FMUs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tolerance: Option<Spanned<f64>>,
+}
+
+impl Experiment {
+    pub(super) fn check(&self) -> Result<(), Wrong> {
+        for (name, time) in [("start-time", &self.start_time), ("stop-time", &self.stop_time)] {
+            expect(name, time.as_ref(), "a finite number", f64::is_finite)?;
+        }
+        expect("tolerance", self.tolerance.as_ref(), ABOVE, above)
+    }
+}
+
+/// `[results]`: what is written.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct Results {
+    /// The file, `.csv` or `.parquet`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<PathBuf>,
+    /// Variables by name or pattern.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub record: Vec<String>,
+    /// Variables that are left out of them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub exclude: Vec<String>,
+    /// How often.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub every: Option<Every>,
+    /// Variables to plot, by name or pattern.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub plot: Vec<String>,
+    /// The picture, `.svg` or `.png`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub plot_file: Option<PathBuf>,
+}
+
+/// `[isolation]`: FMUs in processes of their own.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct Isolation {
+    /// Whether each FMU gets a process.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub isolate: Option<bool>,
+    /// How long a call may take, in s of the clock on the wall.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time_limit: Option<Spanned<f64>>,
+    /// Most memory that each process may take.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub memory_limit: Option<Memory>,
+}
+
+impl Isolation {
+    pub(super) fn check(&self) -> Result<(), Wrong> {
+        expect("time-limit", self.time_limit.as_ref(), ABOVE, above)
+    }
+}
+
+/// `[checkpoint]`: the state of the run, saved to be resumed.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct Saving {
+    /// The file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<PathBuf>,
+    /// Simulated seconds between two checkpoints; not stated: one at the end.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub every: Option<Spanned<f64>>,
+}
+
+impl Saving {
+    pub(super) fn check(&self) -> Result<(), Wrong> {
+        expect("every", self.every.as_ref(), ABOVE, above)?;
+        match &self.every {
+            Some(every) if self.file.is_none() => {
+                Err((every.span(), "every: expected file beside it".to_owned()))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+const ABOVE: &str = "a finite number above 0";
+
+fn above(value: f64) -> bool {
+    value > 0.0 && value.is_finite()
+}
+
+fn expect(
+    name: &str,
+    value: Option<&Spanned<f64>>,
+    expected: &str,
+    holds: fn(f64) -> bool,
+) -> Result<(), Wrong> {
+    match value {
+        Some(value) if !holds(*value.get_ref()) => {
+            let message = format!("{name}: expected {expected}, found {}", value.get_ref());
+            Err((value.span(), message))
+        }
+        _ => Ok(()),
+    }
+}

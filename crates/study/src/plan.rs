@@ -1,0 +1,245 @@
+//! What a configuration leaves open, decided by the system: algorithm, times, how often to record.
+
+use crate::error::Error;
+use fmu_description::DefaultExperiment;
+use fmu_description::Experiment;
+use master::{
+    Algorithm, Coupling, Course, StepControl, Sweep, System, Wanted, by_direct_dependencies, choose,
+};
+use toml::Spanned;
+
+use crate::assemble::Assembled;
+use crate::config::{Config, Every, Wire};
+
+/// Most rows that are recorded where nothing is stated and steps are fixed.
+const ROWS: f64 = 1e4;
+/// Length in s of a run whose stop time nobody states, as in FMPy.
+const LENGTH: f64 = 1.0;
+/// Share of a step by which a proposed step may miss a multiple of the communication step.
+const NEAR: f64 = 1e-6;
+
+/// Everything decided.
+pub struct Plan {
+    /// The algorithm.
+    pub algorithm: Algorithm,
+    /// Start time, stop time and tolerance for the FMUs.
+    pub experiment: Experiment,
+    /// In s.
+    pub stop: f64,
+    /// How often rows are recorded.
+    pub every: Every,
+    /// A sentence for each decision that the user did not make.
+    pub reasons: Vec<String>,
+}
+
+/// Decides, and completes `config` accordingly.
+pub fn plan(config: &mut Config, assembled: &Assembled) -> Result<Plan, Error> {
+    let system = &assembled.system;
+    let mut reasons = Vec::new();
+    propose_algorithm(&mut config.algorithm, assembled, &mut reasons);
+    propose_steps(&mut config.algorithm, assembled, &mut reasons);
+    check_step(&config.algorithm)?;
+    let (start, stop) = times(config, assembled, &mut reasons);
+    let chosen = choose(system, &config.algorithm, stop - start)?;
+    reasons.extend(chosen.reasons);
+    let algorithm = chosen.algorithm;
+    let tolerance = config.experiment.tolerance.as_ref().map(|tolerance| *tolerance.get_ref());
+    explain_tolerances(system, tolerance, &mut reasons);
+    let experiment = Experiment { start_time: start, stop_time: Some(stop), tolerance };
+    let every =
+        config.results.every.unwrap_or_else(|| rows(&algorithm, stop - start, &mut reasons));
+    complete(&mut config.algorithm, &algorithm, system);
+    config.experiment.start_time = Some(Spanned::new(0..0, start));
+    config.experiment.stop_time = Some(Spanned::new(0..0, stop));
+    config.results.every = Some(every);
+    config.isolation.isolate.get_or_insert(false);
+    if config.system.is_none() && config.connections.is_none() {
+        let wire = |connection: &master::Connection| {
+            Wire::new(system.name(connection.from), system.name(connection.to))
+        };
+        config.connections = Some(system.connections.iter().map(wire).collect());
+    }
+    Ok(Plan { algorithm, experiment, stop, every, reasons })
+}
+
+/// What the solvers inside the FMUs are told.
+fn explain_tolerances(system: &System, stated: Option<f64>, reasons: &mut Vec<String>) {
+    if stated.is_some() {
+        return;
+    }
+    for (name, slave) in &system.slaves {
+        let default = slave.description().default_experiment.as_ref();
+        if let Some(tolerance) = default.and_then(DefaultExperiment::usable_tolerance) {
+            reasons
+                .push(format!("tolerance {tolerance:e} for {name}: that of its DefaultExperiment"));
+        }
+    }
+}
+
+/// The step, before numbers that follow from it are looked at.
+fn check_step(wanted: &Wanted) -> Result<(), Error> {
+    match wanted.step {
+        Some(step) if !(step > 0.0 && step.is_finite()) => {
+            return Err(Error::Invalid(format!(
+                "the communication step is {step} s, expected more than 0"
+            )));
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Takes of libcosim's algorithm what is not stated, where the system structure asks for it.
+fn propose_algorithm(wanted: &mut Wanted, assembled: &Assembled, reasons: &mut Vec<String>) {
+    if !assembled.fixed_step {
+        return;
+    }
+    let open = wanted.method.is_none() || wanted.course.is_none() || wanted.coupling.is_none();
+    wanted.method.get_or_insert(Sweep::Jacobi);
+    wanted.course.get_or_insert(Course::Hold);
+    wanted.coupling.get_or_insert(Coupling::Once);
+    if open {
+        let sentence = "the system structure asks for libcosim's fixed steps: jacobi, course hold, \
+             coupling once, where nothing else is stated";
+        reasons.push(sentence.to_owned());
+    }
+}
+
+/// Takes steps that an SSP proposes where nothing else is said.
+fn propose_steps(wanted: &mut Wanted, assembled: &Assembled, reasons: &mut Vec<String>) {
+    let sound = |step: &f64| *step > 0.0 && step.is_finite();
+    let hints = assembled.steps.iter().filter(|(_, step)| sound(step));
+    if wanted.step.is_none() {
+        let least = hints.clone().map(|(_, step)| *step).reduce(f64::min);
+        wanted.step = assembled.experiment.step_size.filter(sound).or(least);
+        if let Some(step) = wanted.step {
+            reasons.push(format!("step {step} s: that of the system structure"));
+        }
+    }
+    let plain = wanted.step_control.is_none_or(|control| control == StepControl::Fixed)
+        && wanted.coupling.is_none_or(|coupling| coupling == Coupling::Once)
+        && wanted.next_event.is_empty()
+        && wanted.crossing.is_empty()
+        && (wanted.coupling.is_some()
+            || by_direct_dependencies(&assembled.system).looped.is_empty());
+    let Some(step) = wanted.step.filter(|_| plain && wanted.every.is_empty()) else { return };
+    for (name, proposed) in hints {
+        let multiple = (proposed / step).round();
+        if multiple >= 2.0 && (proposed / step - multiple).abs() < NEAR * multiple {
+            reasons.push(format!(
+                "{name} steps every {multiple} communication steps: the system structure proposes \
+                 {proposed} s for it"
+            ));
+            wanted.every.insert(name.clone(), count(multiple));
+        }
+    }
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "2 and more; saturates"
+)]
+fn count(multiple: f64) -> u32 {
+    multiple as u32
+}
+
+/// Start and stop time in s: stated, of the system structure, or of the FMUs.
+fn times(config: &Config, assembled: &Assembled, reasons: &mut Vec<String>) -> (f64, f64) {
+    let stated = |time: &Option<Spanned<f64>>| time.as_ref().map(|time| *time.get_ref());
+    let defaults = || {
+        let slaves = assembled.system.slaves.iter();
+        slaves.filter_map(|(name, slave)| {
+            slave.description().default_experiment.as_ref().map(|default| (name, default))
+        })
+    };
+    let finite = |time: &f64| time.is_finite();
+    let known = stated(&config.experiment.start_time).or(assembled.experiment.start_time);
+    let start = known.unwrap_or_else(|| {
+        let stated = defaults().filter_map(|(name, one)| Some((name, one.start_time?)));
+        match stated.filter(|(_, time)| finite(time)).min_by(|a, b| a.1.total_cmp(&b.1)) {
+            Some((name, time)) => {
+                reasons
+                    .push(format!("start time {time} s: that of the DefaultExperiment of {name}"));
+                time
+            }
+            None => 0.0,
+        }
+    });
+    if let Some(stop) = stated(&config.experiment.stop_time).or(assembled.experiment.stop_time) {
+        return (start, stop);
+    }
+    let latest = defaults()
+        .filter_map(|(name, one)| Some((name, one.stop_time?)))
+        .filter(|(_, time)| finite(time) && *time > start)
+        .max_by(|a, b| a.1.total_cmp(&b.1));
+    let Some((name, stop)) = latest else {
+        let stop = start + LENGTH;
+        let reason = format!(
+            "stop time {stop} s: neither the system nor the DefaultExperiment of an FMU states one \
+             after the start time {start} s"
+        );
+        tracing::warn!("{reason}; --stop-time SECONDS sets it");
+        reasons.push(reason);
+        return (start, stop);
+    };
+    reasons.push(format!(
+        "stop time {stop} s: the latest stopTime of a DefaultExperiment, that of {name}"
+    ));
+    (start, stop)
+}
+
+/// Each communication point, unless these would be very many.
+fn rows(algorithm: &Algorithm, length: f64, reasons: &mut Vec<String>) -> Every {
+    if algorithm.control == StepControl::Fixed && length > ROWS * algorithm.step * (1.0 + NEAR) {
+        let interval = length / ROWS;
+        reasons.push(format!("a row every {interval} s: {ROWS} intervals"));
+        Every::Seconds(interval)
+    } else {
+        Every::Step
+    }
+}
+
+/// States all that was chosen.
+fn complete(wanted: &mut Wanted, algorithm: &Algorithm, system: &System) {
+    wanted.method = Some(algorithm.sweep);
+    wanted.course = Some(algorithm.course);
+    wanted.coupling = Some(algorithm.coupling);
+    wanted.step_control = Some(algorithm.control);
+    wanted.step = Some(algorithm.step);
+    wanted.relative_tolerance = Some(algorithm.relative_tolerance);
+    wanted.absolute_tolerance = Some(algorithm.absolute_tolerance);
+    wanted.smallest_step = Some(algorithm.smallest_step);
+    wanted.largest_step = Some(algorithm.largest_step);
+    wanted.iterations = Some(algorithm.iterations);
+    wanted.fallback = Some(algorithm.fallback);
+    wanted.jobs = Some(wanted.jobs.unwrap_or(algorithm.jobs));
+    wanted.rollback = Some(algorithm.rollback);
+    wanted.allow_nan = Some(algorithm.allow_nan);
+    let multiples = system.slaves.iter().zip(&algorithm.multiples);
+    wanted.every = multiples.map(|((name, _), multiple)| (name.clone(), *multiple)).collect();
+}
+
+impl Plan {
+    /// What `--explain` prints.
+    pub fn explanation(&self, system: &System) -> String {
+        let algorithm = &self.algorithm;
+        let mut lines = vec![
+            format!(
+                "algorithm: {}, course {}, coupling {}, {} step {} s",
+                algorithm.sweep.name(),
+                algorithm.course.name(),
+                algorithm.coupling.name(),
+                algorithm.control.name(),
+                algorithm.step
+            ),
+            format!("time: {} to {} s", self.experiment.start_time, self.stop),
+        ];
+        for ((name, _), multiple) in system.slaves.iter().zip(&algorithm.multiples) {
+            if *multiple != 1 {
+                lines.push(format!("{name} steps every {multiple} communication steps"));
+            }
+        }
+        lines.extend(self.reasons.iter().map(|reason| format!("- {reason}")));
+        lines.join("\n")
+    }
+}

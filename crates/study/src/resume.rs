@@ -1,0 +1,39 @@
+//! Runs that go on from a checkpoint.
+
+use crate::error::Error;
+
+use master::Scenario;
+use master::{Checkpoint, Simulation, System, SystemError};
+
+use crate::plan::Plan;
+
+/// The simulation where `checkpoint` left it. What is another than in its run is refused or said.
+pub(crate) fn resume(
+    system: System,
+    plan: &Plan,
+    scenario: Scenario,
+    checkpoint: &Checkpoint,
+) -> Result<Simulation, Error> {
+    let Plan { algorithm, experiment, stop, .. } = plan;
+    let resumed = Simulation::resume(system, algorithm, experiment, scenario, checkpoint);
+    let simulation = resumed.map_err(|error| match error {
+        SystemError::Resume { name, taken, given } => Error::Invalid(format!(
+            "resume: the checkpoint was taken with {name} {taken}; --{name} {given} is not possible"
+        )),
+        other => Error::from(other).within("resume"),
+    })?;
+    if let Some(told) = checkpoint.told_stop_time().filter(|told| told < stop) {
+        tracing::warn!(
+            "resume: the stop time {stop} s is later than {told} s, which the FMUs were told at \
+             their start: an FMU may refuse to step beyond {told} s"
+        );
+    }
+    if simulation.is_finished() && simulation.ended_by().is_none() {
+        let time = checkpoint.time();
+        tracing::warn!(
+            "resume: the checkpoint was taken at t = {time} s, which is the end of the run; \
+             --stop-time SECONDS gives a later one"
+        );
+    }
+    Ok(simulation)
+}

@@ -1,0 +1,285 @@
+//! A run: prepared from a configuration, started or resumed, advanced to its end.
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use master::{Port, Scenario, Simulation, SlowState, System, SystemError};
+use ssp::Folders;
+
+use crate::assemble::{Assembled, Making, assemble};
+use crate::config::{Config, Every, Loaded};
+use crate::error::Error;
+use crate::plan::{Plan, plan};
+use crate::record::{Recorder, select};
+use crate::resume::resume;
+use crate::saved::Saved;
+use crate::scenario::Setup;
+
+/// A run with everything decided, not yet initialised.
+pub struct Prepared {
+    /// The complete configuration, with everything that was decided.
+    pub config: Config,
+    /// The FMUs and their connections.
+    pub system: System,
+    /// What the configuration left open.
+    pub plan: Plan,
+    /// The variables to record.
+    pub ports: Vec<Port>,
+    scenario: Scenario,
+    /// What an SSP was unpacked to; outlives the system.
+    folders: Option<Folders>,
+}
+
+impl Prepared {
+    /// Loads and connects the FMUs, decides what `loaded` leaves open, finds the variables of scenario
+    /// and results. The paths of the configuration become absolute, because an FMU may change the
+    /// current folder.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`] with the first thing that is wrong, with its line where it is in a file.
+    pub fn new(mut loaded: Loaded, making: &Making<'_>) -> Result<Self, Error> {
+        loaded.config.make_absolute().map_err(Error::file("find", Path::new(".")))?;
+        let mut assembled = assemble(&loaded, making)?;
+        let plan = plan(&mut loaded.config, &assembled)?;
+        let Assembled { system, folders, .. } = &mut assembled;
+        let (system, folders) = (std::mem::take(system), folders.take());
+        let scenario = scenario(&loaded, &system, &plan)?;
+        let config = loaded.config;
+        let ports = select(&system, &config.results.record, &config.results.exclude)?;
+        check_saving(&config, &system)?;
+        Ok(Self { config, system, plan, ports, scenario, folders })
+    }
+
+    /// Initialises the FMUs, or brings them to the state of the checkpoint `saved`, and creates the
+    /// file of results.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`]: an FMU fails, the checkpoint does not fit, the file cannot be written.
+    pub fn start(self, saved: Option<&Saved>) -> Result<Run, Error> {
+        let Self { config, system, plan, ports, scenario, folders } = self;
+        let text = config.render()?;
+        let Plan { algorithm, experiment, .. } = &plan;
+        let mut simulation = match saved {
+            None => Simulation::with_scenario(system, algorithm, experiment, scenario)?,
+            Some(saved) => resume(system, &plan, scenario, saved.checkpoint())?,
+        };
+        if let Some(early) = simulation.early_end() {
+            tracing::warn!("{early}");
+        }
+        let start = experiment.start_time;
+        let mut recorder = match &config.results.file {
+            Some(file) => Recorder::create(file, &mut simulation, &ports, plan.every, start)?,
+            None => None,
+        };
+        let due = saved.and_then(|saved| saved.due(plan.every));
+        if let (Some(recorder), Some(saved)) = (&mut recorder, saved) {
+            recorder.restore(&mut simulation, saved.slow())?;
+            if let Some(due) = due {
+                recorder.set_due(due);
+            }
+        }
+        Ok(Run {
+            resumed: due.is_some(),
+            checkpoints: Checkpoints::new(&config, text, plan.every),
+            simulation,
+            recorder,
+            tally: Tally::default(),
+            config,
+            plan,
+            _folders: folders,
+        })
+    }
+}
+
+/// What is done to the system while it runs.
+fn scenario(loaded: &Loaded, system: &System, plan: &Plan) -> Result<Scenario, Error> {
+    // Its paths are absolute already.
+    let folder = Path::new("");
+    let setup = Setup { folder, start: plan.experiment.start_time, step: plan.algorithm.step };
+    let resolved = loaded.config.scenario.resolve(system, &setup);
+    let prepared = resolved.map_err(|error| {
+        let place = error.place.clone();
+        loaded.point(&place, Error::Scenario(error))
+    })?;
+    for (file, column) in &prepared.unused {
+        tracing::info!("{}: the column {column:?} drives nothing", file.display());
+    }
+    Ok(prepared.scenario)
+}
+
+/// Refuses checkpoints that could not be saved at the end of the run.
+fn check_saving(config: &Config, system: &System) -> Result<(), Error> {
+    if config.checkpoint.file.is_none() {
+        return Ok(());
+    }
+    let unable = system.slaves.iter().find(|(_, slave)| {
+        let flags = slave.description().co_simulation.as_ref();
+        !flags.is_some_and(|flags| flags.can_serialize_fmu_state)
+    });
+    match unable {
+        Some((name, _)) => Err(Error::Invalid(format!(
+            "{name} cannot take part in a checkpoint: its canSerializeFMUstate is false"
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// How a run ended.
+pub enum Ended {
+    /// At its stop time.
+    AtStop,
+    /// Because this FMU asked for it.
+    ByFmu(String),
+    /// Because the caller asked for it.
+    Interrupted,
+    /// By a failure.
+    Lost(Error),
+}
+
+/// How much a run has done.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Tally {
+    /// Communication steps.
+    pub steps: u64,
+    /// Wall-clock time in s.
+    pub seconds: f64,
+}
+
+/// Where and when checkpoints are written.
+struct Checkpoints {
+    path: PathBuf,
+    /// Simulated seconds between two; none: only at the end.
+    interval: Option<f64>,
+    /// The complete configuration.
+    text: String,
+    every: Every,
+}
+
+impl Checkpoints {
+    fn new(config: &Config, text: String, every: Every) -> Option<Self> {
+        let interval = config.checkpoint.every.as_ref().map(|every| *every.get_ref());
+        config.checkpoint.file.clone().map(|path| Self { path, interval, text, every })
+    }
+}
+
+/// A run that has started.
+pub struct Run {
+    /// The simulation.
+    pub simulation: Simulation,
+    /// The complete configuration.
+    pub config: Config,
+    /// What the configuration left open.
+    pub plan: Plan,
+    recorder: Option<Recorder>,
+    checkpoints: Option<Checkpoints>,
+    /// The run that was resumed recorded the present communication point.
+    resumed: bool,
+    tally: Tally,
+    /// Removed after the simulation.
+    _folders: Option<Folders>,
+}
+
+impl Run {
+    /// Steps to the stop time, records rows, writes checkpoints, and terminates the FMUs. `watch` sees
+    /// the start and every step, and may end the run.
+    pub fn advance(
+        &mut self,
+        watch: impl FnMut(&mut Simulation) -> Result<ControlFlow<()>, SystemError>,
+    ) -> Ended {
+        let start = Instant::now();
+        let ended = self.steps(watch).unwrap_or_else(Ended::Lost);
+        self.tally.seconds = start.elapsed().as_secs_f64();
+        ended
+    }
+
+    fn steps(
+        &mut self,
+        mut watch: impl FnMut(&mut Simulation) -> Result<ControlFlow<()>, SystemError>,
+    ) -> Result<Ended, Error> {
+        let start = self.simulation.time();
+        let interval = self.checkpoints.as_ref().and_then(|own| own.interval);
+        let mut saved = 0.0;
+        let mut save_at = interval.map_or(f64::INFINITY, |interval| start + interval);
+        let mut flow = watch(&mut self.simulation)?;
+        if !self.resumed {
+            self.sample()?;
+        }
+        while flow.is_continue() && !self.simulation.is_finished() {
+            if let Some(recorder) = &mut self.recorder {
+                recorder.before_step(&mut self.simulation)?;
+            }
+            let before = self.simulation.time();
+            self.simulation.step()?;
+            self.tally.steps += 1;
+            flow = watch(&mut self.simulation)?;
+            let time = self.simulation.time();
+            // An end that an FMU asked for may be one that the others have not reached together.
+            if time > before {
+                self.sample()?;
+            }
+            if let Some(interval) = interval
+                && time >= save_at
+            {
+                self.save()?;
+                saved = ((time - start) / interval).floor().max(saved + 1.0);
+                save_at = start + (saved + 1.0) * interval;
+            }
+        }
+        self.save()?;
+        // From here on an FMU may end the process.
+        self.recorder.as_mut().map_or(Ok(()), Recorder::flush)?;
+        self.simulation.terminate()?;
+        self.simulation.free()?;
+        Ok(match self.simulation.ended_by() {
+            Some(name) => Ended::ByFmu(name.to_owned()),
+            None if self.simulation.is_finished() => Ended::AtStop,
+            None => Ended::Interrupted,
+        })
+    }
+
+    #[inline]
+    fn sample(&mut self) -> Result<(), Error> {
+        let simulation = &mut self.simulation;
+        self.recorder.as_mut().map_or(Ok(()), |recorder| recorder.sample(simulation))
+    }
+
+    /// Writes a checkpoint, after the rows that belong to it.
+    fn save(&mut self) -> Result<(), Error> {
+        let Some(checkpoints) = &self.checkpoints else { return Ok(()) };
+        let (mut due, mut slow) = (None, SlowState::default());
+        if let Some(recorder) = &mut self.recorder {
+            recorder.flush()?;
+            due = Some((checkpoints.every, recorder.due().clone()));
+            slow = recorder.slow_state(&mut self.simulation);
+        }
+        let saved = Saved::new(&checkpoints.text, self.simulation.checkpoint()?, due, slow);
+        saved.write(&checkpoints.path)
+    }
+
+    /// How much the run has done.
+    #[must_use]
+    pub fn tally(&self) -> Tally {
+        self.tally
+    }
+
+    /// The file of the checkpoints, where they are written.
+    #[must_use]
+    pub fn checkpoint_file(&self) -> Option<&Path> {
+        self.checkpoints.as_ref().map(|checkpoints| checkpoints.path.as_path())
+    }
+
+    /// Completes the file of results; the file, where rows were recorded.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Results`].
+    pub fn finish(&mut self) -> Result<Option<&Path>, Error> {
+        match self.recorder.take() {
+            Some(recorder) => recorder.finish().map(|()| self.config.results.file.as_deref()),
+            None => Ok(None),
+        }
+    }
+}
