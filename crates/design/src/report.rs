@@ -181,9 +181,9 @@ pub struct Theorem1 {
 /// P by linear matrix inequalities.
 #[derive(Serialize)]
 pub struct FreeP {
-    /// Largest certified decay rate, 1/s, and the margin of its inequality.
+    /// Largest certified decay rate, 1/s.
     pub decay: f64,
-    /// XX
+    /// Margin of its inequality, relative.
     pub decay_margin: f64,
     /// Smallest certified delta.
     pub delta: f64,
