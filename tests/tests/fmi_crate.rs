@@ -11,7 +11,7 @@ use fmu_description::Causality;
 use fmu_description::Experiment;
 use fmu_description::package::{Package, platforms};
 use fmu_import::{Fmu, FmuError, LoadError};
-use master::fmi_crate::{FmiCrateError, FmiSlave};
+use tests::fmi_crate::{FmiCrateError, FmiSlave};
 use master::{Algorithm, Course, Failure, Probe, Simulation, Slave, Sweep, System};
 
 const PENDULUM: &str = "FrictionPendulum.fmu";

@@ -51,7 +51,7 @@ fn the_mathematics_depends_on_neither_fmi_nor_files() {
 }
 
 /// The folders of our libraries, each with those that it may use.
-const ARROWS: [(&str, &[&str]); 14] = [
+const ARROWS: [(&str, &[&str]); 15] = [
     ("lapack", &[]),
     ("control", &["lapack"]),
     ("fmu-description", &[]),
@@ -61,7 +61,8 @@ const ARROWS: [(&str, &[&str]); 14] = [
     ("linearise", &["fmu-description", "fmu-import", "slave"]),
     ("ssp", &["fmu-description", "slave"]),
     ("results", &[]),
-    ("master", &["fmu-description", "slave"]),
+    ("solve", &[]),
+    ("master", &["fmu-description", "slave", "solve"]),
     ("files", &[]),
     ("figure", &["files"]),
     ("study", &["files", "fmu-description", "fmu-import", "master", "results", "slave", "ssp"]),

@@ -19,7 +19,6 @@ mod probe;
 mod readout;
 pub mod signal;
 mod simulation;
-pub mod solve;
 mod system;
 
 pub use algorithm::{Algorithm, Coupling, Course, StepControl, Sweep};

@@ -7,7 +7,7 @@
 //! the slaves stays in charge:
 //!
 //! ```
-//! use master::solve::{Anderson, Progress, Scale, Solver};
+//! use solve::{Anderson, Progress, Scale, Solver};
 //!
 //! let scale = Scale::new(1e-9, 1e-12, vec![1.0]);
 //! let mut solver = Anderson::new(scale, 20, 5);
@@ -23,6 +23,8 @@
 //! assert!(matches!(outcome, Progress::Converged { .. }));
 //! assert!((u[0] - 0.25).abs() < 1e-9);
 //! ```
+
+#![forbid(unsafe_code)]
 
 mod anderson;
 mod control;

@@ -1,6 +1,6 @@
 //! What the stepping loop calls allocates nothing.
 
-use master::solve::{
+use solve::{
     Anderson, Bond, Bracket, EnergyControl, ErrorControl, ForwardControl, Newton, Progress,
     QuasiNewton, Scale, SizeBounds, Solver,
 };
