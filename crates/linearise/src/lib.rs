@@ -252,3 +252,7 @@ fn candidates(description: &ModelDescription) -> String {
     let names: Vec<&str> = readable.map(|variable| variable.name.as_str()).take(10).collect();
     if names.is_empty() { String::new() } else { format!(" among {}", names.join(", ")) }
 }
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -392,3 +392,7 @@ pub fn absent(function: &'static str) -> CallError {
 fn quoted(messages: &[String]) -> String {
     if messages.is_empty() { String::new() } else { format!(": {}", messages.join("; ")) }
 }
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -232,3 +232,7 @@ impl Watch {
         ended.then_some(Progress::NotConverged { iterations, residual: distance })
     }
 }
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
