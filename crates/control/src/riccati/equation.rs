@@ -1,12 +1,13 @@
 //! The two equations with R = I: gain, left side, and the sum of the absolute terms.
 
 use crate::Domain;
+use crate::blocks::symmetric_part;
 use crate::lyapunov::{self, Equation, relative};
 use nalgebra::DMatrix;
 
 /// What differs between continuous and sampled time, for the weights Q, N and R = I.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Form {
+pub(super) struct RiccatiEquation {
     pub(super) a: DMatrix<f64>,
     pub(super) b: DMatrix<f64>,
     pub(super) q: DMatrix<f64>,
@@ -14,14 +15,14 @@ pub(super) struct Form {
     pub(super) domain: Domain,
 }
 
-impl Form {
+impl RiccatiEquation {
     /// K = -(B' P + N'), sampled -(I + B' P B)^-1 (B' P A + N'); None if it cannot be computed.
     pub(super) fn gain(&self, p: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let effect = self.b.tr_mul(p);
         match self.domain {
             Domain::Continuous => Some(-(effect + self.n.transpose())),
             Domain::Sampled { .. } => {
-                let size = symmetric(&effect * &self.b) + identity(self.b.ncols());
+                let size = symmetric_part(&(&effect * &self.b)) + identity(self.b.ncols());
                 size.cholesky().map(|size| -size.solve(&(effect * &self.a + self.n.transpose())))
             }
         }
@@ -34,7 +35,7 @@ impl Form {
         let cross = &self.n * gain;
         let cost = &self.q + &cross + cross.transpose() + gain.tr_mul(gain);
         let closed = &self.a + &self.b * gain;
-        symmetric(match self.domain {
+        symmetric_part(&match self.domain {
             Domain::Continuous => closed.tr_mul(p) + p * closed + cost,
             Domain::Sampled { .. } => closed.tr_mul(p) * closed - p + cost,
         })
@@ -71,9 +72,9 @@ impl Form {
     pub(super) fn newton(&self, p: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let gain = self.gain(p)?;
         let closed = &self.a + &self.b * &gain;
-        crate::stability::require("A + B K", &closed, self.domain).ok()?;
+        crate::stability::require_stable("A + B K", &closed, self.domain).ok()?;
         let step = self.equation().solve(&closed, &self.left_side(p, &gain)).ok()?;
-        Some(symmetric(p + step))
+        Some(symmetric_part(&(p + step)))
     }
 
     fn equation(&self) -> &'static Equation {
@@ -86,10 +87,4 @@ impl Form {
 
 pub(super) fn identity(order: usize) -> DMatrix<f64> {
     DMatrix::identity(order, order)
-}
-
-/// The symmetric part.
-pub(super) fn symmetric(m: DMatrix<f64>) -> DMatrix<f64> {
-    let transposed = m.transpose();
-    (m + transposed) * 0.5
 }
