@@ -1,5 +1,4 @@
 //! FMUs in C through our own loader: what is unusual is served, what is wrong is said.
-#![forbid(unsafe_code)]
 #![expect(clippy::unwrap_used, clippy::float_cmp, reason = "tests; exact by construction")]
 
 use std::path::PathBuf;

@@ -1,5 +1,4 @@
 //! The packed FMUs and what is committed of them.
-#![forbid(unsafe_code)]
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::collections::BTreeSet;

@@ -1,5 +1,4 @@
 //! Steps that a system structure proposes for its elements: `osp:StepSizeHint`.
-#![forbid(unsafe_code)]
 #![expect(clippy::unwrap_used, reason = "tests; numbers are exact by construction")]
 
 use std::path::{Path, PathBuf};

@@ -8,7 +8,7 @@ use study::scenario::{Scenario, Setup};
 use tests::linear::{ABLE, Block};
 use tests::network::Network;
 
-use crate::until;
+use crate::engine::until;
 
 #[derive(serde::Deserialize)]
 struct File {

@@ -1,5 +1,4 @@
 //! The command line, driven from outside.
-#![forbid(unsafe_code)]
 #![expect(clippy::unwrap_used, clippy::float_cmp, reason = "tests; numbers as written")]
 
 use std::fs;

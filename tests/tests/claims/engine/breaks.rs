@@ -8,7 +8,7 @@ use study::scenario::{Scenario, Setup};
 use tests::linear::ABLE;
 use tests::problems;
 
-use crate::until;
+use crate::engine::until;
 
 const FAULT: &str = r#"
 [[scenario.fault]]

@@ -1,6 +1,5 @@
 //! `aso-ftc check` on FMUs in C that misbehave: whatever one does to its process is a finding.
 #![cfg(target_os = "linux")]
-#![forbid(unsafe_code)]
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::path::Path;

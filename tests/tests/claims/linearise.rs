@@ -1,5 +1,4 @@
 //! Linearisation of FMUs in each of its ways, against derivatives by hand.
-#![forbid(unsafe_code)]
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::fs;

@@ -1,5 +1,4 @@
 //! Calls that FMUs in C refuse, put off or do in part: what the master is told.
-#![forbid(unsafe_code)]
 #![expect(clippy::unwrap_used, clippy::float_cmp, reason = "tests; exact by construction")]
 
 use std::time::Duration;

@@ -4,8 +4,8 @@ use master::algorithm::EventSource;
 use master::{Algorithm, Course, Simulation, StepControl, Sweep};
 use tests::linear::OUTPUTS;
 
-use crate::puppet::{system, whole};
-use crate::until;
+use crate::engine::puppet::{system, whole};
+use crate::engine::until;
 
 const EVENTS: [f64; 4] = [0.137, 0.3, 0.3001, 0.7777];
 

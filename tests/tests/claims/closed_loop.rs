@@ -1,5 +1,4 @@
 //! The closed loop of plant and controller, one test for each claim.
-#![forbid(unsafe_code)]
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 use master::{Algorithm, Course, Sweep};

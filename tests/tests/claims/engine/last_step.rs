@@ -3,8 +3,8 @@
 use master::algorithm::EventSource;
 use master::{Algorithm, Coupling, Course, Simulation, StepControl, Sweep, System};
 
-use crate::puppet::{Asked, rigid, system, whole};
-use crate::until;
+use crate::engine::puppet::{Asked, rigid, system, whole};
+use crate::engine::until;
 
 /// Steps and stop times in s: so many steps end an ulp or more beyond the stop time where each begins
 /// at a multiple and is whole.

@@ -1,22 +1,14 @@
 //! `aso-ftc run`, driven from outside.
-#![forbid(unsafe_code)]
 #![expect(clippy::unwrap_used, clippy::float_cmp, reason = "tests; numbers as written")]
 
-#[path = "run/configuration.rs"]
 mod configuration;
-#[path = "run/ends.rs"]
 mod ends;
-#[path = "run/files.rs"]
 mod files;
-#[path = "run/first_minute.rs"]
 mod first_minute;
-#[path = "run/library.rs"]
 mod library;
-#[path = "run/messages.rs"]
 mod messages;
 
 #[cfg(unix)]
-#[path = "run/process.rs"]
 mod process;
 
 use std::fs;

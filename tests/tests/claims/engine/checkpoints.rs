@@ -10,7 +10,7 @@ use tests::linear::{ABLE, Abilities};
 use tests::network::Network;
 use tests::problems;
 
-use crate::until;
+use crate::engine::until;
 
 const FAULTS: &str = r#"
 [[scenario.fault]]
@@ -144,14 +144,14 @@ fn a_checkpoint_of_another_step_or_algorithm_is_refused_by_name() {
 
 #[test]
 fn a_run_that_was_ended_by_a_slave_stays_ended() {
-    let (system, _) = crate::puppet::system([f64::sin; 2], crate::parts::ends);
+    let (system, _) = crate::engine::puppet::system([f64::sin; 2], crate::engine::parts::ends);
     let algorithm = Algorithm::fixed(Sweep::Jacobi, Course::Hold, 0.25);
     let mut run = Simulation::new(system, &algorithm, &until(1.0)).unwrap();
     while !run.is_finished() {
         run.step().unwrap();
     }
     let checkpoint = run.checkpoint().unwrap();
-    let (system, _) = crate::puppet::system([f64::sin; 2], crate::parts::ends);
+    let (system, _) = crate::engine::puppet::system([f64::sin; 2], crate::engine::parts::ends);
     let resumed = Simulation::resume(
         system,
         &algorithm,

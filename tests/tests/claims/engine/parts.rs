@@ -2,8 +2,8 @@
 
 use master::{Algorithm, Coupling, Course, Readout, Simulation, StepControl, Stepped, Sweep};
 
-use crate::puppet::{add_clock, system, whole};
-use crate::until;
+use crate::engine::puppet::{add_clock, system, whole};
+use crate::engine::until;
 
 /// Stops at 0.35 s, to be asked again.
 fn stops(begin: f64, end: f64) -> Stepped {

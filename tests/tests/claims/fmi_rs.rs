@@ -2,7 +2,6 @@
 //!
 //! It offers neither input and output derivatives nor `fmi2GetStatus`, so inputs are held.
 #![cfg(feature = "fmi")]
-#![forbid(unsafe_code)]
 #![expect(clippy::unwrap_used, reason = "a test fails by a panic, in its set-up too")]
 
 use std::fs;

@@ -2,8 +2,8 @@
 
 use master::{Algorithm, Course, Readout, Simulation, Sweep};
 
-use crate::puppet::{system, whole};
-use crate::until;
+use crate::engine::puppet::{system, whole};
+use crate::engine::until;
 
 /// The input of a, which makes every step, from p, which makes four at once and whose output is
 /// 1 + 2 t, over 12 steps of 0.25 s.

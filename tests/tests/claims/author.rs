@@ -1,5 +1,4 @@
 //! What the author of a model meets: the examples, `aso-ftc new`, `aso-ftc pack PATH`.
-#![forbid(unsafe_code)]
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::collections::BTreeSet;

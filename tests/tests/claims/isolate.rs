@@ -1,6 +1,5 @@
 //! FMUs in processes of their own: the same numbers, and whatever they do, a clear report.
 #![cfg(target_os = "linux")]
-#![forbid(unsafe_code)]
 #![expect(clippy::unwrap_used, clippy::float_cmp, reason = "tests; numbers as written")]
 
 use std::time::{Duration, Instant};

@@ -7,7 +7,7 @@ use tests::linear::{ABLE, Block};
 use tests::network::Network;
 use tests::problems;
 
-use crate::until;
+use crate::engine::until;
 
 /// `y_a = 1 - 2 y_b`, `y_b = -0.5 + 1.5 y_a`: `y_a = 0.5`, `y_b = 0.25`. Passing values on diverges.
 #[test]

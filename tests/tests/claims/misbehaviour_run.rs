@@ -1,11 +1,8 @@
 //! FMUs in C under `aso-ftc run`, in its own process: unusual ones run, and where one fails the
 //! message, the exit status and the results so far are right, even where it takes the process with
 //! it. The same in processes of their own is in `misbehaviour_isolated.rs`.
-#![forbid(unsafe_code)]
 
-#[path = "misbehaviour_run/promises.rs"]
 mod promises;
-#[path = "misbehaviour_run/settings.rs"]
 mod settings;
 
 use tests::c_fmu::CFmu;

@@ -6,7 +6,7 @@ use master::{Algorithm, Coupling, Course, Simulation, Sweep};
 use tests::linear::ABLE;
 use tests::problems;
 
-use crate::{typed, until};
+use crate::engine::{typed, until};
 
 const ALL: [Course; 4] = [Course::Hold, Course::Limited, Course::Linear, Course::Quadratic];
 

@@ -1,6 +1,5 @@
 //! FMUs in C under `aso-ftc run --isolate`: whatever one does to its process, the run ends with
 //! the FMU, the call, the time and the signal, and the results so far are whole.
-#![forbid(unsafe_code)]
 
 use tests::c_fmu::CFmu;
 use tests::coupled::{ALL, Run, STEP, TO_T1, UNUSUAL};

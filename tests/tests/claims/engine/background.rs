@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use master::{Algorithm, Coupling, Course, Simulation, StepControl, Stepped, Sweep, System};
 
-use crate::ahead::{Fails, ahead};
-use crate::{puppet, typed, until};
+use crate::engine::ahead::{Fails, ahead};
+use crate::engine::{puppet, typed, until};
 use tests::linear::ABLE;
 use tests::problems;
 

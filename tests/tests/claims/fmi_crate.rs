@@ -1,6 +1,5 @@
 //! The crate `fmi` as the master's second way in, beside our own loader.
 #![cfg(feature = "fmi")]
-#![forbid(unsafe_code)]
 #![expect(clippy::unwrap_used, reason = "a test fails by a panic, in its set-up too")]
 
 use std::fs;
