@@ -86,7 +86,8 @@ pub struct Linearise {
 /// # Example
 ///
 /// ```no_run
-/// use linearise::{Fmu, Linearise, linearise};
+/// use fmu_import::Fmu;
+/// use linearise::{Linearise, linearise};
 /// let names = |list: &[&str]| list.iter().map(|name| (*name).to_owned()).collect();
 /// let request = Linearise {
 ///     inputs: names(&["u"]),

@@ -17,6 +17,7 @@ mod misbehaviour_calls;
 mod misbehaviour_isolated;
 mod misbehaviour_run;
 mod order;
+mod outside;
 mod package;
 mod run;
 mod step_hints;

@@ -189,7 +189,7 @@ fn the_models_forbid_unsafe_code() {
     for model in [
         "fmu-plant",
         "fmu-controller",
-        "control",
+        "crates/control",
         "cli",
         "examples/van-der-pol",
         "examples/bouncing-ball",
