@@ -3,6 +3,7 @@
 mod binaries;
 mod library;
 mod licenses;
+#[cfg(feature = "sbom")]
 mod sbom;
 mod ssp;
 
@@ -46,13 +47,19 @@ pub(crate) struct Options {
     /// Pack the libraries in this folder, as FOLDER/win64/MODEL.dll, in place of the one built here
     #[arg(long, value_name = "FOLDER")]
     binaries: Option<PathBuf>,
-    /// Also write a bill of materials beside each FMU
+    /// Also write a bill of materials beside each FMU; needs a command built with the feature `sbom`
     #[arg(long)]
     sbom: bool,
 }
 
 /// Builds and packs the given crates or all models of the workspace.
 pub(crate) fn pack(options: &Options) -> anyhow::Result<bool> {
+    if options.sbom && !cfg!(feature = "sbom") {
+        bail!(
+            "--sbom: this aso-ftc is built without bills of materials; \
+             `cargo run --release --features sbom -- pack --sbom` builds one that writes them"
+        );
+    }
     let packing = Packing {
         out: &options.out,
         binaries: options.binaries.as_deref(),
@@ -148,6 +155,7 @@ fn pack_crate(folder: &Path, packing: &Packing<'_>) -> anyhow::Result<Packed> {
     licenses::add(&mut package, &library)?;
     let path = packing.out.join(format!("{identifier}.fmu"));
     package.write(&path)?;
+    #[cfg(feature = "sbom")]
     if packing.sbom {
         let bill = sbom::bill(&description, &library, packing.binaries.is_some())?;
         let target = path.with_extension("cdx.json");

@@ -1,4 +1,4 @@
-//! The second way in: FMUs through the crate `fmi`, as an independent check of our own loader.
+//! FMUs through the crate `fmi`, as an independent check of our own loader.
 //!
 //! What that crate does not do well is kept away from it. [`Fmu::open`] goes first: its model
 //! description is the one in use, and it refuses archives that lead out of their folder and
@@ -12,16 +12,18 @@
 use std::ffi::CString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::{self, JoinHandle};
 
 use fmi::fmi2::Fmi2Error;
 use fmi::fmi2::import::Fmi2Import;
-use fmi::fmi2::instance::{CoSimulation as _, Common, InstanceCS};
+use fmi::fmi2::instance::{CoSimulation as _, Common as _, InstanceCS};
 use fmu_description::Experiment;
 use fmu_description::ModelDescription;
 use fmu_description::abi::Status;
+use fmu_import::{Fmu, FmuError};
+use master::{CallError, Failure, Slave, Stepped};
 
-use crate::fmu::{Fmu, FmuError};
-use crate::slave::{CallError, Failure, Slave, Stepped};
 
 /// Why an FMU could not be opened or instantiated through the crate `fmi`.
 #[derive(Debug, thiserror::Error)]
@@ -50,48 +52,61 @@ pub enum FmiCrateError {
 /// An instance of an FMU, by the crate `fmi`.
 ///
 /// That crate has no function for the derivatives of inputs and outputs. So the description says
-/// that the FMU has none, whatever it says itself, and the master holds its inputs.
+/// that the FMU has none, whatever it says itself, and the master holds its inputs. Its instances are
+/// bound to a thread, so each has one of its own.
 pub struct FmiSlave {
-    // Freed before its folder goes.
-    instance: InstanceCS,
-    _folder: Fmi2Import,
+    jobs: Option<Sender<Job>>,
+    thread: Option<JoinHandle<()>>,
     description: ModelDescription,
 }
+
+type Job = Box<dyn FnOnce(&mut InstanceCS) + Send>;
+/// What comes of opening: nothing, a refusal, or the message of a panic.
+type Opened = Result<Result<(), Box<fmi::Error>>, String>;
 
 impl FmiSlave {
     /// Opens the FMU at `path` and instantiates it as `name`.
     ///
     /// # Errors
     ///
-    /// [`FmiCrateError`]: as [`Fmu::open`], and where the crate does not understand the model
-    /// description or the FMU refuses the instance.
+    /// [`FmiCrateError`]: the FMU cannot be opened, the crate does not understand the model
+    /// description, or the FMU refuses the instance.
+    ///
+    /// # Panics
+    ///
+    /// Where no thread can be started.
     pub fn open(path: &Path, name: &str) -> Result<Self, FmiCrateError> {
         let mut description = Fmu::open(path)?.description().clone();
         if let Some(co_simulation) = &mut description.co_simulation {
             co_simulation.can_interpolate_inputs = false;
             co_simulation.max_output_derivative_order = 0;
         }
-        let name = name.replace('\0', "");
-        let opened = fenced(|| {
-            let folder: Fmi2Import = fmi::import::from_path(path)?;
-            let instance = folder.instantiate_cs(&name, false, false)?;
-            Ok((instance, folder))
-        });
-        let path = path.to_owned();
-        match opened {
-            Ok(Ok((instance, folder))) => Ok(Self { instance, _folder: folder, description }),
-            Ok(Err(source)) => Err(FmiCrateError::Refused { path, source: Box::new(source) }),
+        let (name, path) = (name.replace('\0', ""), path.to_owned());
+        let (jobs, waiting) = channel();
+        let (tell, opened) = channel();
+        let file = path.clone();
+        let thread = thread::spawn(move || serve(&file, &name, &tell, &waiting));
+        match opened.recv().expect("the thread answers") {
+            Ok(Ok(())) => Ok(Self { jobs: Some(jobs), thread: Some(thread), description }),
+            Ok(Err(source)) => Err(FmiCrateError::Refused { path, source }),
             Err(message) => Err(FmiCrateError::Panic { path, message }),
         }
     }
 
-    fn call<T>(
+    fn call<T: Send + 'static>(
         &mut self,
         function: &'static str,
-        call: impl FnOnce(&mut InstanceCS) -> Result<T, Fmi2Error>,
-    ) -> Result<(), CallError> {
-        let status = match fenced(|| call(&mut self.instance)) {
-            Ok(Ok(_)) => return Ok(()),
+        call: impl FnOnce(&mut InstanceCS) -> Result<T, Fmi2Error> + Send + 'static,
+    ) -> Result<T, CallError> {
+        let (tell, done) = channel();
+        let job: Job = Box::new(move |instance| {
+            // Nobody is left to hear where the slave is gone.
+            let _ = tell.send(fenced(|| call(instance)));
+        });
+        let jobs = self.jobs.as_ref().expect("open until it is dropped");
+        jobs.send(job).expect("the thread lives");
+        let status = match done.recv().expect("the thread answers") {
+            Ok(Ok(done)) => return Ok(done),
             Ok(Err(Fmi2Error::Discard)) => Status::Discard,
             Ok(Err(Fmi2Error::Fatal)) => Status::Fatal,
             Ok(Err(Fmi2Error::Error | Fmi2Error::TypesPlatformMismatch(_))) => Status::Error,
@@ -105,6 +120,36 @@ impl FmiSlave {
     }
 }
 
+/// The thread of an instance: opens it, then does the jobs until there are no more.
+fn serve(path: &Path, name: &str, tell: &Sender<Opened>, jobs: &Receiver<Job>) {
+    let opened = fenced(|| {
+        let folder: Fmi2Import = fmi::import::from_path(path)?;
+        let instance = folder.instantiate_cs(name, false, false)?;
+        Ok((instance, folder))
+    });
+    // The instance is freed before its folder goes.
+    let (mut instance, _folder) = match opened {
+        Ok(Ok(both)) => both,
+        Ok(Err(error)) => return drop(tell.send(Ok(Err(Box::new(error))))),
+        Err(message) => return drop(tell.send(Err(message))),
+    };
+    let _ = tell.send(Ok(Ok(())));
+    for job in jobs {
+        job(&mut instance);
+    }
+    drop(instance);
+}
+
+impl Drop for FmiSlave {
+    fn drop(&mut self) {
+        drop(self.jobs.take());
+        if let Some(thread) = self.thread.take() {
+            // A panic while it is freed was printed.
+            let _ = thread.join();
+        }
+    }
+}
+
 /// The result of `action`, or what it panicked with.
 fn fenced<T>(action: impl FnOnce() -> T) -> Result<T, String> {
     catch_unwind(AssertUnwindSafe(action)).map_err(|payload| {
@@ -114,61 +159,72 @@ fn fenced<T>(action: impl FnOnce() -> T) -> Result<T, String> {
     })
 }
 
+/// Methods that read, and methods that write, values of one type.
+macro_rules! values {
+    ($($get:ident $set:ident $type:ty, $read:literal $write:literal;)*) => {$(
+        fn $get(&mut self, references: &[u32], values: &mut [$type]) -> Result<(), CallError> {
+            let (references, mut found) = (references.to_vec(), values.to_vec());
+            let found = self.call($read, move |instance| {
+                instance.$get(&references, &mut found).map(|_| found)
+            })?;
+            values.copy_from_slice(&found);
+            Ok(())
+        }
+
+        fn $set(&mut self, references: &[u32], values: &[$type]) -> Result<(), CallError> {
+            let (references, values) = (references.to_vec(), values.to_vec());
+            self.call($write, move |instance| instance.$set(&references, &values).map(drop))
+        }
+    )*};
+}
+
 impl Slave for FmiSlave {
+    values! {
+        get_real set_real f64, "fmi2GetReal" "fmi2SetReal";
+        get_integer set_integer i32, "fmi2GetInteger" "fmi2SetInteger";
+        get_boolean set_boolean i32, "fmi2GetBoolean" "fmi2SetBoolean";
+    }
+
     fn description(&self) -> &ModelDescription {
         &self.description
     }
 
-    fn setup_experiment(&mut self, e: &Experiment) -> Result<(), CallError> {
-        self.call("fmi2SetupExperiment", |instance| {
-            instance.setup_experiment(e.tolerance, e.start_time, e.stop_time)
+    fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError> {
+        let Experiment { start_time, stop_time, tolerance } = *experiment;
+        self.call("fmi2SetupExperiment", move |instance| {
+            instance.setup_experiment(tolerance, start_time, stop_time).map(drop)
         })
     }
 
     fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
-        self.call("fmi2EnterInitializationMode", Common::enter_initialization_mode)
+        self.call("fmi2EnterInitializationMode", |instance| {
+            instance.enter_initialization_mode().map(drop)
+        })
     }
 
     fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
-        self.call("fmi2ExitInitializationMode", Common::exit_initialization_mode)
+        self.call("fmi2ExitInitializationMode", |instance| {
+            instance.exit_initialization_mode().map(drop)
+        })
     }
 
     fn terminate(&mut self) -> Result<(), CallError> {
-        self.call("fmi2Terminate", Common::terminate)
-    }
-
-    fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
-        self.call("fmi2GetReal", |instance| instance.get_real(references, values))
-    }
-
-    fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), CallError> {
-        self.call("fmi2SetReal", |instance| instance.set_real(references, values))
-    }
-
-    fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
-        self.call("fmi2GetInteger", |instance| instance.get_integer(references, values))
-    }
-
-    fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
-        self.call("fmi2SetInteger", |instance| instance.set_integer(references, values))
-    }
-
-    fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
-        self.call("fmi2GetBoolean", |instance| instance.get_boolean(references, values))
-    }
-
-    fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
-        self.call("fmi2SetBoolean", |instance| instance.set_boolean(references, values))
+        self.call("fmi2Terminate", |instance| instance.terminate().map(drop))
     }
 
     fn set_string(&mut self, references: &[u32], values: &[String]) -> Result<(), CallError> {
         let text = |value: &String| CString::new(value.replace('\0', "")).unwrap_or_default();
         let values: Vec<_> = values.iter().map(text).collect();
-        self.call("fmi2SetString", |instance| instance.set_string(references, &values))
+        let references = references.to_vec();
+        self.call("fmi2SetString", move |instance| {
+            instance.set_string(&references, &values).map(drop)
+        })
     }
 
     fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<Stepped, CallError> {
-        self.call("fmi2DoStep", |instance| instance.do_step(time, size, never_back))?;
+        self.call("fmi2DoStep", move |instance| {
+            instance.do_step(time, size, never_back).map(drop)
+        })?;
         Ok(Stepped::Whole)
     }
 }

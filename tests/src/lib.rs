@@ -4,6 +4,8 @@
 
 pub mod c_fmu;
 pub mod coupled;
+#[cfg(feature = "fmi")]
+pub mod fmi_crate;
 pub mod isolated;
 pub mod linear;
 pub mod network;

@@ -261,8 +261,4 @@ impl Slave for Linear {
         }
         Ok(())
     }
-
-    fn in_thread(&mut self) -> Option<&mut (dyn Slave + Send)> {
-        Some(self)
-    }
 }

@@ -93,7 +93,7 @@ pub(crate) fn place_controller(
 ///
 /// ```
 /// use control::aso::{FaultyPlant, design};
-/// use control::placement::real;
+/// use control::placement::real_poles;
 /// use nalgebra::{Complex, DMatrix};
 /// let plant = FaultyPlant::with_constant_faults(
 ///     DMatrix::from_row_slice(2, 2, &[0.0, 1.0, 0.0, 0.0]),
@@ -101,7 +101,7 @@ pub(crate) fn place_controller(
 ///     DMatrix::from_row_slice(1, 2, &[1.0, 0.0]),
 ///     DMatrix::from_row_slice(2, 1, &[0.0, -1.0]),
 /// );
-/// let gains = design(&plant, &real(&[-1.0, -2.0]), &real(&[-10.0, -11.0, -12.0]), None)?.gains;
+/// let gains = design(&plant, &real_poles(&[-1.0, -2.0]), &real_poles(&[-10.0, -11.0, -12.0]), None)?.gains;
 /// // (s + 10) (s + 11) (s + 12) = s^3 + 33 s^2 + 362 s + 1320
 /// assert!((gains.l_x - DMatrix::from_row_slice(2, 1, &[33.0, 362.0])).amax() < 1e-9);
 /// assert!((gains.l_f[(0, 0)] + 1320.0).abs() < 1e-8);

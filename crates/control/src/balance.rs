@@ -17,7 +17,7 @@ pub(crate) struct Balance {
 }
 
 impl Balance {
-    pub(crate) fn of(a: &DMatrix<f64>) -> Self {
+    pub(crate) fn new(a: &DMatrix<f64>) -> Self {
         let mut balance = Self { matrix: a.clone(), scale: DVector::from_element(a.nrows(), 1.0) };
         for _ in 0..SWEEPS {
             let mut changed = false;
@@ -100,7 +100,7 @@ mod tests {
     #[test]
     fn balancing_is_undone_without_rounding_and_levels_a_badly_scaled_matrix() {
         let a = DMatrix::from_row_slice(3, 3, &[1., 1e-8, 3e-9, 2e8, 2., 0.7, 5e9, 0.3, -3.]);
-        let balance = Balance::of(&a);
+        let balance = Balance::new(&a);
         assert_eq!(balance.restore(&balance.matrix), a);
         assert!(balance.matrix.norm() < 10.0, "{}", balance.matrix);
     }
@@ -120,14 +120,14 @@ mod tests {
 
     #[test]
     fn a_state_without_partners_keeps_its_scale() {
-        let balance = Balance::of(&DMatrix::from_row_slice(2, 2, &[0., 1e6, 0., 0.]));
+        let balance = Balance::new(&DMatrix::from_row_slice(2, 2, &[0., 1e6, 0., 0.]));
         assert_eq!(balance.scale, DVector::from_element(2, 1.0));
     }
 
     #[test]
     fn entries_near_the_ends_of_the_range_do_not_break_the_scaling() {
         let a = DMatrix::from_row_slice(2, 2, &[0., 1e300, 1e-300, 0.]);
-        let balance = Balance::of(&a);
+        let balance = Balance::new(&a);
         assert!(balance.matrix.iter().chain(balance.scale.iter()).all(|x| x.is_finite()));
     }
 }

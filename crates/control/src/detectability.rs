@@ -3,7 +3,7 @@
 mod hidden;
 mod visibility;
 
-pub use hidden::Hidden;
+pub use hidden::HiddenFault;
 pub(crate) use hidden::hidden_faults;
 pub use visibility::Visibility;
 
@@ -23,7 +23,7 @@ pub struct Detectability {
     pub unobservable: Vec<(Mode, bool)>,
     /// The combinations of faults that are hidden by states. None: with (A, C) observable, the
     /// augmented observer exists.
-    pub hidden: Vec<Hidden>,
+    pub hidden: Vec<HiddenFault>,
     /// Rank of (`A_0`, `C_0`): full if and only if the observer can have any eigenvalues.
     pub augmented: Rank,
     /// Distance of (`A_0`, `C_0`) from the nearest pair that is not observable.
@@ -38,7 +38,7 @@ pub struct Detectability {
 impl Detectability {
     /// Whether the augmented observer exists and can have any wanted eigenvalues.
     #[must_use]
-    pub fn is_full(&self) -> bool {
+    pub fn observer_exists(&self) -> bool {
         self.observability.is_full() && self.hidden.is_empty() && self.augmented.is_full()
     }
 
@@ -50,9 +50,9 @@ impl Detectability {
 
     /// The columns of `F_a` that no measurement shows, from zero.
     #[must_use]
-    pub fn invisible(&self) -> Vec<usize> {
+    pub fn invisible_faults(&self) -> Vec<usize> {
         let faults = self.visibility.first().map_or(0, Vec::len);
-        (0..faults).filter(|&fault| self.visibility.iter().all(|row| !row[fault].seen)).collect()
+        (0..faults).filter(|&fault| self.visibility.iter().all(|row| !row[fault].visible)).collect()
     }
 }
 
@@ -77,7 +77,7 @@ impl Detectability {
 ///     DMatrix::from_row_slice(2, 1, &[1.0, 0.0]),
 /// );
 /// let found = detectability(&plant, Domain::Continuous)?;
-/// assert!(found.visibility[0][0].seen);
+/// assert!(found.visibility[0][0].visible);
 /// assert_eq!(found.hidden[0].faults(), [0]);
 /// assert_eq!(found.hidden[0].states(), [1]);
 /// # Ok::<(), control::Error>(())
@@ -89,10 +89,7 @@ impl Detectability {
 pub fn detectability(plant: &FaultyPlant, domain: Domain) -> Result<Detectability, Error> {
     plant.check()?;
     let with_stability = |mode: Mode| {
-        let stable = match domain {
-            Domain::Continuous => mode.eigenvalue.re < 0.0,
-            Domain::Sampled { .. } => mode.eigenvalue.norm() < 1.0,
-        };
+        let stable = domain.excess(mode.eigenvalue) < 0.0;
         (mode, stable)
     };
     let modes = unobservable_modes(&plant.a, &plant.c)?;

@@ -3,8 +3,9 @@
 //! Rank is yes or no; this is the size of the smallest change that turns yes into no.
 
 use crate::balance::{Balance, divide_rows, unit_columns};
+use crate::blocks::to_complex;
 use crate::eigen::eigenvalues;
-use crate::singular::{Singular, smallest};
+use crate::svd::{ComplexSvd, norm_2};
 use crate::{Error, check};
 use nalgebra::{Complex, DMatrix};
 use std::cmp::Ordering;
@@ -101,8 +102,8 @@ struct Pencil {
 
 impl Pencil {
     fn of(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Self, Error> {
-        let Balance { matrix, scale } = Balance::of(a);
-        let size = Singular::of(&matrix)?.values[0];
+        let Balance { matrix, scale } = Balance::new(a);
+        let size = norm_2(&matrix)?;
         let unit = if size.is_normal() { size } else { 1.0 };
         Ok(Self { a: matrix / unit, b: unit_columns(&divide_rows(b, &scale)), unit })
     }
@@ -115,8 +116,8 @@ impl Pencil {
             let shift = if i == j { s.conj() } else { Complex::new(0.0, 0.0) };
             Complex::new(entry, 0.0) - shift
         });
-        let (value, u) = smallest(&adjoint, 0)?;
-        let image = self.a.map(|entry| Complex::new(entry, 0.0)) * &u;
+        let (value, u) = ComplexSvd::new(&adjoint)?.from_smallest(0);
+        let image = to_complex(&self.a) * &u;
         Ok((value, u.dotc(&image)))
     }
 

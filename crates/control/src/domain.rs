@@ -1,6 +1,9 @@
-//! The domain of time in which a model holds.
+//! Continuous or sampled time.
 
-/// The domain of time in which a model holds.
+use crate::{Error, check};
+use nalgebra::Complex;
+
+/// Continuous or sampled time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Domain {
     /// x' = A x + B u: stable when every eigenvalue of A has a negative real part.
@@ -10,4 +13,24 @@ pub enum Domain {
         /// Time from one sample to the next, in s, above zero.
         period: f64,
     },
+}
+
+impl Domain {
+    /// Distance of an eigenvalue beyond the stability limit: Re s in continuous time, |z| - 1 in
+    /// sampled time. A mode is stable when it is negative.
+    #[must_use]
+    pub fn excess(self, eigenvalue: Complex<f64>) -> f64 {
+        match self {
+            Self::Continuous => eigenvalue.re,
+            Self::Sampled { .. } => eigenvalue.norm() - 1.0,
+        }
+    }
+
+    /// Checks that the period of sampled time is a finite number above zero.
+    pub(crate) fn check(self) -> Result<(), Error> {
+        match self {
+            Self::Continuous => Ok(()),
+            Self::Sampled { period } => check::positive("period", period),
+        }
+    }
 }

@@ -36,22 +36,11 @@ const ZERO: [f64; 2] = [f64::EPSILON, 256.0 * f64::EPSILON];
 /// when the QR algorithm does not end within 100 iterations per row.
 pub fn eigenvalues(a: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, Error> {
     check::square("A", a)?;
-    let balanced = Balance::of(a).matrix;
+    let balanced = Balance::new(a).matrix;
     let (_, t) = schur(&balanced).or_else(|_| schur(&reflected(&balanced)))?.unpack();
     let mut found = diagonal_blocks(&t);
     found.sort_by(|x, y| x.re.total_cmp(&y.re).then(x.im.total_cmp(&y.im)));
     Ok(found)
-}
-
-/// The spectral abscissa of A: the largest real part of its eigenvalues; below zero A is Hurwitz.
-///
-/// `a`: n x n, finite. Method and precision as in [`eigenvalues`].
-///
-/// # Errors
-///
-/// Those of [`eigenvalues`].
-pub fn spectral_abscissa(a: &DMatrix<f64>) -> Result<f64, Error> {
-    Ok(eigenvalues(a)?.iter().fold(f64::NEG_INFINITY, |largest, value| largest.max(value.re)))
 }
 
 /// Schur form with bounded iterations.

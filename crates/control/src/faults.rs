@@ -20,6 +20,7 @@ mod loss;
 pub use loss::{LossTolerance, estimated_loss, loss_tolerance};
 
 use crate::aso::{AsoDesign, FaultyPlant, design_feedback};
+use crate::blocks::{block_2x2, stacked};
 use crate::{Error, check};
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -34,7 +35,7 @@ pub enum FaultKind {
 
 /// Where a fault enters.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Entry {
+pub enum FaultEntry {
     /// x' = A x + B u + column f; n entries.
     Actuator(DVector<f64>),
     /// y = C x + column f; p entries.
@@ -47,14 +48,14 @@ pub enum Entry {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fault {
     /// Where it enters.
-    pub enters: Entry,
+    pub entry: FaultEntry,
     /// How it is taken to develop.
     pub kind: FaultKind,
 }
 
 /// Where the estimates of a fault stand in `f_hat`, from zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Channel {
+pub struct FaultChannel {
     /// The fault.
     pub estimate: usize,
     /// The rate of a ramp.
@@ -71,14 +72,14 @@ pub struct ExtendedPlant {
     /// Number of states of the plant itself.
     pub states: usize,
     /// For each of the user's faults its place in `f_hat`.
-    pub channels: Vec<Channel>,
+    pub channels: Vec<FaultChannel>,
 }
 
 impl ExtendedPlant {
     /// A plant whose faults all enter its states by a fault model of their own; no filter.
     #[must_use]
     pub fn without_filter(plant: FaultyPlant) -> Self {
-        let channel = |estimate| Channel { estimate, rate: None };
+        let channel = |estimate| FaultChannel { estimate, rate: None };
         let channels = (0..plant.f_a.ncols()).map(channel).collect();
         Self { states: plant.a.nrows(), plant, filter: None, channels }
     }
@@ -96,13 +97,13 @@ impl ExtendedPlant {
     /// A motor whose torque is lost in part and whose speed sensor has a drift:
     ///
     /// ```
-    /// use control::faults::{Entry, ExtendedPlant, Fault, FaultKind};
+    /// use control::faults::{FaultEntry, ExtendedPlant, Fault, FaultKind};
     /// use nalgebra::{DMatrix, DVector};
     /// let a = DMatrix::from_row_slice(2, 2, &[0.0, 1.0, 0.0, -2.0]);
     /// let b = DMatrix::from_row_slice(2, 1, &[0.0, 5.0]);
-    /// let loss = Fault { enters: Entry::LossOfEffectiveness(0), kind: FaultKind::Constant };
-    /// let drift = Entry::Sensor(DVector::from_vec(vec![0.0, 1.0]));
-    /// let drift = Fault { enters: drift, kind: FaultKind::Ramp };
+    /// let loss = Fault { entry: FaultEntry::LossOfEffectiveness(0), kind: FaultKind::Constant };
+    /// let drift = FaultEntry::Sensor(DVector::from_vec(vec![0.0, 1.0]));
+    /// let drift = Fault { entry: drift, kind: FaultKind::Ramp };
     /// let c = DMatrix::identity(2, 2);
     /// let extended = ExtendedPlant::new(&a, &b, &c, &[loss, drift], &[50.0, 50.0])?;
     /// assert_eq!(extended.plant.f_a.shape(), (4, 3));
@@ -129,7 +130,7 @@ impl ExtendedPlant {
         let (f_a, f_s) = columns(b, c.nrows(), faults)?;
         let (a_f, channels) = models(faults);
         let width = a_f.nrows();
-        let sensors = faults.iter().any(|fault| matches!(fault.enters, Entry::Sensor(_)));
+        let sensors = faults.iter().any(|fault| matches!(fault.entry, FaultEntry::Sensor(_)));
         let f_a = f_a.resize_horizontally(width, 0.0);
         if !sensors {
             let plant = FaultyPlant { a: a.clone(), b: b.clone(), c: c.clone(), f_a, a_f };
@@ -138,7 +139,7 @@ impl ExtendedPlant {
         let rates = checked_filter(filter, c.nrows())?;
         let f_s = f_s.resize_horizontally(width, 0.0);
         let plant = FaultyPlant {
-            a: filtered(a, &(&rates * c), &-&rates),
+            a: block_2x2([a, &DMatrix::zeros(n, c.nrows())], [&(&rates * c), &-&rates]),
             b: b.clone().resize_vertically(n + c.nrows(), 0.0),
             c: DMatrix::identity(c.nrows(), c.nrows()).insert_columns(0, n, 0.0),
             f_a: stacked(&f_a, &(&rates * f_s)),
@@ -176,13 +177,13 @@ fn columns(
     let (n, m) = b.shape();
     let (mut f_a, mut f_s) = (DMatrix::zeros(n, faults.len()), DMatrix::zeros(p, faults.len()));
     for (at, fault) in faults.iter().enumerate() {
-        let (name, into, column) = match &fault.enters {
-            Entry::Actuator(column) => ("a column of F_a", &mut f_a, column.clone()),
-            Entry::Sensor(column) => ("a column of F_s", &mut f_s, column.clone()),
-            Entry::LossOfEffectiveness(input) if *input < m => {
+        let (name, into, column) = match &fault.entry {
+            FaultEntry::Actuator(column) => ("a column of F_a", &mut f_a, column.clone()),
+            FaultEntry::Sensor(column) => ("a column of F_s", &mut f_s, column.clone()),
+            FaultEntry::LossOfEffectiveness(input) if *input < m => {
                 ("B", &mut f_a, b.column(*input).into())
             }
-            Entry::LossOfEffectiveness(input) => {
+            FaultEntry::LossOfEffectiveness(input) => {
                 #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
                 let value = *input as f64;
                 let rule = "the index of an input, from zero";
@@ -197,13 +198,13 @@ fn columns(
 }
 
 /// `A_f`, and where each fault and its rate stand.
-fn models(faults: &[Fault]) -> (DMatrix<f64>, Vec<Channel>) {
+fn models(faults: &[Fault]) -> (DMatrix<f64>, Vec<FaultChannel>) {
     let mut next = faults.len();
     let mut channels = Vec::with_capacity(faults.len());
     for (estimate, fault) in faults.iter().enumerate() {
         let rate = (fault.kind == FaultKind::Ramp).then_some(next);
         next += usize::from(rate.is_some());
-        channels.push(Channel { estimate, rate });
+        channels.push(FaultChannel { estimate, rate });
     }
     let mut a_f = DMatrix::zeros(next, next);
     for channel in &channels {
@@ -222,24 +223,4 @@ fn checked_filter(filter: &[f64], p: usize) -> Result<DMatrix<f64>, Error> {
         check::positive("a rate of the filter W", rate)?;
     }
     Ok(DMatrix::from_diagonal(&rates))
-}
-
-/// [A, 0; below, corner].
-pub(crate) fn filtered(
-    a: &DMatrix<f64>,
-    below: &DMatrix<f64>,
-    corner: &DMatrix<f64>,
-) -> DMatrix<f64> {
-    let (n, p) = (a.nrows(), corner.nrows());
-    let mut whole = a.clone().resize(n + p, n + p, 0.0);
-    whole.view_mut((n, 0), (p, n)).copy_from(below);
-    whole.view_mut((n, n), (p, p)).copy_from(corner);
-    whole
-}
-
-/// [above; below].
-pub(crate) fn stacked(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut both = above.clone().resize_vertically(above.nrows() + below.nrows(), 0.0);
-    both.rows_mut(above.nrows(), below.nrows()).copy_from(below);
-    both
 }

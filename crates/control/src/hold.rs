@@ -137,7 +137,7 @@ fn integrals(
     check::positive("h", h)?;
     let m = b.ncols();
     let slopes = if degree == Degree::Linear { m } else { 0 };
-    let balance = Balance::of(a);
+    let balance = Balance::new(a);
     let inputs = check::in_range("B h", divide_rows(b, &balance.scale) * h)?;
     let units = DVector::from_iterator(m, inputs.column_iter().map(|c| unit(c.norm())));
     let mut block = DMatrix::zeros(n + m + slopes, n + m + slopes);

@@ -22,6 +22,7 @@
 
 pub mod aso;
 mod balance;
+mod blocks;
 mod check;
 pub mod controller;
 pub mod detectability;
@@ -41,11 +42,13 @@ pub mod rank;
 pub mod response;
 pub mod riccati;
 pub mod sampled;
-mod singular;
-mod stability;
+pub mod stability;
+mod state_space;
+mod svd;
 pub mod theorem1;
 pub mod zeros;
 
 pub use domain::Domain;
 pub use error::Error;
 pub use product::product;
+pub use state_space::StateSpace;

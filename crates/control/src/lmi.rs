@@ -14,14 +14,14 @@ mod affine;
 mod coordinates;
 pub(crate) mod definite;
 mod gain;
+mod observer;
 mod problem;
 mod region;
-mod search;
 mod solver;
 mod synthesis;
 
 pub use affine::Affine;
-pub use gain::{Channel, GainBound, Norm, certify_gain};
+pub use gain::{GainBound, Norm, certify_gain};
 pub use problem::Problem;
 pub use region::{Disc, Region, RegionCertificate, certify_region};
 pub use synthesis::{Performance, Synthesis, observer_gain, state_feedback};
@@ -40,7 +40,7 @@ pub enum Outcome<T> {
         conflict: Vec<&'static str>,
     },
     /// Neither an answer nor a contradiction was found in double precision; says why.
-    Trouble(&'static str),
+    Inconclusive(&'static str),
 }
 
 impl<T> Outcome<T> {
@@ -48,7 +48,7 @@ impl<T> Outcome<T> {
     pub fn optimal(self) -> Option<T> {
         match self {
             Self::Optimal(answer) => Some(answer),
-            Self::Infeasible { .. } | Self::Trouble(_) => None,
+            Self::Infeasible { .. } | Self::Inconclusive(_) => None,
         }
     }
 
@@ -57,7 +57,7 @@ impl<T> Outcome<T> {
         match self {
             Self::Optimal(answer) => next(answer),
             Self::Infeasible { conflict } => Ok(Outcome::Infeasible { conflict }),
-            Self::Trouble(why) => Ok(Outcome::Trouble(why)),
+            Self::Inconclusive(why) => Ok(Outcome::Inconclusive(why)),
         }
     }
 }
@@ -76,6 +76,6 @@ impl Solution {
     /// The value of an expression.
     #[must_use]
     pub fn value(&self, expression: &Affine) -> DMatrix<f64> {
-        expression.at(&self.unknowns)
+        expression.evaluate(&self.unknowns)
     }
 }

@@ -3,7 +3,7 @@
 mod triangular;
 
 use crate::balance::{Balance, multiply_columns, multiply_rows};
-use crate::singular::Singular;
+use crate::svd::Svd;
 use crate::{Domain, Error, check, stability};
 use nalgebra::DMatrix;
 use triangular::Triangular;
@@ -101,7 +101,7 @@ pub fn definite_range(p: &DMatrix<f64>) -> Result<(f64, f64), Error> {
     check::square("P", p)?;
     symmetric("P", p)?;
     let factor = p.clone().cholesky().ok_or(Error::NotPositiveDefinite { matrix: "P" })?.l();
-    let values = Singular::of(&factor.transpose())?.values;
+    let values = Svd::new(&factor.transpose())?.values;
     Ok((values[values.len() - 1].powi(2), values[0].powi(2)))
 }
 
@@ -154,13 +154,13 @@ impl Equation {
         let n = check::square("A", a)?;
         check::shape("Q", q, (n, n))?;
         symmetric("Q", q)?;
-        stability::require("A", a, domain)?;
+        stability::require_stable("A", a, domain)?;
         self.verified(a, self.solve(a, q)?, q)
     }
 
     /// P for a stable A and a symmetric Q.
     pub(crate) fn solve(&self, a: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
-        let Balance { matrix, scale } = Balance::of(a);
+        let Balance { matrix, scale } = Balance::new(a);
         let scaled_q = multiply_rows(&multiply_columns(q, &scale), &scale);
         let triangular = Triangular::of(&matrix)?;
         let mut p = (self.substitute)(&triangular, &scaled_q);

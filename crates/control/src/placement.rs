@@ -9,7 +9,7 @@ mod wanted;
 
 use crate::balance::{Balance, divide_columns, divide_rows, multiply_columns};
 use crate::rank::require_controllable;
-use crate::singular::Singular;
+use crate::svd::Svd;
 use crate::{Error, check};
 use assignable::Assignable;
 use conditioning::{best_directions, condition};
@@ -50,7 +50,7 @@ pub struct Quality {
 
 /// Real eigenvalues as [`place`] takes them.
 #[must_use]
-pub fn real(poles: &[f64]) -> Vec<Complex<f64>> {
+pub fn real_poles(poles: &[f64]) -> Vec<Complex<f64>> {
     poles.iter().map(|&pole| Complex::new(pole, 0.0)).collect()
 }
 
@@ -79,11 +79,11 @@ pub fn real(poles: &[f64]) -> Vec<Complex<f64>> {
 /// # Example
 ///
 /// ```
-/// use control::placement::{place, real};
+/// use control::placement::{place, real_poles};
 /// use nalgebra::{Complex, DMatrix};
 /// let a = DMatrix::from_row_slice(2, 2, &[0.0, 1.0, 0.0, 0.0]);
 /// let b = DMatrix::from_row_slice(2, 1, &[0.0, 1.0]);
-/// let placement = place(&a, &b, &real(&[-1.0, -2.0]))?;
+/// let placement = place(&a, &b, &real_poles(&[-1.0, -2.0]))?;
 /// assert!((placement.gain - DMatrix::from_row_slice(1, 2, &[-2.0, -3.0])).amax() < 1e-13);
 /// let pair = [Complex::new(-3.0, 4.0), Complex::new(-3.0, -4.0)];
 /// let placement = place(&a, &b, &pair)?;
@@ -138,11 +138,11 @@ pub fn place_balanced(
 /// A mass, its position and velocity sampled every 0.1 s, pushed by a force held in between:
 ///
 /// ```
-/// use control::placement::{place_discrete, real};
+/// use control::placement::{place_discrete, real_poles};
 /// use nalgebra::DMatrix;
 /// let a = DMatrix::from_row_slice(2, 2, &[1.0, 0.1, 0.0, 1.0]);
 /// let b = DMatrix::from_row_slice(2, 1, &[0.005, 0.1]);
-/// let gain = place_discrete(&a, &b, &real(&[0.0, 0.1]))?.gain;
+/// let gain = place_discrete(&a, &b, &real_poles(&[0.0, 0.1]))?.gain;
 /// assert!((&gain - DMatrix::from_row_slice(1, 2, &[-90.0, -14.5])).amax() < 1e-11);
 /// # Ok::<(), control::Error>(())
 /// ```
@@ -225,7 +225,7 @@ impl Choice {
 
     /// Units of the states in which A + B K is balanced.
     fn balance(&self, a: &DMatrix<f64>, b: &DMatrix<f64>) -> DVector<f64> {
-        Balance::of(&(a + b * &self.gain)).scale
+        Balance::new(&(a + b * &self.gain)).scale
     }
 
     /// Verified, with condition numbers in the coordinates of A and in those of `scale`.
@@ -262,6 +262,6 @@ fn check_poles(poles: &[Complex<f64>], n: usize) -> Result<(), Error> {
 fn input_basis(b: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
     let lengths = DVector::from_iterator(b.ncols(), b.column_iter().map(|column| column.norm()));
     let lengths = lengths.map(|length| if length > 0.0 { length } else { 1.0 });
-    let unit = Singular::of(&divide_columns(b, &lengths))?;
+    let unit = Svd::new(&divide_columns(b, &lengths))?;
     Ok(divide_rows(&unit.whitening(unit.rank(DEPENDENT_INPUTS)), &lengths))
 }

@@ -6,8 +6,9 @@ mod staircase;
 
 pub(crate) use staircase::Staircase;
 
+use crate::blocks::to_complex;
 use crate::eigen::eigenvalues;
-use crate::singular::smallest;
+use crate::svd::ComplexSvd;
 use crate::{Error, check};
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -21,7 +22,7 @@ pub struct Rank {
     pub rank: usize,
     /// Number of states; the pair is controllable or observable when `rank` equals it.
     pub n: usize,
-    /// Singular values at or below this count as zero, relative to the scaled matrix.
+    /// Svd values at or below this count as zero, relative to the scaled matrix.
     pub tolerance: f64,
     /// The smallest relative singular value that counted as not zero: how near the rank is to
     /// being lower. Zero when the rank is zero.
@@ -77,7 +78,7 @@ impl Rank {
 pub fn controllability(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Rank, Error> {
     let n = check::square("A", a)?;
     check::shape("B", b, (n, b.ncols()))?;
-    Ok(Staircase::of(a, b)?.answer)
+    Ok(Staircase::new(a, b)?.answer)
 }
 
 /// Rank of the observability matrix [C; C A; ...; C A^(n-1)] of x' = A x, y = C x.
@@ -92,7 +93,7 @@ pub fn controllability(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Rank, Error
 pub fn observability(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Rank, Error> {
     let n = check::square("A", a)?;
     check::shape("C", c, (c.nrows(), n))?;
-    Ok(Staircase::of(&a.transpose(), &c.transpose())?.answer)
+    Ok(Staircase::new(&a.transpose(), &c.transpose())?.answer)
 }
 
 /// Refuses a pair that is not controllable.
@@ -159,18 +160,19 @@ pub fn unobservable_modes(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Vec<Mode
 }
 
 fn left_over(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Vec<Mode>, Error> {
-    let staircase = Staircase::of(a, b)?;
+    let staircase = Staircase::new(a, b)?;
     if staircase.answer.is_full() {
         return Ok(Vec::new());
     }
-    let rest = staircase.rest.transpose().map(|entry| Complex::new(entry, 0.0));
+    let rest = to_complex(&staircase.rest.transpose());
     let found = eigenvalues(&staircase.rest)?;
     let same = staircase.answer.tolerance.sqrt() * (1.0 + staircase.rest.norm());
     let mode = |(at, &eigenvalue): (usize, &Complex<f64>)| {
         let earlier = found[..at].iter().filter(|other| (*other - eigenvalue).norm() <= same);
         let shifted = &rest - DMatrix::identity(rest.nrows(), rest.nrows()) * eigenvalue;
-        let (value, vector) = smallest(&shifted, earlier.count())?;
-        let vector = if value <= same { vector } else { smallest(&shifted, 0)?.1 };
+        let svd = ComplexSvd::new(&shifted)?;
+        let (value, vector) = svd.from_smallest(earlier.count());
+        let vector = if value <= same { vector } else { svd.from_smallest(0).1 };
         Ok(named(eigenvalue, &staircase, &vector))
     };
     found.iter().enumerate().map(mode).collect()
@@ -182,8 +184,7 @@ fn named(
     staircase: &Staircase,
     coordinates: &DVector<Complex<f64>>,
 ) -> Mode {
-    let basis = staircase.rest_basis.map(|entry| Complex::new(entry, 0.0));
-    let balanced = basis * coordinates;
+    let balanced = to_complex(&staircase.rest_basis) * coordinates;
     let size = |state: usize| balanced[state].norm();
     let mut dominant: Vec<usize> = (0..balanced.len()).collect();
     dominant.sort_by(|&i, &j| size(j).total_cmp(&size(i)));

@@ -32,48 +32,5 @@ pub use fault_loop::{fault_rate_system, fault_system};
 pub use frequency::{FrequencyPoint, frequency_grid, frequency_response};
 pub use h_infinity::{HInfinity, h_infinity};
 pub use peak_gain::{Bracket, peak_gain};
-pub use trace::{Trace, ramp_response, step_response};
+pub use trace::{TimeResponse, ramp_response, step_response};
 pub use transient::Transient;
-
-use crate::{Domain, Error, check, stability};
-use nalgebra::{Complex, DMatrix};
-
-/// A linear system with n states, m inputs w and p outputs z.
-#[derive(Debug, Clone, PartialEq)]
-pub struct System {
-    /// A, n x n.
-    pub a: DMatrix<f64>,
-    /// B, n x m.
-    pub b: DMatrix<f64>,
-    /// C, p x n.
-    pub c: DMatrix<f64>,
-    /// D, p x m.
-    pub d: DMatrix<f64>,
-    /// Continuous or sampled time.
-    pub domain: Domain,
-}
-
-impl System {
-    /// Shapes and finiteness of the four matrices, and the period.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`], naming the matrix;
-    /// [`Error::OutOfRange`] for the period.
-    pub fn check(&self) -> Result<(), Error> {
-        let n = check::square("A", &self.a)?;
-        check::shape("B", &self.b, (n, self.b.ncols()))?;
-        check::shape("C", &self.c, (self.c.nrows(), n))?;
-        check::shape("D", &self.d, (self.c.nrows(), self.b.ncols()))?;
-        match self.domain {
-            Domain::Continuous => Ok(()),
-            Domain::Sampled { period } => check::positive("period", period),
-        }
-    }
-
-    /// The eigenvalues of A, all stable.
-    fn stable_eigenvalues(&self) -> Result<Vec<Complex<f64>>, Error> {
-        self.check()?;
-        stability::require("A", &self.a, self.domain)
-    }
-}

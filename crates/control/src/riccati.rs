@@ -9,16 +9,16 @@
 //! of x' Q x + 2 x' N u + u' R u. The filter is the same problem for A' and C'.
 
 mod doubling;
+mod equation;
 mod existence;
-mod form;
 mod kalman;
 mod problem;
 
-pub use kalman::{Filter, kalman};
+pub use kalman::{KalmanFilter, kalman};
 
-use crate::{Domain, Error, check, stability};
+use crate::{Domain, Error, stability};
 use nalgebra::{Complex, DMatrix};
-use problem::Problem;
+use problem::ScaledProblem;
 
 /// Largest residual of a solution that is returned, see [`Regulator::residual`].
 const ALLOWED_RESIDUAL: f64 = 1e-9;
@@ -96,14 +96,12 @@ pub fn lqr(
     weights: &Weights,
     domain: Domain,
 ) -> Result<Regulator, Error> {
-    if let Domain::Sampled { period } = domain {
-        check::positive("period", period)?;
-    }
-    let problem = Problem::of(a, b, weights, domain)?;
+    domain.check()?;
+    let problem = ScaledProblem::new(a, b, weights, domain)?;
     existence::require(&problem)?;
     let p = problem.refined(&problem.start()?)?;
     let (p, gain) = (problem.restored(&p)?, problem.restored_gain(&p)?);
-    let eigenvalues = stability::require("A + B K", &(a + b * &gain), domain)?;
+    let eigenvalues = stability::require_stable("A + B K", &(a + b * &gain), domain)?;
     let residual = problem.residual(&problem.scaled_solution(&p));
     if residual > ALLOWED_RESIDUAL {
         let (equation, allowed) = ("the Riccati equation", ALLOWED_RESIDUAL);

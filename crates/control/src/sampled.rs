@@ -6,14 +6,16 @@
 
 use crate::aso::{Estimator, FaultyPlant, Gains, place_controller};
 use crate::balance::{divide_columns, multiply_columns, multiply_rows, power_of_two};
-use crate::controller::{Controller, instability};
-use crate::faults::{ExtendedPlant, filtered, stacked};
+use crate::blocks::{block_2x2, stacked};
+use crate::controller::{closed_loop, controller};
+use crate::faults::ExtendedPlant;
 use crate::hold::FirstOrderHold;
 use crate::placement::{Quality, place_discrete, place_discrete_as_given};
+use crate::stability::instability;
 use crate::{Domain, Error, check};
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// The largest decay exponent per sample that [`poles`] gives out.
+/// The largest decay exponent per sample that [`sampled_poles`] gives out.
 const FASTEST: f64 = 4.0;
 
 /// A sampled controller.
@@ -53,12 +55,12 @@ pub struct SampledDesign {
 /// # Example
 ///
 /// ```
-/// use control::sampled::poles;
+/// use control::sampled::sampled_poles;
 /// use nalgebra::Complex;
 /// let wanted = [-10.0, -3000.0].map(|p| Complex::new(p, 0.0));
-/// let fine = poles(&wanted, 1e-3)?;
+/// let fine = sampled_poles(&wanted, 1e-3)?;
 /// assert!((fine[1].re - (-3.0_f64).exp()).abs() < 1e-15);
-/// let coarse = poles(&wanted, 1e-2)?;
+/// let coarse = sampled_poles(&wanted, 1e-2)?;
 /// assert!((coarse[0].re - (-0.1_f64).exp()).abs() < 1e-15);
 /// assert!((coarse[1].re - (-4.0_f64).exp()).abs() < 1e-15);
 /// # Ok::<(), control::Error>(())
@@ -68,7 +70,7 @@ pub struct SampledDesign {
 ///
 /// [`Error::OutOfRange`] for a bad `period` and for a pole that is not finite or that turns by more
 /// than half a turn from sample to sample; [`Error::Overflow`] when e^(p T) is out of range.
-pub fn poles(continuous: &[Complex<f64>], period: f64) -> Result<Vec<Complex<f64>>, Error> {
+pub fn sampled_poles(continuous: &[Complex<f64>], period: f64) -> Result<Vec<Complex<f64>>, Error> {
     check::positive("the sample time", period)?;
     for pole in continuous {
         let (decay, angle) = (pole.re * period, pole.im * period);
@@ -131,10 +133,9 @@ pub fn sample(extended: &ExtendedPlant, period: f64) -> Result<FaultyPlant, Erro
     let moved = DMatrix::from_diagonal(&moved);
     let kept = DVector::from_vec(rates.iter().map(|rate| (-rate * period).exp()).collect());
     Ok(FaultyPlant {
-        a: filtered(
-            &a,
-            &(&moved * plant.a.view((n, 0), (filters, n))),
-            &DMatrix::from_diagonal(&kept),
+        a: block_2x2(
+            [&a, &DMatrix::zeros(n, filters)],
+            [&(&moved * plant.a.view((n, 0), (filters, n))), &DMatrix::from_diagonal(&kept)],
         ),
         b,
         c: plant.c.clone(),
@@ -157,7 +158,7 @@ fn part(rate: f64, period: f64) -> f64 {
 ///
 /// `extended`: the plant in continuous time; `period`: T in s, above zero; `controller_poles`: one
 /// per state of the plant itself; `observer_poles`: one per state of the extended plant and entry of
-/// `f_hat`, both of the sampled loop, of a modulus below one for a stable one, see [`poles`]; `k_f`:
+/// `f_hat`, both of the sampled loop, of a modulus below one for a stable one, see [`sampled_poles`]; `k_f`:
 /// m x q, or None for the continuous [`FaultyPlant::compensation_gain`] times the mean over the
 /// interval of the fault as modelled, so that the held u cancels a ramp in the mean. The design
 /// exists when the sampled plant is controllable and its augmented pair observable, for the current
@@ -205,14 +206,16 @@ pub fn design(
     };
     let ((n, q), m) = (plant.f_a.shape(), plant.b.ncols());
     check::shape("K_f", &k_f, (m, q))?;
-    let controller = place_controller((&plant, extended.states), controller_poles, place_discrete)?;
+    let feedback = place_controller((&plant, extended.states), controller_poles, place_discrete)?;
     let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
-    let seen = estimator.seen(&a_0, &c_0);
+    let seen = estimator.output_matrix(&a_0, &c_0);
     let (l, observer) = place_estimator(&a_0, &seen, observer_poles)?;
     let (l_x, l_f) = (l.rows(0, n).into(), -l.rows(n, q));
-    let gains = Gains { estimator, k_x: controller.gain, k_f, l_x, l_f };
-    let whole = Controller::of(&plant, &gains)?.closed_loop(&plant, &vec![1.0; m])?;
-    let radius = 1.0 + instability(&whole, Domain::Sampled { period })?;
+    let gains = Gains { estimator, k_x: feedback.gain, k_f, l_x, l_f };
+    let domain = Domain::Sampled { period };
+    let controller_system = controller(&plant, &gains, domain)?;
+    let dynamics = closed_loop(&plant, &controller_system, &vec![1.0; m])?;
+    let radius = 1.0 + instability(&dynamics, domain)?;
     let wanted = controller_poles.iter().chain(observer_poles);
     let largest = wanted.fold(0.0, |largest: f64, pole| largest.max(pole.norm()));
     if largest < 1.0 && radius >= 1.0 {
@@ -221,9 +224,9 @@ pub fn design(
     Ok(SampledDesign {
         period,
         plant,
-        filter: filter(extended, Domain::Sampled { period }),
+        filter: filter(extended, domain),
         gains,
-        controller: controller.quality,
+        controller: feedback.quality,
         observer,
         radius,
     })
@@ -231,7 +234,7 @@ pub fn design(
 
 /// The gain of the sampled observer whose error is that of `a_0` - L `output`, its eigenvalues `poles`.
 ///
-/// `a_0`: n x n; `output`: p x n, [`Estimator::seen`]; `poles`: n, in the z plane. It is found in the
+/// `a_0`: n x n; `output`: p x n, [`Estimator::output_matrix`]; `poles`: n, in the z plane. It is found in the
 /// coordinates in which each state alone moves the output alike: the sum of the squares of what it
 /// shows in as many samples as there are states is one. Existence, method, cost and tolerance: those
 /// of [`place_discrete`].

@@ -1,32 +1,62 @@
-//! Stability of a square matrix in continuous or sampled time.
+//! Stability of a square matrix, in continuous or sampled time.
 
 use crate::eigen::eigenvalues;
-use crate::{Domain, Error, check};
+use crate::{Domain, Error};
 use nalgebra::{Complex, DMatrix};
 
-/// The eigenvalues of a stable matrix; an unstable one is refused under the name given.
-pub(crate) fn require(
-    matrix: &'static str,
+/// How far a matrix is beyond the stability limit; negative when it is stable.
+///
+/// ```text
+/// max Re(lambda_i)       continuous: the spectral abscissa
+/// max |lambda_i| - 1     sampled: the spectral radius less one
+/// ```
+///
+/// `a`: n x n, with eigenvalues lambda; the result has the unit of A in continuous time, none in
+/// sampled time. Method and precision: those of [`eigenvalues`].
+///
+/// # Example
+///
+/// ```
+/// use control::{Domain, stability::instability};
+/// use nalgebra::DMatrix;
+/// let a = DMatrix::from_row_slice(2, 2, &[0.0, 1.0, 0.0, -3.0]);
+/// assert!(instability(&a, Domain::Continuous)?.abs() < 1e-15);
+/// assert!((instability(&a, Domain::Sampled { period: 0.1 })? - 2.0).abs() < 1e-15);
+/// # Ok::<(), control::Error>(())
+/// ```
+///
+/// # Errors
+///
+/// Same as [`eigenvalues`]; [`Error::OutOfRange`] for a bad period.
+pub fn instability(a: &DMatrix<f64>, domain: Domain) -> Result<f64, Error> {
+    domain.check()?;
+    Ok(largest_excess(&eigenvalues(a)?, domain))
+}
+
+/// The largest [`Domain::excess`] of the eigenvalues.
+fn largest_excess(eigenvalues: &[Complex<f64>], domain: Domain) -> f64 {
+    eigenvalues.iter().map(|&value| domain.excess(value)).fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// The eigenvalues of a stable matrix.
+///
+/// # Errors
+///
+/// [`Error::NotHurwitz`] or [`Error::NotSchur`] with `name` for a matrix that is not stable; the
+/// errors of [`instability`].
+pub(crate) fn require_stable(
+    name: &'static str,
     a: &DMatrix<f64>,
     domain: Domain,
 ) -> Result<Vec<Complex<f64>>, Error> {
-    if let Domain::Sampled { period } = domain {
-        check::positive("period", period)?;
-    }
+    domain.check()?;
     let values = eigenvalues(a)?;
-    match domain {
-        Domain::Continuous => {
-            let abscissa = values.iter().fold(f64::NEG_INFINITY, |most, value| most.max(value.re));
-            if abscissa >= 0.0 {
-                return Err(Error::NotHurwitz { matrix, abscissa });
-            }
-        }
-        Domain::Sampled { .. } => {
-            let radius = values.iter().fold(0.0_f64, |most, value| most.max(value.norm()));
-            if radius >= 1.0 {
-                return Err(Error::NotSchur { matrix, radius });
-            }
-        }
+    let excess = largest_excess(&values, domain);
+    if excess < 0.0 {
+        return Ok(values);
     }
-    Ok(values)
+    Err(match domain {
+        Domain::Continuous => Error::NotHurwitz { matrix: name, abscissa: excess },
+        Domain::Sampled { .. } => Error::NotSchur { matrix: name, radius: 1.0 + excess },
+    })
 }

@@ -1,16 +1,25 @@
 //! The bound on the estimation error, theorem 1 of the paper named in [`crate::aso`].
 
 #[cfg(feature = "lmi")]
-mod free;
+mod decay;
 #[cfg(feature = "lmi")]
-pub use free::{Decay, FreeRegion, UltimateBound, largest_decay, smallest_region, ultimate_bound};
+mod radius;
+#[cfg(feature = "lmi")]
+mod ultimate_bound;
+
+#[cfg(feature = "lmi")]
+pub use decay::{DecayCertificate, largest_decay};
+#[cfg(feature = "lmi")]
+pub use radius::{RadiusCertificate, smallest_radius};
+#[cfg(feature = "lmi")]
+pub use ultimate_bound::{UltimateBound, ultimate_bound};
 
 use crate::aso::{FaultyPlant, Gains};
-use crate::eigen::spectral_abscissa;
 use crate::lyapunov::{definite_range, lyapunov};
 use crate::rank::{Rank, observability, require_controllable};
-use crate::singular::Singular;
-use crate::{Error, check};
+use crate::stability::instability;
+use crate::svd::norm_2;
+use crate::{Domain, Error, check};
 use nalgebra::DMatrix;
 
 /// Everything theorem 1 says about a controller.
@@ -58,13 +67,13 @@ pub struct Certificate {
 /// # Example
 ///
 /// ```
-/// use control::placement::real;
+/// use control::placement::real_poles;
 /// use control::{aso, theorem1};
 /// use nalgebra::DMatrix;
 /// let one = |value| DMatrix::from_element(1, 1, value);
 /// let plant =
 ///     aso::FaultyPlant::with_constant_faults(one(0.5), one(1.0), one(1.0), one(-1.0));
-/// let gains = aso::design(&plant, &real(&[-1.0]), &real(&[-2.0, -3.0]), None)?.gains;
+/// let gains = aso::design(&plant, &real_poles(&[-1.0]), &real_poles(&[-2.0, -3.0]), None)?.gains;
 /// let small = theorem1::certify(&plant, &gains, 1.0, 30.0)?;
 /// let large = theorem1::certify(&plant, &gains, 1000.0, 30.0)?;
 /// assert!((small.delta / large.delta - 1.0).abs() < 1e-12);
@@ -89,13 +98,13 @@ pub fn certify(
     let controllability = require_controllable(&plant.a, &plant.b)?;
     let error_dynamics = gains.error_dynamics(plant);
     let order = error_dynamics.nrows();
-    let observer_abscissa = spectral_abscissa(&error_dynamics)?;
+    let observer_abscissa = instability(&error_dynamics, Domain::Continuous)?;
     if observer_abscissa >= 0.0 {
         return Err(Error::NotHurwitz { matrix: "A_0 - L C_0", abscissa: observer_abscissa });
     }
     let right = DMatrix::from_diagonal_element(order, order, alpha * beta);
     let solution = lyapunov(&error_dynamics, &right)?;
-    let effect = Singular::of(&(&solution.p * plant.augmented_fault()))?.values[0];
+    let effect = norm_2(&(&solution.p * plant.augmented_fault()))?;
     Ok(Certificate {
         alpha,
         beta,
@@ -106,7 +115,19 @@ pub fn certify(
         delta: 2.0 / alpha * effect,
         controllability,
         observability: observability(&plant.augmented_dynamics(), &plant.augmented_output())?,
-        controller_abscissa: spectral_abscissa(&gains.controlled_dynamics(plant))?,
+        controller_abscissa: instability(&gains.controlled_dynamics(plant), Domain::Continuous)?,
         observer_abscissa,
     })
+}
+
+/// Factors by which right-hand sides are enlarged until the inequality is proven despite rounding.
+#[cfg(feature = "lmi")]
+const ENLARGEMENTS: [f64; 5] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2];
+
+/// Checks z' = F z + G w with |w| <= bound.
+#[cfg(feature = "lmi")]
+fn check_system(f: &DMatrix<f64>, g: &DMatrix<f64>, bound: f64) -> Result<(), Error> {
+    let n = check::square("error dynamics", f)?;
+    check::shape("disturbance", g, (n, g.ncols()))?;
+    check::positive("bound", bound)
 }

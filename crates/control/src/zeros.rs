@@ -1,12 +1,13 @@
 //! Invariant zeros: the frequencies that a system blocks.
 
 use crate::balance::{Balance, divide_rows, multiply_columns, unit_columns};
+use crate::blocks::stacked;
 use crate::eigen::eigenvalues;
-use crate::singular::Singular;
-use crate::{Error, check};
+use crate::svd::Svd;
+use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{Complex, DMatrix};
 
-/// Singular values below this part of the scaled matrices' norm count as zero, per row.
+/// Svd values below this part of the scaled matrices' norm count as zero, per row.
 const TOLERANCE_PER_STATE: f64 = 100.0 * f64::EPSILON;
 
 /// The invariant zeros of a system, and the rank of its transfer function.
@@ -60,11 +61,12 @@ pub fn zeros(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Zer
     let n = check::square("A", a)?;
     check::shape("B", b, (n, b.ncols()))?;
     check::shape("C", c, (c.nrows(), n))?;
-    let system = System::scaled(a, b, c);
+    let system = scaled(a, b, c);
+    let size = system.a.norm().hypot(system.b.norm()).hypot(system.c.norm());
     let all = n + b.ncols() + c.nrows();
     #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
-    let zero = TOLERANCE_PER_STATE * all as f64 * system.norm();
-    let square = system.reduced(zero)?.dual().reduced(zero)?.dual();
+    let zero = TOLERANCE_PER_STATE * all as f64 * size;
+    let square = reduced(reduced(system, zero)?.dual(), zero)?.dual();
     let rank = square.d.nrows();
     if square.a.is_empty() {
         return Ok(Zeros { finite: Vec::new(), rank });
@@ -77,76 +79,54 @@ pub fn zeros(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Zer
     Ok(Zeros { finite: eigenvalues(&dynamics)?, rank })
 }
 
-/// x' = A x + B u, y = C x + D u.
-struct System {
-    a: DMatrix<f64>,
-    b: DMatrix<f64>,
-    c: DMatrix<f64>,
-    d: DMatrix<f64>,
-}
-
-impl System {
-    /// Balanced states, inputs and outputs of the size of A. The zeros are the same.
-    fn scaled(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> Self {
-        let Balance { matrix, scale } = Balance::of(a);
-        let size = if matrix.norm().is_normal() { matrix.norm() } else { 1.0 };
-        let c = multiply_columns(c, &scale).transpose();
-        Self {
-            b: unit_columns(&divide_rows(b, &scale)) * size,
-            c: unit_columns(&c).transpose() * size,
-            d: DMatrix::zeros(c.ncols(), b.ncols()),
-            a: matrix,
-        }
-    }
-
-    fn norm(&self) -> f64 {
-        self.a.norm().hypot(self.b.norm()).hypot(self.c.norm())
-    }
-
-    /// (A', C', B', D').
-    fn dual(&self) -> Self {
-        Self {
-            a: self.a.transpose(),
-            b: self.c.transpose(),
-            c: self.b.transpose(),
-            d: self.d.transpose(),
-        }
-    }
-
-    /// The part with the same zeros and with D of full row rank.
-    ///
-    /// Outputs that D does not reach are turned to the end; as they must be zero, they fix as many
-    /// states as their rows of C are independent. The equations of these states become outputs.
-    fn reduced(mut self, zero: f64) -> Result<Self, Error> {
-        loop {
-            let turn = Singular::of(&self.d.transpose())?;
-            let reached = turn.values.iter().filter(|&&value| value > zero).count();
-            let (d, c) = (turn.right.tr_mul(&self.d), turn.right.tr_mul(&self.c));
-            let silent = Singular::of(&c.rows(reached, c.nrows() - reached).into_owned())?;
-            let fixed = silent.values.iter().filter(|&&value| value > zero).count();
-            let (c, d) = (c.rows(0, reached).into_owned(), d.rows(0, reached).into_owned());
-            if fixed == 0 {
-                return Ok(Self { c, d, ..self });
-            }
-            let free = self.a.nrows() - fixed;
-            let v = &silent.right;
-            let (a, b, c) = (v.tr_mul(&self.a) * v, v.tr_mul(&self.b), c * v);
-            self = Self {
-                c: stacked(
-                    &c.columns(fixed, free).into(),
-                    &a.view((0, fixed), (fixed, free)).into(),
-                ),
-                d: stacked(&d, &b.rows(0, fixed).into()),
-                a: a.view((fixed, fixed), (free, free)).into(),
-                b: b.rows(fixed, free).into(),
-            };
-        }
+/// The system {A, B, C, 0} with balanced states, and inputs and outputs scaled to the norm of A. It
+/// has the same zeros.
+fn scaled(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> StateSpace {
+    let Balance { matrix, scale } = Balance::new(a);
+    let size = if matrix.norm().is_normal() { matrix.norm() } else { 1.0 };
+    let c = multiply_columns(c, &scale).transpose();
+    StateSpace {
+        b: unit_columns(&divide_rows(b, &scale)) * size,
+        c: unit_columns(&c).transpose() * size,
+        d: DMatrix::zeros(c.ncols(), b.ncols()),
+        a: matrix,
+        domain: Domain::Continuous,
     }
 }
 
-/// [above; below].
-fn stacked(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut both = above.clone().resize_vertically(above.nrows() + below.nrows(), 0.0);
-    both.rows_mut(above.nrows(), below.nrows()).copy_from(below);
-    both
+/// The subsystem with the same zeros whose D has full row rank.
+///
+/// One pass of the reduction, with `zero` the threshold of the ranks:
+///
+/// 1. An orthogonal change of the outputs splits y = C x + D u into outputs y1 with a D1 of full row
+///    rank and outputs y2 = C2 x that D does not reach.
+/// 2. At a zero y2 = 0, which fixes as many states as C2 has independent rows. An orthogonal change
+///    of the states separates the fixed states from the free ones.
+/// 3. The fixed states are zero, so that the right-hand sides of their differential equations become
+///    outputs of the free states.
+///
+/// The passes end when C2 fixes no further state.
+fn reduced(mut system: StateSpace, zero: f64) -> Result<StateSpace, Error> {
+    loop {
+        let StateSpace { a, b, c, d, domain } = system;
+        let outputs = Svd::new(&d.transpose())?;
+        let reached = outputs.rank_above(zero);
+        let (c, d) = (outputs.right.tr_mul(&c), outputs.right.tr_mul(&d));
+        let (c1, d1) = (c.rows(0, reached).into_owned(), d.rows(0, reached).into_owned());
+        let states = Svd::new(&c.rows(reached, c.nrows() - reached).into_owned())?;
+        let fixed = states.rank_above(zero);
+        if fixed == 0 {
+            return Ok(StateSpace { a, b, c: c1, d: d1, domain });
+        }
+        let free = a.nrows() - fixed;
+        let v = &states.right;
+        let (a, b, c) = (v.tr_mul(&a) * v, v.tr_mul(&b), c1 * v);
+        system = StateSpace {
+            c: stacked(&c.columns(fixed, free).into(), &a.view((0, fixed), (fixed, free)).into()),
+            d: stacked(&d1, &b.rows(0, fixed).into()),
+            a: a.view((fixed, fixed), (free, free)).into(),
+            b: b.rows(fixed, free).into(),
+            domain,
+        };
+    }
 }

@@ -1,10 +1,10 @@
 //! What is known of a design: the numbers of the report.
 
 use control::response::{
-    System, energy, fault_rate_system, fault_system, frequency_grid, frequency_response,
-    h_infinity, peak_gain, ramp_response, step_response,
+    energy, fault_rate_system, fault_system, frequency_grid, frequency_response, h_infinity,
+    peak_gain, ramp_response, step_response,
 };
-use control::{Domain, Error};
+use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
 use super::designed::Designed;
@@ -49,8 +49,8 @@ impl Outputs {
 pub(crate) struct Loops<'a> {
     designed: &'a Designed,
     outputs: Outputs,
-    of_faults: System,
-    of_rates: System,
+    of_faults: StateSpace,
+    of_rates: StateSpace,
 }
 
 impl<'a> Loops<'a> {
@@ -132,12 +132,12 @@ impl<'a> Loops<'a> {
     }
 
     /// From the faults as `system` has them to the errors of their estimates.
-    fn to_fault_errors(&self, system: &System) -> System {
+    fn to_fault_errors(&self, system: &StateSpace) -> StateSpace {
         let channels = &self.designed.extended.channels;
         let columns: Vec<_> = channels.iter().map(|channel| channel.estimate).collect();
         let all = self.designed.plant.a.nrows();
         let rows: Vec<_> = columns.iter().map(|column| 2 * all + column).collect();
-        System {
+        StateSpace {
             a: system.a.clone(),
             b: system.b.select_columns(&columns),
             c: system.c.select_rows(&rows),
@@ -151,10 +151,10 @@ impl<'a> Loops<'a> {
         let errors = self.to_fault_errors(&self.of_faults);
         let count = errors.d.ncols();
         let identity = DMatrix::identity(count, count);
-        let estimates = System { d: &errors.d + identity, ..errors.clone() };
+        let estimates = StateSpace { d: &errors.d + identity, ..errors.clone() };
         let rates = self.to_fault_errors(&self.of_rates);
         let grid = frequency_grid(&self.of_faults, POINTS_PER_DECADE)?;
-        let curve = |name: &str, system: &System| {
+        let curve = |name: &str, system: &StateSpace| {
             let points = frequency_response(system, &grid)?;
             let values = |k: usize| points.iter().map(|point| point.singular_values[k]).collect();
             Ok(Frequency {

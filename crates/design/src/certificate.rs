@@ -2,7 +2,7 @@
 
 use control::Domain;
 use control::lmi::Outcome;
-use control::theorem1::{self, certify, largest_decay, smallest_region, ultimate_bound};
+use control::theorem1::{self, certify, largest_decay, smallest_radius, ultimate_bound};
 
 use super::designed::Designed;
 use super::report::{Certificate, FreeP, Norm, Theorem1, Ultimate, rows};
@@ -67,7 +67,7 @@ fn verified<T>(outcome: Result<Outcome<T>, control::Error>) -> Result<T, String>
     match outcome {
         Ok(Outcome::Optimal(found)) => Ok(found),
         Ok(Outcome::Infeasible { conflict }) => Err(format!("infeasible: {}", conflict.join("; "))),
-        Ok(Outcome::Trouble(reason)) => Err(format!("numerical trouble: {reason}")),
+        Ok(Outcome::Inconclusive(reason)) => Err(format!("numerical trouble: {reason}")),
         Err(error) => Err(error.to_string()),
     }
 }
@@ -77,7 +77,7 @@ fn free(designed: &Designed) -> Result<FreeP, String> {
     let dynamics = designed.gains.error_dynamics(&designed.plant);
     let decay = verified(largest_decay(&dynamics))?;
     let beta = fault_bound(designed)?;
-    let region = verified(smallest_region(&dynamics, &designed.plant.augmented_fault(), beta))?;
+    let region = verified(smallest_radius(&dynamics, &designed.plant.augmented_fault(), beta))?;
     Ok(FreeP {
         decay: decay.alpha,
         decay_margin: decay.certificate.margin,

@@ -72,7 +72,7 @@ fn existence(designed: &Designed) -> [Check; 3] {
         ),
         check(
             "the augmented observer exists",
-            detectability.is_full(),
+            detectability.observer_exists(),
             Some(detectability.distance.lower),
             away(
                 "no invariant zero of (A, F_a, C) at an eigenvalue of the fault model",

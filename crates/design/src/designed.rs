@@ -5,13 +5,14 @@ use super::linear_plant::LinearPlant;
 use super::plant_file::PlantFile;
 use super::wanted::Request;
 use control::aso::{Estimator, FaultyPlant, Gains};
-use control::controller::{Controller, instability};
+use control::controller::{closed_loop, controller};
 use control::detectability::{Detectability, detectability};
 use control::distance::{Distance, from_uncontrollable};
 use control::faults::ExtendedPlant;
 use control::rank::{Rank, controllability};
 use control::sampled;
-use control::{Domain, Error};
+use control::stability::instability;
+use control::{Domain, Error, StateSpace};
 use files::PlaceError;
 use nalgebra::DMatrix;
 
@@ -37,7 +38,7 @@ pub(crate) struct Designed {
     /// The part of the faults' effect on the states that the compensation cannot cancel, relative.
     pub(crate) cancellation_residual: f64,
     /// The linear controller, from measurements to commands.
-    pub(crate) controller: Controller,
+    pub(crate) controller: StateSpace,
     /// Largest real part of the eigenvalues of the loop, or largest modulus less one; below zero.
     pub(crate) instability: f64,
     /// The same of the observer's error while the faults are not estimated, where that happens.
@@ -63,12 +64,12 @@ pub(crate) fn design(file: &PlantFile<'_>) -> Result<Designed, crate::Error> {
         l_x: observer.gain.rows(0, n).into(),
         l_f: -observer.gain.rows(n, plant.f_a.ncols()),
     };
-    let controller = Controller::of(&plant, &gains)?;
-    let whole = controller.closed_loop(&plant, &vec![1.0; plant.b.ncols()])?;
+    let controller = controller(&plant, &gains, domain)?;
+    let whole = closed_loop(&plant, &controller, &vec![1.0; plant.b.ncols()])?;
     Ok(Designed {
         cancellation_residual: cancellation_residual(&extended)?,
         instability_before: if file.t_on > 0.0 && !file.monitor {
-            Some(instability(&gains.error_dynamics_of_states(&plant), domain)?)
+            Some(instability(&gains.state_error_dynamics(&plant), domain)?)
         } else {
             None
         },
@@ -180,7 +181,7 @@ fn check_detectable(
         return Err(file.error(&["C", "measurements"], message).into());
     }
     let fault_names = fault_names(linear, extended);
-    if let Some(&unseen) = found.invisible().first() {
+    if let Some(&unseen) = found.invisible_faults().first() {
         let message = format!(
             "fault `{}` cannot be seen from the measurements {measurements}",
             fault_names[unseen]

@@ -4,7 +4,7 @@ use control::aso::Estimator;
 use control::lmi::{self, Norm, Outcome, Performance, Synthesis};
 use control::placement::{Placement, Quality, place, place_balanced, place_discrete};
 use control::riccati::{Weights, kalman, lqr};
-use control::sampled::{place_estimator, poles};
+use control::sampled::{place_estimator, sampled_poles};
 use control::{Domain, Error};
 use nalgebra::{Complex, DMatrix};
 
@@ -70,12 +70,12 @@ pub(crate) fn feedback(
         }
         Wanted::HInfinity { bound, region } => {
             let (m, p) = (b.ncols(), c.nrows());
-            let mut feed = DMatrix::zeros(p + m, m);
-            feed.view_mut((p, 0), (m, m)).fill_with_identity();
+            let mut feedthrough = DMatrix::zeros(p + m, m);
+            feedthrough.view_mut((p, 0), (m, m)).fill_with_identity();
             let performance = Performance {
                 disturbance: (*f_a).clone(),
                 output: (*c).clone().resize_vertically(p + m, 0.0),
-                feed,
+                feedthrough,
                 norm: Norm::HInfinity,
                 gamma: *bound,
             };
@@ -94,7 +94,7 @@ pub(crate) fn observer(
     domain: Domain,
     estimator: Estimator,
 ) -> Result<Found, Refusal> {
-    let seen = estimator.seen(a_0, c_0);
+    let seen = estimator.output_matrix(a_0, c_0);
     match wanted {
         Wanted::Eigenvalues(continuous) => {
             let (wanted, sampled) = in_domain(continuous, domain)?;
@@ -135,8 +135,8 @@ fn rate_to_error(
 ) -> Performance {
     let mut rate = DMatrix::zeros(order, faults);
     rate.rows_mut(order - faults, faults).fill_with_identity();
-    let (output, feed) = (rate.transpose(), DMatrix::zeros(measurements, faults));
-    Performance { disturbance: rate, output, feed, norm: Norm::HInfinity, gamma }
+    let (output, feedthrough) = (rate.transpose(), DMatrix::zeros(measurements, faults));
+    Performance { disturbance: rate, output, feedthrough, norm: Norm::HInfinity, gamma }
 }
 
 /// The eigenvalues in the plane of the domain, and whether that is the z plane.
@@ -146,7 +146,7 @@ fn in_domain(
 ) -> Result<(Vec<Complex<f64>>, bool), Error> {
     match domain {
         Domain::Continuous => Ok((continuous.to_vec(), false)),
-        Domain::Sampled { period } => Ok((poles(continuous, period)?, true)),
+        Domain::Sampled { period } => Ok((sampled_poles(continuous, period)?, true)),
     }
 }
 
@@ -182,7 +182,7 @@ fn synthesised(found: Outcome<Synthesis>, method: &str) -> Result<Found, Refusal
             Ok(Found { gain: found.gain, method, wanted: Vec::new(), quality: None })
         }
         Outcome::Infeasible { conflict } => Err(Refusal::Conflict(contradiction(&conflict))),
-        Outcome::Trouble(reason) => Err(Refusal::Conflict(format!(
+        Outcome::Inconclusive(reason) => Err(Refusal::Conflict(format!(
             "no answer could be verified: {reason}; other wanted values or units nearer to the size of \
              the signals may help"
         ))),

@@ -101,3 +101,7 @@ fn description(file: &PlantFile<'_>, designed: &Designed) -> String {
         format!("Fault-tolerant controller that estimates and compensates {}", faults.join(", "))
     })
 }
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

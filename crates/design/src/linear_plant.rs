@@ -1,6 +1,6 @@
 //! The plant as a linear system with faults, out of the plant file's matrices or its FMU.
 
-use control::faults::{Entry, Fault as Model, FaultKind};
+use control::faults::{Fault as Model, FaultEntry, FaultKind};
 use fmu_import::Fmu;
 use linearise::{Linearisation, Linearise, LineariseError, linearise};
 use nalgebra::{DMatrix, DVector};
@@ -36,7 +36,9 @@ impl LinearPlant {
             plant_file::Model::Matrices { a, b, c, f_a, states } => {
                 let columns = f_a.clone().unwrap_or_else(|| DMatrix::zeros(a.nrows(), 0));
                 let model = |fault: &Fault| match fault.entrance {
-                    Entrance::Column(at) => modelled(fault, Entry::Actuator(column(&columns, at))),
+                    Entrance::Column(at) => {
+                        modelled(fault, FaultEntry::Actuator(column(&columns, at)))
+                    }
                     _ => on_signals(fault, b, c.nrows()),
                 };
                 Ok(Self {
@@ -62,23 +64,23 @@ fn column(m: &DMatrix<f64>, at: usize) -> DVector<f64> {
     m.column(at).into_owned()
 }
 
-fn modelled(fault: &Fault, enters: Entry) -> Model {
+fn modelled(fault: &Fault, entry: FaultEntry) -> Model {
     let kind = match fault.course {
         Course::Constant => FaultKind::Constant,
         Course::Ramp => FaultKind::Ramp,
     };
-    Model { enters, kind }
+    Model { entry, kind }
 }
 
 /// A fault of an actuator or a sensor; `p` measurements.
 fn on_signals(fault: &Fault, b: &DMatrix<f64>, p: usize) -> Model {
     let enters = match fault.entrance {
         Entrance::Sensor(at) => {
-            Entry::Sensor(DVector::from_fn(p, |row, _| f64::from(u8::from(row == at))))
+            FaultEntry::Sensor(DVector::from_fn(p, |row, _| f64::from(u8::from(row == at))))
         }
-        Entrance::Loss { actuator, .. } => Entry::LossOfEffectiveness(actuator),
-        Entrance::Actuator(at) => Entry::Actuator(column(b, at)),
-        Entrance::Column(_) | Entrance::Input(_) => Entry::Actuator(DVector::zeros(b.nrows())),
+        Entrance::Loss { actuator, .. } => FaultEntry::LossOfEffectiveness(actuator),
+        Entrance::Actuator(at) => FaultEntry::Actuator(column(b, at)),
+        Entrance::Column(_) | Entrance::Input(_) => FaultEntry::Actuator(DVector::zeros(b.nrows())),
     };
     modelled(fault, enters)
 }
@@ -218,11 +220,11 @@ fn entry(
     fault: &Fault,
     found: &linearise::Matrices,
     at: usize,
-) -> Result<Entry, crate::Error> {
+) -> Result<FaultEntry, crate::Error> {
     let (states, measurements) = (column(&found.f, at), column(&found.g, at));
     match (states.amax() > 0.0, measurements.amax() > 0.0) {
-        (true, false) => Ok(Entry::Actuator(states)),
-        (false, true) if file.filter.is_some() => Ok(Entry::Sensor(measurements)),
+        (true, false) => Ok(FaultEntry::Actuator(states)),
+        (false, true) if file.filter.is_some() => Ok(FaultEntry::Sensor(measurements)),
         (false, true) => {
             let message = format!(
                 "fault `{}` enters the measurements, which needs `filter`: the rates, in 1/s, of \

@@ -2,7 +2,7 @@
 
 use control::aso::Estimator;
 use control::eigen::eigenvalues;
-use control::faults::{Entry, loss_tolerance};
+use control::faults::{FaultEntry, loss_tolerance};
 use control::placement::Quality;
 use control::{Domain, Error};
 use fmu_description::documentation::texts;
@@ -256,16 +256,16 @@ fn sorted(eigenvalues: &[Complex<f64>]) -> Vec<Complex<f64>> {
 
 /// How much of its effect each actuator may lose.
 fn effectiveness(designed: &Designed) -> Result<Vec<Effectiveness>, Error> {
-    let lossy = |model: &control::faults::Fault| match model.enters {
-        Entry::LossOfEffectiveness(input) => Some(input),
+    let lossy = |model: &control::faults::Fault| match model.entry {
+        FaultEntry::LossOfEffectiveness(input) => Some(input),
         _ => None,
     };
     let inputs: Vec<_> = designed.linear.models.iter().filter_map(lossy).collect();
     if inputs.is_empty() {
         return Ok(Vec::new());
     }
-    let Designed { plant, controller, domain, .. } = designed;
-    let found = loss_tolerance(plant, controller, &inputs, 1.0, *domain)?;
+    let Designed { plant, controller, .. } = designed;
+    let found = loss_tolerance(plant, controller, &inputs, 1.0)?;
     let one = |(input, loss): (&usize, &f64)| Effectiveness {
         actuator: designed.linear.actuators[*input].name.clone(),
         largest_stable_loss: *loss,
@@ -295,7 +295,8 @@ fn assumptions(designed: &Designed, faults: &[Fault]) -> Vec<String> {
             "Between samples, {period} s, commands are held; the responses are those at samples."
         ));
     }
-    if designed.linear.models.iter().any(|m| matches!(m.enters, Entry::LossOfEffectiveness(_))) {
+    if designed.linear.models.iter().any(|m| matches!(m.entry, FaultEntry::LossOfEffectiveness(_)))
+    {
         all.push(
             "The loss of effectiveness is constant; it is seen only while the command is well \
              above its threshold."

@@ -328,3 +328,7 @@ fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), FigureError> {
 
 #[cfg(test)]
 mod tests;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -8,3 +8,7 @@ pub mod document;
 pub mod whole;
 
 pub use document::{Entry, Place, PlaceError, Source, Table};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

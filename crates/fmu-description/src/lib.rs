@@ -26,3 +26,7 @@ pub mod xml;
 
 pub use description::*;
 pub use experiment::Experiment;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -362,10 +362,6 @@ impl Slave for Instance {
     fn take_warning(&mut self) -> bool {
         self.component.take_warning()
     }
-
-    fn in_thread(&mut self) -> Option<&mut (dyn Slave + Send)> {
-        Some(self)
-    }
 }
 
 impl Instance {

@@ -20,3 +20,7 @@ pub use described::{DescriptionError, described};
 pub use error::LoadError;
 pub use fmu::{Fmu, FmuError, Instance};
 pub use library::{Component, Interface, describe, preload};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

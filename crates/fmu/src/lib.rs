@@ -49,3 +49,7 @@ pub use fmu_description::{abi, call_order};
 pub use interface::{describe, problems};
 pub use model::{About, At, Event, Failure, Model, ModelExchange, Step};
 pub use variable::{Enumeration, Variable};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

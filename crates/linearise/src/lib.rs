@@ -86,7 +86,8 @@ pub struct Linearise {
 /// # Example
 ///
 /// ```no_run
-/// use linearise::{Fmu, Linearise, linearise};
+/// use fmu_import::Fmu;
+/// use linearise::{Linearise, linearise};
 /// let names = |list: &[&str]| list.iter().map(|name| (*name).to_owned()).collect();
 /// let request = Linearise {
 ///     inputs: names(&["u"]),
@@ -252,3 +253,7 @@ fn candidates(description: &ModelDescription) -> String {
     let names: Vec<&str> = readable.map(|variable| variable.name.as_str()).take(10).collect();
     if names.is_empty() { String::new() } else { format!(" among {}", names.join(", ")) }
 }
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -19,7 +19,6 @@ mod probe;
 mod readout;
 pub mod signal;
 mod simulation;
-pub mod solve;
 mod system;
 
 pub use algorithm::{Algorithm, Coupling, Course, StepControl, Sweep};
@@ -32,3 +31,7 @@ pub use readout::{Readout, SlowState, SlowValues};
 pub use simulation::{Checkpoint, EarlyEnd, Fallbacks, Simulation};
 pub use slave::{Advance, Background, CallError, Failure, Slave, Stepped, Transformation};
 pub use system::{Connection, Port, System};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use fmu_description::{ModelDescription, Unknown};
 
-use crate::solve::components;
+use solve::components;
 use crate::system::System;
 
 /// An order of stepping.

@@ -369,3 +369,9 @@ fn read_at_start(
     exchange.commit(start);
     Ok(())
 }
+
+// Threads and other languages may hold one.
+const _: () = {
+    const fn is_send<T: Send>() {}
+    is_send::<Simulation>();
+};

@@ -297,3 +297,7 @@ fn open_alone(path: &Path) -> io::Result<Option<File>> {
 
 #[cfg(test)]
 mod tests;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

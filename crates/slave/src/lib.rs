@@ -21,7 +21,7 @@ pub use value::Value;
 /// (`fmi2OK`, `fmi2Warning`) or is an error. What a kind of slave does not have, it leaves to the
 /// method given here, which says that the function is missing.
 #[expect(clippy::missing_errors_doc, reason = "said at setup_experiment for all")]
-pub trait Slave {
+pub trait Slave: Send {
     /// The model description that the instance belongs to.
     fn description(&self) -> &ModelDescription;
 
@@ -202,13 +202,8 @@ pub trait Slave {
         false
     }
 
-    /// The same slave for another thread to step; none where it is bound to its thread.
-    fn in_thread(&mut self) -> Option<&mut (dyn Slave + Send)> {
-        None
-    }
-
-    /// The same slave to begin steps that are finished later; none, always, where a step takes its
-    /// caller along.
+    /// The same slave to begin steps that are finished later; always `None` where stepping blocks the
+    /// calling thread.
     fn in_background(&mut self) -> Option<&mut dyn Background> {
         None
     }
@@ -397,3 +392,7 @@ pub fn absent(function: &'static str) -> CallError {
 fn quoted(messages: &[String]) -> String {
     if messages.is_empty() { String::new() } else { format!(": {}", messages.join("; ")) }
 }
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

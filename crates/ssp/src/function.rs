@@ -309,8 +309,4 @@ impl Slave for FunctionSlave {
         }
         Ok(())
     }
-
-    fn in_thread(&mut self) -> Option<&mut (dyn Slave + Send)> {
-        Some(self)
-    }
 }

@@ -168,3 +168,7 @@ fn element(kind: &Type) -> Option<&'static str> {
         Type::Binary | Type::Clock | Type::Array(_) | Type::Clocked(_) => None,
     }
 }
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -36,3 +36,7 @@ pub use record::{Recorder, keep_results, select, unit};
 pub use run::{Ended, Prepared, Run, Tally};
 #[cfg(feature = "load")]
 pub use saved::Saved;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

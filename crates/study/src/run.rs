@@ -41,6 +41,10 @@ impl Prepared {
     /// [`Error`] with the first thing that is wrong, with its line where it is in a file.
     pub fn new(mut loaded: Loaded, making: &Making<'_>) -> Result<Self, Error> {
         loaded.config.make_absolute().map_err(Error::file("find", Path::new(".")))?;
+        if making.log_calls.is_some() {
+            // In threads the calls would be written in an order of chance.
+            loaded.config.algorithm.jobs = Some(1);
+        }
         let mut assembled = assemble(&loaded, making)?;
         let plan = plan(&mut loaded.config, &assembled)?;
         let Assembled { system, folders, .. } = &mut assembled;

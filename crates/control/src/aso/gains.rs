@@ -34,7 +34,7 @@ impl Estimator {
     /// The output whose deviation L takes back: `C_0`, or `C_0` `A_0` for a current estimator, which
     /// sees the measurement after the step of `A_0`.
     #[must_use]
-    pub fn seen(self, a_0: &DMatrix<f64>, c_0: &DMatrix<f64>) -> DMatrix<f64> {
+    pub fn output_matrix(self, a_0: &DMatrix<f64>, c_0: &DMatrix<f64>) -> DMatrix<f64> {
         match self {
             Self::Prediction => c_0.clone(),
             Self::Current => c_0 * a_0,
@@ -63,15 +63,15 @@ impl Gains {
     #[must_use]
     pub fn error_dynamics(&self, plant: &FaultyPlant) -> DMatrix<f64> {
         let a_0 = plant.augmented_dynamics();
-        &a_0 - self.observer_gain() * self.estimator.seen(&a_0, &plant.augmented_output())
+        &a_0 - self.observer_gain() * self.estimator.output_matrix(&a_0, &plant.augmented_output())
     }
 
     /// A - `L_x` C, n x n, or A - `L_x` C A for a current estimator: the error of the states while the
     /// estimates of the faults are held. No eigenvalue of it is placed; a loop that begins without
     /// estimating faults needs it stable.
     #[must_use]
-    pub fn error_dynamics_of_states(&self, plant: &FaultyPlant) -> DMatrix<f64> {
-        &plant.a - &self.l_x * self.estimator.seen(&plant.a, &plant.c)
+    pub fn state_error_dynamics(&self, plant: &FaultyPlant) -> DMatrix<f64> {
+        &plant.a - &self.l_x * self.estimator.output_matrix(&plant.a, &plant.c)
     }
 
     /// Shapes and finiteness of the gains for a plant.

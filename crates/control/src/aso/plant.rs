@@ -1,12 +1,12 @@
 //! The plant with faults.
 
-use crate::detectability::{Hidden, hidden_faults};
+use crate::detectability::{HiddenFault, hidden_faults};
 use crate::rank::require_observable;
-use crate::singular::Singular;
+use crate::svd::Svd;
 use crate::{Error, check};
 use nalgebra::DMatrix;
 
-/// Singular values of B below this part of the largest count as zero.
+/// Svd values of B below this part of the largest count as zero.
 const TOLERANCE: f64 = 1e-12;
 
 /// x' = A x + B u + `F_a` f, f' = `A_f` f, y = C x: the plant with faults (1) and their model.
@@ -84,7 +84,7 @@ impl FaultyPlant {
     /// eigenvalue s of `A_f`, whose eigenvectors are the columns of N, the matrix [A - s I, `F_a` N;
     /// C, 0] has full column rank: no fault that develops as e^(s t) is hidden by a state that does.
     /// For constant and ramp faults s = 0, or 1 when sampled. It needs as many measurements as N
-    /// has columns. Singular values below 1e-12 of the largest count as zero, rows and columns of
+    /// has columns. Svd values below 1e-12 of the largest count as zero, rows and columns of
     /// the matrix scaled to length one. [`crate::detectability`] tells which fault is hidden.
     ///
     /// # Errors
@@ -105,7 +105,7 @@ impl FaultyPlant {
     /// `K_f` with the least norm of B `K_f` + `F_a`, m x q; the smallest one if there are several.
     ///
     /// It always exists; full compensation needs `F_a` in the range of B, which
-    /// [`super::AsoDesign::cancellation_residual`] tells. Singular values of B below 1e-12 of the largest
+    /// [`super::AsoDesign::cancellation_residual`] tells. Svd values of B below 1e-12 of the largest
     /// count as zero.
     ///
     /// # Errors
@@ -113,7 +113,7 @@ impl FaultyPlant {
     /// Those of [`FaultyPlant::check`]; [`Error::NotConverged`].
     pub fn compensation_gain(&self) -> Result<DMatrix<f64>, Error> {
         self.check()?;
-        let b = Singular::of(&self.b)?;
+        let b = Svd::new(&self.b)?;
         let rank = b.rank(TOLERANCE);
         let gain = b.least_squares(&-&self.f_a, rank);
         let correction = b.least_squares(&(&self.b * &gain + &self.f_a), rank);
@@ -121,7 +121,7 @@ impl FaultyPlant {
     }
 }
 
-fn refusal(hidden: &Hidden, measurements: usize) -> Error {
+fn refusal(hidden: &HiddenFault, measurements: usize) -> Error {
     if hidden.channels > measurements {
         return Error::TooManyFaults { faults: hidden.channels, measurements };
     }

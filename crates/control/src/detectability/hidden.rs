@@ -1,130 +1,157 @@
-//! Faults that a state hides.
+//! Faults that the measurements cannot tell from a motion of the states.
+//!
+//! A fault f = f_0 e^(s t) that follows its model, `A_f` `f_0` = s `f_0`, and a motion x = x_0 e^(s t)
+//! of the plant that it drives give no output when
+//!
+//! ```text
+//! (A - s I) x_0 + F_a f_0 = 0,   C x_0 = 0
+//! ```
+//!
+//! With N a basis of the eigenvectors of `A_f` for s and `f_0` = N v this is the null space of the
+//! matrix
+//!
+//! ```text
+//! R(s) = [A - s I, F_a N; C, 0],   R(s) [x_0; v] = 0          (n + p) x (n + columns of N)
+//! ```
+//!
+//! which is the Popov-Belevitch-Hautus test of (`A_0`, `C_0`) at the eigenvalues of `A_f`. A vector of
+//! the null space with v = 0 is an unobservable mode of (A, C) and no hidden fault.
+//!
+//! Source: M. L. J. Hautus, Controllability and observability conditions of linear autonomous
+//! systems, Indagationes Mathematicae 72 (1969).
 
 use crate::Error;
 use crate::aso::FaultyPlant;
+use crate::blocks::to_complex;
 use crate::eigen::eigenvalues;
-use crate::singular::{Singular, smallest};
+use crate::svd::ComplexSvd;
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// Singular values below this part of the largest count as zero.
-const TOLERANCE: f64 = 1e-12;
-/// Eigenvalues of the fault model nearer than this, relative to its norm, are one.
-const SAME: f64 = 1e-6;
-/// Parts of a combination below this part of its largest do not count.
-const PART: f64 = 1e-6;
+/// A singular value below this, relative to the largest, counts as zero.
+const RANK_TOLERANCE: f64 = 1e-12;
+/// Eigenvalues of the fault model nearer than this, relative to its norm, count as one.
+const CLUSTER_TOLERANCE: f64 = 1e-6;
+/// An entry of a combination below this, relative to the largest, counts as zero.
+const ENTRY_TOLERANCE: f64 = 1e-6;
 
-type Complexes = DMatrix<Complex<f64>>;
-type ComplexColumn = DVector<Complex<f64>>;
+type ComplexMatrix = DMatrix<Complex<f64>>;
+type ComplexVector = DVector<Complex<f64>>;
 
-/// A development of the faults that the measurements cannot tell from one of the states.
+/// A combination of faults that the measurements cannot tell from a motion of the states.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Hidden {
-    /// s: both develop as e^(s t), or s^k when sampled. An eigenvalue of `A_f`.
+#[non_exhaustive]
+pub struct HiddenFault {
+    /// s: fault and motion develop as e^(s t), or s^k in sampled time. An eigenvalue of `A_f`.
     pub at: Complex<f64>,
-    /// How many faults develop so independently: columns of N, the eigenvectors of `A_f` for s.
+    /// Number of independent faults that develop so: columns of N, the eigenvectors of `A_f` for s.
     pub channels: usize,
-    /// Rank of [A - s I, `F_a` N; C, 0].
+    /// Rank of R(s) = [A - s I, `F_a` N; C, 0].
     pub rank: usize,
-    /// Number of its columns.
+    /// Number of columns of R(s). The fault is hidden because `rank` is lower.
     pub expected: usize,
-    /// The faults, q, scaled so that the largest is one.
+    /// The fault `f_0`, q entries, scaled so that the largest is one.
     pub fault: DVector<Complex<f64>>,
-    /// The states that hide them, n.
+    /// The motion `x_0` of the states that cancels it in the measurements, n entries.
     pub state: DVector<Complex<f64>>,
 }
 
-impl Hidden {
-    /// Which faults take part, from zero.
+impl HiddenFault {
+    /// Indices, from zero, of the faults with an entry in `fault` that is not negligible.
     #[must_use]
     pub fn faults(&self) -> Vec<usize> {
-        parts(&self.fault)
+        support(&self.fault)
     }
 
-    /// Which states take part, from zero.
+    /// Indices, from zero, of the states with an entry in `state` that is not negligible.
     #[must_use]
     pub fn states(&self) -> Vec<usize> {
-        parts(&self.state)
+        support(&self.state)
     }
 }
 
-fn parts(v: &ComplexColumn) -> Vec<usize> {
-    let largest = v.iter().map(|part| part.norm()).fold(0.0, f64::max);
-    (0..v.len()).filter(|&at| v[at].norm() > PART * largest).collect()
+/// Indices of the entries above [`ENTRY_TOLERANCE`] times the largest.
+fn support(v: &ComplexVector) -> Vec<usize> {
+    let largest = v.iter().map(|entry| entry.norm()).fold(0.0, f64::max);
+    (0..v.len()).filter(|&at| v[at].norm() > ENTRY_TOLERANCE * largest).collect()
 }
 
-/// The hidden combinations of faults, as few faults in each as elimination gives.
+/// All hidden faults of a plant, for each eigenvalue s of `A_f` a basis of the null space of R(s).
 ///
-/// At each eigenvalue s of `A_f` (of a conjugate pair the one above) the null space of [A - s I,
-/// `F_a` N; C, 0], rows and columns scaled to length one. For a complex s one combination is given.
-pub(crate) fn hidden_faults(plant: &FaultyPlant) -> Result<Vec<Hidden>, Error> {
-    let mut found = Vec::new();
-    for at in developments(&plant.a_f)? {
-        let directions = eigenvectors(&plant.a_f, at)?;
-        let pencil = pencil(plant, at, &directions);
-        let (scaled, columns) = level(&pencil);
-        let (rank, null) = null_space(&scaled)?;
-        let null = Complexes::from_fn(null.nrows(), null.ncols(), |i, j| null[(i, j)] / columns[i]);
-        let n = plant.a.nrows();
-        let faults = &directions * null.rows(n, directions.ncols());
-        for (fault, state) in eliminated(faults, null.rows(0, n).into()) {
-            let (channels, expected) = (directions.ncols(), pencil.ncols());
-            found.push(Hidden { at, channels, rank, expected, fault, state });
+/// The basis is reduced so that each of its vectors has a fault that the others lack. R(s) has rows
+/// and columns scaled to length one. For a complex s, of which only the one above the real axis is
+/// examined, at most one combination is returned.
+pub(crate) fn hidden_faults(plant: &FaultyPlant) -> Result<Vec<HiddenFault>, Error> {
+    let n = plant.a.nrows();
+    let mut hidden = Vec::new();
+    for s in distinct_eigenvalues(&plant.a_f)? {
+        let eigenvectors = eigenvectors(&plant.a_f, s)?;
+        let channels = eigenvectors.ncols();
+        let (rank, null) = scaled_null_space(&rosenbrock_matrix(plant, s, &eigenvectors))?;
+        let states = null.rows(0, n).into_owned();
+        let faults = &eigenvectors * null.rows(n, channels);
+        for (fault, state) in reduced_basis(faults, states) {
+            hidden.push(HiddenFault {
+                at: s,
+                channels,
+                rank,
+                expected: n + channels,
+                fault,
+                state,
+            });
         }
     }
-    Ok(found)
+    Ok(hidden)
 }
 
-/// The distinct eigenvalues of `A_f`, those of a cluster averaged, none below the real axis.
-fn developments(a_f: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, Error> {
-    let same = SAME * a_f.norm();
+/// The distinct eigenvalues of `A_f` on and above the real axis; clusters count as their mean.
+fn distinct_eigenvalues(a_f: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, Error> {
+    let radius = CLUSTER_TOLERANCE * a_f.norm();
     let mut clusters: Vec<(Complex<f64>, f64)> = Vec::new();
     for value in eigenvalues(a_f)? {
-        match clusters.iter_mut().find(|(sum, count)| (*sum / *count - value).norm() <= same) {
+        match clusters.iter_mut().find(|(sum, count)| (*sum / *count - value).norm() <= radius) {
             Some((sum, count)) => (*sum, *count) = (*sum + value, *count + 1.0),
             None => clusters.push((value, 1.0)),
         }
     }
-    let averages = clusters.into_iter().map(|(sum, count)| sum / count);
-    Ok(averages.filter(|average| average.im >= 0.0).collect())
+    let means = clusters.into_iter().map(|(sum, count)| sum / count);
+    Ok(means.filter(|mean| mean.im >= 0.0).collect())
 }
 
-/// The null space of `A_f` - s I.
-fn eigenvectors(a_f: &DMatrix<f64>, s: Complex<f64>) -> Result<Complexes, Error> {
+/// N: the null space of `A_f` - s I, q x (number of eigenvectors).
+fn eigenvectors(a_f: &DMatrix<f64>, s: Complex<f64>) -> Result<ComplexMatrix, Error> {
     let q = a_f.nrows();
     let size = a_f.norm() + s.norm();
     if size <= 0.0 {
-        return Ok(Complexes::identity(q, q));
+        return Ok(ComplexMatrix::identity(q, q));
     }
-    let shifted = complex(a_f) - Complexes::identity(q, q) * s;
-    let mut found = Vec::new();
-    for index in 0..q {
-        let (value, vector) = smallest(&shifted, index)?;
-        if value > TOLERANCE * size {
-            break;
-        }
-        found.push(vector);
-    }
-    Ok(Complexes::from_fn(q, found.len(), |i, j| found[j][i]))
+    let svd = ComplexSvd::new(&(to_complex(a_f) - ComplexMatrix::identity(q, q) * s))?;
+    let pairs = (0..q).map(|index| svd.from_smallest(index));
+    let null: Vec<_> = pairs.take_while(|(value, _)| *value <= RANK_TOLERANCE * size).collect();
+    Ok(ComplexMatrix::from_fn(q, null.len(), |i, j| null[j].1[i]))
 }
 
-/// [A - s I, `F_a` N; C, 0].
-fn pencil(plant: &FaultyPlant, s: Complex<f64>, directions: &Complexes) -> Complexes {
+/// R(s) = [A - s I, `F_a` N; C, 0].
+fn rosenbrock_matrix(
+    plant: &FaultyPlant,
+    s: Complex<f64>,
+    eigenvectors: &ComplexMatrix,
+) -> ComplexMatrix {
     let (n, p) = (plant.a.nrows(), plant.c.nrows());
-    let mut m = Complexes::zeros(n + p, n + directions.ncols());
-    let shifted = complex(&plant.a) - Complexes::identity(n, n) * s;
-    m.view_mut((0, 0), (n, n)).copy_from(&shifted);
-    m.view_mut((0, n), (n, directions.ncols())).copy_from(&(complex(&plant.f_a) * directions));
-    m.view_mut((n, 0), (p, n)).copy_from(&complex(&plant.c));
-    m
+    let mut r = ComplexMatrix::zeros(n + p, n + eigenvectors.ncols());
+    let shifted = to_complex(&plant.a) - ComplexMatrix::identity(n, n) * s;
+    r.view_mut((0, 0), (n, n)).copy_from(&shifted);
+    r.view_mut((0, n), (n, eigenvectors.ncols()))
+        .copy_from(&(to_complex(&plant.f_a) * eigenvectors));
+    r.view_mut((n, 0), (p, n)).copy_from(&to_complex(&plant.c));
+    r
 }
 
-fn complex(m: &DMatrix<f64>) -> Complexes {
-    m.map(|entry| Complex::new(entry, 0.0))
-}
-
-/// Rows, then columns scaled to length one, so that units do not decide a rank; and the lengths of
-/// the columns.
-fn level(m: &Complexes) -> (Complexes, Vec<f64>) {
+/// The rank of M and a basis of its null space, decided for M with rows, then columns, scaled to
+/// length one, so that units do not decide the rank.
+///
+/// With D the lengths of the columns and z in the null space of the scaled matrix, D^-1 z is in that
+/// of M.
+fn scaled_null_space(m: &ComplexMatrix) -> Result<(usize, ComplexMatrix), Error> {
     let length = |norm: f64| if norm > 0.0 { norm } else { 1.0 };
     let mut scaled = m.clone();
     for mut row in scaled.row_iter_mut() {
@@ -135,32 +162,32 @@ fn level(m: &Complexes) -> (Complexes, Vec<f64>) {
     for (mut column, length) in scaled.column_iter_mut().zip(&lengths) {
         column.unscale_mut(*length);
     }
-    (scaled, lengths)
+    let (rank, null) = null_space(&scaled)?;
+    Ok((rank, ComplexMatrix::from_fn(null.nrows(), null.ncols(), |i, j| null[(i, j)] / lengths[i])))
 }
 
-/// The rank, and columns that span the null space; for a matrix that is not real one of them.
-fn null_space(m: &Complexes) -> Result<(usize, Complexes), Error> {
-    let cols = m.ncols();
-    if m.iter().all(|entry| entry.im.abs() <= 0.0) {
-        let s = Singular::of(&m.map(|entry| entry.re))?;
-        let rank = s.rank(TOLERANCE);
-        return Ok((rank, complex(&s.right.columns(rank, cols - rank).into())));
+/// The rank of M and a basis of its null space; for a matrix with imaginary parts one vector of it.
+fn null_space(m: &ComplexMatrix) -> Result<(usize, ComplexMatrix), Error> {
+    let svd = ComplexSvd::new(m)?;
+    let (cols, rank) = (m.ncols(), svd.rank(RANK_TOLERANCE));
+    if let Some(null) = svd.real_right(rank) {
+        return Ok((rank, to_complex(&null)));
     }
-    let largest = smallest(m, cols - 1)?.0;
-    let mut null = 0;
-    while null < cols && smallest(m, null)?.0 <= TOLERANCE * largest {
-        null += 1;
-    }
-    let kept = null.min(1);
-    let vector = smallest(m, 0)?.1;
-    Ok((cols - null, Complexes::from_fn(cols, kept, |i, _| vector[i])))
+    let count = (cols - rank).min(1);
+    let (_, vector) = svd.from_smallest(0);
+    Ok((rank, ComplexMatrix::from_fn(cols, count, |i, _| vector[i])))
 }
 
-/// Combines the columns so that each has a fault that the others lack; those without faults, which
-/// are modes that no measurement shows, are left out.
-fn eliminated(mut faults: Complexes, mut states: Complexes) -> Vec<(ComplexColumn, ComplexColumn)> {
-    let zero = PART * faults.norm();
-    let mut kept: Vec<usize> = Vec::new();
+/// Pairs of fault and state that span the same space as the columns of `faults` and `states`, each
+/// fault with a row in which the others are zero (Gauss-Jordan elimination with pivots in `faults`).
+///
+/// Columns without a fault, which are unobservable modes of (A, C), are left out.
+fn reduced_basis(
+    mut faults: ComplexMatrix,
+    mut states: ComplexMatrix,
+) -> Vec<(ComplexVector, ComplexVector)> {
+    let zero = ENTRY_TOLERANCE * faults.norm();
+    let mut basis: Vec<usize> = Vec::new();
     for column in 0..faults.ncols() {
         let row = faults.column(column).icamax();
         let pivot = faults[(row, column)];
@@ -173,12 +200,12 @@ fn eliminated(mut faults: Complexes, mut states: Complexes) -> Vec<(ComplexColum
         for other in (0..faults.ncols()).filter(|&other| other != column) {
             let factor = faults[(row, other)];
             for m in [&mut faults, &mut states] {
-                let step = m.column(column) * factor;
-                m.column_mut(other).zip_apply(&step, |entry, part| *entry -= part);
+                let multiple = m.column(column) * factor;
+                m.column_mut(other).zip_apply(&multiple, |entry, part| *entry -= part);
             }
         }
-        kept.push(column);
+        basis.push(column);
     }
     let pair = |&at: &usize| (faults.column(at).into_owned(), states.column(at).into_owned());
-    kept.iter().map(pair).collect()
+    basis.iter().map(pair).collect()
 }

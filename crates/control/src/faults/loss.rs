@@ -1,8 +1,9 @@
 //! Loss of effectiveness: its estimate, and how much of it the loop survives.
 
 use crate::aso::FaultyPlant;
-use crate::controller::{Controller, instability};
-use crate::{Domain, Error, check};
+use crate::controller::closed_loop;
+use crate::stability::instability;
+use crate::{Error, StateSpace, check};
 
 /// Points between no loss and the largest one at which stability is examined along a line.
 const POINTS: u32 = 50;
@@ -60,12 +61,11 @@ pub struct LossTolerance {
 /// `largest`, an input that does not exist, or more than nine inputs.
 pub fn loss_tolerance(
     plant: &FaultyPlant,
-    controller: &Controller,
+    controller: &StateSpace,
     inputs: &[usize],
     largest: f64,
-    domain: Domain,
 ) -> Result<LossTolerance, Error> {
-    let losses = Losses { plant, controller, inputs, domain };
+    let losses = Losses { plant, controller, inputs };
     losses.check(largest)?;
     let alone = |at: usize| {
         let mut direction = vec![0.0; inputs.len()];
@@ -83,9 +83,8 @@ pub fn loss_tolerance(
 
 struct Losses<'a> {
     plant: &'a FaultyPlant,
-    controller: &'a Controller,
+    controller: &'a StateSpace,
     inputs: &'a [usize],
-    domain: Domain,
 }
 
 impl Losses<'_> {
@@ -108,11 +107,12 @@ impl Losses<'_> {
     }
 
     fn instability(&self, loss: &[f64]) -> Result<f64, Error> {
-        let mut effect = vec![1.0; self.plant.b.ncols()];
+        let mut effectiveness = vec![1.0; self.plant.b.ncols()];
         for (&input, loss) in self.inputs.iter().zip(loss) {
-            effect[input] = 1.0 - loss;
+            effectiveness[input] = 1.0 - loss;
         }
-        instability(&self.controller.closed_loop(self.plant, &effect)?, self.domain)
+        let dynamics = closed_loop(self.plant, self.controller, &effectiveness)?;
+        instability(&dynamics, self.controller.domain)
     }
 
     /// The largest t, at most `end`, with stability from zero to t times the direction.

@@ -89,12 +89,12 @@ impl Affine {
 
     /// The matrix for given unknowns.
     #[must_use]
-    pub fn at(&self, unknowns: &DVector<f64>) -> DMatrix<f64> {
+    pub fn evaluate(&self, unknowns: &DVector<f64>) -> DMatrix<f64> {
         self.terms.iter().fold(self.constant.clone(), |sum, (at, m)| sum + m * unknowns[*at])
     }
 
     /// Largest entry of all its matrices.
-    pub(super) fn size(&self) -> f64 {
+    pub(super) fn largest_entry(&self) -> f64 {
         self.terms.values().fold(self.constant.amax(), |size, m| size.max(m.amax()))
     }
 

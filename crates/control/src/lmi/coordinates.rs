@@ -5,7 +5,7 @@ use crate::balance::{
     Balance, divide_columns, divide_rows, multiply_columns, multiply_rows, power_of_two,
 };
 use crate::eigen::eigenvalues;
-use crate::singular::Singular;
+use crate::svd::Svd;
 use nalgebra::{Complex, DMatrix, DVector};
 
 /// Radius of the disc around the eigenvalues relative to the smallest.
@@ -28,7 +28,7 @@ impl Coordinates {
     /// eigenvalues, s 1.2 times the largest distance from it. None when rounding errors hide P > 0.
     pub(super) fn of_dynamics(a: &DMatrix<f64>) -> Result<Option<Self>, Error> {
         let n = a.nrows();
-        let Balance { matrix, scale } = Balance::of(a);
+        let Balance { matrix, scale } = Balance::new(a);
         let center = mean_eigenvalue(a);
         let distance = |value: &Complex<f64>| (value - Complex::new(center, 0.0)).norm();
         let farthest = eigenvalues(a)?.iter().map(distance).fold(0.0, f64::max);
@@ -69,7 +69,7 @@ impl Coordinates {
         seen = multiply_columns(&seen, &scale);
         let hardly = seen.norm() / STRETCH;
         seen.rows_mut(n * p, n).fill_diagonal(hardly);
-        let found = Singular::of(&seen.transpose())?;
+        let found = Svd::new(&seen.transpose())?;
         let (directions, values) = (found.left.columns(0, n), found.values.rows(0, n).into_owned());
         let root = multiply_rows(&directions.transpose(), &values);
         let inverse = divide_columns(&directions.into_owned(), &values);

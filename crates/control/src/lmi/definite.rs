@@ -1,19 +1,21 @@
-//! Whether a matrix is positive definite, so that rounding cannot pretend it.
+//! Tests for positive definiteness that allow for rounding errors.
 
 use crate::Error;
 use crate::balance::power_of_two;
-use crate::singular::Singular;
+use crate::blocks::symmetric_part;
+use crate::svd::Svd;
 use nalgebra::DMatrix;
 
-/// Rounding errors per row that the smallest eigenvalue must exceed.
+/// Rounding error per row of a matrix with entries of about one, with a margin.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
-/// Smallest eigenvalue of D S D, D the diagonal of powers of two that brings the diagonal of S to
-/// about one; zero or below when S is not shown positive definite.
+/// The definiteness margin of a symmetric matrix S: the smallest eigenvalue of D S D, D the diagonal
+/// of powers of two that brings the diagonal of S to about one. Above zero, S is positive definite;
+/// zero, it was not shown to be.
 ///
-/// D S D is positive definite when S is (Sylvester), and scaling by powers of two rounds nothing.
-/// The entries of S count as right to a few roundings of their own. A value is returned as above
-/// zero only if it exceeds 16 roundings per row.
+/// D S D is positive definite if and only if S is (Sylvester), and scaling by powers of two does not
+/// round. The entries of S may have relative errors of a few units of rounding. The margin is set to
+/// zero unless it exceeds 16 n^2 units of rounding of the largest entry.
 pub(crate) fn margin(s: &DMatrix<f64>) -> Result<f64, Error> {
     let scale: Vec<f64> =
         s.diagonal().iter().map(|&entry| 1.0 / power_of_two(entry.sqrt())).collect();
@@ -29,48 +31,56 @@ pub(crate) fn margin(s: &DMatrix<f64>) -> Result<f64, Error> {
     Ok(if smallest > ROUNDING * order * order * size { smallest } else { 0.0 })
 }
 
-/// The smallest eigenvalue of a symmetric matrix if all are above zero.
+/// The smallest eigenvalue of a positive definite matrix; None for any other.
 ///
-/// Of the two triangles the mean is taken. Cholesky factor, squares of its singular values.
+/// The symmetric part of `s` is taken. Method: Cholesky factor, squares of its singular values.
 pub(super) fn smallest_eigenvalue(s: &DMatrix<f64>) -> Result<Option<f64>, Error> {
-    let Some(factor) = ((s + s.transpose()) * 0.5).cholesky() else { return Ok(None) };
-    let values = Singular::of(&factor.l().transpose())?.values;
+    let Some(factor) = symmetric_part(s).cholesky() else { return Ok(None) };
+    let values = Svd::new(&factor.l().transpose())?.values;
     Ok(Some(values[values.len() - 1].powi(2)))
 }
 
-/// A B as the sum of two matrices: the rounded product and what rounding took away, itself rounded.
+/// A B in twice the precision: the unevaluated sum `high` + `low` of the rounded product and its
+/// rounding error, the latter rounded itself.
 ///
 /// Source: T. Ogita, S. M. Rump, S. Oishi, Accurate sum and dot product, SIAM J. Sci. Comput. 26
 /// (2005), algorithm 5.3.
-pub(crate) struct Product {
+pub(crate) struct AccurateProduct {
     pub(crate) high: DMatrix<f64>,
     pub(crate) low: DMatrix<f64>,
 }
 
-impl Product {
-    pub(crate) fn of(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Self {
+impl AccurateProduct {
+    /// `a`: n x k; `b`: k x m.
+    pub(crate) fn new(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Self {
         let (rows, cols) = (a.nrows(), b.ncols());
-        let mut found = Self { high: DMatrix::zeros(rows, cols), low: DMatrix::zeros(rows, cols) };
+        let mut product =
+            Self { high: DMatrix::zeros(rows, cols), low: DMatrix::zeros(rows, cols) };
         for row in 0..rows {
             for col in 0..cols {
                 let (mut sum, mut error) = (0.0_f64, 0.0_f64);
                 for k in 0..a.ncols() {
                     let (x, y) = (a[(row, k)], b[(k, col)]);
                     let term = x * y;
-                    let (next, lost) = exact_sum(sum, term);
+                    let (next, lost) = two_sum(sum, term);
                     error += x.mul_add(y, -term) + lost;
                     sum = next;
                 }
-                let (high, low) = exact_sum(sum, error);
-                (found.high[(row, col)], found.low[(row, col)]) = (high, low);
+                let (high, low) = two_sum(sum, error);
+                (product.high[(row, col)], product.low[(row, col)]) = (high, low);
             }
         }
-        found
+        product
+    }
+
+    /// A B + (A B)' + `constant`, rounded after the large terms have cancelled.
+    pub(crate) fn plus_transpose(&self, constant: &DMatrix<f64>) -> DMatrix<f64> {
+        (&self.high + self.high.transpose() + constant) + (&self.low + self.low.transpose())
     }
 }
 
-/// The rounded sum and the rounding error.
-fn exact_sum(a: f64, b: f64) -> (f64, f64) {
+/// The rounded sum of two numbers and its rounding error, which is exact.
+fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     let part = sum - a;
     (sum, (a - (sum - part)) + (b - part))
@@ -84,9 +94,9 @@ mod tests {
     fn a_product_with_cancellation_keeps_its_digits() {
         let row = DMatrix::from_row_slice(1, 3, &[1e16, 1.0, -1e16]);
         let column = DMatrix::from_row_slice(3, 1, &[1.0, 1.0, 1.0]);
-        assert_eq!(Product::of(&row, &column).high[(0, 0)].to_bits(), 1.0_f64.to_bits());
+        assert_eq!(AccurateProduct::new(&row, &column).high[(0, 0)].to_bits(), 1.0_f64.to_bits());
         let tenth = DMatrix::from_element(1, 1, 0.1);
-        let square = Product::of(&tenth, &tenth);
+        let square = AccurateProduct::new(&tenth, &tenth);
         // 0.1 as a number is 0.1 + 5.551115123125783e-18.
         assert!((square.low[(0, 0)] - (0.01 - square.high[(0, 0)] + 1.11e-18)).abs() < 2e-18);
     }

@@ -2,19 +2,18 @@
 
 use super::affine::Affine;
 use super::coordinates::Coordinates;
-use super::definite::{Product, margin};
+use super::definite::{AccurateProduct, margin};
 use super::region::MARGIN;
 use super::{Outcome, Problem};
 use crate::balance::power_of_two;
-use crate::domain::Domain;
-use crate::eigen::eigenvalues;
-use crate::{Error, check};
+use crate::stability::instability;
+use crate::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
-/// Levels that are tried, relative to the smallest, when P of the smallest is lost in rounding errors.
-const RELAXED: [f64; 4] = [1.0 + 1e-6, 1.0 + 1e-5, 1.0 + 1e-4, 1.0 + 1e-3];
+/// GainScaling that are tried, relative to the smallest, when P of the smallest is lost in rounding errors.
+const RELAXED_LEVELS: [f64; 4] = [1.0 + 1e-6, 1.0 + 1e-5, 1.0 + 1e-4, 1.0 + 1e-3];
 
-const NO_P: &str = "no P shows in double precision that the gain is bounded";
+const NO_P: &str = "no bound of the gain could be proven in double precision";
 
 /// How large an output may become.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,19 +29,6 @@ pub enum Norm {
     ImpulseToEnergy,
 }
 
-/// x' = A x + B w, z = C x + D w, or the same from sample to sample.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Channel {
-    /// A, n x n.
-    pub a: DMatrix<f64>,
-    /// B, n x k, from the disturbance.
-    pub b: DMatrix<f64>,
-    /// C, r x n, to the output.
-    pub c: DMatrix<f64>,
-    /// D, r x k.
-    pub d: DMatrix<f64>,
-}
-
 /// A proof that a gain is below a bound.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GainBound {
@@ -55,31 +41,36 @@ pub struct GainBound {
     pub margin: f64,
 }
 
-/// What the inequalities of a bound are made of: P, P A, P B, C, D and the level, gamma for
-/// H-infinity and its square otherwise.
-pub(super) struct Terms {
+/// The matrices from which the inequalities of a gain bound are built.
+pub(super) struct GainInequality {
+    /// P, n x n.
     pub(super) p: Affine,
+    /// P A, n x n.
     pub(super) dynamics: Affine,
+    /// P B, n x k.
     pub(super) input: Affine,
+    /// C, r x n.
     pub(super) output: Affine,
-    pub(super) feed: Affine,
+    /// D, r x k.
+    pub(super) feedthrough: Affine,
+    /// gamma for H-infinity, gamma^2 for the other norms.
     pub(super) level: Affine,
 }
 
-impl Terms {
-    /// The matrices that are positive definite if the gain is below the bound.
-    pub(super) fn requirements(&self, norm: Norm, domain: Domain) -> Vec<Affine> {
+impl GainInequality {
+    /// The matrices of [`certify_gain`], positive definite if the gain is below the bound.
+    pub(super) fn matrices(&self, norm: Norm, domain: Domain) -> Vec<Affine> {
         let continuous = domain == Domain::Continuous;
         let (inputs, outputs) = (self.input.shape().1, self.output.shape().0);
         let level = |order: usize| self.level.times(&DMatrix::identity(order, order));
         let one = |order: usize| Affine::identity(order, 1.0);
-        let (turned, feed) = (self.output.transpose(), self.feed.transpose());
+        let (turned, feedthrough) = (self.output.transpose(), self.feedthrough.transpose());
         let Self { p, dynamics, input, .. } = self;
         let decay = || -&dynamics.plus_transpose();
         match (norm, continuous) {
             (Norm::HInfinity, true) => vec![upper(&[
                 &[&decay(), &-input, &-&turned],
-                &[&level(inputs), &-&feed],
+                &[&level(inputs), &-&feedthrough],
                 &[&level(outputs)],
             ])],
             (Norm::HInfinity, false) => {
@@ -87,7 +78,7 @@ impl Terms {
                 vec![upper(&[
                     &[p, dynamics, input, &Affine::zeros(p.shape().0, outputs)],
                     &[p, &zero, &turned],
-                    &[&level(inputs), &feed],
+                    &[&level(inputs), &feedthrough],
                     &[&level(outputs)],
                 ])]
             }
@@ -99,7 +90,11 @@ impl Terms {
                 let zero = Affine::zeros(p.shape().0, inputs);
                 vec![
                     upper(&[&[p, dynamics, input], &[p, &zero], &[&one(inputs)]]),
-                    upper(&[&[p, &zero, &turned], &[&one(inputs), &feed], &[&level(outputs)]]),
+                    upper(&[
+                        &[p, &zero, &turned],
+                        &[&one(inputs), &feedthrough],
+                        &[&level(outputs)],
+                    ]),
                 ]
             }
             (Norm::ImpulseToEnergy, true) => vec![
@@ -110,14 +105,14 @@ impl Terms {
                 let zero = Affine::zeros(p.shape().0, outputs);
                 vec![
                     upper(&[&[p, dynamics, &zero], &[p, &turned], &[&one(outputs)]]),
-                    upper(&[&[p, input, &zero], &[&level(inputs), &feed], &[&one(outputs)]]),
+                    upper(&[&[p, input, &zero], &[&level(inputs), &feedthrough], &[&one(outputs)]]),
                 ]
             }
         }
     }
 }
 
-/// The symmetric matrix of which the blocks on and above the diagonal are given.
+/// The symmetric matrix with the given blocks on and above its diagonal, row by row.
 fn upper(rows: &[&[&Affine]]) -> Affine {
     let whole: Vec<Vec<Affine>> = (0..rows.len())
         .map(|row| {
@@ -130,18 +125,17 @@ fn upper(rows: &[&[&Affine]]) -> Affine {
     Affine::blocks(&rows)
 }
 
-/// Sizes by which disturbance and output are divided for the solver, and what that makes of a bound
-/// and of P.
-pub(super) struct Levels {
+/// Units of disturbance, output and time for the solver, and the conversion of bounds and of P.
+pub(super) struct GainScaling {
     norm: Norm,
     disturbance: f64,
     output: f64,
     unit: f64,
 }
 
-impl Levels {
-    /// B and C in the solver's coordinates.
-    pub(super) fn of(norm: Norm, b: &DMatrix<f64>, c: &DMatrix<f64>, unit: f64) -> Self {
+impl GainScaling {
+    /// Units from B and C in the solver's coordinates.
+    pub(super) fn new(norm: Norm, b: &DMatrix<f64>, c: &DMatrix<f64>, unit: f64) -> Self {
         let size = |m: &DMatrix<f64>| if m.amax() > 0.0 { power_of_two(m.norm()) } else { 1.0 };
         Self { norm, disturbance: size(b), output: size(c), unit }
     }
@@ -151,22 +145,24 @@ impl Levels {
         self.disturbance
     }
 
-    /// Unit of the bound.
+    /// Unit of the bound gamma.
     fn gain(&self) -> f64 {
         let time = if self.norm == Norm::HInfinity { 1.0 } else { self.unit.sqrt() };
         self.disturbance * self.output * time
     }
 
-    /// Level of the inequalities for a bound, and back.
+    /// The level of the inequalities for a bound gamma.
     pub(super) fn level(&self, gamma: f64) -> f64 {
         let scaled = gamma / self.gain();
         if self.norm == Norm::HInfinity { scaled } else { scaled * scaled }
     }
 
+    /// The bound gamma for a level of the inequalities.
     fn gamma(&self, level: f64) -> f64 {
         self.gain() * if self.norm == Norm::HInfinity { level } else { level.sqrt() }
     }
 
+    /// The factor of P between the solver's units and those of the data.
     fn certificate(&self) -> f64 {
         match self.norm {
             Norm::HInfinity => self.output / (self.disturbance * self.unit),
@@ -175,7 +171,7 @@ impl Levels {
         }
     }
 
-    /// B, C and D for the solver.
+    /// B, C and D in the units of the solver.
     pub(super) fn scale(
         &self,
         b: &DMatrix<f64>,
@@ -187,27 +183,15 @@ impl Levels {
     }
 }
 
-impl Channel {
-    /// Shapes and finiteness of the four matrices, and no D where the norm would be infinite.
-    fn check(&self, norm: Norm, domain: Domain) -> Result<(), Error> {
-        let n = check::square("A", &self.a)?;
-        check::shape("B", &self.b, (n, self.b.ncols()))?;
-        check::shape("C", &self.c, (self.c.nrows(), n))?;
-        check::shape("D", &self.d, (self.c.nrows(), self.b.ncols()))?;
-        if domain == Domain::Continuous && norm != Norm::HInfinity && self.d.amax() > 0.0 {
-            let rule = "zero: an impulse would reach the output";
-            return Err(Error::OutOfRange { name: "D", value: self.d.amax(), rule });
-        }
-        Ok(())
+/// Checks the system, and that D is zero where the norm would be infinite otherwise.
+fn check(system: &StateSpace, norm: Norm) -> Result<(), Error> {
+    system.check()?;
+    let value = system.d.amax();
+    if system.domain == Domain::Continuous && norm != Norm::HInfinity && value > 0.0 {
+        let rule = "zero: the norm is infinite otherwise";
+        return Err(Error::OutOfRange { name: "D", value, rule });
     }
-
-    fn is_stable(&self, domain: Domain) -> Result<bool, Error> {
-        let values = eigenvalues(&self.a)?;
-        Ok(match domain {
-            Domain::Continuous => values.iter().all(|value| value.re < 0.0),
-            Domain::Sampled { .. } => values.iter().all(|value| value.norm() < 1.0),
-        })
-    }
+    Ok(())
 }
 
 /// The smallest bound gamma of the gain from w to z, with its proof.
@@ -241,12 +225,13 @@ impl Channel {
 /// The gain of 2 / (s + 4) is 1/2, and its peak per energy 2 / sqrt(8):
 ///
 /// ```
-/// use control::Domain;
-/// use control::lmi::{Channel, Norm, certify_gain};
+/// use control::lmi::{Norm, certify_gain};
+/// use control::{Domain, StateSpace};
 /// use nalgebra::DMatrix;
 /// let one = |value| DMatrix::from_element(1, 1, value);
-/// let channel = Channel { a: one(-4.0), b: one(2.0), c: one(1.0), d: one(0.0) };
-/// let bound = |norm| certify_gain(&channel, norm, Domain::Continuous).map(|found| found.optimal());
+/// let (a, b, c, d) = (one(-4.0), one(2.0), one(1.0), one(0.0));
+/// let system = StateSpace { a, b, c, d, domain: Domain::Continuous };
+/// let bound = |norm| certify_gain(&system, norm).map(|outcome| outcome.optimal());
 /// let (first, second) = (bound(Norm::HInfinity)?.unwrap(), bound(Norm::EnergyToPeak)?.unwrap());
 /// assert!(first.gamma > 0.5 && first.gamma < 0.5001);
 /// assert!(second.gamma > 0.5_f64.sqrt() && second.gamma < 0.7072);
@@ -257,127 +242,127 @@ impl Channel {
 ///
 /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix; [`Error::OutOfRange`]
 /// for a D other than zero where the norm is infinite; [`Error::NotConverged`].
-pub fn certify_gain(
-    channel: &Channel,
-    norm: Norm,
-    domain: Domain,
-) -> Result<Outcome<GainBound>, Error> {
-    channel.check(norm, domain)?;
-    if !channel.is_stable(domain)? {
+pub fn certify_gain(system: &StateSpace, norm: Norm) -> Result<Outcome<GainBound>, Error> {
+    check(system, norm)?;
+    if instability(&system.a, system.domain)? >= 0.0 {
         return Ok(Outcome::Infeasible { conflict: vec!["stability"] });
     }
-    match Coordinates::of_dynamics(&channel.a)? {
-        Some(coordinates) => certify_in(coordinates, channel, norm, domain),
-        None => Ok(Outcome::Trouble(NO_P)),
+    match Coordinates::of_dynamics(&system.a)? {
+        Some(coordinates) => certify_in(coordinates, system, norm),
+        None => Ok(Outcome::Inconclusive(NO_P)),
     }
 }
 
-/// The same by a solution in given coordinates.
+/// [`certify_gain`] with the program solved in given coordinates.
 pub(super) fn certify_in(
     coordinates: Coordinates,
-    channel: &Channel,
+    system: &StateSpace,
     norm: Norm,
-    domain: Domain,
 ) -> Result<Outcome<GainBound>, Error> {
-    let search = Search::new(coordinates, channel, norm, domain);
+    let search = BoundProblem::new(coordinates, system, norm);
     let (problem, p, level) = search.problem(None);
-    let Some((smallest, unknowns)) = problem.smallest() else {
-        return Ok(Outcome::Trouble(NO_P));
+    let Some((smallest, unknowns)) = problem.minimum() else {
+        return Ok(Outcome::Inconclusive(NO_P));
     };
-    if let Some(bound) = search.verified(level.at(&unknowns)[(0, 0)], &p.at(&unknowns))? {
+    if let Some(bound) =
+        search.verified(level.evaluate(&unknowns)[(0, 0)], &p.evaluate(&unknowns))?
+    {
         return Ok(Outcome::Optimal(bound));
     }
-    for more in RELAXED {
-        let (problem, p, _) = search.problem(Some(smallest * more));
+    for relaxation in RELAXED_LEVELS {
+        let (problem, p, _) = search.problem(Some(smallest * relaxation));
         if let Outcome::Optimal(solution) = problem.solve()?
-            && let Some(bound) = search.verified(smallest * more, &solution.value(&p))?
+            && let Some(bound) = search.verified(smallest * relaxation, &solution.value(&p))?
         {
             return Ok(Outcome::Optimal(bound));
         }
     }
-    Ok(Outcome::Trouble(NO_P))
+    Ok(Outcome::Inconclusive(NO_P))
 }
 
-/// The search for P and the level in the solver's coordinates.
-struct Search<'a> {
-    channel: &'a Channel,
+/// The semidefinite program for P and the level, in the solver's coordinates.
+struct BoundProblem<'a> {
+    system: &'a StateSpace,
     norm: Norm,
-    domain: Domain,
     coordinates: Coordinates,
-    levels: Levels,
+    scaling: GainScaling,
 }
 
-impl<'a> Search<'a> {
-    fn new(mut coordinates: Coordinates, channel: &'a Channel, norm: Norm, domain: Domain) -> Self {
-        if domain != Domain::Continuous {
+impl<'a> BoundProblem<'a> {
+    fn new(mut coordinates: Coordinates, system: &'a StateSpace, norm: Norm) -> Self {
+        if system.domain != Domain::Continuous {
             coordinates.unit = 1.0;
         }
-        let (b, c) = (coordinates.input(&channel.b), coordinates.output(&channel.c));
-        let levels = Levels::of(norm, &b, &c, coordinates.unit);
-        Self { channel, norm, domain, coordinates, levels }
+        let (b, c) = (coordinates.input(&system.b), coordinates.output(&system.c));
+        let scaling = GainScaling::new(norm, &b, &c, coordinates.unit);
+        Self { system, norm, coordinates, scaling }
     }
 
-    /// The problem, its P, and the level: given, or to be minimised.
+    /// The program, its P, and its level: a given number, or an unknown that is minimised.
     fn problem(&self, level: Option<f64>) -> (Problem, Affine, Affine) {
-        let (channel, coordinates) = (self.channel, &self.coordinates);
+        let (system, coordinates) = (self.system, &self.coordinates);
         let mut problem = Problem::new();
-        let p = problem.symmetric(channel.a.nrows());
+        let p = problem.symmetric(system.a.nrows());
         let value = level.map_or_else(|| problem.scalar(), |value| Affine::identity(1, value));
         if level.is_none() {
             problem.minimise(&value);
         }
-        let (b, c) = (coordinates.input(&channel.b), coordinates.output(&channel.c));
-        let (b, c, d) = self.levels.scale(&b, &c, &channel.d);
-        let terms = Terms {
-            dynamics: &p * &coordinates.dynamics(&channel.a),
+        let (b, c) = (coordinates.input(&system.b), coordinates.output(&system.c));
+        let (b, c, d) = self.scaling.scale(&b, &c, &system.d);
+        let terms = GainInequality {
+            dynamics: &p * &coordinates.dynamics(&system.a),
             input: &p * &b,
             output: Affine::constant(&c),
-            feed: Affine::constant(&d),
+            feedthrough: Affine::constant(&d),
             level: value.clone(),
             p: p.clone(),
         };
-        problem.always(&p, MARGIN);
-        for matrix in terms.requirements(self.norm, self.domain) {
-            problem.always(&matrix, MARGIN);
+        problem.constrain(&p, MARGIN);
+        for matrix in terms.matrices(self.norm, self.system.domain) {
+            problem.constrain(&matrix, MARGIN);
         }
         (problem, p, value)
     }
 
+    /// The bound at `level`, if P proves it.
     fn verified(&self, level: f64, p: &DMatrix<f64>) -> Result<Option<GainBound>, Error> {
-        let gamma = self.levels.gamma(level);
-        let p = self.coordinates.certificate(p) * self.levels.certificate();
-        verify(self.channel, self.norm, self.domain, gamma, p)
+        let gamma = self.scaling.gamma(level);
+        let p = self.coordinates.certificate(p) * self.scaling.certificate();
+        verify(self.system, self.norm, gamma, p)
     }
 }
 
-/// Checks P and gamma in the data as given.
+/// Verifies the inequalities for P and gamma in the units of the data.
+///
+/// Each product P M is `high` + `low`; the matrices of both parts are added after the large terms have
+/// cancelled. The constant blocks appear in the matrices of the low part too and are subtracted.
 fn verify(
-    channel: &Channel,
+    system: &StateSpace,
     norm: Norm,
-    domain: Domain,
     gamma: f64,
     p: DMatrix<f64>,
 ) -> Result<Option<GainBound>, Error> {
-    let (dynamics, input) = (Product::of(&p, &channel.a), Product::of(&p, &channel.b));
-    let known = |part: f64, p: &DMatrix<f64>, dynamics: &DMatrix<f64>, input: &DMatrix<f64>| {
+    let (dynamics, input) =
+        (AccurateProduct::new(&p, &system.a), AccurateProduct::new(&p, &system.b));
+    let matrices = |part: f64, p: &DMatrix<f64>, dynamics: &DMatrix<f64>, input: &DMatrix<f64>| {
         let level = if norm == Norm::HInfinity { gamma } else { gamma * gamma };
-        Terms {
+        GainInequality {
             p: Affine::constant(p),
             dynamics: Affine::constant(dynamics),
             input: Affine::constant(input),
-            output: Affine::constant(&(&channel.c * part)),
-            feed: Affine::constant(&(&channel.d * part)),
+            output: Affine::constant(&(&system.c * part)),
+            feedthrough: Affine::constant(&(&system.d * part)),
             level: Affine::identity(1, level * part),
         }
-        .requirements(norm, domain)
+        .matrices(norm, system.domain)
     };
     let zero = DMatrix::zeros(p.nrows(), p.nrows());
-    let rounded = known(1.0, &p, &dynamics.high, &input.high);
-    let lost = known(0.0, &zero, &dynamics.low, &input.low);
-    let rest = known(0.0, &zero, &zero, &(&input.low * 0.0));
+    let rounded = matrices(1.0, &p, &dynamics.high, &input.high);
+    let corrections = matrices(0.0, &zero, &dynamics.low, &input.low);
+    let constants = matrices(0.0, &zero, &zero, &(&input.low * 0.0));
     let mut smallest = margin(&p)?;
-    for ((matrix, correction), rest) in rounded.iter().zip(&lost).zip(&rest) {
-        let exact = &matrix.constant + (&correction.constant - &rest.constant);
+    for ((matrix, correction), constant) in rounded.iter().zip(&corrections).zip(&constants) {
+        let exact = &matrix.constant + (&correction.constant - &constant.constant);
         smallest = smallest.min(margin(&exact)?);
     }
     Ok((smallest > 0.0).then_some(GainBound { gamma, p, margin: smallest }))

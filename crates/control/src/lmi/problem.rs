@@ -64,7 +64,7 @@ struct Requirement {
 impl Requirement {
     /// S(x) - (m + slack) I, both relative to the largest entry if a slack is given.
     fn semidefinite(&self, slack: Option<&Affine>) -> Affine {
-        let size = power_of_two(self.matrix.size());
+        let size = power_of_two(self.matrix.largest_entry());
         let order = self.matrix.shape().0;
         let scaled = &self.matrix * (1.0 / if size.is_normal() { size } else { 1.0 });
         let kept = Affine::identity(order, self.margin / size);
@@ -132,7 +132,7 @@ impl Problem {
     /// # Panics
     ///
     /// When the matrix is not square.
-    pub fn always(&mut self, matrix: &Affine, margin: f64) {
+    pub fn constrain(&mut self, matrix: &Affine, margin: f64) {
         self.push(None, matrix, margin);
     }
 
@@ -154,20 +154,22 @@ impl Problem {
     /// [`Error::NotConverged`] when eigenvalues are not found.
     pub fn solve(&self) -> Result<Outcome<Solution>, Error> {
         if self.objective.is_some()
-            && let Some(solution) = self.verified(self.smallest().map(|found| found.1))?
+            && let Some(solution) = self.verified(self.minimum().map(|found| found.1))?
         {
             return Ok(Outcome::Optimal(solution));
         }
         let all: Vec<_> = self.requirements.iter().collect();
-        let Some((slack, found)) = self.most_inside(&all) else {
-            return Ok(Outcome::Trouble("the interior point method did not end"));
+        let Some((slack, found)) = self.largest_slack(&all) else {
+            return Ok(Outcome::Inconclusive("the interior point method did not end"));
         };
         if slack < -UNDECIDED {
             return Ok(Outcome::Infeasible { conflict: self.conflict() });
         }
         match self.verified(Some(found))? {
-            None => Ok(Outcome::Trouble("the requirements are met or missed by a rounding error")),
-            Some(_) if self.objective.is_some() => Ok(Outcome::Trouble(
+            None => {
+                Ok(Outcome::Inconclusive("the requirements are met or missed by a rounding error"))
+            }
+            Some(_) if self.objective.is_some() => Ok(Outcome::Inconclusive(
                 "the requirements can be met, but the smallest value is not found",
             )),
             Some(solution) => Ok(Outcome::Optimal(solution)),
@@ -176,7 +178,7 @@ impl Problem {
 
     /// The smallest value of the objective and where it is found, as far as the solver came: for a
     /// first look, nothing is checked.
-    pub(crate) fn smallest(&self) -> Option<(f64, DVector<f64>)> {
+    pub(crate) fn minimum(&self) -> Option<(f64, DVector<f64>)> {
         let objective = self.objective.as_ref()?;
         let mut costs = DVector::zeros(self.unknowns);
         for (at, cost) in &objective.terms {
@@ -185,18 +187,18 @@ impl Problem {
         let matrices: Vec<_> =
             self.requirements.iter().map(|each| each.semidefinite(None)).collect();
         let (unknowns, _) = minimise(&costs, &matrices)?;
-        Some((objective.at(&unknowns)[(0, 0)], unknowns))
+        Some((objective.evaluate(&unknowns)[(0, 0)], unknowns))
     }
 
     /// Unknowns as far inside of all requirements as possible, or as little outside: nothing is
     /// checked.
-    pub(super) fn middle(&self) -> Option<DVector<f64>> {
+    pub(super) fn most_interior(&self) -> Option<DVector<f64>> {
         let all: Vec<_> = self.requirements.iter().collect();
-        Some(self.most_inside(&all)?.1)
+        Some(self.largest_slack(&all)?.1)
     }
 
     /// The largest common slack, at most one, and where it is found.
-    fn most_inside(&self, requirements: &[&Requirement]) -> Option<(f64, DVector<f64>)> {
+    fn largest_slack(&self, requirements: &[&Requirement]) -> Option<(f64, DVector<f64>)> {
         let mut extended = self.clone();
         let slack = extended.scalar();
         let mut matrices: Vec<_> =
@@ -225,7 +227,7 @@ impl Problem {
                 .iter()
                 .filter(|each| each.name.is_none_or(|name| rest.contains(&name)))
                 .collect();
-            if self.most_inside(&kept).is_some_and(|(slack, _)| slack < -UNDECIDED) {
+            if self.largest_slack(&kept).is_some_and(|(slack, _)| slack < -UNDECIDED) {
                 names = rest;
             }
         }
@@ -237,7 +239,7 @@ impl Problem {
         let Some(unknowns) = unknowns else { return Ok(None) };
         let mut margins = Vec::with_capacity(self.requirements.len());
         for each in &self.requirements {
-            let matrix = each.matrix.at(&unknowns);
+            let matrix = each.matrix.evaluate(&unknowns);
             let half =
                 DMatrix::from_diagonal_element(matrix.nrows(), matrix.nrows(), each.margin * 0.5);
             let Some(above) = smallest_eigenvalue(&(matrix - half))? else { return Ok(None) };

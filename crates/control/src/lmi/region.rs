@@ -2,17 +2,17 @@
 
 use super::affine::Affine;
 use super::coordinates::Coordinates;
-use super::definite::{Product, margin};
+use super::definite::{AccurateProduct, margin};
 use super::{Outcome, Problem};
 use crate::domain::Domain;
 use crate::eigen::eigenvalues;
 use crate::{Error, check};
 use nalgebra::{Complex, DMatrix};
 
-/// Part of the data by which inequalities are kept in the solver's coordinates.
+/// Margin of the inequalities in the solver's coordinates, where the data are about one.
 pub(super) const MARGIN: f64 = 2e-7;
 
-const NO_P: &str = "no P shows in double precision that the region is kept";
+const NO_P: &str = "the region could not be proven in double precision";
 
 /// A disc around a real number.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,8 +23,8 @@ pub struct Disc {
     pub radius: f64,
 }
 
-/// Where eigenvalues shall lie: in all of the parts that are given; with none, in the region of
-/// stability.
+/// A region of the complex plane: the intersection of the parts that are given; without any, the
+/// region of stability.
 ///
 /// Continuous time: eigenvalues s. Sampled time: eigenvalues z of the sampled system.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -48,7 +48,7 @@ pub struct RegionCertificate {
     pub margin: f64,
 }
 
-/// A part of a region and its name.
+/// A part of a region and the name by which a conflict reports it.
 struct Part {
     name: &'static str,
     shape: Shape,
@@ -72,9 +72,7 @@ impl Region {
                 return Err(Error::OutOfRange { name: "disc center", value: center, rule });
             }
         }
-        if let Domain::Sampled { period } = domain {
-            check::positive("period", period)?;
-        }
+        domain.check()?;
         let Some(value) = self.sector else { return Ok(()) };
         let rule = match domain {
             Domain::Continuous => "an angle between 0 and pi/2",
@@ -87,7 +85,7 @@ impl Region {
         Err(Error::OutOfRange { name: "sector", value, rule })
     }
 
-    /// The parts with their names, time scaled by `unit`.
+    /// The parts, with frequencies divided by `unit`.
     fn parts(&self, domain: Domain, unit: f64) -> Vec<Part> {
         let mut parts = Vec::new();
         let around_zero = |radius| Shape::Disc(Disc { center: 0.0, radius });
@@ -115,9 +113,9 @@ impl Region {
         parts
     }
 
-    /// The matrices that are positive definite if P and the product P A, `product`, prove that the
-    /// eigenvalues of A lie in the region.
-    pub(super) fn requirements(
+    /// The matrices of [`certify_region`] with their names, positive definite if P and the product
+    /// P A, `product`, prove that the eigenvalues of A are in the region.
+    pub(super) fn inequalities(
         &self,
         p: &Affine,
         product: &Affine,
@@ -125,10 +123,10 @@ impl Region {
         unit: f64,
     ) -> Vec<(&'static str, Affine)> {
         let parts = self.parts(domain, unit);
-        parts.iter().map(|part| (part.name, part.shape.requirement(p, product))).collect()
+        parts.iter().map(|part| (part.name, part.shape.inequality(p, product))).collect()
     }
 
-    /// Whether all parts have real numbers in common.
+    /// Whether the parts have a real interval in common.
     pub(super) fn has_real_numbers(&self, domain: Domain) -> bool {
         let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
         for part in self.parts(domain, 1.0) {
@@ -142,16 +140,16 @@ impl Region {
         low < high
     }
 
-    /// Names of the parts that an eigenvalue is outside of.
-    fn missed(&self, values: &[Complex<f64>], domain: Domain) -> Vec<&'static str> {
+    /// Names of the parts that do not contain all eigenvalues.
+    fn violated(&self, values: &[Complex<f64>], domain: Domain) -> Vec<&'static str> {
         let parts = self.parts(domain, 1.0);
-        let outside = |part: &&Part| values.iter().any(|value| !part.shape.holds(value));
+        let outside = |part: &&Part| values.iter().any(|value| !part.shape.contains(value));
         parts.iter().filter(outside).map(|part| part.name).collect()
     }
 }
 
 impl Shape {
-    fn holds(&self, value: &Complex<f64>) -> bool {
+    fn contains(&self, value: &Complex<f64>) -> bool {
         match self {
             Self::HalfPlane(decay) => value.re < -decay,
             Self::Disc(Disc { center, radius }) => (value - center).norm() < *radius,
@@ -159,7 +157,7 @@ impl Shape {
         }
     }
 
-    fn requirement(&self, p: &Affine, product: &Affine) -> Affine {
+    fn inequality(&self, p: &Affine, product: &Affine) -> Affine {
         let sum = product.plus_transpose();
         match self {
             Self::HalfPlane(decay) => -&(&sum + &(p * (2.0 * decay))),
@@ -222,17 +220,17 @@ pub fn certify_region(
 ) -> Result<Outcome<RegionCertificate>, Error> {
     check::square("A", a)?;
     region.check(domain)?;
-    let conflict = region.missed(&eigenvalues(a)?, domain);
+    let conflict = region.violated(&eigenvalues(a)?, domain);
     if !conflict.is_empty() {
         return Ok(Outcome::Infeasible { conflict });
     }
     match Coordinates::of_dynamics(a)? {
         Some(coordinates) => certify_in(&coordinates, a, region, domain),
-        None => Ok(Outcome::Trouble(NO_P)),
+        None => Ok(Outcome::Inconclusive(NO_P)),
     }
 }
 
-/// The same by a solution in given coordinates.
+/// [`certify_region`] with the program solved in given coordinates.
 pub(super) fn certify_in(
     coordinates: &Coordinates,
     a: &DMatrix<f64>,
@@ -242,41 +240,41 @@ pub(super) fn certify_in(
     let n = a.nrows();
     let mut problem = Problem::new();
     let p = problem.symmetric(n);
-    problem.always(&p, MARGIN);
-    problem.always(&(&Affine::identity(n, 1.0) - &p), MARGIN);
+    problem.constrain(&p, MARGIN);
+    problem.constrain(&(&Affine::identity(n, 1.0) - &p), MARGIN);
     let product = &p * &coordinates.dynamics(a);
-    for (_, matrix) in region.requirements(&p, &product, domain, coordinates.unit) {
-        problem.always(&matrix, MARGIN);
+    for (_, matrix) in region.inequalities(&p, &product, domain, coordinates.unit) {
+        problem.constrain(&matrix, MARGIN);
     }
     match problem.solve()? {
         Outcome::Optimal(solution) => {
             verify(a, region, domain, coordinates.certificate(&solution.value(&p)))
         }
-        _ => Ok(Outcome::Trouble(NO_P)),
+        _ => Ok(Outcome::Inconclusive(NO_P)),
     }
 }
 
-/// Checks P in the data as given.
+/// Verifies the inequalities for P in the units of the data.
 fn verify(
     a: &DMatrix<f64>,
     region: &Region,
     domain: Domain,
     p: DMatrix<f64>,
 ) -> Result<Outcome<RegionCertificate>, Error> {
-    let product = Product::of(&p, a);
+    let product = AccurateProduct::new(&p, a);
     let matrices = |p: &DMatrix<f64>, product: &DMatrix<f64>| {
         let (p, product) = (Affine::constant(p), Affine::constant(product));
-        region.requirements(&p, &product, domain, 1.0)
+        region.inequalities(&p, &product, domain, 1.0)
     };
     let zero = DMatrix::zeros(p.nrows(), p.nrows());
     let rounded = matrices(&p, &product.high);
-    let lost = matrices(&zero, &product.low);
+    let corrections = matrices(&zero, &product.low);
     let mut smallest = margin(&p)?;
-    for ((_, matrix), (_, correction)) in rounded.iter().zip(&lost) {
+    for ((_, matrix), (_, correction)) in rounded.iter().zip(&corrections) {
         smallest = smallest.min(margin(&(&matrix.constant + &correction.constant))?);
     }
     if smallest > 0.0 {
         return Ok(Outcome::Optimal(RegionCertificate { p, margin: smallest }));
     }
-    Ok(Outcome::Trouble("the certificate of the region is lost in rounding errors"))
+    Ok(Outcome::Inconclusive("the certificate of the region is within the rounding errors"))
 }

@@ -1,6 +1,7 @@
 //! The call of Clarabel.
 
 use super::affine::Affine;
+use aso_lapack as _;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{
     DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT as Cone,

@@ -1,39 +1,38 @@
 //! Gains from inequalities.
 
-use super::gain::{Channel, GainBound, Norm, certify_gain};
+use super::gain::{GainBound, Norm, certify_gain};
+use super::observer::{Candidate, ObserverRequirements};
 use super::region::{Region, RegionCertificate, certify_region};
-use super::search::{Found, Wanted};
 use super::{Outcome, gain, region};
-use crate::domain::Domain;
-use crate::{Error, check};
+use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
 
-const NOT_PROVEN: &str = "the gain that was found does not prove to keep the requirements";
+const NOT_PROVEN: &str = "a gain was found, but the requirements could not be proven for it";
 
-/// What is wanted of the gain from a disturbance w to an output z.
+/// A requirement on the gain from a disturbance w to an output z.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Performance {
-    /// n x k: how w drives the states.
+    /// n x k: how w acts on the states.
     pub disturbance: DMatrix<f64>,
-    /// r x n: z as a function of the states.
+    /// r x n: the part of z that depends on the states.
     pub output: DMatrix<f64>,
-    /// For an observer p x k, how w enters the measurement; for a state feedback r x m, how the
-    /// command enters z.
-    pub feed: DMatrix<f64>,
+    /// How w acts on the measurement (p x k, for an observer), or the command on z (r x m, for a state
+    /// feedback).
+    pub feedthrough: DMatrix<f64>,
     /// The norm.
     pub norm: Norm,
-    /// The bound to keep; None: nearly the smallest one.
+    /// The bound to keep; None for nearly the smallest one possible.
     pub gamma: Option<f64>,
 }
 
-/// A gain and the proofs of what it does.
+/// A gain and the certificates of its closed loop.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Synthesis {
     /// The gain.
     pub gain: DMatrix<f64>,
-    /// Eigenvalues in the region.
+    /// The proof that the eigenvalues are in the region.
     pub region: RegionCertificate,
-    /// The bound that the gain keeps, if one was wanted; not above the bound that was given.
+    /// The bound of the norm, if a performance was required; not above the given bound.
     pub bound: Option<GainBound>,
 }
 
@@ -45,24 +44,25 @@ pub struct Synthesis {
 /// P (B - L D_y) = P B - Z D_y, one P for all of them
 /// ```
 ///
-/// `a`: n x n; `c`: p x n; `performance`: B = `disturbance`, E = `output`, `D_y` = `feed`. For the
+/// `a`: n x n; `c`: p x n; `performance`: B = `disturbance`, E = `output`, `D_y` = `feedthrough`. For the
 /// augmented observer: (`A_0`, `C_0`), B = [0; -I] from the fault rate to the error [e; eps], or
 /// `-F_0` from the fault to [e; `f_hat`].
 ///
-/// Regions alone: L exists if all states are seen and the parts of the region have real numbers
-/// in common. P >= I and Z within twice the smallest norm possible are taken as far inside of all
-/// inequalities as can be. With a performance one P for all inequalities is sufficient, not
-/// necessary; the smallest bound is sought and then kept within 5 %, as far inside as can be, because
-/// at the smallest bound itself gains often grow without limit. Where faster is always better, that is
-/// without disturbance on the measurement, give a disc.
+/// Region only: L exists if (A, C) is observable and the parts of the region have a real interval in
+/// common. P >= I, and Z of a norm up to twice the smallest possible, are chosen as far inside of all
+/// inequalities as possible. With a performance, one P for all inequalities is sufficient, not
+/// necessary. The smallest bound is computed; the gain is then designed for a bound 5 % larger, as far
+/// inside as possible, because gains often grow without limit towards the smallest bound. When w does
+/// not act on the measurement, faster is always better: give a disc to limit the gain.
 ///
-/// Coordinates: all states are seen equally well at the speed that the region wants; if no gain is
-/// found, three times those in which the nearest P becomes the identity. With a performance P and Z
-/// stay below 1e6 there, and a conflict with "gain" means: not within that.
+/// The program is solved in coordinates in which all states are equally observable at the speed that
+/// the region requires; if no gain is found, up to three times more in coordinates in which the most
+/// interior P becomes the identity. With a performance, P and Z are bounded by 1e6 there; a conflict
+/// that names "gain" means that none exists within this bound.
 ///
-/// What is found is L; its region and its bound are then proven for A - L C as it is, by
-/// [`certify_region`] and [`certify_gain`], each with its own P. Requirements are named "decay",
-/// "disc", "sector" ("stability" when no region is given) and "gain".
+/// The region and the bound are then proven for A - L C itself, by [`certify_region`] and
+/// [`certify_gain`], each with a P of its own. Conflicts name the requirements "decay", "disc",
+/// "sector" ("stability" when no region is given) and "gain".
 ///
 /// Source: M. Chilali and P. Gahinet (1996), section IV; M. Chilali, P. Gahinet, P. Apkarian, Robust
 /// pole placement in LMI regions, IEEE Trans. Autom. Control 44 (1999).
@@ -101,24 +101,26 @@ pub fn observer_gain(
     let n = check::square("A", a)?;
     check::shape("C", c, (c.nrows(), n))?;
     region.check(domain)?;
-    if let Some(wanted) = performance {
-        let k = wanted.disturbance.ncols();
-        check::shape("disturbance", &wanted.disturbance, (n, k))?;
-        check::shape("output", &wanted.output, (wanted.output.nrows(), n))?;
-        check::shape("feed", &wanted.feed, (c.nrows(), k))?;
-        check::positive("gamma", wanted.gamma.unwrap_or(1.0))?;
+    if let Some(given) = performance {
+        let (k, r) = (given.disturbance.ncols(), given.output.nrows());
+        given.check((n, k), (r, n), (c.nrows(), k))?;
     }
-    let wanted = Wanted { a, c, region: *region, performance, domain };
-    wanted.search(|found| {
-        let dynamics = a - &found.gain * c;
-        let channel = performance.map(|wanted| Channel {
-            a: dynamics.clone(),
-            b: &wanted.disturbance - &found.gain * &wanted.feed,
-            c: wanted.output.clone(),
-            d: DMatrix::zeros(wanted.output.nrows(), wanted.disturbance.ncols()),
+    let requirements = ObserverRequirements { a, c, region: *region, performance, domain };
+    requirements.search(|candidate| {
+        let Candidate { gain, coordinates } = candidate;
+        let dynamics = a - &gain * c;
+        let bound = performance.map(|given| Bound {
+            system: StateSpace {
+                a: dynamics.clone(),
+                b: &given.disturbance - &gain * &given.feedthrough,
+                c: given.output.clone(),
+                d: DMatrix::zeros(given.output.nrows(), given.disturbance.ncols()),
+                domain,
+            },
+            norm: given.norm,
+            gamma: given.gamma,
         });
-        let wish = channel.zip(performance.map(|wanted| (wanted.norm, wanted.gamma)));
-        prove(found, &dynamics, region, wish, domain)
+        prove(Candidate { gain, coordinates }, &dynamics, region, bound, domain)
     })
 }
 
@@ -128,14 +130,15 @@ pub fn observer_gain(
 /// x' = (A + B K) x + B_1 w, z = (C_1 + D_12 K) x
 /// ```
 ///
-/// `a`: n x n; `b`: n x m; `performance`: `B_1` = `disturbance`, `C_1` = `output`, `D_12` = `feed`.
+/// `a`: n x n; `b`: n x m; `performance`: `B_1` = `disturbance`, `C_1` = `output`, `D_12` = `feedthrough`.
 /// K = -L' with L the [`observer_gain`] for A' and B' from `C_1`', `D_12`' to `B_1`': transposing a
-/// system changes neither eigenvalues nor the H-infinity norm and turns energy to peak into
-/// impulse to energy. The certificates are for A + B K itself. All else as there.
+/// system changes neither eigenvalues nor the H-infinity norm, and exchanges energy to peak with
+/// impulse to energy. The certificates are for A + B K itself. Existence, method and names of the
+/// requirements: same as [`observer_gain`].
 ///
 /// # Errors
 ///
-/// Those of [`observer_gain`].
+/// Same as [`observer_gain`].
 pub fn state_feedback(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
@@ -146,72 +149,101 @@ pub fn state_feedback(
     let n = check::square("A", a)?;
     check::shape("B", b, (n, b.ncols()))?;
     region.check(domain)?;
-    if let Some(wanted) = performance {
-        let r = wanted.output.nrows();
-        check::shape("disturbance", &wanted.disturbance, (n, wanted.disturbance.ncols()))?;
-        check::shape("output", &wanted.output, (r, n))?;
-        check::shape("feed", &wanted.feed, (r, b.ncols()))?;
-        check::positive("gamma", wanted.gamma.unwrap_or(1.0))?;
+    if let Some(given) = performance {
+        let (k, r) = (given.disturbance.ncols(), given.output.nrows());
+        given.check((n, k), (r, n), (r, b.ncols()))?;
     }
-    let turned = performance.map(|wanted| Performance {
-        disturbance: wanted.output.transpose(),
-        output: wanted.disturbance.transpose(),
-        feed: wanted.feed.transpose(),
-        norm: match wanted.norm {
-            Norm::HInfinity => Norm::HInfinity,
-            Norm::EnergyToPeak => Norm::ImpulseToEnergy,
-            Norm::ImpulseToEnergy => Norm::EnergyToPeak,
-        },
-        gamma: wanted.gamma,
-    });
-    let (a_turned, b_turned) = (a.transpose(), b.transpose());
-    let wanted = Wanted {
-        a: &a_turned,
-        c: &b_turned,
+    let dual = performance.map(Performance::dual);
+    let requirements = ObserverRequirements {
+        a: &a.transpose(),
+        c: &b.transpose(),
         region: *region,
-        performance: turned.as_ref(),
+        performance: dual.as_ref(),
         domain,
     };
-    wanted.search(|found| {
-        let gain = -found.gain.transpose();
+    requirements.search(|candidate| {
+        let gain = -candidate.gain.transpose();
         let dynamics = a + b * &gain;
-        let channel = performance.map(|wanted| Channel {
-            a: dynamics.clone(),
-            b: wanted.disturbance.clone(),
-            c: &wanted.output + &wanted.feed * &gain,
-            d: DMatrix::zeros(wanted.output.nrows(), wanted.disturbance.ncols()),
+        let bound = performance.map(|given| Bound {
+            system: StateSpace {
+                a: dynamics.clone(),
+                b: given.disturbance.clone(),
+                c: &given.output + &given.feedthrough * &gain,
+                d: DMatrix::zeros(given.output.nrows(), given.disturbance.ncols()),
+                domain,
+            },
+            norm: given.norm,
+            gamma: given.gamma,
         });
-        let wish = channel.zip(performance.map(|wanted| (wanted.norm, wanted.gamma)));
-        let found = Found { gain, coordinates: found.coordinates.transposed() };
-        prove(found, &dynamics, region, wish, domain)
+        let coordinates = candidate.coordinates.transposed();
+        prove(Candidate { gain, coordinates }, &dynamics, region, bound, domain)
     })
 }
 
-/// The proofs for a gain that was found, in the coordinates of its search or in its own.
+impl Performance {
+    /// Checks the matrices against the given shapes, and the bound.
+    fn check(
+        &self,
+        disturbance: (usize, usize),
+        output: (usize, usize),
+        feedthrough: (usize, usize),
+    ) -> Result<(), Error> {
+        check::shape("disturbance", &self.disturbance, disturbance)?;
+        check::shape("output", &self.output, output)?;
+        check::shape("feedthrough", &self.feedthrough, feedthrough)?;
+        check::positive("gamma", self.gamma.unwrap_or(1.0))
+    }
+
+    /// The same requirement for the transposed system.
+    fn dual(&self) -> Self {
+        Self {
+            disturbance: self.output.transpose(),
+            output: self.disturbance.transpose(),
+            feedthrough: self.feedthrough.transpose(),
+            norm: match self.norm {
+                Norm::HInfinity => Norm::HInfinity,
+                Norm::EnergyToPeak => Norm::ImpulseToEnergy,
+                Norm::ImpulseToEnergy => Norm::EnergyToPeak,
+            },
+            gamma: self.gamma,
+        }
+    }
+}
+
+/// A bound to prove: that the norm of `system` is at most `gamma`, or any value if None.
+struct Bound {
+    system: StateSpace,
+    norm: Norm,
+    gamma: Option<f64>,
+}
+
+/// Proves region and bound for the closed loop with a candidate gain.
+///
+/// Each certificate is computed in the coordinates of the candidate first, then in those that suit
+/// the closed-loop dynamics.
 fn prove(
-    found: Found,
+    candidate: Candidate,
     dynamics: &DMatrix<f64>,
     region: &Region,
-    wish: Option<(Channel, (Norm, Option<f64>))>,
+    bound: Option<Bound>,
     domain: Domain,
 ) -> Result<Outcome<Synthesis>, Error> {
-    let Found { gain, coordinates } = found;
+    let Candidate { gain, coordinates } = candidate;
     let certificate = match region::certify_in(&coordinates, dynamics, region, domain)?.optimal() {
         None => certify_region(dynamics, region, domain)?.optimal(),
         certificate => certificate,
     };
-    let Some(region) = certificate else { return Ok(Outcome::Trouble(NOT_PROVEN)) };
-    let Some((channel, (norm, gamma))) = wish else {
+    let Some(region) = certificate else { return Ok(Outcome::Inconclusive(NOT_PROVEN)) };
+    let Some(Bound { system, norm, gamma }) = bound else {
         return Ok(Outcome::Optimal(Synthesis { gain, region, bound: None }));
     };
     let kept = |bound: &GainBound| bound.gamma <= gamma.unwrap_or(f64::INFINITY);
-    let own = gain::certify_in(coordinates, &channel, norm, domain)?.optimal().filter(kept);
-    let bound = match own {
-        None => certify_gain(&channel, norm, domain)?.optimal().filter(kept),
+    let bound = match gain::certify_in(coordinates, &system, norm)?.optimal().filter(kept) {
+        None => certify_gain(&system, norm)?.optimal().filter(kept),
         bound => bound,
     };
     Ok(match bound {
-        None => Outcome::Trouble(NOT_PROVEN),
+        None => Outcome::Inconclusive(NOT_PROVEN),
         bound => Outcome::Optimal(Synthesis { gain, region, bound }),
     })
 }

@@ -4,7 +4,7 @@ use super::wanted::Wanted;
 use crate::Error;
 use crate::balance::power_of_two;
 use crate::balance::{Balance, divide_columns, divide_rows, multiply_columns, multiply_rows};
-use crate::singular::Singular;
+use crate::svd::Svd;
 use nalgebra::{DMatrix, DVector};
 
 const SCALING_PASSES: usize = 20;
@@ -43,7 +43,7 @@ impl Assignable {
     ) -> Result<Self, Error> {
         let (n, r) = b.shape();
         let mut units = DVector::from_element(n + r, 1.0);
-        units.rows_mut(0, n).copy_from(&Balance::of(a).scale);
+        units.rows_mut(0, n).copy_from(&Balance::new(a).scale);
         let mut solutions = in_units(a, b, wanted, &units)?;
         for _ in 0..SCALING_PASSES {
             let factors = row_sizes(&solutions, wanted, n);
@@ -58,7 +58,7 @@ impl Assignable {
             let count = wanted.count();
             let (top, bottom) = (solution.rows(0, count * n), solution.rows(count * n, count * r));
             let given = multiply_rows(&top.into(), &repeated(&scale, count));
-            let whitening = Singular::of(&given)?.whitening(count * r) * root(count);
+            let whitening = Svd::new(&given)?.whitening(count * r) * root(count);
             Ok(Space { wanted, states: given * &whitening, responses: bottom * whitening })
         };
         let spaces = solutions.iter().zip(wanted).map(space).collect::<Result<_, Error>>()?;
@@ -148,7 +148,7 @@ pub(crate) fn solutions(
     let shifted = one.kronecker(a) - wanted.block().transpose().kronecker(&DMatrix::identity(n, n));
     let mut equations = shifted.resize_horizontally(count * (n + r), 0.0);
     equations.columns_mut(count * n, count * r).copy_from(&one.kronecker(b));
-    Ok(Singular::of(&equations)?.right.columns(count * n, count * r).into())
+    Ok(Svd::new(&equations)?.right.columns(count * n, count * r).into())
 }
 
 /// Size of each state and each response over all solutions, as powers of two around one.

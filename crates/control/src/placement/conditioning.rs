@@ -3,7 +3,7 @@
 use super::assignable::{Assignable, Space};
 use super::descent::minimise;
 use crate::Error;
-use crate::singular::Singular;
+use crate::svd::Svd;
 use nalgebra::{DMatrix, DVector, RowDVector};
 
 const STARTS: usize = 3;
@@ -30,7 +30,7 @@ pub(crate) fn best_directions(problem: &Assignable) -> Result<Vec<DVector<f64>>,
 
 /// Largest over smallest singular value, precise for rows of very different size.
 pub(crate) fn condition(eigenvectors: &DMatrix<f64>) -> Result<f64, Error> {
-    Ok(Singular::of(&eigenvectors.transpose())?.condition())
+    Ok(Svd::new(&eigenvectors.transpose())?.condition())
 }
 
 /// Directions spread without pattern: the fractional parts of multiples of square roots.
@@ -94,8 +94,8 @@ fn widest(space: &Space, normals: &DMatrix<f64>) -> Result<DVector<f64>, Error> 
         - first.column(1) * second.column(0).transpose();
     let form = &half + half.transpose();
     let shift = DMatrix::from_diagonal_element(form.nrows(), form.nrows(), form.norm());
-    let highest = Singular::of(&(&shift + &form))?.right.column(0).into_owned();
-    let lowest = Singular::of(&(&shift - &form))?.right.column(0).into_owned();
+    let highest = Svd::new(&(&shift + &form))?.right.column(0).into_owned();
+    let lowest = Svd::new(&(&shift - &form))?.right.column(0).into_owned();
     let size = |w: &DVector<f64>| w.dot(&(&form * w)).abs();
     Ok(if size(&highest) >= size(&lowest) { highest } else { lowest })
 }
@@ -151,7 +151,7 @@ impl Chart {
     /// ln(s1 / sn) of the eigenvector matrix V = sum of s x u', and its gradient: ds = x' dV u.
     fn objective(&self, problem: &Assignable, t: &DVector<f64>) -> Option<(f64, DVector<f64>)> {
         let directions = self.directions(t);
-        let v = Singular::of(&problem.eigenvectors(&directions).transpose()).ok()?;
+        let v = Svd::new(&problem.eigenvectors(&directions).transpose()).ok()?;
         let last = v.values.len() - 1;
         let value = v.condition().ln();
         let of_columns = v.right.column(0) * (v.left.column(0) / v.values[0]).transpose()
@@ -179,7 +179,7 @@ fn normals(space: &Space, w: &DVector<f64>) -> Result<DMatrix<f64>, Error> {
     if count == 2 {
         fixed.push(quarter_turn(space, w));
     }
-    let across = Singular::of(&DMatrix::from_rows(&fixed))?.right;
+    let across = Svd::new(&DMatrix::from_rows(&fixed))?.right;
     Ok(across.columns(count, w.len() - count).into())
 }
 

@@ -4,7 +4,7 @@ use super::assignable::{Assignable, solutions};
 use super::wanted::Wanted;
 use crate::Error;
 use crate::balance::{divide_columns, divide_rows, multiply_columns, multiply_rows};
-use crate::singular::Singular;
+use crate::svd::Svd;
 use nalgebra::{DMatrix, DVector};
 
 /// Eigenvectors whose part normal to those before is below this part of them are dependent.
@@ -41,10 +41,10 @@ pub(crate) fn gain(
         let g = responses.columns(column, count) - &k * v;
         let chosen = (inside.norm() > DEPENDENT * v.norm()).then_some((&inside, &g));
         let (v, g) = nearest_solution(&rest, &a, &b, space.wanted, chosen)?;
-        let basis = Singular::of(&v)?;
+        let basis = Svd::new(&v)?;
         let q = &rest * &basis.left;
         k += g * basis.whitening(count) * q.transpose();
-        let across = Singular::of(&basis.left.transpose())?.right;
+        let across = Svd::new(&basis.left.transpose())?.right;
         rest = &rest * across.columns(count, across.ncols() - count);
         column += count;
     }
@@ -67,7 +67,7 @@ fn nearest_solution(
         let entries = v.iter().chain(g).map(|entry| entry / size);
         basis.tr_mul(&DVector::from_iterator(basis.nrows(), entries))
     } else {
-        Singular::of(&basis.rows(0, states).into())?.right.column(0).into()
+        Svd::new(&basis.rows(0, states).into())?.right.column(0).into()
     };
     let nearest = basis * weights;
     let part = |entries: &[f64]| DMatrix::from_column_slice(entries.len() / count, count, entries);

@@ -3,7 +3,7 @@
 use super::Rank;
 use crate::Error;
 use crate::balance::{Balance, divide_rows, multiply_rows, unit_columns};
-use crate::singular::Singular;
+use crate::svd::Svd;
 use nalgebra::{DMatrix, DVector};
 
 /// What is zero in a rank decision, relative to the norm of the scaled matrix, per state.
@@ -24,9 +24,9 @@ pub(crate) struct Staircase {
 }
 
 impl Staircase {
-    pub(crate) fn of(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Self, Error> {
+    pub(crate) fn new(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Self, Error> {
         let n = a.nrows();
-        let Balance { matrix: balanced, scale } = Balance::of(a);
+        let Balance { matrix: balanced, scale } = Balance::new(a);
         let (mut rest, mut rest_basis) = (balanced.clone(), DMatrix::identity(n, n));
         let mut reached = Vec::with_capacity(n);
         let mut link = unit_columns(&divide_rows(b, &scale));
@@ -36,8 +36,8 @@ impl Staircase {
         let size = rest.norm();
         let mut reference = link.norm();
         while !rest.is_empty() {
-            let step = Singular::of(&link.transpose())?;
-            let kept = step.values.iter().filter(|&&value| value > tolerance * reference).count();
+            let step = Svd::new(&link.transpose())?;
+            let kept = step.rank_above(tolerance * reference);
             if kept == 0 {
                 break;
             }

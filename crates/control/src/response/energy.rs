@@ -1,10 +1,9 @@
 //! Norms by the covariance of the state: H2 and energy to peak.
 
-use super::System;
+use crate::blocks::symmetric_part;
 use crate::lyapunov::{discrete_lyapunov, lyapunov};
-use crate::singular::Singular;
-use crate::{Domain, Error};
-use nalgebra::DMatrix;
+use crate::svd::norm_2;
+use crate::{Domain, Error, StateSpace};
 
 /// Norms that follow from the covariance C W C' of z under white noise.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,23 +36,24 @@ pub struct Energy {
 ///
 /// ```
 /// use control::Domain;
-/// use control::response::{System, energy};
+/// use control::StateSpace;
+/// use control::response::{energy};
 /// use nalgebra::DMatrix;
 /// let one = DMatrix::identity(1, 1);
 /// let (a, d) = (-&one, DMatrix::zeros(1, 1));
-/// let lag = System { a, b: one.clone(), c: one, d, domain: Domain::Continuous };
+/// let lag = StateSpace { a, b: one.clone(), c: one, d, domain: Domain::Continuous };
 /// assert!((energy(&lag)?.h2 - 0.5_f64.sqrt()).abs() < 1e-15);
 /// # Ok::<(), control::Error>(())
 /// ```
 ///
 /// # Errors
 ///
-/// Those of [`System::check`]; [`Error::OutOfRange`] when D is not zero in continuous time; those
+/// Those of [`StateSpace::check`]; [`Error::OutOfRange`] when D is not zero in continuous time; those
 /// of [`lyapunov`] and [`discrete_lyapunov`].
-pub fn energy(system: &System) -> Result<Energy, Error> {
+pub fn energy(system: &StateSpace) -> Result<Energy, Error> {
     system.check()?;
-    let System { a, b, c, d, domain } = system;
-    let noise = symmetric(b * b.transpose());
+    let StateSpace { a, b, c, d, domain } = system;
+    let noise = symmetric_part(&(b * b.transpose()));
     let covariance = match domain {
         Domain::Continuous => {
             let value = d.amax();
@@ -68,15 +68,10 @@ pub fn energy(system: &System) -> Result<Energy, Error> {
             c * state * c.transpose() + d * d.transpose()
         }
     };
-    let covariance = symmetric(covariance);
+    let covariance = symmetric_part(&covariance);
     Ok(Energy {
         h2: covariance.trace().max(0.0).sqrt(),
-        peak: Singular::of(&covariance)?.values[0].sqrt(),
+        peak: norm_2(&covariance)?.sqrt(),
         peaks: covariance.diagonal().iter().map(|entry| entry.max(0.0).sqrt()).collect(),
     })
-}
-
-fn symmetric(m: DMatrix<f64>) -> DMatrix<f64> {
-    let transposed = m.transpose();
-    (m + transposed) * 0.5
 }

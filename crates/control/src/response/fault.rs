@@ -1,7 +1,8 @@
 //! What bounded faults and reversals of friction do to the loop.
 
 use super::{
-    Trace, Transient, fault_rate_system, fault_system, peak_gain, ramp_response, step_response,
+    TimeResponse, Transient, fault_rate_system, fault_system, peak_gain, ramp_response,
+    step_response,
 };
 use crate::aso::{FaultyPlant, Gains};
 use crate::{Domain, Error, check};
@@ -97,7 +98,7 @@ pub struct Reversal {
     /// Of the errors `f_hat` - f, q.
     pub fault_errors: Vec<Transient>,
     /// The outputs [x; e; eps] over time, for figures.
-    pub trace: Trace,
+    pub trace: TimeResponse,
 }
 
 /// The response of the loop at rest to a fault that changes by `change`: a reversal of friction.
@@ -130,15 +131,15 @@ pub struct Reversal {
 /// # Example
 ///
 /// ```
-/// use control::placement::real;
+/// use control::placement::real_poles;
 /// use control::{Domain, aso, response};
 /// use nalgebra::DMatrix;
 /// let one = |value| DMatrix::from_element(1, 1, value);
 /// let plant = aso::FaultyPlant::with_constant_faults(one(0.5), one(1.0), one(1.0), one(-1.0));
-/// let gains = aso::design(&plant, &real(&[-1.0]), &real(&[-20.0, -30.0]), None)?.gains;
+/// let gains = aso::design(&plant, &real_poles(&[-1.0]), &real_poles(&[-20.0, -30.0]), None)?.gains;
 /// let turn = response::reversal(&plant, &gains, Domain::Continuous, 0, 2.0, None, 0.02)?;
 /// assert!((turn.fault_errors[0].peak + 2.0).abs() < 1e-12);
-/// assert!(turn.states[0].settled.abs() < 1e-12);
+/// assert!(turn.states[0].final_value.abs() < 1e-12);
 /// # Ok::<(), control::Error>(())
 /// ```
 ///

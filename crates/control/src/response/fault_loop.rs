@@ -1,8 +1,7 @@
 //! Plant and controller of [`crate::aso`] as one system driven by the fault.
 
-use super::System;
 use crate::aso::{Estimator, FaultyPlant, Gains};
-use crate::{Domain, Error};
+use crate::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
 /// From the fault f to [x; e; eps].
@@ -24,7 +23,11 @@ use nalgebra::DMatrix;
 /// # Errors
 ///
 /// Those of [`Gains::check`].
-pub fn fault_system(plant: &FaultyPlant, gains: &Gains, domain: Domain) -> Result<System, Error> {
+pub fn fault_system(
+    plant: &FaultyPlant,
+    gains: &Gains,
+    domain: Domain,
+) -> Result<StateSpace, Error> {
     gains.check(plant)?;
     let (n, q) = plant.f_a.shape();
     let mut b = DMatrix::zeros(2 * n + q, q);
@@ -37,7 +40,7 @@ pub fn fault_system(plant: &FaultyPlant, gains: &Gains, domain: Domain) -> Resul
     let mut d = DMatrix::zeros(2 * n + q, q);
     d.view_mut((2 * n, 0), (q, q)).copy_from(&-DMatrix::identity(q, q));
     let c = DMatrix::identity(2 * n + q, 2 * n + q);
-    Ok(System { a: loop_dynamics(plant, gains), b, c, d, domain })
+    Ok(StateSpace { a: loop_dynamics(plant, gains), b, c, d, domain })
 }
 
 /// From [r; f] to [x; e; eps], with r = f' - `A_f` f the part of the fault's rate that the fault
@@ -59,7 +62,7 @@ pub fn fault_rate_system(
     plant: &FaultyPlant,
     gains: &Gains,
     domain: Domain,
-) -> Result<System, Error> {
+) -> Result<StateSpace, Error> {
     gains.check(plant)?;
     let (n, q) = plant.f_a.shape();
     let order = 2 * n + q;
@@ -67,7 +70,7 @@ pub fn fault_rate_system(
     b.view_mut((2 * n, 0), (q, q)).copy_from(&-DMatrix::identity(q, q));
     b.view_mut((0, q), (n, q)).copy_from(&(&plant.f_a + &plant.b * &gains.k_f));
     let (c, d) = (DMatrix::identity(order, order), DMatrix::zeros(order, 2 * q));
-    Ok(System { a: loop_dynamics(plant, gains), b, c, d, domain })
+    Ok(StateSpace { a: loop_dynamics(plant, gains), b, c, d, domain })
 }
 
 /// The matrix of both: [A + B `K_x`, [-B `K_x`, B `K_f`]; 0, `A_0` - L `C_0`].

@@ -1,10 +1,10 @@
 //! The frequency response.
 
-use super::System;
 use crate::balance::{Balance, divide_rows, multiply_columns};
+use crate::blocks::to_complex;
 use crate::eigen::eigenvalues;
-use crate::singular::Singular;
-use crate::{Domain, Error, check};
+use crate::svd::ComplexSvd;
+use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{Complex, DMatrix};
 use std::f64::consts::PI;
 
@@ -31,11 +31,12 @@ pub struct FrequencyPoint {
 ///
 /// ```
 /// use control::Domain;
-/// use control::response::{System, frequency_response};
+/// use control::StateSpace;
+/// use control::response::{frequency_response};
 /// use nalgebra::DMatrix;
 /// let one = DMatrix::identity(1, 1);
 /// let (a, d) = (-&one, DMatrix::zeros(1, 1));
-/// let lag = System { a, b: one.clone(), c: one, d, domain: Domain::Continuous };
+/// let lag = StateSpace { a, b: one.clone(), c: one, d, domain: Domain::Continuous };
 /// let points = frequency_response(&lag, &[1.0])?;
 /// assert!((points[0].singular_values[0] - 0.5_f64.sqrt()).abs() < 1e-15);
 /// # Ok::<(), control::Error>(())
@@ -43,10 +44,10 @@ pub struct FrequencyPoint {
 ///
 /// # Errors
 ///
-/// Those of [`System::check`]; [`Error::OutOfRange`] for a frequency that is negative or not
+/// Those of [`StateSpace::check`]; [`Error::OutOfRange`] for a frequency that is negative or not
 /// finite; [`Error::Overflow`] at an eigenvalue; [`Error::NotConverged`].
 pub fn frequency_response(
-    system: &System,
+    system: &StateSpace,
     frequencies: &[f64],
 ) -> Result<Vec<FrequencyPoint>, Error> {
     system.check()?;
@@ -61,9 +62,9 @@ pub fn frequency_response(
 ///
 /// # Errors
 ///
-/// Those of [`System::check`]; [`Error::OutOfRange`] for `per_decade` of zero;
+/// Those of [`StateSpace::check`]; [`Error::OutOfRange`] for `per_decade` of zero;
 /// [`Error::NotConverged`].
-pub fn frequency_grid(system: &System, per_decade: u32) -> Result<Vec<f64>, Error> {
+pub fn frequency_grid(system: &StateSpace, per_decade: u32) -> Result<Vec<f64>, Error> {
     system.check()?;
     check::positive("per_decade", f64::from(per_decade))?;
     let values = eigenvalues(&system.a)?;
@@ -100,10 +101,10 @@ pub(super) struct Transfer<'a> {
 }
 
 impl<'a> Transfer<'a> {
-    pub(super) fn of(system: &'a System) -> Self {
-        let Balance { matrix, scale } = Balance::of(&system.a);
-        let b = divide_rows(&system.b, &scale).map(real);
-        let c = multiply_columns(&system.c, &scale).map(real);
+    pub(super) fn of(system: &'a StateSpace) -> Self {
+        let Balance { matrix, scale } = Balance::new(&system.a);
+        let b = to_complex(&divide_rows(&system.b, &scale));
+        let c = to_complex(&multiply_columns(&system.c, &scale));
         Self { a: matrix, b, c, d: &system.d, domain: system.domain }
     }
 
@@ -118,13 +119,14 @@ impl<'a> Transfer<'a> {
         };
         let overflow = Error::Overflow { what: "the frequency response" };
         let n = self.a.nrows();
-        let resolvent = DMatrix::from_diagonal_element(n, n, s) - self.a.map(real);
+        let resolvent = DMatrix::from_diagonal_element(n, n, s) - to_complex(&self.a);
         let states = resolvent.lu().solve(&self.b).ok_or(overflow.clone())?;
-        let gain = &self.c * states + self.d.map(real);
+        let gain = &self.c * states + to_complex(self.d);
         if gain.iter().any(|entry| !(entry.re.is_finite() && entry.im.is_finite())) {
             return Err(overflow);
         }
-        let singular_values = singular_values(&gain)?;
+        let tall = if gain.nrows() < gain.ncols() { gain.transpose() } else { gain.clone() };
+        let singular_values = ComplexSvd::new(&tall)?.values();
         Ok(FrequencyPoint { frequency, gain, singular_values })
     }
 
@@ -132,23 +134,4 @@ impl<'a> Transfer<'a> {
     pub(super) fn size(&self, frequency: f64) -> Result<f64, Error> {
         Ok(self.point(frequency)?.singular_values[0])
     }
-}
-
-fn real(entry: f64) -> Complex<f64> {
-    Complex::new(entry, 0.0)
-}
-
-/// Those of the real matrix [Re, -Im; Im, Re], where each appears twice.
-fn singular_values(m: &DMatrix<Complex<f64>>) -> Result<Vec<f64>, Error> {
-    let tall = if m.nrows() < m.ncols() { m.transpose() } else { m.clone() };
-    let (rows, cols) = tall.shape();
-    let both = DMatrix::from_fn(2 * rows, 2 * cols, |i, j| {
-        let entry = tall[(i % rows, j % cols)];
-        match (i < rows, j < cols) {
-            (true, true) | (false, false) => entry.re,
-            (true, false) => -entry.im,
-            (false, true) => entry.im,
-        }
-    });
-    Ok(Singular::of(&both)?.values.iter().step_by(2).copied().collect())
 }

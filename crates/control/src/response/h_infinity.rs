@@ -1,12 +1,12 @@
 //! The H-infinity norm.
 
-use super::System;
 use super::frequency::Transfer;
+use crate::blocks::block_2x2;
 use crate::eigen::eigenvalues;
-use crate::singular::Singular;
-use crate::{Domain, Error, check};
+use crate::svd::norm_2;
+use crate::{Domain, Error, StateSpace, check};
 use nalgebra::DMatrix;
-use std::f64::consts::{FRAC_PI_2, SQRT_2};
+use std::f64::consts::SQRT_2;
 
 const ROUNDS: usize = 100;
 
@@ -47,10 +47,11 @@ pub struct HInfinity {
 ///
 /// ```
 /// use control::Domain;
-/// use control::response::{System, h_infinity};
+/// use control::StateSpace;
+/// use control::response::{h_infinity};
 /// use nalgebra::DMatrix;
 /// // 1 / (s^2 + 2 d s + 1) with d = 0.1: 1 / (2 d sqrt(1 - d^2)) at w^2 = 1 - 2 d^2.
-/// let system = System {
+/// let system = StateSpace {
 ///     a: DMatrix::from_row_slice(2, 2, &[0.0, 1.0, -1.0, -0.2]),
 ///     b: DMatrix::from_row_slice(2, 1, &[0.0, 1.0]),
 ///     c: DMatrix::from_row_slice(1, 2, &[1.0, 0.0]),
@@ -65,15 +66,15 @@ pub struct HInfinity {
 ///
 /// # Errors
 ///
-/// Those of [`System::check`]; [`Error::OutOfRange`] for `width`; [`Error::NotHurwitz`],
+/// Those of [`StateSpace::check`]; [`Error::OutOfRange`] for `width`; [`Error::NotHurwitz`],
 /// [`Error::NotSchur`]; [`Error::NotConverged`]; [`Error::Overflow`].
-pub fn h_infinity(system: &System, width: f64) -> Result<HInfinity, Error> {
+pub fn h_infinity(system: &StateSpace, width: f64) -> Result<HInfinity, Error> {
     let modes = system.stable_eigenvalues()?;
     check::positive("width", width)?;
     let width = width.max(1e-10);
     let transfer = Transfer::of(system);
-    let level = LevelSet::of(system)?;
-    let mut best = level.ends(&transfer)?;
+    let continuous = continuous_equivalent(system)?;
+    let mut best = HInfinity::at_ends(&transfer, &continuous.d, system.domain)?;
     let resonances = modes.iter().flat_map(|mode| match system.domain {
         Domain::Continuous => vec![mode.im.abs(), mode.norm()],
         Domain::Sampled { period } => vec![mode.arg().abs() / period],
@@ -86,8 +87,8 @@ pub fn h_infinity(system: &System, width: f64) -> Result<HInfinity, Error> {
             return Ok(best);
         }
         best.upper = best.lower * (1.0 + width);
-        for frequency in level.crossings(best.upper)? {
-            best.offer(&transfer, frequency)?;
+        for frequency in crossings(&continuous, best.upper)? {
+            best.offer(&transfer, original_frequency(frequency, system.domain))?;
         }
         if best.lower < best.upper {
             return Ok(best);
@@ -97,6 +98,17 @@ pub fn h_infinity(system: &System, width: f64) -> Result<HInfinity, Error> {
 }
 
 impl HInfinity {
+    /// The larger of the values at frequency zero and at the highest frequency, where G is `d`, the
+    /// D of the continuous equivalent.
+    fn at_ends(transfer: &Transfer, d: &DMatrix<f64>, domain: Domain) -> Result<Self, Error> {
+        let frequency = original_frequency(f64::INFINITY, domain);
+        let lower = norm_2(d)?;
+        let mut best = Self { lower, upper: lower, frequency };
+        best.offer(transfer, 0.0)?;
+        Ok(best)
+    }
+
+    /// Raises the lower bound to the value at `frequency` if that is larger.
     fn offer(&mut self, transfer: &Transfer, frequency: f64) -> Result<(), Error> {
         let size = transfer.size(frequency)?;
         if size > self.lower {
@@ -107,74 +119,59 @@ impl HInfinity {
     }
 }
 
-/// A continuous system with the same singular values.
-struct LevelSet {
-    a: DMatrix<f64>,
-    b: DMatrix<f64>,
-    c: DMatrix<f64>,
-    d: DMatrix<f64>,
-    domain: Domain,
+/// The continuous system whose frequency response takes the same values as that of `system`.
+///
+/// A sampled system is transformed by z = (1 + s) / (1 - s), with R = (A + I)^-1:
+///
+/// ```text
+/// A_c = R (A - I),  B_c = sqrt(2) R B,  C_c = sqrt(2) C R,  D_c = D - C R B
+/// ```
+fn continuous_equivalent(system: &StateSpace) -> Result<StateSpace, Error> {
+    let StateSpace { a, b, c, d, domain } = system.clone();
+    if domain == Domain::Continuous {
+        return Ok(StateSpace { a, b, c, d, domain });
+    }
+    let identity = DMatrix::identity(a.nrows(), a.nrows());
+    let overflow = Error::Overflow { what: "(A + I)^-1" };
+    let inverse = (&a + &identity).try_inverse().ok_or(overflow)?;
+    Ok(StateSpace {
+        a: &inverse * (a - identity),
+        b: &inverse * &b * SQRT_2,
+        d: d - &c * &inverse * b,
+        c: c * inverse * SQRT_2,
+        domain: Domain::Continuous,
+    })
 }
 
-impl LevelSet {
-    fn of(system: &System) -> Result<Self, Error> {
-        let System { a, b, c, d, domain } = system.clone();
-        if domain == Domain::Continuous {
-            return Ok(Self { a, b, c, d, domain });
-        }
-        let identity = DMatrix::identity(a.nrows(), a.nrows());
-        let overflow = Error::Overflow { what: "(A + I)^-1" };
-        let inverse = (&a + &identity).try_inverse().ok_or(overflow)?;
-        Ok(Self {
-            a: &inverse * (a - identity),
-            b: &inverse * &b * SQRT_2,
-            d: d - &c * &inverse * b,
-            c: c * inverse * SQRT_2,
-            domain,
-        })
-    }
+/// Frequencies of a continuous system: all those at which a singular value of G equals `gamma`, and
+/// the midpoints between them.
+fn crossings(system: &StateSpace, gamma: f64) -> Result<Vec<f64>, Error> {
+    let (m, p) = (system.b.ncols(), system.c.nrows());
+    let (b, c) = (&system.b / gamma.sqrt(), &system.c / gamma.sqrt());
+    let d = &system.d / gamma;
+    let overflow = Error::Overflow { what: "(gamma^2 I - D' D)^-1" };
+    let r = DMatrix::identity(m, m) - d.tr_mul(&d);
+    let inverse = r.try_inverse().ok_or(overflow)?;
+    let a = &system.a + &b * &inverse * d.tr_mul(&c);
+    let weight = DMatrix::identity(p, p) + &d * &inverse * d.transpose();
+    let hamiltonian = block_2x2(
+        [&a, &(&b * inverse * b.transpose())],
+        [&-(c.tr_mul(&weight) * &c), &-a.transpose()],
+    );
+    let hamiltonian = check::in_range("the Hamiltonian matrix", hamiltonian)?;
+    let mut found: Vec<f64> = eigenvalues(&hamiltonian)?.iter().map(|x| x.im.abs()).collect();
+    found.push(0.0);
+    found.sort_by(f64::total_cmp);
+    found.dedup();
+    let midpoints: Vec<f64> = found.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
+    found.extend(midpoints);
+    Ok(found)
+}
 
-    /// The larger of the values at frequency zero and at the other end.
-    fn ends(&self, transfer: &Transfer) -> Result<HInfinity, Error> {
-        let frequency = match self.domain {
-            Domain::Continuous => f64::INFINITY,
-            Domain::Sampled { period } => 2.0 * FRAC_PI_2 / period,
-        };
-        let lower = Singular::of(&self.d)?.values[0];
-        let mut best = HInfinity { lower, upper: lower, frequency };
-        best.offer(transfer, 0.0)?;
-        Ok(best)
-    }
-
-    /// Frequencies among which are those where a singular value of G is gamma, and those midway.
-    fn crossings(&self, gamma: f64) -> Result<Vec<f64>, Error> {
-        let (n, m, p) = (self.a.nrows(), self.b.ncols(), self.c.nrows());
-        let (b, c, d) = (&self.b / gamma.sqrt(), &self.c / gamma.sqrt(), &self.d / gamma);
-        let overflow = Error::Overflow { what: "(gamma^2 I - D' D)^-1" };
-        let r = DMatrix::identity(m, m) - d.tr_mul(&d);
-        let inverse = r.try_inverse().ok_or(overflow)?;
-        let a = &self.a + &b * &inverse * d.tr_mul(&c);
-        let weight = DMatrix::identity(p, p) + &d * &inverse * d.transpose();
-        let mut hamiltonian = DMatrix::zeros(2 * n, 2 * n);
-        hamiltonian.view_mut((0, 0), (n, n)).copy_from(&a);
-        hamiltonian.view_mut((0, n), (n, n)).copy_from(&(&b * inverse * b.transpose()));
-        hamiltonian.view_mut((n, 0), (n, n)).copy_from(&-(c.tr_mul(&weight) * &c));
-        hamiltonian.view_mut((n, n), (n, n)).copy_from(&-a.transpose());
-        let hamiltonian = check::in_range("the Hamiltonian matrix", hamiltonian)?;
-        let mut found: Vec<f64> = eigenvalues(&hamiltonian)?.iter().map(|x| x.im.abs()).collect();
-        found.push(0.0);
-        found.sort_by(f64::total_cmp);
-        found.dedup();
-        let middles: Vec<f64> = found.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
-        found.extend(middles);
-        Ok(found.into_iter().map(|frequency| self.given(frequency)).collect())
-    }
-
-    /// The frequency in the time of the system given.
-    fn given(&self, frequency: f64) -> f64 {
-        match self.domain {
-            Domain::Continuous => frequency,
-            Domain::Sampled { period } => 2.0 * frequency.atan() / period,
-        }
+/// The frequency of a system at which its [`continuous_equivalent`] has the given frequency.
+fn original_frequency(frequency: f64, domain: Domain) -> f64 {
+    match domain {
+        Domain::Continuous => frequency,
+        Domain::Sampled { period } => 2.0 * frequency.atan() / period,
     }
 }

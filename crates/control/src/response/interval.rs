@@ -1,9 +1,8 @@
 //! The integral of |h| and of h^2 over intervals of dyadic length.
 
-use super::System;
 use crate::balance::{Balance, divide_rows, multiply_columns, power_of_two};
 use crate::hold::zero_order_hold;
-use crate::{Domain, Error};
+use crate::{Domain, Error, StateSpace};
 use nalgebra::{DMatrix, DVector};
 
 /// The shortest interval of continuous time, relative to the norm of A: h is straight over it.
@@ -67,8 +66,8 @@ pub(super) struct Intervals {
 }
 
 impl Intervals {
-    pub(super) fn of(system: &System) -> Result<Self, Error> {
-        let Balance { matrix, scale } = Balance::of(&system.a);
+    pub(super) fn of(system: &StateSpace) -> Result<Self, Error> {
+        let Balance { matrix, scale } = Balance::new(&system.a);
         let starts = divide_rows(&system.b, &scale);
         let outputs = multiply_columns(&system.c, &scale);
         let shortest = (0..outputs.nrows())

@@ -1,8 +1,7 @@
 //! The peak-to-peak gain.
 
-use super::System;
 use super::interval::{Intervals, Length};
-use crate::{Error, check};
+use crate::{Error, StateSpace, check};
 use nalgebra::{DMatrix, DVector};
 
 /// Rounds of halving; each round halves the intervals that leave most open.
@@ -43,10 +42,11 @@ pub struct Bracket {
 ///
 /// ```
 /// use control::Domain;
-/// use control::response::{System, peak_gain};
+/// use control::StateSpace;
+/// use control::response::{peak_gain};
 /// use nalgebra::DMatrix;
 /// // 1 / (s^2 + 0.2 s + 1): the impulse response changes its sign at multiples of pi / w.
-/// let system = System {
+/// let system = StateSpace {
 ///     a: DMatrix::from_row_slice(2, 2, &[0.0, 1.0, -1.0, -0.2]),
 ///     b: DMatrix::from_row_slice(2, 1, &[0.0, 1.0]),
 ///     c: DMatrix::from_row_slice(1, 2, &[1.0, 0.0]),
@@ -62,10 +62,10 @@ pub struct Bracket {
 ///
 /// # Errors
 ///
-/// Those of [`System::check`]; [`Error::OutOfRange`] for `width`; [`Error::NotHurwitz`],
+/// Those of [`StateSpace::check`]; [`Error::OutOfRange`] for `width`; [`Error::NotHurwitz`],
 /// [`Error::NotSchur`]; [`Error::NotConverged`] when a lightly damped system needs more than 4
 /// million intervals.
-pub fn peak_gain(system: &System, width: f64) -> Result<Bracket, Error> {
+pub fn peak_gain(system: &StateSpace, width: f64) -> Result<Bracket, Error> {
     system.stable_eigenvalues()?;
     check::positive("width", width)?;
     let intervals = Intervals::of(system)?;

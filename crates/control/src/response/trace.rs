@@ -1,8 +1,7 @@
 //! The output over time, on a grid that follows the modes.
 
-use super::System;
 use crate::hold::FirstOrderHold;
-use crate::{Domain, Error, check};
+use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{Complex, DMatrix, DVector};
 
 /// A mode is followed until it has fallen to e^-25, 1e-11.
@@ -13,24 +12,24 @@ const MOST_SAMPLES: f64 = 200_000.0;
 
 /// Outputs over time.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Trace {
+pub struct TimeResponse {
     /// Times, ascending from 0, in the unit of time of A or of the period.
     pub time: Vec<f64>,
     /// z at these times, p x length of `time`. The value at 0 is that after the input has jumped.
     pub output: DMatrix<f64>,
     /// z after all time, p.
-    pub settled: DVector<f64>,
+    pub final_value: DVector<f64>,
     /// The derivative of z, p x length of `time`; without columns in sampled time.
     pub(super) slope: DMatrix<f64>,
 }
 
-impl Trace {
+impl TimeResponse {
     /// The same for an input that is `factor` times as large.
     pub(super) fn scaled(&self, factor: f64) -> Self {
         Self {
             time: self.time.clone(),
             output: &self.output * factor,
-            settled: &self.settled * factor,
+            final_value: &self.final_value * factor,
             slope: &self.slope * factor,
         }
     }
@@ -47,10 +46,10 @@ impl Trace {
 ///
 /// # Errors
 ///
-/// Those of [`System::check`]; [`Error::OutOfRange`] for `input`; [`Error::NotHurwitz`],
+/// Those of [`StateSpace::check`]; [`Error::OutOfRange`] for `input`; [`Error::NotHurwitz`],
 /// [`Error::NotSchur`]; [`Error::NotConverged`] for an oscillation damped so lightly that it needs
 /// more than 200000 points; [`Error::Overflow`].
-pub fn step_response(system: &System, input: usize) -> Result<Trace, Error> {
+pub fn step_response(system: &StateSpace, input: usize) -> Result<TimeResponse, Error> {
     response(system, input, None)
 }
 
@@ -62,12 +61,16 @@ pub fn step_response(system: &System, input: usize) -> Result<Trace, Error> {
 /// # Errors
 ///
 /// Those of [`step_response`]; [`Error::OutOfRange`] for `duration`.
-pub fn ramp_response(system: &System, input: usize, duration: f64) -> Result<Trace, Error> {
+pub fn ramp_response(
+    system: &StateSpace,
+    input: usize,
+    duration: f64,
+) -> Result<TimeResponse, Error> {
     check::positive("duration", duration)?;
     response(system, input, Some(duration))
 }
 
-fn response(system: &System, input: usize, rise: Option<f64>) -> Result<Trace, Error> {
+fn response(system: &StateSpace, input: usize, rise: Option<f64>) -> Result<TimeResponse, Error> {
     let eigenvalues = system.stable_eigenvalues()?;
     let inputs = system.b.ncols();
     if input >= inputs {
@@ -184,7 +187,7 @@ impl Modes {
 
 /// The state on its way.
 struct Walk<'a> {
-    system: &'a System,
+    system: &'a StateSpace,
     state: DVector<f64>,
     input: DVector<f64>,
     slope: DVector<f64>,
@@ -194,7 +197,7 @@ struct Walk<'a> {
 }
 
 impl<'a> Walk<'a> {
-    fn from_rest(system: &'a System) -> Self {
+    fn from_rest(system: &'a StateSpace) -> Self {
         let (n, m) = system.b.shape();
         Self {
             system,
@@ -208,7 +211,7 @@ impl<'a> Walk<'a> {
     }
 
     fn record(&mut self, time: f64) {
-        let System { a, b, c, d, domain } = self.system;
+        let StateSpace { a, b, c, d, domain } = self.system;
         self.time.push(time);
         self.output.push(c * &self.state + d * &self.input);
         if *domain == Domain::Continuous {
@@ -242,8 +245,8 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
-    fn finished(self) -> Result<Trace, Error> {
-        let System { a, b, c, d, domain } = self.system;
+    fn finished(self) -> Result<TimeResponse, Error> {
+        let StateSpace { a, b, c, d, domain } = self.system;
         let decay = match domain {
             Domain::Continuous => -a,
             Domain::Sampled { .. } => DMatrix::identity(a.nrows(), a.nrows()) - a,
@@ -255,13 +258,13 @@ impl<'a> Walk<'a> {
             Domain::Continuous => DMatrix::from_columns(&self.rates),
             Domain::Sampled { .. } => DMatrix::zeros(output.nrows(), 0),
         };
-        Ok(Trace { time: self.time, output, settled: c * rest + d * self.input, slope })
+        Ok(TimeResponse { time: self.time, output, final_value: c * rest + d * self.input, slope })
     }
 }
 
 /// The step of length `step`; in sampled time a whole number of samples, by repeated squaring.
-fn hold(system: &System, step: f64) -> Result<FirstOrderHold, Error> {
-    let System { a, b, domain, .. } = system;
+fn hold(system: &StateSpace, step: f64) -> Result<FirstOrderHold, Error> {
+    let StateSpace { a, b, domain, .. } = system;
     let Domain::Sampled { period } = *domain else {
         return FirstOrderHold::new(a, b, step);
     };

@@ -1,6 +1,6 @@
 //! Peak and settling time of an output.
 
-use super::Trace;
+use super::TimeResponse;
 use nalgebra::DMatrix;
 
 /// How an output goes to its settled value.
@@ -13,10 +13,10 @@ pub struct Transient {
     /// From here on z stays within the band around its settled value; zero if always.
     pub settling_time: f64,
     /// z after all time.
-    pub settled: f64,
+    pub final_value: f64,
 }
 
-impl Trace {
+impl TimeResponse {
     /// Peak and settling time of output `output`, an index from 0.
     ///
     /// The band is `fraction` times the largest distance of z from its settled value. Between the
@@ -29,11 +29,11 @@ impl Trace {
     /// If there is no such output.
     #[must_use]
     pub fn transient(&self, output: usize, fraction: f64) -> Transient {
-        let (z, settled) = (self.output.row(output), self.settled[output]);
+        let (z, final_value) = (self.output.row(output), self.final_value[output]);
         let (mut peak, mut peak_time) = (0.0_f64, 0.0);
         let mut distance = 0.0_f64;
         let mut see = |time: f64, value: f64| {
-            distance = distance.max((value - settled).abs());
+            distance = distance.max((value - final_value).abs());
             if value.abs() > peak.abs() {
                 (peak, peak_time) = (value, time);
             }
@@ -45,9 +45,9 @@ impl Trace {
             }
         }
         let band = fraction * distance;
-        let outside = (0..self.time.len()).rev().find(|&k| (z[k] - settled).abs() > band);
+        let outside = (0..self.time.len()).rev().find(|&k| (z[k] - final_value).abs() > band);
         let settling_time = outside.map_or(0.0, |k| self.entry(output, k, band));
-        Transient { peak, peak_time, settling_time, settled }
+        Transient { peak, peak_time, settling_time, final_value }
     }
 
     /// Where z turns between points k and k + 1, and its value there.
@@ -73,7 +73,7 @@ impl Trace {
         if self.slope.ncols() == 0 || k + 1 == self.time.len() {
             return self.time[(k + 1).min(self.time.len() - 1)];
         }
-        let distance = |k: usize| (self.output[(output, k)] - self.settled[output]).abs();
+        let distance = |k: usize| (self.output[(output, k)] - self.final_value[output]).abs();
         let part = (distance(k) - band) / (distance(k) - distance(k + 1));
         self.time[k] + part.min(1.0) * (self.time[k + 1] - self.time[k])
     }

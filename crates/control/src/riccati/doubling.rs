@@ -1,7 +1,8 @@
 //! Structured doubling: P as the limit of a sequence whose error is squared in each step.
 
-use super::form::{identity, symmetric};
+use super::equation::identity;
 use crate::Error;
+use crate::blocks::symmetric_part;
 use crate::eigen::eigenvalues;
 use nalgebra::DMatrix;
 
@@ -23,8 +24,8 @@ pub(super) fn sampled(
         let (Some(moved), Some(spread)) = (inverse.solve(&a), inverse.solve(&g)) else {
             return Err(failed);
         };
-        let growth = symmetric(a.tr_mul(&h) * &moved);
-        g += symmetric(&a * spread * a.transpose());
+        let growth = symmetric_part(&(a.tr_mul(&h) * &moved));
+        g += symmetric_part(&(&a * spread * a.transpose()));
         h += &growth;
         a = &a * moved;
         if !(growth.amax().is_finite() && g.amax().is_finite() && a.amax().is_finite()) {
@@ -70,7 +71,7 @@ pub(super) fn continuous(
     let solved =
         left.lu().solve(&right).ok_or(Error::NotConverged { what: WHAT, iterations: 0 })?;
     let start = solved.view((0, 0), (n, n)).into();
-    let g = symmetric(solved.view((0, n), (n, n)).into());
-    let h = symmetric(-solved.view((n, 0), (n, n)).into_owned());
+    let g = symmetric_part(&solved.view((0, n), (n, n)).into());
+    let h = symmetric_part(&-solved.view((n, 0), (n, n)).into_owned());
     sampled(&start, &g, &h)
 }

@@ -1,8 +1,9 @@
 //! When a stabilising solution exists.
 
-use super::problem::Problem;
+use super::problem::ScaledProblem;
+use crate::blocks::{stacked, to_complex};
 use crate::eigen::eigenvalues;
-use crate::singular::Singular;
+use crate::svd::ComplexSvd;
 use crate::{Domain, Error};
 use nalgebra::{Complex, DMatrix, DVector, SymmetricEigen};
 
@@ -14,10 +15,10 @@ const NEAR: f64 = 1e-12;
 const SEMIDEFINITE: f64 = 1e-13;
 
 /// (A, B) is stabilisable, and Q sees every eigenvalue on the limit of stability.
-pub(super) fn require(problem: &Problem) -> Result<(), Error> {
-    let (a, b, domain) = (&problem.free, &problem.form.b, problem.form.domain);
+pub(super) fn require(problem: &ScaledProblem) -> Result<(), Error> {
+    let (a, b, domain) = (&problem.free, &problem.equation.b, problem.equation.domain);
     for eigenvalue in eigenvalues(a)? {
-        if !stable(eigenvalue, a.norm(), domain)
+        if domain.excess(eigenvalue) >= -NEAR * a.norm()
             && deficient(&a.transpose(), &b.transpose(), eigenvalue)?
         {
             return Err(Error::NotStabilisable { eigenvalue });
@@ -30,13 +31,6 @@ pub(super) fn require(problem: &Problem) -> Result<(), Error> {
     Ok(())
 }
 
-fn stable(eigenvalue: Complex<f64>, size: f64, domain: Domain) -> bool {
-    match domain {
-        Domain::Continuous => eigenvalue.re < -NEAR * size,
-        Domain::Sampled { .. } => eigenvalue.norm() < 1.0 - NEAR * size,
-    }
-}
-
 /// The point of the imaginary axis, or of the unit circle, nearest to the eigenvalue.
 fn on_limit(eigenvalue: Complex<f64>, domain: Domain) -> Complex<f64> {
     match domain {
@@ -45,27 +39,18 @@ fn on_limit(eigenvalue: Complex<f64>, domain: Domain) -> Complex<f64> {
     }
 }
 
-/// Whether [A - lambda I; C] has less than full column rank.
-///
-/// C is scaled to the size of A. The complex matrix is taken as a real one of twice the order,
-/// whose singular values are the same, each twice.
+/// Whether [A - lambda I; C] has less than full column rank, C scaled to the size of A.
 fn deficient(a: &DMatrix<f64>, c: &DMatrix<f64>, lambda: Complex<f64>) -> Result<bool, Error> {
-    let (n, p) = (a.nrows(), c.nrows());
+    let n = a.nrows();
     let size = if a.norm() > 0.0 { a.norm() } else { 1.0 };
     let unit = if c.norm() > 0.0 { size / c.norm() } else { 1.0 };
-    let (scaled, shifted) = (c * unit, a - DMatrix::from_diagonal_element(n, n, lambda.re));
-    let mut all = DMatrix::zeros(2 * (n + p), 2 * n);
-    for half in 0..2 {
-        all.view_mut((half * n, half * n), (n, n)).copy_from(&shifted);
-        all.view_mut((2 * n + half * p, half * n), (p, n)).copy_from(&scaled);
-    }
+    let mut pencil = to_complex(&stacked(a, &(c * unit)));
     for i in 0..n {
-        all[(i, n + i)] = lambda.im;
-        all[(n + i, i)] = -lambda.im;
+        pencil[(i, i)] -= lambda;
     }
     #[expect(clippy::cast_precision_loss, reason = "a matrix order is far below 2^52")]
     let tolerance = TOLERANCE_PER_STATE * n as f64;
-    Ok(Singular::of(&all)?.rank(tolerance) < 2 * n)
+    Ok(ComplexSvd::new(&pencil)?.rank(tolerance) < n)
 }
 
 /// `m` is positive semidefinite to rounding. `before` is what it was computed of, and says how

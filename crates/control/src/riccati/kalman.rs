@@ -6,7 +6,7 @@ use nalgebra::{Complex, DMatrix};
 
 /// The gains of a Kalman filter in steady state.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Filter {
+pub struct KalmanFilter {
     /// L, n x p, of `x_hat' = A x_hat + B u + L (y - C x_hat)`; in sampled time of the prediction
     /// `x_hat[k+1] = A x_hat[k] + B u[k] + L (y[k] - C x_hat[k])`.
     pub gain: DMatrix<f64>,
@@ -63,7 +63,7 @@ pub fn kalman(
     w: &DMatrix<f64>,
     v: &DMatrix<f64>,
     domain: Domain,
-) -> Result<Filter, Error> {
+) -> Result<KalmanFilter, Error> {
     let (n, p) = (check::square("A", a)?, c.nrows());
     check::shape("C", c, (p, n))?;
     check::shape("W", w, (n, n))?;
@@ -79,7 +79,7 @@ pub fn kalman(
             Some(factor.solve(&(c * &dual.p)).transpose())
         }
     };
-    Ok(Filter {
+    Ok(KalmanFilter {
         gain: -dual.gain.transpose(),
         current_gain,
         covariance: dual.p,

@@ -1,11 +1,12 @@
 //! A Riccati equation in balanced coordinates, with R = I.
 
 use super::doubling;
-use super::form::{Form, symmetric};
+use super::equation::RiccatiEquation;
 use super::{Weights, existence};
 use crate::balance::{
     Balance, divide_columns, divide_rows, multiply_columns, multiply_rows, power_of_two,
 };
+use crate::blocks::symmetric_part;
 use crate::lyapunov;
 use crate::{Domain, Error, check};
 use nalgebra::{DMatrix, DVector};
@@ -13,8 +14,8 @@ use nalgebra::{DMatrix, DVector};
 const NEWTON_STEPS: usize = 60;
 
 /// x = S `x_s` with a positive diagonal S, u = L^-T `u_s` with R = L L'.
-pub(super) struct Problem {
-    pub(super) form: Form,
+pub(super) struct ScaledProblem {
+    pub(super) equation: RiccatiEquation,
     /// A - B N', with which the cost has no product of x and u.
     pub(super) free: DMatrix<f64>,
     /// Q - N N'.
@@ -25,8 +26,8 @@ pub(super) struct Problem {
     factor: DMatrix<f64>,
 }
 
-impl Problem {
-    pub(super) fn of(
+impl ScaledProblem {
+    pub(super) fn new(
         a: &DMatrix<f64>,
         b: &DMatrix<f64>,
         weights: &Weights,
@@ -45,7 +46,8 @@ impl Problem {
         let b = check::in_range("B R^-1 B'", per_unit(b, &factor))?;
         let n = check::in_range("N R^-1 N'", per_unit(&n, &factor))?;
         let free = check::in_range("A - B R^-1 N'", a - &b * n.transpose())?;
-        let free_q = check::in_range("Q - N R^-1 N'", &weights.q - symmetric(&n * n.transpose()))?;
+        let free_q =
+            check::in_range("Q - N R^-1 N'", &weights.q - symmetric_part(&(&n * n.transpose())))?;
         existence::require_semidefinite(&free_q, &weights.q)?;
         let scale = balancing(&free, &check::in_range("B R^-1 B'", &b * b.transpose())?, &free_q);
         let both = |m: &DMatrix<f64>| multiply_rows(&multiply_columns(m, &scale), &scale);
@@ -54,7 +56,7 @@ impl Problem {
         Ok(Self {
             free: similar(&free),
             free_q: both(&free_q),
-            form: Form { a, b, q: both(&weights.q), n, domain },
+            equation: RiccatiEquation { a, b, q: both(&weights.q), n, domain },
             scale,
             factor,
         })
@@ -66,13 +68,13 @@ impl Problem {
     /// that Q does not see. With Q + d I it sees all, and Newton's method falls from there to the
     /// stabilising solution.
     pub(super) fn start(&self) -> Result<DMatrix<f64>, Error> {
-        let effect = symmetric(&self.form.b * self.form.b.transpose());
-        let solve = |q: &DMatrix<f64>| match self.form.domain {
+        let effect = symmetric_part(&(&self.equation.b * self.equation.b.transpose()));
+        let solve = |q: &DMatrix<f64>| match self.equation.domain {
             Domain::Continuous => doubling::continuous(&self.free, &effect, q),
             Domain::Sampled { .. } => doubling::sampled(&self.free, &effect, q),
         };
         if let Ok(p) = solve(&self.free_q)
-            && self.form.newton(&p).is_some()
+            && self.equation.newton(&p).is_some()
         {
             return Ok(p);
         }
@@ -83,11 +85,11 @@ impl Problem {
 
     /// Newton's method until the residual does not fall any more.
     pub(super) fn refined(&self, start: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
-        let (mut best, mut residual) = (start.clone(), self.form.residual(start));
+        let (mut best, mut residual) = (start.clone(), self.equation.residual(start));
         let mut p = start.clone();
         for _ in 0..NEWTON_STEPS {
-            let Some(next) = self.form.newton(&p) else { break };
-            let (moved, found) = ((&next - &p).amax(), self.form.residual(&next));
+            let Some(next) = self.equation.newton(&p) else { break };
+            let (moved, found) = ((&next - &p).amax(), self.equation.residual(&next));
             if found < residual {
                 (best, residual) = (next.clone(), found);
             }
@@ -104,7 +106,7 @@ impl Problem {
     }
 
     pub(super) fn residual(&self, scaled_p: &DMatrix<f64>) -> f64 {
-        self.form.residual(scaled_p)
+        self.equation.residual(scaled_p)
     }
 
     /// S^-1 P S^-1, and back.
@@ -118,7 +120,8 @@ impl Problem {
 
     /// L^-T K S^-1.
     pub(super) fn restored_gain(&self, p: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
-        let gain = self.form.gain(p).and_then(|gain| self.factor.tr_solve_lower_triangular(&gain));
+        let gain =
+            self.equation.gain(p).and_then(|gain| self.factor.tr_solve_lower_triangular(&gain));
         let gain = gain.ok_or(Error::Overflow { what: "K" })?;
         check::in_range("K", divide_columns(&gain, &self.scale))
     }
@@ -138,6 +141,6 @@ fn balancing(a: &DMatrix<f64>, g: &DMatrix<f64>, q: &DMatrix<f64>) -> DVector<f6
     hamiltonian.view_mut((0, order), (order, order)).copy_from(&g.abs());
     hamiltonian.view_mut((order, 0), (order, order)).copy_from(&q.abs());
     hamiltonian.view_mut((order, order), (order, order)).copy_from(&a.abs().transpose());
-    let scale = Balance::of(&hamiltonian).scale;
+    let scale = Balance::new(&hamiltonian).scale;
     DVector::from_fn(order, |i, _| power_of_two((scale[i] / scale[order + i]).sqrt()))
 }

@@ -4,11 +4,11 @@ use control::Error;
 use control::aso::{AsoDesign, FaultyPlant, design};
 use control::eigen::eigenvalues;
 use control::hold::FirstOrderHold;
-use control::placement::real;
+use control::placement::real_poles;
 use nalgebra::{Complex, DMatrix};
 
 fn designed() -> AsoDesign {
-    design(&plant(), &real(&CONTROLLER_POLES), &real(&OBSERVER_POLES), None)
+    design(&plant(), &real_poles(&CONTROLLER_POLES), &real_poles(&OBSERVER_POLES), None)
         .expect("the design exists")
 }
 
@@ -40,7 +40,8 @@ fn friction_on_the_cart_is_compensated_one_to_one() {
 #[test]
 fn a_fault_beside_the_actuator_leaves_the_residual_of_the_projection() {
     let plant = FaultyPlant { f_a: matrix(4, 1, &[0., 0., 0., 1.]), ..plant() };
-    let design = design(&plant, &real(&CONTROLLER_POLES), &real(&OBSERVER_POLES), None).unwrap();
+    let design =
+        design(&plant, &real_poles(&CONTROLLER_POLES), &real_poles(&OBSERVER_POLES), None).unwrap();
     let (b_3, b_4) = (plant.b[2], plant.b[3]);
     let sine = b_3 / b_3.hypot(b_4);
     assert!((design.cancellation_residual - sine).abs() < 1e-12);
@@ -120,7 +121,8 @@ fn a_fault_that_looks_like_a_state_is_refused() {
         matrix(1, 2, &[1., 0.]),
         matrix(2, 1, &[1., 0.]),
     );
-    let refused = design(&plant, &real(&[-1.0, -2.0]), &real(&[-3.0, -4.0, -5.0]), None);
+    let refused =
+        design(&plant, &real_poles(&[-1.0, -2.0]), &real_poles(&[-3.0, -4.0, -5.0]), None);
     let at = Complex::new(0.0, 0.0);
     assert_eq!(refused, Err(Error::HiddenFault { at, rank: 2, expected: 3, faults: vec![1] }));
     assert_eq!(
@@ -133,7 +135,8 @@ fn a_fault_that_looks_like_a_state_is_refused() {
 #[test]
 fn an_unobservable_plant_is_refused() {
     let plant = FaultyPlant { c: matrix(1, 4, &[0., 0., 1., 0.]), ..plant() };
-    let refused = design(&plant, &real(&CONTROLLER_POLES), &real(&OBSERVER_POLES), None);
+    let refused =
+        design(&plant, &real_poles(&CONTROLLER_POLES), &real_poles(&OBSERVER_POLES), None);
     assert_eq!(refused, Err(Error::NotObservable { rank: 3, n: 4 }));
 }
 
@@ -148,7 +151,8 @@ fn two_faults_with_three_measurements_are_designed() {
     );
     let observer_poles = [-10., -11., -12., -13., -14., -15., -16.];
     let design =
-        design(&plant, &real(&[-1., -2., -3., -4., -5.]), &real(&observer_poles), None).unwrap();
+        design(&plant, &real_poles(&[-1., -2., -3., -4., -5.]), &real_poles(&observer_poles), None)
+            .unwrap();
     let half = DMatrix::from_diagonal_element(2, 2, 0.5);
     assert!((&design.gains.k_f - half).amax() < 1e-13);
     assert_eq!((design.gains.l_x.shape(), design.gains.l_f.shape()), ((5, 3), (2, 3)));

@@ -2,13 +2,15 @@ use crate::matrix;
 use crate::paper::plant;
 use control::Domain;
 use control::aso::FaultyPlant;
-use control::detectability::{Hidden, detectability};
+use control::detectability::{HiddenFault, detectability};
 use nalgebra::{Complex, DMatrix};
 
 #[test]
 fn the_friction_of_the_pendulum_can_be_estimated() {
     let found = detectability(&plant(), Domain::Continuous).unwrap();
-    assert!(found.is_full() && found.is_detectable() && found.invisible().is_empty());
+    assert!(
+        found.observer_exists() && found.is_detectable() && found.invisible_faults().is_empty()
+    );
     assert!(found.hidden.is_empty() && found.unobservable.is_empty());
     assert!(found.distance.lower > 0.0 && found.distance.upper < 1.0, "{:?}", found.distance);
 }
@@ -18,8 +20,8 @@ fn the_friction_of_the_pendulum_can_be_estimated() {
 #[test]
 fn a_constant_force_drives_the_cart_away_and_leaves_the_angle() {
     let visibility = detectability(&plant(), Domain::Continuous).unwrap().visibility;
-    assert_eq!((visibility[0][0].seen, visibility[0][0].dc_gain), (true, None));
-    assert!(visibility[1][0].seen);
+    assert_eq!((visibility[0][0].visible, visibility[0][0].dc_gain), (true, None));
+    assert!(visibility[1][0].visible);
     assert!(visibility[1][0].dc_gain.unwrap().abs() < 1e-12, "{visibility:?}");
 }
 
@@ -37,13 +39,13 @@ fn chain() -> FaultyPlant {
 fn each_fault_is_seen_where_it_acts_with_its_gain_at_rest() {
     let found = detectability(&chain(), Domain::Continuous).unwrap();
     let row = &found.visibility[0];
-    assert_eq!(row.iter().map(|entry| entry.seen).collect::<Vec<_>>(), [true, true, false]);
+    assert_eq!(row.iter().map(|entry| entry.visible).collect::<Vec<_>>(), [true, true, false]);
     for (entry, expected) in row.iter().zip([0.5, 0.5, 0.0]) {
         assert!((entry.dc_gain.unwrap() - expected).abs() < 1e-15, "{row:?}");
     }
-    assert_eq!(found.invisible(), [2]);
+    assert_eq!(found.invisible_faults(), [2]);
     let (mode, stable) = &found.unobservable[0];
-    assert!(*stable && found.is_detectable() && !found.is_full());
+    assert!(*stable && found.is_detectable() && !found.observer_exists());
     assert_eq!(mode.dominant, [2]);
     assert!((mode.eigenvalue + 3.0).norm() < 1e-14);
 }
@@ -52,7 +54,7 @@ fn each_fault_is_seen_where_it_acts_with_its_gain_at_rest() {
 #[test]
 fn hidden_combinations_are_named_by_their_faults() {
     let found = detectability(&chain(), Domain::Continuous).unwrap();
-    let mut faults: Vec<_> = found.hidden.iter().map(Hidden::faults).collect();
+    let mut faults: Vec<_> = found.hidden.iter().map(HiddenFault::faults).collect();
     faults.sort_unstable();
     assert_eq!(faults, [vec![0, 1], vec![2]]);
     let pair = found.hidden.iter().find(|hidden| hidden.faults().len() == 2).unwrap();
@@ -92,11 +94,11 @@ fn a_swinging_fault_is_examined_at_its_own_frequency() {
         f_a: matrix(3, 2, &[0., 0., 0., 0., 1., 0.]),
         a_f: matrix(2, 2, &[0., frequency, -frequency, 0.]),
     };
-    assert!(detectability(&swing(1.9), Domain::Continuous).unwrap().is_full());
+    assert!(detectability(&swing(1.9), Domain::Continuous).unwrap().observer_exists());
     let found = detectability(&swing(2.0), Domain::Continuous).unwrap();
     assert_eq!(found.hidden.len(), 1);
     assert!((found.hidden[0].at - Complex::new(0.0, 2.0)).norm() < 1e-14);
-    assert!(!found.is_full());
+    assert!(!found.observer_exists());
 }
 
 /// A sampled integrator x[k+1] = x[k] + f: seen at z = 1, without a bound.
@@ -113,7 +115,7 @@ fn sampled_faults_are_examined_at_one() {
     };
     let domain = Domain::Sampled { period: 0.1 };
     let found = detectability(&plant(&one), domain).unwrap();
-    assert!(found.is_full());
+    assert!(found.observer_exists());
     assert_eq!(found.visibility[0][0].dc_gain, None);
     let found = detectability(&plant(&half), domain).unwrap();
     assert!((found.visibility[0][0].dc_gain.unwrap() - 2.0).abs() < 1e-15);
@@ -129,6 +131,6 @@ fn the_rate_of_a_ramp_is_seen_through_the_fault() {
         ..constant
     };
     let found = detectability(&ramp, Domain::Continuous).unwrap();
-    assert!(found.is_full() && found.invisible().is_empty());
+    assert!(found.observer_exists() && found.invisible_faults().is_empty());
     assert_eq!(found.visibility[0][1].dc_gain, Some(0.0));
 }

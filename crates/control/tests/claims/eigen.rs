@@ -1,5 +1,7 @@
 use crate::matrix;
-use control::eigen::{eigenvalues, spectral_abscissa};
+use control::Domain;
+use control::eigen::eigenvalues;
+use control::stability::instability;
 use nalgebra::{Complex, DMatrix};
 
 /// The roots of unity; the unshifted QR algorithm stands still on these.
@@ -38,11 +40,13 @@ fn bad_units_cost_no_precision() {
 }
 
 #[test]
-fn the_spectral_abscissa_is_the_largest_real_part() {
+fn the_instability_is_the_largest_real_part_or_the_spectral_radius_less_one() {
     let saddle = matrix(2, 2, &[-7.0, 0.0, 3.0, 0.5]);
-    assert!((spectral_abscissa(&saddle).unwrap() - 0.5).abs() < 1e-15);
+    assert!((instability(&saddle, Domain::Continuous).unwrap() - 0.5).abs() < 1e-15);
+    let sampled = Domain::Sampled { period: 0.1 };
+    assert!((instability(&saddle, sampled).unwrap() - 6.0).abs() < 1e-14);
     let turning = matrix(2, 2, &[0.25, 100.0, -100.0, 0.25]);
-    assert!((spectral_abscissa(&turning).unwrap() - 0.25).abs() < 1e-13);
+    assert!((instability(&turning, Domain::Continuous).unwrap() - 0.25).abs() < 1e-13);
 }
 
 /// Three equal pairs -1.5 +- 2i and four others in many bases: rounding keeps the entries between

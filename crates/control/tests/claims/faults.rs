@@ -4,11 +4,14 @@
 use crate::data::reference;
 use crate::matrix;
 use crate::paper::{CONTROLLER_POLES, plant};
+use control::StateSpace;
 use control::aso::{AsoDesign, Estimator, FaultyPlant, Gains};
-use control::controller::Controller;
-use control::faults::{Entry, ExtendedPlant, Fault, FaultKind, estimated_loss, loss_tolerance};
+use control::controller::controller;
+use control::faults::{
+    ExtendedPlant, Fault, FaultEntry, FaultKind, estimated_loss, loss_tolerance,
+};
 use control::hold::FirstOrderHold;
-use control::placement::real;
+use control::placement::real_poles;
 use control::{Domain, Error};
 use nalgebra::{DMatrix, DVector};
 
@@ -29,8 +32,8 @@ fn poles(count: usize) -> Vec<f64> {
     (6..).take(count).map(|rate: i32| -f64::from(rate)).collect()
 }
 
-fn fault(enters: Entry, kind: FaultKind) -> Fault {
-    Fault { enters, kind }
+fn fault(entry: FaultEntry, kind: FaultKind) -> Fault {
+    Fault { entry, kind }
 }
 
 fn column(entries: &[f64]) -> DVector<f64> {
@@ -49,7 +52,7 @@ struct Truth<'a> {
 struct Loop {
     dynamics: DMatrix<f64>,
     inputs: DMatrix<f64>,
-    controller: Controller,
+    controller: StateSpace,
     before: usize,
 }
 
@@ -60,7 +63,8 @@ impl Truth<'_> {
         let (n, faults) = (4, self.f_a.ncols());
         let w = DMatrix::from_diagonal(&column(extended.filter.as_deref().unwrap_or(&[])));
         let p = w.nrows();
-        let controller = Controller::of(&extended.plant, gains).expect("gains that fit");
+        let controller =
+            controller(&extended.plant, gains, Domain::Continuous).expect("gains that fit");
         let (order, before) = (controller.a.nrows(), n + p);
         let left = b * DMatrix::from_diagonal(&column(&self.effect));
         let mut dynamics = DMatrix::zeros(before + order, before + order);
@@ -124,14 +128,15 @@ fn built(faults: &[Fault]) -> (Carts, ExtendedPlant, AsoDesign) {
     let extended = ExtendedPlant::new(&carts.a, &carts.b, &carts.c, faults, &[30.0, 40.0])
         .expect("shapes that fit");
     let order = extended.plant.a.nrows() + extended.plant.f_a.ncols();
-    let design = extended.design(&real(&CARTS), &real(&poles(order)), None).expect("a design");
+    let design =
+        extended.design(&real_poles(&CARTS), &real_poles(&poles(order)), None).expect("a design");
     (carts, extended, design)
 }
 
 #[test]
 fn two_constant_actuator_faults_at_once_are_estimated() {
     let f_a = matrix(4, 2, &[0., 0., 0., 0., 1., 0.5, 0., -1.]);
-    let enters = |at: usize| Entry::Actuator(f_a.column(at).into());
+    let enters = |at: usize| FaultEntry::Actuator(f_a.column(at).into());
     let faults = [fault(enters(0), FaultKind::Constant), fault(enters(1), FaultKind::Constant)];
     let (carts, extended, design) = built(&faults);
     assert!(extended.filter.is_none() && design.cancellation_residual < 1e-15);
@@ -146,7 +151,7 @@ fn two_constant_actuator_faults_at_once_are_estimated() {
 /// The observer for constant faults lags behind a ramp, that for ramps does not.
 #[test]
 fn a_ramp_is_followed_without_a_lag_by_the_model_of_a_ramp_only() {
-    let force = || Entry::Actuator(column(&[0., 0., 1., 0.]));
+    let force = || FaultEntry::Actuator(column(&[0., 0., 1., 0.]));
     let run = |kind: FaultKind| {
         let (carts, extended, design) = built(&[fault(force(), kind)]);
         let f_a = matrix(4, 1, &[0., 0., 1., 0.]);
@@ -165,8 +170,8 @@ fn a_ramp_is_followed_without_a_lag_by_the_model_of_a_ramp_only() {
 fn sensor_faults_constant_and_ramp_are_estimated_beside_an_actuator_fault() {
     for kind in [FaultKind::Constant, FaultKind::Ramp] {
         let slope = if kind == FaultKind::Ramp { -0.02 } else { 0.0 };
-        let sensor = fault(Entry::Sensor(column(&[1.0, 0.0])), kind);
-        let force = fault(Entry::Actuator(column(&[0., 0., 0., 1.])), FaultKind::Constant);
+        let sensor = fault(FaultEntry::Sensor(column(&[1.0, 0.0])), kind);
+        let force = fault(FaultEntry::Actuator(column(&[0., 0., 0., 1.])), FaultKind::Constant);
         let (carts, extended, design) = built(&[sensor, force]);
         assert_eq!((extended.plant.a.nrows(), extended.states), (6, 4));
         let f_a = matrix(4, 2, &[0., 0., 0., 0., 0., 0., 0., 1.]);
@@ -183,8 +188,8 @@ fn sensor_faults_constant_and_ramp_are_estimated_beside_an_actuator_fault() {
 
 #[test]
 fn the_compensation_ignores_sensor_faults_and_rates_and_restores_lost_effect() {
-    let loss = fault(Entry::LossOfEffectiveness(1), FaultKind::Ramp);
-    let sensor = fault(Entry::Sensor(column(&[1.0, 0.0])), FaultKind::Constant);
+    let loss = fault(FaultEntry::LossOfEffectiveness(1), FaultKind::Ramp);
+    let sensor = fault(FaultEntry::Sensor(column(&[1.0, 0.0])), FaultKind::Constant);
     let (_, extended, design) = built(&[loss, sensor]);
     let expected = matrix(2, 3, &[0., 0., 0., -1., 0., 0.]);
     assert!((&design.gains.k_f - expected).amax() < 1e-15, "{}", design.gains.k_f);
@@ -195,7 +200,7 @@ fn the_compensation_ignores_sensor_faults_and_rates_and_restores_lost_effect() {
 /// Input 1 has lost 30 %, input 2 10 %; a constant command excites both.
 #[test]
 fn the_loss_of_effectiveness_is_estimated_where_the_command_shows_it() {
-    let loss = |input| fault(Entry::LossOfEffectiveness(input), FaultKind::Constant);
+    let loss = |input| fault(FaultEntry::LossOfEffectiveness(input), FaultKind::Constant);
     let (carts, extended, design) = built(&[loss(0), loss(1)]);
     let nothing = (DMatrix::zeros(4, 2), DMatrix::zeros(2, 2));
     let truth = Truth { carts: &carts, f_a: nothing.0, f_s: nothing.1, effect: [0.7, 0.9] };
@@ -220,15 +225,15 @@ fn the_loss_that_a_loop_survives_is_that_of_scipy() {
         l_x: reference("loss_l_x"),
         l_f: reference("loss_l_f"),
     };
-    let controller = Controller::of(&plant, &gains).unwrap();
-    let found = loss_tolerance(&plant, &controller, &[0, 1], 1.0, Domain::Continuous).unwrap();
+    let controller = controller(&plant, &gains, Domain::Continuous).unwrap();
+    let found = loss_tolerance(&plant, &controller, &[0, 1], 1.0).unwrap();
     let expected = reference("loss_limits");
     let limits = [found.common, found.single[0], found.single[1]];
     for (limit, expected) in limits.iter().zip(expected.iter()) {
         assert!((limit - expected).abs() < 1e-9, "{found:?} {expected}");
     }
     assert!(found.worst_instability > 0.0);
-    let small = loss_tolerance(&plant, &controller, &[0, 1], 0.3, Domain::Continuous).unwrap();
+    let small = loss_tolerance(&plant, &controller, &[0, 1], 0.3).unwrap();
     assert!(small.worst_instability < 0.0 && (small.common - 0.3).abs() < 1e-15, "{small:?}");
 }
 
@@ -250,9 +255,8 @@ fn the_loss_that_a_sampled_loop_survives_is_that_of_scipy() {
         l_x: of("m_x"),
         l_f: of("m_f"),
     };
-    let controller = Controller::of(&plant, &gains).unwrap();
-    let domain = Domain::Sampled { period: 0.1 };
-    let found = loss_tolerance(&plant, &controller, &[0, 1], 1.0, domain).unwrap();
+    let controller = controller(&plant, &gains, Domain::Sampled { period: 0.1 }).unwrap();
+    let found = loss_tolerance(&plant, &controller, &[0, 1], 1.0).unwrap();
     let limits = [found.common, found.single[0], found.single[1]];
     for (limit, expected) in limits.iter().zip(of("limits").iter()) {
         assert!((limit - expected).abs() < 1e-9, "{found:?} {expected}");
@@ -264,28 +268,29 @@ fn the_loss_that_a_sampled_loop_survives_is_that_of_scipy() {
 #[test]
 fn the_bias_of_a_position_that_nothing_else_shows_is_refused() {
     let FaultyPlant { a, b, c, .. } = plant();
-    let bias = fault(Entry::Sensor(column(&[1.0, 0.0])), FaultKind::Constant);
+    let bias = fault(FaultEntry::Sensor(column(&[1.0, 0.0])), FaultKind::Constant);
     let extended = ExtendedPlant::new(&a, &b, &c, &[bias], &[100.0, 100.0]).unwrap();
-    let refused = extended.design(&real(&CONTROLLER_POLES), &real(&poles(7)), None).unwrap_err();
+    let refused =
+        extended.design(&real_poles(&CONTROLLER_POLES), &real_poles(&poles(7)), None).unwrap_err();
     assert!(matches!(&refused, Error::HiddenFault { faults, .. } if *faults == [1]), "{refused:?}");
 }
 
 #[test]
 fn bad_faults_are_refused_by_name() {
     let Carts { a, b, c } = carts();
-    let build = |enters: Entry, filter: &[f64]| {
-        ExtendedPlant::new(&a, &b, &c, &[fault(enters, FaultKind::Constant)], filter).unwrap_err()
+    let build = |entry: FaultEntry, filter: &[f64]| {
+        ExtendedPlant::new(&a, &b, &c, &[fault(entry, FaultKind::Constant)], filter).unwrap_err()
     };
     let short = column(&[1.0]);
-    let message = build(Entry::Actuator(short.clone()), &[]).to_string();
+    let message = build(FaultEntry::Actuator(short.clone()), &[]).to_string();
     assert_eq!(message, "a column of F_a is 1x1, expected 4x1");
-    let message = build(Entry::Sensor(short), &[]).to_string();
+    let message = build(FaultEntry::Sensor(short), &[]).to_string();
     assert_eq!(message, "a column of F_s is 1x1, expected 2x1");
-    let message = build(Entry::Sensor(column(&[1.0, 0.0])), &[]).to_string();
+    let message = build(FaultEntry::Sensor(column(&[1.0, 0.0])), &[]).to_string();
     assert_eq!(message, "W is 0x1, expected 2x1");
-    let refused = build(Entry::Sensor(column(&[1.0, 0.0])), &[10.0, -1.0]);
+    let refused = build(FaultEntry::Sensor(column(&[1.0, 0.0])), &[10.0, -1.0]);
     assert!(matches!(refused, Error::OutOfRange { value: -1.0, .. }), "{refused:?}");
-    let refused = build(Entry::LossOfEffectiveness(2), &[]);
+    let refused = build(FaultEntry::LossOfEffectiveness(2), &[]);
     assert!(matches!(refused, Error::OutOfRange { value: 2.0, .. }), "{refused:?}");
     let none = ExtendedPlant::new(&a, &b, &c, &[], &[]);
     assert!(none.is_err() || none.unwrap().plant.check().is_err());

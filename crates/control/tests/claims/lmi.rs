@@ -3,11 +3,11 @@ use crate::paper::{CONTROLLER_POLES, OBSERVER_POLES, plant};
 use crate::recorded::{Case, cases};
 use control::eigen::eigenvalues;
 use control::lmi::{
-    Affine, Channel, Disc, Norm, Outcome, Performance, Problem, Region, certify_gain,
-    certify_region, observer_gain, state_feedback,
+    Affine, Disc, Norm, Outcome, Performance, Problem, Region, certify_gain, certify_region,
+    observer_gain, state_feedback,
 };
-use control::placement::real;
-use control::{Domain, Error};
+use control::placement::real_poles;
+use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 use std::f64::consts::FRAC_PI_4;
 
@@ -139,9 +139,9 @@ fn regions_of_sampled_systems_are_discs_and_decay_per_period() {
     assert!(matches!(refused, Err(Error::OutOfRange { name: "sector", .. })));
 }
 
-fn channel(case: &Case) -> Channel {
+fn system(case: &Case, domain: Domain) -> StateSpace {
     let get = |name| case.get(name).clone();
-    Channel { a: get("A"), b: get("B"), c: get("C"), d: get("D") }
+    StateSpace { a: get("A"), b: get("B"), c: get("C"), d: get("D"), domain }
 }
 
 /// A bound is one: it lies above the norm that another method finds, and close to it.
@@ -152,7 +152,7 @@ fn assert_bounds(case: &Case, domain: Domain) {
         ("impulse", Norm::ImpulseToEnergy),
     ];
     for (name, norm) in names {
-        let bound = optimal(certify_gain(&channel(case), norm, domain));
+        let bound = optimal(certify_gain(&system(case, domain), norm));
         let ratio = bound.gamma / case.number(name);
         assert!(ratio > 1.0 - 1e-9 && ratio < 1.002, "{} {name}: {ratio}", case.name);
         assert!(bound.margin > 0.0 && smallest(&bound.p) > 0.0);
@@ -179,8 +179,8 @@ fn the_resonance_of_an_oscillator_is_bounded_tightly() {
     for damping in [0.5, 0.1, 0.01] {
         let a = matrix(2, 2, &[0., 1., -1., -2.0 * damping]);
         let (b, c) = (matrix(2, 1, &[0., 1.]), matrix(1, 2, &[1., 0.]));
-        let channel = Channel { a, b, c, d: one(0.0) };
-        let bound = optimal(certify_gain(&channel, Norm::HInfinity, Domain::Continuous));
+        let system = StateSpace { a, b, c, d: one(0.0), domain: Domain::Continuous };
+        let bound = optimal(certify_gain(&system, Norm::HInfinity));
         let exact = 0.5 / (damping * (1.0 - damping * damping).sqrt());
         assert!(bound.gamma > exact && bound.gamma < 1.001 * exact, "{} {exact}", bound.gamma);
     }
@@ -188,8 +188,14 @@ fn the_resonance_of_an_oscillator_is_bounded_tightly() {
 
 #[test]
 fn an_unstable_system_has_no_bound() {
-    let channel = Channel { a: one(0.1), b: one(1.0), c: one(1.0), d: one(0.0) };
-    let found = certify_gain(&channel, Norm::HInfinity, Domain::Continuous);
+    let system = StateSpace {
+        a: one(0.1),
+        b: one(1.0),
+        c: one(1.0),
+        d: one(0.0),
+        domain: Domain::Continuous,
+    };
+    let found = certify_gain(&system, Norm::HInfinity);
     assert_eq!(conflict(found), ["stability"]);
 }
 
@@ -198,7 +204,7 @@ fn wish(case: &Case, norm: Norm, gamma: Option<f64>) -> Performance {
     Performance {
         disturbance: get("disturbance"),
         output: get("output"),
-        feed: get("feed"),
+        feedthrough: get("feed"),
         norm,
         gamma,
     }
@@ -297,8 +303,8 @@ fn a_sampled_observer_comes_into_its_disc() {
 fn fault_rate(norm: Norm, gamma: Option<f64>) -> Performance {
     let mut disturbance = DMatrix::zeros(5, 1);
     disturbance[4] = -1.0;
-    let (output, feed) = (DMatrix::identity(5, 5), DMatrix::zeros(2, 1));
-    Performance { disturbance, output, feed, norm, gamma }
+    let (output, feedthrough) = (DMatrix::identity(5, 5), DMatrix::zeros(2, 1));
+    Performance { disturbance, output, feedthrough, norm, gamma }
 }
 
 /// The observer of the paper at its own scale: eigenvalues around -2100, entries from 1 to 1e9. The gain
@@ -308,9 +314,13 @@ fn the_observer_of_the_paper_is_designed_by_inequalities() {
     let plant = plant();
     let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
     let region = disc(-2100.0, 1000.0);
-    let placed =
-        control::aso::design(&plant, &real(&CONTROLLER_POLES), &real(&OBSERVER_POLES), None)
-            .unwrap();
+    let placed = control::aso::design(
+        &plant,
+        &real_poles(&CONTROLLER_POLES),
+        &real_poles(&OBSERVER_POLES),
+        None,
+    )
+    .unwrap();
     let placed = placed.gains.error_dynamics(&plant);
     assert!(optimal(certify_region(&placed, &region, Domain::Continuous)).margin > 0.0);
     for norm in [Norm::HInfinity, Norm::EnergyToPeak] {
@@ -319,8 +329,14 @@ fn the_observer_of_the_paper_is_designed_by_inequalities() {
         let found = optimal(found);
         assert_inside(&(&a_0 - &found.gain * &c_0), region.disc.unwrap());
         let (b, c) = (wanted.disturbance, wanted.output);
-        let channel = Channel { a: placed.clone(), b, c, d: DMatrix::zeros(5, 1) };
-        let before = optimal(certify_gain(&channel, norm, Domain::Continuous));
+        let system = StateSpace {
+            a: placed.clone(),
+            b,
+            c,
+            d: DMatrix::zeros(5, 1),
+            domain: Domain::Continuous,
+        };
+        let before = optimal(certify_gain(&system, norm));
         assert!(found.bound.unwrap().gamma < before.gamma);
     }
     let impossible = fault_rate(Norm::HInfinity, Some(1e-4));
@@ -345,14 +361,15 @@ fn bad_arguments_are_refused_by_name() {
     let wanted = Performance {
         disturbance: DMatrix::zeros(2, 1),
         output: DMatrix::zeros(1, 3),
-        feed: DMatrix::zeros(1, 1),
+        feedthrough: DMatrix::zeros(1, 1),
         norm: Norm::HInfinity,
         gamma: None,
     };
     let refused = observer_gain(&a, &c, &region, Some(&wanted), Domain::Continuous);
     assert!(matches!(refused, Err(Error::Shape { matrix: "output", .. })));
-    let channel = Channel { a: a.clone(), b: c.transpose(), c, d: one(1.0) };
-    let refused = certify_gain(&channel, Norm::EnergyToPeak, Domain::Continuous);
+    let system =
+        StateSpace { a: a.clone(), b: c.transpose(), c, d: one(1.0), domain: Domain::Continuous };
+    let refused = certify_gain(&system, Norm::EnergyToPeak);
     assert!(matches!(refused, Err(Error::OutOfRange { name: "D", .. })));
 }
 
@@ -363,5 +380,5 @@ fn what_is_lost_in_rounding_is_no_conflict() {
     let a = crate::integers(5, 5, |i, j| (7 * i * i + 3 * j + 5 * i * j) % 11 - 5);
     let c = crate::integers(1, 5, |_, j| (3 * j) % 5 - 1);
     let found = observer_gain(&a, &c, &disc(-20000.0, 2000.0), None, Domain::Continuous).unwrap();
-    assert!(matches!(found, Outcome::Trouble(_)), "{found:?}");
+    assert!(matches!(found, Outcome::Inconclusive(_)), "{found:?}");
 }

@@ -3,7 +3,7 @@ use crate::{entry_error, integers, matrix};
 use control::Error;
 use control::eigen::eigenvalues;
 use control::exponential::exponential;
-use control::placement::{Placement, place, place_balanced, place_discrete, real};
+use control::placement::{Placement, place, place_balanced, place_discrete, real_poles};
 use nalgebra::{Complex, DMatrix};
 
 mod scipy;
@@ -38,7 +38,7 @@ fn observer() -> (DMatrix<f64>, DMatrix<f64>) {
 #[test]
 fn the_order_in_which_eigenvalues_are_stated_does_not_change_a_bit() {
     let (a, b) = observer();
-    let mut poles = [&real(&[-1200., -1500., -2500.])[..], &pair(-3000., 800.)].concat();
+    let mut poles = [&real_poles(&[-1200., -1500., -2500.])[..], &pair(-3000., 800.)].concat();
     let first = place_balanced(&a, &b, &poles).unwrap();
     for _ in 0..poles.len() {
         poles.rotate_left(1);
@@ -51,7 +51,7 @@ fn the_order_in_which_eigenvalues_are_stated_does_not_change_a_bit() {
 /// Published as rounded here, from the printed A and B.
 #[test]
 fn one_input_gives_the_published_gain() {
-    let placement = place(&printed().a, &printed().b, &real(&CONTROLLER_POLES)).unwrap();
+    let placement = place(&printed().a, &printed().b, &real_poles(&CONTROLLER_POLES)).unwrap();
     let published = matrix(1, 4, &[184.10, 365.71, 123.66, 63.86]);
     assert!((&placement.gain - published).amax() < 5.1e-3, "{}", placement.gain);
 }
@@ -60,7 +60,7 @@ fn one_input_gives_the_published_gain() {
 /// parameters.
 #[test]
 fn one_input_gives_the_gain_of_scipy() {
-    let placement = place(&plant().a, &plant().b, &real(&CONTROLLER_POLES)).unwrap();
+    let placement = place(&plant().a, &plant().b, &real_poles(&CONTROLLER_POLES)).unwrap();
     let scipy = [184.088_126_31, 365.721_398_02, 123.654_284_82, 63.865_665_69];
     assert!(entry_error(&placement.gain, &matrix(1, 4, &scipy)) < 1e-9);
 }
@@ -73,7 +73,7 @@ fn one_input_and_pairs_give_the_coefficients_of_the_wanted_polynomial() {
     a.view_mut((0, 1), (4, 4)).fill_with_identity();
     a.row_mut(4).copy_from(&matrix(1, 5, &[3.0, -1.0, 4.0, 1.0, -5.0]));
     let b = matrix(5, 1, &[0.0, 0.0, 0.0, 0.0, 1.0]);
-    let poles = [&pair(-3.0, 4.0)[..], &real(&[-1.0]), &pair(-1.0, 0.25)].concat();
+    let poles = [&pair(-3.0, 4.0)[..], &real_poles(&[-1.0]), &pair(-1.0, 0.25)].concat();
     let placement = place(&a, &b, &poles).unwrap();
     let wanted = [26.5625, 82.9375, 94.4375, 46.0625, 9.0];
     let expected = DMatrix::from_fn(1, 5, |_, j| -wanted[j] - a[(4, j)]);
@@ -85,17 +85,17 @@ fn one_input_and_pairs_give_the_coefficients_of_the_wanted_polynomial() {
 #[test]
 fn the_observer_of_the_pendulum_has_the_condition_number_that_a_random_search_finds() {
     let (a, c) = observer();
-    let placement = place(&a, &c, &real(&OBSERVER_POLES)).unwrap();
+    let placement = place(&a, &c, &real_poles(&OBSERVER_POLES)).unwrap();
     assert!((placement.quality.condition / 3.198_767e7 - 1.0).abs() < 1e-6);
     assert!(placement.quality.pole_error < 1e-9);
-    assert_assigned(&a, &c, &placement, &real(&OBSERVER_POLES));
+    assert_assigned(&a, &c, &placement, &real_poles(&OBSERVER_POLES));
 }
 
 /// Each is best in its own coordinates.
 #[test]
 fn the_coordinates_decide_which_condition_number_is_low() {
     let (a, c) = observer();
-    let poles = real(&OBSERVER_POLES);
+    let poles = real_poles(&OBSERVER_POLES);
     let (given, balanced) =
         (place(&a, &c, &poles).unwrap().quality, place_balanced(&a, &c, &poles).unwrap().quality);
     assert!(given.condition < 0.95 * balanced.condition, "{given:?} {balanced:?}");
@@ -109,7 +109,8 @@ fn the_balanced_placement_does_not_depend_on_the_units_of_the_states() {
     let units = [1.0, 1024.0, 0.125, 8.0, 1.0 / 65536.0];
     let scaled_a = DMatrix::from_fn(5, 5, |i, j| a[(i, j)] * units[j] / units[i]);
     let scaled_c = DMatrix::from_fn(5, 2, |i, j| c[(i, j)] / units[i]);
-    let poles = [&pair(-1500.0, 300.0)[..], &pair(-2000.0, 1000.0), &real(&[-1200.0])].concat();
+    let poles =
+        [&pair(-1500.0, 300.0)[..], &pair(-2000.0, 1000.0), &real_poles(&[-1200.0])].concat();
     let given = place_balanced(&a, &c, &poles).unwrap();
     let scaled = place_balanced(&scaled_a, &scaled_c, &poles).unwrap();
     let ratio = scaled.quality.balanced_condition / given.quality.balanced_condition;
@@ -123,7 +124,9 @@ fn the_balanced_placement_does_not_depend_on_the_units_of_the_states() {
 fn as_many_inputs_as_states_give_orthogonal_eigenvectors() {
     let a = integers(3, 3, |i, j| (3 * i * i + 2 * i * j + j) % 7 - 3);
     let b = matrix(3, 3, &[1., 2., 0., 0., 1., 3., 1., 0., 1.]);
-    for poles in [real(&[-1.0, -2.0, -3.0]), [&pair(-1.0, 5.0)[..], &real(&[-2.0])].concat()] {
+    for poles in
+        [real_poles(&[-1.0, -2.0, -3.0]), [&pair(-1.0, 5.0)[..], &real_poles(&[-2.0])].concat()]
+    {
         let placement = place(&a, &b, &poles).unwrap();
         assert!(placement.quality.condition < 1.0 + 1e-7, "{:?}", placement.quality);
     }
@@ -133,7 +136,7 @@ fn as_many_inputs_as_states_give_orthogonal_eigenvectors() {
 fn an_eigenvalue_or_a_pair_may_come_as_often_as_there_are_inputs() {
     let a = integers(4, 4, |i, j| (7 * i * i + 3 * i * j + 5 * j + i * j * j) % 11 - 5);
     let b = integers(4, 2, |i, j| (5 * i * i + 3 * j + 2 * i * j + i) % 7 - 3);
-    let twice = real(&[-2.0, -1.0, -2.0, -1.0]);
+    let twice = real_poles(&[-2.0, -1.0, -2.0, -1.0]);
     assert_assigned(&a, &b, &place(&a, &b, &twice).unwrap(), &twice);
     let [p, q] = pair(-1.0, 3.0);
     let placement = place(&a, &b, &[p, q, p, q]).unwrap();
@@ -146,7 +149,7 @@ fn an_eigenvalue_or_a_pair_may_come_as_often_as_there_are_inputs() {
 fn an_eigenvalue_or_a_pair_that_comes_more_often_than_there_are_inputs_is_refused() {
     let a = integers(6, 6, |i, j| (7 * i * i + 3 * i * j + 5 * j + i * j * j) % 11 - 5);
     let b = integers(6, 2, |i, j| (5 * i * i + 3 * j + 2 * i * j + i) % 7 - 3);
-    let refused = place(&a, &b, &real(&[-2.0, -1.0, -2.0, -2.0, -3.0, -4.0])).unwrap_err();
+    let refused = place(&a, &b, &real_poles(&[-2.0, -1.0, -2.0, -2.0, -3.0, -4.0])).unwrap_err();
     let expected = "the eigenvalue -2 is wanted 3 times, at most 2 are possible";
     assert_eq!(refused.to_string(), expected);
     let refused = place(&a, &b, &[pair(-1.0, 3.0); 3].concat()).unwrap_err();
@@ -171,7 +174,7 @@ fn a_complex_eigenvalue_without_its_conjugate_is_refused_by_name() {
 fn dependent_inputs_get_the_smallest_gain() {
     let (a, one) = (plant().a, plant().b);
     let both = DMatrix::from_fn(4, 2, |i, _| one[i]);
-    for poles in [real(&CONTROLLER_POLES), [pair(-5.0, 2.0), pair(-6.0, 6.0)].concat()] {
+    for poles in [real_poles(&CONTROLLER_POLES), [pair(-5.0, 2.0), pair(-6.0, 6.0)].concat()] {
         let single = place(&a, &one, &poles).unwrap().gain;
         let shared = place(&a, &both, &poles).unwrap().gain;
         let expected = DMatrix::from_fn(2, 4, |_, j| single[j] / 2.0);
@@ -183,7 +186,7 @@ fn dependent_inputs_get_the_smallest_gain() {
 fn an_eigenvalue_of_the_plant_may_be_kept_and_zero_may_be_assigned() {
     let a = matrix(2, 2, &[0.0, 1.0, 0.0, -3.0]);
     let b = matrix(2, 1, &[0.0, 1.0]);
-    let kept = place(&a, &b, &real(&[-3.0, 0.0])).unwrap();
+    let kept = place(&a, &b, &real_poles(&[-3.0, 0.0])).unwrap();
     assert!(kept.gain.amax() < 1e-13, "{}", kept.gain);
     let oscillator = matrix(2, 2, &[0.0, 1.0, -25.0, -6.0]);
     let kept = place(&oscillator, &b, &pair(-3.0, 4.0)).unwrap();
@@ -194,7 +197,7 @@ fn an_eigenvalue_of_the_plant_may_be_kept_and_zero_may_be_assigned() {
 #[test]
 fn a_single_state_needs_one_division() {
     let (a, b) = (matrix(1, 1, &[2.0]), matrix(1, 2, &[3.0, 4.0]));
-    let placement = place(&a, &b, &real(&[-8.0])).unwrap();
+    let placement = place(&a, &b, &real_poles(&[-8.0])).unwrap();
     assert!(entry_error(&placement.gain, &matrix(2, 1, &[-5.0 / 3.0, -5.0 / 4.0])) < 1e-15);
     assert!((placement.quality.condition - 1.0).abs() < 1e-15);
 }
@@ -203,11 +206,11 @@ fn a_single_state_needs_one_division() {
 #[test]
 fn eigenvalues_of_very_different_size_are_each_reached() {
     let (a, b) = (matrix(2, 2, &[0.0, 1.0, 0.0, 0.0]), matrix(2, 1, &[0.0, 1.0]));
-    let gain = place(&a, &b, &real(&[-1e-3, -1e6])).unwrap().gain;
+    let gain = place(&a, &b, &real_poles(&[-1e-3, -1e6])).unwrap().gain;
     assert!(entry_error(&gain, &matrix(1, 2, &[-1e3, -1e6 - 1e-3])) < 1e-14, "{gain}");
     let two = matrix(3, 2, &[0.0, 0.3, 1.0, 0.0, 0.0, 1.0]);
     let three = matrix(3, 3, &[0.0, 1.0, 0.2, 0.0, 0.0, 1.0, 0.5, 0.0, 0.0]);
-    let poles = [&real(&[-1e-3])[..], &pair(-1e5, 1e5)].concat();
+    let poles = [&real_poles(&[-1e-3])[..], &pair(-1e5, 1e5)].concat();
     let placement = place(&three, &two, &poles).unwrap();
     assert!(placement.quality.pole_error < 1e-6, "{:?}", placement.quality);
 }
@@ -215,7 +218,7 @@ fn eigenvalues_of_very_different_size_are_each_reached() {
 #[test]
 fn a_state_out_of_reach_is_refused() {
     let a = matrix(2, 2, &[1.0, 0.0, 0.0, 2.0]);
-    let refused = place(&a, &matrix(2, 1, &[1.0, 0.0]), &real(&[-1.0, -2.0]));
+    let refused = place(&a, &matrix(2, 1, &[1.0, 0.0]), &real_poles(&[-1.0, -2.0]));
     assert_eq!(refused, Err(Error::NotControllable { rank: 1, n: 2 }));
     let refused = place(&a, &matrix(2, 1, &[1.0, 0.0]), &pair(-1.0, 2.0));
     assert_eq!(refused, Err(Error::NotControllable { rank: 1, n: 2 }));
@@ -228,7 +231,7 @@ fn the_sampled_observer_of_the_pendulum_is_placed_at_every_sample_time() {
     for outputs in [1, 2] {
         let c = c.columns(0, outputs).into_owned();
         for sample_time in [1e-4, 1e-3, 5e-3, 1e-2, 2e-2] {
-            let poles = real(&OBSERVER_POLES.map(|pole| (pole * sample_time).exp()));
+            let poles = real_poles(&OBSERVER_POLES.map(|pole| (pole * sample_time).exp()));
             let a = exponential(&(&a * sample_time)).unwrap();
             let placement = place_discrete(&a, &c, &poles).unwrap();
             let radius = poles[0].re;
@@ -244,7 +247,9 @@ fn the_sampled_observer_of_the_pendulum_is_placed_at_every_sample_time() {
 fn a_plant_with_as_many_inputs_as_states_comes_to_rest_in_one_sample() {
     let a = matrix(2, 2, &[0.9, 0.1, -0.3, 1.1]);
     let b = matrix(2, 2, &[1.0, 2.0, 0.0, 1.0]);
-    for placement in [place, place_discrete].map(|way| way(&a, &b, &real(&[0.0, 0.0])).unwrap()) {
+    for placement in
+        [place, place_discrete].map(|way| way(&a, &b, &real_poles(&[0.0, 0.0])).unwrap())
+    {
         assert!((&a + &b * &placement.gain).amax() < 1e-15, "{}", placement.gain);
     }
 }

@@ -2,8 +2,9 @@
 
 use crate::paper::{CONTROLLER_POLES, OBSERVER_POLES, plant, repaired_gains};
 use crate::{integers, matrix};
+use control::StateSpace;
 use control::aso::{FaultyPlant, design};
-use control::controller::Controller;
+use control::controller::{closed_loop, controller};
 use control::detectability::detectability;
 use control::distance::{from_uncontrollable, from_unobservable};
 use control::eigen::eigenvalues;
@@ -11,7 +12,7 @@ use control::exponential::exponential;
 use control::faults::{ExtendedPlant, loss_tolerance};
 use control::hold::FirstOrderHold;
 use control::lyapunov::lyapunov;
-use control::placement::{place, real};
+use control::placement::{place, real_poles};
 use control::rank::{controllability, observability, uncontrollable_modes, unobservable_modes};
 use control::sampled::sample;
 use control::theorem1::certify;
@@ -50,9 +51,9 @@ fn an_entry_that_is_not_a_number_is_named_in_every_matrix() {
     assert_eq!(name_of(zeros(&good, &good, &bad)), "C");
     assert_eq!(name_of(FirstOrderHold::new(&bad, &good, 1.0)), "A");
     assert_eq!(name_of(FirstOrderHold::new(&good, &bad, 1.0)), "B");
-    assert_eq!(name_of(place(&bad, &good, &real(&[-1.0, -2.0]))), "A");
-    assert_eq!(name_of(place(&good, &bad, &real(&[-1.0, -2.0]))), "B");
-    assert_eq!(name_of(place(&good, &good, &real(&[-1.0, f64::NAN]))), "poles");
+    assert_eq!(name_of(place(&bad, &good, &real_poles(&[-1.0, -2.0]))), "A");
+    assert_eq!(name_of(place(&good, &bad, &real_poles(&[-1.0, -2.0]))), "B");
+    assert_eq!(name_of(place(&good, &good, &real_poles(&[-1.0, f64::NAN]))), "poles");
 }
 
 #[test]
@@ -65,8 +66,8 @@ fn a_wrong_shape_is_named_with_what_was_expected() {
     assert_eq!(name_of(observability(&good, &wide)), "C");
     let refused = FirstOrderHold::new(&good, &tall, 1.0);
     assert_eq!(refused, Err(Error::Shape { matrix: "B", expected: (2, 1), found: (3, 1) }));
-    assert_eq!(name_of(place(&good, &DMatrix::zeros(2, 0), &real(&[-1.0, -2.0]))), "B");
-    let refused = place(&good, &good, &real(&[-1.0]));
+    assert_eq!(name_of(place(&good, &DMatrix::zeros(2, 0), &real_poles(&[-1.0, -2.0]))), "B");
+    let refused = place(&good, &good, &real_poles(&[-1.0]));
     assert_eq!(refused, Err(Error::PoleCount { expected: 2, found: 1 }));
 }
 
@@ -74,14 +75,19 @@ fn a_wrong_shape_is_named_with_what_was_expected() {
 fn each_matrix_of_the_plant_and_of_the_gains_is_checked() {
     let zeros = DMatrix::zeros(3, 3);
     let of_plant = |plant: FaultyPlant| {
-        name_of(design(&plant, &real(&CONTROLLER_POLES), &real(&OBSERVER_POLES), None))
+        name_of(design(&plant, &real_poles(&CONTROLLER_POLES), &real_poles(&OBSERVER_POLES), None))
     };
     assert_eq!(of_plant(FaultyPlant { a: DMatrix::zeros(4, 3), ..plant() }), "A");
     assert_eq!(of_plant(FaultyPlant { b: zeros.clone(), ..plant() }), "B");
     assert_eq!(of_plant(FaultyPlant { c: zeros.clone(), ..plant() }), "C");
     assert_eq!(of_plant(FaultyPlant { f_a: zeros.clone(), ..plant() }), "F_a");
     assert_eq!(of_plant(FaultyPlant { a_f: zeros.clone(), ..plant() }), "A_f");
-    let refused = design(&plant(), &real(&CONTROLLER_POLES), &real(&OBSERVER_POLES), Some(&zeros));
+    let refused = design(
+        &plant(),
+        &real_poles(&CONTROLLER_POLES),
+        &real_poles(&OBSERVER_POLES),
+        Some(&zeros),
+    );
     assert_eq!(name_of(refused), "K_f");
     let mut gains = [repaired_gains(), repaired_gains(), repaired_gains(), repaired_gains()];
     gains[0].k_x = zeros.clone();
@@ -109,13 +115,13 @@ fn numbers_out_of_range_are_refused_with_the_rule() {
 #[test]
 fn a_controller_or_a_loss_that_does_not_fit_is_refused() {
     let plant = plant();
-    let controller = Controller::of(&plant, &repaired_gains()).unwrap();
-    let tolerance = |controller: &Controller, inputs: &[usize], largest: f64| {
-        loss_tolerance(&plant, controller, inputs, largest, Domain::Continuous)
+    let controller = controller(&plant, &repaired_gains(), Domain::Continuous).unwrap();
+    let tolerance = |controller: &StateSpace, inputs: &[usize], largest: f64| {
+        loss_tolerance(&plant, controller, inputs, largest)
     };
-    let wrong = Controller { d: DMatrix::zeros(2, 2), ..controller.clone() };
+    let wrong = StateSpace { d: DMatrix::zeros(2, 2), ..controller.clone() };
     assert_eq!(name_of(tolerance(&wrong, &[0], 0.5)), "the controller's D");
-    assert_eq!(name_of(controller.closed_loop(&plant, &[1.0, 1.0])), "effect");
+    assert_eq!(name_of(closed_loop(&plant, &controller, &[1.0, 1.0])), "effectiveness");
     for (inputs, largest) in [(&[1][..], 0.5), (&[][..], 0.5), (&[0][..], 0.0), (&[0][..], 1.5)] {
         let refused = tolerance(&controller, inputs, largest);
         assert!(matches!(refused, Err(Error::OutOfRange { .. })), "{refused:?}");
@@ -140,9 +146,11 @@ fn entries_near_the_ends_of_the_range_end_in_an_answer_or_an_error() {
         let _ = exponential(&a).map(finite);
         let _ = FirstOrderHold::new(&a, &b, 0.1).map(|hold| finite(hold.gamma_1));
         let _ = lyapunov(&a, &identity).map(|solution| finite(solution.p));
-        let _ = place(&a, &b, &real(&CONTROLLER_POLES)).map(|placement| finite(placement.gain));
+        let _ =
+            place(&a, &b, &real_poles(&CONTROLLER_POLES)).map(|placement| finite(placement.gain));
         let plant = FaultyPlant::with_constant_faults(a, b, wild(2, 4, 3), f_a);
-        let designed = design(&plant, &real(&CONTROLLER_POLES), &real(&OBSERVER_POLES), None);
+        let designed =
+            design(&plant, &real_poles(&CONTROLLER_POLES), &real_poles(&OBSERVER_POLES), None);
         let _ = designed.map(|design| finite(design.gains.l_x));
         let _ = detectability(&plant, Domain::Continuous)
             .map(|found| assert!(found.zeros.finite.iter().all(|zero| zero.re.is_finite())));

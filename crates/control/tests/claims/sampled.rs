@@ -1,26 +1,26 @@
 use crate::data::reference;
 use crate::paper::{CONTROLLER_POLES, OBSERVER_POLES, plant};
 use crate::{entry_error, matrix};
-use control::Error;
 use control::aso::Estimator;
 use control::aso::FaultyPlant;
-use control::controller::Controller;
+use control::controller::controller;
 use control::eigen::eigenvalues;
-use control::faults::{Entry, ExtendedPlant, Fault, FaultKind};
+use control::faults::{ExtendedPlant, Fault, FaultEntry, FaultKind};
 use control::hold::FirstOrderHold;
-use control::placement::real;
-use control::sampled::{SampledDesign, design, poles, sample};
+use control::placement::real_poles;
+use control::sampled::{SampledDesign, design, sample, sampled_poles};
+use control::{Domain, Error};
 use nalgebra::{Complex, DMatrix, DVector};
 
 /// From a tenth of a millisecond to ten.
 const PERIODS: [f64; 7] = [1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2];
 
-fn real_poles(continuous: &[f64], period: f64) -> Vec<f64> {
+fn on_real_axis(continuous: &[f64], period: f64) -> Vec<f64> {
     in_z(continuous, period).iter().map(|z| z.re).collect()
 }
 
 fn in_z(continuous: &[f64], period: f64) -> Vec<Complex<f64>> {
-    poles(&real(continuous), period).expect("poles in range")
+    sampled_poles(&real_poles(continuous), period).expect("poles in range")
 }
 
 fn pendulum(period: f64, estimator: Estimator) -> SampledDesign {
@@ -53,8 +53,10 @@ fn the_sampled_pendulum_is_that_of_scipy() {
 #[test]
 fn a_ramp_moves_inside_of_the_interval_as_in_scipy() {
     let (a, b, f_a) = (reference("ramp_a"), reference("ramp_b"), reference("ramp_f_a"));
-    let fault =
-        |at: usize| Fault { enters: Entry::Actuator(f_a.column(at).into()), kind: FaultKind::Ramp };
+    let fault = |at: usize| Fault {
+        entry: FaultEntry::Actuator(f_a.column(at).into()),
+        kind: FaultKind::Ramp,
+    };
     let c = DMatrix::identity(3, 3);
     let extended = ExtendedPlant::new(&a, &b, &c, &[fault(0), fault(1)], &[]).unwrap();
     let sampled = sample(&extended, 0.25).unwrap();
@@ -66,8 +68,10 @@ fn a_ramp_moves_inside_of_the_interval_as_in_scipy() {
 #[test]
 fn the_filter_runs_on_the_samples() {
     let one = matrix(1, 1, &[1.0]);
-    let bias =
-        Fault { enters: Entry::Sensor(DVector::from_element(1, 3.0)), kind: FaultKind::Constant };
+    let bias = Fault {
+        entry: FaultEntry::Sensor(DVector::from_element(1, 3.0)),
+        kind: FaultKind::Constant,
+    };
     let extended =
         ExtendedPlant::new(&matrix(1, 1, &[0.0]), &one, &(&one * 5.0), &[bias], &[2.0]).unwrap();
     let sampled = sample(&extended, 1.0).unwrap();
@@ -93,7 +97,8 @@ fn the_pendulum_is_stable_at_every_sample_time() {
 /// The friction modelled as a ramp, one more pole.
 fn pendulum_with_ramp(period: f64) -> SampledDesign {
     let FaultyPlant { a, b, c, f_a, .. } = plant();
-    let friction = Fault { enters: Entry::Actuator(f_a.column(0).into()), kind: FaultKind::Ramp };
+    let friction =
+        Fault { entry: FaultEntry::Actuator(f_a.column(0).into()), kind: FaultKind::Ramp };
     let extended = ExtendedPlant::new(&a, &b, &c, &[friction], &[]).expect("shapes that fit");
     let controller = in_z(&CONTROLLER_POLES, period);
     let observer = in_z(&[&OBSERVER_POLES[..], &[-2500.0]].concat(), period);
@@ -147,7 +152,7 @@ fn the_estimation_error_has_the_wanted_eigenvalues() {
         let (a_0, c_0) = (found.plant.augmented_dynamics(), found.plant.augmented_output());
         let m = found.gains.observer_gain();
         let error = (DMatrix::identity(5, 5) - m * c_0) * a_0;
-        let mut wanted = real_poles(&OBSERVER_POLES, period);
+        let mut wanted = on_real_axis(&OBSERVER_POLES, period);
         wanted.sort_by(f64::total_cmp);
         for (reached, wanted) in eigenvalues(&error).unwrap().iter().zip(wanted) {
             assert!((reached - wanted).norm() < 1e-5 * wanted, "{period}: {reached} {wanted}");
@@ -165,7 +170,9 @@ fn run(
     samples: u32,
 ) -> (f64, f64) {
     let n = extended.states;
-    let equations = Controller::of(&design.plant, &design.gains).expect("gains that fit");
+    let equations =
+        controller(&design.plant, &design.gains, Domain::Sampled { period: design.period })
+            .expect("gains that fit");
     let inputs = DMatrix::from_columns(&[b.column(0), f_a.column(0)]);
     let a: DMatrix<f64> = extended.plant.a.view((0, 0), (n, n)).into();
     let hold = FirstOrderHold::new(&a, &inputs, design.period).expect("a hold");
@@ -188,7 +195,7 @@ fn run(
 fn constant_and_ramp_faults_are_estimated_in_the_sampled_loop() {
     let FaultyPlant { a, b, c, f_a, .. } = plant();
     for (kind, slope) in [(FaultKind::Constant, 0.0), (FaultKind::Ramp, 2.0)] {
-        let friction = Fault { enters: Entry::Actuator(f_a.column(0).into()), kind };
+        let friction = Fault { entry: FaultEntry::Actuator(f_a.column(0).into()), kind };
         let extended = ExtendedPlant::new(&a, &b, &c, &[friction], &[]).unwrap();
         for estimator in [Estimator::Prediction, Estimator::Current] {
             let period = 2e-3;
@@ -212,13 +219,16 @@ fn constant_and_ramp_faults_are_estimated_in_the_sampled_loop() {
 /// Poles that would all be zero in double precision keep a distance that can be placed.
 #[test]
 fn fast_poles_are_slowed_in_order_and_slow_ones_are_not() {
-    let found = real_poles(&[-1e6, -1e5, -2e3, -50.0, -1.0], 1e-2);
+    let found = on_real_axis(&[-1e6, -1e5, -2e3, -50.0, -1.0], 1e-2);
     assert!(found.windows(2).all(|pair| pair[0] < 0.99 * pair[1]), "{found:?}");
     assert!((found[0] - (-4.0_f64).exp()).abs() < 1e-15);
     assert!((found[3] - (-0.5_f64).exp()).abs() < 1e-15);
-    let turning = poles(&[Complex::new(-1.0, 100.0)], 1e-2).unwrap();
+    let turning = sampled_poles(&[Complex::new(-1.0, 100.0)], 1e-2).unwrap();
     assert!((turning[0] - Complex::new(-0.01, 1.0).exp()).norm() < 1e-15);
-    let aliased = poles(&[Complex::new(-1.0, 400.0)], 1e-2);
+    let aliased = sampled_poles(&[Complex::new(-1.0, 400.0)], 1e-2);
     assert!(matches!(aliased, Err(Error::OutOfRange { name: "Im(p) T", .. })), "{aliased:?}");
-    assert!(matches!(poles(&[], 0.0), Err(Error::OutOfRange { name: "the sample time", .. })));
+    assert!(matches!(
+        sampled_poles(&[], 0.0),
+        Err(Error::OutOfRange { name: "the sample time", .. })
+    ));
 }

@@ -1,12 +1,13 @@
 use crate::paper::{CONTROLLER_POLES, OBSERVER_POLES, plant, printed, repaired_gains};
 use control::Error;
 use control::aso::{Estimator, FaultyPlant, Gains, design};
-use control::placement::real;
+use control::placement::real_poles;
 use control::theorem1::certify;
 use nalgebra::DMatrix;
 
 fn gains() -> Gains {
-    let designed = design(&plant(), &real(&CONTROLLER_POLES), &real(&OBSERVER_POLES), None);
+    let designed =
+        design(&plant(), &real_poles(&CONTROLLER_POLES), &real_poles(&OBSERVER_POLES), None);
     designed.expect("the design exists").gains
 }
 
@@ -86,7 +87,7 @@ mod free {
     use crate::paper::{plant, repaired_gains};
     use crate::recorded::cases;
     use control::lmi::Outcome;
-    use control::theorem1::{certify, largest_decay, smallest_region, ultimate_bound};
+    use control::theorem1::{certify, largest_decay, smallest_radius, ultimate_bound};
     use nalgebra::DMatrix;
 
     const DATA: &str = include_str!("../data/lmi.txt");
@@ -94,7 +95,7 @@ mod free {
     #[test]
     fn the_smallest_radius_is_that_of_a_semidefinite_program_stated_elsewhere() {
         for case in cases(DATA, "radius") {
-            let found = smallest_region(case.get("F"), case.get("G"), 1.0).unwrap();
+            let found = smallest_radius(case.get("F"), case.get("G"), 1.0).unwrap();
             let delta = found.optimal().unwrap().delta;
             let ratio = delta / case.number("free");
             assert!(ratio > 1.0 - 1e-6 && ratio < 1.001, "{}: {ratio}", case.name);
@@ -109,7 +110,7 @@ mod free {
         for (gains, factor) in [(gains(), 6.0), (repaired_gains(), 3.0)] {
             let printed = certify(&plant, &gains, 1.0, 30.0).unwrap().delta;
             let f = gains.error_dynamics(&plant);
-            let found = smallest_region(&f, &plant.augmented_fault(), 30.0).unwrap();
+            let found = smallest_radius(&f, &plant.augmented_fault(), 30.0).unwrap();
             let found = found.optimal().unwrap();
             assert!(found.delta * factor < printed, "{} {printed}", found.delta);
             let left = &found.p * &f + f.transpose() * &found.p + DMatrix::identity(5, 5);
@@ -166,7 +167,7 @@ mod free {
         let (f, g) = (matrix(1, 1, &[0.5]), matrix(1, 1, &[1.0]));
         let expected = vec!["stability"];
         assert_eq!(largest_decay(&f), Ok(Outcome::Infeasible { conflict: expected.clone() }));
-        let found = smallest_region(&f, &g, 1.0);
+        let found = smallest_radius(&f, &g, 1.0);
         assert_eq!(found, Ok(Outcome::Infeasible { conflict: expected.clone() }));
         assert_eq!(ultimate_bound(&f, &g, 1.0), Ok(Outcome::Infeasible { conflict: expected }));
     }

@@ -226,10 +226,6 @@ impl Slave for Isolated {
         self.finish_advance(step)
     }
 
-    fn in_thread(&mut self) -> Option<&mut (dyn Slave + Send)> {
-        Some(self)
-    }
-
     fn in_background(&mut self) -> Option<&mut dyn Background> {
         Some(self)
     }

@@ -2,7 +2,7 @@
 #![expect(unsafe_code, reason = "the routines are C functions")]
 #![expect(clippy::unwrap_used, reason = "tests")]
 
-extern crate lapack_src as _;
+use aso_lapack as _;
 
 use nalgebra::DMatrix;
 

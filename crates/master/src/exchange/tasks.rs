@@ -19,8 +19,8 @@ impl Reals {
         Ok(done)
     }
 
-    /// [`Reals::advance`] of several slaves: those in the background begin first, then those that can
-    /// be stepped in another thread are by `run`.
+    /// [`Reals::advance`] of several slaves: those in the background begin first, then `run` steps
+    /// the others.
     pub(crate) fn advance_all(
         &mut self,
         system: &mut System,
@@ -66,8 +66,6 @@ impl Reals {
 struct Sorted<'a> {
     /// Begun in the background.
     begun: Vec<Step<'a>>,
-    /// For this thread.
-    bound: Vec<Step<'a>>,
     /// For any thread.
     tasks: Vec<Task<'a>>,
     done: Vec<(usize, Result<Stepped, CallError>)>,
@@ -82,12 +80,7 @@ impl<'a> Sorted<'a> {
         match instance.in_background().map(|instance| instance.begin_advance(&step)) {
             Some(Ok(())) => self.begun.push((slave, instance, step)),
             Some(Err(error)) => self.done.push((slave, Err(error))),
-            None if instance.in_thread().is_none() => self.bound.push((slave, instance, step)),
-            None => {
-                if let Some(instance) = instance.in_thread() {
-                    self.tasks.push(Task { slave, instance, step, done: Ok(Stepped::Whole) });
-                }
-            }
+            None => self.tasks.push(Task { slave, instance, step, done: Ok(Stepped::Whole) }),
         }
     }
 
@@ -96,9 +89,6 @@ impl<'a> Sorted<'a> {
         mut self,
         run: impl FnOnce(&mut [Task<'_>]),
     ) -> Vec<(usize, Result<Stepped, CallError>)> {
-        for (slave, instance, mut step) in self.bound {
-            self.done.push((slave, instance.advance(&mut step)));
-        }
         if !self.tasks.is_empty() {
             run(&mut self.tasks);
         }

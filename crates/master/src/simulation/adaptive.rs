@@ -7,7 +7,7 @@ use crate::algorithm::StepControl;
 use crate::error::SystemError;
 use crate::exchange::Values;
 use crate::signal::near;
-use crate::solve::Verdict;
+use solve::Verdict;
 
 /// The slot of FMU states from which a rejected step is repeated.
 const SLOT: usize = 1;

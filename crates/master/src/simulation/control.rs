@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::algorithm::{Algorithm, Course, StepControl};
 use crate::error::SystemError;
 use crate::exchange::Reals;
-use crate::solve::{Bond, EnergyControl, ErrorControl, ForwardControl, Scale, SizeBounds, Verdict};
+use solve::{Bond, EnergyControl, ErrorControl, ForwardControl, Scale, SizeBounds, Verdict};
 use crate::system::{Port, System};
 use fmu_description::Kind;
 

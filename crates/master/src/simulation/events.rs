@@ -6,7 +6,7 @@ use super::sweep::Swept;
 use crate::algorithm::EventSource;
 use crate::error::SystemError;
 use crate::exchange::{Values, call};
-use crate::solve::Bracket;
+use solve::Bracket;
 use crate::system::Port;
 use slave::Value;
 

@@ -10,7 +10,7 @@ use crate::error::SystemError;
 use crate::exchange::call;
 use crate::fault::FaultLine;
 use crate::order::Rows;
-use crate::solve::{Components, Newton, Progress, Scale, Solver, components};
+use solve::{Components, Newton, Progress, Scale, Solver, components};
 use crate::system::{Port, System};
 use slave::Value;
 

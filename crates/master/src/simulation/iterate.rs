@@ -5,7 +5,7 @@ use super::sweep::Swept;
 use crate::algorithm::{Algorithm, Coupling};
 use crate::error::SystemError;
 use crate::exchange::{Reals, Values, call};
-use crate::solve::{Anderson, Newton, Progress, QuasiNewton, Scale, Solver};
+use solve::{Anderson, Newton, Progress, QuasiNewton, Scale, Solver};
 use crate::system::System;
 
 use fmu_description::CoSimulation;

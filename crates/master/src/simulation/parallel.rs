@@ -16,7 +16,7 @@ const WORTH: f64 = 0.9;
 /// One slave with a step to make.
 pub(crate) struct Task<'a> {
     pub(crate) slave: usize,
-    pub(crate) instance: &'a mut (dyn Slave + Send),
+    pub(crate) instance: &'a mut dyn Slave,
     pub(crate) step: Advance<'a>,
     pub(crate) done: Result<Stepped, CallError>,
 }

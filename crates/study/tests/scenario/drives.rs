@@ -24,7 +24,7 @@ fn told(text: &str, folder: &Path, times: &[f64]) -> Vec<(f64, Vec<String>)> {
 }
 
 fn take(told: &Told) -> Vec<String> {
-    std::mem::take(&mut *told.borrow_mut())
+    std::mem::take(&mut *told.lock().unwrap())
 }
 
 fn here() -> &'static Path {

@@ -6,9 +6,9 @@ mod examples;
 mod faults;
 mod refusals;
 
-use std::cell::RefCell;
+
 use std::path::Path;
-use std::rc::Rc;
+use std::sync::{Arc, Mutex};
 
 use fmu_description::Experiment;
 use fmu_description::ModelDescription;
@@ -16,7 +16,7 @@ use master::{CallError, Slave, Stepped, System};
 use study::scenario::{Prepared, Scenario, ScenarioError, Setup};
 
 /// What a slave was told: function, value references, values.
-type Told = Rc<RefCell<Vec<String>>>;
+type Told = Arc<Mutex<Vec<String>>>;
 
 /// Writes down what is set.
 struct Listener {
@@ -26,7 +26,7 @@ struct Listener {
 
 impl Listener {
     fn note(&self, function: &str, references: &[u32], values: impl std::fmt::Debug) {
-        self.told.borrow_mut().push(format!("{function} {references:?} {values:?}"));
+        self.told.lock().unwrap().push(format!("{function} {references:?} {values:?}"));
     }
 }
 

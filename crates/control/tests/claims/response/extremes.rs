@@ -3,9 +3,10 @@
 use super::CONTINUOUS;
 use crate::integers;
 use control::Domain;
+use control::StateSpace;
 use control::lyapunov::discrete_lyapunov;
 use control::response::{
-    System, energy, frequency_grid, frequency_response, h_infinity, peak_gain, step_response,
+    energy, frequency_grid, frequency_response, h_infinity, peak_gain, step_response,
 };
 use control::riccati::{Weights, kalman, lqr};
 use nalgebra::DMatrix;
@@ -48,7 +49,7 @@ fn responses_end_in_an_answer_or_an_error() {
         let contracted = a.map(|entry| entry % 1.0);
         let sampled = Domain::Sampled { period: 0.1 };
         for (a, domain) in [(a, CONTINUOUS), (contracted, sampled)] {
-            let system = System { a, b: b.clone(), c: c.clone(), d: d.clone(), domain };
+            let system = StateSpace { a, b: b.clone(), c: c.clone(), d: d.clone(), domain };
             let _ = peak_gain(&system, 1e-2).map(|gain| {
                 assert!(gain.lower.iter().zip(gain.upper.iter()).all(|(low, up)| low <= up));
             });

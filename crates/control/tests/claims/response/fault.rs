@@ -4,14 +4,14 @@ use super::{CONTINUOUS, RECORDED};
 use crate::paper::CONTROLLER_POLES;
 use crate::recorded::{Case, cases};
 use control::aso::{Estimator, FaultyPlant, Gains};
-use control::controller::Controller;
+use control::controller::{closed_loop, controller};
 use control::faults::ExtendedPlant;
 use control::hold::zero_order_hold;
-use control::placement::real;
+use control::placement::real_poles;
 use control::response::{
     fault_bounds, fault_rate_system, fault_system, peak_gain, reversal, step_response,
 };
-use control::sampled::{design, poles};
+use control::sampled::{design, sampled_poles};
 use control::{Domain, Error};
 use nalgebra::{DMatrix, DVector};
 
@@ -151,7 +151,7 @@ fn a_fast_sampled_loop_tends_to_the_continuous_one() {
     let slow = slow.unwrap();
     let h = 1e-4;
     let system = fault_system(&plant(0.5, 1.0), &gains(10.0, -20.0), CONTINUOUS).unwrap();
-    let sampled = control::response::System {
+    let sampled = control::StateSpace {
         a: DMatrix::identity(3, 3) + &system.a * h,
         b: &system.b * h,
         domain: Domain::Sampled { period: h },
@@ -171,14 +171,15 @@ fn a_fast_sampled_loop_tends_to_the_continuous_one() {
 fn the_sampled_loop_of_either_estimator_is_that_of_plant_and_controller() {
     let extended = ExtendedPlant::without_filter(crate::paper::plant());
     let period = 2e-3;
-    let in_z = |wanted: &[f64]| poles(&real(wanted), period).unwrap();
+    let in_z = |wanted: &[f64]| sampled_poles(&real_poles(wanted), period).unwrap();
     for estimator in [Estimator::Prediction, Estimator::Current] {
         let (k, l) = (in_z(&CONTROLLER_POLES), in_z(&[-50., -60., -70., -80., -90.]));
         let found = design(&extended, period, estimator, &k, &l, None).unwrap();
         let (plant, gains) = (&found.plant, &found.gains);
-        let controller = Controller::of(plant, gains).unwrap();
-        let whole = controller.closed_loop(plant, &[1.0]).unwrap();
-        let system = fault_system(plant, gains, Domain::Sampled { period }).unwrap();
+        let domain = Domain::Sampled { period };
+        let controller = controller(plant, gains, domain).unwrap();
+        let whole = closed_loop(plant, &controller, &[1.0]).unwrap();
+        let system = fault_system(plant, gains, domain).unwrap();
         let (mut both, mut state) = (DVector::zeros(9), DVector::zeros(9));
         let (mut largest, mut difference) = (0.0_f64, 0.0_f64);
         for _ in 0..2000 {

@@ -3,15 +3,14 @@
 use super::{CONTINUOUS, RECORDED, oscillator, single, system};
 use crate::matrix;
 use crate::recorded::cases;
-use control::response::{
-    System, energy, frequency_grid, frequency_response, h_infinity, peak_gain,
-};
+use control::StateSpace;
+use control::response::{energy, frequency_grid, frequency_response, h_infinity, peak_gain};
 use control::{Domain, Error};
 use nalgebra::DMatrix;
 use std::f64::consts::PI;
 
 #[track_caller]
-fn assert_bracketed(system: &System, expected: &DMatrix<f64>, slack: f64) {
+fn assert_bracketed(system: &StateSpace, expected: &DMatrix<f64>, slack: f64) {
     let found = peak_gain(system, 1e-3).expect("a gain");
     for (index, &exact) in expected.iter().enumerate() {
         let (lower, upper) = (found.lower[index], found.upper[index]);
@@ -82,9 +81,9 @@ fn unstable_systems_are_refused() {
     assert!(matches!(refused, Err(Error::NotHurwitz { matrix: "A", .. })), "{refused:?}");
     assert!(matches!(h_infinity(&unstable, 1e-3), Err(Error::NotHurwitz { .. })));
     assert!(matches!(energy(&unstable), Err(Error::NotHurwitz { .. })));
-    let sampled = System { domain: Domain::Sampled { period: 1.0 }, ..unstable };
+    let sampled = StateSpace { domain: Domain::Sampled { period: 1.0 }, ..unstable };
     assert!(peak_gain(&sampled, 1e-3).is_ok());
-    let sampled = System { a: matrix(1, 1, &[-1.0]), ..sampled };
+    let sampled = StateSpace { a: matrix(1, 1, &[-1.0]), ..sampled };
     assert!(matches!(peak_gain(&sampled, 1e-3), Err(Error::NotSchur { .. })));
 }
 
@@ -95,15 +94,15 @@ fn bad_arguments_are_named() {
         let refused = peak_gain(&good, width);
         assert!(matches!(refused, Err(Error::OutOfRange { name: "width", .. })), "{refused:?}");
     }
-    let wrong = System { d: DMatrix::zeros(2, 1), ..good.clone() };
+    let wrong = StateSpace { d: DMatrix::zeros(2, 1), ..good.clone() };
     let refused = peak_gain(&wrong, 1e-3);
     assert_eq!(refused, Err(Error::Shape { matrix: "D", expected: (1, 1), found: (2, 1) }));
     let refused = frequency_response(&good, &[1.0, f64::NAN]);
     assert!(matches!(refused, Err(Error::OutOfRange { name: "frequency", .. })), "{refused:?}");
-    let period = System { domain: Domain::Sampled { period: -1.0 }, ..good.clone() };
+    let period = StateSpace { domain: Domain::Sampled { period: -1.0 }, ..good.clone() };
     let refused = energy(&period);
     assert!(matches!(refused, Err(Error::OutOfRange { name: "period", .. })), "{refused:?}");
-    let direct = System { d: DMatrix::identity(1, 1), ..good };
+    let direct = StateSpace { d: DMatrix::identity(1, 1), ..good };
     assert!(matches!(energy(&direct), Err(Error::OutOfRange { name: "D", .. })));
 }
 
@@ -116,7 +115,7 @@ fn norms_agree_with_slycot() {
         let (norm, exact) = (h_infinity(&system, 1e-9).unwrap(), case.number("hinf"));
         assert!((norm.lower / exact - 1.0).abs() < 1e-8, "{}: {norm:?} {exact}", case.name);
         assert!(norm.upper <= norm.lower * (1.0 + 1.1e-9));
-        let strict = System { d: system.d.clone() * 0.0, ..system.clone() };
+        let strict = StateSpace { d: system.d.clone() * 0.0, ..system.clone() };
         let (h2, exact) = (energy(&strict).unwrap().h2, case.number("h2"));
         assert!((h2 / exact - 1.0).abs() < 1e-10, "{}: {h2} {exact}", case.name);
         let points = frequency_response(&system, case.get("frequencies").as_slice()).unwrap();
@@ -158,12 +157,12 @@ fn the_grid_reaches_from_a_tenth_of_the_slowest_to_ten_times_the_fastest() {
     let grid = frequency_grid(&slow, 10).unwrap();
     assert!((grid[0] - 0.2).abs() < 1e-12 && (grid[grid.len() - 1] - 3000.0).abs() < 1e-9);
     assert!(grid.windows(2).all(|pair| pair[1] > pair[0] && pair[1] / pair[0] < 1.26));
-    let sampled = System {
+    let sampled = StateSpace {
         a: slow.a.map(|x| (0.01 * x).exp()),
         domain: Domain::Sampled { period: 0.01 },
         ..slow
     };
-    let sampled = System { a: DMatrix::from_diagonal(&sampled.a.diagonal()), ..sampled };
+    let sampled = StateSpace { a: DMatrix::from_diagonal(&sampled.a.diagonal()), ..sampled };
     let grid = frequency_grid(&sampled, 10).unwrap();
     assert!((grid[grid.len() - 1] - PI / 0.01).abs() < 1e-9);
 }
@@ -177,11 +176,11 @@ fn the_energy_to_peak_norm_is_reached_by_the_reversed_impulse_response() {
     let found = energy(&lag).unwrap();
     assert!((found.peak - (36.0_f64 / 8.0).sqrt()).abs() < 1e-14);
     // Two outputs of one state: the Euclidean peak is the longer diagonal.
-    let two = System { c: matrix(2, 1, &[2.0, -1.5]), d: DMatrix::zeros(2, 1), ..lag };
+    let two = StateSpace { c: matrix(2, 1, &[2.0, -1.5]), d: DMatrix::zeros(2, 1), ..lag };
     let found = energy(&two).unwrap();
     assert!((found.peak - 2.5 * (9.0_f64 / 8.0).sqrt()).abs() < 1e-14);
     assert!((found.peaks[1] - 1.5 * (9.0_f64 / 8.0).sqrt()).abs() < 1e-14);
-    let sampled = System {
+    let sampled = StateSpace {
         a: matrix(1, 1, &[0.5]),
         d: matrix(2, 1, &[1.0, 0.0]),
         domain: Domain::Sampled { period: 0.1 },

@@ -2,11 +2,12 @@
 
 use super::{CONTINUOUS, oscillator, single};
 use crate::matrix;
-use control::response::{System, Trace, ramp_response, step_response};
+use control::StateSpace;
+use control::response::{TimeResponse, ramp_response, step_response};
 use control::{Domain, Error};
 use nalgebra::DMatrix;
 
-fn largest_step(trace: &Trace) -> f64 {
+fn largest_step(trace: &TimeResponse) -> f64 {
     let range = trace.output.max() - trace.output.min();
     let change = |k: usize| (trace.output[(0, k + 1)] - trace.output[(0, k)]).abs();
     (0..trace.time.len() - 1).map(change).fold(0.0, f64::max) / range
@@ -22,7 +23,7 @@ fn an_oscillator_overshoots_as_the_textbook_says() {
         let found = trace.transient(0, 0.02);
         assert!((found.peak - 1.0 - overshoot).abs() < 1e-6, "{zeta}: {found:?}");
         assert!((found.peak_time * damped / std::f64::consts::PI - 1.0).abs() < 1e-3);
-        assert!((found.settled - 1.0).abs() < 1e-14);
+        assert!((found.final_value - 1.0).abs() < 1e-14);
         for (k, &t) in trace.time.iter().enumerate() {
             let (cosine, sine) = ((damped * t).cos(), (damped * t).sin());
             let exact = 1.0 - (-zeta * w * t).exp() * (cosine + zeta * w / damped * sine);
@@ -36,7 +37,7 @@ fn a_lag_settles_after_the_logarithm_of_the_band() {
     let lag = single(matrix(1, 1, &[-5.0]), &[10.0], &[1.0], CONTINUOUS);
     let found = step_response(&lag, 0).unwrap().transient(0, 0.02);
     assert!((found.settling_time - 50.0_f64.ln() / 5.0).abs() < 2e-4, "{found:?}");
-    assert!((found.settled - 2.0).abs() < 1e-15);
+    assert!((found.final_value - 2.0).abs() < 1e-15);
 }
 
 /// 1 - e^-t + 1 - e^(-1e5 t): both parts are resolved, with a few hundred points.
@@ -93,7 +94,7 @@ fn sampled_responses_are_those_of_the_recursion() {
             state = &system.a * state + &system.b * input;
         }
         assert_eq!(seen, trace.time.len());
-        assert!((trace.settled[0] - (&system.c * &state)[0]).abs() < 1e-9);
+        assert!((trace.final_value[0] - (&system.c * &state)[0]).abs() < 1e-9);
     }
 }
 
@@ -104,7 +105,7 @@ fn bad_arguments_are_named() {
     assert!(matches!(refused, Err(Error::OutOfRange { name: "input", .. })), "{refused:?}");
     let refused = ramp_response(&good, 0, 0.0);
     assert!(matches!(refused, Err(Error::OutOfRange { name: "duration", .. })), "{refused:?}");
-    let unstable = System { a: -good.a.clone(), ..good };
+    let unstable = StateSpace { a: -good.a.clone(), ..good };
     assert!(matches!(step_response(&unstable, 0), Err(Error::NotHurwitz { .. })));
     let light = oscillator(1.0, 1e-6);
     assert!(matches!(step_response(&light, 0), Err(Error::NotConverged { .. })));

@@ -1,0 +1,31 @@
+//! Matrices made of blocks, and parts of matrices.
+
+use nalgebra::{Complex, DMatrix};
+
+/// [above; below].
+pub(crate) fn stacked(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut both = above.clone().resize_vertically(above.nrows() + below.nrows(), 0.0);
+    both.rows_mut(above.nrows(), below.nrows()).copy_from(below);
+    both
+}
+
+/// [a, b; c, d], whose blocks may have any fitting shapes.
+pub(crate) fn block_2x2([a, b]: [&DMatrix<f64>; 2], [c, d]: [&DMatrix<f64>; 2]) -> DMatrix<f64> {
+    let ((rows, cols), (below, right)) = (a.shape(), d.shape());
+    let mut whole = DMatrix::zeros(rows + below, cols + right);
+    whole.view_mut((0, 0), (rows, cols)).copy_from(a);
+    whole.view_mut((0, cols), (rows, right)).copy_from(b);
+    whole.view_mut((rows, 0), (below, cols)).copy_from(c);
+    whole.view_mut((rows, cols), (below, right)).copy_from(d);
+    whole
+}
+
+/// The symmetric part (M + M') / 2.
+pub(crate) fn symmetric_part(m: &DMatrix<f64>) -> DMatrix<f64> {
+    (m + m.transpose()) * 0.5
+}
+
+/// A real matrix as a complex one.
+pub(crate) fn to_complex(m: &DMatrix<f64>) -> DMatrix<Complex<f64>> {
+    m.map(|entry| Complex::new(entry, 0.0))
+}

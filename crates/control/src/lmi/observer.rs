@@ -1,0 +1,264 @@
+//! The semidefinite program for an observer gain, and the coordinates in which it is solved.
+//!
+//! The inequalities for A - L C contain the product P L of two unknowns. With Z = P L they are linear:
+//!
+//! ```text
+//! P (A - L C) = P A - Z C,  P (B - L D_y) = P B - Z D_y,  L = P^-1 Z
+//! ```
+//!
+//! Source: M. Chilali and P. Gahinet, H-infinity design with pole placement constraints: an LMI
+//! approach, IEEE Trans. Autom. Control 41 (1996), section IV, for the dual problem of state feedback.
+
+use super::affine::Affine;
+use super::coordinates::{Coordinates, mean_eigenvalue};
+use super::gain::{GainInequality, GainScaling, Norm};
+use super::region::{Disc, MARGIN, Region};
+use super::synthesis::{Performance, Synthesis};
+use super::{Outcome, Problem, Solution};
+use crate::balance::{divide_columns, divide_rows, power_of_two};
+use crate::eigen::eigenvalues;
+use crate::rank::observability;
+use crate::{Domain, Error};
+use nalgebra::{Complex, DMatrix, DVector};
+
+/// The bound for which a gain is designed, relative to the smallest bound.
+const RELAXED_BOUND: f64 = 1.05;
+/// The bound of norm(P L) within which a gain is designed, relative to the smallest one.
+const RELAXED_GAIN: f64 = 2.0;
+/// How often the coordinates are refined before the search ends without a gain.
+const REFINEMENTS: usize = 3;
+/// Bound of P and of norm(P L) in the solver's coordinates when a performance is required.
+const LARGEST: f64 = 1e6;
+
+const OUT_OF_RANGE: &str = "a gain exists, but none could be proven in double precision";
+const NOT_DEFINITE: &str = "P is not positive definite in double precision";
+
+/// A gain that the solver found, not yet proven, and coordinates in which its P is the identity.
+pub(super) struct Candidate {
+    pub(super) gain: DMatrix<f64>,
+    pub(super) coordinates: Coordinates,
+}
+
+/// The requirements on an observer gain L: eigenvalues of A - L C in `region`, and the norm of the
+/// system {A - L C, B - L `D_y`, E, 0} of `performance`.
+#[derive(Clone, Copy)]
+pub(super) struct ObserverRequirements<'a> {
+    /// n x n.
+    pub(super) a: &'a DMatrix<f64>,
+    /// p x n.
+    pub(super) c: &'a DMatrix<f64>,
+    pub(super) region: Region,
+    pub(super) performance: Option<&'a Performance>,
+    pub(super) domain: Domain,
+}
+
+impl ObserverRequirements<'_> {
+    /// Searches for a gain that passes `proof`.
+    ///
+    /// The program is solved in [`Coordinates::of_observation`] first, then up to three times in
+    /// coordinates in which the most interior P of the program before becomes the identity.
+    pub(super) fn search(
+        self,
+        proof: impl Fn(Candidate) -> Result<Outcome<Synthesis>, Error>,
+    ) -> Result<Outcome<Synthesis>, Error> {
+        let (speed, unit) = self.speed()?;
+        let mut coordinates = Coordinates::of_observation(self.a, self.c, speed, unit)?;
+        let mut refinements = 0;
+        loop {
+            let program = ObserverProgram::new(self, coordinates);
+            let outcome = program.candidate()?.then(&proof)?;
+            if matches!(outcome, Outcome::Optimal(_)) {
+                return Ok(outcome);
+            }
+            let refined =
+                if refinements < REFINEMENTS { program.refined_coordinates() } else { None };
+            let Some(refined) = refined else { return self.plausible(outcome) };
+            coordinates = refined;
+            refinements += 1;
+        }
+    }
+
+    /// The outcome, unless the solver reports a conflict between parts of the region although a gain
+    /// exists: when all states are observable and the parts have a real interval in common, all
+    /// eigenvalues can be assigned there.
+    fn plausible(self, outcome: Outcome<Synthesis>) -> Result<Outcome<Synthesis>, Error> {
+        if let Outcome::Infeasible { conflict } = &outcome
+            && !conflict.contains(&"gain")
+            && self.region.has_real_numbers(self.domain)
+            && observability(self.a, self.c)?.is_full()
+        {
+            return Ok(Outcome::Inconclusive(OUT_OF_RANGE));
+        }
+        Ok(outcome)
+    }
+
+    /// A power of two near the distance by which eigenvalues are moved, and the unit of frequency.
+    ///
+    /// The distance is that from the mean eigenvalue of A to the target (the centre of the disc, else
+    /// the limit of the decay rate), at least the largest distance of an eigenvalue of A from the
+    /// mean. The unit of frequency is that distance in continuous time, 1 in sampled time.
+    fn speed(self) -> Result<(f64, f64), Error> {
+        let mean = mean_eigenvalue(self.a);
+        let distance = |value: &Complex<f64>| (value - Complex::new(mean, 0.0)).norm();
+        let spread = eigenvalues(self.a)?.iter().map(distance).fold(0.0, f64::max);
+        let limit = |alpha: f64| match self.domain {
+            Domain::Continuous => -alpha,
+            Domain::Sampled { period } => (-alpha * period).exp(),
+        };
+        let disc = self.region.disc.map(|Disc { center, .. }| center);
+        let target = disc.or(self.region.decay.map(limit)).unwrap_or(mean);
+        let speed = spread.max((target - mean).abs());
+        let speed = if speed > 0.0 { power_of_two(speed) } else { 1.0 };
+        Ok((speed, if self.domain == Domain::Continuous { speed } else { 1.0 }))
+    }
+}
+
+/// The semidefinite program for L in given coordinates.
+struct ObserverProgram<'a> {
+    requirements: ObserverRequirements<'a>,
+    coordinates: Coordinates,
+    /// Units of the measurements: powers of two near the lengths of the rows of C in the coordinates.
+    units: DVector<f64>,
+}
+
+/// A semidefinite program and its unknowns P (n x n) and Z (n x p).
+struct Program {
+    problem: Problem,
+    p: Affine,
+    z: Affine,
+}
+
+impl<'a> ObserverProgram<'a> {
+    fn new(requirements: ObserverRequirements<'a>, coordinates: Coordinates) -> Self {
+        let c = coordinates.output(requirements.c);
+        let units = DVector::from_fn(c.nrows(), |row, _| {
+            let norm = c.row(row).norm();
+            if norm > 0.0 { power_of_two(norm) } else { 1.0 }
+        });
+        Self { requirements, coordinates, units }
+    }
+
+    /// Coordinates in which the most interior P of the program is the identity.
+    fn refined_coordinates(&self) -> Option<Coordinates> {
+        let Program { problem, p, .. } = self.program(None);
+        self.coordinates.refined(&p.evaluate(&problem.most_interior()?))
+    }
+
+    /// A gain for the given bound; without one, a gain as far inside of all inequalities as possible
+    /// at a level slightly above the smallest, or else the gain of the smallest level itself.
+    fn candidate(&self) -> Result<Outcome<Candidate>, Error> {
+        let performance = self.requirements.performance;
+        if let Some((performance, gamma)) =
+            performance.and_then(|given| Some((given, given.gamma?)))
+        {
+            return self.solve(&self.program(Some(self.scaling(performance).level(gamma))));
+        }
+        let relaxation = match performance {
+            None => RELAXED_GAIN,
+            Some(given) if given.norm == Norm::HInfinity => RELAXED_BOUND,
+            Some(_) => RELAXED_BOUND * RELAXED_BOUND,
+        };
+        let program = self.program(None);
+        if let Some((smallest, _)) = program.problem.minimum()
+            && let Outcome::Optimal(candidate) =
+                self.solve(&self.program(Some(smallest * relaxation)))?
+        {
+            return Ok(Outcome::Optimal(candidate));
+        }
+        self.solve(&program)
+    }
+
+    fn solve(&self, program: &Program) -> Result<Outcome<Candidate>, Error> {
+        program.problem.solve()?.then(|solution| Ok(self.recovered(&solution, program)))
+    }
+
+    /// L = P^-1 Z, in the coordinates of the data.
+    fn recovered(&self, solution: &Solution, program: &Program) -> Outcome<Candidate> {
+        let (p, z) = (solution.value(&program.p), solution.value(&program.z));
+        let parts = p.clone().cholesky().zip(self.coordinates.refined(&p));
+        let Some((factor, coordinates)) = parts else {
+            return Outcome::Inconclusive(NOT_DEFINITE);
+        };
+        let l = divide_columns(&factor.solve(&z), &self.units);
+        Outcome::Optimal(Candidate { gain: self.coordinates.gain(&l), coordinates })
+    }
+
+    /// The program at a given level, or with the level minimised.
+    ///
+    /// ```text
+    /// the inequalities of the region for P and P A - Z C
+    /// without performance:  P >= I,  [t I, Z; Z', t I] >= 0
+    /// with performance:     0 < P <= 1e6 I,  [1e6 I, Z; Z', 1e6 I] >= 0,
+    ///                       the inequalities of the norm at level t
+    /// ```
+    fn program(&self, level: Option<f64>) -> Program {
+        let ObserverRequirements { a, c, region, performance, domain } = self.requirements;
+        let (n, outputs) = (a.nrows(), c.nrows());
+        let c = divide_rows(&self.coordinates.output(c), &self.units);
+        let mut problem = Problem::new();
+        let (p, z) = (problem.symmetric(n), problem.rectangular(n, outputs));
+        let dynamics = &(&p * &self.coordinates.dynamics(a)) - &(&z * &c);
+        for (name, matrix) in region.inequalities(&p, &dynamics, domain, self.coordinates.unit) {
+            problem.require(name, &matrix, MARGIN);
+        }
+        let level = match level {
+            Some(given) => Affine::identity(1, given),
+            None => {
+                let unknown = problem.scalar();
+                problem.minimise(&unknown);
+                unknown
+            }
+        };
+        if let Some(performance) = performance {
+            problem.constrain(&p, MARGIN);
+            problem.constrain(&(&Affine::identity(n, LARGEST) - &p), MARGIN);
+            problem.constrain(&norm_below(&z, &Affine::identity(1, LARGEST)), MARGIN);
+            for matrix in self.gain_inequalities(performance, (&p, &z), dynamics, &level) {
+                problem.require("gain", &matrix, MARGIN);
+            }
+        } else {
+            problem.constrain(&p, 1.0);
+            problem.constrain(&norm_below(&z, &level), MARGIN);
+        }
+        Program { problem, p, z }
+    }
+
+    /// The inequalities of the norm of {A - L C, B - L `D_y`, E, 0}; `dynamics` is P (A - L C).
+    fn gain_inequalities(
+        &self,
+        performance: &Performance,
+        (p, z): (&Affine, &Affine),
+        dynamics: Affine,
+        level: &Affine,
+    ) -> Vec<Affine> {
+        let scaling = self.scaling(performance);
+        let (b, e, _) = scaling.scale(
+            &self.coordinates.input(&performance.disturbance),
+            &self.coordinates.output(&performance.output),
+            &performance.feedthrough,
+        );
+        let d_y = divide_rows(&performance.feedthrough, &self.units) / scaling.disturbance();
+        let inequality = GainInequality {
+            p: p.clone(),
+            dynamics,
+            input: &(p * &b) - &(z * &d_y),
+            output: Affine::constant(&e),
+            feedthrough: Affine::zeros(e.nrows(), b.ncols()),
+            level: level.clone(),
+        };
+        inequality.matrices(performance.norm, self.requirements.domain)
+    }
+
+    fn scaling(&self, performance: &Performance) -> GainScaling {
+        let b = self.coordinates.input(&performance.disturbance);
+        let e = self.coordinates.output(&performance.output);
+        GainScaling::new(performance.norm, &b, &e, self.coordinates.unit)
+    }
+}
+
+/// [t I, Z; Z', t I], which is positive semidefinite if and only if the norm of Z is at most t.
+fn norm_below(z: &Affine, t: &Affine) -> Affine {
+    let (rows, cols) = z.shape();
+    let t_identity = |order: usize| t.times(&DMatrix::identity(order, order));
+    Affine::blocks(&[&[&t_identity(rows), z], &[&z.transpose(), &t_identity(cols)]])
+}

@@ -1,0 +1,90 @@
+//! The two equations with R = I: gain, left side, and the sum of the absolute terms.
+
+use crate::Domain;
+use crate::blocks::symmetric_part;
+use crate::lyapunov::{self, Equation, relative};
+use nalgebra::DMatrix;
+
+/// What differs between continuous and sampled time, for the weights Q, N and R = I.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct RiccatiEquation {
+    pub(super) a: DMatrix<f64>,
+    pub(super) b: DMatrix<f64>,
+    pub(super) q: DMatrix<f64>,
+    pub(super) n: DMatrix<f64>,
+    pub(super) domain: Domain,
+}
+
+impl RiccatiEquation {
+    /// K = -(B' P + N'), sampled -(I + B' P B)^-1 (B' P A + N'); None if it cannot be computed.
+    pub(super) fn gain(&self, p: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let effect = self.b.tr_mul(p);
+        match self.domain {
+            Domain::Continuous => Some(-(effect + self.n.transpose())),
+            Domain::Sampled { .. } => {
+                let size = symmetric_part(&(&effect * &self.b)) + identity(self.b.ncols());
+                size.cholesky().map(|size| -size.solve(&(effect * &self.a + self.n.transpose())))
+            }
+        }
+    }
+
+    /// The left side of the equation. With the optimal K it is also that of the Lyapunov equation
+    /// for A + B K, in which an error of K is felt to second order only:
+    /// (A + B K)' P (A + B K) - P + Q + N K + K' N' + K' K, and likewise in continuous time.
+    pub(super) fn left_side(&self, p: &DMatrix<f64>, gain: &DMatrix<f64>) -> DMatrix<f64> {
+        let cross = &self.n * gain;
+        let cost = &self.q + &cross + cross.transpose() + gain.tr_mul(gain);
+        let closed = &self.a + &self.b * gain;
+        symmetric_part(&match self.domain {
+            Domain::Continuous => closed.tr_mul(p) + p * closed + cost,
+            Domain::Sampled { .. } => closed.tr_mul(p) * closed - p + cost,
+        })
+    }
+
+    /// Largest entry of the left side relative to the absolute terms it is made of.
+    pub(super) fn residual(&self, p: &DMatrix<f64>) -> f64 {
+        let Some(gain) = self.gain(p) else { return f64::INFINITY };
+        let left = self.left_side(p, &gain);
+        if left.iter().any(|entry| !entry.is_finite()) {
+            return f64::INFINITY;
+        }
+        let (a, b, n, size) = (self.a.abs(), self.b.abs(), self.n.abs(), p.abs());
+        let effect = b.tr_mul(&size);
+        let terms = match self.domain {
+            Domain::Continuous => {
+                let feedback = effect + n.transpose();
+                a.tr_mul(&size) + &size * &a + feedback.tr_mul(&feedback)
+            }
+            Domain::Sampled { .. } => {
+                let closed = a + b * gain.abs();
+                let cross = n * gain.abs();
+                closed.tr_mul(&size) * &closed
+                    + &size
+                    + &cross
+                    + cross.transpose()
+                    + gain.abs().tr_mul(&gain.abs())
+            }
+        };
+        relative(&left, &(terms + self.q.abs()))
+    }
+
+    /// One step of Newton's method; None when A + B K is not stable or the step cannot be computed.
+    pub(super) fn newton(&self, p: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let gain = self.gain(p)?;
+        let closed = &self.a + &self.b * &gain;
+        crate::stability::require_stable("A + B K", &closed, self.domain).ok()?;
+        let step = self.equation().solve(&closed, &self.left_side(p, &gain)).ok()?;
+        Some(symmetric_part(&(p + step)))
+    }
+
+    fn equation(&self) -> &'static Equation {
+        match self.domain {
+            Domain::Continuous => &lyapunov::CONTINUOUS,
+            Domain::Sampled { .. } => &lyapunov::DISCRETE,
+        }
+    }
+}
+
+pub(super) fn identity(order: usize) -> DMatrix<f64> {
+    DMatrix::identity(order, order)
+}

@@ -1,0 +1,14 @@
+//! Runs a system.toml and prints the file of its results.
+use std::ops::ControlFlow;
+
+use study::{Ended, Loaded, Making, Prepared};
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let path = std::env::args().nth(1).ok_or("expected a system.toml")?;
+    let mut run = Prepared::new(Loaded::read(path.as_ref())?, &Making::default())?.start(None)?;
+    if let Ended::Lost(error) = run.advance(|_| Ok(ControlFlow::Continue(()))) {
+        return Err(error.into());
+    }
+    println!("{}", run.finish()?.ok_or("nothing was recorded")?.display());
+    Ok(())
+}

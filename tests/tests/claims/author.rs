@@ -1,0 +1,238 @@
+//! What the author of a model meets: the examples, `aso-ftc new`, `aso-ftc pack PATH`.
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use fmu_description::ModelDescription;
+use fmu_description::package::Unpacked;
+use tests::{command, root};
+
+const EXAMPLES: [&str; 4] = ["van-der-pol", "bouncing-ball", "pid", "lookup-table"];
+
+/// Runs the command in `folder`; the libraries share what they are built of, so that no two tests
+/// may use the same name for a crate.
+fn run_in(folder: &Path, arguments: &[&str]) -> Output {
+    let libraries = root().join("target/author");
+    let mut command = Command::new(command());
+    command.current_dir(folder).env("CARGO_TARGET_DIR", libraries).args(arguments).output().unwrap()
+}
+
+fn message(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// Checks that the command refuses with status 2 and a message that has all of `parts`.
+fn refuses(folder: &Path, arguments: &[&str], parts: &[&str]) {
+    let output = run_in(folder, arguments);
+    let message = message(&output);
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+    for part in parts {
+        assert!(message.contains(part), "{part:?} is not in {message:?}");
+    }
+    assert!(!message.contains("panicked"), "{message}");
+}
+
+/// Makes the crate `name` in `folder`, with the versions of this workspace: nothing is fetched.
+fn new_crate(folder: &Path, name: &str) {
+    let output = run_in(folder, &["new", name]);
+    assert!(output.status.success(), "{}", message(&output));
+    fs::copy(root().join("Cargo.lock"), folder.join(name).join("Cargo.lock")).unwrap();
+}
+
+/// Replaces `old` in the file, where it must be.
+fn edit(path: &Path, old: &str, new: &str) {
+    let text = fs::read_to_string(path).unwrap();
+    assert!(text.contains(old), "{old:?} is not in {}", path.display());
+    fs::write(path, text.replace(old, new)).unwrap();
+}
+
+#[test]
+fn a_model_is_one_file_of_fewer_than_60_lines() {
+    // The van der Pol oscillator has both interfaces and directional derivatives.
+    for example in EXAMPLES.into_iter().filter(|example| *example != "van-der-pol") {
+        let path = root().join("examples").join(example).join("src/lib.rs");
+        let text = fs::read_to_string(&path).unwrap();
+        let export = text.lines().position(|line| line.starts_with("fmu::export!")).unwrap();
+        assert!(export + 1 < 60, "{example}: the export line is line {}", export + 1);
+        assert!(text.contains("#![forbid(unsafe_code)]"), "{example}");
+    }
+}
+
+#[test]
+fn a_new_crate_is_packed_to_the_same_bytes_in_any_folder_and_with_the_files_of_its_author() {
+    let folders = [(); 2].map(|()| tempfile::tempdir().unwrap());
+    let [one, other] = folders.each_ref().map(|folder| {
+        new_crate(folder.path(), "heat-pump");
+        fs::write(folder.path().join("heat-pump/LICENSE"), "To be used by nobody.").unwrap();
+        let output = run_in(folder.path(), &["pack", "heat-pump", "--out", "."]);
+        assert!(output.status.success(), "{}", message(&output));
+        fs::read(folder.path().join("HeatPump.fmu")).unwrap()
+    });
+    assert!(one == other);
+    let fmu = Unpacked::open_whole(&folders[0].path().join("HeatPump.fmu")).unwrap();
+    let library = fs::read(fmu.library("HeatPump").unwrap()).unwrap();
+    let home = std::env::var("HOME").unwrap_or_default();
+    for path in [folders[0].path(), &root(), Path::new(&home)] {
+        let path = path.display().to_string();
+        let found = library.windows(path.len()).any(|bytes| bytes == path.as_bytes());
+        assert!(!found, "the library contains {path}");
+    }
+    let licenses = fmu.folder().join("documentation/licenses");
+    let entry = fs::read_to_string(licenses.join("license.txt")).unwrap();
+    assert!(entry.starts_with("heat-pump 0.1.0: no licence is stated\n\nTo be used by nobody."));
+    assert!(fs::read_dir(&licenses).unwrap().count() > 5);
+    let page = fs::read_to_string(fmu.folder().join("documentation/index.html")).unwrap();
+    assert!(page.contains("T_outside"));
+    assert!(!fmu.folder().join("model.png").exists());
+    packs_the_files_of_the_author(folders[1].path());
+}
+
+/// The files of the author, packed as they are; the library is built already.
+fn packs_the_files_of_the_author(place: &Path) {
+    let own = place.join("heat-pump");
+    let files =
+        ["resources/maps/a.csv", "documentation/index.html", "documentation/pictures/b.svg"];
+    for path in files {
+        fs::create_dir_all(own.join(path).parent().unwrap()).unwrap();
+        fs::write(own.join(path), path).unwrap();
+    }
+    let picture = b"\x89PNG\r\n\x1a\n and more";
+    fs::write(own.join("model.png"), picture).unwrap();
+    let output = run_in(&own, &["pack", "."]);
+    assert!(output.status.success(), "{}", message(&output));
+    let fmu = Unpacked::open_whole(&own.join("dist/HeatPump.fmu")).unwrap();
+    for path in files {
+        assert_eq!(fs::read_to_string(fmu.folder().join(path)).unwrap(), path);
+    }
+    assert_eq!(fs::read(fmu.folder().join("model.png")).unwrap(), picture);
+    fs::write(own.join("model.png"), "GIF89a").unwrap();
+    refuses(&own, &["pack", "."], &["model.png", "expected a PNG file"]);
+}
+
+#[test]
+fn another_table_gives_the_same_library_other_variables() {
+    let folder = tempfile::tempdir().unwrap();
+    let example = root().join("examples/lookup-table").display().to_string();
+    let output = run_in(folder.path(), &["pack", &example, "--out", "."]);
+    assert!(output.status.success(), "{}", message(&output));
+    let fmu = Unpacked::open(&folder.path().join("LookupTable.fmu")).unwrap();
+    let library = fmu.library("LookupTable").unwrap();
+    let names = |table: &str| {
+        fs::write(folder.path().join("table.csv"), table).unwrap();
+        let xml =
+            fmu_import::describe(&library, folder.path()).map_err(|error| error.to_string())?;
+        let description = ModelDescription::parse(xml.as_bytes()).unwrap();
+        let names = description.variables.iter().skip(1).map(|variable| variable.name.clone());
+        Ok(names.collect::<Vec<_>>())
+    };
+    assert_eq!(names("alpha,lift\n0,0\n1,2\n"), Ok(vec!["alpha".to_owned(), "lift".to_owned()]));
+    for table in
+        ["", "x,y\n", "x,y\n0,0\n", "x,y\n1,0\n1,1\n", "x,y\n0,0\n1,inf\n", "x,y\n0,a\n1,0\n"]
+    {
+        let refusal: String = names(table).unwrap_err();
+        assert!(refusal.contains("table.csv"), "{refusal}");
+    }
+}
+
+#[test]
+fn broken_rules_of_the_table_are_told_with_the_section_by_the_first_test_and_by_the_packer() {
+    let folder = tempfile::tempdir().unwrap();
+    new_crate(folder.path(), "broken-table");
+    let model = folder.path().join("broken-table/src/lib.rs");
+    edit(&model, "real(\"T_outside\"", "real(\"power\"");
+    edit(&model, ".range(1e-9, 1e9)", ".range(1e9, 1e-9)");
+    let parts = ["\"power\" is there twice", "2.2.7", "max"];
+    refuses(folder.path(), &["pack", "broken-table"], &parts);
+    let output = Command::new("cargo")
+        .current_dir(folder.path().join("broken-table"))
+        .env("CARGO_TARGET_DIR", root().join("target/author"))
+        .args(["test", "--quiet"])
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stdout).into_owned() + &message(&output);
+    assert!(!output.status.success());
+    for part in parts {
+        assert!(said.contains(part) || said.contains(&part.replace('"', "\\\"")), "{said}");
+    }
+    assert!(!folder.path().join("dist").exists());
+}
+
+#[test]
+fn what_is_no_crate_with_a_model_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let refuses = |parts: &[&str]| refuses(folder.path(), &["pack", "own"], parts);
+    let own = folder.path().join("own");
+    fs::create_dir_all(own.join("src")).unwrap();
+    refuses(&["own", "there is no", "Cargo.toml"]);
+    fs::write(own.join("Cargo.toml"), "[workspace]\nmembers = []\n").unwrap();
+    refuses(&["own", "no members"]);
+    fs::create_dir_all(own.join("member/src")).unwrap();
+    fs::write(own.join("member/Cargo.toml"), "[package]\nname = \"member\"\n").unwrap();
+    fs::write(own.join("member/src/lib.rs"), "").unwrap();
+    fs::write(own.join("Cargo.toml"), "[workspace]\nmembers = [\"member\"]\n").unwrap();
+    refuses(&["Cargo.toml is a workspace", "one of its crates"]);
+    let manifest = "[package]\nname = \"own\"\nedition = \"2024\"\n[workspace]\n[lib]\n";
+    fs::write(own.join("Cargo.toml"), manifest).unwrap();
+    fs::write(own.join("src/lib.rs"), "pub fn nothing() {}\n").unwrap();
+    refuses(&["Cargo.toml", "crate-type = [\"cdylib\"]"]);
+    fs::write(own.join("Cargo.toml"), format!("{manifest}crate-type = [\"cdylib\"]\n")).unwrap();
+    refuses(&["does not describe itself", "fmuDescribe"]);
+    fs::write(own.join("src/lib.rs"), "pub fn nothing() {\n").unwrap();
+    refuses(&["unclosed delimiter", "could not build"]);
+    fs::write(own.join("Cargo.toml"), "[package\n").unwrap();
+    refuses(&["cannot pack own", "Cargo.toml"]);
+    assert!(!folder.path().join("dist").exists());
+}
+
+#[test]
+fn bad_names_and_existing_folders_are_refused_and_nothing_is_left() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = folder.path();
+    for name in ["", "2nd", "Heat", "heat pump", "heat--pump", "wärme", "heat/pump", "-", "../up"]
+    {
+        refuses(place, &["new", "--", name], &["gives no identifier", "heat-pump"]);
+    }
+    for name in ["serde", "fmu", "self", "con", "model"] {
+        refuses(place, &["new", name], &[name, "taken"]);
+    }
+    refuses(place, &["new", &"long".repeat(20)], &["80 characters", "at most 64"]);
+    refuses(place, &["new", "pump", "--fmu", "nowhere"], &["nowhere", "crate fmu"]);
+    assert_eq!(fs::read_dir(place).unwrap().count(), 0);
+    fs::create_dir(place.join("pump")).unwrap();
+    fs::write(place.join("file"), "mine").unwrap();
+    refuses(place, &["new", "pump"], &["pump exists already"]);
+    refuses(place, &["new", "pump", "--path", "file"], &["file exists already"]);
+    refuses(place, &["new", "pump", "--path", "file/pump"], &["cannot write", "file"]);
+    assert_eq!(fs::read_dir(place.join("pump")).unwrap().count(), 0);
+    assert_eq!(fs::read_dir(place).unwrap().count(), 2);
+}
+
+#[test]
+fn a_new_crate_depends_on_the_fmu_that_it_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let own = root().join("crates/fmu").display().to_string();
+    let url = "https://example.org/fmu.git";
+    let kinds = [("a", None, "path", own.as_str()), ("b", Some(url), "git", url)];
+    let mut files = BTreeSet::new();
+    for (name, source, key, expected) in kinds {
+        let mut arguments = vec!["new", name, "--path"];
+        let target = format!("deep/down/{name}");
+        arguments.push(&target);
+        arguments.extend(source.iter().flat_map(|source| ["--fmu", source]));
+        let output = run_in(folder.path(), &arguments);
+        assert!(output.status.success(), "{}", message(&output));
+        let manifest = fs::read_to_string(folder.path().join(&target).join("Cargo.toml")).unwrap();
+        let manifest: toml::Table = manifest.parse().unwrap();
+        assert_eq!(manifest["dependencies"]["fmu"][key].as_str(), Some(expected));
+        files.extend(
+            fs::read_dir(folder.path().join(&target))
+                .unwrap()
+                .map(|item| item.unwrap().file_name().into_string().unwrap()),
+        );
+    }
+    let expected = [".gitignore", "Cargo.toml", "README.md", "src"].map(str::to_owned);
+    assert_eq!(files, BTreeSet::from(expected));
+}

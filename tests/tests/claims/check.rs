@@ -1,0 +1,130 @@
+//! `aso-ftc check` on FMUs in C that misbehave: whatever one does to its process is a finding.
+#![cfg(target_os = "linux")]
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+use tests::c_fmu::CFmu;
+use tests::run;
+
+/// With that behaviour, which begins at 0.5 s: within the ten steps of a trial.
+fn fmu(behaviour: &str) -> CFmu {
+    CFmu::that(behaviour).proposing(0.0625)
+}
+
+/// Exit status and findings of `check --json`.
+fn check(fmu: &CFmu, more: &[&str]) -> (Option<i32>, Vec<Value>) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = fmu.write(folder.path(), "slave").display().to_string();
+    let output = run(&[&["check", "--json", path.as_str()], more].concat());
+    let report: Value = serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|error| panic!("{error}: {}", String::from_utf8_lossy(&output.stderr)));
+    (output.status.code(), report["findings"].as_array().unwrap().clone())
+}
+
+fn text<'a>(finding: &'a Value, key: &str) -> &'a str {
+    finding[key].as_str().unwrap_or("")
+}
+
+/// The findings on behaviour that a well-behaved FMU does not have.
+fn new(behaviour: &str, more: &[&str]) -> (Option<i32>, Vec<Value>) {
+    let (_, usual) = check(&fmu("as it should"), &[]);
+    let (status, mut found) = check(&fmu(behaviour), more);
+    let elsewhere = |own: &Value| text(own, "part") != "behaviour";
+    assert_eq!(
+        found.iter().filter(|own| elsewhere(own)).count(),
+        usual.iter().filter(|own| elsewhere(own)).count(),
+        "the files are looked at all the same: {found:#?}"
+    );
+    found.retain(|own| text(own, "part") == "behaviour" && !usual.contains(own));
+    (status, found)
+}
+
+#[test]
+fn an_fmu_that_ends_its_process_is_one_finding_with_function_and_reason() {
+    for (deed, reason) in [
+        ("crash", "crashed: its process was ended by signal 11 (SIGSEGV)"),
+        ("abort", "crashed: its process was ended by signal 6 (SIGABRT)"),
+        ("exit 3", "ended its process with exit status 3"),
+        ("exit 0", "ended its process with exit status 0"),
+    ] {
+        for function in [
+            "fmi2Instantiate",
+            "fmi2SetupExperiment",
+            "fmi2EnterInitializationMode",
+            "fmi2DoStep",
+            "fmi2GetReal",
+            "fmi2GetString",
+            "fmi2Terminate",
+            "fmi2FreeInstance",
+        ] {
+            let (status, found) = new(&format!("{deed} in {function}"), &[]);
+            assert_eq!((status, found.len()), (Some(1), 1), "{deed} in {function}: {found:#?}");
+            assert_eq!(text(&found[0], "severity"), "error");
+            assert_eq!(text(&found[0], "where"), function);
+            assert!(text(&found[0], "what").starts_with(reason), "{found:#?}");
+            assert!(text(&found[0], "why").contains("ends with it"), "{found:#?}");
+        }
+    }
+}
+
+#[test]
+fn an_fmu_that_hangs_is_a_finding_after_the_time_limit() {
+    for function in ["fmi2Instantiate", "fmi2DoStep", "fmi2FreeInstance"] {
+        let begin = Instant::now();
+        let (status, found) = new(&format!("hang in {function}"), &["--time-limit", "0.5"]);
+        assert!(begin.elapsed() < Duration::from_secs(60));
+        assert_eq!((status, found.len()), (Some(1), 1), "{found:#?}");
+        assert_eq!(text(&found[0], "where"), function);
+        assert!(text(&found[0], "what").starts_with("did not return within 0.5 s"), "{found:#?}");
+    }
+}
+
+#[test]
+fn a_flood_of_messages_is_a_warning_with_their_number() {
+    let (status, found) = new("flood in fmi2SetupExperiment", &[]);
+    assert_eq!(status, check(&fmu("as it should"), &[]).0);
+    let flood = found.iter().find(|own| text(own, "what").starts_with("sends")).unwrap();
+    let number = text(flood, "what").split(' ').nth(1).unwrap().parse::<u64>().unwrap();
+    // A million for each instance that is made.
+    assert!(number >= 1_000_000 && number % 1_000_000 < 1000, "{flood}");
+    assert_eq!(text(flood, "severity"), "warning");
+}
+
+#[test]
+fn the_plain_words_name_function_and_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = fmu("crash in fmi2DoStep").write(folder.path(), "slave");
+    let output = run(&["check", &path.display().to_string()]);
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    let expected =
+        "error: fmi2DoStep: crashed: its process was ended by signal 11 (SIGSEGV) at t = ";
+    assert!(said.contains(expected), "{said}");
+    assert_eq!(output.status.code(), Some(1));
+}
+
+#[test]
+fn an_fmu_for_one_instance_in_a_process_has_no_finding_for_that() {
+    let one = CFmu::that("one instance only").flag("canBeInstantiatedOnlyOncePerProcess", true);
+    let (_, found) = check(&one, &[]);
+    assert!(!found.iter().any(|own| text(own, "where") == "fmi2Instantiate"), "{found:#?}");
+}
+
+#[test]
+fn what_is_no_fault_of_the_fmu_is_an_error_of_the_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = CFmu::well_behaved().write(folder.path(), "slave").display().to_string();
+    assert!(Path::new(&path).exists());
+    for (more, parts) in [
+        (["--time-limit", "0"], ["--time-limit is 0", "above 0"]),
+        (["--time-limit", "-1"], ["--time-limit is -1", "above 0"]),
+        (["--preload", "libnowhere.so.7"], ["libnowhere.so.7", "cannot"]),
+    ] {
+        let output = run(&[&["check", path.as_str()], &more[..]].concat());
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(parts.iter().all(|part| said.contains(part)), "{said}");
+    }
+}

@@ -1,0 +1,25 @@
+//! The engine: initialization, step control, events, steps in part, threads, checkpoints, scenarios.
+#![expect(clippy::unwrap_used, clippy::float_cmp, reason = "tests; exact by construction")]
+
+mod ahead;
+mod background;
+mod breaks;
+mod checkpoints;
+mod control;
+mod events;
+mod fallback;
+mod initial;
+mod last_step;
+mod multirate;
+mod parts;
+mod puppet;
+mod scenario;
+mod stepping;
+mod typed;
+
+use fmu_description::Experiment;
+
+/// From 0 to `stop` s.
+fn until(stop: f64) -> Experiment {
+    Experiment { stop_time: Some(stop), ..Experiment::default() }
+}

@@ -1,0 +1,199 @@
+//! Slaves in the background: their steps overlap, and nothing else is different.
+
+use std::sync::Arc;
+
+use master::{Algorithm, Coupling, Course, Simulation, StepControl, Stepped, Sweep, System};
+
+use crate::engine::ahead::{Fails, ahead};
+use crate::engine::{puppet, typed, until};
+use tests::linear::ABLE;
+use tests::problems;
+
+#[expect(clippy::unnecessary_wraps, reason = "the form of a choice")]
+fn all(_: &str) -> Option<Fails> {
+    Some(Fails::Nowhere)
+}
+
+fn none(_: &str) -> Option<Fails> {
+    None
+}
+
+fn jacobi(jobs: usize) -> Algorithm {
+    Algorithm { jobs, ..Algorithm::fixed(Sweep::Jacobi, Course::Hold, 0.25) }
+}
+
+/// A, b and c in a circle by Reals only.
+fn reals() -> System {
+    let mut system = typed::ring();
+    let to_reals = |port: master::Port| port.variable < 2;
+    let kept: Vec<_> =
+        system.connections.iter().filter(|own| to_reals(own.from)).cloned().collect();
+    assert_eq!(kept.len(), 3);
+    system.connections = kept;
+    system
+}
+
+#[test]
+fn all_slaves_of_a_group_begin_before_the_first_is_finished() {
+    for (system, jobs) in
+        [(reals as fn() -> System, 1), (typed::ring, 1), (reals, 2), (typed::ring, 2)]
+    {
+        let (system, record) = ahead(system(), all);
+        let mut simulation = Simulation::new(system, &jacobi(jobs), &until(100.0)).unwrap();
+        // The first 32 steps find out whether threads are faster: without them, then with them.
+        for _ in 0..40 {
+            simulation.step().unwrap();
+            let found = std::mem::take(&mut *record.lock().unwrap());
+            assert_eq!(
+                found,
+                ["begin a", "begin b", "begin c", "finish a", "finish b", "finish c"]
+            );
+        }
+    }
+}
+
+#[test]
+fn slaves_that_are_connected_are_not_begun_together_by_gauss_seidel() {
+    let algorithm = Algorithm { sweep: Sweep::GaussSeidel, ..jacobi(1) };
+    let (system, record) = ahead(typed::ring(), all);
+    Simulation::new(system, &algorithm, &until(1.0)).unwrap().step().unwrap();
+    let found = record.lock().unwrap().join(", ");
+    let pairs = ["begin a, finish a", "begin b, finish b", "begin c, finish c"];
+    assert!(pairs.iter().all(|pair| found.contains(pair)), "{found}");
+}
+
+/// The bits of all connected outputs after each step.
+fn course(algorithm: &Algorithm, fails: fn(&str) -> Option<Fails>) -> Vec<u64> {
+    let network = problems::coupled_oscillators();
+    let (system, _) = ahead(network.system(ABLE, &Arc::default()), fails);
+    let mut simulation = Simulation::new(system, algorithm, &until(2.5)).unwrap();
+    let mut found = Vec::new();
+    while !simulation.is_finished() {
+        simulation.step().unwrap();
+        found.extend(network.outputs(simulation.system()).iter().map(|y| y.to_bits()));
+        found.push(simulation.time().to_bits());
+    }
+    found
+}
+
+#[test]
+fn the_background_changes_no_bit() {
+    let first: fn(&str) -> Option<Fails> = |name| (name == "a").then_some(Fails::Nowhere);
+    assert!(!course(&Algorithm::new(0.05), first).is_empty());
+    for sweep in [Sweep::Jacobi, Sweep::GaussSeidel] {
+        for course_of_inputs in [Course::Hold, Course::Limited, Course::Linear, Course::Quadratic] {
+            let fixed = Algorithm::fixed(sweep, course_of_inputs, 0.05);
+            for algorithm in [
+                fixed.clone(),
+                Algorithm { jobs: 2, ..fixed.clone() },
+                Algorithm { control: StepControl::Doubling, ..fixed.clone() },
+                Algorithm { coupling: Coupling::Newton, ..fixed },
+            ] {
+                let expected = course(&algorithm, none);
+                assert!(expected.len() > 20);
+                assert_eq!(course(&algorithm, all), expected, "{algorithm:?}");
+                assert_eq!(course(&algorithm, first), expected, "{algorithm:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn values_of_all_types_and_multiples_are_the_same_in_the_background() {
+    for (multiples, course) in [(vec![], Course::Hold), (vec![1, 2, 4], Course::Linear)] {
+        let run = |fails: fn(&str) -> Option<Fails>| {
+            let algorithm = Algorithm { multiples: multiples.clone(), course, ..jacobi(1) };
+            let (system, _) = ahead(typed::ring(), fails);
+            let mut simulation = Simulation::new(system, &algorithm, &until(10.0)).unwrap();
+            let mut found = Vec::new();
+            while !simulation.is_finished() {
+                simulation.step().unwrap();
+                for (_, slave) in &mut simulation.system().slaves {
+                    let (mut real, mut integer, mut boolean) = ([0.0], [0], [0]);
+                    slave.get_real(&[1], &mut real).unwrap();
+                    slave.get_integer(&[1], &mut integer).unwrap();
+                    slave.get_boolean(&[1], &mut boolean).unwrap();
+                    found.push((real[0].to_bits(), integer, boolean));
+                }
+            }
+            found
+        };
+        assert_eq!(run(all), run(none));
+        assert_eq!(run(all).len(), 120);
+    }
+}
+
+fn stops(begin: f64, end: f64) -> Stepped {
+    if begin < 0.35 && end > 0.35 {
+        return Stepped::Part { reached: 0.35, terminated: false };
+    }
+    Stepped::Whole
+}
+
+#[test]
+fn a_step_in_part_is_gone_on_with_or_repeated_as_elsewhere() {
+    for algorithm in [
+        jacobi(1),
+        Algorithm { course: Course::Linear, ..jacobi(1) },
+        Algorithm { coupling: Coupling::Newton, ..Algorithm::new(0.25) },
+        Algorithm { control: StepControl::Doubling, ..Algorithm::new(0.25) },
+    ] {
+        let run = |fails: fn(&str) -> Option<Fails>| {
+            let (system, asked) = puppet::system([|time| 1.0 + time; 2], stops);
+            let (system, _) = ahead(system, fails);
+            let mut simulation = Simulation::new(system, &algorithm, &until(1.0)).unwrap();
+            while !simulation.is_finished() {
+                simulation.step().unwrap();
+            }
+            asked.lock().unwrap().clone()
+        };
+        let expected = run(none);
+        assert!(expected.iter().any(|step| step.0 == 0.35 || step.1 == 0.35), "{expected:?}");
+        assert_eq!(run(all), expected);
+    }
+}
+
+/// The error of the step from 5 s, which is one of those in threads where there are any, and what was begun and finished in it. After it every slave still
+/// answers.
+fn failed(jobs: usize, fails: fn(&str) -> Option<Fails>) -> (String, String) {
+    let (system, record) = ahead(typed::ring(), fails);
+    let mut simulation = Simulation::new(system, &jacobi(jobs), &until(10.0)).unwrap();
+    for _ in 0..20 {
+        simulation.step().unwrap();
+    }
+    record.lock().unwrap().clear();
+    let message = simulation.step().unwrap_err().to_string();
+    let found = record.lock().unwrap().join(", ");
+    for (_, slave) in &mut simulation.system().slaves {
+        slave.get_real(&[1], &mut [0.0]).unwrap();
+    }
+    simulation.terminate().unwrap();
+    (message, found)
+}
+
+#[test]
+fn the_error_is_that_of_the_first_slave_in_order_wherever_it_fails() {
+    use Fails::{InBegin, InFinish, InSet};
+    let only_b = |fails: Fails| -> fn(&str) -> Option<Fails> {
+        match fails {
+            InFinish => |name| Some(if name == "b" { InFinish } else { Fails::Nowhere }),
+            InBegin => |name| Some(if name == "b" { InBegin } else { Fails::Nowhere }),
+            _ => |name| Some(if name == "b" { InSet } else { Fails::Nowhere }),
+        }
+    };
+    for jobs in [1, 2] {
+        for (fails, function, begun) in [
+            (InFinish, "fmi2DoStep", "begin a, begin b, begin c, finish a, finish b"),
+            (InBegin, "fmi2DoStep", "begin a, begin b, finish a"),
+            (InSet, "fmi2SetInteger", "begin a, finish a"),
+        ] {
+            let (message, found) = failed(jobs, only_b(fails));
+            assert_eq!(message, format!("b at t = 5 s: {function} returned fmi2Error"));
+            assert!(jobs > 1 || found == begun, "{found}");
+        }
+        let (message, _) = failed(jobs, |name| Some(if name == "a" { InFinish } else { InBegin }));
+        assert_eq!(message, "a at t = 5 s: fmi2DoStep returned fmi2Error");
+        let (message, _) = failed(jobs, |name| (name == "c").then_some(InFinish));
+        assert_eq!(message, "c at t = 5 s: fmi2DoStep returned fmi2Error");
+    }
+}

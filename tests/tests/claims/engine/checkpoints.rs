@@ -1,0 +1,165 @@
+//! A run that goes on from a checkpoint, bit by bit.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use master::algorithm::PowerBond;
+use master::{Algorithm, Checkpoint, Coupling, Course, Simulation, StepControl, Sweep, System};
+use study::scenario::{Scenario, Setup};
+use tests::linear::{ABLE, Abilities};
+use tests::network::Network;
+use tests::problems;
+
+use crate::engine::until;
+
+const FAULTS: &str = r#"
+[[scenario.fault]]
+connection = "b.u0"
+delay = { seconds = 0.07, from = 0.05 }
+[[scenario.fault]]
+connection = "a.u0"
+noise = { deviation = 0.01, seed = 7 }
+"#;
+
+#[derive(serde::Deserialize)]
+struct File {
+    scenario: Scenario,
+}
+
+fn prepared(text: &str, system: &System) -> master::Scenario {
+    if text.is_empty() {
+        return master::Scenario::default();
+    }
+    let file: File = toml::from_str(text).unwrap();
+    let setup = Setup { folder: Path::new("."), start: 0.0, step: 0.01 };
+    file.scenario.resolve(system, &setup).unwrap().scenario
+}
+
+/// Times and outputs of `steps` steps, as bits.
+fn bits(simulation: &mut Simulation, network: &Network, steps: usize) -> Vec<u64> {
+    let mut all = Vec::new();
+    for _ in 0..steps {
+        simulation.step().unwrap();
+        all.push(simulation.time().to_bits());
+        all.extend(network.outputs(simulation.system()).iter().map(|value| value.to_bits()));
+    }
+    all
+}
+
+fn verify(label: &str, able: Abilities, algorithm: &Algorithm, scenario: &str) {
+    let network = problems::two_masses(20.0, 0.5);
+    let new = || {
+        let system = network.system(able, &Arc::default());
+        let scenario = prepared(scenario, &system);
+        (system, scenario)
+    };
+    let (system, scenario) = new();
+    let mut whole = Simulation::with_scenario(system, algorithm, &until(100.0), scenario).unwrap();
+    bits(&mut whole, &network, 13);
+    let kept = postcard::to_stdvec(&whole.checkpoint().unwrap()).unwrap();
+    let checkpoint: Checkpoint = postcard::from_bytes(&kept).unwrap();
+    assert_eq!(checkpoint.time(), whole.time());
+    let expected = bits(&mut whole, &network, 20);
+    let (system, scenario) = new();
+    let resumed = Simulation::resume(system, algorithm, &until(100.0), scenario, &checkpoint);
+    let found = bits(&mut resumed.unwrap(), &network, 20);
+    assert_eq!(found, expected, "{label}");
+}
+
+#[test]
+fn fixed_steps_go_on_bit_by_bit() {
+    let past = Abilities { derivatives: 0, ..ABLE };
+    for sweep in [Sweep::Jacobi, Sweep::GaussSeidel] {
+        for course in [Course::Hold, Course::Limited, Course::Linear, Course::Quadratic] {
+            for multiples in [vec![], vec![1, 4], vec![3, 1]] {
+                let label = format!("{} {} {multiples:?}", sweep.name(), course.name());
+                let algorithm = Algorithm { multiples, ..Algorithm::fixed(sweep, course, 0.01) };
+                verify(&label, ABLE, &algorithm, "");
+                verify(&label, past, &algorithm, FAULTS);
+            }
+        }
+    }
+}
+
+#[test]
+fn iterated_steps_go_on_bit_by_bit() {
+    for coupling in [Coupling::Newton, Coupling::Anderson, Coupling::QuasiNewton] {
+        for control in [StepControl::Fixed, StepControl::Doubling] {
+            let algorithm = Algorithm { coupling, control, ..Algorithm::new(0.01) };
+            verify(coupling.name(), ABLE, &algorithm, "");
+            verify(coupling.name(), ABLE, &algorithm, FAULTS);
+        }
+    }
+}
+
+#[test]
+fn chosen_steps_go_on_bit_by_bit() {
+    let system = problems::two_masses(20.0, 0.5).system(ABLE, &Arc::default());
+    let port = |name: &str| system.port(name).unwrap();
+    let bonds = vec![PowerBond { first: port("b.u1"), second: port("a.u0") }];
+    for control in
+        [StepControl::Doubling, StepControl::Embedded, StepControl::Increment, StepControl::Energy]
+    {
+        let (bonds, relative_tolerance) = (bonds.clone(), 1e-2);
+        let algorithm = Algorithm { control, bonds, relative_tolerance, ..Algorithm::new(0.01) };
+        verify(control.name(), ABLE, &algorithm, "");
+    }
+}
+
+#[test]
+fn a_checkpoint_of_another_step_or_algorithm_is_refused_by_name() {
+    let network = problems::two_masses(20.0, 0.5);
+    let system = || network.system(ABLE, &Arc::default());
+    let iterated = Algorithm { coupling: Coupling::Anderson, ..Algorithm::new(0.01) };
+    let mut one = Simulation::new(system(), &iterated, &until(1.0)).unwrap();
+    one.step().unwrap();
+    let checkpoint = one.checkpoint().unwrap();
+    let resume = |algorithm: &Algorithm, experiment: &fmu_description::Experiment| {
+        let none = master::Scenario::default();
+        let resumed = Simulation::resume(system(), algorithm, experiment, none, &checkpoint);
+        resumed.err().map(|error| error.to_string())
+    };
+    let refused = |other: Algorithm, said: &str| {
+        let message = resume(&other, &until(1.0)).unwrap();
+        assert_eq!(message, format!("the checkpoint was taken with {said} is not possible"));
+    };
+    let base = || iterated.clone();
+    refused(Algorithm { step: 0.02, ..base() }, "step 0.01 s; step 0.02 s");
+    let control = StepControl::Doubling;
+    refused(Algorithm { control, ..base() }, "step-control fixed; step-control doubling");
+    let sweep = Sweep::Jacobi;
+    refused(Algorithm { sweep, ..base() }, "method gauss-seidel; method jacobi");
+    refused(Algorithm { course: Course::Hold, ..base() }, "course limited; course hold");
+    let coupling = Coupling::Newton;
+    refused(Algorithm { coupling, ..base() }, "coupling anderson; coupling newton");
+    refused(Algorithm { iterations: 7, ..base() }, "iterations 50; iterations 7");
+    let once = Algorithm { coupling: Coupling::Once, ..base() };
+    refused(once, "coupling anderson; coupling once");
+    let later = fmu_description::Experiment { start_time: 0.5, ..until(1.0) };
+    let message = resume(&base(), &later).unwrap();
+    assert!(message.contains("start-time 0 s; start-time 0.5 s"), "{message}");
+    // What changes no state may be another one.
+    assert_eq!(resume(&Algorithm { jobs: 2, ..base() }, &until(2.0)), None);
+}
+
+#[test]
+fn a_run_that_was_ended_by_a_slave_stays_ended() {
+    let (system, _) = crate::engine::puppet::system([f64::sin; 2], crate::engine::parts::ends);
+    let algorithm = Algorithm::fixed(Sweep::Jacobi, Course::Hold, 0.25);
+    let mut run = Simulation::new(system, &algorithm, &until(1.0)).unwrap();
+    while !run.is_finished() {
+        run.step().unwrap();
+    }
+    let checkpoint = run.checkpoint().unwrap();
+    let (system, _) = crate::engine::puppet::system([f64::sin; 2], crate::engine::parts::ends);
+    let resumed = Simulation::resume(
+        system,
+        &algorithm,
+        &until(1.0),
+        master::Scenario::default(),
+        &checkpoint,
+    );
+    let resumed = resumed.unwrap();
+    assert!(resumed.is_finished());
+    assert_eq!(resumed.ended_by(), Some("p"));
+}

@@ -1,0 +1,117 @@
+//! Steps that end at events.
+
+use master::algorithm::EventSource;
+use master::{Algorithm, Course, Simulation, StepControl, Sweep};
+use tests::linear::OUTPUTS;
+
+use crate::engine::puppet::{system, whole};
+use crate::engine::until;
+
+const EVENTS: [f64; 4] = [0.137, 0.3, 0.3001, 0.7777];
+
+fn next(time: f64) -> f64 {
+    EVENTS.into_iter().find(|event| *event > time).unwrap_or(f64::INFINITY)
+}
+
+fn times(simulation: &mut Simulation) -> Vec<f64> {
+    let mut times = Vec::new();
+    while !simulation.is_finished() {
+        simulation.step().unwrap();
+        times.push(simulation.time());
+    }
+    times
+}
+
+#[test]
+fn fixed_steps_end_at_the_times_that_an_output_announces_and_on_the_grid() {
+    let (system, asked) = system([f64::sin, next], whole);
+    let event = EventSource::NextTime(system.port("p.z").unwrap());
+    let algorithm =
+        Algorithm { events: vec![event], ..Algorithm::fixed(Sweep::Jacobi, Course::Hold, 0.1) };
+    let mut simulation = Simulation::new(system, &algorithm, &until(1.0)).unwrap();
+    let grid = |k: u32| f64::from(k) * 0.1;
+    let mut expected: Vec<f64> = (1..10).map(grid).chain([0.137, 0.3001, 0.7777, 1.0]).collect();
+    expected.sort_by(f64::total_cmp);
+    // 3 * 0.1 is the double above 0.3: the event there is the point of the grid.
+    assert_eq!(times(&mut simulation), expected);
+    let ends: Vec<f64> = asked.lock().unwrap().iter().map(|step| step.1).collect();
+    for (end, expected) in ends.iter().zip(&expected) {
+        assert!((end - expected).abs() <= f64::EPSILON, "{end} {expected}");
+    }
+}
+
+#[test]
+fn chosen_steps_end_at_the_times_that_an_output_announces() {
+    for control in [StepControl::Doubling, StepControl::Embedded, StepControl::Increment] {
+        let (system, _) = system([f64::sin, next], whole);
+        let event = EventSource::NextTime(system.port("p.z").unwrap());
+        let algorithm =
+            Algorithm { events: vec![event], control, largest_step: 0.25, ..Algorithm::new(0.1) };
+        let mut simulation = Simulation::new(system, &algorithm, &until(1.0)).unwrap();
+        let times = times(&mut simulation);
+        for event in [0.137, 0.3, 0.3001, 0.7777, 1.0] {
+            assert!(times.contains(&event), "{}: {event} in {times:?}", control.name());
+        }
+    }
+}
+
+/// Rises through zero at 0.4321 s, falls through it at 0.8 s.
+fn crosses(time: f64) -> f64 {
+    let (first, second) = (time - 0.4321, 0.8 - time);
+    first * second * (1.0 + time)
+}
+
+#[test]
+fn a_change_of_sign_ends_a_step_within_1e_9_of_its_size() {
+    for control in [StepControl::Fixed, StepControl::Doubling] {
+        let (system, _) = system([f64::sin, crosses], whole);
+        let event = EventSource::Crossing(system.port("p.z").unwrap());
+        let algorithm =
+            Algorithm { events: vec![event], control, largest_step: 0.15, ..Algorithm::new(0.15) };
+        let mut simulation = Simulation::new(system, &algorithm, &until(1.0)).unwrap();
+        let times = times(&mut simulation);
+        for event in [0.4321, 0.8] {
+            let near = |time: &&f64| (*time - event).abs() <= 0.15e-9;
+            let found: Vec<_> = times.iter().filter(near).collect();
+            assert_eq!(found.len(), 1, "{}: {event} in {times:?}", control.name());
+            // At its end the sign has changed.
+            assert!((crosses(*found[0]) > 0.0) != (crosses(event - 1e-6) > 0.0));
+        }
+    }
+}
+
+#[test]
+fn between_events_fixed_steps_stay_on_the_grid() {
+    let (system, _) = system([f64::sin, crosses], whole);
+    let event = EventSource::Crossing(system.port("p.z").unwrap());
+    let algorithm = Algorithm { events: vec![event], ..Algorithm::new(0.15) };
+    let mut simulation = Simulation::new(system, &algorithm, &until(1.0)).unwrap();
+    let times = times(&mut simulation);
+    for k in 1..=6 {
+        assert!(times.contains(&(f64::from(k) * 0.15)), "{k}: {times:?}");
+    }
+    assert_eq!(times.len(), 9);
+}
+
+/// The lag behind a jump to 1 at 0.5 s: `1 - exp(-(t - 0.5))`, whether 0.5 s is a point of the grid or not.
+/// A line through values before and after the jump would go on to 2.
+#[test]
+fn after_an_event_inputs_do_not_go_on_as_before() {
+    let step = |time: f64| if time > 0.5 - 1e-9 { 1.0 } else { 0.0 };
+    let next = |time: f64| if time > 0.5 - 1e-9 { f64::INFINITY } else { 0.5 };
+    for course in [Course::Hold, Course::Limited, Course::Linear, Course::Quadratic] {
+        for size in [0.1, 0.08] {
+            let (system, _) = system([step, next], whole);
+            let event = EventSource::NextTime(system.port("p.z").unwrap());
+            let algorithm =
+                Algorithm { events: vec![event], ..Algorithm::fixed(Sweep::Jacobi, course, size) };
+            let mut simulation = Simulation::new(system, &algorithm, &until(1.0)).unwrap();
+            times(&mut simulation);
+            let mut value = [0.0];
+            let lag = &mut simulation.system().slaves[1].1;
+            lag.get_real(&[OUTPUTS], &mut value).unwrap();
+            let expected = 1.0 - f64::exp(-0.5);
+            assert!((value[0] - expected).abs() < 1e-12, "{} {size}: {value:?}", course.name());
+        }
+    }
+}

@@ -1,0 +1,24 @@
+//! What the libraries and the command claim, a module for each subject. Tests that need a process for
+//! themselves are in binaries of their own.
+#![forbid(unsafe_code)]
+
+mod author;
+mod check;
+mod closed_loop;
+mod command;
+mod engine;
+mod fmi_crate;
+mod fmi_rs;
+mod isolate;
+mod isolate_together;
+mod linearise;
+mod misbehaviour;
+mod misbehaviour_calls;
+mod misbehaviour_isolated;
+mod misbehaviour_run;
+mod order;
+mod outside;
+mod package;
+mod run;
+mod step_hints;
+mod tidy;

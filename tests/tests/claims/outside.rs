@@ -1,0 +1,109 @@
+//! Crates outside of the workspace that use one library each, as a user writes them.
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+use tests::{dist, root, run};
+
+/// Builds the crates of `tests/outside` with the versions of this workspace; the folder of their programs.
+fn built() -> &'static Path {
+    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
+    FOLDER.get_or_init(|| {
+        let crates = root().join("target/outside/crates");
+        let source = root().join("tests/outside");
+        for name in ["import", "couple", "study", "design"] {
+            fs::create_dir_all(crates.join(name).join("src")).unwrap();
+            let main = format!("{name}/src/main.rs");
+            fs::copy(source.join(&main), crates.join(&main)).unwrap();
+            // Paths from one folder deeper.
+            let manifest = fs::read_to_string(source.join(name).join("Cargo.toml")).unwrap();
+            let manifest = manifest.replace("\"../../../crates", "\"../../../../crates");
+            fs::write(crates.join(name).join("Cargo.toml"), manifest).unwrap();
+        }
+        fs::copy(source.join("Cargo.toml"), crates.join("Cargo.toml")).unwrap();
+        fs::copy(root().join("Cargo.lock"), crates.join("Cargo.lock")).unwrap();
+        let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+        cargo.current_dir(&crates).args(["build", "--release", "--quiet", "--target-dir"]);
+        let output = cargo.arg(root().join("target")).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        root().join("target/release")
+    })
+}
+
+/// What the program `name` prints.
+fn printed(name: &str, arguments: &[&Path]) -> String {
+    let output = Command::new(built().join(name)).args(arguments).output().unwrap();
+    assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap().trim().to_owned()
+}
+
+/// The last value of the column `name` of a file of results.
+fn last(file: &Path, name: &str) -> String {
+    let text = fs::read_to_string(file).unwrap();
+    let column = text.lines().next().unwrap().split(',').position(|own| own == name).unwrap();
+    text.lines().last().unwrap().split(',').nth(column).unwrap().to_owned()
+}
+
+fn command(arguments: &[&str]) {
+    let output = run(arguments);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn twenty_lines_load_and_step_an_fmu_as_the_command_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let (out, plant) = (folder.path().display().to_string(), dist().join("FrictionPendulum.fmu"));
+    let plant_path = plant.display().to_string();
+    command(&["run", &plant_path, "--stop-time", "10", "--step", "0.001", "--out", &out]);
+    let x_p = last(&folder.path().join("results.csv"), "FrictionPendulum.x_p");
+    let found: f64 = printed("import", &[&plant]).parse().unwrap();
+    assert_eq!(found.to_bits(), x_p.parse::<f64>().unwrap().to_bits());
+}
+
+#[test]
+fn thirty_lines_couple_two_fmus_as_the_command_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().display().to_string();
+    let [plant, controller] =
+        ["FrictionPendulum.fmu", "AsoController.fmu"].map(|file| dist().join(file));
+    let (first, second) = (plant.display().to_string(), controller.display().to_string());
+    let paths = ["run", "--plant", &first, "--controller", &second];
+    // What `Algorithm::new` stands for: Gauss-Seidel, limited slopes, fixed steps.
+    let algorithm = ["--method", "gauss-seidel", "--course", "limited", "--coupling", "once"];
+    let rest = ["--step", "0.001", "--stop-time", "10", "--out", &out];
+    command(&[&paths[..], &algorithm, &rest].concat());
+    let x_p = last(&folder.path().join("results.csv"), "plant.x_p");
+    let found: f64 = printed("couple", &[&plant, &controller]).parse().unwrap();
+    assert_eq!(found.to_bits(), x_p.parse::<f64>().unwrap().to_bits());
+}
+
+#[test]
+fn a_system_toml_runs_by_the_library_as_by_the_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("system.toml");
+    let entry = |name: &str, file: &str| format!("{name} = {:?}\n", dist().join(file));
+    let text = format!(
+        "[fmus]\n{}{}\n[experiment]\nstop-time = 1.0\n\n[results]\nfile = \"library.csv\"\n",
+        entry("plant", "FrictionPendulum.fmu"),
+        entry("controller", "AsoController.fmu")
+    );
+    fs::write(&file, text).unwrap();
+    let written = printed("run-study", &[&file]);
+    let other = folder.path().join("command.csv");
+    let (system, results) = (file.display().to_string(), other.display().to_string());
+    command(&["run", &system, "--results", &results]);
+    assert_eq!(fs::read(written).unwrap(), fs::read(other).unwrap());
+}
+
+#[test]
+fn a_design_is_the_same_by_the_library_and_by_the_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let plant = root().join("fmu-controller/pendulum.toml");
+    let text = printed("make-design", &[&plant]);
+    let file = folder.path().join("design.toml");
+    command(&["design", &plant.display().to_string(), "--out", &file.display().to_string()]);
+    assert_eq!(text, fs::read_to_string(file).unwrap().trim());
+}

@@ -1,0 +1,275 @@
+//! The invariants of ARCHITECTURE.md.
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use tests::root;
+
+/// Files that may be longer than 400 lines: name and reason.
+const LONG_FILES: [(&str, &str); 0] = [];
+/// Functions that may be longer than 50 lines: file, name and reason.
+const LONG_FUNCTIONS: [(&str, &str, &str); 0] = [];
+const MAX_FILE: usize = 400;
+const MAX_FUNCTION: usize = 50;
+
+/// All files below `folder` with that extension, without what is built.
+fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for item in fs::read_dir(folder).unwrap() {
+        let path = item.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if path.is_dir() && !["target", "dist", "results"].contains(&name.as_str()) {
+            if !name.starts_with('.') && !path.join("pyvenv.cfg").exists() {
+                found.extend(files(&path, extension));
+            }
+        } else if path.extension().is_some_and(|found| found == extension) {
+            found.push(path);
+        }
+    }
+    found.sort();
+    found
+}
+
+fn name(path: &Path) -> String {
+    path.strip_prefix(root()).unwrap().to_string_lossy().replace('\\', "/")
+}
+
+#[test]
+fn the_mathematics_depends_on_neither_fmi_nor_files() {
+    let manifest: toml::Table =
+        fs::read_to_string(root().join("crates/control/Cargo.toml")).unwrap().parse().unwrap();
+    let dependencies: Vec<_> = manifest["dependencies"].as_table().unwrap().keys().collect();
+    assert_eq!(dependencies, ["clarabel", "libm", "nalgebra", "thiserror"]);
+    for file in files(&root().join("crates/control/src"), "rs") {
+        let text = fs::read_to_string(&file).unwrap();
+        for word in ["std::fs", "std::io", "std::net", "std::env", "println!", "eprintln!"] {
+            assert!(!text.contains(word), "{} uses {word}", name(&file));
+        }
+    }
+}
+
+/// The folders of our libraries, each with those that it may use.
+const ARROWS: [(&str, &[&str]); 15] = [
+    ("lapack", &[]),
+    ("control", &["aso-lapack"]),
+    ("fmu-description", &[]),
+    ("fmu", &["fmu-description"]),
+    ("slave", &["fmu-description"]),
+    ("fmu-import", &["fmu-description", "slave"]),
+    ("linearise", &["fmu-description", "fmu-import", "slave"]),
+    ("ssp", &["fmu-description", "slave"]),
+    ("results", &[]),
+    ("solve", &[]),
+    ("master", &["fmu-description", "slave", "solve"]),
+    ("files", &[]),
+    ("figure", &["files"]),
+    ("study", &["files", "fmu-description", "fmu-import", "master", "results", "slave", "ssp"]),
+    ("design", &["control", "figure", "files", "fmu-description", "fmu-import", "linearise"]),
+];
+
+fn manifest(folder: &Path) -> toml::Table {
+    fs::read_to_string(folder.join("Cargo.toml")).unwrap().parse().unwrap()
+}
+
+#[test]
+fn the_libraries_use_each_other_along_the_arrows_only() {
+    let mut folders: Vec<String> = fs::read_dir(root().join("crates"))
+        .unwrap()
+        .map(|item| item.unwrap().file_name().into_string().unwrap())
+        .collect();
+    folders.sort();
+    let mut known: Vec<&str> = ARROWS.iter().map(|(folder, _)| *folder).collect();
+    known.sort_unstable();
+    assert_eq!(folders, known);
+    for (folder, allowed) in ARROWS {
+        let manifest = manifest(&root().join("crates").join(folder));
+        let dependencies = manifest["dependencies"].as_table().unwrap().keys();
+        let is_ours = |name: &&String| known.contains(&name.trim_start_matches("aso-"));
+        for ours in dependencies.filter(is_ours) {
+            assert!(allowed.contains(&ours.as_str()), "crates/{folder} uses {ours}");
+        }
+    }
+}
+
+#[test]
+fn nothing_but_the_tests_uses_a_model_or_the_command() {
+    let folders = ARROWS.iter().map(|(folder, _)| root().join("crates").join(folder));
+    for folder in folders.chain([root().join("cli"), root().join("tests")]) {
+        let manifest = manifest(&folder);
+        for section in ["dependencies", "dev-dependencies", "build-dependencies"] {
+            let Some(dependencies) = manifest.get(section).and_then(toml::Value::as_table) else {
+                continue;
+            };
+            for forbidden in ["fmu-plant", "fmu-controller", "aso-ftc"] {
+                assert!(
+                    !dependencies.contains_key(forbidden),
+                    "{} uses {forbidden}",
+                    name(&folder)
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn unsafe_code_stands_at_the_boundaries_only() {
+    let allowed = [
+        "crates/fmu/src/ffi.rs",
+        "crates/fmu/src/ffi/entry.rs",
+        "crates/fmu/src/ffi/exports.rs",
+        "crates/fmu-import/src/library.rs",
+        // Signal handlers, and what they read.
+        "crates/fmu-import/src/crash/place.rs",
+        "crates/fmu-import/src/crash/signals.rs",
+        "crates/fmu-import/src/isolate/memory.rs",
+        // A mapping of shared memory becomes a slice of atomics.
+        "crates/fmu-import/src/isolate/region.rs",
+        // The C side of BLAS and LAPACK, and its tests.
+        "crates/lapack/src/memory.rs",
+        "crates/lapack/src/products.rs",
+        "crates/lapack/src/routines.rs",
+        "crates/lapack/src/symbols.rs",
+        "crates/lapack/tests/definitions/products.rs",
+        "crates/lapack/tests/definitions/singular.rs",
+        "crates/lapack/tests/definitions/solvers.rs",
+        "crates/lapack/tests/definitions/spectrum.rs",
+        "crates/fmu-import/src/library/calls.rs",
+        "crates/fmu-import/src/library/foreign.rs",
+        "crates/fmu-import/src/library/functions.rs",
+        "crates/fmu-import/src/library/log.rs",
+        "crates/fmu-import/src/library/states.rs",
+        "crates/fmu-import/src/library/step.rs",
+        // Importers of their own, to call the C functions as no safe one would.
+        "crates/fmu/tests/robustness/importer.rs",
+        "crates/fmu/tests/robustness/uninitialised.rs",
+        "fuzz/src/design.rs",
+    ];
+    for file in files(&root(), "rs") {
+        let path = name(&file);
+        if allowed.contains(&path.as_str()) || path == "tests/tests/claims/tidy.rs" {
+            continue;
+        }
+        for (number, line) in fs::read_to_string(&file).unwrap().lines().enumerate() {
+            let code = line.split("//").next().unwrap_or_default();
+            let opens = ["unsafe {", "unsafe fn", "unsafe impl", "unsafe(", "unsafe trait"]
+                .iter()
+                .any(|form| code.contains(form));
+            assert!(!opens, "{path}:{} has unsafe code", number + 1);
+        }
+    }
+}
+
+/// Whether a licence expression can be met by those that are allowed: each part that AND joins by one
+/// of its alternatives.
+fn is_allowed(expression: &str, allowed: &[&str]) -> bool {
+    let plain = expression.replace(['(', ')'], " ").replace('/', " OR ");
+    let known = |own: &str| allowed.contains(&own.trim().split(" WITH ").next().unwrap_or(""));
+    plain.split(" AND ").all(|part| part.split(" OR ").any(known))
+}
+
+#[test]
+fn every_dependency_has_a_licence_that_deny_toml_allows() {
+    let deny: toml::Table = fs::read_to_string(root().join("deny.toml")).unwrap().parse().unwrap();
+    let allowed = deny["licenses"]["allow"].as_array().unwrap();
+    let allowed: Vec<&str> = allowed.iter().map(|own| own.as_str().unwrap()).collect();
+    let mut cargo = std::process::Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    cargo.current_dir(root()).args(["metadata", "--format-version", "1", "--all-features"]);
+    let output = cargo.arg("--locked").output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let metadata: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    for package in metadata["packages"].as_array().unwrap() {
+        let license = package["license"].as_str().unwrap_or("none");
+        assert!(is_allowed(license, &allowed), "{}: {license}", package["name"]);
+    }
+}
+
+#[test]
+fn the_models_forbid_unsafe_code() {
+    for model in [
+        "fmu-plant",
+        "fmu-controller",
+        "crates/control",
+        "cli",
+        "examples/van-der-pol",
+        "examples/bouncing-ball",
+        "examples/pid",
+        "examples/lookup-table",
+        "examples/three-tank",
+        "examples/dc-servo",
+    ] {
+        let entry = if model == "cli" { "src/main.rs" } else { "src/lib.rs" };
+        let text = fs::read_to_string(root().join(model).join(entry)).unwrap();
+        assert!(text.contains("#![forbid(unsafe_code)]"), "{model}");
+    }
+}
+
+#[test]
+fn no_file_is_longer_than_400_lines() {
+    for extension in ["rs", "py"] {
+        for file in files(&root(), extension) {
+            let lines = fs::read_to_string(&file).unwrap().lines().count();
+            let path = name(&file);
+            let excused = LONG_FILES.iter().any(|(known, _)| *known == path);
+            assert!(lines <= MAX_FILE || excused, "{path} has {lines} lines");
+        }
+    }
+}
+
+#[test]
+fn no_function_is_longer_than_50_lines() {
+    for file in files(&root(), "rs") {
+        let text = fs::read_to_string(&file).unwrap();
+        for (function, length) in functions(&text) {
+            let path = name(&file);
+            let excused =
+                LONG_FUNCTIONS.iter().any(|(known, name, _)| *known == path && *name == function);
+            let limit = MAX_FUNCTION;
+            assert!(length <= limit || excused, "{path}: {function} has {length} lines");
+        }
+    }
+}
+
+/// Name and length of each function: from `fn` to the closing brace of the same indentation, which
+/// in a macro may be followed by something.
+fn functions(text: &str) -> Vec<(String, usize)> {
+    let lines: Vec<_> = text.lines().collect();
+    let mut found = Vec::new();
+    for (start, line) in lines.iter().enumerate() {
+        let code = line.trim_start();
+        let indentation = &line[..line.len() - code.len()];
+        let words = ["pub ", "pub(crate) ", "pub(super) ", "const ", "unsafe ", "extern \"C\" "];
+        let mut rest = code;
+        while let Some(shorter) = words.iter().find_map(|word| rest.strip_prefix(word)) {
+            rest = shorter;
+        }
+        let Some(signature) = rest.strip_prefix("fn ") else { continue };
+        let function = signature.split(['(', '<']).next().unwrap_or_default().to_owned();
+        let end = format!("{indentation}}}");
+        let length = lines[start..].iter().take_while(|line| !line.starts_with(&end)).count() + 1;
+        if !line.ends_with(';') && !line.ends_with('}') {
+            found.push((function, length));
+        }
+    }
+    found
+}
+
+#[test]
+fn lengths_of_functions_are_counted_right() {
+    let text = "fn one() {\n    a;\n}\n\nimpl X {\n    pub(crate) fn two<T>(\n        a: T,\n    ) {\n    }\n}\n";
+    assert_eq!(functions(text), [("one".to_owned(), 3), ("two".to_owned(), 4)]);
+}
+
+#[test]
+fn there_are_no_marks_of_unfinished_work() {
+    let marks = ["todo!(", "unimplemented!(", "FIXME", "#[ignore"];
+    for file in files(&root(), "rs").into_iter().chain(files(&root(), "py")) {
+        if name(&file) == "tests/tests/claims/tidy.rs" {
+            continue;
+        }
+        let text = fs::read_to_string(&file).unwrap();
+        for mark in marks {
+            assert!(!text.contains(mark), "{} has {mark}", name(&file));
+        }
+    }
+}
