@@ -24,7 +24,6 @@ use fmu_description::abi::Status;
 use fmu_import::{Fmu, FmuError};
 use master::{CallError, Failure, Slave, Stepped};
 
-
 /// Why an FMU could not be opened or instantiated through the crate `fmi`.
 #[derive(Debug, thiserror::Error)]
 pub enum FmiCrateError {

@@ -4,8 +4,8 @@ use std::collections::{HashMap, HashSet};
 
 use fmu_description::{ModelDescription, Unknown};
 
-use solve::components;
 use crate::system::System;
+use solve::components;
 
 /// An order of stepping.
 #[derive(Clone, Debug, PartialEq, Eq)]

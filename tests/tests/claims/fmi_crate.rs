@@ -10,8 +10,8 @@ use fmu_description::Causality;
 use fmu_description::Experiment;
 use fmu_description::package::{Package, platforms};
 use fmu_import::{Fmu, FmuError, LoadError};
-use tests::fmi_crate::{FmiCrateError, FmiSlave};
 use master::{Algorithm, Course, Failure, Probe, Simulation, Slave, Sweep, System};
+use tests::fmi_crate::{FmiCrateError, FmiSlave};
 
 const PENDULUM: &str = "FrictionPendulum.fmu";
 

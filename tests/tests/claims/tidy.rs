@@ -173,7 +173,8 @@ fn every_dependency_has_a_licence_that_deny_toml_allows() {
     let deny: toml::Table = fs::read_to_string(root().join("deny.toml")).unwrap().parse().unwrap();
     let allowed = deny["licenses"]["allow"].as_array().unwrap();
     let allowed: Vec<&str> = allowed.iter().map(|own| own.as_str().unwrap()).collect();
-    let mut cargo = std::process::Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    let mut cargo =
+        std::process::Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     cargo.current_dir(root()).args(["metadata", "--format-version", "1", "--all-features"]);
     let output = cargo.arg("--locked").output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

@@ -5,9 +5,9 @@ use serde::{Deserialize, Serialize};
 use crate::algorithm::{Algorithm, Course, StepControl};
 use crate::error::SystemError;
 use crate::exchange::Reals;
-use solve::{Bond, EnergyControl, ErrorControl, ForwardControl, Scale, SizeBounds, Verdict};
 use crate::system::{Port, System};
 use fmu_description::Kind;
+use solve::{Bond, EnergyControl, ErrorControl, ForwardControl, Scale, SizeBounds, Verdict};
 
 /// The state of the step control: what a run that goes on later needs.
 #[derive(Clone, Debug, Serialize, Deserialize)]

@@ -6,9 +6,9 @@ use super::sweep::Swept;
 use crate::algorithm::EventSource;
 use crate::error::SystemError;
 use crate::exchange::{Values, call};
-use solve::Bracket;
 use crate::system::Port;
 use slave::Value;
+use solve::Bracket;
 
 /// The slot of FMU states from which crossings are located.
 const SLOT: usize = 2;

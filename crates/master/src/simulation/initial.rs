@@ -10,9 +10,9 @@ use crate::error::SystemError;
 use crate::exchange::call;
 use crate::fault::FaultLine;
 use crate::order::Rows;
-use solve::{Components, Newton, Progress, Scale, Solver, components};
 use crate::system::{Port, System};
 use slave::Value;
+use solve::{Components, Newton, Progress, Scale, Solver, components};
 
 /// Tolerance of the values in a loop, relative and in nominal values.
 const TOLERANCE: f64 = 1e-10;

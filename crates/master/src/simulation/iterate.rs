@@ -5,8 +5,8 @@ use super::sweep::Swept;
 use crate::algorithm::{Algorithm, Coupling};
 use crate::error::SystemError;
 use crate::exchange::{Reals, Values, call};
-use solve::{Anderson, Newton, Progress, QuasiNewton, Scale, Solver};
 use crate::system::System;
+use solve::{Anderson, Newton, Progress, QuasiNewton, Scale, Solver};
 
 use fmu_description::CoSimulation;
 use serde::{Deserialize, Serialize};

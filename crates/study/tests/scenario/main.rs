@@ -6,7 +6,6 @@ mod examples;
 mod faults;
 mod refusals;
 
-
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
