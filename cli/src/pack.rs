@@ -97,6 +97,7 @@ struct Packing<'a> {
     out: &'a Path,
     /// Folder with libraries of all platforms.
     binaries: Option<&'a Path>,
+    #[cfg_attr(not(feature = "sbom"), expect(dead_code, reason = "refused without the feature"))]
     sbom: bool,
     /// As in cargo.
     locked: bool,
