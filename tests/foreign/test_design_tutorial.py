@@ -1,4 +1,4 @@
-"""docs/tutorial.md: its commands run, its numbers come out."""
+"""docs/tutorials/controller.md: its commands run, its numbers come out."""
 
 import json
 import re
@@ -10,7 +10,7 @@ import pytest
 from conftest import ROOT
 from design_loop import Designed, changed, coupled, packed_plant
 
-TEXT = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
+TEXT = (ROOT / "docs" / "tutorials" / "controller.md").read_text(encoding="utf-8")
 COMMANDS = re.findall(r"^    (.*)$", TEXT, flags=re.MULTILINE)
 
 
