@@ -80,7 +80,8 @@ def copy(tmp_path_factory):
         return subprocess.run(command, cwd=folder, env=environment, check=False, **options)
 
     def run(text):
-        return once(text.replace("cargo run --release --", "aso-ftc"))
+        text = text.replace("cargo run --release --", "aso-ftc")
+        return once(re.sub(r" +#.*$", "", text, flags=re.MULTILINE))
 
     examples = "examples/dc-servo examples/pid examples/three-tank"
     done = run(f"aso-ftc pack --ssp\naso-ftc pack {examples}")
