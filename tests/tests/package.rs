@@ -75,7 +75,10 @@ fn the_interfaces_are_those_of_the_documents() {
         for causality in [Causality::Input, Causality::Output] {
             for variable in names(description, causality) {
                 let family = variable.split('[').next().unwrap_or(variable);
-                assert!(page.contains(&format!("`{family}")), "docs/reference/fmus.md: {name}.{variable}");
+                assert!(
+                    page.contains(&format!("`{family}")),
+                    "docs/reference/fmus.md: {name}.{variable}"
+                );
             }
         }
     }
