@@ -16,7 +16,7 @@ SIDE = Path(__file__).resolve().with_name("field_fmpy.py")
 CLOSE = 1e-9  # of a variable's largest magnitude
 CHAINED_STEPS = 20
 
-# The verdicts of each question, the best first. docs/field.md explains them.
+# The verdicts of each question, the best first. docs/how-to/field.md explains them.
 QUESTIONS = {
     "defaults": ["ok", "only aso-ftc", "neither", "lost", "crashed"],
     "values": ["bits", "close", "steps", "times", "only aso-ftc", "neither", "differ", "lost", "crashed"],

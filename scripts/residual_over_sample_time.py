@@ -1,11 +1,11 @@
-"""The cart's residual over the sample time of the controller: figure and tables of docs/sampled.md.
+"""The cart's residual over the sample time of the controller: figure and tables of docs/explanation/sampled.md.
 
 Usage: python scripts/residual_over_sample_time.py
 
 Needs dist/ and target/release/aso-ftc (`cargo run --release -- pack`), and numpy; takes two minutes. For
 each sample time and choice of the design it derives a plant file from fmu-controller/pendulum.toml, makes
 the controller FMU by `aso-ftc design --fmu`, couples it with dist/FrictionPendulum.fmu by `aso-ftc run`
-and measures. Writes docs/residual_over_sample_time.csv and .svg; prints the tables of docs/sampled.md.
+and measures. Writes docs/figures/residual_over_sample_time.csv and .svg; prints the tables of docs/explanation/sampled.md.
 """
 
 import csv
@@ -22,7 +22,7 @@ from log_plot import Curve, log_plot
 
 ROOT = Path(__file__).resolve().parent.parent
 COMMAND = ROOT / "target" / "release" / "aso-ftc"
-STEM = ROOT / "docs" / "residual_over_sample_time"
+STEM = ROOT / "docs" / "figures" / "residual_over_sample_time"
 
 SAMPLE_TIMES = [0.1, 0.2, 0.5, 1, 2, 3, 5, 7, 10]  # ms
 SETTLED = 60.0  # s: compensation starts at 40 s

@@ -1,6 +1,6 @@
-"""Draws docs/work_precision.svg from docs/work_precision.csv.
+"""Draws docs/figures/work_precision.svg from docs/figures/work_precision.csv.
 
-Usage: cargo run --release -p tests --example work_precision > docs/work_precision.csv
+Usage: cargo run --release -p tests --example work_precision > docs/figures/work_precision.csv
        python scripts/work_precision.py
 """
 
@@ -9,7 +9,7 @@ import math
 from collections import defaultdict
 from pathlib import Path
 
-STEM = Path(__file__).resolve().parent.parent / "docs" / "work_precision"
+STEM = Path(__file__).resolve().parent.parent / "docs" / "figures" / "work_precision"
 WIDTH, HEIGHT = 1000.0, 560.0
 TOP, BOTTOM = 70.0, 480.0
 PANELS = [(90.0, 480.0), (590.0, 980.0)]

@@ -9,7 +9,7 @@ use files::whole::Pending;
 
 #[derive(clap::Args)]
 pub(crate) struct Options {
-    /// The plant file: plant, faults and what is wanted of the controller (docs/plant-file.md)
+    /// The plant file: plant, faults and what is wanted of the controller (docs/reference/plant-file.md)
     plant: PathBuf,
     /// The design file to write; the report goes beside it
     #[arg(long, value_name = "FILE", default_value = "design.toml")]

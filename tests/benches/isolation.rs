@@ -1,7 +1,7 @@
 //! What a step costs more when the FMU has a process of its own: microseconds per step of a tiny C
 //! FMU and of the pendulum, in this process and isolated, one instance and several.
 //!
-//! `cargo bench --package tests --bench isolation` prints the table of `docs/isolation.md`.
+//! `cargo bench --package tests --bench isolation` prints the table of `docs/how-to/isolation.md`.
 #![forbid(unsafe_code)]
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a measurement")]
 

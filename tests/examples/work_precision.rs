@@ -1,6 +1,6 @@
 //! Error over the number of steps, for fixed steps and for every choice of the step.
 //!
-//! `cargo run --release -p tests --example work_precision > docs/work_precision.csv`, then
+//! `cargo run --release -p tests --example work_precision > docs/figures/work_precision.csv`, then
 //! `python scripts/work_precision.py` draws the figure.
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a program for the table it prints")]
 

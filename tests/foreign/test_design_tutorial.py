@@ -1,4 +1,4 @@
-"""docs/tutorial.md: its commands run, its numbers come out."""
+"""docs/tutorials/controller.md: its commands run, its numbers come out."""
 
 import json
 import re
@@ -10,8 +10,8 @@ import pytest
 from conftest import ROOT
 from design_loop import Designed, changed, coupled, packed_plant
 
-TEXT = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
-COMMANDS = re.findall(r"^    (.*)$", TEXT, flags=re.MULTILINE)
+TEXT = (ROOT / "docs" / "tutorials" / "controller.md").read_text(encoding="utf-8")
+COMMANDS = "".join(re.findall(r"^```sh\n(.*?)^```$", TEXT, flags=re.MULTILINE | re.DOTALL)).splitlines()
 
 
 def table(path):
@@ -32,11 +32,11 @@ def runs(aso_ftc, python, tmp_path_factory):
     packed_plant(aso_ftc, "DcServo")
     results = tmp_path_factory.mktemp("results")
     found, report = {}, None
-    for command in COMMANDS[4:]:
+    for command in COMMANDS[4:8]:
         program, arguments = command.split(" ", 1)
         arguments = arguments.replace("results/servo", str(results)).split()
-        if program == "cargo":
-            done = aso_ftc(*arguments[arguments.index("--") + 1 :], "--json")
+        if program == "aso-ftc":
+            done = aso_ftc(*arguments, "--json")
             report = done.stdout
         else:
             assert program == ".venv/bin/python"
@@ -48,10 +48,10 @@ def runs(aso_ftc, python, tmp_path_factory):
 
 
 def test_the_commands_are_the_ones_that_are_run_here():
-    assert len(COMMANDS) == 8 and sys.version_info >= (3, 11)
+    assert len(COMMANDS) == 9 and sys.version_info >= (3, 11)
     assert COMMANDS[:4] == [
-        "cargo run --release -- pack",
-        "cargo run --release -- pack examples/dc-servo",
+        "aso-ftc pack",
+        "aso-ftc pack examples/dc-servo",
         "python3 -m venv .venv",
         ".venv/bin/pip install fmpy",
     ]

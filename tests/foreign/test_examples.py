@@ -1,4 +1,4 @@
-"""The examples of `fmi2` and a new crate, packed, judged and simulated by FMPy.
+"""The examples of `fmu` and a new crate, packed, judged and simulated by FMPy.
 
 Oracles: the published output of the Reference-FMUs, closed forms, and numpy.
 """

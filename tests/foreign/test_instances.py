@@ -1,6 +1,6 @@
 """Lives of many instances in a host of C: nothing is left over after loading and unloading.
 
-The same host runs under valgrind, see docs/robustness.md.
+The same host runs under valgrind, see docs/explanation/robustness.md.
 """
 
 import os

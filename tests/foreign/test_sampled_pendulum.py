@@ -88,8 +88,8 @@ def test_by_weights_the_ramp_model_needs_less_gain(tmp_path):
 
 
 def test_the_tables_of_the_documentation_are_those_of_the_figure():
-    page = (ROOT / "docs" / "sampled.md").read_text(encoding="utf-8")
-    lines = (ROOT / "docs" / "residual_over_sample_time.csv").read_text(encoding="utf-8").splitlines()
+    page = (ROOT / "docs" / "explanation" / "sampled.md").read_text(encoding="utf-8")
+    lines = (ROOT / "docs" / "figures" / "residual_over_sample_time.csv").read_text(encoding="utf-8").splitlines()
     found = {}
     for row in lines[1:]:
         label, cart = re.match(r'[\d.]+,"(.*)",([\d.]+),', row).groups()

@@ -1,4 +1,4 @@
-"""What a command that is at its limit for a part of a step costs: docs/plant-file.md, "Limits"."""
+"""What a command that is at its limit for a part of a step costs: docs/reference/plant-file.md, "Limits"."""
 
 import numpy as np
 import pytest

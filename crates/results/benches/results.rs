@@ -4,7 +4,7 @@
 //!
 //! `printf.c` writes the table in C, in a process of its own. All take turns in each sample and
 //! report the processor time that they took, the writing to the file in it; the last lines are the
-//! table of `docs/results.md`. Needs a C compiler; Unix only.
+//! table of `docs/reference/results.md`. Needs a C compiler; Unix only.
 #![forbid(unsafe_code)]
 #![expect(clippy::print_stdout, reason = "the result")]
 #![expect(clippy::cast_precision_loss, reason = "figures for a table")]

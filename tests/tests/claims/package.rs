@@ -70,11 +70,14 @@ fn the_interfaces_are_those_of_the_documents() {
     let states = ["x_hat[1]", "x_hat[2]", "x_hat[3]", "x_hat[4]", "f_hat"];
     assert_eq!(names(&controller, Causality::Local), states.map(|name| format!("der({name})")));
     for (name, description) in [("plant", &plant), ("controller", &controller)] {
-        let readme = fs::read_to_string(root().join("README.md")).unwrap();
+        let page = fs::read_to_string(root().join("docs/reference/fmus.md")).unwrap();
         for causality in [Causality::Input, Causality::Output] {
             for variable in names(description, causality) {
                 let family = variable.split('[').next().unwrap_or(variable);
-                assert!(readme.contains(&format!("`{family}")), "README: {name}.{variable}");
+                assert!(
+                    page.contains(&format!("`{family}")),
+                    "docs/reference/fmus.md: {name}.{variable}"
+                );
             }
         }
     }

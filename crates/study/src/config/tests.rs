@@ -157,8 +157,8 @@ fn hostile_text_ends_in_an_error() {
 
 #[test]
 fn the_documented_example_has_every_entry_of_the_algorithm() {
-    let document = include_str!("../../../../docs/system-toml.md");
-    let example = document.split("```").nth(1).unwrap().strip_prefix("toml\n").unwrap();
+    let document = include_str!("../../../../docs/reference/system-toml.md");
+    let example = document.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
     let config = parsed(example);
     assert_eq!((config.fmus.0.len(), config.settings.0.len()), (1, 3));
     // An entry that is not known names those that are.

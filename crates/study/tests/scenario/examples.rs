@@ -1,10 +1,10 @@
-//! The examples of docs/scenario.md.
+//! The examples of docs/reference/scenario.md.
 
 use super::{Document, scenario, setup, system};
 
 /// The blocks of the document that are files.
 fn blocks() -> Vec<String> {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/scenario.md");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/reference/scenario.md");
     let text = std::fs::read_to_string(path).unwrap();
     let parts = text.split("```toml\n").skip(1);
     parts.map(|part| part.split("```").next().unwrap().to_owned()).collect()

@@ -1,0 +1,19 @@
+"""A hook of mkdocs: formulas become MathML while the book is built, so that pages need no script."""
+
+import html
+import re
+
+from latex2mathml.converter import convert
+
+FORMULA = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.*?)\\[)\]]</\1>', re.DOTALL)
+
+
+def mathml(found):
+    """The formula as MathML, inline or as a paragraph of its own."""
+    display = "block" if found[2] == "[" else "inline"
+    return convert(html.unescape(found[3]), display=display)
+
+
+def on_page_content(content, **_):
+    """Called by mkdocs with the HTML of each page."""
+    return FORMULA.sub(mathml, content)
