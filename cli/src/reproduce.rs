@@ -71,7 +71,7 @@ pub(crate) fn reproduce(options: &Options) -> anyhow::Result<bool> {
     let written = Summary {
         scenario: options.scenario.name(),
         method: run.plan.algorithm.sweep.name(),
-        course: run.plan.algorithm.course.name(),
+        extrapolation: run.plan.algorithm.extrapolation.name(),
         communication_step: run.plan.algorithm.step,
         stop_time: options.stop_time,
         reached,

@@ -21,7 +21,7 @@ const ALPHA: f64 = 1.0;
 pub(crate) struct Summary<'a> {
     pub(crate) scenario: &'static str,
     pub(crate) method: &'static str,
-    pub(crate) course: &'static str,
+    pub(crate) extrapolation: &'static str,
     /// In s.
     pub(crate) communication_step: f64,
     /// In s.

@@ -16,8 +16,8 @@ mod linux {
     use fmu_import::isolate::{self, Isolated, Options};
     use master::Transformation;
     use master::{
-        Advance, Algorithm, Background as _, CallError, Course, Simulation, Slave, Stepped, Sweep,
-        System,
+        Advance, Algorithm, Background as _, CallError, Extrapolation, Method, Simulation, Slave,
+        StepResult, System,
     };
     use ssp::{Link, Terminal};
     use tests::{dist, troubles};
@@ -120,10 +120,10 @@ mod linux {
         fn set_real(&mut self, which: &[u32], values: &[f64]) -> Result<(), CallError> {
             self.0.set_real(which, values)
         }
-        fn do_step(&mut self, time: f64, size: f64, back: bool) -> Result<Stepped, CallError> {
+        fn do_step(&mut self, time: f64, size: f64, back: bool) -> Result<StepResult, CallError> {
             self.0.do_step(time, size, back)
         }
-        fn advance(&mut self, step: &mut Advance<'_>) -> Result<Stepped, CallError> {
+        fn advance(&mut self, step: &mut Advance<'_>) -> Result<StepResult, CallError> {
             self.0.advance(step)
         }
     }
@@ -147,7 +147,7 @@ mod linux {
             study::link(&mut system, &Link { from, to, transformation, units_settled: true })
                 .unwrap();
         }
-        let algorithm = Algorithm::fixed(Sweep::Jacobi, Course::Hold, SIZE);
+        let algorithm = Algorithm::fixed(Method::Jacobi, Extrapolation::Hold, SIZE);
         let mut simulation = Simulation::new(system, &algorithm, &Experiment::default()).unwrap();
         samples(|_| simulation.step().unwrap())
     }

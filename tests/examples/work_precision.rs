@@ -5,7 +5,7 @@
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a program for the table it prints")]
 
 use master::algorithm::PowerBond;
-use master::{Algorithm, Course, StepControl, Sweep};
+use master::{Algorithm, Extrapolation, Method, StepControl};
 use tests::linear::ABLE;
 use tests::network::{Network, Run};
 use tests::problems;
@@ -21,7 +21,7 @@ fn print(problem: &str, control: StepControl, parameter: f64, run: &Run) {
 }
 
 fn study(problem: &str, network: &Network, bonds: &[PowerBond]) {
-    let fixed = |step: f64| Algorithm::fixed(Sweep::GaussSeidel, Course::Linear, step);
+    let fixed = |step: f64| Algorithm::fixed(Method::GaussSeidel, Extrapolation::Linear, step);
     for power in 6..=14 {
         let step = STOP / 2.0_f64.powi(power);
         print(problem, StepControl::Fixed, step, &network.run(ABLE, &fixed(step), STOP).unwrap());

@@ -8,7 +8,7 @@ from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 
 # Every input held over a step at the value of its begin.
-HELD = ("--method", "jacobi", "--course", "hold")
+HELD = ("--method", "jacobi", "--extrapolation", "hold")
 
 
 def run(aso_ftc, folder, fmus, step, stop, *more, links=(), status=0, **options):

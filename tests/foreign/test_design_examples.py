@@ -144,16 +144,16 @@ def test_the_fault_of_a_sensor_is_told_from_that_of_a_pump(aso_ftc, python, tank
 
 
 @pytest.mark.parametrize(
-    ("course", "inputs"), [("limited", ()), ("hold", ("--hold",))]
+    ("extrapolation", "inputs"), [("limited", ()), ("hold", ("--hold",))]
 )
 def test_fmpy_and_the_rust_master_agree_on_the_tanks(
-    course, inputs, aso_ftc, python, tanks, tmp_path
+    extrapolation, inputs, aso_ftc, python, tanks, tmp_path
 ):
     designed = Designed(aso_ftc, "examples/three-tank/plant.toml", tmp_path)
     steps = ("--step", 0.37, "--stop-time", 400)
     table, _ = coupled(python, designed, tanks, BOTH, *steps, *inputs)
     settings = [text for name, value in BOTH.items() for text in ("--set", f"{name}={value}")]
-    options = ("--course", course, "--record-every", 0.37, "--out", tmp_path)
+    options = ("--extrapolation", extrapolation, "--record-every", 0.37, "--out", tmp_path)
     fmus = ("--plant", tanks, "--controller", designed.fmu)
     done = aso_ftc("run", *fmus, *settings, *steps, *options)
     assert done.returncode == 0, done.stderr

@@ -23,7 +23,7 @@ def run(aso_ftc, tmp_path):
 
     def run(path, step, stop, names):
         out = tmp_path / "out"
-        options = ["--step", step, "--stop-time", stop, "--method", "jacobi", "--course", "hold"]
+        options = ["--step", step, "--stop-time", stop, "--method", "jacobi", "--extrapolation", "hold"]
         done = aso_ftc("run", path, "--out", out, *options)
         assert done.returncode == 0, done.stderr
         with open(out / "results.csv", encoding="utf-8", newline="") as file:

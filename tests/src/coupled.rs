@@ -70,7 +70,7 @@ impl Run {
             arguments.extend(["--fmu".to_owned(), format!("{name}={}", path.display())]);
         }
         let step = STEP.to_string();
-        let mut fixed = vec!["--method", "jacobi", "--course", "hold"];
+        let mut fixed = vec!["--method", "jacobi", "--extrapolation", "hold"];
         if !more.contains(&"--step") {
             fixed.extend(["--step", &step]);
         }

@@ -22,7 +22,7 @@ use fmu_description::Experiment;
 use fmu_description::ModelDescription;
 use fmu_description::abi::Status;
 use fmu_import::{Fmu, FmuError};
-use master::{CallError, Failure, Slave, Stepped};
+use master::{CallError, Failure, Slave, StepResult};
 
 /// Why an FMU could not be opened or instantiated through the crate `fmi`.
 #[derive(Debug, thiserror::Error)]
@@ -220,10 +220,10 @@ impl Slave for FmiSlave {
         })
     }
 
-    fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<Stepped, CallError> {
+    fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError> {
         self.call("fmi2DoStep", move |instance| {
             instance.do_step(time, size, never_back).map(drop)
         })?;
-        Ok(Stepped::Whole)
+        Ok(StepResult::Whole)
     }
 }

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use fmu_description::Experiment;
 use fmu_description::ModelDescription;
-use master::{CallError, Slave, Stepped};
+use master::{CallError, Slave, StepResult};
 use nalgebra::{DMatrix, DVector};
 
 /// Value reference of the first output; those of the inputs begin at 0.
@@ -217,13 +217,13 @@ impl Slave for Linear {
         Ok(())
     }
 
-    fn do_step(&mut self, _: f64, size: f64, _: bool) -> Result<Stepped, CallError> {
+    fn do_step(&mut self, _: f64, size: f64, _: bool) -> Result<StepResult, CallError> {
         if self.propagator.0.to_bits() != size.to_bits() {
             self.propagator = (size, (&self.matrix * size).exp());
         }
         self.state = &self.propagator.1 * &self.state;
         self.steps.fetch_add(1, Ordering::Relaxed);
-        Ok(Stepped::Whole)
+        Ok(StepResult::Whole)
     }
 
     fn directional_derivative(

@@ -21,7 +21,7 @@ fn open(time_limit: Option<Duration>) -> Isolated {
         .unwrap()
 }
 
-fn step(slave: &mut Isolated, trouble: Trouble) -> Result<master::Stepped, master::CallError> {
+fn step(slave: &mut Isolated, trouble: Trouble) -> Result<master::StepResult, master::CallError> {
     slave.set_integer(&[0], &[trouble as i32])?;
     slave.do_step(0.0, 0.1, true)
 }

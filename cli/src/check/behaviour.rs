@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use fmu_description::Experiment;
 use fmu_description::ModelDescription;
-use master::{CallError, Failure, Slave, Stepped};
+use master::{CallError, Failure, Slave, StepResult};
 
 use super::answer::Here;
 use super::finding::Severity::{Error, Note, Warning};
@@ -56,8 +56,8 @@ struct Trial<'a, S> {
 
 /// Whether the process of the FMU is gone, or as good as that.
 fn gone(error: &CallError) -> bool {
-    use Failure::{Exited, Killed, Nonsense, TimedOut};
-    matches!(error.failure, Killed(..) | Exited(_) | TimedOut(_) | Nonsense(_))
+    use Failure::{Exited, InvalidAnswer, Killed, TimedOut};
+    matches!(error.failure, Killed(..) | Exited(_) | TimedOut(_) | InvalidAnswer(_))
 }
 
 const ENDS_IT: &str =
@@ -225,8 +225,8 @@ impl<S: Slave> Trial<'_, S> {
         let mut course = vec![self.read(slave)?];
         for k in from..from + STEPS {
             match slave.do_step(self.time(k), self.step_size(), true) {
-                Ok(Stepped::Whole) => course.push(self.read(slave)?),
-                Ok(Stepped::Part { reached, .. }) => {
+                Ok(StepResult::Whole) => course.push(self.read(slave)?),
+                Ok(StepResult::Part { reached, .. }) => {
                     let what =
                         format!("a step of {} s is done to {reached} s only", self.step_size());
                     let why = "FMPy and others end the run there.";
@@ -316,7 +316,7 @@ impl<S: Slave> Trial<'_, S> {
             return;
         };
         match slave.do_step(start, size, true) {
-            Ok(Stepped::Whole) => {
+            Ok(StepResult::Whole) => {
                 let what = "steps past a stopTime that was defined, expected fmi2Error";
                 let why = "What an FMU computes beyond the end of its data goes unnoticed.";
                 self.findings.add(Warning, "fmi2DoStep", what, (why, "2.1.6"));

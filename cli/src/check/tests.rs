@@ -3,7 +3,7 @@
 use fmu_description::Experiment;
 use fmu_description::ModelDescription;
 use fmu_description::abi::Status;
-use master::{CallError, Failure, Slave, Stepped};
+use master::{CallError, Failure, Slave, StepResult};
 
 use super::answer::{Answer, Here};
 use super::behaviour;
@@ -96,7 +96,7 @@ impl Slave for Sum {
         Ok(())
     }
 
-    fn do_step(&mut self, time: f64, size: f64, _: bool) -> Result<Stepped, CallError> {
+    fn do_step(&mut self, time: f64, size: f64, _: bool) -> Result<StepResult, CallError> {
         if self.fault == Fault::Step && time > 0.5 {
             return Err(refused("fmi2DoStep", "tired"));
         }
@@ -110,7 +110,7 @@ impl Slave for Sum {
         if self.fault == Fault::Nan {
             self.y = f64::NAN;
         }
-        Ok(Stepped::Whole)
+        Ok(StepResult::Whole)
     }
 
     fn save_state(&mut self, _: usize) -> Result<(), CallError> {

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use master::{Coupling, Course, StepControl, Sweep, Wanted};
+use master::{AlgorithmRequest, Coupling, Extrapolation, Method, StepControl};
 use toml::Spanned;
 
 use study::{Config, Every, Loaded, Memory, Saved, Wire};
@@ -23,10 +23,13 @@ pub(crate) struct AlgorithmOptions {
     /// Order of stepping: gauss-seidel (one FMU after the other) or jacobi (all from the same
     /// values)
     #[arg(long, value_parser = method)]
-    pub(crate) method: Option<Sweep>,
-    /// Course of inputs during a step: hold, limited, linear or quadratic
-    #[arg(long, value_parser = str::parse::<Course>)]
-    pub(crate) course: Option<Course>,
+    pub(crate) method: Option<Method>,
+    /// Extrapolation of inputs during a step: hold, limited, linear or quadratic
+    #[arg(long, value_parser = str::parse::<Extrapolation>)]
+    pub(crate) extrapolation: Option<Extrapolation>,
+    /// The former name of --extrapolation
+    #[arg(long, hide = true, conflicts_with = "extrapolation", value_parser = str::parse::<Extrapolation>)]
+    course: Option<Extrapolation>,
     /// Repetition of a step until inputs and outputs agree: once, newton, anderson or quasi-newton
     #[arg(long, value_parser = str::parse::<Coupling>)]
     pub(crate) coupling: Option<Coupling>,
@@ -187,19 +190,22 @@ fn multiple(text: &str) -> Result<(String, u32), String> {
     }
 }
 
-fn method(text: &str) -> Result<Sweep, String> {
+fn method(text: &str) -> Result<Method, String> {
     if text == "gauss-seidel-hold" {
-        return Err("say `--method gauss-seidel --course hold`".to_owned());
+        return Err("say `--method gauss-seidel --extrapolation hold`".to_owned());
     }
     text.parse()
 }
 
 impl AlgorithmOptions {
     /// Puts what is stated over `wanted`.
-    pub(crate) fn apply(&self, wanted: &mut Wanted) {
+    pub(crate) fn apply(&self, wanted: &mut AlgorithmRequest) {
         put(&mut wanted.step, self.step);
         put(&mut wanted.method, self.method);
-        put(&mut wanted.course, self.course);
+        if self.course.is_some() {
+            tracing::warn!("--course is now called --extrapolation");
+        }
+        put(&mut wanted.extrapolation, self.extrapolation.or(self.course));
         put(&mut wanted.coupling, self.coupling);
         put(&mut wanted.step_control, self.step_control);
         put(&mut wanted.relative_tolerance, self.relative_tolerance);

@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex};
 use fmu_description::Experiment;
 use fmu_description::ModelDescription;
 
-use slave::{CallError, Slave, Stepped};
+use slave::{CallError, Slave, StepResult};
 
 /// A file that FMI calls are written to.
 ///
@@ -240,10 +240,10 @@ impl Slave for LoggedSlave {
         self.call(("fmi2GetRealOutputDerivatives", arguments), call, String::clone).map(|_| ())
     }
 
-    fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<Stepped, CallError> {
+    fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError> {
         self.begin("fmi2DoStep", &format!("{time:?}, {size:?}, {never_back}"));
         let done = self.slave.do_step(time, size, never_back);
-        if let Ok(Stepped::Part { reached, terminated }) = done {
+        if let Ok(StepResult::Part { reached, terminated }) = done {
             self.log.write(&format!(
                 " -> fmi2Discard fmi2LastSuccessfulTime {reached:?}, fmi2Terminated {terminated}\n"
             ));

@@ -13,7 +13,7 @@ use fmu_description::{Kind, ModelDescription};
 
 use crate::error::LoadError;
 use crate::library::{Component, Interface, Library, Names};
-use slave::{CallError, Slave, Stepped};
+use slave::{CallError, Slave, StepResult};
 
 /// Why an FMU could not be opened or instantiated.
 #[derive(Debug, thiserror::Error)]
@@ -319,7 +319,7 @@ impl Slave for Instance {
         self.component.get_real_output_derivatives(references, orders, values)
     }
 
-    fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<Stepped, CallError> {
+    fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError> {
         self.component.do_step(time, size, never_back)
     }
 
@@ -355,7 +355,7 @@ impl Slave for Instance {
         span: (f64, f64),
         never_back: bool,
         outputs: (&[u32], &mut [f64]),
-    ) -> Result<Stepped, CallError> {
+    ) -> Result<StepResult, CallError> {
         self.component.pass(inputs, span, never_back, outputs)
     }
 

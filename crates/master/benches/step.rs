@@ -13,7 +13,7 @@ use anyhow::Context;
 use criterion::{BenchmarkId, Criterion};
 use fmu_description::Experiment;
 use fmu_import::Fmu;
-use master::algorithm::{Algorithm, Course, Sweep};
+use master::algorithm::{Algorithm, Extrapolation, Method};
 use master::{Simulation, Slave, System};
 
 #[path = "../../../tests/speed/lag.rs"]
@@ -34,8 +34,11 @@ fn simulation(fmu: &Fmu, count: usize, ports: usize) -> anyhow::Result<Simulatio
     for (from, to, port) in lag::ring(count, ports) {
         system.connect(&format!("f{from}.y{port}"), &format!("f{to}.u{port}"))?;
     }
-    let algorithm =
-        Algorithm { sweep: Sweep::Jacobi, course: Course::Hold, ..Algorithm::new(STEP) };
+    let algorithm = Algorithm {
+        sweep: Method::Jacobi,
+        extrapolation: Extrapolation::Hold,
+        ..Algorithm::new(STEP)
+    };
     Ok(Simulation::new(system, &algorithm, &EXPERIMENT)?)
 }
 

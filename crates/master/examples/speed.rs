@@ -27,7 +27,7 @@ use anyhow::{Context, bail};
 use fmu_description::Causality;
 use fmu_description::Experiment;
 use fmu_import::Fmu;
-use master::algorithm::{Algorithm, Course, Sweep};
+use master::algorithm::{Algorithm, Extrapolation, Method};
 use master::{Readout, Simulation, System};
 use results::{Column, ColumnKind, Row, create};
 use rustix::time::{ClockId, clock_gettime};
@@ -79,8 +79,11 @@ fn run(path: &Path, step: f64, steps: u64, results: Option<&Path>) -> anyhow::Re
     let mut sink = results.map(|path| create(path, &columns)).transpose()?;
     let mut readout = Readout::new(&system, &ports);
     let experiment = Experiment { start_time: 0.0, stop_time: None, tolerance: None };
-    let algorithm =
-        Algorithm { sweep: Sweep::Jacobi, course: Course::Hold, ..Algorithm::new(step) };
+    let algorithm = Algorithm {
+        sweep: Method::Jacobi,
+        extrapolation: Extrapolation::Hold,
+        ..Algorithm::new(step)
+    };
     let mut simulation = Simulation::new(system, &algorithm, &experiment)?;
     let (started, wall) = (cpu(), clock.elapsed());
     for _ in 0..steps {

@@ -39,7 +39,7 @@ macro_rules! choice {
 
 choice! {
     /// In which order the slaves step.
-    Sweep {
+    Method {
         /// All from the values at the begin of the step.
         Jacobi = "jacobi",
         /// One after the other, in the order of their direct dependencies: a slave sees the values
@@ -54,7 +54,7 @@ choice! {
     /// (`canInterpolateInputs`) gets the mean of the line or parabola over the step, held, which is
     /// of order 2 (1 where its outputs depend directly on such an input); of a limited line the
     /// value at the end where that is known, else at the begin, which is of order 1.
-    Course {
+    Extrapolation {
         /// Its value at the begin of the step, or at the end where the source has stepped already.
         Hold = "hold",
         /// A line. Interpolated where the source has stepped already; else extrapolated by the
@@ -126,9 +126,9 @@ pub struct PowerBond {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Algorithm {
     /// Order of stepping.
-    pub sweep: Sweep,
-    /// Course of the inputs.
-    pub course: Course,
+    pub sweep: Method,
+    /// Extrapolation of the inputs.
+    pub extrapolation: Extrapolation,
     /// Repetition of a step.
     pub coupling: Coupling,
     /// Choice of the step.
@@ -163,19 +163,19 @@ pub struct Algorithm {
 }
 
 impl Algorithm {
-    /// Fixed communication steps of `step` s, with that order of stepping and that course of the
+    /// Fixed communication steps of `step` s, by that method and with that extrapolation of the
     /// inputs; the rest as in [`Algorithm::new`].
     #[must_use]
-    pub fn fixed(sweep: Sweep, course: Course, step: f64) -> Self {
-        Self { sweep, course, ..Self::new(step) }
+    pub fn fixed(sweep: Method, extrapolation: Extrapolation, step: f64) -> Self {
+        Self { sweep, extrapolation, ..Self::new(step) }
     }
 
     /// Gauss-Seidel with limited slopes and the fixed communication step `step` in s.
     #[must_use]
     pub fn new(step: f64) -> Self {
         Self {
-            sweep: Sweep::GaussSeidel,
-            course: Course::Limited,
+            sweep: Method::GaussSeidel,
+            extrapolation: Extrapolation::Limited,
             coupling: Coupling::Once,
             control: StepControl::Fixed,
             step,

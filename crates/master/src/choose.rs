@@ -2,7 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::algorithm::{Algorithm, Coupling, Course, EventSource, PowerBond, StepControl, Sweep};
+use crate::algorithm::{
+    Algorithm, Coupling, EventSource, Extrapolation, Method, PowerBond, StepControl,
+};
 use crate::error::SystemError;
 use crate::order::by_direct_dependencies;
 use crate::system::System;
@@ -18,13 +20,13 @@ const STEPS: f64 = 1e5;
 /// What the user states of an [`Algorithm`]; the rest is chosen.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
-pub struct Wanted {
+pub struct AlgorithmRequest {
     /// `jacobi` or `gauss-seidel`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub method: Option<Sweep>,
-    /// Course of the inputs.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub course: Option<Course>,
+    pub method: Option<Method>,
+    /// Extrapolation of the inputs; `course` is its former name.
+    #[serde(alias = "course", skip_serializing_if = "Option::is_none")]
+    pub extrapolation: Option<Extrapolation>,
     /// Repetition of a step.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coupling: Option<Coupling>,
@@ -89,7 +91,11 @@ pub struct Chosen {
 /// # Errors
 ///
 /// Where names do not exist, or what is wanted needs what an FMU cannot do.
-pub fn choose(system: &System, wanted: &Wanted, length: f64) -> Result<Chosen, SystemError> {
+pub fn choose(
+    system: &System,
+    wanted: &AlgorithmRequest,
+    length: f64,
+) -> Result<Chosen, SystemError> {
     let mut reasons = Vec::new();
     let step = wanted.step.unwrap_or_else(|| default_step(system, length, &mut reasons));
     let base = Algorithm::new(step);
@@ -102,14 +108,15 @@ pub fn choose(system: &System, wanted: &Wanted, length: f64) -> Result<Chosen, S
             "gauss-seidel, in the order of the direct dependencies: {}",
             shortened(&names)
         ));
-        Sweep::GaussSeidel
+        Method::GaussSeidel
     });
-    let course = wanted.course.unwrap_or_else(|| default_course(system, &mut reasons));
+    let extrapolation =
+        wanted.extrapolation.unwrap_or_else(|| default_extrapolation(system, &mut reasons));
     let loose = matches!(control, StepControl::Increment | StepControl::Energy);
     let default_relative = if loose { 1e-2 } else { base.relative_tolerance };
     let algorithm = Algorithm {
         sweep,
-        course,
+        extrapolation,
         coupling,
         control,
         step,
@@ -191,7 +198,7 @@ fn default_coupling(system: &System, reasons: &mut Vec<String>) -> Coupling {
     }
 }
 
-fn default_course(system: &System, reasons: &mut Vec<String>) -> Course {
+fn default_extrapolation(system: &System, reasons: &mut Vec<String>) -> Extrapolation {
     let fed: std::collections::BTreeSet<usize> =
         system.connections.iter().map(|connection| connection.to.slave).collect();
     let unable: Vec<_> = fed
@@ -203,16 +210,16 @@ fn default_course(system: &System, reasons: &mut Vec<String>) -> Course {
         .collect();
     if unable.is_empty() {
         reasons.push(
-            "course limited: all connected FMUs take input derivatives (canInterpolateInputs)"
+            "extrapolation limited: all connected FMUs take input derivatives (canInterpolateInputs)"
                 .to_owned(),
         );
     } else {
         reasons.push(format!(
-            "course limited, held for {}: canInterpolateInputs is false",
+            "extrapolation limited, held for {}: canInterpolateInputs is false",
             shortened(&unable)
         ));
     }
-    Course::Limited
+    Extrapolation::Limited
 }
 
 /// The first names of a list.
@@ -223,7 +230,7 @@ fn shortened(names: &[&str]) -> String {
     if more == 0 { shown } else { format!("{shown} and {more} more") }
 }
 
-fn multiples(system: &System, wanted: &Wanted) -> Result<Vec<u32>, SystemError> {
+fn multiples(system: &System, wanted: &AlgorithmRequest) -> Result<Vec<u32>, SystemError> {
     if wanted.every.is_empty() {
         return Ok(Vec::new());
     }
@@ -234,14 +241,14 @@ fn multiples(system: &System, wanted: &Wanted) -> Result<Vec<u32>, SystemError> 
     Ok(multiples)
 }
 
-fn events(system: &System, wanted: &Wanted) -> Result<Vec<EventSource>, SystemError> {
+fn events(system: &System, wanted: &AlgorithmRequest) -> Result<Vec<EventSource>, SystemError> {
     let times = wanted.next_event.iter().map(|name| Ok(EventSource::NextTime(system.port(name)?)));
     let crossings =
         wanted.crossing.iter().map(|name| Ok(EventSource::Crossing(system.port(name)?)));
     times.chain(crossings).collect()
 }
 
-fn bonds(system: &System, wanted: &Wanted) -> Result<Vec<PowerBond>, SystemError> {
+fn bonds(system: &System, wanted: &AlgorithmRequest) -> Result<Vec<PowerBond>, SystemError> {
     let bond = |(first, second): &(String, String)| {
         Ok(PowerBond { first: system.port(first)?, second: system.port(second)? })
     };

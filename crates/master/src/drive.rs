@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::SystemError;
 use crate::exchange::call;
-use crate::fault::FaultLine;
+use crate::fault::FaultChain;
 use crate::signal::{Cursor, Sample, Signal, earliest, reached};
 use crate::system::{Port, System};
 
@@ -16,7 +16,7 @@ pub struct Scenario {
     pub drives: Drives,
     /// Faults on connections, by their inputs. They act on what the connection's transformation
     /// gives.
-    pub faults: Vec<(Port, FaultLine)>,
+    pub faults: Vec<(Port, FaultChain)>,
 }
 
 /// Type of a driven variable.
@@ -45,7 +45,7 @@ pub struct Drive {
     /// Before this time it keeps its start value.
     begin: f64,
     texts: Vec<String>,
-    faults: Option<FaultLine>,
+    faults: Option<FaultChain>,
     cursor: Cursor,
     /// Set last, and set last when a communication point was reached for good.
     written: Option<Sample>,
@@ -101,7 +101,7 @@ impl Drive {
     }
 
     /// Disturbs the signal on its way to the variable.
-    pub fn set_faults(&mut self, faults: FaultLine) {
+    pub fn set_faults(&mut self, faults: FaultChain) {
         self.faults = Some(faults);
     }
 
@@ -131,7 +131,7 @@ pub struct Following {
 /// What a checkpoint holds of a [`Drive`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DriveState {
-    faults: Option<FaultLine>,
+    faults: Option<FaultChain>,
     accepted: Option<Sample>,
 }
 

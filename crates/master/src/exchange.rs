@@ -1,7 +1,7 @@
 //! Values on their way from outputs to inputs, in arrays laid out once: stepping allocates nothing.
 
-mod course;
 mod discrete;
+mod extrapolation;
 mod faulty;
 mod layout;
 mod multirate;
@@ -17,13 +17,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::algorithm::Algorithm;
 use crate::error::SystemError;
-use crate::fault::FaultLine;
+use crate::fault::FaultChain;
 use crate::simulation::Task;
 use crate::system::{Port, System};
 use discrete::{BOOLEANS, Channel, INTEGERS, STRINGS};
 pub(crate) use layout::Refusal;
 pub(crate) use reals::{Reals, Trace};
-use slave::{CallError, Slave, Stepped};
+use slave::{CallError, Slave, StepResult};
 
 /// The connections of a system, ready to be carried out.
 pub(crate) struct Exchange {
@@ -83,7 +83,7 @@ impl Exchange {
     pub(crate) fn set_faults(
         &mut self,
         system: &System,
-        faults: &[(Port, FaultLine)],
+        faults: &[(Port, FaultChain)],
     ) -> Result<(), SystemError> {
         for (input, fault) in faults {
             let set = self.reals.set_fault(*input, fault)
@@ -126,7 +126,7 @@ impl Exchange {
     }
 
     /// The faults, for a checkpoint.
-    pub(crate) fn faults(&mut self) -> impl Iterator<Item = &mut FaultLine> {
+    pub(crate) fn faults(&mut self) -> impl Iterator<Item = &mut FaultChain> {
         self.reals.faults().chain(self.integers.faults()).chain(self.booleans.faults())
     }
 
@@ -161,7 +161,7 @@ impl Exchange {
         position: usize,
         (time, size): (f64, f64),
         never_back: bool,
-    ) -> Result<Stepped, SystemError> {
+    ) -> Result<StepResult, SystemError> {
         let (name, slave) = &mut system.slaves[position];
         let slave = slave.as_mut();
         if self.discrete {
@@ -204,7 +204,7 @@ impl Exchange {
         position: usize,
         (time, size): (f64, f64),
         never_back: bool,
-    ) -> Result<Stepped, SystemError> {
+    ) -> Result<StepResult, SystemError> {
         let (name, slave) = &mut system.slaves[position];
         if slave.in_background().is_none() {
             return self.advance(system, position, (time, size), never_back);
@@ -223,7 +223,7 @@ impl Exchange {
         span: &dyn Fn(usize) -> (f64, f64),
         never_back: bool,
         run: impl FnOnce(&mut [Task<'_>]),
-    ) -> Result<Vec<Stepped>, SystemError> {
+    ) -> Result<Vec<StepResult>, SystemError> {
         for &position in slaves {
             let (name, slave) = &mut system.slaves[position];
             self.set_discrete(position, slave.as_mut())

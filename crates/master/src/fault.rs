@@ -107,7 +107,7 @@ pub enum Lost {
     },
 }
 
-/// Why there can be no [`FaultLine`].
+/// Why there can be no [`FaultChain`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FaultError {
     /// A delay over too many communication steps.
@@ -128,15 +128,15 @@ pub enum FaultError {
 
 /// All faults on one way, each on what the one before it leaves.
 ///
-/// [`FaultLine::apply`] is pure: a step may be repeated. What a fault remembers (the value at which
-/// it sticks, the last value not lost, the values on their way) is what [`FaultLine::commit`] was
+/// [`FaultChain::apply`] is pure: a step may be repeated. What a fault remembers (the value at which
+/// it sticks, the last value not lost, the values on their way) is what [`FaultChain::commit`] was
 /// told at communication points. Neither allocates.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct FaultLine {
+pub struct FaultChain {
     stages: Vec<Stage>,
 }
 
-impl FaultLine {
+impl FaultChain {
     /// The faults in their order, for communication steps of `step` s. Steps may differ from that;
     /// a delay keeps no two points that are nearer than half of it.
     ///
@@ -157,28 +157,28 @@ impl FaultLine {
         self.apply_sample(time, Sample::held(value)).value
     }
 
-    /// As [`FaultLine::apply`], with the derivative by time of what arrives; for a value that
+    /// As [`FaultChain::apply`], with the derivative by time of what arrives; for a value that
     /// changes in jumps it is zero.
     #[must_use]
     pub fn apply_sample(&self, time: f64, sample: Sample) -> Sample {
-        let [value, slope, _] = self.apply_course(time, [sample.value, sample.slope, 0.0]);
+        let [value, slope, _] = self.apply_derivatives(time, [sample.value, sample.slope, 0.0]);
         Sample { value, slope }
     }
 
-    /// As [`FaultLine::apply_sample`], with the second derivative too: value, slope, curvature.
+    /// As [`FaultChain::apply_sample`], with the second derivative too: value, slope, curvature.
     #[must_use]
-    pub fn apply_course(&self, time: f64, course: [f64; 3]) -> [f64; 3] {
+    pub fn apply_derivatives(&self, time: f64, course: [f64; 3]) -> [f64; 3] {
         self.stages.iter().fold(course, |course, stage| stage.apply(time, course))
     }
 
-    /// As [`FaultLine::apply`], for Integers, rounded and within their range.
+    /// As [`FaultChain::apply`], for Integers, rounded and within their range.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "saturates")]
     pub fn apply_integer(&self, time: f64, value: i32) -> i32 {
         self.apply(time, f64::from(value)).round() as i32
     }
 
-    /// As [`FaultLine::apply`], for Booleans: 0 is false, as in the C interface.
+    /// As [`FaultChain::apply`], for Booleans: 0 is false, as in the C interface.
     #[must_use]
     pub fn apply_boolean(&self, time: f64, value: i32) -> i32 {
         i32::from(self.apply(time, f64::from(i32::from(value != 0))) != 0.0)

@@ -21,15 +21,15 @@ pub mod signal;
 mod simulation;
 mod system;
 
-pub use algorithm::{Algorithm, Coupling, Course, StepControl, Sweep};
-pub use choose::{Chosen, Wanted, choose};
+pub use algorithm::{Algorithm, Coupling, Extrapolation, Method, StepControl};
+pub use choose::{AlgorithmRequest, Chosen, choose};
 pub use drive::Scenario;
 pub use error::SystemError;
 pub use order::{Order, by_direct_dependencies};
 pub use probe::Probe;
 pub use readout::{Readout, SlowState, SlowValues};
 pub use simulation::{Checkpoint, EarlyEnd, Fallbacks, Simulation};
-pub use slave::{Advance, Background, CallError, Failure, Slave, Stepped, Transformation};
+pub use slave::{Advance, Background, CallError, Failure, Slave, StepResult, Transformation};
 pub use system::{Connection, Port, System};
 
 #[cfg(doctest)]

@@ -14,7 +14,7 @@ mod together;
 
 use fmu_description::Experiment;
 
-use crate::algorithm::{Algorithm, Course, StepControl};
+use crate::algorithm::{Algorithm, Extrapolation, StepControl};
 use crate::drive::{Drives, Scenario};
 use crate::error::SystemError;
 use crate::exchange::{Exchange, call};
@@ -344,7 +344,7 @@ impl Simulation {
         for (name, slave) in &mut self.system.slaves {
             match slave.terminate() {
                 // There is nothing to end.
-                Ok(()) | Err(CallError { failure: Failure::Absent, .. }) => {}
+                Ok(()) | Err(CallError { failure: Failure::Missing, .. }) => {}
                 Err(source) => first = first.and(Err(call(name, time, source))),
             }
         }
@@ -362,7 +362,7 @@ fn read_at_start(
     for slave in 0..system.slaves.len() {
         exchange.read(system, slave, start)?;
     }
-    if algorithm.course == Course::Quadratic {
+    if algorithm.extrapolation == Extrapolation::Quadratic {
         exchange.derive_at_start(system, (start, algorithm.step))?;
     }
     exchange.reals.forget();

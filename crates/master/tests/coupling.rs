@@ -5,14 +5,14 @@ use fmu_description::Experiment;
 use fmu_description::ModelDescription;
 use fmu_description::abi::Status;
 use master::{
-    Algorithm, CallError, Course, Failure, Simulation, Slave, Stepped, Sweep, System,
+    Algorithm, CallError, Extrapolation, Failure, Method, Simulation, Slave, StepResult, System,
     by_direct_dependencies,
 };
 use ssp::Function;
 
-const JACOBI: (Sweep, Course) = (Sweep::Jacobi, Course::Hold);
-const GAUSS_SEIDEL: (Sweep, Course) = (Sweep::GaussSeidel, Course::Limited);
-const GAUSS_SEIDEL_HOLD: (Sweep, Course) = (Sweep::GaussSeidel, Course::Hold);
+const JACOBI: (Method, Extrapolation) = (Method::Jacobi, Extrapolation::Hold);
+const GAUSS_SEIDEL: (Method, Extrapolation) = (Method::GaussSeidel, Extrapolation::Limited);
+const GAUSS_SEIDEL_HOLD: (Method, Extrapolation) = (Method::GaussSeidel, Extrapolation::Hold);
 
 /// x' = gain u, stepped exactly for a line u + slope t; with `direct` the output is y = u instead.
 struct Integrator {
@@ -93,7 +93,7 @@ impl Slave for Integrator {
         slopes[0] = self.gain * self.u;
         Ok(())
     }
-    fn do_step(&mut self, time: f64, size: f64, _: bool) -> Result<Stepped, CallError> {
+    fn do_step(&mut self, time: f64, size: f64, _: bool) -> Result<StepResult, CallError> {
         if time >= self.fails_at {
             let messages = vec!["out of paper".to_owned()];
             return Err(CallError {
@@ -105,7 +105,7 @@ impl Slave for Integrator {
         self.x += self.gain * (self.u * size + 0.5 * self.slope * size * size);
         self.u += self.slope * size;
         self.slope = 0.0;
-        Ok(Stepped::Whole)
+        Ok(StepResult::Whole)
     }
 }
 
@@ -119,7 +119,7 @@ fn ring() -> System {
     system
 }
 
-fn start(system: System, method: (Sweep, Course), stop_time: Option<f64>) -> Simulation {
+fn start(system: System, method: (Method, Extrapolation), stop_time: Option<f64>) -> Simulation {
     let experiment = Experiment { stop_time, ..Experiment::default() };
     Simulation::new(system, &Algorithm::fixed(method.0, method.1, 0.5), &experiment).unwrap()
 }
@@ -178,7 +178,7 @@ fn a_slave_that_takes_equal_steps_only_is_not_given_a_shorter_one() {
     let mut system = ring();
     system.slaves[0].1 = rigid;
     let experiment = Experiment { stop_time: Some(1.2), ..Experiment::default() };
-    let algorithm = Algorithm::fixed(Sweep::Jacobi, Course::Hold, 0.5);
+    let algorithm = Algorithm::fixed(Method::Jacobi, Extrapolation::Hold, 0.5);
     let mut simulation = Simulation::new(system, &algorithm, &experiment).unwrap();
     while !simulation.is_finished() {
         simulation.step().unwrap();
@@ -287,7 +287,7 @@ fn a_function_of_a_slower_slave_gets_what_that_slave_has_reached_and_not_what_li
     let mut system = with_sum();
     system.add("three", Integrator::boxed(1.0, 3.0, false)).unwrap();
     system.connect("three.y", "constant.u").unwrap();
-    let mut algorithm = Algorithm::fixed(Sweep::Jacobi, Course::Hold, 0.5);
+    let mut algorithm = Algorithm::fixed(Method::Jacobi, Extrapolation::Hold, 0.5);
     algorithm.multiples = vec![1, 1, 2, 1];
     let mut simulation = Simulation::new(system, &algorithm, &Experiment::default()).unwrap();
     let (mut x, mut slow) = (1.0, 2.0);
@@ -305,7 +305,7 @@ fn a_function_of_a_slower_slave_gets_what_that_slave_has_reached_and_not_what_li
 
 #[test]
 fn a_function_that_follows_the_course_of_its_inputs_reaches_the_values_of_the_end() {
-    let mut simulation = start(with_sum(), (Sweep::GaussSeidel, Course::Linear), None);
+    let mut simulation = start(with_sum(), (Method::GaussSeidel, Extrapolation::Linear), None);
     for _ in 0..3 {
         simulation.step().unwrap();
         let mut found = [0.0; 3];

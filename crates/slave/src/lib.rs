@@ -125,7 +125,7 @@ pub trait Slave: Send {
 
     /// `fmi2DoStep` from `time` over `size`, both in s. `never_back` is
     /// `noSetFMUStatePriorToCurrentPoint`. An answer of `fmi2Pending` is waited for.
-    fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<Stepped, CallError>;
+    fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError>;
 
     /// `fmi2GetDirectionalDerivative`: the change of `unknowns` when `knowns` change by `seed`.
     fn directional_derivative(
@@ -164,7 +164,7 @@ pub trait Slave: Send {
 
     /// Sets Real inputs and their derivatives, steps, reads Real outputs and their derivatives:
     /// one call, so that a slave in another process is asked once. A step done in part reads too.
-    fn advance(&mut self, step: &mut Advance<'_>) -> Result<Stepped, CallError> {
+    fn advance(&mut self, step: &mut Advance<'_>) -> Result<StepResult, CallError> {
         if !step.inputs.is_empty() {
             self.set_real(step.inputs, step.input_values)?;
         }
@@ -192,7 +192,7 @@ pub trait Slave: Send {
         (time, size): (f64, f64),
         never_back: bool,
         outputs: (&[u32], &mut [f64]),
-    ) -> Result<Stepped, CallError> {
+    ) -> Result<StepResult, CallError> {
         self.advance(&mut Advance::held(inputs, (time, size), never_back, outputs))
     }
 
@@ -225,11 +225,11 @@ pub trait Background {
     /// # Errors
     ///
     /// As [`Slave::advance`], and where no step was begun.
-    fn finish_advance(&mut self, step: &mut Advance<'_>) -> Result<Stepped, CallError>;
+    fn finish_advance(&mut self, step: &mut Advance<'_>) -> Result<StepResult, CallError>;
 }
 
 /// [`Background::finish_advance`] of a slave in the background, [`Slave::advance`] of another.
-pub fn finish(slave: &mut dyn Slave, step: &mut Advance<'_>) -> Result<Stepped, CallError> {
+pub fn finish(slave: &mut dyn Slave, step: &mut Advance<'_>) -> Result<StepResult, CallError> {
     match slave.in_background() {
         Some(slave) => slave.finish_advance(step),
         None => slave.advance(step),
@@ -297,7 +297,7 @@ impl<'a> Advance<'a> {
 
 /// How far a step came.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Stepped {
+pub enum StepResult {
     /// To its end.
     Whole,
     /// `fmi2Discard`: only to `fmi2LastSuccessfulTime`.
@@ -328,7 +328,7 @@ impl CallError {
     pub fn leaves_the_instance_usable(&self) -> bool {
         match &self.failure {
             Failure::Status(status) => *status != Status::Fatal,
-            Failure::Absent => true,
+            Failure::Missing => true,
             _ => false,
         }
     }
@@ -342,7 +342,7 @@ pub enum Failure {
     /// It returned a value that the standard does not know.
     UnknownStatus(i32),
     /// The library, or this way in, does not have the function.
-    Absent,
+    Missing,
     /// It panicked inside the crate through which it was called.
     Panicked(String),
     /// The process of the FMU was ended by this signal: number and name.
@@ -354,7 +354,7 @@ pub enum Failure {
     /// Its process crashed after it had not been given memory beyond this limit in bytes.
     OutOfMemory(u64),
     /// It answered something impossible: what.
-    Nonsense(String),
+    InvalidAnswer(String),
 }
 
 impl fmt::Display for Failure {
@@ -364,7 +364,7 @@ impl fmt::Display for Failure {
             Failure::UnknownStatus(status) => {
                 write!(formatter, "returned {status}, expected a status of the standard (0 to 5)")
             }
-            Failure::Absent => formatter.write_str("is missing"),
+            Failure::Missing => formatter.write_str("is missing"),
             Failure::Panicked(text) => write!(formatter, "panicked: {text}"),
             Failure::Killed(number, name) => {
                 write!(formatter, "crashed: its process was ended by signal {number} ({name})")
@@ -377,7 +377,7 @@ impl fmt::Display for Failure {
                 formatter,
                 "crashed: it needs more memory than the limit of {limit} bytes for its process"
             ),
-            Failure::Nonsense(what) => formatter.write_str(what),
+            Failure::InvalidAnswer(what) => formatter.write_str(what),
         }
     }
 }
@@ -386,7 +386,7 @@ impl fmt::Display for Failure {
 #[cold]
 #[must_use]
 pub fn absent(function: &'static str) -> CallError {
-    CallError { function, failure: Failure::Absent, messages: Vec::new() }
+    CallError { function, failure: Failure::Missing, messages: Vec::new() }
 }
 
 fn quoted(messages: &[String]) -> String {

@@ -6,7 +6,7 @@ use fmu_description::{
     Unknown, Variability,
 };
 
-use slave::{CallError, Failure, Slave, Stepped};
+use slave::{CallError, Failure, Slave, StepResult};
 
 /// A function of the values on connections.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -175,7 +175,7 @@ impl FunctionSlave {
 
 #[cold]
 fn unknown(function: &'static str, reference: u32) -> CallError {
-    let failure = Failure::Nonsense(format!("got the unknown value reference {reference}"));
+    let failure = Failure::InvalidAnswer(format!("got the unknown value reference {reference}"));
     CallError { function, failure, messages: Vec::new() }
 }
 
@@ -244,14 +244,14 @@ impl Slave for FunctionSlave {
         Ok(())
     }
 
-    fn do_step(&mut self, _: f64, size: f64, _: bool) -> Result<Stepped, CallError> {
+    fn do_step(&mut self, _: f64, size: f64, _: bool) -> Result<StepResult, CallError> {
         for input in &mut self.inputs {
             let Polynomial { value, slope, curvature } = *input;
             if slope != 0.0 || curvature != 0.0 {
                 input.value = value + size * (slope + 0.5 * size * curvature);
             }
         }
-        Ok(Stepped::Whole)
+        Ok(StepResult::Whole)
     }
 
     fn directional_derivative(
@@ -295,7 +295,7 @@ impl Slave for FunctionSlave {
     fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
         let (values, rest) = bytes.as_chunks::<8>();
         if values.len() != self.inputs.len() || !rest.is_empty() {
-            let failure = Failure::Nonsense(format!(
+            let failure = Failure::InvalidAnswer(format!(
                 "got {} bytes, expected {}",
                 bytes.len(),
                 8 * self.inputs.len()

@@ -207,7 +207,7 @@ fn as_shown(error: Error, element: &Element) -> Error {
 
 fn switch_logging_on(name: &str, slave: &mut dyn Slave) {
     match slave.set_debug_logging(true) {
-        Ok(()) | Err(CallError { failure: Failure::Absent, .. }) => {}
+        Ok(()) | Err(CallError { failure: Failure::Missing, .. }) => {}
         Err(error) => tracing::warn!("{name}: {error}"),
     }
 }

@@ -9,7 +9,7 @@ use crate::error::Error;
 use std::path::{Path, PathBuf};
 
 use crate::scenario::Scenario;
-use master::Wanted;
+use master::AlgorithmRequest;
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
@@ -40,7 +40,7 @@ pub struct Config {
     #[serde(skip_serializing_if = "Settings::is_empty")]
     pub settings: Settings,
     /// The algorithm.
-    pub algorithm: Wanted,
+    pub algorithm: AlgorithmRequest,
     /// Times and tolerance that the FMUs are told.
     pub experiment: Experiment,
     /// What is written.
@@ -74,6 +74,10 @@ impl Loaded {
     pub fn read(path: &Path) -> Result<Self, Error> {
         let source = Source::read(path).map_err(Error::file("read", path))?;
         let config = parse(source.text(), path)?;
+        let table: toml::Table = source.text().parse().unwrap_or_default();
+        if table.get("algorithm").is_some_and(|algorithm| algorithm.get("course").is_some()) {
+            tracing::warn!("{}: algorithm.course is now called extrapolation", path.display());
+        }
         Ok(Self { config, source: Some(source) })
     }
 

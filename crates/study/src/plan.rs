@@ -4,7 +4,8 @@ use crate::error::Error;
 use fmu_description::DefaultExperiment;
 use fmu_description::Experiment;
 use master::{
-    Algorithm, Coupling, Course, StepControl, Sweep, System, Wanted, by_direct_dependencies, choose,
+    Algorithm, AlgorithmRequest, Coupling, Extrapolation, Method, StepControl, System,
+    by_direct_dependencies, choose,
 };
 use toml::Spanned;
 
@@ -77,7 +78,7 @@ fn explain_tolerances(system: &System, stated: Option<f64>, reasons: &mut Vec<St
 }
 
 /// The step, before numbers that follow from it are looked at.
-fn check_step(wanted: &Wanted) -> Result<(), Error> {
+fn check_step(wanted: &AlgorithmRequest) -> Result<(), Error> {
     match wanted.step {
         Some(step) if !(step > 0.0 && step.is_finite()) => {
             return Err(Error::Invalid(format!(
@@ -89,23 +90,28 @@ fn check_step(wanted: &Wanted) -> Result<(), Error> {
 }
 
 /// Takes of libcosim's algorithm what is not stated, where the system structure asks for it.
-fn propose_algorithm(wanted: &mut Wanted, assembled: &Assembled, reasons: &mut Vec<String>) {
+fn propose_algorithm(
+    wanted: &mut AlgorithmRequest,
+    assembled: &Assembled,
+    reasons: &mut Vec<String>,
+) {
     if !assembled.fixed_step {
         return;
     }
-    let open = wanted.method.is_none() || wanted.course.is_none() || wanted.coupling.is_none();
-    wanted.method.get_or_insert(Sweep::Jacobi);
-    wanted.course.get_or_insert(Course::Hold);
+    let open =
+        wanted.method.is_none() || wanted.extrapolation.is_none() || wanted.coupling.is_none();
+    wanted.method.get_or_insert(Method::Jacobi);
+    wanted.extrapolation.get_or_insert(Extrapolation::Hold);
     wanted.coupling.get_or_insert(Coupling::Once);
     if open {
-        let sentence = "the system structure asks for libcosim's fixed steps: jacobi, course hold, \
+        let sentence = "the system structure asks for libcosim's fixed steps: jacobi, extrapolation hold, \
              coupling once, where nothing else is stated";
         reasons.push(sentence.to_owned());
     }
 }
 
 /// Takes steps that an SSP proposes where nothing else is said.
-fn propose_steps(wanted: &mut Wanted, assembled: &Assembled, reasons: &mut Vec<String>) {
+fn propose_steps(wanted: &mut AlgorithmRequest, assembled: &Assembled, reasons: &mut Vec<String>) {
     let sound = |step: &f64| *step > 0.0 && step.is_finite();
     let hints = assembled.steps.iter().filter(|(_, step)| sound(step));
     if wanted.step.is_none() {
@@ -200,9 +206,9 @@ fn rows(algorithm: &Algorithm, length: f64, reasons: &mut Vec<String>) -> Every 
 }
 
 /// States all that was chosen.
-fn complete(wanted: &mut Wanted, algorithm: &Algorithm, system: &System) {
+fn complete(wanted: &mut AlgorithmRequest, algorithm: &Algorithm, system: &System) {
     wanted.method = Some(algorithm.sweep);
-    wanted.course = Some(algorithm.course);
+    wanted.extrapolation = Some(algorithm.extrapolation);
     wanted.coupling = Some(algorithm.coupling);
     wanted.step_control = Some(algorithm.control);
     wanted.step = Some(algorithm.step);
@@ -225,9 +231,9 @@ impl Plan {
         let algorithm = &self.algorithm;
         let mut lines = vec![
             format!(
-                "algorithm: {}, course {}, coupling {}, {} step {} s",
+                "algorithm: {}, extrapolation {}, coupling {}, {} step {} s",
                 algorithm.sweep.name(),
-                algorithm.course.name(),
+                algorithm.extrapolation.name(),
                 algorithm.coupling.name(),
                 algorithm.control.name(),
                 algorithm.step

@@ -1,7 +1,7 @@
 //! The closed loop of plant and controller, one test for each claim.
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-use master::{Algorithm, Course, Sweep};
+use master::{Algorithm, Extrapolation, Method};
 use tests::{Table, closed_loop, root, simulation};
 
 /// The signals that are compared, with the columns of the reference files.
@@ -79,7 +79,7 @@ fn the_first_5_s_with_compensation_are_those_of_scipy_at_a_communication_step_of
 }
 
 /// Differences of the cart's position from the reference over the first 5 s for halved steps.
-fn errors(method: (Sweep, Course), steps: &[f64]) -> Vec<f64> {
+fn errors(method: (Method, Extrapolation), steps: &[f64]) -> Vec<f64> {
     let reference = paper();
     let error = |step: &f64| {
         differences(&reference, &[], &Algorithm::fixed(method.0, method.1, *step), 5.0)[0]
@@ -96,19 +96,20 @@ fn orders(errors: &[f64]) -> Vec<f64> {
 
 #[test]
 fn gauss_seidel_with_slopes_is_of_second_order() {
-    let orders = orders(&errors((Sweep::GaussSeidel, Course::Limited), &[1e-4, 5e-5, 2.5e-5]));
+    let orders =
+        orders(&errors((Method::GaussSeidel, Extrapolation::Limited), &[1e-4, 5e-5, 2.5e-5]));
     assert!(orders.iter().all(|order| (1.7..2.6).contains(order)), "{orders:?}");
 }
 
 #[test]
 fn jacobi_is_of_first_order() {
-    let orders = orders(&errors((Sweep::Jacobi, Course::Hold), &[8e-6, 4e-6, 2e-6]));
+    let orders = orders(&errors((Method::Jacobi, Extrapolation::Hold), &[8e-6, 4e-6, 2e-6]));
     assert!(orders.iter().all(|order| (0.7..1.4).contains(order)), "{orders:?}");
 }
 
 #[test]
 fn gauss_seidel_with_held_inputs_is_of_first_order() {
-    let orders = orders(&errors((Sweep::GaussSeidel, Course::Hold), &[8e-6, 4e-6, 2e-6]));
+    let orders = orders(&errors((Method::GaussSeidel, Extrapolation::Hold), &[8e-6, 4e-6, 2e-6]));
     assert!(orders.iter().all(|order| (0.7..1.4).contains(order)), "{orders:?}");
 }
 

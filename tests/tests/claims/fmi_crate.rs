@@ -10,7 +10,7 @@ use fmu_description::Causality;
 use fmu_description::Experiment;
 use fmu_description::package::{Package, platforms};
 use fmu_import::{Fmu, FmuError, LoadError};
-use master::{Algorithm, Course, Failure, Probe, Simulation, Slave, Sweep, System};
+use master::{Algorithm, Extrapolation, Failure, Method, Probe, Simulation, Slave, System};
 use tests::fmi_crate::{FmiCrateError, FmiSlave};
 
 const PENDULUM: &str = "FrictionPendulum.fmu";
@@ -26,7 +26,7 @@ fn crate_fmi(path: &Path, name: &str) -> Box<dyn Slave> {
 /// The closed loop with every output and local variable, compensating from 0.5 s on.
 fn closed_loop(
     open: fn(&Path, &str) -> Box<dyn Slave>,
-    method: (Sweep, Course),
+    method: (Method, Extrapolation),
 ) -> (Simulation, Probe) {
     let mut system = System::default();
     for (name, file) in [("plant", PENDULUM), ("controller", "AsoController.fmu")] {
@@ -69,12 +69,12 @@ fn expect_equal_runs(mut own: (Simulation, Probe), mut other: (Simulation, Probe
 fn the_closed_loop_through_the_crate_fmi_is_bit_identical_to_the_one_through_our_own_loader() {
     // Without derivatives, the default method holds all inputs.
     expect_equal_runs(
-        closed_loop(own_loader, (Sweep::GaussSeidel, Course::Hold)),
-        closed_loop(crate_fmi, (Sweep::GaussSeidel, Course::Limited)),
+        closed_loop(own_loader, (Method::GaussSeidel, Extrapolation::Hold)),
+        closed_loop(crate_fmi, (Method::GaussSeidel, Extrapolation::Limited)),
     );
     expect_equal_runs(
-        closed_loop(own_loader, (Sweep::Jacobi, Course::Hold)),
-        closed_loop(crate_fmi, (Sweep::Jacobi, Course::Hold)),
+        closed_loop(own_loader, (Method::Jacobi, Extrapolation::Hold)),
+        closed_loop(crate_fmi, (Method::Jacobi, Extrapolation::Hold)),
     );
 }
 
@@ -90,7 +90,7 @@ fn what_the_crate_fmi_lacks_is_neither_promised_nor_silently_left_out() {
     assert_eq!(error.function, "fmi2SetRealInputDerivatives");
     let error = slave.get_output_derivatives(&[1], &[1], &mut [0.0]).unwrap_err();
     assert_eq!(error.function, "fmi2GetRealOutputDerivatives");
-    assert_eq!(error.failure, Failure::Absent);
+    assert_eq!(error.failure, Failure::Missing);
 }
 
 /// Functions that return a status, of those that a slave through the crate calls.

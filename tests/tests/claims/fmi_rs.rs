@@ -19,7 +19,7 @@ use fmi_rs::sim::fmi2::{
 use fmu_description::Experiment;
 use fmu_description::{Causality, Initial};
 use fmu_import::Fmu;
-use master::{Algorithm, Course, Simulation, Slave, Sweep, System};
+use master::{Algorithm, Extrapolation, Method, Simulation, Slave, System};
 
 const FILES: [&str; 2] = ["FrictionPendulum.fmu", "AsoController.fmu"];
 const STEP: f64 = 1e-3;
@@ -167,8 +167,11 @@ fn the_closed_loop_by_fmi_rs_is_bit_identical_to_the_one_by_our_master() {
         .collect();
     let ports: Vec<_> = qualified.iter().map(String::as_str).collect();
     let system = tests::closed_loop(&settings);
-    let (mut own, mut probe) =
-        tests::simulation(system, &Algorithm::fixed(Sweep::Jacobi, Course::Hold, STEP), &ports);
+    let (mut own, mut probe) = tests::simulation(
+        system,
+        &Algorithm::fixed(Method::Jacobi, Extrapolation::Hold, STEP),
+        &ports,
+    );
 
     exchange(&plant, &controller);
     exchange(&plant, &controller);

@@ -9,7 +9,7 @@ use fmu_description::abi::Status;
 use fmu_description::{Causality, Kind, ModelDescription};
 use fmu_import::Fmu;
 use fmu_import::isolate::{self, IsolateError, Isolated, Options};
-use master::{Advance, CallError, Failure, Slave, Stepped};
+use master::{Advance, CallError, Failure, Slave, StepResult};
 use tests::isolated::{limited, options, ready};
 use tests::{Trouble, dist, troubles};
 
@@ -24,7 +24,7 @@ fn error_of(trouble: Trouble, options: &Options) -> (Isolated, CallError) {
 }
 
 /// Sets u = `input`, steps 0.5 s from 0 s; y.
-fn advance(slave: &mut dyn Slave, input: f64, size: f64) -> Result<(Stepped, f64), CallError> {
+fn advance(slave: &mut dyn Slave, input: f64, size: f64) -> Result<(StepResult, f64), CallError> {
     let mut output = [f64::NAN];
     let input = [input];
     let mut step = Advance::held((&[0], &input), (0.0, size), true, (&[1], &mut output));
@@ -52,7 +52,7 @@ struct Pendulum<'a> {
     inputs: Vec<u32>,
     outputs: Vec<u32>,
     /// The bits of all that was read.
-    course: Vec<u64>,
+    trajectory: Vec<u64>,
 }
 
 impl Pendulum<'_> {
@@ -74,26 +74,26 @@ impl Pendulum<'_> {
             output_orders: &vec![1; outputs],
             output_derivatives: &mut derivatives,
         };
-        assert_eq!(self.plant.advance(&mut step).unwrap(), Stepped::Whole);
+        assert_eq!(self.plant.advance(&mut step).unwrap(), StepResult::Whole);
         self.keep(&values);
         self.keep(&derivatives);
     }
 
     fn keep(&mut self, values: &[f64]) {
-        self.course.extend(values.iter().map(|value| value.to_bits()));
+        self.trajectory.extend(values.iter().map(|value| value.to_bits()));
     }
 }
 
 /// All Reals of the pendulum, by bits, after each of some steps that go back now and then, and at
 /// the end its state as bytes and a derivative.
-fn course(plant: &mut dyn Slave) -> (Vec<u64>, Vec<u8>) {
+fn trajectory(plant: &mut dyn Slave) -> (Vec<u64>, Vec<u8>) {
     let description = plant.description().clone();
     let of = |causality| reals(&description, causality);
     let (inputs, outputs) = (of(Some(Causality::Input)), of(Some(Causality::Output)));
     plant.setup_experiment(&Experiment { stop_time: Some(5.0), ..Experiment::default() }).unwrap();
     plant.enter_initialization_mode().unwrap();
     plant.exit_initialization_mode().unwrap();
-    let mut pendulum = Pendulum { plant, inputs, outputs, course: Vec::new() };
+    let mut pendulum = Pendulum { plant, inputs, outputs, trajectory: Vec::new() };
     for count in 0..2000_u32 {
         let time = f64::from(count) * 0.001;
         let force = 20.0 * (7.0 * time).sin();
@@ -104,19 +104,19 @@ fn course(plant: &mut dyn Slave) -> (Vec<u64>, Vec<u8>) {
         }
         pendulum.step(time, force);
     }
-    let Pendulum { plant, inputs, outputs, mut course } = pendulum;
+    let Pendulum { plant, inputs, outputs, mut trajectory } = pendulum;
     let all = of(None);
     let (mut values, mut changes) = (vec![0.0; all.len()], vec![0.0; outputs.len()]);
     plant.get_real(&all, &mut values).unwrap();
     plant
         .directional_derivative(&outputs, &inputs, &vec![1.0; inputs.len()], &mut changes)
         .unwrap();
-    course.extend(values.iter().chain(&changes).map(|value| value.to_bits()));
+    trajectory.extend(values.iter().chain(&changes).map(|value| value.to_bits()));
     let state = plant.serialize_state().unwrap();
     plant.deserialize_state(&state).unwrap();
     assert_eq!(plant.serialize_state().unwrap(), state);
     plant.terminate().unwrap();
-    (course, state)
+    (trajectory, state)
 }
 
 #[test]
@@ -125,7 +125,7 @@ fn the_isolated_pendulum_gives_the_same_bits() {
     let mut near = Fmu::open(&fmu).unwrap().instantiate("plant").unwrap();
     let mut far = isolate::open(&fmu, "plant", &options()).unwrap();
     assert_eq!(far.description(), near.description());
-    let (near, far) = (course(&mut near), course(&mut far));
+    let (near, far) = (trajectory(&mut near), trajectory(&mut far));
     assert!(near.0.len() > 10_000);
     assert_eq!(near, far);
 }
@@ -145,7 +145,7 @@ fn every_type_of_variable_and_long_data_pass() {
     slave.set_string(&[0], &[String::new()]).unwrap();
     slave.get_string(&[0], &mut texts[..1]).unwrap();
     assert_eq!(texts[0], "");
-    assert_eq!(advance(&mut slave, 3.0, 0.5).unwrap(), (Stepped::Whole, 1.5));
+    assert_eq!(advance(&mut slave, 3.0, 0.5).unwrap(), (StepResult::Whole, 1.5));
     let state = slave.serialize_state().unwrap();
     assert!(state.len() > 1 << 20);
     let ones = state.iter().map(|byte| usize::from(*byte == 1)).sum::<usize>();
@@ -179,7 +179,7 @@ fn errors_and_early_ends_are_those_of_the_fmu_itself() {
     let refused = near.0.last().unwrap();
     assert_eq!(refused.failure, Failure::Status(Status::Error));
     assert_eq!(refused.messages.last().map(String::as_str), Some("not today"));
-    assert_eq!(near.1, (Stepped::Part { reached: 0.25, terminated: true }, 1.0));
+    assert_eq!(near.1, (StepResult::Part { reached: 0.25, terminated: true }, 1.0));
 }
 
 #[test]
@@ -277,9 +277,9 @@ fn shared_memory_that_a_thread_of_the_fmu_fills_with_anything_is_survived() {
 fn a_flood_of_messages_neither_stalls_nor_stops_the_run() {
     let mut slave = ready(&options());
     slave.set_integer(&[0], &[Trouble::Flood as i32]).unwrap();
-    assert_eq!(advance(&mut slave, 1.0, 0.5).unwrap(), (Stepped::Whole, 0.5));
+    assert_eq!(advance(&mut slave, 1.0, 0.5).unwrap(), (StepResult::Whole, 0.5));
     slave.set_integer(&[0], &[Trouble::None as i32]).unwrap();
-    assert_eq!(advance(&mut slave, 1.0, 0.5).unwrap(), (Stepped::Whole, 1.0));
+    assert_eq!(advance(&mut slave, 1.0, 0.5).unwrap(), (StepResult::Whole, 1.0));
 }
 
 #[test]
@@ -309,7 +309,7 @@ fn an_instance_is_made_anew_in_the_same_process() {
     let mut slave = ready(&options());
     let process = slave.process_id();
     for _ in 0..3 {
-        assert_eq!(advance(&mut slave, 1.0, 0.5).unwrap(), (Stepped::Whole, 0.5));
+        assert_eq!(advance(&mut slave, 1.0, 0.5).unwrap(), (StepResult::Whole, 0.5));
         slave.renew("two", &options()).unwrap();
         assert_eq!(slave.process_id(), process);
         slave.setup_experiment(&Experiment::default()).unwrap();

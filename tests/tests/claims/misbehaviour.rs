@@ -8,7 +8,7 @@ use fmu_description::abi::Status;
 use fmu_import::{Fmu, FmuError, Instance, LoadError};
 use linearise::{Differences, Method};
 use linearise::{Linearise, linearise};
-use master::{CallError, Failure, Slave, Stepped};
+use master::{CallError, Failure, Slave, StepResult};
 use tempfile::TempDir;
 use tests::c_fmu::CFmu;
 
@@ -70,7 +70,7 @@ fn the_values_of_all_types_go_through_an_fmu_as_they_are() {
         slave.set_boolean(&[0], &[boolean]).unwrap();
         slave.set_string(&[0], &[text.to_owned()]).unwrap();
         let time = [0.0, 1.0, 2.0][step];
-        assert_eq!(slave.do_step(time, 1.0, true), Ok(Stepped::Whole));
+        assert_eq!(slave.do_step(time, 1.0, true), Ok(StepResult::Whole));
         let (mut integers, mut booleans) = ([0, 0], [7]);
         let mut strings = ["before".to_owned(), "before".to_owned()];
         slave.get_integer(&[1, 11], &mut integers).unwrap();
@@ -206,9 +206,9 @@ fn a_missing_optional_function_is_missed_by_name_where_it_is_called_and_nowhere_
     for (function, call) in OPTIONAL {
         let mut slave = instance(&CFmu::well_behaved().without(&[function]));
         initialise(&mut slave).unwrap();
-        assert_eq!(slave.do_step(0.0, 0.5, true), Ok(Stepped::Whole), "{function}");
+        assert_eq!(slave.do_step(0.0, 0.5, true), Ok(StepResult::Whole), "{function}");
         let error = call(&mut slave).unwrap_err();
-        assert_eq!((error.function, &error.failure), (function, &Failure::Absent), "{error}");
+        assert_eq!((error.function, &error.failure), (function, &Failure::Missing), "{error}");
     }
 }
 
@@ -221,8 +221,8 @@ fn an_fmu_without_any_optional_function_still_steps() {
     missing.push("fmi2GetStringStatus");
     let mut slave = instance(&CFmu::well_behaved().without(&missing));
     initialise(&mut slave).unwrap();
-    assert_eq!(slave.do_step(0.0, 0.5, true), Ok(Stepped::Whole));
-    assert_eq!(slave.do_step(0.5, 0.5, true), Ok(Stepped::Whole));
+    assert_eq!(slave.do_step(0.0, 0.5, true), Ok(StepResult::Whole));
+    assert_eq!(slave.do_step(0.5, 0.5, true), Ok(StepResult::Whole));
 }
 
 #[test]
@@ -253,7 +253,7 @@ fn an_fmu_without_a_way_back_says_so_when_it_is_asked() {
 #[test]
 fn a_state_that_was_never_saved_is_an_error_without_a_call_of_the_fmu() {
     let error = ready("as it should").restore_state(3).unwrap_err();
-    assert!(matches!(error.failure, Failure::Nonsense(_)), "{error}");
+    assert!(matches!(error.failure, Failure::InvalidAnswer(_)), "{error}");
 }
 
 #[test]

@@ -6,10 +6,10 @@ use std::time::Duration;
 use fmu_description::Experiment;
 use fmu_description::abi::Status;
 use fmu_import::{Fmu, Instance};
-use master::{CallError, Failure, Slave, Stepped};
+use master::{CallError, Failure, Slave, StepResult};
 use tests::c_fmu::CFmu;
 
-const PART: Stepped = Stepped::Part { reached: 0.5, terminated: false };
+const PART: StepResult = StepResult::Part { reached: 0.5, terminated: false };
 
 fn instance(behaviour: &str) -> Instance {
     let folder = tempfile::tempdir().unwrap();
@@ -117,21 +117,21 @@ fn a_discarded_step_tells_how_far_it_came_and_can_be_repeated_to_there() {
     assert_eq!(slave.do_step(0.0, 0.75, false), Ok(PART));
     assert_eq!(output(&mut slave), 0.5, "the values of the last successful time");
     slave.restore_state(0).unwrap();
-    assert_eq!(slave.do_step(0.0, 0.5, false), Ok(Stepped::Whole));
-    assert_eq!(slave.do_step(0.5, 0.5, true), Ok(Stepped::Whole));
+    assert_eq!(slave.do_step(0.0, 0.5, false), Ok(StepResult::Whole));
+    assert_eq!(slave.do_step(0.5, 0.5, true), Ok(StepResult::Whole));
     assert_eq!(output(&mut slave), 1.0);
 }
 
 #[test]
 fn a_step_that_was_discarded_without_any_progress_came_to_its_begin() {
     let mut slave = ready("discard every step");
-    let nowhere = Stepped::Part { reached: 0.0, terminated: false };
+    let nowhere = StepResult::Part { reached: 0.0, terminated: false };
     assert_eq!(slave.do_step(0.0, 1.0, false), Ok(nowhere));
 }
 
 #[test]
 fn an_fmu_that_wants_the_simulation_to_end_says_where() {
-    let end = Stepped::Part { reached: 0.5, terminated: true };
+    let end = StepResult::Part { reached: 0.5, terminated: true };
     let mut slave = ready("end at t1");
     assert_eq!(slave.do_step(0.0, 1.0, true), Ok(end));
     assert_eq!(output(&mut slave), 0.5);
@@ -148,7 +148,7 @@ fn a_discarded_step_without_a_last_successful_time_is_an_error() {
 #[test]
 fn a_last_successful_time_outside_the_step_is_nonsense() {
     let error = ready("lie about t1").do_step(0.0, 1.0, true).unwrap_err();
-    let Failure::Nonsense(what) = &error.failure else { panic!("{error}") };
+    let Failure::InvalidAnswer(what) = &error.failure else { panic!("{error}") };
     assert!(what.contains("-1 s") && what.contains("from 0 to 1 s"), "{what}");
 }
 
@@ -157,15 +157,15 @@ fn a_pending_step_is_asked_for_until_it_is_done() {
     let mut slave = instance("pend");
     slave.set_integer(&[2], &[25]).unwrap();
     initialise(&mut slave).unwrap();
-    assert_eq!(slave.do_step(0.0, 0.5, true), Ok(Stepped::Whole));
-    assert_eq!(slave.do_step(0.5, 0.25, true), Ok(Stepped::Whole));
+    assert_eq!(slave.do_step(0.0, 0.5, true), Ok(StepResult::Whole));
+    assert_eq!(slave.do_step(0.5, 0.25, true), Ok(StepResult::Whole));
     assert_eq!(output(&mut slave), 0.75);
 }
 
 #[test]
 fn a_pending_step_that_fails_later_is_an_error_of_the_step() {
     let mut slave = ready("pend and fail");
-    assert_eq!(slave.do_step(0.0, 0.5, true), Ok(Stepped::Whole));
+    assert_eq!(slave.do_step(0.0, 0.5, true), Ok(StepResult::Whole));
     let error = slave.do_step(0.5, 0.5, true).unwrap_err();
     assert_eq!(error.to_string(), "fmi2DoStep returned fmi2Error: failed in the background");
 }
@@ -211,8 +211,8 @@ fn after_a_fatal_error_no_instance_is_freed() {
 #[test]
 fn a_step_of_another_size_is_refused_in_the_words_of_the_fmu() {
     let mut slave = ready("step of one size");
-    assert_eq!(slave.do_step(0.0, 0.25, true), Ok(Stepped::Whole));
-    assert_eq!(slave.do_step(0.25, 0.25, true), Ok(Stepped::Whole));
+    assert_eq!(slave.do_step(0.0, 0.25, true), Ok(StepResult::Whole));
+    assert_eq!(slave.do_step(0.25, 0.25, true), Ok(StepResult::Whole));
     let error = slave.do_step(0.5, 0.125, true).unwrap_err();
     assert_eq!(error.messages, ["the size of the step has changed"]);
 }

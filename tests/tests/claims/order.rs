@@ -3,7 +3,7 @@
 //! `cargo test --release -p tests --test order -- --nocapture` prints the tables.
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "tests; the tables are printed")]
 
-use master::{Algorithm, Coupling, Course, Sweep, SystemError};
+use master::{Algorithm, Coupling, Extrapolation, Method, SystemError};
 use tests::linear::{ABLE, Abilities};
 use tests::network::Network;
 use tests::problems;
@@ -14,15 +14,15 @@ const STEPS: [u32; 5] = [64, 128, 256, 512, 1024];
 const HELD: Abilities = Abilities { interpolates: false, ..ABLE };
 const PAST: Abilities = Abilities { derivatives: 0, ..ABLE };
 const SLOPES: Abilities = Abilities { derivatives: 1, ..ABLE };
-const SWEEPS: [Sweep; 2] = [Sweep::Jacobi, Sweep::GaussSeidel];
+const SWEEPS: [Method; 2] = [Method::Jacobi, Method::GaussSeidel];
 const COUPLINGS: [Coupling; 3] = [Coupling::Newton, Coupling::Anderson, Coupling::QuasiNewton];
 
-fn iterated(coupling: Coupling, sweep: Sweep, course: Course) -> Algorithm {
+fn iterated(coupling: Coupling, sweep: Method, extrapolation: Extrapolation) -> Algorithm {
     Algorithm {
         coupling,
         relative_tolerance: 1e-11,
         absolute_tolerance: 1e-11,
-        ..Algorithm::fixed(sweep, course, 1.0)
+        ..Algorithm::fixed(sweep, extrapolation, 1.0)
     }
 }
 
@@ -55,7 +55,7 @@ fn both() -> [(&'static str, Network); 2] {
 
 /// The order of `algorithm`, which is to be `expected`.
 fn check(network: &Network, able: Abilities, algorithm: &Algorithm, expected: f64) {
-    let mut label = format!("{} {}", algorithm.sweep.name(), algorithm.course.name());
+    let mut label = format!("{} {}", algorithm.sweep.name(), algorithm.extrapolation.name());
     if algorithm.coupling != Coupling::Once {
         label = format!("{} {label}", algorithm.coupling.name());
     }
@@ -63,13 +63,13 @@ fn check(network: &Network, able: Abilities, algorithm: &Algorithm, expected: f6
     assert!((order - expected).abs() < 0.25, "{label}: {order}");
 }
 
-/// Every sweep with every course and its order, on both problems.
-fn verify(what: &str, able: Abilities, courses: &[(Course, f64)]) {
+/// Every sweep with every extrapolation and its order, on both problems.
+fn verify(what: &str, able: Abilities, courses: &[(Extrapolation, f64)]) {
     for (problem, network) in both() {
         head(&format!("{problem}; {what}"));
         for sweep in SWEEPS {
-            for &(course, expected) in courses {
-                check(&network, able, &Algorithm::fixed(sweep, course, 1.0), expected);
+            for &(extrapolation, expected) in courses {
+                check(&network, able, &Algorithm::fixed(sweep, extrapolation, 1.0), expected);
             }
         }
     }
@@ -78,29 +78,33 @@ fn verify(what: &str, able: Abilities, courses: &[(Course, f64)]) {
 #[test]
 fn with_all_derivatives_hold_is_of_order_1_lines_of_2_parabolas_of_3() {
     let courses = [
-        (Course::Hold, 1.0),
-        (Course::Limited, 2.0),
-        (Course::Linear, 2.0),
-        (Course::Quadratic, 3.0),
+        (Extrapolation::Hold, 1.0),
+        (Extrapolation::Limited, 2.0),
+        (Extrapolation::Linear, 2.0),
+        (Extrapolation::Quadratic, 3.0),
     ];
     verify("input derivatives, output derivatives of order 2", ABLE, &courses);
 }
 
 #[test]
 fn with_first_derivatives_only_parabolas_are_of_order_3() {
-    verify("input derivatives, output derivatives of order 1", SLOPES, &[(Course::Quadratic, 3.0)]);
+    verify(
+        "input derivatives, output derivatives of order 1",
+        SLOPES,
+        &[(Extrapolation::Quadratic, 3.0)],
+    );
 }
 
 /// The first step has no past values and is held, which costs a parabola its order 3.
 #[test]
 fn past_values_in_place_of_output_derivatives_give_order_2() {
-    let courses = [(Course::Limited, 2.0), (Course::Linear, 2.0)];
+    let courses = [(Extrapolation::Limited, 2.0), (Extrapolation::Linear, 2.0)];
     verify("input derivatives, no output derivatives", PAST, &courses);
     for (problem, network) in both() {
         head(&format!("{problem}; input derivatives, no output derivatives"));
         for sweep in SWEEPS {
             let label = format!("{} quadratic", sweep.name());
-            let algorithm = Algorithm::fixed(sweep, Course::Quadratic, 1.0);
+            let algorithm = Algorithm::fixed(sweep, Extrapolation::Quadratic, 1.0);
             assert!(observed(&label, &network, PAST, &algorithm) > 1.75, "{problem}, {label}");
         }
     }
@@ -108,12 +112,13 @@ fn past_values_in_place_of_output_derivatives_give_order_2() {
 
 #[test]
 fn slaves_that_hold_their_inputs_get_the_mean_of_the_course_which_is_of_order_2() {
-    let courses = [(Course::Hold, 1.0), (Course::Linear, 2.0), (Course::Quadratic, 2.0)];
+    let courses =
+        [(Extrapolation::Hold, 1.0), (Extrapolation::Linear, 2.0), (Extrapolation::Quadratic, 2.0)];
     let network = problems::coupled_oscillators();
     head("Two coupled oscillators; no input derivatives, output derivatives of order 2");
     for sweep in SWEEPS {
-        for (course, expected) in courses {
-            check(&network, HELD, &Algorithm::fixed(sweep, course, 1.0), expected);
+        for (extrapolation, expected) in courses {
+            check(&network, HELD, &Algorithm::fixed(sweep, extrapolation, 1.0), expected);
         }
     }
 }
@@ -124,8 +129,13 @@ fn slaves_that_hold_their_inputs_and_depend_on_them_directly_are_of_order_1() {
     let network = problems::two_masses(20.0, 0.5);
     head("Two masses, force and displacement; no input derivatives, output derivatives of order 2");
     for sweep in SWEEPS {
-        for course in [Course::Hold, Course::Limited, Course::Linear, Course::Quadratic] {
-            check(&network, HELD, &Algorithm::fixed(sweep, course, 1.0), 1.0);
+        for extrapolation in [
+            Extrapolation::Hold,
+            Extrapolation::Limited,
+            Extrapolation::Linear,
+            Extrapolation::Quadratic,
+        ] {
+            check(&network, HELD, &Algorithm::fixed(sweep, extrapolation, 1.0), 1.0);
         }
     }
 }
@@ -135,9 +145,12 @@ fn slaves_at_steps_of_their_own_keep_the_order() {
     for (problem, network) in both() {
         head(&format!("{problem}; the second slave steps every 4 H"));
         for sweep in SWEEPS {
-            for (course, expected) in [(Course::Linear, 2.0), (Course::Quadratic, 3.0)] {
+            for (extrapolation, expected) in
+                [(Extrapolation::Linear, 2.0), (Extrapolation::Quadratic, 3.0)]
+            {
                 let multiples = vec![1, 4];
-                let algorithm = Algorithm { multiples, ..Algorithm::fixed(sweep, course, 1.0) };
+                let algorithm =
+                    Algorithm { multiples, ..Algorithm::fixed(sweep, extrapolation, 1.0) };
                 check(&network, ABLE, &algorithm, expected);
             }
         }
@@ -151,15 +164,17 @@ fn what_is_read_of_a_slave_on_its_way_is_of_its_time() {
     for (problem, network) in both() {
         for sweep in SWEEPS {
             for multiples in [vec![1, 4], vec![4, 1]] {
-                for (course, expected) in [(Course::Hold, 1.0), (Course::Linear, 2.0)] {
+                for (extrapolation, expected) in
+                    [(Extrapolation::Hold, 1.0), (Extrapolation::Linear, 2.0)]
+                {
                     let errors = [1.0 / 512.0, 1.0 / 1024.0].map(|step| {
                         let multiples = multiples.clone();
                         let algorithm =
-                            Algorithm { multiples, ..Algorithm::fixed(sweep, course, step) };
+                            Algorithm { multiples, ..Algorithm::fixed(sweep, extrapolation, step) };
                         network.run(ABLE, &algorithm, STOP).unwrap().between
                     });
                     let order = (errors[0] / errors[1]).log2();
-                    let label = format!("{problem}, {} {}", sweep.name(), course.name());
+                    let label = format!("{problem}, {} {}", sweep.name(), extrapolation.name());
                     println!("{label} {multiples:?}: {errors:?}, order {order:.2}");
                     assert!((order - expected).abs() < 0.25, "{label} {multiples:?}: {order}");
                 }
@@ -174,10 +189,12 @@ fn iterated_coupling_is_of_the_order_of_its_course() {
         head(&format!("{problem}; iterated"));
         for coupling in COUPLINGS {
             for sweep in SWEEPS {
-                for (course, expected) in
-                    [(Course::Hold, 1.0), (Course::Linear, 2.0), (Course::Quadratic, 3.0)]
-                {
-                    check(&network, ABLE, &iterated(coupling, sweep, course), expected);
+                for (extrapolation, expected) in [
+                    (Extrapolation::Hold, 1.0),
+                    (Extrapolation::Linear, 2.0),
+                    (Extrapolation::Quadratic, 3.0),
+                ] {
+                    check(&network, ABLE, &iterated(coupling, sweep, extrapolation), expected);
                 }
             }
         }
@@ -188,20 +205,20 @@ fn iterated_coupling_is_of_the_order_of_its_course() {
 #[test]
 fn iterated_coupling_is_stable_where_explicit_coupling_is_not() {
     for sweep in SWEEPS {
-        stable(&problems::two_masses(1e3, 1.0), sweep, Course::Linear);
+        stable(&problems::two_masses(1e3, 1.0), sweep, Extrapolation::Linear);
     }
 }
 
-fn stable(network: &Network, sweep: Sweep, course: Course) {
+fn stable(network: &Network, sweep: Method, extrapolation: Extrapolation) {
     let step = 0.05;
-    let explicit = network.run(ABLE, &Algorithm::fixed(sweep, course, step), STOP);
+    let explicit = network.run(ABLE, &Algorithm::fixed(sweep, extrapolation, step), STOP);
     assert!(explicit.map_or(true, |run| run.late > 1e6));
     for coupling in COUPLINGS {
         for directional in [true, false] {
             let able = Abilities { directional, ..ABLE };
-            let algorithm = Algorithm { step, ..iterated(coupling, sweep, course) };
+            let algorithm = Algorithm { step, ..iterated(coupling, sweep, extrapolation) };
             let run = network.run(able, &algorithm, STOP).unwrap();
-            let label = format!("{} {} {}", coupling.name(), sweep.name(), course.name());
+            let label = format!("{} {} {}", coupling.name(), sweep.name(), extrapolation.name());
             println!("{label}: error {:.2e}, {} calls", run.late, run.calls);
             // At the start the force is 1 kN.
             assert!(run.late < 1e3, "{label}: {run:?}");
@@ -212,11 +229,12 @@ fn stable(network: &Network, sweep: Sweep, course: Course) {
 #[test]
 fn an_algebraic_loop_with_gain_beyond_1_is_solved_by_iteration_only() {
     let network = problems::algebraic_loop(-2.0, 1.5);
-    let explicit = network.run(ABLE, &Algorithm::fixed(Sweep::Jacobi, Course::Hold, 0.01), STOP);
+    let explicit =
+        network.run(ABLE, &Algorithm::fixed(Method::Jacobi, Extrapolation::Hold, 0.01), STOP);
     assert!(explicit.map_or(true, |run| run.error > 1e6));
     for coupling in COUPLINGS {
         head(&format!("Algebraic loop of gain -3; {}", coupling.name()));
-        let algorithm = iterated(coupling, Sweep::Jacobi, Course::Linear);
+        let algorithm = iterated(coupling, Method::Jacobi, Extrapolation::Linear);
         let order = observed("jacobi linear", &network, ABLE, &algorithm);
         assert!((order - 2.0).abs() < 0.25, "{}: {order}", coupling.name());
     }
@@ -225,7 +243,7 @@ fn an_algebraic_loop_with_gain_beyond_1_is_solved_by_iteration_only() {
 #[test]
 fn a_loop_of_gain_1_has_no_solution_and_is_refused_with_the_names_of_its_outputs() {
     let network = problems::algebraic_loop(2.0, 0.5);
-    let algorithm = iterated(Coupling::Newton, Sweep::Jacobi, Course::Linear);
+    let algorithm = iterated(Coupling::Newton, Method::Jacobi, Extrapolation::Linear);
     let calls = std::sync::Arc::default();
     let refused = master::Simulation::new(
         network.system(ABLE, &calls),

@@ -72,7 +72,8 @@ fn thirty_lines_couple_two_fmus_as_the_command_does() {
     let (first, second) = (plant.display().to_string(), controller.display().to_string());
     let paths = ["run", "--plant", &first, "--controller", &second];
     // What `Algorithm::new` stands for: Gauss-Seidel, limited slopes, fixed steps.
-    let algorithm = ["--method", "gauss-seidel", "--course", "limited", "--coupling", "once"];
+    let algorithm =
+        ["--method", "gauss-seidel", "--extrapolation", "limited", "--coupling", "once"];
     let rest = ["--step", "0.001", "--stop-time", "10", "--out", &out];
     command(&[&paths[..], &algorithm, &rest].concat());
     let x_p = last(&folder.path().join("results.csv"), "plant.x_p");

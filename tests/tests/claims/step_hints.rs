@@ -61,7 +61,7 @@ fn structure(hints: [Option<f64>; 2], base: Option<f64>) -> (TempDir, PathBuf) {
 fn run(structure: &Path, more: &[&str]) -> (Vec<f64>, Vec<f64>, String) {
     let out = structure.with_file_name("out");
     let (path, folder) = (structure.display().to_string(), out.display().to_string());
-    let fixed = ["run", &path, "--method", "jacobi", "--course", "hold", "--out", &folder];
+    let fixed = ["run", &path, "--method", "jacobi", "--extrapolation", "hold", "--out", &folder];
     let explained = ["--explain", "--record", "a.y", "--record", "sub.b.y"];
     let output = tests::run(&[&fixed[..], &explained, more].concat());
     let said = [output.stdout, output.stderr].concat();

@@ -7,7 +7,7 @@ use super::command::Command;
 use super::isolated::Isolated;
 use super::strings;
 use super::words::{Reader, Writer};
-use slave::{Advance, Background, CallError, Slave, Stepped};
+use slave::{Advance, Background, CallError, Slave, StepResult};
 
 /// For commands without arguments, or without results.
 fn nothing(_: &mut Writer<'_>) {}
@@ -30,10 +30,10 @@ fn pairs<T: super::words::Word>(writer: &mut Writer<'_>, references: &[u32], val
     writer.put_all(values);
 }
 
-fn stepped(reader: &mut Reader<'_>) -> Option<Stepped> {
+fn stepped(reader: &mut Reader<'_>) -> Option<StepResult> {
     let whole: bool = reader.take()?;
     let (reached, terminated) = (reader.take()?, reader.take()?);
-    Some(if whole { Stepped::Whole } else { Stepped::Part { reached, terminated } })
+    Some(if whole { StepResult::Whole } else { StepResult::Part { reached, terminated } })
 }
 
 impl Isolated {
@@ -62,7 +62,7 @@ impl Background for Isolated {
     }
 
     #[inline]
-    fn finish_advance(&mut self, step: &mut Advance<'_>) -> Result<Stepped, CallError> {
+    fn finish_advance(&mut self, step: &mut Advance<'_>) -> Result<StepResult, CallError> {
         self.answer(Command::Advance, |reader| {
             let done = stepped(reader)?;
             reader.take_all(step.output_values)?;
@@ -177,7 +177,7 @@ impl Slave for Isolated {
         self.call(Command::GetOutputDerivatives, write, |reader| reader.take_all(values))
     }
 
-    fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<Stepped, CallError> {
+    fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError> {
         self.place.set_time(time);
         let write = |writer: &mut Writer<'_>| {
             writer.put(time);
@@ -221,7 +221,7 @@ impl Slave for Isolated {
         self.call(Command::DeserializeState, write, no_result)
     }
 
-    fn advance(&mut self, step: &mut Advance<'_>) -> Result<Stepped, CallError> {
+    fn advance(&mut self, step: &mut Advance<'_>) -> Result<StepResult, CallError> {
         self.begin_advance(step)?;
         self.finish_advance(step)
     }

@@ -125,10 +125,10 @@ pub(super) fn write_error(error: &CallError, writer: &mut Writer<'_>) {
     let (kind, number, text): (u64, u64, &str) = match &error.failure {
         Failure::Status(status) => (0, *status as u64, ""),
         Failure::UnknownStatus(status) => (1, i64::from(*status).cast_unsigned(), ""),
-        Failure::Absent => (2, 0, ""),
+        Failure::Missing => (2, 0, ""),
         Failure::TimedOut(seconds) => (3, seconds.to_bits(), ""),
         Failure::Panicked(text) => (4, 0, text),
-        Failure::Nonsense(text) => (5, 0, text),
+        Failure::InvalidAnswer(text) => (5, 0, text),
         // What happens to a process it cannot tell itself.
         Failure::Killed(..) | Failure::Exited(_) | Failure::OutOfMemory(_) => {
             (5, 0, "ended a process of its own")
@@ -161,10 +161,10 @@ pub(super) fn read_error(command: Command, reader: &mut Reader<'_>) -> Option<Ca
     let failure = match kind {
         0 => Failure::Status(Status::from_c(status.ok()?)?),
         1 => Failure::UnknownStatus(status.ok()?),
-        2 => Failure::Absent,
+        2 => Failure::Missing,
         3 => Failure::TimedOut(f64::from_bits(number)),
         4 => Failure::Panicked(text),
-        5 => Failure::Nonsense(text),
+        5 => Failure::InvalidAnswer(text),
         _ => return None,
     };
     let mut messages = Vec::new();
@@ -203,10 +203,10 @@ mod tests {
         let failures = [
             Failure::Status(Status::Fatal),
             Failure::UnknownStatus(-77),
-            Failure::Absent,
+            Failure::Missing,
             Failure::TimedOut(0.25),
             Failure::Panicked("index 4".to_owned()),
-            Failure::Nonsense("returned fmi2Discard".to_owned()),
+            Failure::InvalidAnswer("returned fmi2Discard".to_owned()),
         ];
         for failure in failures {
             let error = error(failure, &["first", "", "zweite Äußerung"]);
@@ -216,7 +216,7 @@ mod tests {
 
     #[test]
     fn of_too_many_messages_the_last_ones_pass() {
-        let error = error(Failure::Absent, &["aaaaaaaaaaaaaaaaaaaaaaaaa", "bb", "cc"]);
+        let error = error(Failure::Missing, &["aaaaaaaaaaaaaaaaaaaaaaaaa", "bb", "cc"]);
         assert_eq!(through(&error, &area(10)).messages, ["bb", "cc"]);
     }
 

@@ -8,7 +8,7 @@ use fmu_description::ModelDescription;
 use fmu_description::package::Unpacked;
 
 use super::{IsolateError, Options, WorkerError};
-use slave::{CallError, Slave, Stepped};
+use slave::{CallError, Slave, StepResult};
 
 /// An instance in a process of its own: there is none on this operating system.
 #[derive(Debug)]
@@ -69,7 +69,7 @@ impl Slave for Isolated {
         match self.never {}
     }
 
-    fn do_step(&mut self, _: f64, _: f64, _: bool) -> Result<Stepped, CallError> {
+    fn do_step(&mut self, _: f64, _: f64, _: bool) -> Result<StepResult, CallError> {
         match self.never {}
     }
 }

@@ -241,7 +241,7 @@ impl Isolated {
     /// Judges what was seen instead of an answer. `begin` is when the wait began, as soon as known.
     #[cold]
     fn worry(&mut self, seen: Seen, begin: &mut Option<Instant>) -> Result<(), Failure> {
-        let broken = |what: &str| Failure::Nonsense(what.to_owned());
+        let broken = |what: &str| Failure::InvalidAnswer(what.to_owned());
         if let Seen::Turn(_) = seen {
             return Err(broken("is lost: its process wrote over shared memory"));
         }
@@ -315,7 +315,7 @@ impl Isolated {
         }
         if bytes.len() != total {
             let what = format!("announced {total} bytes and gave {}", bytes.len());
-            return Err(self.lose(command, Failure::Nonsense(what)));
+            return Err(self.lose(command, Failure::InvalidAnswer(what)));
         }
         Ok(bytes)
     }
@@ -323,7 +323,7 @@ impl Isolated {
     /// The error that the answer to `command` makes no sense.
     pub(super) fn senseless(&mut self, command: Command) -> CallError {
         let what = "left an answer that makes no sense: its process wrote over shared memory";
-        self.lose(command, Failure::Nonsense(what.to_owned()))
+        self.lose(command, Failure::InvalidAnswer(what.to_owned()))
     }
 
     /// The process of the worker.
@@ -378,5 +378,5 @@ fn error(command: Command, failure: Failure) -> CallError {
 
 #[cold]
 fn nonsense(command: Command, what: &str) -> CallError {
-    error(command, Failure::Nonsense(what.to_owned()))
+    error(command, Failure::InvalidAnswer(what.to_owned()))
 }

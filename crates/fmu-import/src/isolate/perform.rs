@@ -9,7 +9,7 @@ use super::layout::Shared;
 use super::strings;
 use super::words::{Reader, Word, Writer};
 use crate::fmu::{Fmu, Instance};
-use slave::{CallError, Slave, Stepped};
+use slave::{CallError, Slave, StepResult};
 
 /// What came of a command; none where its arguments make no sense.
 type Done = Option<Result<(), CallError>>;
@@ -295,7 +295,7 @@ impl Step {
     }
 
     /// The calls of [`Slave::advance`], each with its place left for the master to find.
-    fn make(&mut self, instance: &mut Instance, shared: &Shared) -> Result<Stepped, CallError> {
+    fn make(&mut self, instance: &mut Instance, shared: &Shared) -> Result<StepResult, CallError> {
         let at = |command: Command| shared.place().store(command.to_word(), Ordering::Relaxed);
         if !self.inputs.is_empty() {
             at(Command::SetReal);
@@ -356,10 +356,10 @@ fn experiment(reader: &mut Reader<'_>) -> Option<Experiment> {
     Some(Experiment { start_time, stop_time: optional()?, tolerance: optional()? })
 }
 
-fn write_stepped(done: Stepped, writer: &mut Writer<'_>) {
+fn write_stepped(done: StepResult, writer: &mut Writer<'_>) {
     let (whole, reached, terminated) = match done {
-        Stepped::Whole => (true, 0.0, false),
-        Stepped::Part { reached, terminated } => (false, reached, terminated),
+        StepResult::Whole => (true, 0.0, false),
+        StepResult::Part { reached, terminated } => (false, reached, terminated),
     };
     writer.put(DONE);
     writer.put(whole);

@@ -130,7 +130,7 @@ fn serve(line: &mut Line) -> Result<(), WorkerError> {
 #[cold]
 fn lost(command: Command) -> CallError {
     let what = "was asked for something else than a master asks: shared memory is corrupted";
-    let failure = Failure::Nonsense(what.to_owned());
+    let failure = Failure::InvalidAnswer(what.to_owned());
     CallError { function: command.function(), failure, messages: Vec::new() }
 }
 
@@ -138,7 +138,7 @@ fn fitting(command: Command, writer: &Writer<'_>) -> Result<(), CallError> {
     if writer.fits() {
         return Ok(());
     }
-    let failure = Failure::Nonsense("gave more than its shared memory holds".to_owned());
+    let failure = Failure::InvalidAnswer("gave more than its shared memory holds".to_owned());
     Err(CallError { function: command.function(), failure, messages: Vec::new() })
 }
 
@@ -158,7 +158,7 @@ fn open(
         && let Err(error) = memory::limit(shared, limit)
     {
         let what = format!("cannot limit its memory to {limit} bytes: {error}");
-        let failure = Failure::Nonsense(what);
+        let failure = Failure::InvalidAnswer(what);
         return Some(Err(CallError { function: LOADING, failure, messages: Vec::new() }));
     }
     let mut preload = Vec::new();

@@ -28,7 +28,7 @@ impl Component {
         let state = self.saved.get(slot).copied().unwrap_or(null_mut());
         if state.is_null() {
             let what = format!("was asked for the state of slot {slot}, which is empty");
-            return Err(self.failed(NAME, Failure::Nonsense(what)));
+            return Err(self.failed(NAME, Failure::InvalidAnswer(what)));
         }
         self.set_state(state)
     }

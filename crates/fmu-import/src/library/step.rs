@@ -7,7 +7,7 @@ use fmu_description::abi::{Status, StatusKind, fmi2Status};
 
 use super::Component;
 use super::calls::{function, same_length};
-use slave::{CallError, Failure, Stepped, absent};
+use slave::{CallError, Failure, StepResult, absent};
 
 const NAME: &str = "fmi2DoStep";
 const SET: &str = "fmi2SetReal";
@@ -24,14 +24,14 @@ impl Component {
         time: f64,
         size: f64,
         never_back: bool,
-    ) -> Result<Stepped, CallError> {
+    ) -> Result<StepResult, CallError> {
         let function = function!(self.do_step, NAME);
         self.place.set_time(time);
         // SAFETY: the instance is alive.
         let status = unsafe { function(self.pointer, time, size, never_back.into()) };
         self.place.leave();
         if status == Status::OK as fmi2Status || self.is_warning(status) {
-            return Ok(Stepped::Whole);
+            return Ok(StepResult::Whole);
         }
         self.unfinished(status, time, size)
     }
@@ -46,7 +46,7 @@ impl Component {
         (time, size): (f64, f64),
         never_back: bool,
         (outputs, results): (&[u32], &mut [f64]),
-    ) -> Result<Stepped, CallError> {
+    ) -> Result<StepResult, CallError> {
         let hot = &self.hot;
         let usual =
             |status| status == Status::OK as fmi2Status || status == Status::Warning as fmi2Status;
@@ -81,7 +81,7 @@ impl Component {
             }
         }
         self.place.leave();
-        Ok(Stepped::Whole)
+        Ok(StepResult::Whole)
     }
 
     /// Reads the outputs after a step that was not done at once.
@@ -90,8 +90,8 @@ impl Component {
         &mut self,
         outputs: &[u32],
         results: &mut [f64],
-        done: Stepped,
-    ) -> Result<Stepped, CallError> {
+        done: StepResult,
+    ) -> Result<StepResult, CallError> {
         if !outputs.is_empty() {
             self.get_real(outputs, results)?;
         }
@@ -105,7 +105,7 @@ impl Component {
         mut status: fmi2Status,
         time: f64,
         size: f64,
-    ) -> Result<Stepped, CallError> {
+    ) -> Result<StepResult, CallError> {
         let (begin, mut pause) = (Instant::now(), Duration::from_micros(1));
         while status == Status::Pending as fmi2Status {
             if let Some(limit) = self.time_limit.filter(|limit| begin.elapsed() > *limit) {
@@ -117,7 +117,7 @@ impl Component {
             status = self.status(StatusKind::DoStepStatus)?;
         }
         if status != Status::Discard as fmi2Status {
-            return self.check(NAME, status).map(|()| Stepped::Whole);
+            return self.check(NAME, status).map(|()| StepResult::Whole);
         }
         let reached = match self.real_status(StatusKind::LastSuccessfulTime) {
             Ok(reached) => reached,
@@ -134,9 +134,9 @@ impl Component {
                  from {time} to {} s",
                 time + size
             );
-            return Err(self.failed(NAME, Failure::Nonsense(what)));
+            return Err(self.failed(NAME, Failure::InvalidAnswer(what)));
         }
-        Ok(Stepped::Part { reached, terminated })
+        Ok(StepResult::Part { reached, terminated })
     }
 
     /// `fmi2CancelStep`: only then may the instance be freed (section 4.2.4).

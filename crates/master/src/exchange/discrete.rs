@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use fmu_description::Kind;
 
-use crate::fault::FaultLine;
+use crate::fault::FaultChain;
 use crate::system::{Connection, Port, System};
 use slave::Transformation;
 use slave::{CallError, Slave};
@@ -19,7 +19,7 @@ pub(crate) struct Access<T> {
     set: Set<T>,
     /// What becomes of a value, into the place of another.
     map: fn(&T, &Transformation, &mut T),
-    disturb: fn(&FaultLine, f64, &T) -> T,
+    disturb: fn(&FaultChain, f64, &T) -> T,
     number: fn(&T) -> f64,
 }
 
@@ -66,7 +66,7 @@ pub(crate) const STRINGS: Access<String> = Access {
 
 /// What one slave sets and reads of a type.
 #[derive(Default)]
-struct Lane {
+struct PortMap {
     inputs: Vec<u32>,
     input_range: Range<usize>,
     outputs: Vec<u32>,
@@ -76,13 +76,13 @@ struct Lane {
 /// The connected variables of one type.
 pub(crate) struct Channel<T> {
     access: Access<T>,
-    lanes: Vec<Lane>,
+    port_maps: Vec<PortMap>,
     output_ports: Vec<Port>,
     /// For each input the index of its output, and what becomes of the value.
     sources: Vec<usize>,
     transformations: Vec<Transformation>,
     input_ports: Vec<Port>,
-    faults: Vec<Option<FaultLine>>,
+    faults: Vec<Option<FaultChain>>,
     /// Values of the outputs.
     pub(crate) latest: Vec<T>,
     /// Their values at the begins of the last steps, where slaves make several steps at once.
@@ -109,8 +109,9 @@ impl<T: Clone + Default> Channel<T> {
         inputs.sort_by_key(|connection| connection.to.slave);
         let indices: HashMap<Port, usize> =
             outputs.iter().enumerate().map(|(index, &port)| (port, index)).collect();
-        let mut lanes: Vec<Lane> = system.slaves.iter().map(|_| Lane::default()).collect();
-        for (slave, lane) in lanes.iter_mut().enumerate() {
+        let mut port_maps: Vec<PortMap> =
+            system.slaves.iter().map(|_| PortMap::default()).collect();
+        for (slave, lane) in port_maps.iter_mut().enumerate() {
             let begin = outputs.partition_point(|port| port.slave < slave);
             let end = outputs.partition_point(|port| port.slave <= slave);
             lane.outputs = references(system, outputs[begin..end].iter().copied());
@@ -123,7 +124,7 @@ impl<T: Clone + Default> Channel<T> {
         }
         Self {
             access,
-            lanes,
+            port_maps,
             sources: inputs.iter().map(|connection| indices[&connection.from]).collect(),
             transformations: inputs.iter().map(|each| each.transformation.clone()).collect(),
             input_ports: inputs.iter().map(|connection| connection.to).collect(),
@@ -143,7 +144,7 @@ impl<T: Clone + Default> Channel<T> {
     }
 
     /// Puts a fault on the way to an input; false where there is no such connected input.
-    pub(crate) fn set_fault(&mut self, input: Port, fault: &FaultLine) -> bool {
+    pub(crate) fn set_fault(&mut self, input: Port, fault: &FaultChain) -> bool {
         let Some(k) = self.input_ports.iter().position(|&port| port == input) else {
             return false;
         };
@@ -182,19 +183,19 @@ impl<T: Clone + Default> Channel<T> {
 
     /// The slave will step: what was its end is its begin.
     pub(crate) fn shift(&mut self, slave: usize) {
-        let range = self.lanes[slave].output_range.clone();
+        let range = self.port_maps[slave].output_range.clone();
         self.begin[range.clone()].clone_from_slice(&self.latest[range]);
     }
 
     /// The faults, for a checkpoint.
-    pub(crate) fn faults(&mut self) -> impl Iterator<Item = &mut FaultLine> {
+    pub(crate) fn faults(&mut self) -> impl Iterator<Item = &mut FaultChain> {
         self.faults.iter_mut().flatten()
     }
 
     /// The inputs of `slave` from the values of now, for a step from `time`; those of slaves that are
     /// `ahead` have not changed yet.
     pub(crate) fn gather(&mut self, slave: usize, time: f64, ahead: impl Fn(usize) -> bool) {
-        for k in self.lanes[slave].input_range.clone() {
+        for k in self.port_maps[slave].input_range.clone() {
             let source = self.sources[k];
             let is_ahead = ahead(self.output_ports[source].slave);
             let value = if is_ahead { &self.begin[source] } else { &self.latest[source] };
@@ -207,7 +208,7 @@ impl<T: Clone + Default> Channel<T> {
 
     /// Sets the gathered inputs.
     pub(crate) fn set(&self, slave: usize, instance: &mut dyn Slave) -> Result<(), CallError> {
-        let lane = &self.lanes[slave];
+        let lane = &self.port_maps[slave];
         if lane.inputs.is_empty() {
             return Ok(());
         }
@@ -216,7 +217,7 @@ impl<T: Clone + Default> Channel<T> {
 
     /// Reads the outputs.
     pub(crate) fn read(&mut self, slave: usize, instance: &mut dyn Slave) -> Result<(), CallError> {
-        let lane = &self.lanes[slave];
+        let lane = &self.port_maps[slave];
         if lane.outputs.is_empty() {
             return Ok(());
         }

@@ -1,12 +1,12 @@
 //! Faults on the connections of Reals.
 
 use super::reals::Reals;
-use crate::fault::FaultLine;
+use crate::fault::FaultChain;
 use crate::system::Port;
 
 impl Reals {
     /// Puts a fault on the way to an input; false where there is no such connected input.
-    pub(crate) fn set_fault(&mut self, input: Port, fault: &FaultLine) -> bool {
+    pub(crate) fn set_fault(&mut self, input: Port, fault: &FaultChain) -> bool {
         let Some(k) = self.layout.input_ports.iter().position(|&port| port == input) else {
             return false;
         };
@@ -36,7 +36,7 @@ impl Reals {
     }
 
     /// The faults, for a checkpoint.
-    pub(crate) fn faults(&mut self) -> impl Iterator<Item = &mut FaultLine> {
+    pub(crate) fn faults(&mut self) -> impl Iterator<Item = &mut FaultChain> {
         self.faults.iter_mut().flatten()
     }
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use fmu_description::Kind;
 
-use crate::algorithm::{Algorithm, Course};
+use crate::algorithm::{Algorithm, Extrapolation};
 use crate::system::{Port, System};
 use slave::Advance;
 use slave::Transformation;
@@ -21,7 +21,7 @@ pub(crate) struct Refusal {
 
 /// What one slave sets and reads of connected Reals.
 #[derive(Debug, Default)]
-pub(super) struct Lane {
+pub(super) struct PortMap {
     pub(super) inputs: Vec<u32>,
     /// Of the inputs in the arrays of all slaves.
     pub(super) input_range: Range<usize>,
@@ -38,7 +38,7 @@ pub(super) struct Lane {
     pub(super) output_order: usize,
 }
 
-impl Lane {
+impl PortMap {
     /// A step with the values of all inputs and of all its own outputs, each with the derivatives of
     /// its own.
     #[inline]
@@ -70,8 +70,8 @@ impl Lane {
 /// The connected Reals of all slaves.
 #[derive(Debug, Default)]
 pub(super) struct Layout {
-    pub(super) lanes: Vec<Lane>,
-    /// For each input: index of its output, factor and offset, and whether its course is a value
+    pub(super) port_maps: Vec<PortMap>,
+    /// For each input: index of its output, factor and offset, and whether its extrapolation is a value
     /// that is held.
     pub(super) sources: Vec<u32>,
     pub(super) factors: Vec<f64>,
@@ -102,15 +102,15 @@ impl Layout {
         let count = system.slaves.len();
         let functions = system.slaves.iter().map(|(_, slave)| slave.is_function()).collect();
         let mut layout = Self { plain: vec![true; count], functions, ..Self::default() };
-        layout.lanes.resize_with(count, Lane::default);
+        layout.port_maps.resize_with(count, PortMap::default);
         layout.collect_outputs(system);
         layout.collect_inputs(system);
-        for (slave, lane) in layout.lanes.iter_mut().enumerate() {
+        for (slave, lane) in layout.port_maps.iter_mut().enumerate() {
             let Some(flags) = &system.slaves[slave].1.description().co_simulation else { continue };
-            let wanted = match algorithm.course {
-                Course::Hold => 0,
-                Course::Limited | Course::Linear => 1,
-                Course::Quadratic => 2,
+            let wanted = match algorithm.extrapolation {
+                Extrapolation::Hold => 0,
+                Extrapolation::Limited | Extrapolation::Linear => 1,
+                Extrapolation::Quadratic => 2,
             };
             let refusal = refusing.get(slave).copied().unwrap_or_default();
             if flags.can_interpolate_inputs && !refusal.inputs {
@@ -126,7 +126,7 @@ impl Layout {
 
     /// Every connected Real output once, slave by slave; then the Integers that go to Reals.
     fn collect_outputs(&mut self, system: &System) {
-        let mut by_slave = vec![Vec::new(); self.lanes.len()];
+        let mut by_slave = vec![Vec::new(); self.port_maps.len()];
         let mut integers = Vec::new();
         for connection in &system.connections {
             let (from, to) = (connection.from, connection.to);
@@ -146,9 +146,9 @@ impl Layout {
             let begin = self.output_ports.len();
             for port in ports {
                 self.add_output(port);
-                self.lanes[slave].outputs.push(system.variable(port).value_reference);
+                self.port_maps[slave].outputs.push(system.variable(port).value_reference);
             }
-            self.lanes[slave].output_range = begin..self.output_ports.len();
+            self.port_maps[slave].output_range = begin..self.output_ports.len();
         }
         for port in integers {
             self.from_integers.push((port, self.output_ports.len()));
@@ -165,7 +165,7 @@ impl Layout {
     }
 
     fn collect_inputs(&mut self, system: &System) {
-        let mut by_slave = vec![Vec::new(); self.lanes.len()];
+        let mut by_slave = vec![Vec::new(); self.port_maps.len()];
         for connection in &system.connections {
             if matches!(system.variable(connection.to).kind, Kind::Real(_)) {
                 by_slave[connection.to.slave].push(connection);
@@ -175,7 +175,7 @@ impl Layout {
             let begin = self.sources.len();
             for connection in connections {
                 let variable = system.variable(connection.to);
-                self.lanes[slave].inputs.push(variable.value_reference);
+                self.port_maps[slave].inputs.push(variable.value_reference);
                 self.input_ports.push(connection.to);
                 self.sources.push(self.indices[&connection.from]);
                 let (factor, offset) = match connection.transformation {
@@ -188,13 +188,13 @@ impl Layout {
                 let real = matches!(system.variable(connection.from).kind, Kind::Real(_));
                 self.held.push(!real);
             }
-            self.lanes[slave].input_range = begin..self.sources.len();
+            self.port_maps[slave].input_range = begin..self.sources.len();
         }
     }
 
     /// Derivatives stand slave by slave, those of first order before those of second.
     fn place_derivatives(&mut self) {
-        for lane in &mut self.lanes {
+        for lane in &mut self.port_maps {
             let begin = self.output_derivatives;
             for order in 1..=lane.output_order {
                 for output in lane.output_range.clone() {

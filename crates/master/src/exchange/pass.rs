@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use slave::{CallError, Slave, Stepped};
+use slave::{CallError, Slave, StepResult};
 
 /// Where the values of one slave stand among those of all.
 #[derive(Clone, Debug)]
@@ -24,7 +24,7 @@ pub(super) struct Pass {
     /// Outputs at the end of the step while those at its begin still count.
     next: Vec<f64>,
     /// Slaves that did not come to the end of their step.
-    parts: Vec<(usize, Stepped)>,
+    parts: Vec<(usize, StepResult)>,
 }
 
 impl Pass {
@@ -56,7 +56,7 @@ impl Pass {
         latest: &mut Vec<f64>,
         span: (f64, f64),
         never_back: bool,
-    ) -> Result<&mut Vec<(usize, Stepped)>, (usize, CallError)> {
+    ) -> Result<&mut Vec<(usize, StepResult)>, (usize, CallError)> {
         self.parts.clear();
         for (slave, ((_, instance), place)) in slaves.iter_mut().zip(&self.places).enumerate() {
             let values = &mut self.values[place.inputs.clone()];
@@ -70,7 +70,7 @@ impl Pass {
                 (&self.outputs[place.outputs.clone()], &mut self.next[place.outputs.clone()]),
             );
             match done {
-                Ok(Stepped::Whole) => {}
+                Ok(StepResult::Whole) => {}
                 Ok(part) => self.parts.push((slave, part)),
                 Err(error) => return Err((slave, error)),
             }

@@ -1,16 +1,16 @@
 //! Connected Reals: values and derivatives of outputs over their last steps, and what inputs get.
 
 use super::call;
-use super::course::{Known, Polynomial};
+use super::extrapolation::{Known, Polynomial};
 use super::layout::{Layout, Refusal};
 use super::pass::Pass;
 use super::trace::Span;
 pub(crate) use super::trace::Trace;
-use crate::algorithm::{Algorithm, Coupling, Course, StepControl, Sweep};
+use crate::algorithm::{Algorithm, Coupling, Extrapolation, Method, StepControl};
 use crate::error::SystemError;
-use crate::fault::FaultLine;
+use crate::fault::FaultChain;
 use crate::system::{Port, System};
-use slave::{Advance, CallError, Slave, Stepped};
+use slave::{Advance, CallError, Slave, StepResult};
 
 /// Part of a step by which times may miss each other: their rounding.
 const ROUNDING: f64 = 1e-9;
@@ -20,9 +20,9 @@ const ROUNDING: f64 = 1e-9;
 pub(crate) struct Reals {
     pub(super) layout: Layout,
     /// Faults by input; empty where there are none at all.
-    pub(super) faults: Vec<Option<FaultLine>>,
-    pub(super) course: Course,
-    pub(super) sweep: Sweep,
+    pub(super) faults: Vec<Option<FaultChain>>,
+    pub(super) extrapolation: Extrapolation,
+    pub(super) sweep: Method,
     /// Every input is held and all slaves step together: the latest values are all it takes.
     pub(super) simple: bool,
     /// Some slaves make several steps at once.
@@ -53,7 +53,7 @@ impl Reals {
             spans: vec![Span::default(); system.slaves.len()],
         };
         let mut pass = Pass::default();
-        for lane in &layout.lanes {
+        for lane in &layout.port_maps {
             let sources = &layout.sources[lane.input_range.clone()];
             pass.add(&lane.inputs, sources, &lane.outputs);
         }
@@ -65,9 +65,9 @@ impl Reals {
             values: vec![0.0; layout.sources.len()],
             input_derivatives: vec![0.0; layout.input_derivatives],
             reported: vec![false; outputs],
-            course: algorithm.course,
+            extrapolation: algorithm.extrapolation,
             sweep: algorithm.sweep,
-            simple: algorithm.course == Course::Hold
+            simple: algorithm.extrapolation == Extrapolation::Hold
                 && algorithm.coupling == Coupling::Once
                 && algorithm.control == StepControl::Fixed
                 && algorithm.multiples.iter().all(|&multiple| multiple == 1),
@@ -108,7 +108,7 @@ impl Reals {
             return;
         }
         let trace = &mut self.trace;
-        let lane = &self.layout.lanes[slave];
+        let lane = &self.layout.port_maps[slave];
         let (range, derived) = (lane.output_range.clone(), lane.output_derivative_range.clone());
         let span = &mut trace.spans[slave];
         (span.earlier_size, span.last_size) = (span.last_size, span.size);
@@ -125,7 +125,7 @@ impl Reals {
         }
     }
 
-    /// Values of now have no past: the course of inputs begins anew.
+    /// Values of now have no past: the extrapolation of inputs begins anew.
     pub(crate) fn forget(&mut self) {
         let trace = &mut self.trace;
         for past in [&mut trace.begin, &mut trace.before, &mut trace.earlier] {
@@ -138,7 +138,7 @@ impl Reals {
 
     /// The inputs of `slave` for a step from `time` over `size`.
     pub(crate) fn gather(&mut self, slave: usize, time: f64, size: f64) {
-        let range = self.layout.lanes[slave].input_range.clone();
+        let range = self.layout.port_maps[slave].input_range.clone();
         if self.simple {
             let sources = &self.layout.sources[range.clone()];
             for (value, &source) in self.values[range.clone()].iter_mut().zip(sources) {
@@ -160,35 +160,36 @@ impl Reals {
 
     /// Value and derivatives of the input at index `k`, the slave's input number `position`.
     fn place(&mut self, slave: usize, k: usize, position: usize, time: f64, size: f64) {
-        let (layout, lane) = (&self.layout, &self.layout.lanes[slave]);
+        let (layout, lane) = (&self.layout, &self.layout.port_maps[slave]);
         let source = layout.sources[k] as usize;
         let known = self.is_known(slave, source, time + size);
         let seen_at = self.seen_at(slave, layout.owners[source] as usize, time, size);
-        let ahead = self.several && known && self.course == Course::Hold;
-        let course = if layout.held[k] || ahead {
+        let ahead = self.several && known && self.extrapolation == Extrapolation::Hold;
+        let extrapolation = if layout.held[k] || ahead {
             Polynomial::held(self.value_at(source, seen_at))
         } else {
             self.polynomial(slave, source, (time, size))
         };
-        let value = match (lane.input_order, self.course) {
-            (0, Course::Limited) if known => course.end(size),
-            (0, Course::Linear | Course::Quadratic) => course.mean(size),
-            _ => course.value,
+        let value = match (lane.input_order, self.extrapolation) {
+            (0, Extrapolation::Limited) if known => extrapolation.end(size),
+            (0, Extrapolation::Linear | Extrapolation::Quadratic) => extrapolation.mean(size),
+            _ => extrapolation.value,
         };
         let factor = layout.factors[k];
         let value = if layout.plain[slave] { value } else { factor * value + layout.offsets[k] };
         let mut given = Polynomial {
             value,
-            slope: factor * course.slope,
-            curvature: factor * course.curvature,
+            slope: factor * extrapolation.slope,
+            curvature: factor * extrapolation.curvature,
         };
         if let Some(Some(fault)) = self.faults.get(k) {
             given = if lane.input_order > 0 {
                 let [value, slope, curvature] =
-                    fault.apply_course(time, [value, given.slope, given.curvature]);
+                    fault.apply_derivatives(time, [value, given.slope, given.curvature]);
                 Polynomial { value, slope, curvature }
             } else {
-                let at_end = known && matches!(self.course, Course::Hold | Course::Limited);
+                let at_end = known
+                    && matches!(self.extrapolation, Extrapolation::Hold | Extrapolation::Limited);
                 Polynomial::held(fault.apply(if at_end { time + size } else { time }, value))
             };
         }
@@ -208,7 +209,7 @@ impl Reals {
     pub(super) fn sees_end(&self, slave: usize, source: usize, end: f64) -> bool {
         let span = &self.trace.spans[source];
         let is_there = || span.begin + span.size <= end + ROUNDING * span.size;
-        self.sweep == Sweep::GaussSeidel || (self.layout.functions[slave] && is_there())
+        self.sweep == Method::GaussSeidel || (self.layout.functions[slave] && is_there())
     }
 
     /// Whether the source of that output has stepped beyond the begin of the current step, for a
@@ -226,7 +227,7 @@ impl Reals {
             earlier: trace.earlier[output],
             before: trace.before[output],
             begin: trace.begin[output],
-            end: if self.assumes && !(span.stepped && self.sweep == Sweep::GaussSeidel) {
+            end: if self.assumes && !(span.stepped && self.sweep == Method::GaussSeidel) {
                 self.assumed[output]
             } else {
                 trace.latest[output]
@@ -239,17 +240,17 @@ impl Reals {
         }
     }
 
-    /// The course of an output from `time` on.
+    /// The extrapolation of an output from `time` on.
     fn polynomial(&self, slave: usize, output: usize, (time, size): (f64, f64)) -> Polynomial {
         let (layout, trace) = (&self.layout, &self.trace);
         let span = &trace.spans[layout.owners[output] as usize];
         let known = self.known(output, span);
-        let course = if self.is_known(slave, output, time + size) {
-            known.interpolated(self.course)
+        let extrapolation = if self.is_known(slave, output, time + size) {
+            known.interpolated(self.extrapolation)
         } else {
-            known.extrapolated(self.course)
+            known.extrapolated(self.extrapolation)
         };
-        course.later(time - span.begin)
+        extrapolation.later(time - span.begin)
     }
 
     /// Sets the gathered inputs of `slave`, steps it, reads its outputs.
@@ -260,7 +261,7 @@ impl Reals {
         instance: &mut dyn Slave,
         span: (f64, f64),
         never_back: bool,
-    ) -> Result<Stepped, CallError> {
+    ) -> Result<StepResult, CallError> {
         let done = instance.advance(&mut self.step(slave, span, never_back))?;
         self.trace.spans[slave].stepped = true;
         Ok(done)
@@ -269,7 +270,7 @@ impl Reals {
     /// The step of `slave` with its gathered inputs.
     #[inline]
     pub(super) fn step(&mut self, slave: usize, span: (f64, f64), never_back: bool) -> Advance<'_> {
-        let lane = &self.layout.lanes[slave];
+        let lane = &self.layout.port_maps[slave];
         let trace = &mut self.trace;
         let inputs =
             (&self.values[..], &self.input_derivatives[lane.input_derivative_range.clone()]);
@@ -283,7 +284,7 @@ impl Reals {
     /// Whether [`Reals::pass`] does all that a sweep of Jacobi's method takes.
     pub(crate) fn passes(&self) -> bool {
         self.simple
-            && self.sweep == Sweep::Jacobi
+            && self.sweep == Method::Jacobi
             && self.layout.plain.iter().all(|plain| *plain)
             && !self.layout.functions.contains(&true)
             && self.layout.from_integers.is_empty()
@@ -296,7 +297,7 @@ impl Reals {
         system: &mut System,
         (time, size): (f64, f64),
         never_back: bool,
-    ) -> Result<&mut Vec<(usize, Stepped)>, SystemError> {
+    ) -> Result<&mut Vec<(usize, StepResult)>, SystemError> {
         let latest = &mut self.trace.latest;
         let done = self.pass.run(&mut system.slaves, latest, (time, size), never_back);
         done.map_err(|(slave, source)| call(&system.slaves[slave].0, time, source))
@@ -310,7 +311,7 @@ impl Reals {
 
     /// Reads the connected outputs of a slave and their derivatives.
     pub(crate) fn read(&mut self, slave: usize, instance: &mut dyn Slave) -> Result<(), CallError> {
-        let (lane, trace) = (&self.layout.lanes[slave], &mut self.trace);
+        let (lane, trace) = (&self.layout.port_maps[slave], &mut self.trace);
         if !lane.outputs.is_empty() {
             instance.get_real(&lane.outputs, &mut trace.latest[lane.output_range.clone()])?;
         }
@@ -327,7 +328,7 @@ impl Reals {
         if self.layout.plain[slave] && self.faults.is_empty() {
             return None;
         }
-        let range = self.layout.lanes[slave].input_range.clone();
+        let range = self.layout.port_maps[slave].input_range.clone();
         let found = range.into_iter().find(|&k| !self.values[k].is_finite())?;
         Some((self.layout.input_ports[found], self.values[found]))
     }
@@ -335,7 +336,7 @@ impl Reals {
     /// The output of a slave whose value is not finite.
     #[inline]
     pub(crate) fn not_finite(&self, slave: usize) -> Option<(Port, f64)> {
-        let range = self.layout.lanes[slave].output_range.clone();
+        let range = self.layout.port_maps[slave].output_range.clone();
         let values = &self.trace.latest[range.clone()];
         if all_finite(values) {
             return None;
@@ -348,14 +349,14 @@ impl Reals {
     /// not are held: see [`Known::extrapolated`].
     #[inline]
     pub(crate) fn derivatives_are_finite(&self, slave: usize) -> bool {
-        let range = self.layout.lanes[slave].output_derivative_range.clone();
+        let range = self.layout.port_maps[slave].output_derivative_range.clone();
         all_finite(&self.trace.derivatives[range])
     }
 
     /// An output of a slave whose derivative is not finite and has not been reported before.
     #[cold]
     pub(crate) fn report_derivative(&mut self, slave: usize) -> Option<(Port, f64)> {
-        for output in self.layout.lanes[slave].output_range.clone() {
+        for output in self.layout.port_maps[slave].output_range.clone() {
             let places = [self.layout.slopes[output], self.layout.curvatures[output]];
             let derivatives = places.into_iter().flatten();
             let mut derivatives = derivatives.map(|place| self.trace.derivatives[place as usize]);

@@ -1,23 +1,23 @@
 //! What iterations and step controls ask of the connected Reals.
 
-use super::course::Known;
-use super::layout::Lane;
+use super::extrapolation::Known;
+use super::layout::PortMap;
 use super::reals::Reals;
-use crate::algorithm::Course;
+use crate::algorithm::Extrapolation;
 use crate::system::System;
 use slave::CallError;
 
 impl Reals {
-    /// Order of convergence of the course as the slaves can follow it: a mean that is held is of order
+    /// Order of convergence of the extrapolation as the slaves can follow it: a mean that is held is of order
     /// 2, the value at one end of the step of order 1.
     pub(crate) fn order(&self) -> u8 {
-        let held = |lane: &Lane| lane.input_order == 0 && !lane.inputs.is_empty();
-        let held = self.layout.lanes.iter().any(held);
-        match self.course {
-            Course::Hold => 1,
-            Course::Limited if held => 1,
-            Course::Quadratic if !held => 3,
-            Course::Limited | Course::Linear | Course::Quadratic => 2,
+        let held = |lane: &PortMap| lane.input_order == 0 && !lane.inputs.is_empty();
+        let held = self.layout.port_maps.iter().any(held);
+        match self.extrapolation {
+            Extrapolation::Hold => 1,
+            Extrapolation::Limited if held => 1,
+            Extrapolation::Quadratic if !held => 3,
+            Extrapolation::Limited | Extrapolation::Linear | Extrapolation::Quadratic => 2,
         }
     }
 
@@ -47,7 +47,7 @@ impl Reals {
                 last_size: span.size,
                 size,
             };
-            *end = known.extrapolated(self.course).end(size);
+            *end = known.extrapolated(self.extrapolation).end(size);
         }
     }
 
@@ -60,7 +60,7 @@ impl Reals {
         changes: &mut [f64],
     ) -> Result<(), (usize, CallError)> {
         let layout = &self.layout;
-        for (slave, lane) in layout.lanes.iter().enumerate() {
+        for (slave, lane) in layout.port_maps.iter().enumerate() {
             for k in lane.input_range.clone() {
                 if layout.sources[k] as usize != output || lane.outputs.is_empty() {
                     continue;
@@ -90,7 +90,7 @@ impl Reals {
             let span = &self.trace.spans[self.layout.owners[output] as usize];
             let mut known = self.known(output, span);
             known.size = size;
-            *error = self.trace.latest[output] - known.extrapolated(self.course).end(size);
+            *error = self.trace.latest[output] - known.extrapolated(self.extrapolation).end(size);
         }
     }
 }

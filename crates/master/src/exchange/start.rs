@@ -42,7 +42,7 @@ impl Reals {
         slave: usize,
         instance: &mut dyn Slave,
     ) -> (Result<(), CallError>, Result<(), CallError>) {
-        let lane = &self.layout.lanes[slave];
+        let lane = &self.layout.port_maps[slave];
         let (mut outputs, mut inputs) = (Ok(()), Ok(()));
         if !lane.derived_outputs.is_empty() {
             let mut values = vec![0.0; lane.derived_outputs.len()];
@@ -60,7 +60,7 @@ impl Reals {
     /// Tells `slave` the gathered derivatives of its inputs before its first step: derivatives of
     /// outputs that depend directly on inputs are made of them.
     fn set_derivatives(&self, slave: usize, instance: &mut dyn Slave) -> Result<(), CallError> {
-        let lane = &self.layout.lanes[slave];
+        let lane = &self.layout.port_maps[slave];
         if lane.derived_inputs.is_empty() {
             return Ok(());
         }

@@ -3,7 +3,7 @@
 use super::reals::Reals;
 use crate::simulation::Task;
 use crate::system::System;
-use slave::{Advance, CallError, Slave, Stepped, finish};
+use slave::{Advance, CallError, Slave, StepResult, finish};
 
 impl Reals {
     /// The second half of [`Reals::advance`].
@@ -13,7 +13,7 @@ impl Reals {
         instance: &mut dyn Slave,
         span: (f64, f64),
         never_back: bool,
-    ) -> Result<Stepped, CallError> {
+    ) -> Result<StepResult, CallError> {
         let done = finish(instance, &mut self.step(slave, span, never_back))?;
         self.trace.spans[slave].stepped = true;
         Ok(done)
@@ -28,17 +28,17 @@ impl Reals {
         span: &dyn Fn(usize) -> (f64, f64),
         never_back: bool,
         run: impl FnOnce(&mut [Task<'_>]),
-    ) -> Vec<Result<Stepped, CallError>> {
+    ) -> Vec<Result<StepResult, CallError>> {
         let mut chosen = vec![false; system.slaves.len()];
         for &slave in slaves {
             chosen[slave] = true;
         }
-        let mut results: Vec<Option<Result<Stepped, CallError>>> = vec![None; chosen.len()];
+        let mut results: Vec<Option<Result<StepResult, CallError>>> = vec![None; chosen.len()];
         let (mut values, mut derivatives) =
             (self.trace.latest.as_mut_slice(), self.trace.derivatives.as_mut_slice());
         let mut sorted = Sorted::default();
         for (slave, (_, instance)) in system.slaves.iter_mut().enumerate() {
-            let lane = &self.layout.lanes[slave];
+            let lane = &self.layout.port_maps[slave];
             let (output_values, rest) = values.split_at_mut(lane.output_range.len());
             values = rest;
             let (output_derivatives, rest) =
@@ -57,7 +57,7 @@ impl Reals {
             self.trace.spans[slave].stepped |= done.is_ok();
             results[slave] = Some(done);
         }
-        slaves.iter().map(|&slave| results[slave].take().unwrap_or(Ok(Stepped::Whole))).collect()
+        slaves.iter().map(|&slave| results[slave].take().unwrap_or(Ok(StepResult::Whole))).collect()
     }
 }
 
@@ -68,7 +68,7 @@ struct Sorted<'a> {
     begun: Vec<Step<'a>>,
     /// For any thread.
     tasks: Vec<Task<'a>>,
-    done: Vec<(usize, Result<Stepped, CallError>)>,
+    done: Vec<(usize, Result<StepResult, CallError>)>,
 }
 
 /// A slave and its step.
@@ -80,7 +80,7 @@ impl<'a> Sorted<'a> {
         match instance.in_background().map(|instance| instance.begin_advance(&step)) {
             Some(Ok(())) => self.begun.push((slave, instance, step)),
             Some(Err(error)) => self.done.push((slave, Err(error))),
-            None => self.tasks.push(Task { slave, instance, step, done: Ok(Stepped::Whole) }),
+            None => self.tasks.push(Task { slave, instance, step, done: Ok(StepResult::Whole) }),
         }
     }
 
@@ -88,7 +88,7 @@ impl<'a> Sorted<'a> {
     fn run(
         mut self,
         run: impl FnOnce(&mut [Task<'_>]),
-    ) -> Vec<(usize, Result<Stepped, CallError>)> {
+    ) -> Vec<(usize, Result<StepResult, CallError>)> {
         if !self.tasks.is_empty() {
             run(&mut self.tasks);
         }

@@ -7,7 +7,7 @@ use super::draw::period_of;
 use super::{Fault, FaultError, Lost, Window};
 use crate::signal::{Sample, earliest, reached};
 
-/// A fault of a [`super::FaultLine`].
+/// A fault of a [`super::FaultChain`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Stage {
     window: Window,

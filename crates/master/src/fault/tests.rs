@@ -10,12 +10,12 @@ fn window(from: f64, until: Option<f64>) -> Window {
     Window { from, until }
 }
 
-fn single(fault: Fault, from: f64, until: Option<f64>) -> FaultLine {
-    FaultLine::new(vec![(window(from, until), fault)], 0.1).unwrap()
+fn single(fault: Fault, from: f64, until: Option<f64>) -> FaultChain {
+    FaultChain::new(vec![(window(from, until), fault)], 0.1).unwrap()
 }
 
 /// What arrives of values at communication points.
-fn series(line: &mut FaultLine, values: &[(f64, f64)]) -> Vec<f64> {
+fn series(line: &mut FaultChain, values: &[(f64, f64)]) -> Vec<f64> {
     values
         .iter()
         .map(|&(time, value)| {
@@ -49,13 +49,13 @@ fn a_gain_multiplies_the_value_and_its_slope() {
     let line = single(Fault::Gain(-2.0), 0.0, None);
     let arrived = line.apply_sample(1.0, Sample { value: 3.0, slope: 5.0 });
     assert_eq!(arrived, Sample { value: -6.0, slope: -10.0 });
-    assert_eq!(line.apply_course(1.0, [3.0, 5.0, 7.0]), [-6.0, -10.0, -14.0]);
+    assert_eq!(line.apply_derivatives(1.0, [3.0, 5.0, 7.0]), [-6.0, -10.0, -14.0]);
 }
 
 #[test]
 fn what_is_added_leaves_the_curvature_and_what_jumps_has_none() {
     let course = [1.0, 2.0, 3.0];
-    let of = |fault: Fault| single(fault, 0.0, None).apply_course(4.0, course);
+    let of = |fault: Fault| single(fault, 0.0, None).apply_derivatives(4.0, course);
     assert_eq!(of(Fault::Bias(1.0)), [2.0, 2.0, 3.0]);
     assert_eq!(of(Fault::Drift(0.5)), [3.0, 2.5, 3.0]);
     assert_eq!(of(Fault::Stuck(Some(9.0))), [9.0, 0.0, 0.0]);
@@ -122,7 +122,7 @@ fn faults_act_in_the_order_stated() {
     let (bias, gain) = (Fault::Bias(1.0), Fault::Gain(10.0));
     let always = window(0.0, None);
     let of = |first: &Fault, second: &Fault| {
-        FaultLine::new(vec![(always, first.clone()), (always, second.clone())], 0.1).unwrap()
+        FaultChain::new(vec![(always, first.clone()), (always, second.clone())], 0.1).unwrap()
     };
     assert_eq!(of(&bias, &gain).apply(0.0, 2.0), 30.0);
     assert_eq!(of(&gain, &bias).apply(0.0, 2.0), 21.0);
@@ -152,7 +152,7 @@ fn breaks_are_begin_and_end_and_the_edges_of_a_periodic_dropout() {
     let lost = Lost::Periodic { period: 2.0, part: 0.5 };
     let dropout = Fault::Dropout { lost, instead: None };
     let faults = vec![(window(1.0, Some(5.2)), dropout), (window(3.2, None), Fault::Bias(1.0))];
-    let line = FaultLine::new(faults, 0.1).unwrap();
+    let line = FaultChain::new(faults, 0.1).unwrap();
     let mut found = vec![0.0];
     while let Some(next) = line.next_break(found[found.len() - 1]) {
         found.push(next);

@@ -12,7 +12,7 @@ use crate::algorithm::Algorithm;
 use crate::drive::{DriveState, Scenario};
 use crate::error::SystemError;
 use crate::exchange::{Values, call};
-use crate::fault::FaultLine;
+use crate::fault::FaultChain;
 use crate::system::System;
 pub(super) use origin::Origin;
 
@@ -26,7 +26,7 @@ pub struct Checkpoint {
     controller: Controller,
     iteration: Option<Iteration>,
     values: Values,
-    faults: Vec<FaultLine>,
+    faults: Vec<FaultChain>,
     drives: Vec<DriveState>,
     /// For each slave its name, the GUID of its FMU and its serialized FMU state.
     slaves: Vec<(String, String, Vec<u8>)>,

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::algorithm::{Algorithm, Course, StepControl};
+use crate::algorithm::{Algorithm, Extrapolation, StepControl};
 use crate::error::SystemError;
 use crate::exchange::Reals;
 use crate::system::{Port, System};
@@ -59,11 +59,11 @@ impl Control {
         algorithm: &Algorithm,
     ) -> Result<Self, SystemError> {
         let order = reals.order();
-        // Of the extrapolation: that of the course, whatever the slaves make of it.
-        let extrapolation = match algorithm.course {
-            Course::Hold => 1.0,
-            Course::Limited | Course::Linear => 2.0,
-            Course::Quadratic => 3.0,
+        // Of the extrapolation: that of the extrapolation, whatever the slaves make of it.
+        let extrapolation = match algorithm.extrapolation {
+            Extrapolation::Hold => 1.0,
+            Extrapolation::Limited | Extrapolation::Linear => 2.0,
+            Extrapolation::Quadratic => 3.0,
         };
         let bounds =
             SizeBounds { smallest: algorithm.smallest_step, largest: algorithm.largest_step };

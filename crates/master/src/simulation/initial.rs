@@ -8,7 +8,7 @@ use fmu_description::{DefaultExperiment, Kind, ModelDescription};
 use crate::drive::{Drive, Scenario};
 use crate::error::SystemError;
 use crate::exchange::call;
-use crate::fault::FaultLine;
+use crate::fault::FaultChain;
 use crate::order::Rows;
 use crate::system::{Port, System};
 use slave::Value;
@@ -80,7 +80,7 @@ fn solve_connections(
 
 /// Connected outputs and what they depend on.
 struct Graph<'a> {
-    faults: HashMap<Port, &'a FaultLine>,
+    faults: HashMap<Port, &'a FaultChain>,
     outputs: Vec<Port>,
     /// For each output the connections that begin there.
     connections: Vec<Vec<usize>>,
@@ -88,7 +88,7 @@ struct Graph<'a> {
 }
 
 impl<'a> Graph<'a> {
-    fn new(system: &System, faults: &'a [(Port, FaultLine)]) -> Self {
+    fn new(system: &System, faults: &'a [(Port, FaultChain)]) -> Self {
         let mut outputs: Vec<Port> = Vec::new();
         let mut nodes: HashMap<Port, usize> = HashMap::new();
         let mut connections: Vec<Vec<usize>> = Vec::new();

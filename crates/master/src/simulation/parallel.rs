@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::error::SystemError;
-use slave::{Advance, CallError, Slave, Stepped};
+use slave::{Advance, CallError, Slave, StepResult};
 
 /// Steps that are measured one way and the other.
 const TRIALS: u32 = 16;
@@ -18,7 +18,7 @@ pub(crate) struct Task<'a> {
     pub(crate) slave: usize,
     pub(crate) instance: &'a mut dyn Slave,
     pub(crate) step: Advance<'a>,
-    pub(crate) done: Result<Stepped, CallError>,
+    pub(crate) done: Result<StepResult, CallError>,
 }
 
 /// The threads, and what is known of their use for each group of slaves.

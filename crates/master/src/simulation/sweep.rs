@@ -3,12 +3,12 @@
 use super::Simulation;
 use super::grid::size_between;
 use super::parallel::{Parallel, run};
-use crate::algorithm::Sweep;
+use crate::algorithm::Method;
 use crate::error::SystemError;
 use crate::exchange::call;
 use crate::order::Order;
 use crate::system::System;
-use slave::{CallError, Failure, Stepped};
+use slave::{CallError, Failure, StepResult};
 
 /// Most attempts of a slave to come to the end of a step that it makes in parts.
 const PARTS: u32 = 1000;
@@ -39,9 +39,9 @@ impl Groups {
     /// Jacobi: all slaves are one group, but for functions, which come after them one by one.
     /// Gauss-Seidel: neighbours in the order of stepping are one
     /// where none is connected to another, as then it makes no difference.
-    pub(super) fn new(system: &System, sweep: Sweep, order: &Order) -> Self {
+    pub(super) fn new(system: &System, sweep: Method, order: &Order) -> Self {
         let count = system.slaves.len();
-        if sweep == Sweep::Jacobi {
+        if sweep == Method::Jacobi {
             let is_function = |slave: &usize| system.slaves[*slave].1.is_function();
             let mut sequence: Vec<usize> = (0..count).filter(|slave| !is_function(slave)).collect();
             let first = sequence.len();
@@ -204,12 +204,12 @@ impl Simulation {
         &mut self,
         slave: usize,
         time: f64,
-        done: Stepped,
+        done: StepResult,
         never_back: bool,
         swept: &mut Swept,
     ) -> Result<(), SystemError> {
         let size = self.sizes[slave];
-        if done != Stepped::Whole {
+        if done != StepResult::Whole {
             self.in_parts(slave, (time, size), done, never_back, swept)?;
         }
         self.exchange.check_finite(&self.system, slave, time + size)
@@ -221,14 +221,14 @@ impl Simulation {
         &mut self,
         slave: usize,
         (time, size): (f64, f64),
-        mut done: Stepped,
+        mut done: StepResult,
         never_back: bool,
         swept: &mut Swept,
     ) -> Result<(), SystemError> {
         let end = time + size;
         let mut begin = time;
         for _ in 0..PARTS {
-            let Stepped::Part { reached, terminated } = done else {
+            let StepResult::Part { reached, terminated } = done else {
                 return self.exchange.read(&mut self.system, slave, end);
             };
             if terminated {
@@ -258,7 +258,7 @@ impl Simulation {
         );
         let source = CallError {
             function: "fmi2DoStep",
-            failure: Failure::Nonsense(what),
+            failure: Failure::InvalidAnswer(what),
             messages: Vec::new(),
         };
         Err(call(&self.system.slaves[slave].0, begin, source))

@@ -25,7 +25,7 @@ ape = { mode = "fast", count = 7, inner.gain = 1e-3 }
 
 [algorithm]
 method = "jacobi"
-course = "hold"
+extrapolation = "hold"
 step = 0.01
 every = { ape = 5 }
 

@@ -11,7 +11,7 @@ use super::{
     Delay, Disturbed, Dropout, Literal, Noise, Quantisation, Reason, Saturation, ScenarioError,
 };
 use master::Port;
-use master::fault::{Draw, Fault, FaultLine, Lost, Spread, Window};
+use master::fault::{Draw, Fault, FaultChain, Lost, Spread, Window};
 
 /// Kinds of a fault.
 const KINDS: &str = "bias, gain, drift, stuck, dropout, delay, quantisation, saturation, noise, \
@@ -35,7 +35,7 @@ impl<'a> Resolver<'a> {
     pub(super) fn faults(
         &mut self,
         entries: &'a [Spanned<Disturbed>],
-    ) -> Result<Vec<(Port, FaultLine)>, ScenarioError> {
+    ) -> Result<Vec<(Port, FaultChain)>, ScenarioError> {
         let mut ways: Vec<Way<'a>> = Vec::new();
         for (index, entry) in entries.iter().enumerate() {
             let path = format!("scenario.fault[{}]", index + 1);
@@ -53,7 +53,7 @@ impl<'a> Resolver<'a> {
         }
         let mut lines = Vec::new();
         for Way { port, entry, path, faults } in ways {
-            let line = FaultLine::new(faults, self.setup.step)
+            let line = FaultChain::new(faults, self.setup.step)
                 .map_err(|error| at(entry, &path)(error.into()))?;
             match self.drives.iter_mut().find(|(drive, _)| drive.port() == port) {
                 Some((drive, _)) => drive.set_faults(line),

@@ -172,7 +172,7 @@ impl<'a> Resolver<'a> {
     pub(super) fn add(
         &mut self,
         target: &Target<'_>,
-        course: Following,
+        following: Following,
         path: &str,
     ) -> Result<(), Reason> {
         if let Some((_, first)) = self.driver(target.port) {
@@ -182,7 +182,7 @@ impl<'a> Resolver<'a> {
         let derivatives =
             target.is_continuous() && takes.is_some_and(|takes| takes.can_interpolate_inputs);
         let kind = DriveKind::of(&target.variable.kind, derivatives);
-        let drive = Drive::new(target.port, target.variable.value_reference, kind, course);
+        let drive = Drive::new(target.port, target.variable.value_reference, kind, following);
         self.drives.push((drive, path.to_owned()));
         Ok(())
     }

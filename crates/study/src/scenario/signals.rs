@@ -54,8 +54,8 @@ impl<'a> Resolver<'a> {
             points.push((set.at + 0.0, value));
         }
         for Settings { target, path, entry, points, texts } in variables {
-            let course = settings_course(points, texts).map_err(at(entry, &path))?;
-            self.add(&target, course, &path).map_err(at(entry, &path))?;
+            let following = settings_following(points, texts).map_err(at(entry, &path))?;
+            self.add(&target, following, &path).map_err(at(entry, &path))?;
         }
         Ok(())
     }
@@ -130,8 +130,8 @@ impl<'a> Resolver<'a> {
                     if known.iter().all(|(drive, _)| drive.port() != target.port) {
                         let signal = column_signal(&file, &table, column, &target, false)?;
                         let texts = Vec::new();
-                        let course = Following { signal, begin: f64::NEG_INFINITY, texts };
-                        self.add(&target, course, path)?;
+                        let following = Following { signal, begin: f64::NEG_INFINITY, texts };
+                        self.add(&target, following, path)?;
                         continue;
                     }
                 }
@@ -200,7 +200,10 @@ fn encode(
 }
 
 /// Settings in the order of their times; of several at one time the last one stated.
-fn settings_course(mut points: Vec<(f64, f64)>, texts: Vec<String>) -> Result<Following, Reason> {
+fn settings_following(
+    mut points: Vec<(f64, f64)>,
+    texts: Vec<String>,
+) -> Result<Following, Reason> {
     points.reverse();
     points.sort_by(|one, other| one.0.total_cmp(&other.0));
     points.dedup_by(|later, first| later.0 <= first.0);

@@ -4,24 +4,24 @@ use std::path::Path;
 
 use allocation_counter::measure;
 use master::drive::DriveState;
-use master::fault::FaultLine;
+use master::fault::FaultChain;
 use study::scenario::Prepared;
 
 use super::{resolve, scenario, setup, system};
 
-fn lines(text: &str) -> Vec<(String, FaultLine)> {
+fn lines(text: &str) -> Vec<(String, FaultChain)> {
     let system = system().0;
     let faults = scenario(text).resolve(&system, &setup(Path::new("."))).unwrap().scenario.faults;
     faults.into_iter().map(|(port, line)| (system.name(port), line)).collect()
 }
 
-fn line(body: &str) -> FaultLine {
+fn line(body: &str) -> FaultChain {
     let text = format!("[[scenario.fault]]\nconnection = \"ctrl.force\"\n{body}\n");
     lines(&text).remove(0).1
 }
 
 /// What arrives of 1, 2, 3, .. at 0 s, 0.5 s, 1 s, ..
-fn series(mut line: FaultLine) -> [f64; 6] {
+fn series(mut line: FaultChain) -> [f64; 6] {
     [0, 1, 2, 3, 4, 5].map(|step: u8| {
         let (time, value) = (0.5 * f64::from(step), 1.0 + f64::from(step));
         let arrived = line.apply(time, value);
@@ -206,7 +206,7 @@ fn nothing_allocates_between_the_steps() {
     let mut prepared = resolve(&text).unwrap();
     let line = &mut prepared.scenario.faults[0].1;
     let bytes = postcard::to_allocvec(line).unwrap();
-    let mut restored: FaultLine = postcard::from_bytes(&bytes).unwrap();
+    let mut restored: FaultChain = postcard::from_bytes(&bytes).unwrap();
     let drives = &mut prepared.scenario.drives;
     let counted = measure(|| {
         let mut time = 0.0;

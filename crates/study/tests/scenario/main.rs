@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex};
 
 use fmu_description::Experiment;
 use fmu_description::ModelDescription;
-use master::{CallError, Slave, Stepped, System};
+use master::{CallError, Slave, StepResult, System};
 use study::scenario::{Prepared, Scenario, ScenarioError, Setup};
 
 /// What a slave was told: function, value references, values.
@@ -75,8 +75,8 @@ impl Slave for Listener {
         self.note("derivative", references, values);
         Ok(())
     }
-    fn do_step(&mut self, _: f64, _: f64, _: bool) -> Result<Stepped, CallError> {
-        Ok(Stepped::Whole)
+    fn do_step(&mut self, _: f64, _: f64, _: bool) -> Result<StepResult, CallError> {
+        Ok(StepResult::Whole)
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 use fmu_description::Experiment;
 use fmu_description::ModelDescription;
 use fmu_description::abi::Status;
-use master::{Advance, Background, CallError, Failure, Slave, Stepped, System};
+use master::{Advance, Background, CallError, Failure, Slave, StepResult, System};
 
 type Done = Result<(), CallError>;
 
@@ -75,7 +75,7 @@ impl Background for Ahead {
         Ok(())
     }
 
-    fn finish_advance(&mut self, step: &mut Advance<'_>) -> Result<Stepped, CallError> {
+    fn finish_advance(&mut self, step: &mut Advance<'_>) -> Result<StepResult, CallError> {
         self.note("finish");
         assert_eq!(self.begun.take().as_deref(), Some(step.input_values), "the step begun");
         self.fail(Fails::InFinish, "fmi2DoStep")?;
@@ -136,7 +136,7 @@ impl Slave for Ahead {
     ) -> Done {
         self.other().get_output_derivatives(which, orders, values)
     }
-    fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<Stepped, CallError> {
+    fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError> {
         self.other().do_step(time, size, never_back)
     }
     fn directional_derivative(

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use master::{Algorithm, Coupling, Course, Simulation, StepControl, Stepped, Sweep, System};
+use master::{
+    Algorithm, Coupling, Extrapolation, Method, Simulation, StepControl, StepResult, System,
+};
 
 use crate::engine::ahead::{Fails, ahead};
 use crate::engine::{puppet, typed, until};
@@ -19,7 +21,7 @@ fn none(_: &str) -> Option<Fails> {
 }
 
 fn jacobi(jobs: usize) -> Algorithm {
-    Algorithm { jobs, ..Algorithm::fixed(Sweep::Jacobi, Course::Hold, 0.25) }
+    Algorithm { jobs, ..Algorithm::fixed(Method::Jacobi, Extrapolation::Hold, 0.25) }
 }
 
 /// A, b and c in a circle by Reals only.
@@ -54,7 +56,7 @@ fn all_slaves_of_a_group_begin_before_the_first_is_finished() {
 
 #[test]
 fn slaves_that_are_connected_are_not_begun_together_by_gauss_seidel() {
-    let algorithm = Algorithm { sweep: Sweep::GaussSeidel, ..jacobi(1) };
+    let algorithm = Algorithm { sweep: Method::GaussSeidel, ..jacobi(1) };
     let (system, record) = ahead(typed::ring(), all);
     Simulation::new(system, &algorithm, &until(1.0)).unwrap().step().unwrap();
     let found = record.lock().unwrap().join(", ");
@@ -63,7 +65,7 @@ fn slaves_that_are_connected_are_not_begun_together_by_gauss_seidel() {
 }
 
 /// The bits of all connected outputs after each step.
-fn course(algorithm: &Algorithm, fails: fn(&str) -> Option<Fails>) -> Vec<u64> {
+fn trajectory(algorithm: &Algorithm, fails: fn(&str) -> Option<Fails>) -> Vec<u64> {
     let network = problems::coupled_oscillators();
     let (system, _) = ahead(network.system(ABLE, &Arc::default()), fails);
     let mut simulation = Simulation::new(system, algorithm, &until(2.5)).unwrap();
@@ -79,9 +81,14 @@ fn course(algorithm: &Algorithm, fails: fn(&str) -> Option<Fails>) -> Vec<u64> {
 #[test]
 fn the_background_changes_no_bit() {
     let first: fn(&str) -> Option<Fails> = |name| (name == "a").then_some(Fails::Nowhere);
-    assert!(!course(&Algorithm::new(0.05), first).is_empty());
-    for sweep in [Sweep::Jacobi, Sweep::GaussSeidel] {
-        for course_of_inputs in [Course::Hold, Course::Limited, Course::Linear, Course::Quadratic] {
+    assert!(!trajectory(&Algorithm::new(0.05), first).is_empty());
+    for sweep in [Method::Jacobi, Method::GaussSeidel] {
+        for course_of_inputs in [
+            Extrapolation::Hold,
+            Extrapolation::Limited,
+            Extrapolation::Linear,
+            Extrapolation::Quadratic,
+        ] {
             let fixed = Algorithm::fixed(sweep, course_of_inputs, 0.05);
             for algorithm in [
                 fixed.clone(),
@@ -89,10 +96,10 @@ fn the_background_changes_no_bit() {
                 Algorithm { control: StepControl::Doubling, ..fixed.clone() },
                 Algorithm { coupling: Coupling::Newton, ..fixed },
             ] {
-                let expected = course(&algorithm, none);
+                let expected = trajectory(&algorithm, none);
                 assert!(expected.len() > 20);
-                assert_eq!(course(&algorithm, all), expected, "{algorithm:?}");
-                assert_eq!(course(&algorithm, first), expected, "{algorithm:?}");
+                assert_eq!(trajectory(&algorithm, all), expected, "{algorithm:?}");
+                assert_eq!(trajectory(&algorithm, first), expected, "{algorithm:?}");
             }
         }
     }
@@ -100,9 +107,11 @@ fn the_background_changes_no_bit() {
 
 #[test]
 fn values_of_all_types_and_multiples_are_the_same_in_the_background() {
-    for (multiples, course) in [(vec![], Course::Hold), (vec![1, 2, 4], Course::Linear)] {
+    for (multiples, extrapolation) in
+        [(vec![], Extrapolation::Hold), (vec![1, 2, 4], Extrapolation::Linear)]
+    {
         let run = |fails: fn(&str) -> Option<Fails>| {
-            let algorithm = Algorithm { multiples: multiples.clone(), course, ..jacobi(1) };
+            let algorithm = Algorithm { multiples: multiples.clone(), extrapolation, ..jacobi(1) };
             let (system, _) = ahead(typed::ring(), fails);
             let mut simulation = Simulation::new(system, &algorithm, &until(10.0)).unwrap();
             let mut found = Vec::new();
@@ -123,18 +132,18 @@ fn values_of_all_types_and_multiples_are_the_same_in_the_background() {
     }
 }
 
-fn stops(begin: f64, end: f64) -> Stepped {
+fn stops(begin: f64, end: f64) -> StepResult {
     if begin < 0.35 && end > 0.35 {
-        return Stepped::Part { reached: 0.35, terminated: false };
+        return StepResult::Part { reached: 0.35, terminated: false };
     }
-    Stepped::Whole
+    StepResult::Whole
 }
 
 #[test]
 fn a_step_in_part_is_gone_on_with_or_repeated_as_elsewhere() {
     for algorithm in [
         jacobi(1),
-        Algorithm { course: Course::Linear, ..jacobi(1) },
+        Algorithm { extrapolation: Extrapolation::Linear, ..jacobi(1) },
         Algorithm { coupling: Coupling::Newton, ..Algorithm::new(0.25) },
         Algorithm { control: StepControl::Doubling, ..Algorithm::new(0.25) },
     ] {

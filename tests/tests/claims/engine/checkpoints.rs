@@ -4,7 +4,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use master::algorithm::PowerBond;
-use master::{Algorithm, Checkpoint, Coupling, Course, Simulation, StepControl, Sweep, System};
+use master::{
+    Algorithm, Checkpoint, Coupling, Extrapolation, Method, Simulation, StepControl, System,
+};
 use study::scenario::{Scenario, Setup};
 use tests::linear::{ABLE, Abilities};
 use tests::network::Network;
@@ -69,11 +71,17 @@ fn verify(label: &str, able: Abilities, algorithm: &Algorithm, scenario: &str) {
 #[test]
 fn fixed_steps_go_on_bit_by_bit() {
     let past = Abilities { derivatives: 0, ..ABLE };
-    for sweep in [Sweep::Jacobi, Sweep::GaussSeidel] {
-        for course in [Course::Hold, Course::Limited, Course::Linear, Course::Quadratic] {
+    for sweep in [Method::Jacobi, Method::GaussSeidel] {
+        for extrapolation in [
+            Extrapolation::Hold,
+            Extrapolation::Limited,
+            Extrapolation::Linear,
+            Extrapolation::Quadratic,
+        ] {
             for multiples in [vec![], vec![1, 4], vec![3, 1]] {
-                let label = format!("{} {} {multiples:?}", sweep.name(), course.name());
-                let algorithm = Algorithm { multiples, ..Algorithm::fixed(sweep, course, 0.01) };
+                let label = format!("{} {} {multiples:?}", sweep.name(), extrapolation.name());
+                let algorithm =
+                    Algorithm { multiples, ..Algorithm::fixed(sweep, extrapolation, 0.01) };
                 verify(&label, ABLE, &algorithm, "");
                 verify(&label, past, &algorithm, FAULTS);
             }
@@ -127,9 +135,12 @@ fn a_checkpoint_of_another_step_or_algorithm_is_refused_by_name() {
     refused(Algorithm { step: 0.02, ..base() }, "step 0.01 s; step 0.02 s");
     let control = StepControl::Doubling;
     refused(Algorithm { control, ..base() }, "step-control fixed; step-control doubling");
-    let sweep = Sweep::Jacobi;
+    let sweep = Method::Jacobi;
     refused(Algorithm { sweep, ..base() }, "method gauss-seidel; method jacobi");
-    refused(Algorithm { course: Course::Hold, ..base() }, "course limited; course hold");
+    refused(
+        Algorithm { extrapolation: Extrapolation::Hold, ..base() },
+        "extrapolation limited; extrapolation hold",
+    );
     let coupling = Coupling::Newton;
     refused(Algorithm { coupling, ..base() }, "coupling anderson; coupling newton");
     refused(Algorithm { iterations: 7, ..base() }, "iterations 50; iterations 7");
@@ -145,7 +156,7 @@ fn a_checkpoint_of_another_step_or_algorithm_is_refused_by_name() {
 #[test]
 fn a_run_that_was_ended_by_a_slave_stays_ended() {
     let (system, _) = crate::engine::puppet::system([f64::sin; 2], crate::engine::parts::ends);
-    let algorithm = Algorithm::fixed(Sweep::Jacobi, Course::Hold, 0.25);
+    let algorithm = Algorithm::fixed(Method::Jacobi, Extrapolation::Hold, 0.25);
     let mut run = Simulation::new(system, &algorithm, &until(1.0)).unwrap();
     while !run.is_finished() {
         run.step().unwrap();

@@ -1,7 +1,7 @@
 //! Steps whose size is chosen on the way.
 
 use master::algorithm::PowerBond;
-use master::{Algorithm, Course, StepControl, Sweep, SystemError};
+use master::{Algorithm, Extrapolation, Method, StepControl, SystemError};
 use tests::linear::{ABLE, Abilities};
 use tests::network::{Network, Run};
 use tests::problems;
@@ -15,7 +15,7 @@ fn chosen(control: StepControl, tolerance: f64) -> Algorithm {
         absolute_tolerance: tolerance,
         largest_step: 1.0,
         smallest_step: 1e-9,
-        ..Algorithm::fixed(Sweep::GaussSeidel, Course::Linear, 1e-3)
+        ..Algorithm::fixed(Method::GaussSeidel, Extrapolation::Linear, 1e-3)
     }
 }
 
@@ -27,8 +27,10 @@ fn run(network: &Network, algorithm: &Algorithm) -> Run {
 fn fixed_of(network: &Network, error: f64) -> Run {
     let mut steps = 16.0;
     loop {
-        let found =
-            run(network, &Algorithm::fixed(Sweep::GaussSeidel, Course::Linear, STOP / steps));
+        let found = run(
+            network,
+            &Algorithm::fixed(Method::GaussSeidel, Extrapolation::Linear, STOP / steps),
+        );
         if found.error <= error {
             return found;
         }
@@ -72,7 +74,7 @@ fn the_increment_makes_steps_small_where_signals_move_fast() {
     let network = problems::transient();
     let of = |tolerance: f64| {
         let control = chosen(StepControl::Increment, tolerance);
-        run(&network, &Algorithm { course: Course::Hold, step: 1e-4, ..control })
+        run(&network, &Algorithm { extrapolation: Extrapolation::Hold, step: 1e-4, ..control })
     };
     let (coarse, fine) = (of(1e-2), of(1e-3));
     assert!(coarse.sizes.1 > 10.0 * coarse.sizes.0, "{coarse:?}");
@@ -130,19 +132,23 @@ fn a_tolerance_that_the_smallest_step_does_not_meet_is_an_error() {
     assert!(matches!(refused, SystemError::Stuck { .. }), "{refused}");
 }
 
-/// The estimate knows that means are of order 2 whatever the course, and held ends of order 1.
+/// The estimate knows that means are of order 2 whatever the extrapolation, and held ends of order 1.
 #[test]
 fn doubling_keeps_the_tolerance_with_slaves_that_hold_their_inputs() {
     let network = problems::coupled_oscillators();
     let able = Abilities { interpolates: false, ..ABLE };
-    for (course, exponent) in [
-        (Course::Hold, 1.0 / 2.0),
-        (Course::Limited, 1.0 / 2.0),
-        (Course::Linear, 2.0 / 3.0),
-        (Course::Quadratic, 2.0 / 3.0),
+    for (extrapolation, exponent) in [
+        (Extrapolation::Hold, 1.0 / 2.0),
+        (Extrapolation::Limited, 1.0 / 2.0),
+        (Extrapolation::Linear, 2.0 / 3.0),
+        (Extrapolation::Quadratic, 2.0 / 3.0),
     ] {
-        let algorithm = Algorithm { course, ..chosen(StepControl::Doubling, 1e-5) };
+        let algorithm = Algorithm { extrapolation, ..chosen(StepControl::Doubling, 1e-5) };
         let found = network.run(able, &algorithm, STOP).unwrap();
-        assert!(found.error < 5.0 * f64::powf(1e-5, exponent), "{}: {found:?}", course.name());
+        assert!(
+            found.error < 5.0 * f64::powf(1e-5, exponent),
+            "{}: {found:?}",
+            extrapolation.name()
+        );
     }
 }

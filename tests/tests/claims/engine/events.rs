@@ -1,7 +1,7 @@
 //! Steps that end at events.
 
 use master::algorithm::EventSource;
-use master::{Algorithm, Course, Simulation, StepControl, Sweep};
+use master::{Algorithm, Extrapolation, Method, Simulation, StepControl};
 use tests::linear::OUTPUTS;
 
 use crate::engine::puppet::{system, whole};
@@ -26,8 +26,10 @@ fn times(simulation: &mut Simulation) -> Vec<f64> {
 fn fixed_steps_end_at_the_times_that_an_output_announces_and_on_the_grid() {
     let (system, asked) = system([f64::sin, next], whole);
     let event = EventSource::NextTime(system.port("p.z").unwrap());
-    let algorithm =
-        Algorithm { events: vec![event], ..Algorithm::fixed(Sweep::Jacobi, Course::Hold, 0.1) };
+    let algorithm = Algorithm {
+        events: vec![event],
+        ..Algorithm::fixed(Method::Jacobi, Extrapolation::Hold, 0.1)
+    };
     let mut simulation = Simulation::new(system, &algorithm, &until(1.0)).unwrap();
     let grid = |k: u32| f64::from(k) * 0.1;
     let mut expected: Vec<f64> = (1..10).map(grid).chain([0.137, 0.3001, 0.7777, 1.0]).collect();
@@ -99,19 +101,30 @@ fn between_events_fixed_steps_stay_on_the_grid() {
 fn after_an_event_inputs_do_not_go_on_as_before() {
     let step = |time: f64| if time > 0.5 - 1e-9 { 1.0 } else { 0.0 };
     let next = |time: f64| if time > 0.5 - 1e-9 { f64::INFINITY } else { 0.5 };
-    for course in [Course::Hold, Course::Limited, Course::Linear, Course::Quadratic] {
+    for extrapolation in [
+        Extrapolation::Hold,
+        Extrapolation::Limited,
+        Extrapolation::Linear,
+        Extrapolation::Quadratic,
+    ] {
         for size in [0.1, 0.08] {
             let (system, _) = system([step, next], whole);
             let event = EventSource::NextTime(system.port("p.z").unwrap());
-            let algorithm =
-                Algorithm { events: vec![event], ..Algorithm::fixed(Sweep::Jacobi, course, size) };
+            let algorithm = Algorithm {
+                events: vec![event],
+                ..Algorithm::fixed(Method::Jacobi, extrapolation, size)
+            };
             let mut simulation = Simulation::new(system, &algorithm, &until(1.0)).unwrap();
             times(&mut simulation);
             let mut value = [0.0];
             let lag = &mut simulation.system().slaves[1].1;
             lag.get_real(&[OUTPUTS], &mut value).unwrap();
             let expected = 1.0 - f64::exp(-0.5);
-            assert!((value[0] - expected).abs() < 1e-12, "{} {size}: {value:?}", course.name());
+            assert!(
+                (value[0] - expected).abs() < 1e-12,
+                "{} {size}: {value:?}",
+                extrapolation.name()
+            );
         }
     }
 }

@@ -3,7 +3,7 @@
 use fmu_description::Experiment;
 use fmu_description::ModelDescription;
 use master::{
-    Algorithm, CallError, Coupling, Simulation, Slave, StepControl, Stepped, System, SystemError,
+    Algorithm, CallError, Coupling, Simulation, Slave, StepControl, StepResult, System, SystemError,
 };
 
 use super::{puppet, until};
@@ -62,9 +62,9 @@ impl Slave for Direct {
         self.u = values[0];
         Ok(())
     }
-    fn do_step(&mut self, _: f64, _: f64, _: bool) -> Result<Stepped, CallError> {
+    fn do_step(&mut self, _: f64, _: f64, _: bool) -> Result<StepResult, CallError> {
         self.y = (self.function)(self.u);
-        Ok(Stepped::Whole)
+        Ok(StepResult::Whole)
     }
     fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
         self.kept[slot] = (self.u, self.y);

@@ -1,7 +1,7 @@
 //! The last step of a run: an FMU may refuse what is an ulp beyond its stop time.
 
 use master::algorithm::EventSource;
-use master::{Algorithm, Coupling, Course, Simulation, StepControl, Sweep, System};
+use master::{Algorithm, Coupling, Extrapolation, Method, Simulation, StepControl, System};
 
 use crate::engine::puppet::{Asked, rigid, system, whole};
 use crate::engine::until;
@@ -15,7 +15,7 @@ fn algorithms(step: f64, system: &System) -> Vec<(&'static str, Algorithm)> {
     let base = Algorithm::new(step);
     let largest_step = step;
     vec![
-        ("plain", Algorithm::fixed(Sweep::Jacobi, Course::Hold, step)),
+        ("plain", Algorithm::fixed(Method::Jacobi, Extrapolation::Hold, step)),
         ("gauss-seidel", base.clone()),
         ("multiple", Algorithm { multiples: vec![3, 1], ..base.clone() }),
         ("both multiples", Algorithm { multiples: vec![2, 2], ..base.clone() }),

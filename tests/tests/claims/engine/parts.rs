@@ -1,30 +1,32 @@
 //! Slaves that stop on the way, and outputs that are no numbers.
 
-use master::{Algorithm, Coupling, Course, Readout, Simulation, StepControl, Stepped, Sweep};
+use master::{
+    Algorithm, Coupling, Extrapolation, Method, Readout, Simulation, StepControl, StepResult,
+};
 
 use crate::engine::puppet::{add_clock, system, whole};
 use crate::engine::until;
 
 /// Stops at 0.35 s, to be asked again.
-fn stops(begin: f64, end: f64) -> Stepped {
+fn stops(begin: f64, end: f64) -> StepResult {
     if begin < 0.35 && end > 0.35 {
-        return Stepped::Part { reached: 0.35, terminated: false };
+        return StepResult::Part { reached: 0.35, terminated: false };
     }
-    Stepped::Whole
+    StepResult::Whole
 }
 
-pub(crate) fn ends(begin: f64, end: f64) -> Stepped {
+pub(crate) fn ends(begin: f64, end: f64) -> StepResult {
     if begin < 0.35 && end > 0.35 {
-        return Stepped::Part { reached: 0.35, terminated: true };
+        return StepResult::Part { reached: 0.35, terminated: true };
     }
-    Stepped::Whole
+    StepResult::Whole
 }
 
-fn never(begin: f64, _: f64) -> Stepped {
-    Stepped::Part { reached: begin, terminated: false }
+fn never(begin: f64, _: f64) -> StepResult {
+    StepResult::Part { reached: begin, terminated: false }
 }
 
-fn run(way: fn(f64, f64) -> Stepped, algorithm: &Algorithm) -> (Vec<f64>, Vec<(f64, f64)>) {
+fn run(way: fn(f64, f64) -> StepResult, algorithm: &Algorithm) -> (Vec<f64>, Vec<(f64, f64)>) {
     let (system, asked) = system([|time| 1.0 + time; 2], way);
     let mut simulation = Simulation::new(system, algorithm, &until(1.0)).unwrap();
     let mut times = Vec::new();
@@ -38,7 +40,7 @@ fn run(way: fn(f64, f64) -> Stepped, algorithm: &Algorithm) -> (Vec<f64>, Vec<(f
 
 #[test]
 fn without_rollback_a_slave_that_stops_on_the_way_goes_on_from_there() {
-    let algorithm = Algorithm::fixed(Sweep::Jacobi, Course::Hold, 0.25);
+    let algorithm = Algorithm::fixed(Method::Jacobi, Extrapolation::Hold, 0.25);
     let (times, asked) = run(stops, &algorithm);
     assert_eq!(times, [0.25, 0.5, 0.75, 1.0]);
     assert_eq!(asked, [(0.0, 0.25), (0.25, 0.5), (0.35, 0.5), (0.5, 0.75), (0.75, 1.0)]);
@@ -74,9 +76,9 @@ fn a_step_in_part_does_not_make_the_next_one_longer() {
         let often = (begin * 20.0).floor() + 1.0;
         let stop = often / 20.0;
         if end > stop + 1e-12 {
-            Stepped::Part { reached: stop, terminated: false }
+            StepResult::Part { reached: stop, terminated: false }
         } else {
-            Stepped::Whole
+            StepResult::Whole
         }
     };
     let (_, asked) = run(late, &algorithm);
@@ -106,7 +108,7 @@ fn ended(algorithm: &Algorithm) -> (f64, Vec<f64>) {
 fn a_slave_that_asks_for_the_end_ends_the_run_at_its_time_where_all_can_go_back() {
     for algorithm in [
         Algorithm { rollback: true, ..Algorithm::new(0.25) },
-        Algorithm { rollback: true, ..Algorithm::fixed(Sweep::Jacobi, Course::Hold, 0.25) },
+        Algorithm { rollback: true, ..Algorithm::fixed(Method::Jacobi, Extrapolation::Hold, 0.25) },
         Algorithm { coupling: Coupling::Newton, ..Algorithm::new(0.25) },
         Algorithm { control: StepControl::Doubling, ..Algorithm::new(0.25) },
         Algorithm { control: StepControl::Embedded, ..Algorithm::new(0.25) },
@@ -118,8 +120,8 @@ fn a_slave_that_asks_for_the_end_ends_the_run_at_its_time_where_all_can_go_back(
 /// The time of the run is one that all slaves have had: its row was that of the step before.
 #[test]
 fn a_slave_that_asks_for_the_end_ends_the_run_at_the_last_common_point_where_others_are_beyond() {
-    for sweep in [Sweep::Jacobi, Sweep::GaussSeidel] {
-        let (time, outputs) = ended(&Algorithm::fixed(sweep, Course::Hold, 0.25));
+    for sweep in [Method::Jacobi, Method::GaussSeidel] {
+        let (time, outputs) = ended(&Algorithm::fixed(sweep, Extrapolation::Hold, 0.25));
         assert_eq!((time, outputs), (0.25, vec![0.35, 0.5]));
     }
 }
@@ -127,7 +129,7 @@ fn a_slave_that_asks_for_the_end_ends_the_run_at_the_last_common_point_where_oth
 #[test]
 fn a_slave_that_comes_nowhere_is_an_error() {
     for algorithm in [
-        Algorithm::fixed(Sweep::Jacobi, Course::Hold, 0.25),
+        Algorithm::fixed(Method::Jacobi, Extrapolation::Hold, 0.25),
         Algorithm { coupling: Coupling::Newton, ..Algorithm::new(0.25) },
     ] {
         let (system, _) = system([|time| time; 2], never);
@@ -139,8 +141,8 @@ fn a_slave_that_comes_nowhere_is_an_error() {
     }
 }
 
-fn nearly(_: f64, end: f64) -> Stepped {
-    Stepped::Part { reached: end - 1e-13, terminated: false }
+fn nearly(_: f64, end: f64) -> StepResult {
+    StepResult::Part { reached: end - 1e-13, terminated: false }
 }
 
 #[test]
@@ -157,7 +159,7 @@ fn breaks(time: f64) -> f64 {
 
 #[test]
 fn an_output_that_is_no_number_ends_the_run_unless_that_is_allowed() {
-    let algorithm = Algorithm::fixed(Sweep::GaussSeidel, Course::Linear, 0.25);
+    let algorithm = Algorithm::fixed(Method::GaussSeidel, Extrapolation::Linear, 0.25);
     let (once, _) = system([breaks; 2], whole);
     let mut simulation = Simulation::new(once, &algorithm, &until(1.0)).unwrap();
     simulation.step().unwrap();

@@ -4,13 +4,13 @@ use std::sync::{Arc, Mutex};
 
 use fmu_description::Experiment;
 use fmu_description::ModelDescription;
-use master::{CallError, Slave, Stepped, System};
+use master::{CallError, Slave, StepResult, System};
 use tests::linear::{ABLE, Block, Linear};
 
 /// Output over time in s.
 type Output = fn(f64) -> f64;
 /// How far a step between two times comes.
-type Way = fn(f64, f64) -> Stepped;
+type Way = fn(f64, f64) -> StepResult;
 /// The steps asked for: begin and end in s.
 pub(crate) type Asked = Arc<Mutex<Vec<(f64, f64)>>>;
 
@@ -24,8 +24,8 @@ pub(crate) struct Puppet {
     asked: Asked,
 }
 
-pub(crate) fn whole(_: f64, _: f64) -> Stepped {
-    Stepped::Whole
+pub(crate) fn whole(_: f64, _: f64) -> StepResult {
+    StepResult::Whole
 }
 
 /// A system of one puppet called p with a lag a behind its y, and the steps that p was asked for.
@@ -109,13 +109,13 @@ impl Slave for Puppet {
     fn set_real(&mut self, _: &[u32], _: &[f64]) -> Result<(), CallError> {
         Ok(())
     }
-    fn do_step(&mut self, time: f64, size: f64, _: bool) -> Result<Stepped, CallError> {
+    fn do_step(&mut self, time: f64, size: f64, _: bool) -> Result<StepResult, CallError> {
         assert!((time - self.time).abs() < 1e-12, "a step begins where the last one ended");
         self.asked.lock().unwrap().push((time, time + size));
         let stepped = (self.way)(time, time + size);
         self.time = match stepped {
-            Stepped::Whole => time + size,
-            Stepped::Part { reached, .. } => reached,
+            StepResult::Whole => time + size,
+            StepResult::Part { reached, .. } => reached,
         };
         Ok(stepped)
     }

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use master::{Algorithm, Course, Simulation, StepControl, Sweep, System};
+use master::{Algorithm, Extrapolation, Method, Simulation, StepControl, System};
 use study::scenario::{Scenario, Setup};
 use tests::linear::{ABLE, Block};
 use tests::network::Network;
@@ -44,8 +44,8 @@ fn a_fault_on_a_connection_reaches_the_input() {
         [[scenario.fault]]
         connection = "b.u0"
         bias = { value = 3, from = 0.5 }"#;
-    for sweep in [Sweep::Jacobi, Sweep::GaussSeidel] {
-        let mut simulation = simulate(text, &Algorithm::fixed(sweep, Course::Linear, 0.125));
+    for sweep in [Method::Jacobi, Method::GaussSeidel] {
+        let mut simulation = simulate(text, &Algorithm::fixed(sweep, Extrapolation::Linear, 0.125));
         assert!((result(&mut simulation) - 8.5).abs() < 1e-12);
     }
 }
@@ -59,7 +59,7 @@ fn a_signal_on_a_free_input_is_followed() {
         points = [[0, 0], [2, 2]]"#;
     for control in [StepControl::Fixed, StepControl::Doubling, StepControl::Embedded] {
         let algorithm =
-            Algorithm { control, ..Algorithm::fixed(Sweep::Jacobi, Course::Linear, 0.125) };
+            Algorithm { control, ..Algorithm::fixed(Method::Jacobi, Extrapolation::Linear, 0.125) };
         let found = result(&mut simulate(text, &algorithm));
         assert!((found - 6.0).abs() < 1e-12, "{}: {found}", control.name());
     }
@@ -76,7 +76,7 @@ fn chosen_steps_end_where_a_signal_bends() {
         let algorithm = Algorithm {
             control,
             relative_tolerance: 0.1,
-            ..Algorithm::fixed(Sweep::Jacobi, Course::Linear, 0.125)
+            ..Algorithm::fixed(Method::Jacobi, Extrapolation::Linear, 0.125)
         };
         let mut simulation = simulate(text, &algorithm);
         let mut times = Vec::new();

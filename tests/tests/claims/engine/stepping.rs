@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use master::{Algorithm, Coupling, Course, Simulation, Sweep};
+use master::{Algorithm, Coupling, Extrapolation, Method, Simulation};
 use tests::linear::ABLE;
 use tests::problems;
 
 use crate::engine::{typed, until};
 
-const ALL: [Course; 4] = [Course::Hold, Course::Limited, Course::Linear, Course::Quadratic];
+const ALL: [Extrapolation; 4] =
+    [Extrapolation::Hold, Extrapolation::Limited, Extrapolation::Linear, Extrapolation::Quadratic];
 
 #[test]
 fn time_is_the_start_and_so_many_steps_to_the_bit() {
@@ -33,10 +34,11 @@ fn time_is_the_start_and_so_many_steps_to_the_bit() {
 
 #[test]
 fn stepping_allocates_nothing_with_variables_of_all_types() {
-    for sweep in [Sweep::Jacobi, Sweep::GaussSeidel] {
-        for course in ALL {
+    for sweep in [Method::Jacobi, Method::GaussSeidel] {
+        for extrapolation in ALL {
             for multiples in [vec![], vec![1, 2, 4]] {
-                let algorithm = Algorithm { multiples, ..Algorithm::fixed(sweep, course, 0.25) };
+                let algorithm =
+                    Algorithm { multiples, ..Algorithm::fixed(sweep, extrapolation, 0.25) };
                 let mut simulation =
                     Simulation::new(typed::ring(), &algorithm, &until(1e3)).unwrap();
                 // The Strings of the exchange get their room in the first steps.
@@ -48,7 +50,7 @@ fn stepping_allocates_nothing_with_variables_of_all_types() {
                         simulation.step().unwrap();
                     }
                 });
-                let label = format!("{} {}", sweep.name(), course.name());
+                let label = format!("{} {}", sweep.name(), extrapolation.name());
                 assert_eq!(counted.count_total, 0, "{label}");
             }
         }
@@ -59,10 +61,10 @@ fn stepping_allocates_nothing_with_variables_of_all_types() {
 #[test]
 fn threads_change_no_bit() {
     let network = problems::coupled_oscillators();
-    for sweep in [Sweep::Jacobi, Sweep::GaussSeidel] {
-        for course in ALL {
+    for sweep in [Method::Jacobi, Method::GaussSeidel] {
+        for extrapolation in ALL {
             let run = |jobs: usize| {
-                let algorithm = Algorithm { jobs, ..Algorithm::fixed(sweep, course, 0.05) };
+                let algorithm = Algorithm { jobs, ..Algorithm::fixed(sweep, extrapolation, 0.05) };
                 let system = network.system(ABLE, &Arc::default());
                 let mut simulation = Simulation::new(system, &algorithm, &until(2.5)).unwrap();
                 let mut all = Vec::new();
@@ -72,7 +74,7 @@ fn threads_change_no_bit() {
                 }
                 all
             };
-            assert_eq!(run(1), run(2), "{} {}", sweep.name(), course.name());
+            assert_eq!(run(1), run(2), "{} {}", sweep.name(), extrapolation.name());
         }
     }
 }

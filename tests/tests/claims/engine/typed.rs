@@ -2,7 +2,7 @@
 
 use fmu_description::Experiment;
 use fmu_description::ModelDescription;
-use master::{CallError, Slave, Stepped, System};
+use master::{CallError, Slave, StepResult, System};
 
 type Done = Result<(), CallError>;
 
@@ -109,10 +109,10 @@ impl Slave for Typed {
         values[0] = 0.0;
         Ok(())
     }
-    fn do_step(&mut self, _: f64, _: f64, _: bool) -> Result<Stepped, CallError> {
+    fn do_step(&mut self, _: f64, _: f64, _: bool) -> Result<StepResult, CallError> {
         self.real += 0.5;
         self.integer += 1;
         self.boolean = 1 - self.boolean;
-        Ok(Stepped::Whole)
+        Ok(StepResult::Whole)
     }
 }

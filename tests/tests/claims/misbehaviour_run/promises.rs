@@ -3,7 +3,7 @@
 use super::*;
 
 /// Gauss-Seidel's lines from output derivatives, in place of the held inputs of [`Run`].
-const LINES: [&str; 4] = ["--method", "jacobi", "--course", "linear"];
+const LINES: [&str; 4] = ["--method", "jacobi", "--extrapolation", "linear"];
 
 /// `a` behind a connection by lines, which b, without input derivatives, gets as their means.
 fn by_lines(a: &CFmu, more: &[&str]) -> Vec<String> {

@@ -59,7 +59,7 @@ fn a_printed_configuration_gives_the_same_bytes() {
     let arguments = coupled(&[
         "--stop-time=0.7",
         "--method=jacobi",
-        "--course=linear",
+        "--extrapolation=linear",
         "--every=controller=2",
         "--set=plant.F_c=20.25",
         "--set=controller.K_x[1,2]=-1.5e3",
@@ -130,7 +130,7 @@ fn an_explanation_says_what_was_chosen_and_why() {
     let bench = Bench::new();
     let said = bench.coupled_well(&["--stop-time", "0.01", "--explain"]);
     for part in [
-        "algorithm: gauss-seidel, course limited, coupling once, fixed step 0.001 s",
+        "algorithm: gauss-seidel, extrapolation limited, coupling once, fixed step 0.001 s",
         "the smallest stepSize of a DefaultExperiment, that of plant",
         "in the order of the direct dependencies: plant, controller",
         "time: 0 to 0.01 s",
@@ -151,4 +151,25 @@ fn another_fmu_takes_the_place_of_one_of_the_file() {
     fails(&bench.run(&["system.toml"]), 2, &["None.fmu"]);
     let controller = format!("controller={}", fmu("AsoController"));
     printed(&bench.run(&["system.toml", "--fmu", &controller, "--out", "out"]));
+}
+
+#[test]
+fn the_former_name_of_the_extrapolation_is_taken_with_a_warning() {
+    let bench = Bench::new();
+    let run = |arguments: &[&str]| {
+        let output = bench.run(arguments);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        printed(&output);
+        (bench.read("out/results.csv"), said)
+    };
+    let (held, silent) = run(&coupled(&["--stop-time=0.2", "--extrapolation=hold"]));
+    assert_eq!(silent, "");
+    let (former, said) = run(&coupled(&["--stop-time=0.2", "--course=hold"]));
+    assert_eq!(former, held);
+    assert!(said.contains("--course is now called --extrapolation"), "{said}");
+    let rest = "\n[experiment]\nstop-time = 0.2\n\n[algorithm]\ncourse = 'hold'\n";
+    bench.write("system.toml", &system_toml(rest));
+    let (file, said) = run(&["system.toml", "--out=out"]);
+    assert_eq!(file, held);
+    assert!(said.contains("algorithm.course is now called extrapolation"), "{said}");
 }

@@ -144,8 +144,9 @@ fn bad_checkpoints_are_refused() {
     fs::write(bench.path("bad"), "no checkpoint").unwrap();
     fails(&bench.run(&["--resume", "bad"]), 2, &["bad: expected a checkpoint"]);
     fails(&bench.run(&["--resume", "none"]), 2, &["none"]);
-    let other = ["--resume", "state", "--course", "hold", "--coupling", "anderson"];
-    let refused = "resume: the checkpoint was taken with course limited; --course hold is not";
+    let other = ["--resume", "state", "--extrapolation", "hold", "--coupling", "anderson"];
+    let refused =
+        "resume: the checkpoint was taken with extrapolation limited; --extrapolation hold is not";
     fails(&bench.run(&other), 2, &[refused]);
     let other = ["--resume", "state", "--step", "0.002"];
     let refused = "resume: the checkpoint was taken with step 0.001 s; --step 0.002 s is not";

@@ -55,7 +55,8 @@ fn rows_on_the_way_of_an_fmu_with_a_multiple_of_the_step_have_the_values_of_thei
     let [a, b] = ["a", "b"].map(|name| format!("{name}={}", file.display()));
     let fmus = ["--fmu", &a, "--fmu", &b, "--connect", "a.y=b.u", "--connect", "a.i_out=b.i_in"];
     let set = ["--set", "a.i_in=7", "--set", "a.b_in=true", "--set", "a.s_in=word"];
-    let times = ["--step", "0.0625", "--stop-time", "1", "--every", "a=4", "--course", "hold"];
+    let times =
+        ["--step", "0.0625", "--stop-time", "1", "--every", "a=4", "--extrapolation", "hold"];
     for (method, seen) in [("jacobi", 0.0), ("gauss-seidel", 0.0625)] {
         let more = ["--method", method, "--out", "out"];
         let names = ["a.y", "b.y", "a.i_out", "a.b_out"];

@@ -1,7 +1,7 @@
 //! What is written is what the library computes.
 
 use master::Transformation;
-use master::{Algorithm, Coupling, Course, Probe, Simulation, StepControl, Sweep, System};
+use master::{Algorithm, Coupling, Extrapolation, Method, Probe, Simulation, StepControl, System};
 use ssp::{Link, Terminal};
 use tests::{Table, closed_loop, simulation};
 
@@ -38,18 +38,27 @@ fn written(path: &Path) -> Vec<[f64; 5]> {
 
 #[test]
 fn each_option_of_the_algorithm_does_what_the_algorithm_of_the_library_does() {
-    let fixed = |sweep, course| Algorithm::fixed(sweep, course, 0.001);
-    let default = fixed(Sweep::GaussSeidel, Course::Limited);
+    let fixed = |sweep, extrapolation| Algorithm::fixed(sweep, extrapolation, 0.001);
+    let default = fixed(Method::GaussSeidel, Extrapolation::Limited);
     let cases: [(&[&str], Algorithm); 9] = [
         (&[], default.clone()),
-        (&["--method", "jacobi"], fixed(Sweep::Jacobi, Course::Limited)),
-        (&["--method", "jacobi", "--course", "hold"], fixed(Sweep::Jacobi, Course::Hold)),
-        (&["--course", "quadratic"], fixed(Sweep::GaussSeidel, Course::Quadratic)),
-        (&["--step", "0.0005"], Algorithm::fixed(Sweep::GaussSeidel, Course::Limited, 0.0005)),
+        (&["--method", "jacobi"], fixed(Method::Jacobi, Extrapolation::Limited)),
+        (
+            &["--method", "jacobi", "--extrapolation", "hold"],
+            fixed(Method::Jacobi, Extrapolation::Hold),
+        ),
+        (&["--extrapolation", "quadratic"], fixed(Method::GaussSeidel, Extrapolation::Quadratic)),
+        (
+            &["--step", "0.0005"],
+            Algorithm::fixed(Method::GaussSeidel, Extrapolation::Limited, 0.0005),
+        ),
         (&["--coupling", "newton"], Algorithm { coupling: Coupling::Newton, ..default.clone() }),
         (&["--every", "controller=2"], Algorithm { multiples: vec![1, 2], ..default.clone() }),
-        (&["--jobs", "2", "--method", "jacobi"], fixed(Sweep::Jacobi, Course::Limited)),
-        (&["--course", "linear", "--allow-nan"], fixed(Sweep::GaussSeidel, Course::Linear)),
+        (&["--jobs", "2", "--method", "jacobi"], fixed(Method::Jacobi, Extrapolation::Limited)),
+        (
+            &["--extrapolation", "linear", "--allow-nan"],
+            fixed(Method::GaussSeidel, Extrapolation::Linear),
+        ),
     ];
     let mut seen = Vec::new();
     for (options, algorithm) in cases {

@@ -56,9 +56,12 @@ fn fmus_without_common_names_run_unconnected_with_a_warning() {
 fn misuse_is_refused_with_what_was_expected() {
     let bench = Bench::new();
     for (options, parts) in [
-        (&["--method", "gauss-seidel-hold"][..], &["--method gauss-seidel --course hold"][..]),
+        (
+            &["--method", "gauss-seidel-hold"][..],
+            &["--method gauss-seidel --extrapolation hold"][..],
+        ),
         (&["--method", "jakobi"], &["jacobi, gauss-seidel"]),
-        (&["--course", "cubic"], &["hold, limited, linear, quadratic"]),
+        (&["--extrapolation", "cubic"], &["hold, limited, linear, quadratic"]),
         (&["--coupling", "twice"], &["once, newton, anderson, quasi-newton"]),
         (&["--step-control", "free"], &["fixed, doubling, embedded, increment, energy"]),
         (&["--every", "plant=0"], &["above 0", "\"0\""]),

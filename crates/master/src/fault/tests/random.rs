@@ -1,19 +1,19 @@
 //! Noise and random dropouts: bounds are five standard deviations of the estimate.
 
-use super::{Draw, Fault, FaultLine, Lost, Sample, Spread, single, window};
+use super::{Draw, Fault, FaultChain, Lost, Sample, Spread, single, window};
 
 const COUNT: u32 = 40_000;
 
-fn noise(spread: Spread, draw: Draw) -> FaultLine {
+fn noise(spread: Spread, draw: Draw) -> FaultChain {
     single(Fault::Noise { spread, draw }, 0.0, None)
 }
 
-fn normal(seed: u64, name: &str, place: u64) -> FaultLine {
+fn normal(seed: u64, name: &str, place: u64) -> FaultChain {
     noise(Spread::Normal(2.0), Draw::new(seed, name, place, None))
 }
 
 /// The noise at `COUNT` communication points, 1 ms apart.
-fn drawn(line: &FaultLine) -> Vec<f64> {
+fn drawn(line: &FaultChain) -> Vec<f64> {
     (0..COUNT).map(|step| line.apply(1e-3 * f64::from(step), 0.0)).collect()
 }
 
@@ -102,7 +102,7 @@ fn a_random_dropout_loses_its_part_of_the_samples() {
     let (n, probability) = (f64::from(COUNT), 0.2);
     let lost = Lost::Random { probability, draw: Draw::new(4, "ctrl.y", 0, None) };
     let fault = Fault::Dropout { lost, instead: Some(0.0) };
-    let line = FaultLine::new(vec![(window(0.0, None), fault)], 1e-3).unwrap();
+    let line = FaultChain::new(vec![(window(0.0, None), fault)], 1e-3).unwrap();
     let arrived: Vec<_> = (0..COUNT).map(|step| line.apply(1e-3 * f64::from(step), 1.0)).collect();
     let part = 1.0 - mean(&arrived);
     let deviation = (probability * (1.0 - probability) / n).sqrt();

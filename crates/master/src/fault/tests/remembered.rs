@@ -1,7 +1,7 @@
 //! Faults that remember: dropout, delay; repeated steps and checkpoints.
 
 use super::super::delay::Line;
-use super::{Fault, FaultError, FaultLine, Lost, Sample, series, single, window};
+use super::{Fault, FaultChain, FaultError, Lost, Sample, series, single, window};
 use crate::fault::{Draw, Spread};
 
 fn dropout(lost: Lost, instead: Option<f64>) -> Fault {
@@ -110,13 +110,13 @@ fn a_delay_of_a_straight_line_is_exact_for_steps_of_any_size() {
 
 #[test]
 fn a_delay_beyond_memory_is_refused() {
-    let found = FaultLine::new(vec![(window(0.0, None), delay(1e9))], 1e-3).unwrap_err();
+    let found = FaultChain::new(vec![(window(0.0, None), delay(1e9))], 1e-3).unwrap_err();
     assert!(matches!(found, FaultError::Delay { steps, .. } if steps == 1e12), "{found}");
     assert!(found.to_string().contains("a delay of 1000000000 s is 1000000000000"), "{found}");
 }
 
 /// One fault of each kind, all at once.
-fn everything() -> FaultLine {
+fn everything() -> FaultChain {
     let draw = |place| Draw::new(5, "a.b", place, None);
     let random = Lost::Random { probability: 0.3, draw: draw(7) };
     let noise = Fault::Noise { spread: Spread::Normal(0.1), draw: draw(6) };
@@ -131,7 +131,7 @@ fn everything() -> FaultLine {
         (window(1.5, Some(2.0)), Fault::Stuck(None)),
         (window(0.0, None), Fault::Quantisation { step: 1e-6, offset: 0.0 }),
     ];
-    FaultLine::new(faults, 0.1).unwrap()
+    FaultChain::new(faults, 0.1).unwrap()
 }
 
 fn point(step: u32) -> (f64, f64) {
@@ -161,7 +161,7 @@ fn a_line_read_back_from_a_checkpoint_goes_on_identically() {
             series(&mut line, &[point(step)]);
         }
         let bytes = postcard::to_allocvec(&line).unwrap();
-        let mut restored: FaultLine = postcard::from_bytes(&bytes).unwrap();
+        let mut restored: FaultChain = postcard::from_bytes(&bytes).unwrap();
         assert_eq!(restored, line);
         for step in stop..40 {
             let values = [point(step)];

@@ -58,7 +58,7 @@ fn settings(
         ("start-time", seconds(experiment.start_time)),
         ("step", seconds(algorithm.step)),
         ("method", algorithm.sweep.name().to_owned()),
-        ("course", algorithm.course.name().to_owned()),
+        ("extrapolation", algorithm.extrapolation.name().to_owned()),
         ("coupling", algorithm.coupling.name().to_owned()),
         ("step-control", algorithm.control.name().to_owned()),
         ("every", multiples(system, &algorithm.multiples)),

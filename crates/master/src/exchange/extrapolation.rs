@@ -1,6 +1,6 @@
-//! The course of an input over a step, from what is known of its source.
+//! The extrapolation of an input over a step, from what is known of its source.
 
-use crate::algorithm::Course;
+use crate::algorithm::Extrapolation;
 
 /// `value + slope s + curvature s^2 / 2` for the time s since the begin of the step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,17 +57,17 @@ impl Polynomial {
 impl Known {
     /// Over the step whose end is not known: from its start onwards. Held where a derivative of the
     /// output is NaN or infinite, as some FMUs give it at the start time.
-    pub(super) fn extrapolated(&self, course: Course) -> Polynomial {
+    pub(super) fn extrapolated(&self, extrapolation: Extrapolation) -> Polynomial {
         let finite = |derivative: Option<f64>| derivative.is_none_or(f64::is_finite);
         if !(finite(self.slope) && finite(self.curvature)) {
             return Polynomial::held(self.begin);
         }
         let quotient = (self.begin - self.before) / self.last_size;
-        let (slope, curvature) = match course {
-            Course::Hold => (0.0, 0.0),
-            Course::Limited => (self.limited(quotient), 0.0),
-            Course::Linear => (self.slope.unwrap_or(quotient), 0.0),
-            Course::Quadratic => self.parabola(quotient),
+        let (slope, curvature) = match extrapolation {
+            Extrapolation::Hold => (0.0, 0.0),
+            Extrapolation::Limited => (self.limited(quotient), 0.0),
+            Extrapolation::Linear => (self.slope.unwrap_or(quotient), 0.0),
+            Extrapolation::Quadratic => self.parabola(quotient),
         };
         Polynomial { value: self.begin, slope, curvature }
     }
@@ -99,14 +99,14 @@ impl Known {
     }
 
     /// Over the step whose end is known: between begin and end.
-    pub(super) fn interpolated(&self, course: Course) -> Polynomial {
+    pub(super) fn interpolated(&self, extrapolation: Extrapolation) -> Polynomial {
         let slope = (self.end - self.begin) / self.size;
-        match course {
-            Course::Hold => Polynomial::held(self.end),
-            Course::Limited | Course::Linear => {
+        match extrapolation {
+            Extrapolation::Hold => Polynomial::held(self.end),
+            Extrapolation::Limited | Extrapolation::Linear => {
                 Polynomial { value: self.begin, slope, curvature: 0.0 }
             }
-            Course::Quadratic => {
+            Extrapolation::Quadratic => {
                 let quotient = (self.begin - self.before) / self.last_size;
                 // Newton's divided difference where there is no derivative at the begin.
                 let curvature = match self.slope.filter(|slope| slope.is_finite()) {

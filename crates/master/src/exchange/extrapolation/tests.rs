@@ -1,7 +1,7 @@
 //! Courses through points of `1 + 2 t + 3 t^2`, computed by hand.
 
 use super::{Known, Polynomial};
-use crate::algorithm::Course;
+use crate::algorithm::Extrapolation;
 
 /// At t = -0.5, 0.5, 1 and 3 s: 0.75, 2.75, 6 and 34; at 1 s the slope is 8, the curvature 6.
 const PAST: Known = Known {
@@ -26,39 +26,39 @@ fn three_values_or_two_and_a_slope_or_both_derivatives_make_the_parabola() {
     let slope = Known { slope: Some(8.0), ..PAST };
     let both = Known { curvature: Some(6.0), before: 100.0, ..slope };
     for known in [PAST, slope, both] {
-        assert_eq!(known.extrapolated(Course::Quadratic), PARABOLA);
+        assert_eq!(known.extrapolated(Extrapolation::Quadratic), PARABOLA);
     }
 }
 
 #[test]
 fn a_line_has_the_given_slope_or_the_last_difference_quotient() {
-    assert_eq!(PAST.extrapolated(Course::Linear), line(6.5));
+    assert_eq!(PAST.extrapolated(Extrapolation::Linear), line(6.5));
     let slope = Known { slope: Some(8.0), ..PAST };
-    assert_eq!(slope.extrapolated(Course::Linear), line(8.0));
+    assert_eq!(slope.extrapolated(Extrapolation::Linear), line(8.0));
 }
 
 #[test]
 fn a_limited_line_has_the_smaller_slope_and_none_where_signs_differ() {
     for (slope, expected) in [(8.0, 6.5), (5.0, 5.0), (-1.0, 0.0), (0.0, 0.0)] {
         let known = Known { slope: Some(slope), ..PAST };
-        assert_eq!(known.extrapolated(Course::Limited), line(expected));
+        assert_eq!(known.extrapolated(Extrapolation::Limited), line(expected));
     }
-    assert_eq!(PAST.extrapolated(Course::Limited), line(6.5));
+    assert_eq!(PAST.extrapolated(Extrapolation::Limited), line(6.5));
 }
 
 #[test]
 fn a_held_value_is_that_of_the_begin_or_of_the_known_end() {
-    assert_eq!(PAST.extrapolated(Course::Hold), Polynomial::held(6.0));
-    assert_eq!(PAST.interpolated(Course::Hold), Polynomial::held(34.0));
+    assert_eq!(PAST.extrapolated(Extrapolation::Hold), Polynomial::held(6.0));
+    assert_eq!(PAST.interpolated(Extrapolation::Hold), Polynomial::held(34.0));
 }
 
 #[test]
 fn between_begin_and_end_is_a_line_or_the_parabola_with_the_slope_or_the_value_before() {
-    assert_eq!(PAST.interpolated(Course::Linear), line(14.0));
-    assert_eq!(PAST.interpolated(Course::Limited), line(14.0));
-    assert_eq!(PAST.interpolated(Course::Quadratic), PARABOLA);
+    assert_eq!(PAST.interpolated(Extrapolation::Linear), line(14.0));
+    assert_eq!(PAST.interpolated(Extrapolation::Limited), line(14.0));
+    assert_eq!(PAST.interpolated(Extrapolation::Quadratic), PARABOLA);
     let slope = Known { slope: Some(8.0), before: 100.0, ..PAST };
-    assert_eq!(slope.interpolated(Course::Quadratic), PARABOLA);
+    assert_eq!(slope.interpolated(Extrapolation::Quadratic), PARABOLA);
 }
 
 /// From 1 s on: at 2 s 17 with the slope 14; at 3 s 34; the integral from 1 to 3 s is 36.
@@ -69,17 +69,22 @@ fn later_end_and_mean_are_those_of_the_parabola() {
     assert_eq!((PARABOLA.end(2.0), PARABOLA.mean(2.0)), (34.0, 18.0));
 }
 
-/// Without a past a course is of as many derivatives as there are, with one value before a line.
+/// Without a past a extrapolation is of as many derivatives as there are, with one value before a line.
 #[test]
 fn what_never_was_bends_nothing() {
     let first =
         Known { earlier: 6.0, before: 6.0, earlier_size: f64::MAX, last_size: f64::MAX, ..PAST };
-    for course in [Course::Hold, Course::Limited, Course::Linear, Course::Quadratic] {
-        assert_eq!(first.extrapolated(course), Polynomial::held(6.0));
+    for extrapolation in [
+        Extrapolation::Hold,
+        Extrapolation::Limited,
+        Extrapolation::Linear,
+        Extrapolation::Quadratic,
+    ] {
+        assert_eq!(first.extrapolated(extrapolation), Polynomial::held(6.0));
     }
     let second = Known { earlier: 2.75, earlier_size: f64::MAX, ..PAST };
-    assert_eq!(second.extrapolated(Course::Quadratic).end(2.0), 19.0);
+    assert_eq!(second.extrapolated(Extrapolation::Quadratic).end(2.0), 19.0);
     let slope = Known { slope: Some(8.0), ..first };
-    assert_eq!(slope.extrapolated(Course::Quadratic).end(2.0), 22.0);
-    assert_eq!(first.interpolated(Course::Quadratic).mean(2.0), 20.0);
+    assert_eq!(slope.extrapolated(Extrapolation::Quadratic).end(2.0), 22.0);
+    assert_eq!(first.interpolated(Extrapolation::Quadratic).mean(2.0), 20.0);
 }
