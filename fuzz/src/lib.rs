@@ -1,24 +1,6 @@
-//! The fuzz targets: those of `crates/fmu/tests/robustness` and of `crates/study/tests/robustness`, one for the
-//! controller's design file and one for `system.toml`.
+//! The fuzz targets: those of the crate `robustness`, and one for the controller's design file.
 
-#[path = "../../crates/fmu/tests/robustness/array.rs"]
-mod array;
-#[path = "../../crates/fmu/tests/robustness/calls/mod.rs"]
-mod calls;
-#[path = "../../crates/fmu/tests/robustness/choice.rs"]
-mod choice;
-#[path = "../../crates/fmu/tests/robustness/importer.rs"]
-mod importer;
-#[path = "../../crates/fmu/tests/robustness/machine.rs"]
-mod machine;
-#[path = "../../crates/study/tests/robustness/targets.rs"]
-mod master_files;
-#[path = "../../crates/fmu/tests/robustness/prediction.rs"]
-mod prediction;
-#[path = "../../crates/fmu/tests/robustness/sequence.rs"]
-mod sequence;
-#[path = "../../crates/fmu/tests/robustness/targets.rs"]
-mod targets;
+use robustness::{exporter, system_files, system_toml};
 
 mod design;
 
@@ -37,28 +19,16 @@ macro_rules! targets {
 }
 
 targets! {
-    /// See `targets.rs`.
-    serialized_state: targets::serialized_state;
-    /// See `targets.rs`.
-    resource_location: targets::resource_location;
-    /// See `targets.rs`.
-    model_description: targets::model_description;
-    /// See `targets.rs`.
-    package: targets::package;
-    /// See `targets.rs`.
-    call_sequence: targets::call_sequence;
-    /// See `design.rs`.
+    serialized_state: exporter::serialized_state;
+    resource_location: exporter::resource_location;
+    model_description: exporter::model_description;
+    package: exporter::package;
+    call_sequence: exporter::call_sequence;
     design_file: design::design_file;
-    /// See `crates/study/tests/robustness/targets.rs`.
-    system_structure: master_files::system_structure;
-    /// See `crates/study/tests/robustness/targets.rs`.
-    parameter_values: master_files::parameter_values;
-    /// See `crates/study/tests/robustness/targets.rs`.
-    parameter_mapping: master_files::parameter_mapping;
-    /// See `crates/study/tests/robustness/targets.rs`.
-    signal_dictionary: master_files::signal_dictionary;
-    /// See `crates/study/tests/robustness/targets.rs`.
-    signal_table: master_files::signal_table;
-    /// See `cli/src/config/tests/target.rs`.
-    system_toml: command::system_toml;
+    system_structure: system_files::system_structure;
+    parameter_values: system_files::parameter_values;
+    parameter_mapping: system_files::parameter_mapping;
+    signal_dictionary: system_files::signal_dictionary;
+    signal_table: system_files::signal_table;
+    system_toml: system_toml::system_toml;
 }

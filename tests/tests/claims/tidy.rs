@@ -141,8 +141,8 @@ fn unsafe_code_stands_at_the_boundaries_only() {
         "crates/fmu-import/src/library/states.rs",
         "crates/fmu-import/src/library/step.rs",
         // Importers of their own, to call the C functions as no safe one would.
-        "crates/fmu/tests/robustness/importer.rs",
-        "crates/fmu/tests/robustness/uninitialised.rs",
+        "tests/robustness/src/importer.rs",
+        "tests/robustness/tests/robustness/uninitialised.rs",
         "fuzz/src/design.rs",
     ];
     for file in files(&root(), "rs") {

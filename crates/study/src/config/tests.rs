@@ -1,5 +1,3 @@
-mod robustness;
-
 use std::path::Path;
 
 use super::*;

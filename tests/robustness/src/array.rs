@@ -7,7 +7,7 @@ use fmu_description::abi::fmi2String;
 
 /// How the pointer to an array is passed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Shape {
+pub enum Shape {
     Right,
     Null,
     Misaligned,
@@ -17,17 +17,17 @@ pub(crate) enum Shape {
 
 /// An array as an argument.
 #[derive(Debug)]
-pub(crate) struct Array<T> {
-    pub(crate) items: Vec<T>,
-    pub(crate) shape: Shape,
+pub struct Array<T> {
+    pub items: Vec<T>,
+    pub shape: Shape,
 }
 
 impl<T> Array<T> {
-    pub(crate) fn right(items: Vec<T>) -> Self {
+    pub fn right(items: Vec<T>) -> Self {
         Self { items, shape: Shape::Right }
     }
 
-    pub(crate) fn pointer(&self) -> *const T {
+    pub fn pointer(&self) -> *const T {
         match self.shape {
             Shape::Right | Shape::Huge => self.items.as_ptr(),
             Shape::Null => null(),
@@ -35,7 +35,7 @@ impl<T> Array<T> {
         }
     }
 
-    pub(crate) fn pointer_mut(&mut self) -> *mut T {
+    pub fn pointer_mut(&mut self) -> *mut T {
         match self.shape {
             Shape::Right | Shape::Huge => self.items.as_mut_ptr(),
             Shape::Null => null_mut(),
@@ -44,25 +44,25 @@ impl<T> Array<T> {
     }
 
     /// The length to state.
-    pub(crate) fn count(&self) -> usize {
+    pub fn count(&self) -> usize {
         if self.shape == Shape::Huge { usize::MAX } else { self.items.len() }
     }
 }
 
 /// The count of two arrays that share it.
-pub(crate) fn shared<A, B>(one: &Array<A>, other: &Array<B>) -> usize {
+pub fn shared<A, B>(one: &Array<A>, other: &Array<B>) -> usize {
     let huge = [one.shape, other.shape].contains(&Shape::Huge);
     assert_eq!(one.items.len(), other.items.len());
     if huge { usize::MAX } else { one.items.len() }
 }
 
 /// A C string as an argument; `None` is null.
-pub(crate) type Text = Option<CString>;
+pub type Text = Option<CString>;
 
-pub(crate) fn pointer(text: &Text) -> fmi2String {
+pub fn pointer(text: &Text) -> fmi2String {
     text.as_ref().map_or(null(), |text| text.as_ptr())
 }
 
-pub(crate) fn pointers(texts: &Array<Text>) -> Array<fmi2String> {
+pub fn pointers(texts: &Array<Text>) -> Array<fmi2String> {
     Array { items: texts.items.iter().map(pointer).collect(), shape: texts.shape }
 }

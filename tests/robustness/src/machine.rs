@@ -12,7 +12,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// Where the model's code runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Place {
+pub enum Place {
     New,
     About,
     Variables,
@@ -32,7 +32,7 @@ pub(crate) enum Place {
 }
 
 impl Place {
-    pub(crate) const EVERY: [Place; 16] = [
+    pub const EVERY: [Place; 16] = [
         Place::New,
         Place::About,
         Place::Variables,
@@ -54,7 +54,7 @@ impl Place {
 
 /// What the model does there instead of its work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Mischief {
+pub enum Mischief {
     Panic,
     Discard,
     Incomplete,
@@ -64,7 +64,7 @@ pub(crate) enum Mischief {
 }
 
 impl Mischief {
-    pub(crate) const EVERY: [Mischief; 6] = [
+    pub const EVERY: [Mischief; 6] = [
         Mischief::Panic,
         Mischief::Discard,
         Mischief::Incomplete,
@@ -81,7 +81,7 @@ thread_local! {
 }
 
 /// Runs `work` while the models of this thread follow `plan`; whether they came to it.
-pub(crate) fn with_plan<T>(plan: Option<(Place, Mischief)>, work: impl FnOnce() -> T) -> (T, bool) {
+pub fn with_plan<T>(plan: Option<(Place, Mischief)>, work: impl FnOnce() -> T) -> (T, bool) {
     HAPPENED.set(false);
     PLAN.set(plan);
     let done = work();
@@ -90,12 +90,12 @@ pub(crate) fn with_plan<T>(plan: Option<(Place, Mischief)>, work: impl FnOnce() 
 }
 
 /// Whether the models of this thread came to what the plan says.
-pub(crate) fn happened() -> bool {
+pub fn happened() -> bool {
     HAPPENED.get()
 }
 
 /// How many models exist in this thread.
-pub(crate) fn alive() -> isize {
+pub fn alive() -> isize {
     ALIVE.get()
 }
 
@@ -163,7 +163,7 @@ impl<'de> Deserialize<'de> for Witness {
 }
 
 #[derive(Clone, Serialize, Deserialize)]
-pub(crate) struct Machine {
+pub struct Machine {
     u: f64,
     u_slope: f64,
     x: f64,
@@ -186,8 +186,8 @@ pub(crate) struct Machine {
 }
 
 /// Value references of the Reals; 0 is time.
-pub(crate) mod real {
-    pub(crate) const U: u32 = 1;
+pub mod real {
+    pub const U: u32 = 1;
 }
 
 macro_rules! field {

@@ -5,11 +5,11 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 
-use crate::calls::CALLS;
-use crate::importer::{Importer, describe};
-use crate::machine::{Mischief, Place, with_plan};
-use crate::sequence::{FREE, HOSTILE, ILLEGAL, LENGTH, run};
-use crate::targets::order;
+use robustness::calls::CALLS;
+use robustness::importer::{Importer, describe};
+use robustness::machine::{Mischief, Place, with_plan};
+use robustness::sequence::{FREE, HOSTILE, ILLEGAL, LENGTH, run};
+use robustness::exporter::order;
 
 /// Bytes for up to `calls` calls; `first` says which instance and whether calls may be illegal.
 fn bytes(first: impl Strategy<Value = u8>, calls: usize) -> impl Strategy<Value = Vec<u8>> {

@@ -19,10 +19,10 @@ use crate::machine::Machine;
 
 /// One call of the logger.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Message {
-    pub(crate) status: c_int,
-    pub(crate) category: String,
-    pub(crate) text: String,
+pub struct Message {
+    pub status: c_int,
+    pub category: String,
+    pub text: String,
 }
 
 /// What the logger receives, and the instance that it calls meanwhile.
@@ -63,33 +63,33 @@ unsafe extern "C" fn receive(
 }
 
 /// Whether messages arrive: not where variadic calls differ from others or cannot be made.
-pub(crate) const HEARS: bool = cfg!(not(any(miri, target_vendor = "apple")));
+pub const HEARS: bool = cfg!(not(any(miri, target_vendor = "apple")));
 
 /// A state that was got or read, freed once.
 #[derive(Debug)]
-pub(crate) struct Saved(fmi2FMUstate);
+pub struct Saved(fmi2FMUstate);
 
 impl Saved {
-    pub(crate) const NULL: Saved = Saved(null_mut());
+    pub const NULL: Saved = Saved(null_mut());
 
-    pub(crate) fn is_null(&self) -> bool {
+    pub fn is_null(&self) -> bool {
         self.0.is_null()
     }
 
-    pub(crate) fn raw(&self) -> fmi2FMUstate {
+    pub fn raw(&self) -> fmi2FMUstate {
         self.0
     }
 }
 
 /// An instance, or none.
 #[derive(Debug)]
-pub(crate) struct Importer {
+pub struct Importer {
     component: fmi2Component,
     ear: Box<Ear>,
 }
 
 /// What `fmuDescribe` says of the machine.
-pub(crate) fn describe() -> Result<String, String> {
+pub fn describe() -> Result<String, String> {
     unsafe extern "C" fn sink(context: *mut c_void, text: *const c_char, length: usize) {
         // SAFETY: the context is the vector below, the text has this length.
         unsafe {
@@ -106,17 +106,17 @@ pub(crate) fn describe() -> Result<String, String> {
 }
 
 /// The arguments of `fmi2Instantiate`.
-pub(crate) struct Order {
-    pub(crate) name: Text,
-    pub(crate) kind: c_int,
-    pub(crate) guid: Text,
-    pub(crate) resources: Text,
-    pub(crate) callbacks: bool,
-    pub(crate) logger: bool,
+pub struct Order {
+    pub name: Text,
+    pub kind: c_int,
+    pub guid: Text,
+    pub resources: Text,
+    pub callbacks: bool,
+    pub logger: bool,
 }
 
 impl Importer {
-    pub(crate) fn new(order: &Order) -> Self {
+    pub fn new(order: &Order) -> Self {
         let messages = RefCell::default();
         let (component, panics) = (Cell::new(null_mut()), Cell::new(false));
         let ear = Box::new(Ear { messages, component, panics });
@@ -151,26 +151,26 @@ impl Importer {
         Self { component, ear }
     }
 
-    pub(crate) fn exists(&self) -> bool {
+    pub fn exists(&self) -> bool {
         !self.component.is_null()
     }
 
-    pub(crate) fn component(&self) -> fmi2Component {
+    pub fn component(&self) -> fmi2Component {
         self.component
     }
 
     /// From now on the logger panics, and catches it.
-    pub(crate) fn let_the_logger_panic(&self) {
+    pub fn let_the_logger_panic(&self) {
         self.ear.panics.set(true);
     }
 
     /// The messages since the last call of this.
-    pub(crate) fn take_messages(&self) -> Vec<Message> {
+    pub fn take_messages(&self) -> Vec<Message> {
         self.ear.messages.take()
     }
 
     /// `fmi2FreeInstance`; from then on the component is null.
-    pub(crate) fn free(&mut self) {
+    pub fn free(&mut self) {
         let component = std::mem::replace(&mut self.component, null_mut());
         // SAFETY: the component is null or not yet freed.
         unsafe { ffi::free_instance::<Machine>(component) }
@@ -194,17 +194,17 @@ macro_rules! call {
 
 macro_rules! without_arguments {
     ($($name:ident)*) => {
-        $(pub(crate) fn $name(&self) -> c_int { call!(self.$name()) })*
+        $(pub fn $name(&self) -> c_int { call!(self.$name()) })*
     };
 }
 
 macro_rules! values {
     ($($get:ident $set:ident $type:ty;)*) => {
-        $(pub(crate) fn $get(&self, vr: &Array<u32>, values: &mut Array<$type>) -> c_int {
+        $(pub fn $get(&self, vr: &Array<u32>, values: &mut Array<$type>) -> c_int {
             call!(self.$get(vr.pointer(), shared(vr, values), values.pointer_mut()))
         }
 
-        pub(crate) fn $set(&self, vr: &Array<u32>, values: &Array<$type>) -> c_int {
+        pub fn $set(&self, vr: &Array<u32>, values: &Array<$type>) -> c_int {
             call!(self.$set(vr.pointer(), shared(vr, values), values.pointer()))
         })*
     };
@@ -212,7 +212,7 @@ macro_rules! values {
 
 macro_rules! vectors {
     ($($name:ident)*) => {
-        $(pub(crate) fn $name(&self, values: &mut Array<f64>) -> c_int {
+        $(pub fn $name(&self, values: &mut Array<f64>) -> c_int {
             call!(self.$name(values.pointer_mut(), values.count()))
         })*
     };
@@ -220,7 +220,7 @@ macro_rules! vectors {
 
 macro_rules! statuses {
     ($($name:ident $type:ty;)*) => {
-        $(pub(crate) fn $name(&self, kind: c_int, value: &mut Array<$type>) -> c_int {
+        $(pub fn $name(&self, kind: c_int, value: &mut Array<$type>) -> c_int {
             call!(self.$name(kind, value.pointer_mut()))
         })*
     };
@@ -248,12 +248,12 @@ impl Importer {
         get_string_status fmi2String;
     }
 
-    pub(crate) fn set_debug_logging(&self, on: bool, categories: &Array<Text>) -> c_int {
+    pub fn set_debug_logging(&self, on: bool, categories: &Array<Text>) -> c_int {
         let categories = pointers(categories);
         call!(self.set_debug_logging(on.into(), categories.count(), categories.pointer()))
     }
 
-    pub(crate) fn setup_experiment(
+    pub fn setup_experiment(
         &self,
         tolerance: Option<f64>,
         start: f64,
@@ -269,7 +269,7 @@ impl Importer {
     }
 
     /// Status and, where it is OK, the texts.
-    pub(crate) fn get_string(&self, vr: &Array<u32>, shape: Shape) -> (c_int, Vec<String>) {
+    pub fn get_string(&self, vr: &Array<u32>, shape: Shape) -> (c_int, Vec<String>) {
         let mut values = Array { items: vec![null(); vr.items.len()], shape };
         let count = shared(vr, &values);
         let status = call!(self.get_string(vr.pointer(), count, values.pointer_mut()));
@@ -281,12 +281,12 @@ impl Importer {
         (status, if got { values.items.iter().map(text).collect() } else { Vec::new() })
     }
 
-    pub(crate) fn set_string(&self, vr: &Array<u32>, values: &Array<Text>) -> c_int {
+    pub fn set_string(&self, vr: &Array<u32>, values: &Array<Text>) -> c_int {
         let values = pointers(values);
         call!(self.set_string(vr.pointer(), shared(vr, &values), values.pointer()))
     }
 
-    pub(crate) fn set_real_input_derivatives(
+    pub fn set_real_input_derivatives(
         &self,
         vr: &Array<u32>,
         orders: &Array<c_int>,
@@ -301,7 +301,7 @@ impl Importer {
         ))
     }
 
-    pub(crate) fn get_real_output_derivatives(
+    pub fn get_real_output_derivatives(
         &self,
         vr: &Array<u32>,
         orders: &Array<c_int>,
@@ -316,7 +316,7 @@ impl Importer {
         ))
     }
 
-    pub(crate) fn get_directional_derivative(
+    pub fn get_directional_derivative(
         &self,
         (unknowns, to): (&Array<u32>, &mut Array<f64>),
         (knowns, delta): (&Array<u32>, &Array<f64>),
@@ -331,15 +331,15 @@ impl Importer {
         ))
     }
 
-    pub(crate) fn do_step(&self, start: f64, size: f64) -> c_int {
+    pub fn do_step(&self, start: f64, size: f64) -> c_int {
         call!(self.do_step(start, size, 1))
     }
 
-    pub(crate) fn new_discrete_states(&self, info: &mut Array<fmi2EventInfo>) -> c_int {
+    pub fn new_discrete_states(&self, info: &mut Array<fmi2EventInfo>) -> c_int {
         call!(self.new_discrete_states(info.pointer_mut()))
     }
 
-    pub(crate) fn completed_integrator_step(
+    pub fn completed_integrator_step(
         &self,
         enter: &mut Array<c_int>,
         terminate: &mut Array<c_int>,
@@ -347,28 +347,28 @@ impl Importer {
         call!(self.completed_integrator_step(1, enter.pointer_mut(), terminate.pointer_mut()))
     }
 
-    pub(crate) fn set_time(&self, time: f64) -> c_int {
+    pub fn set_time(&self, time: f64) -> c_int {
         call!(self.set_time(time))
     }
 
-    pub(crate) fn set_continuous_states(&self, values: &Array<f64>) -> c_int {
+    pub fn set_continuous_states(&self, values: &Array<f64>) -> c_int {
         call!(self.set_continuous_states(values.pointer(), values.count()))
     }
 
     /// `None` stands for a null pointer.
-    pub(crate) fn get_fmu_state(&self, state: Option<&mut Saved>) -> c_int {
+    pub fn get_fmu_state(&self, state: Option<&mut Saved>) -> c_int {
         call!(self.get_fmu_state(state.map_or(null_mut(), |state| &raw mut state.0)))
     }
 
-    pub(crate) fn set_fmu_state(&self, state: &Saved) -> c_int {
+    pub fn set_fmu_state(&self, state: &Saved) -> c_int {
         call!(self.set_fmu_state(state.0))
     }
 
-    pub(crate) fn free_fmu_state(&self, state: Option<&mut Saved>) -> c_int {
+    pub fn free_fmu_state(&self, state: Option<&mut Saved>) -> c_int {
         call!(self.free_fmu_state(state.map_or(null_mut(), |state| &raw mut state.0)))
     }
 
-    pub(crate) fn serialized_fmu_state_size(
+    pub fn serialized_fmu_state_size(
         &self,
         state: &Saved,
         size: &mut Array<usize>,
@@ -376,12 +376,12 @@ impl Importer {
         call!(self.serialized_fmu_state_size(state.0, size.pointer_mut()))
     }
 
-    pub(crate) fn serialize_fmu_state(&self, state: &Saved, bytes: &mut Array<u8>) -> c_int {
+    pub fn serialize_fmu_state(&self, state: &Saved, bytes: &mut Array<u8>) -> c_int {
         let count = bytes.count();
         call!(self.serialize_fmu_state(state.0, bytes.pointer_mut().cast(), count))
     }
 
-    pub(crate) fn de_serialize_fmu_state(
+    pub fn de_serialize_fmu_state(
         &self,
         bytes: &Array<u8>,
         state: Option<&mut Saved>,

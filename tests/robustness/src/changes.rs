@@ -8,10 +8,10 @@ use proptest::prelude::*;
 use proptest::strategy::ValueTree as _;
 use proptest::test_runner::TestRunner;
 
-use super::corpus;
+use crate::corpus;
 
 /// A change: what, where, and two numbers for it.
-pub(crate) type Change = (u8, u32, u32, u8);
+pub type Change = (u8, u32, u32, u8);
 
 /// What is put in, besides single bytes and the words of a format: numbers at the edge.
 const NUMBERS: [&[u8]; 8] = [
@@ -27,7 +27,7 @@ const NUMBERS: [&[u8]; 8] = [
 /// Longest that a target may take for one small file: far more than any needs on a busy machine.
 const LONGEST: Duration = Duration::from_secs(20);
 
-pub(crate) fn changed(data: &[u8], words: &[&[u8]], changes: &[Change]) -> Vec<u8> {
+pub fn changed(data: &[u8], words: &[&[u8]], changes: &[Change]) -> Vec<u8> {
     let mut bytes = data.to_vec();
     for (what, at, more, byte) in changes {
         let at = *at as usize % (bytes.len() + 1);
@@ -52,7 +52,7 @@ pub(crate) fn changed(data: &[u8], words: &[&[u8]], changes: &[Change]) -> Vec<u
 }
 
 /// Gives `count` changed files of a corpus to a target; `words` are what its format lives on.
-pub(crate) fn mutate(name: &str, words: &[&[u8]], target: fn(&[u8]), count: usize) {
+pub fn mutate(name: &str, words: &[&[u8]], target: fn(&[u8]), count: usize) {
     let files: Vec<_> =
         corpus::files(name).iter().map(|file| std::fs::read(file).unwrap()).collect();
     let mut runner = TestRunner::deterministic();

@@ -8,13 +8,13 @@ use fmu::call_order::{Function, State};
 use crate::machine::Mischief;
 
 /// Sets of statuses, as bits.
-pub(crate) const OK: u8 = 1;
-pub(crate) const DISCARD: u8 = 1 << 2;
-pub(crate) const ERROR: u8 = 1 << 3;
-pub(crate) const FATAL: u8 = 1 << 4;
+pub const OK: u8 = 1;
+pub const DISCARD: u8 = 1 << 2;
+pub const ERROR: u8 = 1 << 3;
+pub const FATAL: u8 = 1 << 4;
 
-const EXCHANGE: &str = include_str!("../../../fmu-description/src/call_order/section_3_2_3.csv");
-const SIMULATION: &str = include_str!("../../../fmu-description/src/call_order/section_4_2_4.csv");
+const EXCHANGE: &str = include_str!("../../../crates/fmu-description/src/call_order/section_3_2_3.csv");
+const SIMULATION: &str = include_str!("../../../crates/fmu-description/src/call_order/section_4_2_4.csv");
 
 /// Entries of a table, by function and state.
 type Table = Vec<[bool; State::EVERY.len()]>;
@@ -34,7 +34,7 @@ fn read(text: &str) -> Table {
 }
 
 /// Whether the table of the interface has an entry for the function in that state.
-pub(crate) fn in_table(exchange: bool, function: Function, state: State) -> bool {
+pub fn in_table(exchange: bool, function: Function, state: State) -> bool {
     static TABLES: OnceLock<[Table; 2]> = OnceLock::new();
     let tables = TABLES.get_or_init(|| [SIMULATION, EXCHANGE].map(read));
     tables[usize::from(exchange)][function as usize][state as usize]
@@ -62,19 +62,19 @@ fn may_discard(exchange: bool, function: Function) -> bool {
 
 /// What was set, and so is read back.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Values {
+pub struct Values {
     /// u, p, q, guess.
-    pub(crate) reals: [f64; 4],
+    pub reals: [f64; 4],
     /// n, side.
-    pub(crate) integers: [i32; 2],
-    pub(crate) on: bool,
+    pub integers: [i32; 2],
+    pub on: bool,
     /// label, word.
-    pub(crate) strings: [String; 2],
+    pub strings: [String; 2],
 }
 
 impl Values {
     /// Where the Real is kept; x is not, the model changes it.
-    pub(crate) fn place_of_real(reference: u32) -> Option<usize> {
+    pub fn place_of_real(reference: u32) -> Option<usize> {
         [1, 5, 6, 7].iter().position(|own| *own == reference)
     }
 
@@ -90,25 +90,25 @@ impl Values {
 
 /// What an FMU state consists of.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Core {
-    pub(crate) exchange: bool,
-    pub(crate) state: State,
-    pub(crate) start: f64,
-    pub(crate) stop: Option<f64>,
-    pub(crate) time: f64,
-    pub(crate) ended: bool,
-    pub(crate) values: Values,
+pub struct Core {
+    pub exchange: bool,
+    pub state: State,
+    pub start: f64,
+    pub stop: Option<f64>,
+    pub time: f64,
+    pub ended: bool,
+    pub values: Values,
 }
 
 impl Core {
-    pub(crate) fn new(exchange: bool) -> Self {
+    pub fn new(exchange: bool) -> Self {
         let values = Values::new();
         let state = State::Instantiated;
         Self { exchange, state, start: 0.0, stop: None, time: 0.0, ended: false, values }
     }
 
     /// The statuses that the call may have: `verdict` is what its arguments deserve.
-    pub(crate) fn statuses(
+    pub fn statuses(
         &self,
         function: Function,
         verdict: u8,
@@ -131,7 +131,7 @@ impl Core {
     }
 
     /// The states in which a function has gone wrong, where it did.
-    pub(crate) fn after(&mut self, function: Function, status: u8, mischief: Option<Mischief>) {
+    pub fn after(&mut self, function: Function, status: u8, mischief: Option<Mischief>) {
         match status {
             DISCARD if function == Function::DoStep => {
                 self.state = State::StepFailed;
@@ -144,13 +144,13 @@ impl Core {
     }
 
     /// Whether a step may end there: `stopTime`, where it is defined, is not passed (section 2.1.6).
-    pub(crate) fn is_before_stop(&self, time: f64) -> bool {
+    pub fn is_before_stop(&self, time: f64) -> bool {
         self.stop.is_none_or(|stop| time <= stop + 1e-9 * stop.abs().max(1.0))
     }
 
     /// Whether the Real may be set now: the variables of `machine.rs` by section 2.2.7 and the
     /// conditions of the tables.
-    pub(crate) fn settable_real(&self, reference: u32) -> bool {
+    pub fn settable_real(&self, reference: u32) -> bool {
         use State as S;
         let early = matches!(self.state, S::Instantiated | S::InitializationMode);
         let event = matches!(self.state, S::EventMode | S::StepComplete);
@@ -166,7 +166,7 @@ impl Core {
     }
 
     /// Whether the Real is an unknown of the equations solved in this state.
-    pub(crate) fn is_unknown(&self, reference: u32) -> bool {
+    pub fn is_unknown(&self, reference: u32) -> bool {
         match self.state {
             State::InitializationMode => [3, 4, 8].contains(&reference),
             _ => [2, 3, 4].contains(&reference),
@@ -174,7 +174,7 @@ impl Core {
     }
 
     /// Whether the Real is a known of the equations solved in this state.
-    pub(crate) fn is_known(&self, reference: u32) -> bool {
+    pub fn is_known(&self, reference: u32) -> bool {
         match self.state {
             State::InitializationMode => [0, 1, 2, 5, 6].contains(&reference),
             _ => [0, 1, 2].contains(&reference),

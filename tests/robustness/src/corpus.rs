@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 /// The files of a corpus.
-pub(crate) fn files(name: &str) -> Vec<PathBuf> {
+pub fn files(name: &str) -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus").join(name);
     let files = std::fs::read_dir(folder).unwrap().map(|file| file.unwrap().path());
     let mut files: Vec<_> = files.collect();
@@ -14,7 +14,7 @@ pub(crate) fn files(name: &str) -> Vec<PathBuf> {
 }
 
 /// Gives each file of a corpus to its target.
-pub(crate) fn replay(name: &str, target: fn(&[u8])) {
+pub fn replay(name: &str, target: fn(&[u8])) {
     for file in files(name) {
         let outcome = std::panic::catch_unwind(|| target(&std::fs::read(&file).unwrap()));
         assert!(outcome.is_ok(), "{}: {:?}", file.display(), outcome.err());

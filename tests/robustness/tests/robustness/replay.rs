@@ -1,7 +1,7 @@
 //! The corpora of the fuzz targets, once more.
 
-use crate::corpus::replay;
-use crate::targets;
+use robustness::corpus::replay;
+use robustness::exporter as targets;
 
 #[test]
 #[cfg_attr(miri, ignore = "reads files")]

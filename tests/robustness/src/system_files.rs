@@ -33,28 +33,28 @@ fn lines(data: &[u8]) -> usize {
 }
 
 /// An SSD file.
-pub(crate) fn system_structure(data: &[u8]) {
+pub fn system_structure(data: &[u8]) {
     both_ways(data, ssp::read_ssd, ssp::render_ssd);
 }
 
 /// An SSV file.
-pub(crate) fn parameter_values(data: &[u8]) {
+pub fn parameter_values(data: &[u8]) {
     both_ways(data, ssp::read_ssv, ssp::render_ssv);
 }
 
 /// An SSM file.
-pub(crate) fn parameter_mapping(data: &[u8]) {
+pub fn parameter_mapping(data: &[u8]) {
     both_ways(data, ssp::read_ssm, ssp::render_ssm);
 }
 
 /// An SSB file.
-pub(crate) fn signal_dictionary(data: &[u8]) {
+pub fn signal_dictionary(data: &[u8]) {
     both_ways(data, ssp::read_ssb, ssp::render_ssb);
 }
 
 /// A CSV file with signals: what was read is a table in order, and written it reads back as the same;
 /// an error names a line. Its columns, if they are signals, have finite values everywhere.
-pub(crate) fn signal_table(data: &[u8]) {
+pub fn signal_table(data: &[u8]) {
     let table = match table::parse(data) {
         Ok(table) => table,
         Err(error) => return refused(data, &error),

@@ -14,7 +14,7 @@ const OK: c_int = 0;
 const ERROR: c_int = 3;
 
 /// The GUID of the machine.
-pub(crate) fn guid() -> &'static str {
+pub fn guid() -> &'static str {
     static GUID: OnceLock<String> = OnceLock::new();
     GUID.get_or_init(|| {
         let xml = describe().unwrap_or_else(|message| panic!("{message}"));
@@ -23,13 +23,13 @@ pub(crate) fn guid() -> &'static str {
 }
 
 /// A text up to its first NUL.
-pub(crate) fn c_text(bytes: &[u8]) -> CString {
+pub fn c_text(bytes: &[u8]) -> CString {
     let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
     CString::new(&bytes[..end]).unwrap_or_default()
 }
 
 /// What a well-behaved importer passes to `fmi2Instantiate`.
-pub(crate) fn order(kind: c_int) -> Order {
+pub fn order(kind: c_int) -> Order {
     Order {
         name: Some(c"one".to_owned()),
         kind,
@@ -69,7 +69,7 @@ fn go_on(importer: &Importer) {
 
 /// `fmi2DeSerializeFMUstate`: the bytes as they are, then behind a right header and before a right
 /// checksum, so that they reach what decodes them.
-pub(crate) fn serialized_state(data: &[u8]) {
+pub fn serialized_state(data: &[u8]) {
     let Some((kind, data)) = data.split_first() else { return };
     let importer = Importer::new(&order(c_int::from(kind % 2)));
     let mut state = Saved::NULL;
@@ -96,7 +96,7 @@ pub(crate) fn serialized_state(data: &[u8]) {
 }
 
 /// `fmuResourceLocation`: a path that is read from a URI has a URI that reads back as this path.
-pub(crate) fn resource_location(data: &[u8]) {
+pub fn resource_location(data: &[u8]) {
     if let Ok(path) = path_from_uri(&String::from_utf8_lossy(data)) {
         let uri = file_uri(&path).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(path_from_uri(&uri).as_ref(), Ok(&path), "{uri}");
@@ -110,7 +110,7 @@ pub(crate) fn resource_location(data: &[u8]) {
 
 /// `modelDescription.xml`: what was read and written again reads as the same; without a warning,
 /// where it breaks no rule.
-pub(crate) fn model_description(data: &[u8]) {
+pub fn model_description(data: &[u8]) {
     let Ok((read, _)) = ModelDescription::read(data) else { return };
     let problems = read.problems();
     let xml = read.to_xml();
@@ -125,7 +125,7 @@ pub(crate) fn model_description(data: &[u8]) {
 
 /// An FMU archive: nothing is written beside the folder it is unpacked into, no more than the limit,
 /// and nothing stays.
-pub(crate) fn package(data: &[u8]) {
+pub fn package(data: &[u8]) {
     use fmu_description::package::{Unpacked, unpack_archive};
     let folder = tempfile::tempdir().unwrap_or_else(|error| panic!("{error}"));
     let path = folder.path().join("M.fmu");
@@ -157,7 +157,7 @@ fn size(folder: &std::path::Path) -> u64 {
 }
 
 /// Any sequence of calls: see `sequence.rs`.
-pub(crate) fn call_sequence(data: &[u8]) {
+pub fn call_sequence(data: &[u8]) {
     if let Err(what) = crate::sequence::run(data) {
         panic!("{what}");
     }

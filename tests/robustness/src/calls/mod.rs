@@ -15,46 +15,46 @@ use crate::importer::{Importer, Saved};
 use crate::prediction::{Core, ERROR, OK};
 
 /// A state that the importer holds, and what it is a copy of; nothing where it is null.
-pub(crate) struct Kept {
-    pub(crate) saved: Saved,
-    pub(crate) of: Option<Core>,
+pub struct Kept {
+    pub saved: Saved,
+    pub of: Option<Core>,
 }
 
 /// A serialised state.
 #[derive(Clone)]
-pub(crate) struct Record {
-    pub(crate) bytes: Vec<u8>,
-    pub(crate) of: Core,
+pub struct Record {
+    pub bytes: Vec<u8>,
+    pub of: Core,
 }
 
 /// What belongs to no instance.
-pub(crate) struct Stores {
-    pub(crate) kept: [Kept; 3],
-    pub(crate) records: [Option<Record>; 2],
+pub struct Stores {
+    pub kept: [Kept; 3],
+    pub records: [Option<Record>; 2],
 }
 
 /// What a call has to work with.
-pub(crate) struct Call<'a> {
-    pub(crate) importer: &'a Importer,
-    pub(crate) core: &'a Core,
-    pub(crate) stores: &'a mut Stores,
-    pub(crate) choice: Choice<'a>,
+pub struct Call<'a> {
+    pub importer: &'a Importer,
+    pub core: &'a Core,
+    pub stores: &'a mut Stores,
+    pub choice: Choice<'a>,
 }
 
 type Effect = Box<dyn FnOnce(&mut Core, &mut Stores)>;
 
 /// What came of a call.
-pub(crate) struct Outcome {
-    pub(crate) status: c_int,
+pub struct Outcome {
+    pub status: c_int,
     /// The statuses that the arguments deserve.
-    pub(crate) verdict: u8,
-    pub(crate) effect: Effect,
+    pub verdict: u8,
+    pub effect: Effect,
     /// Where a step ends that stops half way.
-    pub(crate) half_way: f64,
+    pub half_way: f64,
     /// The categories that `fmi2SetDebugLogging` chose, if it is `fmi2OK`.
-    pub(crate) chosen: Option<Vec<String>>,
+    pub chosen: Option<Vec<String>>,
     /// What was read and is not as predicted.
-    pub(crate) complaint: Option<String>,
+    pub complaint: Option<String>,
 }
 
 impl Outcome {
@@ -90,7 +90,7 @@ fn together(verdicts: impl IntoIterator<Item = u8>) -> u8 {
 type Caller = fn(&mut Call) -> Outcome;
 
 /// Every function that works on an instance, but `fmi2FreeInstance`.
-pub(crate) const CALLS: [(Function, Caller); 40] = [
+pub const CALLS: [(Function, Caller); 40] = [
     (Function::EnterInitializationMode, enter_initialization_mode),
     (Function::ExitInitializationMode, exit_initialization_mode),
     (Function::DoStep, simulation::do_step),

@@ -7,10 +7,10 @@ use std::thread;
 
 use fmu_description::abi::fmi2EventInfo;
 
-use crate::array::Array;
-use crate::importer::{HEARS, Importer};
-use crate::machine::{Mischief, Place, with_plan};
-use crate::targets::order;
+use robustness::array::Array;
+use robustness::importer::{HEARS, Importer};
+use robustness::machine::{Mischief, Place, with_plan};
+use robustness::exporter::order;
 
 const FATAL: i32 = 4;
 
@@ -151,7 +151,7 @@ fn the_hook_of_the_process_is_back_when_the_last_instance_is_freed() {
         let plan = Some((Place::New, Mischief::Panic));
         assert!(!with_plan(plan, || Importer::new(&order(1))).0.exists());
         assert_eq!(installed(), own, "after an instance that could not be made");
-        crate::importer::describe().unwrap();
+        robustness::importer::describe().unwrap();
         assert_eq!(installed(), own, "after a description");
     });
 }

@@ -1,8 +1,8 @@
 //! The fuzz targets for a short fixed count. What it finds is found without a nightly toolchain.
 #![cfg(not(miri))]
 
-use crate::changes::{changed, mutate};
-use crate::targets;
+use robustness::changes::{changed, mutate};
+use robustness::exporter as targets;
 
 /// What XML, ZIP and URIs live on.
 const WORDS: [&[u8]; 16] = [

@@ -1,14 +1,10 @@
 //! No file that the master reads does any harm, whatever is in it.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
-#[path = "../../../fmu/tests/robustness/changes.rs"]
-mod changes;
-#[path = "../../../fmu/tests/robustness/corpus.rs"]
-mod corpus;
-mod targets;
 
-use changes::mutate;
-use corpus::replay;
+use robustness::changes::mutate;
+use robustness::corpus::replay;
+use robustness::system_files as targets;
 
 /// What the XML of SSP lives on.
 const XML: [&[u8]; 20] = [

@@ -1,13 +1,8 @@
 //! No `system.toml` does any harm, whatever is in it.
 
-#[path = "../../../../fmu/tests/robustness/changes.rs"]
-mod changes;
-#[path = "../../../../fmu/tests/robustness/corpus.rs"]
-mod corpus;
-#[path = "target.rs"]
-mod target;
 
-use target::system_toml;
+use robustness::system_toml::system_toml;
+use robustness::{changes, corpus};
 
 /// What TOML and this file live on.
 const WORDS: [&[u8]; 22] = [

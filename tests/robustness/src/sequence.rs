@@ -9,19 +9,19 @@ use crate::choice::Choice;
 use crate::importer::{HEARS, Importer, Message, Order, Saved};
 use crate::machine::{Mischief, Place, alive, happened, with_plan};
 use crate::prediction::{Core, DISCARD, OK, in_table};
-use crate::targets::{c_text, guid, order};
+use crate::exporter::{c_text, guid, order};
 
 /// How many bytes one call may use.
-pub(crate) const LENGTH: usize = 24;
+pub const LENGTH: usize = 24;
 
 /// First bytes of a call from which on its arguments may be hostile.
-pub(crate) const HOSTILE: u8 = 0xd0;
+pub const HOSTILE: u8 = 0xd0;
 /// The same for calls that need not be legal.
-pub(crate) const ILLEGAL: u8 = 0xf0;
+pub const ILLEGAL: u8 = 0xf0;
 /// The same for calls with a null component.
 const NOBODY: u8 = 0xf8;
 /// The second byte of `fmi2FreeInstance`.
-pub(crate) const FREE: u8 = 0xff;
+pub const FREE: u8 = 0xff;
 
 /// An instance and what is predicted of it.
 struct Life {
@@ -45,7 +45,7 @@ type Plan = Option<(Place, Mischief)>;
 
 /// Makes the calls that `bytes` say: the places of mischief that were reached, as bits, or what was
 /// not as predicted.
-pub(crate) fn run(bytes: &[u8]) -> Result<u32, String> {
+pub fn run(bytes: &[u8]) -> Result<u32, String> {
     let before = alive();
     let mut world = World::new();
     for (number, call) in bytes.chunks(LENGTH).enumerate() {

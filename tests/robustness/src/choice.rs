@@ -5,36 +5,36 @@ use std::ffi::CString;
 use crate::array::{Array, Shape, Text};
 
 /// The bytes that one call may use.
-pub(crate) struct Choice<'a> {
+pub struct Choice<'a> {
     bytes: std::slice::Iter<'a, u8>,
     /// Whether arguments may be chosen that the standard forbids.
-    pub(crate) hostile: bool,
+    pub hostile: bool,
 }
 
 impl<'a> Choice<'a> {
-    pub(crate) fn new(bytes: &'a [u8]) -> Self {
+    pub fn new(bytes: &'a [u8]) -> Self {
         Self { bytes: bytes.iter(), hostile: true }
     }
 
-    pub(crate) fn byte(&mut self) -> u8 {
+    pub fn byte(&mut self) -> u8 {
         self.bytes.next().copied().unwrap_or(0)
     }
 
-    pub(crate) fn of<T: Clone>(&mut self, from: &[T]) -> T {
+    pub fn of<T: Clone>(&mut self, from: &[T]) -> T {
         from[usize::from(self.byte()) % from.len()].clone()
     }
 
     /// One of `fine`, or of `odd` where that may be.
-    pub(crate) fn either<T: Clone>(&mut self, fine: &[T], odd: &[T]) -> T {
+    pub fn either<T: Clone>(&mut self, fine: &[T], odd: &[T]) -> T {
         if self.rarely() { self.of(odd) } else { self.of(fine) }
     }
 
     /// True for one byte of eight, where hostile arguments may be chosen.
-    pub(crate) fn rarely(&mut self) -> bool {
+    pub fn rarely(&mut self) -> bool {
         self.byte() >= 224 && self.hostile
     }
 
-    pub(crate) fn shape(&mut self) -> Shape {
+    pub fn shape(&mut self) -> Shape {
         match self.byte() {
             _ if !self.hostile => Shape::Right,
             0..=231 => Shape::Right,
@@ -45,7 +45,7 @@ impl<'a> Choice<'a> {
     }
 
     /// An array of `count` items.
-    pub(crate) fn array<T>(
+    pub fn array<T>(
         &mut self,
         count: usize,
         mut item: impl FnMut(&mut Self) -> T,
@@ -55,7 +55,7 @@ impl<'a> Choice<'a> {
     }
 
     /// One place to write to.
-    pub(crate) fn place<T: Clone>(&mut self, before: T) -> Array<T> {
+    pub fn place<T: Clone>(&mut self, before: T) -> Array<T> {
         let shape = match self.shape() {
             Shape::Huge => Shape::Right,
             shape => shape,
@@ -64,25 +64,25 @@ impl<'a> Choice<'a> {
     }
 
     /// A length of arrays.
-    pub(crate) fn count(&mut self) -> usize {
+    pub fn count(&mut self) -> usize {
         self.of(&[1, 2, 3, 1, 0])
     }
 
     /// A value reference below `count` that `fits`, or any other.
-    pub(crate) fn reference(&mut self, count: u32, fits: impl Fn(u32) -> bool) -> u32 {
+    pub fn reference(&mut self, count: u32, fits: impl Fn(u32) -> bool) -> u32 {
         let fine: Vec<_> = (0..count).filter(|own| fits(*own)).collect();
         let odd: Vec<_> = (0..count).chain([count, 1 << 31, u32::MAX]).collect();
         if fine.is_empty() { self.of(&odd) } else { self.either(&fine, &odd) }
     }
 
-    pub(crate) fn real(&mut self) -> f64 {
+    pub fn real(&mut self) -> f64 {
         const ODD: [f64; 8] =
             [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -0.0, 1e300, 5e-324, 11.0, -11.0];
         let fine = f64::from(self.byte() % 16) - 4.0;
         self.either(&[fine], &ODD)
     }
 
-    pub(crate) fn text(&mut self) -> Text {
+    pub fn text(&mut self) -> Text {
         let bytes = match self.byte() {
             byte @ 0..=199 => vec![b'a' + byte % 26; usize::from(byte % 5)],
             200..=227 => "100 %s%n #1 ä".into(),
@@ -96,7 +96,7 @@ impl<'a> Choice<'a> {
 }
 
 /// The status that an array deserves: an error unless it can be used, or has nothing in it.
-pub(crate) fn usable<T>(array: &Array<T>) -> bool {
+pub fn usable<T>(array: &Array<T>) -> bool {
     match array.shape {
         Shape::Right => true,
         Shape::Null | Shape::Misaligned => array.items.is_empty(),

@@ -2,9 +2,9 @@
 
 use std::thread;
 
-use crate::array::Array;
-use crate::importer::Importer;
-use crate::targets::order;
+use robustness::array::Array;
+use robustness::importer::Importer;
+use robustness::exporter::order;
 
 const OK: i32 = 0;
 const COUNT: usize = if cfg!(miri) { 2 } else { 40 };

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use crate::config::{Config, parse};
+use study::config::{Config, parse};
 
 /// A `system.toml`: what was read is written, and reads back as the same; an error says where.
-pub(crate) fn system_toml(data: &[u8]) {
+pub fn system_toml(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let mut config = match parse(text, Path::new("/models/system.toml")) {
         Ok(config) => config,
