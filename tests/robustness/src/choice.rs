@@ -45,11 +45,7 @@ impl<'a> Choice<'a> {
     }
 
     /// An array of `count` items.
-    pub fn array<T>(
-        &mut self,
-        count: usize,
-        mut item: impl FnMut(&mut Self) -> T,
-    ) -> Array<T> {
+    pub fn array<T>(&mut self, count: usize, mut item: impl FnMut(&mut Self) -> T) -> Array<T> {
         let shape = self.shape();
         Array { items: (0..count).map(|_| item(self)).collect(), shape }
     }

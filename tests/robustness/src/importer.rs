@@ -253,12 +253,7 @@ impl Importer {
         call!(self.set_debug_logging(on.into(), categories.count(), categories.pointer()))
     }
 
-    pub fn setup_experiment(
-        &self,
-        tolerance: Option<f64>,
-        start: f64,
-        stop: Option<f64>,
-    ) -> c_int {
+    pub fn setup_experiment(&self, tolerance: Option<f64>, start: f64, stop: Option<f64>) -> c_int {
         call!(self.setup_experiment(
             tolerance.is_some().into(),
             tolerance.unwrap_or(-1.0),
@@ -368,11 +363,7 @@ impl Importer {
         call!(self.free_fmu_state(state.map_or(null_mut(), |state| &raw mut state.0)))
     }
 
-    pub fn serialized_fmu_state_size(
-        &self,
-        state: &Saved,
-        size: &mut Array<usize>,
-    ) -> c_int {
+    pub fn serialized_fmu_state_size(&self, state: &Saved, size: &mut Array<usize>) -> c_int {
         call!(self.serialized_fmu_state_size(state.0, size.pointer_mut()))
     }
 
@@ -381,11 +372,7 @@ impl Importer {
         call!(self.serialize_fmu_state(state.0, bytes.pointer_mut().cast(), count))
     }
 
-    pub fn de_serialize_fmu_state(
-        &self,
-        bytes: &Array<u8>,
-        state: Option<&mut Saved>,
-    ) -> c_int {
+    pub fn de_serialize_fmu_state(&self, bytes: &Array<u8>, state: Option<&mut Saved>) -> c_int {
         let state = state.map_or(null_mut(), |state| &raw mut state.0);
         call!(self.de_serialize_fmu_state(bytes.pointer().cast(), bytes.count(), state))
     }

@@ -13,8 +13,10 @@ pub const DISCARD: u8 = 1 << 2;
 pub const ERROR: u8 = 1 << 3;
 pub const FATAL: u8 = 1 << 4;
 
-const EXCHANGE: &str = include_str!("../../../crates/fmu-description/src/call_order/section_3_2_3.csv");
-const SIMULATION: &str = include_str!("../../../crates/fmu-description/src/call_order/section_4_2_4.csv");
+const EXCHANGE: &str =
+    include_str!("../../../crates/fmu-description/src/call_order/section_3_2_3.csv");
+const SIMULATION: &str =
+    include_str!("../../../crates/fmu-description/src/call_order/section_4_2_4.csv");
 
 /// Entries of a table, by function and state.
 type Table = Vec<[bool; State::EVERY.len()]>;
@@ -108,12 +110,7 @@ impl Core {
     }
 
     /// The statuses that the call may have: `verdict` is what its arguments deserve.
-    pub fn statuses(
-        &self,
-        function: Function,
-        verdict: u8,
-        mischief: Option<Mischief>,
-    ) -> u8 {
+    pub fn statuses(&self, function: Function, verdict: u8, mischief: Option<Mischief>) -> u8 {
         if self.state == State::Fatal {
             return FATAL;
         }

@@ -6,10 +6,10 @@ use fmu::call_order::{Function, State};
 
 use crate::calls::{CALLS, Call, Kept, Outcome, Stores};
 use crate::choice::Choice;
+use crate::exporter::{c_text, guid, order};
 use crate::importer::{HEARS, Importer, Message, Order, Saved};
 use crate::machine::{Mischief, Place, alive, happened, with_plan};
 use crate::prediction::{Core, DISCARD, OK, in_table};
-use crate::exporter::{c_text, guid, order};
 
 /// How many bytes one call may use.
 pub const LENGTH: usize = 24;

@@ -8,9 +8,9 @@ use std::thread;
 use fmu_description::abi::fmi2EventInfo;
 
 use robustness::array::Array;
+use robustness::exporter::order;
 use robustness::importer::{HEARS, Importer};
 use robustness::machine::{Mischief, Place, with_plan};
-use robustness::exporter::order;
 
 const FATAL: i32 = 4;
 
@@ -70,7 +70,7 @@ fn panic_in_a_step(importer: &Importer) {
 
 /// `file:line:` of the line that contains `text` in the source of the machine.
 fn place_of(text: &str) -> String {
-    let source = include_str!("machine.rs");
+    let source = include_str!("../../src/machine.rs");
     let line = source.lines().position(|line| line.contains(text)).unwrap() + 1;
     format!("machine.rs:{line}:")
 }

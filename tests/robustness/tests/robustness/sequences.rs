@@ -6,10 +6,10 @@ use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 
 use robustness::calls::CALLS;
+use robustness::exporter::order;
 use robustness::importer::{Importer, describe};
 use robustness::machine::{Mischief, Place, with_plan};
 use robustness::sequence::{FREE, HOSTILE, ILLEGAL, LENGTH, run};
-use robustness::exporter::order;
 
 /// Bytes for up to `calls` calls; `first` says which instance and whether calls may be illegal.
 fn bytes(first: impl Strategy<Value = u8>, calls: usize) -> impl Strategy<Value = Vec<u8>> {

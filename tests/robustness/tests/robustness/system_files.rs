@@ -1,7 +1,6 @@
 //! No file that the master reads does any harm, whatever is in it.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
-
 use robustness::changes::mutate;
 use robustness::corpus::replay;
 use robustness::system_files as targets;

@@ -1,6 +1,5 @@
 //! No `system.toml` does any harm, whatever is in it.
 
-
 use robustness::system_toml::system_toml;
 use robustness::{changes, corpus};
 

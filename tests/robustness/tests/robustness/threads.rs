@@ -3,8 +3,8 @@
 use std::thread;
 
 use robustness::array::Array;
-use robustness::importer::Importer;
 use robustness::exporter::order;
+use robustness::importer::Importer;
 
 const OK: i32 = 0;
 const COUNT: usize = if cfg!(miri) { 2 } else { 40 };

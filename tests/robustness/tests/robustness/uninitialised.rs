@@ -9,9 +9,9 @@ use std::mem::MaybeUninit;
 use fmu::ffi;
 use fmu_description::abi::{fmi2Component, fmi2EventInfo};
 
+use robustness::exporter::order;
 use robustness::importer::{Importer, Saved};
 use robustness::machine::Machine;
-use robustness::exporter::order;
 
 /// What `fill` makes of `N` places.
 fn filled<T: Copy, const N: usize>(fill: impl FnOnce(*mut T) -> c_int) -> [T; N] {

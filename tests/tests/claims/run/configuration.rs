@@ -162,9 +162,13 @@ fn the_former_name_of_the_extrapolation_is_taken_with_a_warning() {
         printed(&output);
         (bench.read("out/results.csv"), said)
     };
-    let (held, silent) = run(&coupled(&["--stop-time=0.2", "--extrapolation=hold"]));
+    let run_coupled = |more: &[&str]| {
+        let arguments = coupled(more);
+        run(&arguments.iter().map(String::as_str).collect::<Vec<_>>())
+    };
+    let (held, silent) = run_coupled(&["--stop-time=0.2", "--extrapolation=hold"]);
     assert_eq!(silent, "");
-    let (former, said) = run(&coupled(&["--stop-time=0.2", "--course=hold"]));
+    let (former, said) = run_coupled(&["--stop-time=0.2", "--course=hold"]);
     assert_eq!(former, held);
     assert!(said.contains("--course is now called --extrapolation"), "{said}");
     let rest = "\n[experiment]\nstop-time = 0.2\n\n[algorithm]\ncourse = 'hold'\n";
