@@ -120,7 +120,7 @@ impl Pencil {
             let shift = if i == j { s.conj() } else { Complex::new(0.0, 0.0) };
             Complex::new(entry, 0.0) - shift
         });
-        let (value, u) = ComplexSvd::new(&adjoint)?.from_smallest(0);
+        let (value, u) = ComplexSvd::new(&adjoint)?.nth_smallest(0);
         let image = to_complex(&self.a) * &u;
         Ok((value, u.dotc(&image)))
     }

@@ -176,8 +176,8 @@ fn uncontrollable_part(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Vec<Mode>, 
         let earlier = found[..at].iter().filter(|other| (*other - eigenvalue).norm() <= same);
         let shifted = &rest - DMatrix::identity(rest.nrows(), rest.nrows()) * eigenvalue;
         let svd = ComplexSvd::new(&shifted)?;
-        let (value, vector) = svd.from_smallest(earlier.count());
-        let vector = if value <= same { vector } else { svd.from_smallest(0).1 };
+        let (value, vector) = svd.nth_smallest(earlier.count());
+        let vector = if value <= same { vector } else { svd.nth_smallest(0).1 };
         Ok(mode_in_given_coordinates(eigenvalue, &staircase, &vector))
     };
     found.iter().enumerate().map(mode).collect()

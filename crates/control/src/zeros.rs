@@ -99,11 +99,11 @@ fn scaled(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> StateSpace {
 /// One pass of the reduction, with `zero` the threshold of the ranks:
 ///
 /// 1. An orthogonal change of the outputs splits y = C x + D u into outputs y1 with a D1 of full
-///   row rank and outputs y2 = C2 x that D does not reach.
+///    row rank and outputs y2 = C2 x that D does not reach.
 /// 2. At a zero y2 = 0, which fixes as many states as C2 has independent rows. An orthogonal change
-/// of the states separates the fixed states from the free ones.
+///    of the states separates the fixed states from the free ones.
 /// 3. The fixed states are zero, so that the right-hand sides of their differential equations
-///   become outputs of the free states.
+///    become outputs of the free states.
 ///
 /// The passes end when C2 fixes no further state.
 fn reduced(mut system: StateSpace, zero: f64) -> Result<StateSpace, Error> {

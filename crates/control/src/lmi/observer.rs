@@ -205,14 +205,12 @@ impl<'a> ObserverProgram<'a> {
         for (name, matrix) in region.inequalities(&p, &dynamics, domain, self.coordinates.unit) {
             problem.require(name, &matrix, MARGIN);
         }
-        let level = match level {
-            Some(given) => Affine::identity(1, given),
-            None => {
-                let unknown = problem.scalar();
-                problem.minimise(&unknown);
-                unknown
-            }
-        };
+        let given = level.map(|value| Affine::identity(1, value));
+        let level = given.unwrap_or_else(|| {
+            let unknown = problem.scalar();
+            problem.minimise(&unknown);
+            unknown
+        });
         if let Some(performance) = performance {
             problem.constrain(&p, MARGIN);
             problem.constrain(&(&Affine::identity(n, LARGEST) - &p), MARGIN);
