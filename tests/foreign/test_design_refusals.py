@@ -81,7 +81,7 @@ WRONG = [
         "5:30: fault `slope` cannot be seen from the measurements y1",
     ),
     ("[-5, -6, -7]", "[-5, -6]", "6:24: expected 3 eigenvalues"),
-    ("[-5, -6, -7]", "[-5, -5, -7]", "6:24: the eigenvalue -5 is wanted 2 times, at most 1"),
+    ("[-5, -6, -7]", "[-5, -5, -7]", "6:24: the eigenvalue -5 is requested 2 times, expected at most 1"),
     (
         "observer.eigenvalues = [-5, -6, -7]",
         "observer.region = { decay = 10, disc = { center = -5, radius = 2 } }",

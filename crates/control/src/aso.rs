@@ -9,24 +9,25 @@
 //! u      = K_x x_hat + K_f f_hat                              (2)
 //! ```
 //!
-//! The paper has constant faults, `A_f` = 0; other fault models f' = `A_f` f are made by
-//! [`crate::faults`]. The general form holds for any u that the actuator really applies. With (2) in full and B `K_f`
-//! = -`F_a` the two terms with `f_hat` cancel and (4) is left as printed. The estimation error e =
-//! x - `x_hat` obeys (9) to (11) in both cases, because `F_a` takes the place of -B `K_f`:
+//! The paper treats constant faults, `A_f` = 0; [`crate::faults`] builds other fault models f' =
+//! `A_f` f. The general form holds for every command u that the actuator applies. If u is (2)
+//! without saturation and B `K_f` = -`F_a`, the two terms with `f_hat` cancel and (4) is obtained
+//! as printed. The estimation error e = x - `x_hat` follows (9) to (11) in both cases, with `F_a`
+//! in place of -B `K_f`:
 //!
 //! ```text
 //! [e; f_hat]' = (A_0 - L C_0) [e; f_hat] - F_0 f_a
 //! A_0 = [A, -F_a; 0, A_f],  C_0 = [C, 0],  L = [L_x; -L_f],  F_0 = [-F_a; 0]
 //! ```
 //!
-//! With eps = `f_hat` - f in the place of `f_hat` the same matrix belongs to a disturbance by what
-//! the fault model misses:
+//! With eps = `f_hat` - f in place of `f_hat` the same matrix is driven by the part of f' that the
+//! fault model does not predict:
 //!
 //! ```text
 //! [e; eps]' = (A_0 - L C_0) [e; eps] - [0; f' - A_f f]
 //! ```
 //!
-//! In sampled time the same matrices hold with x[k+1], f[k+1] for x', f'; constant faults have
+//! In sampled time the same equations hold with x[k+1], f[k+1] for x', f'; constant faults have
 //! `A_f` = I.
 
 mod gains;
@@ -39,26 +40,28 @@ use crate::placement::{Placement, Quality, place, place_balanced};
 use crate::{Error, check};
 use nalgebra::{Complex, DMatrix};
 
-/// A designed controller and how well it is designed.
+/// A designed controller and the quality of the design.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct AsoDesign {
     /// The gains.
     pub gains: Gains,
-    /// Norm of B `K_f` + `F_a` relative to that of `F_a` (Frobenius): the part of the fault's
-    /// effect that the compensation cannot cancel. Zero when `F_a` lies in the range of B. States
-    /// of a measurement filter do not count.
+    /// Frobenius norm of B `K_f` + `F_a` relative to the norm of `F_a`: the part of the effect of
+    /// the faults that the compensation cannot cancel. Zero when the columns of `F_a` are in the
+    /// range of B. States of a measurement filter do not count.
     pub cancellation_residual: f64,
-    /// Quality of the eigenvalues of A + B `K_x`.
+    /// Quality of the assignment for A + B `K_x`.
     pub controller: Quality,
-    /// Quality of the eigenvalues of `A_0` - L `C_0`, for its transpose.
+    /// Quality of the assignment for the transpose of `A_0` - L `C_0`.
     pub observer: Quality,
 }
 
-/// One of the assignments of [`crate::placement`].
+/// A function of [`crate::placement`] that assigns eigenvalues.
 pub(crate) type Place =
     fn(&DMatrix<f64>, &DMatrix<f64>, &[Complex<f64>]) -> Result<Placement, Error>;
 
-/// The observer gain, (n + q) x p, that gives `A_0` - L `C_0` the eigenvalues `poles`.
+/// Computes the observer gain L, (n + q) x p, such that `A_0` - L `C_0` has the eigenvalues
+/// `poles`.
 pub(crate) fn place_observer(
     (a_0, c_0): (&DMatrix<f64>, &DMatrix<f64>),
     poles: &[Complex<f64>],
@@ -68,7 +71,8 @@ pub(crate) fn place_observer(
     Ok((-placed.gain.transpose(), placed.quality))
 }
 
-/// `K_x` for the first `states` states, which the others do not act on; zero for the others.
+/// Computes `K_x` for the first `states` states, on which the other states do not act; the columns
+/// of the other states are zero.
 pub(crate) fn place_controller(
     (plant, states): (&FaultyPlant, usize),
     poles: &[Complex<f64>],
@@ -80,16 +84,17 @@ pub(crate) fn place_controller(
     Ok(placed)
 }
 
-/// Designs the controller: A + B `K_x` and `A_0` - L `C_0` get the wanted eigenvalues.
+/// Designs the controller: assigns the eigenvalues of A + B `K_x` and of `A_0` - L `C_0`.
 ///
-/// `controller_poles`: n, `observer_poles`: n + q, of negative real part for a stable loop, in
-/// the unit of A; `k_f`: m x q, or None for [`FaultyPlant::compensation_gain`]. The design exists when (A, B)
-/// is controllable and [`FaultyPlant::check_observer_exists`] holds. Method, cost and tolerance:
-/// those of [`place`] on (A, B) and of [`place_balanced`] on (`A_0`', `C_0`').
+/// `controller_poles`: n, `observer_poles`: n + q, in the unit of A, of negative real part for a
+/// stable loop; `k_f`: m x q, or None for [`FaultyPlant::compensation_gain`]. The design exists
+/// when (A, B) is controllable and [`FaultyPlant::check_observer_exists`] succeeds. Method, cost
+/// and tolerance: [`place`] for (A, B), [`place_balanced`] for (`A_0`', `C_0`').
 ///
 /// # Example
 ///
-/// A mass pushed by a force, against an unknown constant force, with its position measured:
+/// A mass with a commanded force and an unknown constant force against it; the position is
+/// measured:
 ///
 /// ```
 /// use control::aso::{FaultyPlant, design};
@@ -111,8 +116,8 @@ pub(crate) fn place_controller(
 ///
 /// # Errors
 ///
-/// Those of [`place`], of [`FaultyPlant::check_observer_exists`] and of
-/// [`FaultyPlant::compensation_gain`]; [`Error::Shape`], [`Error::NotFinite`] for a bad `k_f`.
+/// Same as [`place`] and [`FaultyPlant::check_observer_exists`]; [`Error::Shape`],
+/// [`Error::NotFinite`] for a bad `k_f`.
 pub fn design(
     plant: &FaultyPlant,
     controller_poles: &[Complex<f64>],
@@ -122,7 +127,8 @@ pub fn design(
     design_feedback(plant, plant.a.nrows(), controller_poles, observer_poles, k_f)
 }
 
-/// [`design`] with feedback of the first `states` states only; the others are a measurement filter.
+/// [`design`] with feedback of the first `states` states only; the other states are a measurement
+/// filter.
 pub(crate) fn design_feedback(
     plant: &FaultyPlant,
     states: usize,
@@ -154,7 +160,8 @@ pub(crate) fn design_feedback(
     })
 }
 
-/// Norm of B `K_f` + `F_a` over that of `F_a`, in the rows of the plant; zero without a fault there.
+/// Norm of B `K_f` + `F_a` relative to the norm of `F_a`, in the rows of the plant; zero if no
+/// fault acts there.
 fn cancellation_residual(plant: &FaultyPlant, states: usize, k_f: &DMatrix<f64>) -> f64 {
     let size = plant.f_a.rows(0, states).norm();
     let left = (&plant.b * k_f + &plant.f_a).rows(0, states).norm();

@@ -1,15 +1,16 @@
-//! Diagonal scaling of states by powers of two, so that no rounding enters.
+//! Diagonal scaling of states by powers of two, which does not round.
 
 use nalgebra::{DMatrix, DVector};
 
 const SWEEPS: usize = 100;
-/// A scaling is kept only if it lowers the sum of the norms by 5 %.
+/// A scaling is applied only if it reduces the sum of the norms by 5 %.
 const WORTHWHILE: f64 = 0.95;
 
-/// S^-1 A S with the positive diagonal S that brings the norms of row i and column i together.
+/// The balanced matrix S^-1 A S, S diagonal and positive such that row i and column i have about
+/// the same norm.
 ///
-/// Osborne (1960), Parlett and Reinsch (1969), in the 1-norm without the diagonal. A row or column
-/// without other entries leaves its state as it is.
+/// Osborne (1960), Parlett and Reinsch (1969), in the 1-norm without the diagonal. The scale of a
+/// state whose row or column has no other entries is not changed.
 pub(crate) struct Balance {
     pub(crate) matrix: DMatrix<f64>,
     /// Diagonal of S, powers of two.
@@ -45,13 +46,14 @@ impl Balance {
         true
     }
 
-    /// S M S^-1: a function of the balanced matrix brought back to the given coordinates.
+    /// S M S^-1: transforms a function M of the balanced matrix back to the coordinates of A.
     pub(crate) fn restore(&self, m: &DMatrix<f64>) -> DMatrix<f64> {
         DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] * (self.scale[i] / self.scale[j]))
     }
 }
 
-/// The power of two nearest to x > 0 on the logarithmic scale; what is not normal stays as it is.
+/// The power of two nearest to x > 0 on the logarithmic scale; a number that is not normal is
+/// returned unchanged.
 pub(crate) fn power_of_two(x: f64) -> f64 {
     if !x.is_normal() {
         return x;
@@ -81,7 +83,7 @@ pub(crate) fn divide_columns(m: &DMatrix<f64>, d: &DVector<f64>) -> DMatrix<f64>
     DMatrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] / d[j])
 }
 
-/// Each column divided by its norm; a zero column stays.
+/// Divides each column by its norm; a zero column is not changed.
 pub(crate) fn unit_columns(m: &DMatrix<f64>) -> DMatrix<f64> {
     let mut scaled = m.clone();
     for mut column in scaled.column_iter_mut() {

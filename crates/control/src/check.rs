@@ -1,9 +1,9 @@
-//! Guards at the doors: shape and finiteness of arguments.
+//! Checks of arguments: shape, finiteness, sign.
 
 use crate::Error;
 use nalgebra::DMatrix;
 
-/// Every entry is finite, and there is at least one.
+/// Checks that every entry is finite and that there is at least one.
 pub(crate) fn finite(matrix: &'static str, m: &DMatrix<f64>) -> Result<(), Error> {
     if m.is_empty() {
         return Err(Error::Empty { matrix, found: m.shape() });
@@ -17,7 +17,7 @@ pub(crate) fn finite(matrix: &'static str, m: &DMatrix<f64>) -> Result<(), Error
     }
 }
 
-/// Finite, and of the expected shape.
+/// Checks that a matrix is finite and has the expected shape.
 pub(crate) fn shape(
     matrix: &'static str,
     m: &DMatrix<f64>,
@@ -29,13 +29,13 @@ pub(crate) fn shape(
     finite(matrix, m)
 }
 
-/// Finite and square; the answer is its order.
+/// Checks that a matrix is finite and square; returns its order.
 pub(crate) fn square(matrix: &'static str, m: &DMatrix<f64>) -> Result<usize, Error> {
     shape(matrix, m, (m.nrows(), m.nrows()))?;
     Ok(m.nrows())
 }
 
-/// A finite number above zero.
+/// Checks that a number is finite and above zero.
 pub(crate) fn positive(name: &'static str, value: f64) -> Result<(), Error> {
     if value.is_finite() && value > 0.0 {
         return Ok(());
@@ -43,7 +43,7 @@ pub(crate) fn positive(name: &'static str, value: f64) -> Result<(), Error> {
     Err(Error::OutOfRange { name, value, rule: "a finite number above zero" })
 }
 
-/// A computed matrix that left the range of double precision is an error, not a result.
+/// Checks that a computed matrix is within the range of double precision.
 pub(crate) fn in_range(what: &'static str, m: DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
     if m.iter().all(|value| value.is_finite()) { Ok(m) } else { Err(Error::Overflow { what }) }
 }

@@ -1,4 +1,4 @@
-//! Which faults can be estimated, and why not the others.
+//! Tests which faults the measurements make it possible to estimate.
 
 mod hidden;
 mod visibility;
@@ -13,42 +13,44 @@ use crate::rank::{Mode, Rank, observability, unobservable_modes};
 use crate::zeros::{Zeros, zeros};
 use crate::{Domain, Error};
 
-/// What there is to know about estimating the faults of a plant.
+/// The conditions for estimating the faults of a plant.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Detectability {
     /// Rank of (A, C).
     pub observability: Rank,
-    /// The modes of A that no measurement shows, and whether each is stable. With stable ones only
-    /// (A, C) is detectable: an observer exists, but these eigenvalues stay where they are.
+    /// The unobservable modes of A, each with whether it is stable. If all are stable, (A, C) is
+    /// detectable: an observer exists, but it cannot move these eigenvalues.
     pub unobservable: Vec<(Mode, bool)>,
-    /// The combinations of faults that are hidden by states. None: with (A, C) observable, the
-    /// augmented observer exists.
+    /// The combinations of faults that the measurements cannot tell from motions of the states. If
+    /// there are none and (A, C) is observable, the augmented observer exists.
     pub hidden: Vec<HiddenFault>,
-    /// Rank of (`A_0`, `C_0`): full if and only if the observer can have any eigenvalues.
+    /// Rank of (`A_0`, `C_0`): full if and only if the eigenvalues of the observer can be assigned
+    /// arbitrarily.
     pub augmented: Rank,
-    /// Distance of (`A_0`, `C_0`) from the nearest pair that is not observable.
+    /// Distance of (`A_0`, `C_0`) from the nearest unobservable pair.
     pub distance: Distance,
     /// Invariant zeros of (A, `F_a`, C). A fault that develops as e^(s t), or s^k when sampled, is
     /// blocked at a zero s.
     pub zeros: Zeros,
-    /// What each measurement (outer) shows of each column of `F_a` (inner).
+    /// The effect of each column of `F_a` (inner index) on each measurement (outer index).
     pub visibility: Vec<Vec<Visibility>>,
 }
 
 impl Detectability {
-    /// Whether the augmented observer exists and can have any wanted eigenvalues.
+    /// Whether the augmented observer exists and its eigenvalues can be assigned arbitrarily.
     #[must_use]
     pub fn observer_exists(&self) -> bool {
         self.observability.is_full() && self.hidden.is_empty() && self.augmented.is_full()
     }
 
-    /// Whether every mode that no measurement shows is stable.
+    /// Whether every unobservable mode is stable.
     #[must_use]
     pub fn is_detectable(&self) -> bool {
         self.unobservable.iter().all(|(_, stable)| *stable)
     }
 
-    /// The columns of `F_a` that no measurement shows, from zero.
+    /// Indices, from zero, of the columns of `F_a` that no measurement shows.
     #[must_use]
     pub fn invisible_faults(&self) -> Vec<usize> {
         let faults = self.visibility.first().map_or(0, Vec::len);
@@ -56,16 +58,17 @@ impl Detectability {
     }
 }
 
-/// Examines whether and how the faults of a plant show in its measurements.
+/// Tests whether and how the faults of a plant appear in its measurements.
 ///
-/// `plant`: in the given `domain`. The augmented observer with any wanted eigenvalues exists when
-/// (`A_0`, `C_0`) is observable, see [`FaultyPlant::check_observer_exists`]; this function does not
-/// stop at the first condition that fails, but answers all of them. Methods, cost and tolerances:
-/// those of [`observability`], [`zeros`], [`from_unobservable`].
+/// `plant`: in the given `domain`. An augmented observer with arbitrary eigenvalues exists when
+/// (`A_0`, `C_0`) is observable, see [`FaultyPlant::check_observer_exists`], which stops at the
+/// first condition that fails; this function tests all of them. Methods, cost and tolerances: see
+/// [`observability`], [`zeros`], [`from_unobservable`].
 ///
 /// # Example
 ///
-/// x' = v + f, v' = u with x measured: a constant error f of the rate looks like another velocity.
+/// x' = v + f, v' = u with x measured: a constant error f of the rate has the same effect as a
+/// change of the velocity v.
 ///
 /// ```
 /// use control::{Domain, aso::FaultyPlant, detectability::detectability};
@@ -85,7 +88,8 @@ impl Detectability {
 ///
 /// # Errors
 ///
-/// Those of [`FaultyPlant::check`], [`observability`], [`zeros`], [`from_unobservable`].
+/// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix of the plant;
+/// [`Error::NotConverged`] when an inner iteration does not end; [`Error::Overflow`].
 pub fn detectability(plant: &FaultyPlant, domain: Domain) -> Result<Detectability, Error> {
     plant.check()?;
     let with_stability = |mode: Mode| {

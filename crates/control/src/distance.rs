@@ -1,6 +1,7 @@
-//! How far a pair (A, B) or (A, C) is from one that is not controllable or observable.
+//! The distance of a pair (A, B) or (A, C) from the nearest uncontrollable or unobservable pair.
 //!
-//! Rank is yes or no; this is the size of the smallest change that turns yes into no.
+//! The rank only decides whether a pair is controllable; the distance is the size of the smallest
+//! change of the matrices that destroys controllability.
 
 use crate::balance::{Balance, divide_rows, unit_columns};
 use crate::blocks::to_complex;
@@ -11,49 +12,52 @@ use nalgebra::{Complex, DMatrix};
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-/// Most evaluations of the smallest singular value in the search of the plane.
+/// Largest number of evaluations of the smallest singular value in the search of the plane.
 const EVALUATIONS: usize = 1000;
-/// A distance below this is rounding; no search is made for its lower bound.
+/// A distance below this is within rounding; its lower bound is not searched for.
 const ROUNDING: f64 = 1e-14;
-/// The search ends when the lower bound reaches this part of the upper one.
+/// The search ends when the lower bound reaches this fraction of the upper bound.
 const CLOSE: f64 = 0.9;
 const DESCENT_STEPS: usize = 30;
-/// A step of the descent is worth its cost if it lowers the value by this part.
+/// The descent ends when a step lowers the value by less than this fraction.
 const WORTHWHILE: f64 = 1e-3;
 
-/// The distance of a scaled pair from the nearest one without the property.
+/// Bounds of the distance of a scaled pair from the nearest uncontrollable or unobservable one.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Distance {
-    /// The distance is at least this: proved up to rounding by a search of the whole plane. Zero
-    /// when the search could not exclude it within its bound of evaluations.
+    /// Lower bound, proven up to rounding by a search of the whole complex plane. Zero if the
+    /// search ended at its limit of evaluations before a larger bound was proven.
     pub lower: f64,
-    /// The distance is at most this: attained at `at`.
+    /// Upper bound, attained at `at`.
     pub upper: f64,
-    /// Where in the plane, in the unit of A: the eigenvalue that is lost first.
+    /// The point of the complex plane, in the unit of A: the eigenvalue that becomes uncontrollable
+    /// or unobservable first.
     pub at: Complex<f64>,
 }
 
-/// The distance of (A, B) from the nearest pair that is not controllable.
+/// Bounds the distance of (A, B) from the nearest uncontrollable pair.
 ///
 /// ```text
 /// min over all complex s of the smallest singular value of [A / r - s I, B],   r = norm of A
 /// ```
 ///
-/// `a`: n x n; `b`: n x m. First the states are balanced, A divided by its norm (2-norm; by one when
-/// A is zero) and the columns of B scaled to length one, so that neither units of states and inputs
-/// nor that of time decide. The number is then the 2-norm of the smallest complex change of the
-/// scaled [A, B] that takes controllability away: 1 is large, 1e-12 is rounding.
+/// `a`: n x n; `b`: n x m. First the states are balanced, A divided by its norm (2-norm; by one
+/// when A is zero) and the columns of B scaled to length one, so that the units of states, inputs
+/// and time do not matter. The distance is the 2-norm of the smallest complex change of the scaled
+/// [A, B] that makes the pair uncontrollable: 1 is large, 1e-12 is within rounding.
 ///
-/// The upper bound is the least value found; descents by s = u* A u, u the left singular vector,
-/// start from each eigenvalue of A and from each better point. The lower bound is sound: the value
-/// changes by no more than s does, so a square is excluded by the value at its centre less its half
-/// diagonal, and outside of |s| = 1 + upper nothing is lower. The most promising square is divided
-/// until the bounds agree to 10 %, at most 1000 evaluations, each some 100 (n + m) n^2
-/// multiplications; for a small distance or many states the lower bound may stay behind, and below
-/// 1e-14 it is zero.
+/// The upper bound is the smallest value found by descents s := u* A u, u the left singular vector,
+/// which start at each eigenvalue of A and at each better point of the search. The lower bound is a
+/// branch and bound: the singular value changes by at most the change of s, so that its value at
+/// the centre of a square less half the diagonal bounds it in the square; for |s| > 1 + upper it is
+/// larger than `upper`. The square with the lowest bound is divided until the bounds agree to 10 %,
+/// with at most 1000 evaluations of about 100 (n + m) n^2 multiplications each. For a small
+/// distance or many states the lower bound may remain far below the upper one; below 1e-14 it is
+/// zero.
 ///
-/// Source: R. Eising, Between controllable and uncontrollable, Systems and Control Letters 4 (1984);
-/// the bound by squares follows from Weyl's inequality for singular values.
+/// Source: R. Eising, Between controllable and uncontrollable, Systems and Control Letters 4
+/// (1984); the lower bound follows from Weyl's inequality for singular values.
 ///
 /// # Example
 ///
@@ -74,13 +78,13 @@ pub struct Distance {
 pub fn from_uncontrollable(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Distance, Error> {
     let n = check::square("A", a)?;
     check::shape("B", b, (n, b.ncols()))?;
-    Pencil::of(a, b)?.search()
+    Pencil::new(a, b)?.search()
 }
 
-/// The distance of (A, C) from the nearest pair that is not observable.
+/// Bounds the distance of (A, C) from the nearest unobservable pair.
 ///
-/// `a`: n x n; `c`: p x n. That of (A', C') from the nearest pair that is not controllable, see
-/// [`from_uncontrollable`].
+/// `a`: n x n; `c`: p x n. It equals the distance of (A', C') from the nearest uncontrollable pair,
+/// see [`from_uncontrollable`].
 ///
 /// # Errors
 ///
@@ -89,19 +93,19 @@ pub fn from_uncontrollable(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Distanc
 pub fn from_unobservable(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Distance, Error> {
     let n = check::square("A", a)?;
     check::shape("C", c, (c.nrows(), n))?;
-    Pencil::of(&a.transpose(), &c.transpose())?.search()
+    Pencil::new(&a.transpose(), &c.transpose())?.search()
 }
 
 /// The scaled pair.
 struct Pencil {
     a: DMatrix<f64>,
     b: DMatrix<f64>,
-    /// What A was divided by.
+    /// The norm by which A was divided.
     unit: f64,
 }
 
 impl Pencil {
-    fn of(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Self, Error> {
+    fn new(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Self, Error> {
         let Balance { matrix, scale } = Balance::new(a);
         let size = norm_2(&matrix)?;
         let unit = if size.is_normal() { size } else { 1.0 };
@@ -116,12 +120,12 @@ impl Pencil {
             let shift = if i == j { s.conj() } else { Complex::new(0.0, 0.0) };
             Complex::new(entry, 0.0) - shift
         });
-        let (value, u) = ComplexSvd::new(&adjoint)?.from_smallest(0);
+        let (value, u) = ComplexSvd::new(&adjoint)?.nth_smallest(0);
         let image = to_complex(&self.a) * &u;
         Ok((value, u.dotc(&image)))
     }
 
-    /// A point near s with a lower value: for a fixed u the best s is u* A u.
+    /// Descends from s: for a fixed u the smallest value is at s = u* A u.
     fn descend(&self, s: Complex<f64>) -> Result<(f64, Complex<f64>), Error> {
         let mut best = (f64::INFINITY, s);
         let mut s = s;
@@ -172,7 +176,8 @@ fn lower_of(one: (f64, Complex<f64>), other: (f64, Complex<f64>)) -> (f64, Compl
     if other.0 < one.0 { other } else { one }
 }
 
-/// A square of the plane in which no value is below `bound`; the heap gives the lowest first.
+/// A square of the plane in which no value is below `bound`; ordered so that a heap returns the
+/// lowest bound first.
 struct Square {
     bound: f64,
     centre: Complex<f64>,

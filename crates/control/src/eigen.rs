@@ -4,20 +4,20 @@ use crate::balance::Balance;
 use crate::{Error, check};
 use nalgebra::{Complex, ComplexField, DMatrix, DVector, Dyn, Schur};
 
-/// Iterations of the QR algorithm per row of the matrix; two or three are usual.
+/// Largest number of QR iterations per row of the matrix; two or three are usual.
 const ITERATIONS_PER_ROW: usize = 100;
 
-/// An entry below the diagonal is zero when it is smaller than this times its neighbours on the
-/// diagonal. Between equal eigenvalues the rounding errors, which are relative to the norm, may
-/// keep it above the first number for ever.
+/// An entry below the diagonal counts as zero below this fraction of its neighbours on the
+/// diagonal. The second value is tried if the first is never reached: between equal eigenvalues the
+/// rounding errors are relative to the norm of the matrix.
 const ZERO: [f64; 2] = [f64::EPSILON, 256.0 * f64::EPSILON];
 
 /// The eigenvalues of A, ordered by real part, then by imaginary part.
 ///
-/// `a`: n x n, finite. They always exist. Method: diagonal balancing (Parlett and Reinsch 1969),
-/// then the QR algorithm with a bounded number of iterations; about 10 n^3 multiplications. The
-/// answer is exact for a matrix that differs from the balanced A by a few rounding errors of its
-/// norm. Complex eigenvalues come as exact conjugates.
+/// `a`: n x n, finite. Method: diagonal balancing (Parlett and Reinsch 1969), then the QR algorithm
+/// with a bounded number of iterations; about 10 n^3 multiplications. The result is exact for a
+/// matrix that differs from the balanced A by a few units of rounding of its norm. Complex
+/// eigenvalues are exact conjugates.
 ///
 /// # Example
 ///
@@ -43,7 +43,7 @@ pub fn eigenvalues(a: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, Error> {
     Ok(found)
 }
 
-/// Schur form with bounded iterations.
+/// The Schur form, with a bounded number of iterations.
 pub(crate) fn schur<T>(m: &DMatrix<T>) -> Result<Schur<T, Dyn>, Error>
 where
     T: ComplexField<RealField = f64>,
@@ -56,8 +56,8 @@ where
 
 /// H M H with the reflection H = I - 2 v v' / (v'v), v = (1, 1/2, 1/3, ...).
 ///
-/// The shifts of the QR algorithm stand still on some matrices with many symmetries, permutations
-/// for example. The reflection breaks the symmetry and changes no eigenvalue.
+/// The shifts of the QR algorithm do not converge on some matrices with many symmetries,
+/// permutations for example. The reflection breaks the symmetry and preserves the eigenvalues.
 fn reflected(m: &DMatrix<f64>) -> DMatrix<f64> {
     let mut divisor = 0.0;
     let v = DVector::from_fn(m.nrows(), |_, _| {

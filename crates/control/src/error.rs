@@ -1,8 +1,8 @@
-//! The reasons for which a computation is refused.
+//! The errors of this crate.
 
 use nalgebra::Complex;
 
-/// Why a computation was refused. Rows and columns count from 1, as in the literature.
+/// The reason for which a computation failed. Rows and columns count from 1, as in the literature.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -53,7 +53,7 @@ pub enum Error {
         name: &'static str,
         /// Its value.
         value: f64,
-        /// The rule it breaks.
+        /// The range.
         rule: &'static str,
     },
     /// The pair (A, B) is not controllable.
@@ -67,14 +67,14 @@ pub enum Error {
     /// The pair (A, C) is not observable.
     #[error("the pair (A, C) is not observable: {rank} of {n} states can be seen")]
     NotObservable {
-        /// Dimension of the observable quotient.
+        /// Rank of the observability matrix.
         rank: usize,
         /// Number of states.
         n: usize,
     },
-    /// More fault channels than measurements: no observer tells them apart.
+    /// There are more fault channels than measurements, so that no observer can distinguish them.
     #[error(
-        "{faults} fault channels need at least as many independent measurements, \
+        "{faults} fault channels need at least {faults} independent measurements, \
          found {measurements}"
     )]
     TooManyFaults {
@@ -83,22 +83,22 @@ pub enum Error {
         /// Rows of C.
         measurements: usize,
     },
-    /// A fault is hidden by a state that develops like it.
+    /// The measurements cannot distinguish a fault from a motion of the states.
     #[error(
         "a fault that develops with {} cannot be told from a state: rank [A - s I, F_a; C, 0] is \
          {rank}, expected {expected}; it hides in the columns {faults:?} of F_a", development(*at)
     )]
     HiddenFault {
-        /// s, an eigenvalue of the fault model: 0 for a constant fault, 1 when sampled.
+        /// s, an eigenvalue of the fault model: 0 for a constant fault, 1 in sampled time.
         at: Complex<f64>,
-        /// Rank of the matrix, `F_a` taken times the eigenvectors of the fault model.
+        /// Rank of [A - s I, `F_a` N; C, 0], N the eigenvectors of the fault model.
         rank: usize,
         /// Number of its columns.
         expected: usize,
         /// Columns of `F_a` that take part in one hidden combination, from 1.
         faults: Vec<usize>,
     },
-    /// Not one eigenvalue per state.
+    /// The number of eigenvalues differs from the number of states.
     #[error("{found} eigenvalues are given, expected {expected}, one per state")]
     PoleCount {
         /// Number of states.
@@ -106,33 +106,35 @@ pub enum Error {
         /// Number of eigenvalues given.
         found: usize,
     },
-    /// An eigenvalue is wanted more often than there are independent inputs.
+    /// An eigenvalue is requested more often than there are independent inputs.
     #[error(
-        "the eigenvalue {} is wanted {times} times, at most {inputs} are possible", shown(*.pole)
+        "the eigenvalue {} is requested {times} times, expected at most {inputs}, the rank of B", shown(*.pole)
     )]
     RepeatedPole {
         /// The eigenvalue.
         pole: Complex<f64>,
-        /// How often it is wanted.
+        /// How often it is requested.
         times: usize,
         /// Rank of B.
         inputs: usize,
     },
-    /// A complex eigenvalue is wanted more often than its conjugate.
-    #[error("the eigenvalue {} is wanted without its conjugate {}", shown(*.pole), shown(.pole.conj()))]
+    /// A complex eigenvalue is requested more often than its conjugate.
+    #[error("the eigenvalue {} is requested without its conjugate {}", shown(*.pole), shown(.pole.conj()))]
     UnpairedPole {
         /// The eigenvalue.
         pole: Complex<f64>,
     },
-    /// The gain found does not give the wanted eigenvalues.
-    #[error("the wanted eigenvalues are missed by {relative:e} relative, allowed is {allowed:e}")]
+    /// The computed gain does not assign the requested eigenvalues.
+    #[error(
+        "the assigned eigenvalues differ from the requested ones by {relative:e} relative, expected at most {allowed:e}"
+    )]
     PolesMissed {
         /// Largest relative distance.
         relative: f64,
         /// Largest relative distance allowed.
         allowed: f64,
     },
-    /// An eigenvalue lies in the closed right half plane.
+    /// A matrix has an eigenvalue in the closed right half plane.
     #[error("{matrix} is not Hurwitz: its largest real part is {abscissa}")]
     NotHurwitz {
         /// Name of the matrix.
@@ -140,7 +142,7 @@ pub enum Error {
         /// Largest real part of the eigenvalues.
         abscissa: f64,
     },
-    /// An eigenvalue lies on the unit circle or outside.
+    /// A matrix has an eigenvalue on or outside the unit circle.
     #[error("{matrix} is not Schur stable: its spectral radius is {radius}")]
     NotSchur {
         /// Name of the matrix.
@@ -148,7 +150,7 @@ pub enum Error {
         /// Largest absolute value of the eigenvalues.
         radius: f64,
     },
-    /// No feedback moves an eigenvalue that has to be moved.
+    /// (A, B) has an unstable mode that is not controllable.
     #[error(
         "the pair (A, B) is not stabilisable: no feedback moves the eigenvalue {:.6}{:+.6}i",
         eigenvalue.re, eigenvalue.im
@@ -157,7 +159,7 @@ pub enum Error {
         /// The eigenvalue of A.
         eigenvalue: Complex<f64>,
     },
-    /// No observer moves an eigenvalue that has to be moved.
+    /// (A, C) has an unstable mode that is not observable.
     #[error(
         "the pair (A, C) is not detectable: no observer moves the eigenvalue {:.6}{:+.6}i",
         eigenvalue.re, eigenvalue.im
@@ -166,9 +168,10 @@ pub enum Error {
         /// The eigenvalue of A.
         eigenvalue: Complex<f64>,
     },
-    /// An eigenvalue on the limit of stability that the weight does not reach stays there.
+    /// A mode on the stability limit does not appear in the weight, so that no stabilising solution
+    /// exists.
     #[error(
-        "{weight} does not reach the eigenvalue {:.6}{:+.6}i on the limit of stability",
+        "the mode {:.6}{:+.6}i on the stability limit does not appear in the weight {weight}",
         eigenvalue.re, eigenvalue.im
     )]
     Unweighted {
@@ -189,25 +192,27 @@ pub enum Error {
         /// Name of the matrix.
         matrix: &'static str,
     },
-    /// An iteration did not end within its bound.
+    /// An iteration did not converge within its limit.
     #[error("{what} did not converge within {iterations} iterations")]
     NotConverged {
-        /// What was iterated.
+        /// The iteration.
         what: &'static str,
-        /// The bound.
+        /// The limit.
         iterations: usize,
     },
-    /// A solution does not satisfy its equation well enough.
-    #[error("{equation} is satisfied to {residual:e} only, allowed is {allowed:e}")]
+    /// The residual of a computed solution is too large.
+    #[error(
+        "the solution of {equation} has the relative residual {residual:e}, expected at most {allowed:e}"
+    )]
     ResidualTooLarge {
         /// The equation.
         equation: &'static str,
-        /// Relative residual found.
+        /// Relative residual of the solution.
         residual: f64,
         /// Relative residual allowed.
         allowed: f64,
     },
-    /// The result exceeds the range of double precision.
+    /// A result exceeds the range of double precision.
     #[error("{what} exceeds the range of double precision")]
     Overflow {
         /// The quantity.
@@ -219,7 +224,7 @@ fn shown(value: Complex<f64>) -> String {
     if value.im == 0.0 { value.re.to_string() } else { value.to_string() }
 }
 
-/// The eigenvalue s of a fault model.
+/// Formats an eigenvalue s of a fault model.
 fn development(s: Complex<f64>) -> String {
     format!("s = {}", shown(s))
 }

@@ -24,13 +24,12 @@ const PADE: [f64; 14] = [
 /// Up to this 1-norm the approximant is exact to double precision (Higham 2005, table 2.3).
 const REACH: f64 = 5.371_920_351_148_152;
 
-/// e^A.
+/// The matrix exponential e^A.
 ///
-/// `a`: n x n, finite, without a unit (a rate times a time). It always exists, but may exceed the
-/// range of double precision. Method: diagonal balancing, then scaling and squaring with the Pade
-/// approximant of order 13; about (6 + s) 2 n^3 multiplications with s = log2(norm of A / 5.4).
-/// The approximant is exact to rounding; the squarings add errors that are small relative to the
-/// largest of the powers squared, in balanced coordinates.
+/// `a`: n x n, finite, without a unit (a rate times a time). Method: diagonal balancing, then
+/// scaling and squaring with the Pade approximant of order 13; about (6 + s) 2 n^3 multiplications
+/// with s = log2(norm of A / 5.4). The approximant is exact to rounding; the squarings add errors
+/// that are small relative to the largest of the powers squared, in balanced coordinates.
 ///
 /// Source: N. J. Higham, The scaling and squaring method for the matrix exponential revisited,
 /// SIAM J. Matrix Anal. Appl. 26 (2005), algorithm 2.3; balancing: R. C. Ward (1977).

@@ -1,4 +1,4 @@
-//! Fault models: from a user's faults to a plant with a fault model.
+//! Fault models: builds the plant with a fault model from a list of faults.
 //!
 //! | fault | enters | `F_a` | `A_f` |
 //! |---|---|---|---|
@@ -7,8 +7,8 @@
 //! | sensor | y = C x + `F_s` f | [0; W `F_s`] | by its kind |
 //! | loss of effectiveness | x' = A x + B (I - E) u | columns of B, f = -E u | by its kind |
 //!
-//! Sensor faults enter through the usual filter of the measurements, which is part of the controller
-//! and becomes part of the plant that the observer sees:
+//! Sensor faults enter through the usual filter of the measurements, which is part of the
+//! controller and becomes part of the plant that the observer sees:
 //!
 //! ```text
 //! y_f' = W (y - y_f)
@@ -24,8 +24,9 @@ use crate::blocks::{block_2x2, stacked};
 use crate::{Error, check};
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// How a fault is taken to develop.
+/// The model by which a fault develops.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum FaultKind {
     /// f' = 0.
     Constant,
@@ -35,12 +36,13 @@ pub enum FaultKind {
 
 /// Where a fault enters.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum FaultEntry {
     /// x' = A x + B u + column f; n entries.
     Actuator(DVector<f64>),
     /// y = C x + column f; p entries.
     Sensor(DVector<f64>),
-    /// The input with this index, from zero, acts with the part 1 - E: f = -E u.
+    /// The input with this index, from zero, loses the part E of its effect: f = -E u.
     LossOfEffectiveness(usize),
 }
 
@@ -53,30 +55,32 @@ pub struct Fault {
     pub kind: FaultKind,
 }
 
-/// Where the estimates of a fault stand in `f_hat`, from zero.
+/// Indices, from zero, of the estimates of a fault in `f_hat`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct FaultChannel {
     /// The fault.
     pub estimate: usize,
-    /// The rate of a ramp.
+    /// The estimate of the rate of a ramp.
     pub rate: Option<usize>,
 }
 
-/// A plant in the form that the observer needs, and the way back to the user's.
+/// A plant in the form that the observer needs, and the relation of its faults to those of the
+/// user.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtendedPlant {
     /// The plant, in continuous time, with the filter's states after its own.
     pub plant: FaultyPlant,
-    /// Diagonal of W, in 1/s, p of them; None without sensor faults: then y is used as it is.
+    /// Diagonal of W, in 1/s, p entries. None without sensor faults: y is then not filtered.
     pub filter: Option<Vec<f64>>,
     /// Number of states of the plant itself.
     pub states: usize,
-    /// For each of the user's faults its place in `f_hat`.
+    /// For each fault of the user its indices in `f_hat`.
     pub channels: Vec<FaultChannel>,
 }
 
 impl ExtendedPlant {
-    /// A plant whose faults all enter its states by a fault model of their own; no filter.
+    /// Wraps a plant whose faults all act on its states; no filter is needed.
     #[must_use]
     pub fn without_filter(plant: FaultyPlant) -> Self {
         let channel = |estimate| FaultChannel { estimate, rate: None };
@@ -84,17 +88,17 @@ impl ExtendedPlant {
         Self { states: plant.a.nrows(), plant, filter: None, channels }
     }
 
-    /// Builds the plant that has these faults.
+    /// Builds the plant with the given faults.
     ///
     /// `a`: n x n; `b`: n x m; `c`: p x n; `faults`: at least one; `filter`: the diagonal of W, p
-    /// rates above zero in 1/s, used when there is a sensor fault. The estimates stand in `f_hat` in
-    /// the order of the faults, the rates of the ramps after them. Whether an observer exists is
-    /// examined by [`FaultyPlant::check_observer_exists`] and [`crate::detectability`]: a sensor
-    /// fault, for example, needs other measurements or a plant that show the same state.
+    /// rates above zero in 1/s, used only if there is a sensor fault. `f_hat` holds the estimates
+    /// in the order of the faults, then the rates of the ramps.
+    /// [`FaultyPlant::check_observer_exists`] and [`crate::detectability`] test whether an observer
+    /// exists: a sensor fault, for example, needs other measurements that show the same state.
     ///
     /// # Example
     ///
-    /// A motor whose torque is lost in part and whose speed sensor has a drift:
+    /// A motor that loses part of its torque and whose speed sensor drifts:
     ///
     /// ```
     /// use control::faults::{FaultEntry, ExtendedPlant, Fault, FaultKind};
@@ -115,8 +119,8 @@ impl ExtendedPlant {
     /// # Errors
     ///
     /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`] for a bad matrix, a column of the
-    /// wrong length or a missing filter W; [`Error::OutOfRange`] for an input that does not exist or
-    /// a rate that is not positive.
+    /// wrong length or a missing filter W; [`Error::OutOfRange`] for an input that does not exist
+    /// or a rate that is not positive.
     pub fn new(
         a: &DMatrix<f64>,
         b: &DMatrix<f64>,
@@ -151,13 +155,13 @@ impl ExtendedPlant {
     /// Designs the controller as [`crate::aso::design`] does.
     ///
     /// `controller_poles`: one per state of the plant itself, the filter's states are not fed back;
-    /// `observer_poles`: one per state of the extended plant and per entry of `f_hat`; `k_f`: m x q,
-    /// or None for [`FaultyPlant::compensation_gain`], whose columns for sensor faults and for rates
-    /// are zero and which is -1 for an effectiveness that is lost.
+    /// `observer_poles`: one per state of the extended plant and per entry of `f_hat`; `k_f`: m x
+    /// q, or None for [`FaultyPlant::compensation_gain`], whose columns for sensor faults and for
+    /// rates are zero and which is -1 for an effectiveness that is lost.
     ///
     /// # Errors
     ///
-    /// Those of [`crate::aso::design`].
+    /// Same as [`crate::aso::design`].
     pub fn design(
         &self,
         controller_poles: &[Complex<f64>],
@@ -197,7 +201,7 @@ fn columns(
     Ok((f_a, f_s))
 }
 
-/// `A_f`, and where each fault and its rate stand.
+/// `A_f`, and the indices of each fault and its rate.
 fn models(faults: &[Fault]) -> (DMatrix<f64>, Vec<FaultChannel>) {
     let mut next = faults.len();
     let mut channels = Vec::with_capacity(faults.len());

@@ -1,5 +1,4 @@
-//! Exact discretisation of a linear system whose input is constant or a straight line over the
-//! step.
+//! Exact discretisation of a linear system with an input that is constant or linear over the step.
 
 use crate::balance::{Balance, divide_rows, power_of_two};
 use crate::exponential::scaling_and_squaring;
@@ -9,8 +8,8 @@ use nalgebra::{DMatrix, DVector};
 /// x(h) = Phi x0 + `Gamma_0` w0 + `Gamma_1` w1, the exact solution of x' = A x + B (w0 + w1 t).
 ///
 /// Phi = e^(A h), `Gamma_0` = integral of e^(A s) B, `Gamma_1` = integral of e^(A s) (h - s) B,
-/// both over s from 0 to h. With w1 = 0 the input is held constant: [`zero_order_hold`] gives that
-/// case alone. No step size makes a stable system unstable.
+/// both over s from 0 to h. With w1 = 0 the input is held constant; [`zero_order_hold`] computes
+/// only this case. A stable system stays stable for every step size.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FirstOrderHold {
     /// Phi, n x n.
@@ -24,12 +23,11 @@ pub struct FirstOrderHold {
 impl FirstOrderHold {
     /// Discretises x' = A x + B w over a step.
     ///
-    /// `a`: n x n; `b`: n x m; `h`: the step in the unit of time of A, above zero. The solution
-    /// always exists. Method: states balanced, inputs scaled, then one exponential of the block
-    /// matrix [A h, B h, 0; 0, 0, I; 0, 0, 0] of order n + 2 m, whose first row of blocks is [Phi,
-    /// `Gamma_0`, `Gamma_1` / h]; about (6 + s) 2 (n + 2 m)^3 multiplications, s = log2(norm of A
-    /// h). The error is that of the exponential, relative to each column's norm in balanced
-    /// coordinates.
+    /// `a`: n x n; `b`: n x m; `h`: the step in the unit of time of A, above zero. Method: states
+    /// balanced, inputs scaled, then one exponential of the block matrix [A h, B h, 0; 0, 0, I; 0,
+    /// 0, 0] of order n + 2 m, whose first row of blocks is [Phi, `Gamma_0`, `Gamma_1` / h]; about
+    /// (6 + s) 2 (n + 2 m)^3 multiplications, s = log2(norm of A h). The error is the error of the
+    /// exponential, relative to the norm of each column in balanced coordinates.
     ///
     /// Source: C. F. Van Loan, Computing integrals involving the matrix exponential, IEEE Trans.
     /// Autom. Control 23 (1978), theorem 1.
@@ -59,12 +57,12 @@ impl FirstOrderHold {
 
     /// out = Phi x + `Gamma_0` w0 + `Gamma_1` w1, without allocation.
     ///
-    /// `x`, `out`: n; `w0`, `w1`: m, the input at the start of the step and its slope. Not finite
-    /// numbers pass through, as in any sum.
+    /// `x`, `out`: n; `w0`, `w1`: m, the input at the start of the step and its slope. NaN and
+    /// infinities propagate.
     ///
     /// # Errors
     ///
-    /// [`Error::Shape`] when a length is wrong; `out` is then untouched.
+    /// [`Error::Shape`] when a length is wrong; `out` is not changed then.
     pub fn step_into(
         &self,
         x: &[f64],
@@ -87,12 +85,12 @@ impl FirstOrderHold {
 
 /// x(h) = Phi x0 + Gamma w: the exact solution of x' = A x + B w with w constant over the step.
 ///
-/// `a`: n x n; `b`: n x m; `h`: the step in the unit of time of A, above zero. The answer is (Phi,
-/// Gamma), n x n and n x m: Phi = e^(A h), Gamma = integral of e^(A s) B over s from 0 to h. It is
-/// the plant that a sampled controller sees which holds its output from sample to sample. Method,
-/// cost and tolerance as in [`FirstOrderHold::new`], with a block matrix of order n + m.
+/// `a`: n x n; `b`: n x m; `h`: the step in the unit of time of A, above zero. Returns (Phi,
+/// Gamma), n x n and n x m: Phi = e^(A h), Gamma = integral of e^(A s) B over s from 0 to h. This
+/// is the plant as a sampled controller sees it that holds its output between samples. Method, cost
+/// and tolerance as in [`FirstOrderHold::new`], with a block matrix of order n + m.
 ///
-/// Source: C. F. Van Loan (1978), as there.
+/// Source: C. F. Van Loan (1978), see [`FirstOrderHold::new`].
 ///
 /// # Example
 ///
@@ -108,7 +106,7 @@ impl FirstOrderHold {
 ///
 /// # Errors
 ///
-/// Those of [`FirstOrderHold::new`].
+/// Same as [`FirstOrderHold::new`].
 pub fn zero_order_hold(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
@@ -118,7 +116,7 @@ pub fn zero_order_hold(
     Ok((phi, gamma))
 }
 
-/// The input over a step.
+/// The polynomial degree of the input over a step.
 #[derive(Clone, Copy, PartialEq)]
 enum Degree {
     Constant,
@@ -174,7 +172,7 @@ fn length(name: &'static str, vector: &[f64], expected: usize) -> Result<(), Err
     Err(Error::Shape { matrix: name, expected: (expected, 1), found: (vector.len(), 1) })
 }
 
-/// Columns of up to eight numbers stay in registers.
+/// Selects a specialised loop for up to eight states, whose columns fit into registers.
 macro_rules! fixed_sizes {
     ($m:expr, $v:expr, $out:expr; $($n:literal)*) => {
         match $out.len() {

@@ -1,23 +1,27 @@
-//! Mathematics of linear control on matrices: no input or output, no FMI.
+#![doc = include_str!("../README.md")]
 //!
-//! * [`eigen`]: eigenvalues. [`exponential`]: e^A. [`lyapunov`]: A' P + P A = -Q and
-//!   A' P A - P = -Q. [`riccati`]: linear-quadratic regulators and Kalman filters.
-//! * [`hold`]: the exact discretisation of x' = A x + B w with w constant or linear over a step.
-//! * [`rank`]: controllability and observability; [`distance`]: how far they are from being lost;
-//!   [`zeros`]: invariant zeros.
-//! * [`response`]: gains, norms, step and frequency responses, and what a fault does to the loop.
-//! * [`placement`]: state feedback with wanted eigenvalues.
-//! * [`aso`]: the augmented state observer that estimates and compensates actuator faults, and
-//!   [`theorem1`]: the bound that belongs to it.
-//! * [`faults`]: fault models beyond the constant fault; [`detectability`]: which faults can be seen.
-//! * [`sampled`]: the controller designed for its sample time; [`controller`]: its equations.
-//! * [`product`]: products of matrices for exported models.
-//! * `lmi`, behind the feature of that name: linear matrix inequalities by Clarabel, for pole
-//!   regions, H-infinity and generalised H2 bounds, and theorem 1 with free P.
+//! # Modules
 //!
-//! Matrices have any size; bad arguments and singular problems are an [`Error`], never a panic.
-//! Feedback gains and Lyapunov solutions are put back into their equations before they are
-//! returned. ' is the transpose in formulas.
+//! | task | module |
+//! |---|---|
+//! | assign the poles of a state feedback or an observer | [`placement`] |
+//! | linear-quadratic regulator, Kalman filter | [`riccati`] |
+//! | augmented state observer (ASO): estimate and compensate faults | [`aso`], [`faults`], [`sampled`] |
+//! | test which faults can be estimated | [`detectability`] |
+//! | controllability, observability, distance from losing them, zeros | [`rank`], [`distance`], [`zeros`] |
+//! | norms, step and frequency responses, the effect of faults | [`response`] |
+//! | bound of the estimation error with a proof | [`theorem1`] |
+//! | linear matrix inequalities (feature `lmi`) | `lmi` |
+//! | the controller as one system, the closed loop, its stability | [`controller`], [`stability`] |
+//! | discretisation, matrix exponential | [`hold`], [`exponential`] |
+//! | eigenvalues, Lyapunov equations, reproducible products | [`eigen`], [`lyapunov`], [`product`] |
+//!
+//! # Conventions
+//!
+//! Feedback is u = K x, so that the closed loop is A + B K; an observer has the error dynamics A - L C.
+//! ' is the transpose in formulas, [A, B; C, D] a matrix of blocks, eps the machine epsilon. Systems are
+//! [`StateSpace`]; [`Domain`] distinguishes continuous and sampled time. Matrices may have any size. Bad
+//! arguments and unsolvable problems are an [`Error`], never a panic.
 #![forbid(unsafe_code)]
 
 pub mod aso;

@@ -1,14 +1,17 @@
-//! Linear matrix inequalities: pole regions, bounds of gains, and gains that keep them.
+//! Linear matrix inequalities: pole regions, gain bounds, and the synthesis of feedback and
+//! observer gains.
 //!
-//! * [`Problem`] and [`Affine`]: any problem with semidefinite requirements.
-//! * [`certify_region`]: eigenvalues in a [`Region`] of the complex plane, with its certificate P.
-//! * [`certify_gain`]: a bound of the H-infinity or the generalised H2 norm, with its certificate.
-//! * [`observer_gain`], [`state_feedback`]: a gain that puts the eigenvalues into a region and keeps
-//!   or minimises such a bound.
+//! * [`Problem`] and [`Affine`]: semidefinite programs.
+//! * [`certify_region`]: proves that the eigenvalues of a matrix are in a [`Region`], with a
+//!   certificate P.
+//! * [`certify_gain`]: bounds the H-infinity or the generalised H2 norm of a system, with a
+//!   certificate P.
+//! * [`observer_gain`], [`state_feedback`]: compute a gain that places the eigenvalues in a region
+//!   and keeps or minimises such a bound.
 //!
-//! Problems are solved by an interior point method (Clarabel) in coordinates that suit the data, and
-//! nothing that it says is trusted: a certificate counts only if the eigenvalues of its inequality
-//! are positive in the data as given, by more than the rounding errors.
+//! Problems are solved by an interior point method (Clarabel) in coordinates in which the data are
+//! about one. Its result is never trusted: a certificate is returned only if the eigenvalues of its
+//! inequalities, in the units of the data, are positive by more than the rounding errors.
 
 mod affine;
 mod coordinates;
@@ -28,23 +31,23 @@ pub use synthesis::{Performance, Synthesis, observer_gain, state_feedback};
 
 use nalgebra::{DMatrix, DVector};
 
-/// How a problem with inequalities ended.
+/// The outcome of a problem with inequalities.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome<T> {
-    /// An answer whose inequalities were checked by eigenvalues.
+    /// A solution whose inequalities were verified by eigenvalues.
     Optimal(T),
-    /// By the numbers of the solver no answer exists: these requirements contradict each other, and
-    /// without any one of them the others do not.
+    /// According to the solver no solution exists: these requirements contradict each other, and
+    /// every one of them is necessary for the contradiction.
     Infeasible {
         /// Their names, in the order in which they were stated.
         conflict: Vec<&'static str>,
     },
-    /// Neither an answer nor a contradiction was found in double precision; says why.
+    /// Neither a solution nor a contradiction was found in double precision, with the reason.
     Inconclusive(&'static str),
 }
 
 impl<T> Outcome<T> {
-    /// The answer if there is one.
+    /// The solution, if there is one.
     pub fn optimal(self) -> Option<T> {
         match self {
             Self::Optimal(answer) => Some(answer),
@@ -52,7 +55,7 @@ impl<T> Outcome<T> {
         }
     }
 
-    /// The outcome with a function of the answer, which may end otherwise.
+    /// Applies a function to the solution; any other outcome is passed on.
     fn then<U, E>(self, next: impl FnOnce(T) -> Result<Outcome<U>, E>) -> Result<Outcome<U>, E> {
         match self {
             Self::Optimal(answer) => next(answer),
@@ -62,13 +65,13 @@ impl<T> Outcome<T> {
     }
 }
 
-/// Unknowns that keep the requirements of a [`Problem`].
+/// Values of the unknowns that meet the requirements of a [`Problem`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
     /// One number per unknown.
     unknowns: DVector<f64>,
-    /// Smallest eigenvalue of each requirement with its name, if it has one, as stated in
-    /// [`Problem::require`]; at least half of the margin that was wanted.
+    /// Smallest eigenvalue of each requirement with its name, if it has one, as given to
+    /// [`Problem::require`]; at least half of the required margin.
     pub margins: Vec<(Option<&'static str>, f64)>,
 }
 

@@ -12,18 +12,19 @@ use triangular::Triangular;
 const ALLOWED_RESIDUAL: f64 = 1e-10;
 const REFINEMENTS: usize = 2;
 
-/// P with A' P + P A = -Q, or with A' P A - P = -Q.
+/// The solution P of A' P + P A = -Q or A' P A - P = -Q.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Solution {
     /// P, n x n, symmetric.
     pub p: DMatrix<f64>,
-    /// With `|P|[i,j]` at least the root of `P[i,i] P[j,j]`, the
-    /// largest entry of |A' P + P A + Q| relative to the same entry of |A'| |P| + |P| |A| + |Q|; in
-    /// sampled time of |A' P A - P + Q| relative to |A'| |P| |A| + |P| + |Q|.
+    /// The largest entry of |A' P + P A + Q| relative to the same entry of |A'| |P| + |P| |A| +
+    /// |Q|; in sampled time of |A' P A - P + Q| relative to |A'| |P| |A| + |P| + |Q|. Here
+    /// `|P|[i,j]` is at least the root of `P[i,i] P[j,j]`.
     pub residual: f64,
     /// Norm of the left side plus Q relative to the norm of Q (Frobenius). For a badly scaled A the
     /// rounding of P alone keeps it far above the rounding error; below 1 / sqrt(n) with Q = I it
-    /// still shows A stable.
+    /// still proves A stable.
     pub defect: f64,
 }
 
@@ -105,7 +106,7 @@ pub fn definite_range(p: &DMatrix<f64>) -> Result<(f64, f64), Error> {
     Ok((values[values.len() - 1].powi(2), values[0].powi(2)))
 }
 
-/// Refuses a matrix that differs from its transpose by more than its rounding.
+/// Checks that a matrix differs from its transpose by no more than rounding.
 pub(crate) fn symmetric(matrix: &'static str, m: &DMatrix<f64>) -> Result<(), Error> {
     let allowed = f64::EPSILON * m.amax();
     for col in 0..m.ncols() {
@@ -120,12 +121,12 @@ pub(crate) fn symmetric(matrix: &'static str, m: &DMatrix<f64>) -> Result<(), Er
 
 type LeftSide = fn(&DMatrix<f64>, &DMatrix<f64>, &DMatrix<f64>) -> DMatrix<f64>;
 
-/// One of the two equations, its left side and Q brought to one side.
+/// One of the two equations, written as remainder = 0.
 pub(crate) struct Equation {
     name: &'static str,
-    /// What is to be zero, of A, P and Q.
+    /// The left side plus Q, from A, P and Q.
     remainder: LeftSide,
-    /// The sum of the absolute terms, of |A|, |P| and |Q|.
+    /// The sum of the absolute terms, from |A|, |P| and |Q|.
     terms: LeftSide,
     substitute: fn(&Triangular, &DMatrix<f64>) -> DMatrix<f64>,
 }
@@ -158,11 +159,11 @@ impl Equation {
         self.verified(a, self.solve(a, q)?, q)
     }
 
-    /// P for a stable A and a symmetric Q.
+    /// Computes P for a stable A and a symmetric Q.
     pub(crate) fn solve(&self, a: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
         let Balance { matrix, scale } = Balance::new(a);
         let scaled_q = multiply_rows(&multiply_columns(q, &scale), &scale);
-        let triangular = Triangular::of(&matrix)?;
+        let triangular = Triangular::new(&matrix)?;
         let mut p = (self.substitute)(&triangular, &scaled_q);
         for _ in 0..REFINEMENTS {
             p += (self.substitute)(&triangular, &(self.remainder)(&matrix, &p, &scaled_q));
@@ -194,7 +195,7 @@ impl Equation {
     }
 }
 
-/// The largest entry of |remainder|, each relative to the same entry of `terms`.
+/// The largest entry of |remainder| relative to the same entry of `terms`.
 pub(crate) fn relative(remainder: &DMatrix<f64>, terms: &DMatrix<f64>) -> f64 {
     remainder.zip_map(terms, |r, t| if t > 0.0 { r.abs() / t } else { 0.0 }).amax()
 }

@@ -1,73 +1,74 @@
-//! State feedback with wanted eigenvalues.
+//! Pole placement: state feedback that assigns the eigenvalues of A + B K.
 
-mod assignable;
-mod conditioning;
 mod deflation;
 mod descent;
-mod reached;
-mod wanted;
+mod eigenvectors;
+mod pole_block;
+mod pole_error;
+mod subspace;
 
 use crate::balance::{Balance, divide_columns, divide_rows, multiply_columns};
 use crate::rank::require_controllable;
 use crate::svd::Svd;
 use crate::{Error, check};
-use assignable::Assignable;
-use conditioning::{best_directions, condition};
+use eigenvectors::{best_directions, condition};
 use nalgebra::{Complex, DMatrix, DVector};
-use reached::{CONTINUOUS, DISCRETE, Demand};
-use wanted::wanted;
+use pole_block::pole_blocks;
+use pole_error::{CONTINUOUS, DISCRETE, PoleTolerance};
+use subspace::AssignableSubspaces;
 
-/// Inputs are dependent when a singular value of B with columns of length one is below this.
+/// Inputs count as dependent when a singular value of B, its columns scaled to length one, is below
+/// this.
 const DEPENDENT_INPUTS: f64 = 1e-13;
 
-/// A state feedback u = K x.
+/// A state feedback u = K x with assigned eigenvalues.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Placement {
     /// K, m x n.
     pub gain: DMatrix<f64>,
-    /// How well the eigenvalues are assigned.
+    /// The quality of the assignment.
     pub quality: Quality,
 }
 
-/// How well the eigenvalues of A + B K are assigned.
+/// The quality of an assignment of the eigenvalues of A + B K.
 ///
-/// A condition number is that of the matrix of eigenvectors of length one, in the 2-norm: an
-/// eigenvalue moves by at most this times the norm of a change of A + B K (Bauer and Fike), both
-/// in the same coordinates.
+/// The condition numbers are those of the matrix of eigenvectors of length one, in the 2-norm: a
+/// change of A + B K moves an eigenvalue by at most the condition number times the norm of the
+/// change, both in the same coordinates (Bauer and Fike).
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Quality {
-    /// Condition number in the coordinates of A. [`place`] makes this one small.
+    /// Condition number in the coordinates of A. [`place`] minimises this one.
     pub condition: f64,
-    /// Condition number in coordinates that balance the A + B K of [`place`], so without the part
-    /// that comes from the units of the states. [`place_balanced`] and [`place_discrete`] make
-    /// this one small.
+    /// Condition number in coordinates that balance the A + B K of [`place`], which does not depend
+    /// on the units of the states. [`place_balanced`] and [`place_discrete`] minimise this one.
     pub balanced_condition: f64,
-    /// Largest distance of an eigenvalue of A + B K from the wanted one, relative to the size of
-    /// the latter (to the largest size for a wanted eigenvalue of zero, to the norm of A if all
-    /// are zero). In discrete time the same for A - I and the eigenvalues less one.
+    /// Largest distance of an eigenvalue of A + B K from the requested one, relative to the modulus
+    /// of the latter (to the largest modulus for a requested eigenvalue of zero, to the norm of A
+    /// if all are zero). In discrete time the same for A - I and the eigenvalues less one.
     pub pole_error: f64,
 }
 
-/// Real eigenvalues as [`place`] takes them.
+/// Converts real eigenvalues to the complex numbers that [`place`] takes.
 #[must_use]
 pub fn real_poles(poles: &[f64]) -> Vec<Complex<f64>> {
     poles.iter().map(|&pole| Complex::new(pole, 0.0)).collect()
 }
 
-/// Finds K such that the eigenvalues of A + B K are `poles`.
+/// Computes K such that the eigenvalues of A + B K are `poles`.
 ///
 /// `a`: n x n; `b`: n x m; `poles`: n numbers, in the unit of A, in any order; complex ones with
-/// their exact conjugates; none more often than rank B. K exists for all of them when (A, B) is
-/// controllable. With one independent input it is unique. With more, the eigenvectors are chosen
-/// so that the condition number of their matrix, in the coordinates given, is as small as found
-/// from several fixed starts: sweeps over the eigenvectors that enlarge the determinant, then a
-/// descent on the condition number itself. With dependent inputs the smallest K is taken, in units
-/// of the inputs that give the columns of B length one. Same arguments, same answer.
+/// their exact conjugates; none more often than rank B. K exists for every such choice when (A, B)
+/// is controllable. With one independent input it is unique. With more, the eigenvectors are chosen
+/// to minimise the condition number of their matrix, in the given coordinates: from several fixed
+/// starts, sweeps over the eigenvectors enlarge the determinant, then a descent reduces the
+/// condition number itself. With dependent inputs K has the least norm, in units of the inputs for
+/// which the columns of B have length one. The result is deterministic.
 ///
-/// The gain follows from the eigenvectors by orthogonal deflation, so that it is as exact for
-/// clustered eigenvalues as for well separated ones. Cost: some hundred iterations of a singular
-/// value decomposition per start, so some 1e4 n^3 multiplications. Tolerance: 1e-6, each eigenvalue
-/// relative to itself, verified.
+/// The gain follows from the eigenvectors by orthogonal deflation, so that clustered eigenvalues
+/// are as accurate as well separated ones. Cost: about a hundred singular value decompositions per
+/// start, in all about 1e4 n^3 multiplications. Tolerance: 1e-6 relative to each eigenvalue,
+/// verified.
 ///
 /// Sources: J. Kautsky, N. K. Nichols and P. Van Dooren, Robust pole assignment in linear state
 /// feedback, Int. J. Control 41 (1985), method 0, for real eigenvalues; A. L. Tits and Y. Yang,
@@ -105,17 +106,16 @@ pub fn place(
     as_given(a, b, poles, &CONTINUOUS)
 }
 
-/// As [`place`], with the eigenvectors well conditioned in balanced coordinates.
+/// Like [`place`], with eigenvectors that are well conditioned in balanced coordinates.
 ///
 /// The states are first scaled by powers of two such that A + B K of [`place`] is balanced (Parlett
-/// and Reinsch 1969); the eigenvectors are chosen in these coordinates and the gain is brought back.
-/// So the units of the states, in which numbers of very different size may stand, have little part
-/// in the choice. Arguments, existence, tolerance, sources and errors: those of [`place`]; the cost
-/// is twice as high.
+/// and Reinsch 1969); the eigenvectors are chosen in these coordinates and the gain is transformed
+/// back. The choice then hardly depends on the units of the states. Arguments, existence, tolerance
+/// and sources: same as [`place`]; the cost is twice as high.
 ///
 /// # Errors
 ///
-/// Those of [`place`].
+/// Same as [`place`].
 pub fn place_balanced(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
@@ -124,14 +124,14 @@ pub fn place_balanced(
     balanced(a, b, poles, &CONTINUOUS)
 }
 
-/// As [`place_balanced`], for the sampled plant `x[k+1] = A x[k] + B u[k]`.
+/// Like [`place_balanced`], for the sampled plant `x[k+1] = A x[k] + B u[k]`.
 ///
-/// The gain is that of [`place_balanced`]; only what counts as reached differs. `poles`: n
-/// eigenvalues in the z plane, zero among them if wanted, with the same rules. Tolerance: 1e-2, the
-/// distance of each eigenvalue from the wanted p relative to |p - 1|, verified. So the decay of a
-/// slow eigenvalue is right to 1e-2 of itself, and a fast one lies within about 1e-2 of the wanted
-/// one. That much must be allowed: k eigenvalues near zero for each input move by the k-th root of
-/// a rounding error of A + B K, and the samples hardly tell the difference.
+/// The gain is computed as in [`place_balanced`]; only the tolerance differs. `poles`: n
+/// eigenvalues in the z plane, zero allowed, with the same rules. Tolerance: the distance of each
+/// eigenvalue from the requested p is at most 1e-2 |p - 1|, verified. The decay of a slow
+/// eigenvalue is then accurate to 1e-2 of itself, a fast one to about 1e-2. The tolerance cannot be
+/// much smaller: k eigenvalues near zero for each input move by the k-th root of a rounding error
+/// of A + B K, which hardly changes the samples.
 ///
 /// # Example
 ///
@@ -149,7 +149,7 @@ pub fn place_balanced(
 ///
 /// # Errors
 ///
-/// Those of [`place`].
+/// Same as [`place`].
 pub fn place_discrete(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
@@ -158,7 +158,7 @@ pub fn place_discrete(
     balanced(a, b, poles, &DISCRETE)
 }
 
-/// [`place_discrete`] with the eigenvectors chosen in the coordinates given.
+/// [`place_discrete`] with the eigenvectors chosen in the given coordinates.
 pub(crate) fn place_discrete_as_given(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
@@ -171,33 +171,33 @@ fn as_given(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
     poles: &[Complex<f64>],
-    demand: &Demand,
+    tolerance: &PoleTolerance,
 ) -> Result<Placement, Error> {
-    let choice = Choice::given(a, b, poles)?;
-    let scale = choice.balance(a, b);
-    choice.placement(a, b, poles, &scale, demand)
+    let assignment = Assignment::given(a, b, poles)?;
+    let scale = assignment.balance(a, b);
+    assignment.placement(a, b, poles, &scale, tolerance)
 }
 
 fn balanced(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
     poles: &[Complex<f64>],
-    demand: &Demand,
+    tolerance: &PoleTolerance,
 ) -> Result<Placement, Error> {
-    let scale = Choice::given(a, b, poles)?.balance(a, b);
-    Choice::new(a, b, poles, &scale)?.placement(a, b, poles, &scale, demand)
+    let scale = Assignment::given(a, b, poles)?.balance(a, b);
+    Assignment::new(a, b, poles, &scale)?.placement(a, b, poles, &scale, tolerance)
 }
 
-/// The eigenvectors with the least condition number in some coordinates, and their gain.
-struct Choice {
+/// Eigenvectors of least condition number in given coordinates, and their gain.
+struct Assignment {
     gain: DMatrix<f64>,
-    problem: Assignable,
+    problem: AssignableSubspaces,
     directions: Vec<DVector<f64>>,
     /// Diagonal S with x = S z, z the coordinates of the problem.
     units: DVector<f64>,
 }
 
-impl Choice {
+impl Assignment {
     fn given(a: &DMatrix<f64>, b: &DMatrix<f64>, poles: &[Complex<f64>]) -> Result<Self, Error> {
         Self::new(a, b, poles, &DVector::from_element(a.nrows(), 1.0))
     }
@@ -216,7 +216,7 @@ impl Choice {
         let b = divide_rows(b, units);
         let basis = input_basis(&b)?;
         let b = &b * &basis;
-        let problem = Assignable::new(&a, &b, &wanted(poles, basis.ncols())?)?;
+        let problem = AssignableSubspaces::new(&a, &b, &pole_blocks(poles, basis.ncols())?)?;
         let directions = best_directions(&problem)?;
         let gain = basis * deflation::gain(&a, &b, &problem, &directions)?;
         let gain = check::in_range("K", divide_columns(&gain, units))?;
@@ -228,14 +228,15 @@ impl Choice {
         Balance::new(&(a + b * &self.gain)).scale
     }
 
-    /// Verified, with condition numbers in the coordinates of A and in those of `scale`.
+    /// Verifies the eigenvalues; computes the condition numbers in the coordinates of A and in the
+    /// coordinates `scale`.
     fn placement(
         self,
         a: &DMatrix<f64>,
         b: &DMatrix<f64>,
         poles: &[Complex<f64>],
         scale: &DVector<f64>,
-        demand: &Demand,
+        tolerance: &PoleTolerance,
     ) -> Result<Placement, Error> {
         let condition_in = |coordinates: &DVector<f64>| {
             let units = coordinates.component_div(&self.units);
@@ -244,7 +245,7 @@ impl Choice {
         let quality = Quality {
             condition: condition_in(&DVector::from_element(a.nrows(), 1.0))?,
             balanced_condition: condition_in(scale)?,
-            pole_error: demand.pole_error(a, b, &self.gain, poles)?,
+            pole_error: tolerance.pole_error(a, b, &self.gain, poles)?,
         };
         Ok(Placement { gain: self.gain, quality })
     }

@@ -2,16 +2,16 @@
 
 use nalgebra::DMatrix;
 
-/// A B, column by column: for each column of B the columns of A times its entries, added in their
-/// order.
+/// The matrix product A B, summed in a fixed order: for each column of B the columns of A times its
+/// entries.
 ///
-/// `a`: n x k; `b`: k x m. The same bits on every processor, other than nalgebra's `*`, which leaves
-/// matrices of more than 5 x 5 to kernels that are chosen by what the processor can do. An exported
-/// model uses this one.
+/// `a`: n x k; `b`: k x m. The result has the same bits on every processor. nalgebra's `*` does
+/// not: it multiplies matrices larger than 5 x 5 by kernels that depend on the features of the
+/// processor. Exported models use this function.
 ///
 /// # Panics
 ///
-/// Where A has another number of columns than B has rows, as `*` does.
+/// If the number of columns of A differs from the number of rows of B, as `*` does.
 #[must_use]
 pub fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let mut result = DMatrix::zeros(a.nrows(), b.ncols());

@@ -1,6 +1,7 @@
-//! Controllability and observability: yes or no, and the modes that make it no.
+//! Controllability and observability: the rank decision, and the modes that are uncontrollable or
+//! unobservable.
 //!
-//! How far a pair is from losing the property is measured in [`crate::distance`].
+//! [`crate::distance`] measures the distance of a pair from the nearest one without the property.
 
 mod staircase;
 
@@ -12,34 +13,38 @@ use crate::svd::ComplexSvd;
 use crate::{Error, check};
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// Entries of a mode's vector above this part of the largest make their states dominant.
+/// A state is dominant in a mode when its entry in the vector is above this fraction of the
+/// largest.
 const DOMINANT: f64 = 0.5;
 
-/// The answer of a rank decision.
+/// The result of a rank decision.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Rank {
-    /// Dimension of the controllable subspace or of the observable quotient.
+    /// Rank of the controllability or observability matrix.
     pub rank: usize,
     /// Number of states; the pair is controllable or observable when `rank` equals it.
     pub n: usize,
-    /// Svd values at or below this count as zero, relative to the scaled matrix.
+    /// Singular values at or below this count as zero, relative to the scaled matrix.
     pub tolerance: f64,
-    /// The smallest relative singular value that counted as not zero: how near the rank is to
-    /// being lower. Zero when the rank is zero.
+    /// The smallest relative singular value that counted as nonzero. The nearer it is to
+    /// `tolerance`, the less certain the rank. Zero when the rank is zero.
     pub margin: f64,
 }
 
-/// A mode of x' = A x that the inputs do not reach or the measurements do not show.
+/// An uncontrollable or unobservable mode of x' = A x.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Mode {
     /// Its eigenvalue.
     pub eigenvalue: Complex<f64>,
     /// An eigenvector of length one in the given coordinates, its largest entry real and positive:
-    /// v with A v = s v, C v = 0 for an unobservable mode, the motion that is not seen; w with w' A
-    /// = s w', w' B = 0 for an uncontrollable one, the combination w' x that nothing moves.
+    /// v with A v = s v, C v = 0 for an unobservable mode: the motion that the measurements do not
+    /// show; w with w' A = s w', w' B = 0 for an uncontrollable mode: the combination w' x that the
+    /// inputs do not move.
     pub vector: DVector<Complex<f64>>,
-    /// The states with the large entries of the vector in balanced coordinates, largest first, from
-    /// zero: those of at least half of the largest entry.
+    /// Indices, from zero, of the states whose entries of the vector, in balanced coordinates, are
+    /// at least half of the largest one; largest first.
     pub dominant: Vec<usize>,
 }
 
@@ -56,7 +61,7 @@ impl Rank {
 /// `a`: n x n; `b`: n x m. The powers of A are never formed: the staircase algorithm reduces (A, B)
 /// by orthogonal transformations and adds up the ranks of its steps, after balancing the states and
 /// giving each input unit length. About 20 n^3 multiplications. Tolerance: 100 n eps, relative to
-/// the norm of the scaled B in the first step and to that of the balanced A in the others.
+/// the norm of the scaled B in the first step and to the norm of the balanced A in the other steps.
 ///
 /// Source: C. C. Paige, Properties of numerical algorithms related to computing controllability,
 /// IEEE Trans. Autom. Control 26 (1981), section IV.
@@ -96,7 +101,7 @@ pub fn observability(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Rank, Error> 
     Ok(Staircase::new(&a.transpose(), &c.transpose())?.answer)
 }
 
-/// Refuses a pair that is not controllable.
+/// Checks that a pair is controllable.
 pub(crate) fn require_controllable(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Rank, Error> {
     let found = controllability(a, b)?;
     if found.is_full() {
@@ -105,7 +110,7 @@ pub(crate) fn require_controllable(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result
     Err(Error::NotControllable { rank: found.rank, n: found.n })
 }
 
-/// Refuses a pair that is not observable.
+/// Checks that a pair is observable.
 pub(crate) fn require_observable(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Rank, Error> {
     let found = observability(a, c)?;
     if found.is_full() {
@@ -114,30 +119,30 @@ pub(crate) fn require_observable(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<R
     Err(Error::NotObservable { rank: found.rank, n: found.n })
 }
 
-/// The uncontrollable modes of x' = A x + B u: one for each state that the rank lacks.
+/// The uncontrollable modes of x' = A x + B u: as many as the rank is below n.
 ///
-/// `a`: n x n; `b`: n x m. They are the eigenvalues of the block that the staircase algorithm leaves
-/// over, so that their number agrees with [`controllability`]; a multiple eigenvalue with one
-/// eigenvector gives that eigenvector more than once. Method and tolerance: those of
+/// `a`: n x n; `b`: n x m. They are the eigenvalues of the uncontrollable block of the staircase
+/// form, so that their number agrees with [`controllability`]. A multiple eigenvalue with a single
+/// eigenvector is returned as often as it occurs, with the same vector. Method and tolerance: see
 /// [`controllability`] and [`eigenvalues`].
 ///
 /// # Errors
 ///
-/// Those of [`controllability`] and [`eigenvalues`].
+/// Same as [`controllability`].
 pub fn uncontrollable_modes(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Vec<Mode>, Error> {
     let n = check::square("A", a)?;
     check::shape("B", b, (n, b.ncols()))?;
-    left_over(a, b)
+    uncontrollable_part(a, b)
 }
 
-/// The unobservable modes of x' = A x, y = C x: one for each state that the rank lacks.
+/// The unobservable modes of x' = A x, y = C x: as many as the rank is below n.
 ///
 /// `a`: n x n; `c`: p x n. Computed as the uncontrollable modes of (A', C'), see
 /// [`uncontrollable_modes`].
 ///
 /// # Example
 ///
-/// A cart of which only the velocity is measured: its position is not seen.
+/// A cart of which only the velocity is measured; its position is unobservable:
 ///
 /// ```
 /// use nalgebra::DMatrix;
@@ -152,14 +157,14 @@ pub fn uncontrollable_modes(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Vec<Mo
 ///
 /// # Errors
 ///
-/// Those of [`observability`] and [`eigenvalues`].
+/// Same as [`observability`].
 pub fn unobservable_modes(a: &DMatrix<f64>, c: &DMatrix<f64>) -> Result<Vec<Mode>, Error> {
     let n = check::square("A", a)?;
     check::shape("C", c, (c.nrows(), n))?;
-    left_over(&a.transpose(), &c.transpose())
+    uncontrollable_part(&a.transpose(), &c.transpose())
 }
 
-fn left_over(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Vec<Mode>, Error> {
+fn uncontrollable_part(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Vec<Mode>, Error> {
     let staircase = Staircase::new(a, b)?;
     if staircase.answer.is_full() {
         return Ok(Vec::new());
@@ -171,15 +176,16 @@ fn left_over(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<Vec<Mode>, Error> {
         let earlier = found[..at].iter().filter(|other| (*other - eigenvalue).norm() <= same);
         let shifted = &rest - DMatrix::identity(rest.nrows(), rest.nrows()) * eigenvalue;
         let svd = ComplexSvd::new(&shifted)?;
-        let (value, vector) = svd.from_smallest(earlier.count());
-        let vector = if value <= same { vector } else { svd.from_smallest(0).1 };
-        Ok(named(eigenvalue, &staircase, &vector))
+        let (value, vector) = svd.nth_smallest(earlier.count());
+        let vector = if value <= same { vector } else { svd.nth_smallest(0).1 };
+        Ok(mode_in_given_coordinates(eigenvalue, &staircase, &vector))
     };
     found.iter().enumerate().map(mode).collect()
 }
 
-/// The mode with the left eigenvector that has these coordinates in the basis of the rest.
-fn named(
+/// The mode whose left eigenvector has the given coordinates in the basis of the uncontrollable
+/// states.
+fn mode_in_given_coordinates(
     eigenvalue: Complex<f64>,
     staircase: &Staircase,
     coordinates: &DVector<Complex<f64>>,
@@ -191,11 +197,11 @@ fn named(
     let largest = size(dominant[0]);
     dominant.retain(|&state| size(state) >= DOMINANT * largest);
     let given = balanced.zip_map(&staircase.scale, |entry, scale| entry / scale);
-    Mode { eigenvalue, vector: turned(&given), dominant }
+    Mode { eigenvalue, vector: normalised(&given), dominant }
 }
 
-/// Length one, the largest entry real and positive.
-fn turned(v: &DVector<Complex<f64>>) -> DVector<Complex<f64>> {
+/// Scales a vector to length one with its largest entry real and positive.
+fn normalised(v: &DVector<Complex<f64>>) -> DVector<Complex<f64>> {
     let largest = v.iter().fold(Complex::new(0.0, 0.0), |most: Complex<f64>, entry| {
         if entry.norm() > most.norm() { *entry } else { most }
     });

@@ -1,5 +1,5 @@
-//! What a linear system makes of its input: gains, norms, step and frequency responses, and what a
-//! fault does to the closed loop.
+//! The response of a linear system to its input: gains, norms, step and frequency responses, and
+//! the effect of faults on the closed loop.
 //!
 //! ```text
 //! x' = A x + B w,  z = C x + D w             continuous
@@ -8,13 +8,13 @@
 //!
 //! | question | answer |
 //! |---|---|
-//! | largest z for w up to one in size | [`peak_gain`] |
+//! | largest z for inputs w bounded by one | [`peak_gain`] |
 //! | largest z for w of unit energy, energy of z for an impulse or white noise | [`energy`] |
 //! | largest amplification of energy | [`h_infinity`] |
 //! | amplification at one frequency | [`frequency_response`] |
 //! | z for a step or a ramp of w | [`step_response`], [`ramp_response`] |
-//! | errors and states of the loop of [`crate::aso`] under bounded faults | [`fault_bounds`] |
-//! | the same when friction turns round | [`reversal`] |
+//! | bounds of errors and states of the loop of [`crate::aso`] under bounded faults | [`fault_bounds`] |
+//! | response of that loop to a reversal of friction | [`reversal`] |
 
 mod energy;
 mod fault;

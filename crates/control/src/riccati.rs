@@ -36,30 +36,31 @@ pub struct Weights {
 
 /// The stabilising solution of a Riccati equation and its feedback u = K x.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Regulator {
-    /// P, n x n, symmetric, positive semidefinite: x' P x is the cost of the way from x to rest.
+    /// P, n x n, symmetric, positive semidefinite: x' P x is the cost from the initial state x.
     pub p: DMatrix<f64>,
     /// K, m x n: -R^-1 (B' P + N'), sampled -(R + B' P B)^-1 (B' P A + N').
     pub gain: DMatrix<f64>,
     /// Eigenvalues of A + B K.
     pub eigenvalues: Vec<Complex<f64>>,
-    /// Largest entry of the left side of the equation relative to the same entry of the sum of the
-    /// absolute terms it is made of, products included.
+    /// Largest entry of the left side of the equation relative to the same entry of the sum of its
+    /// absolute terms, products included.
     pub residual: f64,
 }
 
 /// The linear-quadratic regulator u = K x for x' = A x + B u, or for `x[k+1] = A x[k] + B u[k]`.
 ///
-/// `a`: n x n; `b`: n x m; the weights as in [`Weights`], for a sampled system those of one sample.
-/// It solves the Riccati equation of the domain, printed in [`crate::riccati`]. The stabilising
-/// solution exists and is unique when (A, B) is stabilisable and the weight sees every eigenvalue
-/// of A - B R^-1 N' on the limit of stability; both are decided by the smallest singular value of
-/// [A - lambda I, B], or of [A - lambda I; Q], in balanced coordinates, zero below 1e-13 n of the
+/// `a`: n x n; `b`: n x m; `weights`: see [`Weights`], for a sampled system the cost of one sample.
+/// Solves the Riccati equation of the domain, see [`crate::riccati`]. The stabilising solution
+/// exists and is unique when (A, B) is stabilisable and every mode of A - B R^-1 N' on the
+/// stability limit appears in the weight; both are decided by the smallest singular value of [A -
+/// lambda I, B], or of [A - lambda I; Q], in balanced coordinates, zero below 1e-13 n of the
 /// largest. Method: balancing of the Hamiltonian, structured doubling (after a Cayley transform for
 /// continuous time), then Newton's method, each step a Lyapunov equation for the remainder. About
 /// (20 + 15 s) n^3 multiplications for s doublings and 300 n^3 for a step of Newton; usually 5 to
 /// 15 doublings and 2 steps. The solution is returned only if A + B K is stable and every entry of
-/// the residual is below 1e-9 of the absolute terms it is made of.
+/// the residual is below 1e-9 of the sum of its absolute terms.
 ///
 /// Source: E. K.-W. Chu, H.-Y. Fan and W.-W. Lin, A structure-preserving doubling algorithm for
 /// continuous-time algebraic Riccati equations, Linear Algebra Appl. 396 (2005); sampled: with

@@ -1,8 +1,8 @@
-//! The controller designed for its sample time.
+//! The design of the controller for a given sample time.
 //!
-//! The plant is discretised exactly, with u held from sample to sample and the fault developing by
-//! its model inside the interval. All gains are then those of the sampled plant, so that the loop is
-//! stable at any sample time at which the sampled plant stays controllable and observable.
+//! The plant is discretised exactly, with u held between samples and the fault developing by its
+//! model. All gains are designed for the sampled plant, so that the loop is stable at every sample
+//! time at which the sampled plant is controllable and observable.
 
 use crate::aso::{Estimator, FaultyPlant, Gains, place_controller};
 use crate::balance::{divide_columns, multiply_columns, multiply_rows, power_of_two};
@@ -15,30 +15,32 @@ use crate::stability::instability;
 use crate::{Domain, Error, check};
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// The largest decay exponent per sample that [`sampled_poles`] gives out.
+/// The largest decay exponent per sample that [`sampled_poles`] returns.
 const FASTEST: f64 = 4.0;
 
-/// A sampled controller.
+/// A controller designed for its sample time.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct SampledDesign {
     /// The sample time in s.
     pub period: f64,
     /// The sampled plant.
     pub plant: FaultyPlant,
-    /// The part 1 - e^(-w period) of y - `y_f` by which the filter of each measurement moves.
+    /// The gain 1 - e^(-w period) of each measurement filter, `y_f` := `y_f` + gain (y - `y_f`).
     pub filter: Option<Vec<f64>>,
-    /// The gains. `L_x`, `L_f` correct the next estimate of a prediction estimator, the present one
-    /// of a current estimator.
+    /// The gains. `L_x`, `L_f` correct the next estimate with a prediction estimator, the present
+    /// estimate with a current estimator.
     pub gains: Gains,
-    /// Quality of the eigenvalues of A + B `K_x`.
+    /// Quality of the assignment for A + B `K_x`.
     pub controller: Quality,
-    /// Quality of the eigenvalues of the observer's error, in the coordinates of [`design`].
+    /// Quality of the assignment for the error dynamics of the observer, in the coordinates of
+    /// [`place_estimator`].
     pub observer: Quality,
     /// Largest modulus of the eigenvalues of the closed loop; below one it is stable.
     pub radius: f64,
 }
 
-/// The poles of a sampled loop that belong to those of a continuous one: e^(p T), the fast slowed.
+/// Maps continuous poles p to sampled ones, e^(p T), with the fastest poles slowed down.
 ///
 /// ```text
 /// |z| = e^(-q),  q = -Re(p) T                      when no q is above 4
@@ -46,11 +48,11 @@ pub struct SampledDesign {
 /// ```
 ///
 /// `continuous`: in 1/s; `period`: T in s, above zero. The angle of z is Im(p) T. A pole with q = 4
-/// leaves 1.8 % of an error after one sample; faster ones crowd at zero, where the eigenvectors of
-/// any observer with fewer measurements than states become parallel: for the pendulum of the paper
-/// at 10 ms the condition number would be 1e14, for a residual motion that is 8 % smaller. The rule
-/// keeps the order of the poles, leaves those that take longer than a sample as they are, and brings
-/// the fastest to q = 4.
+/// reduces an error to 1.8 % in one sample; faster poles crowd at zero, where the eigenvectors of
+/// an observer with fewer measurements than states become parallel: for the pendulum of the paper
+/// at 10 ms the condition number would be 1e14, and the residual motion only 8 % smaller. The rule
+/// preserves the order of the poles, does not change those with q <= 1, and maps the fastest to q =
+/// 4.
 ///
 /// # Example
 ///
@@ -68,8 +70,8 @@ pub struct SampledDesign {
 ///
 /// # Errors
 ///
-/// [`Error::OutOfRange`] for a bad `period` and for a pole that is not finite or that turns by more
-/// than half a turn from sample to sample; [`Error::Overflow`] when e^(p T) is out of range.
+/// [`Error::OutOfRange`] for a bad `period` and for a pole that is not finite or whose angle is
+/// above pi per sample; [`Error::Overflow`] when e^(p T) is out of range.
 pub fn sampled_poles(continuous: &[Complex<f64>], period: f64) -> Result<Vec<Complex<f64>>, Error> {
     check::positive("the sample time", period)?;
     for pole in continuous {
@@ -78,7 +80,7 @@ pub fn sampled_poles(continuous: &[Complex<f64>], period: f64) -> Result<Vec<Com
             return Err(Error::OutOfRange { name: "Re(p) T", value: decay, rule: "finite" });
         }
         if angle.is_nan() || angle.abs() > std::f64::consts::PI {
-            let rule = "at most pi in size: half a turn from sample to sample";
+            let rule = "at most pi in modulus: half a turn per sample";
             return Err(Error::OutOfRange { name: "Im(p) T", value: angle, rule });
         }
     }
@@ -93,21 +95,21 @@ pub fn sampled_poles(continuous: &[Complex<f64>], period: f64) -> Result<Vec<Com
     continuous.iter().map(sampled).collect()
 }
 
-/// The plant from sample to sample.
+/// Discretises the plant.
 ///
 /// ```text
 /// [x; f](T) = e^([A, F_a; 0, A_f] T) [x; f] + integral of e^([A, F_a; 0, A_f] s) ds [B; 0] u
 /// y_f[k+1]  = y_f[k] + (I - e^(-W T)) (y[k] - y_f[k])
 /// ```
 ///
-/// `extended`: in continuous time; `period`: T in s, above zero. Exact for u held and faults as
-/// modelled, so that a ramp moves inside the interval; the filter of the measurements runs on their
-/// samples. Method and precision: those of [`FirstOrderHold`].
+/// `extended`: in continuous time; `period`: T in s, above zero. Exact for a held u and faults that
+/// follow their model, a ramp within the interval included; the measurement filter operates on
+/// samples. Method and precision: see [`FirstOrderHold`].
 ///
 /// # Errors
 ///
-/// Those of [`FaultyPlant::check`] and [`FirstOrderHold::new`]; [`Error::Shape`] when filter and
-/// plant do not belong together.
+/// Same as [`FaultyPlant::check`] and [`FirstOrderHold::new`]; [`Error::Shape`] when the filter
+/// does not fit the plant.
 pub fn sample(extended: &ExtendedPlant, period: f64) -> Result<FaultyPlant, Error> {
     let ExtendedPlant { plant, filter, states, .. } = extended;
     plant.check()?;
@@ -129,7 +131,8 @@ pub fn sample(extended: &ExtendedPlant, period: f64) -> Result<FaultyPlant, Erro
     let Some(rates) = filter else {
         return Ok(FaultyPlant { a, b, c: plant.c.clone(), f_a, a_f });
     };
-    let moved = DVector::from_vec(rates.iter().map(|rate| part(*rate, period) / rate).collect());
+    let moved =
+        DVector::from_vec(rates.iter().map(|rate| filter_gain(*rate, period) / rate).collect());
     let moved = DMatrix::from_diagonal(&moved);
     let kept = DVector::from_vec(rates.iter().map(|rate| (-rate * period).exp()).collect());
     Ok(FaultyPlant {
@@ -145,7 +148,7 @@ pub fn sample(extended: &ExtendedPlant, period: f64) -> Result<FaultyPlant, Erro
 }
 
 /// 1 - e^(-rate T).
-fn part(rate: f64, period: f64) -> f64 {
+fn filter_gain(rate: f64, period: f64) -> f64 {
     -(-rate * period).exp_m1()
 }
 
@@ -157,24 +160,22 @@ fn part(rate: f64, period: f64) -> f64 {
 /// ```
 ///
 /// `extended`: the plant in continuous time; `period`: T in s, above zero; `controller_poles`: one
-/// per state of the plant itself; `observer_poles`: one per state of the extended plant and entry of
-/// `f_hat`, both of the sampled loop, of a modulus below one for a stable one, see [`sampled_poles`]; `k_f`:
-/// m x q, or None for the continuous [`FaultyPlant::compensation_gain`] times the mean over the
-/// interval of the fault as modelled, so that the held u cancels a ramp in the mean. The design
+/// per state of the plant itself; `observer_poles`: one per state of the extended plant and entry
+/// of `f_hat`, both in the z plane, of modulus below one for a stable loop, see [`sampled_poles`];
+/// `k_f`: m x q, or None for the continuous [`FaultyPlant::compensation_gain`] times the mean of
+/// the modelled fault over the interval, so that the held u cancels a ramp on average. The design
 /// exists when the sampled plant is controllable and its augmented pair observable, for the current
-/// estimator with the output `C_0` `A_0`: `A_0` must not lose rank, which very fast filters do.
-/// Method, cost and tolerance: those of [`crate::placement::place`].
+/// estimator with the output `C_0` `A_0`: `A_0` must not be singular, which very fast filters make
+/// it. Method, cost and tolerance: see [`crate::placement::place`].
 ///
-/// The estimator is placed in coordinates in which each state alone moves the measurements alike
-/// over as many samples as there are states, so that neither the sample time nor units decide what
-/// a well-conditioned observer is.
+/// The estimator is placed in the coordinates of [`place_estimator`], so that the condition number
+/// depends neither on the sample time nor on units.
 ///
 /// Two choices matter more than the poles. The current estimator acts one sample earlier. And with
-/// the fault modelled as a ramp the command's error `K_f` eps - `K_x` e after a step of the fault is
-/// first too small, then too large, and sums up to almost nothing, as the estimate of a ramp has no
-/// lag: the plant is not pushed away. For the friction
-/// pendulum of the paper (poles of the paper, -2500 added for the ramp) the cart then moves by, half
-/// of peak to peak in mm:
+/// the fault modelled as a ramp the command's error `K_f` eps - `K_x` e after a step of the fault
+/// is first too small, then too large, and its sum is almost zero, as the estimate of a ramp has no
+/// lag: the plant is hardly displaced. For the friction pendulum of the paper (poles of the paper,
+/// -2500 added for the ramp) the cart then moves by, half of peak to peak in mm:
 ///
 /// | sample time in ms | 0.1 | 0.5 | 1 | 2 | 5 | 10 |
 /// |---|---|---|---|---|---|---|
@@ -187,9 +188,9 @@ fn part(rate: f64, period: f64) -> f64 {
 ///
 /// # Errors
 ///
-/// Those of [`sample`], of [`FaultyPlant::check_observer_exists`] for the sampled plant and of
+/// Same as [`sample`], [`FaultyPlant::check_observer_exists`] for the sampled plant and
 /// [`crate::placement::place`]; [`Error::Shape`], [`Error::NotFinite`] for a bad `k_f`;
-/// [`Error::PolesMissed`] when the closed loop is unstable although all poles wanted are stable.
+/// [`Error::PolesMissed`] when the closed loop is unstable although all requested poles are stable.
 pub fn design(
     extended: &ExtendedPlant,
     period: f64,
@@ -232,16 +233,16 @@ pub fn design(
     })
 }
 
-/// The gain of the sampled observer whose error is that of `a_0` - L `output`, its eigenvalues `poles`.
+/// Computes the gain L of a sampled observer such that `a_0` - L `output` has the eigenvalues
+/// `poles`.
 ///
-/// `a_0`: n x n; `output`: p x n, [`Estimator::output_matrix`]; `poles`: n, in the z plane. It is found in the
-/// coordinates in which each state alone moves the output alike: the sum of the squares of what it
-/// shows in as many samples as there are states is one. Existence, method, cost and tolerance: those
-/// of [`place_discrete`].
+/// `a_0`: n x n; `output`: p x n, [`Estimator::output_matrix`]; `poles`: n, in the z plane. The
+/// states are first scaled such that each of them alone, over n samples, gives an output with a sum
+/// of squares of about one. Existence, method, cost and tolerance: see [`place_discrete`].
 ///
 /// # Errors
 ///
-/// Those of [`place_discrete`].
+/// Same as [`place_discrete`].
 pub fn place_estimator(
     a_0: &DMatrix<f64>,
     output: &DMatrix<f64>,
@@ -266,23 +267,23 @@ pub fn place_estimator(
     Ok((-gain.transpose(), placed.quality))
 }
 
-/// W of the measurement filter as the controller runs it in `domain`: the rates w, or when sampled
-/// the parts 1 - e^(-w T) of y - `y_f` by which it moves from sample to sample.
+/// The coefficients of the measurement filter in `domain`: the rates w, in sampled time the gains 1
+/// - e^(-w T). None without a filter.
 #[must_use]
 pub fn filter(extended: &ExtendedPlant, domain: Domain) -> Option<Vec<f64>> {
     let rates = extended.filter.as_ref()?.iter();
     Some(match domain {
         Domain::Continuous => rates.copied().collect(),
-        Domain::Sampled { period } => rates.map(|&rate| part(rate, period)).collect(),
+        Domain::Sampled { period } => rates.map(|&rate| filter_gain(rate, period)).collect(),
     })
 }
 
-/// `K_f` in `domain`: [`FaultyPlant::compensation_gain`] of the continuous plant, when sampled times
-/// the mean over the interval of the fault as modelled.
+/// `K_f` in `domain`: [`FaultyPlant::compensation_gain`] of the continuous plant, in sampled time
+/// multiplied by the mean of the modelled fault over the interval.
 ///
 /// # Errors
 ///
-/// Those of [`FaultyPlant::compensation_gain`] and [`FirstOrderHold::new`].
+/// Same as [`FaultyPlant::compensation_gain`] and [`FirstOrderHold::new`].
 pub fn compensation_gain(extended: &ExtendedPlant, domain: Domain) -> Result<DMatrix<f64>, Error> {
     let gain = extended.plant.compensation_gain()?;
     let Domain::Sampled { period } = domain else {

@@ -140,7 +140,7 @@ impl ComplexSvd {
 
     /// A singular value and its right singular vector, counted from the smallest: index 0 is the
     /// smallest. Vectors of a repeated singular value need not be orthogonal.
-    pub(crate) fn from_smallest(&self, index: usize) -> (f64, DVector<Complex<f64>>) {
+    pub(crate) fn nth_smallest(&self, index: usize) -> (f64, DVector<Complex<f64>>) {
         let at = self.repeats * (self.cols - 1 - index);
         let column = self.real.right.column(at);
         let imaginary = |i: usize| if self.repeats == 2 { column[i + self.cols] } else { 0.0 };
@@ -258,7 +258,7 @@ mod tests {
         let svd = ComplexSvd::new(&m).unwrap();
         assert_eq!(svd.rank(1e-12), 1);
         for (index, value) in svd.values().into_iter().rev().enumerate() {
-            let (found, v) = svd.from_smallest(index);
+            let (found, v) = svd.nth_smallest(index);
             assert!((found - value).abs() < 1e-15);
             assert!(((&m * &v).norm() - value).abs() < 1e-15);
             assert!((v.norm() - 1.0).abs() < 1e-15);

@@ -22,8 +22,9 @@ use crate::svd::norm_2;
 use crate::{Domain, Error, check};
 use nalgebra::DMatrix;
 
-/// Everything theorem 1 says about a controller.
+/// The quantities of theorem 1 for a controller.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Certificate {
     /// The design parameter alpha. It cancels in `delta`.
     pub alpha: f64,
@@ -33,14 +34,15 @@ pub struct Certificate {
     pub p: DMatrix<f64>,
     /// Smallest and largest eigenvalue of P.
     pub p_range: (f64, f64),
-    /// Residual of (12), each entry relative to the absolute terms it is made of.
+    /// Residual of (12), the largest entry relative to the sum of its absolute terms.
     pub residual: f64,
-    /// Norm of the residual of (12) relative to that of alpha beta I. Below 1 / sqrt(n + q) the
-    /// computed P, rounding included, shows the error dynamics stable.
+    /// Norm of the residual of (12) relative to the norm of alpha beta I. Below 1 / sqrt(n + q) the
+    /// computed P, rounding included, proves that the error dynamics are stable.
     pub defect: f64,
-    /// Radius (16): V = z' P z falls wherever the norm of z = [e; `f_hat`] is larger. The paper says that
-    /// the error ends in that ball; what follows is that it ends in the smallest ellipsoid z' P z =
-    /// constant around it, whose longest axis is sqrt(cond P) times as long.
+    /// Radius (16): V = z' P z decreases wherever the norm of z = [e; `f_hat`] is larger. The paper
+    /// concludes that the error ends in that ball; the proof shows that it ends in the smallest
+    /// ellipsoid z' P z = constant around the ball, whose longest axis is sqrt(cond P) times as
+    /// long.
     pub delta: f64,
     /// Rank of (A, B); full.
     pub controllability: Rank,
@@ -52,7 +54,7 @@ pub struct Certificate {
     pub observer_abscissa: f64,
 }
 
-/// P of (12) and the radius delta of (16) for a plant and a controller.
+/// Computes P of (12) and the radius delta of (16) for a plant and a controller.
 ///
 /// ```text
 /// P (A_0 - L C_0) + (A_0 - L C_0)' P = -alpha beta I                 (12)
@@ -61,8 +63,8 @@ pub struct Certificate {
 ///
 /// `alpha`: above zero; `beta`: above zero, the largest norm of the fault in its unit. P exists
 /// when `A_0` - L `C_0` is Hurwitz. P grows with alpha: with `P_1` the solution for alpha beta = 1,
-/// delta = 2 beta norm(`P_1` `F_0`) for every alpha, so that, other than the paper says, enlarging
-/// alpha does not shrink the region. Method, cost and tolerance: those of [`lyapunov`].
+/// delta = 2 beta norm(`P_1` `F_0`) for every alpha: contrary to the paper, a larger alpha does not
+/// give a smaller region. Method, cost and tolerance: see [`lyapunov`].
 ///
 /// # Example
 ///
@@ -82,9 +84,9 @@ pub struct Certificate {
 ///
 /// # Errors
 ///
-/// Those of [`Gains::check`]; [`Error::OutOfRange`] for `alpha` or `beta`;
+/// Same as [`Gains::check`]; [`Error::OutOfRange`] for `alpha` or `beta`;
 /// [`Error::NotControllable`]; [`Error::NotHurwitz`] when the observer is unstable;
-/// [`Error::NotPositiveDefinite`] when rounding hides it; those of [`lyapunov`].
+/// [`Error::NotPositiveDefinite`] when rounding errors hide that P > 0; same as [`lyapunov`].
 pub fn certify(
     plant: &FaultyPlant,
     gains: &Gains,

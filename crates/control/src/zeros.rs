@@ -1,4 +1,4 @@
-//! Invariant zeros: the frequencies that a system blocks.
+//! Invariant zeros of a linear system.
 
 use crate::balance::{Balance, divide_rows, multiply_columns, unit_columns};
 use crate::blocks::stacked;
@@ -7,17 +7,18 @@ use crate::svd::Svd;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{Complex, DMatrix};
 
-/// Svd values below this part of the scaled matrices' norm count as zero, per row.
+/// A singular value counts as zero below this times the number of rows and columns, relative to the
+/// norm of the scaled matrices.
 const TOLERANCE_PER_STATE: f64 = 100.0 * f64::EPSILON;
 
 /// The invariant zeros of a system, and the rank of its transfer function.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Zeros {
-    /// Where the system matrix has a lower rank than elsewhere, with multiplicity, ordered by real
-    /// part, then by imaginary part.
+    /// The finite zeros, with multiplicity, ordered by real part, then by imaginary part.
     pub finite: Vec<Complex<f64>>,
-    /// Rank of C (s I - A)^-1 B for almost every s. Below the number of inputs some combination of
-    /// the inputs never shows in y.
+    /// Rank of C (s I - A)^-1 B for almost every s. If it is below the number of inputs, some
+    /// combination of the inputs has no effect on y.
     pub rank: usize,
 }
 
@@ -27,13 +28,12 @@ pub struct Zeros {
 /// s with rank [A - s I, B; C, 0] below its rank for almost every s
 /// ```
 ///
-/// `a`: n x n; `b`: n x m; `c`: p x n; also with more inputs than outputs or the reverse, and with
-/// modes that are not controllable or not observable: these are zeros when they block. They always
-/// exist as a set, possibly empty. Method: states balanced, columns of B and rows of C scaled to the
-/// norm of A; orthogonal transformations take away the states that y = 0 fixes until the part that
-/// is left has a square invertible D; the zeros are the eigenvalues of A - B D^-1 C there. Some 20 n
-/// (n + m) (n + p) min(n, m + p) multiplications. Tolerance of the ranks: 100 (n + m + p) eps,
-/// relative to the norm of the scaled matrices.
+/// `a`: n x n; `b`: n x m; `c`: p x n; the numbers of inputs and outputs may differ. Uncontrollable
+/// and unobservable modes are zeros if they lower the rank. Method: states are balanced, columns of
+/// B and rows of C scaled to the norm of A; orthogonal transformations remove the states that y = 0
+/// determines, until D of the remaining system is square and invertible; the zeros are the
+/// eigenvalues of its A - B D^-1 C. About 20 n (n + m) (n + p) min(n, m + p) multiplications.
+/// Tolerance of the ranks: 100 (n + m + p) eps, relative to the norm of the scaled matrices.
 ///
 /// Source: A. Emami-Naeini and P. Van Dooren, Computation of zeros of linear multivariable systems,
 /// Automatica 18 (1982), the algorithm of section 3.
@@ -98,12 +98,12 @@ fn scaled(a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>) -> StateSpace {
 ///
 /// One pass of the reduction, with `zero` the threshold of the ranks:
 ///
-/// 1. An orthogonal change of the outputs splits y = C x + D u into outputs y1 with a D1 of full row
-///    rank and outputs y2 = C2 x that D does not reach.
+/// 1. An orthogonal change of the outputs splits y = C x + D u into outputs y1 with a D1 of full
+///    row rank and outputs y2 = C2 x that D does not reach.
 /// 2. At a zero y2 = 0, which fixes as many states as C2 has independent rows. An orthogonal change
 ///    of the states separates the fixed states from the free ones.
-/// 3. The fixed states are zero, so that the right-hand sides of their differential equations become
-///    outputs of the free states.
+/// 3. The fixed states are zero, so that the right-hand sides of their differential equations
+///    become outputs of the free states.
 ///
 /// The passes end when C2 fixes no further state.
 fn reduced(mut system: StateSpace, zero: f64) -> Result<StateSpace, Error> {

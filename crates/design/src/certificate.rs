@@ -67,7 +67,7 @@ fn verified<T>(outcome: Result<Outcome<T>, control::Error>) -> Result<T, String>
     match outcome {
         Ok(Outcome::Optimal(found)) => Ok(found),
         Ok(Outcome::Infeasible { conflict }) => Err(format!("infeasible: {}", conflict.join("; "))),
-        Ok(Outcome::Inconclusive(reason)) => Err(format!("numerical trouble: {reason}")),
+        Ok(Outcome::Inconclusive(reason)) => Err(format!("not proven: {reason}")),
         Err(error) => Err(error.to_string()),
     }
 }

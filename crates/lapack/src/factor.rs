@@ -1,8 +1,8 @@
-//! Triangular factors and their use.
+//! Cholesky and LU factors, and solutions with them.
 
 use nalgebra::DMatrix;
 
-/// The lower triangular L with L L' = A, A given by its lower triangle.
+/// Computes the lower triangular L with L L' = A, A given by its lower triangle.
 ///
 /// The error is the order, from 1, of the first leading minor that is not positive.
 pub(crate) fn cholesky(a: &DMatrix<f64>) -> Result<DMatrix<f64>, usize> {
@@ -10,8 +10,8 @@ pub(crate) fn cholesky(a: &DMatrix<f64>) -> Result<DMatrix<f64>, usize> {
     let mut l = DMatrix::zeros(n, n);
     for col in 0..n {
         for row in col..n {
-            let done: f64 = (0..col).map(|k| l[(row, k)] * l[(col, k)]).sum();
-            let rest = a[(row, col)] - done;
+            let known: f64 = (0..col).map(|k| l[(row, k)] * l[(col, k)]).sum();
+            let rest = a[(row, col)] - known;
             if row > col {
                 l[(row, col)] = rest / l[(col, col)];
             } else if rest > 0.0 {
@@ -24,25 +24,25 @@ pub(crate) fn cholesky(a: &DMatrix<f64>) -> Result<DMatrix<f64>, usize> {
     Ok(l)
 }
 
-/// X with L X = B.
+/// Solves L X = B by forward substitution.
 pub(crate) fn forward(l: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let mut x = b.clone();
     for col in 0..x.ncols() {
         for row in 0..x.nrows() {
-            let done: f64 = (0..row).map(|k| l[(row, k)] * x[(k, col)]).sum();
-            x[(row, col)] = (x[(row, col)] - done) / l[(row, row)];
+            let known: f64 = (0..row).map(|k| l[(row, k)] * x[(k, col)]).sum();
+            x[(row, col)] = (x[(row, col)] - known) / l[(row, row)];
         }
     }
     x
 }
 
-/// X with U X = B.
+/// Solves U X = B by back substitution.
 pub(crate) fn backward(u: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let mut x = b.clone();
     for col in 0..x.ncols() {
         for row in (0..x.nrows()).rev() {
-            let done: f64 = (row + 1..x.nrows()).map(|k| u[(row, k)] * x[(k, col)]).sum();
-            x[(row, col)] = (x[(row, col)] - done) / u[(row, row)];
+            let known: f64 = (row + 1..x.nrows()).map(|k| u[(row, k)] * x[(k, col)]).sum();
+            x[(row, col)] = (x[(row, col)] - known) / u[(row, row)];
         }
     }
     x
@@ -50,27 +50,27 @@ pub(crate) fn backward(u: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
 
 /// P A = L U with partial pivoting.
 pub(crate) struct Elimination {
-    /// L below the diagonal, where its ones are left out, U on and above it.
+    /// L below the diagonal (its diagonal is one), U on and above the diagonal.
     pub(crate) factors: DMatrix<f64>,
-    /// In step k row k was swapped with this one.
+    /// For each step k the row that was swapped with row k.
     pub(crate) swaps: Vec<usize>,
     /// The first pivot that is zero, from 1.
     pub(crate) singular: Option<usize>,
 }
 
 impl Elimination {
-    pub(crate) fn of(a: &DMatrix<f64>) -> Self {
+    pub(crate) fn new(a: &DMatrix<f64>) -> Self {
         let n = a.nrows();
-        let mut found = Self { factors: a.clone(), swaps: Vec::with_capacity(n), singular: None };
-        let m = &mut found.factors;
+        let mut lu = Self { factors: a.clone(), swaps: Vec::with_capacity(n), singular: None };
+        let m = &mut lu.factors;
         for step in 0..n {
             let pivot =
                 (step..n).rev().max_by(|&i, &j| m[(i, step)].abs().total_cmp(&m[(j, step)].abs()));
             let pivot = pivot.unwrap_or(step);
-            found.swaps.push(pivot);
+            lu.swaps.push(pivot);
             m.swap_rows(step, pivot);
             if m[(step, step)] == 0.0 {
-                found.singular = found.singular.or(Some(step + 1));
+                lu.singular = lu.singular.or(Some(step + 1));
                 continue;
             }
             for row in step + 1..n {
@@ -81,10 +81,10 @@ impl Elimination {
                 }
             }
         }
-        found
+        lu
     }
 
-    /// X with A X = B.
+    /// Solves A X = B.
     pub(crate) fn solve(&self, b: &DMatrix<f64>) -> DMatrix<f64> {
         let mut right = b.clone();
         for (step, &pivot) in self.swaps.iter().enumerate() {

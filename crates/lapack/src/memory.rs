@@ -1,9 +1,9 @@
-//! Arrays as Fortran lays them out, read into matrices and written from them.
+//! Column-major arrays of Fortran, read into matrices and written from them.
 #![expect(unsafe_code, reason = "the boundary to callers in C and Fortran")]
 
 use nalgebra::DMatrix;
 
-/// The two precisions; all arithmetic is done in the wider one.
+/// A number in single or double precision; all arithmetic is in double precision.
 pub(crate) trait Number: Copy {
     fn wide(self) -> f64;
     fn narrow(value: f64) -> Self;
@@ -30,7 +30,7 @@ impl Number for f32 {
     }
 }
 
-/// Which entries of a square array are meant.
+/// The part of a square array that is read or written.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Part {
     All,
@@ -39,7 +39,7 @@ pub(crate) enum Part {
 }
 
 impl Part {
-    /// The argument UPLO.
+    /// The triangle that the argument UPLO selects.
     pub(crate) fn triangle(letter: u8) -> Option<Self> {
         match letter.to_ascii_uppercase() {
             b'U' => Some(Self::Upper),
@@ -73,7 +73,7 @@ impl Layout {
         (step >= rows.max(1)).then_some(Self { rows, cols, step })
     }
 
-    /// The matrix in the array; entries outside of `part` are not read, but zero.
+    /// Reads the matrix; entries outside of `part` are not read and are zero.
     ///
     /// # Safety
     ///
@@ -81,7 +81,7 @@ impl Layout {
     pub(crate) unsafe fn read<T: Number>(self, from: *const T, part: Part) -> DMatrix<f64> {
         DMatrix::from_fn(self.rows, self.cols, |row, col| {
             if part.holds(row, col) {
-                // SAFETY: the entry lies inside of the array, see above.
+                // SAFETY: the entry is inside of the array, see above.
                 unsafe { from.add(row + col * self.step).read() }.wide()
             } else {
                 0.0
@@ -99,7 +99,7 @@ impl Layout {
         for (at, value) in m.iter().enumerate() {
             let (row, col) = (at % self.rows, at / self.rows);
             if part.holds(row, col) {
-                // SAFETY: the entry lies inside of the array, see above.
+                // SAFETY: the entry is inside of the array, see above.
                 unsafe { to.add(row + col * self.step).write(T::narrow(*value)) }
             }
         }
@@ -120,12 +120,12 @@ impl Vector {
         (increment != 0).then_some(Self { length, increment })
     }
 
-    fn place(self, at: usize) -> usize {
+    fn offset(self, at: usize) -> usize {
         let step = self.increment.unsigned_abs() as usize;
         if self.increment < 0 { (self.length - 1 - at) * step } else { at * step }
     }
 
-    /// The vector as a column.
+    /// Reads the vector as a column.
     ///
     /// # Safety
     ///
@@ -133,7 +133,7 @@ impl Vector {
     pub(crate) unsafe fn read<T: Number>(self, from: *const T) -> DMatrix<f64> {
         DMatrix::from_fn(self.length, 1, |at, _| {
             // SAFETY: the entry belongs to the vector, see above.
-            unsafe { from.add(self.place(at)).read() }.wide()
+            unsafe { from.add(self.offset(at)).read() }.wide()
         })
     }
 
@@ -146,7 +146,7 @@ impl Vector {
         for (at, &value) in product.iter().enumerate() {
             // SAFETY: the entry belongs to the vector, see above.
             unsafe {
-                let entry = y.add(self.place(at));
+                let entry = y.add(self.offset(at));
                 let before =
                     if beta.wide() == 0.0 { 0.0 } else { beta.wide() * entry.read().wide() };
                 entry.write(T::narrow(value + before));

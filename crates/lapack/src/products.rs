@@ -6,9 +6,9 @@ use nalgebra::DMatrix;
 
 /// A matrix argument with its option TRANS.
 pub(crate) struct Operand<T> {
-    pub(crate) at: *const T,
+    pub(crate) data: *const T,
     pub(crate) leading: i32,
-    pub(crate) turned: u8,
+    pub(crate) transpose: u8,
 }
 
 impl<T: Number> Operand<T> {
@@ -18,25 +18,25 @@ impl<T: Number> Operand<T> {
     ///
     /// The array is valid for reads.
     unsafe fn read(&self, rows: i32, cols: i32) -> Option<DMatrix<f64>> {
-        match self.turned.to_ascii_uppercase() {
+        match self.transpose.to_ascii_uppercase() {
             b'N' => {
                 let layout = Layout::new(rows, cols, self.leading)?;
-                // SAFETY: as the caller promises.
-                Some(unsafe { layout.read(self.at, Part::All) })
+                // SAFETY: the caller guarantees it.
+                Some(unsafe { layout.read(self.data, Part::All) })
             }
             b'T' | b'C' => {
                 let layout = Layout::new(cols, rows, self.leading)?;
-                // SAFETY: as the caller promises.
-                Some(unsafe { layout.read(self.at, Part::All) }.transpose())
+                // SAFETY: the caller guarantees it.
+                Some(unsafe { layout.read(self.data, Part::All) }.transpose())
             }
             _ => None,
         }
     }
 }
 
-/// The array C, the part of it that is meant, and the two factors.
+/// The output array C, the part of it that is written, and the two factors.
 pub(crate) struct Target<T> {
-    pub(crate) at: *mut T,
+    pub(crate) data: *mut T,
     pub(crate) leading: i32,
     pub(crate) part: Option<Part>,
     pub(crate) alpha: T,
@@ -53,17 +53,17 @@ impl<T: Number> Target<T> {
         let (layout, part) = (Layout::new(rows, cols, self.leading)?, self.part?);
         let mut sum = product * self.alpha.wide();
         if self.beta.wide() != 0.0 {
-            // SAFETY: as the caller promises.
-            sum += unsafe { layout.read(self.at, part) } * self.beta.wide();
+            // SAFETY: the caller guarantees it.
+            sum += unsafe { layout.read(self.data, part) } * self.beta.wide();
         }
-        // SAFETY: as the caller promises.
-        unsafe { layout.write(self.at, &sum, part) };
+        // SAFETY: the caller guarantees it.
+        unsafe { layout.write(self.data, &sum, part) };
         Some(())
     }
 }
 
-/// C := alpha op(A) op(B) + beta C with C of m x n and op(A) of m x k; None if nothing was done
-/// because an argument is illegal.
+/// C := alpha op(A) op(B) + beta C with C of m x n and op(A) of m x k; None, with C unchanged, if an
+/// argument is illegal.
 ///
 /// # Safety
 ///
@@ -74,7 +74,7 @@ pub(crate) unsafe fn general<T: Number>(
     b: &Operand<T>,
     c: &Target<T>,
 ) -> Option<()> {
-    // SAFETY: as the caller promises.
+    // SAFETY: the caller guarantees it.
     unsafe {
         let (left, right) = (a.read(m, k)?, b.read(k, n)?);
         c.update(m, n, left * right)
@@ -86,12 +86,12 @@ pub(crate) unsafe fn general<T: Number>(
 /// # Safety
 ///
 /// The arrays are valid for what the arguments say.
-pub(crate) unsafe fn square<T: Number>(
+pub(crate) unsafe fn rank_k<T: Number>(
     (n, k): (i32, i32),
     a: &Operand<T>,
     c: &Target<T>,
 ) -> Option<()> {
-    // SAFETY: as the caller promises.
+    // SAFETY: the caller guarantees it.
     unsafe {
         let left = a.read(n, k)?;
         c.update(n, n, &left * left.transpose())
@@ -103,13 +103,13 @@ pub(crate) unsafe fn square<T: Number>(
 /// # Safety
 ///
 /// The arrays are valid for what the arguments say.
-pub(crate) unsafe fn mixed_square<T: Number>(
+pub(crate) unsafe fn rank_2k<T: Number>(
     (n, k): (i32, i32),
     a: &Operand<T>,
     b: &Operand<T>,
     c: &Target<T>,
 ) -> Option<()> {
-    // SAFETY: as the caller promises.
+    // SAFETY: the caller guarantees it.
     unsafe {
         let (left, right) = (a.read(n, k)?, b.read(n, k)?);
         let half = left * right.transpose();
@@ -122,16 +122,16 @@ pub(crate) unsafe fn mixed_square<T: Number>(
 /// # Safety
 ///
 /// The arrays are valid for what the arguments say.
-pub(crate) unsafe fn on_vector<T: Number>(
+pub(crate) unsafe fn matrix_vector<T: Number>(
     (m, n): (i32, i32),
     a: &Operand<T>,
     x: (*const T, i32),
     (alpha, beta): (T, T),
     y: (*mut T, i32),
 ) -> Option<()> {
-    let (rows, cols) = if a.turned.eq_ignore_ascii_case(&b'N') { (m, n) } else { (n, m) };
+    let (rows, cols) = if a.transpose.eq_ignore_ascii_case(&b'N') { (m, n) } else { (n, m) };
     let (input, output) = (Vector::new(cols, x.1)?, Vector::new(rows, y.1)?);
-    // SAFETY: as the caller promises.
+    // SAFETY: the caller guarantees it.
     unsafe {
         let product = a.read(rows, cols)? * input.read(x.0);
         output.update(y.0, &(product * alpha.wide()), beta);
@@ -144,7 +144,7 @@ pub(crate) unsafe fn on_vector<T: Number>(
 /// # Safety
 ///
 /// The arrays are valid for what the arguments say.
-pub(crate) unsafe fn symmetric_on_vector<T: Number>(
+pub(crate) unsafe fn symmetric_vector<T: Number>(
     (triangle, n): (u8, i32),
     (a, leading): (*const T, i32),
     x: (*const T, i32),
@@ -153,7 +153,7 @@ pub(crate) unsafe fn symmetric_on_vector<T: Number>(
 ) -> Option<()> {
     let (part, layout) = (Part::triangle(triangle)?, Layout::new(n, n, leading)?);
     let (input, output) = (Vector::new(n, x.1)?, Vector::new(n, y.1)?);
-    // SAFETY: as the caller promises.
+    // SAFETY: the caller guarantees it.
     unsafe {
         let half = layout.read(a, part);
         let mut whole = &half + half.transpose();

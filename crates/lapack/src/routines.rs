@@ -1,12 +1,12 @@
-//! The routines of LAPACK on arrays; each answers with its INFO.
+//! The routines of LAPACK on arrays. Each returns its error code INFO.
 //!
-//! 0: done; -i: argument i, from 1, is illegal; above 0: as said at the routine.
+//! -i: argument i, from 1, is illegal; above 0: see the routine.
 #![expect(unsafe_code, reason = "the boundary to callers in C and Fortran")]
 
 use crate::factor::{Elimination, backward, cholesky, forward};
 use crate::memory::{Layout, Number, Part};
-use crate::singular::Decomposition;
-use crate::spectrum::eigen;
+use crate::spectrum::symmetric_eigen;
+use crate::svd::Svd;
 use nalgebra::DMatrix;
 
 const NOT_CONVERGED: i32 = 1;
@@ -19,23 +19,24 @@ pub(crate) struct Array<T> {
 }
 
 impl<T> Array<T> {
-    /// INFO is -`argument` when sizes and leading dimension do not fit.
+    /// The layout of the array; INFO -`argument` if sizes and leading dimension do not fit.
     fn layout(self, rows: i32, cols: i32, argument: i32) -> Result<Layout, i32> {
         Layout::new(rows, cols, self.leading).ok_or(-argument)
     }
 }
 
-/// INFO is -`argument` for a negative size.
+/// Checks a size; INFO -`argument` if it is negative.
 fn size(value: i32, argument: i32) -> Result<i32, i32> {
     if value < 0 { Err(-argument) } else { Ok(value) }
 }
 
-/// An index, from 1, as INFO or pivot.
+/// Converts an index, from 1, to the integers of LAPACK.
 fn from_one(index: usize) -> i32 {
     i32::try_from(index).unwrap_or(i32::MAX)
 }
 
-/// A := its factor L or U, A = L L' or U' U; INFO k: the leading minor of order k is not positive.
+/// Replaces A by its Cholesky factor L or U, A = L L' or U' U; INFO k: the leading minor of order k is
+/// not positive.
 ///
 /// # Safety
 ///
@@ -43,17 +44,17 @@ fn from_one(index: usize) -> i32 {
 pub(crate) unsafe fn potrf<T: Number>(triangle: u8, n: i32, a: Array<T>) -> Result<(), i32> {
     let part = Part::triangle(triangle).ok_or(-1)?;
     let layout = a.layout(size(n, 2)?, n, 4)?;
-    // SAFETY: as the caller promises.
+    // SAFETY: the caller guarantees it.
     let half = unsafe { layout.read(a.at, part) };
     let lower = if part == Part::Lower { half } else { half.transpose() };
     let l = cholesky(&lower).map_err(from_one)?;
     let factor = if part == Part::Lower { l } else { l.transpose() };
-    // SAFETY: as the caller promises.
+    // SAFETY: the caller guarantees it.
     unsafe { layout.write(a.at, &factor, part) };
     Ok(())
 }
 
-/// B := X of A X = B with the factor of A that [`potrf`] found.
+/// Replaces B by the solution X of A X = B, with the factor of A from [`potrf`].
 ///
 /// # Safety
 ///
@@ -67,16 +68,16 @@ pub(crate) unsafe fn potrs<T: Number>(
     let part = Part::triangle(triangle).ok_or(-1)?;
     let layout = a.layout(size(n, 2)?, n, 5)?;
     let right = b.layout(n, size(right_sides, 3)?, 7)?;
-    // SAFETY: as the caller promises.
+    // SAFETY: the caller guarantees it.
     let (factor, given) = unsafe { (layout.read(a.at, part), right.read(b.at, Part::All)) };
     let l = if part == Part::Lower { factor } else { factor.transpose() };
     let x = backward(&l.transpose(), &forward(&l, &given));
-    // SAFETY: as the caller promises.
+    // SAFETY: the caller guarantees it.
     unsafe { right.write(b.at, &x, Part::All) };
     Ok(())
 }
 
-/// B := X of A X = B, A := L and U; INFO k: pivot k is zero.
+/// Replaces B by the solution X of A X = B and A by its factors L and U; INFO k: pivot k is zero.
 ///
 /// # Safety
 ///
@@ -89,10 +90,10 @@ pub(crate) unsafe fn gesv<T: Number>(
 ) -> Result<(), i32> {
     let layout = a.layout(size(n, 1)?, n, 4)?;
     let right = b.layout(n, size(right_sides, 2)?, 7)?;
-    // SAFETY: as the caller promises.
+    // SAFETY: the caller guarantees it.
     let (matrix, given) = unsafe { (layout.read(a.at, Part::All), right.read(b.at, Part::All)) };
-    let elimination = Elimination::of(&matrix);
-    // SAFETY: as the caller promises; there are n pivots.
+    let elimination = Elimination::new(&matrix);
+    // SAFETY: the caller guarantees it; there are n pivots.
     unsafe {
         layout.write(a.at, &elimination.factors, Part::All);
         for (step, &pivot) in elimination.swaps.iter().enumerate() {
@@ -102,12 +103,12 @@ pub(crate) unsafe fn gesv<T: Number>(
     if let Some(pivot) = elimination.singular {
         return Err(from_one(pivot));
     }
-    // SAFETY: as the caller promises.
+    // SAFETY: the caller guarantees it.
     unsafe { right.write(b.at, &elimination.solve(&given), Part::All) };
     Ok(())
 }
 
-/// Where eigenvalues and eigenvectors go.
+/// The output arrays of [`syevr`].
 pub(crate) struct Spectrum<T> {
     pub(crate) count: *mut i32,
     pub(crate) values: *mut T,
@@ -115,7 +116,7 @@ pub(crate) struct Spectrum<T> {
     pub(crate) support: *mut i32,
 }
 
-/// All eigenvalues, ascending, and with JOBZ = V the eigenvectors; INFO 1: not converged.
+/// Computes all eigenvalues, ascending, and with JOBZ = V the eigenvectors; INFO 1: not converged.
 ///
 /// # Safety
 ///
@@ -126,7 +127,7 @@ pub(crate) unsafe fn syevr<T: Number>(
     a: Array<T>,
     to: &Spectrum<T>,
 ) -> Result<(), i32> {
-    let wants_vectors = match job.to_ascii_uppercase() {
+    let compute_vectors = match job.to_ascii_uppercase() {
         b'N' => false,
         b'V' => true,
         _ => return Err(-1),
@@ -136,12 +137,12 @@ pub(crate) unsafe fn syevr<T: Number>(
     }
     let part = Part::triangle(triangle).ok_or(-3)?;
     let layout = a.layout(size(n, 4)?, n, 6)?;
-    // SAFETY: as the caller promises.
+    // SAFETY: the caller guarantees it.
     let half = unsafe { layout.read(a.at, part) };
     let upper = if part == Part::Upper { half } else { half.transpose() };
-    let vectors = wants_vectors.then(|| to.vectors.layout(n, n, 15)).transpose()?;
-    let (values, directions) = eigen(&upper).ok_or(NOT_CONVERGED)?;
-    // SAFETY: as the caller promises.
+    let vectors = compute_vectors.then(|| to.vectors.layout(n, n, 15)).transpose()?;
+    let (values, directions) = symmetric_eigen(&upper).ok_or(NOT_CONVERGED)?;
+    // SAFETY: the caller guarantees it.
     unsafe {
         to.count.write(n);
         for (at, &value) in values.iter().enumerate() {
@@ -158,7 +159,7 @@ pub(crate) unsafe fn syevr<T: Number>(
     Ok(())
 }
 
-/// Which singular vectors are wanted.
+/// The singular vectors to compute.
 #[derive(Clone, Copy)]
 enum Vectors {
     None,
@@ -167,7 +168,7 @@ enum Vectors {
 }
 
 impl Vectors {
-    fn of(letter: u8, argument: i32) -> Result<Self, i32> {
+    fn new(letter: u8, argument: i32) -> Result<Self, i32> {
         match letter.to_ascii_uppercase() {
             b'N' => Ok(Self::None),
             b'S' => Ok(Self::Thin),
@@ -176,7 +177,7 @@ impl Vectors {
         }
     }
 
-    /// Number of vectors out of `all`, of which `thin` have a singular value.
+    /// The number of vectors: `all`, or the `thin` ones that have a singular value.
     fn count(self, thin: i32, all: i32) -> i32 {
         match self {
             Self::None => 0,
@@ -186,15 +187,15 @@ impl Vectors {
     }
 }
 
-/// Where singular values and vectors go; the letters are JOBU and JOBVT.
+/// The output arrays of [`singular_values`], with the options JOBU and JOBVT.
 pub(crate) struct Factors<T> {
     pub(crate) values: *mut T,
     pub(crate) left: (u8, Array<T>),
     pub(crate) right: (u8, Array<T>),
 }
 
-/// The singular value decomposition; INFO 1: not converged. `first` is the number of the argument
-/// M, before which the options stand.
+/// Computes the singular value decomposition; INFO 1: not converged. `first` is the number of the
+/// argument M, which follows the options.
 ///
 /// # Safety
 ///
@@ -205,7 +206,7 @@ pub(crate) unsafe fn singular_values<T: Number>(
     to: &Factors<T>,
     first: i32,
 ) -> Result<(), i32> {
-    let (left, right) = (Vectors::of(to.left.0, 1)?, Vectors::of(to.right.0, first - 1)?);
+    let (left, right) = (Vectors::new(to.left.0, 1)?, Vectors::new(to.right.0, first - 1)?);
     let layout = a.layout(size(m, first)?, size(n, first + 1)?, first + 3)?;
     let thin = m.min(n);
     let count = (left.count(thin, m), right.count(thin, n));
@@ -213,24 +214,24 @@ pub(crate) unsafe fn singular_values<T: Number>(
     let vt_cols = if count.1 == 0 { 0 } else { n };
     let u_layout = to.left.1.layout(u_rows, count.0, first + 6)?;
     let vt_layout = to.right.1.layout(count.1, vt_cols, first + 8)?;
-    // SAFETY: as the caller promises.
+    // SAFETY: the caller guarantees it.
     let matrix = unsafe { layout.read(a.at, Part::All) };
     if matrix.iter().any(|entry| entry.is_nan()) {
         return Err(-(first + 2));
     }
-    let found = Decomposition::of(&matrix).ok_or(NOT_CONVERGED)?;
-    // SAFETY: as the caller promises.
+    let svd = Svd::new(&matrix).ok_or(NOT_CONVERGED)?;
+    // SAFETY: the caller guarantees it.
     unsafe {
-        for (at, &value) in found.values.iter().enumerate() {
+        for (at, &value) in svd.values.iter().enumerate() {
             to.values.add(at).write(T::narrow(value));
         }
-        u_layout.write(to.left.1.at, &corner(&found.u, u_layout), Part::All);
-        vt_layout.write(to.right.1.at, &corner(&found.v.transpose(), vt_layout), Part::All);
+        u_layout.write(to.left.1.at, &corner(&svd.u, u_layout), Part::All);
+        vt_layout.write(to.right.1.at, &corner(&svd.v.transpose(), vt_layout), Part::All);
     }
     Ok(())
 }
 
-/// The first rows and columns, as many as the layout has.
+/// The leading rows and columns, in the size of the layout.
 fn corner(m: &DMatrix<f64>, layout: Layout) -> DMatrix<f64> {
     m.view((0, 0), (layout.rows, layout.cols)).into_owned()
 }

@@ -1,14 +1,15 @@
-//! Eigenvalues and eigenvectors of a symmetric matrix by plane rotations.
+//! Eigenvalues and eigenvectors of a symmetric matrix by Jacobi rotations.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Six to ten sweeps are usual.
+/// Largest number of sweeps; 6 to 10 are usual.
 const SWEEPS: usize = 60;
 
-/// A V = V diag(values), V orthogonal, values ascending; A is given by its upper triangle.
+/// Eigenvalues, ascending, and orthonormal eigenvectors V of A, A V = V diag(values). A is given by its
+/// upper triangle.
 ///
-/// None when the rotations do not end. An entry that is not finite makes all answers NaN.
-pub(crate) fn eigen(a: &DMatrix<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
+/// None if the sweeps do not converge. If an entry is not finite, all results are NaN.
+pub(crate) fn symmetric_eigen(a: &DMatrix<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
     let n = a.nrows();
     let mut m = DMatrix::from_fn(n, n, |row, col| a[(row.min(col), row.max(col))]);
     if m.iter().any(|entry| !entry.is_finite()) {
@@ -29,7 +30,7 @@ pub(crate) fn eigen(a: &DMatrix<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
     None
 }
 
-/// Rotates the plane of p and q so that m[p, q] becomes zero; false if it is nothing already.
+/// Rotates in the plane of p and q so that m[p, q] becomes zero; false if it is negligible already.
 fn annihilate(m: &mut DMatrix<f64>, v: &mut DMatrix<f64>, p: usize, q: usize) -> bool {
     let coupling = m[(p, q)];
     let scale = m[(p, p)].abs() + m[(q, q)].abs();

@@ -1,16 +1,14 @@
-//! The C side: names, arguments and failure codes of the reference implementation.
+//! The exported C functions, with the names, arguments and error codes of the reference implementation.
 //!
-//! A reference in a signature is a pointer that must not be null. The workspaces are not used: one
-//! entry is the size that the routines ask for.
+//! A reference in a signature is a pointer that must not be null. The workspaces are not used; a
+//! workspace query returns the size 1.
 #![expect(unsafe_code, reason = "the boundary to callers in C and Fortran")]
 
 use crate::memory::{Number, Part};
-use crate::products::{
-    Operand, Target, general, mixed_square, on_vector, square, symmetric_on_vector,
-};
+use crate::products::{Operand, Target, general, matrix_vector, rank_2k, rank_k, symmetric_vector};
 use crate::routines::{Array, Factors, Spectrum, gesv, potrf, potrs, singular_values, syevr};
 
-/// INFO of an answer.
+/// The INFO of a result.
 fn code(answer: Result<(), i32>) -> i32 {
     answer.err().unwrap_or(0)
 }
@@ -21,7 +19,7 @@ macro_rules! gemm {
         ///
         /// # Safety
         ///
-        /// The arrays are as large as the reference implementation wants them.
+        /// The arrays have the sizes that the reference implementation requires.
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $symbol(
             transa: &u8,
@@ -38,11 +36,11 @@ macro_rules! gemm {
             c: *mut $number,
             ldc: &i32,
         ) {
-            let left = Operand { at: a, leading: *lda, turned: *transa };
-            let right = Operand { at: b, leading: *ldb, turned: *transb };
+            let left = Operand { data: a, leading: *lda, transpose: *transa };
+            let right = Operand { data: b, leading: *ldb, transpose: *transb };
             let part = Some(Part::All);
-            let target = Target { at: c, leading: *ldc, part, alpha: *alpha, beta: *beta };
-            // SAFETY: as the caller promises.
+            let target = Target { data: c, leading: *ldc, part, alpha: *alpha, beta: *beta };
+            // SAFETY: the caller guarantees it.
             unsafe { general((*m, *n, *k), &left, &right, &target) };
         }
     };
@@ -54,7 +52,7 @@ macro_rules! gemv {
         ///
         /// # Safety
         ///
-        /// The arrays are as large as the reference implementation wants them.
+        /// The arrays have the sizes that the reference implementation requires.
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $symbol(
             trans: &u8,
@@ -69,9 +67,9 @@ macro_rules! gemv {
             y: *mut $number,
             incy: &i32,
         ) {
-            let matrix = Operand { at: a, leading: *lda, turned: *trans };
-            // SAFETY: as the caller promises.
-            unsafe { on_vector((*m, *n), &matrix, (x, *incx), (*alpha, *beta), (y, *incy)) };
+            let matrix = Operand { data: a, leading: *lda, transpose: *trans };
+            // SAFETY: the caller guarantees it.
+            unsafe { matrix_vector((*m, *n), &matrix, (x, *incx), (*alpha, *beta), (y, *incy)) };
         }
     };
 }
@@ -82,7 +80,7 @@ macro_rules! symv {
         ///
         /// # Safety
         ///
-        /// The arrays are as large as the reference implementation wants them.
+        /// The arrays have the sizes that the reference implementation requires.
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $symbol(
             uplo: &u8,
@@ -97,8 +95,8 @@ macro_rules! symv {
             incy: &i32,
         ) {
             let factors = (*alpha, *beta);
-            // SAFETY: as the caller promises.
-            unsafe { symmetric_on_vector((*uplo, *n), (a, *lda), (x, *incx), factors, (y, *incy)) };
+            // SAFETY: the caller guarantees it.
+            unsafe { symmetric_vector((*uplo, *n), (a, *lda), (x, *incx), factors, (y, *incy)) };
         }
     };
 }
@@ -109,7 +107,7 @@ macro_rules! syrk {
         ///
         /// # Safety
         ///
-        /// The arrays are as large as the reference implementation wants them.
+        /// The arrays have the sizes that the reference implementation requires.
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $symbol(
             uplo: &u8,
@@ -123,11 +121,11 @@ macro_rules! syrk {
             c: *mut $number,
             ldc: &i32,
         ) {
-            let left = Operand { at: a, leading: *lda, turned: *trans };
+            let left = Operand { data: a, leading: *lda, transpose: *trans };
             let part = Part::triangle(*uplo);
-            let target = Target { at: c, leading: *ldc, part, alpha: *alpha, beta: *beta };
-            // SAFETY: as the caller promises.
-            unsafe { square((*n, *k), &left, &target) };
+            let target = Target { data: c, leading: *ldc, part, alpha: *alpha, beta: *beta };
+            // SAFETY: the caller guarantees it.
+            unsafe { rank_k((*n, *k), &left, &target) };
         }
     };
 }
@@ -138,7 +136,7 @@ macro_rules! syr2k {
         ///
         /// # Safety
         ///
-        /// The arrays are as large as the reference implementation wants them.
+        /// The arrays have the sizes that the reference implementation requires.
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $symbol(
             uplo: &u8,
@@ -154,23 +152,23 @@ macro_rules! syr2k {
             c: *mut $number,
             ldc: &i32,
         ) {
-            let left = Operand { at: a, leading: *lda, turned: *trans };
-            let right = Operand { at: b, leading: *ldb, turned: *trans };
+            let left = Operand { data: a, leading: *lda, transpose: *trans };
+            let right = Operand { data: b, leading: *ldb, transpose: *trans };
             let part = Part::triangle(*uplo);
-            let target = Target { at: c, leading: *ldc, part, alpha: *alpha, beta: *beta };
-            // SAFETY: as the caller promises.
-            unsafe { mixed_square((*n, *k), &left, &right, &target) };
+            let target = Target { data: c, leading: *ldc, part, alpha: *alpha, beta: *beta };
+            // SAFETY: the caller guarantees it.
+            unsafe { rank_2k((*n, *k), &left, &right, &target) };
         }
     };
 }
 
 macro_rules! potrf {
     ($symbol:ident, $number:ty) => {
-        /// The Cholesky factor of A.
+        /// Replaces A by its Cholesky factor.
         ///
         /// # Safety
         ///
-        /// The arrays are as large as the reference implementation wants them.
+        /// The arrays have the sizes that the reference implementation requires.
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $symbol(
             uplo: &u8,
@@ -179,7 +177,7 @@ macro_rules! potrf {
             lda: &i32,
             info: &mut i32,
         ) {
-            // SAFETY: as the caller promises.
+            // SAFETY: the caller guarantees it.
             let answer = unsafe { potrf(*uplo, *n, Array { at: a, leading: *lda }) };
             *info = code(answer);
         }
@@ -188,11 +186,11 @@ macro_rules! potrf {
 
 macro_rules! potrs {
     ($symbol:ident, $number:ty) => {
-        /// A X = B with the Cholesky factor of A.
+        /// Solves A X = B with the Cholesky factor of A.
         ///
         /// # Safety
         ///
-        /// The arrays are as large as the reference implementation wants them.
+        /// The arrays have the sizes that the reference implementation requires.
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $symbol(
             uplo: &u8,
@@ -206,7 +204,7 @@ macro_rules! potrs {
         ) {
             let factor = Array { at: a.cast_mut(), leading: *lda };
             let right = Array { at: b, leading: *ldb };
-            // SAFETY: as the caller promises; the factor is only read.
+            // SAFETY: the caller guarantees it; the factor is only read.
             let answer = unsafe { potrs(*uplo, (*n, *nrhs), factor, right) };
             *info = code(answer);
         }
@@ -215,11 +213,11 @@ macro_rules! potrs {
 
 macro_rules! gesv {
     ($symbol:ident, $number:ty) => {
-        /// A X = B by elimination.
+        /// Solves A X = B by elimination with partial pivoting.
         ///
         /// # Safety
         ///
-        /// The arrays are as large as the reference implementation wants them.
+        /// The arrays have the sizes that the reference implementation requires.
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $symbol(
             n: &i32,
@@ -232,7 +230,7 @@ macro_rules! gesv {
             info: &mut i32,
         ) {
             let (matrix, right) = (Array { at: a, leading: *lda }, Array { at: b, leading: *ldb });
-            // SAFETY: as the caller promises.
+            // SAFETY: the caller guarantees it.
             let answer = unsafe { gesv((*n, *nrhs), matrix, ipiv, right) };
             *info = code(answer);
         }
@@ -241,11 +239,11 @@ macro_rules! gesv {
 
 macro_rules! syevr {
     ($symbol:ident, $number:ty) => {
-        /// Eigenvalues and eigenvectors of a symmetric A.
+        /// Computes eigenvalues and eigenvectors of a symmetric A.
         ///
         /// # Safety
         ///
-        /// The arrays are as large as the reference implementation wants them.
+        /// The arrays have the sizes that the reference implementation requires.
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $symbol(
             jobz: &u8,
@@ -279,7 +277,7 @@ macro_rules! syevr {
             let vectors = Array { at: z, leading: *ldz };
             let matrix = Array { at: a, leading: *lda };
             let to = Spectrum { count: m, values: w, vectors, support: isuppz };
-            // SAFETY: as the caller promises.
+            // SAFETY: the caller guarantees it.
             let answer = unsafe { syevr((*jobz, *range, *uplo), *n, matrix, &to) };
             *info = code(answer);
         }
@@ -288,11 +286,11 @@ macro_rules! syevr {
 
 macro_rules! gesdd {
     ($symbol:ident, $number:ty) => {
-        /// The singular value decomposition of A, one option for both sides.
+        /// Computes the singular value decomposition of A, with one option for both sides.
         ///
         /// # Safety
         ///
-        /// The arrays are as large as the reference implementation wants them.
+        /// The arrays have the sizes that the reference implementation requires.
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $symbol(
             jobz: &u8,
@@ -320,7 +318,7 @@ macro_rules! gesdd {
             let right = (*jobz, Array { at: vt, leading: *ldvt });
             let matrix = Array { at: a, leading: *lda };
             let to = Factors { values: s, left, right };
-            // SAFETY: as the caller promises.
+            // SAFETY: the caller guarantees it.
             let answer = unsafe { singular_values((*m, *n), matrix, &to, 2) };
             *info = code(answer);
         }
@@ -329,11 +327,11 @@ macro_rules! gesdd {
 
 macro_rules! gesvd {
     ($symbol:ident, $number:ty) => {
-        /// The singular value decomposition of A, one option for each side.
+        /// Computes the singular value decomposition of A, with one option for each side.
         ///
         /// # Safety
         ///
-        /// The arrays are as large as the reference implementation wants them.
+        /// The arrays have the sizes that the reference implementation requires.
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $symbol(
             jobu: &u8,
@@ -361,7 +359,7 @@ macro_rules! gesvd {
             let right = (*jobvt, Array { at: vt, leading: *ldvt });
             let matrix = Array { at: a, leading: *lda };
             let to = Factors { values: s, left, right };
-            // SAFETY: as the caller promises.
+            // SAFETY: the caller guarantees it.
             let answer = unsafe { singular_values((*m, *n), matrix, &to, 3) };
             *info = code(answer);
         }

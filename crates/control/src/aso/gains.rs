@@ -7,18 +7,18 @@ use nalgebra::DMatrix;
 /// How the observer uses the newest measurement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Estimator {
-    /// The measurement corrects the derivative of the estimate or, when sampled, the next estimate:
-    /// u has the whole interval for its computation, and acts one sample late.
+    /// The measurement corrects the derivative of the estimate, in sampled time the next estimate.
+    /// The computation of u may take the whole sampling interval; u acts one sample late.
     Prediction,
-    /// Sampled only: `x_hat[k]` is corrected by `y[k]` before `u[k]` is formed, which must take no
-    /// time to speak of.
+    /// Sampled time only: `y[k]` corrects `x_hat[k]` before `u[k]` is formed. The computation must
+    /// be short compared with the sampling interval.
     Current,
 }
 
 /// The gains of the controller.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gains {
-    /// What `L_x` and `L_f` correct.
+    /// How the observer uses the newest measurement.
     pub estimator: Estimator,
     /// `K_x`, m x n.
     pub k_x: DMatrix<f64>,
@@ -31,8 +31,8 @@ pub struct Gains {
 }
 
 impl Estimator {
-    /// The output whose deviation L takes back: `C_0`, or `C_0` `A_0` for a current estimator, which
-    /// sees the measurement after the step of `A_0`.
+    /// The output matrix of the error dynamics: `C_0`, or `C_0` `A_0` for a current estimator,
+    /// which uses the measurement after the step of `A_0`.
     #[must_use]
     pub fn output_matrix(self, a_0: &DMatrix<f64>, c_0: &DMatrix<f64>) -> DMatrix<f64> {
         match self {
@@ -66,20 +66,20 @@ impl Gains {
         &a_0 - self.observer_gain() * self.estimator.output_matrix(&a_0, &plant.augmented_output())
     }
 
-    /// A - `L_x` C, n x n, or A - `L_x` C A for a current estimator: the error of the states while the
-    /// estimates of the faults are held. No eigenvalue of it is placed; a loop that begins without
-    /// estimating faults needs it stable.
+    /// A - `L_x` C, n x n, or A - `L_x` C A for a current estimator: the dynamics of the state
+    /// error while the fault estimates are held. Its eigenvalues are not assigned; a loop that
+    /// starts without fault estimation needs them stable.
     #[must_use]
     pub fn state_error_dynamics(&self, plant: &FaultyPlant) -> DMatrix<f64> {
         &plant.a - &self.l_x * self.estimator.output_matrix(&plant.a, &plant.c)
     }
 
-    /// Shapes and finiteness of the gains for a plant.
+    /// Checks shapes and finiteness of the plant and of the gains for it.
     ///
     /// # Errors
     ///
-    /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`], naming the matrix; those of
-    /// [`FaultyPlant::check`].
+    /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`], with the name of the matrix of
+    /// plant or gains.
     pub fn check(&self, plant: &FaultyPlant) -> Result<(), Error> {
         plant.check()?;
         let ((n, m), p, q) = (plant.b.shape(), plant.c.nrows(), plant.f_a.ncols());

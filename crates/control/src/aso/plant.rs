@@ -6,10 +6,10 @@ use crate::svd::Svd;
 use crate::{Error, check};
 use nalgebra::DMatrix;
 
-/// Svd values of B below this part of the largest count as zero.
+/// Singular values of B below this part of the largest count as zero.
 const TOLERANCE: f64 = 1e-12;
 
-/// x' = A x + B u + `F_a` f, f' = `A_f` f, y = C x: the plant with faults (1) and their model.
+/// The plant with faults (1) and the fault model: x' = A x + B u + `F_a` f, f' = `A_f` f, y = C x.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FaultyPlant {
     /// A, n x n.
@@ -18,16 +18,17 @@ pub struct FaultyPlant {
     pub b: DMatrix<f64>,
     /// C, p x n.
     pub c: DMatrix<f64>,
-    /// `F_a`, n x q: how the faults act. A force against the actuator has `F_a` = -B.
+    /// `F_a`, n x q: how the faults act on the states. A force against the actuator has `F_a` = -B.
     pub f_a: DMatrix<f64>,
-    /// `A_f`, q x q: how the faults are taken to develop. Zero for constant faults; I when sampled.
+    /// `A_f`, q x q: the fault model. Zero for constant faults; I in sampled time.
     pub a_f: DMatrix<f64>,
 }
 
 impl FaultyPlant {
-    /// The plant of the paper: faults that stay constant, `A_f` = 0.
+    /// Creates the plant of the paper, with constant faults: `A_f` = 0.
     ///
-    /// `a`: n x n; `b`: n x m; `c`: p x n; `f_a`: n x q. Shapes are checked where the plant is used.
+    /// `a`: n x n; `b`: n x m; `c`: p x n; `f_a`: n x q. The functions that use the plant check the
+    /// shapes.
     #[must_use]
     pub fn with_constant_faults(
         a: DMatrix<f64>,
@@ -39,11 +40,11 @@ impl FaultyPlant {
         Self { a, b, c, f_a, a_f }
     }
 
-    /// Shapes and finiteness of the five matrices.
+    /// Checks shapes and finiteness of the five matrices.
     ///
     /// # Errors
     ///
-    /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`], naming the matrix.
+    /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`], with the name of the matrix.
     pub fn check(&self) -> Result<(), Error> {
         let n = check::square("A", &self.a)?;
         check::shape("B", &self.b, (n, self.b.ncols()))?;
@@ -52,8 +53,8 @@ impl FaultyPlant {
         check::shape("A_f", &self.a_f, (self.f_a.ncols(), self.f_a.ncols()))
     }
 
-    /// `A_0` = [A, -`F_a`; 0, `A_f`], (n + q) x (n + q); with B `K_f` = -`F_a` and `A_f` = 0 that of
-    /// (10).
+    /// `A_0` = [A, -`F_a`; 0, `A_f`], (n + q) x (n + q); equal to (10) if B `K_f` = -`F_a` and
+    /// `A_f` = 0.
     #[must_use]
     pub fn augmented_dynamics(&self) -> DMatrix<f64> {
         let (n, q) = self.f_a.shape();
@@ -78,19 +79,21 @@ impl FaultyPlant {
         (-&self.f_a).resize_vertically(n + q, 0.0)
     }
 
-    /// Whether an augmented observer with any wanted eigenvalues exists.
+    /// Checks that an augmented observer with arbitrary eigenvalues exists: (`A_0`, `C_0`) is
+    /// observable.
     ///
-    /// It does when (`A_0`, `C_0`) is observable. That is: (A, C) is observable, and at every
-    /// eigenvalue s of `A_f`, whose eigenvectors are the columns of N, the matrix [A - s I, `F_a` N;
-    /// C, 0] has full column rank: no fault that develops as e^(s t) is hidden by a state that does.
-    /// For constant and ramp faults s = 0, or 1 when sampled. It needs as many measurements as N
-    /// has columns. Svd values below 1e-12 of the largest count as zero, rows and columns of
-    /// the matrix scaled to length one. [`crate::detectability`] tells which fault is hidden.
+    /// Equivalent conditions: (A, C) is observable, and at every eigenvalue s of `A_f`, with
+    /// eigenvectors in the columns of N, the matrix [A - s I, `F_a` N; C, 0] has full column rank.
+    /// The measurements then distinguish a fault that develops as e^(s t) from every motion of the
+    /// states. For constant and ramp faults s = 0, or 1 in sampled time. There must be at least as
+    /// many measurements as N has columns. Singular values below 1e-12 of the largest count as
+    /// zero, rows and columns of the matrix scaled to length one. [`crate::detectability`] returns
+    /// the hidden faults.
     ///
     /// # Errors
     ///
     /// [`Error::NotObservable`], [`Error::TooManyFaults`], [`Error::HiddenFault`] with the
-    /// condition that fails; those of [`FaultyPlant::check`].
+    /// condition that fails; same as [`FaultyPlant::check`] otherwise.
     pub fn check_observer_exists(&self) -> Result<(), Error> {
         self.check()?;
         require_observable(&self.a, &self.c)?;
@@ -102,15 +105,16 @@ impl FaultyPlant {
         Ok(())
     }
 
-    /// `K_f` with the least norm of B `K_f` + `F_a`, m x q; the smallest one if there are several.
+    /// The `K_f`, m x q, that minimises the norm of B `K_f` + `F_a`; if there are several, the one
+    /// of least norm.
     ///
-    /// It always exists; full compensation needs `F_a` in the range of B, which
-    /// [`super::AsoDesign::cancellation_residual`] tells. Svd values of B below 1e-12 of the largest
-    /// count as zero.
+    /// It always exists. The compensation is complete if the columns of `F_a` are in the range of
+    /// B; [`super::AsoDesign::cancellation_residual`] measures the part that is not cancelled.
+    /// Singular values of B below 1e-12 of the largest count as zero.
     ///
     /// # Errors
     ///
-    /// Those of [`FaultyPlant::check`]; [`Error::NotConverged`].
+    /// Same as [`FaultyPlant::check`]; [`Error::NotConverged`].
     pub fn compensation_gain(&self) -> Result<DMatrix<f64>, Error> {
         self.check()?;
         let b = Svd::new(&self.b)?;

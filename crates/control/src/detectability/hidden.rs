@@ -1,6 +1,6 @@
 //! Faults that the measurements cannot tell from a motion of the states.
 //!
-//! A fault f = f_0 e^(s t) that follows its model, `A_f` `f_0` = s `f_0`, and a motion x = x_0 e^(s t)
+//! A fault f = `f_0` e^(s t) that follows its model, `A_f` `f_0` = s `f_0`, and a motion x = `x_0` e^(s t)
 //! of the plant that it drives give no output when
 //!
 //! ```text
@@ -125,7 +125,7 @@ fn eigenvectors(a_f: &DMatrix<f64>, s: Complex<f64>) -> Result<ComplexMatrix, Er
         return Ok(ComplexMatrix::identity(q, q));
     }
     let svd = ComplexSvd::new(&(to_complex(a_f) - ComplexMatrix::identity(q, q) * s))?;
-    let pairs = (0..q).map(|index| svd.from_smallest(index));
+    let pairs = (0..q).map(|index| svd.nth_smallest(index));
     let null: Vec<_> = pairs.take_while(|(value, _)| *value <= RANK_TOLERANCE * size).collect();
     Ok(ComplexMatrix::from_fn(q, null.len(), |i, j| null[j].1[i]))
 }
@@ -174,7 +174,7 @@ fn null_space(m: &ComplexMatrix) -> Result<(usize, ComplexMatrix), Error> {
         return Ok((rank, to_complex(&null)));
     }
     let count = (cols - rank).min(1);
-    let (_, vector) = svd.from_smallest(0);
+    let (_, vector) = svd.nth_smallest(0);
     Ok((rank, ComplexMatrix::from_fn(cols, count, |i, _| vector[i])))
 }
 

@@ -1,4 +1,4 @@
-//! Which measurement shows which fault.
+//! Tests which measurement shows which fault.
 
 use crate::aso::FaultyPlant;
 use crate::rank::Staircase;
@@ -6,22 +6,25 @@ use crate::svd::Svd;
 use crate::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
-/// An output of the reachable states below this part of the output's norm counts as zero, as does
-/// a singular value below this part of the largest.
+/// An output of the controllable states counts as zero below this fraction of the norm of the
+/// output, a singular value below this fraction of the largest.
 const TOLERANCE: f64 = 1e-12;
 
-/// What one measurement shows of one fault.
+/// The effect of one fault on one measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Visibility {
-    /// Whether the fault, developing by its model, ever moves the measurement: for a constant fault
-    /// whether the transfer function from its column of `F_a` is not identically zero.
+    /// Whether a fault that develops by its model changes the measurement at some time. For a
+    /// constant fault: whether the transfer function from its column of `F_a` to the measurement is
+    /// not identically zero.
     pub visible: bool,
-    /// That transfer function at s = 0, or z = 1 when sampled; None where it has a pole there, so
-    /// that the measurement grows without bound. Zero for the rate of a ramp, which has no column.
+    /// That transfer function at s = 0, or z = 1 in sampled time. None if it has a pole there: the
+    /// measurement then grows without bound. Zero for the rate of a ramp, which has no column in
+    /// `F_a`.
     pub dc_gain: Option<f64>,
 }
 
-/// One row per measurement, one entry per fault.
+/// The effects of all faults (inner index) on all measurements (outer index).
 pub(super) fn table(plant: &FaultyPlant, domain: Domain) -> Result<Vec<Vec<Visibility>>, Error> {
     let ((n, q), p) = (plant.f_a.shape(), plant.c.nrows());
     let (a_0, outputs) = (plant.augmented_dynamics(), plant.augmented_output().transpose());
@@ -37,8 +40,8 @@ pub(super) fn table(plant: &FaultyPlant, domain: Domain) -> Result<Vec<Vec<Visib
     (0..p).map(|measurement| (0..q).map(|fault| entry(measurement, fault)).collect()).collect()
 }
 
-/// The controllable and observable part of the system {a, b, c', 0}; None when its transfer function
-/// is identically zero.
+/// The controllable and observable part of the system {a, b, c', 0}; None when its transfer
+/// function is identically zero.
 ///
 /// `a`: n x n; `b`, `c`: n x 1.
 fn minimal_part(

@@ -1,27 +1,27 @@
-//! Loss of effectiveness: its estimate, and how much of it the loop survives.
+//! Loss of effectiveness: its estimate, and the loss up to which the loop is stable.
 
 use crate::aso::FaultyPlant;
 use crate::controller::closed_loop;
 use crate::stability::instability;
 use crate::{Error, StateSpace, check};
 
-/// Points between no loss and the largest one at which stability is examined along a line.
+/// Number of points on a line, between no loss and the largest loss, at which stability is tested.
 const POINTS: u32 = 50;
 const BISECTIONS: usize = 40;
-/// Most points of the grid over several inputs.
+/// Largest number of points of the grid over several inputs.
 const GRID: usize = 1000;
 const GRID_PER_INPUT: usize = 11;
 
-/// The part E of its effect that an input has lost, from the estimate of f = -E u.
+/// Estimates the part E of its effect that an input has lost, from the estimate of f = -E u.
 ///
 /// ```text
 /// E_hat = -u f_hat / (u^2 + u_e^2)
 /// ```
 ///
-/// `u`: the command; `f_hat`: the estimate, both in the unit of the input; `excitation`: `u_e`, above
-/// zero: a command well below it says nothing and gives an estimate near zero. It is the least
-/// squares estimate of E with a prior of zero, so that the exact `f_hat` gives E times
-/// u^2 / (u^2 + `u_e`^2).
+/// `u`: the command; `f_hat`: the estimate, both in the unit of the input; `excitation`: `u_e`,
+/// above zero. A command well below `u_e` carries no information and gives an estimate near zero.
+/// This is the regularised least-squares estimate of E; an exact `f_hat` gives E times u^2 / (u^2 +
+/// `u_e`^2).
 ///
 /// # Errors
 ///
@@ -32,12 +32,13 @@ pub fn estimated_loss(u: f64, f_hat: f64, excitation: f64) -> Result<f64, Error>
     Ok(-(u / size) * (f_hat / size))
 }
 
-/// How much constant loss of effectiveness a loop survives.
+/// The constant losses of effectiveness for which a loop is stable.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct LossTolerance {
-    /// The loss up to which the loop is stable when all inputs lose the same part.
+    /// Loss up to which the loop is stable if all inputs lose the same part.
     pub common: f64,
-    /// For each input the loss up to which the loop is stable when it alone loses.
+    /// For each input, the loss up to which the loop is stable if only this input loses.
     pub single: Vec<f64>,
     /// The point of the grid over all combinations where the loop is least stable.
     pub worst: Vec<f64>,
@@ -45,19 +46,20 @@ pub struct LossTolerance {
     pub worst_instability: f64,
 }
 
-/// For which constant losses E the loop of the true plant x' = A x + B (I - E) u and the controller
-/// is stable.
+/// Computes the constant losses E up to which the loop of the plant x' = A x + B (I - E) u and the
+/// controller is stable.
 ///
-/// `plant`, `controller`: in the given `domain`; `inputs`: which inputs may lose effect, from zero;
-/// `largest`: the largest loss of each, in (0, 1]. For a constant E the loop is linear, and its
-/// eigenvalues decide. Along each line 50 points are examined and the first change of sign is
-/// bisected: a return to instability between two points goes unseen. The grid has 11 points for each
-/// input, fewer when more than 1000 combinations would come together, at least the corners.
-/// The observer is told the command, not what is left of it: the loss acts on it as a fault.
+/// `plant`: in the time domain of `controller`; `inputs`: which inputs may lose effect, from zero;
+/// `largest`: the largest loss of each, in (0, 1]. For a constant E the loop is linear and its
+/// eigenvalues decide stability. On each line 50 points are tested and the first loss of stability
+/// is located by bisection; an unstable interval between two points is missed. The grid has 11
+/// points for each input, fewer if there were more than 1000 combinations, at least the corners.
+/// The observer receives the command, not its remaining effect, so that the loss acts on it as a
+/// fault.
 ///
 /// # Errors
 ///
-/// Those of [`Controller::closed_loop`] and [`instability`]; [`Error::OutOfRange`] for a bad
+/// Same as [`closed_loop`] and [`instability`]; [`Error::OutOfRange`] for a bad
 /// `largest`, an input that does not exist, or more than nine inputs.
 pub fn loss_tolerance(
     plant: &FaultyPlant,
@@ -115,7 +117,7 @@ impl Losses<'_> {
         instability(&dynamics, self.controller.domain)
     }
 
-    /// The largest t, at most `end`, with stability from zero to t times the direction.
+    /// The largest t, at most `end`, such that the loop is stable from zero to t times `direction`.
     fn along(&self, direction: &[f64], end: f64) -> Result<f64, Error> {
         let stable = |t: f64| {
             let loss: Vec<f64> = direction.iter().map(|part| part * t).collect();

@@ -1,14 +1,15 @@
-//! Matrices that depend affinely on unknowns.
+//! Matrices that are affine functions of unknowns.
 
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 use std::ops::{Add, Mul, Neg, Sub};
 
-/// `M_0` + `x_1` `M_1` + `x_2` `M_2` + ... with unknown numbers x.
+/// `M_0` + `x_1` `M_1` + `x_2` `M_2` + ... a matrix that is an affine function of unknown numbers
+/// x.
 ///
 /// Unknowns come from [`super::Problem`]; constants from [`Affine::constant`]. Sums, differences
-/// and products with known matrices and numbers are written with operators on references. Like
-/// those of nalgebra they panic when the shapes do not fit.
+/// and products with known matrices and numbers are written with operators on references. Like the
+/// operators of nalgebra they panic if the shapes do not fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Affine {
     pub(super) constant: DMatrix<f64>,
@@ -58,7 +59,7 @@ impl Affine {
         self.map(|factor| m * factor[(0, 0)])
     }
 
-    /// The matrix made of blocks, row by row.
+    /// The matrix with the given blocks, row by row.
     ///
     /// # Panics
     ///
@@ -87,13 +88,13 @@ impl Affine {
         whole
     }
 
-    /// The matrix for given unknowns.
+    /// The matrix at given values of the unknowns.
     #[must_use]
     pub fn evaluate(&self, unknowns: &DVector<f64>) -> DMatrix<f64> {
         self.terms.iter().fold(self.constant.clone(), |sum, (at, m)| sum + m * unknowns[*at])
     }
 
-    /// Largest entry of all its matrices.
+    /// The largest entry of all the matrices.
     pub(super) fn largest_entry(&self) -> f64 {
         self.terms.values().fold(self.constant.amax(), |size, m| size.max(m.amax()))
     }

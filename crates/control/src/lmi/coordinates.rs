@@ -1,4 +1,4 @@
-//! Coordinates in which the solver meets numbers of about one.
+//! Coordinates of the state in which the data of the solver are about one.
 
 use crate::Error;
 use crate::balance::{
@@ -8,11 +8,11 @@ use crate::eigen::eigenvalues;
 use crate::svd::Svd;
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// Radius of the disc around the eigenvalues relative to the smallest.
+/// Radius of the disc around the eigenvalues, relative to the smallest possible.
 const WIDER: f64 = 1.2;
-/// Doublings of the sum over powers: (1 / `WIDER`)^(2^10) is nothing.
+/// Doublings of the sum over powers: (1 / `WIDER`)^(2^10) is negligible.
 const DOUBLINGS: usize = 10;
-/// Directions that can hardly be seen are not stretched by more than this.
+/// Largest factor by which weakly observable directions are stretched.
 const STRETCH: f64 = 1e11;
 
 /// x~ = T x and the time scale: x' = A x becomes x~' = unit A~ x~ with A~ of about one.
@@ -23,9 +23,9 @@ pub(super) struct Coordinates {
 }
 
 impl Coordinates {
-    /// Coordinates in which A differs from a multiple of the identity by little more than its
-    /// eigenvalues do: T'T = P with (A - c I)' P (A - c I) - `s^2` P = -`s^2` I, c the mean of the
-    /// eigenvalues, s 1.2 times the largest distance from it. None when rounding errors hide P > 0.
+    /// Coordinates in which the norm of A - c I is little more than its spectral radius: T'T = P
+    /// with (A - c I)' P (A - c I) - `s^2` P = -`s^2` I, c the mean of the eigenvalues, s 1.2 times
+    /// the largest distance from it. None if rounding errors hide that P > 0.
     pub(super) fn of_dynamics(a: &DMatrix<f64>) -> Result<Option<Self>, Error> {
         let n = a.nrows();
         let Balance { matrix, scale } = Balance::new(a);
@@ -47,9 +47,10 @@ impl Coordinates {
         Ok(Some(Self::within(&scale, &root, &inverse, unit)))
     }
 
-    /// Coordinates in which all states are seen equally well through C by an observer whose
-    /// eigenvalues lie `speed` away from those of A: T'T is the sum of (C `M^k`)' (C `M^k`), k from 0 to
-    /// n - 1, with M = (A - c I) / speed, c the mean of the eigenvalues of A.
+    /// Coordinates in which all states are equally observable through C for an observer whose
+    /// eigenvalues are at a distance `speed` from the eigenvalues of A: T'T is the sum of (C
+    /// `M^k`)' (C `M^k`), k from 0 to n - 1, with M = (A - c I) / speed, c the mean of the
+    /// eigenvalues of A.
     pub(super) fn of_observation(
         a: &DMatrix<f64>,
         c: &DMatrix<f64>,
@@ -76,14 +77,15 @@ impl Coordinates {
         Ok(Self::within(&scale, &root, &inverse, unit))
     }
 
-    /// Coordinates in which P~ is the identity; None if it is not positive definite.
+    /// Coordinates in which the matrix P~ = `p` of these coordinates becomes the identity; None if
+    /// it is not positive definite.
     pub(super) fn refined(&self, p: &DMatrix<f64>) -> Option<Self> {
         let root = p.clone().cholesky()?.l().transpose();
         let from = &self.from * inverse_of_upper(&root);
         Some(Self { to: root * &self.to, from, unit: self.unit })
     }
 
-    /// Coordinates that suit A' as these suit A.
+    /// The coordinates for A' that correspond to these for A.
     pub(super) fn transposed(&self) -> Self {
         Self { to: self.from.transpose(), from: self.to.transpose(), unit: self.unit }
     }

@@ -9,13 +9,13 @@ use nalgebra::DMatrix;
 /// Rounding error per row of a matrix with entries of about one, with a margin.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
-/// The definiteness margin of a symmetric matrix S: the smallest eigenvalue of D S D, D the diagonal
-/// of powers of two that brings the diagonal of S to about one. Above zero, S is positive definite;
-/// zero, it was not shown to be.
+/// The definiteness margin of a symmetric matrix S: the smallest eigenvalue of D S D, D the
+/// diagonal of powers of two that brings the diagonal of S to about one. Above zero, S is positive
+/// definite; zero, it was not shown to be.
 ///
-/// D S D is positive definite if and only if S is (Sylvester), and scaling by powers of two does not
-/// round. The entries of S may have relative errors of a few units of rounding. The margin is set to
-/// zero unless it exceeds 16 n^2 units of rounding of the largest entry.
+/// D S D is positive definite if and only if S is (Sylvester), and scaling by powers of two does
+/// not round. The entries of S may have relative errors of a few units of rounding. The margin is
+/// set to zero unless it exceeds 16 n^2 units of rounding of the largest entry.
 pub(crate) fn margin(s: &DMatrix<f64>) -> Result<f64, Error> {
     let scale: Vec<f64> =
         s.diagonal().iter().map(|&entry| 1.0 / power_of_two(entry.sqrt())).collect();

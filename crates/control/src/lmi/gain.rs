@@ -1,4 +1,4 @@
-//! Bounds of the gain from a disturbance to an output.
+//! Bounds of the norm of a system, with certificates.
 
 use super::affine::Affine;
 use super::coordinates::Coordinates;
@@ -10,13 +10,15 @@ use crate::stability::instability;
 use crate::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
-/// GainScaling that are tried, relative to the smallest, when P of the smallest is lost in rounding errors.
+/// Levels, relative to the smallest, that are tried in turn when the P of the smallest cannot be
+/// verified. errors.
 const RELAXED_LEVELS: [f64; 4] = [1.0 + 1e-6, 1.0 + 1e-5, 1.0 + 1e-4, 1.0 + 1e-3];
 
 const NO_P: &str = "no bound of the gain could be proven in double precision";
 
-/// How large an output may become.
+/// A norm of a system from w to z.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Norm {
     /// H-infinity: energy of the output over energy of the disturbance, the largest singular value
     /// of the transfer matrix over all frequencies.
@@ -24,19 +26,20 @@ pub enum Norm {
     /// Generalised H2: peak of the Euclidean norm of the output over the root of the energy of the
     /// disturbance. In continuous time for D = 0 only.
     EnergyToPeak,
-    /// Root of the energy of the output after an impulse over the size of the impulse: what
-    /// [`Norm::EnergyToPeak`] becomes for the transposed system.
+    /// Root of the energy of the output after an impulse over the size of the impulse:
+    /// [`Norm::EnergyToPeak`] of the transposed system.
     ImpulseToEnergy,
 }
 
-/// A proof that a gain is below a bound.
+/// A proven bound of a norm.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct GainBound {
     /// The bound, in the unit of the norm.
     pub gamma: f64,
     /// P, n x n, symmetric positive definite.
     pub p: DMatrix<f64>,
-    /// Smallest eigenvalue of all the inequalities, each scaled to a diagonal of about one; above
+    /// Smallest eigenvalue of all inequalities, each scaled to a diagonal of about one; larger than
     /// the rounding errors.
     pub margin: f64,
 }
@@ -194,14 +197,14 @@ fn check(system: &StateSpace, norm: Norm) -> Result<(), Error> {
     Ok(())
 }
 
-/// The smallest bound gamma of the gain from w to z, with its proof.
+/// Computes the smallest bound gamma of the norm of a system from w to z, with its certificate.
 ///
 /// ```text
 /// P > 0 and
 /// H-infinity:        [A' P + P A, P B, C'; B' P, -gamma I, D'; C, D, -gamma I] < 0
 /// energy to peak:    [A' P + P A, P B; B' P, -I] < 0,  [P, C'; C, gamma^2 I] > 0
 /// impulse to energy: [A' P + P A, C'; C, -I] < 0,  [P, P B; B' P, gamma^2 I] > 0
-/// and from sample to sample
+/// and in sampled time
 /// H-infinity:        [P, P A, P B, 0; *, P, 0, C'; *, *, gamma I, D'; *, *, *, gamma I] > 0
 /// energy to peak:    [P, P A, P B; *, P, 0; *, *, I] > 0,
 ///                    [P, 0, C'; *, I, D'; *, *, gamma^2 I] > 0
@@ -209,20 +212,20 @@ fn check(system: &StateSpace, norm: Norm) -> Result<(), Error> {
 ///                    [P, P B, 0; *, gamma^2 I, D'; *, *, I] > 0
 /// ```
 ///
-/// All disturbances start from x = 0. A finite bound exists if and only if the part of A between w
-/// and z is stable; here all of A has to be, or the answer is a conflict named "stability". The bound
-/// found lies above the norm by 1e-6 to 1e-3 of it. It is proven: the
-/// inequalities hold for P and gamma in the data as given, the products computed in twice the
-/// precision.
+/// The initial state is zero. The norm is finite if and only if the controllable and observable
+/// part of the system is stable; here all of A must be stable, otherwise the outcome is
+/// [`Outcome::Infeasible`] with the conflict "stability". The bound exceeds the norm by 1e-6 to
+/// 1e-3 of it. It is proven: the inequalities are verified for P and gamma in the units of the
+/// data, with products in twice the precision.
 ///
-/// Source: S. Boyd, L. El Ghaoui, E. Feron, V. Balakrishnan, Linear matrix inequalities in system and
-/// control theory (1994), (2.25); M. A. Rotea, The generalized H2 control problem, Automatica 29
-/// (1993); C. Scherer, P. Gahinet, M. Chilali, Multiobjective output-feedback control via LMI
+/// Source: S. Boyd, L. El Ghaoui, E. Feron, V. Balakrishnan, Linear matrix inequalities in system
+/// and control theory (1994), (2.25); M. A. Rotea, The generalized H2 control problem, Automatica
+/// 29 (1993); C. Scherer, P. Gahinet, M. Chilali, Multiobjective output-feedback control via LMI
 /// optimization, IEEE Trans. Autom. Control 42 (1997), section II.
 ///
 /// # Example
 ///
-/// The gain of 2 / (s + 4) is 1/2, and its peak per energy 2 / sqrt(8):
+/// The H-infinity norm of 2 / (s + 4) is 1/2, its energy-to-peak norm 2 / sqrt(8):
 ///
 /// ```
 /// use control::lmi::{Norm, certify_gain};
@@ -334,8 +337,9 @@ impl<'a> BoundProblem<'a> {
 
 /// Verifies the inequalities for P and gamma in the units of the data.
 ///
-/// Each product P M is `high` + `low`; the matrices of both parts are added after the large terms have
-/// cancelled. The constant blocks appear in the matrices of the low part too and are subtracted.
+/// Each product P M is `high` + `low`; the matrices of both parts are added after the large terms
+/// have cancelled. The constant blocks appear in the matrices of the low part too and are
+/// subtracted.
 fn verify(
     system: &StateSpace,
     norm: Norm,

@@ -1,13 +1,15 @@
 //! The semidefinite program for an observer gain, and the coordinates in which it is solved.
 //!
-//! The inequalities for A - L C contain the product P L of two unknowns. With Z = P L they are linear:
+//! The inequalities for A - L C contain the product P L of two unknowns. With Z = P L they are
+//! linear:
 //!
 //! ```text
 //! P (A - L C) = P A - Z C,  P (B - L D_y) = P B - Z D_y,  L = P^-1 Z
 //! ```
 //!
 //! Source: M. Chilali and P. Gahinet, H-infinity design with pole placement constraints: an LMI
-//! approach, IEEE Trans. Autom. Control 41 (1996), section IV, for the dual problem of state feedback.
+//! approach, IEEE Trans. Autom. Control 41 (1996), section IV, for the dual problem of state
+//! feedback.
 
 use super::affine::Affine;
 use super::coordinates::{Coordinates, mean_eigenvalue};
@@ -78,9 +80,9 @@ impl ObserverRequirements<'_> {
         }
     }
 
-    /// The outcome, unless the solver reports a conflict between parts of the region although a gain
-    /// exists: when all states are observable and the parts have a real interval in common, all
-    /// eigenvalues can be assigned there.
+    /// The outcome, unless the solver reports a conflict between parts of the region although a
+    /// gain exists: when all states are observable and the parts have a real interval in common,
+    /// all eigenvalues can be assigned there.
     fn plausible(self, outcome: Outcome<Synthesis>) -> Result<Outcome<Synthesis>, Error> {
         if let Outcome::Infeasible { conflict } = &outcome
             && !conflict.contains(&"gain")
@@ -94,9 +96,9 @@ impl ObserverRequirements<'_> {
 
     /// A power of two near the distance by which eigenvalues are moved, and the unit of frequency.
     ///
-    /// The distance is that from the mean eigenvalue of A to the target (the centre of the disc, else
-    /// the limit of the decay rate), at least the largest distance of an eigenvalue of A from the
-    /// mean. The unit of frequency is that distance in continuous time, 1 in sampled time.
+    /// The distance is that from the mean eigenvalue of A to the target (the centre of the disc,
+    /// else the limit of the decay rate), at least the largest distance of an eigenvalue of A from
+    /// the mean. The unit of frequency is that distance in continuous time, 1 in sampled time.
     fn speed(self) -> Result<(f64, f64), Error> {
         let mean = mean_eigenvalue(self.a);
         let distance = |value: &Complex<f64>| (value - Complex::new(mean, 0.0)).norm();
@@ -117,7 +119,8 @@ impl ObserverRequirements<'_> {
 struct ObserverProgram<'a> {
     requirements: ObserverRequirements<'a>,
     coordinates: Coordinates,
-    /// Units of the measurements: powers of two near the lengths of the rows of C in the coordinates.
+    /// Units of the measurements: powers of two near the lengths of the rows of C in the
+    /// coordinates.
     units: DVector<f64>,
 }
 
@@ -144,8 +147,9 @@ impl<'a> ObserverProgram<'a> {
         self.coordinates.refined(&p.evaluate(&problem.most_interior()?))
     }
 
-    /// A gain for the given bound; without one, a gain as far inside of all inequalities as possible
-    /// at a level slightly above the smallest, or else the gain of the smallest level itself.
+    /// A gain for the given bound; without one, a gain as far inside of all inequalities as
+    /// possible at a level slightly above the smallest, or else the gain of the smallest level
+    /// itself.
     fn candidate(&self) -> Result<Outcome<Candidate>, Error> {
         let performance = self.requirements.performance;
         if let Some((performance, gamma)) =
@@ -201,14 +205,12 @@ impl<'a> ObserverProgram<'a> {
         for (name, matrix) in region.inequalities(&p, &dynamics, domain, self.coordinates.unit) {
             problem.require(name, &matrix, MARGIN);
         }
-        let level = match level {
-            Some(given) => Affine::identity(1, given),
-            None => {
-                let unknown = problem.scalar();
-                problem.minimise(&unknown);
-                unknown
-            }
-        };
+        let given = level.map(|value| Affine::identity(1, value));
+        let level = given.unwrap_or_else(|| {
+            let unknown = problem.scalar();
+            problem.minimise(&unknown);
+            unknown
+        });
         if let Some(performance) = performance {
             problem.constrain(&p, MARGIN);
             problem.constrain(&(&Affine::identity(n, LARGEST) - &p), MARGIN);

@@ -1,4 +1,4 @@
-//! Problems with linear matrix inequalities.
+//! Semidefinite programs: problems with linear matrix inequalities.
 
 use super::affine::Affine;
 use super::definite::smallest_eigenvalue;
@@ -8,23 +8,23 @@ use crate::Error;
 use crate::balance::power_of_two;
 use nalgebra::{DMatrix, DVector};
 
-/// Requirements missed by less than this part of their largest entry are neither met nor in
-/// conflict.
+/// A requirement violated by less than this, relative to its largest entry, counts as neither met
+/// nor in conflict.
 const UNDECIDED: f64 = 1e-7;
 
-/// Unknown matrices, requirements on them, and something to minimise.
+/// A semidefinite program: unknown matrices, requirements on them, and an objective.
 ///
 /// ```text
 /// minimise c(x) such that S_i(x) - m_i I is positive semidefinite for every i
 /// ```
 ///
 /// Method: the interior point method of Clarabel (Goulart and Chen, 2024) on data in which the
-/// largest entry of each requirement is about one. What it finds is taken only if the eigenvalues
-/// of every `S_i`(x) say that at least half of the margin `m_i` is kept. Otherwise the largest
-/// common t with `S_i`(x) - `m_i` I - t I semidefinite is sought, which always exists. If it is
-/// below zero some requirements contradict each other, and those that can be left out with the
-/// others still in conflict are left out, in the order in which they were stated: what remains
-/// is a conflict of which each part is needed.
+/// largest entry of each requirement is about one. Its result is accepted only if the eigenvalues
+/// of every `S_i`(x) show that at least half of the margin `m_i` is kept. Otherwise the largest t
+/// such that every `S_i`(x) - `m_i` I - t I is positive semidefinite is computed, which always
+/// exists. If t < 0 the requirements contradict each other. Requirements without which the others
+/// still contradict each other are then removed, in the order in which they were stated; each of
+/// the remaining ones is necessary for the contradiction.
 ///
 /// Cost: some 20 iterations of about u^3 + u^2 k^2 multiplications, u unknowns, k the order of the
 /// largest requirement; a conflict costs that once more for each named requirement.
@@ -55,14 +55,14 @@ pub struct Problem {
 
 #[derive(Debug, Clone)]
 struct Requirement {
-    /// None: what makes the problem one, never given up.
+    /// None for a constraint that is never part of a conflict.
     name: Option<&'static str>,
     matrix: Affine,
     margin: f64,
 }
 
 impl Requirement {
-    /// S(x) - (m + slack) I, both relative to the largest entry if a slack is given.
+    /// (S(x) - m I) / (largest entry of S) - slack I.
     fn semidefinite(&self, slack: Option<&Affine>) -> Affine {
         let size = power_of_two(self.matrix.largest_entry());
         let order = self.matrix.shape().0;
@@ -77,13 +77,13 @@ impl Requirement {
 }
 
 impl Problem {
-    /// No unknowns, no requirements.
+    /// Creates a program without unknowns and requirements.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// An unknown symmetric matrix.
+    /// Adds an unknown symmetric matrix.
     pub fn symmetric(&mut self, order: usize) -> Affine {
         let mut matrix = Affine::zeros(order, order);
         for col in 0..order {
@@ -96,7 +96,7 @@ impl Problem {
         matrix
     }
 
-    /// An unknown matrix.
+    /// Adds an unknown matrix.
     pub fn rectangular(&mut self, rows: usize, cols: usize) -> Affine {
         let mut matrix = Affine::zeros(rows, cols);
         for at in 0..rows * cols {
@@ -107,7 +107,7 @@ impl Problem {
         matrix
     }
 
-    /// An unknown number, as a matrix of one row and column.
+    /// Adds an unknown number, as a matrix of one row and column.
     pub fn scalar(&mut self) -> Affine {
         self.rectangular(1, 1)
     }
@@ -117,8 +117,8 @@ impl Problem {
         self.unknowns - 1
     }
 
-    /// `matrix` - `margin` I is positive semidefinite. `name` is what a conflict calls it; several
-    /// requirements of one name stand and fall together.
+    /// Requires that `matrix` - `margin` I is positive semidefinite. A conflict reports it by
+    /// `name`; requirements of the same name are treated as one.
     ///
     /// # Panics
     ///
@@ -127,7 +127,8 @@ impl Problem {
         self.push(Some(name), matrix, margin);
     }
 
-    /// The same for what is no wish but belongs to the problem, such as P > 0.
+    /// Like [`Problem::require`], for a constraint that is part of the formulation, such as P > 0,
+    /// and never reported in a conflict.
     ///
     /// # Panics
     ///
@@ -142,12 +143,13 @@ impl Problem {
         self.requirements.push(Requirement { name, matrix: matrix.clone(), margin });
     }
 
-    /// What is to be made small: an expression of one row and column.
+    /// Sets the objective to minimise: an expression of one row and column.
     pub fn minimise(&mut self, objective: &Affine) {
         self.objective = Some(objective.clone());
     }
 
-    /// Solves the problem; without an objective any x far inside of the requirements will do.
+    /// Solves the program; without an objective, computes an x as far inside of all requirements as
+    /// possible.
     ///
     /// # Errors
     ///
@@ -176,8 +178,8 @@ impl Problem {
         }
     }
 
-    /// The smallest value of the objective and where it is found, as far as the solver came: for a
-    /// first look, nothing is checked.
+    /// The smallest value of the objective and the unknowns there, as computed by the solver and
+    /// not verified.
     pub(crate) fn minimum(&self) -> Option<(f64, DVector<f64>)> {
         let objective = self.objective.as_ref()?;
         let mut costs = DVector::zeros(self.unknowns);
@@ -190,14 +192,14 @@ impl Problem {
         Some((objective.evaluate(&unknowns)[(0, 0)], unknowns))
     }
 
-    /// Unknowns as far inside of all requirements as possible, or as little outside: nothing is
-    /// checked.
+    /// The unknowns as far inside of all requirements as possible, or as little outside, not
+    /// verified.
     pub(super) fn most_interior(&self) -> Option<DVector<f64>> {
         let all: Vec<_> = self.requirements.iter().collect();
         Some(self.largest_slack(&all)?.1)
     }
 
-    /// The largest common slack, at most one, and where it is found.
+    /// The largest common slack, at most one, and the unknowns there.
     fn largest_slack(&self, requirements: &[&Requirement]) -> Option<(f64, DVector<f64>)> {
         let mut extended = self.clone();
         let slack = extended.scalar();

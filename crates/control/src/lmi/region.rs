@@ -1,4 +1,4 @@
-//! Regions of the complex plane for eigenvalues.
+//! Regions of the complex plane and the proof that they contain all eigenvalues.
 
 use super::affine::Affine;
 use super::coordinates::Coordinates;
@@ -38,12 +38,13 @@ pub struct Region {
     pub sector: Option<f64>,
 }
 
-/// A proof that all eigenvalues of A lie in a region.
+/// A proof that all eigenvalues of A are in a region.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct RegionCertificate {
     /// P, n x n, symmetric positive definite.
     pub p: DMatrix<f64>,
-    /// Smallest eigenvalue of all the inequalities, each scaled to a diagonal of about one; above
+    /// Smallest eigenvalue of all inequalities, each scaled to a diagonal of about one; larger than
     /// the rounding errors.
     pub margin: f64,
 }
@@ -174,7 +175,7 @@ impl Shape {
     }
 }
 
-/// Proves that all eigenvalues of A lie in a region.
+/// Proves that all eigenvalues of A are in a region.
 ///
 /// ```text
 /// P > 0 and, for each part of the region,
@@ -184,12 +185,13 @@ impl Shape {
 ///                         cos(t) (A' P - P A), sin(t) (P A + A' P)] < 0
 /// ```
 ///
-/// `a`: n x n. P exists if and only if the eigenvalues lie in the region. Of all P <= I the one
-/// farthest inside of all inequalities is taken, in coordinates in which A is a multiple of the
-/// identity plus a matrix of about the size of its eigenvalues' spread. An eigenvalue outside is a
-/// conflict of the parts concerned; eigenvalues inside by less than 1e-7 of the spectrum's size may
-/// end in trouble. The inequalities of the answer are checked in the data as given, the products
-/// computed in twice the precision.
+/// `a`: n x n. P exists if and only if the eigenvalues are in the region. Of all P <= I the one
+/// farthest inside of all inequalities is computed, in the coordinates in which A is a multiple of
+/// the identity plus a matrix whose norm is about the spread of the eigenvalues. An eigenvalue
+/// outside of the region gives [`Outcome::Infeasible`] with the names of the parts that it
+/// violates; an eigenvalue inside by less than 1e-7 of the size of the spectrum may give
+/// [`Outcome::Inconclusive`]. The inequalities are verified in the units of the data, with products
+/// in twice the precision.
 ///
 /// Source: M. Chilali and P. Gahinet, H-infinity design with pole placement constraints: an LMI
 /// approach, IEEE Trans. Autom. Control 41 (1996), theorem 2.2 and section II.C.

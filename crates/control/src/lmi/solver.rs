@@ -1,4 +1,4 @@
-//! The call of Clarabel.
+//! The interface to the solver Clarabel.
 
 use super::affine::Affine;
 use aso_lapack as _;
@@ -9,19 +9,19 @@ use clarabel::solver::{
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::SQRT_2;
 
-/// How far the solver came.
+/// How the solver ended.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum End {
     Solved,
-    /// It stopped on the way.
+    /// It stopped before the tolerances were met.
     Stalled,
 }
 
-/// The unknowns that minimise `objective`' x while every matrix is positive semidefinite; None when
-/// there are none or the solver failed. Not to be trusted.
+/// Minimises `objective`' x subject to every matrix being positive semidefinite. None if the
+/// problem is infeasible or the solver failed. The result is not verified.
 ///
-/// The cone of a matrix of order k takes its upper triangle column by column, entries beside the
-/// diagonal times sqrt(2).
+/// The cone of a matrix of order k is given its upper triangle column by column, off-diagonal
+/// entries times sqrt(2).
 pub(super) fn minimise(
     objective: &DVector<f64>,
     matrices: &[Affine],

@@ -16,8 +16,8 @@ pub struct Performance {
     pub disturbance: DMatrix<f64>,
     /// r x n: the part of z that depends on the states.
     pub output: DMatrix<f64>,
-    /// How w acts on the measurement (p x k, for an observer), or the command on z (r x m, for a state
-    /// feedback).
+    /// How w acts on the measurement (p x k, for an observer), or the command on z (r x m, for a
+    /// state feedback).
     pub feedthrough: DMatrix<f64>,
     /// The norm.
     pub norm: Norm,
@@ -27,6 +27,7 @@ pub struct Performance {
 
 /// A gain and the certificates of its closed loop.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Synthesis {
     /// The gain.
     pub gain: DMatrix<f64>,
@@ -44,28 +45,28 @@ pub struct Synthesis {
 /// P (B - L D_y) = P B - Z D_y, one P for all of them
 /// ```
 ///
-/// `a`: n x n; `c`: p x n; `performance`: B = `disturbance`, E = `output`, `D_y` = `feedthrough`. For the
-/// augmented observer: (`A_0`, `C_0`), B = [0; -I] from the fault rate to the error [e; eps], or
-/// `-F_0` from the fault to [e; `f_hat`].
+/// `a`: n x n; `c`: p x n; `performance`: B = `disturbance`, E = `output`, `D_y` = `feedthrough`.
+/// For the augmented observer: (`A_0`, `C_0`), B = [0; -I] from the fault rate to the error [e;
+/// eps], or `-F_0` from the fault to [e; `f_hat`].
 ///
-/// Region only: L exists if (A, C) is observable and the parts of the region have a real interval in
-/// common. P >= I, and Z of a norm up to twice the smallest possible, are chosen as far inside of all
-/// inequalities as possible. With a performance, one P for all inequalities is sufficient, not
-/// necessary. The smallest bound is computed; the gain is then designed for a bound 5 % larger, as far
-/// inside as possible, because gains often grow without limit towards the smallest bound. When w does
-/// not act on the measurement, faster is always better: give a disc to limit the gain.
+/// Region only: L exists if (A, C) is observable and the parts of the region have a real interval
+/// in common. P >= I, and Z of a norm up to twice the smallest possible, are chosen as far inside
+/// of all inequalities as possible. With a performance, one P for all inequalities is sufficient,
+/// not necessary. The smallest bound is computed; the gain is then designed for a bound 5 % larger,
+/// as far inside as possible, because gains often grow without limit towards the smallest bound.
+/// When w does not act on the measurement, faster is always better: give a disc to limit the gain.
 ///
-/// The program is solved in coordinates in which all states are equally observable at the speed that
-/// the region requires; if no gain is found, up to three times more in coordinates in which the most
-/// interior P becomes the identity. With a performance, P and Z are bounded by 1e6 there; a conflict
-/// that names "gain" means that none exists within this bound.
+/// The program is solved in coordinates in which all states are equally observable at the speed
+/// that the region requires; if no gain is found, up to three times more in coordinates in which
+/// the most interior P becomes the identity. With a performance, P and Z are bounded by 1e6 there;
+/// a conflict that names "gain" means that none exists within this bound.
 ///
 /// The region and the bound are then proven for A - L C itself, by [`certify_region`] and
 /// [`certify_gain`], each with a P of its own. Conflicts name the requirements "decay", "disc",
 /// "sector" ("stability" when no region is given) and "gain".
 ///
-/// Source: M. Chilali and P. Gahinet (1996), section IV; M. Chilali, P. Gahinet, P. Apkarian, Robust
-/// pole placement in LMI regions, IEEE Trans. Autom. Control 44 (1999).
+/// Source: M. Chilali and P. Gahinet (1996), section IV; M. Chilali, P. Gahinet, P. Apkarian,
+/// Robust pole placement in LMI regions, IEEE Trans. Autom. Control 44 (1999).
 ///
 /// # Example
 ///
@@ -124,17 +125,18 @@ pub fn observer_gain(
     })
 }
 
-/// A state feedback K, u = K x: the eigenvalues of A + B K in a region, the gain from w to z bounded.
+/// A state feedback K, u = K x: the eigenvalues of A + B K in a region, the gain from w to z
+/// bounded.
 ///
 /// ```text
 /// x' = (A + B K) x + B_1 w, z = (C_1 + D_12 K) x
 /// ```
 ///
-/// `a`: n x n; `b`: n x m; `performance`: `B_1` = `disturbance`, `C_1` = `output`, `D_12` = `feedthrough`.
-/// K = -L' with L the [`observer_gain`] for A' and B' from `C_1`', `D_12`' to `B_1`': transposing a
-/// system changes neither eigenvalues nor the H-infinity norm, and exchanges energy to peak with
-/// impulse to energy. The certificates are for A + B K itself. Existence, method and names of the
-/// requirements: same as [`observer_gain`].
+/// `a`: n x n; `b`: n x m; `performance`: `B_1` = `disturbance`, `C_1` = `output`, `D_12` =
+/// `feedthrough`. K = -L' with L the [`observer_gain`] for A' and B' from `C_1`', `D_12`' to
+/// `B_1`': transposing a system changes neither eigenvalues nor the H-infinity norm, and exchanges
+/// energy to peak with impulse to energy. The certificates are for A + B K itself. Existence,
+/// method and names of the requirements: same as [`observer_gain`].
 ///
 /// # Errors
 ///

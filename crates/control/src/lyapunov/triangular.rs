@@ -11,7 +11,7 @@ pub(super) struct Triangular {
 }
 
 impl Triangular {
-    pub(super) fn of(a: &DMatrix<f64>) -> Result<Self, Error> {
+    pub(super) fn new(a: &DMatrix<f64>) -> Result<Self, Error> {
         let (u, t) = schur(&a.map(|entry| Complex::new(entry, 0.0)))?.unpack();
         Ok(Self { u, t })
     }
@@ -19,7 +19,7 @@ impl Triangular {
     /// A' P + P A = -Q: T* Y + Y T = -U* Q U column by column, forward in the rows; P = Re(U Y U*).
     pub(super) fn continuous(&self, q: &DMatrix<f64>) -> DMatrix<f64> {
         let (t, n) = (&self.t, self.t.nrows());
-        let mut y = self.turned(q);
+        let mut y = self.enter_schur_basis(q);
         for col in 0..n {
             for row in 0..n {
                 let mut sum = -y[(row, col)];
@@ -32,13 +32,13 @@ impl Triangular {
                 y[(row, col)] = sum / (t[(row, row)].conj() + t[(col, col)]);
             }
         }
-        self.turned_back(&y)
+        self.leave_schur_basis(&y)
     }
 
     /// A' P A - P = -Q: T* Y T - Y = -U* Q U column by column, forward in the rows.
     pub(super) fn discrete(&self, q: &DMatrix<f64>) -> DMatrix<f64> {
         let (t, n) = (&self.t, self.t.nrows());
-        let mut y = self.turned(q);
+        let mut y = self.enter_schur_basis(q);
         for col in 0..n {
             // Column `col` of Y T, as far as it is known.
             let mut product = y.columns(0, col) * t.view((0, col), (col, 1));
@@ -52,14 +52,14 @@ impl Triangular {
                 product[row] += y[(row, col)] * t[(col, col)];
             }
         }
-        self.turned_back(&y)
+        self.leave_schur_basis(&y)
     }
 
-    fn turned(&self, q: &DMatrix<f64>) -> DMatrix<Complex<f64>> {
+    fn enter_schur_basis(&self, q: &DMatrix<f64>) -> DMatrix<Complex<f64>> {
         self.u.adjoint() * q.map(|entry| Complex::new(entry, 0.0)) * &self.u
     }
 
-    fn turned_back(&self, y: &DMatrix<Complex<f64>>) -> DMatrix<f64> {
+    fn leave_schur_basis(&self, y: &DMatrix<Complex<f64>>) -> DMatrix<f64> {
         (&self.u * y * self.u.adjoint()).map(|entry| entry.re)
     }
 }

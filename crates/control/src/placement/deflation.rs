@@ -1,17 +1,18 @@
-//! The gain that belongs to chosen eigenvectors.
+//! The gain for chosen eigenvectors.
 
-use super::assignable::{Assignable, solutions};
-use super::wanted::Wanted;
+use super::pole_block::PoleBlock;
+use super::subspace::{AssignableSubspaces, solutions};
 use crate::Error;
 use crate::balance::{divide_columns, divide_rows, multiply_columns, multiply_rows};
 use crate::svd::Svd;
 use nalgebra::{DMatrix, DVector};
 
-/// Eigenvectors whose part normal to those before is below this part of them are dependent.
+/// An eigenvector counts as dependent when its component normal to the previous ones is below this
+/// fraction.
 const DEPENDENT: f64 = 1e-14;
 
-/// K such that A + B K has the wanted eigenvalues, with eigenvectors as near to the chosen ones as
-/// rounding allows.
+/// Computes K such that A + B K has the requested eigenvalues, with eigenvectors as near to the
+/// chosen ones as rounding permits.
 ///
 /// K V = G alone loses as many digits of the eigenvalues as the condition number of V has. Here one
 /// eigenvalue, or pair, after the other is assigned in the part of the state space that is normal
@@ -22,7 +23,7 @@ const DEPENDENT: f64 = 1e-14;
 pub(crate) fn gain(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
-    problem: &Assignable,
+    problem: &AssignableSubspaces,
     directions: &[DVector<f64>],
 ) -> Result<DMatrix<f64>, Error> {
     let (scale, response_scale) = (&problem.scale, &problem.response_scale);
@@ -35,12 +36,12 @@ pub(crate) fn gain(
     let mut rest = DMatrix::identity(n, n);
     let mut column = 0;
     for space in &problem.spaces {
-        let count = space.wanted.count();
+        let count = space.poles.count();
         let v = vectors.columns(column, count);
         let inside = rest.tr_mul(&v);
         let g = responses.columns(column, count) - &k * v;
         let chosen = (inside.norm() > DEPENDENT * v.norm()).then_some((&inside, &g));
-        let (v, g) = nearest_solution(&rest, &a, &b, space.wanted, chosen)?;
+        let (v, g) = nearest_solution(&rest, &a, &b, space.poles, chosen)?;
         let basis = Svd::new(&v)?;
         let q = &rest * &basis.left;
         k += g * basis.whitening(count) * q.transpose();
@@ -57,11 +58,11 @@ fn nearest_solution(
     rest: &DMatrix<f64>,
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
-    wanted: Wanted,
+    poles: PoleBlock,
     chosen: Option<(&DMatrix<f64>, &DMatrix<f64>)>,
 ) -> Result<(DMatrix<f64>, DMatrix<f64>), Error> {
-    let basis = solutions(&(rest.tr_mul(a) * rest), &rest.tr_mul(b), wanted)?;
-    let (count, states) = (wanted.count(), wanted.count() * rest.ncols());
+    let basis = solutions(&(rest.tr_mul(a) * rest), &rest.tr_mul(b), poles)?;
+    let (count, states) = (poles.count(), poles.count() * rest.ncols());
     let weights = if let Some((v, g)) = chosen {
         let size = v.norm();
         let entries = v.iter().chain(g).map(|entry| entry / size);

@@ -1,19 +1,19 @@
-//! Quasi-Newton descent that also works where the function has kinks.
+//! Quasi-Newton descent for functions that need not be differentiable everywhere.
 
 use nalgebra::{DMatrix, DVector};
 
 const ITERATIONS: usize = 300;
 const TRIALS: usize = 20;
-/// Part of the predicted decrease that a step must reach.
+/// Fraction of the predicted decrease that a step must reach.
 const ENOUGH: f64 = 1e-4;
-/// Part of the slope that may be left after a step.
+/// Fraction of the slope that may remain after a step.
 const FLATTER: f64 = 0.9;
-/// Rounding error of a value, relative; within it a step counts that makes the slope smaller.
+/// Relative rounding error of a value; within it a step is accepted if it reduces the slope.
 const NOISE: f64 = 1e-15;
-/// The descent ends when so many iterations lower the value by less than `STALLED`.
+/// The descent ends when this many iterations lower the value by less than `STALLED`.
 const PATIENCE: usize = 10;
 const STALLED: f64 = 1e-6;
-/// A gradient this short ends the descent.
+/// The descent ends at a gradient shorter than this.
 const FLAT: f64 = 1e-12;
 
 /// Value and gradient at a point; None where the function is not defined.
@@ -25,7 +25,8 @@ struct Point {
     gradient: DVector<f64>,
 }
 
-/// The lowest point found from zero, and its value (infinite if undefined at zero).
+/// Minimises a function from the starting point zero; returns the point and its value (infinite if
+/// the function is undefined at zero).
 ///
 /// BFGS with a line search by bisection for the weak Wolfe conditions: A. S. Lewis and M. L.
 /// Overton, Nonsmooth optimization via quasi-Newton methods, Math. Program. 141 (2013), algorithms

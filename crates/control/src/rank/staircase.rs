@@ -1,4 +1,4 @@
-//! The staircase algorithm: the states that inputs reach, and those that are left over.
+//! The staircase algorithm: separates the controllable from the uncontrollable states.
 
 use super::Rank;
 use crate::Error;
@@ -6,15 +6,16 @@ use crate::balance::{Balance, divide_rows, multiply_rows, unit_columns};
 use crate::svd::Svd;
 use nalgebra::{DMatrix, DVector};
 
-/// What is zero in a rank decision, relative to the norm of the scaled matrix, per state.
+/// A singular value counts as zero below this times the number of states, relative to the norm of
+/// the scaled matrix.
 const TOLERANCE_PER_STATE: f64 = 100.0 * f64::EPSILON;
 
 /// With x = S z: S^-1 A S [Q1, Q2] = [Q1, Q2] [A1, *; 0, R], Q2' S^-1 B = 0.
 pub(crate) struct Staircase {
     pub(crate) answer: Rank,
-    /// Q1, n x rank, orthonormal: the states that are reached.
+    /// Q1, n x rank, orthonormal: the controllable states.
     reached_basis: DMatrix<f64>,
-    /// Q2, n x (n - rank), orthonormal: the rest, Q2' S^-1 A S = R Q2'.
+    /// Q2, n x (n - rank), orthonormal: the uncontrollable states, Q2' S^-1 A S = R Q2'.
     pub(crate) rest_basis: DMatrix<f64>,
     /// R.
     pub(crate) rest: DMatrix<f64>,
@@ -42,13 +43,13 @@ impl Staircase {
                 break;
             }
             margin = margin.min(step.values[kept - 1] / reference);
-            let turned = step.right.transpose() * &rest * &step.right;
-            let left = turned.nrows() - kept;
-            link = turned.view((kept, 0), (left, kept)).into();
-            rest = turned.view((kept, kept), (left, left)).into();
-            let turned_basis: DMatrix<f64> = rest_basis * step.right;
-            reached.extend((0..kept).map(|column| turned_basis.column(column).into_owned()));
-            rest_basis = turned_basis.columns(kept, left).into();
+            let transformed = step.right.transpose() * &rest * &step.right;
+            let left = transformed.nrows() - kept;
+            link = transformed.view((kept, 0), (left, kept)).into();
+            rest = transformed.view((kept, kept), (left, left)).into();
+            let new_basis: DMatrix<f64> = rest_basis * step.right;
+            reached.extend((0..kept).map(|column| new_basis.column(column).into_owned()));
+            rest_basis = new_basis.columns(kept, left).into();
             reference = size;
         }
         let rank = reached.len();
@@ -58,18 +59,18 @@ impl Staircase {
         Ok(Self { answer, reached_basis, rest_basis, rest, scale, balanced })
     }
 
-    /// Q1' S^-1 A S Q1: the dynamics of the states that are reached.
+    /// Q1' S^-1 A S Q1: the dynamics of the controllable states.
     pub(crate) fn reached_dynamics(&self) -> DMatrix<f64> {
         self.reached_basis.tr_mul(&self.balanced) * &self.reached_basis
     }
 
-    /// Q1' S^-1 B for a B whose columns lie in the states that are reached.
+    /// Q1' S^-1 B for a B whose columns are in the span of the controllable states.
     pub(crate) fn reached_input(&self, b: &DMatrix<f64>) -> DMatrix<f64> {
         self.reached_basis.tr_mul(&divide_rows(b, &self.scale))
     }
 
-    /// Q1' S C': what an output sees of the states that are reached, transposed, for C transposed;
-    /// beside it the norm of S C'.
+    /// Q1' S C', the transposed output matrix of the controllable states, and the norm of S C'; the
+    /// argument is C'.
     pub(crate) fn reached_output(&self, c_transposed: &DMatrix<f64>) -> (DMatrix<f64>, f64) {
         let scaled = multiply_rows(c_transposed, &self.scale);
         (self.reached_basis.tr_mul(&scaled), scaled.norm())

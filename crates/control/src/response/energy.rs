@@ -1,15 +1,16 @@
-//! Norms by the covariance of the state: H2 and energy to peak.
+//! Norms computed from the covariance of the state: H2 and energy to peak.
 
 use crate::blocks::symmetric_part;
 use crate::lyapunov::{discrete_lyapunov, lyapunov};
 use crate::svd::norm_2;
 use crate::{Domain, Error, StateSpace};
 
-/// Norms that follow from the covariance C W C' of z under white noise.
+/// The H2 norm and the generalised H2 norms of a system.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Energy {
-    /// The H2 norm: the root of the trace. The root of the mean square of z under white noise of
-    /// unit intensity, and of the energy of z after impulses at all inputs one by one.
+    /// The H2 norm: the root of the trace. The root-mean-square value of z under white noise of
+    /// unit intensity; also the root of the energy of z summed over an impulse at each input.
     pub h2: f64,
     /// The generalised H2 norm: the root of the largest eigenvalue. The largest Euclidean length of
     /// z that an input of unit energy can cause.
@@ -27,7 +28,7 @@ pub struct Energy {
 ///
 /// The energy of w is the integral of w'w, in sampled time the sum over the samples without the
 /// period. The norms are finite when A is stable, and in continuous time D = 0. Method, cost and
-/// tolerance those of the Lyapunov equation.
+/// tolerance: see [`lyapunov`].
 ///
 /// Source: D. A. Wilson, Convolution and Hankel operator norms for linear systems, IEEE Trans.
 /// Autom. Control 34 (1989).
@@ -48,8 +49,8 @@ pub struct Energy {
 ///
 /// # Errors
 ///
-/// Those of [`StateSpace::check`]; [`Error::OutOfRange`] when D is not zero in continuous time; those
-/// of [`lyapunov`] and [`discrete_lyapunov`].
+/// Same as [`StateSpace::check`]; [`Error::OutOfRange`] when D is not zero in continuous time; same
+/// as [`lyapunov`] and [`discrete_lyapunov`].
 pub fn energy(system: &StateSpace) -> Result<Energy, Error> {
     system.check()?;
     let StateSpace { a, b, c, d, domain } = system;
@@ -58,7 +59,7 @@ pub fn energy(system: &StateSpace) -> Result<Energy, Error> {
         Domain::Continuous => {
             let value = d.amax();
             if value > 0.0 {
-                let rule = "zero: the norm is infinite else";
+                let rule = "zero: the norm is infinite otherwise";
                 return Err(Error::OutOfRange { name: "D", value, rule });
             }
             c * lyapunov(&a.transpose(), &noise)?.p * c.transpose()

@@ -1,4 +1,4 @@
-//! What bounded faults and reversals of friction do to the loop.
+//! The effect of bounded faults and of reversals of friction on the closed loop.
 
 use super::{
     TimeResponse, Transient, fault_rate_system, fault_system, peak_gain, ramp_response,
@@ -7,11 +7,13 @@ use super::{
 use crate::aso::{FaultyPlant, Gains};
 use crate::{Domain, Error, check};
 
-/// Relative width of the brackets from which [`FaultBounds`] takes the upper ends.
+/// Relative width of the brackets of the peak gains; [`FaultBounds`] uses their upper ends.
 const WIDTH: f64 = 1e-3;
 
-/// Bounds of what a fault from rest can do at any time, each in the unit of its quantity.
+/// Bounds of states and errors at all times, for faults that start from rest; each in the unit of
+/// its quantity.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct FaultBounds {
     /// Of |`x_i`|, n.
     pub states: Vec<f64>,
@@ -31,21 +33,21 @@ pub struct FaultBounds {
 /// of the two halves of the inputs of [`fault_rate_system`]. `magnitudes`: F, q, bounds of |`f_j`|;
 /// `rates`: R, q, bounds of |`r_j`|, r = f' - `A_f` f, infinite if the fault may jump (in sampled
 /// time `r[k] = f[k+1] - A_f f[k]`). The bounds hold for every such fault of the linear loop from
-/// rest with the commands within the limits of the actuators, and for each of the two terms alone
-/// there is a fault that comes as near as one likes. Other than delta of theorem 1, each quantity
-/// has its own bound in its own unit. They are the upper ends of brackets 1e-3 wide.
+/// rest with the commands within the limits of the actuators, and each of the two terms alone is
+/// the least upper bound for its class of faults. Unlike delta of theorem 1, each quantity has its
+/// own bound in its own unit. The bounds are the upper ends of brackets of relative width 1e-3.
 ///
-/// What they are worth on the pendulum of the paper (|f| <= 30 N, observer -1200 to -3000 / s):
-/// half of peak to peak of cart and pendulum after compensation is 0.96 mm and 1.75 mrad in the
-/// simulation, and the bounds from |f| alone are 1.98 mm and 4.22 mrad. Those of the velocities are
-/// 4.3 and 6.1 times what the simulation shows, because the worst fault jumps. The errors need a
-/// rate: without one the worst fault jumps by 60 N, and the bound of |eps| is 60 N. In the
-/// simulation the friction turns round while the cart sticks, at up to 521 N/s; with that rate the
-/// bounds are within 1 % of the largest errors seen.
+/// Comparison with a simulation of the pendulum of the paper (|f| <= 30 N, observer -1200 to -3000
+/// / s): half of peak to peak of cart and pendulum after compensation is 0.96 mm and 1.75 mrad in
+/// the simulation, and the bounds from |f| alone are 1.98 mm and 4.22 mrad. The bounds of the
+/// velocities are 4.3 and 6.1 times the simulated values, because the worst fault jumps. Useful
+/// bounds of the errors need a rate: without one the worst fault jumps by 60 N, and the bound of
+/// |eps| is 60 N. In the simulation the friction reverses while the cart sticks, at up to 521 N/s;
+/// with that rate the bounds are within 1 % of the largest simulated errors.
 ///
 /// # Errors
 ///
-/// Those of [`Gains::check`] and [`peak_gain`]; [`Error::Shape`], [`Error::OutOfRange`] for
+/// Same as [`Gains::check`] and [`peak_gain`]; [`Error::Shape`], [`Error::OutOfRange`] for
 /// `magnitudes` and `rates`; [`Error::NotHurwitz`], [`Error::NotSchur`] when the loop is not
 /// stable.
 pub fn fault_bounds(
@@ -68,16 +70,16 @@ pub fn fault_bounds(
             check::positive("rate", rate)?;
         }
     }
-    let jumping = peak_gain(&fault_system(plant, gains, domain)?, WIDTH)?.upper;
-    let gliding = peak_gain(&fault_rate_system(plant, gains, domain)?, WIDTH)?.upper;
+    let gain_of_fault = peak_gain(&fault_system(plant, gains, domain)?, WIDTH)?.upper;
+    let gain_of_rate = peak_gain(&fault_rate_system(plant, gains, domain)?, WIDTH)?.upper;
     let bound = |output: usize| {
         let of_fault = |j: usize| {
-            let jump = jumping[(output, j)] * magnitudes[j];
+            let by_size = gain_of_fault[(output, j)] * magnitudes[j];
             if rates[j] == f64::INFINITY {
-                return jump;
+                return by_size;
             }
-            let left = gliding[(output, q + j)] * magnitudes[j];
-            jump.min(gliding[(output, j)] * rates[j] + left)
+            let uncancelled = gain_of_rate[(output, q + j)] * magnitudes[j];
+            by_size.min(gain_of_rate[(output, j)] * rates[j] + uncancelled)
         };
         (0..q).map(of_fault).sum::<f64>()
     };
@@ -88,8 +90,9 @@ pub fn fault_bounds(
     })
 }
 
-/// What the loop does when a fault turns round.
+/// The response of the loop to a step or a ramp of one fault.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Reversal {
     /// Of the states, n.
     pub states: Vec<Transient>,
@@ -101,15 +104,15 @@ pub struct Reversal {
     pub trace: TimeResponse,
 }
 
-/// The response of the loop at rest to a fault that changes by `change`: a reversal of friction.
+/// Computes the response of the loop, from rest, to a change of one fault, such as a reversal of
+/// friction.
 ///
-/// `fault`: which fault, an index from 0; `change`: how much, in its unit, 2 `F_s` for friction
-/// that turns from -`F_s` to `F_s`; `rate`: how fast, above zero, None for a jump; `fraction`: the
-/// band of the settling times, relative to the largest distance of the quantity from its settled
-/// value. Since the loop is linear, the answer is that of [`fault_system`] to a step or a ramp. The
-/// peaks of the states predict the amplitude (half of peak to peak) of the limit cycle that is left
-/// after compensation, as far as the loop settles from one reversal to the next; the peaks of the
-/// errors are those at the reversal.
+/// `fault`: which fault, an index from 0; `change`: the size of the change in the unit of the
+/// fault, 2 `F_s` for friction that reverses from -`F_s` to `F_s`; `rate`: above zero, None for a
+/// jump; `fraction`: the band of the settling times, relative to the largest distance of the
+/// quantity from its final value. The loop is linear, so that this is the step or ramp response of
+/// [`fault_system`]. The peaks of the states predict the amplitude (half of peak to peak) of the
+/// limit cycle that remains after compensation, provided that the loop settles between reversals.
 ///
 /// On the pendulum of the paper, with 2 `F_s` = 60 N, against the amplitudes of the simulation
 /// after compensation (0.96 mm, 1.75 mrad, 0.0100 m/s, 0.0205 rad/s) and its largest |eps| of 0.88
@@ -120,13 +123,13 @@ pub struct Reversal {
 /// | jump | 1.18 mm | 2.59 mrad | 0.0298 m/s | 0.0938 rad/s | 60 N |
 /// | at 521 N/s | 1.17 mm | 2.17 mrad | 0.0098 m/s | 0.0225 rad/s | 0.88 N |
 ///
-/// The jump is right for the positions, since the impulse that the estimate lets through, the
-/// integral of eps, does not depend on the rate. It is no prediction for errors and angular
-/// velocity: after compensation the friction does not jump. The cart stops, and while it sticks the
-/// friction swings from -30 N to 30 N in 0.26 s, at up to 521 N/s, as fast as the observer moves
-/// the command. That rate is a property of the loop with friction and has to be known, from a
-/// simulation or a measurement, or assumed; it is not predicted here. Nor is the root mean square
-/// of eps (0.28 N), of which |eps| is a bound only.
+/// The jump predicts the positions well, since the integral of eps, the impulse that is not
+/// compensated, does not depend on the rate. It does not predict errors and angular velocity: after
+/// compensation the friction does not jump. The cart stops, and while it sticks the friction swings
+/// from -30 N to 30 N in 0.26 s, at up to 521 N/s, as fast as the observer moves the command. That
+/// rate is a property of the loop with friction; it must be known from a simulation or a
+/// measurement, or assumed. The root mean square of eps (0.28 N) is not predicted either; |eps|
+/// only bounds it.
 ///
 /// # Example
 ///
@@ -145,7 +148,7 @@ pub struct Reversal {
 ///
 /// # Errors
 ///
-/// Those of [`Gains::check`] and [`step_response`]; [`Error::OutOfRange`] for `fault`, `change`,
+/// Same as [`Gains::check`] and [`step_response`]; [`Error::OutOfRange`] for `fault`, `change`,
 /// `rate` and `fraction`.
 pub fn reversal(
     plant: &FaultyPlant,

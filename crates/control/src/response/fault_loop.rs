@@ -1,10 +1,10 @@
-//! Plant and controller of [`crate::aso`] as one system driven by the fault.
+//! Plant and controller of [`crate::aso`] as one system with the fault as its input.
 
 use crate::aso::{Estimator, FaultyPlant, Gains};
 use crate::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
-/// From the fault f to [x; e; eps].
+/// The closed loop as a system from the fault f to [x; e; eps].
 ///
 /// ```text
 /// x' = (A + B K_x) x - B K_x e + B K_f f_hat + F_a f
@@ -13,16 +13,16 @@ use nalgebra::DMatrix;
 /// ```
 ///
 /// e = x - `x_hat`, eps = `f_hat` - f; state [x; e; `f_hat`], 2 n + q; in sampled time the left
-/// sides are those of the next sample. With a current estimator the matrix of the second line is
-/// `A_0` - L `C_0` `A_0` and f enters by (I - L `C_0`) [`F_a`; 0]; the estimates are those after the
-/// correction. The commands are within the limits of the actuators. It describes every f, jumps
-/// included, and is stable when the loop is.
+/// sides are the values at the next sample. With a current estimator the matrix of the second line
+/// is `A_0` - L `C_0` `A_0`, f enters by (I - L `C_0`) [`F_a`; 0], and the estimates are the
+/// corrected ones. The commands are within the limits of the actuators. The fault f may be any
+/// function of time, jumps included.
 ///
 /// Source: (1) to (11) of the paper named in [`crate::aso`].
 ///
 /// # Errors
 ///
-/// Those of [`Gains::check`].
+/// Same as [`Gains::check`].
 pub fn fault_system(
     plant: &FaultyPlant,
     gains: &Gains,
@@ -43,8 +43,8 @@ pub fn fault_system(
     Ok(StateSpace { a: loop_dynamics(plant, gains), b, c, d, domain })
 }
 
-/// From [r; f] to [x; e; eps], with r = f' - `A_f` f the part of the fault's rate that the fault
-/// model does not foresee; r = f' for the constant fault.
+/// The closed loop as a system from [r; f] to [x; e; eps], with r = f' - `A_f` f the part of the
+/// fault's rate that the fault model does not predict; r = f' for a constant fault.
 ///
 /// ```text
 /// x' = (A + B K_x) x - B K_x e + B K_f eps + (F_a + B K_f) f
@@ -52,12 +52,12 @@ pub fn fault_system(
 /// z = [x; e; eps]
 /// ```
 ///
-/// In sampled time `r[k] = f[k+1] - A_f f[k]`. f acts through what the compensation cannot cancel
-/// only. For an f without jumps it is the same loop as [`fault_system`] in other coordinates.
+/// In sampled time `r[k] = f[k+1] - A_f f[k]`. f acts only through the part that the compensation
+/// cannot cancel. For an f without jumps this is the loop of [`fault_system`] in other coordinates.
 ///
 /// # Errors
 ///
-/// Those of [`Gains::check`].
+/// Same as [`Gains::check`].
 pub fn fault_rate_system(
     plant: &FaultyPlant,
     gains: &Gains,
@@ -73,7 +73,7 @@ pub fn fault_rate_system(
     Ok(StateSpace { a: loop_dynamics(plant, gains), b, c, d, domain })
 }
 
-/// The matrix of both: [A + B `K_x`, [-B `K_x`, B `K_f`]; 0, `A_0` - L `C_0`].
+/// The state matrix of both systems: [A + B `K_x`, [-B `K_x`, B `K_f`]; 0, `A_0` - L `C_0`].
 fn loop_dynamics(plant: &FaultyPlant, gains: &Gains) -> DMatrix<f64> {
     let (n, q) = plant.f_a.shape();
     let mut a = DMatrix::zeros(2 * n + q, 2 * n + q);

@@ -10,6 +10,7 @@ use std::f64::consts::PI;
 
 /// The response at one frequency.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct FrequencyPoint {
     /// w in rad per unit of time.
     pub frequency: f64,
@@ -20,9 +21,9 @@ pub struct FrequencyPoint {
     pub singular_values: Vec<f64>,
 }
 
-/// G at the frequencies given.
+/// Computes G at the given frequencies.
 ///
-/// `frequencies`: in rad per unit of time, not negative. G exists where j w is no eigenvalue of A;
+/// `frequencies`: in rad per unit of time, not negative. G exists unless j w is an eigenvalue of A;
 /// the system need not be stable. Method: balancing, one complex LU decomposition for each
 /// frequency, one-sided Jacobi rotations for the singular values; about 4 n^3 multiplications each.
 /// Error: about 1e-16 times the condition number of s I - A in balanced coordinates.
@@ -44,14 +45,14 @@ pub struct FrequencyPoint {
 ///
 /// # Errors
 ///
-/// Those of [`StateSpace::check`]; [`Error::OutOfRange`] for a frequency that is negative or not
+/// Same as [`StateSpace::check`]; [`Error::OutOfRange`] for a frequency that is negative or not
 /// finite; [`Error::Overflow`] at an eigenvalue; [`Error::NotConverged`].
 pub fn frequency_response(
     system: &StateSpace,
     frequencies: &[f64],
 ) -> Result<Vec<FrequencyPoint>, Error> {
     system.check()?;
-    let transfer = Transfer::of(system);
+    let transfer = Transfer::new(system);
     frequencies.iter().map(|&frequency| transfer.point(frequency)).collect()
 }
 
@@ -62,7 +63,7 @@ pub fn frequency_response(
 ///
 /// # Errors
 ///
-/// Those of [`StateSpace::check`]; [`Error::OutOfRange`] for `per_decade` of zero;
+/// Same as [`StateSpace::check`]; [`Error::OutOfRange`] for `per_decade` of zero;
 /// [`Error::NotConverged`].
 pub fn frequency_grid(system: &StateSpace, per_decade: u32) -> Result<Vec<f64>, Error> {
     system.check()?;
@@ -101,7 +102,7 @@ pub(super) struct Transfer<'a> {
 }
 
 impl<'a> Transfer<'a> {
-    pub(super) fn of(system: &'a StateSpace) -> Self {
+    pub(super) fn new(system: &'a StateSpace) -> Self {
         let Balance { matrix, scale } = Balance::new(&system.a);
         let b = to_complex(&divide_rows(&system.b, &scale));
         let c = to_complex(&multiply_columns(&system.c, &scale));

@@ -10,34 +10,35 @@ use std::f64::consts::SQRT_2;
 
 const ROUNDS: usize = 100;
 
-/// The H-infinity norm and where it is reached.
+/// The H-infinity norm and the frequency of its maximum.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct HInfinity {
-    /// The largest singular value that was found; the norm is not below.
+    /// Lower bound: the largest singular value that was evaluated.
     pub lower: f64,
-    /// No frequency was found at which the largest singular value reaches this.
+    /// Upper bound: the largest singular value is below it at every frequency, up to rounding.
     pub upper: f64,
     /// The frequency of `lower` in rad per unit of time; infinite when it is the D of a continuous
     /// system.
     pub frequency: f64,
 }
 
-/// The H-infinity norm: the largest singular value of G over all frequencies.
+/// Computes the H-infinity norm: the largest singular value of G over all frequencies.
 ///
-/// It is the largest ratio of the energy of z to that of w, as the root. `width`: relative width of
-/// the answer, at least 1e-10. It is finite when A is stable. Method: the singular values of G
-/// equal gamma at the imaginary eigenvalues of the Hamiltonian matrix
+/// It is the root of the largest ratio of the energy of z to the energy of w. `width`: relative
+/// width of the result, at least 1e-10. It is finite when A is stable. Method: the singular values
+/// of G equal gamma at the imaginary eigenvalues of the Hamiltonian matrix
 ///
 /// ```text
 /// [A + B R^-1 D' C, B R^-1 B'; -C' (I + D R^-1 D') C, -(A + B R^-1 D' C)'],  R = gamma^2 I - D' D
 /// ```
 ///
 /// so that gamma, a little above the largest value known, is the norm when the largest singular
-/// value stays below gamma at the imaginary parts of all eigenvalues and midway between them. Which
-/// eigenvalues are imaginary need not be decided. Otherwise the largest found takes the place of
-/// gamma; this converges quadratically. A sampled system is first taken to a continuous one by z =
-/// (1 + s) / (1 - s). About 100 n^3 multiplications for the eigenvalues and 4 n^3 for each of the 4
-/// n frequencies in a round; usually 3 to 6 rounds.
+/// value stays below gamma at the imaginary parts of all eigenvalues and midway between them. It
+/// need not be decided which eigenvalues are imaginary. Otherwise the largest value found replaces
+/// gamma; the convergence is quadratic. A sampled system is first transformed to a continuous one
+/// by z = (1 + s) / (1 - s). About 100 n^3 multiplications for the eigenvalues and 4 n^3 for each
+/// of the 4 n frequencies in a round; usually 3 to 6 rounds.
 ///
 /// Source: N. A. Bruinsma and M. Steinbuch, A fast algorithm to compute the H-infinity norm of a
 /// transfer function matrix, Systems & Control Letters 14 (1990); S. Boyd and V. Balakrishnan, 15
@@ -66,13 +67,13 @@ pub struct HInfinity {
 ///
 /// # Errors
 ///
-/// Those of [`StateSpace::check`]; [`Error::OutOfRange`] for `width`; [`Error::NotHurwitz`],
+/// Same as [`StateSpace::check`]; [`Error::OutOfRange`] for `width`; [`Error::NotHurwitz`],
 /// [`Error::NotSchur`]; [`Error::NotConverged`]; [`Error::Overflow`].
 pub fn h_infinity(system: &StateSpace, width: f64) -> Result<HInfinity, Error> {
     let modes = system.stable_eigenvalues()?;
     check::positive("width", width)?;
     let width = width.max(1e-10);
-    let transfer = Transfer::of(system);
+    let transfer = Transfer::new(system);
     let continuous = continuous_equivalent(system)?;
     let mut best = HInfinity::at_ends(&transfer, &continuous.d, system.domain)?;
     let resonances = modes.iter().flat_map(|mode| match system.domain {

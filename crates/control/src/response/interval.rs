@@ -1,18 +1,18 @@
-//! The integral of |h| and of h^2 over intervals of dyadic length.
+//! Bounds of the integral of |h| over intervals of dyadic length, for an impulse response h.
 
 use crate::balance::{Balance, divide_rows, multiply_columns, power_of_two};
 use crate::hold::zero_order_hold;
 use crate::{Domain, Error, StateSpace};
 use nalgebra::{DMatrix, DVector};
 
-/// The shortest interval of continuous time, relative to the norm of A: h is straight over it.
+/// The shortest interval of continuous time, relative to the norm of A; h is nearly linear over it.
 const SHORTEST: f64 = 1.0 / 4096.0;
 /// Relative rounding error of a quadratic form, for some ten states.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
-/// Lengths are doubled no more often than this.
+/// Largest number of doublings of the length.
 const LENGTHS: usize = 120;
 
-/// What an interval does to the state at its start, for one output row c and h(t) = c x(t).
+/// An interval: its effect on the state at its start, for one output row c and h(t) = c x(t).
 pub(super) struct Length {
     /// Time, or number of samples.
     pub(super) time: f64,
@@ -25,7 +25,7 @@ pub(super) struct Length {
 }
 
 impl Length {
-    /// Two intervals in a row.
+    /// The interval of twice the length.
     fn doubled(&self) -> Self {
         Self {
             time: 2.0 * self.time,
@@ -66,7 +66,7 @@ pub(super) struct Intervals {
 }
 
 impl Intervals {
-    pub(super) fn of(system: &StateSpace) -> Result<Self, Error> {
+    pub(super) fn new(system: &StateSpace) -> Result<Self, Error> {
         let Balance { matrix, scale } = Balance::new(&system.a);
         let starts = divide_rows(&system.b, &scale);
         let outputs = multiply_columns(&system.c, &scale);
@@ -76,7 +76,7 @@ impl Intervals {
     }
 
     /// Lengths for one output, each twice the one before, until the tail of h for one input is
-    /// below `part` of what surely lies before it.
+    /// below `part` of a lower bound of the integral before it.
     pub(super) fn lengths(
         &self,
         output: usize,

@@ -4,12 +4,13 @@ use super::interval::{Intervals, Length};
 use crate::{Error, StateSpace, check};
 use nalgebra::{DMatrix, DVector};
 
-/// Rounds of halving; each round halves the intervals that leave most open.
+/// Largest number of rounds; each round halves the intervals with the widest bounds.
 const ROUNDS: usize = 200;
 const MOST_INTERVALS: usize = 1 << 22;
 
-/// Numbers that are known to lie between two others.
+/// Lower and upper bounds of a matrix, entry by entry.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Bracket {
     /// p x m.
     pub lower: DMatrix<f64>,
@@ -17,23 +18,23 @@ pub struct Bracket {
     pub upper: DMatrix<f64>,
 }
 
-/// The peak-to-peak gain from each input to each output.
+/// Computes the peak-to-peak gain from each input to each output.
 ///
 /// ```text
 /// gain[i,j] = |D[i,j]| + integral of |h_ij(t)|,  h(t) = C e^(A t) B       continuous
 /// gain[i,j] = |D[i,j]| + sum of |h_ij[k]|,       h[k] = C A^k B           sampled
 /// ```
 ///
-/// The largest |`z_i`| that an input `w_j` with |`w_j`| <= 1 can cause from rest, and no less:
-/// inputs exist that come as near as one likes. With several inputs, |`z_i`| <= sum over j of
-/// `gain[i,j]` times the bound of |`w_j`|. `width`: relative width of the bracket wanted, 1e-3 for
-/// example. The gain is finite when A is stable. Method: over an interval the integral of |h| lies
-/// between |integral of h| and the root of its length times the integral of h^2, both exact from
-/// matrix exponentials; intervals of dyadic length are halved where the two differ most, so that
-/// fast and slow modes get the steps they need; behind the last interval a bound from the
-/// contraction of the state. So the bracket is a proof up to rounding, and it is not narrowed below
-/// the rounding error of the integral of h^2. Cost: for each channel about 100 n^3, and for each
-/// time constant or oscillation some 50 intervals of 3 n^2 multiplications.
+/// It is the least upper bound of |`z_i`| from rest over all inputs `w_j` with |`w_j`| <= 1. With
+/// several inputs, |`z_i`| <= sum over j of `gain[i,j]` times the bound of |`w_j`|. `width`:
+/// relative width of the bracket, 1e-3 for example. The gain is finite when A is stable. Method:
+/// over an interval the integral of |h| lies between |integral of h| and the root of its length
+/// times the integral of h^2, both exact from matrix exponentials; intervals of dyadic length are
+/// halved where the two differ most, so that fast and slow modes get the steps they need; the
+/// contraction of the state bounds the integral after the last interval. The bracket is proven up
+/// to rounding; it is not narrowed below the rounding error of the integral of h^2. Cost: for each
+/// channel about 100 n^3, and for each time constant or oscillation some 50 intervals of 3 n^2
+/// multiplications.
 ///
 /// Source: M. A. Dahleh and J. B. Pearson, L1-optimal compensators for continuous-time systems,
 /// IEEE Trans. Autom. Control 32 (1987), for the gain; the bracket is elementary.
@@ -62,13 +63,13 @@ pub struct Bracket {
 ///
 /// # Errors
 ///
-/// Those of [`StateSpace::check`]; [`Error::OutOfRange`] for `width`; [`Error::NotHurwitz`],
+/// Same as [`StateSpace::check`]; [`Error::OutOfRange`] for `width`; [`Error::NotHurwitz`],
 /// [`Error::NotSchur`]; [`Error::NotConverged`] when a lightly damped system needs more than 4
 /// million intervals.
 pub fn peak_gain(system: &StateSpace, width: f64) -> Result<Bracket, Error> {
     system.stable_eigenvalues()?;
     check::positive("width", width)?;
-    let intervals = Intervals::of(system)?;
+    let intervals = Intervals::new(system)?;
     let mut lower = system.d.abs();
     let mut upper = lower.clone();
     for output in 0..system.c.nrows() {

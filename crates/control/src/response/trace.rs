@@ -1,30 +1,31 @@
-//! The output over time, on a grid that follows the modes.
+//! Step and ramp responses, on a time grid that is adapted to the modes.
 
 use crate::hold::FirstOrderHold;
 use crate::{Domain, Error, StateSpace, check};
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// A mode is followed until it has fallen to e^-25, 1e-11.
+/// A mode is followed until it has decayed to e^-25, about 1e-11.
 const FOLLOWED: f64 = 25.0;
 /// Steps per time constant, and per radian of an oscillation.
 const STEPS: f64 = 10.0;
 const MOST_SAMPLES: f64 = 200_000.0;
 
-/// Outputs over time.
+/// The outputs of a system over time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TimeResponse {
     /// Times, ascending from 0, in the unit of time of A or of the period.
     pub time: Vec<f64>,
-    /// z at these times, p x length of `time`. The value at 0 is that after the input has jumped.
+    /// z at these times, p x length of `time`. The value at 0 is the one after the jump of the
+    /// input.
     pub output: DMatrix<f64>,
-    /// z after all time, p.
+    /// The limit of z for large times, p.
     pub final_value: DVector<f64>,
     /// The derivative of z, p x length of `time`; without columns in sampled time.
     pub(super) slope: DMatrix<f64>,
 }
 
 impl TimeResponse {
-    /// The same for an input that is `factor` times as large.
+    /// The response to an input that is `factor` times as large.
     pub(super) fn scaled(&self, factor: f64) -> Self {
         Self {
             time: self.time.clone(),
@@ -35,32 +36,33 @@ impl TimeResponse {
     }
 }
 
-/// z for a unit step of input `input` (from 0) at rest.
+/// Computes the response to a unit step of one input, from rest.
 ///
-/// The system must be stable. The grid has ten steps for each time constant or radian of the
-/// fastest mode still alive, each mode for 25 of its time constants; so it begins in fractions of
-/// the fastest and ends with the slowest, and has some 250 points per real mode. Each point is
-/// exact up to rounding, whatever the step: it comes from matrix exponentials, or from powers of A
-/// in sampled time, where no step is shorter than a sample. Rates 1e5 apart cost about four digits.
-/// Cost: about 20 (n + 2 m)^3 multiplications per mode, n^2 per point.
+/// `input`: its index, from 0. The system must be stable. The grid has ten steps per time constant
+/// or radian of the fastest mode that has not yet decayed; a mode counts as decayed after 25 time
+/// constants. A real mode adds about 250 points. Each point is exact up to rounding for every step
+/// size: it is computed by matrix exponentials, in sampled time by powers of A, with steps of whole
+/// samples. Rates 1e5 apart cost about four digits. Cost: about 20 (n + 2 m)^3 multiplications per
+/// mode, n^2 per point.
 ///
 /// # Errors
 ///
-/// Those of [`StateSpace::check`]; [`Error::OutOfRange`] for `input`; [`Error::NotHurwitz`],
+/// Same as [`StateSpace::check`]; [`Error::OutOfRange`] for `input`; [`Error::NotHurwitz`],
 /// [`Error::NotSchur`]; [`Error::NotConverged`] for an oscillation damped so lightly that it needs
 /// more than 200000 points; [`Error::Overflow`].
 pub fn step_response(system: &StateSpace, input: usize) -> Result<TimeResponse, Error> {
     response(system, input, None)
 }
 
-/// z for an input that rises from 0 to 1 in a straight line over `duration` and stays there.
+/// Computes the response to an input that rises linearly from 0 to 1 over `duration` and then stays
+/// at 1.
 ///
-/// As [`step_response`], with the grid begun anew where the ramp ends. In sampled time the line is
-/// sampled, and the duration rounded to samples, at least one.
+/// Same as [`step_response`], with a new grid at the end of the ramp. In sampled time the duration
+/// is rounded to samples, at least one.
 ///
 /// # Errors
 ///
-/// Those of [`step_response`]; [`Error::OutOfRange`] for `duration`.
+/// Same as [`step_response`]; [`Error::OutOfRange`] for `duration`.
 pub fn ramp_response(
     system: &StateSpace,
     input: usize,
@@ -76,24 +78,28 @@ fn response(system: &StateSpace, input: usize, rise: Option<f64>) -> Result<Time
     if input >= inputs {
         #[expect(clippy::cast_precision_loss, reason = "an index for a message")]
         let value = input as f64;
-        return Err(Error::OutOfRange { name: "input", value, rule: "an index below that of B" });
+        return Err(Error::OutOfRange {
+            name: "input",
+            value,
+            rule: "an index below the number of columns of B",
+        });
     }
-    let modes = Modes::of(&eigenvalues, system.domain);
-    let mut walk = Walk::from_rest(system);
+    let modes = Modes::new(&eigenvalues, system.domain);
+    let mut simulation = GridSimulation::from_rest(system);
     if let Some(rise) = rise {
         let rise = modes.whole(rise);
-        walk.slope[input] = 1.0 / rise;
-        walk.follow(&modes.segments(rise)?)?;
-        walk.slope[input] = 0.0;
+        simulation.slope[input] = 1.0 / rise;
+        simulation.follow(&modes.segments(rise)?)?;
+        simulation.slope[input] = 0.0;
     }
-    walk.input[input] = 1.0;
-    walk.follow(&modes.segments(f64::INFINITY)?)?;
-    walk.finished()
+    simulation.input[input] = 1.0;
+    simulation.follow(&modes.segments(f64::INFINITY)?)?;
+    simulation.finished()
 }
 
 /// Time constants of a system, and its time step.
 struct Modes {
-    /// For each mode: until when it is alive, and its rate in 1 / time.
+    /// For each mode: the time at which it has decayed, and its rate in 1 / time.
     lives: Vec<(f64, f64)>,
     /// Zero in continuous time.
     period: f64,
@@ -106,7 +112,7 @@ struct Segment {
 }
 
 impl Modes {
-    fn of(eigenvalues: &[Complex<f64>], domain: Domain) -> Self {
+    fn new(eigenvalues: &[Complex<f64>], domain: Domain) -> Self {
         let exponents = eigenvalues.iter().map(|value| match domain {
             Domain::Continuous => *value,
             Domain::Sampled { period } => {
@@ -127,7 +133,7 @@ impl Modes {
         Self { lives, period }
     }
 
-    /// A time rounded to samples, at least one.
+    /// Rounds a time to samples, at least one.
     fn whole(&self, time: f64) -> f64 {
         if self.period > 0.0 { (time / self.period).round().max(1.0) * self.period } else { time }
     }
@@ -160,7 +166,7 @@ impl Modes {
         Ok(segments)
     }
 
-    /// Adds `count` steps from `from` to `until`; in sampled time of whole samples, the last ones
+    /// Adds `count` steps from `from` to `until`; in sampled time of whole samples, the last one
     /// shorter.
     fn push(list: &mut Vec<Segment>, period: f64, from: f64, until: f64, count: f64) -> f64 {
         #[expect(
@@ -185,8 +191,8 @@ impl Modes {
     }
 }
 
-/// The state on its way.
-struct Walk<'a> {
+/// The simulation of a system along the grid.
+struct GridSimulation<'a> {
     system: &'a StateSpace,
     state: DVector<f64>,
     input: DVector<f64>,
@@ -196,7 +202,7 @@ struct Walk<'a> {
     rates: Vec<DVector<f64>>,
 }
 
-impl<'a> Walk<'a> {
+impl<'a> GridSimulation<'a> {
     fn from_rest(system: &'a StateSpace) -> Self {
         let (n, m) = system.b.shape();
         Self {
@@ -219,7 +225,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Continues through the segments; the first point is that where the last walk ended.
+    /// Simulates the segments, from the point where the previous call ended.
     fn follow(&mut self, segments: &[Segment]) -> Result<(), Error> {
         if self.time.is_empty() {
             self.record(0.0);
@@ -262,7 +268,7 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// The step of length `step`; in sampled time a whole number of samples, by repeated squaring.
+/// The propagator of a step; in sampled time of a whole number of samples, by repeated squaring.
 fn hold(system: &StateSpace, step: f64) -> Result<FirstOrderHold, Error> {
     let StateSpace { a, b, domain, .. } = system;
     let Domain::Sampled { period } = *domain else {
@@ -291,7 +297,7 @@ fn hold(system: &StateSpace, step: f64) -> Result<FirstOrderHold, Error> {
     Ok(whole)
 }
 
-/// One step, which takes `time`, then another.
+/// The propagator of step `one`, which takes `time`, followed by step `other`.
 fn chained(one: &FirstOrderHold, time: f64, other: &FirstOrderHold) -> FirstOrderHold {
     FirstOrderHold {
         phi: &other.phi * &one.phi,

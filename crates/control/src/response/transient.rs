@@ -3,26 +3,27 @@
 use super::TimeResponse;
 use nalgebra::DMatrix;
 
-/// How an output goes to its settled value.
+/// Peak and settling of an output.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Transient {
-    /// The z that is largest in size, with its sign.
+    /// The value of z with the largest modulus.
     pub peak: f64,
-    /// When.
+    /// The time of the peak.
     pub peak_time: f64,
-    /// From here on z stays within the band around its settled value; zero if always.
+    /// The time after which z stays within the band around its final value; zero if it always does.
     pub settling_time: f64,
-    /// z after all time.
+    /// The limit of z for large times.
     pub final_value: f64,
 }
 
 impl TimeResponse {
-    /// Peak and settling time of output `output`, an index from 0.
+    /// Computes peak and settling time of an output.
     ///
-    /// The band is `fraction` times the largest distance of z from its settled value. Between the
-    /// points of the grid z is the cubic through both values and slopes in continuous time, 1e-6
-    /// relative to its peak; settling times are between the points where a straight line leaves the
-    /// band. In sampled time both are those of the points.
+    /// `output`: its index, from 0. The band is `fraction` times the largest distance of z from its
+    /// final value. In continuous time peaks between grid points are those of the cubic through
+    /// both values and slopes (error 1e-6 of the peak), settling times are interpolated linearly.
+    /// In sampled time both are at grid points.
     ///
     /// # Panics
     ///
@@ -50,7 +51,7 @@ impl TimeResponse {
         Transient { peak, peak_time, settling_time, final_value }
     }
 
-    /// Where z turns between points k and k + 1, and its value there.
+    /// Time and value of an extremum of z between points k and k + 1.
     fn turn(&self, output: usize, k: usize) -> Option<(f64, f64)> {
         let slopes: &DMatrix<f64> = &self.slope;
         if k + 1 >= slopes.ncols() {
@@ -68,7 +69,7 @@ impl TimeResponse {
         Some((self.time[k] + part * step, begin + rise * (end - begin) + curve))
     }
 
-    /// When z enters the band for good, after the last point k outside.
+    /// The time at which z enters the band for the last time; k is the last point outside.
     fn entry(&self, output: usize, k: usize, band: f64) -> f64 {
         if self.slope.ncols() == 0 || k + 1 == self.time.len() {
             return self.time[(k + 1).min(self.time.len() - 1)];

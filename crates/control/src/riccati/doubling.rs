@@ -1,4 +1,4 @@
-//! Structured doubling: P as the limit of a sequence whose error is squared in each step.
+//! Structured doubling: an iteration for P with quadratic convergence.
 
 use super::equation::identity;
 use crate::Error;
@@ -40,8 +40,9 @@ pub(super) fn sampled(
 
 /// A' P + P A - P G P + Q = 0, for G and Q positive semidefinite: the least such P.
 ///
-/// The Cayley transform with gamma takes an eigenvalue s of the Hamiltonian matrix to (s + gamma) /
-/// (s - gamma). The smallest and the largest converge alike when gamma is their geometric mean.
+/// The Cayley transform with gamma maps an eigenvalue s of the Hamiltonian matrix to (s + gamma) /
+/// (s - gamma). With gamma the geometric mean of the smallest and the largest modulus both converge
+/// equally fast.
 pub(super) fn continuous(
     a: &DMatrix<f64>,
     g: &DMatrix<f64>,

@@ -1,11 +1,11 @@
-//! The two equations with R = I: gain, left side, and the sum of the absolute terms.
+//! The two Riccati equations with R = I: gain, left side, residual, and a step of Newton's method.
 
 use crate::Domain;
 use crate::blocks::symmetric_part;
 use crate::lyapunov::{self, Equation, relative};
 use nalgebra::DMatrix;
 
-/// What differs between continuous and sampled time, for the weights Q, N and R = I.
+/// A Riccati equation of continuous or sampled time, with the weights Q, N and R = I.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct RiccatiEquation {
     pub(super) a: DMatrix<f64>,
@@ -16,7 +16,8 @@ pub(super) struct RiccatiEquation {
 }
 
 impl RiccatiEquation {
-    /// K = -(B' P + N'), sampled -(I + B' P B)^-1 (B' P A + N'); None if it cannot be computed.
+    /// K = -(B' P + N'), sampled -(I + B' P B)^-1 (B' P A + N'); None if I + B' P B is not positive
+    /// definite.
     pub(super) fn gain(&self, p: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let effect = self.b.tr_mul(p);
         match self.domain {
@@ -28,9 +29,9 @@ impl RiccatiEquation {
         }
     }
 
-    /// The left side of the equation. With the optimal K it is also that of the Lyapunov equation
-    /// for A + B K, in which an error of K is felt to second order only:
-    /// (A + B K)' P (A + B K) - P + Q + N K + K' N' + K' K, and likewise in continuous time.
+    /// The left side of the equation. Written as the Lyapunov equation for A + B K, in which an
+    /// error of K has an effect of second order only: (A + B K)' P (A + B K) - P + Q + N K + K' N'
+    /// + K' K, and likewise in continuous time.
     pub(super) fn left_side(&self, p: &DMatrix<f64>, gain: &DMatrix<f64>) -> DMatrix<f64> {
         let cross = &self.n * gain;
         let cost = &self.q + &cross + cross.transpose() + gain.tr_mul(gain);
@@ -41,7 +42,7 @@ impl RiccatiEquation {
         })
     }
 
-    /// Largest entry of the left side relative to the absolute terms it is made of.
+    /// Largest entry of the left side relative to the sum of its absolute terms.
     pub(super) fn residual(&self, p: &DMatrix<f64>) -> f64 {
         let Some(gain) = self.gain(p) else { return f64::INFINITY };
         let left = self.left_side(p, &gain);

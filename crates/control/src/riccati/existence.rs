@@ -1,4 +1,4 @@
-//! When a stabilising solution exists.
+//! Conditions for a stabilising solution.
 
 use super::problem::ScaledProblem;
 use crate::blocks::{stacked, to_complex};
@@ -14,7 +14,7 @@ const NEAR: f64 = 1e-12;
 /// Negative eigenvalues of a weight down to this part of its scale are rounding, per state.
 const SEMIDEFINITE: f64 = 1e-13;
 
-/// (A, B) is stabilisable, and Q sees every eigenvalue on the limit of stability.
+/// Checks that (A, B) is stabilisable and that every mode on the stability limit appears in Q.
 pub(super) fn require(problem: &ScaledProblem) -> Result<(), Error> {
     let (a, b, domain) = (&problem.free, &problem.equation.b, problem.equation.domain);
     for eigenvalue in eigenvalues(a)? {
@@ -53,8 +53,8 @@ fn deficient(a: &DMatrix<f64>, c: &DMatrix<f64>, lambda: Complex<f64>) -> Result
     Ok(ComplexSvd::new(&pencil)?.rank(tolerance) < n)
 }
 
-/// `m` is positive semidefinite to rounding. `before` is what it was computed of, and says how
-/// large that rounding is; both are scaled by its diagonal.
+/// Checks that `m` is positive semidefinite up to rounding. `before` is the matrix from which it
+/// was computed; its diagonal gives the size of the rounding errors.
 pub(super) fn require_semidefinite(m: &DMatrix<f64>, before: &DMatrix<f64>) -> Result<(), Error> {
     let n = m.nrows();
     let refused = Error::NotPositiveSemidefinite { matrix: "Q - N R^-1 N'" };

@@ -6,6 +6,7 @@ use nalgebra::{Complex, DMatrix};
 
 /// The gains of a Kalman filter in steady state.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct KalmanFilter {
     /// L, n x p, of `x_hat' = A x_hat + B u + L (y - C x_hat)`; in sampled time of the prediction
     /// `x_hat[k+1] = A x_hat[k] + B u[k] + L (y[k] - C x_hat[k])`.
@@ -25,8 +26,8 @@ pub struct KalmanFilter {
 /// `x[k+1] = A x[k] + w[k]` and the same y.
 ///
 /// `a`: n x n; `c`: p x n; `w`: n x n, symmetric positive semidefinite, the intensity of the
-/// process noise (in sampled time its covariance); `v`: p x p, symmetric positive definite, that of
-/// the measurement noise. It solves the equation of [`lqr`] for A', C', W, V:
+/// process noise (in sampled time its covariance); `v`: p x p, symmetric positive definite, the
+/// intensity of the measurement noise. Solves the equation of [`lqr`] for A', C', W, V:
 ///
 /// ```text
 /// A P + P A' - P C' V^-1 C P + W = 0              L = P C' V^-1
@@ -34,8 +35,8 @@ pub struct KalmanFilter {
 ///                     L = A P C' (V + C P C')^-1,  M = P C' (V + C P C')^-1
 /// ```
 ///
-/// It exists when (A, C) is detectable and W reaches every eigenvalue of A on the limit of
-/// stability. Method, cost, tolerance and source as in [`lqr`]; R. E. Kalman and R. S. Bucy, J.
+/// The filter exists when (A, C) is detectable and every mode of A on the stability limit is
+/// excited by W. Method, cost, tolerance and source as in [`lqr`]; R. E. Kalman and R. S. Bucy, J.
 /// Basic Eng. 83 (1961).
 ///
 /// # Example
@@ -56,7 +57,7 @@ pub struct KalmanFilter {
 /// [`Error::Shape`], [`Error::Empty`], [`Error::NotFinite`], [`Error::NotSymmetric`] for a bad
 /// matrix, [`Error::OutOfRange`] for a bad period; [`Error::NotPositiveDefinite`] for V;
 /// [`Error::NotPositiveSemidefinite`] for W; [`Error::NotDetectable`]; [`Error::Unweighted`]; the
-/// numerical ones of [`lqr`].
+/// numerical errors of [`lqr`].
 pub fn kalman(
     a: &DMatrix<f64>,
     c: &DMatrix<f64>,
@@ -88,7 +89,7 @@ pub fn kalman(
     })
 }
 
-/// The names that the dual problem has in the filter.
+/// Renames the matrices of the dual problem in an error.
 fn named_for_filter(error: Error) -> Error {
     match error {
         Error::NotSymmetric { matrix, row, col } => {

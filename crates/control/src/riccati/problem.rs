@@ -16,7 +16,8 @@ const NEWTON_STEPS: usize = 60;
 /// x = S `x_s` with a positive diagonal S, u = L^-T `u_s` with R = L L'.
 pub(super) struct ScaledProblem {
     pub(super) equation: RiccatiEquation,
-    /// A - B N', with which the cost has no product of x and u.
+    /// A - B N', the dynamics after the substitution of u that removes the product of x and u from
+    /// the cost.
     pub(super) free: DMatrix<f64>,
     /// Q - N N'.
     pub(super) free_q: DMatrix<f64>,
@@ -62,11 +63,11 @@ impl ScaledProblem {
         })
     }
 
-    /// A stabilising P near the solution.
+    /// Computes a stabilising P near the solution.
     ///
-    /// Doubling finds the least semidefinite solution, which leaves an unstable eigenvalue alone
-    /// that Q does not see. With Q + d I it sees all, and Newton's method falls from there to the
-    /// stabilising solution.
+    /// Doubling computes the least semidefinite solution, which does not stabilise an unstable mode
+    /// that does not appear in Q. With Q + d I every mode appears, and Newton's method converges
+    /// from there to the stabilising solution.
     pub(super) fn start(&self) -> Result<DMatrix<f64>, Error> {
         let effect = symmetric_part(&(&self.equation.b * self.equation.b.transpose()));
         let solve = |q: &DMatrix<f64>| match self.equation.domain {
@@ -83,7 +84,7 @@ impl ScaledProblem {
         solve(&(&self.free_q + DMatrix::from_diagonal_element(order, order, size)))
     }
 
-    /// Newton's method until the residual does not fall any more.
+    /// Applies Newton's method until the residual stops decreasing.
     pub(super) fn refined(&self, start: &DMatrix<f64>) -> Result<DMatrix<f64>, Error> {
         let (mut best, mut residual) = (start.clone(), self.equation.residual(start));
         let mut p = start.clone();

@@ -81,7 +81,7 @@ pub fn smallest_radius(
 
 /// The Y >= 0 for which norm(P G) is smallest, where F' P + P F = -I - Y; None if the solver fails.
 ///
-/// With `P(Q)` the solution of F' P + P F = -Q and E_ij the symmetric unit matrices,
+/// With `P(Q)` the solution of F' P + P F = -Q and `E_ij` the symmetric unit matrices,
 ///
 /// ```text
 /// P G = P(I) G + sum over i <= j of y_ij P(E_ij) G
@@ -89,7 +89,7 @@ pub fn smallest_radius(
 /// ```
 ///
 /// For the solver P G is divided by norm(P(I) G) = s, and Y = D Y~ D with D diagonal such that
-/// norm(P(D E_ii D) G) = s for every i.
+/// norm(P(D `E_ii` D) G) = s for every i.
 fn best_surplus(f: &DMatrix<f64>, g: &DMatrix<f64>) -> Result<Option<DMatrix<f64>>, Error> {
     let n = f.nrows();
     let p_times_g = |q: &DMatrix<f64>| Ok::<_, Error>(lyapunov(f, q)?.p * g);

@@ -150,10 +150,10 @@ fn an_eigenvalue_or_a_pair_that_comes_more_often_than_there_are_inputs_is_refuse
     let a = integers(6, 6, |i, j| (7 * i * i + 3 * i * j + 5 * j + i * j * j) % 11 - 5);
     let b = integers(6, 2, |i, j| (5 * i * i + 3 * j + 2 * i * j + i) % 7 - 3);
     let refused = place(&a, &b, &real_poles(&[-2.0, -1.0, -2.0, -2.0, -3.0, -4.0])).unwrap_err();
-    let expected = "the eigenvalue -2 is wanted 3 times, at most 2 are possible";
+    let expected = "the eigenvalue -2 is requested 3 times, expected at most 2, the rank of B";
     assert_eq!(refused.to_string(), expected);
     let refused = place(&a, &b, &[pair(-1.0, 3.0); 3].concat()).unwrap_err();
-    let expected = "the eigenvalue -1+3i is wanted 3 times, at most 2 are possible";
+    let expected = "the eigenvalue -1+3i is requested 3 times, expected at most 2, the rank of B";
     assert_eq!(refused.to_string(), expected);
 }
 
@@ -164,7 +164,7 @@ fn a_complex_eigenvalue_without_its_conjugate_is_refused_by_name() {
     let alone = [Complex::new(-3.0, 0.0), q, Complex::new(-4.0, 0.0)];
     let refused = place(&a, &b, &alone).unwrap_err();
     assert_eq!(refused, Error::UnpairedPole { pole: q });
-    let expected = "the eigenvalue -1-2i is wanted without its conjugate -1+2i";
+    let expected = "the eigenvalue -1-2i is requested without its conjugate -1+2i";
     assert_eq!(refused.to_string(), expected);
     assert_eq!(place(&a, &b, &[p, q, p]), Err(Error::UnpairedPole { pole: p }));
 }

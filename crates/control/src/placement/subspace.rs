@@ -1,6 +1,6 @@
-//! The eigenvectors a feedback can give to each wanted eigenvalue.
+//! The eigenvectors that a feedback can assign to each eigenvalue.
 
-use super::wanted::Wanted;
+use super::pole_block::PoleBlock;
 use crate::Error;
 use crate::balance::power_of_two;
 use crate::balance::{Balance, divide_columns, divide_rows, multiply_columns, multiply_rows};
@@ -9,24 +9,24 @@ use nalgebra::{DMatrix, DVector};
 
 const SCALING_PASSES: usize = 20;
 
-/// For each wanted eigenvalue all (V, G) with A V + B G = V M: with G = K V the columns of V span
-/// the eigenvectors of A + B K.
+/// For each eigenvalue, or pair, with real block M the subspace of all (V, G) with A V + B G = V M.
+/// If G = K V, the columns of V span eigenvectors of A + B K.
 ///
-/// V and G have one column for a real eigenvalue, two for a pair; a direction w gives all of them:
-/// the columns of V, one below the other, are X w, those of G are Y w. B has r independent columns,
-/// so w has r entries for each column of V.
-pub(crate) struct Assignable {
-    /// One for each wanted eigenvalue or pair.
-    pub(crate) spaces: Vec<Space>,
+/// V and G have one column for a real eigenvalue, two for a pair. Stacked, the columns of V are X w
+/// and the columns of G are Y w for a direction w. B has r independent columns; w has r entries for
+/// each column of V.
+pub(crate) struct AssignableSubspaces {
+    /// One for each eigenvalue or pair.
+    pub(crate) spaces: Vec<AssignableSubspace>,
     /// Units of the states that give eigenvectors entries of similar size; powers of two.
     pub(crate) scale: DVector<f64>,
     /// Units of the responses G.
     pub(crate) response_scale: DVector<f64>,
 }
 
-/// What one eigenvalue, or one pair, can have.
-pub(crate) struct Space {
-    pub(crate) wanted: Wanted,
+/// The eigenvectors that can be assigned to one eigenvalue or pair.
+pub(crate) struct AssignableSubspace {
+    pub(crate) poles: PoleBlock,
     /// X, its columns orthonormal in the given coordinates, times the root of the count: a w of
     /// length one gives eigenvectors of length one.
     pub(crate) states: DMatrix<f64>,
@@ -34,34 +34,38 @@ pub(crate) struct Space {
     responses: DMatrix<f64>,
 }
 
-impl Assignable {
+impl AssignableSubspaces {
     /// `a`: n x n, `b`: n x r of rank r, the pair controllable.
     pub(crate) fn new(
         a: &DMatrix<f64>,
         b: &DMatrix<f64>,
-        wanted: &[Wanted],
+        blocks: &[PoleBlock],
     ) -> Result<Self, Error> {
         let (n, r) = b.shape();
         let mut units = DVector::from_element(n + r, 1.0);
         units.rows_mut(0, n).copy_from(&Balance::new(a).scale);
-        let mut solutions = in_units(a, b, wanted, &units)?;
+        let mut solutions = in_units(a, b, blocks, &units)?;
         for _ in 0..SCALING_PASSES {
-            let factors = row_sizes(&solutions, wanted, n);
+            let factors = row_sizes(&solutions, blocks, n);
             if factors.iter().all(|factor| (factor - 1.0).abs() <= 0.0) {
                 break;
             }
             units.component_mul_assign(&factors);
-            solutions = in_units(a, b, wanted, &units)?;
+            solutions = in_units(a, b, blocks, &units)?;
         }
         let scale: DVector<f64> = units.rows(0, n).into();
-        let space = |(solution, &wanted): (&DMatrix<f64>, &Wanted)| {
-            let count = wanted.count();
+        let space = |(solution, &poles): (&DMatrix<f64>, &PoleBlock)| {
+            let count = poles.count();
             let (top, bottom) = (solution.rows(0, count * n), solution.rows(count * n, count * r));
             let given = multiply_rows(&top.into(), &repeated(&scale, count));
             let whitening = Svd::new(&given)?.whitening(count * r) * root(count);
-            Ok(Space { wanted, states: given * &whitening, responses: bottom * whitening })
+            Ok(AssignableSubspace {
+                poles,
+                states: given * &whitening,
+                responses: bottom * whitening,
+            })
         };
-        let spaces = solutions.iter().zip(wanted).map(space).collect::<Result<_, Error>>()?;
+        let spaces = solutions.iter().zip(blocks).map(space).collect::<Result<_, Error>>()?;
         Ok(Self { spaces, scale, response_scale: units.rows(n, r).into() })
     }
 
@@ -94,7 +98,7 @@ impl Assignable {
         units: &DVector<f64>,
     ) -> DMatrix<f64> {
         let columns = self.spaces.iter().zip(directions).map(|(space, w)| {
-            let count = space.wanted.count();
+            let count = space.poles.count();
             let v = (&space.states * w).component_div(&repeated(units, count));
             v.normalize() * root(count)
         });
@@ -123,40 +127,40 @@ fn repeated(v: &DVector<f64>, times: usize) -> DVector<f64> {
     DVector::from_fn(times * v.len(), |i, _| v[i % v.len()])
 }
 
-/// Solutions with A, B and the answer in the given units of states and responses.
+/// [`solutions`] in the given units of states and responses.
 fn in_units(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
-    wanted: &[Wanted],
+    blocks: &[PoleBlock],
     units: &DVector<f64>,
 ) -> Result<Vec<DMatrix<f64>>, Error> {
     let (n, r) = b.shape();
     let (of_states, of_responses) = (units.rows(0, n).into(), units.rows(n, r).into());
     let a = divide_rows(&multiply_columns(a, &of_states), &of_states);
     let b = divide_rows(&multiply_columns(b, &of_responses), &of_states);
-    wanted.iter().map(|&wanted| solutions(&a, &b, wanted)).collect()
+    blocks.iter().map(|&poles| solutions(&a, &b, poles)).collect()
 }
 
 /// Orthonormal basis of the solutions (V; G) of A V - V M + B G = 0, columns stacked.
 pub(crate) fn solutions(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
-    wanted: Wanted,
+    poles: PoleBlock,
 ) -> Result<DMatrix<f64>, Error> {
-    let ((n, r), count) = (b.shape(), wanted.count());
+    let ((n, r), count) = (b.shape(), poles.count());
     let one = DMatrix::identity(count, count);
-    let shifted = one.kronecker(a) - wanted.block().transpose().kronecker(&DMatrix::identity(n, n));
+    let shifted = one.kronecker(a) - poles.block().transpose().kronecker(&DMatrix::identity(n, n));
     let mut equations = shifted.resize_horizontally(count * (n + r), 0.0);
     equations.columns_mut(count * n, count * r).copy_from(&one.kronecker(b));
     Ok(Svd::new(&equations)?.right.columns(count * n, count * r).into())
 }
 
 /// Size of each state and each response over all solutions, as powers of two around one.
-fn row_sizes(solutions: &[DMatrix<f64>], wanted: &[Wanted], n: usize) -> DVector<f64> {
-    let rows = solutions[0].nrows() / wanted[0].count();
+fn row_sizes(solutions: &[DMatrix<f64>], blocks: &[PoleBlock], n: usize) -> DVector<f64> {
+    let rows = solutions[0].nrows() / blocks[0].count();
     let mut sizes = DVector::<f64>::zeros(rows);
-    for (solution, wanted) in solutions.iter().zip(wanted) {
-        let count = wanted.count();
+    for (solution, poles) in solutions.iter().zip(blocks) {
+        let count = poles.count();
         for (row, entries) in solution.row_iter().enumerate() {
             let states = count * n;
             let of = if row < states { row % n } else { n + (row - states) % (rows - n) };

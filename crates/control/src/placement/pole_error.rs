@@ -1,25 +1,26 @@
-//! Wanted eigenvalues compared with those reached.
+//! Comparison of the eigenvalues of A + B K with the requested ones.
 
 use crate::Error;
 use crate::eigen::eigenvalues;
 use nalgebra::{Complex, DMatrix};
 
-/// How near an eigenvalue must come to the one wanted.
-pub(crate) struct Demand {
-    /// Distances are relative to that of the wanted eigenvalue from this point.
+/// The tolerance of assigned eigenvalues.
+pub(crate) struct PoleTolerance {
+    /// Errors are relative to the distance of the requested eigenvalue from this point.
     pub(crate) origin: f64,
     /// Largest relative distance.
     pub(crate) allowed: f64,
 }
 
-/// Of x' = A x.
-pub(crate) const CONTINUOUS: Demand = Demand { origin: 0.0, allowed: 1e-6 };
-/// Of `x[k+1] = A x[k]`, where 1 - z is about -s times the sample time for slow eigenvalues. A few
-/// rounding errors of A + B K move a cluster of k eigenvalues near zero by about their k-th root.
-pub(crate) const DISCRETE: Demand = Demand { origin: 1.0, allowed: 1e-2 };
+/// The tolerance for x' = A x.
+pub(crate) const CONTINUOUS: PoleTolerance = PoleTolerance { origin: 0.0, allowed: 1e-6 };
+/// The tolerance for `x[k+1] = A x[k]`, where 1 - z is about -s times the sample time for slow
+/// eigenvalues. Rounding errors of A + B K move a cluster of k eigenvalues near zero by about their
+/// k-th root.
+pub(crate) const DISCRETE: PoleTolerance = PoleTolerance { origin: 1.0, allowed: 1e-2 };
 
-impl Demand {
-    /// Largest relative distance when wanted and reached eigenvalues are paired, nearest first.
+impl PoleTolerance {
+    /// The largest relative error, with requested and assigned eigenvalues paired, nearest first.
     pub(crate) fn pole_error(
         &self,
         a: &DMatrix<f64>,
@@ -49,8 +50,8 @@ impl Demand {
         Ok(worst)
     }
 
-    /// For each wanted eigenvalue its distance from the origin; the largest one for an eigenvalue
-    /// in the origin, the norm of A there if all are.
+    /// For each requested eigenvalue its distance from the origin; for an eigenvalue at the origin
+    /// the largest of these distances, or the norm of A if all are there.
     fn references(&self, a: &DMatrix<f64>, poles: &[Complex<f64>]) -> Vec<f64> {
         let origin = Complex::new(self.origin, 0.0);
         let far: Vec<f64> = poles.iter().map(|&pole| distance(pole, origin)).collect();

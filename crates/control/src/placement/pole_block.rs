@@ -1,20 +1,21 @@
-//! The set of wanted eigenvalues.
+//! Requested eigenvalues, grouped into real ones and conjugate pairs.
 
-use super::reached::distance;
+use super::pole_error::distance;
 use crate::Error;
 use nalgebra::{Complex, DMatrix};
 
-/// A real eigenvalue, or a pair of conjugates p and conj p that is treated as one.
+/// A real eigenvalue, or a pair of conjugate eigenvalues p and conj p that is assigned together.
 ///
-/// A pair has the real matrix V = sqrt 2 [Re v, Im v] for its eigenvectors [v, conj v], which V
-/// times a unitary matrix gives. All condition numbers and angles are therefore those of V.
+/// The eigenvectors [v, conj v] of a pair are represented by the real matrix V = sqrt 2 [Re v, Im
+/// v], from which they differ by a unitary factor. Condition numbers and angles are therefore the
+/// same.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Wanted {
+pub(crate) struct PoleBlock {
     /// p, its imaginary part not below zero.
     pole: Complex<f64>,
 }
 
-impl Wanted {
+impl PoleBlock {
     /// Number of eigenvalues: 1 or 2.
     pub(crate) fn count(self) -> usize {
         if self.pole.im > 0.0 { 2 } else { 1 }
@@ -31,12 +32,13 @@ impl Wanted {
     }
 }
 
-/// One entry per real eigenvalue and per pair, the largest real part first: the order in which the
-/// user states them must not decide which of several local optima is found.
+/// Groups eigenvalues; returns one entry per real eigenvalue and per pair, sorted by descending
+/// real part, so that the order of the argument does not influence which of several local optima is
+/// found.
 ///
-/// Refuses an eigenvalue without its conjugate and one that comes more than `inputs` times. Both
-/// are decided on exact equality.
-pub(crate) fn wanted(poles: &[Complex<f64>], inputs: usize) -> Result<Vec<Wanted>, Error> {
+/// An eigenvalue without its conjugate, or more often than `inputs`, is an error. Both are decided
+/// by exact equality.
+pub(crate) fn pole_blocks(poles: &[Complex<f64>], inputs: usize) -> Result<Vec<PoleBlock>, Error> {
     let occurrences = |pole| poles.iter().filter(|&&other| distance(other, pole) <= 0.0).count();
     for &pole in poles {
         let times = occurrences(pole);
@@ -48,7 +50,7 @@ pub(crate) fn wanted(poles: &[Complex<f64>], inputs: usize) -> Result<Vec<Wanted
         }
     }
     let upper = poles.iter().filter(|pole| pole.im >= 0.0);
-    let mut all: Vec<_> = upper.map(|&pole| Wanted { pole }).collect();
+    let mut all: Vec<_> = upper.map(|&pole| PoleBlock { pole }).collect();
     let order =
         |x: &Complex<f64>, y: &Complex<f64>| y.re.total_cmp(&x.re).then(x.im.total_cmp(&y.im));
     all.sort_by(|x, y| order(&x.pole, &y.pole));

@@ -1,21 +1,21 @@
-//! The choice of eigenvectors with the best condition number.
+//! The choice of the eigenvectors with the smallest condition number.
 
-use super::assignable::{Assignable, Space};
 use super::descent::minimise;
+use super::subspace::{AssignableSubspace, AssignableSubspaces};
 use crate::Error;
 use crate::svd::Svd;
 use nalgebra::{DMatrix, DVector, RowDVector};
 
 const STARTS: usize = 3;
-/// A later start must be better by more than rounding, or else the earliest wins.
+/// A later start is preferred only if it is better by more than rounding.
 const BETTER: f64 = 1.0 - 1e-5;
 const SWEEPS: usize = 20;
 const ROUNDS: usize = 5;
-/// Another round of descent is worth its cost if it lowers ln(condition) by this.
+/// The descent ends when a round lowers ln(condition) by less than this.
 const WORTHWHILE: f64 = 1e-6;
 
-/// Directions w, of length one, of the best of several descents from fixed starts.
-pub(crate) fn best_directions(problem: &Assignable) -> Result<Vec<DVector<f64>>, Error> {
+/// The directions w, of length one, of the best of several descents from fixed starts.
+pub(crate) fn best_directions(problem: &AssignableSubspaces) -> Result<Vec<DVector<f64>>, Error> {
     let mut best: Option<(f64, Vec<DVector<f64>>)> = None;
     let starts = if problem.inputs() == 1 { 1 } else { STARTS };
     for start in 0..starts {
@@ -33,15 +33,15 @@ pub(crate) fn condition(eigenvectors: &DMatrix<f64>) -> Result<f64, Error> {
     Ok(Svd::new(&eigenvectors.transpose())?.condition())
 }
 
-/// Directions spread without pattern: the fractional parts of multiples of square roots.
-fn spread(problem: &Assignable, start: usize) -> Vec<DVector<f64>> {
+/// Quasi-random directions: the fractional parts of multiples of square roots.
+fn spread(problem: &AssignableSubspaces, start: usize) -> Vec<DVector<f64>> {
     let count = problem.scale.len() * problem.inputs();
     let mut seed = (2 + start * count..).map(|k| {
         #[expect(clippy::cast_precision_loss, reason = "the count is far below 2^52")]
         let root = (k as f64).sqrt();
         (1000.0 * root).fract() - 0.5
     });
-    let mut direction = |space: &Space| {
+    let mut direction = |space: &AssignableSubspace| {
         let w = DVector::from_fn(space.states.ncols(), |_, _| seed.next().unwrap_or(1.0));
         let length = w.norm();
         if length > 0.0 { w / length } else { DVector::from_element(w.len(), 1.0).normalize() }
@@ -49,8 +49,8 @@ fn spread(problem: &Assignable, start: usize) -> Vec<DVector<f64>> {
     problem.spaces.iter().map(&mut direction).collect()
 }
 
-/// Sweeps in which each eigenvector, or pair, in turn becomes the one that spans the largest volume
-/// with the others.
+/// Replaces each eigenvector, or pair, in turn by the one that spans the largest volume with the
+/// others; several sweeps.
 ///
 /// For a real eigenvalue that is the projection, onto its subspace, of the normal of the plane that
 /// the others span: method 0 of Kautsky, Nichols and Van Dooren. A pair V = [v1, v2] spans with the
@@ -58,7 +58,7 @@ fn spread(problem: &Assignable, start: usize) -> Vec<DVector<f64>> {
 /// greatest at an eigenvector of a symmetric matrix: A. L. Tits and Y. Yang, Globally convergent
 /// algorithms for robust pole assignment by state feedback, IEEE Trans. Autom. Control 41 (1996).
 fn project(
-    problem: &Assignable,
+    problem: &AssignableSubspaces,
     mut directions: Vec<DVector<f64>>,
 ) -> Result<Vec<DVector<f64>>, Error> {
     for _ in 0..SWEEPS {
@@ -67,7 +67,7 @@ fn project(
             let Some(inverse) = problem.inverse(&directions) else {
                 return Ok(directions);
             };
-            let count = space.wanted.count();
+            let count = space.poles.count();
             let normals = inverse.rows(column, count).transpose();
             if normals.norm().is_normal() {
                 let best = widest(space, &(&normals / normals.norm()))?;
@@ -83,9 +83,9 @@ fn project(
 }
 
 /// The w that spans the largest volume, `normals` spanning what is normal to the other vectors.
-fn widest(space: &Space, normals: &DMatrix<f64>) -> Result<DVector<f64>, Error> {
+fn widest(space: &AssignableSubspace, normals: &DMatrix<f64>) -> Result<DVector<f64>, Error> {
     let n = normals.nrows();
-    if space.wanted.count() == 1 {
+    if space.poles.count() == 1 {
         return Ok(space.states.tr_mul(&normals.column(0)));
     }
     let first = space.states.rows(0, n).tr_mul(normals);
@@ -102,7 +102,7 @@ fn widest(space: &Space, normals: &DMatrix<f64>) -> Result<DVector<f64>, Error> 
 
 /// Descent on ln(condition) in local coordinates that are centred anew in each round.
 fn descend(
-    problem: &Assignable,
+    problem: &AssignableSubspaces,
     mut directions: Vec<DVector<f64>>,
 ) -> Result<Vec<DVector<f64>>, Error> {
     let mut value = f64::INFINITY;
@@ -121,14 +121,14 @@ fn descend(
 /// Directions near given ones: w = (w0 + N t) / |w0 + N t|.
 ///
 /// The columns of N are orthonormal and normal to w0. For a pair they are also normal to the
-/// direction of i v, because the factor of a complex eigenvector changes nothing.
+/// direction of i v, because a complex factor does not change an eigenvector.
 struct Chart {
     centres: Vec<DVector<f64>>,
     normals: Vec<DMatrix<f64>>,
 }
 
 impl Chart {
-    fn around(problem: &Assignable, centres: Vec<DVector<f64>>) -> Result<Self, Error> {
+    fn around(problem: &AssignableSubspaces, centres: Vec<DVector<f64>>) -> Result<Self, Error> {
         let pairs = problem.spaces.iter().zip(&centres);
         let normals = pairs.map(|(space, w)| normals(space, w)).collect::<Result<_, _>>()?;
         Ok(Self { centres, normals })
@@ -149,7 +149,11 @@ impl Chart {
     }
 
     /// ln(s1 / sn) of the eigenvector matrix V = sum of s x u', and its gradient: ds = x' dV u.
-    fn objective(&self, problem: &Assignable, t: &DVector<f64>) -> Option<(f64, DVector<f64>)> {
+    fn objective(
+        &self,
+        problem: &AssignableSubspaces,
+        t: &DVector<f64>,
+    ) -> Option<(f64, DVector<f64>)> {
         let directions = self.directions(t);
         let v = Svd::new(&problem.eigenvectors(&directions).transpose()).ok()?;
         let last = v.values.len() - 1;
@@ -159,7 +163,7 @@ impl Chart {
         let mut gradient = DVector::zeros(t.len());
         let (mut column, mut first) = (0, 0);
         for ((space, normals), w) in problem.spaces.iter().zip(&self.normals).zip(&directions) {
-            let (count, free) = (space.wanted.count(), normals.ncols());
+            let (count, free) = (space.poles.count(), normals.ncols());
             let own = of_columns.columns(column, count).into_owned();
             let slope = space.states.tr_mul(&DVector::from_column_slice(own.as_slice()));
             let tangential = &slope - w * w.dot(&slope);
@@ -173,8 +177,8 @@ impl Chart {
 }
 
 /// Orthonormal columns normal to w and, for a pair, to the w of i v.
-fn normals(space: &Space, w: &DVector<f64>) -> Result<DMatrix<f64>, Error> {
-    let count = space.wanted.count();
+fn normals(space: &AssignableSubspace, w: &DVector<f64>) -> Result<DMatrix<f64>, Error> {
+    let count = space.poles.count();
     let mut fixed = vec![w.transpose()];
     if count == 2 {
         fixed.push(quarter_turn(space, w));
@@ -184,7 +188,7 @@ fn normals(space: &Space, w: &DVector<f64>) -> Result<DMatrix<f64>, Error> {
 }
 
 /// The w of i v as a row: v1 + i v2 becomes -v2 + i v1.
-fn quarter_turn(space: &Space, w: &DVector<f64>) -> RowDVector<f64> {
+fn quarter_turn(space: &AssignableSubspace, w: &DVector<f64>) -> RowDVector<f64> {
     let v = &space.states * w;
     let n = v.len() / 2;
     let turned = DVector::from_fn(2 * n, |i, _| if i < n { -v[n + i] } else { v[i - n] });

@@ -1,31 +1,31 @@
-//! Singular values and vectors by one-sided rotations, for any rank.
+//! The singular value decomposition by one-sided Jacobi rotations, with complete bases U and V.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Five to ten sweeps are usual.
+/// Largest number of sweeps; 5 to 10 are usual.
 const SWEEPS: usize = 60;
-/// Columns below this part of the largest are zero.
-const NOTHING: f64 = 1e-100;
+/// A column shorter than this, relative to the largest entry of the matrix, counts as zero.
+const NEGLIGIBLE: f64 = 1e-100;
 
 /// A = U S V', U and V square and orthogonal, S descending.
-pub(crate) struct Decomposition {
+pub(crate) struct Svd {
     pub(crate) u: DMatrix<f64>,
     /// min(rows, columns) values.
     pub(crate) values: DVector<f64>,
     pub(crate) v: DMatrix<f64>,
 }
 
-impl Decomposition {
-    /// None when the rotations do not end, as with entries that are not finite.
-    pub(crate) fn of(a: &DMatrix<f64>) -> Option<Self> {
+impl Svd {
+    /// Decomposes `a`; None for entries that are not finite or if the sweeps do not converge.
+    pub(crate) fn new(a: &DMatrix<f64>) -> Option<Self> {
         if a.nrows() >= a.ncols() {
-            return Self::of_tall(a);
+            return Self::tall(a);
         }
-        let turned = Self::of_tall(&a.transpose())?;
-        Some(Self { u: turned.v, values: turned.values, v: turned.u })
+        let transposed = Self::tall(&a.transpose())?;
+        Some(Self { u: transposed.v, values: transposed.values, v: transposed.u })
     }
 
-    fn of_tall(a: &DMatrix<f64>) -> Option<Self> {
+    fn tall(a: &DMatrix<f64>) -> Option<Self> {
         let size = a.amax();
         if size == 0.0 || a.is_empty() {
             let (rows, cols) = a.shape();
@@ -44,7 +44,7 @@ impl Decomposition {
         let mut order: Vec<usize> = (0..norms.len()).collect();
         order.sort_by(|&i, &j| norms[j].total_cmp(&norms[i]));
         let mut u = DMatrix::zeros(a.nrows(), a.nrows());
-        let rank = order.iter().filter(|&&k| norms[k] > NOTHING).count();
+        let rank = order.iter().filter(|&&k| norms[k] > NEGLIGIBLE).count();
         for (at, &k) in order.iter().take(rank).enumerate() {
             u.set_column(at, &(images.column(k) / norms[k]));
         }
@@ -55,7 +55,7 @@ impl Decomposition {
     }
 }
 
-/// A V with orthogonal columns, and V.
+/// A V with orthogonal columns, and V; None if the sweeps do not converge.
 fn orthogonal_images(mut images: DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
     let cols = images.ncols();
     let mut v = DMatrix::identity(cols, cols);
@@ -77,11 +77,11 @@ fn orthogonal_images(mut images: DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<
     None
 }
 
-/// Cosine and sine that make columns p and q orthogonal; None if they are.
+/// Cosine and sine of the rotation that makes columns p and q orthogonal; None if they are already.
 fn rotation(m: &DMatrix<f64>, p: usize, q: usize) -> Option<(f64, f64)> {
     let (a, b) = (m.column(p), m.column(q));
     let (first, second) = (a.norm(), b.norm());
-    if first <= NOTHING || second <= NOTHING {
+    if first <= NEGLIGIBLE || second <= NEGLIGIBLE {
         return None;
     }
     let cosine = (a / first).dot(&(b / second));
@@ -95,7 +95,7 @@ fn rotation(m: &DMatrix<f64>, p: usize, q: usize) -> Option<(f64, f64)> {
     Some((c, c * tangent))
 }
 
-/// Columns a, b become c a - s b, s a + c b.
+/// Replaces columns a and b by c a - s b and s a + c b.
 fn rotate(m: &mut DMatrix<f64>, p: usize, q: usize, c: f64, s: f64) {
     for row in 0..m.nrows() {
         let (a, b) = (m[(row, p)], m[(row, q)]);
@@ -103,8 +103,8 @@ fn rotate(m: &mut DMatrix<f64>, p: usize, q: usize, c: f64, s: f64) {
     }
 }
 
-/// Orthonormal columns from `done` on: of the unit vectors the one farthest from the columns
-/// before, made orthogonal to them twice.
+/// Completes the first `done` columns to an orthonormal basis: each new column is the unit vector
+/// farthest from the span of the previous columns, made orthogonal to them twice.
 fn complete(u: &mut DMatrix<f64>, done: usize) {
     let n = u.nrows();
     for at in done..n {
