@@ -87,7 +87,7 @@ fn the_slopes_of_all_outputs_are_the_limits_of_their_differences() {
         let zeros = vec![0.0; model.values.y.len()];
         step(&mut model, 1.0, 0.1, &zeros, &zeros);
         let (z, u, losses) = (model.values.z.clone(), model.values.u.clone(), model.losses.clone());
-        let slopes = (model.z_slopes.clone(), model.u_slopes.clone());
+        let slopes = (model.deviations.z_slopes.clone(), model.u_slopes.clone());
         let h = 1e-7;
         step(&mut model, 1.1, h, &zeros, &zeros);
         let rate = |after: &[f64], before: &[f64]| -> Vec<f64> {
@@ -114,7 +114,7 @@ fn a_loss_is_the_fault_by_the_command_where_that_is_large_enough() {
         (1e-3, -1e-3, 1e-6 / (1e-6 + 0.49)),
         (1e200, 1.0, 0.0),
     ] {
-        let found = loss.at(&[u, f64::NAN], &[f_hat, f64::NAN]);
+        let found = loss.lost(u, f_hat);
         assert!((found - wanted).abs() < 1e-12, "{u} {f_hat}: {found}");
     }
 }
