@@ -13,7 +13,7 @@ use crate::loss::Loss;
 use crate::mode::Mode;
 use crate::observer::{Conditions, Observer};
 use crate::sampled::Sampler;
-use crate::signals::{Signals, Values};
+use crate::signals::{OperatingPoint, Signals, Values};
 use crate::{names, variables};
 
 /// The part of the range of an actuator by which a free command passes a limit before that is an
@@ -30,9 +30,12 @@ pub(crate) struct AsoController {
     pub(crate) f_hat_0: Vec<f64>,
     /// Estimates, measurements and commands as the importer sees them.
     pub(crate) values: Values,
-    /// The same as deviations from the operating point, and z'.
+    /// The operating point of `design`, as it was at the start.
+    operating_point: OperatingPoint,
+    /// The signals as deviations from the operating point.
     pub(crate) deviations: Signals,
-    /// u'.
+    /// z' and u'.
+    pub(crate) z_slopes: Vec<f64>,
     pub(crate) u_slopes: Vec<f64>,
     pub(crate) compensate: bool,
     /// E_hat with its derivative.
@@ -66,6 +69,7 @@ impl AsoController {
         x_hat.copy_from_slice(&self.x_hat_0);
         f_hat.copy_from_slice(&self.f_hat_0);
         y_f.iter_mut().zip(&self.values.y).for_each(|(y_f, y)| *y_f = *y);
+        self.operating_point.read(&self.design);
     }
 
     /// Advances the deviations of the estimate over the part of a step from `offset` to
@@ -85,14 +89,14 @@ impl AsoController {
         let resolution = clock_rounding(step.end());
         let until_on = self.design.t_on - step.start;
         let inside = self.compensate && until_on > resolution && step.size - until_on > resolution;
-        self.deviations.set(&self.design, &self.values, 0.0);
+        self.deviations.set(&self.values, &self.operating_point, 0.0);
         if inside {
             self.advance(false, (0.0, until_on))?;
             self.advance(true, (until_on, step.size - until_on))?;
         } else {
             self.advance(self.is_compensating(step.start), (0.0, step.size))?;
         }
-        self.values.set_estimate(&self.design, &self.deviations.z);
+        self.values.set_estimate(&self.deviations.z, &self.operating_point);
         self.mode = self.free_mode(self.is_compensating(step.end()));
         self.evaluate(step.size);
         Ok(())
@@ -101,19 +105,20 @@ impl AsoController {
     /// Computes z', u, u' and E_hat at the state and time reached, `offset` s after the measurements
     /// were set.
     fn evaluate(&mut self, offset: f64) {
-        let Self { design, values, deviations, mode, u_slopes, .. } = self;
-        deviations.set(design, values, offset);
+        let Self { design, values, operating_point, deviations, mode, .. } = self;
+        let (z_slopes, u_slopes) = (&mut self.z_slopes, &mut self.u_slopes);
+        deviations.set(values, operating_point, offset);
         if !self.frozen {
             *mode = mode.limited(design, &deviations.z);
         }
         mode.set_limited(design, &mut deviations.u);
         let equations = Equations::<f64>::new(design, *mode);
-        equations.evaluate(&mut &mut *deviations);
+        equations.evaluate(&mut &mut *deviations, &mut &mut z_slopes[..]);
         for (j, slope) in u_slopes.iter_mut().enumerate() {
-            let free = equations.free_command(j, equations.estimate(&deviations.z_slopes));
+            let free = equations.free_command(j, equations.estimate(z_slopes));
             *slope = if mode.is_limited(j) { 0.0 } else { free };
         }
-        values.set_commands(design, *mode, &deviations.u);
+        values.set_commands(&deviations.u, (design, *mode), operating_point);
         self.set_losses();
     }
 
@@ -123,7 +128,7 @@ impl AsoController {
             let (u, f_hat) = (loss.actuator, self.design.states.len() + loss.fault);
             let lost = loss.lost(
                 Dual64::new(self.values.u[u], self.u_slopes[u]),
-                Dual64::new(self.values.z[f_hat], self.deviations.z_slopes[f_hat]),
+                Dual64::new(self.values.z[f_hat], self.z_slopes[f_hat]),
             );
             (loss.estimate, loss.slope) = (lost.re, lost.eps);
         }
@@ -139,8 +144,9 @@ impl AsoController {
         };
         while let Some(offset) = sampler.time_to_sample(start, end) {
             let mode = self.free_mode(self.is_compensating(sampler.next_instant()));
-            let Self { design, values, deviations, .. } = self;
-            self.mode = sampler.sample((design, mode), (values, deviations), offset);
+            let Self { design, values, operating_point, deviations, .. } = self;
+            self.mode =
+                sampler.sample((design, mode), (values, operating_point, deviations), offset);
         }
         self.sampler = Some(sampler);
         self.set_losses();
@@ -177,9 +183,11 @@ impl Model for AsoController {
         let design = Design::read(resources).map_err(|error| Failure::Error(error.to_string()))?;
         let operating = design.states.iter().map(|state| state.operating.unwrap_or_default());
         let (values, deviations) = (Values::zero(&design), Signals::zero(&design));
+        let operating_point = OperatingPoint::of(&design);
         Ok(Self {
             x_hat_0: operating.collect(),
             f_hat_0: vec![0.0; design.faults.len()],
+            z_slopes: vec![0.0; values.z.len()],
             u_slopes: vec![0.0; values.u.len()],
             compensate: true,
             losses: Loss::all(&design),
@@ -188,6 +196,7 @@ impl Model for AsoController {
             sampler: Sampler::new(&design),
             observer: None,
             values,
+            operating_point,
             deviations,
             design,
         })
@@ -253,19 +262,20 @@ impl Model for AsoController {
         if initial {
             direction.start();
         }
-        let Self { design, values, deviations, sampler, losses, .. } = direction;
-        deviations.set(design, values, 0.0);
+        direction.operating_point.read(&direction.design);
+        let Self { design, values, operating_point, deviations, z_slopes, .. } = direction;
+        deviations.set(values, operating_point, 0.0);
         self.mode.set_limited(design, &mut deviations.u);
         let equations = Equations::<Dual64>::new([&self.design, design], self.mode);
         let mut signals = (&self.deviations, &mut *deviations);
-        if let (Some(own), Some(sampler)) = (&self.sampler, sampler) {
+        if let (Some(own), Some(sampler)) = (&self.sampler, &mut direction.sampler) {
             own.differentiate_first_sample(equations, sampler, &mut signals);
         } else {
-            equations.evaluate(&mut signals);
+            equations.evaluate(&mut signals, &mut (&self.z_slopes[..], z_slopes));
         }
-        values.set_estimate(design, &deviations.z);
-        values.set_commands(design, self.mode, &deviations.u);
-        for loss in losses {
+        values.set_estimate(&deviations.z, operating_point);
+        values.set_commands(&deviations.u, (design, self.mode), operating_point);
+        for loss in &mut direction.losses {
             let (u, f_hat) = (loss.actuator, design.states.len() + loss.fault);
             let lost = loss.lost(
                 Dual64::new(self.values.u[u], values.u[u]),
@@ -303,7 +313,7 @@ impl Model for AsoController {
             return Ok(Event { next_event_time, ..Event::default() });
         }
         self.frozen = true;
-        self.deviations.set(&self.design, &self.values, 0.0);
+        self.deviations.set(&self.values, &self.operating_point, 0.0);
         self.mode = self.free_mode(self.is_compensating(time));
         self.mode = self.mode.limited(&self.design, &self.deviations.z);
         let waiting = self.compensate && !self.mode.compensating;

@@ -57,6 +57,13 @@ pub(crate) struct Knowns<'a, D: Number> {
     u: D::In<'a, [f64]>,
 }
 
+impl<D: Number> Knowns<'_, D> {
+    /// The same signals with no innovation.
+    pub(crate) fn without_innovations(self) -> Self {
+        Self { e: D::part(self.e, |e| &e[..0]), ..self }
+    }
+}
+
 impl<'a, D: Number> Equations<'a, D> {
     pub(crate) fn new(design: D::In<'a, Design>, mode: Mode) -> Self {
         let Design { states, faults, .. } = D::values(design);
@@ -64,7 +71,8 @@ impl<'a, D: Number> Equations<'a, D> {
     }
 
     /// z as its parts.
-    pub(crate) fn estimate<'b>(self, z: D::In<'b, [f64]>) -> Estimate<'b, D> {
+    #[inline]
+    pub(crate) fn estimate(self, z: D::In<'_, [f64]>) -> Estimate<'_, D> {
         let faults = self.states..self.states + self.faults;
         Estimate {
             x_hat: D::part(z, |z| &z[..faults.start]),
@@ -74,6 +82,7 @@ impl<'a, D: Number> Equations<'a, D> {
     }
 
     /// The signals as they are now.
+    #[inline]
     pub(crate) fn knowns<'b>(self, signals: &'b D::Out<'_, Signals>) -> Knowns<'b, D> {
         let signals = D::read(signals);
         Knowns {
@@ -85,20 +94,18 @@ impl<'a, D: Number> Equations<'a, D> {
     }
 
     /// Computes e, the free commands and z' from z and y. The commands at a limit are in u already.
-    pub(crate) fn evaluate(self, signals: &mut D::Out<'_, Signals>) {
-        let Signals { e, z_slopes, .. } = D::values(D::read(signals));
-        let (innovations, order) = (e.len(), z_slopes.len());
-        for k in 0..innovations {
+    pub(crate) fn evaluate(
+        self,
+        signals: &mut D::Out<'_, Signals>,
+        z_slopes: &mut D::Out<'_, [f64]>,
+    ) {
+        for k in 0..D::values(D::read(signals)).e.len() {
             let Knowns { z, y, .. } = self.knowns(signals);
             let e = self.innovation(k, z, y);
             D::write(signals, |signals| &mut signals.e[k], e);
         }
         self.set_free_commands(signals);
-        for i in 0..order {
-            let knowns = self.knowns(signals);
-            let slope = self.corrected(i, self.predicted(i, knowns), knowns);
-            D::write(signals, |signals| &mut signals.z_slopes[i], slope);
-        }
+        self.set_slopes(self.knowns(signals), z_slopes);
     }
 
     /// Computes the commands that are not at a limit from z.
@@ -112,6 +119,7 @@ impl<'a, D: Number> Equations<'a, D> {
     }
 
     /// Element `k` of e = y - C x_hat; with a filter, of y_f - C x_hat.
+    #[inline]
     pub(crate) fn innovation(
         self,
         k: usize,
@@ -124,6 +132,7 @@ impl<'a, D: Number> Equations<'a, D> {
     }
 
     /// Element `j` of K_x x_hat + K_f f_hat, the second term while compensating; limits ignored.
+    #[inline]
     pub(crate) fn free_command(self, j: usize, z: Estimate<'_, D>) -> D {
         let mut command = self.product(|design| design.k_x.row(j), z.x_hat);
         if self.mode.compensating {
@@ -132,34 +141,46 @@ impl<'a, D: Number> Equations<'a, D> {
         command
     }
 
-    /// Element `i` of [A x_hat + B u + F_a f_hat; A_f f_hat; W (y - y_f)], which is z' without the
-    /// innovations. The second part is 0 unless estimating.
-    pub(crate) fn predicted(self, i: usize, Knowns { z, y, u, .. }: Knowns<'_, D>) -> D {
-        let Estimate { x_hat, f_hat, y_f } = z;
-        if let Some(k) = i.checked_sub(self.states + self.faults) {
-            let w = D::part(self.design, |design| design.filter.as_deref().unwrap_or_default());
-            return D::at(w, k) * (D::at(y, k) - D::at(y_f, k));
+    /// Computes z' = [A x_hat + B u + F_a f_hat + L_x e; A_f f_hat + L_f e; W (y - y_f)], the second part
+    /// 0 unless estimating.
+    pub(crate) fn set_slopes(self, knowns: Knowns<'_, D>, z_slopes: &mut D::Out<'_, [f64]>) {
+        let Knowns { z: Estimate { x_hat, f_hat, y_f }, y, e, u } = knowns;
+        for i in 0..self.states {
+            let slope = self.product(|design| design.a.row(i), x_hat)
+                + self.product(|design| design.b.row(i), u)
+                + self.product(|design| design.f_a.row(i), f_hat);
+            let slope = self.sum(slope, |design| design.l_x.row(i), e);
+            D::write(z_slopes, |z_slopes| &mut z_slopes[i], slope);
         }
-        if let Some(i) = i.checked_sub(self.states) {
-            if !self.has_fault_model() {
-                return D::zero();
+        for i in 0..self.faults {
+            let mut slope = D::zero();
+            if self.has_fault_model() {
+                let row = |a_f: &'a Matrix| a_f.row(i);
+                slope = self.product(|design| design.a_f.as_ref().map_or(&[], row), f_hat);
             }
-            let row = |a_f: &'a Matrix| a_f.row(i);
-            return self.product(|design| design.a_f.as_ref().map_or(&[], row), f_hat);
+            if self.mode.estimating {
+                slope = self.sum(slope, |design| design.l_f.row(i), e);
+            }
+            D::write(z_slopes, |z_slopes| &mut z_slopes[self.states + i], slope);
         }
-        self.product(|design| design.a.row(i), x_hat)
-            + self.product(|design| design.b.row(i), u)
-            + self.product(|design| design.f_a.row(i), f_hat)
+        let w = D::part(self.design, |design| design.filter.as_deref().unwrap_or_default());
+        for (k, w) in D::list(w).enumerate() {
+            let slope = w * (D::at(y, k) - D::at(y_f, k));
+            D::write(z_slopes, |z_slopes| &mut z_slopes[self.states + self.faults + k], slope);
+        }
     }
 
-    /// `start` plus element `i` of [L_x e; L_f e; 0]. The second part is 0 unless estimating.
-    pub(crate) fn corrected(self, i: usize, start: D, Knowns { e, .. }: Knowns<'_, D>) -> D {
-        if i < self.states {
-            self.sum(start, |design| design.l_x.row(i), e)
-        } else if i < self.states + self.faults && self.mode.estimating {
-            self.sum(start, |design| design.l_f.row(i - self.states), e)
-        } else {
-            start
+    /// Adds [L_x e; L_f e] to x_hat and, while estimating, f_hat.
+    pub(crate) fn correct(self, signals: &mut D::Out<'_, Signals>) {
+        for i in 0..self.states {
+            let Knowns { z, e, .. } = self.knowns(signals);
+            let x_hat = self.sum(D::at(z.x_hat, i), |design| design.l_x.row(i), e);
+            D::write(signals, |signals| &mut signals.z[i], x_hat);
+        }
+        for i in (0..self.faults).filter(|_| self.mode.estimating) {
+            let Knowns { z, e, .. } = self.knowns(signals);
+            let f_hat = self.sum(D::at(z.f_hat, i), |design| design.l_f.row(i), e);
+            D::write(signals, |signals| &mut signals.z[self.states + i], f_hat);
         }
     }
 

@@ -49,7 +49,7 @@ impl Loss {
         all
     }
 
-    /// E_hat = -u f_hat / (u^2 + u_e^2).
+    /// `E_hat = -u f_hat / (u^2 + u_e^2)` of a command and an estimated fault.
     pub(crate) fn lost<D: Number>(&self, u: D, f_hat: D) -> D {
         let scale = (u * u + self.least_command * self.least_command).recip();
         -(u * scale) * f_hat

@@ -12,10 +12,10 @@ pub(crate) trait Number: DualNum<Primitive = f64> + Copy {
     type In<'a, T: ?Sized + 'a>: Copy;
 
     /// Numbers to read and to write; of dual numbers only the derivatives are written.
-    type Out<'a, T: 'a>;
+    type Out<'a, T: ?Sized + 'a>;
 
     /// The `T` with the values.
-    fn values<'a, T: ?Sized>(numbers: Self::In<'a, T>) -> &'a T;
+    fn values<T: ?Sized>(numbers: Self::In<'_, T>) -> &T;
 
     /// A part of the numbers.
     fn part<'a, T: ?Sized, U: ?Sized>(
@@ -27,10 +27,10 @@ pub(crate) trait Number: DualNum<Primitive = f64> + Copy {
     fn list(numbers: Self::In<'_, [f64]>) -> impl Iterator<Item = Self>;
 
     /// The numbers as they are now.
-    fn read<'a, T>(numbers: &'a Self::Out<'_, T>) -> Self::In<'a, T>;
+    fn read<'a, T: ?Sized>(numbers: &'a Self::Out<'_, T>) -> Self::In<'a, T>;
 
     /// Writes one number.
-    fn write<T>(
+    fn write<T: ?Sized>(
         numbers: &mut Self::Out<'_, T>,
         place: impl FnOnce(&mut T) -> &mut f64,
         number: Self,
@@ -42,10 +42,10 @@ pub(crate) trait Number: DualNum<Primitive = f64> + Copy {
 
 impl Number for f64 {
     type In<'a, T: ?Sized + 'a> = &'a T;
-    type Out<'a, T: 'a> = &'a mut T;
+    type Out<'a, T: ?Sized + 'a> = &'a mut T;
 
     #[inline]
-    fn values<'a, T: ?Sized>(numbers: Self::In<'a, T>) -> &'a T {
+    fn values<T: ?Sized>(numbers: Self::In<'_, T>) -> &T {
         numbers
     }
 
@@ -60,12 +60,16 @@ impl Number for f64 {
     }
 
     #[inline]
-    fn read<'a, T>(numbers: &'a &mut T) -> &'a T {
+    fn read<'a, T: ?Sized>(numbers: &'a &mut T) -> &'a T {
         numbers
     }
 
     #[inline]
-    fn write<T>(numbers: &mut &mut T, place: impl FnOnce(&mut T) -> &mut f64, number: Self) {
+    fn write<T: ?Sized>(
+        numbers: &mut Self::Out<'_, T>,
+        place: impl FnOnce(&mut T) -> &mut f64,
+        number: Self,
+    ) {
         *place(numbers) = number;
     }
 
@@ -77,9 +81,9 @@ impl Number for f64 {
 
 impl Number for Dual64 {
     type In<'a, T: ?Sized + 'a> = [&'a T; 2];
-    type Out<'a, T: 'a> = (&'a T, &'a mut T);
+    type Out<'a, T: ?Sized + 'a> = (&'a T, &'a mut T);
 
-    fn values<'a, T: ?Sized>(numbers: Self::In<'a, T>) -> &'a T {
+    fn values<T: ?Sized>(numbers: Self::In<'_, T>) -> &T {
         numbers[0]
     }
 
@@ -95,11 +99,11 @@ impl Number for Dual64 {
         values.iter().zip(derivatives).map(|(value, derivative)| Self::new(*value, *derivative))
     }
 
-    fn read<'a, T>((values, derivatives): &'a (&T, &mut T)) -> [&'a T; 2] {
+    fn read<'a, T: ?Sized>((values, derivatives): &'a (&T, &mut T)) -> [&'a T; 2] {
         [values, derivatives]
     }
 
-    fn write<T>(
+    fn write<T: ?Sized>(
         (_, derivatives): &mut (&T, &mut T),
         place: impl FnOnce(&mut T) -> &mut f64,
         number: Self,

@@ -58,8 +58,9 @@ fn system(design: &Design, mode: Mode) -> (DMatrix<f64>, DMatrix<f64>) {
     let z_slopes = |set: &dyn Fn(&mut Signals)| {
         let mut unit = Signals::zero(design);
         set(&mut unit);
-        equations.evaluate(&mut &mut unit);
-        unit.z_slopes
+        let mut slopes = vec![0.0; n];
+        equations.evaluate(&mut &mut unit, &mut &mut slopes[..]);
+        slopes
     };
     let state = (0..n).flat_map(|j| z_slopes(&|unit| unit.z[j] = 1.0));
     let measured = (0..p).flat_map(|k| z_slopes(&|unit| unit.y[k] = 1.0));

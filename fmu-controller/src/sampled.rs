@@ -24,7 +24,7 @@ use crate::design::{Design, Estimator};
 use crate::equations::Equations;
 use crate::mode::Mode;
 use crate::number::Number;
-use crate::signals::{Signals, Values, add_operating_point};
+use crate::signals::{OperatingPoint, Signals, Values};
 
 /// A sample is due this part of the sample time before its instant: an importer adds up its steps,
 /// with rounding.
@@ -91,42 +91,42 @@ impl Sampler {
     pub(crate) fn sample(
         &mut self,
         (design, mode): (&Design, Mode),
-        (values, mut signals): (&mut Values, &mut Signals),
+        (values, point, mut signals): (&mut Values, &OperatingPoint, &mut Signals),
         offset: f64,
     ) -> Mode {
         values.z.copy_from_slice(&self.prediction);
-        signals.set(design, values, offset);
+        signals.set(values, point, offset);
         self.last_prediction.copy_from_slice(&signals.z);
         let equations = Equations::<f64>::new(design, mode);
         estimate(self.estimator, equations, &self.last_prediction, &mut signals);
         if self.estimator == Estimator::Current {
-            values.set_estimate(design, &signals.z[..design.filtered_at(0)]);
+            values.set_estimate(&signals.z[..design.filtered_at(0)], point);
         }
         let mode = mode.limited(design, &signals.z);
         mode.set_limited(design, &mut signals.u);
         let equations = Equations::<f64>::new(design, mode);
         equations.set_free_commands(&mut signals);
-        values.set_commands(design, mode, &signals.u);
+        values.set_commands(&signals.u, (design, mode), point);
         self.predict(design, equations, signals);
+        for (next, point) in self.prediction.iter_mut().zip(&point.z) {
+            *next += point;
+        }
+        self.next += 1.0;
         mode
     }
 
-    /// Computes z[k+1|k] from z, e and u of sample k.
+    /// Computes the deviations z[k+1|k] from z, e and u of sample k.
     fn predict(&mut self, design: &Design, equations: Equations<'_, f64>, signals: &mut Signals) {
-        let knowns = equations.knowns(&signals);
-        for (i, next) in self.prediction.iter_mut().enumerate() {
-            *next = equations.predicted(i, knowns);
-            if self.estimator == Estimator::Prediction {
-                *next = equations.corrected(i, *next, knowns);
-            }
+        let mut knowns = equations.knowns(&signals);
+        if self.estimator == Estimator::Current {
+            knowns = knowns.without_innovations();
         }
+        equations.set_slopes(knowns, &mut &mut self.prediction[..]);
         let first_kept =
             if equations.has_fault_model() { design.filtered_at(0) } else { design.states.len() };
         for (next, z) in self.prediction.iter_mut().zip(&signals.z).skip(first_kept) {
             *next += z;
         }
-        add_operating_point(design, &mut self.prediction, 1.0);
-        self.next += 1.0;
     }
 
     /// Computes the derivatives of e, z and u of sample 0 in a direction, from those of z[0|-1], of y
@@ -157,9 +157,6 @@ fn estimate<D: Number>(
         D::write(signals, |signals| &mut signals.e[k], e);
     }
     if estimator == Estimator::Current {
-        for i in 0..D::values(prediction).len() {
-            let z = equations.corrected(i, D::at(prediction, i), equations.knowns(signals));
-            D::write(signals, |signals| &mut signals.z[i], z);
-        }
+        equations.correct(signals);
     }
 }

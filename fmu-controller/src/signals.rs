@@ -17,6 +17,15 @@ pub(crate) struct Values {
     pub(crate) u: Vec<f64>,
 }
 
+/// The operating point: zero where the design states none.
+#[derive(Clone, Serialize, Deserialize)]
+pub(crate) struct OperatingPoint {
+    /// [x_op; 0; y_op], the last part where the design has a filter.
+    pub(crate) z: Vec<f64>,
+    y: Vec<f64>,
+    u: Vec<f64>,
+}
+
 /// The signals of the equations: deviations from the operating point, or a direction in them.
 #[derive(Clone, Serialize, Deserialize)]
 pub(crate) struct Signals {
@@ -28,42 +37,50 @@ pub(crate) struct Signals {
     pub(crate) e: Vec<f64>,
     /// The commands.
     pub(crate) u: Vec<f64>,
-    /// z'.
-    pub(crate) z_slopes: Vec<f64>,
 }
 
-/// Adds the operating point, times `sign`, to the values of some signals.
-#[inline]
-fn add_operating(values: &mut [f64], signals: &[Signal], sign: f64) {
-    for (value, signal) in values.iter_mut().zip(signals) {
-        *value += sign * signal.operating.unwrap_or_default();
+impl OperatingPoint {
+    /// The operating point of `design`.
+    pub(crate) fn of(design: &Design) -> Self {
+        let Signals { z, y, u, .. } = Signals::zero(design);
+        let mut point = Self { z, y, u };
+        point.read(design);
+        point
     }
-}
 
-/// Adds the operating point [x_op; 0; y_op], times `sign`, to z or to its first parts.
-#[inline]
-pub(crate) fn add_operating_point(design: &Design, z: &mut [f64], sign: f64) {
-    let (x, rest) = z.split_at_mut(design.states.len());
-    add_operating(x, &design.states, sign);
-    add_operating(&mut rest[design.faults.len()..], &design.measurements, sign);
+    /// Takes the operating point from `design`, without allocation.
+    pub(crate) fn read(&mut self, design: &Design) {
+        let read = |to: &mut [f64], signals: &[Signal]| {
+            for (to, signal) in to.iter_mut().zip(signals) {
+                *to = signal.operating.unwrap_or_default();
+            }
+        };
+        let [x, _, y_f] = design.parts_mut(&mut self.z);
+        read(x, &design.states);
+        read(y_f, &design.measurements);
+        read(&mut self.y, &design.measurements);
+        for (to, actuator) in self.u.iter_mut().zip(&design.actuators) {
+            *to = actuator.operating.unwrap_or_default();
+        }
+    }
 }
 
 impl Signals {
     /// All signals of `design`, zero.
     pub(crate) fn zero(design: &Design) -> Self {
         let (p, m) = (design.measurements.len(), design.actuators.len());
-        let [z, z_slopes] = [0.0; 2].map(|zero| vec![zero; design.order()]);
-        Self { z, y: vec![0.0; p], e: vec![0.0; p], u: vec![0.0; m], z_slopes }
+        Self { z: vec![0.0; design.order()], y: vec![0.0; p], e: vec![0.0; p], u: vec![0.0; m] }
     }
 
-    /// Sets z and y to the deviations of `values`, the measurements `offset` s after these were given.
-    pub(crate) fn set(&mut self, design: &Design, values: &Values, offset: f64) {
-        self.z.copy_from_slice(&values.z);
-        add_operating_point(design, &mut self.z, -1.0);
-        self.y.copy_from_slice(&values.y);
-        add_operating(&mut self.y, &design.measurements, -1.0);
-        for (y, slope) in self.y.iter_mut().zip(&values.y_slopes) {
-            *y += slope * offset;
+    /// Sets z and y to the deviations of `values` from `point`, the measurements `offset` s after these
+    /// were given.
+    pub(crate) fn set(&mut self, values: &Values, point: &OperatingPoint, offset: f64) {
+        for ((own, value), point) in self.z.iter_mut().zip(&values.z).zip(&point.z) {
+            *own = value - point;
+        }
+        let measured = values.y.iter().zip(&values.y_slopes).zip(&point.y);
+        for (own, ((value, slope), point)) in self.y.iter_mut().zip(measured) {
+            *own = value - point + slope * offset;
         }
     }
 }
@@ -76,17 +93,22 @@ impl Values {
     }
 
     /// Sets z, or its first parts, to the operating point plus the deviations `z`.
-    pub(crate) fn set_estimate(&mut self, design: &Design, z: &[f64]) {
-        let values = &mut self.z[..z.len()];
-        values.copy_from_slice(z);
-        add_operating_point(design, values, 1.0);
+    pub(crate) fn set_estimate(&mut self, z: &[f64], point: &OperatingPoint) {
+        for ((value, own), point) in self.z.iter_mut().zip(z).zip(&point.z) {
+            *value = own + point;
+        }
     }
 
-    /// Sets u to the operating point plus the deviations `u`, and the channels at a limit to it.
-    pub(crate) fn set_commands(&mut self, design: &Design, mode: Mode, u: &[f64]) {
-        for (j, (value, actuator)) in self.u.iter_mut().zip(&design.actuators).enumerate() {
-            let free = u[j] + actuator.operating.unwrap_or_default();
-            *value = mode.limit(actuator.limits, j).unwrap_or(free);
+    /// Sets u to the operating point plus the deviations `u`, and the channels at a limit to that limit.
+    pub(crate) fn set_commands(
+        &mut self,
+        u: &[f64],
+        (design, mode): (&Design, Mode),
+        point: &OperatingPoint,
+    ) {
+        let free = u.iter().zip(&point.u).map(|(own, point)| own + point);
+        for (j, (value, free)) in self.u.iter_mut().zip(free).enumerate() {
+            *value = mode.limit(design.actuators[j].limits, j).unwrap_or(free);
         }
     }
 }

@@ -134,7 +134,7 @@ fn estimates(design: &Design) -> Vec<Variable<AsoController>> {
                 Variable::real(name, text, move |model: &mut AsoController| &mut model.values.z[k]);
             output(design, with_unit(variable, unit), Vec::new())
                 .initially(dependencies::of_initial_estimate(design, k))
-                .derivative(move |model| &mut model.deviations.z_slopes[k])
+                .derivative(move |model| &mut model.z_slopes[k])
         })
         .collect()
 }
@@ -165,7 +165,7 @@ fn slopes(design: &Design) -> Vec<Variable<AsoController>> {
         .map(|State { position: k, name: state, texts: [_, text], unit }| {
             let variable =
                 Variable::real(format!("der({state})"), text, move |model: &mut AsoController| {
-                    &mut model.deviations.z_slopes[k]
+                    &mut model.z_slopes[k]
                 });
             let variable = with_unit(variable, per_second(unit).as_ref()).derivative_of(state);
             depending(variable, dependencies::of_slope(design, k))

@@ -87,7 +87,7 @@ fn the_slopes_of_all_outputs_are_the_limits_of_their_differences() {
         let zeros = vec![0.0; model.values.y.len()];
         step(&mut model, 1.0, 0.1, &zeros, &zeros);
         let (z, u, losses) = (model.values.z.clone(), model.values.u.clone(), model.losses.clone());
-        let slopes = (model.deviations.z_slopes.clone(), model.u_slopes.clone());
+        let slopes = (model.z_slopes.clone(), model.u_slopes.clone());
         let h = 1e-7;
         step(&mut model, 1.1, h, &zeros, &zeros);
         let rate = |after: &[f64], before: &[f64]| -> Vec<f64> {
