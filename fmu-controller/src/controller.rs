@@ -4,165 +4,152 @@ use std::path::Path;
 
 use fmu::description::DefaultExperiment;
 use fmu::{About, At, Event, Experiment, Failure, Model, ModelExchange, Step, Variable};
+use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
 use crate::design::Design;
-use crate::equations::{Knowns, Mode};
+use crate::equations::Equations;
 use crate::loss::Loss;
+use crate::mode::Mode;
 use crate::observer::{Conditions, Observer};
-use crate::sampled::{Sample, Sampler};
-use crate::signals::Signals;
+use crate::sampled::Sampler;
+use crate::signals::{OperatingPoint, Signals, Values};
 use crate::{names, variables};
 
-/// How far a free command passes a limit before that is an event, as part of the range of the
-/// actuator: no event indicator is zero after an event, and rounding repeats none.
+/// The part of the range of an actuator by which a free command passes a limit before that is an
+/// event: no event indicator is zero after an event, and rounding causes no second event.
 const HYSTERESIS: f64 = 1e-9;
 
-/// A fault-tolerant controller with an augmented state observer; any linear plant, any sizes.
+/// A fault-tolerant controller with an augmented state observer, for a linear plant of any size.
 ///
-/// Everything but what is said here carries the name of its FMI variable.
+/// Fields without a comment have the name of their FMI variable.
 #[derive(Clone, Serialize, Deserialize)]
 pub(crate) struct AsoController {
     pub(crate) design: Design,
     pub(crate) x_hat_0: Vec<f64>,
     pub(crate) f_hat_0: Vec<f64>,
-    /// Estimates, measurements, commands.
-    pub(crate) values: Signals,
-    /// y' as the importer gives it; z' and u'.
-    pub(crate) y_slopes: Vec<f64>,
+    /// Estimates, measurements and commands as the importer sees them.
+    pub(crate) values: Values,
+    /// The operating point of `design`, as it was at the start.
+    operating_point: OperatingPoint,
+    /// The signals as deviations from the operating point.
+    pub(crate) deviations: Signals,
+    /// z' and u'.
     pub(crate) z_slopes: Vec<f64>,
     pub(crate) u_slopes: Vec<f64>,
     pub(crate) compensate: bool,
     /// E_hat with its derivative.
     pub(crate) losses: Vec<Loss>,
-    /// What the equations take in place of `values`, in a design with an operating point.
-    deviations: Option<Signals>,
-    /// The mode that u and z' are those of. Whether it compensates is decided at the start, at each
-    /// end of a step and at events; in a sampled controller at each sample.
+    /// The mode of u and z'. Whether it compensates is decided at the start, at the end of each step
+    /// and at events; in a sampled controller at each sample.
     mode: Mode,
     /// Model exchange: a channel reaches or leaves a limit at events only.
     frozen: bool,
-    /// Of a sampled controller.
+    /// `None` for a continuous controller.
     sampler: Option<Sampler>,
-    /// Follows from `design`; made anew where an instance starts or is read from bytes.
+    /// Follows from `design`: created when an instance starts or is read from bytes.
     #[serde(skip)]
     observer: Option<Observer>,
 }
 
 impl AsoController {
     /// Whether f_hat is part of the command at `time`.
-    fn compensating(&self, time: f64) -> bool {
+    fn is_compensating(&self, time: f64) -> bool {
         self.compensate && time >= self.design.t_on - clock_rounding(time)
     }
 
-    /// Switches f_hat on or off, in the command and in the observer.
-    fn switch(&mut self, time: f64) {
-        self.mode.compensating = self.compensating(time);
-        self.mode.estimating = self.mode.compensating || self.design.monitor;
+    /// The mode with no channel at a limit.
+    fn free_mode(&self, compensating: bool) -> Mode {
+        Mode::free(compensating, compensating || self.design.monitor)
     }
 
-    /// Finds the deviations of estimates and measurements.
-    fn deviate(&mut self) {
-        if let Some(deviations) = &mut self.deviations {
-            deviations.deviate(&self.design, &self.values);
-        }
-    }
-
-    /// What the equations take.
-    fn signals(&self) -> &Signals {
-        self.deviations.as_ref().unwrap_or(&self.values)
-    }
-
-    /// Finds the channels at a limit.
-    fn limit(&mut self) {
-        let Mode { compensating, estimating, .. } = self.mode;
-        self.mode = Mode::of(&self.design, &self.signals().z, compensating, estimating);
-    }
-
-    /// The estimate as it starts.
-    fn begin(&mut self) {
+    /// Sets the estimate to its initial value.
+    fn start(&mut self) {
         let [x_hat, f_hat, y_f] = self.design.parts_mut(&mut self.values.z);
         x_hat.copy_from_slice(&self.x_hat_0);
         f_hat.copy_from_slice(&self.f_hat_0);
         y_f.iter_mut().zip(&self.values.y).for_each(|(y_f, y)| *y_f = *y);
+        self.operating_point.read(&self.design);
     }
 
-    /// Advances the estimate by the part of a step between `offset` and `offset + size`.
+    /// Advances the deviations of the estimate over the part of a step from `offset` to
+    /// `offset + size`.
     fn advance(&mut self, compensating: bool, part: (f64, f64)) -> Result<(), Failure> {
-        let Self { design, values, deviations, y_slopes, observer, .. } = self;
-        let Signals { z, y, .. } = deviations.as_mut().unwrap_or(values);
-        let estimating = compensating || design.monitor;
-        let conditions = Conditions { design, y: [y, y_slopes], compensating, estimating };
+        let mode = self.free_mode(compensating);
+        let Self { design, values, deviations: Signals { z, y, .. }, observer, .. } = self;
+        let conditions = Conditions { design, y: [y, &values.y_slopes], mode };
         observer
             .get_or_insert_with(|| Observer::new(design))
             .advance(z, conditions, part)
             .map_err(|error| Failure::Error(format!("the observer cannot be stepped: {error}")))
     }
 
-    /// A step of the observer that is integrated.
+    /// Makes a step of a continuous controller.
     fn integrate(&mut self, step: &Step) -> Result<(), Failure> {
         let resolution = clock_rounding(step.end());
         let until_on = self.design.t_on - step.start;
         let inside = self.compensate && until_on > resolution && step.size - until_on > resolution;
-        self.deviate();
+        self.deviations.set(&self.values, &self.operating_point, 0.0);
         if inside {
             self.advance(false, (0.0, until_on))?;
             self.advance(true, (until_on, step.size - until_on))?;
         } else {
-            self.advance(self.compensating(step.start), (0.0, step.size))?;
+            self.advance(self.is_compensating(step.start), (0.0, step.size))?;
         }
-        if let Some(deviations) = &self.deviations {
-            deviations.state_into(&self.design, &mut self.values.z);
-        }
-        self.switch(step.end());
+        self.values.set_estimate(&self.deviations.z, &self.operating_point);
+        self.mode = self.free_mode(self.is_compensating(step.end()));
         self.evaluate(step.size);
         Ok(())
     }
 
-    /// u, u' and z' for the state and time reached, `offset` s after the measurements were set.
+    /// Computes z', u, u' and E_hat at the state and time reached, `offset` s after the measurements
+    /// were set.
     fn evaluate(&mut self, offset: f64) {
-        self.deviate();
+        let Self { design, values, operating_point, deviations, mode, .. } = self;
+        let (z_slopes, u_slopes) = (&mut self.z_slopes, &mut self.u_slopes);
+        deviations.set(values, operating_point, offset);
         if !self.frozen {
-            self.limit();
+            *mode = mode.limited(design, &deviations.z);
         }
-        let Self { design, mode, z_slopes, u_slopes, .. } = self;
-        let own = self.deviations.as_mut().unwrap_or(&mut self.values);
-        mode.command(design, &own.z, &mut own.u);
-        let point = Knowns { design, signals: own };
-        mode.slopes(point, (&self.y_slopes, offset), (&mut *z_slopes, u_slopes));
-        if let Some(deviations) = &self.deviations {
-            deviations.command_into(design, *mode, &mut self.values.u);
+        mode.set_limited(design, &mut deviations.u);
+        let equations = Equations::<f64>::new(design, *mode);
+        equations.evaluate(&mut &mut *deviations, &mut &mut z_slopes[..]);
+        for (j, slope) in u_slopes.iter_mut().enumerate() {
+            let free = equations.free_command(j, equations.estimate(z_slopes));
+            *slope = if mode.is_limited(j) { 0.0 } else { free };
         }
+        values.set_commands(&deviations.u, (design, *mode), operating_point);
+        self.set_losses();
+    }
+
+    /// Computes E_hat with its derivative with respect to time.
+    fn set_losses(&mut self) {
         for loss in &mut self.losses {
-            let [_, f_hat, _] = design.parts(&self.values.z);
-            let [_, f_slopes, _] = design.parts(z_slopes);
-            loss.estimate = loss.at(&self.values.u, f_hat);
-            loss.slope = loss.along([&self.values.u, u_slopes], [f_hat, f_slopes]);
+            let (u, f_hat) = (loss.actuator, self.design.states.len() + loss.fault);
+            let lost = loss.lost(
+                Dual64::new(self.values.u[u], self.u_slopes[u]),
+                Dual64::new(self.values.z[f_hat], self.z_slopes[f_hat]),
+            );
+            (loss.estimate, loss.slope) = (lost.re, lost.eps);
         }
     }
 
-    /// Takes the samples that are due until `end`, with the measurements given at `begin`, in s.
-    fn sample(&mut self, begin: f64, end: f64) -> Result<(), Failure> {
-        let Some(mut sampler) = self.sampler.take_if(|sampler| !sampler.is_flooded(end)) else {
+    /// Takes the samples that are due until `end`, with the measurements given at `start`, in s.
+    fn sample(&mut self, start: f64, end: f64) -> Result<(), Failure> {
+        let Some(mut sampler) = self.sampler.take_if(|sampler| !sampler.has_too_many_samples(end))
+        else {
             return Err(Failure::Error(format!(
-                "too many samples are due from {begin} to {end} s"
+                "too many samples are due from {start} to {end} s"
             )));
         };
-        while let Some(offset) = sampler.due(begin, end) {
-            self.switch(sampler.next_instant());
-            let sample = Sample {
-                design: &self.design,
-                slopes: (&self.y_slopes, offset),
-                compensating: self.mode.compensating,
-                estimating: self.mode.estimating,
-            };
-            self.mode = sampler.sample(sample, &mut self.values, &mut self.deviations);
-        }
-        let [_, f_hat, _] = self.design.parts(&self.values.z);
-        for loss in &mut self.losses {
-            loss.estimate = loss.at(&self.values.u, f_hat);
+        while let Some(offset) = sampler.time_to_sample(start, end) {
+            let mode = self.free_mode(self.is_compensating(sampler.next_instant()));
+            let Self { design, values, operating_point, deviations, .. } = self;
+            self.mode =
+                sampler.sample((design, mode), (values, operating_point, deviations), offset);
         }
         self.sampler = Some(sampler);
+        self.set_losses();
         Ok(())
     }
 }
@@ -195,21 +182,22 @@ impl Model for AsoController {
     fn new(resources: &Path) -> Result<Self, Failure> {
         let design = Design::read(resources).map_err(|error| Failure::Error(error.to_string()))?;
         let operating = design.states.iter().map(|state| state.operating.unwrap_or_default());
-        let values = Signals::zero(&design);
+        let (values, deviations) = (Values::zero(&design), Signals::zero(&design));
+        let operating_point = OperatingPoint::of(&design);
         Ok(Self {
             x_hat_0: operating.collect(),
             f_hat_0: vec![0.0; design.faults.len()],
-            y_slopes: vec![0.0; values.y.len()],
             z_slopes: vec![0.0; values.z.len()],
             u_slopes: vec![0.0; values.u.len()],
             compensate: true,
             losses: Loss::all(&design),
-            deviations: design.has_operating_point().then(|| values.clone()),
             mode: Mode::default(),
             frozen: false,
-            sampler: Sampler::of(&design),
+            sampler: Sampler::new(&design),
             observer: None,
             values,
+            operating_point,
+            deviations,
             design,
         })
     }
@@ -239,14 +227,14 @@ impl Model for AsoController {
 
     fn initialize(&mut self, experiment: &Experiment) -> Result<(), Failure> {
         let time = experiment.start_time;
-        self.begin();
+        self.start();
         self.observer = None;
         self.frozen = false;
         if let Some(sampler) = &mut self.sampler {
-            sampler.begin(time, &self.values.z);
+            sampler.start(time, &self.values.z);
             return self.sample(time, time);
         }
-        self.switch(time);
+        self.mode = self.free_mode(self.is_compensating(time));
         self.evaluate(0.0);
         Ok(())
     }
@@ -266,32 +254,34 @@ impl Model for AsoController {
     }
 
     fn differentiate(&self, at: &At, direction: &mut Self) -> Result<(), Failure> {
-        let starts = *at == At::Initialization;
-        if !starts && self.sampler.is_some() {
+        let initial = *at == At::Initialization;
+        if !initial && self.sampler.is_some() {
             // Between samples nothing changes.
             return Ok(());
         }
-        if starts {
-            direction.begin();
+        if initial {
+            direction.start();
         }
-        direction.deviate();
-        let point = Knowns { design: &self.design, signals: self.signals() };
-        let Self { design, values, deviations, z_slopes, .. } = direction;
-        let along = deviations.as_mut().unwrap_or(values);
+        direction.operating_point.read(&direction.design);
+        let Self { design, values, operating_point, deviations, z_slopes, .. } = direction;
+        deviations.set(values, operating_point, 0.0);
+        self.mode.set_limited(design, &mut deviations.u);
+        let equations = Equations::<Dual64>::new([&self.design, design], self.mode);
+        let mut signals = (&self.deviations, &mut *deviations);
         if let (Some(own), Some(sampler)) = (&self.sampler, &mut direction.sampler) {
-            own.first_sample_along(self.mode, point, design, (along, sampler.changes()));
+            own.differentiate_first_sample(equations, sampler, &mut signals);
         } else {
-            self.mode.command_along(point, design, along);
-            self.mode.slopes_along(point, Knowns { design, signals: along }, z_slopes);
+            equations.evaluate(&mut signals, &mut (&self.z_slopes[..], z_slopes));
         }
-        if let Some(deviations) = deviations {
-            deviations.state_into(design, &mut values.z);
-            deviations.command_into(design, self.mode, &mut values.u);
-        }
-        let [_, f_hat, _] = design.parts(&self.values.z);
-        let [_, df_hat, _] = design.parts(&values.z);
-        for (loss, own) in direction.losses.iter_mut().zip(&self.losses) {
-            loss.estimate = own.along([&self.values.u, &values.u], [f_hat, df_hat]);
+        values.set_estimate(&deviations.z, operating_point);
+        values.set_commands(&deviations.u, (design, self.mode), operating_point);
+        for loss in &mut direction.losses {
+            let (u, f_hat) = (loss.actuator, design.states.len() + loss.fault);
+            let lost = loss.lost(
+                Dual64::new(self.values.u[u], values.u[u]),
+                Dual64::new(self.values.z[f_hat], values.z[f_hat]),
+            );
+            loss.estimate = lost.eps;
         }
         Ok(())
     }
@@ -303,10 +293,11 @@ impl Model for AsoController {
     }
 
     fn event_indicators(&self, _time: f64, indicators: &mut [f64]) {
+        let equations = Equations::<f64>::new(&self.design, self.mode);
         let mut pairs = indicators.chunks_exact_mut(2);
         for (j, actuator) in self.design.actuators.iter().enumerate() {
             let Some([low, high]) = actuator.range() else { continue };
-            let command = self.mode.free_command(&self.design, &self.signals().z, j);
+            let command = equations.free_command(j, equations.estimate(&self.deviations.z));
             let distances = [command - low, high - command];
             for (side, indicator) in pairs.next().into_iter().flatten().enumerate() {
                 let beyond = if self.mode.is_at(side, j) { -HYSTERESIS } else { HYSTERESIS };
@@ -322,9 +313,9 @@ impl Model for AsoController {
             return Ok(Event { next_event_time, ..Event::default() });
         }
         self.frozen = true;
-        self.switch(time);
-        self.deviate();
-        self.limit();
+        self.deviations.set(&self.values, &self.operating_point, 0.0);
+        self.mode = self.free_mode(self.is_compensating(time));
+        self.mode = self.mode.limited(&self.design, &self.deviations.z);
         let waiting = self.compensate && !self.mode.compensating;
         Ok(Event { next_event_time: waiting.then_some(self.design.t_on), ..Event::default() })
     }

@@ -237,13 +237,6 @@ impl Design {
     }
 
     /// x_hat, f_hat and y_f of z.
-    pub(crate) fn parts<'a>(&self, z: &'a [f64]) -> [&'a [f64]; 3] {
-        let (x_hat, rest) = z.split_at(self.states.len());
-        let (f_hat, y_f) = rest.split_at(self.faults.len());
-        [x_hat, f_hat, y_f]
-    }
-
-    /// x_hat, f_hat and y_f of z.
     pub(crate) fn parts_mut<'a>(&self, z: &'a mut [f64]) -> [&'a mut [f64]; 3] {
         let (x_hat, rest) = z.split_at_mut(self.states.len());
         let (f_hat, y_f) = rest.split_at_mut(self.faults.len());

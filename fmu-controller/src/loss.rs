@@ -13,6 +13,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::design::Design;
+use crate::number::Number;
 
 /// One fault that is a loss of effectiveness.
 #[derive(Clone, Serialize, Deserialize)]
@@ -48,22 +49,9 @@ impl Loss {
         all
     }
 
-    /// The factor of -f_hat in E_hat, and its derivative with respect to u.
-    fn inverse(&self, u: &[f64]) -> (f64, f64) {
-        let u = u[self.actuator];
-        let scale = 1.0 / (u * u + self.least_command * self.least_command);
-        let inverse = u * scale;
-        (inverse, scale - 2.0 * inverse * inverse)
-    }
-
-    /// E_hat of commands and faults.
-    pub(crate) fn at(&self, u: &[f64], f_hat: &[f64]) -> f64 {
-        -self.inverse(u).0 * f_hat[self.fault]
-    }
-
-    /// The derivative of E_hat along a direction in commands and faults.
-    pub(crate) fn along(&self, [u, du]: [&[f64]; 2], [f_hat, df_hat]: [&[f64]; 2]) -> f64 {
-        let (inverse, slope) = self.inverse(u);
-        -inverse * df_hat[self.fault] - slope * du[self.actuator] * f_hat[self.fault]
+    /// `E_hat = -u f_hat / (u^2 + u_e^2)` of a command and an estimated fault.
+    pub(crate) fn lost<D: Number>(&self, u: D, f_hat: D) -> D {
+        let scale = (u * u + self.least_command * self.least_command).recip();
+        -(u * scale) * f_hat
     }
 }

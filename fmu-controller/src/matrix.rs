@@ -1,5 +1,6 @@
 //! A matrix as a list of rows: the form of the design file and of the FMI variables.
 
+#[cfg(test)]
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -18,18 +19,13 @@ impl Matrix {
         format!("{name}[{},{}]", k / self.columns + 1, k % self.columns + 1)
     }
 
-    /// The element in `row` and `column`, both from 0.
-    pub(crate) fn entry(&self, row: usize, column: usize) -> f64 {
-        self.values[row * self.columns + column]
-    }
-
-    /// Row `row` times `vector`.
-    pub(crate) fn row_times(&self, row: usize, vector: &[f64]) -> f64 {
-        let row = &self.values[row * self.columns..][..self.columns];
-        row.iter().zip(vector).map(|(element, value)| element * value).sum()
+    /// The elements of row `i`, counted from 0.
+    pub(crate) fn row(&self, i: usize) -> &[f64] {
+        &self.values[i * self.columns..][..self.columns]
     }
 
     /// The matrix for linear algebra.
+    #[cfg(test)]
     pub(crate) fn dense(&self) -> DMatrix<f64> {
         DMatrix::from_row_slice(self.rows, self.columns, &self.values)
     }

@@ -1,29 +1,31 @@
 //! The observer with its feedback as one piecewise linear system, stepped exactly.
 //!
-//! As long as no channel enters or leaves a limit, the equations are `z' = M z + N [y; w]`, w being
-//! the commands of the channels at a limit, so one step is exact for `y = y_0 + y_1 t`: the hold of
+//! While no channel reaches or leaves a limit, the equations are `z' = M z + N [y; w]`, w being the
+//! commands of the channels at a limit, so one step is exact for `y = y_0 + y_1 t`: the hold of
 //! [`FirstOrderHold`].
 
 use std::sync::Arc;
 
 use control::hold::FirstOrderHold;
-use control::product;
 use nalgebra::DMatrix;
 
 use crate::design::Design;
-use crate::equations::Mode;
-use crate::matrix::Matrix;
+use crate::equations::Equations;
+use crate::mode::Mode;
+use crate::signals::Signals;
 
 /// Halvings of a step until the instant at which a channel reaches its limit is accepted.
 const HALVINGS: u32 = 20;
-/// Propagators kept; a step that comes back finds its own.
-const KEPT: usize = 96;
+/// The most propagators in the cache.
+const CACHE_SIZE: usize = 96;
 
-/// What was computed from one design for the steps so far.
+/// Steps the observer of one design.
 #[derive(Clone)]
 pub(crate) struct Observer {
-    kept: Vec<(Mode, f64, Arc<FirstOrderHold>)>,
-    next: usize,
+    /// Propagators with the mode and the step size that they were computed for.
+    cache: Vec<(Mode, f64, Arc<FirstOrderHold>)>,
+    /// Position of the propagator that was replaced last.
+    replaced: usize,
     /// Space for [y; w] and its slope, and for z before and after a step.
     input: Vec<f64>,
     input_slope: Vec<f64>,
@@ -31,66 +33,52 @@ pub(crate) struct Observer {
     after: Vec<f64>,
 }
 
-/// What holds over a step. The matrices of `design` are those of all steps before.
+/// What does not change during a step.
 #[derive(Clone, Copy)]
 pub(crate) struct Conditions<'a> {
+    /// The design; its matrices are the same in every step.
     pub(crate) design: &'a Design,
-    /// The measurements at the begin of the step, and their slopes.
+    /// The measurements at the start of the step, and their slopes.
     pub(crate) y: [&'a [f64]; 2],
-    pub(crate) compensating: bool,
-    pub(crate) estimating: bool,
+    /// The mode without limits.
+    pub(crate) mode: Mode,
 }
 
 impl Conditions<'_> {
     /// The mode in which z evolves from here.
-    fn mode(&self, z: &[f64]) -> Mode {
-        Mode::of(self.design, z, self.compensating, self.estimating)
+    fn mode_at(&self, z: &[f64]) -> Mode {
+        self.mode.limited(self.design, z)
     }
 }
 
-/// M and N of `mode`.
+/// M and N of `mode`: as the equations are linear, their columns are z' at unit vectors.
 fn system(design: &Design, mode: Mode) -> (DMatrix<f64>, DMatrix<f64>) {
-    let dense = |matrix: fn(&Design) -> &Matrix| matrix(design).dense();
-    let (c, l_x, l_f) = (dense(|own| &own.c), dense(|own| &own.l_x), dense(|own| &own.l_f));
-    let (f_a, mut free) = (dense(|own| &own.f_a), dense(|own| &own.b));
-    let ((n, q), (p, m)) = (f_a.shape(), (c.nrows(), free.ncols()));
-    let mut held = free.clone();
-    for j in 0..m {
-        let one = if mode.is_limited(j) { &mut free } else { &mut held };
-        one.column_mut(j).fill(0.0);
-    }
-    let compensating = f64::from(mode.compensating);
-    let estimating = f64::from(mode.estimating);
-    let (a, k_x, k_f) = (dense(|own| &own.a), dense(|own| &own.k_x), dense(|own| &own.k_f));
-    let mut state = DMatrix::zeros(design.order(), design.order());
-    state.view_mut((0, 0), (n, n)).copy_from(&(&a + product(&free, &k_x) - product(&l_x, &c)));
-    state.view_mut((0, n), (n, q)).copy_from(&(&f_a + product(&free, &k_f) * compensating));
-    state.view_mut((n, 0), (q, n)).copy_from(&(product(&l_f, &c) * -estimating));
-    if let Some(a_f) = &design.a_f {
-        state.view_mut((n, n), (q, q)).copy_from(&(a_f.dense() * estimating));
-    }
-    let mut input = DMatrix::zeros(design.order(), p + m);
-    input.view_mut((0, p), (n, m)).copy_from(&held);
-    // The innovation follows y, or y_f, which is part of z.
-    let source = if design.filter.is_some() { &mut state } else { &mut input };
-    let column = if design.filter.is_some() { n + q } else { 0 };
-    source.view_mut((0, column), (n, p)).copy_from(&l_x);
-    source.view_mut((n, column), (q, p)).copy_from(&(&l_f * estimating));
-    for (k, w) in design.filter.iter().flatten().enumerate() {
-        let at = design.filtered_at(k);
-        (state[(at, at)], input[(at, k)]) = (-w, *w);
-    }
-    (state, input)
+    let equations = Equations::<f64>::new(design, mode);
+    let (n, p, m) = (design.order(), design.measurements.len(), design.actuators.len());
+    let z_slopes = |set: &dyn Fn(&mut Signals)| {
+        let mut unit = Signals::zero(design);
+        set(&mut unit);
+        let mut slopes = vec![0.0; n];
+        equations.evaluate(&mut &mut unit, &mut &mut slopes[..]);
+        slopes
+    };
+    let state = (0..n).flat_map(|j| z_slopes(&|unit| unit.z[j] = 1.0));
+    let measured = (0..p).flat_map(|k| z_slopes(&|unit| unit.y[k] = 1.0));
+    let held = (0..m).flat_map(|j| {
+        let command = if mode.is_limited(j) { 1.0 } else { 0.0 };
+        z_slopes(&|unit| unit.u[j] = command)
+    });
+    (DMatrix::from_iterator(n, n, state), DMatrix::from_iterator(n, p + m, measured.chain(held)))
 }
 
 impl Observer {
-    /// The observer of `design`, which has not stepped yet.
+    /// The observer of `design` with an empty cache.
     pub(crate) fn new(design: &Design) -> Self {
         let inputs = design.measurements.len() + design.actuators.len();
         let states = design.order();
         Self {
-            kept: Vec::with_capacity(KEPT),
-            next: 0,
+            cache: Vec::with_capacity(CACHE_SIZE),
+            replaced: 0,
             input: vec![0.0; inputs],
             input_slope: vec![0.0; inputs],
             before: vec![0.0; states],
@@ -101,8 +89,8 @@ impl Observer {
     /// Advances `z` by `size` s, from `offset` s after the instant of the measurements.
     ///
     /// Where a channel reaches or leaves a limit on the way, the step is halved until that instant
-    /// is known to 2^-20 of the step; a channel that leaves its mode and is back in it both at the
-    /// middle and at the end of a part is not noticed.
+    /// is known to 2^-20 of the step. A channel that leaves its mode and returns to it before the
+    /// middle or the end of a part is not detected.
     pub(crate) fn advance(
         &mut self,
         z: &mut [f64],
@@ -115,8 +103,7 @@ impl Observer {
             self.advance_part(conditions, span)?;
             z.copy_from_slice(&self.before);
         } else {
-            let mode = Mode::free(conditions.compensating, conditions.estimating);
-            self.propagate(mode, conditions, span)?;
+            self.propagate(conditions.mode, conditions, span)?;
             z.copy_from_slice(&self.after);
         }
         Ok(())
@@ -127,7 +114,7 @@ impl Observer {
         conditions: Conditions<'_>,
         span: Span,
     ) -> Result<(), control::Error> {
-        let mode = conditions.mode(&self.before);
+        let mode = conditions.mode_at(&self.before);
         if span.halvings > 0 {
             let stays = self.stays(mode, conditions, span.half(0))?
                 && self.stays(mode, conditions, span)?;
@@ -142,7 +129,7 @@ impl Observer {
         Ok(())
     }
 
-    /// Propagates over `span` into `after`; whether the mode holds at its end.
+    /// Propagates over `span` into `after`; true if the mode is the same at its end.
     fn stays(
         &mut self,
         mode: Mode,
@@ -150,10 +137,10 @@ impl Observer {
         span: Span,
     ) -> Result<bool, control::Error> {
         self.propagate(mode, conditions, span)?;
-        Ok(conditions.mode(&self.after) == mode)
+        Ok(conditions.mode_at(&self.after) == mode)
     }
 
-    /// From `before` to `after` over `span` in `mode`.
+    /// Computes `after` from `before` over `span` in `mode`.
     fn propagate(
         &mut self,
         mode: Mode,
@@ -167,42 +154,43 @@ impl Observer {
             self.input_slope[k] = *slope;
         }
         for (j, held) in held.iter_mut().enumerate() {
-            *held = mode.limit(design, j).unwrap_or(0.0);
+            *held = mode.limit(design.actuators[j].range(), j).unwrap_or(0.0);
         }
         let position = self.propagator(design, mode, span)?;
-        let (_, _, hold) = &self.kept[position];
+        let (_, _, hold) = &self.cache[position];
         hold.step_into(&self.before, &self.input, &self.input_slope, &mut self.after)
     }
 
-    /// Position of the propagator for `mode` and the size of `span`, computed when it is new.
+    /// The position in the cache of the propagator for `mode` and the size of `span`, which is
+    /// computed where it is new.
     ///
-    /// Only the same size counts: what is kept must not decide what comes out, so that a restored
-    /// instance, which has kept nothing, continues with the same bits.
+    /// Sizes must be equal to the last bit: the content of the cache must not change results, so
+    /// that a restored instance, whose cache is empty, continues with the same bits.
     fn propagator(
         &mut self,
         design: &Design,
         mode: Mode,
         span: Span,
     ) -> Result<usize, control::Error> {
-        let known = self.kept.iter().position(|(kept, size, _)| {
-            kept.has_the_system_of(mode) && size.to_bits() == span.size.to_bits()
+        let known = self.cache.iter().position(|(cached, size, _)| {
+            cached.has_the_matrices_of(mode) && size.to_bits() == span.size.to_bits()
         });
         if let Some(position) = known {
             return Ok(position);
         }
         let (state, input) = system(design, mode);
         let hold = Arc::new(FirstOrderHold::new(&state, &input, span.size)?);
-        if self.kept.len() < KEPT {
-            self.kept.push((mode, span.size, hold));
-            return Ok(self.kept.len() - 1);
+        if self.cache.len() < CACHE_SIZE {
+            self.cache.push((mode, span.size, hold));
+            return Ok(self.cache.len() - 1);
         }
-        self.next = (self.next + 1) % KEPT;
-        self.kept[self.next] = (mode, span.size, hold);
-        Ok(self.next)
+        self.replaced = (self.replaced + 1) % CACHE_SIZE;
+        self.cache[self.replaced] = (mode, span.size, hold);
+        Ok(self.replaced)
     }
 }
 
-/// A part of a communication step, in s after its begin.
+/// A part of a communication step; times in s after its start.
 #[derive(Clone, Copy)]
 struct Span {
     offset: f64,

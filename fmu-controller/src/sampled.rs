@@ -15,13 +15,16 @@
 //! ```
 //!
 //! f_hat only while estimating, K_f f_hat only while compensating, u within its limits. A design
-//! without A_f has A_f = I.
+//! without A_f has A_f = I. All signals are deviations from the operating point.
 
+use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
 use crate::design::{Design, Estimator};
-use crate::equations::{Knowns, Mode, innovation, innovation_along};
-use crate::signals::Signals;
+use crate::equations::Equations;
+use crate::mode::Mode;
+use crate::number::Number;
+use crate::signals::{OperatingPoint, Signals, Values};
 
 /// A sample is due this part of the sample time before its instant: an importer adds up its steps,
 /// with rounding.
@@ -39,39 +42,28 @@ pub(crate) struct Sampler {
     start: f64,
     /// k of the next sample: a whole number, exact up to 2^53.
     next: f64,
-    /// z[k|k-1] of that sample.
+    /// z[k|k-1] of the next sample as the importer will see it: a value that nothing adds to has no
+    /// rounding of the operating point.
     prediction: Vec<f64>,
-    /// Of the last sample, z[k|k-1] as the equations take it, and e.
-    before: Vec<f64>,
-    innovations: Vec<f64>,
-}
-
-/// What holds at one sample.
-#[derive(Clone, Copy)]
-pub(crate) struct Sample<'a> {
-    pub(crate) design: &'a Design,
-    /// The slopes of the measurements, and how long ago they were given with their values, in s.
-    pub(crate) slopes: (&'a [f64], f64),
-    pub(crate) compensating: bool,
-    pub(crate) estimating: bool,
+    /// The deviations z[k|k-1] of the last sample.
+    last_prediction: Vec<f64>,
 }
 
 impl Sampler {
-    /// The sampler of `design`, if that is one of a sampled controller.
-    pub(crate) fn of(design: &Design) -> Option<Self> {
+    /// The sampler of `design`, if that is the design of a sampled controller.
+    pub(crate) fn new(design: &Design) -> Option<Self> {
         Some(Self {
             estimator: design.estimator?,
             period: design.sample_time?,
             start: 0.0,
             next: 0.0,
             prediction: vec![0.0; design.order()],
-            before: vec![0.0; design.order()],
-            innovations: vec![0.0; design.measurements.len()],
+            last_prediction: vec![0.0; design.order()],
         })
     }
 
-    /// Starts at `time` from the estimate `z`; sample 0 is due.
-    pub(crate) fn begin(&mut self, time: f64, z: &[f64]) {
+    /// Starts at `time` from the estimate `z` as the importer sees it; sample 0 is due.
+    pub(crate) fn start(&mut self, time: f64, z: &[f64]) {
         (self.start, self.next) = (time, 0.0);
         self.prediction.copy_from_slice(z);
     }
@@ -81,118 +73,90 @@ impl Sampler {
         self.start + self.next * self.period
     }
 
-    /// How long after `begin` the next sample is taken, if it is due until `end`.
-    pub(crate) fn due(&self, begin: f64, end: f64) -> Option<f64> {
+    /// The time in s from `start` to the next sample, if it is due until `end`.
+    pub(crate) fn time_to_sample(&self, start: f64, end: f64) -> Option<f64> {
         let elapsed = self.next * self.period;
         let due = elapsed <= end - self.start + TOLERANCE * self.period;
-        due.then_some(elapsed - (begin - self.start))
+        due.then_some(elapsed - (start - self.start))
     }
 
-    /// Whether more samples are due until `end` than a step may have.
-    pub(crate) fn is_flooded(&self, end: f64) -> bool {
+    /// Whether more samples are due until `end` than one step may take.
+    pub(crate) fn has_too_many_samples(&self, end: f64) -> bool {
         (end - self.start) / self.period - self.next > MOST_SAMPLES
     }
 
-    /// Takes the next sample: z and u of `values`, by their `deviations` where the design has an
-    /// operating point; the mode.
+    /// Takes the next sample, `offset` s after the measurements in `values` were given: computes z, e
+    /// and u, and the prediction for the sample after it. `mode` has the switches; the result has the
+    /// limits, too.
     pub(crate) fn sample(
         &mut self,
-        sample: Sample<'_>,
-        values: &mut Signals,
-        deviations: &mut Option<Signals>,
+        (design, mode): (&Design, Mode),
+        (values, point, mut signals): (&mut Values, &OperatingPoint, &mut Signals),
+        offset: f64,
     ) -> Mode {
-        let Sample { design, slopes: (slopes, offset), compensating, estimating } = sample;
         values.z.copy_from_slice(&self.prediction);
-        let own = relative(design, values, deviations);
-        self.before.copy_from_slice(&own.z);
-        let [x_hat, _, y_f] = design.parts(&own.z);
-        for (k, e) in self.innovations.iter_mut().enumerate() {
-            *e = innovation(design, x_hat, y_f, (k, own.y[k] + slopes[k] * offset));
-        }
+        signals.set(values, point, offset);
+        self.last_prediction.copy_from_slice(&signals.z);
+        let equations = Equations::<f64>::new(design, mode);
+        estimate(self.estimator, equations, &self.last_prediction, &mut signals);
         if self.estimator == Estimator::Current {
-            self.correct(design, Mode::free(compensating, estimating), &mut values.z);
+            values.set_estimate(&signals.z[..design.filtered_at(0)], point);
         }
-        let own = relative(design, values, deviations);
-        let mode = Mode::of(design, &own.z, compensating, estimating);
-        mode.command(design, &own.z, &mut own.u);
-        self.predict(design, mode, own);
-        if let Some(deviations) = deviations {
-            deviations.command_into(design, mode, &mut values.u);
-        }
-        let [_, _, filtered] = design.parts_mut(&mut self.prediction);
-        for (k, (w, next)) in design.filter.iter().flatten().zip(filtered).enumerate() {
-            let y_f = values.z[design.filtered_at(k)];
-            *next = y_f + w * (values.y[k] + slopes[k] * offset - y_f);
+        let mode = mode.limited(design, &signals.z);
+        mode.set_limited(design, &mut signals.u);
+        let equations = Equations::<f64>::new(design, mode);
+        equations.set_free_commands(&mut signals);
+        values.set_commands(&signals.u, (design, mode), point);
+        self.predict(design, equations, signals);
+        for (next, point) in self.prediction.iter_mut().zip(&point.z) {
+            *next += point;
         }
         self.next += 1.0;
         mode
     }
 
-    /// Adds the gains times the innovations to `z`.
-    fn correct(&self, design: &Design, mode: Mode, z: &mut [f64]) {
-        let [x_hat, f_hat, _] = design.parts_mut(z);
-        for (k, e) in self.innovations.iter().enumerate() {
-            mode.correct(design, (k, *e), x_hat, f_hat);
-        }
-    }
-
-    /// The prediction of x_hat and f_hat from the estimate and the command in `own`.
-    fn predict(&mut self, design: &Design, mode: Mode, own: &Signals) {
-        let mut prediction = std::mem::take(&mut self.prediction);
-        mode.free_rates(design, &own.z, &own.u, &mut prediction);
-        if self.estimator == Estimator::Prediction {
-            self.correct(design, mode, &mut prediction);
-        }
-        self.prediction = prediction;
-        let [x_hat, f_hat, _] = design.parts_mut(&mut self.prediction);
-        for (next, state) in x_hat.iter_mut().zip(&design.states) {
-            *next += state.operating.unwrap_or_default();
-        }
-        if design.a_f.is_none() || !mode.estimating {
-            let [_, kept, _] = design.parts(&own.z);
-            f_hat.iter_mut().zip(kept).for_each(|(next, kept)| *next += kept);
-        }
-    }
-
-    /// The derivative of z and u of sample 0, which led to `point`: those of `along`, in which z is
-    /// what the sample started from. `changes` is space for the derivative of e.
-    pub(crate) fn first_sample_along(
-        &self,
-        mode: Mode,
-        point: Knowns<'_>,
-        design: &Design,
-        (along, changes): (&mut Signals, &mut [f64]),
-    ) {
+    /// Computes the deviations z[k+1|k] from z, e and u of sample k.
+    fn predict(&mut self, design: &Design, equations: Equations<'_, f64>, signals: &mut Signals) {
+        let mut knowns = equations.knowns(&signals);
         if self.estimator == Estimator::Current {
-            let designs = [point.design, design];
-            for (k, de) in changes.iter_mut().enumerate() {
-                *de = innovation_along(designs, [&self.before, &along.z], k, along.y[k]);
-            }
-            let [x_hat, f_hat, _] = design.parts_mut(&mut along.z);
-            for (k, (e, de)) in self.innovations.iter().zip(changes).enumerate() {
-                mode.correct_along(designs, (k, [*e, *de]), x_hat, f_hat);
-            }
+            knowns = knowns.without_innovations();
         }
-        mode.command_along(point, design, along);
+        equations.set_slopes(knowns, &mut &mut self.prediction[..]);
+        let first_kept =
+            if equations.has_fault_model() { design.filtered_at(0) } else { design.states.len() };
+        for (next, z) in self.prediction.iter_mut().zip(&signals.z).skip(first_kept) {
+            *next += z;
+        }
     }
 
-    /// Space for the derivatives of the innovations, in the sampler of a direction.
-    pub(crate) fn changes(&mut self) -> &mut [f64] {
-        &mut self.innovations
+    /// Computes the derivatives of e, z and u of sample 0 in a direction, from those of z[0|-1], of y
+    /// and of the commands at a limit.
+    pub(crate) fn differentiate_first_sample(
+        &self,
+        equations: Equations<'_, Dual64>,
+        direction: &mut Self,
+        signals: &mut <Dual64 as Number>::Out<'_, Signals>,
+    ) {
+        direction.last_prediction.copy_from_slice(&signals.1.z);
+        let predictions = [&self.last_prediction[..], &direction.last_prediction];
+        estimate(self.estimator, equations, predictions, signals);
+        equations.set_free_commands(signals);
     }
 }
 
-/// What the equations take: the deviations of `values`, or these themselves.
-fn relative<'a>(
-    design: &Design,
-    values: &'a mut Signals,
-    deviations: &'a mut Option<Signals>,
-) -> &'a mut Signals {
-    match deviations {
-        None => values,
-        Some(deviations) => {
-            deviations.deviate(design, values);
-            deviations
-        }
+/// Computes e[k] from z[k|k-1], and with a current estimator z[k|k].
+fn estimate<D: Number>(
+    estimator: Estimator,
+    equations: Equations<'_, D>,
+    prediction: D::In<'_, [f64]>,
+    signals: &mut D::Out<'_, Signals>,
+) {
+    for k in 0..D::values(D::read(signals)).e.len() {
+        let z = equations.estimate(prediction);
+        let e = equations.innovation(k, z, equations.knowns(signals).y);
+        D::write(signals, |signals| &mut signals.e[k], e);
+    }
+    if estimator == Estimator::Current {
+        equations.correct(signals);
     }
 }

@@ -1,63 +1,114 @@
-//! The signals of the controller, and their deviations from the operating point.
+//! The signals of the controller: as the importer sees them, and as the equations take them.
 
 use serde::{Deserialize, Serialize};
 
-use crate::design::Design;
-use crate::equations::Mode;
+use crate::design::{Design, Signal};
+use crate::mode::Mode;
 
-/// What the equations connect: values, deviations, or a direction in them.
+/// The signals as the importer sees them.
+#[derive(Clone, Serialize, Deserialize)]
+pub(crate) struct Values {
+    /// z = [x_hat; f_hat; y_f].
+    pub(crate) z: Vec<f64>,
+    /// The measurements, and their derivatives with respect to time.
+    pub(crate) y: Vec<f64>,
+    pub(crate) y_slopes: Vec<f64>,
+    /// The commands.
+    pub(crate) u: Vec<f64>,
+}
+
+/// The operating point: zero where the design states none.
+#[derive(Clone, Serialize, Deserialize)]
+pub(crate) struct OperatingPoint {
+    /// [x_op; 0; y_op], the last part where the design has a filter.
+    pub(crate) z: Vec<f64>,
+    y: Vec<f64>,
+    u: Vec<f64>,
+}
+
+/// The signals of the equations: deviations from the operating point, or a direction in them.
 #[derive(Clone, Serialize, Deserialize)]
 pub(crate) struct Signals {
     /// z = [x_hat; f_hat; y_f].
     pub(crate) z: Vec<f64>,
     /// The measurements.
     pub(crate) y: Vec<f64>,
+    /// The innovations.
+    pub(crate) e: Vec<f64>,
     /// The commands.
     pub(crate) u: Vec<f64>,
 }
 
-/// [x_op; 0; y_op], the operating point of z.
-fn operating_point(design: &Design) -> impl Iterator<Item = f64> + '_ {
-    let states = design.states.iter().map(|state| state.operating);
-    let faults = design.faults.iter().map(|_| None);
-    let filtered = design.measurements.iter().map(|measurement| measurement.operating);
-    states.chain(faults).chain(filtered).map(Option::unwrap_or_default)
+impl OperatingPoint {
+    /// The operating point of `design`.
+    pub(crate) fn of(design: &Design) -> Self {
+        let Signals { z, y, u, .. } = Signals::zero(design);
+        let mut point = Self { z, y, u };
+        point.read(design);
+        point
+    }
+
+    /// Takes the operating point from `design`, without allocation.
+    pub(crate) fn read(&mut self, design: &Design) {
+        let read = |to: &mut [f64], signals: &[Signal]| {
+            for (to, signal) in to.iter_mut().zip(signals) {
+                *to = signal.operating.unwrap_or_default();
+            }
+        };
+        let [x, _, y_f] = design.parts_mut(&mut self.z);
+        read(x, &design.states);
+        read(y_f, &design.measurements);
+        read(&mut self.y, &design.measurements);
+        for (to, actuator) in self.u.iter_mut().zip(&design.actuators) {
+            *to = actuator.operating.unwrap_or_default();
+        }
+    }
 }
 
 impl Signals {
     /// All signals of `design`, zero.
     pub(crate) fn zero(design: &Design) -> Self {
-        Self {
-            z: vec![0.0; design.order()],
-            y: vec![0.0; design.measurements.len()],
-            u: vec![0.0; design.actuators.len()],
-        }
+        let (p, m) = (design.measurements.len(), design.actuators.len());
+        Self { z: vec![0.0; design.order()], y: vec![0.0; p], e: vec![0.0; p], u: vec![0.0; m] }
     }
 
-    /// Becomes the deviations of `values`, but for those of the commands.
-    pub(crate) fn deviate(&mut self, design: &Design, values: &Self) {
-        for ((own, value), point) in self.z.iter_mut().zip(&values.z).zip(operating_point(design)) {
+    /// Sets z and y to the deviations of `values` from `point`, the measurements `offset` s after these
+    /// were given.
+    pub(crate) fn set(&mut self, values: &Values, point: &OperatingPoint, offset: f64) {
+        for ((own, value), point) in self.z.iter_mut().zip(&values.z).zip(&point.z) {
             *own = value - point;
         }
-        for ((own, value), signal) in self.y.iter_mut().zip(&values.y).zip(&design.measurements) {
-            *own = value - signal.operating.unwrap_or_default();
+        let measured = values.y.iter().zip(&values.y_slopes).zip(&point.y);
+        for (own, ((value, slope), point)) in self.y.iter_mut().zip(measured) {
+            *own = value - point + slope * offset;
         }
     }
+}
 
-    /// The values of z that these deviations are those of.
-    pub(crate) fn state_into(&self, design: &Design, z: &mut [f64]) {
-        for ((value, own), point) in z.iter_mut().zip(&self.z).zip(operating_point(design)) {
+impl Values {
+    /// All signals of `design`, zero.
+    pub(crate) fn zero(design: &Design) -> Self {
+        let Signals { z, y, u, .. } = Signals::zero(design);
+        Self { z, y_slopes: y.clone(), y, u }
+    }
+
+    /// Sets z, or its first parts, to the operating point plus the deviations `z`.
+    pub(crate) fn set_estimate(&mut self, z: &[f64], point: &OperatingPoint) {
+        for ((value, own), point) in self.z.iter_mut().zip(z).zip(&point.z) {
             *value = own + point;
         }
     }
 
-    /// The commands that these deviations are those of: at a limit the limit itself.
-    pub(crate) fn command_into(&self, design: &Design, mode: Mode, u: &mut [f64]) {
-        for (j, (value, actuator)) in u.iter_mut().zip(&design.actuators).enumerate() {
-            *value = match actuator.limits {
-                Some(limits) if mode.is_limited(j) => mode.side(limits, j),
-                _ => self.u[j] + actuator.operating.unwrap_or_default(),
-            };
+    /// Sets u to the operating point plus the deviations `u`, and the channels at a limit to that limit.
+    pub(crate) fn set_commands(
+        &mut self,
+        u: &[f64],
+        (design, mode): (&Design, Mode),
+        point: &OperatingPoint,
+    ) {
+        let free = u.iter().zip(&point.u).map(|(own, point)| own + point);
+        for (j, (value, free)) in self.u.iter_mut().zip(free).enumerate() {
+            *value = mode.limit(design.actuators[j].limits, j).unwrap_or(free);
         }
     }
 }

@@ -67,7 +67,7 @@ fn inputs(design: &Design) -> Vec<Variable<AsoController>> {
             let variable = Variable::real(&signal.name, text, move |model: &mut AsoController| {
                 &mut model.values.y[k]
             });
-            with_unit(variable, unit).input().derivative(move |model| &mut model.y_slopes[k])
+            with_unit(variable, unit).input().derivative(move |model| &mut model.values.y_slopes[k])
         })
         .collect();
     let text = "Whether the estimated fault is compensated from t_on on";

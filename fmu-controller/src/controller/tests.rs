@@ -42,7 +42,7 @@ fn ready(mut controller: AsoController) -> AsoController {
 
 fn step(controller: &mut AsoController, start: f64, size: f64, y: &[f64], slope: &[f64]) {
     controller.values.y.copy_from_slice(y);
-    controller.y_slopes.copy_from_slice(slope);
+    controller.values.y_slopes.copy_from_slice(slope);
     controller.step(&Step { start, size }).unwrap();
 }
 

@@ -6,13 +6,6 @@ use std::path::{Path, PathBuf};
 
 use tests::root;
 
-/// Files that may be longer than 400 lines: name and reason.
-const LONG_FILES: [(&str, &str); 0] = [];
-/// Functions that may be longer than 50 lines: file, name and reason.
-const LONG_FUNCTIONS: [(&str, &str, &str); 0] = [];
-const MAX_FILE: usize = 400;
-const MAX_FUNCTION: usize = 50;
-
 /// All files below `folder` with that extension, without what is built.
 fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
     let mut found = Vec::new();
@@ -203,62 +196,6 @@ fn the_models_forbid_unsafe_code() {
         let text = fs::read_to_string(root().join(model).join(entry)).unwrap();
         assert!(text.contains("#![forbid(unsafe_code)]"), "{model}");
     }
-}
-
-#[test]
-fn no_file_is_longer_than_400_lines() {
-    for extension in ["rs", "py"] {
-        for file in files(&root(), extension) {
-            let lines = fs::read_to_string(&file).unwrap().lines().count();
-            let path = name(&file);
-            let excused = LONG_FILES.iter().any(|(known, _)| *known == path);
-            assert!(lines <= MAX_FILE || excused, "{path} has {lines} lines");
-        }
-    }
-}
-
-#[test]
-fn no_function_is_longer_than_50_lines() {
-    for file in files(&root(), "rs") {
-        let text = fs::read_to_string(&file).unwrap();
-        for (function, length) in functions(&text) {
-            let path = name(&file);
-            let excused =
-                LONG_FUNCTIONS.iter().any(|(known, name, _)| *known == path && *name == function);
-            let limit = MAX_FUNCTION;
-            assert!(length <= limit || excused, "{path}: {function} has {length} lines");
-        }
-    }
-}
-
-/// Name and length of each function: from `fn` to the closing brace of the same indentation, which
-/// in a macro may be followed by something.
-fn functions(text: &str) -> Vec<(String, usize)> {
-    let lines: Vec<_> = text.lines().collect();
-    let mut found = Vec::new();
-    for (start, line) in lines.iter().enumerate() {
-        let code = line.trim_start();
-        let indentation = &line[..line.len() - code.len()];
-        let words = ["pub ", "pub(crate) ", "pub(super) ", "const ", "unsafe ", "extern \"C\" "];
-        let mut rest = code;
-        while let Some(shorter) = words.iter().find_map(|word| rest.strip_prefix(word)) {
-            rest = shorter;
-        }
-        let Some(signature) = rest.strip_prefix("fn ") else { continue };
-        let function = signature.split(['(', '<']).next().unwrap_or_default().to_owned();
-        let end = format!("{indentation}}}");
-        let length = lines[start..].iter().take_while(|line| !line.starts_with(&end)).count() + 1;
-        if !line.ends_with(';') && !line.ends_with('}') {
-            found.push((function, length));
-        }
-    }
-    found
-}
-
-#[test]
-fn lengths_of_functions_are_counted_right() {
-    let text = "fn one() {\n    a;\n}\n\nimpl X {\n    pub(crate) fn two<T>(\n        a: T,\n    ) {\n    }\n}\n";
-    assert_eq!(functions(text), [("one".to_owned(), 3), ("two".to_owned(), 4)]);
 }
 
 #[test]

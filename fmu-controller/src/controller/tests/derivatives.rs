@@ -25,9 +25,11 @@ fn each_mode(designs: &[Shape], check: impl Fn(&AsoController, f64)) {
                 let mut model = sized(of);
                 model.design.monitor = monitor;
                 begin(&mut model, time);
+                let equations = Equations::<f64>::new(&model.design, model.mode);
+                let estimate = equations.estimate(&model.deviations.z);
                 let free = |j: usize| {
                     let operating = model.design.actuators[j].operating.unwrap_or_default();
-                    model.mode.free_command(&model.design, &model.signals().z, j) + operating
+                    equations.free_command(j, estimate) + operating
                 };
                 let middle: Vec<_> = (0..model.values.u.len()).map(free).collect();
                 for (actuator, middle) in model.design.actuators.iter_mut().zip(middle) {

@@ -63,7 +63,7 @@ fn ten_steps_of_a_tenth_of_the_sample_time_take_one_sample_a_million_times() {
     for (period, start) in [(0.1, 0.0), (0.007, 3.3)] {
         let (mut model, _) = tamed(([1, 1, 1, 1], "l", "c"));
         model.design.sample_time = Some(period);
-        model.sampler = Sampler::of(&model.design);
+        model.sampler = Sampler::new(&model.design);
         model.initialize(&Experiment { start_time: start, ..Experiment::default() }).unwrap();
         let (size, mut time) = (period / 10.0, start);
         for k in 1..=1_000_000_u32 {
