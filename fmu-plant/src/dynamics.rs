@@ -1,5 +1,6 @@
 //! The rigid body of equation (20) and the force on the cart.
 
+use crate::functions::Functions;
 use crate::number::Number;
 use crate::parameters::Parameters;
 
@@ -106,11 +107,11 @@ impl<D: Number> RigidBody<D> {
     }
 
     #[inline]
-    fn position(&self, angle: D, rate: D) -> Position<D> {
+    fn position(&self, functions: &impl Functions<D>, angle: D, rate: D) -> Position<D> {
         if self.linearised {
             return Position { sine: angle, cosine: D::one(), centrifugal: D::zero() };
         }
-        let (sine, cosine) = angle.sine_and_cosine();
+        let (sine, cosine) = functions.sine_and_cosine(angle);
         Position { sine, cosine, centrifugal: rate * rate * sine }
     }
 
@@ -118,9 +119,9 @@ impl<D: Number> RigidBody<D> {
     /// in N.
     #[must_use]
     #[inline]
-    pub fn slide(&self, state: &State<D>, net_force: D) -> State<D> {
+    pub fn slide(&self, functions: &impl Functions<D>, state: &State<D>, net_force: D) -> State<D> {
         let [_, angle, velocity, rate] = *state;
-        let at = self.position(angle, rate);
+        let at = self.position(functions, angle, rate);
         let push = net_force - self.cart_damping * velocity + self.coupling * at.centrifugal;
         let torque = self.weight * at.sine - self.pendulum_damping * rate;
         let lever = self.coupling * at.cosine;
@@ -133,9 +134,9 @@ impl<D: Number> RigidBody<D> {
     /// Derivative of the state of a cart held at rest: `J theta'' = m l g sin theta - F_theta theta'`.
     #[must_use]
     #[inline]
-    pub fn stick(&self, state: &State<D>) -> State<D> {
+    pub fn stick(&self, functions: &impl Functions<D>, state: &State<D>) -> State<D> {
         let [_, angle, _, rate] = *state;
-        let sine = if self.linearised { angle } else { angle.sine() };
+        let sine = if self.linearised { angle } else { functions.sine(angle) };
         let torque = self.weight * sine - self.pendulum_damping * rate;
         [D::zero(), rate, D::zero(), torque * self.inverse_inertia]
     }
@@ -145,9 +146,9 @@ impl<D: Number> RigidBody<D> {
     /// `f = u + m l theta'² sin theta - (m l / J) cos theta (m l g sin theta - F_theta theta')`.
     #[must_use]
     #[inline]
-    pub fn balancing_force(&self, state: &State<D>, force: D) -> D {
+    pub fn balancing_force(&self, functions: &impl Functions<D>, state: &State<D>, force: D) -> D {
         let [_, angle, _, rate] = *state;
-        let at = self.position(angle, rate);
+        let at = self.position(functions, angle, rate);
         let torque = self.weight * at.sine - self.pendulum_damping * rate;
         force + self.coupling * (at.centrifugal - at.cosine * torque * self.inverse_inertia)
     }
@@ -158,9 +159,15 @@ impl RigidBody {
     /// changes at `force_rate` in N/s.
     #[must_use]
     #[inline]
-    pub fn balancing(&self, state: &State, force: f64, force_rate: f64) -> (f64, f64) {
+    pub fn balancing(
+        &self,
+        functions: &impl Functions<f64>,
+        state: &State,
+        force: f64,
+        force_rate: f64,
+    ) -> (f64, f64) {
         let [_, angle, _, rate] = *state;
-        let at = self.position(angle, rate);
+        let at = self.position(functions, angle, rate);
         let torque = self.weight * at.sine - self.pendulum_damping * rate;
         let lever = at.cosine * torque;
         let balance = force + self.coupling * (at.centrifugal - lever * self.inverse_inertia);
@@ -181,6 +188,7 @@ impl RigidBody {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::functions::Direct;
 
     const STATES: [State; 3] =
         [[0.2, 0.4, 0.7, -1.3], [0.0, -2.5, -1.1, 4.0], [1.0, 7.0, 0.0, 0.3]];
@@ -197,7 +205,7 @@ mod tests {
         let moment = p.pendulum_mass * p.length;
         for state in STATES {
             let [_, angle, v, rate] = state;
-            let [_, _, a, turn] = bodies()[0].slide(&state, 12.0);
+            let [_, _, a, turn] = bodies()[0].slide(&Direct, &state, 12.0);
             let cart = (p.cart_mass + p.pendulum_mass) * a
                 + p.cart_damping * v
                 + moment * (turn * angle.cos() - rate * rate * angle.sin())
@@ -220,7 +228,7 @@ mod tests {
         ];
         let body = &bodies()[1];
         for (state, factor, column) in printed {
-            let derivative = body.slide(&state, 1.0 - factor);
+            let derivative = body.slide(&Direct, &state, 1.0 - factor);
             for (computed, printed) in derivative.iter().zip(column) {
                 assert!((computed - printed).abs() < 6e-5, "{computed} {printed}");
             }
@@ -231,8 +239,9 @@ mod tests {
     fn the_linearised_body_is_the_tangent_of_the_nonlinear_one() {
         let [nonlinear, linearised] = bodies();
         let small = [0.0, 1e-4, 2e-4, -3e-4];
-        let difference =
-            |i: usize| nonlinear.slide(&small, 1e-3)[i] - linearised.slide(&small, 1e-3)[i];
+        let difference = |i: usize| {
+            nonlinear.slide(&Direct, &small, 1e-3)[i] - linearised.slide(&Direct, &small, 1e-3)[i]
+        };
         assert!(difference(2).abs() < 1e-10 && difference(3).abs() < 1e-10);
     }
 
@@ -241,10 +250,10 @@ mod tests {
         for body in bodies() {
             for mut state in STATES {
                 state[2] = 0.0;
-                let friction = body.balancing_force(&state, 12.0);
-                let [_, _, acceleration, turn] = body.slide(&state, 12.0 - friction);
+                let friction = body.balancing_force(&Direct, &state, 12.0);
+                let [_, _, acceleration, turn] = body.slide(&Direct, &state, 12.0 - friction);
                 assert!(acceleration.abs() < 1e-12, "{acceleration}");
-                assert!((turn - body.stick(&state)[3]).abs() < 1e-10);
+                assert!((turn - body.stick(&Direct, &state)[3]).abs() < 1e-10);
             }
         }
     }
@@ -254,18 +263,18 @@ mod tests {
         for body in bodies() {
             for mut state in STATES {
                 state[2] = 0.0;
-                let slope = body.stick(&state);
+                let slope = body.stick(&Direct, &state);
                 let along = |t: f64| {
                     let turn_rate =
-                        (body.stick(&offset(&state, &slope, 1e-6))[3] - slope[3]) / 1e-6;
+                        (body.stick(&Direct, &offset(&state, &slope, 1e-6))[3] - slope[3]) / 1e-6;
                     let mut moved = offset(&state, &slope, t);
                     moved[1] += 0.5 * t * t * slope[3];
                     moved[3] += 0.5 * t * t * turn_rate;
-                    body.balancing_force(&moved, 5.0 + 3.0 * t)
+                    body.balancing_force(&Direct, &moved, 5.0 + 3.0 * t)
                 };
                 let numeric = (along(1e-5) - along(-1e-5)) / 2e-5;
-                let (force, rate) = body.balancing(&state, 5.0, 3.0);
-                assert_eq!(force.to_bits(), body.balancing_force(&state, 5.0).to_bits());
+                let (force, rate) = body.balancing(&Direct, &state, 5.0, 3.0);
+                assert_eq!(force.to_bits(), body.balancing_force(&Direct, &state, 5.0).to_bits());
                 assert!((numeric - rate).abs() < 1e-6 * rate.abs().max(1.0), "{numeric} {rate}");
             }
         }

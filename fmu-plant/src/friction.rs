@@ -1,5 +1,6 @@
 //! Set-valued Stribeck friction between cart and rail, without regularisation.
 
+use crate::functions::Functions;
 use crate::number::Number;
 use crate::parameters::Parameters;
 use serde::{Deserialize, Serialize};
@@ -62,20 +63,20 @@ impl<D: Number> StribeckLaw<D> {
     /// the right.
     #[must_use]
     #[inline]
-    pub fn magnitude(&self, velocity: D) -> D {
+    pub fn magnitude(&self, functions: &impl Functions<D>, velocity: D) -> D {
         let power = (velocity.absolute() * self.inverse_velocity).power(self.exponent);
-        self.coulomb + self.excess * (-power).exponential()
+        self.coulomb + self.excess * functions.exponential(-power)
     }
 
     /// The friction in N of a cart that slides in the given direction at this velocity in m/s.
     #[must_use]
     #[inline]
-    pub fn sliding(&self, direction: Regime, velocity: D) -> D {
+    pub fn sliding(&self, functions: &impl Functions<D>, direction: Regime, velocity: D) -> D {
         let (speed, sign) = match direction {
             Regime::Backward => (-velocity, -1.0),
             _ => (velocity, 1.0),
         };
-        self.magnitude(speed) * sign
+        self.magnitude(functions, speed) * sign
     }
 
     /// The friction in N of a cart at rest: the balancing force, at most `F_s` to either side.
@@ -126,6 +127,7 @@ impl StribeckLaw {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::functions::Direct;
 
     fn law(change: impl Fn(&mut Parameters)) -> StribeckLaw {
         let mut parameters = Parameters::default();
@@ -136,26 +138,26 @@ mod tests {
     #[test]
     fn friction_falls_from_static_at_rest_to_coulomb_at_speed() {
         let law = law(|_| ());
-        assert_eq!(law.magnitude(0.0).to_bits(), 30.0_f64.to_bits());
-        assert_eq!(law.magnitude(-5.0).to_bits(), 25.0_f64.to_bits());
+        assert_eq!(law.magnitude(&Direct, 0.0).to_bits(), 30.0_f64.to_bits());
+        assert_eq!(law.magnitude(&Direct, -5.0).to_bits(), 25.0_f64.to_bits());
         let at_stribeck_velocity = 25.0 + 5.0 / std::f64::consts::E;
-        assert!((law.magnitude(0.15) - at_stribeck_velocity).abs() < 1e-13);
-        assert!((law.magnitude(-0.15) - at_stribeck_velocity).abs() < 1e-13);
+        assert!((law.magnitude(&Direct, 0.15) - at_stribeck_velocity).abs() < 1e-13);
+        assert!((law.magnitude(&Direct, -0.15) - at_stribeck_velocity).abs() < 1e-13);
     }
 
     #[test]
     fn the_exponent_shapes_the_fall() {
         let linear = law(|p| p.stribeck_exponent = 1.0);
         let cubic = law(|p| p.stribeck_exponent = 3.0);
-        assert!((linear.magnitude(0.3) - (25.0 + 5.0 * (-2.0_f64).exp())).abs() < 1e-13);
-        assert!((cubic.magnitude(0.3) - (25.0 + 5.0 * (-8.0_f64).exp())).abs() < 1e-13);
+        assert!((linear.magnitude(&Direct, 0.3) - (25.0 + 5.0 * (-2.0_f64).exp())).abs() < 1e-13);
+        assert!((cubic.magnitude(&Direct, 0.3) - (25.0 + 5.0 * (-8.0_f64).exp())).abs() < 1e-13);
     }
 
     #[test]
     fn the_limit_is_the_magnitude_at_rest_to_the_last_bit() {
         for coulomb in [0.1, 0.3, 7.7, 24.999_999_999] {
             let law = law(|p| p.coulomb = coulomb);
-            assert_eq!(law.limit().to_bits(), law.magnitude(0.0).to_bits());
+            assert_eq!(law.limit().to_bits(), law.magnitude(&Direct, 0.0).to_bits());
         }
     }
 

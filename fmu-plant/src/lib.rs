@@ -5,6 +5,7 @@ mod crossing;
 mod dormand_prince;
 pub mod dynamics;
 pub mod friction;
+pub mod functions;
 pub mod motion;
 pub mod number;
 pub mod parameters;

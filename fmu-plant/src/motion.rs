@@ -8,6 +8,7 @@
 use crate::crossing::locate;
 use crate::dynamics::{Force, State};
 use crate::friction::Regime;
+use crate::functions::Memory;
 use crate::parameters::{Parameters, Refusal, require};
 use crate::plant::{Crossing, NotFinite, Plant};
 use crate::response::Response;
@@ -95,12 +96,19 @@ pub struct Motion {
     state: State,
     regime: Regime,
     suggested_step: f64,
+    #[serde(skip)]
+    memory: Memory,
 }
 
 impl Default for Motion {
     /// At rest at the origin.
     fn default() -> Self {
-        Self { state: [0.0; 4], regime: Regime::Stick, suggested_step: FIRST_STEP }
+        Self {
+            state: [0.0; 4],
+            regime: Regime::Stick,
+            suggested_step: FIRST_STEP,
+            memory: Memory::default(),
+        }
     }
 }
 
@@ -117,7 +125,8 @@ impl Motion {
             require(name, value, true, "finite")?;
         }
         let mut motion = Self { state: initial, ..Self::default() };
-        motion.regime = Plant::new(parameters, Force::constant(force)).regime(0.0, &initial);
+        let plant = Plant::new(parameters, Force::constant(force), Memory::default());
+        motion.regime = plant.regime(0.0, &initial);
         Ok(motion)
     }
 
@@ -141,7 +150,7 @@ impl Motion {
     /// Friction and derivative of the state under the force `u + f_a` in N at this time.
     #[must_use]
     pub fn response(&self, parameters: &Parameters, force: f64) -> Response {
-        Response::new(parameters, self.regime, &self.state, force)
+        Response::new(&self.memory, parameters, self.regime, &self.state, force)
     }
 
     /// Follows the motion from the time `start` for `duration`, both in s, under the force given
@@ -171,7 +180,21 @@ impl Motion {
         if !force.is_finite() {
             return Err(Failure::NotFinite { time: start });
         }
-        let plant = Plant::new(parameters, force.seen_from(start));
+        let memory = std::mem::take(&mut self.memory);
+        let plant = Plant::new(parameters, force.seen_from(start), memory);
+        let done = self.follow(&plant, start, duration, tolerance);
+        self.memory = plant.memory;
+        done
+    }
+
+    /// Follows the motion of `plant` for `duration` s; `start` is for the reasons of failures.
+    fn follow(
+        &mut self,
+        plant: &Plant,
+        start: f64,
+        duration: f64,
+        tolerance: &Tolerance,
+    ) -> Result<(), Failure> {
         let mut elapsed = 0.0;
         let mut events = 0;
         self.regime = plant.regime(elapsed, &self.state);
@@ -180,7 +203,7 @@ impl Motion {
                 return Ok(());
             }
             let time = start + elapsed;
-            match self.proceed(&plant, elapsed, duration - elapsed, tolerance) {
+            match self.proceed(plant, elapsed, duration - elapsed, tolerance) {
                 Progress::Finished => elapsed = duration,
                 Progress::Advanced(length) => elapsed += length,
                 Progress::Event(length) => {

@@ -8,6 +8,7 @@ use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
 use crate::dynamics::Force;
+use crate::functions::Direct;
 use crate::motion::exchange::INDICATORS;
 use crate::motion::{Motion, Tolerance};
 use crate::parameters::{Parameters, Refusal};
@@ -67,6 +68,7 @@ impl FrictionPendulum {
     fn friction_rate(&mut self) -> &mut f64 {
         let state = self.motion.state();
         let response = Response::new(
+            &Direct,
             &self.parameters.along(&Parameters::ZERO),
             self.motion.regime(),
             &std::array::from_fn(|k| Dual64::new(state[k], self.slope[k])),
@@ -156,6 +158,7 @@ impl Model for FrictionPendulum {
         }
         let (state, change) = (self.motion.state(), direction.motion.state());
         let response = Response::new(
+            &Direct,
             &self.parameters.along(&direction.parameters),
             self.motion.regime(),
             &std::array::from_fn(|k| Dual64::new(state[k], change[k])),

@@ -4,6 +4,7 @@ use crate::crossing::Quartic;
 use crate::dormand_prince::Step;
 use crate::dynamics::{Force, RigidBody, State};
 use crate::friction::{Regime, StribeckLaw};
+use crate::functions::{Direct, Functions, Memory};
 use crate::parameters::Parameters;
 
 pub(crate) struct Plant {
@@ -11,6 +12,8 @@ pub(crate) struct Plant {
     law: StribeckLaw,
     /// As a polynomial of the time elapsed in the communication step.
     force: Force,
+    /// Of the start and the end of the last steps.
+    pub(crate) memory: Memory,
 }
 
 /// A part of an integration step at whose end an event has happened, as far as the continuous
@@ -23,16 +26,35 @@ pub(crate) struct Crossing {
 }
 
 impl Plant {
-    pub(crate) fn new(parameters: &Parameters, force: Force) -> Self {
-        Self { body: RigidBody::new(parameters), law: StribeckLaw::new(parameters), force }
+    pub(crate) fn new(parameters: &Parameters, force: Force, memory: Memory) -> Self {
+        Self { body: RigidBody::new(parameters), law: StribeckLaw::new(parameters), force, memory }
+    }
+
+    /// The derivative of the state inside a step.
+    #[inline]
+    pub(crate) fn derivative(&self, regime: Regime, elapsed: f64, state: &State) -> State {
+        self.derivative_by(&Direct, regime, elapsed, state)
+    }
+
+    /// The derivative of the state at the start or the end of a step.
+    #[inline]
+    pub(crate) fn derivative_at_end(&self, regime: Regime, elapsed: f64, state: &State) -> State {
+        self.derivative_by(&self.memory, regime, elapsed, state)
     }
 
     #[inline]
-    pub(crate) fn derivative(&self, regime: Regime, elapsed: f64, state: &State) -> State {
+    fn derivative_by(
+        &self,
+        functions: &impl Functions<f64>,
+        regime: Regime,
+        elapsed: f64,
+        state: &State,
+    ) -> State {
         if regime == Regime::Stick {
-            return self.body.stick(state);
+            return self.body.stick(functions, state);
         }
-        self.body.slide(state, self.force.at(elapsed) - self.law.sliding(regime, state[2]))
+        let friction = self.law.sliding(functions, regime, state[2]);
+        self.body.slide(functions, state, self.force.at(elapsed) - friction)
     }
 
     /// The change of velocity in m/s within which the friction is surely seen to change.
@@ -86,7 +108,8 @@ impl Plant {
 
     fn first_break(&self, elapsed: f64, step: &Step) -> Result<Option<Crossing>, NotFinite> {
         let end = elapsed + step.length;
-        let middle = self.balancing_force(elapsed + 0.5 * step.length, &step.middle());
+        let force = self.force.at(elapsed + 0.5 * step.length);
+        let middle = self.body.balancing_force(&Direct, &step.middle(), force);
         let balancing = Quartic::new(
             self.balancing(elapsed, &step.start, step.length),
             middle,
@@ -110,12 +133,12 @@ impl Plant {
     /// The balancing force and its rise over a length in s at its present rate.
     fn balancing(&self, elapsed: f64, state: &State, length: f64) -> (f64, f64) {
         let (force, force_rate) = (self.force.at(elapsed), self.force.rate_at(elapsed));
-        let (balance, rate) = self.body.balancing(state, force, force_rate);
+        let (balance, rate) = self.body.balancing(&self.memory, state, force, force_rate);
         (balance, length * rate)
     }
 
     fn balancing_force(&self, elapsed: f64, state: &State) -> f64 {
-        self.body.balancing_force(state, self.force.at(elapsed))
+        self.body.balancing_force(&self.memory, state, self.force.at(elapsed))
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::dynamics::{RigidBody, State};
 use crate::friction::{Regime, StribeckLaw};
+use crate::functions::Functions;
 use crate::number::Number;
 use crate::parameters::Parameters;
 
@@ -21,14 +22,20 @@ impl<D: Number> Response<D> {
     /// A force that has just jumped can exceed what holds the cart; the friction is then the
     /// largest possible one, `F_s`.
     #[must_use]
-    pub fn new(parameters: &Parameters<D>, regime: Regime, state: &State<D>, force: D) -> Self {
+    pub fn new(
+        functions: &impl Functions<D>,
+        parameters: &Parameters<D>,
+        regime: Regime,
+        state: &State<D>,
+        force: D,
+    ) -> Self {
         let body = RigidBody::new(parameters);
         let law = StribeckLaw::new(parameters);
         if regime == Regime::Stick {
-            let friction = law.holding(body.balancing_force(state, force));
-            return Self { friction, slope: body.stick(state) };
+            let friction = law.holding(body.balancing_force(functions, state, force));
+            return Self { friction, slope: body.stick(functions, state) };
         }
-        let friction = law.sliding(regime, state[2]);
-        Self { friction, slope: body.slide(state, force - friction) }
+        let friction = law.sliding(functions, regime, state[2]);
+        Self { friction, slope: body.slide(functions, state, force - friction) }
     }
 }

@@ -55,7 +55,7 @@ impl<'a> Instant<'a> {
         let nominal = if holds { limit } else { 1.0 };
         let excess = EXCESS * nominal + 2.0 * LANDING * parameters.cart_damping;
         Self {
-            plant: Plant::new(parameters, Force::constant(force)),
+            plant: Plant::new(parameters, Force::constant(force), motion.memory.clone()),
             motion,
             nominal,
             excess: if holds { excess } else { FREE },
@@ -66,7 +66,7 @@ impl<'a> Instant<'a> {
     /// Velocity in m/s and acceleration in m/s² of a sliding cart in its direction.
     fn sliding(&self) -> [f64; 2] {
         let Motion { state, regime, .. } = self.motion;
-        let slope = self.plant.derivative(*regime, 0.0, state);
+        let slope = self.plant.derivative_at_end(*regime, 0.0, state);
         [state[2], slope[2]].map(|part| regime.sign() * part)
     }
 

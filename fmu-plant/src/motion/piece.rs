@@ -19,13 +19,15 @@ pub(super) struct Piece<'a> {
 impl<'a> Piece<'a> {
     pub(super) fn new(plant: &'a Plant, motion: &Motion, elapsed: f64) -> Self {
         let Motion { state: start, regime, .. } = *motion;
-        let slope = plant.derivative(regime, elapsed, &start);
+        let slope = plant.derivative_at_end(regime, elapsed, &start);
         Self { plant, regime, elapsed, start, slope }
     }
 
     pub(super) fn step(&self, length: f64) -> Step {
-        let derivative = |time: f64, state: &State| self.plant.derivative(self.regime, time, state);
-        Step::take(derivative, self.elapsed, &self.start, &self.slope, length)
+        let Self { plant, regime, .. } = *self;
+        let derivative = |time: f64, state: &State| plant.derivative(regime, time, state);
+        let at_end = |time: f64, state: &State| plant.derivative_at_end(regime, time, state);
+        Step::take(derivative, at_end, self.elapsed, &self.start, &self.slope, length)
     }
 
     pub(super) fn margin(&self, direction: Regime, step: &Step) -> f64 {
