@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::config::{self, Config, Every};
 
 /// What a file of this kind and version begins with; four bytes of CRC-32 of the rest follow.
-const MAGIC: &[u8; 16] = b"aso-ftc-state-2\n";
+const MAGIC: &[u8; 16] = b"aso-ftc-state-3\n";
 /// What files of this kind and of every version begin with.
 const KIND: &[u8] = b"aso-ftc-state-";
 
@@ -103,7 +103,7 @@ fn unreadable(path: &Path, bytes: &[u8]) -> String {
         return format!("{shown}: expected a checkpoint of this version of aso-ftc");
     };
     format!(
-        "{shown}: found a checkpoint of format {}, expected format 2: another version of aso-ftc \
+        "{shown}: found a checkpoint of format {}, expected format 3: another version of aso-ftc \
          wrote it. Resume it with that version, or repeat the run from its start with --checkpoint",
         char::from(*version)
     )

@@ -43,7 +43,13 @@ fn printed(name: &str, arguments: &[&Path]) -> String {
 /// The last value of the column `name` of a file of results.
 fn last(file: &Path, name: &str) -> String {
     let text = fs::read_to_string(file).unwrap();
-    let column = text.lines().next().unwrap().split(',').position(|own| own == name).unwrap();
+    let column = text
+        .lines()
+        .next()
+        .unwrap()
+        .split(',')
+        .position(|own| own.trim_matches('"') == name)
+        .unwrap();
     text.lines().last().unwrap().split(',').nth(column).unwrap().to_owned()
 }
 
