@@ -66,6 +66,10 @@ impl ControllerFmu {
     }
 
     /// Writes it to `path`, with `report` in its documentation: whole or not at all.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`] with the reason.
     pub fn write(mut self, path: &Path, report: &str) -> Result<(), Error> {
         self.package.add("documentation/report.html", report);
         self.package

@@ -180,11 +180,11 @@ impl DesignFile<'_> {
         let mut text = "# Written by aso-ftc design.\n\n".to_owned();
         text += &toml::to_string(&scalars).map_err(unwritable)?;
         for (name, matrix) in matrices {
-            text += &format!("\n{name} = [\n");
+            text.extend(["\n", name, " = [\n"]);
             for row in matrix.row_iter() {
                 let entries: Vec<_> =
                     row.iter().map(|entry| format!("{:?}", entry + 0.0)).collect();
-                text += &format!("    [{}],\n", entries.join(", "));
+                text.extend(["    [", &entries.join(", "), "],\n"]);
             }
             text += "]\n";
         }

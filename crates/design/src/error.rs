@@ -18,7 +18,7 @@ pub enum Error {
     Control(#[from] control::Error),
     /// An archive cannot be read or written.
     #[error(transparent)]
-    Package(#[from] PackageError),
+    Package(Box<PackageError>),
     /// The library of the controller cannot be loaded.
     #[error(transparent)]
     Library(#[from] fmu_import::LoadError),
@@ -46,6 +46,12 @@ pub enum Error {
     /// What is asked for makes no sense.
     #[error("{0}")]
     Invalid(String),
+}
+
+impl From<PackageError> for Error {
+    fn from(error: PackageError) -> Self {
+        Error::Package(Box::new(error))
+    }
 }
 
 impl Error {

@@ -39,6 +39,7 @@ pub struct Axis {
 
 impl Axis {
     /// The axis ends where the interval ends; one that is empty or not finite becomes usable.
+    #[must_use]
     pub fn exact((low, high): (f64, f64), pixels: (f64, f64), ticks: u8) -> Self {
         let (low, high) = if low <= high && low.is_finite() && high.is_finite() {
             (low.clamp(-HUGE, HUGE), high.clamp(-HUGE, HUGE))
@@ -58,6 +59,7 @@ impl Axis {
     }
 
     /// An axis of decades between two values above zero; others become usable.
+    #[must_use]
     pub fn logarithmic((low, high): (f64, f64), pixels: (f64, f64), ticks: u8) -> Self {
         let usable = low > 0.0 && low < high && high < HUGE;
         let (low, high) = if usable { (low, high) } else { (0.1, 10.0) };
@@ -65,6 +67,7 @@ impl Axis {
     }
 
     /// An axis that is linear between minus and plus `knee`, with decades beyond.
+    #[must_use]
     pub fn symmetric(ends: (f64, f64), knee: f64, pixels: (f64, f64), ticks: u8) -> Self {
         Self { scale: Scale::Symmetric(knee), ..Self::exact(ends, pixels, ticks) }
     }
@@ -87,21 +90,25 @@ impl Axis {
     }
 
     /// The range of the values.
+    #[must_use]
     pub fn range(&self) -> (f64, f64) {
         (self.low, self.high)
     }
 
     /// The positions of both ends of the range.
+    #[must_use]
     pub fn pixels(&self) -> (f64, f64) {
         self.pixels
     }
 
     /// Whether a value is in the range.
+    #[must_use]
     pub fn contains(&self, value: f64) -> bool {
         (self.low..=self.high).contains(&value)
     }
 
     /// The place of a value on the page; a value far outside stops one axis length outside.
+    #[must_use]
     pub fn place(&self, value: f64) -> f64 {
         let [low, high, value] = [self.low, self.high, value].map(|end| self.scale.stretch(end));
         let share = (value - low) / (high - low);
@@ -110,6 +117,7 @@ impl Axis {
     }
 
     /// Round values inside the axis, with their labels.
+    #[must_use]
     pub fn ticks(&self) -> Vec<(f64, String)> {
         match self.scale {
             Scale::Linear => self.multiples(),

@@ -5,6 +5,7 @@ use super::axis::Axis;
 /// The SVG path of a series, to a tenth of a page unit. Of the points that share a column of one
 /// unit, the first, the lowest, the highest and the last remain: no spike is lost, and the length
 /// of the path is bounded by the width of the page. Cost: one pass.
+#[must_use]
 pub fn path(time: &[f64], values: &[f64], horizontal: &Axis, vertical: &Axis) -> String {
     let points: Vec<(f64, f64)> = time
         .iter()

@@ -51,16 +51,22 @@ impl Source {
     }
 
     /// The whole text.
+    #[must_use]
     pub fn text(&self) -> &str {
         &self.text
     }
 
     /// A file of this text.
+    #[must_use]
     pub fn new(path: &Path, text: String) -> Self {
         Self { path: path.to_owned(), text }
     }
 
     /// The tables and values of the file.
+    ///
+    /// # Errors
+    ///
+    /// [`PlaceError`] that points at the entry, where it is missing or not what is expected.
     pub fn parse(&self) -> Result<Spanned<DeTable<'_>>, PlaceError> {
         DeTable::parse(&self.text).map_err(|error| {
             let end = self.text.len();
@@ -111,6 +117,7 @@ pub struct Entry<'a> {
 
 impl<'a> Table<'a> {
     /// The whole file, as parsed from `source`.
+    #[must_use]
     pub fn whole(source: &'a Source, parsed: &'a Spanned<DeTable<'a>>) -> Self {
         Self { source, name: String::new(), place: 0..0, entries: parsed.get_ref() }
     }
@@ -120,6 +127,10 @@ impl<'a> Table<'a> {
     }
 
     /// Refuses entries that are not in `known`.
+    ///
+    /// # Errors
+    ///
+    /// [`PlaceError`] that points at the entry, where it is missing or not what is expected.
     pub fn allow(&self, known: &[&str]) -> Result<(), PlaceError> {
         let unknown = self.entries.keys().find(|key| !known.contains(&key.get_ref().as_ref()));
         let Some(key) = unknown else {
@@ -137,6 +148,7 @@ impl<'a> Table<'a> {
     }
 
     /// The entry `key`, if it is there.
+    #[must_use]
     pub fn get(&self, key: &str) -> Option<Entry<'a>> {
         let (_, value) = self.entries.iter().find(|(name, _)| name.get_ref() == key)?;
         Some(self.entry(key, value))
@@ -148,6 +160,10 @@ impl<'a> Table<'a> {
     }
 
     /// The entry `key`; `meaning` is for the message when it is missing.
+    ///
+    /// # Errors
+    ///
+    /// [`PlaceError`] that points at the entry, where it is missing or not what is expected.
     pub fn require(&self, key: &str, meaning: &str) -> Result<Entry<'a>, PlaceError> {
         self.get(key).ok_or_else(|| {
             let message = format!("`{}` is missing: {meaning}", self.path(key));
@@ -186,6 +202,10 @@ impl<'a> Entry<'a> {
     }
 
     /// A finite number.
+    ///
+    /// # Errors
+    ///
+    /// [`PlaceError`] that points at the entry, where it is missing or not what is expected.
     pub fn number(&self) -> Result<f64, PlaceError> {
         let text = match self.value {
             DeValue::Integer(integer) => integer.as_str(),
@@ -200,6 +220,10 @@ impl<'a> Entry<'a> {
     }
 
     /// A finite number above zero.
+    ///
+    /// # Errors
+    ///
+    /// [`PlaceError`] that points at the entry, where it is missing or not what is expected.
     pub fn positive(&self) -> Result<f64, PlaceError> {
         match self.number()? {
             number if number > 0.0 => Ok(number),
@@ -208,16 +232,28 @@ impl<'a> Entry<'a> {
     }
 
     /// A text.
+    ///
+    /// # Errors
+    ///
+    /// [`PlaceError`] that points at the entry, where it is missing or not what is expected.
     pub fn text(&self) -> Result<&'a str, PlaceError> {
         self.value.as_str().ok_or_else(|| self.expected("a text in quotes"))
     }
 
     /// True or false.
+    ///
+    /// # Errors
+    ///
+    /// [`PlaceError`] that points at the entry, where it is missing or not what is expected.
     pub fn flag(&self) -> Result<bool, PlaceError> {
         self.value.as_bool().ok_or_else(|| self.expected("true or false"))
     }
 
     /// A table.
+    ///
+    /// # Errors
+    ///
+    /// [`PlaceError`] that points at the entry, where it is missing or not what is expected.
     pub fn table(&self) -> Result<Table<'a>, PlaceError> {
         let entries = self.value.as_table().ok_or_else(|| self.expected("a table"))?;
         let (source, name, place) = (self.source, self.name.clone(), self.place.clone());
@@ -225,6 +261,10 @@ impl<'a> Entry<'a> {
     }
 
     /// The members of a list.
+    ///
+    /// # Errors
+    ///
+    /// [`PlaceError`] that points at the entry, where it is missing or not what is expected.
     pub fn list(&self) -> Result<Vec<Entry<'a>>, PlaceError> {
         let members = self.value.as_array().ok_or_else(|| self.expected("a list"))?;
         let member = |(position, value): (usize, &'a Spanned<DeValue<'a>>)| Entry {
@@ -237,21 +277,28 @@ impl<'a> Entry<'a> {
     }
 
     /// Whether it is a list.
+    #[must_use]
     pub fn is_list(&self) -> bool {
         self.value.is_array()
     }
 
     /// Whether it is a text.
+    #[must_use]
     pub fn is_text(&self) -> bool {
         self.value.is_str()
     }
 
     /// Whether it is a table.
+    #[must_use]
     pub fn is_table(&self) -> bool {
         self.value.is_table()
     }
 
     /// Finite numbers.
+    ///
+    /// # Errors
+    ///
+    /// [`PlaceError`] that points at the entry, where it is missing or not what is expected.
     pub fn numbers(&self) -> Result<Vec<f64>, PlaceError> {
         self.list()?.iter().map(Entry::number).collect()
     }

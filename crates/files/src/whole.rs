@@ -11,6 +11,10 @@ pub struct Pending {
 
 impl Pending {
     /// Writes `bytes` into a file beside `path`, whose folder is made where it is missing.
+    ///
+    /// # Errors
+    ///
+    /// [`PlaceError`] that points at the entry, where it is missing or not what is expected.
     pub fn new(path: &Path, bytes: &[u8]) -> io::Result<Self> {
         let mut name = path.as_os_str().to_owned();
         name.push(format!(".{}.partial", process::id()));
@@ -21,6 +25,10 @@ impl Pending {
     }
 
     /// Gives it its name.
+    ///
+    /// # Errors
+    ///
+    /// [`PlaceError`] that points at the entry, where it is missing or not what is expected.
     pub fn commit(self) -> io::Result<()> {
         fs::rename(&self.partial, &self.path)
     }
@@ -35,6 +43,10 @@ impl Drop for Pending {
 
 /// Writes `bytes` to `path`, whose folder is made where it is missing: into a file beside it, which
 /// then takes its name.
+///
+/// # Errors
+///
+/// [`PlaceError`] that points at the entry, where it is missing or not what is expected.
 pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     Pending::new(path, bytes)?.commit()
 }

@@ -174,6 +174,7 @@ pub fn allowed(interface: InterfaceType, function: Function, state: State) -> bo
 
 /// The states in which a variable may be set: conditions 1, 3 and 6 of section 4.2.4, 4 and 5 of
 /// 3.2.3; inputs also before initialization mode, as importers do.
+#[must_use]
 pub fn settable(
     (causality, variability): (Causality, Variability),
     initial: Option<Initial>,

@@ -189,6 +189,10 @@ impl Fmu {
     }
 
     /// An instance for `interface`, by its C functions.
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`]: the function is missing, or the FMU returns neither `fmi2OK` nor `fmi2Warning`.
     pub fn component(&self, interface: Interface, name: &str) -> Result<Component, FmuError> {
         let unpacked = &self.content.unpacked;
         let description = &unpacked.description;

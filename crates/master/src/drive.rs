@@ -350,6 +350,7 @@ pub(crate) fn integer(value: f64) -> i32 {
 
 impl DriveKind {
     /// The type of a variable; `derivatives` is for Reals.
+    #[must_use]
     pub fn of(kind: &Kind, derivatives: bool) -> Self {
         match kind {
             Kind::Real(_) => Self::Real { derivatives },

@@ -229,6 +229,10 @@ pub trait Background {
 }
 
 /// [`Background::finish_advance`] of a slave in the background, [`Slave::advance`] of another.
+///
+/// # Errors
+///
+/// With the reason.
 pub fn finish(slave: &mut dyn Slave, step: &mut Advance<'_>) -> Result<StepResult, CallError> {
     match slave.in_background() {
         Some(slave) => slave.finish_advance(step),

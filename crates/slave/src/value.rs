@@ -21,9 +21,12 @@ pub enum Value {
 }
 
 impl Value {
-    /// What `text` spells for a variable of that kind, or what was expected. An item of an
-    /// enumeration may be given by its name in `types`.
-    #[must_use]
+    /// Reads `text` as a value of a variable of that kind. An item of an enumeration may be given by its
+    /// name in `types`.
+    ///
+    /// # Errors
+    ///
+    /// What was expected, as part of a sentence: "a number".
     pub fn parse(kind: &Kind, types: &[SimpleType], text: &str) -> Result<Self, String> {
         let trimmed = text.trim();
         match kind {

@@ -41,6 +41,10 @@ pub struct Making<'a> {
 }
 
 /// Loads and connects what the configuration names, and makes its settings.
+///
+/// # Errors
+///
+/// [`Error`] with the reason.
 pub fn assemble(loaded: &Loaded, making: &Making<'_>) -> Result<Assembled, Error> {
     let config = &loaded.config;
     if config.isolation.isolate != Some(true) {
@@ -60,9 +64,9 @@ pub fn assemble(loaded: &Loaded, making: &Making<'_>) -> Result<Assembled, Error
         }
     }
     if assembly.elements.is_empty() {
-        return Err(Error::Invalid(format!(
-            "there is no FMU in the system, expected `system` or an entry of [fmus]"
-        )));
+        return Err(Error::Invalid(
+            "there is no FMU in the system, expected `system` or an entry of [fmus]".to_owned(),
+        ));
     }
     let mut system = instantiate(&assembly.elements, config, making)?;
     for (name, function) in &assembly.functions {
@@ -115,9 +119,10 @@ fn instantiate(
     let memory_limit = config.isolation.memory_limit.map(|memory| memory.0);
     if config.isolation.isolate != Some(true) {
         if memory_limit.is_some() {
-            return Err(Error::Invalid(format!(
+            return Err(Error::Invalid(
                 "--memory-limit is for FMUs in processes of their own, expected --isolate"
-            )));
+                    .to_owned(),
+            ));
         }
         if time_limit.is_some() {
             tracing::warn!(
@@ -155,12 +160,11 @@ struct Opening<'a> {
 impl<'a> Opening<'a> {
     /// An instance in a process of its own.
     fn isolated(&mut self, element: &'a Element) -> Result<isolate::Isolated, Error> {
-        let package = match self.isolated.get(&element.fmu) {
-            Some(package) => package.clone(),
-            None => {
-                let opened = isolate::Package::open(&element.fmu);
-                opened.map_err(|error| Error::from(error).within(&element.name))?
-            }
+        let package = if let Some(package) = self.isolated.get(&element.fmu) {
+            package.clone()
+        } else {
+            let opened = isolate::Package::open(&element.fmu);
+            opened.map_err(|error| Error::from(error).within(&element.name))?
         };
         let slave = package.instantiate(&element.name, &self.isolation);
         let slave = slave.map_err(|error| as_shown(error.into(), element))?;

@@ -71,6 +71,10 @@ pub struct Loaded {
 
 impl Loaded {
     /// Reads the file at `path`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`] with the reason.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let source = Source::read(path).map_err(Error::file("read", path))?;
         let config = parse(source.text(), path)?;
@@ -112,6 +116,10 @@ pub fn parse(text: &str, path: &Path) -> Result<Config, PlaceError> {
 
 impl Config {
     /// As a `system.toml`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`] with the reason.
     pub fn render(&self) -> Result<String, Error> {
         toml::to_string(self).map_err(|error| Error::Invalid(error.to_string()))
     }
@@ -130,6 +138,10 @@ impl Config {
     }
 
     /// Makes every path absolute, so that the configuration holds wherever it is written to.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`] with the reason.
     pub fn make_absolute(&mut self) -> std::io::Result<()> {
         let mut done = Ok(());
         self.each_path(|path| match std::path::absolute(&*path) {

@@ -34,6 +34,10 @@ pub struct Plan {
 }
 
 /// Decides, and completes `config` accordingly.
+///
+/// # Errors
+///
+/// [`Error`] with the reason.
 pub fn plan(config: &mut Config, assembled: &Assembled) -> Result<Plan, Error> {
     let system = &assembled.system;
     let mut reasons = Vec::new();
@@ -81,9 +85,7 @@ fn explain_tolerances(system: &System, stated: Option<f64>, reasons: &mut Vec<St
 fn check_step(wanted: &AlgorithmRequest) -> Result<(), Error> {
     match wanted.step {
         Some(step) if !(step > 0.0 && step.is_finite()) => {
-            return Err(Error::Invalid(format!(
-                "the communication step is {step} s, expected more than 0"
-            )));
+            Err(Error::Invalid(format!("the communication step is {step} s, expected more than 0")))
         }
         _ => Ok(()),
     }
@@ -227,6 +229,7 @@ fn complete(wanted: &mut AlgorithmRequest, algorithm: &Algorithm, system: &Syste
 
 impl Plan {
     /// What `--explain` prints.
+    #[must_use]
     pub fn explanation(&self, system: &System) -> String {
         let algorithm = &self.algorithm;
         let mut lines = vec![

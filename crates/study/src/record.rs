@@ -36,6 +36,10 @@ pub struct Recorder {
 
 impl Recorder {
     /// A recorder of `ports` into the file at `path`; none where nothing is to be recorded.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`] with the reason.
     pub fn create(
         path: &Path,
         simulation: &mut Simulation,
@@ -67,11 +71,16 @@ impl Recorder {
     }
 
     /// Which rows come next.
+    #[must_use]
     pub fn due(&self) -> &Due {
         &self.due
     }
 
     /// Records a row where one is due at the time of `simulation`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`] with the reason.
     #[inline]
     pub fn sample(&mut self, simulation: &mut Simulation) -> Result<(), Error> {
         let time = simulation.time();
@@ -79,6 +88,10 @@ impl Recorder {
     }
 
     /// Before a step: see [`SlowValues::before_step`].
+    ///
+    /// # Errors
+    ///
+    /// [`Error`] with the reason.
     #[inline]
     pub fn before_step(&mut self, simulation: &mut Simulation) -> Result<(), Error> {
         Ok(self.slow.before_step(simulation)?)
@@ -90,6 +103,10 @@ impl Recorder {
     }
 
     /// Goes on with the recording of a run that was resumed.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`] with the reason.
     pub fn restore(&mut self, simulation: &mut Simulation, state: &SlowState) -> Result<(), Error> {
         Ok(self.slow.restore(simulation, state)?)
     }
@@ -104,11 +121,19 @@ impl Recorder {
     }
 
     /// Hands all rows over; the file is whole.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`] with the reason.
     pub fn flush(&mut self) -> Result<(), Error> {
         Ok(lock(&self.recording).sink.as_mut().map_or(Ok(()), |sink| sink.flush())?)
     }
 
     /// Ends the file.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`] with the reason.
     pub fn finish(self) -> Result<(), Error> {
         let sink = lock(&self.recording).sink.take();
         Ok(sink.map_or(Ok(()), Sink::finish)?)
@@ -174,6 +199,7 @@ fn column(system: &System, port: Port) -> Column {
 }
 
 /// The unit of a variable, where it has one.
+#[must_use]
 pub fn unit(system: &System, port: Port) -> Option<String> {
     match &system.variable(port).kind {
         Kind::Real(real) => real.unit.clone(),
@@ -183,6 +209,10 @@ pub fn unit(system: &System, port: Port) -> Option<String> {
 
 /// The variables that `record` and `exclude` choose. Patterns are of inputs, outputs and locals; a
 /// name may be that of any variable.
+///
+/// # Errors
+///
+/// [`Error`] with the reason.
 pub fn select(system: &System, record: &[String], exclude: &[String]) -> Result<Vec<Port>, Error> {
     let shown = [Causality::Input, Causality::Output, Causality::Local];
     let mut ports: Vec<Port> =

@@ -27,6 +27,7 @@ pub struct Saved {
 
 impl Saved {
     /// A checkpoint of `checkpoint`, with the configuration `text` and what the recording knows.
+    #[must_use]
     pub fn new(
         text: &str,
         checkpoint: Checkpoint,
@@ -38,6 +39,10 @@ impl Saved {
     }
 
     /// Writes the file: whole or not at all.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`] with the reason.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
         let content =
             postcard::to_stdvec(self).map_err(|error| Error::Invalid(error.to_string()))?;
@@ -48,6 +53,10 @@ impl Saved {
     }
 
     /// Reads the file at `path`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`] with the reason.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let shown = path.display();
         let bytes = std::fs::read(path).map_err(Error::file("read", path))?;
@@ -69,27 +78,35 @@ impl Saved {
     }
 
     /// The configuration of the run, from the checkpoint at `path`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`] with the reason.
     pub fn config(&self, path: &Path) -> Result<Config, Error> {
         Ok(config::parse(&self.text, path)?)
     }
 
     /// When the next row is due, where rows are recorded as they were.
+    #[must_use]
     pub fn due(&self, every: Every) -> Option<&Due> {
         let (text, due) = self.due.as_ref()?;
         (*text == every.to_string()).then_some(due)
     }
 
     /// What the recording knows of FMUs that make several steps at once.
+    #[must_use]
     pub fn slow(&self) -> &SlowState {
         &self.slow
     }
 
     /// The simulation.
+    #[must_use]
     pub fn checkpoint(&self) -> &Checkpoint {
         &self.checkpoint
     }
 
     /// Time reached in s.
+    #[must_use]
     pub fn time(&self) -> f64 {
         self.checkpoint.time()
     }

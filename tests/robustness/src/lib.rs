@@ -4,7 +4,14 @@
 //! [`exporter`] drives a model through the C functions, [`system_files`] the readers of SSP and of tables of
 //! signals, [`system_toml`] the reader of `system.toml`. Each target panics where a claim does not hold.
 #![expect(missing_docs, reason = "parts of tests")]
-#![expect(clippy::unwrap_used, clippy::missing_panics_doc, reason = "tests")]
+#![expect(
+    clippy::float_cmp,
+    clippy::missing_errors_doc,
+    clippy::missing_panics_doc,
+    clippy::must_use_candidate,
+    clippy::unwrap_used,
+    reason = "parts of tests; values that are set and read back"
+)]
 
 pub mod array;
 pub mod calls;

@@ -12,6 +12,11 @@ pub struct Guid(pub [u8; 16]);
 
 impl Guid {
     /// The hash of everything in `description` but its `guid`.
+    ///
+    /// # Panics
+    ///
+    /// Never: plain data can always be serialised.
+    #[must_use]
     pub fn of(description: &ModelDescription) -> Self {
         let form = postcard::to_stdvec(description).expect("plain data has a serialized form");
         let hash = Sha256::digest(form);

@@ -11,6 +11,10 @@ use slave::{CallError, Failure, absent};
 
 impl Component {
     /// `fmi2GetFMUstate` into a slot.
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`]: the function is missing, or the FMU returns neither `fmi2OK` nor `fmi2Warning`.
     pub fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
         const NAME: &str = "fmi2GetFMUstate";
         let function = function!(self.get_state, NAME);
@@ -23,6 +27,10 @@ impl Component {
     }
 
     /// `fmi2SetFMUstate` from a slot.
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`]: the function is missing, or the FMU returns neither `fmi2OK` nor `fmi2Warning`.
     pub fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
         const NAME: &str = "fmi2SetFMUstate";
         let state = self.saved.get(slot).copied().unwrap_or(null_mut());
@@ -53,6 +61,10 @@ impl Component {
     }
 
     /// `fmi2SerializeFMUstate` of the state of now.
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`]: the function is missing, or the FMU returns neither `fmi2OK` nor `fmi2Warning`.
     pub fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
         const NAME: &str = "fmi2GetFMUstate";
         let function = function!(self.get_state, NAME);
@@ -82,6 +94,10 @@ impl Component {
     }
 
     /// `fmi2DeSerializeFMUstate`, and on to that state.
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`]: the function is missing, or the FMU returns neither `fmi2OK` nor `fmi2Warning`.
     pub fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
         const NAME: &str = "fmi2DeSerializeFMUstate";
         let mut state = null_mut();

@@ -18,6 +18,10 @@ const PAUSE: Duration = Duration::from_millis(1);
 
 impl Component {
     /// `fmi2DoStep` from `time` over `size`.
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`]: the function is missing, or the FMU returns neither `fmi2OK` nor `fmi2Warning`.
     #[inline]
     pub fn do_step(
         &mut self,
@@ -39,6 +43,10 @@ impl Component {
     /// [`slave::Slave::pass`]: the three calls of C one after the other, their statuses
     /// looked at without a detour. An answer out of the ordinary is left to the methods of its
     /// own.
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`]: the function is missing, or the FMU returns neither `fmi2OK` nor `fmi2Warning`.
     #[inline]
     pub fn pass(
         &mut self,

@@ -29,6 +29,7 @@ pub struct Wire {
 
 impl Wire {
     /// One of the command line.
+    #[must_use]
     pub fn new(from: String, to: String) -> Spanned<Self> {
         let text = |text| Spanned::new(0..0, text);
         Spanned::new(0..0, Self { from: text(from), to: text(to), factor: None, offset: None })

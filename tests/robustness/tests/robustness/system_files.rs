@@ -1,5 +1,4 @@
 //! No file that the master reads does any harm, whatever is in it.
-#![expect(clippy::unwrap_used, reason = "tests")]
 
 use robustness::changes::mutate;
 use robustness::corpus::replay;
