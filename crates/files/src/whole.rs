@@ -14,7 +14,7 @@ impl Pending {
     ///
     /// # Errors
     ///
-    /// [`PlaceError`] that points at the entry, where it is missing or not what is expected.
+    /// The file, or the folder around it, cannot be written.
     pub fn new(path: &Path, bytes: &[u8]) -> io::Result<Self> {
         let mut name = path.as_os_str().to_owned();
         name.push(format!(".{}.partial", process::id()));
@@ -28,7 +28,7 @@ impl Pending {
     ///
     /// # Errors
     ///
-    /// [`PlaceError`] that points at the entry, where it is missing or not what is expected.
+    /// The file, or the folder around it, cannot be written.
     pub fn commit(self) -> io::Result<()> {
         fs::rename(&self.partial, &self.path)
     }
@@ -46,7 +46,7 @@ impl Drop for Pending {
 ///
 /// # Errors
 ///
-/// [`PlaceError`] that points at the entry, where it is missing or not what is expected.
+/// The file, or the folder around it, cannot be written.
 pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     Pending::new(path, bytes)?.commit()
 }

@@ -6,7 +6,7 @@
 //!   returns a [`Warning`] for each defect; [`ModelDescription::problems`] lists the rules of the
 //!   standard that a description breaks; [`ModelDescription::to_xml`] writes one.
 //! * `package` (feature `package`) unpacks and writes `.fmu` archives.
-//! * [`unit`] derives base units from names, [`location`] converts paths to `fmuResourceLocation` and
+//! * [`unit`](mod@unit) derives base units from names, [`location`] converts paths to `fmuResourceLocation` and
 //!   back, [`documentation`] writes the documentation page of a model.
 //!
 //! To run an FMU use `fmu-import`; to write a model use `fmu`.

@@ -65,7 +65,7 @@ pub struct Linearise {
 
 /// The matrices of `fmu` about the operating point of `request`.
 ///
-/// The ways are those of the [crate](crate): the first that the FMU offers is taken, and
+/// The ways are those of this [`crate`]: the first that the FMU offers is taken, and
 /// [`Linearisation::method`] says which.
 ///
 /// * Directional derivatives: exact as far as the FMU's are. One call per state and input.

@@ -232,7 +232,7 @@ pub trait Background {
 ///
 /// # Errors
 ///
-/// With the reason.
+/// As [`Slave::advance`].
 pub fn finish(slave: &mut dyn Slave, step: &mut Advance<'_>) -> Result<StepResult, CallError> {
     match slave.in_background() {
         Some(slave) => slave.finish_advance(step),
