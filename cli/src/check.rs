@@ -7,7 +7,7 @@ pub(crate) mod binaries;
 mod description;
 mod finding;
 mod fold;
-mod heard;
+mod messages;
 #[cfg(test)]
 mod tests;
 mod values;
@@ -23,7 +23,7 @@ use fmu_import::isolate::{self, IsolateError, Isolated, Package};
 use fmu_import::{Fmu, Instance};
 use serde::Serialize;
 
-use answer::{Answer, Here};
+use answer::{Answer, TrialResult};
 use finding::Finding;
 
 pub(crate) use finding::Severity;
@@ -87,7 +87,7 @@ pub(crate) fn check(options: &Options) -> anyhow::Result<bool> {
 }
 
 /// What came of the trial, and all findings: errors first, of these the ones that stop a tool.
-fn findings(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(Here, Vec<Finding>)> {
+fn findings(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResult, Vec<Finding>)> {
     let description = &unpacked.description;
     let mut findings = archive::check(&options.fmu, unpacked.entries(), description)?;
     findings.extend(description::check(description, &unpacked.warnings));
@@ -98,7 +98,7 @@ fn findings(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(Here, Vec
     } else {
         let (mut here, mut found) = run(options, unpacked)?;
         let folder = format!("{}/", unpacked.folder().display());
-        if let Here::No { reason } = &mut here {
+        if let TrialResult::No { reason } = &mut here {
             *reason = reason.replace(&folder, "");
         }
         for finding in &mut found {
@@ -112,24 +112,24 @@ fn findings(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(Here, Vec
 }
 
 /// The answer where the FMU is not tried.
-fn without_trial(options: &Options, unpacked: &Unpacked) -> Option<Here> {
+fn without_trial(options: &Options, unpacked: &Unpacked) -> Option<TrialResult> {
     if options.no_run {
-        return Some(Here::NotTried { reason: "--no-run".to_owned() });
+        return Some(TrialResult::NotTried { reason: "--no-run".to_owned() });
     }
     let Some(simulation) = &unpacked.description.co_simulation else {
-        return Some(Here::No { reason: "it is for model exchange only".to_owned() });
+        return Some(TrialResult::No { reason: "it is for model exchange only".to_owned() });
     };
     if simulation.needs_execution_tool {
         let tool = unpacked.description.generation_tool.as_deref().unwrap_or("the exporting tool");
         let reason = format!("it needs {tool} beside it (needsExecutionTool)");
-        return Some(Here::NotTried { reason });
+        return Some(TrialResult::NotTried { reason });
     }
     let refused = unpacked.library(&simulation.model_identifier).err()?;
-    Some(Here::No { reason: refused.to_string() })
+    Some(TrialResult::No { reason: refused.to_string() })
 }
 
 /// Tries the FMU: on Linux in processes of its own, which may crash or hang.
-fn run(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(Here, Vec<Finding>)> {
+fn run(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResult, Vec<Finding>)> {
     let seconds = options.time_limit;
     let limit = Duration::try_from_secs_f64(seconds).ok().filter(|limit| !limit.is_zero());
     let limit = limit.with_context(|| {
@@ -162,7 +162,7 @@ fn isolated(
     options: &Options,
     unpacked: &Unpacked,
     limit: Duration,
-) -> anyhow::Result<(Here, Vec<Finding>)> {
+) -> anyhow::Result<(TrialResult, Vec<Finding>)> {
     let package = Package::open(unpacked.folder())?;
     let preload = options.preload.clone();
     let options = isolate::Options { time_limit: Some(limit), preload, ..Default::default() };

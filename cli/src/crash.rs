@@ -8,7 +8,7 @@ use crate::run;
 
 /// Exit status of a run that is lost, and of one that has not begun.
 const LOST: u8 = 1;
-const NOT_BEGUN: u8 = 2;
+const NOT_STARTED: u8 = 2;
 const ADVICE: &str = "with --isolate each FMU has a process of its own, and what it does to it is an \
                       error of the run";
 
@@ -40,9 +40,9 @@ fn end(ending: &Ending) -> u8 {
     remove_temporary_folders();
     if interrupted {
         run::INTERRUPTED
-    } else if run::has_begun() {
+    } else if run::has_started() {
         LOST
     } else {
-        NOT_BEGUN
+        NOT_STARTED
     }
 }

@@ -16,7 +16,7 @@ use tracing_subscriber::registry::LookupSpan;
 const FMU: &str = "fmu";
 
 /// From now on messages are written: warnings, with `verbose` 1 information, with 2 everything.
-pub(crate) fn begin(verbose: u8, json: bool) {
+pub(crate) fn start(verbose: u8, json: bool) {
     let level = match verbose {
         0 => LevelFilter::WARN,
         1 => LevelFilter::INFO,

@@ -32,11 +32,11 @@ use clap::{Parser, Subcommand};
 #[command(version)]
 struct Arguments {
     #[command(subcommand)]
-    verb: Verb,
+    verb: Command,
 }
 
 #[derive(Subcommand)]
-enum Verb {
+enum Command {
     /// Build and pack both FMUs, run the paper's experiment, compare with its claims
     Reproduce(reproduce::Options),
     /// Build crates that use fmi2, or those of this workspace, and pack them into FMUs
@@ -56,8 +56,8 @@ fn main() -> ExitCode {
         return status;
     }
     let verb = Arguments::parse().verb;
-    if !matches!(verb, Verb::Run(_)) {
-        logging::begin(0, false);
+    if !matches!(verb, Command::Run(_)) {
+        logging::start(0, false);
     }
     crash::watch();
     let status = perform(verb);
@@ -65,14 +65,14 @@ fn main() -> ExitCode {
     status
 }
 
-fn perform(verb: Verb) -> ExitCode {
+fn perform(verb: Command) -> ExitCode {
     let done = match verb {
-        Verb::Reproduce(options) => reproduce::reproduce(&options),
-        Verb::Pack(options) => pack::pack(&options),
-        Verb::New(options) => new::new(&options),
-        Verb::Run(options) => return run::run(&options),
-        Verb::Design(options) => design::design(&options),
-        Verb::Check(options) => check::check(&options),
+        Command::Reproduce(options) => reproduce::reproduce(&options),
+        Command::Pack(options) => pack::pack(&options),
+        Command::New(options) => new::new(&options),
+        Command::Run(options) => return run::run(&options),
+        Command::Design(options) => design::design(&options),
+        Command::Check(options) => check::check(&options),
     };
     match done {
         Ok(true) => ExitCode::SUCCESS,

@@ -60,7 +60,7 @@ pub(crate) fn pack(options: &Options) -> anyhow::Result<bool> {
              `cargo run --release --features sbom -- pack --sbom` builds one that writes them"
         );
     }
-    let packing = Packing {
+    let packing = PackOptions {
         out: &options.out,
         binaries: options.binaries.as_deref(),
         sbom: options.sbom,
@@ -92,7 +92,7 @@ pub(crate) fn pack(options: &Options) -> anyhow::Result<bool> {
 }
 
 /// How to pack.
-struct Packing<'a> {
+struct PackOptions<'a> {
     /// Folder for the FMUs.
     out: &'a Path,
     /// Folder with libraries of all platforms.
@@ -104,18 +104,18 @@ struct Packing<'a> {
 }
 
 /// An FMU as packed.
-pub(crate) struct Packed {
+pub(crate) struct PackedFmu {
     pub(crate) path: PathBuf,
     xml: String,
     description: ModelDescription,
 }
 
 /// Builds all models of the workspace `root` and packs each into the folder `out`.
-pub(crate) fn pack_into(root: &Path, out: &Path) -> anyhow::Result<Vec<Packed>> {
-    pack_models(root, &Packing { out, binaries: None, sbom: false, locked: true })
+pub(crate) fn pack_into(root: &Path, out: &Path) -> anyhow::Result<Vec<PackedFmu>> {
+    pack_models(root, &PackOptions { out, binaries: None, sbom: false, locked: true })
 }
 
-fn pack_models(root: &Path, packing: &Packing<'_>) -> anyhow::Result<Vec<Packed>> {
+fn pack_models(root: &Path, packing: &PackOptions<'_>) -> anyhow::Result<Vec<PackedFmu>> {
     MODELS.iter().map(|model| pack_crate(&root.join(model), packing)).collect()
 }
 
@@ -135,7 +135,7 @@ pub(crate) fn workspace() -> anyhow::Result<PathBuf> {
         })
 }
 
-fn pack_crate(folder: &Path, packing: &Packing<'_>) -> anyhow::Result<Packed> {
+fn pack_crate(folder: &Path, packing: &PackOptions<'_>) -> anyhow::Result<PackedFmu> {
     let others = packing.binaries.map_or(Ok(Vec::new()), binaries::targets)?;
     let library = library::build(folder, packing.locked, &others)?;
     let resources = folder.join("resources");
@@ -163,7 +163,7 @@ fn pack_crate(folder: &Path, packing: &Packing<'_>) -> anyhow::Result<Packed> {
         files::whole::write(&target, &bill)
             .with_context(|| format!("cannot write {}", target.display()))?;
     }
-    Ok(Packed { path, xml, description })
+    Ok(PackedFmu { path, xml, description })
 }
 
 /// Where the library that was built here goes in the FMU, and its bytes.

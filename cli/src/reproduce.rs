@@ -9,11 +9,11 @@ use results::Table;
 use toml::Spanned;
 
 use crate::claims::{Claim, Measurement, WATCHED, table};
-use study::{Config, Ended, Every, Loaded, Making, Prepared};
+use study::{AssemblyOptions, Config, Every, LoadedConfig, PreparedRun, RunEnd};
 
 use crate::run::{AlgorithmOptions, advance, setting};
 use crate::scenario::Scenario;
-use crate::summary::{Certified, Summary};
+use crate::summary::{ControllerCertificate, Summary};
 use crate::{pack, paper_figures, summary};
 
 /// The signals, in the folder of the results.
@@ -55,19 +55,19 @@ pub(crate) fn reproduce(options: &Options) -> anyhow::Result<bool> {
     let settings = settings(options);
     std::fs::create_dir_all(&options.out)
         .with_context(|| format!("cannot make the folder {}", options.out.display()))?;
-    let prepared = Prepared::new(experiment(options, &settings), &Making::default())?;
+    let prepared = PreparedRun::new(experiment(options, &settings), &AssemblyOptions::default())?;
     let mut watch = Watch::new(&prepared.system)?;
     let mut run = prepared.start(None)?;
     let ended = advance(&mut run, |simulation| watch.add(simulation));
     run.finish()?;
     let lost = match ended {
-        Ended::Lost(error) => Some(error.sentence()),
-        Ended::ByFmu(name) => Some(format!("{name} asked for the end of the simulation")),
-        Ended::AtStop | Ended::Interrupted => None,
+        RunEnd::Failed(error) => Some(error.sentence()),
+        RunEnd::ByFmu(name) => Some(format!("{name} asked for the end of the simulation")),
+        RunEnd::AtStop | RunEnd::Interrupted => None,
     };
     let reached = run.simulation.time();
     let claims = watch.claims(reached, lost.is_some());
-    let certified = Certified::of(run.simulation.system(), watch.fault_bound())?;
+    let certified = ControllerCertificate::of(run.simulation.system(), watch.fault_bound())?;
     let written = Summary {
         scenario: options.scenario.name(),
         method: run.plan.algorithm.sweep.name(),
@@ -90,7 +90,7 @@ pub(crate) fn reproduce(options: &Options) -> anyhow::Result<bool> {
 }
 
 /// Plant and controller with these settings, recorded and stepped as the options say.
-fn experiment(options: &Options, settings: &[(String, String)]) -> Loaded {
+fn experiment(options: &Options, settings: &[(String, String)]) -> LoadedConfig {
     let mut config = Config::default();
     for (name, file) in [("plant", "FrictionPendulum.fmu"), ("controller", "AsoController.fmu")] {
         config.fmus.put(name.to_owned(), options.dist.join(file));
@@ -103,7 +103,7 @@ fn experiment(options: &Options, settings: &[(String, String)]) -> Loaded {
     config.experiment.stop_time = Some(Spanned::new(0..0, options.stop_time));
     config.results.file = Some(options.out.join(RESULTS));
     config.results.every = Some(options.record_every);
-    Loaded { config, source: None }
+    LoadedConfig { config, source: None }
 }
 
 /// Those of the scenario, then those of the command line.

@@ -13,11 +13,11 @@ use anyhow::{Context, bail};
 use fmu_import::CallLog;
 use master::{Coupling, Port, Simulation, System, SystemError, by_direct_dependencies};
 use results::Selection;
-use study::{Config, Ended, Every, Making, Plan, Prepared, Run, Tally};
+use study::{AssemblyOptions, Config, Every, Plan, PreparedRun, Run, RunEnd, RunStatistics};
 
 use crate::logging;
 use crate::plot;
-pub(crate) use interrupt::{STATUS as INTERRUPTED, has_begun};
+pub(crate) use interrupt::{STATUS as INTERRUPTED, has_started};
 pub(crate) use options::{AlgorithmOptions, Options, setting};
 use progress::Progress;
 
@@ -27,7 +27,7 @@ const LISTED: usize = 20;
 /// Couples FMUs and writes what comes out. Exit status: 0 the run came to its end, 1 it was lost on
 /// its way, 2 it did not begin, 130 it was interrupted.
 pub(crate) fn run(options: &Options) -> ExitCode {
-    logging::begin(options.verbose, options.log_json);
+    logging::start(options.verbose, options.log_json);
     if let Err(error) = interrupt::listen() {
         tracing::warn!("{}", logging::sentence(&error));
     }
@@ -56,18 +56,18 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Started>> {
     // An FMU may change the current folder.
     let here = std::env::current_dir().context("the current folder")?;
     let log_calls = options.log_calls.as_deref().map(open_call_log).transpose()?;
-    let making = Making {
+    let making = AssemblyOptions {
         logging: options.verbose > 0,
         by_unit: options.names_fmus_by_file(),
         log_calls: log_calls.as_ref(),
     };
     let by_name = loaded.config.connections.is_none() && loaded.config.system.is_none();
-    let prepared = Prepared::new(loaded, &making)?;
+    let prepared = PreparedRun::new(loaded, &making)?;
     if options.print_config {
         print!("{}", prepared.config.render()?);
         return Ok(None);
     }
-    let Prepared { config, system, plan, ports, .. } = &prepared;
+    let PreparedRun { config, system, plan, ports, .. } = &prepared;
     check_plot(config, system, ports)?;
     describe(options, system, plan, by_name);
     let units = units(system, ports);
@@ -97,8 +97,8 @@ fn open_call_log(path: &Path) -> anyhow::Result<CallLog> {
 pub(crate) fn advance(
     run: &mut Run,
     mut watch: impl FnMut(&mut Simulation) -> Result<(), SystemError>,
-) -> Ended {
-    interrupt::begin();
+) -> RunEnd {
+    interrupt::start();
     let mut progress = Progress::new(run.simulation.time(), run.plan.stop);
     let ended = run.advance(|simulation| {
         watch(simulation)?;
@@ -159,10 +159,10 @@ fn warn_of_loop(plan: &Plan, system: &System) {
 }
 
 /// How far a run came, in how many steps and how fast.
-fn summary(tally: Tally, begin: f64, time: f64) -> String {
-    let Tally { steps, seconds } = tally;
+fn summary(tally: RunStatistics, start: f64, time: f64) -> String {
+    let RunStatistics { steps, seconds } = tally;
     let steps = if steps == 1 { "1 step".to_owned() } else { format!("{steps} steps") };
-    let factor = (time - begin) / seconds.max(f64::MIN_POSITIVE);
+    let factor = (time - start) / seconds.max(f64::MIN_POSITIVE);
     format!(
         "t = {time} s reached in {steps} and {seconds:.3} s of wall-clock time, {factor:.3} times \
          real time"
@@ -176,16 +176,16 @@ fn units(system: &System, ports: &[Port]) -> Vec<(String, String)> {
 
 impl Started {
     fn go(mut self) -> ExitCode {
-        let begin = self.run.simulation.time();
+        let start = self.run.simulation.time();
         let ended = advance(&mut self.run, |_| Ok(()));
         let tally = self.run.tally();
         let time = self.run.simulation.time();
-        println!("{}", summary(tally, begin, time));
+        println!("{}", summary(tally, start, time));
         self.warn_of_fallbacks(tally);
         let written = self.write(&ended);
         let status = match &ended {
-            Ended::AtStop => 0,
-            Ended::ByFmu(name) => {
+            RunEnd::AtStop => 0,
+            RunEnd::ByFmu(name) => {
                 let asked = self.run.simulation.ended_at().unwrap_or(time);
                 let ending = apart(asked, time);
                 tracing::warn!(
@@ -193,13 +193,13 @@ impl Started {
                 );
                 0
             }
-            Ended::Interrupted => {
+            RunEnd::Interrupted => {
                 let more = self.run.checkpoint_file().map(|path| resume_hint(path, &self.here));
                 let more = more.unwrap_or_default();
                 tracing::error!("the run was interrupted at t = {time} s{more}");
                 interrupt::STATUS
             }
-            Ended::Lost(error) => {
+            RunEnd::Failed(error) => {
                 let error = error.sentence();
                 tracing::error!("the run ended early, after t = {time} s: {error}");
                 1
@@ -212,7 +212,7 @@ impl Started {
         ExitCode::from(status)
     }
 
-    fn warn_of_fallbacks(&self, tally: Tally) {
+    fn warn_of_fallbacks(&self, tally: RunStatistics) {
         let Some(fallbacks) = self.run.simulation.fallbacks().filter(|known| known.count > 0)
         else {
             return;
@@ -228,7 +228,7 @@ impl Started {
     }
 
     /// Ends the results, draws them, and says what was written.
-    fn write(&mut self, ended: &Ended) -> anyhow::Result<()> {
+    fn write(&mut self, ended: &RunEnd) -> anyhow::Result<()> {
         let written = |path: &Path| {
             println!("{}", path.strip_prefix(&self.here).unwrap_or(path).display());
         };
@@ -246,7 +246,9 @@ impl Started {
                 written(&picture);
             }
         }
-        if let (Some(file), false) = (self.run.checkpoint_file(), matches!(ended, Ended::Lost(_))) {
+        if let (Some(file), false) =
+            (self.run.checkpoint_file(), matches!(ended, RunEnd::Failed(_)))
+        {
             written(file);
         }
         Ok(())

@@ -33,12 +33,12 @@ pub(crate) struct Summary<'a> {
     pub(crate) fell: Option<f64>,
     pub(crate) settings: Vec<String>,
     pub(crate) claims: &'a [Claim],
-    pub(crate) design: &'a Certified,
+    pub(crate) design: &'a ControllerCertificate,
 }
 
 /// The controller and what theorem 1 says about it.
 #[derive(Serialize)]
-pub(crate) struct Certified {
+pub(crate) struct ControllerCertificate {
     #[serde(rename = "K_x")]
     k_x: Rows,
     #[serde(rename = "K_f")]
@@ -85,7 +85,7 @@ fn rows(matrix: &DMatrix<f64>) -> Rows {
     matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
 }
 
-impl Certified {
+impl ControllerCertificate {
     /// Certifies the controller in `system`, its matrices read through its parameters; `beta` is
     /// the bound of the fault in N.
     pub(crate) fn of(system: &mut System, beta: f64) -> anyhow::Result<Self> {

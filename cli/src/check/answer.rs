@@ -10,7 +10,7 @@ use super::finding::{Finding, Tool};
 /// What came of a trial in this master.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "runs", rename_all = "kebab-case")]
-pub(super) enum Here {
+pub(super) enum TrialResult {
     /// It was initialised and stepped with its own start values.
     Yes {
         steps: u32,
@@ -29,10 +29,10 @@ pub(super) enum Here {
     NotTried { reason: String },
 }
 
-impl fmt::Display for Here {
+impl fmt::Display for TrialResult {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Here::Yes { steps, step, start, tolerance, but } => {
+            TrialResult::Yes { steps, step, start, tolerance, but } => {
                 write!(formatter, "yes, {steps} steps of {step} s from t = {start} s")?;
                 match tolerance {
                     Some(tolerance) => write!(formatter, " with tolerance {tolerance:e}")?,
@@ -41,15 +41,15 @@ impl fmt::Display for Here {
                 formatter.write_str(" and its own start values")?;
                 but.as_ref().map_or(Ok(()), |but| write!(formatter, "; {but}"))
             }
-            Here::No { reason } => write!(formatter, "no: {reason}"),
-            Here::NotTried { reason } => write!(formatter, "not tried: {reason}"),
+            TrialResult::No { reason } => write!(formatter, "no: {reason}"),
+            TrialResult::NotTried { reason } => write!(formatter, "not tried: {reason}"),
         }
     }
 }
 
 /// A tool in which the FMU does not run.
 #[derive(Debug, Serialize)]
-pub(super) struct Elsewhere {
+pub(super) struct ToolRefusal {
     tool: Tool,
     /// The first finding that stops it.
     reason: String,
@@ -57,7 +57,7 @@ pub(super) struct Elsewhere {
     more: usize,
 }
 
-impl fmt::Display for Elsewhere {
+impl fmt::Display for ToolRefusal {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(formatter, "{}: {}", self.tool, self.reason)?;
         match self.more {
@@ -71,19 +71,19 @@ impl fmt::Display for Elsewhere {
 /// The answer.
 #[derive(Debug, Serialize)]
 pub(super) struct Answer {
-    pub(super) here: Here,
-    pub(super) not_in: Vec<Elsewhere>,
+    pub(super) here: TrialResult,
+    pub(super) not_in: Vec<ToolRefusal>,
 }
 
 impl Answer {
     /// By what was tried and found.
-    pub(super) fn new(here: Here, findings: &[Finding]) -> Self {
-        let mut tools: BTreeMap<Tool, Elsewhere> = BTreeMap::new();
+    pub(super) fn new(here: TrialResult, findings: &[Finding]) -> Self {
+        let mut tools: BTreeMap<Tool, ToolRefusal> = BTreeMap::new();
         for finding in findings {
             for &tool in &finding.stops {
                 let reason = || format!("{}: {}", finding.place, finding.what);
                 let known = tools.entry(tool).and_modify(|own| own.more += 1);
-                known.or_insert_with(|| Elsewhere { tool, reason: reason(), more: 0 });
+                known.or_insert_with(|| ToolRefusal { tool, reason: reason(), more: 0 });
             }
         }
         Self { here, not_in: tools.into_values().collect() }
@@ -96,7 +96,7 @@ impl fmt::Display for Answer {
         for elsewhere in &self.not_in {
             writeln!(formatter, "does not run in {elsewhere}")?;
         }
-        let alone = self.not_in.is_empty() && !matches!(self.here, Here::No { .. });
+        let alone = self.not_in.is_empty() && !matches!(self.here, TrialResult::No { .. });
         let other = if alone { "no" } else { "no other" };
         write!(formatter, "{other} tool is known to refuse it")
     }

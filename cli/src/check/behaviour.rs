@@ -6,10 +6,10 @@ use fmu_description::Experiment;
 use fmu_description::ModelDescription;
 use master::{CallError, Failure, Slave, StepResult};
 
-use super::answer::Here;
+use super::answer::TrialResult;
 use super::finding::Severity::{Error, Note, Warning};
 use super::finding::{Finding, Findings, Part, Tool};
-use super::heard::Heard;
+use super::messages::MessageRecorder;
 use super::values::{Value, distance, get, kept, outputs, start, unknown_reference};
 
 /// Steps of a trial.
@@ -24,19 +24,19 @@ const FLOOD: u64 = 10_000;
 
 /// Makes an instance of the name given; in place of another one, in the same process, where there is
 /// one.
-pub(super) type Make<'a, S> = dyn FnMut(&str, Option<S>) -> anyhow::Result<S> + 'a;
+pub(super) type MakeInstance<'a, S> = dyn FnMut(&str, Option<S>) -> anyhow::Result<S> + 'a;
 
 /// The outputs at each communication point of a trial, the start with them.
-type Course = Vec<Vec<Value>>;
+type Trajectory = Vec<Vec<Value>>;
 
 /// Tries the FMU of `description`, of which `make` gives instances: whether it runs, and what is found.
 pub(super) fn check<S: Slave>(
     description: &ModelDescription,
-    make: &mut Make<'_, S>,
-) -> (Here, Vec<Finding>) {
-    let here = Here::No { reason: String::new() };
+    make: &mut MakeInstance<'_, S>,
+) -> (TrialResult, Vec<Finding>) {
+    let here = TrialResult::No { reason: String::new() };
     let mut trial = Trial { description, make, here, findings: Findings::about(Part::Behaviour) };
-    let ((), told) = Heard::during(|| trial.run());
+    let ((), told) = MessageRecorder::during(|| trial.run());
     trial.categories(&told.categories);
     if told.messages > FLOOD {
         let what = format!("sends {} messages in this trial, with logging off", told.messages);
@@ -48,9 +48,9 @@ pub(super) fn check<S: Slave>(
 
 struct Trial<'a, S> {
     description: &'a ModelDescription,
-    make: &'a mut Make<'a, S>,
+    make: &'a mut MakeInstance<'a, S>,
     /// What came of the first instance.
-    here: Here,
+    here: TrialResult,
     findings: Findings,
 }
 
@@ -74,9 +74,11 @@ fn harm(failure: &Failure) -> Option<&'static str> {
 
 impl<S: Slave> Trial<'_, S> {
     fn run(&mut self) {
-        let Some((first, slave)) = self.course("first", None) else { return self.stopped() };
-        self.ran(&first);
-        if let Some((second, mut slave)) = self.course("second", Some(slave)) {
+        let Some((first, slave)) = self.trajectory("first", None) else {
+            return self.record_failure();
+        };
+        self.record_success(&first);
+        if let Some((second, mut slave)) = self.trajectory("second", Some(slave)) {
             if second != first {
                 self.differ(&first, &second);
             }
@@ -85,15 +87,15 @@ impl<S: Slave> Trial<'_, S> {
             }
         }
         self.unknown_reference();
-        self.past_the_end();
+        self.step_past_stop_time();
         self.states();
     }
 
     /// The first instance made its steps.
-    fn ran(&mut self, course: &Course) {
-        let steps = u32::try_from(course.len().saturating_sub(1)).unwrap_or(u32::MAX);
+    fn record_success(&mut self, trajectory: &Trajectory) {
+        let steps = u32::try_from(trajectory.len().saturating_sub(1)).unwrap_or(u32::MAX);
         let in_part = self.findings.all.iter().rfind(|own| own.severity == Note);
-        self.here = Here::Yes {
+        self.here = TrialResult::Yes {
             steps,
             step: self.step_size(),
             start: self.start_time(),
@@ -103,16 +105,16 @@ impl<S: Slave> Trial<'_, S> {
     }
 
     /// The first instance failed: the last error says why.
-    fn stopped(&mut self) {
+    fn record_failure(&mut self) {
         let mut errors = self.findings.all.iter_mut().filter(|own| own.severity == Error);
         let Some(error) = errors.next_back() else { return };
-        self.here = Here::No { reason: format!("{}: {}", error.place, error.what) };
+        self.here = TrialResult::No { reason: format!("{}: {}", error.place, error.what) };
         if error.why.as_ref().is_some_and(|why| why.starts_with(ENDS_IT)) {
             error.stops.push(Tool::InProcess);
         }
     }
 
-    fn differ(&mut self, first: &Course, second: &Course) {
+    fn differ(&mut self, first: &Trajectory, second: &Trajectory) {
         let point = first.iter().zip(second).position(|(one, other)| one != other);
         let what = format!("a second instance has other outputs, from step {}", point.unwrap_or(0));
         let why = "A run cannot be repeated: statics, uninitialised memory or the clock are used.";
@@ -192,18 +194,18 @@ impl<S: Slave> Trial<'_, S> {
     }
 
     /// Runs an instance of that name from begin to end: outputs and instance.
-    fn course(&mut self, name: &str, before: Option<S>) -> Option<(Course, S)> {
+    fn trajectory(&mut self, name: &str, before: Option<S>) -> Option<(Trajectory, S)> {
         let mut slave = self.initialized(name, None, before)?;
         if name == "first" {
             self.start_values(&mut slave)?;
         }
-        let course = self.steps(&mut slave, 0)?;
+        let trajectory = self.steps(&mut slave, 0)?;
         if name == "first" {
-            self.numbers(&course);
+            self.numbers(&trajectory);
         }
         if let Err(error) = slave.terminate() {
             self.failed(&error, "after the last step", "4.2.4");
-            return (!gone(&error)).then_some((course, slave));
+            return (!gone(&error)).then_some((trajectory, slave));
         }
         match outputs(self.description).next().map(|output| get(&mut slave, output)) {
             Some(Err(error)) if gone(&error) => {
@@ -217,15 +219,15 @@ impl<S: Slave> Trial<'_, S> {
             }
             _ => {}
         }
-        Some((course, slave))
+        Some((trajectory, slave))
     }
 
     /// The outputs now and after each of the steps from communication point `from` on.
-    fn steps(&mut self, slave: &mut S, from: u32) -> Option<Course> {
-        let mut course = vec![self.read(slave)?];
+    fn steps(&mut self, slave: &mut S, from: u32) -> Option<Trajectory> {
+        let mut trajectory = vec![self.read(slave)?];
         for k in from..from + STEPS {
             match slave.do_step(self.time(k), self.step_size(), true) {
-                Ok(StepResult::Whole) => course.push(self.read(slave)?),
+                Ok(StepResult::Whole) => trajectory.push(self.read(slave)?),
                 Ok(StepResult::Part { reached, .. }) => {
                     let what =
                         format!("a step of {} s is done to {reached} s only", self.step_size());
@@ -239,7 +241,7 @@ impl<S: Slave> Trial<'_, S> {
                 }
             }
         }
-        Some(course)
+        Some(trajectory)
     }
 
     fn read(&mut self, slave: &mut S) -> Option<Vec<Value>> {
@@ -271,10 +273,11 @@ impl<S: Slave> Trial<'_, S> {
         Some(())
     }
 
-    fn numbers(&mut self, course: &Course) {
+    fn numbers(&mut self, trajectory: &Trajectory) {
         for (index, variable) in outputs(self.description).take(LOOKED_AT).enumerate() {
-            let step =
-                course.iter().position(|row| row.get(index).is_some_and(|own| !own.is_finite()));
+            let step = trajectory
+                .iter()
+                .position(|row| row.get(index).is_some_and(|own| !own.is_finite()));
             if let Some(step) = step {
                 let place = format!("variable {}", variable.name);
                 let what = format!("is no finite number after {step} steps");
@@ -310,7 +313,7 @@ impl<S: Slave> Trial<'_, S> {
     }
 
     /// A step beyond a stop time that was defined is an error.
-    fn past_the_end(&mut self) {
+    fn step_past_stop_time(&mut self) {
         let (start, size) = (self.start_time(), self.step_size());
         let Some(mut slave) = self.initialized("end", Some(start + 0.5 * size), None) else {
             return;
@@ -336,7 +339,7 @@ impl<S: Slave> Trial<'_, S> {
         }
         let serialize = flags.can_serialize_fmu_state;
         let Some(mut slave) = self.initialized("states", None, None) else { return };
-        if self.steps(&mut slave, 0).is_none_or(|course| course.len() <= STEPS as usize) {
+        if self.steps(&mut slave, 0).is_none_or(|trajectory| trajectory.len() <= STEPS as usize) {
             return;
         }
         if let Err(error) = slave.save_state(0) {
@@ -362,7 +365,7 @@ impl<S: Slave> Trial<'_, S> {
     }
 
     /// Whether the steps could be made again.
-    fn again(&mut self, slave: &mut S, first: &Course, function: &str) -> bool {
+    fn again(&mut self, slave: &mut S, first: &Trajectory, function: &str) -> bool {
         let second = self.steps(slave, STEPS);
         let apart = second.as_ref().map_or(0.0, |second| distance(first, second));
         if apart > 0.0 {

@@ -124,7 +124,7 @@ fn stops(finding: &Finding, platform: &Platform, interfaces: &[InterfaceType]) -
     };
     let simulation = [InterfaceType::CoSimulation];
     let called = if interfaces.contains(&simulation[0]) { &simulation[..] } else { interfaces };
-    let called: BTreeSet<_> = wanted(called).collect();
+    let called: BTreeSet<_> = required_functions(called).collect();
     let lacking: Vec<_> = lacking.split(", ").filter(|own| called.contains(own)).collect();
     match lacking.iter().all(|own| BY_FLAG.contains(own)) {
         _ if lacking.is_empty() => Vec::new(),
@@ -200,7 +200,7 @@ fn slice_of(bytes: &[u8], machine: Architecture) -> Option<&[u8]> {
 const ALWAYS: [&str; 3] = ["fmi2GetTypesPlatform", "fmi2GetVersion", "fmi2Instantiate"];
 
 /// The functions that every library for `interfaces` exports.
-fn wanted(interfaces: &[InterfaceType]) -> impl Iterator<Item = &'static str> {
+fn required_functions(interfaces: &[InterfaceType]) -> impl Iterator<Item = &'static str> {
     let belongs = |function: &Function| {
         let mut states = State::EVERY.iter();
         states.any(|state| interfaces.iter().any(|own| allowed(*own, *function, *state)))
@@ -228,7 +228,7 @@ fn functions(
         }
     }
     let missing: BTreeSet<_> =
-        wanted(interfaces).filter(|name| !exported.contains(*name)).collect();
+        required_functions(interfaces).filter(|name| !exported.contains(*name)).collect();
     if missing.is_empty() {
         return;
     }

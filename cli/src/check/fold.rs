@@ -6,14 +6,14 @@ use std::fmt;
 use super::finding::{Finding, Part, Severity, Tool};
 
 /// A finding, and how many others say the same of something else.
-pub(super) struct Folded<'a> {
+pub(super) struct FindingGroup<'a> {
     pub(super) first: &'a Finding,
     pub(super) more: usize,
     /// What the others are about, in the plural.
     others: &'static str,
 }
 
-impl fmt::Display for Folded<'_> {
+impl fmt::Display for FindingGroup<'_> {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let more = match self.more {
             0 => String::new(),
@@ -28,8 +28,11 @@ type Key<'a> = (Severity, Part, String, String, Option<String>, Option<&'static 
 
 /// One line for each kind of finding, in the order of the first ones. Two are of one kind where they
 /// differ in names of variables, quoted texts, paths and numbers only.
-pub(super) fn fold<'a>(findings: &'a [Finding], variables: &HashSet<&str>) -> Vec<Folded<'a>> {
-    let mut lines: Vec<Folded<'a>> = Vec::new();
+pub(super) fn fold<'a>(
+    findings: &'a [Finding],
+    variables: &HashSet<&str>,
+) -> Vec<FindingGroup<'a>> {
+    let mut lines: Vec<FindingGroup<'a>> = Vec::new();
     let mut known: HashMap<Key<'a>, usize> = HashMap::new();
     for finding in findings {
         let mut names = false;
@@ -50,7 +53,7 @@ pub(super) fn fold<'a>(findings: &'a [Finding], variables: &HashSet<&str>) -> Ve
             Part::Archive | Part::Binaries => "files",
             Part::Description | Part::Behaviour => "places",
         };
-        lines.push(Folded { first: finding, more: 0, others });
+        lines.push(FindingGroup { first: finding, more: 0, others });
     }
     lines
 }

@@ -5,7 +5,7 @@ use fmu_description::ModelDescription;
 use fmu_description::abi::Status;
 use master::{CallError, Failure, Slave, StepResult};
 
-use super::answer::{Answer, Here};
+use super::answer::{Answer, TrialResult};
 use super::behaviour;
 use super::finding::{Finding, Severity};
 
@@ -146,7 +146,7 @@ fn findings(fault: Fault) -> Vec<Finding> {
     tried(fault).1
 }
 
-fn tried(fault: Fault) -> (Here, Vec<Finding>) {
+fn tried(fault: Fault) -> (TrialResult, Vec<Finding>) {
     let description = ModelDescription::parse(XML).unwrap();
     let mut number = 0;
     let mut make = |_: &str, _: Option<Sum>| -> anyhow::Result<Sum> {
@@ -221,7 +221,7 @@ fn what_cannot_be_instantiated_is_one_finding() {
     let description = ModelDescription::parse(XML).unwrap();
     let mut make = |_: &str, _: Option<Sum>| -> anyhow::Result<Sum> { anyhow::bail!("no licence") };
     let (here, all) = behaviour::check(&description, &mut make);
-    assert_eq!(here, Here::No { reason: "fmi2Instantiate: no licence".to_owned() });
+    assert_eq!(here, TrialResult::No { reason: "fmi2Instantiate: no licence".to_owned() });
     assert!(all.iter().all(|own| own.place == "fmi2Instantiate" && own.what == "no licence"));
     assert_eq!(all.len(), 1, "{all:#?}");
 }

@@ -7,7 +7,7 @@ use master::Transformation;
 
 use ssp::{Assembly, Element, Link, Terminal};
 
-use super::Packed;
+use super::PackedFmu;
 
 /// Names of the elements, in the order of the models of the workspace.
 const NAMES: [&str; 2] = ["plant", "controller"];
@@ -23,7 +23,7 @@ const STOP_TIME: f64 = 100.0;
 const STEP: f64 = 1e-3;
 
 /// Writes `InvertedPendulum.ssp` into the folder `out`.
-pub(super) fn write(fmus: &[Packed], out: &Path) -> anyhow::Result<PathBuf> {
+pub(super) fn write(fmus: &[PackedFmu], out: &Path) -> anyhow::Result<PathBuf> {
     let elements = NAMES.iter().zip(fmus).map(|(name, packed)| Element {
         name: (*name).to_owned(),
         fmu: packed.path.clone(),

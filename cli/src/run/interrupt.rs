@@ -19,7 +19,7 @@ const LOOK: Duration = Duration::from_millis(50);
 static LISTENING: AtomicBool = AtomicBool::new(false);
 static RAISED: AtomicBool = AtomicBool::new(false);
 static NOTICED: AtomicBool = AtomicBool::new(false);
-static BEGUN: AtomicBool = AtomicBool::new(false);
+static STARTED: AtomicBool = AtomicBool::new(false);
 
 /// From now on a signal is noted, and the process ends soon after it; a second one ends it at once.
 pub(super) fn listen() -> anyhow::Result<()> {
@@ -62,13 +62,13 @@ pub(super) fn is_raised() -> bool {
 }
 
 /// The first step is about to begin.
-pub(super) fn begin() {
-    BEGUN.store(true, Ordering::Relaxed);
+pub(super) fn start() {
+    STARTED.store(true, Ordering::Relaxed);
 }
 
 /// Whether a run has begun to step.
-pub(crate) fn has_begun() -> bool {
-    BEGUN.load(Ordering::Relaxed)
+pub(crate) fn has_started() -> bool {
+    STARTED.load(Ordering::Relaxed)
 }
 
 /// The steps have ended: only what follows them is left.

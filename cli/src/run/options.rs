@@ -6,7 +6,7 @@ use anyhow::{Context, bail};
 use master::{AlgorithmRequest, Coupling, Extrapolation, Method, StepControl};
 use toml::Spanned;
 
-use study::{Config, Every, Loaded, Memory, Saved, Wire};
+use study::{Config, ConnectionEntry, Every, LoadedConfig, Memory, SavedRun};
 
 /// Where results go unless told otherwise.
 const OUT: &str = "results/run";
@@ -199,21 +199,21 @@ fn method(text: &str) -> Result<Method, String> {
 
 impl AlgorithmOptions {
     /// Puts what is stated over `wanted`.
-    pub(crate) fn apply(&self, wanted: &mut AlgorithmRequest) {
-        put(&mut wanted.step, self.step);
-        put(&mut wanted.method, self.method);
+    pub(crate) fn apply(&self, request: &mut AlgorithmRequest) {
+        put(&mut request.step, self.step);
+        put(&mut request.method, self.method);
         if self.course.is_some() {
             tracing::warn!("--course is now called --extrapolation");
         }
-        put(&mut wanted.extrapolation, self.extrapolation.or(self.course));
-        put(&mut wanted.coupling, self.coupling);
-        put(&mut wanted.step_control, self.step_control);
-        put(&mut wanted.relative_tolerance, self.relative_tolerance);
-        put(&mut wanted.absolute_tolerance, self.absolute_tolerance);
-        put(&mut wanted.jobs, self.jobs);
-        put(&mut wanted.rollback, self.rollback.then_some(true));
-        put(&mut wanted.allow_nan, self.allow_nan.then_some(true));
-        wanted.every.extend(self.every.iter().cloned());
+        put(&mut request.extrapolation, self.extrapolation.or(self.course));
+        put(&mut request.coupling, self.coupling);
+        put(&mut request.step_control, self.step_control);
+        put(&mut request.relative_tolerance, self.relative_tolerance);
+        put(&mut request.absolute_tolerance, self.absolute_tolerance);
+        put(&mut request.jobs, self.jobs);
+        put(&mut request.rollback, self.rollback.then_some(true));
+        put(&mut request.allow_nan, self.allow_nan.then_some(true));
+        request.every.extend(self.every.iter().cloned());
     }
 }
 
@@ -227,7 +227,7 @@ fn put<T>(value: &mut Option<T>, over: Option<T>) {
 impl Options {
     /// The configuration: the file's or the checkpoint's, with the command line over it; and the
     /// checkpoint.
-    pub(super) fn load(&self) -> anyhow::Result<(Loaded, Option<Saved>)> {
+    pub(super) fn load(&self) -> anyhow::Result<(LoadedConfig, Option<SavedRun>)> {
         let (mut loaded, saved) = self.base()?;
         let config = &mut loaded.config;
         self.put_system(config)?;
@@ -246,11 +246,11 @@ impl Options {
         Ok((loaded, saved))
     }
 
-    fn base(&self) -> anyhow::Result<(Loaded, Option<Saved>)> {
+    fn base(&self) -> anyhow::Result<(LoadedConfig, Option<SavedRun>)> {
         if let Some(path) = &self.resume {
-            let saved = Saved::read(path)?;
+            let saved = SavedRun::read(path)?;
             let (config, source) = (saved.config(path)?, None);
-            return Ok((Loaded { config, source }, Some(saved)));
+            return Ok((LoadedConfig { config, source }, Some(saved)));
         }
         let mut config = Config::default();
         match self.inputs.as_slice() {
@@ -260,7 +260,7 @@ impl Options {
                     config.fmus.put(name, path.clone());
                 }
             }
-            [path] if has_ending(path, "toml") => return Ok((Loaded::read(path)?, None)),
+            [path] if has_ending(path, "toml") => return Ok((LoadedConfig::read(path)?, None)),
             [path]
                 if path.is_dir()
                     || ["ssp", "ssd", "xml"].iter().any(|ending| has_ending(path, ending)) =>
@@ -290,7 +290,7 @@ impl Options {
             }
             [] => {}
         }
-        Ok((Loaded { config, source: None }, None))
+        Ok((LoadedConfig { config, source: None }, None))
     }
 
     fn put_system(&self, config: &mut Config) -> anyhow::Result<()> {
@@ -306,7 +306,7 @@ impl Options {
             }
             let wires = config.connections.get_or_insert_default();
             wires.retain(|wire| wire.get_ref().to.get_ref() != to);
-            wires.push(Wire::new(from.clone(), to.clone()));
+            wires.push(ConnectionEntry::new(from.clone(), to.clone()));
         }
         for (name, value) in &self.settings {
             config.settings.push(name.clone(), value.clone());
@@ -320,7 +320,7 @@ impl Options {
         self.inputs.first().is_some_and(|path| is_fmu(path))
     }
 
-    fn put_results(&self, config: &mut Config, saved: Option<&Saved>) {
+    fn put_results(&self, config: &mut Config, saved: Option<&SavedRun>) {
         let results = &mut config.results;
         if !self.record.is_empty() {
             results.record.clone_from(&self.record);

@@ -1,10 +1,10 @@
-//! What a communication step costs: through `Simulation`, and by the same calls without it.
+//! The cost of a communication step: through `Simulation`, and by the same FMI calls without it.
 //!
 //!     cargo bench --package cosim-master --bench step
 //!
-//! The FMUs are those of `tests/speed`: a pair, 20 and 1000 in a ring. Beside each simulation stand
-//! the calls that it makes, on the same instances' interface, with plain copying of connected values
-//! between them. For the same beside a loop in C see `scripts/benchmark-peers`. Needs a C compiler.
+//! The FMUs are those of `tests/speed`: systems of 2, 20 and 1000 in a ring. For comparison, each
+//! system is also run by a loop that makes the same calls on the same instances and copies the
+//! connected values. `scripts/benchmark-peers` compares with a loop in C. Needs a C compiler.
 #![forbid(unsafe_code)]
 
 use std::path::Path;
@@ -22,7 +22,7 @@ mod lag;
 /// Communication step in s.
 const STEP: f64 = 1.0 / 512.0;
 const EXPERIMENT: Experiment = Experiment { start_time: 0.0, stop_time: None, tolerance: None };
-/// FMUs and ports of each.
+/// Number of FMUs, and of ports of each FMU.
 const SIZES: [(usize, usize); 3] = [(2, 2), (20, 2), (1000, 10)];
 
 fn simulation(fmu: &Fmu, count: usize, ports: usize) -> anyhow::Result<Simulation> {
@@ -42,7 +42,7 @@ fn simulation(fmu: &Fmu, count: usize, ports: usize) -> anyhow::Result<Simulatio
     Ok(Simulation::new(system, &algorithm, &EXPERIMENT)?)
 }
 
-/// Instances and what is copied between them.
+/// The FMU instances and the arrays of connected values.
 struct Calls {
     slaves: Vec<Box<dyn Slave>>,
     inputs: Vec<u32>,

@@ -1,20 +1,20 @@
-//! Runs a system as fast as the master can and says what it cost, for `scripts/benchmark-peers`.
+//! Runs a system as fast as the master can and prints the cost, for `scripts/benchmark-peers`.
 //!
 //!     speed pack FOLDER PORTS
 //!     speed run SYSTEM STEP STEPS [RESULTS]
 //!
-//! `pack` builds the tiny FMU of `tests/speed` and prints its path. `run` reads a file with a line
-//! for each thing that there is, initialises, and makes STEPS steps of STEP s by Jacobi's method with
-//! held inputs, as `tests/speed/loop.c` does:
+//! `pack` builds the small FMU of `tests/speed` and prints its path. `run` reads a file with one
+//! line for each FMU, value and connection, initialises the system, and makes STEPS steps of STEP s
+//! by Jacobi's method with held inputs, as `tests/speed/loop.c` does:
 //!
 //!     fmu NAME PATH
 //!     set NAME.VARIABLE VALUE
 //!     connect NAME.OUTPUT NAME.INPUT
 //!
-//! With RESULTS, a file of the format that its extension says, every output of every step goes there.
-//! It prints a JSON object: processor time in ns of the start (from the archives to the end of
-//! initialisation) and of one step, wall time of the start, peak memory in KiB, and the sum of all
-//! Real outputs at the end.
+//! With RESULTS, it writes every output of every step to that file; the extension selects the
+//! format. It prints a JSON object: processor time in ns of the start (from the archives to the end
+//! of initialisation) and of one step, wall-clock time of the start, peak memory in KiB, and the
+//! sum of all Real outputs at the end.
 #![forbid(unsafe_code)]
 #![expect(clippy::print_stdout, reason = "the result")]
 #![expect(clippy::cast_precision_loss, reason = "figures for a table")]
@@ -42,14 +42,14 @@ fn cpu() -> f64 {
     now.tv_sec as f64 * 1e9 + now.tv_nsec as f64
 }
 
-/// Peak memory in KiB, where Linux says it; else 0.
+/// Returns the peak memory in KiB on Linux; 0 elsewhere.
 fn peak() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
     line.and_then(|text| text.split_whitespace().next()?.parse().ok()).unwrap_or(0)
 }
 
-/// The system of a file; an archive that is named several times is opened once.
+/// Builds the system of a file; opens an archive once even if several lines name it.
 fn read(path: &Path) -> anyhow::Result<System> {
     let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
     let (mut system, mut opened) = (System::default(), HashMap::<PathBuf, Fmu>::new());
@@ -71,7 +71,7 @@ fn read(path: &Path) -> anyhow::Result<System> {
 }
 
 fn run(path: &Path, step: f64, steps: u64, results: Option<&Path>) -> anyhow::Result<()> {
-    let (begin, clock) = (cpu(), Instant::now());
+    let (start, clock) = (cpu(), Instant::now());
     let system = read(path)?;
     let ports = system.ports(Causality::Output);
     let name = |port| Column { name: system.name(port), kind: ColumnKind::Real, unit: None };
@@ -104,7 +104,7 @@ fn run(path: &Path, step: f64, steps: u64, results: Option<&Path>) -> anyhow::Re
     readout.read(simulation.system(), time)?;
     println!(
         "{{\"start_ns\": {}, \"start_wall_ns\": {}, \"step_ns\": {}, \"peak_kib\": {}, \"sum\": {}}}",
-        started - begin,
+        started - start,
         wall.as_nanos(),
         (stepped - started) / steps.max(1) as f64,
         peak(),

@@ -1,4 +1,7 @@
-//! Master algorithms: what can be chosen, by name.
+//! The settings of the master algorithm: method, extrapolation, coupling, step control, events.
+//!
+//! Each choice has a name in `system.toml` and on the command line; [`Algorithm::check`] tests
+//! whether the FMUs of a system support a combination.
 
 use fmu_description::CoSimulation;
 use serde::{Deserialize, Serialize};
@@ -6,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::SystemError;
 use crate::system::{Port, System};
 
-/// Declares a choice whose variants have the names of the configuration file.
+/// Declares an enum whose variants have the names used in the configuration file.
 macro_rules! choice {
     ($(#[$meta:meta])* $name:ident { $($(#[$doc:meta])* $variant:ident = $text:literal,)* }) => {
         $(#[$meta])*
@@ -14,10 +17,10 @@ macro_rules! choice {
         pub enum $name { $($(#[$doc])* #[serde(rename = $text)] $variant,)* }
 
         impl $name {
-            /// The names, in the order of declaration.
+            /// All names, in the order of declaration.
             pub const NAMES: &[&str] = &[$($text),*];
 
-            /// The name in the configuration file.
+            /// Returns the name used in the configuration file.
             #[must_use]
             pub fn name(self) -> &'static str {
                 match self { $(Self::$variant => $text,)* }
@@ -38,106 +41,117 @@ macro_rules! choice {
 }
 
 choice! {
-    /// In which order the slaves step.
+    /// The order in which the slaves step within a communication step.
     Method {
-        /// All from the values at the begin of the step.
+        /// All slaves step from the values at the start of the step.
         Jacobi = "jacobi",
-        /// One after the other, in the order of their direct dependencies: a slave sees the values
-        /// at the end of the step of those that went before.
+        /// The slaves step one after the other, in the order of their direct dependencies. A slave
+        /// uses the values that earlier slaves have reached at the end of the step.
         GaussSeidel = "gauss-seidel",
     }
 }
 
 choice! {
-    /// What an input does during a step. Polynomials through known values: Kuebler and Schiehlen
-    /// 2000, "Two methods of simulator coupling". A slave that takes no input derivatives
-    /// (`canInterpolateInputs`) gets the mean of the line or parabola over the step, held, which is
-    /// of order 2 (1 where its outputs depend directly on such an input); of a limited line the
-    /// value at the end where that is known, else at the begin, which is of order 1.
+    /// How an input varies within a communication step: a polynomial through known values of its
+    /// source (Kuebler and Schiehlen 2000, "Two methods of simulator coupling").
+    ///
+    /// A slave without input derivatives (`canInterpolateInputs` is false) gets a constant input.
+    /// For `linear` and `quadratic` this is the mean of the polynomial over the step, which is of
+    /// order 2 (of order 1 if an output of the slave depends directly on the input). For `limited`
+    /// it is the value at the end of the step if the source has already stepped, otherwise the
+    /// value at the start; this is of order 1.
     Extrapolation {
-        /// Its value at the begin of the step, or at the end where the source has stepped already.
+        /// Constant: the value at the start of the step, or at its end if the source has already
+        /// stepped.
         Hold = "hold",
-        /// A line. Interpolated where the source has stepped already; else extrapolated by the
-        /// source's output derivative or its last difference quotient, whichever is smaller, zero
-        /// where their signs differ (minmod limiter; P. L. Roe, Annu. Rev. Fluid Mech. 18, 1986).
+        /// A line. If the source has already stepped, the line interpolates; otherwise it
+        /// extrapolates with the output derivative or the last difference quotient of the source,
+        /// whichever is smaller, or with slope 0 if their signs differ (minmod limiter; P. L. Roe,
+        /// Annu. Rev. Fluid Mech. 18, 1986).
         Limited = "limited",
-        /// A line, extrapolated by the source's output derivative, or its difference quotient.
+        /// A line, extrapolated with the output derivative of the source if it provides one,
+        /// otherwise with its last difference quotient.
         Linear = "linear",
-        /// A parabola, through output derivatives where there are any, else through past values.
+        /// A parabola through the output derivatives if the source provides them, otherwise through
+        /// past values.
         Quadratic = "quadratic",
     }
 }
 
 choice! {
-    /// How often a step is repeated until outputs and inputs agree at its end.
+    /// How a step is repeated until outputs and inputs agree at its end.
     Coupling {
-        /// Once: explicit ("weak") coupling.
+        /// The step is made once: explicit (weak) coupling.
         Once = "once",
-        /// Newton's method on the inputs at the end of the step; its matrix from directional
-        /// derivatives, where the FMUs have them.
+        /// Newton's method on the inputs at the end of the step. The matrix comes from directional
+        /// derivatives if all FMUs provide them, otherwise from finite differences.
         Newton = "newton",
-        /// Anderson's mixing of the last iterates (Anderson 1965; Walker and Ni 2011).
+        /// Anderson mixing of the last iterates (Anderson 1965; Walker and Ni 2011).
         Anderson = "anderson",
-        /// Interface quasi-Newton with the inverse by least squares (Degroote, Bathe and
-        /// Vierendeels 2009, IQN-ILS).
+        /// Interface quasi-Newton method with a least-squares approximation of the inverse
+        /// (IQN-ILS; Degroote, Bathe and Vierendeels 2009).
         QuasiNewton = "quasi-newton",
     }
 }
 
 choice! {
-    /// How the communication step is chosen.
+    /// How the size of the communication step is chosen.
     StepControl {
-        /// `t0 + k H`.
+        /// Constant steps: communication points at `t0 + k H`.
         Fixed = "fixed",
-        /// Each step once whole and once in two halves (Richardson's estimate), repeated where the
-        /// difference is too large. Needs FMU states.
+        /// Step doubling: each step is made once as a whole and once in two halves (Richardson's
+        /// error estimate), and repeated with a smaller size if the difference is too large. Needs
+        /// FMU states.
         Doubling = "doubling",
-        /// The error of the inputs' extrapolation at the end of the step; repeated where it is too
-        /// large. Needs FMU states.
+        /// The error estimate is the error of the input extrapolation at the end of the step; the
+        /// step is repeated with a smaller size if it is too large. Needs FMU states.
         Embedded = "embedded",
-        /// The next step from how far the connected signals moved in the last; nothing is repeated.
+        /// The size of the next step follows from the change of the connected signals in the last
+        /// step. Never rejects a step.
         Increment = "increment",
-        /// The next step from the energy that the connections lost or made (ECCO: Sadjina, Kyllingstad,
-        /// Skjong and Pedersen 2017); nothing is repeated. Needs power bonds.
+        /// The size of the next step follows from the energy that the connections lost or generated
+        /// (ECCO: Sadjina, Kyllingstad, Skjong and Pedersen 2017). Never rejects a step. Needs
+        /// power bonds.
         Energy = "energy",
     }
 }
 
-/// Where an event is looked for.
+/// A source of events. A communication step ends at an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EventSource {
-    /// A Real output that holds the time of its FMU's next event: a step ends there.
+    /// A Real output whose value is the time in s of the next event of its FMU.
     NextTime(Port),
-    /// A Real output whose change of sign ends a step; located by repeating the step.
+    /// A Real output whose zero crossing is an event; it is located by repeating the step.
     Crossing(Port),
 }
 
-/// Two connections that carry power: effort one way, flow the other (N and m/s, V and A, Pa and
-/// m3/s).
+/// Two connections whose product is a power: effort in one direction, flow in the other (for
+/// example N and m/s, V and A, Pa and m3/s).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PowerBond {
     /// An input port, the target of the first connection.
     pub first: Port,
-    /// An input port, the target of the second connection, which leads back.
+    /// An input port, the target of the second connection, which runs in the opposite direction.
     pub second: Port,
 }
 
-/// A master algorithm.
+/// The settings of a master algorithm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Algorithm {
-    /// Order of stepping.
+    /// Order in which the slaves step.
     pub sweep: Method,
     /// Extrapolation of the inputs.
     pub extrapolation: Extrapolation,
-    /// Repetition of a step.
+    /// Iteration of a step.
     pub coupling: Coupling,
-    /// Choice of the step.
+    /// Choice of the step size.
     pub control: StepControl,
-    /// Communication step H in s; the first one where it is chosen on the way.
+    /// Communication step H in s; the first one if the step control varies it.
     pub step: f64,
-    /// Each slave steps every so many steps; empty: all every step.
+    /// For each slave, the number of communication steps between two of its own steps; empty: 1 for
+    /// all.
     pub multiples: Vec<u32>,
-    /// Relative tolerance of the connected values: of the iteration and of the step control.
+    /// Relative tolerance of the connected values, used by the iteration and the step control.
     pub relative_tolerance: f64,
     /// Absolute tolerance, as a fraction of each output's `nominal`.
     pub absolute_tolerance: f64,
@@ -145,32 +159,35 @@ pub struct Algorithm {
     pub smallest_step: f64,
     /// Largest step in s of the step control.
     pub largest_step: f64,
-    /// Most iterations of one step.
+    /// Largest number of iterations of one step.
     pub iterations: u32,
-    /// A step whose iteration fails is made once; otherwise it ends the run.
+    /// Whether a step whose iteration fails is made once without iteration; otherwise the failure
+    /// ends the run.
     pub fallback: bool,
     /// Events that end a step.
     pub events: Vec<EventSource>,
     /// Power bonds, for [`StepControl::Energy`].
     pub bonds: Vec<PowerBond>,
-    /// Threads that step slaves of one sweep side by side where that pays; 1: none.
+    /// Number of threads that step independent slaves at the same time if this is faster; 1: no
+    /// threads.
     pub jobs: usize,
-    /// FMU states are kept before every step, so that one that an FMU does not finish (`fmi2Discard`)
-    /// is repeated by all, as far as that one came.
+    /// Whether FMU states are saved before every step, so that all FMUs repeat a step that one FMU
+    /// completed only in part (`fmi2Discard`).
     pub rollback: bool,
-    /// Values on connections may be no numbers or infinite.
+    /// Whether NaN and infinity are allowed on connections.
     pub allow_nan: bool,
 }
 
 impl Algorithm {
-    /// Fixed communication steps of `step` s, by that method and with that extrapolation of the
-    /// inputs; the rest as in [`Algorithm::new`].
+    /// Returns an algorithm with the fixed communication step `step` in s, the method `sweep` and
+    /// the input extrapolation `extrapolation`; everything else is as in [`Algorithm::new`].
     #[must_use]
     pub fn fixed(sweep: Method, extrapolation: Extrapolation, step: f64) -> Self {
         Self { sweep, extrapolation, ..Self::new(step) }
     }
 
-    /// Gauss-Seidel with limited slopes and the fixed communication step `step` in s.
+    /// Returns the default algorithm: Gauss-Seidel, limited extrapolation and the fixed
+    /// communication step `step` in s.
     #[must_use]
     pub fn new(step: f64) -> Self {
         Self {
@@ -194,11 +211,12 @@ impl Algorithm {
         }
     }
 
-    /// Whether the FMUs of `system` can do what the algorithm asks for, and the algorithm makes sense.
+    /// Checks that the FMUs of `system` support the algorithm and that its settings are consistent.
     ///
     /// # Errors
     ///
-    /// The flag that an FMU lacks and what needs it; a port that is not what it should be.
+    /// Returns an error if an FMU lacks a capability flag that the algorithm needs, if a port has
+    /// the wrong kind, or if two settings contradict each other.
     pub fn check(&self, system: &System) -> Result<(), SystemError> {
         let repeats = match (self.coupling, self.control) {
             (Coupling::Once, StepControl::Doubling | StepControl::Embedded) => {
@@ -210,17 +228,17 @@ impl Algorithm {
         let crossing = self.events.iter().any(|event| matches!(event, EventSource::Crossing(_)));
         let located = crossing.then(|| "the location of crossings".to_owned());
         let kept = self.rollback.then(|| "steps with rollback".to_owned());
-        if let Some(wanted) = repeats.or(located).or(kept) {
+        if let Some(required_by) = repeats.or(located).or(kept) {
             let lacks = "canGetAndSetFMUstate";
-            require(system, lacks, &wanted, |flags| flags.can_get_and_set_fmu_state)?;
+            require(system, lacks, &required_by, |flags| flags.can_get_and_set_fmu_state)?;
         }
         if self.control != StepControl::Fixed || !self.events.is_empty() {
             let lacks = "canHandleVariableCommunicationStepSize";
-            let wanted = match self.control {
+            let required_by = match self.control {
                 StepControl::Fixed => "steps that end at events".to_owned(),
                 control => format!("the step control {}", control.name()),
             };
-            require(system, lacks, &wanted, |flags| {
+            require(system, lacks, &required_by, |flags| {
                 flags.can_handle_variable_communication_step_size
             })?;
         }
@@ -239,7 +257,7 @@ impl Algorithm {
         self.check_numbers()
     }
 
-    /// Whether steps are repeated, which every slave must be able to do.
+    /// Whether steps may be repeated, so that every slave must be able to restore its state.
     pub(crate) fn repeats(&self) -> bool {
         let crossing = self.events.iter().any(|event| matches!(event, EventSource::Crossing(_)));
         crossing
@@ -277,7 +295,7 @@ impl Algorithm {
 fn require(
     system: &System,
     lacks: &'static str,
-    wanted: &str,
+    required_by: &str,
     can: fn(&CoSimulation) -> bool,
 ) -> Result<(), SystemError> {
     let unable = system
@@ -286,8 +304,10 @@ fn require(
         .find(|(_, slave)| !slave.description().co_simulation.as_ref().is_some_and(can));
     match unable {
         None => Ok(()),
-        Some((name, _)) => {
-            Err(SystemError::Capability { slave: name.clone(), lacks, wanted: wanted.to_owned() })
-        }
+        Some((name, _)) => Err(SystemError::Capability {
+            slave: name.clone(),
+            lacks,
+            required_by: required_by.to_owned(),
+        }),
     }
 }

@@ -1,4 +1,5 @@
-//! The algorithm for a system: what the user wants, completed by what the FMUs can do.
+//! Chooses the settings of the algorithm that the user has not stated, from the capabilities of the
+//! FMUs.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,26 +12,26 @@ use crate::system::System;
 use fmu_description::CoSimulation;
 use slave::Slave;
 
-/// Communication step in s where neither the user nor an FMU states one, for runs of up to
-/// [`STEPS`] steps.
+/// Default communication step in s for runs of up to [`STEPS`] steps; used if neither the user nor
+/// an FMU states one.
 const STEP: f64 = 1e-3;
-/// Most steps of a run whose step nobody states.
+/// Largest number of steps of a run with the default step.
 const STEPS: f64 = 1e5;
 
-/// What the user states of an [`Algorithm`]; the rest is chosen.
+/// The settings of an [`Algorithm`] that the user states; [`choose`] completes the others.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct AlgorithmRequest {
     /// `jacobi` or `gauss-seidel`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub method: Option<Method>,
-    /// Extrapolation of the inputs; `course` is its former name.
+    /// Extrapolation of the inputs. The former name of this key is `course`.
     #[serde(alias = "course", skip_serializing_if = "Option::is_none")]
     pub extrapolation: Option<Extrapolation>,
-    /// Repetition of a step.
+    /// Iteration of a step.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coupling: Option<Coupling>,
-    /// Choice of the step.
+    /// Choice of the step size.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub step_control: Option<StepControl>,
     /// Communication step in s.
@@ -48,60 +49,63 @@ pub struct AlgorithmRequest {
     /// Largest step of the step control in s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub largest_step: Option<f64>,
-    /// Most iterations of a step.
+    /// Largest number of iterations of a step.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub iterations: Option<u32>,
-    /// Make a step once whose iteration fails; by default where the coupling is not stated.
+    /// Whether a step whose iteration fails is made once without iteration; default: true if
+    /// `coupling` is not stated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fallback: Option<bool>,
-    /// FMUs that step every so many communication steps.
+    /// FMUs by name, each with the number of communication steps between two of its own steps.
     #[serde(skip_serializing_if = "std::collections::BTreeMap::is_empty", default)]
     pub every: std::collections::BTreeMap<String, u32>,
-    /// Outputs, `slave.variable`, that hold the time of their FMU's next event.
+    /// Outputs, `slave.variable`, whose value is the time in s of the next event of their FMU.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub next_event: Vec<String>,
-    /// Outputs, `slave.variable`, whose change of sign ends a step.
+    /// Outputs, `slave.variable`, whose zero crossing ends a step.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub crossing: Vec<String>,
     /// Pairs of inputs, `slave.variable`, whose product is a power.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub power_bonds: Vec<(String, String)>,
-    /// Threads; 0: as many as the machine has.
+    /// Number of threads; 0: number of processors.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub jobs: Option<usize>,
-    /// Keep FMU states before every step, to repeat one that an FMU does not finish.
+    /// Save FMU states before every step, so that all FMUs repeat a step that one FMU completed
+    /// only in part.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rollback: Option<bool>,
-    /// Let values on connections be no numbers or infinite.
+    /// Allow NaN and infinity on connections.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub allow_nan: Option<bool>,
 }
 
-/// An algorithm, and why it is this one.
+/// A complete algorithm with the reasons for the settings that were chosen.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Chosen {
+pub struct AlgorithmChoice {
     /// The algorithm.
     pub algorithm: Algorithm,
-    /// A sentence for each choice that the user did not make.
+    /// One sentence for each setting that the user did not state.
     pub reasons: Vec<String>,
 }
 
-/// Completes what is wanted for a run of `length` s of `system`.
+/// Completes `request` for a run of `system` over `length` s.
 ///
 /// # Errors
 ///
-/// Where names do not exist, or what is wanted needs what an FMU cannot do.
+/// Returns an error if a name does not exist, or if a requested setting needs a capability that an
+/// FMU lacks.
 pub fn choose(
     system: &System,
-    wanted: &AlgorithmRequest,
+    request: &AlgorithmRequest,
     length: f64,
-) -> Result<Chosen, SystemError> {
+) -> Result<AlgorithmChoice, SystemError> {
     let mut reasons = Vec::new();
-    let step = wanted.step.unwrap_or_else(|| default_step(system, length, &mut reasons));
+    let step = request.step.unwrap_or_else(|| default_step(system, length, &mut reasons));
     let base = Algorithm::new(step);
-    let control = wanted.step_control.unwrap_or(StepControl::Fixed);
-    let coupling = wanted.coupling.unwrap_or_else(|| default_coupling(system, &mut reasons));
-    let sweep = wanted.method.unwrap_or_else(|| {
+    let control = request.step_control.unwrap_or(StepControl::Fixed);
+    let coupling = request.coupling.unwrap_or_else(|| default_coupling(system, &mut reasons));
+    let sweep = request.method.unwrap_or_else(|| {
         let order = by_direct_dependencies(system);
         let names: Vec<_> = order.sequence.iter().map(|&k| system.slaves[k].0.as_str()).collect();
         reasons.push(format!(
@@ -111,7 +115,7 @@ pub fn choose(
         Method::GaussSeidel
     });
     let extrapolation =
-        wanted.extrapolation.unwrap_or_else(|| default_extrapolation(system, &mut reasons));
+        request.extrapolation.unwrap_or_else(|| default_extrapolation(system, &mut reasons));
     let loose = matches!(control, StepControl::Increment | StepControl::Energy);
     let default_relative = if loose { 1e-2 } else { base.relative_tolerance };
     let algorithm = Algorithm {
@@ -120,33 +124,33 @@ pub fn choose(
         coupling,
         control,
         step,
-        multiples: multiples(system, wanted)?,
-        relative_tolerance: wanted.relative_tolerance.unwrap_or(default_relative),
-        absolute_tolerance: wanted.absolute_tolerance.unwrap_or(base.absolute_tolerance),
-        smallest_step: wanted.smallest_step.unwrap_or(base.smallest_step),
-        largest_step: wanted.largest_step.unwrap_or(base.largest_step),
-        iterations: wanted.iterations.unwrap_or(base.iterations),
-        fallback: wanted.fallback.unwrap_or(wanted.coupling.is_none()),
-        events: events(system, wanted)?,
-        bonds: bonds(system, wanted)?,
-        jobs: match wanted.jobs {
+        multiples: multiples(system, request)?,
+        relative_tolerance: request.relative_tolerance.unwrap_or(default_relative),
+        absolute_tolerance: request.absolute_tolerance.unwrap_or(base.absolute_tolerance),
+        smallest_step: request.smallest_step.unwrap_or(base.smallest_step),
+        largest_step: request.largest_step.unwrap_or(base.largest_step),
+        iterations: request.iterations.unwrap_or(base.iterations),
+        fallback: request.fallback.unwrap_or(request.coupling.is_none()),
+        events: events(system, request)?,
+        bonds: bonds(system, request)?,
+        jobs: match request.jobs {
             Some(0) => std::thread::available_parallelism().map_or(1, usize::from),
             Some(jobs) => jobs,
             None => 1,
         },
-        rollback: wanted.rollback.unwrap_or(false),
-        allow_nan: wanted.allow_nan.unwrap_or(false),
+        rollback: request.rollback.unwrap_or(false),
+        allow_nan: request.allow_nan.unwrap_or(false),
     };
     algorithm.check(system)?;
-    Ok(Chosen { algorithm, reasons })
+    Ok(AlgorithmChoice { algorithm, reasons })
 }
 
 fn flags(slave: &dyn Slave) -> Option<&CoSimulation> {
     slave.description().co_simulation.as_ref()
 }
 
-/// The smallest `stepSize` of the FMUs' default experiments; else 1 ms, or the power of ten by which
-/// a run of `length` s has fewer steps than [`STEPS`].
+/// Returns the smallest `stepSize` of the FMUs' default experiments. Without any, returns 1 ms, or
+/// the power of ten with which a run of `length` s has at most [`STEPS`] steps.
 fn default_step(system: &System, length: f64, reasons: &mut Vec<String>) -> f64 {
     let stated = system.slaves.iter().filter_map(|(name, slave)| {
         let step = slave.description().default_experiment.as_ref()?.step_size?;
@@ -165,7 +169,8 @@ fn default_step(system: &System, length: f64, reasons: &mut Vec<String>) -> f64 
     }
 }
 
-/// Iteration where direct dependencies form a loop and every FMU can go back.
+/// Chooses an iteration if direct dependencies form a loop and the state of every FMU can be
+/// restored.
 fn default_coupling(system: &System, reasons: &mut Vec<String>) -> Coupling {
     let order = by_direct_dependencies(system);
     if order.looped.is_empty() {
@@ -222,7 +227,7 @@ fn default_extrapolation(system: &System, reasons: &mut Vec<String>) -> Extrapol
     Extrapolation::Limited
 }
 
-/// The first names of a list.
+/// Joins the first names of a list for a message.
 fn shortened(names: &[&str]) -> String {
     const SHOWN: usize = 8;
     let more = names.len().saturating_sub(SHOWN);
@@ -230,27 +235,27 @@ fn shortened(names: &[&str]) -> String {
     if more == 0 { shown } else { format!("{shown} and {more} more") }
 }
 
-fn multiples(system: &System, wanted: &AlgorithmRequest) -> Result<Vec<u32>, SystemError> {
-    if wanted.every.is_empty() {
+fn multiples(system: &System, request: &AlgorithmRequest) -> Result<Vec<u32>, SystemError> {
+    if request.every.is_empty() {
         return Ok(Vec::new());
     }
     let mut multiples = vec![1; system.slaves.len()];
-    for (name, multiple) in &wanted.every {
+    for (name, multiple) in &request.every {
         multiples[system.slave(name)?] = *multiple;
     }
     Ok(multiples)
 }
 
-fn events(system: &System, wanted: &AlgorithmRequest) -> Result<Vec<EventSource>, SystemError> {
-    let times = wanted.next_event.iter().map(|name| Ok(EventSource::NextTime(system.port(name)?)));
+fn events(system: &System, request: &AlgorithmRequest) -> Result<Vec<EventSource>, SystemError> {
+    let times = request.next_event.iter().map(|name| Ok(EventSource::NextTime(system.port(name)?)));
     let crossings =
-        wanted.crossing.iter().map(|name| Ok(EventSource::Crossing(system.port(name)?)));
+        request.crossing.iter().map(|name| Ok(EventSource::Crossing(system.port(name)?)));
     times.chain(crossings).collect()
 }
 
-fn bonds(system: &System, wanted: &AlgorithmRequest) -> Result<Vec<PowerBond>, SystemError> {
+fn bonds(system: &System, request: &AlgorithmRequest) -> Result<Vec<PowerBond>, SystemError> {
     let bond = |(first, second): &(String, String)| {
         Ok(PowerBond { first: system.port(first)?, second: system.port(second)? })
     };
-    wanted.power_bonds.iter().map(bond).collect()
+    request.power_bonds.iter().map(bond).collect()
 }

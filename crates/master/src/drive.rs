@@ -1,4 +1,4 @@
-//! Variables that follow signals while a simulation runs.
+//! Driven variables: inputs and tunable parameters that follow a signal during the run.
 
 use fmu_description::Kind;
 use serde::{Deserialize, Serialize};
@@ -9,13 +9,13 @@ use crate::fault::FaultChain;
 use crate::signal::{Cursor, Sample, Signal, earliest, reached};
 use crate::system::{Port, System};
 
-/// What is done to a system while it runs.
+/// Signals and faults that act on a system during a run.
 #[derive(Clone, Debug, Default)]
 pub struct Scenario {
-    /// Variables that follow signals.
+    /// Driven variables.
     pub drives: Drives,
-    /// Faults on connections, by their inputs. They act on what the connection's transformation
-    /// gives.
+    /// Faults on connections, each with the input of its connection. A fault acts on the value
+    /// after the transformation of the connection.
     pub faults: Vec<(Port, FaultChain)>,
 }
 
@@ -24,14 +24,14 @@ pub struct Scenario {
 pub enum DriveKind {
     /// Real.
     Real {
-        /// It is a continuous input of an FMU that takes input derivatives.
+        /// Whether the variable is a continuous input of an FMU that takes input derivatives.
         derivatives: bool,
     },
     /// Integer or Enumeration.
     Integer,
     /// Boolean: 0 is false.
     Boolean,
-    /// String: its signal counts [`Drive::text`].
+    /// String: the value of the signal is an index into the texts of the drive.
     String,
 }
 
@@ -42,54 +42,55 @@ pub struct Drive {
     reference: u32,
     kind: DriveKind,
     signal: Signal,
-    /// Before this time it keeps its start value.
-    begin: f64,
+    /// The variable keeps its start value before this time in s.
+    start: f64,
     texts: Vec<String>,
     faults: Option<FaultChain>,
     cursor: Cursor,
-    /// Set last, and set last when a communication point was reached for good.
+    /// The sample set last, and the sample set last at a final communication point.
     written: Option<Sample>,
     accepted: Option<Sample>,
 }
 
 impl Drive {
-    /// A variable that follows a signal: its port, value reference and type.
+    /// Creates the drive of the variable at `port` with the value reference `reference` and the
+    /// type `kind`.
     #[must_use]
-    pub fn new(port: Port, reference: u32, kind: DriveKind, following: Following) -> Self {
-        let Following { signal, begin, texts } = following;
+    pub fn new(port: Port, reference: u32, kind: DriveKind, following: DriveSource) -> Self {
+        let DriveSource { signal, start, texts } = following;
         let cursor = Cursor::default();
         let faults = None;
         let (written, accepted) = (None, None);
-        Self { port, reference, kind, signal, begin, texts, faults, cursor, written, accepted }
+        Self { port, reference, kind, signal, start, texts, faults, cursor, written, accepted }
     }
 
-    /// The variable.
+    /// Returns the port of the variable.
     #[must_use]
     pub fn port(&self) -> Port {
         self.port
     }
 
-    /// Its value reference.
+    /// Returns the value reference of the variable.
     #[must_use]
     pub fn reference(&self) -> u32 {
         self.reference
     }
 
-    /// Its type.
+    /// Returns the type of the variable.
     #[must_use]
     pub fn kind(&self) -> DriveKind {
         self.kind
     }
 
-    /// Value and right-hand derivative at `time`, in s; none while it keeps its start value. Time
-    /// may go back to the last commit.
+    /// Returns the value and the right-hand derivative at `time` in s; `None` before the start of
+    /// the drive. `time` may go back to the last commit.
     pub fn sample(&mut self, time: f64) -> Option<Sample> {
         let undisturbed = self.undisturbed(time)?;
         let faults = self.faults.as_ref();
         Some(faults.map_or(undisturbed, |faults| faults.apply_sample(time, undisturbed)))
     }
 
-    /// The text that a value of [`Drive::sample`] stands for.
+    /// Returns the text for a value of [`Drive::sample`], if the variable is a String.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a position")]
     pub fn text(&self, value: f64) -> Option<&String> {
@@ -97,60 +98,60 @@ impl Drive {
     }
 
     fn undisturbed(&mut self, time: f64) -> Option<Sample> {
-        reached(time, self.begin).then(|| self.signal.at(time, &mut self.cursor))
+        reached(time, self.start).then(|| self.signal.at(time, &mut self.cursor))
     }
 
-    /// Disturbs the signal on its way to the variable.
+    /// Puts faults between the signal and the variable.
     pub fn set_faults(&mut self, faults: FaultChain) {
         self.faults = Some(faults);
     }
 
-    /// Whether the FMU has this value, with nothing to change it, since the last commit.
+    /// Whether the FMU already holds this value since the last commit and the value is constant.
     fn is_settled(&self, sample: Sample) -> bool {
         sample.slope == 0.0 && self.accepted == Some(sample) && self.written == self.accepted
     }
 
     fn next_break(&self, after: f64) -> Option<f64> {
-        let begin = earliest(after, [self.begin].into_iter().filter(|begin| begin.is_finite()));
+        let start = earliest(after, [self.start].into_iter().filter(|start| start.is_finite()));
         let signal = self.signal.next_break(after);
         let faults = self.faults.as_ref().and_then(|faults| faults.next_break(after));
-        [begin, signal, faults].into_iter().flatten().reduce(f64::min)
+        [start, signal, faults].into_iter().flatten().reduce(f64::min)
     }
 }
 
-/// What a variable follows, and from when.
-pub struct Following {
+/// The signal that a variable follows, and the time at which it starts to follow it.
+pub struct DriveSource {
     /// The signal.
     pub signal: Signal,
-    /// From this time on, in s; minus infinity: always.
-    pub begin: f64,
-    /// What the values of the signal stand for, where the variable is a String.
+    /// Start time in s; minus infinity: the whole run.
+    pub start: f64,
+    /// The texts that the values of the signal index, if the variable is a String.
     pub texts: Vec<String>,
 }
 
-/// What a checkpoint holds of a [`Drive`].
+/// The state of a [`Drive`] in a checkpoint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DriveState {
     faults: Option<FaultChain>,
     accepted: Option<Sample>,
 }
 
-/// A checkpoint that does not fit.
+/// Error: a checkpoint and a scenario have different numbers of driven variables.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the checkpoint is of {found} driven variables, expected {expected} as in the scenario")]
 pub struct CheckpointError {
-    /// Driven variables of the scenario.
+    /// Number of driven variables in the scenario.
     pub expected: usize,
-    /// Those of the checkpoint.
+    /// Number of driven variables in the checkpoint.
     pub found: usize,
 }
 
-/// All driven variables of a system. Nothing here allocates after the construction.
+/// All driven variables of a system. Only the constructor allocates.
 #[derive(Clone, Debug, Default)]
 pub struct Drives {
-    /// Sorted by slave and type.
+    /// The drives, sorted by slave and type.
     all: Vec<Drive>,
-    /// Begin and end of those of one slave and type.
+    /// Start and end index of the drives of each slave and type.
     groups: Vec<(usize, usize)>,
     references: Vec<u32>,
     reals: Vec<f64>,
@@ -161,7 +162,7 @@ pub struct Drives {
 }
 
 impl Drives {
-    /// Driven variables, each port at most once.
+    /// Creates the collection from `drives`, which have different ports.
     #[must_use]
     pub fn new(mut drives: Vec<Drive>) -> Self {
         let key = |drive: &Drive| (drive.port.slave, rank(drive.kind));
@@ -169,11 +170,11 @@ impl Drives {
         let mut groups: Vec<(usize, usize)> = Vec::new();
         for (position, drive) in drives.iter().enumerate() {
             match groups.last_mut() {
-                Some((begin, end)) if key(&drives[*begin]) == key(drive) => *end = position + 1,
+                Some((start, end)) if key(&drives[*start]) == key(drive) => *end = position + 1,
                 _ => groups.push((position, position + 1)),
             }
         }
-        let longest = groups.iter().map(|(begin, end)| end - begin).max().unwrap_or(0);
+        let longest = groups.iter().map(|(start, end)| end - start).max().unwrap_or(0);
         Self {
             all: drives,
             groups,
@@ -186,17 +187,18 @@ impl Drives {
         }
     }
 
-    /// Each of them.
+    /// Iterates over the drives.
     pub fn iter(&self) -> impl Iterator<Item = &Drive> {
         self.all.iter()
     }
 
-    /// Each of them, to be sampled by the caller.
+    /// Iterates mutably over the drives, so that the caller can sample them.
     pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut Drive> {
         self.all.iter_mut()
     }
 
-    /// Hands type, value and text of one at `time`, in s, to `show`, unless it keeps its start value.
+    /// Calls `show` with type, value and text of one drive at `time` in s, unless the variable
+    /// still has its start value.
     pub(crate) fn show(
         &mut self,
         number: usize,
@@ -209,23 +211,23 @@ impl Drives {
         }
     }
 
-    /// Whether there are none.
+    /// Whether there is no driven variable.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.all.is_empty()
     }
 
-    /// Sets every variable that is due at `time`, in s, before the step from there: its value and,
-    /// where the FMU takes it, its derivative. A value that the FMU has already is not set again.
+    /// Sets every driven variable at `time` in s, before the step that starts there: its value and,
+    /// if the FMU takes it, its derivative. Skips values that the FMU already holds.
     ///
     /// # Errors
     ///
-    /// Where an FMU refuses a value.
+    /// Returns an error if an FMU refuses a value.
     pub fn write(&mut self, system: &mut System, time: f64) -> Result<(), SystemError> {
         for group in 0..self.groups.len() {
-            let (begin, end) = self.groups[group];
-            self.write_group(system, begin, end, time).map_err(|source| {
-                call(&system.slaves[self.all[begin].port.slave].0, time, source)
+            let (start, end) = self.groups[group];
+            self.write_group(system, start, end, time).map_err(|source| {
+                call(&system.slaves[self.all[start].port.slave].0, time, source)
             })?;
         }
         Ok(())
@@ -234,14 +236,14 @@ impl Drives {
     fn write_group(
         &mut self,
         system: &mut System,
-        begin: usize,
+        start: usize,
         end: usize,
         time: f64,
     ) -> Result<(), slave::CallError> {
         self.clear();
-        let kind = self.all[begin].kind;
-        let slave = &mut system.slaves[self.all[begin].port.slave].1;
-        for drive in &mut self.all[begin..end] {
+        let kind = self.all[start].kind;
+        let slave = &mut system.slaves[self.all[start].port.slave].1;
+        for drive in &mut self.all[start..end] {
             let Some(sample) = drive.sample(time) else { continue };
             if drive.is_settled(sample) {
                 continue;
@@ -290,7 +292,7 @@ impl Drives {
         self.slopes.clear();
     }
 
-    /// Takes note that the simulation has reached `time`, in s, for good.
+    /// Records that the communication point `time`, in s, is final.
     pub fn commit(&mut self, time: f64) {
         for drive in &mut self.all {
             drive.accepted = drive.written;
@@ -301,13 +303,14 @@ impl Drives {
         }
     }
 
-    /// The first time past `after`, both in s, at which a step should end.
+    /// Returns the first time after `after`, both in s, at which a signal or a fault on it jumps or
+    /// has a kink; a step should end there.
     #[must_use]
     pub fn next_break(&self, after: f64) -> Option<f64> {
         self.all.iter().filter_map(|drive| drive.next_break(after)).reduce(f64::min)
     }
 
-    /// What a checkpoint holds of them, in their order.
+    /// Returns the state of all drives for a checkpoint, in their order.
     #[must_use]
     pub fn state(&self) -> Vec<DriveState> {
         let of =
@@ -315,11 +318,11 @@ impl Drives {
         self.all.iter().map(of).collect()
     }
 
-    /// Takes back what a checkpoint holds, at a communication point.
+    /// Restores the state of a checkpoint, at a communication point.
     ///
     /// # Errors
     ///
-    /// Where it is of another scenario.
+    /// Returns an error if the checkpoint has another number of driven variables.
     pub fn restore(&mut self, state: Vec<DriveState>) -> Result<(), CheckpointError> {
         if state.len() != self.all.len() {
             return Err(CheckpointError { expected: self.all.len(), found: state.len() });
@@ -332,7 +335,7 @@ impl Drives {
     }
 }
 
-/// Order of the types.
+/// Returns the sort key of a type.
 fn rank(kind: DriveKind) -> u8 {
     match kind {
         DriveKind::Real { .. } => 0,
@@ -342,14 +345,14 @@ fn rank(kind: DriveKind) -> u8 {
     }
 }
 
-/// The Integer that a signal's value stands for.
+/// Rounds the value of a signal to an Integer.
 #[expect(clippy::cast_possible_truncation, reason = "saturates")]
 pub(crate) fn integer(value: f64) -> i32 {
     value.round() as i32
 }
 
 impl DriveKind {
-    /// The type of a variable; `derivatives` is for Reals.
+    /// Returns the type of a variable; `derivatives` applies to Reals only.
     #[must_use]
     pub fn of(kind: &Kind, derivatives: bool) -> Self {
         match kind {

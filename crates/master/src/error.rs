@@ -1,35 +1,35 @@
-//! What can be wrong with a system or a run.
+//! Errors of a system and of a simulation.
 
 use slave::CallError;
 
-/// Why a system cannot be put together or advanced.
+/// Error of building, initialising or advancing a system.
 #[derive(Debug, thiserror::Error)]
 pub enum SystemError {
-    /// A text of the form `slave.variable` was expected.
+    /// A name does not have the form `slave.variable`.
     #[error("{text:?} names no variable, expected the form {form}")]
     Syntax {
-        /// What was found.
+        /// The name found.
         text: String,
-        /// What was expected.
+        /// The form expected.
         form: &'static str,
     },
-    /// Two slaves have one name.
+    /// Two slaves have the same name.
     #[error("there are two FMUs of the name {name:?}, expected different names")]
     SameName {
         /// The name.
         name: String,
     },
-    /// There is no slave of that name.
+    /// No slave has this name.
     #[error("{name}: there is no FMU of the name {slave:?}, expected one of {known}")]
     UnknownSlave {
         /// The whole name.
         name: String,
         /// Its first part.
         slave: String,
-        /// The slaves that there are.
+        /// The names of the slaves that exist.
         known: String,
     },
-    /// The slave has no variable of that name.
+    /// The slave has no variable with this name.
     #[error("{name}: {model} has no variable {variable:?}{nearest}")]
     UnknownVariable {
         /// The whole name.
@@ -38,17 +38,17 @@ pub enum SystemError {
         model: String,
         /// The variable.
         variable: String,
-        /// Variables of a similar name, as part of a sentence.
+        /// Variables with a similar name, as part of a sentence.
         nearest: String,
     },
-    /// The variable cannot have this role.
+    /// The variable has the wrong causality or type.
     #[error("{name} is {found}, expected {expected}")]
     Role {
         /// The variable.
         name: String,
         /// Its causality or type.
         found: String,
-        /// What the role needs.
+        /// The causality or type expected.
         expected: String,
     },
     /// An input has two sources.
@@ -73,7 +73,7 @@ pub enum SystemError {
         /// Its unit.
         to_unit: String,
     },
-    /// A value cannot be read as the variable's type.
+    /// A text cannot be parsed as a value of the variable's type.
     #[error("{name} = {value:?}: expected {expected}")]
     Value {
         /// The variable.
@@ -93,7 +93,7 @@ pub enum SystemError {
         /// Function, status and messages.
         source: CallError,
     },
-    /// An FMU does not keep a setting.
+    /// An FMU replaced a value that was set.
     #[error(
         "{name}: the value {value} that was set is lost: after the initialization the FMU has \
          {found}; it ignores or replaces what is set, so leave the setting out"
@@ -103,10 +103,10 @@ pub enum SystemError {
         name: String,
         /// The text.
         value: String,
-        /// What the FMU has.
+        /// The value in the FMU.
         found: String,
     },
-    /// A function of an FMU failed.
+    /// An FMI call failed.
     #[error("{slave} at t = {time} s: {source}")]
     Call {
         /// The slave.
@@ -116,27 +116,27 @@ pub enum SystemError {
         /// Function, status and messages.
         source: CallError,
     },
-    /// An output, or what a connection makes of one, is not a number.
+    /// An output, or the value of a connection, is NaN or infinite.
     #[error("{name} is {value} at t = {time} s, expected a finite number")]
     NotFinite {
         /// The output.
         name: String,
-        /// Its value.
+        /// Its value in s.
         value: f64,
         /// Time of the master in s.
         time: f64,
     },
-    /// The algorithm asks for what an FMU cannot do.
-    #[error("{slave} cannot take part in {wanted}: its {lacks} is false")]
+    /// The algorithm needs a capability that an FMU lacks.
+    #[error("{slave} cannot take part in {required_by}: its {lacks} is false")]
     Capability {
         /// The slave.
         slave: String,
-        /// The flag of its model description.
+        /// The capability flag that is false.
         lacks: &'static str,
-        /// What needs it.
-        wanted: String,
+        /// The function of the master that needs it.
+        required_by: String,
     },
-    /// The values of a loop cannot be found.
+    /// The initial values of an algebraic loop cannot be found.
     #[error("the loop through {names} at t = {time} s: {why}")]
     Loop {
         /// The outputs.
@@ -146,7 +146,7 @@ pub enum SystemError {
         /// How the iteration ended.
         why: String,
     },
-    /// The iteration of a step finds no values that agree.
+    /// The iteration of a step did not converge.
     #[error("the step from t = {time} s over {size} s cannot be solved: {why}")]
     Coupling {
         /// Begin of the step in s.
@@ -156,7 +156,7 @@ pub enum SystemError {
         /// How the iteration ended.
         why: String,
     },
-    /// A run cannot go on from a checkpoint with another setting.
+    /// A checkpoint cannot be resumed because a setting differs.
     #[error("the checkpoint was taken with {name} {taken}; {name} {given} is not possible")]
     Resume {
         /// Name of the setting.
@@ -166,7 +166,7 @@ pub enum SystemError {
         /// Its value now.
         given: String,
     },
-    /// The smallest step is not small enough.
+    /// The error of the smallest step exceeds the tolerance.
     #[error(
         "the smallest step, {size} s at t = {time} s, still has an error of {error:.1e} times the \
          tolerance"
@@ -176,41 +176,41 @@ pub enum SystemError {
         time: f64,
         /// Its size in s.
         size: f64,
-        /// Its error in tolerances.
+        /// Its error as a multiple of the tolerance.
         error: f64,
     },
-    /// The steps have become too small to get on.
+    /// The steps are so small that the run cannot reach its stop time.
     #[error(
         "at t = {time} s the last {steps} steps were {length:.1e} s long together, near the smallest \
          step of {smallest} s: {left:.0e} more would be needed to the stop time; a larger relative \
          tolerance, a larger smallest step or fixed steps help"
     )]
-    Crawl {
-        /// Steps that were looked at.
+    TooManySteps {
+        /// Number of steps in the observed interval.
         steps: u32,
-        /// Their length together in s.
+        /// Total length of these steps in s.
         length: f64,
         /// Smallest step in s.
         smallest: f64,
         /// Time reached in s.
         time: f64,
-        /// Steps that are left at this pace.
+        /// Estimated number of remaining steps.
         left: f64,
     },
-    /// The algorithm makes no sense for this system.
+    /// The settings of the algorithm contradict each other or the system.
     #[error("{what}")]
     Algorithm {
-        /// What is wrong.
+        /// Description of the contradiction.
         what: String,
     },
-    /// The step size or the span of the run makes no sense.
+    /// A step size or a time of the run is invalid.
     #[error("{what} is {value} s, expected {rule}")]
     Time {
-        /// Which one.
+        /// Name of the quantity.
         what: &'static str,
         /// Its value.
         value: f64,
-        /// What it must be.
+        /// The condition it must satisfy.
         rule: String,
     },
 }

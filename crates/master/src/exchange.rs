@@ -1,4 +1,9 @@
-//! Values on their way from outputs to inputs, in arrays laid out once: stepping allocates nothing.
+//! Exchange of connected values: gathers the inputs of a slave, steps the slave, reads its outputs.
+//!
+//! The arrays are laid out once, so that stepping allocates nothing. For each step of a slave,
+//! [`Exchange::shift`] makes the last end values the start values, [`Exchange::gather`] computes
+//! the inputs (extrapolation, transformation, fault), and [`Exchange::advance`] sets them, calls
+//! `fmi2DoStep` and reads the outputs.
 
 mod discrete;
 mod extrapolation;
@@ -25,34 +30,34 @@ pub(crate) use layout::Refusal;
 pub(crate) use reals::{Reals, Trace};
 use slave::{CallError, Slave, StepResult};
 
-/// The connections of a system, ready to be carried out.
+/// All connections of a system with the current values of their outputs.
 pub(crate) struct Exchange {
     pub(crate) reals: Reals,
     integers: Channel<i32>,
     booleans: Channel<i32>,
     strings: Channel<String>,
-    /// Whether there are connections of other types than Real.
+    /// Whether there are connections of types other than Real.
     discrete: bool,
     allow_nan: bool,
-    /// Whether there are faults on connections.
+    /// Whether any connection has a fault.
     faulty: bool,
 }
 
-/// All values on their way: what is kept to repeat a step or to go on later.
+/// The values of all connected outputs, saved to repeat a step or for a checkpoint.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Values {
     reals: Trace,
     integers: Vec<i32>,
     booleans: Vec<i32>,
     strings: Vec<String>,
-    /// Values at the begins of the last steps.
-    begin_integers: Vec<i32>,
-    begin_booleans: Vec<i32>,
-    begin_strings: Vec<String>,
+    /// Values at the start of the last steps.
+    start_integers: Vec<i32>,
+    start_booleans: Vec<i32>,
+    start_strings: Vec<String>,
 }
 
 impl Values {
-    /// Whether these are values of a system with as many connected variables.
+    /// Whether both belong to systems with equal numbers of connected variables.
     pub(crate) fn has_shape_of(&self, other: &Self) -> bool {
         self.reals.has_shape_of(&other.reals)
             && self.integers.len() == other.integers.len()
@@ -62,7 +67,8 @@ impl Values {
 }
 
 impl Exchange {
-    /// The connections of `system`; slaves that are `refusing` derivatives do without them.
+    /// Lays out the connections of `system`. `refusing` lists for each slave the derivatives that
+    /// it refuses.
     pub(crate) fn new(system: &System, algorithm: &Algorithm, refusing: &[Refusal]) -> Self {
         let reals = Reals::new(system, algorithm, refusing);
         let to_reals = reals.integer_sources().iter().map(|(port, _)| *port);
@@ -79,7 +85,11 @@ impl Exchange {
         Self { reals, integers, booleans, strings, discrete, allow_nan, faulty: false }
     }
 
-    /// Puts faults on connections, by their inputs.
+    /// Puts faults on connections; each fault is given with the input of its connection.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if an input has no connection or is a String.
     pub(crate) fn set_faults(
         &mut self,
         system: &System,
@@ -101,18 +111,19 @@ impl Exchange {
         Ok(())
     }
 
-    /// The communication point `time` is reached for good.
+    /// Records the undisturbed values in the faults; the communication point `time` is final.
     #[inline]
     pub(crate) fn commit(&mut self, time: f64) {
         if self.faulty {
             self.reals.commit(time);
-            let ahead = |slave| self.reals.is_beyond(slave, time);
+            let ahead = |slave| self.reals.is_ahead(slave, time);
             self.integers.commit(time, ahead);
             self.booleans.commit(time, ahead);
         }
     }
 
-    /// The first time past `after`, both in s, at which a fault on a connection begins or ends.
+    /// Returns the first time after `after`, both in s, at which a fault on a connection starts or
+    /// ends.
     pub(crate) fn next_break(&self, after: f64) -> Option<f64> {
         if !self.faulty {
             return None;
@@ -125,27 +136,28 @@ impl Exchange {
         breaks.into_iter().flatten().reduce(f64::min)
     }
 
-    /// The faults, for a checkpoint.
+    /// Iterates over all faults, for a checkpoint.
     pub(crate) fn faults(&mut self) -> impl Iterator<Item = &mut FaultChain> {
         self.reals.faults().chain(self.integers.faults()).chain(self.booleans.faults())
     }
 
-    /// Before a step of `slave` from `time` over `size`: what it reached is where it begins.
+    /// Prepares a step of `slave` from `time` over `size`: the last end values become the start
+    /// values.
     pub(crate) fn shift(&mut self, slave: usize, time: f64, size: f64) {
         self.reals.shift(slave, time, size);
-        if self.discrete && self.reals.several {
+        if self.discrete && self.reals.multirate {
             self.integers.shift(slave);
             self.booleans.shift(slave);
             self.strings.shift(slave);
         }
     }
 
-    /// The inputs of `slave` for a step from `time` over `size`.
+    /// Computes the inputs of `slave` for a step from `time` over `size`.
     pub(crate) fn gather(&mut self, slave: usize, time: f64, size: f64) {
         self.reals.gather(slave, time, size);
         if self.discrete {
             let ahead = |source| {
-                self.reals.is_beyond(source, self.reals.seen_at(slave, source, time, size))
+                self.reals.is_ahead(source, self.reals.source_time(slave, source, time, size))
             };
             self.integers.gather(slave, time, ahead);
             self.booleans.gather(slave, time, ahead);
@@ -175,8 +187,8 @@ impl Exchange {
         Ok(done)
     }
 
-    /// The first half of [`Exchange::advance`] of a slave in the background; nothing for another.
-    pub(crate) fn begin(
+    /// Sets the inputs of a background slave and starts its step; does nothing for other slaves.
+    pub(crate) fn start(
         &mut self,
         system: &mut System,
         position: usize,
@@ -197,7 +209,8 @@ impl Exchange {
         .map_err(|source| call(name, time, source))
     }
 
-    /// The second half of [`Exchange::advance`] of a slave in the background; all of it for another.
+    /// Waits for the step of a background slave and reads its outputs; steps any other slave with
+    /// [`Exchange::advance`].
     pub(crate) fn finish(
         &mut self,
         system: &mut System,
@@ -214,8 +227,8 @@ impl Exchange {
             .map_err(|source| call(name, time, source))
     }
 
-    /// As [`Exchange::advance`] for several slaves at once: `run` makes the steps of those that can
-    /// be stepped in another thread. Each slave's step is the time and the size that `span` gives.
+    /// Steps several slaves at once. `run` makes the steps that may run in another thread; `span`
+    /// returns time and size of the step of each slave.
     pub(crate) fn advance_all(
         &mut self,
         system: &mut System,
@@ -240,7 +253,7 @@ impl Exchange {
         Ok(done)
     }
 
-    /// Whether [`Exchange::pass`] does all that a sweep takes.
+    /// Whether [`Reals::pass`] can make a complete sweep.
     pub(crate) fn passes(&self) -> bool {
         !self.discrete && self.reals.passes()
     }
@@ -255,12 +268,12 @@ impl Exchange {
         self.integers.read(position, slave)?;
         self.booleans.read(position, slave)?;
         self.strings.read(position, slave)?;
-        self.take_over_integers();
+        self.copy_integers_to_reals();
         Ok(())
     }
 
-    /// Integers that go to Reals.
-    fn take_over_integers(&mut self) {
+    /// Copies Integer outputs that are connected to Real inputs.
+    fn copy_integers_to_reals(&mut self) {
         for k in 0..self.reals.integer_sources().len() {
             let (port, output) = self.reals.integer_sources()[k];
             if let Some(&value) = self.integers.value(port) {
@@ -269,7 +282,7 @@ impl Exchange {
         }
     }
 
-    /// Reads all connected outputs of the slave at `position`, with derivatives.
+    /// Reads all connected outputs, and their derivatives, of the slave at `position`.
     pub(crate) fn read(
         &mut self,
         system: &mut System,
@@ -283,8 +296,8 @@ impl Exchange {
         self.check_finite(system, position, time)
     }
 
-    /// Every connected Real output of the slave is a finite number; a derivative that is not is
-    /// reported once.
+    /// Checks that every connected Real output of the slave is finite; warns once about a
+    /// derivative that is not.
     #[inline]
     pub(crate) fn check_finite(
         &mut self,
@@ -295,10 +308,10 @@ impl Exchange {
         if !self.reals.derivatives_are_finite(slave) {
             self.report_derivatives(system, slave, time);
         }
-        self.refuse(system, time, || self.reals.not_finite(slave))
+        self.check_value(system, time, || self.reals.not_finite(slave))
     }
 
-    /// Names the outputs of the slave whose derivatives are not finite for the first time.
+    /// Warns about outputs of the slave whose derivative is not finite, once for each output.
     #[cold]
     fn report_derivatives(&mut self, system: &System, slave: usize, time: f64) {
         while let Some((port, value)) = self.reals.report_derivative(slave) {
@@ -310,7 +323,7 @@ impl Exchange {
         }
     }
 
-    /// What connections and faults make of outputs for the gathered inputs of the slave is finite.
+    /// Checks that the gathered inputs of the slave are finite after transformations and faults.
     #[inline]
     pub(crate) fn check_inputs(
         &self,
@@ -318,12 +331,12 @@ impl Exchange {
         slave: usize,
         time: f64,
     ) -> Result<(), SystemError> {
-        self.refuse(system, time, || self.reals.input_not_finite(slave))
+        self.check_value(system, time, || self.reals.input_not_finite(slave))
     }
 
-    /// The error of the value that `wrong` finds, unless any value will do.
+    /// Returns an error for the value that `wrong` finds, unless NaN and infinity are allowed.
     #[inline]
-    fn refuse(
+    fn check_value(
         &self,
         system: &System,
         time: f64,
@@ -340,30 +353,30 @@ impl Exchange {
         }
     }
 
-    /// Keeps all values in `values`.
+    /// Saves all values in `values`.
     pub(crate) fn save(&self, values: &mut Values) {
         values.reals.copy(&self.reals.trace);
         values.integers.clone_from(&self.integers.latest);
         values.booleans.clone_from(&self.booleans.latest);
         values.strings.clone_from(&self.strings.latest);
-        values.begin_integers.clone_from(&self.integers.begin);
-        values.begin_booleans.clone_from(&self.booleans.begin);
-        values.begin_strings.clone_from(&self.strings.begin);
+        values.start_integers.clone_from(&self.integers.start);
+        values.start_booleans.clone_from(&self.booleans.start);
+        values.start_strings.clone_from(&self.strings.start);
     }
 
-    /// Back to the values kept.
+    /// Restores all values from `values`.
     pub(crate) fn restore(&mut self, values: &Values) {
         self.reals.trace.copy(&values.reals);
         self.integers.latest.clone_from(&values.integers);
         self.booleans.latest.clone_from(&values.booleans);
         self.strings.latest.clone_from(&values.strings);
-        self.integers.begin.clone_from(&values.begin_integers);
-        self.booleans.begin.clone_from(&values.begin_booleans);
-        self.strings.begin.clone_from(&values.begin_strings);
+        self.integers.start.clone_from(&values.start_integers);
+        self.booleans.start.clone_from(&values.start_booleans);
+        self.strings.start.clone_from(&values.start_strings);
     }
 }
 
-/// The error of a call of `slave` at `time`.
+/// Wraps the error of an FMI call of `slave` at `time`.
 #[cold]
 pub(crate) fn call(slave: &str, time: f64, source: CallError) -> SystemError {
     SystemError::Call { slave: slave.to_owned(), time, source }

@@ -1,10 +1,11 @@
-//! Faults on the way of a value to an input: what a failed sensor, wire or actuator makes of it.
+//! Faults between an output (or signal) and an input: models of failed sensors, wires and
+//! actuators.
 
 mod delay;
 mod draw;
 mod stage;
 
-pub use draw::{Draw, Spread};
+pub use draw::{NoiseDistribution, RandomSeries};
 
 use serde::{Deserialize, Serialize};
 
@@ -13,13 +14,13 @@ use slave::Value;
 use crate::signal::{Sample, reached};
 use stage::Stage;
 
-/// The time during which a fault acts: `from <= t < until`, in s. A time is reached where it differs
-/// by rounding only (1e-9, relative).
+/// The time interval in which a fault acts: `from <= t < until`, in s. Times that differ by at most
+/// 1e-9 (relative) are equal.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Window {
-    /// Its begin.
+    /// Start time in s.
     pub from: f64,
-    /// Its end; none: it lasts.
+    /// End time in s; `None`: the fault stays.
     pub until: Option<f64>,
 }
 
@@ -31,7 +32,7 @@ impl Window {
     }
 }
 
-/// What becomes of the value `v` at the time `t` while the fault acts.
+/// A kind of fault: the value that replaces `v` at the time `t` while the fault acts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Fault {
     /// `v + b`.
@@ -40,77 +41,76 @@ pub enum Fault {
     Gain(f64),
     /// `v + r (t - from)`, with `r` per second.
     Drift(f64),
-    /// The value given, or else the one at the first communication point of its time.
+    /// The given value, or the value at the first communication point of the window.
     Stuck(Option<f64>),
     /// Values are lost.
     Dropout {
-        /// Which ones.
-        lost: Lost,
-        /// What stands in for them; none: the last value that was not lost. Where all were lost so
-        /// far, the first one.
+        /// Which values are lost.
+        lost: LossPattern,
+        /// Replacement for a lost value. `None`: the last value that was not lost, or the first
+        /// value if all values so far were lost.
         instead: Option<f64>,
     },
-    /// The value of so many seconds ago: on the line between two communication points, or
-    /// that of the last one. Before the first communication point, `initial`, or else the first
-    /// value.
+    /// The value from `seconds` ago: interpolated between two communication points, or held from
+    /// the earlier one. Before the first communication point: `initial`, or the first value.
     Delay {
         /// The delay in s, above 0.
         seconds: f64,
         /// Whether the value of a communication point is held until the next one.
         hold: bool,
-        /// Value before there is one.
+        /// Value before the first delayed value arrives.
         initial: Option<f64>,
     },
-    /// `offset + step round((v - offset) / step)`, halves away from zero.
+    /// `offset + step round((v - offset) / step)`, half-way cases away from zero.
     Quantisation {
         /// Distance of two levels, above 0.
         step: f64,
         /// One of the levels.
         offset: f64,
     },
-    /// `v` within these bounds.
+    /// `v`, limited to these bounds.
     Saturation {
-        /// Lowest value, or minus infinity.
+        /// Lower bound; `None`: minus infinity.
         lowest: Option<f64>,
-        /// Highest value, or infinity.
+        /// Upper bound; `None`: infinity.
         highest: Option<f64>,
     },
-    /// `v + e`, with random `e` of mean zero, each sample independent of the others.
+    /// `v + e` with random `e` of mean zero; samples are independent.
     Noise {
         /// Distribution of `e`.
-        spread: Spread,
-        /// When there is a new one.
-        draw: Draw,
+        spread: NoiseDistribution,
+        /// The random series, which determines the sample times.
+        draw: RandomSeries,
     },
     /// `1 - v`: true becomes false.
     Inversion,
 }
 
-/// Which values a dropout takes.
+/// Which values a dropout loses.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub enum Lost {
-    /// All.
+pub enum LossPattern {
+    /// All values.
     All,
-    /// Those in the first `part` s of each period.
+    /// The values in the first `part` s of each period.
     Periodic {
-        /// The period in s, which begins with the window.
+        /// The period in s; the first one starts with the window.
         period: f64,
-        /// Below the period.
+        /// Length in s of the lost part, less than the period.
         part: f64,
     },
-    /// Each with this probability, independently.
+    /// Each sample with this probability, independently.
     Random {
-        /// From 0 to 1.
+        /// Probability from 0 to 1.
         probability: f64,
-        /// When it is decided anew.
-        draw: Draw,
+        /// The random series, which determines the sample times.
+        draw: RandomSeries,
     },
 }
 
-/// Why there can be no [`FaultChain`].
+/// Error of creating a [`FaultChain`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FaultError {
-    /// A delay over too many communication steps.
+    /// A delay spans too many communication steps.
     #[error(
         "a delay of {seconds} s is {steps:.0} communication steps of {step} s, expected at most {most}"
     )]
@@ -119,30 +119,31 @@ pub enum FaultError {
         seconds: f64,
         /// The communication step in s.
         step: f64,
-        /// Their ratio.
+        /// Number of communication steps in the delay.
         steps: f64,
-        /// The largest ratio.
+        /// The largest number allowed.
         most: f64,
     },
 }
 
-/// All faults on one way, each on what the one before it leaves.
+/// All faults on one connection, applied in order.
 ///
-/// [`FaultChain::apply`] is pure: a step may be repeated. What a fault remembers (the value at which
-/// it sticks, the last value not lost, the values on their way) is what [`FaultChain::commit`] was
-/// told at communication points. Neither allocates.
+/// [`FaultChain::apply`] has no side effects, so that a step may be repeated. The memory of a fault
+/// (the value at which it sticks, the last value not lost, the delayed values) changes only in
+/// [`FaultChain::commit`], which receives the values at final communication points. Neither
+/// function allocates.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FaultChain {
     stages: Vec<Stage>,
 }
 
 impl FaultChain {
-    /// The faults in their order, for communication steps of `step` s. Steps may differ from that;
-    /// a delay keeps no two points that are nearer than half of it.
+    /// Creates a chain of `faults` for communication steps of about `step` s. Steps may have
+    /// another size; a delay merges points that are closer than half of `step`.
     ///
     /// # Errors
     ///
-    /// [`FaultError`] where a delay would need too much memory.
+    /// Returns [`FaultError`] if a delay would need too much memory.
     pub fn new(faults: Vec<(Window, Fault)>, step: f64) -> Result<Self, FaultError> {
         let stages = faults
             .into_iter()
@@ -151,27 +152,27 @@ impl FaultChain {
         Ok(Self { stages })
     }
 
-    /// What arrives at `time`, in s, of `value`. `time` is not before that of the last commit.
+    /// Returns the disturbed value at `time`, in s. `time` is not before the last commit.
     #[must_use]
     pub fn apply(&self, time: f64, value: f64) -> f64 {
         self.apply_sample(time, Sample::held(value)).value
     }
 
-    /// As [`FaultChain::apply`], with the derivative by time of what arrives; for a value that
-    /// changes in jumps it is zero.
+    /// As [`FaultChain::apply`], with the derivative with respect to time; the derivative of a
+    /// value that changes in jumps is zero.
     #[must_use]
     pub fn apply_sample(&self, time: f64, sample: Sample) -> Sample {
         let [value, slope, _] = self.apply_derivatives(time, [sample.value, sample.slope, 0.0]);
         Sample { value, slope }
     }
 
-    /// As [`FaultChain::apply_sample`], with the second derivative too: value, slope, curvature.
+    /// As [`FaultChain::apply_sample`], with the second derivative: value, slope, curvature.
     #[must_use]
-    pub fn apply_derivatives(&self, time: f64, course: [f64; 3]) -> [f64; 3] {
-        self.stages.iter().fold(course, |course, stage| stage.apply(time, course))
+    pub fn apply_derivatives(&self, time: f64, derivatives: [f64; 3]) -> [f64; 3] {
+        self.stages.iter().fold(derivatives, |derivatives, stage| stage.apply(time, derivatives))
     }
 
-    /// As [`FaultChain::apply`], for Integers, rounded and within their range.
+    /// As [`FaultChain::apply`], for Integers; the result is rounded and limited to their range.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "saturates")]
     pub fn apply_integer(&self, time: f64, value: i32) -> i32 {
@@ -184,7 +185,7 @@ impl FaultChain {
         i32::from(self.apply(time, f64::from(i32::from(value != 0))) != 0.0)
     }
 
-    /// Changes a value of any type as it is at `time` in s; a String stays.
+    /// Applies the faults to a value of any type at `time` in s; Strings do not change.
     pub(crate) fn disturb(&self, time: f64, value: &mut Value) {
         match value {
             Value::Real(value) => *value = self.apply(time, *value),
@@ -196,33 +197,33 @@ impl FaultChain {
         }
     }
 
-    /// Takes note of the undisturbed `value` at the communication point `time`, in s, that the
-    /// simulation has reached for good, the start included.
+    /// Records the undisturbed `value` at the final communication point `time`, in s. Call it at
+    /// the start time, too.
     pub fn commit(&mut self, time: f64, value: f64) {
-        let mut course = [value, 0.0, 0.0];
+        let mut derivatives = [value, 0.0, 0.0];
         let count = self.stages.len();
         for (position, stage) in self.stages.iter_mut().enumerate() {
-            stage.commit(time, course[0]);
+            stage.commit(time, derivatives[0]);
             if position + 1 < count {
-                course = stage.apply(time, course);
+                derivatives = stage.apply(time, derivatives);
             }
         }
     }
 
-    /// The first time past `after`, both in s, at which a fault begins or ends, or a periodic
-    /// dropout does.
+    /// Returns the first time after `after`, both in s, at which a fault or a lost part of a
+    /// periodic dropout starts or ends.
     #[must_use]
     pub fn next_break(&self, after: f64) -> Option<f64> {
         self.stages.iter().filter_map(|stage| stage.next_break(after)).reduce(f64::min)
     }
 
-    /// How many faults there are.
+    /// Returns the number of faults.
     #[must_use]
     pub fn len(&self) -> usize {
         self.stages.len()
     }
 
-    /// Whether there are none.
+    /// Whether the chain is empty.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.stages.is_empty()

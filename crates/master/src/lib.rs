@@ -1,11 +1,25 @@
-//! Couples slaves: connects their variables and advances them together.
+//! Co-simulation master: connects FMU instances (slaves) and advances them together in time.
 //!
-//! A [`System`] holds slaves and connections; a [`Simulation`] initialises and steps it by an
-//! [`Algorithm`]; a [`Probe`] or a [`Readout`] reads what is of interest. [`drive`] makes variables
-//! follow signals, [`fault`] disturbs connections.
+//! A [`System`] holds the slaves and their connections. A [`Simulation`] initialises the system and
+//! advances it with an [`Algorithm`]. A [`Probe`] or a [`Readout`] reads values between steps. A
+//! [`drive::Drive`] makes a variable follow a signal; a [`fault::FaultChain`] disturbs the values
+//! on a connection.
 //!
-//! The crate reads no files and loads no libraries: `fmu-import` turns FMUs into slaves, `study` runs
-//! what a file asks for.
+//! # One communication step, from the top
+//!
+//! 1. [`Simulation::step`] (`simulation.rs`) determines the end of the step: the next point of the
+//! grid, the size chosen by the step control, or the time of an event.
+//! 2. `simulation/adaptive.rs` repeats a step whose error is too large; `simulation/iterate.rs`
+//! repeats it until inputs and outputs agree. Both need slaves whose state can be saved and
+//! restored.
+//! 3. `simulation/sweep.rs` steps every slave once, in the order of `order.rs`;
+//! `simulation/parallel.rs` uses threads where they are faster.
+//! 4. For each slave, `exchange.rs` gathers the inputs (extrapolation, transformation, fault), sets
+//! them, calls `fmi2DoStep` and reads the outputs.
+//! 5. When the communication point is final, faults and driven variables record it (`commit`).
+//!
+//! The crate reads no files and loads no libraries: the crate `fmu-import` turns FMUs into slaves,
+//! the crate `study` runs a `system.toml` or an SSP.
 #![forbid(unsafe_code)]
 
 pub mod algorithm;
@@ -22,7 +36,7 @@ mod simulation;
 mod system;
 
 pub use algorithm::{Algorithm, Coupling, Extrapolation, Method, StepControl};
-pub use choose::{AlgorithmRequest, Chosen, choose};
+pub use choose::{AlgorithmChoice, AlgorithmRequest, choose};
 pub use drive::Scenario;
 pub use error::SystemError;
 pub use order::{Order, by_direct_dependencies};

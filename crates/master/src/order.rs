@@ -1,4 +1,4 @@
-//! The order in which Gauss-Seidel steps the slaves.
+//! The order in which the slaves step in a Gauss-Seidel sweep.
 
 use std::collections::{HashMap, HashSet};
 
@@ -7,19 +7,20 @@ use fmu_description::{ModelDescription, Unknown};
 use crate::system::System;
 use solve::components;
 
-/// An order of stepping.
+/// An order of the slaves, with their algebraic loops.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Order {
     /// Positions of the slaves, first to last.
     pub sequence: Vec<usize>,
-    /// Slaves that depend directly on each other in a circle (an algebraic loop), ascending; in
-    /// `sequence` those of one circle stand in the order of their addition.
+    /// Positions of the slaves in algebraic loops (cycles of direct dependencies), ascending. In
+    /// `sequence` the slaves of one loop keep the order in which they were added.
     pub looped: Vec<usize>,
 }
 
-/// Orders the slaves by their direct dependencies: where a connected output of B depends without a
-/// step in between on an input that is connected to A, A comes before B. Slaves that this leaves
-/// free keep the order of their addition.
+/// Orders the slaves by their direct dependencies.
+///
+/// If a connected output of B depends directly (without a step in between) on an input that A
+/// supplies, A comes before B. Otherwise slaves keep the order in which they were added.
 #[must_use]
 pub fn by_direct_dependencies(system: &System) -> Order {
     let through = passed_through(system);
@@ -36,7 +37,7 @@ pub fn by_direct_dependencies(system: &System) -> Order {
     Order { sequence: found.sequence().to_vec(), looped }
 }
 
-/// Inputs, by position.
+/// A set of inputs, by position.
 enum Inputs {
     All,
     These(HashSet<usize>),
@@ -51,7 +52,7 @@ impl Inputs {
     }
 }
 
-/// For each slave the inputs on which a connected output depends directly.
+/// Returns for each slave the inputs with direct feedthrough to a connected output.
 fn passed_through(system: &System) -> Vec<Inputs> {
     let mut through: Vec<Inputs> =
         system.slaves.iter().map(|_| Inputs::These(HashSet::new())).collect();
@@ -78,7 +79,7 @@ fn by_index(unknowns: &[Unknown]) -> HashMap<u32, &Unknown> {
     unknowns.iter().map(|unknown| (unknown.index, unknown)).collect()
 }
 
-/// Rows of `ModelStructure` by the index of their variable, for one model.
+/// The entries of `ModelStructure` of one model, by the index of their variable.
 pub(crate) struct Rows<'a> {
     initial: HashMap<u32, &'a Unknown>,
     outputs: HashMap<u32, &'a Unknown>,
@@ -92,8 +93,8 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// The variables (1-based indices) on which the output at that position depends in
-    /// initialization mode; none: maybe on all.
+    /// Returns the variables (1-based indices) on which the output at position `output` depends in
+    /// initialization mode; `None`: possibly all.
     pub(crate) fn initial_dependencies(&self, output: usize) -> Option<&'a [u32]> {
         let index = u32::try_from(output + 1).ok()?;
         let row = self.initial.get(&index).or_else(|| self.outputs.get(&index))?;

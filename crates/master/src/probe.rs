@@ -1,4 +1,4 @@
-//! Reading chosen variables of a system, each as a number.
+//! Reads chosen variables of a system as numbers.
 
 use fmu_description::Kind;
 
@@ -6,11 +6,11 @@ use crate::error::SystemError;
 use crate::exchange::call;
 use crate::system::{Port, System};
 
-/// A list of variables to read together; Boolean as 0 or 1. Strings are no numbers and are left
-/// out.
+/// A list of variables to read together. Booleans are 0 or 1; Strings are left out.
 pub struct Probe {
     names: Vec<String>,
-    /// One for each slave and type: slave, type, value references, positions among the values.
+    /// One entry for each slave and type: slave, type, value references, positions among the
+    /// values.
     reads: Vec<Read>,
     reals: Vec<f64>,
     integers: Vec<i32>,
@@ -31,7 +31,7 @@ enum ReadKind {
 }
 
 impl Probe {
-    /// A probe for `ports`, in that order.
+    /// Creates a probe of `ports`, in that order.
     #[must_use]
     pub fn new(system: &System, ports: &[Port]) -> Self {
         let mut probe =
@@ -66,17 +66,18 @@ impl Probe {
         probe
     }
 
-    /// The names `slave.variable`, in the order of the values.
+    /// Returns the names `slave.variable`, in the order of the values.
     #[must_use]
     pub fn names(&self) -> &[String] {
         &self.names
     }
 
-    /// Reads all values into `values`, which has the length of [`Probe::names`].
+    /// Reads all values into `values`, which has the length of [`Probe::names`]. `time` in s
+    /// appears in the error message.
     ///
     /// # Errors
     ///
-    /// Where an FMU refuses; `time` is for the message.
+    /// Returns an error if an FMU refuses a read.
     pub fn read(
         &mut self,
         system: &mut System,

@@ -1,4 +1,4 @@
-//! Reading chosen variables of a system, each as its type has it, for results.
+//! Reads chosen variables of a system in their own types, for results.
 
 mod slow;
 
@@ -13,7 +13,8 @@ use crate::system::{Port, System};
 use slave::{CallError, Slave};
 pub use slow::{SlowState, SlowValues};
 
-/// Values of chosen variables, in arrays by type: each in the order of the variables of that type.
+/// Values of chosen variables, in one array for each type. Each array keeps the order of the
+/// variables.
 #[derive(Debug, Default)]
 pub struct Readout {
     ports: Vec<Port>,
@@ -22,15 +23,15 @@ pub struct Readout {
     pub reals: Vec<f64>,
     /// Values of Integers and Enumerations.
     pub integers: Vec<i32>,
-    /// Values of Booleans: 0 is false.
+    /// Values of Booleans; 0 is false.
     pub booleans: Vec<i32>,
     /// Values of Strings.
     pub strings: Vec<String>,
-    /// Variables that follow a signal: which of the [`Drives`], and the position of the value.
+    /// Driven variables: index of the drive, and position of the value.
     driven: Vec<(usize, usize)>,
 }
 
-/// Variables of one slave and one type that stand side by side.
+/// Consecutive variables of one slave and one type, read by one call.
 #[derive(Debug)]
 struct Read {
     slave: usize,
@@ -59,7 +60,7 @@ impl ReadKind {
 }
 
 impl Readout {
-    /// A readout of `ports`, in that order.
+    /// Creates a readout of `ports`, in that order.
     #[must_use]
     pub fn new(system: &System, ports: &[Port]) -> Self {
         let mut readout = Self { ports: ports.to_vec(), ..Self::default() };
@@ -67,7 +68,7 @@ impl Readout {
             let variable = system.variable(port);
             let kind = ReadKind::of(&variable.kind);
             let position = readout.add(kind);
-            // The last read of that kind, so that the range stays one.
+            // Only the last group of this kind can be extended, so that its range stays contiguous.
             let last = readout.reads.iter_mut().rev().find(|read| read.kind == kind);
             match last.filter(|read| read.slave == port.slave) {
                 Some(read) => {
@@ -85,8 +86,8 @@ impl Readout {
         readout
     }
 
-    /// From now on the variables that follow a signal have its value at the time that is read, not
-    /// the one that the FMU was given for its last step.
+    /// Makes driven variables show the value of their signal at the time read, instead of the value
+    /// that the FMU received for its last step.
     pub(crate) fn follow(&mut self, drives: &Drives, system: &System, ports: &[Port]) {
         let kind = |port: Port| ReadKind::of(&system.variable(port).kind);
         for (number, drive) in drives.iter().enumerate() {
@@ -97,7 +98,7 @@ impl Readout {
         }
     }
 
-    /// Gives driven variables their values at `time`, in s.
+    /// Writes the values of driven variables at `time`, in s.
     pub(crate) fn apply(&mut self, drives: &mut Drives, time: f64) {
         for &(number, position) in &self.driven {
             drives.show(number, time, |kind, value, text| match kind {
@@ -113,7 +114,7 @@ impl Readout {
         }
     }
 
-    /// Makes room for a value; its position.
+    /// Adds an element for a value and returns its position.
     fn add(&mut self, kind: ReadKind) -> usize {
         match kind {
             ReadKind::Real => self.reals.push(0.0),
@@ -130,11 +131,11 @@ impl Readout {
         length - 1
     }
 
-    /// Reads all values.
+    /// Reads all values. `time` in s appears in the error message.
     ///
     /// # Errors
     ///
-    /// Where an FMU refuses; `time` is for the message.
+    /// Returns an error if an FMU refuses a read.
     pub fn read(&mut self, system: &mut System, time: f64) -> Result<(), SystemError> {
         for position in 0..self.reads.len() {
             let (name, slave) = &mut system.slaves[self.reads[position].slave];
@@ -143,13 +144,13 @@ impl Readout {
         Ok(())
     }
 
-    /// The variables among `ports`, of which this is the readout, that their FMUs refuse to read now,
-    /// each with the refusal. A group of variables that is read as one is taken apart only where it
-    /// fails.
+    /// Returns the variables among `ports` that their FMUs refuse to read now, each with the error.
+    /// `ports` are the ports of this readout. Reads single variables only in groups whose common
+    /// read fails. `time` in s appears in the error message.
     ///
     /// # Errors
     ///
-    /// Where an FMU ends its process or returns `fmi2Fatal`; `time` is for the message.
+    /// Returns an error if an FMU ends its process or returns `fmi2Fatal`.
     pub fn unreadable(
         &mut self,
         system: &mut System,

@@ -1,61 +1,60 @@
-//! Signals over time, for what no output is connected to.
+//! Signals: functions of time for inputs without a connection.
 
 mod track;
 
-pub use track::{Between, Track, TrackError};
+pub use track::{Interpolation, Track, TrackError};
 
 use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
 
-/// Relative difference of two times that are taken for the same; as in FMPy (Python's
-/// `math.isclose`).
+/// Relative difference below which two times are equal; as in FMPy (Python's `math.isclose`).
 const SAME: f64 = 1e-9;
 
-/// Whether two times are the same but for rounding.
+/// Whether two times are equal up to rounding.
 pub(crate) fn near(one: f64, other: f64) -> bool {
     let difference = (one - other).abs();
     difference == 0.0 || difference.is_finite() && difference <= SAME * one.abs().max(other.abs())
 }
 
-/// Whether `time` is at `moment` but for rounding, or past it.
+/// Whether `time` is at or after `moment`, up to rounding.
 pub(crate) fn reached(time: f64, moment: f64) -> bool {
     time >= moment || near(time, moment)
 }
 
-/// The earlier of `first` and those of `moments` that are past `after`.
+/// Returns the earliest of `moments` that is after `after`.
 pub(crate) fn earliest(after: f64, moments: impl IntoIterator<Item = f64>) -> Option<f64> {
     moments.into_iter().filter(|&moment| !reached(after, moment)).reduce(f64::min)
 }
 
-/// Value and right-hand derivative by time at one instant.
+/// Value and right-hand derivative of a signal at one time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sample {
     /// The value.
     pub value: f64,
-    /// Its derivative by time, for the time to come.
+    /// Right-hand derivative with respect to time, in 1/s.
     pub slope: f64,
 }
 
 impl Sample {
-    /// A value that stays.
+    /// Returns a constant sample: slope 0.
     #[must_use]
     pub fn held(value: f64) -> Self {
         Self { value, slope: 0.0 }
     }
 }
 
-/// A place in a [`Track`], so that the next look-up near it costs nothing. It never changes a
-/// result, and time may go back.
+/// The position of the last look-up in a [`Track`]. It makes the next look-up nearby fast and does
+/// not change any result; time may go back.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Cursor(usize);
 
-/// A function of time. Where it jumps, the value is the one after the jump.
+/// A function of time. At a jump, the value is the one after the jump.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Signal {
-    /// One value.
+    /// A constant.
     Constant(f64),
-    /// `begin` up to the time `from`, `end` after the time `until`, a line between.
+    /// A ramp: `begin` up to the time `from`, `end` after the time `until`, linear in between.
     Ramp {
         /// Time in s.
         from: f64,
@@ -66,8 +65,8 @@ pub enum Signal {
         /// Value after.
         end: f64,
     },
-    /// `offset` before the time `from`, then
-    /// `offset + amplitude sin(2 pi frequency (t - from) + phase)`.
+    /// A sine: `offset` before the time `from`, then `offset + amplitude sin(2 pi frequency (t -
+    /// from) + phase)`.
     Sine {
         /// Amplitude.
         amplitude: f64,
@@ -80,25 +79,25 @@ pub enum Signal {
         /// Time in s.
         from: f64,
     },
-    /// Points in time.
+    /// A sampled signal.
     Track(Track),
 }
 
 impl Signal {
-    /// The value at `time`, in s.
+    /// Returns the value at `time`, in s.
     #[must_use]
     pub fn value(&self, time: f64) -> f64 {
         self.at(time, &mut Cursor::default()).value
     }
 
-    /// The right-hand derivative by time at `time`, in s.
+    /// Returns the right-hand derivative at `time`, in s.
     #[must_use]
     pub fn slope(&self, time: f64) -> f64 {
         self.at(time, &mut Cursor::default()).slope
     }
 
-    /// Both at `time`, in s. With the `cursor` of the call before, a time near that call's costs
-    /// no search.
+    /// Returns value and derivative at `time`, in s. With the `cursor` of the last call, a time
+    /// near the last one needs no search.
     pub fn at(&self, time: f64, cursor: &mut Cursor) -> Sample {
         match self {
             Signal::Constant(value) => Sample::held(*value),
@@ -106,7 +105,7 @@ impl Signal {
                 let part = ((time - from) / (until - from)).clamp(0.0, 1.0);
                 let moves = reached(time, *from) && !reached(time, *until);
                 let slope = if moves { (end - begin) / (until - from) } else { 0.0 };
-                // Both ends are met exactly.
+                // Return `end` exactly at the end.
                 let value = if part < 1.0 { begin + part * (end - begin) } else { *end };
                 Sample { value, slope }
             }
@@ -122,9 +121,8 @@ impl Signal {
         }
     }
 
-    /// The first time past `after`, both in s, at which the signal jumps or has a kink where a step
-    /// should end. The points between the lines of a track are not among them, unless it jumps
-    /// there.
+    /// Returns the first time after `after`, both in s, at which the signal jumps, or has a kink at
+    /// which a step should end. The points of a sampled signal count only if it jumps there.
     #[must_use]
     pub fn next_break(&self, after: f64) -> Option<f64> {
         match self {
@@ -135,7 +133,7 @@ impl Signal {
         }
     }
 
-    /// The signal `factor s(t) + offset`.
+    /// Returns the signal `scale s(t) + shift`.
     #[must_use]
     pub fn scaled(self, scale: f64, shift: f64) -> Self {
         let absolute = |value: f64| scale * value + shift;

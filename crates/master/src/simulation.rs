@@ -1,4 +1,9 @@
-//! The master algorithm at work: initialisation and communication steps.
+//! The simulation: initialisation and communication steps.
+//!
+//! [`Simulation::step`] is the entry point. The submodules hold one part each: `initial`
+//! (initialisation), `grid` (communication points), `sweep` (one step of all slaves), `adaptive`
+//! and `control` (step control), `iterate` (coupling), `events`, `parallel` and `together` (threads
+//! and background slaves), `checkpoint`.
 
 mod adaptive;
 mod capabilities;
@@ -28,7 +33,7 @@ use grid::{Grid, size_between};
 use iterate::Coupled;
 use parallel::Parallel;
 use slave::{CallError, Failure};
-use sweep::{Groups, Swept};
+use sweep::{Groups, SweepResult};
 use together::any_in_background;
 
 pub use checkpoint::Checkpoint;
@@ -37,7 +42,7 @@ pub use grid::EarlyEnd;
 pub use iterate::Fallbacks;
 pub(crate) use parallel::Task;
 
-/// A system in simulation.
+/// A running co-simulation of a [`System`].
 pub struct Simulation {
     system: System,
     exchange: Exchange,
@@ -49,30 +54,30 @@ pub struct Simulation {
     control: Control,
     coupled: Option<Coupled>,
     repetition: Repetition,
-    /// Steps are repeated: every slave can go back.
+    /// Whether steps may be repeated; every slave can then restore its state.
     repeats: bool,
     events: Option<Events>,
     groups: Groups,
     parallel: Option<Parallel>,
-    /// For each slave the steps of the grid that it makes at once, and the size of the step that it
-    /// makes now, 0 for none.
+    /// For each slave: the number of communication steps in one of its steps, and the size in s of
+    /// its current step, 0 if it makes none.
     multiples: Vec<u32>,
     sizes: Vec<f64>,
-    /// Whether a sweep is one pass over the slaves.
+    /// Whether a sweep is a single pass over the slaves.
     passes: bool,
     /// Whether some slaves step in the background.
     background: bool,
-    /// The slave that asked for the end of the simulation, and when.
+    /// The slave that requested the end of the simulation, and the time in s.
     ended: Option<(usize, f64)>,
 }
 
 impl Simulation {
-    /// Initialises all slaves of `system` at the start time, to be advanced by `algorithm`.
+    /// Initialises all slaves of `system` at the start time and prepares stepping with `algorithm`.
     ///
     /// # Errors
     ///
-    /// Where times make no sense, the algorithm asks for what an FMU cannot do, an FMU fails, or
-    /// an output is not finite.
+    /// Returns an error if a time is invalid, if the algorithm needs a capability that an FMU
+    /// lacks, if an FMU fails, or if an output is not finite.
     pub fn new(
         system: System,
         algorithm: &Algorithm,
@@ -81,23 +86,23 @@ impl Simulation {
         Self::with_scenario(system, algorithm, experiment, Scenario::default())
     }
 
-    /// As [`Simulation::new`], with variables that follow signals and faults on connections.
+    /// As [`Simulation::new`], with driven variables and faults on connections.
     ///
     /// # Errors
     ///
-    /// Those of [`Simulation::new`]; where a fault is on no connection.
+    /// Returns an error if [`Simulation::new`] does, or if a fault has no connection.
     pub fn with_scenario(
         system: System,
         algorithm: &Algorithm,
         experiment: &Experiment,
         scenario: Scenario,
     ) -> Result<Self, SystemError> {
-        Self::begin(system, algorithm, experiment, experiment.stop_time, scenario)
+        Self::start(system, algorithm, experiment, experiment.stop_time, scenario)
     }
 
-    /// As [`Simulation::with_scenario`], to end at the time `stop`; the slaves are told the one of
-    /// `experiment`.
-    fn begin(
+    /// As [`Simulation::with_scenario`], with the stop time `stop`; the slaves receive the stop
+    /// time of `experiment`.
+    fn start(
         mut system: System,
         algorithm: &Algorithm,
         experiment: &Experiment,
@@ -112,7 +117,7 @@ impl Simulation {
         let order = by_direct_dependencies(&system);
         initial::initialise(&mut system, experiment, &mut scenario)?;
         let algorithm = &capabilities::confirm_rollback(&mut system, algorithm);
-        let mut exchange = capabilities::exchange(&mut system, algorithm);
+        let mut exchange = capabilities::build_exchange(&mut system, algorithm);
         exchange.set_faults(&system, &scenario.faults)?;
         read_at_start(&mut system, &mut exchange, algorithm, experiment.start_time)?;
         scenario.drives.commit(experiment.start_time);
@@ -143,61 +148,64 @@ impl Simulation {
         })
     }
 
-    /// Time reached in s: start + k H where steps are fixed, the last one ending at the stop time.
+    /// Returns the time reached in s: `start + k H` for fixed steps; the last step ends at the stop
+    /// time.
     #[must_use]
     pub fn time(&self) -> f64 {
         self.grid.time
     }
 
-    /// Whether the stop time is reached, or an FMU asked for the end.
+    /// Whether the stop time is reached or an FMU requested the end.
     #[must_use]
     pub fn is_finished(&self) -> bool {
         self.ended.is_some() || self.grid.is_finished()
     }
 
-    /// The FMU that asked for the end of the simulation (`fmi2Terminated`).
+    /// Returns the FMU that requested the end of the simulation (`fmi2Terminated`).
     #[must_use]
     pub fn ended_by(&self) -> Option<&str> {
         self.ended.map(|(slave, _)| self.system.slaves[slave].0.as_str())
     }
 
-    /// The time in s for which it asked. It is later than [`Simulation::time`] where other FMUs have
-    /// gone beyond it and cannot go back: the run then ends at the last communication point, and
-    /// what the FMUs give is of different times.
+    /// Returns the time in s at which an FMU requested the end.
+    ///
+    /// It is later than [`Simulation::time`] if other FMUs have passed it and cannot restore their
+    /// state. The run then ends at the last communication point, and the FMUs have values at
+    /// different times.
     #[must_use]
     pub fn ended_at(&self) -> Option<f64> {
         self.ended.map(|(_, time)| time)
     }
 
-    /// Why the run ends before its stop time, if it does.
+    /// Returns the reason if the run ends before its stop time.
     #[must_use]
     pub fn early_end(&self) -> Option<&EarlyEnd> {
         self.early_end.as_ref()
     }
 
-    /// The slaves that make several steps at once.
+    /// Returns the slaves that step every several communication steps.
     pub(crate) fn slow_slaves(&self) -> impl Iterator<Item = usize> {
         (0..self.multiples.len()).filter(|&slave| self.multiples[slave] != 1)
     }
 
-    /// Begin and end in s of the last step of a slave that has gone beyond [`Simulation::time`], as it
-    /// makes several steps at once.
-    pub(crate) fn step_beyond(&self, slave: usize) -> Option<(f64, f64)> {
-        self.exchange.reals.beyond(slave, self.grid.time)
+    /// Returns start and end in s of the current step of a slave that is ahead of
+    /// [`Simulation::time`].
+    pub(crate) fn current_step(&self, slave: usize) -> Option<(f64, f64)> {
+        self.exchange.reals.step_ahead(slave, self.grid.time)
     }
 
-    /// The order of stepping.
+    /// Returns the order in which the slaves step.
     #[must_use]
     pub fn order(&self) -> &Order {
         &self.order
     }
 
-    /// The system, for reading values between steps.
+    /// Returns the system, to read values between steps.
     pub fn system(&mut self) -> &mut System {
         &mut self.system
     }
 
-    /// A readout of `ports` for [`Simulation::read`].
+    /// Creates a readout of `ports` for [`Simulation::read`].
     #[must_use]
     pub fn readout(&self, ports: &[Port]) -> Readout {
         let mut readout = Readout::new(&self.system, ports);
@@ -205,26 +213,30 @@ impl Simulation {
         readout
     }
 
-    /// Reads the values of the time reached. A variable that follows a signal has the signal's value
-    /// at that time, which its FMU is given for the next step.
+    /// Reads the values at the time reached. A driven variable has the value of its signal at this
+    /// time, which its FMU receives at the start of the next step.
     ///
     /// # Errors
     ///
-    /// Where an FMU refuses.
+    /// Returns an error if an FMU refuses a read.
     pub fn read(&mut self, readout: &mut Readout) -> Result<(), SystemError> {
         readout.read(&mut self.system, self.grid.time)?;
         readout.apply(&mut self.drives, self.grid.time);
         Ok(())
     }
 
-    /// One communication step.
+    /// Makes one communication step.
+    ///
+    /// With fixed steps and without repetition this is one sweep over the slaves. Otherwise the
+    /// step ends where the step control or an event requires it. At the end, faults and driven
+    /// variables record the new communication point.
     ///
     /// # Errors
     ///
-    /// Where an FMU does not finish the step or an output is not finite; the simulation then
-    /// stands at the begin of the step in some slaves and at its end in others.
+    /// Returns an error if an FMU does not complete the step or an output is not finite. Some
+    /// slaves are then at the start of the step and others at its end.
     pub fn step(&mut self) -> Result<(), SystemError> {
-        let begin = self.grid.time;
+        let start = self.grid.time;
         let swept = match (self.events.take(), self.control.kind) {
             (None, StepControl::Fixed) if !self.repeats => {
                 let (end, size) = self.grid.next();
@@ -233,7 +245,7 @@ impl Simulation {
                 swept
             }
             (None, _) => {
-                let (end, swept) = self.stretch(self.grid.time, self.planned())?;
+                let (end, swept) = self.step_to(self.grid.time, self.planned_end())?;
                 self.grid.reach(end);
                 swept
             }
@@ -244,32 +256,32 @@ impl Simulation {
             }
         };
         if let Some((slave, reached)) = swept.terminated {
-            self.end_early(slave, (begin, reached));
+            self.end_early(slave, (start, reached));
         }
-        if self.grid.time > begin {
+        if self.grid.time > start {
             self.exchange.commit(self.grid.time);
             self.drives.commit(self.grid.time);
         }
         let varies = self.control.kind != StepControl::Fixed || self.events.is_some();
         if varies && !self.is_finished() {
             let (time, stop) = (self.grid.time, self.grid.stop());
-            self.control.check_pace(time, time - begin, stop)?;
+            self.control.check_pace(time, time - start, stop)?;
         }
         Ok(())
     }
 
-    /// A slave asked for the end at the time that it reached in the step from `begin`. The time of the
-    /// run is then that of all slaves: the one reached where all could end there, else `begin`.
+    /// Ends the run because a slave requested it at the time `reached` in the step from `start`.
+    /// The time of the run becomes `reached` if all slaves could end there, otherwise `start`.
     #[cold]
-    fn end_early(&mut self, slave: usize, (begin, reached): (f64, f64)) {
+    fn end_early(&mut self, slave: usize, (start, reached): (f64, f64)) {
         self.ended = Some((slave, reached));
         let alone = self.system.slaves.len() == 1;
-        self.grid.time = if alone || self.repeats { reached } else { begin };
+        self.grid.time = if alone || self.repeats { reached } else { start };
     }
 
-    /// Where the next step would end; steps that are not fixed end where a signal bends and where a
-    /// fault begins or ends.
-    fn planned(&self) -> f64 {
+    /// Returns the planned end of the next step. A step of variable size ends where a signal or a
+    /// fault starts, ends or has a kink.
+    fn planned_end(&self) -> f64 {
         if self.control.kind == StepControl::Fixed {
             return self.grid.next().0;
         }
@@ -279,27 +291,27 @@ impl Simulation {
         breaks.into_iter().flatten().fold(end, f64::min)
     }
 
-    /// A step from `time` to `end` or, where it cannot or must not be as long, not as far.
-    fn stretch(&mut self, time: f64, end: f64) -> Result<(f64, Swept), SystemError> {
+    /// Attempts a step from `time` to `end`; returns the time actually reached.
+    fn step_to(&mut self, time: f64, end: f64) -> Result<(f64, SweepResult), SystemError> {
         if self.repeats {
             let mut repetition = std::mem::take(&mut self.repetition);
-            let done = self.controlled(&mut repetition, time, end);
+            let done = self.controlled_step(&mut repetition, time, end);
             self.repetition = repetition;
             return done;
         }
         let size = size_between(time, end);
         let swept = self.sweep(time, size, true)?;
-        self.control.look_back(&self.exchange.reals, size);
+        self.control.update_size(&self.exchange.reals, size);
         Ok((end, swept))
     }
 
-    fn step_to_event(&mut self, events: &mut Events) -> Result<Swept, SystemError> {
+    fn step_to_event(&mut self, events: &mut Events) -> Result<SweepResult, SystemError> {
         let time = self.grid.time;
-        let planned = self.planned();
-        let next = self.next_event(events, time, planned)?;
-        let limit = next.unwrap_or(planned);
-        self.watch(events, time)?;
-        let (mut end, mut swept) = self.stretch(time, limit)?;
+        let planned_end = self.planned_end();
+        let next = self.next_event(events, time, planned_end)?;
+        let limit = next.unwrap_or(planned_end);
+        self.read_crossings(events, time)?;
+        let (mut end, mut swept) = self.step_to(time, limit)?;
         if swept.terminated.is_some() {
             self.grid.reach(end);
             return Ok(swept);
@@ -310,19 +322,19 @@ impl Simulation {
             (end, swept) = crossing;
         }
         if happened {
-            self.exchange.reals.forget();
-            self.control.forget();
+            self.exchange.reals.clear_history();
+            self.control.clear_history();
         }
         self.grid.reach(end);
         Ok(swept)
     }
 
-    /// After [`Simulation::terminate`]: [`crate::Slave::free`] of every slave, all of them even where
-    /// one fails.
+    /// Calls [`crate::Slave::free`] of every slave, even if one fails; call it after
+    /// [`Simulation::terminate`].
     ///
     /// # Errors
     ///
-    /// The first failure.
+    /// Returns the first failure.
     pub fn free(&mut self) -> Result<(), SystemError> {
         let time = self.grid.time;
         let mut first = Ok(());
@@ -333,17 +345,17 @@ impl Simulation {
         first
     }
 
-    /// Ends the simulation: `fmi2Terminate` of every slave, all of them even where one fails.
+    /// Ends the simulation: calls `fmi2Terminate` of every slave, even if one fails.
     ///
     /// # Errors
     ///
-    /// The first failure.
+    /// Returns the first failure.
     pub fn terminate(&mut self) -> Result<(), SystemError> {
         let time = self.grid.time;
         let mut first = Ok(());
         for (name, slave) in &mut self.system.slaves {
             match slave.terminate() {
-                // There is nothing to end.
+                // A slave without `fmi2Terminate` needs no end.
                 Ok(()) | Err(CallError { failure: Failure::Missing, .. }) => {}
                 Err(source) => first = first.and(Err(call(name, time, source))),
             }
@@ -352,7 +364,7 @@ impl Simulation {
     }
 }
 
-/// Reads all connected outputs at the time `start` in s, which have no past.
+/// Reads all connected outputs at the start time `start` in s and clears their history.
 fn read_at_start(
     system: &mut System,
     exchange: &mut Exchange,
@@ -365,12 +377,12 @@ fn read_at_start(
     if algorithm.extrapolation == Extrapolation::Quadratic {
         exchange.derive_at_start(system, (start, algorithm.step))?;
     }
-    exchange.reals.forget();
+    exchange.reals.clear_history();
     exchange.commit(start);
     Ok(())
 }
 
-// Threads and other languages may hold one.
+// A simulation can move to another thread.
 const _: () = {
     const fn is_send<T: Send>() {}
     is_send::<Simulation>();

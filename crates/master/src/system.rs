@@ -1,4 +1,4 @@
-//! A system: slaves by name, the connections between them, and settings of variables by name.
+//! A system: named slaves, connections between their variables, and settings of variables.
 
 mod access;
 mod connecting;
@@ -15,7 +15,7 @@ use slave::Slave;
 use slave::Transformation;
 use slave::Value;
 
-/// One end of a connection: slave by position, variable by position in its description.
+/// A variable of a slave: position of the slave, and position of the variable in its description.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Port {
     /// Position of the slave in [`System::slaves`].
@@ -31,20 +31,20 @@ pub struct Connection {
     pub from: Port,
     /// The input.
     pub to: Port,
-    /// What becomes of the value on its way, conversion of units included.
+    /// Transformation of the value, including the conversion of units.
     pub transformation: Transformation,
 }
 
-/// Slaves and connections.
+/// Slaves and their connections.
 #[derive(Default)]
 pub struct System {
     /// Name and instance, in the order of their addition.
     pub slaves: Vec<(String, Box<dyn Slave>)>,
     /// The connections.
     pub connections: Vec<Connection>,
-    /// Connections to parameters, of use in initialization mode only.
+    /// Connections to parameters, used in initialization mode only.
     pub(crate) initial: Vec<Connection>,
-    /// Values for variables that the FMUs get when they are initialised.
+    /// Values that the FMUs receive during initialisation.
     pub(crate) settings: Vec<settings::Setting>,
     /// Variables of each slave by name.
     variables: Vec<HashMap<String, usize>>,
@@ -59,7 +59,7 @@ impl System {
     ///
     /// # Errors
     ///
-    /// Where there is one of that name already.
+    /// Returns an error if the name is already in use.
     pub fn add(&mut self, name: &str, slave: Box<dyn Slave>) -> Result<(), SystemError> {
         if self.names.insert(name.to_owned(), self.slaves.len()).is_some() {
             return Err(SystemError::SameName { name: name.to_owned() });
@@ -70,24 +70,24 @@ impl System {
         Ok(())
     }
 
-    /// The variable behind a port.
+    /// Returns the description of the variable at `port`.
     #[must_use]
     pub fn variable(&self, port: Port) -> &ScalarVariable {
         &self.slaves[port.slave].1.description().variables[port.variable]
     }
 
-    /// `slave.variable`.
+    /// Returns the name `slave.variable` of a port.
     #[must_use]
     pub fn name(&self, port: Port) -> String {
         format!("{}.{}", self.slaves[port.slave].0, self.variable(port).name)
     }
 
-    /// The port called `name`, `slave.variable`. Both may have dots in them: of the slaves whose
-    /// name begins `name` and that have such a variable, the one with the longest name counts.
+    /// Returns the port called `name`, in the form `slave.variable`. Both parts may contain dots:
+    /// the longest slave name that has such a variable applies.
     ///
     /// # Errors
     ///
-    /// Where the form is wrong, or slave or variable do not exist.
+    /// Returns an error if the form is wrong, or if slave or variable do not exist.
     pub fn port(&self, name: &str) -> Result<Port, SystemError> {
         let mut missing = None;
         for (at, _) in name.match_indices('.').rev() {
@@ -108,11 +108,11 @@ impl System {
         Err(self.unknown_slave(name, slave))
     }
 
-    /// The port of the variable `variable` of the slave `slave`.
+    /// Returns the port of the variable `variable` of the slave `slave`.
     ///
     /// # Errors
     ///
-    /// Where slave or variable do not exist.
+    /// Returns an error if slave or variable do not exist.
     pub fn terminal(&self, slave: &str, variable: &str) -> Result<Port, SystemError> {
         let name = format!("{slave}.{variable}");
         let Some(&position) = self.names.get(slave) else {
@@ -124,11 +124,11 @@ impl System {
         }
     }
 
-    /// The slave called `name`.
+    /// Returns the position of the slave called `name`.
     ///
     /// # Errors
     ///
-    /// Where there is none.
+    /// Returns an error if there is no such slave.
     pub fn slave(&self, name: &str) -> Result<usize, SystemError> {
         self.names.get(name).copied().ok_or_else(|| self.unknown_slave(name, name))
     }
@@ -142,22 +142,23 @@ impl System {
         }
     }
 
-    /// Connects an output to an input, both `slave.variable`.
+    /// Connects an output to an input, both in the form `slave.variable`.
     ///
     /// # Errors
     ///
-    /// Where one does not exist, causality, type or unit do not fit, or the input has a source.
+    /// Returns an error if a port does not exist, if causality, type or unit do not fit, or if the
+    /// input already has a source.
     pub fn connect(&mut self, from: &str, to: &str) -> Result<(), SystemError> {
         let (from, to) = (self.port(from)?, self.port(to)?);
         self.connect_ports(from, to, Transformation::Identity, false)
     }
 
-    /// Connects each output to the inputs of other slaves that have its name and no source yet;
-    /// the number of connections made.
+    /// Connects each output to the inputs of other slaves with the same name and no source; returns
+    /// the number of new connections.
     ///
     /// # Errors
     ///
-    /// As [`System::connect`], where names agree and types or units do not.
+    /// Returns an error if names agree and types or units do not fit.
     pub fn connect_equal_names(&mut self) -> Result<usize, SystemError> {
         let before = self.connections.len();
         let mut inputs: HashMap<String, Vec<Port>> = HashMap::new();
@@ -175,12 +176,12 @@ impl System {
         Ok(self.connections.len() - before)
     }
 
-    /// Connects an output to an input of another FMU where each is the only free one of its unit in the
-    /// whole system; the connections made.
+    /// Connects a free output to a free input of another FMU if each is the only free one with its
+    /// unit; returns the new connections.
     ///
     /// # Errors
     ///
-    /// As [`System::connect`].
+    /// Returns an error if [`System::connect`] does.
     pub fn connect_equal_units(&mut self) -> Result<Vec<Connection>, SystemError> {
         let before = self.connections.len();
         let (outputs, inputs) = (self.free_outputs(), self.free_inputs());
@@ -200,7 +201,7 @@ impl System {
         Ok(self.connections[before..].to_vec())
     }
 
-    /// Inputs without a connection.
+    /// Returns the inputs without a connection.
     #[must_use]
     pub fn free_inputs(&self) -> Vec<Port> {
         let mut inputs = self.ports(Causality::Input);
@@ -208,7 +209,7 @@ impl System {
         inputs
     }
 
-    /// Outputs without a connection.
+    /// Returns the outputs without a connection.
     #[must_use]
     pub fn free_outputs(&self) -> Vec<Port> {
         let mut outputs = self.ports(Causality::Output);
@@ -216,7 +217,8 @@ impl System {
         outputs
     }
 
-    /// Outputs that may be connected to `input`: of other FMUs, free, of its type and its unit.
+    /// Returns the outputs that can be connected to `input`: free outputs of other FMUs with its
+    /// type and unit.
     #[must_use]
     pub fn candidates(&self, input: Port) -> Vec<Port> {
         let mut outputs = self.free_outputs();
@@ -228,7 +230,7 @@ impl System {
         outputs
     }
 
-    /// Every variable of that causality.
+    /// Returns all variables of the given causality.
     #[must_use]
     pub fn ports(&self, causality: Causality) -> Vec<Port> {
         let of = |(slave, (_, instance)): (usize, &(String, Box<dyn Slave>))| {
@@ -241,13 +243,13 @@ impl System {
         self.slaves.iter().enumerate().flat_map(of).collect()
     }
 
-    /// The connection that ends at that input.
+    /// Returns the connection that ends at `input`.
     #[must_use]
     pub fn source(&self, input: Port) -> Option<&Connection> {
         self.sources.get(&input).map(|&position| &self.connections[position])
     }
 
-    /// What `text` spells for that variable.
+    /// Parses `text` as a value of the variable at `port`.
     pub(crate) fn value(&self, port: Port, text: &str) -> Result<Value, SystemError> {
         let description = self.slaves[port.slave].1.description();
         let kind = &self.variable(port).kind;
@@ -259,7 +261,7 @@ impl System {
     }
 }
 
-/// The error for a missing variable, with similar names.
+/// Returns the error for a missing variable, with similar names.
 fn unknown(name: &str, variable: &str, description: &ModelDescription) -> SystemError {
     SystemError::UnknownVariable {
         name: name.to_owned(),

@@ -275,7 +275,7 @@ fn a_function_is_computed_between_the_steps_whatever_the_order_of_the_slaves() {
             let mut found = [0.0; 2];
             simulation.system().slaves[1].1.get_real(&[2], &mut found[..1]).unwrap();
             simulation.system().slaves[0].1.get_real(&[2], &mut found[1..]).unwrap();
-            // A function that were a step late would give another x from the second step on.
+            // A function that lags by one step would give another x from the second step on.
             assert_eq!(found, [x, x + 2.0], "{method:?}");
         }
     }

@@ -8,7 +8,7 @@
 use std::error::Error;
 use std::process::ExitCode;
 
-use master::signal::{Between, Cursor, Signal, Track};
+use master::signal::{Cursor, Interpolation, Signal, Track};
 use study::table;
 
 fn main() -> ExitCode {
@@ -27,8 +27,8 @@ fn run() -> Result<(), Box<dyn Error>> {
         return Err("expected FILE COLUMN line|hold".into());
     };
     let between = match between.as_str() {
-        "line" => Between::Line,
-        "hold" => Between::Hold,
+        "line" => Interpolation::Line,
+        "hold" => Interpolation::Hold,
         other => return Err(format!("expected line or hold, found {other:?}").into()),
     };
     let table = table::read(file.as_ref())?;

@@ -12,11 +12,11 @@ use ssp::structure::DefaultExperiment;
 use ssp::{self, Folders, Opened};
 use ssp::{Element, Link, Terminal};
 
-use crate::config::{Config, Loaded, Wire};
+use crate::config::{Config, ConnectionEntry, LoadedConfig};
 use crate::link::link as link_ports;
 
 /// A system, not yet initialised.
-pub struct Assembled {
+pub struct AssembledSystem {
     /// The FMUs and their connections.
     pub system: System,
     /// What an SSP says of times and steps.
@@ -31,7 +31,7 @@ pub struct Assembled {
 
 /// What the command line adds to the configuration.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Making<'a> {
+pub struct AssemblyOptions<'a> {
     /// FMUs log everything.
     pub logging: bool,
     /// Free outputs and inputs of equal units are connected.
@@ -45,7 +45,10 @@ pub struct Making<'a> {
 /// # Errors
 ///
 /// [`Error`] with the reason.
-pub fn assemble(loaded: &Loaded, making: &Making<'_>) -> Result<Assembled, Error> {
+pub fn assemble(
+    loaded: &LoadedConfig,
+    making: &AssemblyOptions<'_>,
+) -> Result<AssembledSystem, Error> {
     let config = &loaded.config;
     if config.isolation.isolate != Some(true) {
         for library in &config.preload {
@@ -83,7 +86,7 @@ pub fn assemble(loaded: &Loaded, making: &Making<'_>) -> Result<Assembled, Error
         let set = system.set(name, &value.to_string());
         set.map_err(|error| loaded.point(place, error))?;
     }
-    Ok(Assembled { system, experiment, steps, fixed_step, folders })
+    Ok(AssembledSystem { system, experiment, steps, fixed_step, folders })
 }
 
 /// The system that the configuration begins with.
@@ -109,7 +112,7 @@ fn element(name: &str, path: &Path) -> Element {
 fn instantiate(
     elements: &[Element],
     config: &Config,
-    making: &Making<'_>,
+    making: &AssemblyOptions<'_>,
 ) -> Result<System, Error> {
     let logging = making.logging;
     let limit = config.isolation.time_limit.as_ref().map(|limit| *limit.get_ref());
@@ -139,7 +142,7 @@ fn instantiate(
         let slave: Box<dyn Slave> = if config.isolation.isolate == Some(true) {
             Box::new(opening.isolated(element)?)
         } else {
-            Box::new(opening.here(element)?)
+            Box::new(opening.in_process(element)?)
         };
         let slave = match making.log_calls {
             Some(log) => Box::new(log.listen(&element.name, slave)),
@@ -173,7 +176,7 @@ impl<'a> Opening<'a> {
     }
 
     /// An instance in this process.
-    fn here(&mut self, element: &'a Element) -> Result<Instance, Error> {
+    fn in_process(&mut self, element: &'a Element) -> Result<Instance, Error> {
         let fmu = match self.opened.get(&element.fmu) {
             Some(fmu) => fmu.clone(),
             None => open_fmu(element)?,
@@ -220,7 +223,7 @@ fn switch_logging_on(name: &str, slave: &mut dyn Slave) {
 /// Where none are stated, equal names are connected, and `by_unit` also equal units.
 fn connect(
     system: &mut System,
-    loaded: &Loaded,
+    loaded: &LoadedConfig,
     links: &[Link],
     by_unit: bool,
 ) -> Result<(), Error> {
@@ -228,7 +231,7 @@ fn connect(
     let mut taken = HashSet::new();
     let mut own = Vec::new();
     for wire in config.connections.iter().flatten() {
-        let Wire { from, to, factor, offset } = wire.get_ref();
+        let ConnectionEntry { from, to, factor, offset } = wire.get_ref();
         let port = |name: &toml::Spanned<String>| {
             system.port(name.get_ref()).map_err(|error| loaded.point(&name.span(), error))
         };

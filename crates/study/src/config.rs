@@ -16,7 +16,7 @@ use toml::Spanned;
 pub use every::Every;
 pub use memory::Memory;
 pub use ordered::{Ordered, Settings};
-pub use tables::{Experiment, Isolation, Results, Saving, Wire};
+pub use tables::{CheckpointSettings, ConnectionEntry, Experiment, Isolation, Results};
 
 use files::{Place, PlaceError, Source};
 
@@ -35,7 +35,7 @@ pub struct Config {
     pub fmus: Ordered<PathBuf>,
     /// Connections; not stated: equal names, where `system` is not stated either.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub connections: Option<Vec<Spanned<Wire>>>,
+    pub connections: Option<Vec<Spanned<ConnectionEntry>>>,
     /// Values before the initialization.
     #[serde(skip_serializing_if = "Settings::is_empty")]
     pub settings: Settings,
@@ -50,7 +50,7 @@ pub struct Config {
     pub isolation: Isolation,
     /// Checkpoints.
     #[serde(skip_serializing_if = "is_default")]
-    pub checkpoint: Saving,
+    pub checkpoint: CheckpointSettings,
     /// What is done to the system while it runs.
     #[serde(skip_serializing_if = "is_default")]
     pub scenario: Scenario,
@@ -62,14 +62,14 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
 
 /// A configuration and the text that it was read from, to which errors may point.
 #[derive(Default)]
-pub struct Loaded {
+pub struct LoadedConfig {
     /// The configuration.
     pub config: Config,
     /// Its text, where it comes from a file.
     pub source: Option<Source>,
 }
 
-impl Loaded {
+impl LoadedConfig {
     /// Reads the file at `path`.
     ///
     /// # Errors

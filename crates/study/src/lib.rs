@@ -1,7 +1,7 @@
 //! Runs what a file asks for: `system.toml`, SSP, scenarios with signals and faults.
 //!
-//! [`Loaded::read`] reads a `system.toml`; [`Prepared::new`] loads and connects the FMUs and decides what
-//! the file leaves open; [`Prepared::start`] initialises them; [`Run::advance`] steps to the end and
+//! [`LoadedConfig::read`] reads a `system.toml`; [`PreparedRun::new`] loads and connects the FMUs and decides what
+//! the file leaves open; [`PreparedRun::start`] initialises them; [`Run::advance`] steps to the end and
 //! writes the results. The command `aso-ftc run` is a thin face of this crate.
 #![forbid(unsafe_code)]
 
@@ -24,8 +24,8 @@ pub mod scenario;
 pub mod table;
 
 #[cfg(feature = "load")]
-pub use assemble::{Assembled, Making, assemble};
-pub use config::{Config, Every, Loaded, Memory, Wire};
+pub use assemble::{AssembledSystem, AssemblyOptions, assemble};
+pub use config::{Config, ConnectionEntry, Every, LoadedConfig, Memory};
 pub use error::Error;
 pub use link::link;
 #[cfg(feature = "load")]
@@ -33,9 +33,9 @@ pub use plan::{Plan, plan};
 #[cfg(feature = "load")]
 pub use record::{Recorder, keep_results, select, unit};
 #[cfg(feature = "load")]
-pub use run::{Ended, Prepared, Run, Tally};
+pub use run::{PreparedRun, Run, RunEnd, RunStatistics};
 #[cfg(feature = "load")]
-pub use saved::Saved;
+pub use saved::SavedRun;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

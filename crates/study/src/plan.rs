@@ -9,8 +9,8 @@ use master::{
 };
 use toml::Spanned;
 
-use crate::assemble::Assembled;
-use crate::config::{Config, Every, Wire};
+use crate::assemble::AssembledSystem;
+use crate::config::{Config, ConnectionEntry, Every};
 
 /// Most rows that are recorded where nothing is stated and steps are fixed.
 const ROWS: f64 = 1e4;
@@ -38,7 +38,7 @@ pub struct Plan {
 /// # Errors
 ///
 /// [`Error`] with the reason.
-pub fn plan(config: &mut Config, assembled: &Assembled) -> Result<Plan, Error> {
+pub fn plan(config: &mut Config, assembled: &AssembledSystem) -> Result<Plan, Error> {
     let system = &assembled.system;
     let mut reasons = Vec::new();
     propose_algorithm(&mut config.algorithm, assembled, &mut reasons);
@@ -60,7 +60,7 @@ pub fn plan(config: &mut Config, assembled: &Assembled) -> Result<Plan, Error> {
     config.isolation.isolate.get_or_insert(false);
     if config.system.is_none() && config.connections.is_none() {
         let wire = |connection: &master::Connection| {
-            Wire::new(system.name(connection.from), system.name(connection.to))
+            ConnectionEntry::new(system.name(connection.from), system.name(connection.to))
         };
         config.connections = Some(system.connections.iter().map(wire).collect());
     }
@@ -82,8 +82,8 @@ fn explain_tolerances(system: &System, stated: Option<f64>, reasons: &mut Vec<St
 }
 
 /// The step, before numbers that follow from it are looked at.
-fn check_step(wanted: &AlgorithmRequest) -> Result<(), Error> {
-    match wanted.step {
+fn check_step(request: &AlgorithmRequest) -> Result<(), Error> {
+    match request.step {
         Some(step) if !(step > 0.0 && step.is_finite()) => {
             Err(Error::Invalid(format!("the communication step is {step} s, expected more than 0")))
         }
@@ -93,18 +93,18 @@ fn check_step(wanted: &AlgorithmRequest) -> Result<(), Error> {
 
 /// Takes of libcosim's algorithm what is not stated, where the system structure asks for it.
 fn propose_algorithm(
-    wanted: &mut AlgorithmRequest,
-    assembled: &Assembled,
+    request: &mut AlgorithmRequest,
+    assembled: &AssembledSystem,
     reasons: &mut Vec<String>,
 ) {
     if !assembled.fixed_step {
         return;
     }
     let open =
-        wanted.method.is_none() || wanted.extrapolation.is_none() || wanted.coupling.is_none();
-    wanted.method.get_or_insert(Method::Jacobi);
-    wanted.extrapolation.get_or_insert(Extrapolation::Hold);
-    wanted.coupling.get_or_insert(Coupling::Once);
+        request.method.is_none() || request.extrapolation.is_none() || request.coupling.is_none();
+    request.method.get_or_insert(Method::Jacobi);
+    request.extrapolation.get_or_insert(Extrapolation::Hold);
+    request.coupling.get_or_insert(Coupling::Once);
     if open {
         let sentence = "the system structure asks for libcosim's fixed steps: jacobi, extrapolation hold, \
              coupling once, where nothing else is stated";
@@ -113,23 +113,27 @@ fn propose_algorithm(
 }
 
 /// Takes steps that an SSP proposes where nothing else is said.
-fn propose_steps(wanted: &mut AlgorithmRequest, assembled: &Assembled, reasons: &mut Vec<String>) {
+fn propose_steps(
+    request: &mut AlgorithmRequest,
+    assembled: &AssembledSystem,
+    reasons: &mut Vec<String>,
+) {
     let sound = |step: &f64| *step > 0.0 && step.is_finite();
     let hints = assembled.steps.iter().filter(|(_, step)| sound(step));
-    if wanted.step.is_none() {
+    if request.step.is_none() {
         let least = hints.clone().map(|(_, step)| *step).reduce(f64::min);
-        wanted.step = assembled.experiment.step_size.filter(sound).or(least);
-        if let Some(step) = wanted.step {
+        request.step = assembled.experiment.step_size.filter(sound).or(least);
+        if let Some(step) = request.step {
             reasons.push(format!("step {step} s: that of the system structure"));
         }
     }
-    let plain = wanted.step_control.is_none_or(|control| control == StepControl::Fixed)
-        && wanted.coupling.is_none_or(|coupling| coupling == Coupling::Once)
-        && wanted.next_event.is_empty()
-        && wanted.crossing.is_empty()
-        && (wanted.coupling.is_some()
+    let plain = request.step_control.is_none_or(|control| control == StepControl::Fixed)
+        && request.coupling.is_none_or(|coupling| coupling == Coupling::Once)
+        && request.next_event.is_empty()
+        && request.crossing.is_empty()
+        && (request.coupling.is_some()
             || by_direct_dependencies(&assembled.system).looped.is_empty());
-    let Some(step) = wanted.step.filter(|_| plain && wanted.every.is_empty()) else { return };
+    let Some(step) = request.step.filter(|_| plain && request.every.is_empty()) else { return };
     for (name, proposed) in hints {
         let multiple = (proposed / step).round();
         if multiple >= 2.0 && (proposed / step - multiple).abs() < NEAR * multiple {
@@ -137,7 +141,7 @@ fn propose_steps(wanted: &mut AlgorithmRequest, assembled: &Assembled, reasons: 
                 "{name} steps every {multiple} communication steps: the system structure proposes \
                  {proposed} s for it"
             ));
-            wanted.every.insert(name.clone(), count(multiple));
+            request.every.insert(name.clone(), count(multiple));
         }
     }
 }
@@ -152,7 +156,7 @@ fn count(multiple: f64) -> u32 {
 }
 
 /// Start and stop time in s: stated, of the system structure, or of the FMUs.
-fn times(config: &Config, assembled: &Assembled, reasons: &mut Vec<String>) -> (f64, f64) {
+fn times(config: &Config, assembled: &AssembledSystem, reasons: &mut Vec<String>) -> (f64, f64) {
     let stated = |time: &Option<Spanned<f64>>| time.as_ref().map(|time| *time.get_ref());
     let defaults = || {
         let slaves = assembled.system.slaves.iter();
@@ -208,23 +212,23 @@ fn rows(algorithm: &Algorithm, length: f64, reasons: &mut Vec<String>) -> Every 
 }
 
 /// States all that was chosen.
-fn complete(wanted: &mut AlgorithmRequest, algorithm: &Algorithm, system: &System) {
-    wanted.method = Some(algorithm.sweep);
-    wanted.extrapolation = Some(algorithm.extrapolation);
-    wanted.coupling = Some(algorithm.coupling);
-    wanted.step_control = Some(algorithm.control);
-    wanted.step = Some(algorithm.step);
-    wanted.relative_tolerance = Some(algorithm.relative_tolerance);
-    wanted.absolute_tolerance = Some(algorithm.absolute_tolerance);
-    wanted.smallest_step = Some(algorithm.smallest_step);
-    wanted.largest_step = Some(algorithm.largest_step);
-    wanted.iterations = Some(algorithm.iterations);
-    wanted.fallback = Some(algorithm.fallback);
-    wanted.jobs = Some(wanted.jobs.unwrap_or(algorithm.jobs));
-    wanted.rollback = Some(algorithm.rollback);
-    wanted.allow_nan = Some(algorithm.allow_nan);
+fn complete(request: &mut AlgorithmRequest, algorithm: &Algorithm, system: &System) {
+    request.method = Some(algorithm.sweep);
+    request.extrapolation = Some(algorithm.extrapolation);
+    request.coupling = Some(algorithm.coupling);
+    request.step_control = Some(algorithm.control);
+    request.step = Some(algorithm.step);
+    request.relative_tolerance = Some(algorithm.relative_tolerance);
+    request.absolute_tolerance = Some(algorithm.absolute_tolerance);
+    request.smallest_step = Some(algorithm.smallest_step);
+    request.largest_step = Some(algorithm.largest_step);
+    request.iterations = Some(algorithm.iterations);
+    request.fallback = Some(algorithm.fallback);
+    request.jobs = Some(request.jobs.unwrap_or(algorithm.jobs));
+    request.rollback = Some(algorithm.rollback);
+    request.allow_nan = Some(algorithm.allow_nan);
     let multiples = system.slaves.iter().zip(&algorithm.multiples);
-    wanted.every = multiples.map(|((name, _), multiple)| (name.clone(), *multiple)).collect();
+    request.every = multiples.map(|((name, _), multiple)| (name.clone(), *multiple)).collect();
 }
 
 impl Plan {

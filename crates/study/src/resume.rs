@@ -22,10 +22,10 @@ pub(crate) fn resume(
         )),
         other => Error::from(other).within("resume"),
     })?;
-    if let Some(told) = checkpoint.told_stop_time().filter(|told| told < stop) {
+    if let Some(fmu_stop) = checkpoint.fmu_stop_time().filter(|fmu_stop| fmu_stop < stop) {
         tracing::warn!(
-            "resume: the stop time {stop} s is later than {told} s, which the FMUs were told at \
-             their start: an FMU may refuse to step beyond {told} s"
+            "resume: the stop time {stop} s is later than {fmu_stop} s, which the FMUs were fmu_stop at \
+             their start: an FMU may refuse to step beyond {fmu_stop} s"
         );
     }
     if simulation.is_finished() && simulation.ended_by().is_none() {

@@ -7,17 +7,17 @@ use std::time::Instant;
 use master::{Port, Scenario, Simulation, SlowState, System, SystemError};
 use ssp::Folders;
 
-use crate::assemble::{Assembled, Making, assemble};
-use crate::config::{Config, Every, Loaded};
+use crate::assemble::{AssembledSystem, AssemblyOptions, assemble};
+use crate::config::{Config, Every, LoadedConfig};
 use crate::error::Error;
 use crate::plan::{Plan, plan};
 use crate::record::{Recorder, select};
 use crate::resume::resume;
-use crate::saved::Saved;
+use crate::saved::SavedRun;
 use crate::scenario::Setup;
 
 /// A run with everything decided, not yet initialised.
-pub struct Prepared {
+pub struct PreparedRun {
     /// The complete configuration, with everything that was decided.
     pub config: Config,
     /// The FMUs and their connections.
@@ -31,7 +31,7 @@ pub struct Prepared {
     folders: Option<Folders>,
 }
 
-impl Prepared {
+impl PreparedRun {
     /// Loads and connects the FMUs, decides what `loaded` leaves open, finds the variables of scenario
     /// and results. The paths of the configuration become absolute, because an FMU may change the
     /// current folder.
@@ -39,7 +39,7 @@ impl Prepared {
     /// # Errors
     ///
     /// [`Error`] with the first thing that is wrong, with its line where it is in a file.
-    pub fn new(mut loaded: Loaded, making: &Making<'_>) -> Result<Self, Error> {
+    pub fn new(mut loaded: LoadedConfig, making: &AssemblyOptions<'_>) -> Result<Self, Error> {
         loaded.config.make_absolute().map_err(Error::file("find", Path::new(".")))?;
         if making.log_calls.is_some() {
             // In threads the calls would be written in an order of chance.
@@ -47,7 +47,7 @@ impl Prepared {
         }
         let mut assembled = assemble(&loaded, making)?;
         let plan = plan(&mut loaded.config, &assembled)?;
-        let Assembled { system, folders, .. } = &mut assembled;
+        let AssembledSystem { system, folders, .. } = &mut assembled;
         let (system, folders) = (std::mem::take(system), folders.take());
         let scenario = scenario(&loaded, &system, &plan)?;
         let config = loaded.config;
@@ -62,7 +62,7 @@ impl Prepared {
     /// # Errors
     ///
     /// [`Error`]: an FMU fails, the checkpoint does not fit, the file cannot be written.
-    pub fn start(self, saved: Option<&Saved>) -> Result<Run, Error> {
+    pub fn start(self, saved: Option<&SavedRun>) -> Result<Run, Error> {
         let Self { config, system, plan, ports, scenario, folders } = self;
         let text = config.render()?;
         let Plan { algorithm, experiment, .. } = &plan;
@@ -90,7 +90,7 @@ impl Prepared {
             checkpoints: Checkpoints::new(&config, text, plan.every),
             simulation,
             recorder,
-            tally: Tally::default(),
+            tally: RunStatistics::default(),
             config,
             plan,
             _folders: folders,
@@ -99,7 +99,7 @@ impl Prepared {
 }
 
 /// What is done to the system while it runs.
-fn scenario(loaded: &Loaded, system: &System, plan: &Plan) -> Result<Scenario, Error> {
+fn scenario(loaded: &LoadedConfig, system: &System, plan: &Plan) -> Result<Scenario, Error> {
     // Its paths are absolute already.
     let folder = Path::new("");
     let setup = Setup { folder, start: plan.experiment.start_time, step: plan.algorithm.step };
@@ -132,7 +132,7 @@ fn check_saving(config: &Config, system: &System) -> Result<(), Error> {
 }
 
 /// How a run ended.
-pub enum Ended {
+pub enum RunEnd {
     /// At its stop time.
     AtStop,
     /// Because this FMU asked for it.
@@ -140,12 +140,12 @@ pub enum Ended {
     /// Because the caller asked for it.
     Interrupted,
     /// By a failure.
-    Lost(Error),
+    Failed(Error),
 }
 
 /// How much a run has done.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Tally {
+pub struct RunStatistics {
     /// Communication steps.
     pub steps: u64,
     /// Wall-clock time in s.
@@ -181,7 +181,7 @@ pub struct Run {
     checkpoints: Option<Checkpoints>,
     /// The run that was resumed recorded the present communication point.
     resumed: bool,
-    tally: Tally,
+    tally: RunStatistics,
     /// Removed after the simulation.
     _folders: Option<Folders>,
 }
@@ -192,9 +192,9 @@ impl Run {
     pub fn advance(
         &mut self,
         watch: impl FnMut(&mut Simulation) -> Result<ControlFlow<()>, SystemError>,
-    ) -> Ended {
+    ) -> RunEnd {
         let start = Instant::now();
-        let ended = self.steps(watch).unwrap_or_else(Ended::Lost);
+        let ended = self.steps(watch).unwrap_or_else(RunEnd::Failed);
         self.tally.seconds = start.elapsed().as_secs_f64();
         ended
     }
@@ -202,7 +202,7 @@ impl Run {
     fn steps(
         &mut self,
         mut watch: impl FnMut(&mut Simulation) -> Result<ControlFlow<()>, SystemError>,
-    ) -> Result<Ended, Error> {
+    ) -> Result<RunEnd, Error> {
         let start = self.simulation.time();
         let interval = self.checkpoints.as_ref().and_then(|own| own.interval);
         let mut saved = 0.0;
@@ -238,9 +238,9 @@ impl Run {
         self.simulation.terminate()?;
         self.simulation.free()?;
         Ok(match self.simulation.ended_by() {
-            Some(name) => Ended::ByFmu(name.to_owned()),
-            None if self.simulation.is_finished() => Ended::AtStop,
-            None => Ended::Interrupted,
+            Some(name) => RunEnd::ByFmu(name.to_owned()),
+            None if self.simulation.is_finished() => RunEnd::AtStop,
+            None => RunEnd::Interrupted,
         })
     }
 
@@ -259,13 +259,13 @@ impl Run {
             due = Some((checkpoints.every, recorder.due().clone()));
             slow = recorder.slow_state(&mut self.simulation);
         }
-        let saved = Saved::new(&checkpoints.text, self.simulation.checkpoint()?, due, slow);
+        let saved = SavedRun::new(&checkpoints.text, self.simulation.checkpoint()?, due, slow);
         saved.write(&checkpoints.path)
     }
 
     /// How much the run has done.
     #[must_use]
-    pub fn tally(&self) -> Tally {
+    pub fn tally(&self) -> RunStatistics {
         self.tally
     }
 

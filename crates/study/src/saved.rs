@@ -16,7 +16,7 @@ const KIND: &[u8] = b"aso-ftc-state-";
 
 /// A run as it stands.
 #[derive(Serialize, Deserialize)]
-pub struct Saved {
+pub struct SavedRun {
     /// The complete configuration, a `system.toml` with absolute paths.
     text: String,
     checkpoint: Checkpoint,
@@ -25,7 +25,7 @@ pub struct Saved {
     slow: SlowState,
 }
 
-impl Saved {
+impl SavedRun {
     /// A checkpoint of `checkpoint`, with the configuration `text` and what the recording knows.
     #[must_use]
     pub fn new(

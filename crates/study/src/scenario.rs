@@ -17,7 +17,7 @@ pub use body::{
 };
 pub use error::{Reason, ScenarioError};
 pub use literal::Literal;
-pub use resolve::{Lookup, Prepared, Setup};
+pub use resolve::{Lookup, ResolvedScenario, Setup};
 
 use serde::{Deserialize, Serialize};
 use serde_spanned::Spanned;
@@ -28,22 +28,22 @@ use serde_spanned::Spanned;
 pub struct Scenario {
     /// `[[scenario.set]]`: an input or a tunable parameter gets a value at a time.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub set: Vec<Spanned<Set>>,
+    pub set: Vec<Spanned<SetEntry>>,
     /// `[[scenario.signal]]`: an input or a tunable parameter follows a signal.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub signal: Vec<Spanned<Driven>>,
+    pub signal: Vec<Spanned<SignalEntry>>,
     /// `[[scenario.table]]`: all free inputs that have a column of their name follow it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub table: Vec<Spanned<Columns>>,
+    pub table: Vec<Spanned<TableEntry>>,
     /// `[[scenario.fault]]`: the values on a connection are disturbed.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub fault: Vec<Spanned<Disturbed>>,
+    pub fault: Vec<Spanned<FaultEntry>>,
 }
 
 /// An entry of `[[scenario.set]]`. Before the first one of a variable it keeps its start value.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Set {
+pub struct SetEntry {
     /// `slave.variable`: an input without a connection, or a tunable parameter.
     pub variable: Spanned<String>,
     /// From when on; it takes effect at the first communication point that is not before it.
@@ -61,7 +61,7 @@ pub type Steps = Vec<(f64, Spanned<Literal>)>;
 /// An entry of `[[scenario.signal]]`: exactly one of the kinds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Driven {
+pub struct SignalEntry {
     /// `slave.variable`: an input without a connection, or a tunable parameter.
     pub variable: Spanned<String>,
     /// Unit of the values, if not that of the variable.
@@ -90,7 +90,7 @@ pub struct Driven {
 /// An entry of `[[scenario.table]]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Columns {
+pub struct TableEntry {
     /// The CSV file, seen from the folder of the file that names it.
     pub csv: Spanned<String>,
     /// The slave whose variables the columns are named after; none: they are named
@@ -103,7 +103,7 @@ pub struct Columns {
 /// in their order.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Disturbed {
+pub struct FaultEntry {
     /// The input, `slave.variable`, or the connection, `slave.output=slave.input`.
     pub connection: Spanned<String>,
     /// Unit of the values, if not that of the input.

@@ -2,7 +2,7 @@
 
 use std::fmt::Debug;
 
-use master::signal::{Between, Cursor, Signal, Track};
+use master::signal::{Cursor, Interpolation, Signal, Track};
 use ssp::{self, SspError};
 use study::table::{self, Table, TableError};
 
@@ -70,7 +70,7 @@ pub fn signal_table(data: &[u8]) {
     let again = table::parse(text.as_bytes()).unwrap_or_else(|error| panic!("{error}: {text}"));
     assert_eq!(again, table, "{text}");
     for column in &table.columns {
-        for between in [Between::Line, Between::Hold] {
+        for between in [Interpolation::Line, Interpolation::Hold] {
             // A time may be beyond what a signal takes.
             if let Ok(track) = Track::new(table.times.clone(), column.clone(), between) {
                 follow(&table, column, &Signal::Track(track));

@@ -1,4 +1,4 @@
-//! Connected Integers, Enumerations, Booleans and Strings: always held.
+//! Connections of Integers, Enumerations, Booleans and Strings: inputs are held during a step.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -13,11 +13,11 @@ use slave::{CallError, Slave};
 type Get<T> = fn(&mut dyn Slave, &[u32], &mut [T]) -> Result<(), CallError>;
 type Set<T> = fn(&mut dyn Slave, &[u32], &[T]) -> Result<(), CallError>;
 
-/// The functions and the transformation of a type.
+/// The functions of one type: get and set, transformation, fault.
 pub(crate) struct Access<T> {
     get: Get<T>,
     set: Set<T>,
-    /// What becomes of a value, into the place of another.
+    /// Applies a transformation to a value and stores the result in the third argument.
     map: fn(&T, &Transformation, &mut T),
     disturb: fn(&FaultChain, f64, &T) -> T,
     number: fn(&T) -> f64,
@@ -64,7 +64,7 @@ pub(crate) const STRINGS: Access<String> = Access {
     number: |_| f64::NAN,
 };
 
-/// What one slave sets and reads of a type.
+/// The connected inputs and outputs of one slave, of one type.
 #[derive(Default)]
 struct PortMap {
     inputs: Vec<u32>,
@@ -73,26 +73,28 @@ struct PortMap {
     output_range: Range<usize>,
 }
 
-/// The connected variables of one type.
+/// All connections of one type.
 pub(crate) struct Channel<T> {
     access: Access<T>,
     port_maps: Vec<PortMap>,
     output_ports: Vec<Port>,
-    /// For each input the index of its output, and what becomes of the value.
+    /// For each input, the index of its output and the transformation of the connection.
     sources: Vec<usize>,
     transformations: Vec<Transformation>,
     input_ports: Vec<Port>,
     faults: Vec<Option<FaultChain>>,
-    /// Values of the outputs.
+    /// Current values of the outputs.
     pub(crate) latest: Vec<T>,
-    /// Their values at the begins of the last steps, where slaves make several steps at once.
-    pub(crate) begin: Vec<T>,
-    /// What the inputs get.
+    /// Values of the outputs at the start of the last steps, used if some slaves make steps of
+    /// several communication steps.
+    pub(crate) start: Vec<T>,
+    /// Values for the inputs.
     values: Vec<T>,
 }
 
 impl<T: Clone + Default> Channel<T> {
-    /// The connections between variables of the kinds that `is_of` accepts, and the outputs `more`.
+    /// Collects the connections of variables of the kinds that `is_of` accepts, and the additional
+    /// outputs `more`.
     pub(crate) fn new(
         system: &System,
         access: Access<T>,
@@ -111,16 +113,16 @@ impl<T: Clone + Default> Channel<T> {
             outputs.iter().enumerate().map(|(index, &port)| (port, index)).collect();
         let mut port_maps: Vec<PortMap> =
             system.slaves.iter().map(|_| PortMap::default()).collect();
-        for (slave, lane) in port_maps.iter_mut().enumerate() {
-            let begin = outputs.partition_point(|port| port.slave < slave);
+        for (slave, port_map) in port_maps.iter_mut().enumerate() {
+            let start = outputs.partition_point(|port| port.slave < slave);
             let end = outputs.partition_point(|port| port.slave <= slave);
-            lane.outputs = references(system, outputs[begin..end].iter().copied());
-            lane.output_range = begin..end;
-            let begin = inputs.partition_point(|connection| connection.to.slave < slave);
+            port_map.outputs = references(system, outputs[start..end].iter().copied());
+            port_map.output_range = start..end;
+            let start = inputs.partition_point(|connection| connection.to.slave < slave);
             let end = inputs.partition_point(|connection| connection.to.slave <= slave);
-            let ports = inputs[begin..end].iter().map(|connection| connection.to);
-            lane.inputs = references(system, ports);
-            lane.input_range = begin..end;
+            let ports = inputs[start..end].iter().map(|connection| connection.to);
+            port_map.inputs = references(system, ports);
+            port_map.input_range = start..end;
         }
         Self {
             access,
@@ -130,20 +132,20 @@ impl<T: Clone + Default> Channel<T> {
             input_ports: inputs.iter().map(|connection| connection.to).collect(),
             faults: vec![None; inputs.len()],
             latest: vec![T::default(); outputs.len()],
-            begin: vec![T::default(); outputs.len()],
+            start: vec![T::default(); outputs.len()],
             values: vec![T::default(); inputs.len()],
             output_ports: outputs,
         }
     }
 
-    /// The value of an output that is exchanged.
+    /// Returns the current value of a connected output.
     pub(crate) fn value(&self, port: Port) -> Option<&T> {
         let key = |known: &Port| (known.slave, known.variable);
         let found = self.output_ports.binary_search_by_key(&key(&port), key);
         found.ok().map(|index| &self.latest[index])
     }
 
-    /// Puts a fault on the way to an input; false where there is no such connected input.
+    /// Puts a fault on the connection to an input; returns false if the input has no connection.
     pub(crate) fn set_fault(&mut self, input: Port, fault: &FaultChain) -> bool {
         let Some(k) = self.input_ports.iter().position(|&port| port == input) else {
             return false;
@@ -152,8 +154,8 @@ impl<T: Clone + Default> Channel<T> {
         true
     }
 
-    /// Tells the faults the undisturbed values at `time`, which is reached for good; those of slaves
-    /// that are `ahead` of it have not changed yet.
+    /// Records the undisturbed values in the faults at the final communication point `time`. Slaves
+    /// for which `ahead` is true contribute the value at the start of their step.
     pub(crate) fn commit(&mut self, time: f64, ahead: impl Fn(usize) -> bool) {
         for k in 0..self.faults.len() {
             if self.faults[k].is_some() {
@@ -167,38 +169,38 @@ impl<T: Clone + Default> Channel<T> {
         }
     }
 
-    /// The first time past `after` at which a fault begins or ends.
+    /// Returns the first time after `after` at which a fault starts or ends.
     pub(crate) fn next_break(&self, after: f64) -> Option<f64> {
         let faults = self.faults.iter().flatten();
         faults.filter_map(|fault| fault.next_break(after)).reduce(f64::min)
     }
 
-    /// The value that the input at index `k` is connected to: that at the begin of its slave's last
-    /// step where the slave is `ahead`.
+    /// Returns the source value of the input at index `k`: the value at the start of the source's
+    /// step if the source is `ahead`, otherwise the latest one.
     fn source(&self, k: usize, ahead: impl Fn(usize) -> bool) -> &T {
         let source = self.sources[k];
         let slave = self.output_ports[source].slave;
-        if ahead(slave) { &self.begin[source] } else { &self.latest[source] }
+        if ahead(slave) { &self.start[source] } else { &self.latest[source] }
     }
 
-    /// The slave will step: what was its end is its begin.
+    /// Makes the end values of the last step the start values of the next one.
     pub(crate) fn shift(&mut self, slave: usize) {
         let range = self.port_maps[slave].output_range.clone();
-        self.begin[range.clone()].clone_from_slice(&self.latest[range]);
+        self.start[range.clone()].clone_from_slice(&self.latest[range]);
     }
 
-    /// The faults, for a checkpoint.
+    /// Iterates over the faults, for a checkpoint.
     pub(crate) fn faults(&mut self) -> impl Iterator<Item = &mut FaultChain> {
         self.faults.iter_mut().flatten()
     }
 
-    /// The inputs of `slave` from the values of now, for a step from `time`; those of slaves that are
-    /// `ahead` have not changed yet.
+    /// Computes the inputs of `slave` for a step from `time`. Slaves for which `ahead` is true
+    /// contribute the value at the start of their step.
     pub(crate) fn gather(&mut self, slave: usize, time: f64, ahead: impl Fn(usize) -> bool) {
         for k in self.port_maps[slave].input_range.clone() {
             let source = self.sources[k];
             let is_ahead = ahead(self.output_ports[source].slave);
-            let value = if is_ahead { &self.begin[source] } else { &self.latest[source] };
+            let value = if is_ahead { &self.start[source] } else { &self.latest[source] };
             (self.access.map)(value, &self.transformations[k], &mut self.values[k]);
             if let Some(fault) = &self.faults[k] {
                 self.values[k] = (self.access.disturb)(fault, time, &self.values[k]);
@@ -208,20 +210,24 @@ impl<T: Clone + Default> Channel<T> {
 
     /// Sets the gathered inputs.
     pub(crate) fn set(&self, slave: usize, instance: &mut dyn Slave) -> Result<(), CallError> {
-        let lane = &self.port_maps[slave];
-        if lane.inputs.is_empty() {
+        let port_map = &self.port_maps[slave];
+        if port_map.inputs.is_empty() {
             return Ok(());
         }
-        (self.access.set)(instance, &lane.inputs, &self.values[lane.input_range.clone()])
+        (self.access.set)(instance, &port_map.inputs, &self.values[port_map.input_range.clone()])
     }
 
     /// Reads the outputs.
     pub(crate) fn read(&mut self, slave: usize, instance: &mut dyn Slave) -> Result<(), CallError> {
-        let lane = &self.port_maps[slave];
-        if lane.outputs.is_empty() {
+        let port_map = &self.port_maps[slave];
+        if port_map.outputs.is_empty() {
             return Ok(());
         }
-        (self.access.get)(instance, &lane.outputs, &mut self.latest[lane.output_range.clone()])
+        (self.access.get)(
+            instance,
+            &port_map.outputs,
+            &mut self.latest[port_map.output_range.clone()],
+        )
     }
 }
 

@@ -1,8 +1,9 @@
-//! The extrapolation of an input over a step, from what is known of its source.
+//! Polynomials of an input over a step, from known values and derivatives of its source.
 
 use crate::algorithm::Extrapolation;
 
-/// `value + slope s + curvature s^2 / 2` for the time s since the begin of the step.
+/// The polynomial `value + slope s + curvature s^2 / 2`, with the time s since the start of the
+/// step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Polynomial {
     pub(super) value: f64,
@@ -10,13 +11,13 @@ pub(super) struct Polynomial {
     pub(super) curvature: f64,
 }
 
-/// What is known of an output: values at the begins of its last steps, the last one and two before
-/// it, and at the end of the last; derivatives at the begin where it gives them.
+/// Known values of an output: at the start of its last step and of the two steps before, and at the
+/// end of the last step; with derivatives at the start if the FMU provides them.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Known {
+pub(super) struct OutputHistory {
     pub(super) earlier: f64,
     pub(super) before: f64,
-    pub(super) begin: f64,
+    pub(super) start: f64,
     pub(super) end: f64,
     pub(super) slope: Option<f64>,
     pub(super) curvature: Option<f64>,
@@ -31,7 +32,7 @@ impl Polynomial {
         Self { value, slope: 0.0, curvature: 0.0 }
     }
 
-    /// The same polynomial with its origin `lead` s later.
+    /// Returns the same polynomial with its origin moved by `lead` s.
     pub(super) fn later(self, lead: f64) -> Self {
         if lead == 0.0 {
             return self;
@@ -43,36 +44,37 @@ impl Polynomial {
         }
     }
 
-    /// Its value at the end of `size` s.
+    /// Returns the value after `size` s.
     pub(super) fn end(self, size: f64) -> f64 {
         self.later(size).value
     }
 
-    /// Its mean over `size` s.
+    /// Returns the mean over `size` s.
     pub(super) fn mean(self, size: f64) -> f64 {
         self.value + size * (self.slope / 2.0 + size * self.curvature / 6.0)
     }
 }
 
-impl Known {
-    /// Over the step whose end is not known: from its start onwards. Held where a derivative of the
-    /// output is NaN or infinite, as some FMUs give it at the start time.
+impl OutputHistory {
+    /// Returns the polynomial over a step whose end values are not known yet. Constant if a
+    /// derivative of the output is NaN or infinite, as some FMUs return it at the start time.
     pub(super) fn extrapolated(&self, extrapolation: Extrapolation) -> Polynomial {
         let finite = |derivative: Option<f64>| derivative.is_none_or(f64::is_finite);
         if !(finite(self.slope) && finite(self.curvature)) {
-            return Polynomial::held(self.begin);
+            return Polynomial::held(self.start);
         }
-        let quotient = (self.begin - self.before) / self.last_size;
+        let quotient = (self.start - self.before) / self.last_size;
         let (slope, curvature) = match extrapolation {
             Extrapolation::Hold => (0.0, 0.0),
             Extrapolation::Limited => (self.limited(quotient), 0.0),
             Extrapolation::Linear => (self.slope.unwrap_or(quotient), 0.0),
             Extrapolation::Quadratic => self.parabola(quotient),
         };
-        Polynomial { value: self.begin, slope, curvature }
+        Polynomial { value: self.start, slope, curvature }
     }
 
-    /// Of derivative and difference quotient the smaller one, zero where their signs differ.
+    /// Minmod limiter: returns the smaller of derivative and difference quotient, or 0 if their
+    /// signs differ.
     fn limited(&self, quotient: f64) -> f64 {
         let Some(slope) = self.slope else { return quotient };
         if slope * quotient <= 0.0 {
@@ -84,8 +86,8 @@ impl Known {
         }
     }
 
-    /// Slope and curvature at the begin: both given; or the parabola with the given slope through
-    /// the value before; or the one through the last three values.
+    /// Returns slope and curvature at the start: both derivatives if given; or the parabola with
+    /// the given slope through the value before; or the parabola through the last three values.
     fn parabola(&self, quotient: f64) -> (f64, f64) {
         match (self.slope, self.curvature) {
             (Some(slope), Some(curvature)) => (slope, curvature),
@@ -98,23 +100,23 @@ impl Known {
         }
     }
 
-    /// Over the step whose end is known: between begin and end.
+    /// Returns the polynomial over a step whose end values are known.
     pub(super) fn interpolated(&self, extrapolation: Extrapolation) -> Polynomial {
-        let slope = (self.end - self.begin) / self.size;
+        let slope = (self.end - self.start) / self.size;
         match extrapolation {
             Extrapolation::Hold => Polynomial::held(self.end),
             Extrapolation::Limited | Extrapolation::Linear => {
-                Polynomial { value: self.begin, slope, curvature: 0.0 }
+                Polynomial { value: self.start, slope, curvature: 0.0 }
             }
             Extrapolation::Quadratic => {
-                let quotient = (self.begin - self.before) / self.last_size;
-                // Newton's divided difference where there is no derivative at the begin.
+                let quotient = (self.start - self.before) / self.last_size;
+                // Newton's divided difference if the derivative at the start is missing.
                 let curvature = match self.slope.filter(|slope| slope.is_finite()) {
                     Some(derivative) => 2.0 * (slope - derivative) / self.size,
                     None => 2.0 * (slope - quotient) / (self.size + self.last_size),
                 };
                 let slope = slope - 0.5 * curvature * self.size;
-                Polynomial { value: self.begin, slope, curvature }
+                Polynomial { value: self.start, slope, curvature }
             }
         }
     }

@@ -1,4 +1,4 @@
-//! Which values go where: arrays of value references and indices, made once.
+//! The layout of connected Reals: value references and array indices of all slaves, computed once.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -10,7 +10,7 @@ use crate::system::{Port, System};
 use slave::Advance;
 use slave::Transformation;
 
-/// Derivatives that a slave refuses although its description promises them.
+/// Derivatives that a slave refuses although its model description promises them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Refusal {
     /// `fmi2SetRealInputDerivatives` fails.
@@ -19,11 +19,11 @@ pub(crate) struct Refusal {
     pub(crate) outputs: bool,
 }
 
-/// What one slave sets and reads of connected Reals.
+/// The connected Real inputs and outputs of one slave.
 #[derive(Debug, Default)]
 pub(super) struct PortMap {
     pub(super) inputs: Vec<u32>,
-    /// Of the inputs in the arrays of all slaves.
+    /// Range of the inputs in the arrays of all slaves.
     pub(super) input_range: Range<usize>,
     pub(super) derived_inputs: Vec<u32>,
     pub(super) input_orders: Vec<i32>,
@@ -33,14 +33,14 @@ pub(super) struct PortMap {
     pub(super) derived_outputs: Vec<u32>,
     pub(super) output_orders: Vec<i32>,
     pub(super) output_derivative_range: Range<usize>,
-    /// Highest derivative that its inputs get and that its outputs give.
+    /// Highest order of derivatives that its inputs take and its outputs provide.
     pub(super) input_order: usize,
     pub(super) output_order: usize,
 }
 
 impl PortMap {
-    /// A step with the values of all inputs and of all its own outputs, each with the derivatives of
-    /// its own.
+    /// Builds the arguments of a step: values of its inputs and outputs out of `values` of all
+    /// inputs and `outputs`, with their derivatives.
     #[inline]
     pub(super) fn step<'a>(
         &'a self,
@@ -71,28 +71,26 @@ impl PortMap {
 #[derive(Debug, Default)]
 pub(super) struct Layout {
     pub(super) port_maps: Vec<PortMap>,
-    /// For each input: index of its output, factor and offset, and whether its extrapolation is a value
-    /// that is held.
+    /// For each input: index of its output, factor and offset, and whether it is set to a constant.
     pub(super) sources: Vec<u32>,
     pub(super) factors: Vec<f64>,
     pub(super) offsets: Vec<f64>,
     pub(super) held: Vec<bool>,
     pub(super) input_ports: Vec<Port>,
-    /// For each slave, whether it is a function, which takes the values of the end of a step.
+    /// For each slave, whether it is a function. A function uses input values at the end of a step.
     pub(super) functions: Vec<bool>,
-    /// For each slave, whether all its inputs are outputs as they are.
+    /// For each slave, whether all its inputs are copies of outputs, without transformation.
     pub(super) plain: Vec<bool>,
-    /// For each output: its port, its slave, and where its derivatives of first and second order
-    /// stand among the derivatives.
+    /// For each output: its port, its slave, and the indices of its first and second derivative.
     pub(super) output_ports: Vec<Port>,
     pub(super) owners: Vec<u32>,
     pub(super) slopes: Vec<Option<u32>>,
     pub(super) curvatures: Vec<Option<u32>>,
-    /// Derivatives of all outputs, and of all inputs.
+    /// Number of derivatives of all outputs, and of all inputs.
     pub(super) output_derivatives: usize,
     pub(super) input_derivatives: usize,
-    /// Outputs of type Integer that go to Reals: port, and index among the outputs, behind those of
-    /// the slaves.
+    /// Integer outputs that are connected to Reals: port, and index in the output array, after the
+    /// Real outputs.
     pub(super) from_integers: Vec<(Port, usize)>,
     indices: HashMap<Port, u32>,
 }
@@ -105,26 +103,27 @@ impl Layout {
         layout.port_maps.resize_with(count, PortMap::default);
         layout.collect_outputs(system);
         layout.collect_inputs(system);
-        for (slave, lane) in layout.port_maps.iter_mut().enumerate() {
+        for (slave, port_map) in layout.port_maps.iter_mut().enumerate() {
             let Some(flags) = &system.slaves[slave].1.description().co_simulation else { continue };
-            let wanted = match algorithm.extrapolation {
+            let order = match algorithm.extrapolation {
                 Extrapolation::Hold => 0,
                 Extrapolation::Limited | Extrapolation::Linear => 1,
                 Extrapolation::Quadratic => 2,
             };
             let refusal = refusing.get(slave).copied().unwrap_or_default();
             if flags.can_interpolate_inputs && !refusal.inputs {
-                lane.input_order = wanted;
+                port_map.input_order = order;
             }
             if !refusal.outputs {
-                lane.output_order = wanted.min(flags.max_output_derivative_order as usize);
+                port_map.output_order = order.min(flags.max_output_derivative_order as usize);
             }
         }
         layout.place_derivatives();
         layout
     }
 
-    /// Every connected Real output once, slave by slave; then the Integers that go to Reals.
+    /// Collects every connected Real output once, slave by slave, and then the Integers connected
+    /// to Reals.
     fn collect_outputs(&mut self, system: &System) {
         let mut by_slave = vec![Vec::new(); self.port_maps.len()];
         let mut integers = Vec::new();
@@ -143,12 +142,12 @@ impl Layout {
             }
         }
         for (slave, ports) in by_slave.into_iter().enumerate() {
-            let begin = self.output_ports.len();
+            let start = self.output_ports.len();
             for port in ports {
                 self.add_output(port);
                 self.port_maps[slave].outputs.push(system.variable(port).value_reference);
             }
-            self.port_maps[slave].output_range = begin..self.output_ports.len();
+            self.port_maps[slave].output_range = start..self.output_ports.len();
         }
         for port in integers {
             self.from_integers.push((port, self.output_ports.len()));
@@ -172,7 +171,7 @@ impl Layout {
             }
         }
         for (slave, connections) in by_slave.into_iter().enumerate() {
-            let begin = self.sources.len();
+            let start = self.sources.len();
             for connection in connections {
                 let variable = system.variable(connection.to);
                 self.port_maps[slave].inputs.push(variable.value_reference);
@@ -188,43 +187,45 @@ impl Layout {
                 let real = matches!(system.variable(connection.from).kind, Kind::Real(_));
                 self.held.push(!real);
             }
-            self.port_maps[slave].input_range = begin..self.sources.len();
+            self.port_maps[slave].input_range = start..self.sources.len();
         }
     }
 
-    /// Derivatives stand slave by slave, those of first order before those of second.
+    /// Assigns indices to the derivatives: slave by slave, first order before second order.
     fn place_derivatives(&mut self) {
-        for lane in &mut self.port_maps {
-            let begin = self.output_derivatives;
-            for order in 1..=lane.output_order {
-                for output in lane.output_range.clone() {
+        for port_map in &mut self.port_maps {
+            let start = self.output_derivatives;
+            for order in 1..=port_map.output_order {
+                for output in port_map.output_range.clone() {
                     let places = if order == 1 { &mut self.slopes } else { &mut self.curvatures };
                     places[output] = Some(index(self.output_derivatives));
                     self.output_derivatives += 1;
                 }
-                lane.derived_outputs.extend(&lane.outputs);
-                lane.output_orders
-                    .extend(lane.outputs.iter().map(|_| if order == 1 { 1 } else { 2 }));
+                port_map.derived_outputs.extend(&port_map.outputs);
+                port_map
+                    .output_orders
+                    .extend(port_map.outputs.iter().map(|_| if order == 1 { 1 } else { 2 }));
             }
-            lane.output_derivative_range = begin..self.output_derivatives;
-            let begin = self.input_derivatives;
-            for order in 1..=lane.input_order {
-                self.input_derivatives += lane.inputs.len();
-                lane.derived_inputs.extend(&lane.inputs);
-                lane.input_orders
-                    .extend(lane.inputs.iter().map(|_| if order == 1 { 1 } else { 2 }));
+            port_map.output_derivative_range = start..self.output_derivatives;
+            let start = self.input_derivatives;
+            for order in 1..=port_map.input_order {
+                self.input_derivatives += port_map.inputs.len();
+                port_map.derived_inputs.extend(&port_map.inputs);
+                port_map
+                    .input_orders
+                    .extend(port_map.inputs.iter().map(|_| if order == 1 { 1 } else { 2 }));
             }
-            lane.input_derivative_range = begin..self.input_derivatives;
+            port_map.input_derivative_range = start..self.input_derivatives;
         }
     }
 
-    /// The index of an output.
+    /// Returns the index of an output.
     pub(super) fn output(&self, port: Port) -> Option<usize> {
         self.indices.get(&port).map(|&index| index as usize)
     }
 }
 
-/// A position as it is kept: systems have fewer than 2^32 variables.
+/// Converts a position to an index; systems have fewer than 2^32 variables.
 fn index(position: usize) -> u32 {
     u32::try_from(position).unwrap_or(u32::MAX)
 }

@@ -1,45 +1,46 @@
-//! Slaves that make several steps at once: what others see of them on the way.
+//! Slaves whose step covers several communication steps: their outputs at the points in between.
 
 use super::reals::Reals;
 
-/// Part of a step that is rounding.
+/// Part of a step below which a difference of times is rounding.
 const ROUNDING: f64 = 1e-6;
 
 impl Reals {
-    /// Begin and end in s of the last step of `slave` where it has gone beyond `time`.
-    pub(crate) fn beyond(&self, slave: usize, time: f64) -> Option<(f64, f64)> {
+    /// Returns start and end in s of the last step of `slave` if the step ends after `time`.
+    pub(crate) fn step_ahead(&self, slave: usize, time: f64) -> Option<(f64, f64)> {
         let span = &self.trace.spans[slave];
-        if !(self.several && span.has_size() && span.stepped) {
+        if !(self.multirate && span.has_size() && span.stepped) {
             return None;
         }
-        let end = span.begin + span.size;
-        (end > time + ROUNDING * span.size).then_some((span.begin, end))
+        let end = span.start + span.size;
+        (end > time + ROUNDING * span.size).then_some((span.start, end))
     }
 
-    /// Whether `slave` has gone beyond `time`: always false where all slaves make equal steps.
+    /// Whether the last step of `slave` ends after `time`; always false if all slaves make equal
+    /// steps.
     #[inline]
-    pub(crate) fn is_beyond(&self, slave: usize, time: f64) -> bool {
-        self.several && self.beyond(slave, time).is_some()
+    pub(crate) fn is_ahead(&self, slave: usize, time: f64) -> bool {
+        self.multirate && self.step_ahead(slave, time).is_some()
     }
 
-    /// The time for which a held input of `slave` asks the slave `source`, in a step from `time` over
-    /// `size`: its end where the slave sees that, else its begin.
-    pub(crate) fn seen_at(&self, slave: usize, source: usize, time: f64, size: f64) -> f64 {
-        if self.sees_end(slave, source, time + size) { time + size } else { time }
+    /// Returns the time at which a held input of `slave` reads its source: the end of the step from
+    /// `time` over `size` if the slave uses end values, otherwise its start.
+    pub(crate) fn source_time(&self, slave: usize, source: usize, time: f64, size: f64) -> f64 {
+        if self.uses_end_value(slave, source, time + size) { time + size } else { time }
     }
 
-    /// The value of an output at `time`: the latest, or the one on the way of a slave that has gone
-    /// beyond; on the line between begin and end of its step, of an Integer that at the begin.
+    /// Returns the value of an output at `time`. If its slave is ahead, the value lies on the line
+    /// between start and end of the slave's step; an Integer keeps its start value.
     pub(super) fn value_at(&self, output: usize, time: f64) -> f64 {
         let (trace, owner) = (&self.trace, self.layout.owners[output] as usize);
         let end = trace.latest[output];
-        match self.beyond(owner, time) {
+        match self.step_ahead(owner, time) {
             None => end,
-            Some((begin, until)) => {
-                let start = trace.begin[output];
+            Some((start, until)) => {
+                let value = trace.start[output];
                 let is_integer = self.layout.from_integers.iter().any(|&(_, own)| own == output);
-                let part = if is_integer { 0.0 } else { (time - begin) / (until - begin) };
-                start + part * (end - start)
+                let part = if is_integer { 0.0 } else { (time - start) / (until - start) };
+                value + part * (end - value)
             }
         }
     }

@@ -1,34 +1,36 @@
-//! Jacobi's method with held inputs and nothing but Reals: a sweep is one pass over the slaves.
+//! Fast path of Jacobi's method with held Real inputs: one loop over the slaves.
 
 use std::ops::Range;
 
 use slave::{CallError, Slave, StepResult};
 
-/// Where the values of one slave stand among those of all.
+/// The ranges of one slave in the arrays of all slaves.
 #[derive(Clone, Debug)]
-struct Place {
+struct PortRanges {
     inputs: Range<usize>,
     outputs: Range<usize>,
 }
 
-/// The arrays of a pass, close together: value references, sources and values of all slaves.
+/// The arrays of a pass: value references, sources and values of all slaves, contiguous in memory.
 #[derive(Debug, Default)]
 pub(super) struct Pass {
-    places: Vec<Place>,
+    places: Vec<PortRanges>,
     inputs: Vec<u32>,
-    /// For each input the index of its output.
+    /// For each input, the index of its output.
     sources: Vec<u32>,
-    /// What each input gets.
+    /// The value of each input.
     values: Vec<f64>,
     outputs: Vec<u32>,
-    /// Outputs at the end of the step while those at its begin still count.
+    /// Outputs at the end of the step, kept apart while other slaves still read the values at its
+    /// start.
     next: Vec<f64>,
-    /// Slaves that did not come to the end of their step.
+    /// Slaves that completed only a part of their step.
     parts: Vec<(usize, StepResult)>,
 }
 
 impl Pass {
-    /// Adds the next slave: the references of its inputs, their sources, those of its outputs.
+    /// Adds the next slave: value references of its inputs, sources of these inputs, value
+    /// references of its outputs.
     pub(super) fn add(&mut self, inputs: &[u32], sources: &[u32], outputs: &[u32]) {
         let (first_input, first_output) = (self.inputs.len(), self.outputs.len());
         self.inputs.extend(inputs);
@@ -36,20 +38,20 @@ impl Pass {
         self.values.resize(self.inputs.len(), 0.0);
         self.outputs.extend(outputs);
         self.next.resize(self.outputs.len(), 0.0);
-        self.places.push(Place {
+        self.places.push(PortRanges {
             inputs: first_input..self.inputs.len(),
             outputs: first_output..self.outputs.len(),
         });
         self.parts.reserve(self.places.len());
     }
 
-    /// Sets the inputs of all slaves to values among `latest`, steps them from `time` over `size`
-    /// and reads their outputs, which take the place of `latest` when all have stepped. Gives those
-    /// that stopped on the way.
+    /// Sets the inputs of all slaves from `latest`, steps the slaves from `time` over `size` and
+    /// reads their outputs. Replaces `latest` after all slaves have stepped. Returns the slaves
+    /// that completed only a part of the step.
     ///
     /// # Errors
     ///
-    /// The first failure and its slave; `latest` is then as it was.
+    /// Returns the first failure with its slave; `latest` then has its former values.
     pub(super) fn run(
         &mut self,
         slaves: &mut [(String, Box<dyn Slave>)],

@@ -1,7 +1,8 @@
-//! Connected Reals: values and derivatives of outputs over their last steps, and what inputs get.
+//! Connected Reals: values and derivatives of outputs over their last steps, and the resulting
+//! inputs.
 
 use super::call;
-use super::extrapolation::{Known, Polynomial};
+use super::extrapolation::{OutputHistory, Polynomial};
 use super::layout::{Layout, Refusal};
 use super::pass::Pass;
 use super::trace::Span;
@@ -12,26 +13,27 @@ use crate::fault::FaultChain;
 use crate::system::{Port, System};
 use slave::{Advance, CallError, Slave, StepResult};
 
-/// Part of a step by which times may miss each other: their rounding.
+/// Part of a step below which a difference of times is rounding.
 const ROUNDING: f64 = 1e-9;
 
 /// The connected Reals of a system.
 #[derive(Debug)]
 pub(crate) struct Reals {
     pub(super) layout: Layout,
-    /// Faults by input; empty where there are none at all.
+    /// The fault of each input; empty if there are no faults.
     pub(super) faults: Vec<Option<FaultChain>>,
     pub(super) extrapolation: Extrapolation,
     pub(super) sweep: Method,
-    /// Every input is held and all slaves step together: the latest values are all it takes.
-    pub(super) simple: bool,
-    /// Some slaves make several steps at once.
-    pub(super) several: bool,
+    /// Whether the latest values are sufficient: all inputs are held, all slaves make equal steps,
+    /// no faults.
+    pub(super) copies_latest: bool,
+    /// Whether some slaves make steps of several communication steps.
+    pub(super) multirate: bool,
     pub(crate) trace: Trace,
-    /// Values of the outputs at the end of the step, assumed by an iteration.
+    /// Values of the outputs at the end of the step that an iteration assumes.
     pub(super) assumed: Vec<f64>,
     pub(super) assumes: bool,
-    /// What the inputs get.
+    /// Values for the inputs.
     pub(super) values: Vec<f64>,
     pub(super) input_derivatives: Vec<f64>,
     /// For each output, whether its derivative has been reported as not finite.
@@ -45,17 +47,17 @@ impl Reals {
         let (outputs, derivatives) = (layout.output_ports.len(), layout.output_derivatives);
         let trace = Trace {
             latest: vec![0.0; outputs],
-            begin: vec![0.0; outputs],
+            start: vec![0.0; outputs],
             before: vec![0.0; outputs],
             earlier: vec![0.0; outputs],
             derivatives: vec![0.0; derivatives],
-            begin_derivatives: vec![0.0; derivatives],
+            start_derivatives: vec![0.0; derivatives],
             spans: vec![Span::default(); system.slaves.len()],
         };
         let mut pass = Pass::default();
-        for lane in &layout.port_maps {
-            let sources = &layout.sources[lane.input_range.clone()];
-            pass.add(&lane.inputs, sources, &lane.outputs);
+        for port_map in &layout.port_maps {
+            let sources = &layout.sources[port_map.input_range.clone()];
+            pass.add(&port_map.inputs, sources, &port_map.outputs);
         }
         Self {
             faults: Vec::new(),
@@ -67,79 +69,82 @@ impl Reals {
             reported: vec![false; outputs],
             extrapolation: algorithm.extrapolation,
             sweep: algorithm.sweep,
-            simple: algorithm.extrapolation == Extrapolation::Hold
+            copies_latest: algorithm.extrapolation == Extrapolation::Hold
                 && algorithm.coupling == Coupling::Once
                 && algorithm.control == StepControl::Fixed
                 && algorithm.multiples.iter().all(|&multiple| multiple == 1),
-            several: algorithm.multiples.iter().any(|&multiple| multiple != 1),
+            multirate: algorithm.multiples.iter().any(|&multiple| multiple != 1),
             layout,
             trace,
         }
     }
 
-    /// The index of an output among [`Reals::outputs`], where it is connected.
+    /// Returns the index of an output in [`Reals::outputs`], if it is connected.
     pub(crate) fn output(&self, port: Port) -> Option<usize> {
         self.layout.output(port)
     }
 
-    /// The connected outputs.
+    /// Returns the ports of the connected outputs.
     pub(crate) fn ports(&self) -> &[Port] {
         &self.layout.output_ports
     }
 
-    /// Their values.
+    /// Returns the values of the connected outputs.
     pub(crate) fn outputs(&self) -> &[f64] {
         &self.trace.latest
     }
 
-    /// As [`Reals::outputs`], to be changed by an iteration.
+    /// Returns the values of the connected outputs, mutable for an iteration.
     pub(crate) fn outputs_mut(&mut self) -> &mut [f64] {
         &mut self.trace.latest
     }
 
-    /// The outputs of type Integer that go to Reals: port, and index among the outputs.
+    /// Returns the Integer outputs that are connected to Reals: port, and index in
+    /// [`Reals::outputs`].
     pub(crate) fn integer_sources(&self) -> &[(Port, usize)] {
         &self.layout.from_integers
     }
 
-    /// The slave will step from `time` over `size`: what was its end is its begin.
+    /// Prepares a step of `slave` from `time` over `size`: end values of the last step become start
+    /// values.
     pub(crate) fn shift(&mut self, slave: usize, time: f64, size: f64) {
-        if self.simple {
+        if self.copies_latest {
             return;
         }
         let trace = &mut self.trace;
-        let lane = &self.layout.port_maps[slave];
-        let (range, derived) = (lane.output_range.clone(), lane.output_derivative_range.clone());
+        let port_map = &self.layout.port_maps[slave];
+        let (range, derived) =
+            (port_map.output_range.clone(), port_map.output_derivative_range.clone());
         let span = &mut trace.spans[slave];
         (span.earlier_size, span.last_size) = (span.last_size, span.size);
-        (span.begin, span.size, span.stepped) = (time, size, false);
+        (span.start, span.size, span.stepped) = (time, size, false);
         trace.earlier[range.clone()].copy_from_slice(&trace.before[range.clone()]);
-        trace.before[range.clone()].copy_from_slice(&trace.begin[range.clone()]);
-        trace.begin[range.clone()].copy_from_slice(&trace.latest[range]);
+        trace.before[range.clone()].copy_from_slice(&trace.start[range.clone()]);
+        trace.start[range.clone()].copy_from_slice(&trace.latest[range]);
         let derivatives = &trace.derivatives[derived.clone()];
-        trace.begin_derivatives[derived].copy_from_slice(derivatives);
+        trace.start_derivatives[derived].copy_from_slice(derivatives);
         for &(port, output) in &self.layout.from_integers {
             if port.slave == slave {
-                trace.begin[output] = trace.latest[output];
+                trace.start[output] = trace.latest[output];
             }
         }
     }
 
-    /// Values of now have no past: the extrapolation of inputs begins anew.
-    pub(crate) fn forget(&mut self) {
+    /// Clears the extrapolation history.
+    pub(crate) fn clear_history(&mut self) {
         let trace = &mut self.trace;
-        for past in [&mut trace.begin, &mut trace.before, &mut trace.earlier] {
+        for past in [&mut trace.start, &mut trace.before, &mut trace.earlier] {
             past.copy_from_slice(&trace.latest);
         }
         for span in &mut trace.spans {
-            span.forget();
+            span.clear_history();
         }
     }
 
-    /// The inputs of `slave` for a step from `time` over `size`.
+    /// Computes the inputs of `slave` for a step from `time` over `size`.
     pub(crate) fn gather(&mut self, slave: usize, time: f64, size: f64) {
         let range = self.layout.port_maps[slave].input_range.clone();
-        if self.simple {
+        if self.copies_latest {
             let sources = &self.layout.sources[range.clone()];
             for (value, &source) in self.values[range.clone()].iter_mut().zip(sources) {
                 *value = self.trace.latest[source as usize];
@@ -152,25 +157,26 @@ impl Reals {
             }
             return;
         }
-        let begin = range.start;
+        let start = range.start;
         for k in range {
-            self.place(slave, k, k - begin, time, size);
+            self.place(slave, k, k - start, time, size);
         }
     }
 
-    /// Value and derivatives of the input at index `k`, the slave's input number `position`.
+    /// Computes value and derivatives of the input at index `k`, which is number `position` of the
+    /// slave.
     fn place(&mut self, slave: usize, k: usize, position: usize, time: f64, size: f64) {
-        let (layout, lane) = (&self.layout, &self.layout.port_maps[slave]);
+        let (layout, port_map) = (&self.layout, &self.layout.port_maps[slave]);
         let source = layout.sources[k] as usize;
         let known = self.is_known(slave, source, time + size);
-        let seen_at = self.seen_at(slave, layout.owners[source] as usize, time, size);
-        let ahead = self.several && known && self.extrapolation == Extrapolation::Hold;
+        let source_time = self.source_time(slave, layout.owners[source] as usize, time, size);
+        let ahead = self.multirate && known && self.extrapolation == Extrapolation::Hold;
         let extrapolation = if layout.held[k] || ahead {
-            Polynomial::held(self.value_at(source, seen_at))
+            Polynomial::held(self.value_at(source, source_time))
         } else {
             self.polynomial(slave, source, (time, size))
         };
-        let value = match (lane.input_order, self.extrapolation) {
+        let value = match (port_map.input_order, self.extrapolation) {
             (0, Extrapolation::Limited) if known => extrapolation.end(size),
             (0, Extrapolation::Linear | Extrapolation::Quadratic) => extrapolation.mean(size),
             _ => extrapolation.value,
@@ -183,7 +189,7 @@ impl Reals {
             curvature: factor * extrapolation.curvature,
         };
         if let Some(Some(fault)) = self.faults.get(k) {
-            given = if lane.input_order > 0 {
+            given = if port_map.input_order > 0 {
                 let [value, slope, curvature] =
                     fault.apply_derivatives(time, [value, given.slope, given.curvature]);
                 Polynomial { value, slope, curvature }
@@ -193,8 +199,9 @@ impl Reals {
                 Polynomial::held(fault.apply(if at_end { time + size } else { time }, value))
             };
         }
-        let (count, first) = (lane.inputs.len(), lane.input_derivative_range.start + position);
-        let order = lane.input_order;
+        let (count, first) =
+            (port_map.inputs.len(), port_map.input_derivative_range.start + position);
+        let order = port_map.input_order;
         self.values[k] = given.value;
         if order > 0 {
             self.input_derivatives[first] = given.slope;
@@ -204,29 +211,29 @@ impl Reals {
         }
     }
 
-    /// Whether `slave` gets what the slave `source` reached in the current step, once that has stepped:
-    /// in Jacobi's method a function does, at the `end` of its step, where the source's ends by then.
-    pub(super) fn sees_end(&self, slave: usize, source: usize, end: f64) -> bool {
+    /// Whether `slave` uses the value that `source` has reached in the current step. In Jacobi's
+    /// method only a function does so, if the step of the source ends by `end`.
+    pub(super) fn uses_end_value(&self, slave: usize, source: usize, end: f64) -> bool {
         let span = &self.trace.spans[source];
-        let is_there = || span.begin + span.size <= end + ROUNDING * span.size;
+        let is_there = || span.start + span.size <= end + ROUNDING * span.size;
         self.sweep == Method::GaussSeidel || (self.layout.functions[slave] && is_there())
     }
 
-    /// Whether the source of that output has stepped beyond the begin of the current step, for a
-    /// `slave` that steps to `end`.
+    /// Whether the source of `output` has already made its step, for a `slave` that steps to `end`.
     fn is_known(&self, slave: usize, output: usize, end: f64) -> bool {
         let source = self.layout.owners[output] as usize;
-        self.assumes || (self.trace.spans[source].stepped && self.sees_end(slave, source, end))
+        self.assumes
+            || (self.trace.spans[source].stepped && self.uses_end_value(slave, source, end))
     }
 
-    /// What is known of an output over the last step of its slave.
-    pub(super) fn known(&self, output: usize, span: &Span) -> Known {
+    /// Returns the known values of an output over the last step of its slave.
+    pub(super) fn known(&self, output: usize, span: &Span) -> OutputHistory {
         let (layout, trace) = (&self.layout, &self.trace);
-        let derivative = |place: Option<u32>| place.map(|k| trace.begin_derivatives[k as usize]);
-        Known {
+        let derivative = |place: Option<u32>| place.map(|k| trace.start_derivatives[k as usize]);
+        OutputHistory {
             earlier: trace.earlier[output],
             before: trace.before[output],
-            begin: trace.begin[output],
+            start: trace.start[output],
             end: if self.assumes && !(span.stepped && self.sweep == Method::GaussSeidel) {
                 self.assumed[output]
             } else {
@@ -240,7 +247,7 @@ impl Reals {
         }
     }
 
-    /// The extrapolation of an output from `time` on.
+    /// Returns the polynomial of an output from `time` on.
     fn polynomial(&self, slave: usize, output: usize, (time, size): (f64, f64)) -> Polynomial {
         let (layout, trace) = (&self.layout, &self.trace);
         let span = &trace.spans[layout.owners[output] as usize];
@@ -250,7 +257,7 @@ impl Reals {
         } else {
             known.extrapolated(self.extrapolation)
         };
-        extrapolation.later(time - span.begin)
+        extrapolation.later(time - span.start)
     }
 
     /// Sets the gathered inputs of `slave`, steps it, reads its outputs.
@@ -267,30 +274,30 @@ impl Reals {
         Ok(done)
     }
 
-    /// The step of `slave` with its gathered inputs.
+    /// Builds the arguments of the step of `slave` with its gathered inputs.
     #[inline]
     pub(super) fn step(&mut self, slave: usize, span: (f64, f64), never_back: bool) -> Advance<'_> {
-        let lane = &self.layout.port_maps[slave];
+        let port_map = &self.layout.port_maps[slave];
         let trace = &mut self.trace;
         let inputs =
-            (&self.values[..], &self.input_derivatives[lane.input_derivative_range.clone()]);
+            (&self.values[..], &self.input_derivatives[port_map.input_derivative_range.clone()]);
         let outputs = (
-            &mut trace.latest[lane.output_range.clone()],
-            &mut trace.derivatives[lane.output_derivative_range.clone()],
+            &mut trace.latest[port_map.output_range.clone()],
+            &mut trace.derivatives[port_map.output_derivative_range.clone()],
         );
-        lane.step(inputs, span, never_back, outputs)
+        port_map.step(inputs, span, never_back, outputs)
     }
 
-    /// Whether [`Reals::pass`] does all that a sweep of Jacobi's method takes.
+    /// Whether [`Reals::pass`] can make a complete sweep of Jacobi's method.
     pub(crate) fn passes(&self) -> bool {
-        self.simple
+        self.copies_latest
             && self.sweep == Method::Jacobi
             && self.layout.plain.iter().all(|plain| *plain)
             && !self.layout.functions.contains(&true)
             && self.layout.from_integers.is_empty()
     }
 
-    /// A sweep of all slaves, see [`Pass::run`]; those that stopped on the way.
+    /// Makes a sweep with [`Pass::run`]; returns the slaves that completed only a part of the step.
     #[inline]
     pub(crate) fn pass(
         &mut self,
@@ -311,18 +318,23 @@ impl Reals {
 
     /// Reads the connected outputs of a slave and their derivatives.
     pub(crate) fn read(&mut self, slave: usize, instance: &mut dyn Slave) -> Result<(), CallError> {
-        let (lane, trace) = (&self.layout.port_maps[slave], &mut self.trace);
-        if !lane.outputs.is_empty() {
-            instance.get_real(&lane.outputs, &mut trace.latest[lane.output_range.clone()])?;
+        let (port_map, trace) = (&self.layout.port_maps[slave], &mut self.trace);
+        if !port_map.outputs.is_empty() {
+            instance
+                .get_real(&port_map.outputs, &mut trace.latest[port_map.output_range.clone()])?;
         }
-        if lane.derived_outputs.is_empty() {
+        if port_map.derived_outputs.is_empty() {
             return Ok(());
         }
-        let derivatives = &mut trace.derivatives[lane.output_derivative_range.clone()];
-        instance.get_output_derivatives(&lane.derived_outputs, &lane.output_orders, derivatives)
+        let derivatives = &mut trace.derivatives[port_map.output_derivative_range.clone()];
+        instance.get_output_derivatives(
+            &port_map.derived_outputs,
+            &port_map.output_orders,
+            derivatives,
+        )
     }
 
-    /// The input of a slave that a transformation or a fault gives a value that is not finite.
+    /// Returns an input of the slave that is not finite after transformation and fault.
     #[inline]
     pub(crate) fn input_not_finite(&self, slave: usize) -> Option<(Port, f64)> {
         if self.layout.plain[slave] && self.faults.is_empty() {
@@ -333,7 +345,7 @@ impl Reals {
         Some((self.layout.input_ports[found], self.values[found]))
     }
 
-    /// The output of a slave whose value is not finite.
+    /// Returns an output of the slave whose value is not finite.
     #[inline]
     pub(crate) fn not_finite(&self, slave: usize) -> Option<(Port, f64)> {
         let range = self.layout.port_maps[slave].output_range.clone();
@@ -345,15 +357,16 @@ impl Reals {
         Some((self.layout.output_ports[range.start + position], values[position]))
     }
 
-    /// Whether all derivatives of a slave's outputs are finite. Connections whose derivatives are
-    /// not are held: see [`Known::extrapolated`].
+    /// Whether all output derivatives of a slave are finite. A connection whose derivative is not
+    /// finite is held; see [`OutputHistory::extrapolated`].
     #[inline]
     pub(crate) fn derivatives_are_finite(&self, slave: usize) -> bool {
         let range = self.layout.port_maps[slave].output_derivative_range.clone();
         all_finite(&self.trace.derivatives[range])
     }
 
-    /// An output of a slave whose derivative is not finite and has not been reported before.
+    /// Returns an output of the slave whose derivative is not finite, unless it has been reported
+    /// before.
     #[cold]
     pub(crate) fn report_derivative(&mut self, slave: usize) -> Option<(Port, f64)> {
         for output in self.layout.port_maps[slave].output_range.clone() {
@@ -369,7 +382,8 @@ impl Reals {
     }
 }
 
-/// Whether all values are numbers and finite: zero times any other is not zero.
+/// Whether all values are finite. Multiplies by zero: only NaN and infinity then give a nonzero
+/// result.
 #[inline]
 fn all_finite(values: &[f64]) -> bool {
     let mut sums = [0.0; 4];

@@ -1,6 +1,6 @@
-//! What iterations and step controls ask of the connected Reals.
+//! Functions of the connected Reals for iteration and step control.
 
-use super::extrapolation::Known;
+use super::extrapolation::OutputHistory;
 use super::layout::PortMap;
 use super::reals::Reals;
 use crate::algorithm::Extrapolation;
@@ -8,10 +8,10 @@ use crate::system::System;
 use slave::CallError;
 
 impl Reals {
-    /// Order of convergence of the extrapolation as the slaves can follow it: a mean that is held is of order
-    /// 2, the value at one end of the step of order 1.
+    /// Returns the order of convergence of the input extrapolation: a held mean has order 2, the
+    /// value at one end of the step order 1.
     pub(crate) fn order(&self) -> u8 {
-        let held = |lane: &PortMap| lane.input_order == 0 && !lane.inputs.is_empty();
+        let held = |port_map: &PortMap| port_map.input_order == 0 && !port_map.inputs.is_empty();
         let held = self.layout.port_maps.iter().any(held);
         match self.extrapolation {
             Extrapolation::Hold => 1,
@@ -21,8 +21,8 @@ impl Reals {
         }
     }
 
-    /// From now on all inputs are interpolated to these values of their outputs at the end of the
-    /// step; none: as the algorithm has it.
+    /// Makes all inputs interpolate to the output values `ends` at the end of the step; `None`
+    /// restores the extrapolation of the algorithm.
     pub(crate) fn assume(&mut self, ends: Option<&[f64]>) {
         self.assumes = ends.is_some();
         if let Some(ends) = ends {
@@ -30,16 +30,16 @@ impl Reals {
         }
     }
 
-    /// The extrapolation of each output over a step of `size` s from now, into `ends`.
+    /// Extrapolates each output over the next `size` s and writes the results to `ends`.
     pub(crate) fn predictions(&self, size: f64, ends: &mut [f64]) {
         let trace = &self.trace;
         for (output, end) in ends.iter_mut().enumerate() {
             let span = &trace.spans[self.layout.owners[output] as usize];
             let derivative = |place: Option<u32>| place.map(|k| trace.derivatives[k as usize]);
-            let known = Known {
+            let known = OutputHistory {
                 earlier: trace.before[output],
-                before: trace.begin[output],
-                begin: trace.latest[output],
+                before: trace.start[output],
+                start: trace.latest[output],
                 end: trace.latest[output],
                 slope: derivative(self.layout.slopes[output]),
                 curvature: derivative(self.layout.curvatures[output]),
@@ -51,8 +51,8 @@ impl Reals {
         }
     }
 
-    /// The change of all outputs per change of one through the inputs that it is connected to, by
-    /// directional derivatives; slave and error where one has none.
+    /// Computes the derivatives of all outputs with respect to one, through the connected inputs,
+    /// from directional derivatives. On failure returns the slave and its error.
     pub(crate) fn derivatives_to(
         &self,
         system: &mut System,
@@ -60,18 +60,23 @@ impl Reals {
         changes: &mut [f64],
     ) -> Result<(), (usize, CallError)> {
         let layout = &self.layout;
-        for (slave, lane) in layout.port_maps.iter().enumerate() {
-            for k in lane.input_range.clone() {
-                if layout.sources[k] as usize != output || lane.outputs.is_empty() {
+        for (slave, port_map) in layout.port_maps.iter().enumerate() {
+            for k in port_map.input_range.clone() {
+                if layout.sources[k] as usize != output || port_map.outputs.is_empty() {
                     continue;
                 }
-                let known = lane.inputs[k - lane.input_range.start];
-                let mut own = vec![0.0; lane.outputs.len()];
+                let known = port_map.inputs[k - port_map.input_range.start];
+                let mut own = vec![0.0; port_map.outputs.len()];
                 system.slaves[slave]
                     .1
-                    .directional_derivative(&lane.outputs, &[known], &[layout.factors[k]], &mut own)
+                    .directional_derivative(
+                        &port_map.outputs,
+                        &[known],
+                        &[layout.factors[k]],
+                        &mut own,
+                    )
                     .map_err(|source| (slave, source))?;
-                for (change, own) in changes[lane.output_range.clone()].iter_mut().zip(own) {
+                for (change, own) in changes[port_map.output_range.clone()].iter_mut().zip(own) {
                     *change += own;
                 }
             }
@@ -79,12 +84,13 @@ impl Reals {
         Ok(())
     }
 
-    /// Values of the outputs at the begin of the last step.
-    pub(crate) fn begins(&self) -> &[f64] {
-        &self.trace.begin
+    /// Returns the values of the outputs at the start of the last step.
+    pub(crate) fn starts(&self) -> &[f64] {
+        &self.trace.start
     }
 
-    /// How far the extrapolation of each output over the last step of `size` s was off, into `errors`.
+    /// Writes the error of the extrapolation of each output over the last step of `size` s to
+    /// `errors`.
     pub(crate) fn extrapolation_errors(&self, size: f64, errors: &mut [f64]) {
         for (output, error) in errors.iter_mut().enumerate() {
             let span = &self.trace.spans[self.layout.owners[output] as usize];

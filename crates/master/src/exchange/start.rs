@@ -1,4 +1,4 @@
-//! Derivatives of outputs before the first step.
+//! Output derivatives at the start time, before the first step.
 
 use super::{Exchange, call};
 use crate::error::SystemError;
@@ -6,12 +6,14 @@ use crate::exchange::Reals;
 use crate::system::System;
 use slave::{CallError, Slave};
 
-/// Passes for the derivatives at the start: first derivatives through two slaves, second through one.
+/// Number of passes: they carry first derivatives through two slaves and second derivatives through
+/// one.
 const PASSES: usize = 3;
 
 impl Exchange {
-    /// At the start `time`, before a first step of `size` s: derivatives of all outputs, also of
-    /// those that depend directly on inputs. Each pass brings them through one more slave.
+    /// Computes the derivatives of all outputs at the start time, before a first step of `size` s,
+    /// including outputs that depend directly on inputs. Each pass carries them through one more
+    /// slave.
     pub(crate) fn derive_at_start(
         &mut self,
         system: &mut System,
@@ -35,36 +37,43 @@ impl Exchange {
 }
 
 impl Reals {
-    /// Asks a slave for the derivatives of its connected outputs, and gives its connected inputs
-    /// derivatives of 0.
+    /// Tests whether a slave supports derivatives: reads them for its connected outputs and sets
+    /// derivatives of 0 at its connected inputs.
     pub(crate) fn try_derivatives(
         &self,
         slave: usize,
         instance: &mut dyn Slave,
     ) -> (Result<(), CallError>, Result<(), CallError>) {
-        let lane = &self.layout.port_maps[slave];
+        let port_map = &self.layout.port_maps[slave];
         let (mut outputs, mut inputs) = (Ok(()), Ok(()));
-        if !lane.derived_outputs.is_empty() {
-            let mut values = vec![0.0; lane.derived_outputs.len()];
-            let (references, orders) = (&lane.derived_outputs, &lane.output_orders);
+        if !port_map.derived_outputs.is_empty() {
+            let mut values = vec![0.0; port_map.derived_outputs.len()];
+            let (references, orders) = (&port_map.derived_outputs, &port_map.output_orders);
             outputs = instance.get_output_derivatives(references, orders, &mut values);
         }
-        if !lane.derived_inputs.is_empty() {
-            let values = vec![0.0; lane.derived_inputs.len()];
-            inputs =
-                instance.set_input_derivatives(&lane.derived_inputs, &lane.input_orders, &values);
+        if !port_map.derived_inputs.is_empty() {
+            let values = vec![0.0; port_map.derived_inputs.len()];
+            inputs = instance.set_input_derivatives(
+                &port_map.derived_inputs,
+                &port_map.input_orders,
+                &values,
+            );
         }
         (outputs, inputs)
     }
 
-    /// Tells `slave` the gathered derivatives of its inputs before its first step: derivatives of
-    /// outputs that depend directly on inputs are made of them.
+    /// Sets the gathered input derivatives of `slave` before its first step; output derivatives
+    /// that depend directly on inputs follow from them.
     fn set_derivatives(&self, slave: usize, instance: &mut dyn Slave) -> Result<(), CallError> {
-        let lane = &self.layout.port_maps[slave];
-        if lane.derived_inputs.is_empty() {
+        let port_map = &self.layout.port_maps[slave];
+        if port_map.derived_inputs.is_empty() {
             return Ok(());
         }
-        let derivatives = &self.input_derivatives[lane.input_derivative_range.clone()];
-        instance.set_input_derivatives(&lane.derived_inputs, &lane.input_orders, derivatives)
+        let derivatives = &self.input_derivatives[port_map.input_derivative_range.clone()];
+        instance.set_input_derivatives(
+            &port_map.derived_inputs,
+            &port_map.input_orders,
+            derivatives,
+        )
     }
 }

@@ -1,4 +1,4 @@
-//! The steps of several slaves at once, and steps that are begun and finished.
+//! Steps of several slaves at once: in the background, in threads, or one after the other.
 
 use super::reals::Reals;
 use crate::simulation::Task;
@@ -6,7 +6,7 @@ use crate::system::System;
 use slave::{Advance, CallError, Slave, StepResult, finish};
 
 impl Reals {
-    /// The second half of [`Reals::advance`].
+    /// Waits for the step of a background slave and reads its outputs.
     pub(super) fn finish(
         &mut self,
         slave: usize,
@@ -19,8 +19,7 @@ impl Reals {
         Ok(done)
     }
 
-    /// [`Reals::advance`] of several slaves: those in the background begin first, then `run` steps
-    /// the others.
+    /// Steps several slaves. Starts the background slaves first; then `run` steps the others.
     pub(crate) fn advance_all(
         &mut self,
         system: &mut System,
@@ -36,21 +35,23 @@ impl Reals {
         let mut results: Vec<Option<Result<StepResult, CallError>>> = vec![None; chosen.len()];
         let (mut values, mut derivatives) =
             (self.trace.latest.as_mut_slice(), self.trace.derivatives.as_mut_slice());
-        let mut sorted = Sorted::default();
+        let mut sorted = StepBatch::default();
         for (slave, (_, instance)) in system.slaves.iter_mut().enumerate() {
-            let lane = &self.layout.port_maps[slave];
-            let (output_values, rest) = values.split_at_mut(lane.output_range.len());
+            let port_map = &self.layout.port_maps[slave];
+            let (output_values, rest) = values.split_at_mut(port_map.output_range.len());
             values = rest;
             let (output_derivatives, rest) =
-                derivatives.split_at_mut(lane.output_derivative_range.len());
+                derivatives.split_at_mut(port_map.output_derivative_range.len());
             derivatives = rest;
             if !chosen[slave] {
                 continue;
             }
-            let inputs =
-                (&self.values[..], &self.input_derivatives[lane.input_derivative_range.clone()]);
+            let inputs = (
+                &self.values[..],
+                &self.input_derivatives[port_map.input_derivative_range.clone()],
+            );
             let outputs = (output_values, output_derivatives);
-            let step = lane.step(inputs, span(slave), never_back, outputs);
+            let step = port_map.step(inputs, span(slave), never_back, outputs);
             sorted.add(slave, instance.as_mut(), step);
         }
         for (slave, done) in sorted.run(run) {
@@ -61,30 +62,30 @@ impl Reals {
     }
 }
 
-/// Steps by the way in which they are made.
+/// The steps of a group, sorted by how they are executed.
 #[derive(Default)]
-struct Sorted<'a> {
-    /// Begun in the background.
-    begun: Vec<Step<'a>>,
-    /// For any thread.
+struct StepBatch<'a> {
+    /// Steps started in the background.
+    started: Vec<Step<'a>>,
+    /// Steps that any thread can make.
     tasks: Vec<Task<'a>>,
     done: Vec<(usize, Result<StepResult, CallError>)>,
 }
 
-/// A slave and its step.
+/// A slave with the arguments of its step.
 type Step<'a> = (usize, &'a mut dyn Slave, Advance<'a>);
 
-impl<'a> Sorted<'a> {
-    /// Adds a step, and begins it where that can be done.
+impl<'a> StepBatch<'a> {
+    /// Adds a step; starts it if the slave works in the background.
     fn add(&mut self, slave: usize, instance: &'a mut dyn Slave, step: Advance<'a>) {
         match instance.in_background().map(|instance| instance.begin_advance(&step)) {
-            Some(Ok(())) => self.begun.push((slave, instance, step)),
+            Some(Ok(())) => self.started.push((slave, instance, step)),
             Some(Err(error)) => self.done.push((slave, Err(error))),
             None => self.tasks.push(Task { slave, instance, step, done: Ok(StepResult::Whole) }),
         }
     }
 
-    /// Makes all steps: what came of them.
+    /// Makes all steps and returns their results.
     fn run(
         mut self,
         run: impl FnOnce(&mut [Task<'_>]),
@@ -93,7 +94,7 @@ impl<'a> Sorted<'a> {
             run(&mut self.tasks);
         }
         self.done.extend(self.tasks.into_iter().map(|task| (task.slave, task.done)));
-        for (slave, instance, mut step) in self.begun {
+        for (slave, instance, mut step) in self.started {
             self.done.push((slave, finish(instance, &mut step)));
         }
         self.done

@@ -1,54 +1,55 @@
-//! Values and derivatives of connected outputs over the last steps.
+//! History of the connected outputs: values and derivatives over the last steps.
 
 use serde::{Deserialize, Serialize};
 
-/// When a slave last stepped.
+/// The last step of a slave.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct Span {
-    /// Begin of its last step in s.
-    pub(super) begin: f64,
-    /// Sizes of the last step and of those before it in s.
+    /// Start of the last step in s.
+    pub(super) start: f64,
+    /// Sizes in s of the last step and of the two steps before it.
     pub(super) size: f64,
     pub(super) last_size: f64,
     pub(super) earlier_size: f64,
-    /// Whether the values at its end count already.
+    /// Whether the step is complete, so that its end values are valid.
     pub(super) stepped: bool,
 }
 
-/// Size in s of a step that never was: by it values of now change at no rate.
+/// Size in s that stands for a missing step; difference quotients over it are 0.
 const NEVER: f64 = f64::MAX;
 
 impl Default for Span {
     fn default() -> Self {
-        let (begin, stepped) = (0.0, false);
-        Self { begin, size: NEVER, last_size: NEVER, earlier_size: NEVER, stepped }
+        let (start, stepped) = (0.0, false);
+        Self { start, size: NEVER, last_size: NEVER, earlier_size: NEVER, stepped }
     }
 }
 
 impl Span {
-    /// Whether there was a step.
+    /// Whether the slave has made a step.
     pub(super) fn has_size(&self) -> bool {
         self.size < NEVER
     }
 
-    /// No step was before now.
-    pub(super) fn forget(&mut self) {
+    /// Removes the steps made so far from the history.
+    pub(super) fn clear_history(&mut self) {
         (self.size, self.last_size, self.earlier_size) = (NEVER, NEVER, NEVER);
     }
 }
 
-/// Everything that changes on the way.
+/// The values that change during the run.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Trace {
-    /// Values of all outputs at the end of the last step, at its begin, and before.
+    /// Values of all outputs at the end of the last step, at its start, and at the starts of the
+    /// two steps before.
     pub(super) latest: Vec<f64>,
-    pub(super) begin: Vec<f64>,
+    pub(super) start: Vec<f64>,
     pub(super) before: Vec<f64>,
     pub(super) earlier: Vec<f64>,
-    /// Derivatives of all outputs at the end of the last step and at its begin.
+    /// Derivatives of all outputs at the end of the last step and at its start.
     pub(super) derivatives: Vec<f64>,
-    pub(super) begin_derivatives: Vec<f64>,
-    /// For each slave.
+    pub(super) start_derivatives: Vec<f64>,
+    /// The last step of each slave.
     pub(super) spans: Vec<Span>,
 }
 
@@ -57,25 +58,25 @@ impl Trace {
         let shape = |trace: &Self| {
             [
                 trace.latest.len(),
-                trace.begin.len(),
+                trace.start.len(),
                 trace.before.len(),
                 trace.earlier.len(),
                 trace.derivatives.len(),
-                trace.begin_derivatives.len(),
+                trace.start_derivatives.len(),
                 trace.spans.len(),
             ]
         };
         shape(self) == shape(other)
     }
 
-    /// Takes over all values of `other`, of the same system, into the arrays that are there.
+    /// Copies all values of `other`, which belongs to the same system, without allocating.
     pub(crate) fn copy(&mut self, other: &Self) {
         self.latest.clone_from(&other.latest);
-        self.begin.clone_from(&other.begin);
+        self.start.clone_from(&other.start);
         self.before.clone_from(&other.before);
         self.earlier.clone_from(&other.earlier);
         self.derivatives.clone_from(&other.derivatives);
-        self.begin_derivatives.clone_from(&other.begin_derivatives);
+        self.start_derivatives.clone_from(&other.start_derivatives);
         self.spans.clone_from(&other.spans);
     }
 }

@@ -1,4 +1,4 @@
-//! Random numbers that are functions of the time: asked twice, they say the same.
+//! Random numbers as functions of time: the same time gives the same number.
 
 use chacha20::ChaCha8Rng;
 use chacha20::rand_core::{Rng, SeedableRng};
@@ -8,27 +8,29 @@ use sha2::{Digest, Sha256};
 
 use crate::signal::reached;
 
-/// Distribution of a random number of mean zero.
+/// Distribution of a random number with mean zero.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub enum Spread {
-    /// Normal, of this standard deviation.
+pub enum NoiseDistribution {
+    /// Normal distribution with this standard deviation.
     Normal(f64),
-    /// Uniform from minus to plus this; its standard deviation is smaller by the factor `sqrt(3)`.
+    /// Uniform distribution on `[-a, a]`, with standard deviation `a / sqrt(3)`.
     Uniform(f64),
 }
 
-/// A series of random numbers: of the `ChaCha` stream cipher with 8 rounds (Bernstein 2008), whose
-/// stream is the number of the sample and whose key is a hash (SHA-256) of seed, place and name. So a
-/// sample needs none of those before it, and different names give independent series.
+/// A series of random numbers with random access.
+///
+/// A sample is the output of the `ChaCha` stream cipher with 8 rounds (Bernstein 2008). The stream
+/// is the number of the sample; the key is the SHA-256 hash of seed, place and name. A sample
+/// therefore does not depend on earlier samples, and different names give independent series.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Draw {
+pub struct RandomSeries {
     key: [u8; 32],
     every: Option<f64>,
 }
 
-impl Draw {
-    /// The series of `seed` for the fault in `place` (0, 1, ..) among those on the way to the
-    /// input `name`; with a new sample `every` so many s, or else at each communication point.
+impl RandomSeries {
+    /// Creates the series for the fault number `place` (0, 1, ..) on the connection to the input
+    /// `name`. A new sample starts every `every` s; `None`: at each communication point.
     #[must_use]
     pub fn new(seed: u64, name: &str, place: u64, every: Option<f64>) -> Self {
         let hash = Sha256::new()
@@ -38,19 +40,19 @@ impl Draw {
         Self { key: hash.finalize().into(), every }
     }
 
-    /// The noise at `time`, of a series that begins at `from`, both in s.
-    pub(super) fn noise(&self, spread: Spread, from: f64, time: f64) -> f64 {
+    /// Returns the noise at `time` of a series that starts at `from`, both in s.
+    pub(super) fn noise(&self, spread: NoiseDistribution, from: f64, time: f64) -> f64 {
         let mut generator = self.generator(from, time);
         match spread {
-            Spread::Normal(deviation) => {
+            NoiseDistribution::Normal(deviation) => {
                 let normal: f64 = StandardNormal.sample(&mut generator);
                 deviation * normal
             }
-            Spread::Uniform(bound) => bound * (2.0 * unit(&mut generator) - 1.0),
+            NoiseDistribution::Uniform(bound) => bound * (2.0 * unit(&mut generator) - 1.0),
         }
     }
 
-    /// Whether an event of that probability happens at `time`.
+    /// Whether an event of this probability happens at `time`.
     pub(super) fn happens(&self, probability: f64, from: f64, time: f64) -> bool {
         unit(&mut self.generator(from, time)) < probability
     }
@@ -59,7 +61,7 @@ impl Draw {
     fn generator(&self, from: f64, time: f64) -> ChaCha8Rng {
         let sample = match self.every {
             Some(every) => period_of(from, every, time) as u64,
-            // Plus zero, as minus zero is the same time.
+            // Adding zero maps minus zero to plus zero, which is the same time.
             None => (time + 0.0).to_bits(),
         };
         let mut generator = ChaCha8Rng::from_seed(self.key);
@@ -68,14 +70,14 @@ impl Draw {
     }
 }
 
-/// A number from 0, included, to 1, with 53 bits.
+/// Returns a uniform random number in `[0, 1)` with 53 bits.
 #[expect(clippy::cast_precision_loss, reason = "53 bits fit")]
 fn unit(generator: &mut ChaCha8Rng) -> f64 {
     (generator.next_u64() >> 11) as f64 * 2.0_f64.powi(-53)
 }
 
-/// How many periods from `from` on are over at `time`, all in s; a period is over where its end differs
-/// by rounding only.
+/// Returns the number of complete periods between `from` and `time`, all in s. A period whose end
+/// differs from `time` by rounding is complete.
 pub(super) fn period_of(from: f64, period: f64, time: f64) -> f64 {
     let periods = (time - from) / period;
     let next = periods.round();

@@ -1,42 +1,42 @@
-//! One fault with its time and what it remembers.
+//! A single fault with its window and its memory.
 
 use serde::{Deserialize, Serialize};
 
-use super::delay::Line;
+use super::delay::DelayLine;
 use super::draw::period_of;
-use super::{Fault, FaultError, Lost, Window};
+use super::{Fault, FaultError, LossPattern, Window};
 use crate::signal::{Sample, earliest, reached};
 
-/// A fault of a [`super::FaultChain`].
+/// One element of a [`super::FaultChain`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Stage {
     window: Window,
     fault: Fault,
-    /// The value at which it sticks, or the last one not lost.
+    /// The value at which it sticks, or the last value not lost.
     kept: Option<f64>,
-    /// The values on their way, for a delay.
-    line: Option<Line>,
+    /// The memory of a delay.
+    line: Option<DelayLine>,
 }
 
 impl Stage {
     pub(super) fn new(window: Window, fault: Fault, step: f64) -> Result<Self, FaultError> {
         let line = match fault {
-            Fault::Delay { seconds, .. } => Some(Line::new(seconds, step)?),
+            Fault::Delay { seconds, .. } => Some(DelayLine::new(seconds, step)?),
             _ => None,
         };
         Ok(Self { window, fault, kept: None, line })
     }
 
-    /// What it makes of a value with its two derivatives by time.
-    pub(super) fn apply(&self, time: f64, course: [f64; 3]) -> [f64; 3] {
+    /// Applies the fault to a value with its first two derivatives with respect to time.
+    pub(super) fn apply(&self, time: f64, derivatives: [f64; 3]) -> [f64; 3] {
         if !self.window.contains(time) {
-            return course;
+            return derivatives;
         }
-        let [value, slope, curvature] = course;
+        let [value, slope, curvature] = derivatives;
         let held = |value: f64| [value, 0.0, 0.0];
         match &self.fault {
             Fault::Bias(bias) => [value + bias, slope, curvature],
-            Fault::Gain(factor) => course.map(|derivative| factor * derivative),
+            Fault::Gain(factor) => derivatives.map(|derivative| factor * derivative),
             Fault::Drift(rate) => {
                 let since = (time - self.window.from).max(0.0);
                 [value + rate * since, slope + rate, curvature]
@@ -45,20 +45,20 @@ impl Stage {
             Fault::Dropout { lost, instead } if self.loses(lost, time) => {
                 held(instead.or(self.kept).unwrap_or(value))
             }
-            Fault::Dropout { .. } => course,
-            Fault::Delay { hold, initial, .. } => self.line.as_ref().map_or(course, |line| {
+            Fault::Dropout { .. } => derivatives,
+            Fault::Delay { hold, initial, .. } => self.line.as_ref().map_or(derivatives, |line| {
                 let Sample { value, slope } = line.at(time, value, *hold, *initial);
                 [value, slope, 0.0]
             }),
             Fault::Quantisation { step, offset } => {
                 let level = offset + step * ((value - offset) / step).round();
-                // A step too small for a double leaves the value as it is.
+                // If the step is too small for floating-point numbers, the value does not change.
                 held(if level.is_finite() { level } else { value })
             }
             Fault::Saturation { lowest, highest } => {
                 let below = lowest.filter(|&lowest| value < lowest);
                 let beyond = below.or(highest.filter(|&highest| value > highest));
-                beyond.map_or(course, held)
+                beyond.map_or(derivatives, held)
             }
             Fault::Noise { spread, draw } => {
                 [value + draw.noise(*spread, self.window.from, time), slope, curvature]
@@ -67,7 +67,7 @@ impl Stage {
         }
     }
 
-    /// Takes note of the value before it at a communication point.
+    /// Records the value in front of this fault at a communication point.
     pub(super) fn commit(&mut self, time: f64, value: f64) {
         match &self.fault {
             Fault::Stuck(None) if self.kept.is_none() && self.window.contains(time) => {
@@ -88,31 +88,32 @@ impl Stage {
         }
     }
 
-    fn loses(&self, lost: &Lost, time: f64) -> bool {
+    fn loses(&self, lost: &LossPattern, time: f64) -> bool {
         match lost {
-            Lost::All => true,
-            Lost::Periodic { period, part } => {
-                let begin = self.window.from + period_of(self.window.from, *period, time) * period;
-                !reached(time, begin + part)
+            LossPattern::All => true,
+            LossPattern::Periodic { period, part } => {
+                let start = self.window.from + period_of(self.window.from, *period, time) * period;
+                !reached(time, start + part)
             }
-            Lost::Random { probability, draw } => {
+            LossPattern::Random { probability, draw } => {
                 draw.happens(*probability, self.window.from, time)
             }
         }
     }
 
-    /// The first time past `after` at which it begins or ends to act.
+    /// Returns the first time after `after` at which it starts or stops acting.
     pub(super) fn next_break(&self, after: f64) -> Option<f64> {
         let Window { from, until } = self.window;
         let window = earliest(after, until.into_iter().chain([from]));
-        let Fault::Dropout { lost: Lost::Periodic { period, part }, .. } = &self.fault else {
+        let Fault::Dropout { lost: LossPattern::Periodic { period, part }, .. } = &self.fault
+        else {
             return window;
         };
         if !self.window.contains(after) {
             return window;
         }
-        let begin = from + period_of(from, *period, after) * period;
-        let edges = earliest(after, [begin + part, begin + period]);
+        let start = from + period_of(from, *period, after) * period;
+        let edges = earliest(after, [start + part, start + period]);
         window.into_iter().chain(edges).reduce(f64::min)
     }
 }

@@ -1,4 +1,4 @@
-//! Each fault against a series computed by hand.
+//! Each fault compared with a series computed by hand.
 #![expect(clippy::float_cmp, reason = "exact by construction")]
 
 mod random;
@@ -14,7 +14,7 @@ fn single(fault: Fault, from: f64, until: Option<f64>) -> FaultChain {
     FaultChain::new(vec![(window(from, until), fault)], 0.1).unwrap()
 }
 
-/// What arrives of values at communication points.
+/// Applies the faults to values at communication points.
 fn series(line: &mut FaultChain, values: &[(f64, f64)]) -> Vec<f64> {
     values
         .iter()
@@ -126,7 +126,7 @@ fn faults_act_in_the_order_stated() {
     };
     assert_eq!(of(&bias, &gain).apply(0.0, 2.0), 30.0);
     assert_eq!(of(&gain, &bias).apply(0.0, 2.0), 21.0);
-    // What sticks is what the fault before it leaves.
+    // The value that sticks is the output of the fault before.
     let mut line = of(&bias, &Fault::Stuck(None));
     assert_eq!(series(&mut line, &[(0.0, 2.0), (1.0, 5.0)]), [3.0, 3.0]);
 }
@@ -149,7 +149,7 @@ fn integers_and_booleans_have_faults_too() {
 
 #[test]
 fn breaks_are_begin_and_end_and_the_edges_of_a_periodic_dropout() {
-    let lost = Lost::Periodic { period: 2.0, part: 0.5 };
+    let lost = LossPattern::Periodic { period: 2.0, part: 0.5 };
     let dropout = Fault::Dropout { lost, instead: None };
     let faults = vec![(window(1.0, Some(5.2)), dropout), (window(3.2, None), Fault::Bias(1.0))];
     let line = FaultChain::new(faults, 0.1).unwrap();
@@ -158,6 +158,6 @@ fn breaks_are_begin_and_end_and_the_edges_of_a_periodic_dropout() {
         found.push(next);
     }
     assert_eq!(found, [0.0, 1.0, 1.5, 3.0, 3.2, 3.5, 5.0, 5.2]);
-    // A time that differs by rounding is behind.
+    // A time that differs by rounding counts as past.
     assert_eq!(line.next_break(1.0 - 1e-12), Some(1.5));
 }

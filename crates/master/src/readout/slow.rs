@@ -1,4 +1,4 @@
-//! Values of slaves that make several steps at once, at the communication points on their way.
+//! Values of multirate slaves at the communication points within their steps.
 
 use fmu_description::{Causality, Kind, Variability};
 use serde::{Deserialize, Serialize};
@@ -8,10 +8,11 @@ use crate::error::SystemError;
 use crate::simulation::Simulation;
 use crate::system::{Port, System};
 
-/// The outputs and local variables of the slaves with a multiple of the communication step. Such a
-/// slave is ahead of the others between the points where it ends its steps; a row of results gets
-/// the values of its own time: of continuous Reals those on the line between begin and end of the
-/// slave's step, of all others those at the begin.
+/// The outputs and local variables of the slaves that step every several communication steps.
+///
+/// Such a slave is ahead of the others within its step. A row of results contains values at its own
+/// time: continuous Reals are interpolated between start and end of the slave's step; all others
+/// have their value at its start.
 #[derive(Debug, Default)]
 pub struct SlowValues {
     slaves: Vec<SlowSlave>,
@@ -20,32 +21,32 @@ pub struct SlowValues {
 #[derive(Debug)]
 struct SlowSlave {
     slave: usize,
-    /// The values at the begin of its step.
-    begins: Readout,
-    places: Vec<Place>,
+    /// The values at the start of its step.
+    start_values: Readout,
+    places: Vec<ValueIndex>,
 }
 
-/// A value: where it is among those of its type, at the begins and in a row.
+/// The position of a value among the values of its type: at the start of the step, and in a row.
 #[derive(Clone, Copy, Debug)]
-struct Place {
+struct ValueIndex {
     kind: ReadKind,
-    begin: usize,
+    start: usize,
     row: usize,
     continuous: bool,
 }
 
-/// Values at the begins of steps, as a checkpoint holds them.
+/// The values at the start of the steps, as stored in a checkpoint.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SlowState {
     names: Vec<String>,
     values: Vec<Begins>,
 }
 
-/// Those of one slave, by type.
+/// The values of one slave, by type.
 type Begins = (Vec<f64>, Vec<i32>, Vec<i32>, Vec<String>);
 
 impl SlowValues {
-    /// For a [`Readout`] of `ports`.
+    /// Creates the values for a [`Readout`] of `ports`.
     #[must_use]
     pub fn new(simulation: &mut Simulation, ports: &[Port]) -> Self {
         let slow: Vec<usize> = simulation.slow_slaves().collect();
@@ -54,48 +55,49 @@ impl SlowValues {
         Self { slaves }
     }
 
-    /// Takes note of the values of slaves whose next step begins here. To be called before every
+    /// Reads the values of slaves that start a step at the current time. Call it before every
     /// [`Simulation::step`].
     ///
     /// # Errors
     ///
-    /// Where an FMU refuses.
+    /// Returns an error if an FMU refuses a read.
     #[inline]
     pub fn before_step(&mut self, simulation: &mut Simulation) -> Result<(), SystemError> {
         for slow in &mut self.slaves {
-            if simulation.step_beyond(slow.slave).is_none() {
+            if simulation.current_step(slow.slave).is_none() {
                 let time = simulation.time();
-                slow.begins.read(simulation.system(), time)?;
+                slow.start_values.read(simulation.system(), time)?;
             }
         }
         Ok(())
     }
 
-    /// Gives `row`, just read, the values of the time reached.
+    /// Replaces the values in `row` by the values at the time reached; call it right after reading
+    /// `row`.
     pub fn apply(&self, simulation: &Simulation, row: &mut Readout) {
         for slow in &self.slaves {
-            if let Some((begin, end)) = simulation.step_beyond(slow.slave) {
-                slow.apply((simulation.time() - begin) / (end - begin), row);
+            if let Some((start, end)) = simulation.current_step(slow.slave) {
+                slow.apply((simulation.time() - start) / (end - start), row);
             }
         }
     }
 
-    /// For a checkpoint.
+    /// Returns the values for a checkpoint.
     #[must_use]
     pub fn state(&self, system: &System) -> SlowState {
         let values = |slow: &SlowSlave| {
-            let Readout { reals, integers, booleans, strings, .. } = &slow.begins;
+            let Readout { reals, integers, booleans, strings, .. } = &slow.start_values;
             (reals.clone(), integers.clone(), booleans.clone(), strings.clone())
         };
         SlowState { names: self.names(system), values: self.slaves.iter().map(values).collect() }
     }
 
-    /// Takes over the state of a run that goes on. Where other variables are recorded, those of
-    /// slaves on their way have the values at the end of their step until that is reached.
+    /// Restores the values of a checkpoint. If the resumed run records other variables, the values
+    /// of a slave within its step are those at the end of this step until the slave reaches it.
     ///
     /// # Errors
     ///
-    /// Where an FMU refuses to be read.
+    /// Returns an error if an FMU refuses a read.
     pub fn restore(
         &mut self,
         simulation: &mut Simulation,
@@ -106,18 +108,22 @@ impl SlowValues {
         for (position, slow) in self.slaves.iter_mut().enumerate() {
             match state.values.get(position).filter(|_| same) {
                 Some(values) => {
-                    let begins = &mut slow.begins;
-                    (begins.reals, begins.integers, begins.booleans, begins.strings) =
-                        values.clone();
+                    let start_values = &mut slow.start_values;
+                    (
+                        start_values.reals,
+                        start_values.integers,
+                        start_values.booleans,
+                        start_values.strings,
+                    ) = values.clone();
                 }
-                None => slow.begins.read(simulation.system(), time)?,
+                None => slow.start_values.read(simulation.system(), time)?,
             }
         }
         Ok(())
     }
 
     fn names(&self, system: &System) -> Vec<String> {
-        let ports = self.slaves.iter().flat_map(|slow| &slow.begins.ports);
+        let ports = self.slaves.iter().flat_map(|slow| &slow.start_values.ports);
         ports.map(|&port| system.name(port)).collect()
     }
 }
@@ -125,40 +131,40 @@ impl SlowValues {
 impl SlowSlave {
     fn new(system: &System, ports: &[Port], slave: usize) -> Self {
         let (mut own, mut places) = (Vec::new(), Vec::new());
-        // How many values of each type there are so far, at the begins and in a row.
+        // Numbers of values of each type so far: start values, and values in a row.
         let mut counts = [[0; 2]; 4];
         for &port in ports {
             let variable = system.variable(port);
             let kind = ReadKind::of(&variable.kind);
-            let [begins, rows] = &mut counts[kind as usize];
+            let [starts, rows] = &mut counts[kind as usize];
             let row = *rows;
             *rows += 1;
             let changes = matches!(variable.causality, Causality::Output | Causality::Local);
             if port.slave == slave && changes {
                 let continuous = matches!(variable.kind, Kind::Real(_))
                     && variable.variability == Variability::Continuous;
-                places.push(Place { kind, begin: *begins, row, continuous });
+                places.push(ValueIndex { kind, start: *starts, row, continuous });
                 own.push(port);
-                *begins += 1;
+                *starts += 1;
             }
         }
-        Self { slave, begins: Readout::new(system, &own), places }
+        Self { slave, start_values: Readout::new(system, &own), places }
     }
 
-    /// The values at that part of the step.
+    /// Writes the values at the fraction `part` of the step to `row`.
     fn apply(&self, part: f64, row: &mut Readout) {
-        let begins = &self.begins;
+        let start_values = &self.start_values;
         for place in &self.places {
-            let Place { begin, row: at, .. } = *place;
+            let ValueIndex { start, row: at, .. } = *place;
             match place.kind {
                 ReadKind::Real => {
-                    let (start, end) = (begins.reals[begin], row.reals[at]);
+                    let (start, end) = (start_values.reals[start], row.reals[at]);
                     let part = if place.continuous { part } else { 0.0 };
                     row.reals[at] = start + part * (end - start);
                 }
-                ReadKind::Integer => row.integers[at] = begins.integers[begin],
-                ReadKind::Boolean => row.booleans[at] = begins.booleans[begin],
-                ReadKind::String => row.strings[at].clone_from(&begins.strings[begin]),
+                ReadKind::Integer => row.integers[at] = start_values.integers[start],
+                ReadKind::Boolean => row.booleans[at] = start_values.booleans[start],
+                ReadKind::String => row.strings[at].clone_from(&start_values.strings[start]),
             }
         }
     }

@@ -3,7 +3,7 @@
 
 use super::*;
 
-fn track(points: &[(f64, f64)], between: Between) -> Signal {
+fn track(points: &[(f64, f64)], between: Interpolation) -> Signal {
     let (times, values): (Vec<_>, Vec<_>) = points.iter().copied().unzip();
     Signal::Track(Track::new(times.into(), values.into(), between).unwrap())
 }
@@ -36,7 +36,7 @@ fn a_sine_begins_at_its_time_and_slopes_as_a_cosine() {
     assert_at(&sine, 3.0, 1.0, TAU * 0.25 * 2.0);
     assert_eq!(sine.value(4.0), 3.0);
     assert!(sine.slope(4.0).abs() < 1e-15);
-    // A quarter of a period ahead.
+    // A phase of a quarter period.
     let ahead =
         Signal::Sine { amplitude: 2.0, frequency: 0.25, phase: TAU / 4.0, offset: 1.0, from: 3.0 };
     assert!((ahead.value(3.0) - 3.0).abs() < 1e-15);
@@ -45,7 +45,7 @@ fn a_sine_begins_at_its_time_and_slopes_as_a_cosine() {
 
 #[test]
 fn lines_go_through_the_points_and_the_ends_are_held() {
-    let signal = track(&[(1.0, 10.0), (2.0, 20.0), (4.0, 10.0)], Between::Line);
+    let signal = track(&[(1.0, 10.0), (2.0, 20.0), (4.0, 10.0)], Interpolation::Line);
     for (time, value, slope) in [
         (0.0, 10.0, 0.0),
         (1.0, 10.0, 10.0),
@@ -63,7 +63,7 @@ fn lines_go_through_the_points_and_the_ends_are_held() {
 #[test]
 fn a_time_that_stands_twice_is_a_jump_with_the_later_value_at_it() {
     let signal =
-        track(&[(0.0, 0.0), (1.0, 2.0), (1.0, 5.0), (1.0, 8.0), (3.0, 4.0)], Between::Line);
+        track(&[(0.0, 0.0), (1.0, 2.0), (1.0, 5.0), (1.0, 8.0), (3.0, 4.0)], Interpolation::Line);
     assert_at(&signal, 0.5, 1.0, 2.0);
     assert_at(&signal, 1.0, 8.0, -2.0);
     assert_at(&signal, 1.0 - 1e-12, 8.0, -2.0);
@@ -73,14 +73,14 @@ fn a_time_that_stands_twice_is_a_jump_with_the_later_value_at_it() {
 
 #[test]
 fn held_values_begin_at_their_time() {
-    let signal = track(&[(0.0, 1.0), (1.0, 2.0), (2.0, 2.0), (3.0, 5.0)], Between::Hold);
+    let signal = track(&[(0.0, 1.0), (1.0, 2.0), (2.0, 2.0), (3.0, 5.0)], Interpolation::Hold);
     for (time, value) in
         [(-1.0, 1.0), (0.0, 1.0), (0.999, 1.0), (1.0, 2.0), (2.5, 2.0), (3.0, 5.0), (9.0, 5.0)]
     {
         assert_at(&signal, time, value, 0.0);
     }
     // Three steps of 0.1 s in doubles are past 0.3, seven are before 0.7: both are reached.
-    let steps = track(&[(0.0, 0.0), (0.3, 3.0), (0.7, 7.0)], Between::Hold);
+    let steps = track(&[(0.0, 0.0), (0.3, 3.0), (0.7, 7.0)], Interpolation::Hold);
     assert_eq!(steps.value(0.1 + 0.1 + 0.1), 3.0);
     assert_eq!(steps.value(0.7 - 1e-15), 7.0);
     assert_eq!(breaks(&signal, -1.0), [1.0, 3.0]);
@@ -88,7 +88,7 @@ fn held_values_begin_at_their_time() {
 
 #[test]
 fn a_single_point_is_a_constant() {
-    for between in [Between::Line, Between::Hold] {
+    for between in [Interpolation::Line, Interpolation::Hold] {
         let signal = track(&[(1.0, 4.0)], between);
         for time in [0.0, 1.0, 2.0] {
             assert_at(&signal, time, 4.0, 0.0);
@@ -100,7 +100,7 @@ fn a_single_point_is_a_constant() {
 fn time_may_run_either_way_under_a_cursor() {
     let points: Vec<_> =
         (0..200).map(|k| (f64::from(k / 2) * 0.1, f64::from(k * k % 37))).collect();
-    for between in [Between::Line, Between::Hold] {
+    for between in [Interpolation::Line, Interpolation::Hold] {
         let signal = track(&points, between);
         let mut cursor = Cursor::default();
         let mut time = 5.0;
@@ -118,7 +118,7 @@ fn scaling_scales_values_slopes_and_offsets() {
         Signal::Constant(3.0),
         Signal::Ramp { from: 0.0, until: 2.0, begin: 1.0, end: 5.0 },
         Signal::Sine { amplitude: 1.0, frequency: 0.3, phase: 0.2, offset: 4.0, from: 0.5 },
-        track(&[(0.0, 1.0), (2.0, 4.0)], Between::Line),
+        track(&[(0.0, 1.0), (2.0, 4.0)], Interpolation::Line),
     ];
     for signal in signals {
         let scaled = signal.clone().scaled(2.0, -1.0);
@@ -134,7 +134,7 @@ fn scaling_scales_values_slopes_and_offsets() {
 fn points_that_are_none_are_refused() {
     let refused = |points: &[(f64, f64)]| {
         let (times, values): (Vec<_>, Vec<_>) = points.iter().copied().unzip();
-        Track::new(times.into(), values.into(), Between::Line).unwrap_err().to_string()
+        Track::new(times.into(), values.into(), Interpolation::Line).unwrap_err().to_string()
     };
     assert_eq!(refused(&[]), "there are no points, expected at least one");
     assert_eq!(
@@ -149,13 +149,13 @@ fn points_that_are_none_are_refused() {
         refused(&[(2.0, 0.0), (1.0, 0.0)]),
         "point 2: the time 1 s comes after 2 s, expected ascending times"
     );
-    let lengths = Track::new([0.0].into(), [0.0, 1.0].into(), Between::Hold).unwrap_err();
+    let lengths = Track::new([0.0].into(), [0.0, 1.0].into(), Interpolation::Hold).unwrap_err();
     assert_eq!(lengths.to_string(), "there are 2 values, expected 1, one for each time");
 }
 
 #[test]
 fn points_at_the_ends_of_the_doubles_give_finite_values() {
-    let signal = track(&[(0.0, f64::MAX), (5e-324, f64::MIN), (1e300, 0.0)], Between::Line);
+    let signal = track(&[(0.0, f64::MAX), (5e-324, f64::MIN), (1e300, 0.0)], Interpolation::Line);
     for time in [-1.0, 0.0, 5e-324, 1.0, 1e299, 1e300, 1e301] {
         assert!(signal.value(time).is_finite() && signal.slope(time).is_finite(), "{time}");
     }

@@ -1,58 +1,58 @@
-//! Points in time with what is between them, by the conventions of FMPy 0.3 (`fmpy.simulation.Input`).
+//! Sampled signals, with the conventions of FMPy 0.3 (`fmpy.simulation.Input`).
 
 use std::sync::Arc;
 
 use super::{Sample, near, reached};
 
-/// Largest size of a time in s.
+/// Largest absolute value of a time in s.
 const LARGEST_TIME: f64 = 1e300;
 
-/// What a [`Track`] does between two points.
+/// Interpolation between two points of a [`Track`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Between {
-    /// A line.
+pub enum Interpolation {
+    /// Linear interpolation.
     Line,
-    /// The value of the point before.
+    /// The value of the earlier point is held.
     Hold,
 }
 
-/// Values at points in time.
+/// A sampled signal: values at points in time, ascending.
 ///
-/// * Up to the first time, and at it, the value is the first one; after the last time the last one.
-/// * Between lines, with `v_i` at `t_i`, the value is `w v_i + (1 - w) v_(i+1)` with
-///   `w = (t_(i+1) - t) / (t_(i+1) - t_i)`.
-/// * Where a time stands more than once, the signal jumps: the value there is the last of them.
-/// * Held values begin at their time.
-/// * Times whose relative difference is at most 1e-9 are the same.
+/// * Up to the first time, the value is the first one; after the last time, the last one.
+/// * Linear interpolation between `v_i` at `t_i` and the next point is `w v_i + (1 - w) v_(i+1)`
+///   with `w = (t_(i+1) - t) / (t_(i+1) - t_i)`.
+/// * If a time occurs more than once, the signal jumps; its value there is the last one.
+/// * A held value starts at its time.
+/// * Times with a relative difference of at most 1e-9 are equal.
 ///
-/// The values are those of FMPy to the last bit. The derivatives at a point differ: FMPy gives those
-/// of the line before it, here they are those of the line that begins there.
+/// The values equal FMPy's to the last bit. The derivatives at a point differ: FMPy returns the
+/// slope of the line before the point, this crate the slope of the line after it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Track {
     times: Arc<[f64]>,
     values: Arc<[f64]>,
-    between: Between,
-    /// Where it jumps, ascending.
+    between: Interpolation,
+    /// The times of the jumps, ascending.
     breaks: Arc<[f64]>,
 }
 
-/// Why points make no [`Track`]. Points count from 1.
+/// Error of creating a [`Track`]. Points count from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum TrackError {
-    /// None.
+    /// There are no points.
     #[error("there are no points, expected at least one")]
     Empty,
-    /// A time or a value that is not finite, or a time beyond all measure.
+    /// A time or a value is not finite, or a time is too large.
     #[error("point {point}: the {what} is {found}, expected a finite number")]
     Number {
-        /// The point.
+        /// Number of the point.
         point: usize,
-        /// Time or value.
+        /// "time" or "value".
         what: &'static str,
-        /// What it is.
+        /// The number found.
         found: f64,
     },
-    /// A time before the one before it.
+    /// A time is less than the time before it.
     #[error("point {point}: the time {found} s comes after {before} s, expected ascending times")]
     Order {
         /// The point.
@@ -62,7 +62,7 @@ pub enum TrackError {
         /// The time.
         found: f64,
     },
-    /// Times and values that are not of the same number.
+    /// Times and values have different lengths.
     #[error("there are {values} values, expected {times}, one for each time")]
     Lengths {
         /// Number of times.
@@ -73,37 +73,39 @@ pub enum TrackError {
 }
 
 impl Track {
-    /// The track through `values` at `times`, in s.
+    /// Creates the signal through `values` at `times`, in s.
     ///
     /// # Errors
     ///
-    /// [`TrackError`] where there are no points, or they are not finite, or times go back.
+    /// Returns [`TrackError`] if there are no points, if a number is not finite, or if times are
+    /// not ascending.
     pub fn new(
         times: Arc<[f64]>,
         values: Arc<[f64]>,
-        between: Between,
+        between: Interpolation,
     ) -> Result<Self, TrackError> {
         check(&times, &values)?;
         let jumps = |point: &usize| match between {
-            Between::Line => near(times[point - 1], times[*point]),
-            Between::Hold => values[*point] - values[point - 1] != 0.0,
+            Interpolation::Line => near(times[point - 1], times[*point]),
+            Interpolation::Hold => values[*point] - values[point - 1] != 0.0,
         };
         let breaks = (1..times.len()).filter(jumps).map(|point| times[point]).collect();
         Ok(Self { times, values, between, breaks })
     }
 
-    /// The first time past `after`, in s, at which it jumps.
+    /// Returns the first time after `after`, in s, at which the signal jumps.
     pub(crate) fn next_break(&self, after: f64) -> Option<f64> {
         let first = self.breaks.partition_point(|&moment| moment <= after);
         self.breaks[first..].iter().copied().find(|&moment| !reached(after, moment))
     }
 
-    /// The track with `change` applied to each value.
+    /// Returns the signal with `change` applied to each value.
     pub(crate) fn map(self, change: impl Fn(f64) -> f64) -> Self {
         Self { values: self.values.iter().map(|&value| change(value)).collect(), ..self }
     }
 
-    /// Value and right-hand slope at `time`; `cursor` is where the last look-up ended.
+    /// Returns value and right-hand slope at `time`; `cursor` holds the position of the last
+    /// look-up.
     pub(crate) fn at(&self, time: f64, cursor: &mut usize) -> Sample {
         let (times, values) = (&*self.times, &*self.values);
         let last = times.len() - 1;
@@ -116,19 +118,19 @@ impl Track {
             return Sample::held(values[last]);
         }
         match self.between {
-            Between::Hold if right == 0 => Sample::held(values[0]),
-            Between::Hold => {
+            Interpolation::Hold if right == 0 => Sample::held(values[0]),
+            Interpolation::Hold => {
                 let mut point = right - 1;
                 while point < last && reached(time, times[point + 1]) {
                     point += 1;
                 }
                 Sample::held(values[point])
             }
-            Between::Line => self.on_line(time, right),
+            Interpolation::Line => self.on_line(time, right),
         }
     }
 
-    /// As [`Track::at`], for lines; `right` is the first point not before `time`.
+    /// As [`Track::at`], for linear interpolation; `right` is the first point not before `time`.
     fn on_line(&self, time: f64, right: usize) -> Sample {
         let (times, values) = (&*self.times, &*self.values);
         let last = times.len() - 1;
@@ -151,7 +153,8 @@ impl Track {
         Sample { value, slope: self.slope(if at_point { right } else { left }) }
     }
 
-    /// Slope of the line that begins at a point; 0 after the last one, or beyond the doubles.
+    /// Returns the slope of the line that starts at a point; 0 after the last point, or if the
+    /// slope overflows.
     fn slope(&self, point: usize) -> f64 {
         if point + 1 >= self.times.len() {
             return 0.0;
@@ -161,7 +164,8 @@ impl Track {
         if slope.is_finite() { slope } else { 0.0 }
     }
 
-    /// The first point whose time is not before `time`; their number where there is none.
+    /// Returns the first point whose time is not before `time`, or the number of points if there is
+    /// none.
     fn not_below(&self, time: f64, hint: usize) -> usize {
         let times = &*self.times;
         let fits = |&point: &usize| {

@@ -1,13 +1,13 @@
-//! What the slaves can do in fact: some promise more in their descriptions.
+//! Tests capabilities of the slaves; some model descriptions promise too much.
 
 use crate::algorithm::{Algorithm, Coupling};
 use crate::exchange::{Exchange, Refusal};
 use crate::system::System;
 use slave::CallError;
 
-/// The connections of an initialised system. Derivatives of inputs and outputs that an FMU promises
-/// and refuses are not used, with a warning.
-pub(super) fn exchange(system: &mut System, algorithm: &Algorithm) -> Exchange {
+/// Lays out the connections of an initialised system. Derivatives that an FMU promises and refuses
+/// are not used, with a warning.
+pub(super) fn build_exchange(system: &mut System, algorithm: &Algorithm) -> Exchange {
     let exchange = Exchange::new(system, algorithm, &[]);
     let mut refusing = vec![Refusal::default(); system.slaves.len()];
     for (slave, (name, instance)) in system.slaves.iter_mut().enumerate() {
@@ -23,7 +23,7 @@ pub(super) fn exchange(system: &mut System, algorithm: &Algorithm) -> Exchange {
     Exchange::new(system, algorithm, &refusing)
 }
 
-/// Whether an FMU refuses derivatives that `flag` promises. Any other failure comes again where the
+/// Whether an FMU refuses derivatives that `flag` promises. Other failures appear again when the
 /// derivatives are needed.
 fn is_refused(name: &str, done: Result<(), CallError>, flag: &str, what: &str) -> bool {
     let Err(error) = done else { return false };
@@ -37,8 +37,8 @@ fn is_refused(name: &str, done: Result<(), CallError>, flag: &str, what: &str) -
     refused
 }
 
-/// `algorithm`, or where its iteration was chosen by default and the state of an FMU can in fact not
-/// be set: the one without iteration.
+/// Returns `algorithm`, without iteration if the iteration was chosen by default and the state of
+/// an FMU cannot be restored.
 pub(super) fn confirm_rollback(system: &mut System, algorithm: &Algorithm) -> Algorithm {
     let mut confirmed = algorithm.clone();
     let optional = algorithm.fallback

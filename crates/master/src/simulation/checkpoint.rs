@@ -1,4 +1,4 @@
-//! A simulation as data, to go on with later.
+//! Checkpoints: the state of a simulation as data.
 
 mod origin;
 
@@ -16,7 +16,7 @@ use crate::fault::FaultChain;
 use crate::system::System;
 pub(super) use origin::Origin;
 
-/// Everything that a simulation needs to go on from where it stands, bit by bit.
+/// The complete state of a simulation. A resumed run gives the same results, bit for bit.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Checkpoint {
     origin: Origin,
@@ -28,33 +28,34 @@ pub struct Checkpoint {
     values: Values,
     faults: Vec<FaultChain>,
     drives: Vec<DriveState>,
-    /// For each slave its name, the GUID of its FMU and its serialized FMU state.
+    /// For each slave: its name, the GUID of its FMU, its serialised FMU state.
     slaves: Vec<(String, String, Vec<u8>)>,
-    /// The slave that asked for the end, and when.
+    /// The slave that requested the end, and the time in s.
     ended: Option<(usize, f64)>,
 }
 
 impl Checkpoint {
-    /// Time reached in s.
+    /// Returns the time reached in s.
     #[must_use]
     pub fn time(&self) -> f64 {
         self.time
     }
 
-    /// The stop time in s that the FMUs were told (`fmi2SetupExperiment`), where they were told one. A
-    /// run that goes on tells it again; an FMU may refuse to step beyond it.
+    /// Returns the stop time in s that the FMUs received in `fmi2SetupExperiment`, if any. A
+    /// resumed run passes the same one; an FMU may refuse to step beyond it.
     #[must_use]
-    pub fn told_stop_time(&self) -> Option<f64> {
+    pub fn fmu_stop_time(&self) -> Option<f64> {
         self.origin.stop_time
     }
 }
 
 impl Simulation {
-    /// The simulation as it stands.
+    /// Returns the current state of the simulation.
     ///
     /// # Errors
     ///
-    /// Where an FMU cannot serialize its state (`canSerializeFMUstate`), or fails to.
+    /// Returns an error if an FMU cannot serialise its state (`canSerializeFMUstate` is false) or
+    /// fails to do so.
     pub fn checkpoint(&mut self) -> Result<Checkpoint, SystemError> {
         let time = self.grid.time;
         let mut slaves = Vec::new();
@@ -64,7 +65,7 @@ impl Simulation {
                 return Err(SystemError::Capability {
                     slave: name.clone(),
                     lacks: "canSerializeFMUstate",
-                    wanted: "a checkpoint".to_owned(),
+                    required_by: "a checkpoint".to_owned(),
                 });
             }
             let bytes = slave.serialize_state().map_err(|source| call(name, time, source))?;
@@ -87,13 +88,13 @@ impl Simulation {
         })
     }
 
-    /// The simulation that `checkpoint` was made of, with new slaves in `system`. It may have another
-    /// stop time; the FMUs are told that of the first run.
+    /// Creates the simulation of `checkpoint` with new slaves in `system`. The stop time may differ
+    /// from the first run; the FMUs receive the stop time of the first run.
     ///
     /// # Errors
     ///
-    /// Those of [`Simulation::new`]; where the slaves, the connections, the start time or the
-    /// algorithm are others than those of the checkpoint, or an FMU refuses its state.
+    /// Returns an error if [`Simulation::new`] does, if slaves, connections, start time or
+    /// algorithm differ from the checkpoint, or if an FMU refuses its state.
     pub fn resume(
         system: System,
         algorithm: &Algorithm,
@@ -103,9 +104,9 @@ impl Simulation {
     ) -> Result<Self, SystemError> {
         let origin = &checkpoint.origin;
         origin.expect(&system, algorithm, experiment)?;
-        let told = Experiment { stop_time: origin.stop_time, ..*experiment };
+        let first_experiment = Experiment { stop_time: origin.stop_time, ..*experiment };
         let stop = experiment.stop_time;
-        let mut simulation = Self::begin(system, algorithm, &told, stop, scenario)?;
+        let mut simulation = Self::start(system, algorithm, &first_experiment, stop, scenario)?;
         simulation.expect_origin_of(checkpoint)?;
         let states = checkpoint.slaves.iter();
         for ((name, slave), (_, _, bytes)) in simulation.system.slaves.iter_mut().zip(states) {

@@ -1,4 +1,4 @@
-//! How large the next step is, and whether the last one stands.
+//! Step control: accepts or rejects a step and chooses the size of the next one.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +9,7 @@ use crate::system::{Port, System};
 use fmu_description::Kind;
 use solve::{Bond, EnergyControl, ErrorControl, ForwardControl, Scale, SizeBounds, Verdict};
 
-/// The state of the step control: what a run that goes on later needs.
+/// The state of the step control, which is part of a checkpoint.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) enum Controller {
     Fixed,
@@ -22,29 +22,30 @@ pub(super) enum Controller {
 pub(super) struct Control {
     pub(super) kind: StepControl,
     pub(super) controller: Controller,
-    /// The next step in s.
+    /// Size of the next step in s.
     pub(super) size: f64,
-    /// The smallest step in s, and the steps since the pace was last looked at, with their length.
+    /// The smallest step in s; the number of steps since the last check of their pace, with their
+    /// total length.
     pub(super) smallest: f64,
     pub(super) paced: (u32, f64),
     pub(super) scale: Scale,
-    /// For each bond the outputs at the other ends of its connections.
+    /// For each power bond, the outputs at the other ends of its connections.
     bonds: Vec<(usize, usize)>,
-    /// Order of the method: what a whole step and two halves are compared by.
+    /// Order of the method, used to compare a whole step with two halves.
     order: i32,
     errors: Vec<f64>,
     predicted: Vec<f64>,
     states: Vec<Bond>,
 }
 
-/// Steps after which their pace is looked at.
-const PACED: u32 = 1000;
-/// Mean size of these steps in smallest steps up to which a run may be hopeless, and the steps that are
-/// left to the stop time from which it is.
+/// Number of steps between two checks of the pace.
+const PACE_INTERVAL: u32 = 1000;
+/// Limits of the check: the mean size of the steps as a multiple of the smallest step, and the
+/// estimated number of remaining steps. The run ends if the mean is smaller and the number larger.
 const SMALL: f64 = 10.0;
-const HOPELESS: f64 = 1e7;
+const MOST_REMAINING_STEPS: f64 = 1e7;
 
-/// Magnitude of a variable: its `nominal`, else 1.
+/// Returns the magnitude of a variable: its `nominal`, or 1.
 pub(super) fn nominal(system: &System, port: Port) -> f64 {
     match &system.variable(port).kind {
         Kind::Real(real) => real.nominal.unwrap_or(1.0),
@@ -59,7 +60,7 @@ impl Control {
         algorithm: &Algorithm,
     ) -> Result<Self, SystemError> {
         let order = reals.order();
-        // Of the extrapolation: that of the extrapolation, whatever the slaves make of it.
+        // The order of the extrapolation itself, even if a slave only takes held inputs.
         let extrapolation = match algorithm.extrapolation {
             Extrapolation::Hold => 1.0,
             Extrapolation::Limited | Extrapolation::Linear => 2.0,
@@ -102,13 +103,15 @@ impl Control {
         })
     }
 
-    /// Error of a step whose connected values are `halves` when it is made in halves and `whole`
-    /// otherwise, in tolerances: Richardson's estimate `|halves - whole| / (2^p - 1)`.
+    /// Returns the error of a step as a multiple of the tolerance. `halves` are the connected
+    /// values after two half steps and `whole` those after one whole step: Richardson's estimate
+    /// `|halves - whole| / (2^p - 1)`.
     pub(super) fn doubling_error(&self, halves: &[f64], whole: &[f64]) -> f64 {
         self.scale.distance(halves, whole) / (2_f64.powi(self.order) - 1.0)
     }
 
-    /// Error of the extrapolation over the last step of `size` s, in tolerances.
+    /// Returns the error of the extrapolation over the last step of `size` s, as a multiple of the
+    /// tolerance.
     pub(super) fn extrapolation_error(&mut self, reals: &Reals, size: f64) -> f64 {
         self.predict(reals, size);
         self.scale.distance(reals.outputs(), &self.predicted)
@@ -123,7 +126,7 @@ impl Control {
         }
     }
 
-    /// The verdict of an error control.
+    /// Accepts or rejects a step of `size` s with the error `error`.
     pub(super) fn judge(&mut self, size: f64, error: f64) -> Verdict {
         let verdict = match &mut self.controller {
             Controller::Error(control) => control.judge(size, error),
@@ -137,11 +140,11 @@ impl Control {
         verdict
     }
 
-    /// The next step after one of `size` s, for the controls that repeat nothing.
-    pub(super) fn look_back(&mut self, reals: &Reals, size: f64) {
+    /// Chooses the next size after a step of `size` s, for controls that never reject a step.
+    pub(super) fn update_size(&mut self, reals: &Reals, size: f64) {
         match self.kind {
             StepControl::Increment => {
-                let measure = self.scale.distance(reals.outputs(), reals.begins());
+                let measure = self.scale.distance(reals.outputs(), reals.starts());
                 if let Controller::Forward(control) = &mut self.controller {
                     self.size = control.next(size, measure);
                 }
@@ -164,11 +167,12 @@ impl Control {
         }
     }
 
-    /// A step of `size` s to `time` is done, and the run is to end at `stop`, in s.
+    /// Checks after a step of `size` s to `time` whether the run can reach `stop`, all in s.
     ///
     /// # Errors
     ///
-    /// Where the last steps are so near the smallest that the run will not come to its end.
+    /// Returns an error if the last steps are so close to the smallest one that the run cannot
+    /// reach its end.
     pub(super) fn check_pace(
         &mut self,
         time: f64,
@@ -176,20 +180,20 @@ impl Control {
         stop: Option<f64>,
     ) -> Result<(), SystemError> {
         self.paced = (self.paced.0 + 1, self.paced.1 + size);
-        if self.paced.0 < PACED {
+        if self.paced.0 < PACE_INTERVAL {
             return Ok(());
         }
         let (steps, length) = std::mem::take(&mut self.paced);
         let (mean, smallest) = (length / f64::from(steps), self.smallest);
         let left = stop.map_or(0.0, |stop| (stop - time) / mean);
-        if mean > SMALL * smallest || left < HOPELESS {
+        if mean > SMALL * smallest || left < MOST_REMAINING_STEPS {
             return Ok(());
         }
-        Err(SystemError::Crawl { steps, length, smallest, time, left })
+        Err(SystemError::TooManySteps { steps, length, smallest, time, left })
     }
 
-    /// After an event the past says nothing.
-    pub(super) fn forget(&mut self) {
+    /// Clears the history of the step control after an event.
+    pub(super) fn clear_history(&mut self) {
         match &mut self.controller {
             Controller::Fixed => {}
             Controller::Error(control) => control.forget(),
@@ -199,7 +203,7 @@ impl Control {
     }
 }
 
-/// The outputs that are connected to the inputs of each bond.
+/// Returns the outputs that are connected to the inputs of each power bond.
 fn bonds(
     system: &System,
     reals: &Reals,

@@ -1,8 +1,8 @@
-//! Steps that end where an FMU's output says so.
+//! Events: finds the time of an event and ends a step there.
 
 use super::Simulation;
 use super::grid::size_between;
-use super::sweep::Swept;
+use super::sweep::SweepResult;
 use crate::algorithm::EventSource;
 use crate::error::SystemError;
 use crate::exchange::{Values, call};
@@ -10,30 +10,30 @@ use crate::system::Port;
 use slave::Value;
 use solve::Bracket;
 
-/// The slot of FMU states from which crossings are located.
+/// Slot of the FMU states to which the location of a crossing returns.
 const SLOT: usize = 2;
-/// Part of a step within which a crossing is located.
+/// Relative width, as a part of a step, within which a crossing is located.
 const WIDTH: f64 = 1e-9;
-/// Part of a step that is no step.
+/// Part of a step below which a difference of times is rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// What the location of events needs.
+/// The event sources and the values saved to locate a crossing.
 pub(super) struct Events {
     times: Vec<Port>,
     crossings: Vec<Port>,
-    /// Values of the crossings at the begin of the step.
+    /// Values of the crossing outputs at the start of the step.
     before: Vec<f64>,
-    begin: Values,
+    start: Values,
 }
 
 impl Events {
-    /// None where the algorithm looks for no events.
+    /// Returns `None` if the algorithm has no event sources.
     pub(super) fn new(sources: &[EventSource]) -> Option<Self> {
         let mut events = Self {
             times: Vec::new(),
             crossings: Vec::new(),
             before: Vec::new(),
-            begin: Values::default(),
+            start: Values::default(),
         };
         for source in sources {
             match source {
@@ -53,8 +53,8 @@ impl Simulation {
         Ok(if let Value::Real(value) = value { value } else { f64::NAN })
     }
 
-    /// The first time of an event that lies on the way to `end`; `end` itself where it is as near as
-    /// rounding.
+    /// Returns the time of the first announced event before `end`, or `end` itself if the event
+    /// differs from it by rounding.
     pub(super) fn next_event(
         &mut self,
         events: &Events,
@@ -73,8 +73,12 @@ impl Simulation {
         Ok(first)
     }
 
-    /// Before a step in which crossings are looked for.
-    pub(super) fn watch(&mut self, events: &mut Events, time: f64) -> Result<(), SystemError> {
+    /// Saves the state and reads the crossing outputs before a step.
+    pub(super) fn read_crossings(
+        &mut self,
+        events: &mut Events,
+        time: f64,
+    ) -> Result<(), SystemError> {
         if events.crossings.is_empty() {
             return Ok(());
         }
@@ -84,18 +88,18 @@ impl Simulation {
             events.before.push(value);
         }
         self.save_states(SLOT, time)?;
-        self.exchange.save(&mut events.begin);
+        self.exchange.save(&mut events.start);
         Ok(())
     }
 
-    /// After the step from `time` to `end`: makes it end at the first crossing on the way.
+    /// Ends the step from `time` to `end` at the first zero crossing within it, if there is one.
     pub(super) fn locate(
         &mut self,
         events: &mut Events,
         time: f64,
         end: f64,
-    ) -> Result<Option<(f64, Swept)>, SystemError> {
-        let mut found: Option<(f64, Swept)> = None;
+    ) -> Result<Option<(f64, SweepResult)>, SystemError> {
+        let mut found: Option<(f64, SweepResult)> = None;
         let (mut end, width) = (end, WIDTH * (end - time));
         for k in 0..events.crossings.len() {
             let (port, before) = (events.crossings[k], events.before[k]);
@@ -104,20 +108,25 @@ impl Simulation {
                 continue;
             };
             while let Some(asked) = bracket.ask() {
-                self.again(events, time, asked)?;
+                self.repeat_step(events, time, asked)?;
                 let value = self.read_real(port, asked)?;
                 bracket.tell(asked, value);
             }
             end = bracket.after();
-            found = Some((end, self.again(events, time, end)?));
+            found = Some((end, self.repeat_step(events, time, end)?));
         }
         Ok(found)
     }
 
-    /// The step from `time` once more, to another end.
-    fn again(&mut self, events: &Events, time: f64, end: f64) -> Result<Swept, SystemError> {
+    /// Repeats the step from `time` with another end.
+    fn repeat_step(
+        &mut self,
+        events: &Events,
+        time: f64,
+        end: f64,
+    ) -> Result<SweepResult, SystemError> {
         self.restore_states(SLOT, time)?;
-        self.exchange.restore(&events.begin);
+        self.exchange.restore(&events.start);
         self.attempt(time, size_between(time, end), false)
     }
 }

@@ -1,4 +1,4 @@
-//! Communication points.
+//! The grid of communication points.
 
 use std::fmt;
 
@@ -7,33 +7,33 @@ use crate::error::SystemError;
 use crate::system::System;
 use slave::Slave;
 
-/// Part of a step that is rounding: what is left of a run by less is no step.
+/// Part of a step below which the rest of a run is rounding and gets no step.
 const ROUNDING: f64 = 1e-6;
 
-/// Where the simulation is and where it goes.
+/// The communication points of a run, and the one reached.
 #[derive(Clone, Debug)]
 pub(super) struct Grid {
     start: f64,
-    /// Where the run ends in s.
+    /// End of the run in s.
     stop: Option<f64>,
     step: f64,
-    /// Points of the grid passed.
+    /// Number of grid points passed.
     pub(super) count: u64,
     /// Time reached in s.
     pub(super) time: f64,
 }
 
-/// A run that ends before its stop time: with the last whole step of an FMU that takes equal
-/// steps only.
+/// The reason why a run ends before its stop time: an FMU that takes equal steps only, with its
+/// last whole step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EarlyEnd {
-    /// The FMU.
+    /// Name of the FMU.
     pub slave: String,
     /// Its step in s.
     pub step: f64,
     /// The end of the run in s.
     pub end: f64,
-    /// The stop time in s.
+    /// Returns the stop time in s.
     pub stop: f64,
 }
 
@@ -49,21 +49,21 @@ impl fmt::Display for EarlyEnd {
     }
 }
 
-/// Size in s of a step from `begin` to `end`: `begin + size`, as an FMU computes it, is `end` where
-/// a floating-point number gives that, else less. It is never more: an FMU may refuse what is an
-/// ulp beyond its stop time.
+/// Returns the size in s of a step from `start` to `end`. `start + size`, as an FMU computes it,
+/// equals `end` if a floating-point number allows it, and is never greater: an FMU may refuse a
+/// step that ends one ulp beyond its stop time.
 #[inline]
-pub(super) fn size_between(begin: f64, end: f64) -> f64 {
-    let mut size = end - begin;
-    while begin + size > end {
+pub(super) fn size_between(start: f64, end: f64) -> f64 {
+    let mut size = end - start;
+    while start + size > end {
         size = size.next_down();
     }
-    if begin + size < end && begin + size.next_up() <= end { size.next_up() } else { size }
+    if start + size < end && start + size.next_up() <= end { size.next_up() } else { size }
 }
 
 impl Grid {
-    /// The grid of a run from start to stop time in steps of `step` s, which every slave can follow;
-    /// slaves make as many steps of it at once as `multiples` says. With it the reason if it ends
+    /// Creates the grid from start to stop time with steps of `step` s. `multiples` are the
+    /// communication steps in one step of each slave. Also returns the reason if the run ends
     /// early.
     pub(super) fn new(
         system: &System,
@@ -89,7 +89,8 @@ impl Grid {
         Ok((grid, early))
     }
 
-    /// Where the run ends because some slaves take equal steps only; none: at the stop time.
+    /// Returns the early end of the run if some slaves take equal steps only; `None`: the run ends
+    /// at the stop time.
     #[expect(
         clippy::cast_precision_loss,
         clippy::cast_possible_truncation,
@@ -108,7 +109,7 @@ impl Grid {
         let steps = (stop - self.start) / self.step;
         let is_whole = (steps - steps.round()).abs() <= ROUNDING;
         let most = if is_whole { steps.round() } else { steps.floor() } as u64;
-        // All of them meet at the multiples of all their steps.
+        // All of these slaves meet at the common multiples of their steps.
         let together = rigid().fold(1, |all, (_, &multiple)| least_common(all, multiple.into()));
         let ends = |multiple: u64| is_whole && most.is_multiple_of(multiple);
         let ((name, _), &multiple) = rigid().find(|(_, multiple)| !ends((**multiple).into()))?;
@@ -125,8 +126,8 @@ impl Grid {
         self.stop.is_some_and(|stop| self.time >= stop)
     }
 
-    /// `end`, or the stop time where that is less or so near that nothing sensible of a step of
-    /// `size` s would be left.
+    /// Returns `end`, or the stop time if it is earlier or so close that the rest of a step of
+    /// `size` s would be rounding.
     fn limited(&self, end: f64, size: f64) -> f64 {
         match self.stop {
             Some(stop) if end > stop - ROUNDING * size => stop,
@@ -139,30 +140,30 @@ impl Grid {
         self.stop
     }
 
-    /// End of a step of `size` s from now.
+    /// Returns the end of a step of `size` s from the time reached.
     pub(super) fn end_of(&self, size: f64) -> f64 {
         self.limited(self.time + size, size)
     }
 
-    /// End and size of the next step: H, or what is left where that is less.
+    /// Returns end and size of the next step: H, or the rest up to the stop time.
     #[expect(clippy::cast_precision_loss, reason = "2^53 steps take longer than anyone waits")]
     pub(super) fn next(&self) -> (f64, f64) {
-        let begin = self.start + self.count as f64 * self.step;
+        let start = self.start + self.count as f64 * self.step;
         let end = self.start + (self.count + 1) as f64 * self.step;
-        let on_grid = self.time.total_cmp(&begin).is_eq();
+        let on_grid = self.time.total_cmp(&start).is_eq();
         match self.stop {
             Some(stop) if end > stop - ROUNDING * self.step => {
                 let whole = on_grid && (self.time + self.step).total_cmp(&stop).is_eq();
                 (stop, if whole { self.step } else { size_between(self.time, stop) })
             }
             _ if on_grid => (end, self.step),
-            // After an event the rest of the way to the grid.
+            // After an event, step to the next grid point.
             _ => (end, size_between(self.time, end)),
         }
     }
 
-    /// Size of the step from `time` of a slave that makes `multiple` steps of the grid at once: to
-    /// the next point whose number is a multiple.
+    /// Returns the size of the step from `time` of a slave whose step covers `multiple`
+    /// communication steps. The step ends at the next grid point whose number is a multiple.
     #[expect(clippy::cast_precision_loss, reason = "2^53 steps take longer than anyone waits")]
     pub(super) fn size_of(&self, multiple: u32, time: f64) -> f64 {
         let multiple = u64::from(multiple);
@@ -171,13 +172,13 @@ impl Grid {
         size_between(time, self.limited(end, self.step))
     }
 
-    /// The step to `end`, from [`Grid::next`], is done.
+    /// Records the completion of a step to `end`, which [`Grid::next`] has returned.
     pub(super) fn advance(&mut self, end: f64) {
         self.count += 1;
         self.time = end;
     }
 
-    /// A step to `end` is done, a point of the grid or not.
+    /// Records the completion of a step to `end`, on the grid or not.
     pub(super) fn reach(&mut self, end: f64) {
         if end >= self.next().0 {
             self.count += 1;
@@ -185,8 +186,8 @@ impl Grid {
         self.time = end;
     }
 
-    /// Goes on from `time`, with so many points of the grid passed. The end of a run may have been
-    /// counted without being a point of the grid.
+    /// Resumes at `time` after `count` grid points. The end of the first run may have been counted
+    /// without lying on the grid.
     #[expect(clippy::cast_precision_loss, reason = "2^53 steps take longer than anyone waits")]
     pub(super) fn resume(&mut self, time: f64, count: u64) {
         let point = self.start + count as f64 * self.step;
@@ -195,7 +196,7 @@ impl Grid {
     }
 }
 
-/// The least common multiple of two numbers above 0, or the largest number.
+/// Returns the least common multiple of two positive numbers, saturating.
 fn least_common(a: u64, b: u64) -> u64 {
     let (mut divisor, mut rest) = (a, b);
     while rest != 0 {
@@ -204,7 +205,7 @@ fn least_common(a: u64, b: u64) -> u64 {
     (a / divisor).saturating_mul(b)
 }
 
-/// How many steps of the grid each slave makes at once.
+/// Returns the number of communication steps in one step of each slave.
 pub(super) fn multiples(system: &System, algorithm: &Algorithm) -> Result<Vec<u32>, SystemError> {
     let count = system.slaves.len();
     if algorithm.multiples.is_empty() {

@@ -1,4 +1,5 @@
-//! Initialization of the connected system: outputs in the order of their dependencies, loops solved.
+//! Initialisation of the connected system: settings, outputs in the order of their dependencies,
+//! algebraic loops.
 
 use std::collections::HashMap;
 
@@ -14,13 +15,15 @@ use crate::system::{Port, System};
 use slave::Value;
 use solve::{Components, Newton, Progress, Scale, Solver, components};
 
-/// Tolerance of the values in a loop, relative and in nominal values.
+/// Tolerance of the values in a loop, relative and as a fraction of nominal values.
 const TOLERANCE: f64 = 1e-10;
-/// Most evaluations of a loop, and most passes through one of values that are no Reals.
+/// Largest number of evaluations of a loop of Reals, and of passes through a loop of discrete
+/// values.
 const EVALUATIONS: u32 = 100;
 
-/// Gives all slaves their settings, brings them into initialization mode, solves the connections
-/// there, and ends it. Settings are given after `fmi2SetupExperiment`, which some FMUs reset them in.
+/// Initialises all slaves: settings, initialization mode, values of connections, end of
+/// initialization mode. Settings follow `fmi2SetupExperiment`, because some FMUs reset them in this
+/// call.
 pub(super) fn initialise(
     system: &mut System,
     experiment: &Experiment,
@@ -28,7 +31,7 @@ pub(super) fn initialise(
 ) -> Result<(), SystemError> {
     let start = experiment.start_time;
     for (name, slave) in &mut system.slaves {
-        let experiment = told(experiment, slave.description());
+        let experiment = experiment_of(experiment, slave.description());
         slave.setup_experiment(&experiment).map_err(|source| call(name, start, source))?;
     }
     system.apply_settings()?;
@@ -49,15 +52,16 @@ pub(super) fn initialise(
     Ok(())
 }
 
-/// What one FMU is told: the tolerance of its own `DefaultExperiment` where none is stated.
-fn told(experiment: &Experiment, description: &ModelDescription) -> Experiment {
+/// Returns the experiment for one FMU: with the tolerance of its own `DefaultExperiment` if the
+/// user states none.
+fn experiment_of(experiment: &Experiment, description: &ModelDescription) -> Experiment {
     let default = description.default_experiment.as_ref();
     let default = default.and_then(DefaultExperiment::usable_tolerance);
     Experiment { tolerance: experiment.tolerance.or(default), ..*experiment }
 }
 
-/// Carries the connected outputs to their inputs in initialization mode, in the order of their
-/// dependencies.
+/// Transfers connected outputs to their inputs in initialization mode, in the order of their
+/// dependencies, and solves algebraic loops.
 fn solve_connections(
     system: &mut System,
     scenario: &Scenario,
@@ -78,11 +82,11 @@ fn solve_connections(
     Ok(())
 }
 
-/// Connected outputs and what they depend on.
+/// The dependency graph of the connected outputs in initialization mode.
 struct Graph<'a> {
     faults: HashMap<Port, &'a FaultChain>,
     outputs: Vec<Port>,
-    /// For each output the connections that begin there.
+    /// For each output, its connections.
     connections: Vec<Vec<usize>>,
     components: Components,
 }
@@ -127,7 +131,7 @@ impl<'a> Graph<'a> {
         system.get_value(port).map_err(|source| call(&system.slaves[port.slave].0, time, source))
     }
 
-    /// Gives the value of an output to all inputs that are connected to it.
+    /// Sets all inputs that are connected to an output.
     fn write(
         &self,
         system: &mut System,
@@ -153,7 +157,8 @@ impl<'a> Graph<'a> {
         Ok(())
     }
 
-    /// Solves a loop: the Reals by Newton's method, the others by passing them on until they stay.
+    /// Solves an algebraic loop: Reals by Newton's method, discrete values by fixed-point
+    /// iteration.
     fn solve(
         &mut self,
         system: &mut System,
@@ -189,7 +194,7 @@ impl<'a> Graph<'a> {
         nodes.iter().map(|&node| self.read(system, node, time)).collect()
     }
 
-    /// `G(u)`: the outputs when they have the values u where they are connected.
+    /// Evaluates `G(u)`: the outputs, with the values `u` at the connected inputs.
     fn evaluate(
         &self,
         system: &mut System,
@@ -256,7 +261,7 @@ impl<'a> Graph<'a> {
         }
     }
 
-    /// The matrix `dG/du` by differences.
+    /// Computes the Jacobian `dG/du` by finite differences.
     fn differentiate(
         &self,
         system: &mut System,

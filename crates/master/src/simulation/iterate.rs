@@ -1,7 +1,8 @@
-//! A step that is repeated until what the slaves took for the inputs is what they give.
+//! Iterated (implicit) coupling: repeats a step until the input values assumed at its end equal the
+//! outputs.
 
 use super::Simulation;
-use super::sweep::Swept;
+use super::sweep::SweepResult;
 use crate::algorithm::{Algorithm, Coupling};
 use crate::error::SystemError;
 use crate::exchange::{Reals, Values, call};
@@ -11,14 +12,14 @@ use solve::{Anderson, Newton, Progress, QuasiNewton, Scale, Solver};
 use fmu_description::CoSimulation;
 use serde::{Deserialize, Serialize};
 
-/// The slot of FMU states that an iteration begins each evaluation with.
+/// Slot of the FMU states to which each evaluation returns.
 const SLOT: usize = 0;
-/// Unknowns up to which Anderson's mixing keeps as many iterates.
+/// Largest number of iterates that Anderson mixing keeps.
 const DEPTH: usize = 20;
-/// Solutions whose iterates an interface quasi-Newton iteration goes on using.
+/// Number of past steps whose iterates the interface quasi-Newton method reuses.
 const REUSE: u32 = 5;
 
-/// One of the solvers, with what it has learned.
+/// The solver of the iteration, with its state.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) enum Iteration {
     Newton(Newton),
@@ -39,25 +40,25 @@ impl Iteration {
 /// The iteration of a simulation.
 pub(super) struct Coupled {
     pub(super) iteration: Iteration,
-    /// Connected values as the slaves took them, as they gave them, and as to be taken next.
+    /// Connected values: assumed by the slaves, returned by the slaves, and next to assume.
     u: Vec<f64>,
     g: Vec<f64>,
     next: Vec<f64>,
     column: Vec<f64>,
-    begin: Values,
-    /// All slaves have directional derivatives.
+    start: Values,
+    /// Whether all slaves have directional derivatives.
     directional: bool,
-    /// A step whose iteration fails is made once.
+    /// Whether a step whose iteration fails is made once without iteration.
     falls_back: bool,
     fallbacks: Fallbacks,
 }
 
-/// Steps whose iteration failed and that were made once instead.
+/// Count of the steps whose iteration failed and that were made once without iteration.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Fallbacks {
-    /// How many.
+    /// Number of such steps.
     pub count: u64,
-    /// Why the first one failed, with its time; empty where there is none.
+    /// Reason and time of the first failure; empty if there is none.
     pub first: String,
 }
 
@@ -89,7 +90,7 @@ impl Coupled {
             g: zeros(),
             next: zeros(),
             column: zeros(),
-            begin: Values::default(),
+            start: Values::default(),
             directional,
             falls_back: algorithm.fallback,
             fallbacks: Fallbacks::default(),
@@ -98,13 +99,13 @@ impl Coupled {
 }
 
 impl Simulation {
-    /// One step from `time` over `size`: made once, or repeated by the coupling chosen.
+    /// Makes one step from `time` over `size`: once, or iterated with the selected coupling.
     pub(super) fn attempt(
         &mut self,
         time: f64,
         size: f64,
         never_back: bool,
-    ) -> Result<Swept, SystemError> {
+    ) -> Result<SweepResult, SystemError> {
         let Some(mut coupled) = self.coupled.take() else {
             return self.sweep(time, size, never_back);
         };
@@ -120,23 +121,33 @@ impl Simulation {
         done
     }
 
-    /// The step made once, from where its iteration started.
+    /// Restores the state before the iteration and makes the step once.
     #[cold]
-    fn fall_back(&mut self, coupled: &Coupled, time: f64, size: f64) -> Result<Swept, SystemError> {
+    fn fall_back(
+        &mut self,
+        coupled: &Coupled,
+        time: f64,
+        size: f64,
+    ) -> Result<SweepResult, SystemError> {
         self.restore_states(SLOT, time)?;
-        self.exchange.restore(&coupled.begin);
+        self.exchange.restore(&coupled.start);
         self.sweep(time, size, false)
     }
 
-    /// The steps whose iteration failed and that were made once instead.
+    /// Returns the count of steps whose iteration failed; `None` without iteration.
     #[must_use]
     pub fn fallbacks(&self) -> Option<&Fallbacks> {
         self.coupled.as_ref().map(|coupled| &coupled.fallbacks)
     }
 
-    fn solve(&mut self, coupled: &mut Coupled, time: f64, size: f64) -> Result<Swept, SystemError> {
+    fn solve(
+        &mut self,
+        coupled: &mut Coupled,
+        time: f64,
+        size: f64,
+    ) -> Result<SweepResult, SystemError> {
         self.save_states(SLOT, time)?;
-        self.exchange.save(&mut coupled.begin);
+        self.exchange.save(&mut coupled.start);
         self.exchange.reals.predictions(size, &mut coupled.u);
         let mut matrices = 0;
         let mut swept = self.evaluate(coupled, time, size, true)?;
@@ -170,17 +181,18 @@ impl Simulation {
         }
     }
 
-    /// `G(u)`: steps all slaves from the begin with the values u at the end.
+    /// Evaluates `G(u)`: restores the start of the step and steps all slaves with the values `u` at
+    /// its end.
     fn evaluate(
         &mut self,
         coupled: &Coupled,
         time: f64,
         size: f64,
         first: bool,
-    ) -> Result<Swept, SystemError> {
+    ) -> Result<SweepResult, SystemError> {
         if !first {
             self.restore_states(SLOT, time)?;
-            self.exchange.restore(&coupled.begin);
+            self.exchange.restore(&coupled.start);
         }
         self.exchange.reals.assume(Some(&coupled.u));
         let swept = self.sweep(time, size, false);
@@ -188,8 +200,8 @@ impl Simulation {
         swept
     }
 
-    /// The matrix `dG/du` by the directional derivatives at the end of the step: that of direct
-    /// dependencies.
+    /// Computes the Jacobian `dG/du` from the directional derivatives at the end of the step. It
+    /// contains direct dependencies only.
     fn derive(&mut self, coupled: &mut Coupled, time: f64) -> Result<(), SystemError> {
         for column in 0..coupled.u.len() {
             coupled.column.fill(0.0);
@@ -202,7 +214,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// The matrix `dG/du` by differences of whole steps.
+    /// Computes the Jacobian `dG/du` by finite differences of whole steps.
     fn differentiate(
         &mut self,
         coupled: &mut Coupled,
@@ -235,7 +247,7 @@ impl Fallbacks {
     }
 }
 
-/// Whether the slaves can go back after this error and make the step once.
+/// Whether the slaves can restore their states after this error.
 fn is_recoverable(error: &SystemError) -> bool {
     match error {
         SystemError::Coupling { .. } | SystemError::NotFinite { .. } => true,
@@ -244,7 +256,7 @@ fn is_recoverable(error: &SystemError) -> bool {
     }
 }
 
-/// How an iteration failed.
+/// Describes the failure of an iteration.
 fn described(end: Progress) -> String {
     match end {
         Progress::NotConverged { iterations, residual } => format!(

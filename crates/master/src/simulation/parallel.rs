@@ -1,4 +1,4 @@
-//! Slaves that step side by side in threads, where that is faster.
+//! Parallel stepping of independent slaves in threads, if this is faster.
 
 use std::time::{Duration, Instant};
 
@@ -8,12 +8,12 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use crate::error::SystemError;
 use slave::{Advance, CallError, Slave, StepResult};
 
-/// Steps that are measured one way and the other.
+/// Number of steps measured with and without threads.
 const TRIALS: u32 = 16;
-/// Part of the time in one thread that threads must not exceed to be used.
+/// Threads are used if their time is below this fraction of the time without threads.
 const WORTH: f64 = 0.9;
 
-/// One slave with a step to make.
+/// The step of one slave.
 pub(crate) struct Task<'a> {
     pub(crate) slave: usize,
     pub(crate) instance: &'a mut dyn Slave,
@@ -21,7 +21,7 @@ pub(crate) struct Task<'a> {
     pub(crate) done: Result<StepResult, CallError>,
 }
 
-/// The threads, and what is known of their use for each group of slaves.
+/// The thread pool, and the measured times of each group of slaves.
 pub(super) struct Parallel {
     pool: ThreadPool,
     groups: Vec<Trial>,
@@ -35,7 +35,8 @@ struct Trial {
 }
 
 impl Trial {
-    /// Whether the next step is made in threads: first tried without, then with, then as was faster.
+    /// Whether the next step uses threads: the first trials do not, the following do, and then the
+    /// faster way decides.
     fn in_threads(&self) -> bool {
         if self.steps < 2 * TRIALS {
             return self.steps >= TRIALS;
@@ -45,7 +46,7 @@ impl Trial {
 }
 
 impl Parallel {
-    /// `jobs` threads for so many groups; none for a single one.
+    /// Creates a pool of `jobs` threads for `groups` groups of slaves; `None` for a single thread.
     pub(super) fn new(jobs: usize, groups: usize) -> Result<Option<Self>, SystemError> {
         if jobs < 2 {
             return Ok(None);
@@ -57,21 +58,20 @@ impl Parallel {
         Ok(Some(Self { pool, groups: vec![Trial::default(); groups] }))
     }
 
-    /// Whether the group's next step is made in threads.
+    /// Whether the next step of the group uses threads.
     pub(super) fn in_threads(&self, group: usize) -> bool {
         self.groups[group].in_threads()
     }
 
-    /// Makes a step of a group, by `alone` or in threads, and takes its time where that is not
-    /// decided yet.
+    /// Makes a step of a group and measures its time until the choice is made.
     pub(super) fn measure<T>(&mut self, group: usize, step: impl FnOnce(&ThreadPool) -> T) -> T {
         let trial = self.groups[group];
         if trial.steps >= 2 * TRIALS {
             return step(&self.pool);
         }
-        let begin = Instant::now();
+        let start = Instant::now();
         let done = step(&self.pool);
-        let taken = begin.elapsed();
+        let taken = start.elapsed();
         let trial = &mut self.groups[group];
         if trial.in_threads() {
             trial.together += taken;
@@ -83,7 +83,7 @@ impl Parallel {
     }
 }
 
-/// Makes all steps, in the threads of `pool`.
+/// Makes all steps in the threads of `pool`.
 pub(crate) fn run(pool: &ThreadPool, tasks: &mut [Task<'_>]) {
     pool.install(|| {
         tasks.par_iter_mut().for_each(|task| task.done = task.instance.advance(&mut task.step));

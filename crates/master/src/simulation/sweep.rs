@@ -1,4 +1,4 @@
-//! One step of all slaves, side by side or one after the other.
+//! A sweep: one step of every slave, in groups (Jacobi or Gauss-Seidel).
 
 use super::Simulation;
 use super::grid::size_between;
@@ -10,35 +10,35 @@ use crate::order::Order;
 use crate::system::System;
 use slave::{CallError, Failure, StepResult};
 
-/// Most attempts of a slave to come to the end of a step that it makes in parts.
+/// Largest number of partial steps in which a slave may complete a step.
 const PARTS: u32 = 1000;
-/// Part of a step that may be missing at its end: the rounding of times.
+/// Part of a step below which the missing rest is rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// What helps where a slave does not go on after `fmi2Discard`.
+/// Advice for an FMU that fails after `fmi2Discard`.
 const ADVICE: &str = "the step before it was discarded; with rollback all FMUs repeat it";
 
-/// How a sweep ended.
+/// Result of a sweep.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Swept {
-    /// The slave that wants the simulation to end, and when.
+pub(super) struct SweepResult {
+    /// The slave that requested the end of the simulation, and the time in s.
     pub(super) terminated: Option<(usize, f64)>,
-    /// Until when every slave could go; none: to the end of the step.
+    /// The time in s that every slave can reach; `None`: the end of the step.
     pub(super) reached: Option<f64>,
 }
 
-/// The slaves in groups, to be stepped one after the other; within a group all inputs are taken
-/// before the first step.
+/// The slaves in groups. Groups step one after the other; within a group, all inputs are set before
+/// the first slave steps.
 pub(super) struct Groups {
     pub(super) sequence: Vec<usize>,
-    /// Where each group begins in `sequence`, and the end of the last.
-    begins: Vec<usize>,
+    /// Start of each group in `sequence`, and the end of the last group.
+    starts: Vec<usize>,
 }
 
 impl Groups {
-    /// Jacobi: all slaves are one group, but for functions, which come after them one by one.
-    /// Gauss-Seidel: neighbours in the order of stepping are one
-    /// where none is connected to another, as then it makes no difference.
+    /// Forms the groups. Jacobi: one group of all slaves, except functions, which follow one by
+    /// one. Gauss-Seidel: consecutive slaves without connections between them form a group, because
+    /// their order does not matter.
     pub(super) fn new(system: &System, sweep: Method, order: &Order) -> Self {
         let count = system.slaves.len();
         if sweep == Method::Jacobi {
@@ -46,8 +46,8 @@ impl Groups {
             let mut sequence: Vec<usize> = (0..count).filter(|slave| !is_function(slave)).collect();
             let first = sequence.len();
             sequence.extend(order.sequence.iter().copied().filter(is_function));
-            let begins = [0].into_iter().chain(first..=count).collect();
-            return Self { sequence, begins };
+            let starts = [0].into_iter().chain(first..=count).collect();
+            return Self { sequence, starts };
         }
         let mut neighbours = vec![Vec::new(); count];
         for connection in &system.connections {
@@ -55,35 +55,36 @@ impl Groups {
             neighbours[from].push(to);
             neighbours[to].push(from);
         }
-        let mut begins = vec![0];
-        // The group that a slave cannot be in.
+        let mut starts = vec![0];
+        // The group that must not contain the slave.
         let mut excluded_from = vec![usize::MAX; count];
         for (position, &slave) in order.sequence.iter().enumerate() {
-            if excluded_from[slave] == begins.len() {
-                begins.push(position);
+            if excluded_from[slave] == starts.len() {
+                starts.push(position);
             }
             for &neighbour in &neighbours[slave] {
-                excluded_from[neighbour] = begins.len();
+                excluded_from[neighbour] = starts.len();
             }
         }
-        begins.push(count);
-        Self { sequence: order.sequence.clone(), begins }
+        starts.push(count);
+        Self { sequence: order.sequence.clone(), starts }
     }
 
     pub(super) fn len(&self) -> usize {
-        self.begins.len() - 1
+        self.starts.len() - 1
     }
 }
 
 impl Simulation {
-    /// Steps all slaves from `time` over `size`. With `never_back` a slave that stops on the way
-    /// (`fmi2Discard`) goes on from there by itself; otherwise the step is left as it is, to be repeated.
+    /// Steps all slaves from `time` over `size`. With `never_back`, a slave that completes only a
+    /// part of its step (`fmi2Discard`) continues until the end. Otherwise the sweep returns the
+    /// time reached, so that the caller can repeat the step.
     pub(super) fn sweep(
         &mut self,
         time: f64,
         size: f64,
         never_back: bool,
-    ) -> Result<Swept, SystemError> {
+    ) -> Result<SweepResult, SystemError> {
         if !self.drives.is_empty() {
             self.drives.write(&mut self.system, time)?;
         }
@@ -93,19 +94,20 @@ impl Simulation {
         self.step_groups(time, size, never_back)
     }
 
-    /// A sweep group by group. Apart from [`Simulation::pass`], whose loop is to stay small.
+    /// Makes a sweep group by group. A separate function keeps the loop of [`Simulation::pass`]
+    /// small.
     #[inline(never)]
     fn step_groups(
         &mut self,
         time: f64,
         size: f64,
         never_back: bool,
-    ) -> Result<Swept, SystemError> {
-        let mut swept = Swept::default();
+    ) -> Result<SweepResult, SystemError> {
+        let mut swept = SweepResult::default();
         for slave in 0..self.multiples.len() {
             self.sizes[slave] = match self.multiples[slave] {
                 1 => size,
-                _ if self.exchange.reals.is_beyond(slave, time) => 0.0,
+                _ if self.exchange.reals.is_ahead(slave, time) => 0.0,
                 multiple => self.grid.size_of(multiple, time),
             };
             if self.sizes[slave] > 0.0 {
@@ -113,8 +115,8 @@ impl Simulation {
             }
         }
         for group in 0..self.groups.len() {
-            let (begin, end) = (self.groups.begins[group], self.groups.begins[group + 1]);
-            for position in begin..end {
+            let (start, end) = (self.groups.starts[group], self.groups.starts[group + 1]);
+            for position in start..end {
                 let slave = self.groups.sequence[position];
                 self.exchange.gather(slave, time, self.sizes[slave]);
                 self.exchange.check_inputs(&self.system, slave, time)?;
@@ -125,24 +127,24 @@ impl Simulation {
                 done?;
                 continue;
             }
-            self.advance_members(begin..end, time, never_back, &mut swept)?;
+            self.advance_members(start..end, time, never_back, &mut swept)?;
         }
         Ok(swept)
     }
 
-    /// One step of a group, in threads if that has been found to be faster.
+    /// Makes one step of a group, in threads if measurements show that this is faster.
     #[cold]
     fn side_by_side(
         &mut self,
         parallel: &mut Parallel,
         group: usize,
         (time, never_back): (f64, bool),
-        swept: &mut Swept,
+        swept: &mut SweepResult,
     ) -> Result<(), SystemError> {
-        let (begin, end) = (self.groups.begins[group], self.groups.begins[group + 1]);
-        let in_threads = end - begin > 1 && parallel.in_threads(group);
+        let (start, end) = (self.groups.starts[group], self.groups.starts[group + 1]);
+        let in_threads = end - start > 1 && parallel.in_threads(group);
         parallel.measure(group, |pool| {
-            let members = begin..end;
+            let members = start..end;
             if !in_threads {
                 return self.advance_members(members, time, never_back, swept);
             }
@@ -166,13 +168,13 @@ impl Simulation {
         })
     }
 
-    /// Jacobi's method with held inputs and nothing but Reals: one pass over the slaves.
-    fn pass(&mut self, time: f64, size: f64, never_back: bool) -> Result<Swept, SystemError> {
-        let mut swept = Swept::default();
+    /// Makes a sweep of Jacobi's method with held Real inputs as a single pass over the slaves.
+    fn pass(&mut self, time: f64, size: f64, never_back: bool) -> Result<SweepResult, SystemError> {
+        let mut swept = SweepResult::default();
         let parts = self.exchange.reals.pass(&mut self.system, (time, size), never_back)?;
         if !parts.is_empty() {
             for (slave, done) in std::mem::take(parts) {
-                self.in_parts(slave, (time, size), done, never_back, &mut swept)?;
+                self.finish_in_parts(slave, (time, size), done, never_back, &mut swept)?;
             }
         }
         if !self.exchange.reals.is_finite() {
@@ -189,7 +191,7 @@ impl Simulation {
         slave: usize,
         time: f64,
         never_back: bool,
-        swept: &mut Swept,
+        swept: &mut SweepResult,
     ) -> Result<(), SystemError> {
         let size = self.sizes[slave];
         if size == 0.0 {
@@ -206,27 +208,27 @@ impl Simulation {
         time: f64,
         done: StepResult,
         never_back: bool,
-        swept: &mut Swept,
+        swept: &mut SweepResult,
     ) -> Result<(), SystemError> {
         let size = self.sizes[slave];
         if done != StepResult::Whole {
-            self.in_parts(slave, (time, size), done, never_back, swept)?;
+            self.finish_in_parts(slave, (time, size), done, never_back, swept)?;
         }
         self.exchange.check_finite(&self.system, slave, time + size)
     }
 
-    /// A slave made a part of its step.
+    /// Handles a slave that completed only a part of its step.
     #[cold]
-    fn in_parts(
+    fn finish_in_parts(
         &mut self,
         slave: usize,
         (time, size): (f64, f64),
         mut done: StepResult,
         never_back: bool,
-        swept: &mut Swept,
+        swept: &mut SweepResult,
     ) -> Result<(), SystemError> {
         let end = time + size;
-        let mut begin = time;
+        let mut start = time;
         for _ in 0..PARTS {
             let StepResult::Part { reached, terminated } = done else {
                 return self.exchange.read(&mut self.system, slave, end);
@@ -235,7 +237,7 @@ impl Simulation {
                 swept.terminated = Some((slave, reached));
                 return Ok(());
             }
-            if reached <= begin {
+            if reached <= start {
                 break;
             }
             if reached >= end - ROUNDING * size {
@@ -245,22 +247,22 @@ impl Simulation {
                 swept.reached = Some(swept.reached.map_or(reached, |least| least.min(reached)));
                 return Ok(());
             }
-            begin = reached;
+            start = reached;
             let (name, instance) = &mut self.system.slaves[slave];
             done =
-                instance.do_step(begin, size_between(begin, end), true).map_err(|mut source| {
+                instance.do_step(start, size_between(start, end), true).map_err(|mut source| {
                     source.messages.push(ADVICE.to_owned());
-                    call(name, begin, source)
+                    call(name, start, source)
                 })?;
         }
         let what = format!(
-            "returned fmi2Discard and came to {begin} s only, on the way from {time} to {end} s"
+            "returned fmi2Discard and came to {start} s only, on the way from {time} to {end} s"
         );
         let source = CallError {
             function: "fmi2DoStep",
             failure: Failure::InvalidAnswer(what),
             messages: Vec::new(),
         };
-        Err(call(&self.system.slaves[slave].0, begin, source))
+        Err(call(&self.system.slaves[slave].0, start, source))
     }
 }

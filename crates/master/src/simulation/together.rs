@@ -1,10 +1,10 @@
-//! Slaves of a group that step at the same time: those in the background begin before the first
-//! step is waited for. Whatever comes of the steps is taken in their order.
+//! Steps the slaves of a group at the same time: starts the background slaves before waiting for
+//! the first result. Results are evaluated in the order of the slaves.
 
 use std::ops::Range;
 
 use super::Simulation;
-use super::sweep::Swept;
+use super::sweep::SweepResult;
 use crate::error::SystemError;
 use crate::system::System;
 
@@ -14,14 +14,14 @@ pub(super) fn any_in_background(system: &mut System) -> bool {
 }
 
 impl Simulation {
-    /// One step of the slaves at `members` of the sequence.
+    /// Makes one step of the slaves at `members` of the sequence.
     #[inline]
     pub(super) fn advance_members(
         &mut self,
         members: Range<usize>,
         time: f64,
         never_back: bool,
-        swept: &mut Swept,
+        swept: &mut SweepResult,
     ) -> Result<(), SystemError> {
         if self.background {
             return self.advance_together(members, time, never_back, swept);
@@ -32,16 +32,16 @@ impl Simulation {
         Ok(())
     }
 
-    /// As [`Simulation::advance_members`] where some may be in the background. The error is that of
-    /// the first in order; steps begun behind it are not waited for here.
+    /// As [`Simulation::advance_members`], with background slaves. Returns the first error in the
+    /// order of the slaves; does not wait for steps started after it.
     fn advance_together(
         &mut self,
         members: Range<usize>,
         time: f64,
         never_back: bool,
-        swept: &mut Swept,
+        swept: &mut SweepResult,
     ) -> Result<(), SystemError> {
-        let failed = self.begin_members(members.clone(), time, never_back);
+        let failed = self.start_members(members.clone(), time, never_back);
         for position in members {
             let slave = self.groups.sequence[position];
             if failed.as_ref().is_some_and(|(failed, _)| *failed == position) {
@@ -58,8 +58,9 @@ impl Simulation {
         failed.map_or(Ok(()), |(_, error)| Err(error))
     }
 
-    /// Begins the steps of those in the background, up to the first that fails: position and error.
-    fn begin_members(
+    /// Starts the steps of background slaves up to the first failure; returns its position and
+    /// error.
+    fn start_members(
         &mut self,
         members: Range<usize>,
         time: f64,
@@ -69,8 +70,8 @@ impl Simulation {
             let slave = self.groups.sequence[position];
             let span = (time, self.sizes[slave]);
             if span.1 > 0.0 {
-                let begun = self.exchange.begin(&mut self.system, slave, span, never_back);
-                if let Err(error) = begun {
+                let started = self.exchange.start(&mut self.system, slave, span, never_back);
+                if let Err(error) = started {
                     return Some((position, error));
                 }
             }

@@ -1,4 +1,4 @@
-//! Single values of variables, whatever their type.
+//! Reads and sets single variables of any type.
 
 use fmu_description::Kind;
 
@@ -40,7 +40,7 @@ impl System {
         }
     }
 
-    /// What a connection of that transformation gives to a variable of the kind of `to`.
+    /// Applies the transformation of a connection to `value`; the result has the type of `to`.
     pub(crate) fn transformed(
         &self,
         value: &Value,

@@ -1,4 +1,4 @@
-//! Whether two variables can be connected, and what happens to values between them.
+//! Checks of a connection: causality, type, unit, transformation.
 
 use fmu_description::{Causality, Kind};
 
@@ -7,13 +7,15 @@ use crate::error::SystemError;
 use slave::Transformation;
 
 impl System {
-    /// Connects an output to an input, or an output or a calculated parameter to a parameter, which
-    /// then gets its value in initialization mode. With `units_settled` the units of the two are left
-    /// alone; otherwise units that differ are converted.
+    /// Connects an output to an input, or an output or calculated parameter to a parameter. A
+    /// parameter receives its value in initialization mode. If `units_settled` is true,
+    /// `transformation` already includes the conversion of units; otherwise different units are
+    /// converted.
     ///
     /// # Errors
     ///
-    /// Where causality, type, unit or transformation do not fit, or the input has a source.
+    /// Returns an error if causality, type, unit or transformation do not fit, or if the input
+    /// already has a source.
     pub fn connect_ports(
         &mut self,
         from: Port,
@@ -72,8 +74,8 @@ impl System {
         })
     }
 
-    /// Types fit when they are the same, an Integer and an Enumeration, or an Integer that goes to a
-    /// Real; the transformation must be one of that type.
+    /// Checks the types: equal types, Integer and Enumeration, or Integer to Real, with a
+    /// transformation for this type.
     fn expect_fitting_types(
         &self,
         from: Port,

@@ -1,4 +1,5 @@
-//! Values that the user sets before the run: kept here, handed to the FMUs when they are initialised.
+//! Settings: values of variables that the user states before the run. The FMUs receive them during
+//! initialisation.
 
 use fmu_description::{Causality, Initial, Variability};
 
@@ -16,22 +17,22 @@ pub(crate) struct Setting {
 }
 
 impl System {
-    /// Sets the variable called `name` to the value that `text` spells. The FMU gets it when the
-    /// simulation is initialised; a later setting of the same variable replaces it.
+    /// Sets the variable called `name` to the value of `text`. The FMU receives it when the
+    /// simulation is initialised. A later setting of the same variable replaces it.
     ///
     /// # Errors
     ///
-    /// Where the variable does not exist or the text is no value of its type.
+    /// Returns an error if the variable does not exist or if `text` is not a value of its type.
     pub fn set(&mut self, name: &str, text: &str) -> Result<(), SystemError> {
         let port = self.port(name)?;
         self.set_port(port, text)
     }
 
-    /// As [`System::set`], the variable by its place.
+    /// As [`System::set`], for the variable at `port`.
     ///
     /// # Errors
     ///
-    /// Where the text is no value of the variable's type.
+    /// Returns an error if `text` is not a value of the variable's type.
     pub fn set_port(&mut self, port: Port, text: &str) -> Result<(), SystemError> {
         let setting = Setting { port, value: self.value(port, text)?, text: text.to_owned() };
         match self.settings.iter_mut().find(|known| known.port == port) {
@@ -41,7 +42,7 @@ impl System {
         Ok(())
     }
 
-    /// After `fmi2SetupExperiment`: gives every FMU its settings.
+    /// Sets all settings; call it after `fmi2SetupExperiment`.
     pub(crate) fn apply_settings(&mut self) -> Result<(), SystemError> {
         for setting in self.settings.clone() {
             self.set_value(setting.port, &setting.value).map_err(|source| {
@@ -52,9 +53,9 @@ impl System {
         Ok(())
     }
 
-    /// In initialization mode: gives the settings again that the standard allows there (FMI 2.0.5,
-    /// table 4.2.4), as some FMUs reset them on the way. What an FMU refuses here it has got
-    /// before; [`System::confirm_settings`] finds what is lost.
+    /// Repeats the settings that the standard allows in initialization mode (FMI 2.0.5, table
+    /// 4.2.4), because some FMUs reset them when they enter it. Ignores refusals;
+    /// [`System::confirm_settings`] detects values that are lost.
     pub(crate) fn repeat_settings(&mut self) {
         for setting in self.settings.clone() {
             let variable = self.variable(setting.port);
@@ -67,12 +68,12 @@ impl System {
         }
     }
 
-    /// After the initialization: reads the settings back, but for those of variables in `replaced`,
-    /// which have got another value since.
+    /// Reads the settings back after the initialization, except the variables in `replaced`, which
+    /// have received another value.
     ///
     /// # Errors
     ///
-    /// Where a parameter or an input does not have its value.
+    /// Returns an error if a parameter or an input has another value than the one set.
     pub(crate) fn confirm_settings(&mut self, replaced: &[Port]) -> Result<(), SystemError> {
         for setting in self.settings.clone() {
             if replaced.contains(&setting.port) {
@@ -98,14 +99,14 @@ impl System {
             if matches!(causality, Causality::Parameter | Causality::Input) {
                 return Err(error);
             }
-            // Outputs and local variables may change while the initialization ends.
+            // Outputs and local variables may change at the end of the initialization.
             tracing::warn!("{error}");
         }
         Ok(())
     }
 
-    /// After the initialization: names parameters and inputs, apart from those set and `replaced`,
-    /// that do not have the start value of the description.
+    /// Warns after the initialization about parameters and inputs whose value differs from the
+    /// start value of the description, except variables that were set or are in `replaced`.
     pub(crate) fn confirm_start_values(&mut self, replaced: &[Port]) {
         let set: Vec<Port> = self.settings.iter().map(|setting| setting.port).collect();
         for slave in 0..self.slaves.len() {
@@ -132,7 +133,7 @@ impl System {
         }
     }
 
-    /// The start value of a parameter or an input that is a number or a Boolean.
+    /// Returns the start value of a parameter or an input, if it is a number or a Boolean.
     fn start_value(&self, port: Port) -> Option<Value> {
         let variable = self.variable(port);
         let causality = variable.causality;

@@ -8,7 +8,7 @@ use crate::error::SystemError;
 use slave::Transformation;
 
 impl System {
-    /// Name and base of a variable's unit, where it has one.
+    /// Returns name and base of a variable's unit, if it has one.
     fn unit(&self, port: Port) -> Option<(&String, Option<BaseUnit>)> {
         let Kind::Real(real) = &self.variable(port).kind else { return None };
         let name = real.unit.as_ref()?;
@@ -17,14 +17,14 @@ impl System {
         Some((name, base))
     }
 
-    /// The unit of a variable; none where it has none or is dimensionless.
+    /// Returns the unit of a variable; `None` if it has none or is dimensionless.
     pub(super) fn dimension(&self, port: Port) -> Option<&str> {
         let Kind::Real(real) = &self.variable(port).kind else { return None };
         real.unit.as_deref().filter(|unit| !["", "1", "-"].contains(unit))
     }
 
-    /// Factor and offset from the unit of one variable to that of the other; none where they are
-    /// the same or one of them has no unit.
+    /// Returns factor and offset of the conversion between the units of two variables; `None` if
+    /// they are equal or one variable has no unit.
     pub(super) fn conversion(
         &self,
         from: Port,
@@ -49,7 +49,8 @@ impl System {
     }
 }
 
-/// `transformation` of what the conversion, factor and offset, gives.
+/// Returns the transformation that first applies `conversion` (factor and offset) and then
+/// `transformation`.
 pub(super) fn after(conversion: (f64, f64), transformation: &Transformation) -> Transformation {
     match transformation {
         &Transformation::Linear { factor, offset } => Transformation::Linear {

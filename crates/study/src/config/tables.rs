@@ -14,7 +14,7 @@ type Wrong = (Place, String);
 /// An entry of `[[connections]]`: `to = factor from + offset`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Wire {
+pub struct ConnectionEntry {
     /// The output, `slave.variable`.
     pub from: Spanned<String>,
     /// The input, `slave.variable`.
@@ -27,7 +27,7 @@ pub struct Wire {
     pub offset: Option<f64>,
 }
 
-impl Wire {
+impl ConnectionEntry {
     /// One of the command line.
     #[must_use]
     pub fn new(from: String, to: String) -> Spanned<Self> {
@@ -116,7 +116,7 @@ impl Isolation {
 /// `[checkpoint]`: the state of the run, saved to be resumed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
-pub struct Saving {
+pub struct CheckpointSettings {
     /// The file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
@@ -125,7 +125,7 @@ pub struct Saving {
     pub every: Option<Spanned<f64>>,
 }
 
-impl Saving {
+impl CheckpointSettings {
     pub(super) fn check(&self) -> Result<(), Wrong> {
         expect("every", self.every.as_ref(), ABOVE, above)?;
         match &self.every {

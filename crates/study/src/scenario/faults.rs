@@ -8,10 +8,10 @@ use super::literal::is_integer;
 use super::resolve::{Resolver, Target, at, finite, only, positive, require};
 use super::signals::conversion;
 use super::{
-    Delay, Disturbed, Dropout, Literal, Noise, Quantisation, Reason, Saturation, ScenarioError,
+    Delay, Dropout, FaultEntry, Literal, Noise, Quantisation, Reason, Saturation, ScenarioError,
 };
 use master::Port;
-use master::fault::{Draw, Fault, FaultChain, Lost, Spread, Window};
+use master::fault::{Fault, FaultChain, LossPattern, NoiseDistribution, RandomSeries, Window};
 
 /// Kinds of a fault.
 const KINDS: &str = "bias, gain, drift, stuck, dropout, delay, quantisation, saturation, noise, \
@@ -23,9 +23,9 @@ const OF_ENUMERATIONS: &str = "stuck, dropout or delay";
 const OF_REALS: &str = "any kind but inversion";
 
 /// The faults of one input, with the first entry among them.
-struct Way<'a> {
+struct InputFaults<'a> {
     port: Port,
-    entry: &'a Spanned<Disturbed>,
+    entry: &'a Spanned<FaultEntry>,
     path: String,
     faults: Vec<(Window, Fault)>,
 }
@@ -34,16 +34,16 @@ impl<'a> Resolver<'a> {
     /// `[[scenario.fault]]`. Faults on driven variables go to their drives, the others come back.
     pub(super) fn faults(
         &mut self,
-        entries: &'a [Spanned<Disturbed>],
+        entries: &'a [Spanned<FaultEntry>],
     ) -> Result<Vec<(Port, FaultChain)>, ScenarioError> {
-        let mut ways: Vec<Way<'a>> = Vec::new();
+        let mut ways: Vec<InputFaults<'a>> = Vec::new();
         for (index, entry) in entries.iter().enumerate() {
             let path = format!("scenario.fault[{}]", index + 1);
             let stated = &entry.get_ref().connection;
             let target = self.way(stated.get_ref()).map_err(at(stated, &path))?;
             let port = target.port;
             let position = ways.iter().position(|way| way.port == port).unwrap_or_else(|| {
-                ways.push(Way { port, entry, path: path.clone(), faults: Vec::new() });
+                ways.push(InputFaults { port, entry, path: path.clone(), faults: Vec::new() });
                 ways.len() - 1
             });
             let place = ways[position].faults.len() as u64;
@@ -52,7 +52,7 @@ impl<'a> Resolver<'a> {
             ways[position].faults.push(fault);
         }
         let mut lines = Vec::new();
-        for Way { port, entry, path, faults } in ways {
+        for InputFaults { port, entry, path, faults } in ways {
             let line = FaultChain::new(faults, self.setup.step)
                 .map_err(|error| at(entry, &path)(error.into()))?;
             match self.drives.iter_mut().find(|(drive, _)| drive.port() == port) {
@@ -80,11 +80,11 @@ impl<'a> Resolver<'a> {
             return Err(Reason::NoConnection { name: target.name, found });
         }
         if let Some(source) = source {
-            let wanted = self.names.port(source)?;
-            if found != Some(wanted) {
+            let stated_source = self.names.port(source)?;
+            if found != Some(stated_source) {
                 let found =
                     found.map_or_else(|| "a signal".to_owned(), |port| self.names.name(port));
-                let stated = self.names.name(wanted);
+                let stated = self.names.name(stated_source);
                 return Err(Reason::OtherSource { target: target.name, found, stated });
             }
         }
@@ -101,7 +101,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn fault(&self, entry: &Disturbed) -> Result<(Window, Fault), Reason> {
+    fn fault(&self, entry: &FaultEntry) -> Result<(Window, Fault), Reason> {
         let kinds = [
             ("bias", entry.bias.is_some()),
             ("gain", entry.gain.is_some()),
@@ -125,7 +125,7 @@ impl Reader<'_> {
         Ok((window, fault))
     }
 
-    fn body(&self, entry: &Disturbed, unit: Conversion) -> Result<(Window, Fault), Reason> {
+    fn body(&self, entry: &FaultEntry, unit: Conversion) -> Result<(Window, Fault), Reason> {
         let start = self.start;
         if let Some(bias) = entry.bias.as_ref().map(Spanned::get_ref) {
             let value = unit.relative(finite("value", bias.value)?);
@@ -198,26 +198,26 @@ impl Reader<'_> {
         Ok(Some(unit.absolute(number.map_err(refused)?)))
     }
 
-    fn draw(&self, seed: u64, every: Option<f64>) -> Result<Draw, Reason> {
+    fn draw(&self, seed: u64, every: Option<f64>) -> Result<RandomSeries, Reason> {
         let every = every.map(|every| positive("every", every)).transpose()?;
-        Ok(Draw::new(seed, &self.target.name, self.place, every))
+        Ok(RandomSeries::new(seed, &self.target.name, self.place, every))
     }
 
     fn dropout(&self, dropout: &Dropout, unit: Conversion) -> Result<Fault, Reason> {
         let Dropout { period, lost, probability, every, seed, .. } = *dropout;
         let members = |expected| Reason::Members { what: "dropout", expected };
         let lost = match (period, lost, probability) {
-            (None, None, None) => Lost::All,
+            (None, None, None) => LossPattern::All,
             (Some(period), Some(part), None) => {
                 positive("period", period)?;
                 let fits = part > 0.0 && part < period;
                 require("lost", part, fits, "a time above 0 and below the period")?;
-                Lost::Periodic { period, part }
+                LossPattern::Periodic { period, part }
             }
             (None, None, Some(probability)) => {
                 let fits = (0.0..=1.0).contains(&probability);
                 require("probability", probability, fits, "a number from 0 to 1")?;
-                Lost::Random { probability, draw: self.draw(seed.unwrap_or(0), every)? }
+                LossPattern::Random { probability, draw: self.draw(seed.unwrap_or(0), every)? }
             }
             _ => return Err(members("period and lost, or probability, or none of them")),
         };
@@ -255,10 +255,10 @@ impl Reader<'_> {
     fn noise(&self, noise: &Noise, unit: Conversion) -> Result<Fault, Reason> {
         let spread = match (noise.deviation, noise.amplitude) {
             (Some(deviation), None) => {
-                Spread::Normal(unit.relative(positive("deviation", deviation)?).abs())
+                NoiseDistribution::Normal(unit.relative(positive("deviation", deviation)?).abs())
             }
             (None, Some(amplitude)) => {
-                Spread::Uniform(unit.relative(positive("amplitude", amplitude)?).abs())
+                NoiseDistribution::Uniform(unit.relative(positive("amplitude", amplitude)?).abs())
             }
             _ => {
                 let expected = "deviation (normal) or amplitude (uniform)";

@@ -10,7 +10,7 @@ use serde_spanned::Spanned;
 use super::{Reason, Scenario, ScenarioError};
 use crate::table::{self, Table};
 use master::SystemError;
-use master::drive::{Drive, DriveKind, Drives, Following};
+use master::drive::{Drive, DriveKind, DriveSource, Drives};
 use master::{Port, System};
 
 /// What a scenario asks of a system.
@@ -63,7 +63,7 @@ pub struct Setup<'a> {
 
 /// A scenario that fits its system.
 #[derive(Clone, Debug, Default)]
-pub struct Prepared {
+pub struct ResolvedScenario {
     /// What the engine takes.
     pub scenario: master::Scenario,
     /// Columns of `[[scenario.table]]` that drive nothing, with their file.
@@ -80,7 +80,7 @@ impl Scenario {
         &self,
         names: &dyn Lookup,
         setup: &Setup<'_>,
-    ) -> Result<Prepared, ScenarioError> {
+    ) -> Result<ResolvedScenario, ScenarioError> {
         let mut resolver = Resolver {
             names,
             setup: *setup,
@@ -101,7 +101,7 @@ impl Scenario {
         let faults = resolver.faults(&self.fault)?;
         let drives = Drives::new(resolver.drives.into_iter().map(|(drive, _)| drive).collect());
         let scenario = master::Scenario { drives, faults };
-        Ok(Prepared { scenario, unused: resolver.unused })
+        Ok(ResolvedScenario { scenario, unused: resolver.unused })
     }
 }
 
@@ -172,7 +172,7 @@ impl<'a> Resolver<'a> {
     pub(super) fn add(
         &mut self,
         target: &Target<'_>,
-        following: Following,
+        following: DriveSource,
         path: &str,
     ) -> Result<(), Reason> {
         if let Some((_, first)) = self.driver(target.port) {

@@ -9,12 +9,12 @@ use serde_spanned::Spanned;
 use super::convert::Conversion;
 use super::literal::{Literal, is_integer};
 use super::resolve::{Resolver, Target, at, finite, only, positive, require};
-use super::{Columns, Csv, Driven, Ramp, Reason, ScenarioError, Set, Sine};
+use super::{Csv, Ramp, Reason, ScenarioError, SetEntry, SignalEntry, Sine, TableEntry};
 use crate::table::Table;
 use master::Port;
 use master::SystemError;
-use master::drive::Following;
-use master::signal::{Between, Signal, Track};
+use master::drive::DriveSource;
+use master::signal::{Interpolation, Signal, Track};
 
 /// Kinds of a signal.
 const KINDS: &str = "constant, steps, points, ramp, sine, csv";
@@ -25,14 +25,17 @@ const MOST_NAMES: usize = 10;
 struct Settings<'a> {
     target: Target<'a>,
     path: String,
-    entry: &'a Spanned<Set>,
+    entry: &'a Spanned<SetEntry>,
     points: Vec<(f64, f64)>,
     texts: Vec<String>,
 }
 
 impl<'a> Resolver<'a> {
     /// `[[scenario.set]]`.
-    pub(super) fn settings(&mut self, entries: &'a [Spanned<Set>]) -> Result<(), ScenarioError> {
+    pub(super) fn settings(
+        &mut self,
+        entries: &'a [Spanned<SetEntry>],
+    ) -> Result<(), ScenarioError> {
         let mut variables: Vec<Settings<'a>> = Vec::new();
         let mut positions: BTreeMap<(usize, usize), usize> = BTreeMap::new();
         for (index, entry) in entries.iter().enumerate() {
@@ -61,7 +64,7 @@ impl<'a> Resolver<'a> {
     }
 
     /// `[[scenario.signal]]`.
-    pub(super) fn signal(&mut self, entry: &Driven, path: &str) -> Result<(), Reason> {
+    pub(super) fn signal(&mut self, entry: &SignalEntry, path: &str) -> Result<(), Reason> {
         let target = self.free(entry.variable.get_ref())?;
         let kinds = [
             ("constant", entry.constant.is_some()),
@@ -82,7 +85,7 @@ impl<'a> Resolver<'a> {
         } else if let Some(steps) = &entry.steps {
             held_steps(steps.get_ref(), &target, conversion, &mut texts)?
         } else if let Some(points) = &entry.points {
-            scaled(track(points.get_ref().iter().copied(), Between::Line)?, conversion)
+            scaled(track(points.get_ref().iter().copied(), Interpolation::Line)?, conversion)
         } else if let Some(ramp) = &entry.ramp {
             scaled(ramp_signal(ramp.get_ref())?, conversion)
         } else if let Some(sine) = &entry.sine {
@@ -92,7 +95,7 @@ impl<'a> Resolver<'a> {
         } else {
             return Err(Reason::Kinds { found: Vec::new(), expected: KINDS });
         };
-        self.add(&target, Following { signal, begin: f64::NEG_INFINITY, texts }, path)
+        self.add(&target, DriveSource { signal, start: f64::NEG_INFINITY, texts }, path)
     }
 
     fn column(&mut self, csv: &Csv, target: &Target<'_>) -> Result<Signal, Reason> {
@@ -112,7 +115,7 @@ impl<'a> Resolver<'a> {
     /// `[[scenario.table]]`; what the first `others` drives drive, it leaves to them.
     pub(super) fn table(
         &mut self,
-        entry: &Columns,
+        entry: &TableEntry,
         path: &str,
         others: usize,
     ) -> Result<(), Reason> {
@@ -130,7 +133,7 @@ impl<'a> Resolver<'a> {
                     if known.iter().all(|(drive, _)| drive.port() != target.port) {
                         let signal = column_signal(&file, &table, column, &target, false)?;
                         let texts = Vec::new();
-                        let following = Following { signal, begin: f64::NEG_INFINITY, texts };
+                        let following = DriveSource { signal, start: f64::NEG_INFINITY, texts };
                         self.add(&target, following, path)?;
                         continue;
                     }
@@ -203,12 +206,12 @@ fn encode(
 fn settings_following(
     mut points: Vec<(f64, f64)>,
     texts: Vec<String>,
-) -> Result<Following, Reason> {
+) -> Result<DriveSource, Reason> {
     points.reverse();
     points.sort_by(|one, other| one.0.total_cmp(&other.0));
     points.dedup_by(|later, first| later.0 <= first.0);
-    let begin = points.first().map_or(f64::NEG_INFINITY, |&(time, _)| time);
-    Ok(Following { signal: track(points.into_iter(), Between::Hold)?, begin, texts })
+    let start = points.first().map_or(f64::NEG_INFINITY, |&(time, _)| time);
+    Ok(DriveSource { signal: track(points.into_iter(), Interpolation::Hold)?, start, texts })
 }
 
 fn held_steps(
@@ -224,10 +227,13 @@ fn held_steps(
     if points.windows(2).any(|pair| (pair[1].0 - pair[0].0) == 0.0) {
         return Err(Reason::Members { what: "steps", expected: "each time once" });
     }
-    track(points.into_iter(), Between::Hold)
+    track(points.into_iter(), Interpolation::Hold)
 }
 
-fn track(points: impl Iterator<Item = (f64, f64)>, between: Between) -> Result<Signal, Reason> {
+fn track(
+    points: impl Iterator<Item = (f64, f64)>,
+    between: Interpolation,
+) -> Result<Signal, Reason> {
     let (times, values): (Vec<_>, Vec<_>) = points.unzip();
     Ok(Signal::Track(Track::new(times.into(), values.into(), between)?))
 }
@@ -272,7 +278,8 @@ fn column_signal(
         let expected = expected.to_owned();
         return Err(Reason::Value { name: target.name.clone(), found, expected });
     }
-    let between = if hold || !target.is_continuous() { Between::Hold } else { Between::Line };
+    let between =
+        if hold || !target.is_continuous() { Interpolation::Hold } else { Interpolation::Line };
     Ok(Signal::Track(Track::new(table.times.clone(), values.clone(), between)?))
 }
 

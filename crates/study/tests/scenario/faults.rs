@@ -5,7 +5,7 @@ use std::path::Path;
 use allocation_counter::measure;
 use master::drive::DriveState;
 use master::fault::FaultChain;
-use study::scenario::Prepared;
+use study::scenario::ResolvedScenario;
 
 use super::{resolve, scenario, setup, system};
 
@@ -142,7 +142,7 @@ fn integers_are_disturbed_as_integers() {
 }
 
 /// The state of the drives, written and read.
-fn checkpoint(prepared: &Prepared) -> Vec<DriveState> {
+fn checkpoint(prepared: &ResolvedScenario) -> Vec<DriveState> {
     postcard::from_bytes(&postcard::to_allocvec(&prepared.scenario.drives.state()).unwrap())
         .unwrap()
 }
@@ -167,7 +167,7 @@ fn a_signal_can_be_disturbed_on_its_way_and_go_on_from_a_checkpoint() {
         stuck = { from = 2, until = 4 }"#;
     let mut prepared = resolve(text).unwrap();
     assert!(prepared.scenario.faults.is_empty());
-    let arrived = |prepared: &mut Prepared, time| {
+    let arrived = |prepared: &mut ResolvedScenario, time| {
         let sample = prepared.scenario.drives.iter_mut().next().unwrap().sample(time).unwrap();
         prepared.scenario.drives.commit(time);
         (sample.value, sample.slope)

@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex};
 use fmu_description::Experiment;
 use fmu_description::ModelDescription;
 use master::{CallError, Slave, StepResult, System};
-use study::scenario::{Prepared, Scenario, ScenarioError, Setup};
+use study::scenario::{ResolvedScenario, Scenario, ScenarioError, Setup};
 
 /// What a slave was told: function, value references, values.
 type Told = Arc<Mutex<Vec<String>>>;
@@ -155,6 +155,6 @@ fn setup(folder: &Path) -> Setup<'_> {
     Setup { folder, start: 0.0, step: 0.5 }
 }
 
-fn resolve(text: &str) -> Result<Prepared, ScenarioError> {
+fn resolve(text: &str) -> Result<ResolvedScenario, ScenarioError> {
     scenario(text).resolve(&system().0, &setup(Path::new(".")))
 }

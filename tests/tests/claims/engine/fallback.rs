@@ -147,7 +147,7 @@ fn every_step_control_ends_a_hopeless_run_with_a_reason() {
             }
             assert!(steps < 10_000, "{} goes on", control.name());
         };
-        let named = matches!(error, SystemError::Stuck { .. } | SystemError::Crawl { .. });
+        let named = matches!(error, SystemError::Stuck { .. } | SystemError::TooManySteps { .. });
         assert!(named, "{}: {error}", control.name());
         assert!(error.to_string().contains("smallest step"), "{error}");
     }

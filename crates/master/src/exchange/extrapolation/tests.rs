@@ -1,13 +1,14 @@
-//! Courses through points of `1 + 2 t + 3 t^2`, computed by hand.
+//! Polynomials through points of `1 + 2 t + 3 t^2`, computed by hand.
 
-use super::{Known, Polynomial};
+use super::{OutputHistory, Polynomial};
 use crate::algorithm::Extrapolation;
 
-/// At t = -0.5, 0.5, 1 and 3 s: 0.75, 2.75, 6 and 34; at 1 s the slope is 8, the curvature 6.
-const PAST: Known = Known {
+/// Values at t = -0.5, 0.5, 1 and 3 s: 0.75, 2.75, 6 and 34; at 1 s the slope is 8 and the
+/// curvature 6.
+const PAST: OutputHistory = OutputHistory {
     earlier: 0.75,
     before: 2.75,
-    begin: 6.0,
+    start: 6.0,
     end: 34.0,
     slope: None,
     curvature: None,
@@ -23,8 +24,8 @@ fn line(slope: f64) -> Polynomial {
 
 #[test]
 fn three_values_or_two_and_a_slope_or_both_derivatives_make_the_parabola() {
-    let slope = Known { slope: Some(8.0), ..PAST };
-    let both = Known { curvature: Some(6.0), before: 100.0, ..slope };
+    let slope = OutputHistory { slope: Some(8.0), ..PAST };
+    let both = OutputHistory { curvature: Some(6.0), before: 100.0, ..slope };
     for known in [PAST, slope, both] {
         assert_eq!(known.extrapolated(Extrapolation::Quadratic), PARABOLA);
     }
@@ -33,14 +34,14 @@ fn three_values_or_two_and_a_slope_or_both_derivatives_make_the_parabola() {
 #[test]
 fn a_line_has_the_given_slope_or_the_last_difference_quotient() {
     assert_eq!(PAST.extrapolated(Extrapolation::Linear), line(6.5));
-    let slope = Known { slope: Some(8.0), ..PAST };
+    let slope = OutputHistory { slope: Some(8.0), ..PAST };
     assert_eq!(slope.extrapolated(Extrapolation::Linear), line(8.0));
 }
 
 #[test]
 fn a_limited_line_has_the_smaller_slope_and_none_where_signs_differ() {
     for (slope, expected) in [(8.0, 6.5), (5.0, 5.0), (-1.0, 0.0), (0.0, 0.0)] {
-        let known = Known { slope: Some(slope), ..PAST };
+        let known = OutputHistory { slope: Some(slope), ..PAST };
         assert_eq!(known.extrapolated(Extrapolation::Limited), line(expected));
     }
     assert_eq!(PAST.extrapolated(Extrapolation::Limited), line(6.5));
@@ -57,11 +58,11 @@ fn between_begin_and_end_is_a_line_or_the_parabola_with_the_slope_or_the_value_b
     assert_eq!(PAST.interpolated(Extrapolation::Linear), line(14.0));
     assert_eq!(PAST.interpolated(Extrapolation::Limited), line(14.0));
     assert_eq!(PAST.interpolated(Extrapolation::Quadratic), PARABOLA);
-    let slope = Known { slope: Some(8.0), before: 100.0, ..PAST };
+    let slope = OutputHistory { slope: Some(8.0), before: 100.0, ..PAST };
     assert_eq!(slope.interpolated(Extrapolation::Quadratic), PARABOLA);
 }
 
-/// From 1 s on: at 2 s 17 with the slope 14; at 3 s 34; the integral from 1 to 3 s is 36.
+/// From 1 s on: 17 at 2 s with slope 14; 34 at 3 s; the integral from 1 to 3 s is 36.
 #[test]
 fn later_end_and_mean_are_those_of_the_parabola() {
     let later = Polynomial { value: 17.0, slope: 14.0, curvature: 6.0 };
@@ -69,11 +70,16 @@ fn later_end_and_mean_are_those_of_the_parabola() {
     assert_eq!((PARABOLA.end(2.0), PARABOLA.mean(2.0)), (34.0, 18.0));
 }
 
-/// Without a past a extrapolation is of as many derivatives as there are, with one value before a line.
+/// Without past values an extrapolation uses the given derivatives; with one value before, a line.
 #[test]
 fn what_never_was_bends_nothing() {
-    let first =
-        Known { earlier: 6.0, before: 6.0, earlier_size: f64::MAX, last_size: f64::MAX, ..PAST };
+    let first = OutputHistory {
+        earlier: 6.0,
+        before: 6.0,
+        earlier_size: f64::MAX,
+        last_size: f64::MAX,
+        ..PAST
+    };
     for extrapolation in [
         Extrapolation::Hold,
         Extrapolation::Limited,
@@ -82,9 +88,9 @@ fn what_never_was_bends_nothing() {
     ] {
         assert_eq!(first.extrapolated(extrapolation), Polynomial::held(6.0));
     }
-    let second = Known { earlier: 2.75, earlier_size: f64::MAX, ..PAST };
+    let second = OutputHistory { earlier: 2.75, earlier_size: f64::MAX, ..PAST };
     assert_eq!(second.extrapolated(Extrapolation::Quadratic).end(2.0), 19.0);
-    let slope = Known { slope: Some(8.0), ..first };
+    let slope = OutputHistory { slope: Some(8.0), ..first };
     assert_eq!(slope.extrapolated(Extrapolation::Quadratic).end(2.0), 22.0);
     assert_eq!(first.interpolated(Extrapolation::Quadratic).mean(2.0), 20.0);
 }

@@ -1,18 +1,20 @@
 //! Noise and random dropouts: bounds are five standard deviations of the estimate.
 
-use super::{Draw, Fault, FaultChain, Lost, Sample, Spread, single, window};
+use super::{
+    Fault, FaultChain, LossPattern, NoiseDistribution, RandomSeries, Sample, single, window,
+};
 
 const COUNT: u32 = 40_000;
 
-fn noise(spread: Spread, draw: Draw) -> FaultChain {
+fn noise(spread: NoiseDistribution, draw: RandomSeries) -> FaultChain {
     single(Fault::Noise { spread, draw }, 0.0, None)
 }
 
 fn normal(seed: u64, name: &str, place: u64) -> FaultChain {
-    noise(Spread::Normal(2.0), Draw::new(seed, name, place, None))
+    noise(NoiseDistribution::Normal(2.0), RandomSeries::new(seed, name, place, None))
 }
 
-/// The noise at `COUNT` communication points, 1 ms apart.
+/// Returns the noise at `COUNT` communication points, 1 ms apart.
 fn drawn(line: &FaultChain) -> Vec<f64> {
     (0..COUNT).map(|step| line.apply(1e-3 * f64::from(step), 0.0)).collect()
 }
@@ -50,7 +52,8 @@ fn normal_noise_has_mean_deviation_and_shape_as_stated_and_no_memory() {
 #[test]
 fn uniform_noise_fills_its_bounds_evenly() {
     let n = f64::from(COUNT);
-    let values = drawn(&noise(Spread::Uniform(3.0), Draw::new(9, "ctrl.y", 0, None)));
+    let values =
+        drawn(&noise(NoiseDistribution::Uniform(3.0), RandomSeries::new(9, "ctrl.y", 0, None)));
     assert!(values.iter().all(|value| value.abs() <= 3.0));
     assert!(mean(&values).abs() < 5.0 * 3.0_f64.sqrt() / n.sqrt());
     // a^2 / 3; the fourth moment is a^4 / 5.
@@ -79,7 +82,7 @@ fn equal_seeds_give_equal_series_and_other_seeds_names_or_places_independent_one
 
 #[test]
 fn noise_of_a_sample_time_stays_between_samples_whatever_the_rounding() {
-    let line = noise(Spread::Normal(1.0), Draw::new(3, "ctrl.y", 0, Some(0.01)));
+    let line = noise(NoiseDistribution::Normal(1.0), RandomSeries::new(3, "ctrl.y", 0, Some(0.01)));
     let mut before = None;
     for step in 0..5000_u32 {
         let value = line.apply(1e-3 * f64::from(step), 0.0);
@@ -100,14 +103,14 @@ fn noise_leaves_the_slope_and_is_added_to_the_value() {
 #[test]
 fn a_random_dropout_loses_its_part_of_the_samples() {
     let (n, probability) = (f64::from(COUNT), 0.2);
-    let lost = Lost::Random { probability, draw: Draw::new(4, "ctrl.y", 0, None) };
+    let lost = LossPattern::Random { probability, draw: RandomSeries::new(4, "ctrl.y", 0, None) };
     let fault = Fault::Dropout { lost, instead: Some(0.0) };
     let line = FaultChain::new(vec![(window(0.0, None), fault)], 1e-3).unwrap();
     let arrived: Vec<_> = (0..COUNT).map(|step| line.apply(1e-3 * f64::from(step), 1.0)).collect();
     let part = 1.0 - mean(&arrived);
     let deviation = (probability * (1.0 - probability) / n).sqrt();
     assert!((part - probability).abs() < 5.0 * deviation, "{part}");
-    // Independent: two in a row are lost with the square of the probability.
+    // Independence: two consecutive samples are lost with the square of the probability.
     let pairs = arrived.windows(2).filter(|pair| pair[0] + pair[1] == 0.0).count();
     let pairs = part_of(pairs);
     assert!((pairs - probability * probability).abs() < 10.0 * deviation, "{pairs}");
@@ -116,7 +119,8 @@ fn a_random_dropout_loses_its_part_of_the_samples() {
 #[test]
 fn a_dropout_is_never_or_always_at_the_ends_of_the_probabilities() {
     for (probability, expected) in [(0.0, 1.0), (1.0, 0.0)] {
-        let lost = Lost::Random { probability, draw: Draw::new(4, "ctrl.y", 0, Some(0.5)) };
+        let lost =
+            LossPattern::Random { probability, draw: RandomSeries::new(4, "ctrl.y", 0, Some(0.5)) };
         let line = single(Fault::Dropout { lost, instead: Some(0.0) }, 0.0, None);
         for step in 0..1000 {
             assert_eq!(line.apply(0.1 * f64::from(step), 1.0), expected);

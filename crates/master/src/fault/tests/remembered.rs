@@ -1,10 +1,10 @@
-//! Faults that remember: dropout, delay; repeated steps and checkpoints.
+//! Faults with memory: dropout, delay; repeated steps and checkpoints.
 
-use super::super::delay::Line;
-use super::{Fault, FaultChain, FaultError, Lost, Sample, series, single, window};
-use crate::fault::{Draw, Spread};
+use super::super::delay::DelayLine;
+use super::{Fault, FaultChain, FaultError, LossPattern, Sample, series, single, window};
+use crate::fault::{NoiseDistribution, RandomSeries};
 
-fn dropout(lost: Lost, instead: Option<f64>) -> Fault {
+fn dropout(lost: LossPattern, instead: Option<f64>) -> Fault {
     Fault::Dropout { lost, instead }
 }
 
@@ -14,26 +14,26 @@ fn delay(seconds: f64) -> Fault {
 
 #[test]
 fn a_dropout_holds_the_last_value_that_was_not_lost() {
-    let mut line = single(dropout(Lost::All, None), 1.0, Some(3.0));
+    let mut line = single(dropout(LossPattern::All, None), 1.0, Some(3.0));
     let found = series(&mut line, &[(0.0, 5.0), (1.0, 6.0), (2.0, 7.0), (3.0, 8.0)]);
     assert_eq!(found, [5.0, 5.0, 5.0, 8.0]);
 }
 
 #[test]
 fn a_dropout_from_the_start_holds_the_first_value() {
-    let mut line = single(dropout(Lost::All, None), 0.0, None);
+    let mut line = single(dropout(LossPattern::All, None), 0.0, None);
     assert_eq!(series(&mut line, &[(0.0, 5.0), (1.0, 6.0), (2.0, 7.0)]), [5.0, 5.0, 5.0]);
 }
 
 #[test]
 fn a_dropout_may_give_another_value() {
-    let mut line = single(dropout(Lost::All, Some(0.0)), 1.0, Some(2.0));
+    let mut line = single(dropout(LossPattern::All, Some(0.0)), 1.0, Some(2.0));
     assert_eq!(series(&mut line, &[(0.0, 5.0), (1.0, 6.0), (2.0, 7.0)]), [5.0, 0.0, 7.0]);
 }
 
 #[test]
 fn a_periodic_dropout_takes_the_first_part_of_each_period_whatever_the_rounding() {
-    let lost = Lost::Periodic { period: 1.0, part: 0.3 };
+    let lost = LossPattern::Periodic { period: 1.0, part: 0.3 };
     let mut line = single(dropout(lost, None), 0.1, None);
     let mut last = None;
     for step in 0..2000_u32 {
@@ -94,7 +94,7 @@ fn a_delay_that_sets_in_knows_what_was_before() {
 
 #[test]
 fn a_delay_of_a_straight_line_is_exact_for_steps_of_any_size() {
-    // Told that steps are about 0.1 s.
+    // The line expects steps of about 0.1 s.
     let mut line = single(delay(1.0), 0.0, None);
     let (mut time, mut step) = (0.0, 1e-4);
     while time < 20.0 {
@@ -115,11 +115,11 @@ fn a_delay_beyond_memory_is_refused() {
     assert!(found.to_string().contains("a delay of 1000000000 s is 1000000000000"), "{found}");
 }
 
-/// One fault of each kind, all at once.
+/// A chain of one fault of each kind.
 fn everything() -> FaultChain {
-    let draw = |place| Draw::new(5, "a.b", place, None);
-    let random = Lost::Random { probability: 0.3, draw: draw(7) };
-    let noise = Fault::Noise { spread: Spread::Normal(0.1), draw: draw(6) };
+    let draw = |place| RandomSeries::new(5, "a.b", place, None);
+    let random = LossPattern::Random { probability: 0.3, draw: draw(7) };
+    let noise = Fault::Noise { spread: NoiseDistribution::Normal(0.1), draw: draw(6) };
     let faults = vec![
         (window(0.5, None), Fault::Bias(0.25)),
         (window(0.5, None), Fault::Gain(1.5)),
@@ -175,7 +175,7 @@ fn a_checkpoint_that_no_delay_can_have_is_refused() {
     let read = |seconds: f64, step: f64, points: usize| {
         let points = vec![(0.0_f64, 0.0_f64); points];
         let bytes = postcard::to_allocvec(&(seconds, step, points)).unwrap();
-        postcard::from_bytes::<Line>(&bytes).is_ok()
+        postcard::from_bytes::<DelayLine>(&bytes).is_ok()
     };
     assert!(read(1.0, 0.1, 3));
     assert!(!read(1.0, 0.0, 3), "no step");

@@ -1,4 +1,4 @@
-//! How a run was started: what a run that goes on from its checkpoint has in common with it.
+//! The settings of a run that a resumed run must share.
 
 use fmu_description::Experiment;
 use serde::{Deserialize, Serialize};
@@ -7,12 +7,12 @@ use crate::algorithm::{Algorithm, Coupling, StepControl};
 use crate::error::SystemError;
 use crate::system::System;
 
-/// Start time, told stop time, and the settings of the algorithm that the state depends on.
+/// Start time, stop time of the FMUs, and the settings of the algorithm on which the state depends.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(in crate::simulation) struct Origin {
-    /// The stop time in s that the FMUs got by `fmi2SetupExperiment`.
+    /// The stop time in s that the FMUs received in `fmi2SetupExperiment`.
     pub(in crate::simulation) stop_time: Option<f64>,
-    /// Names and values with their units.
+    /// Names and values of the settings, with units.
     settings: Vec<(String, String)>,
 }
 
@@ -29,7 +29,7 @@ impl Origin {
         }
     }
 
-    /// Refuses other settings.
+    /// Returns an error if a setting differs.
     pub(in crate::simulation) fn expect(
         &self,
         system: &System,
@@ -46,8 +46,8 @@ impl Origin {
     }
 }
 
-/// The settings, by the names of the configuration file: those that choose what is calculated before
-/// those of a choice.
+/// Returns the settings under their names in the configuration file. Settings that select an
+/// algorithm precede the parameters of the algorithm.
 fn settings(
     system: &System,
     algorithm: &Algorithm,

@@ -4,13 +4,13 @@
 use super::{Grid, size_between};
 use crate::system::System;
 
-/// The next of a reproducible sequence of random numbers.
+/// Returns the next number of a reproducible pseudo-random sequence.
 fn random(state: &mut u64) -> u64 {
     *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
     *state >> 11
 }
 
-/// From 10^-exponent to 10^exponent.
+/// Returns a random number from 10^-exponent to 10^exponent.
 #[expect(clippy::cast_precision_loss, reason = "53 bits")]
 fn magnitude(state: &mut u64, exponent: f64) -> f64 {
     let unit = random(state) as f64 / (1_u64 << 53) as f64;
@@ -25,15 +25,15 @@ fn grid(step: f64, start: f64, stop: f64) -> Grid {
 fn a_step_ends_where_it_is_to_end_or_as_little_before_as_numbers_allow() {
     let (mut state, mut exact) = (1, 0);
     for _ in 0..100_000 {
-        let begin = magnitude(&mut state, 8.0) - magnitude(&mut state, 4.0);
-        let end = begin + magnitude(&mut state, 6.0);
-        if end == begin {
+        let start = magnitude(&mut state, 8.0) - magnitude(&mut state, 4.0);
+        let end = start + magnitude(&mut state, 6.0);
+        if end == start {
             continue;
         }
-        let size = size_between(begin, end);
-        assert!(begin + size <= end, "{begin} {end}");
-        assert!(begin + size == end || begin + size.next_up() > end, "{begin} {end}");
-        exact += i32::from(begin + size == end);
+        let size = size_between(start, end);
+        assert!(start + size <= end, "{start} {end}");
+        assert!(start + size == end || start + size.next_up() > end, "{start} {end}");
+        exact += i32::from(start + size == end);
     }
     assert!(exact > 99_000, "{exact}");
 }

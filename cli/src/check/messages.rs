@@ -13,7 +13,7 @@ const TARGET: &str = "fmu";
 
 /// What was heard.
 #[derive(Default)]
-pub(super) struct Told {
+pub(super) struct MessageSummary {
     /// The log categories that are used.
     pub(super) categories: BTreeSet<String>,
     /// Messages, also those that came too fast to be kept.
@@ -22,17 +22,17 @@ pub(super) struct Told {
 
 /// Hears the messages.
 #[derive(Clone, Default)]
-pub(super) struct Heard {
-    told: Arc<Mutex<Told>>,
+pub(super) struct MessageRecorder {
+    messages: Arc<Mutex<MessageSummary>>,
 }
 
-impl Heard {
+impl MessageRecorder {
     /// Runs `body` and gives what came meanwhile.
-    pub(super) fn during<T>(body: impl FnOnce() -> T) -> (T, Told) {
+    pub(super) fn during<T>(body: impl FnOnce() -> T) -> (T, MessageSummary) {
         let heard = Self::default();
         let result = tracing::subscriber::with_default(heard.clone(), body);
-        let told = heard.told.lock().map(|mut own| std::mem::take(&mut *own));
-        (result, told.unwrap_or_default())
+        let messages = heard.messages.lock().map(|mut own| std::mem::take(&mut *own));
+        (result, messages.unwrap_or_default())
     }
 }
 
@@ -59,7 +59,7 @@ impl Visit for Category {
     }
 }
 
-impl Subscriber for Heard {
+impl Subscriber for MessageRecorder {
     fn enabled(&self, metadata: &Metadata<'_>) -> bool {
         metadata.target() == TARGET
     }
@@ -75,9 +75,9 @@ impl Subscriber for Heard {
     fn event(&self, event: &Event<'_>) {
         let mut category = Category(None, 1);
         event.record(&mut category);
-        if let Ok(mut told) = self.told.lock() {
-            told.messages = told.messages.saturating_add(category.1);
-            told.categories.extend(category.0);
+        if let Ok(mut messages) = self.messages.lock() {
+            messages.messages = messages.messages.saturating_add(category.1);
+            messages.categories.extend(category.0);
         }
     }
 
