@@ -89,7 +89,8 @@ impl AsoController {
         let resolution = clock_rounding(step.end());
         let until_on = self.design.t_on - step.start;
         let inside = self.compensate && until_on > resolution && step.size - until_on > resolution;
-        self.deviations.set(&self.values, &self.operating_point, 0.0);
+        // z has its deviations from the step before, or from the start.
+        self.deviations.set_measurements(&self.values, &self.operating_point, 0.0);
         if inside {
             self.advance(false, (0.0, until_on))?;
             self.advance(true, (until_on, step.size - until_on))?;

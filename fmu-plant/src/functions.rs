@@ -53,14 +53,14 @@ pub struct Memory {
 
 #[derive(Clone, Copy, Debug)]
 struct Angle {
-    angle: f64,
+    argument: f64,
     sine: f64,
     cosine: f64,
 }
 
 impl Default for Memory {
     fn default() -> Self {
-        let zero = Angle { angle: 0.0, sine: 0.0, cosine: 1.0 };
+        let zero = Angle { argument: 0.0, sine: 0.0, cosine: 1.0 };
         Self { last: Cell::new(zero), before: Cell::new(zero), exponential: Cell::new([0.0, 1.0]) }
     }
 }
@@ -80,12 +80,12 @@ impl Functions<f64> for Memory {
     #[inline]
     fn sine_and_cosine(&self, angle: f64) -> (f64, f64) {
         for known in [self.last.get(), self.before.get()] {
-            if known.angle.to_bits() == angle.to_bits() {
+            if known.argument.to_bits() == angle.to_bits() {
                 return (known.sine, known.cosine);
             }
         }
         let (sine, cosine) = angle.sine_and_cosine();
-        self.before.set(self.last.replace(Angle { angle, sine, cosine }));
+        self.before.set(self.last.replace(Angle { argument: angle, sine, cosine }));
         (sine, cosine)
     }
 
