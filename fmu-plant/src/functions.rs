@@ -79,13 +79,16 @@ impl Functions<f64> for Memory {
 
     #[inline]
     fn sine_and_cosine(&self, angle: f64) -> (f64, f64) {
-        for known in [self.last.get(), self.before.get()] {
-            if known.argument.to_bits() == angle.to_bits() {
-                return (known.sine, known.cosine);
-            }
+        let (last, before) = (self.last.get(), self.before.get());
+        if last.argument.to_bits() == angle.to_bits() {
+            return (last.sine, last.cosine);
+        }
+        if before.argument.to_bits() == angle.to_bits() {
+            return (before.sine, before.cosine);
         }
         let (sine, cosine) = angle.sine_and_cosine();
-        self.before.set(self.last.replace(Angle { argument: angle, sine, cosine }));
+        self.before.set(last);
+        self.last.set(Angle { argument: angle, sine, cosine });
         (sine, cosine)
     }
 

@@ -125,7 +125,7 @@ impl Motion {
             require(name, value, true, "finite")?;
         }
         let mut motion = Self { state: initial, ..Self::default() };
-        let plant = Plant::new(parameters, Force::constant(force), Memory::default());
+        let plant = Plant::new(parameters, Force::constant(force), &motion.memory);
         motion.regime = plant.regime(0.0, &initial);
         Ok(motion)
     }
@@ -181,16 +181,16 @@ impl Motion {
             return Err(Failure::NotFinite { time: start });
         }
         let memory = std::mem::take(&mut self.memory);
-        let plant = Plant::new(parameters, force.seen_from(start), memory);
+        let plant = Plant::new(parameters, force.seen_from(start), &memory);
         let done = self.integrate(&plant, start, duration, tolerance);
-        self.memory = plant.memory;
+        self.memory = memory;
         done
     }
 
     /// Integrates the motion of `plant` for `duration` s. Failures state times from `start` on.
     fn integrate(
         &mut self,
-        plant: &Plant,
+        plant: &Plant<'_>,
         start: f64,
         duration: f64,
         tolerance: &Tolerance,
@@ -224,7 +224,7 @@ impl Motion {
     /// Takes one integration step, at most to the end of the interval and to the next event.
     fn take_step(
         &mut self,
-        plant: &Plant,
+        plant: &Plant<'_>,
         elapsed: f64,
         remaining: f64,
         tolerance: &Tolerance,

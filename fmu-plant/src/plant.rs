@@ -7,13 +7,13 @@ use crate::friction::{Regime, StribeckLaw};
 use crate::functions::{Direct, Functions, Memory};
 use crate::parameters::Parameters;
 
-pub(crate) struct Plant {
+pub(crate) struct Plant<'a> {
     body: RigidBody,
     law: StribeckLaw,
     /// As a polynomial of the time elapsed in the communication step.
     force: Force,
     /// Terms of the start and the end of the last steps.
-    pub(crate) memory: Memory,
+    memory: &'a Memory,
 }
 
 /// The first event inside an integration step, estimated by the continuous extension.
@@ -24,8 +24,8 @@ pub(crate) struct Crossing {
     pub(crate) direction: Regime,
 }
 
-impl Plant {
-    pub(crate) fn new(parameters: &Parameters, force: Force, memory: Memory) -> Self {
+impl<'a> Plant<'a> {
+    pub(crate) fn new(parameters: &Parameters, force: Force, memory: &'a Memory) -> Self {
         Self { body: RigidBody::new(parameters), law: StribeckLaw::new(parameters), force, memory }
     }
 
@@ -38,7 +38,7 @@ impl Plant {
     /// The derivative of the state at the start or the end of a step.
     #[inline]
     pub(crate) fn derivative_at_end(&self, regime: Regime, elapsed: f64, state: &State) -> State {
-        self.derivative_by(&self.memory, regime, elapsed, state)
+        self.derivative_by(self.memory, regime, elapsed, state)
     }
 
     #[inline]
@@ -132,12 +132,12 @@ impl Plant {
     /// The balancing force and its rise over a length in s at its present rate.
     fn balancing(&self, elapsed: f64, state: &State, length: f64) -> (f64, f64) {
         let (force, force_rate) = (self.force.at(elapsed), self.force.rate_at(elapsed));
-        let (balance, rate) = self.body.balancing(&self.memory, state, force, force_rate);
+        let (balance, rate) = self.body.balancing(self.memory, state, force, force_rate);
         (balance, length * rate)
     }
 
     fn balancing_force(&self, elapsed: f64, state: &State) -> f64 {
-        self.body.balancing_force(&self.memory, state, self.force.at(elapsed))
+        self.body.balancing_force(self.memory, state, self.force.at(elapsed))
     }
 }
 

@@ -36,7 +36,7 @@ const FREE: f64 = 1e-10;
 
 /// The plant at an instant as an importer sees it.
 struct Instant<'a> {
-    plant: Plant,
+    plant: Plant<'a>,
     motion: &'a Motion,
     /// The nominal value of the force in N.
     nominal: f64,
@@ -55,7 +55,7 @@ impl<'a> Instant<'a> {
         let nominal = if holds { limit } else { 1.0 };
         let excess = EXCESS * nominal + 2.0 * LANDING * parameters.cart_damping;
         Self {
-            plant: Plant::new(parameters, Force::constant(force), motion.memory.clone()),
+            plant: Plant::new(parameters, Force::constant(force), &motion.memory),
             motion,
             nominal,
             excess: if holds { excess } else { FREE },

@@ -8,7 +8,7 @@ use crate::plant::Plant;
 
 /// A segment of the motion in one regime, with the state and the slope at its start.
 pub(super) struct Segment<'a> {
-    pub(super) plant: &'a Plant,
+    pub(super) plant: &'a Plant<'a>,
     pub(super) regime: Regime,
     /// Time in s since the start of the communication step.
     pub(super) elapsed: f64,
@@ -17,7 +17,7 @@ pub(super) struct Segment<'a> {
 }
 
 impl<'a> Segment<'a> {
-    pub(super) fn new(plant: &'a Plant, motion: &Motion, elapsed: f64) -> Self {
+    pub(super) fn new(plant: &'a Plant<'a>, motion: &Motion, elapsed: f64) -> Self {
         let Motion { state: start, regime, .. } = *motion;
         let slope = plant.derivative_at_end(regime, elapsed, &start);
         Self { plant, regime, elapsed, start, slope }
