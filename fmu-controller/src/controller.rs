@@ -47,7 +47,7 @@ pub(crate) struct AsoController {
     frozen: bool,
     /// `None` for a continuous controller.
     sampler: Option<Sampler>,
-    /// Follows from `design`: created when an instance starts or is read from bytes.
+    /// Derived from `design` in the first step, also after a state was read from bytes.
     #[serde(skip)]
     observer: Option<Observer>,
 }
@@ -89,7 +89,8 @@ impl AsoController {
         let resolution = clock_rounding(step.end());
         let until_on = self.design.t_on - step.start;
         let inside = self.compensate && until_on > resolution && step.size - until_on > resolution;
-        self.deviations.set(&self.values, &self.operating_point, 0.0);
+        // z has its deviations from the step before, or from the start.
+        self.deviations.set_measurements(&self.values, &self.operating_point, 0.0);
         if inside {
             self.advance(false, (0.0, until_on))?;
             self.advance(true, (until_on, step.size - until_on))?;
@@ -126,7 +127,7 @@ impl AsoController {
     fn set_losses(&mut self) {
         for loss in &mut self.losses {
             let (u, f_hat) = (loss.actuator, self.design.states.len() + loss.fault);
-            let lost = loss.lost(
+            let lost = loss.effectiveness_lost(
                 Dual64::new(self.values.u[u], self.u_slopes[u]),
                 Dual64::new(self.values.z[f_hat], self.z_slopes[f_hat]),
             );
@@ -154,7 +155,7 @@ impl AsoController {
     }
 }
 
-/// Times closer than this (in s) are the same on an importer's clock.
+/// The rounding error in s to expect of an importer that adds up its steps to `time`.
 fn clock_rounding(time: f64) -> f64 {
     8.0 * f64::EPSILON * time.abs()
 }
@@ -203,7 +204,7 @@ impl Model for AsoController {
     }
 
     fn variables(&self) -> Vec<Variable<Self>> {
-        variables::of(self)
+        variables::list(self)
     }
 
     fn check(&self) -> Result<(), Failure> {
@@ -277,7 +278,7 @@ impl Model for AsoController {
         values.set_commands(&deviations.u, (design, self.mode), operating_point);
         for loss in &mut direction.losses {
             let (u, f_hat) = (loss.actuator, design.states.len() + loss.fault);
-            let lost = loss.lost(
+            let lost = loss.effectiveness_lost(
                 Dual64::new(self.values.u[u], values.u[u]),
                 Dual64::new(self.values.z[f_hat], values.z[f_hat]),
             );

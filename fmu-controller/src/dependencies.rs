@@ -1,12 +1,12 @@
-//! What commands, estimates and derivatives depend on: `ModelStructure` of the controller.
+//! The dependencies of commands, estimates and derivatives: `ModelStructure` of the controller.
 //!
-//! All matrices are parameters, so an element that is zero in the design counts like any other.
-//! Whether the fault is compensated, and whether it is estimated, changes at events (in
-//! co-simulation: in steps); so `compensate` and `time` are on none of the lists for a point in
-//! time. A channel that reaches a limit switches by its own value: no linear relationship.
+//! All matrices are parameters, so every element is a dependency, also one that is zero in the design.
+//! Compensation and estimation are switched at events (in co-simulation: in steps), so at a point in
+//! time nothing depends on `compensate` or `time`. A command with limits is not linear in what it
+//! depends on.
 //!
 //! A sampled controller changes its outputs at samples only (`fmi2DoStep`, `fmi2NewDiscreteStates`),
-//! so at a point in time they depend on nothing. Its initial values are those of sample 0.
+//! so at a point in time they depend on nothing. Its initial values are the values of sample 0.
 
 use fmu::description::DependencyKind::{self, Dependent, Discrete, Fixed};
 
@@ -15,7 +15,7 @@ use crate::loss::Loss;
 use crate::matrix::Matrix;
 use crate::names;
 
-/// Knowns that enter with the same kind of factor.
+/// Names of variables that an unknown depends on, with the kind of that dependency.
 pub(crate) type Group = (DependencyKind, Vec<String>);
 
 fn x_hat(design: &Design) -> Vec<String> {
@@ -30,7 +30,7 @@ fn measurements(design: &Design) -> Vec<String> {
     design.measurements.iter().map(|signal| signal.name.clone()).collect()
 }
 
-/// What the innovation follows: the filtered measurements, or the measurements.
+/// The signals that the innovation is computed from: filtered measurements, or measurements.
 fn observed(design: &Design) -> Vec<String> {
     match design.filter {
         Some(_) => names::filtered(design).collect(),
@@ -38,23 +38,23 @@ fn observed(design: &Design) -> Vec<String> {
     }
 }
 
-/// The kinds of K_x and of K_f while it compensates: factors of u, where no limit cuts it off.
+/// The kinds of dependency of a command on x_hat and on f_hat.
 fn kinds_of_feedback(limited: bool) -> [DependencyKind; 2] {
     if limited { [Dependent, Dependent] } else { [Fixed, Discrete] }
 }
 
-/// Of command `j`.
+/// The dependencies of command `j`.
 pub(crate) fn of_command(design: &Design, j: usize) -> Vec<Group> {
     let [state, fault] = kinds_of_feedback(design.actuators[j].limits.is_some());
     vec![(state, x_hat(design)), (fault, f_hat(design))]
 }
 
-/// Of each loss of effectiveness.
+/// The dependencies of each loss of effectiveness.
 pub(crate) fn of_loss(design: &Design) -> Vec<Group> {
     vec![(Dependent, x_hat(design)), (Dependent, f_hat(design))]
 }
 
-/// Of element `i` of z'.
+/// The dependencies of element `i` of z'.
 pub(crate) fn of_slope(design: &Design, i: usize) -> Vec<Group> {
     let (n, q) = (design.states.len(), design.faults.len());
     if i < n {
@@ -84,7 +84,7 @@ fn switches() -> Vec<String> {
     ["time", "compensate", "t_on"].map(str::to_owned).to_vec()
 }
 
-/// `x_op` and `y_op`, where there are any.
+/// The names `x_op`, where the design has an operating point.
 fn operating_states(design: &Design) -> impl Iterator<Item = String> {
     names::operating(design, "x_op", design.states.len())
 }
@@ -93,7 +93,7 @@ fn operating_command(design: &Design, j: usize) -> Option<String> {
     names::operating(design, "u_op", design.actuators.len()).nth(j)
 }
 
-/// Of the initial innovations.
+/// The dependencies of the initial innovations.
 fn of_innovations(design: &Design) -> Vec<String> {
     let mut names = measurements(design);
     names.extend(names::channels("x_hat_0", design.states.len()));
@@ -107,7 +107,7 @@ fn is_current(design: &Design) -> bool {
     design.estimator == Some(Estimator::Current)
 }
 
-/// Of the initial value of the deviation of command `j` from the operating point.
+/// The dependencies of the initial deviation of command `j` from the operating point.
 fn of_initial_deviation(design: &Design, j: usize) -> Vec<String> {
     let mut names = switches();
     names.extend(names::starts(design));
@@ -126,21 +126,21 @@ fn of_initial_deviation(design: &Design, j: usize) -> Vec<String> {
     names
 }
 
-/// Of the initial value of command `j`.
+/// The dependencies of the initial value of command `j`.
 pub(crate) fn of_initial_command(design: &Design, j: usize) -> Vec<String> {
     let mut names = of_initial_deviation(design, j);
     names.extend(operating_command(design, j));
     names
 }
 
-/// Of the initial value of a loss of effectiveness.
+/// The dependencies of the initial value of a loss of effectiveness.
 pub(crate) fn of_initial_loss(design: &Design, loss: &Loss) -> Vec<String> {
     let mut names = of_initial_command(design, loss.actuator);
     names.extend(of_initial_estimate(design, design.states.len() + loss.fault));
     names
 }
 
-/// Of the initial value of element `i` of z.
+/// The dependencies of the initial value of element `i` of z.
 pub(crate) fn of_initial_estimate(design: &Design, i: usize) -> Vec<String> {
     let (n, q) = (design.states.len(), design.faults.len());
     if i >= n + q {
@@ -160,7 +160,7 @@ pub(crate) fn of_initial_estimate(design: &Design, i: usize) -> Vec<String> {
     names
 }
 
-/// Of the initial value of element `i` of z'.
+/// The dependencies of the initial value of element `i` of z'.
 pub(crate) fn of_initial_slope(design: &Design, i: usize) -> Vec<String> {
     let (n, q) = (design.states.len(), design.faults.len());
     if i < n {

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::matrix::Matrix;
 
-/// A design as the file states it. Shapes: n states, m actuators, p measurements, q states of the
+/// The content of a design file. Shapes: n states, m actuators, p measurements, q states of the
 /// fault model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -21,13 +21,13 @@ pub(crate) struct Design {
     /// Whether the fault is estimated while it is not compensated.
     #[serde(default)]
     pub(crate) monitor: bool,
-    /// A sampled controller: its sample time in s. The matrices are then those of the sampled plant.
+    /// The sample time of a sampled controller in s; its matrices describe the sampled plant.
     #[serde(default)]
     pub(crate) sample_time: Option<f64>,
-    /// What a sampled controller computes its command from.
+    /// The estimator of a sampled controller.
     #[serde(default)]
     pub(crate) estimator: Option<Estimator>,
-    /// The diagonal of W, p numbers, in 1/s; of a sampled controller without unit.
+    /// The diagonal of W, p numbers, in 1/s; without unit in a sampled controller.
     #[serde(default)]
     pub(crate) filter: Option<Vec<f64>>,
     /// A, n x n.
@@ -61,7 +61,7 @@ pub(crate) struct Design {
     pub(crate) states: Vec<Signal>,
     /// The m actuators.
     pub(crate) actuators: Vec<Actuator>,
-    /// The p measurements; their names are those of the inputs.
+    /// The p measurements; the inputs have the same names.
     pub(crate) measurements: Vec<Signal>,
     /// The q states of the fault model.
     pub(crate) faults: Vec<Fault>,
@@ -69,13 +69,13 @@ pub(crate) struct Design {
     pub(crate) experiment: Defaults,
 }
 
-/// What the command of a sampled controller is computed from.
+/// The measurements that the command of a sampled controller is computed from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Estimator {
-    /// From all measurements, those of the sample itself included.
+    /// All measurements, those of the sample itself included.
     Current,
-    /// From the measurements before the sample.
+    /// The measurements before the sample.
     Prediction,
 }
 
@@ -93,7 +93,7 @@ pub(crate) struct Signal {
     pub(crate) operating: Option<f64>,
 }
 
-/// An actuator, with its limits where it has any.
+/// An actuator, with its limits if it has any.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Actuator {
@@ -122,7 +122,7 @@ pub(crate) struct Fault {
     /// The actuator whose loss of effectiveness this fault is.
     #[serde(default)]
     pub(crate) loss_of: Option<String>,
-    /// Commands of this size are large enough to tell the loss from.
+    /// The smallest command from which the loss can be estimated.
     #[serde(default)]
     pub(crate) least_command: Option<f64>,
 }
@@ -132,7 +132,7 @@ pub(crate) struct Fault {
 #[serde(deny_unknown_fields)]
 pub(crate) struct Defaults {
     pub(crate) stop_time: f64,
-    /// Of a sampled controller the sample time, where it is not stated.
+    /// `None` stands for the sample time of a sampled controller.
     #[serde(default)]
     pub(crate) step_size: Option<f64>,
 }
@@ -152,7 +152,7 @@ pub(crate) enum DesignError {
     Entry { path: String, what: String },
 }
 
-/// How a signal is called and measured.
+/// Unit and meaning of a signal.
 #[derive(Clone, Copy)]
 pub(crate) struct Label<'a> {
     pub(crate) unit: Option<&'a String>,
@@ -209,7 +209,7 @@ impl Design {
         Ok(design)
     }
 
-    /// Where one value of the operating point is stated, all others are 0.
+    /// Sets the missing values of an operating point to 0 where the file states one of them.
     fn complete_the_operating_point(&mut self) {
         let signals = self.states.iter_mut().chain(&mut self.measurements);
         let mut values: Vec<_> = signals.map(|signal| &mut signal.operating).collect();
@@ -221,12 +221,12 @@ impl Design {
         }
     }
 
-    /// Whether signals are deviations from an operating point.
+    /// Whether the file states an operating point.
     pub(crate) fn has_operating_point(&self) -> bool {
         self.actuators.iter().any(|actuator| actuator.operating.is_some())
     }
 
-    /// Where in z the filtered measurement `k` is.
+    /// The position of the filtered measurement `k` in z.
     pub(crate) fn filtered_at(&self, k: usize) -> usize {
         self.states.len() + self.faults.len() + k
     }

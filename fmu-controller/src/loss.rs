@@ -1,14 +1,14 @@
 //! Loss of effectiveness: the part of a command that its actuator does not carry out.
 //!
-//! An actuator that carries out (1 - E) u of its command u acts like one with the additive fault f =
-//! -E u. From the estimate of that fault
+//! An actuator that carries out (1 - E) u of its command u acts like an actuator with the additive
+//! fault f = -E u. The estimate of that fault gives
 //!
 //! ```text
 //! E_hat = -u f_hat / (u^2 + u_e^2)
 //! ```
 //!
-//! which is near -f_hat / u where the command is well above `least_command`, u_e, and near 0 where it
-//! is well below, for there the loss does not show.
+//! which is near -f_hat / u for commands well above u_e, `least_command`, and near 0 for commands well
+//! below it, where the loss cannot be observed.
 
 use serde::{Deserialize, Serialize};
 
@@ -30,7 +30,7 @@ pub(crate) struct Loss {
 }
 
 impl Loss {
-    /// Those of `design`, in the order of its faults.
+    /// The losses of `design`, in the order of its faults.
     pub(crate) fn all(design: &Design) -> Vec<Self> {
         let mut all = Vec::new();
         for (fault, own) in design.faults.iter().enumerate() {
@@ -50,7 +50,7 @@ impl Loss {
     }
 
     /// `E_hat = -u f_hat / (u^2 + u_e^2)` of a command and an estimated fault.
-    pub(crate) fn lost<D: Number>(&self, u: D, f_hat: D) -> D {
+    pub(crate) fn effectiveness_lost<D: Number>(&self, u: D, f_hat: D) -> D {
         let scale = (u * u + self.least_command * self.least_command).recip();
         -(u * scale) * f_hat
     }

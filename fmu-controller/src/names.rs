@@ -1,4 +1,4 @@
-//! The names of the variables that stand for a channel of a signal.
+//! The names of the variables of signals with several channels.
 
 use crate::design::Design;
 

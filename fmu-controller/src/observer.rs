@@ -14,7 +14,7 @@ use crate::equations::Equations;
 use crate::mode::Mode;
 use crate::signals::Signals;
 
-/// Halvings of a step until the instant at which a channel reaches its limit is accepted.
+/// The most halvings of a step to locate the instant at which a channel reaches its limit.
 const HALVINGS: u32 = 20;
 /// The most propagators in the cache.
 const CACHE_SIZE: usize = 96;
@@ -116,8 +116,8 @@ impl Observer {
     ) -> Result<(), control::Error> {
         let mode = conditions.mode_at(&self.before);
         if span.halvings > 0 {
-            let stays = self.stays(mode, conditions, span.half(0))?
-                && self.stays(mode, conditions, span)?;
+            let stays = self.keeps_mode(mode, conditions, span.half(0))?
+                && self.keeps_mode(mode, conditions, span)?;
             if !stays {
                 self.advance_part(conditions, span.half(0))?;
                 return self.advance_part(conditions, span.half(1));
@@ -130,7 +130,7 @@ impl Observer {
     }
 
     /// Propagates over `span` into `after`; true if the mode is the same at its end.
-    fn stays(
+    fn keeps_mode(
         &mut self,
         mode: Mode,
         conditions: Conditions<'_>,

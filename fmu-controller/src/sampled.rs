@@ -26,13 +26,13 @@ use crate::mode::Mode;
 use crate::number::Number;
 use crate::signals::{OperatingPoint, Signals, Values};
 
-/// A sample is due this part of the sample time before its instant: an importer adds up its steps,
-/// with rounding.
+/// The part of the sample time by which a sample may be early: an importer adds up its steps with
+/// rounding.
 const TOLERANCE: f64 = 1e-4;
 /// The most samples in one step.
 const MOST_SAMPLES: f64 = 1e7;
 
-/// Clock and memory of a sampled controller.
+/// Clock and state of a sampled controller.
 #[derive(Clone, Serialize, Deserialize)]
 pub(crate) struct Sampler {
     estimator: Estimator,

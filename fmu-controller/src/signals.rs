@@ -78,6 +78,16 @@ impl Signals {
         for ((own, value), point) in self.z.iter_mut().zip(&values.z).zip(&point.z) {
             *own = value - point;
         }
+        self.set_measurements(values, point, offset);
+    }
+
+    /// Sets y only, `offset` s after the measurements in `values` were given.
+    pub(crate) fn set_measurements(
+        &mut self,
+        values: &Values,
+        point: &OperatingPoint,
+        offset: f64,
+    ) {
         let measured = values.y.iter().zip(&values.y_slopes).zip(&point.y);
         for (own, ((value, slope), point)) in self.y.iter_mut().zip(measured) {
             *own = value - point + slope * offset;

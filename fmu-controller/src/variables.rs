@@ -1,4 +1,4 @@
-//! The variables of the controller: they follow from the dimensions and names of the design.
+//! The variables of the controller, which follow from the dimensions and names of the design.
 
 mod parameters;
 
@@ -12,7 +12,7 @@ use crate::names::channel;
 use crate::{dependencies, names};
 
 /// All variables of `controller`, in the order of the description.
-pub(crate) fn of(controller: &AsoController) -> Vec<Variable<AsoController>> {
+pub(crate) fn list(controller: &AsoController) -> Vec<Variable<AsoController>> {
     let design = &controller.design;
     let mut all = inputs(design);
     all.extend(commands(design));
@@ -32,26 +32,29 @@ fn with_unit(variable: Variable<AsoController>, unit: Option<&String>) -> Variab
     }
 }
 
-/// The unit per second, where it can be written: `m` gives `m/s`, `m/s` gives `m/s2`.
+/// The unit per second, if it can be written: `m` gives `m/s`, `m/s` gives `m/s2`.
 fn per_second(unit: Option<&String>) -> Option<String> {
     let unit = unit?;
     let slope = if unit.ends_with("/s") { format!("{unit}2") } else { format!("{unit}/s") };
     Unit::parse(&slope).is_ok().then_some(slope)
 }
 
-/// States what the variable depends on.
-fn depending(variable: Variable<AsoController>, groups: Vec<Group>) -> Variable<AsoController> {
+/// Adds dependencies to a variable.
+fn with_dependencies(
+    variable: Variable<AsoController>,
+    groups: Vec<Group>,
+) -> Variable<AsoController> {
     groups.into_iter().fold(variable, |variable, (kind, names)| variable.depends(kind, names))
 }
 
-/// An output with what it depends on; of a sampled controller it is discrete, and nothing.
+/// An output with its dependencies; an output of a sampled controller is discrete and has none.
 fn output(
     design: &Design,
     variable: Variable<AsoController>,
     groups: Vec<Group>,
 ) -> Variable<AsoController> {
     match design.sample_time {
-        None => depending(variable.output(&[]), groups),
+        None => with_dependencies(variable.output(&[]), groups),
         Some(_) => variable.output(&[]).discrete(),
     }
 }
@@ -101,7 +104,7 @@ fn commands(design: &Design) -> Vec<Variable<AsoController>> {
 struct State<'a> {
     position: usize,
     name: String,
-    /// What it is, and what its derivative is.
+    /// The descriptions of the state and of its derivative.
     texts: [String; 2],
     unit: Option<&'a String>,
 }
@@ -139,7 +142,7 @@ fn estimates(design: &Design) -> Vec<Variable<AsoController>> {
         .collect()
 }
 
-/// The loss of effectiveness, for each fault that is one.
+/// The estimates of lost effectiveness.
 fn losses(controller: &AsoController) -> Vec<Variable<AsoController>> {
     let design = &controller.design;
     let losses = controller.losses.iter().enumerate();
@@ -168,7 +171,7 @@ fn slopes(design: &Design) -> Vec<Variable<AsoController>> {
                     &mut model.z_slopes[k]
                 });
             let variable = with_unit(variable, per_second(unit).as_ref()).derivative_of(state);
-            depending(variable, dependencies::of_slope(design, k))
+            with_dependencies(variable, dependencies::of_slope(design, k))
                 .initially(dependencies::of_initial_slope(design, k))
         })
         .collect()

@@ -1,12 +1,12 @@
 //! The first point at which a margin becomes negative.
 
-/// Halvings of the unit interval down to which `Quartic::first_negative` looks.
+/// The most halvings of the unit interval in `Quartic::first_negative`.
 const DEPTH: u32 = 20;
 
 /// Width in s to which `locate` narrows a crossing.
 const WIDTH: f64 = 1e-15;
 
-/// Most evaluations in `locate`; bisection alone would need 50 for a step of 1 s.
+/// The most evaluations in `locate`; bisection alone would need 50 for a step of 1 s.
 const EVALUATIONS: u32 = 100;
 
 /// A polynomial of degree 4 on `[0, 1]` by its Bernstein coefficients.
@@ -17,7 +17,8 @@ const EVALUATIONS: u32 = 100;
 pub(crate) struct Quartic([f64; 5]);
 
 impl Quartic {
-    /// From value and rise (derivative times length) at both ends and the value half-way.
+    /// The polynomial with these values and rises (derivative times length) at both ends and this value
+    /// at the middle.
     pub(crate) fn new(start: (f64, f64), middle: f64, end: (f64, f64)) -> Self {
         let near_start = start.0 + start.1 / 4.0;
         let near_end = end.0 - end.1 / 4.0;
@@ -34,7 +35,7 @@ impl Quartic {
         self.0.iter().all(|coefficient| coefficient.is_finite())
     }
 
-    /// The polynomial is nowhere negative; false is no proof of the contrary.
+    /// Whether no coefficient is negative, which is sufficient for a polynomial without negative values.
     fn is_surely_not_negative(&self) -> bool {
         self.0.iter().all(|&coefficient| coefficient >= 0.0)
     }

@@ -6,7 +6,7 @@
 
 use crate::dynamics::State;
 
-/// A step from `start` to `end` of the given `length`, and what is known inside it.
+/// A step from `start` to `end` of the given `length`, with its slopes.
 pub(crate) struct Step {
     pub(crate) start: State,
     pub(crate) end: State,
@@ -17,8 +17,8 @@ pub(crate) struct Step {
 impl Step {
     /// Integrates `y' = derivative(t, y)` from `t = time`, where its value is `slope`.
     ///
-    /// `derivative_at_end` is the same function; it is called once, for the last slope, whose terms the
-    /// caller may need again. Cost: six evaluations of the derivative.
+    /// `derivative_at_end` is the same function; it computes the last slope, so that a caller can
+    /// remember its terms. Cost: six evaluations of the derivative.
     pub(crate) fn take(
         derivative: impl Fn(f64, &State) -> State,
         derivative_at_end: impl Fn(f64, &State) -> State,
@@ -85,7 +85,7 @@ impl Step {
         combine(&[0.0; 4], self.length, sum)
     }
 
-    /// The continuous extension half-way, of order 4.
+    /// The continuous extension at the middle of the step, of order 4.
     ///
     /// With the values and slopes at both ends it determines the whole extension, a polynomial
     /// of degree 4 in every component.

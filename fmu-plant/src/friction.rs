@@ -5,7 +5,7 @@ use crate::number::Number;
 use crate::parameters::Parameters;
 use serde::{Deserialize, Serialize};
 
-/// What the cart does on its rail.
+/// The motion of the cart on its rail: stick or slip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Regime {
     /// The cart slides in the negative direction.
@@ -27,7 +27,7 @@ impl Regime {
         }
     }
 
-    /// The same number for formulas.
+    /// The regime number as `f64`.
     #[must_use]
     pub fn sign(self) -> f64 {
         f64::from(self.number())
@@ -81,8 +81,7 @@ impl<D: Number> StribeckLaw<D> {
 
     /// The friction in N of a cart at rest: the balancing force, at most `F_s` to either side.
     ///
-    /// Where the balancing force is `F_s` or less, its derivative is that of the balancing force,
-    /// beyond that of `F_s`.
+    /// The derivative is the derivative of the balancing force up to `F_s`, and of `F_s` beyond.
     #[must_use]
     pub fn holding(&self, balancing: D) -> D {
         let limit = self.limit();
@@ -97,7 +96,7 @@ impl<D: Number> StribeckLaw<D> {
 
     /// The largest friction at rest in N: `F_s`, rounded exactly as `magnitude(0.0)` is.
     ///
-    /// The two being the same number, a cart that breaks away never starts backward by rounding.
+    /// As both are the same number, rounding never starts a cart that breaks away backward.
     #[must_use]
     pub fn limit(&self) -> D {
         self.coulomb + self.excess

@@ -53,14 +53,14 @@ pub struct Memory {
 
 #[derive(Clone, Copy, Debug)]
 struct Angle {
-    radians: f64,
+    argument: f64,
     sine: f64,
     cosine: f64,
 }
 
 impl Default for Memory {
     fn default() -> Self {
-        let zero = Angle { radians: 0.0, sine: 0.0, cosine: 1.0 };
+        let zero = Angle { argument: 0.0, sine: 0.0, cosine: 1.0 };
         Self { last: Cell::new(zero), before: Cell::new(zero), exponential: Cell::new([0.0, 1.0]) }
     }
 }
@@ -79,13 +79,16 @@ impl Functions<f64> for Memory {
 
     #[inline]
     fn sine_and_cosine(&self, angle: f64) -> (f64, f64) {
-        for known in [self.last.get(), self.before.get()] {
-            if known.radians.to_bits() == angle.to_bits() {
-                return (known.sine, known.cosine);
-            }
+        let (last, before) = (self.last.get(), self.before.get());
+        if last.argument.to_bits() == angle.to_bits() {
+            return (last.sine, last.cosine);
+        }
+        if before.argument.to_bits() == angle.to_bits() {
+            return (before.sine, before.cosine);
         }
         let (sine, cosine) = angle.sine_and_cosine();
-        self.before.set(self.last.replace(Angle { radians: angle, sine, cosine }));
+        self.before.set(last);
+        self.last.set(Angle { argument: angle, sine, cosine });
         (sine, cosine)
     }
 

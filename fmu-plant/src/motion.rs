@@ -1,7 +1,7 @@
 //! The motion of the friction pendulum: integration between events, and the events.
 //!
 //! While sliding the friction is a smooth function of the state; while sticking the cart is held
-//! and the pendulum moves alone. Each piece is integrated by Dormand-Prince steps of adaptive
+//! and the pendulum moves alone. Each segment between two events is integrated by Dormand-Prince steps of adaptive
 //! length. In every step the polynomial of the margin to the next event is searched for its first
 //! sign change, and the step is repeated with the length that ends at the event.
 
@@ -12,14 +12,14 @@ use crate::functions::Memory;
 use crate::parameters::{Parameters, Refusal, require};
 use crate::plant::{Crossing, NotFinite, Plant};
 use crate::response::Response;
-use piece::Piece;
+use segment::Segment;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 pub use tolerance::Tolerance;
 
 pub(crate) mod exchange;
-mod piece;
+mod segment;
 mod tolerance;
 
 /// Suggested length in s of the first integration step.
@@ -37,9 +37,9 @@ const STEP_LIMIT: u32 = 200_000;
 /// Most events in one call of `advance`.
 const EVENT_LIMIT: u32 = 10_000;
 
-/// Why the motion could not be followed to the end of the interval.
+/// The reason why the motion could not be integrated to the end of the interval.
 ///
-/// The motion is then at the time stated, the last one reached.
+/// The state is the state at the time that the variant names.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum Failure {
     /// Start or duration is not finite, or the duration is negative.
@@ -50,7 +50,7 @@ pub enum Failure {
         /// Duration of the interval in s.
         duration: f64,
     },
-    /// The force or the state has grown beyond all numbers or is not a number.
+    /// The force, the state or its derivative is infinite or not a number.
     #[error("force, state or its derivative is not finite after t = {time} s")]
     NotFinite {
         /// Time reached in s.
@@ -77,7 +77,7 @@ pub enum Failure {
 }
 
 impl Failure {
-    /// The time in s to which the motion was followed.
+    /// The time in s to which the motion was integrated.
     #[must_use]
     pub fn time(&self) -> f64 {
         match self {
@@ -90,7 +90,7 @@ impl Failure {
     }
 }
 
-/// The whole memory of the plant: a copy continues with the same bits.
+/// The state of the plant between steps; a copy continues with the same bits.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Motion {
     state: State,
@@ -125,7 +125,7 @@ impl Motion {
             require(name, value, true, "finite")?;
         }
         let mut motion = Self { state: initial, ..Self::default() };
-        let plant = Plant::new(parameters, Force::constant(force), Memory::default());
+        let plant = Plant::new(parameters, Force::constant(force), &motion.memory);
         motion.regime = plant.regime(0.0, &initial);
         Ok(motion)
     }
@@ -136,12 +136,12 @@ impl Motion {
         &self.state
     }
 
-    /// The same place, for an importer that integrates the state itself.
+    /// The state, for an importer that integrates it.
     pub fn state_mut(&mut self) -> &mut State {
         &mut self.state
     }
 
-    /// What the cart does.
+    /// The regime of the cart.
     #[must_use]
     pub fn regime(&self) -> Regime {
         self.regime
@@ -153,16 +153,16 @@ impl Motion {
         Response::new(&self.memory, parameters, self.regime, &self.state, force)
     }
 
-    /// Follows the motion from the time `start` for `duration`, both in s, under the force given
-    /// as a polynomial of time.
+    /// Integrates the motion from the time `start` for `duration`, both in s, under a force that is a
+    /// polynomial of time.
     ///
-    /// Force and parameters may have changed since the last call: a held cart is tested against
-    /// the new ones first. The parameters must have passed their check.
+    /// Force and parameters may have changed since the last call: the regime is decided anew first.
+    /// The parameters must have passed their check.
     ///
     /// Method: Dormand-Prince 5(4), the error of each step held below a tenth of the tolerance (2-norm
     /// of the components, each relative to its own size); events are located to 1e-15 s. Cost: an
-    /// interval shorter than the suggested step takes one step, seven evaluations of the dynamics;
-    /// nothing is allocated.
+    /// interval shorter than the suggested step takes one step: seven evaluations of the dynamics, of
+    /// which the first finds sine, cosine and exponential remembered; nothing is allocated.
     ///
     /// # Errors
     /// The reason and the time reached; the state is the one at that time.
@@ -181,16 +181,16 @@ impl Motion {
             return Err(Failure::NotFinite { time: start });
         }
         let memory = std::mem::take(&mut self.memory);
-        let plant = Plant::new(parameters, force.seen_from(start), memory);
-        let done = self.follow(&plant, start, duration, tolerance);
-        self.memory = plant.memory;
+        let plant = Plant::new(parameters, force.seen_from(start), &memory);
+        let done = self.integrate(&plant, start, duration, tolerance);
+        self.memory = memory;
         done
     }
 
-    /// Follows the motion of `plant` for `duration` s; `start` is for the reasons of failures.
-    fn follow(
+    /// Integrates the motion of `plant` for `duration` s. Failures state times from `start` on.
+    fn integrate(
         &mut self,
-        plant: &Plant,
+        plant: &Plant<'_>,
         start: f64,
         duration: f64,
         tolerance: &Tolerance,
@@ -203,7 +203,7 @@ impl Motion {
                 return Ok(());
             }
             let time = start + elapsed;
-            match self.proceed(plant, elapsed, duration - elapsed, tolerance) {
+            match self.take_step(plant, elapsed, duration - elapsed, tolerance) {
                 Progress::Finished => elapsed = duration,
                 Progress::Advanced(length) => elapsed += length,
                 Progress::Event(length) => {
@@ -221,19 +221,19 @@ impl Motion {
         Err(Failure::TooManySteps { time: start + elapsed })
     }
 
-    /// One integration step, at most to the end of the interval and at most to the next event.
-    fn proceed(
+    /// Takes one integration step, at most to the end of the interval and to the next event.
+    fn take_step(
         &mut self,
-        plant: &Plant,
+        plant: &Plant<'_>,
         elapsed: f64,
         remaining: f64,
         tolerance: &Tolerance,
     ) -> Progress {
-        let piece = Piece::new(plant, self, elapsed);
-        let limit = self.suggested_step.min(piece.resolving_length());
+        let segment = Segment::new(plant, self, elapsed);
+        let limit = self.suggested_step.min(segment.resolving_length());
         let lasts = remaining <= 1.01 * limit;
         let length = if lasts { remaining } else { limit };
-        let step = piece.step(length);
+        let step = segment.step(length);
         let error = tolerance.squared_error(&step);
         if error.is_nan() || error > 1.0 {
             return self.reject(length, error);
@@ -241,9 +241,9 @@ impl Motion {
         if length >= self.suggested_step {
             self.suggested_step = (length * growth(error)).min(LONGEST_STEP);
         }
-        match plant.first_crossing(piece.regime, elapsed, &step) {
+        match plant.first_crossing(segment.regime, elapsed, &step) {
             Err(NotFinite) => Progress::NotFinite,
-            Ok(Some(crossing)) => self.proceed_to(&crossing, &piece, length, tolerance),
+            Ok(Some(crossing)) => self.step_to_event(&crossing, &segment, length, tolerance),
             Ok(None) => {
                 self.state = step.end;
                 if lasts { Progress::Finished } else { Progress::Advanced(length) }
@@ -264,17 +264,17 @@ impl Motion {
     ///
     /// A margin that the repeated step does not find negative at the crossing only touched zero in
     /// the continuous extension, or by rounding. It is looked for at doubled lengths, up to the
-    /// whole step, so that each step gets on. The repeated step sees the friction at its end, which
+    /// whole step, so that every step makes progress. The repeated step sees the friction at its end, which
     /// the longer one may have stepped over, so its error is tested.
-    fn proceed_to(
+    fn step_to_event(
         &mut self,
         crossing: &Crossing,
-        piece: &Piece,
+        segment: &Segment,
         length: f64,
         tolerance: &Tolerance,
     ) -> Progress {
         let direction = crossing.direction;
-        let margin = |length: f64| piece.margin(direction, &piece.step(length));
+        let margin = |length: f64| segment.margin(direction, &segment.step(length));
         let mut ceiling = crossing.fraction * length;
         let mut at_ceiling = margin(ceiling);
         while at_ceiling >= 0.0 && ceiling < length {
@@ -287,7 +287,7 @@ impl Motion {
         } else {
             ceiling
         };
-        let step = piece.step(length);
+        let step = segment.step(length);
         let error = tolerance.squared_error(&step);
         if error.is_nan() || error > 1.0 {
             return self.reject(length, error);
@@ -296,17 +296,17 @@ impl Motion {
         if !happens {
             return Progress::Advanced(length);
         }
-        if piece.regime == Regime::Stick {
+        if segment.regime == Regime::Stick {
             self.regime = direction;
         } else {
             self.state[2] = 0.0;
-            self.regime = piece.plant.regime(piece.elapsed + length, &self.state);
+            self.regime = segment.plant.regime(segment.elapsed + length, &self.state);
         }
         Progress::Event(length)
     }
 }
 
-/// What one integration step achieved; lengths are in s.
+/// The result of one integration step; lengths are in s.
 enum Progress {
     /// The end of the interval is reached.
     Finished,

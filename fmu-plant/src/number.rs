@@ -1,7 +1,7 @@
 //! The numbers that the equations of the plant are written in.
 //!
-//! Sine, exponential and power are those of the crate `libm`, which have the same bits on every
-//! platform; those of the standard library are the platform's.
+//! Sine, exponential and power are functions of the crate `libm`, which have the same bits on every
+//! platform; the functions of the standard library differ between platforms.
 
 use num_dual::{Dual64, DualNum};
 
@@ -27,7 +27,7 @@ pub trait Number: DualNum<Primitive = f64> + Copy {
     /// `self^exponent` of a number `self >= 0` and an exponent above zero.
     ///
     /// The derivative at zero is the one from the right: infinite for exponents below one, unless
-    /// the direction leaves the number as it is.
+    /// the number does not change in the direction.
     #[must_use]
     fn power(self, exponent: Self) -> Self;
 }

@@ -55,7 +55,7 @@ impl Default for Parameters {
     }
 }
 
-/// A value that the plant cannot work with: which, what it is, and the rule it breaks.
+/// A parameter whose value breaks a rule.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("{name} = {value}: must be {rule}")]
 pub struct Refusal {
@@ -63,7 +63,7 @@ pub struct Refusal {
     pub name: &'static str,
     /// The refused value.
     pub value: f64,
-    /// What holds for every accepted value.
+    /// The rule for accepted values.
     pub rule: &'static str,
 }
 
@@ -95,7 +95,7 @@ impl Parameters {
         require("delta", p.stribeck_exponent, p.stribeck_exponent > 0.0, positive)
     }
 
-    /// No change of any parameter, as a direction.
+    /// All parameters zero: the direction in which none changes.
     pub(crate) const ZERO: Self = Self {
         cart_mass: 0.0,
         pendulum_mass: 0.0,
@@ -111,7 +111,7 @@ impl Parameters {
         linearised: false,
     };
 
-    /// The same parameters, each with its component of a direction.
+    /// The parameters as dual numbers with the components of a direction.
     pub(crate) fn along(&self, direction: &Self) -> Parameters<Dual64> {
         let dual = |part: fn(&Self) -> f64| Dual64::new(part(self), part(direction));
         Parameters {

@@ -24,17 +24,17 @@ pub(crate) struct FrictionPendulum {
     initial: [f64; 4],
     u: f64,
     f_a: f64,
-    /// First and second derivatives of `u` and `f_a` at the begin of the step.
+    /// First and second derivatives of `u` and `f_a` at the start of the step.
     u_derivatives: [f64; 2],
     f_a_derivatives: [f64; 2],
-    /// Holds the states and the regime.
+    /// The states and the regime.
     motion: Motion,
     tolerance: Tolerance,
-    /// The force `u + f_a` in N that friction and slope belong to, and its derivative in N/s.
+    /// The force `u + f_a` in N at the time of the outputs, and its derivative in N/s.
     force: f64,
     force_rate: f64,
     f_fric: f64,
-    /// The derivative of `f_fric` in N/s; only `friction_rate` knows when it is up to date.
+    /// The derivative of `f_fric` in N/s; `friction_rate` computes it on demand.
     f_fric_rate: f64,
     /// The derivative of the states.
     slope: [f64; 4],
@@ -53,8 +53,8 @@ fn refused(refusal: &Refusal) -> Failure {
 }
 
 impl FrictionPendulum {
-    /// Outputs and derivatives from the motion at `time`, under a force of that time.
-    fn show(&mut self, force: &Force, time: f64) {
+    /// Computes outputs and derivatives at `time` under `force`.
+    fn update_outputs(&mut self, force: &Force, time: f64) {
         (self.force, self.force_rate) = (force.at(time), force.rate_at(time));
         let response = self.motion.response(&self.parameters, self.force);
         (self.f_fric, self.slope) = (response.friction, response.slope);
@@ -134,7 +134,7 @@ impl Model for FrictionPendulum {
         let force = force(self, experiment.start_time);
         let motion = Motion::start(&self.parameters, self.initial, force.value);
         self.motion = motion.map_err(|refusal| refused(&refusal))?;
-        self.show(&force, force.start);
+        self.update_outputs(&force, force.start);
         Ok(())
     }
 
@@ -143,12 +143,12 @@ impl Model for FrictionPendulum {
         let Self { motion, parameters, tolerance, .. } = self;
         let done = motion.advance(parameters, &force, step.start, step.size, tolerance);
         let reached = done.as_ref().map_or_else(crate::motion::Failure::time, |()| step.end());
-        self.show(&force, reached);
+        self.update_outputs(&force, reached);
         done.map_err(|failure| Failure::Incomplete { time: reached, message: failure.to_string() })
     }
 
     fn update(&mut self, time: f64) -> Result<(), Failure> {
-        self.show(&force(self, time), time);
+        self.update_outputs(&force(self, time), time);
         Ok(())
     }
 
@@ -189,7 +189,7 @@ impl Model for FrictionPendulum {
     fn event(&mut self, time: f64) -> Result<Event, Failure> {
         let force = force(self, time);
         let values_of_continuous_states_changed = self.motion.settle(&self.parameters, force.value);
-        self.show(&force, time);
+        self.update_outputs(&force, time);
         Ok(Event { values_of_continuous_states_changed, ..Event::default() })
     }
 }

@@ -1,4 +1,4 @@
-//! Body, friction law and force together, as they stand during one communication step.
+//! Body, friction law and force during one communication step.
 
 use crate::crossing::Quartic;
 use crate::dormand_prince::Step;
@@ -7,26 +7,25 @@ use crate::friction::{Regime, StribeckLaw};
 use crate::functions::{Direct, Functions, Memory};
 use crate::parameters::Parameters;
 
-pub(crate) struct Plant {
+pub(crate) struct Plant<'a> {
     body: RigidBody,
     law: StribeckLaw,
     /// As a polynomial of the time elapsed in the communication step.
     force: Force,
-    /// Of the start and the end of the last steps.
-    pub(crate) memory: Memory,
+    /// Terms of the start and the end of the last steps.
+    memory: &'a Memory,
 }
 
-/// A part of an integration step at whose end an event has happened, as far as the continuous
-/// extension tells.
+/// The first event inside an integration step, estimated by the continuous extension.
 pub(crate) struct Crossing {
-    /// Part of the step length.
+    /// The part of the step after which the event has happened.
     pub(crate) fraction: f64,
     /// The direction of sliding before a stop or after a break-away.
     pub(crate) direction: Regime,
 }
 
-impl Plant {
-    pub(crate) fn new(parameters: &Parameters, force: Force, memory: Memory) -> Self {
+impl<'a> Plant<'a> {
+    pub(crate) fn new(parameters: &Parameters, force: Force, memory: &'a Memory) -> Self {
         Self { body: RigidBody::new(parameters), law: StribeckLaw::new(parameters), force, memory }
     }
 
@@ -39,7 +38,7 @@ impl Plant {
     /// The derivative of the state at the start or the end of a step.
     #[inline]
     pub(crate) fn derivative_at_end(&self, regime: Regime, elapsed: f64, state: &State) -> State {
-        self.derivative_by(&self.memory, regime, elapsed, state)
+        self.derivative_by(self.memory, regime, elapsed, state)
     }
 
     #[inline]
@@ -57,14 +56,14 @@ impl Plant {
         self.body.slide(functions, state, self.force.at(elapsed) - friction)
     }
 
-    /// The change of velocity in m/s within which the friction is surely seen to change.
+    /// The change of velocity in m/s that a step may make without missing a change of friction.
     ///
-    /// The fall from static to Coulomb friction is `v_s` wide and lies at velocity zero.
+    /// The fall from static to Coulomb friction is `v_s` wide and begins at velocity zero.
     pub(crate) fn resolved_change(&self, velocity: f64) -> f64 {
         velocity.abs() + self.law.width()
     }
 
-    /// What the cart does at this velocity and, at rest, under this balancing force.
+    /// The regime of a cart in this state, decided at rest by the balancing force.
     pub(crate) fn regime(&self, elapsed: f64, state: &State) -> Regime {
         let velocity = state[2];
         if velocity > 0.0 {
@@ -76,8 +75,8 @@ impl Plant {
         }
     }
 
-    /// What is left before the event: the velocity in m/s before a stop of a cart that slides in
-    /// this direction, the friction in N before a held cart breaks away in this direction.
+    /// The margin to the event: for a cart that slides in this direction its velocity in m/s, for a held
+    /// cart the friction in N that is left before it breaks away in this direction.
     pub(crate) fn margin(
         &self,
         regime: Regime,
@@ -100,13 +99,13 @@ impl Plant {
         step: &Step,
     ) -> Result<Option<Crossing>, NotFinite> {
         if regime == Regime::Stick {
-            self.first_break(elapsed, step)
+            self.first_break_away(elapsed, step)
         } else {
             first_stop(regime, step)
         }
     }
 
-    fn first_break(&self, elapsed: f64, step: &Step) -> Result<Option<Crossing>, NotFinite> {
+    fn first_break_away(&self, elapsed: f64, step: &Step) -> Result<Option<Crossing>, NotFinite> {
         let end = elapsed + step.length;
         let force = self.force.at(elapsed + 0.5 * step.length);
         let middle = self.body.balancing_force(&Direct, &step.middle(), force);
@@ -133,12 +132,12 @@ impl Plant {
     /// The balancing force and its rise over a length in s at its present rate.
     fn balancing(&self, elapsed: f64, state: &State, length: f64) -> (f64, f64) {
         let (force, force_rate) = (self.force.at(elapsed), self.force.rate_at(elapsed));
-        let (balance, rate) = self.body.balancing(&self.memory, state, force, force_rate);
+        let (balance, rate) = self.body.balancing(self.memory, state, force, force_rate);
         (balance, length * rate)
     }
 
     fn balancing_force(&self, elapsed: f64, state: &State) -> f64 {
-        self.body.balancing_force(&self.memory, state, self.force.at(elapsed))
+        self.body.balancing_force(self.memory, state, self.force.at(elapsed))
     }
 }
 

@@ -1,4 +1,4 @@
-//! What follows at once from state, force and regime: the friction and the derivative of the state.
+//! The friction and the derivative of the state as functions of state, force and regime.
 
 use crate::dynamics::{RigidBody, State};
 use crate::friction::{Regime, StribeckLaw};
@@ -19,8 +19,7 @@ impl<D: Number> Response<D> {
     /// The response of checked parameters in a regime, under the force `u + f_a` in N: friction
     /// `g(v) sign(v)` of a sliding cart, the balancing force of a held one.
     ///
-    /// A force that has just jumped can exceed what holds the cart; the friction is then the
-    /// largest possible one, `F_s`.
+    /// A force that has just jumped can exceed the largest friction; the friction is then `F_s`.
     #[must_use]
     pub fn new(
         functions: &impl Functions<D>,

@@ -1,18 +1,18 @@
-//! What a design file must keep to: counts, shapes, ranges, entries that belong together.
+//! The checks of a design file: counts, shapes, ranges, entries that belong together.
 
 use super::{Defaults, Design, DesignError, Fault};
 use crate::names;
 
-/// Limits of `least_command`: its square and the inverse of that are numbers.
+/// Range of `least_command`: its square and the inverse of the square are finite.
 const COMMANDS: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
 /// The most samples in a step of the default experiment.
 const MOST_SAMPLES: f64 = 1e6;
 
-/// A value, what it is and the rule that it breaks.
+/// Name and value of an entry, and the rule that it breaks.
 pub(crate) type Refusal = (String, f64, &'static str);
 
 impl Design {
-    /// Refuses a design that does not fit together.
+    /// Checks shapes, names, ranges and combinations of entries.
     pub(super) fn check(&self, path: &str) -> Result<(), DesignError> {
         if let Some(what) = self.contradiction() {
             return Err(DesignError::Entry { path: path.to_owned(), what });
@@ -56,7 +56,7 @@ impl Design {
         }
     }
 
-    /// What is missing, too much, or without its counterpart.
+    /// Describes the first entry that is missing, not allowed, or without its counterpart.
     fn contradiction(&self) -> Option<String> {
         let lists = [
             (self.states.len(), "state"),
@@ -114,7 +114,7 @@ impl Design {
         self.refused_filter()
     }
 
-    /// The element of `filter` that breaks its rule.
+    /// The first element of `filter` that breaks its rule.
     pub(crate) fn refused_filter(&self) -> Option<Refusal> {
         let (most, rule) = match self.sample_time {
             None => (f64::MAX, "more than 0 1/s"),

@@ -9,11 +9,11 @@ use crate::matrix::Matrix;
 use crate::names;
 use crate::names::channel;
 
-/// Reaches one matrix of the design.
-type Place = fn(&mut Design) -> &mut Matrix;
+/// Returns one matrix of a design.
+type Accessor = fn(&mut Design) -> &mut Matrix;
 
-/// Meaning and place of the matrices, in the order of [`Design::matrices`].
-const MATRICES: [(&str, Place); 9] = [
+/// Meaning and accessor of the matrices, in the order of [`Design::matrices`].
+const MATRICES: [(&str, Accessor); 9] = [
     ("system matrix A of (1)", |design| &mut design.a),
     ("input matrix B of (1)", |design| &mut design.b),
     ("measurement matrix C of (1)", |design| &mut design.c),
@@ -42,7 +42,7 @@ pub(super) fn of(design: &Design) -> Vec<Variable<AsoController>> {
     all
 }
 
-/// Activation and, of a sampled controller, its sample time.
+/// The parameters of the activation and the sample time of a sampled controller.
 fn switches(design: &Design) -> Vec<Variable<AsoController>> {
     let text = "Compensation starts at this time";
     let mut all = vec![

@@ -1,10 +1,10 @@
 //! The motion as an importer integrates it: event indicators, and what an event changes.
 //!
 //! An importer finds an event to within its own accuracy: at the event the velocity is small, but of
-//! either sign and rarely zero. And where the velocity of the cart dies out exponentially, as it does
-//! in a closed loop whose feedback balances the friction, it changes its sign by rounding only, if
-//! at all. So what the cart does follows from the stored regime, from a velocity that counts as
-//! rest, and from the sign of the acceleration, never from the sign of the velocity alone.
+//! either sign and rarely zero. Where the velocity of the cart decays exponentially, as in a closed
+//! loop whose feedback balances the friction, only rounding changes its sign, if anything does. So the
+//! regime is decided by the stored regime, a threshold on the velocity and the sign of the
+//! acceleration, never by the sign of the velocity alone.
 
 use super::Motion;
 use crate::dynamics::Force;
@@ -15,10 +15,10 @@ use crate::plant::Plant;
 /// Number of event indicators.
 pub(crate) const INDICATORS: usize = 3;
 
-/// The velocity in m/s that is of the order of one: its nominal value.
+/// The nominal value of the velocity in m/s.
 pub(crate) const NOMINAL_VELOCITY: f64 = 0.1;
 
-/// The acceleration in m/s² that is of the order of one.
+/// The nominal value of the acceleration in m/s².
 const NOMINAL_ACCELERATION: f64 = 1.0;
 
 /// A cart that slides at most this fast, in m/s, and becomes slower has stopped.
@@ -36,15 +36,15 @@ const FREE: f64 = 1e-10;
 
 /// The plant at an instant as an importer sees it.
 struct Instant<'a> {
-    plant: Plant,
+    plant: Plant<'a>,
     motion: &'a Motion,
-    /// The force in N that is of the order of one.
+    /// The nominal value of the force in N.
     nominal: f64,
     /// How far in N the force on a held cart exceeds the static friction at its break-away.
     ///
-    /// More than the damping of a cart that counts as stopped: what stopped is held.
+    /// It exceeds the damping of a cart at the threshold of rest, so that a stopped cart is held.
     excess: f64,
-    /// There is static friction: a cart can be held.
+    /// Whether there is static friction, so that a cart can be held.
     holds: bool,
 }
 
@@ -55,7 +55,7 @@ impl<'a> Instant<'a> {
         let nominal = if holds { limit } else { 1.0 };
         let excess = EXCESS * nominal + 2.0 * LANDING * parameters.cart_damping;
         Self {
-            plant: Plant::new(parameters, Force::constant(force), motion.memory.clone()),
+            plant: Plant::new(parameters, Force::constant(force), &motion.memory),
             motion,
             nominal,
             excess: if holds { excess } else { FREE },
@@ -75,18 +75,18 @@ impl<'a> Instant<'a> {
         self.plant.margin(Regime::Stick, direction, 0.0, &self.motion.state)
     }
 
-    /// What a cart at rest does: it moves where the force exceeds the static friction by half of
-    /// what is needed in continuous-time mode, so that a break-away located a little too early
-    /// happens, too.
+    /// The regime of a cart at rest. It moves where the force exceeds the static friction by half of
+    /// the excess of continuous-time mode, so that a break-away located a little too early happens,
+    /// too.
     fn regime_at_rest(&self) -> Regime {
         let leaves = |direction: &Regime| self.held(*direction) < -0.5 * self.excess;
         [Regime::Forward, Regime::Backward].into_iter().find(leaves).unwrap_or(Regime::Stick)
     }
 
-    /// Whether a sliding cart has stopped, as event mode sees it: a slow one would not leave its rest
-    /// in this direction.
+    /// Whether a sliding cart has stopped, decided in event mode: it is slow, and from rest it would not
+    /// start in this direction.
     ///
-    /// The acceleration of the indicator is not asked: at an event it may have either sign.
+    /// The acceleration does not decide: at an event it may have either sign.
     fn has_stopped(&self) -> bool {
         let [velocity, _] = self.sliding();
         let rests = || self.regime_at_rest() != self.motion.regime;
@@ -95,7 +95,7 @@ impl<'a> Instant<'a> {
 }
 
 impl Motion {
-    /// How far the next event is away in the present regime; what is not in use is one.
+    /// The event indicators in the present regime; indicators not in use are one.
     ///
     /// First the stop of a sliding cart: with the velocity `v` and the acceleration `a` in its
     /// direction, each relative to its nominal value, `max(v - r, min(a, v + r))` with `r` = 1e-8.
@@ -124,7 +124,7 @@ impl Motion {
     /// Decides the regime at an event; true if that changed the state.
     ///
     /// A sliding cart that has stopped gets the velocity zero; there, the balancing force decides whether
-    /// it is held, goes on or goes back. A held cart that has a velocity was given one.
+    /// it is held, continues or reverses. A held cart with a velocity got it from the importer.
     pub fn settle(&mut self, parameters: &Parameters, force: f64) -> bool {
         let now = Instant::new(self, parameters, force);
         let velocity = self.state[2];

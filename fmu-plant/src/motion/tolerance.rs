@@ -1,10 +1,10 @@
-//! How large the error of one integration step may be.
+//! The tolerance of one integration step.
 
 use crate::dormand_prince::Step;
 use crate::parameters::{Refusal, require};
 use serde::{Deserialize, Serialize};
 
-/// The error of a step is compared with this part of the tolerance.
+/// The part of the tolerance that the error of one step may reach.
 ///
 /// The upright pendulum multiplies an early error by some 7e4 in 2 s.
 const SAFETY: f64 = 0.1;

@@ -114,7 +114,7 @@ fn a_loss_is_the_fault_by_the_command_where_that_is_large_enough() {
         (1e-3, -1e-3, 1e-6 / (1e-6 + 0.49)),
         (1e200, 1.0, 0.0),
     ] {
-        let found = loss.lost(u, f_hat);
+        let found = loss.effectiveness_lost(u, f_hat);
         assert!((found - wanted).abs() < 1e-12, "{u} {f_hat}: {found}");
     }
 }

@@ -1,4 +1,4 @@
-//! Sampled controllers against the recursion of their doc comment, whatever the communication step.
+//! Sampled controllers against the recursion of their doc comment, for communication steps of any size.
 
 use nalgebra::DVector;
 
@@ -29,7 +29,7 @@ fn samples(
 }
 
 #[test]
-fn whatever_the_communication_step_it_acts_at_its_samples_and_holds_in_between() {
+fn for_every_communication_step_it_acts_at_its_samples_and_holds_in_between() {
     for of in SAMPLED {
         for size in [0.1 * T, T / 3.0, 0.7 * T, T, 2.0 * T, 2.7 * T, 13.0 * T] {
             let (mut model, oracle) = tamed(of);

@@ -1,4 +1,4 @@
-//! One piece of the motion, between two events.
+//! The motion between two events.
 
 use super::Motion;
 use crate::dormand_prince::Step;
@@ -6,18 +6,18 @@ use crate::dynamics::State;
 use crate::friction::Regime;
 use crate::plant::Plant;
 
-/// A piece of the motion in one regime: where it starts, and the steps from there.
-pub(super) struct Piece<'a> {
-    pub(super) plant: &'a Plant,
+/// A segment of the motion in one regime, with the state and the slope at its start.
+pub(super) struct Segment<'a> {
+    pub(super) plant: &'a Plant<'a>,
     pub(super) regime: Regime,
-    /// Time in s since the begin of the communication step.
+    /// Time in s since the start of the communication step.
     pub(super) elapsed: f64,
     start: State,
     slope: State,
 }
 
-impl<'a> Piece<'a> {
-    pub(super) fn new(plant: &'a Plant, motion: &Motion, elapsed: f64) -> Self {
+impl<'a> Segment<'a> {
+    pub(super) fn new(plant: &'a Plant<'a>, motion: &Motion, elapsed: f64) -> Self {
         let Motion { state: start, regime, .. } = *motion;
         let slope = plant.derivative_at_end(regime, elapsed, &start);
         Self { plant, regime, elapsed, start, slope }
@@ -34,7 +34,7 @@ impl<'a> Piece<'a> {
         self.plant.margin(self.regime, direction, self.elapsed + step.length, &step.end)
     }
 
-    /// The longest step that cannot leap over the fall of the friction near zero velocity.
+    /// The longest step in s that cannot miss the fall of the friction near zero velocity.
     pub(super) fn resolving_length(&self) -> f64 {
         if self.regime == Regime::Stick {
             return f64::INFINITY;
