@@ -1,4 +1,4 @@
-//! No file that the master reads does any harm, whatever is in it.
+//! The readers of study files neither panic nor hang on any input.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[path = "../../../fmu/tests/robustness/changes.rs"]
@@ -10,7 +10,7 @@ mod targets;
 use changes::mutate;
 use corpus::replay;
 
-/// What the XML of SSP lives on.
+/// Fragments of SSP XML, used to change the corpus.
 const XML: [&[u8]; 20] = [
     b"<",
     b">",
@@ -33,7 +33,7 @@ const XML: [&[u8]; 20] = [
     b"<ssd:Elements/>",
     b"<ssd:System name=\"x\"/>",
 ];
-/// What CSV lives on.
+/// Fragments of CSV, used to change the corpus.
 const CSV: [&[u8]; 10] =
     [b",", b"\"", b"\"\"", b"\n", b"\r\n", b"\r", b"time", b"\xef\xbb\xbf", b"1e308", b"-1e-308"];
 

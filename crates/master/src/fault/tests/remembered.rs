@@ -1,6 +1,6 @@
 //! Faults with memory: dropout, delay; repeated steps and checkpoints.
 
-use super::super::delay::Line;
+use super::super::delay::DelayLine;
 use super::{Fault, FaultChain, FaultError, LossPattern, Sample, series, single, window};
 use crate::fault::{NoiseDistribution, RandomSeries};
 
@@ -175,7 +175,7 @@ fn a_checkpoint_that_no_delay_can_have_is_refused() {
     let read = |seconds: f64, step: f64, points: usize| {
         let points = vec![(0.0_f64, 0.0_f64); points];
         let bytes = postcard::to_allocvec(&(seconds, step, points)).unwrap();
-        postcard::from_bytes::<Line>(&bytes).is_ok()
+        postcard::from_bytes::<DelayLine>(&bytes).is_ok()
     };
     assert!(read(1.0, 0.1, 3));
     assert!(!read(1.0, 0.0, 3), "no step");

@@ -1,4 +1,4 @@
-//! No `system.toml` does any harm, whatever is in it.
+//! The parser of `system.toml` neither panics nor hangs on any input.
 
 #[path = "../../../../fmu/tests/robustness/changes.rs"]
 mod changes;
@@ -9,7 +9,7 @@ mod target;
 
 use target::system_toml;
 
-/// What TOML and this file live on.
+/// Fragments of TOML and of this format, used to change the corpus.
 const WORDS: [&[u8]; 22] = [
     b"[",
     b"]",
