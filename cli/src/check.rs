@@ -1,4 +1,4 @@
-//! `aso-ftc check`: what an importer will stumble over.
+//! `aso-ftc check`: finds faults of an FMU that importers run into.
 
 mod answer;
 mod archive;
@@ -35,10 +35,10 @@ pub(crate) struct Options {
     /// Print the findings as JSON
     #[arg(long)]
     json: bool,
-    /// Look at the files only, do not run the FMU
+    /// Check the files only, do not run the FMU
     #[arg(long)]
     no_run: bool,
-    /// How long a call of the FMU may take while it is tried
+    /// Time limit of a call of the FMU in s
     #[arg(long, value_name = "SECONDS", default_value_t = 30.0, allow_negative_numbers = true)]
     time_limit: f64,
     /// Load a shared library first, its symbols visible to the FMU; may be repeated
@@ -46,7 +46,7 @@ pub(crate) struct Options {
     preload: Vec<OsString>,
 }
 
-/// What `--json` prints.
+/// The JSON object of `--json`.
 #[derive(Serialize)]
 struct Report<'a> {
     fmu: &'a Path,
@@ -58,7 +58,7 @@ struct Report<'a> {
     findings: &'a [Finding],
 }
 
-/// Prints whether the FMU runs, then what was found; true where no finding is an error.
+/// Prints whether the FMU runs, and the findings; returns true if no finding is an error.
 pub(crate) fn check(options: &Options) -> anyhow::Result<bool> {
     let unpacked = Unpacked::open_whole(&options.fmu)?;
     let (here, findings) = findings(options, &unpacked)?;
@@ -86,7 +86,8 @@ pub(crate) fn check(options: &Options) -> anyhow::Result<bool> {
     Ok(errors == 0)
 }
 
-/// What came of the trial, and all findings: errors first, of these the ones that stop a tool.
+/// Returns the result of the trial, and all findings: errors first, starting with those that stop a
+/// tool.
 fn findings(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResult, Vec<Finding>)> {
     let description = &unpacked.description;
     let mut findings = archive::check(&options.fmu, unpacked.entries(), description)?;
@@ -111,7 +112,7 @@ fn findings(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResu
     Ok((here, findings))
 }
 
-/// The answer where the FMU is not tried.
+/// Returns the result if the FMU is not run.
 fn without_trial(options: &Options, unpacked: &Unpacked) -> Option<TrialResult> {
     if options.no_run {
         return Some(TrialResult::NotTried { reason: "--no-run".to_owned() });
@@ -128,7 +129,7 @@ fn without_trial(options: &Options, unpacked: &Unpacked) -> Option<TrialResult> 
     Some(TrialResult::No { reason: refused.to_string() })
 }
 
-/// Tries the FMU: on Linux in processes of its own, which may crash or hang.
+/// Runs the FMU; on Linux in separate processes, which may crash or hang.
 fn run(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResult, Vec<Finding>)> {
     let seconds = options.time_limit;
     let limit = Duration::try_from_secs_f64(seconds).ok().filter(|limit| !limit.is_zero());
@@ -157,7 +158,8 @@ fn run(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResult, V
     Ok(behaviour::check(&unpacked.description, &mut make))
 }
 
-/// Tries the FMU in processes of its own. What is no fault of the FMU is an error of the command.
+/// Runs the FMU in separate processes. A failure that is not the FMU's fault is an error of the
+/// command.
 fn isolated(
     options: &Options,
     unpacked: &Unpacked,

@@ -1,25 +1,24 @@
-//! The claims of the paper beside what a run shows.
+//! Compares the claims of the paper with measurements of a run.
 
 use std::f64::consts::FRAC_PI_2;
 
 use serde::Serialize;
 
-/// The variables that the claims are about, in the order of the values given to
-/// [`Measurement::add`].
+/// The variables used by the claims, in the order of the values of [`Measurement::add`].
 pub(crate) const WATCHED: [&str; 5] =
     ["plant.x_p", "plant.theta", "plant.f_fric", "controller.f_hat", "plant.regime"];
 
-/// What the compensation leaves is measured from this long after the activation, in s.
+/// Time in s after the activation at which the measurement of the residual motion starts.
 const SETTLING: f64 = 20.0;
-/// The limit cycle is measured over this last part of the time before the activation.
+/// Fraction of the time before the activation after which the limit cycle is measured.
 const CYCLE: f64 = 0.75;
-/// A slide counts from this distance on, in m: near the end of a creep, rounding alone makes the
-/// cart stick and slip.
+/// Shortest slide in m that counts; near the end of a creep, rounding makes the cart stick and
+/// slip.
 const SLIDE: f64 = 1e-3;
-/// The Coulomb friction of the paper in N: an estimate whose error is below a fifth of it follows
-/// the friction.
+/// Coulomb friction of the paper in N. An estimate follows the friction if its error is below a
+/// fifth of it.
 const LEVEL: f64 = 25.0;
-/// What happens within this time in s of a transition happens at it.
+/// Time in s around a transition within which an event belongs to the transition.
 const NEAR: f64 = 0.01;
 
 /// Smallest and largest value seen.
@@ -37,29 +36,30 @@ impl Extremes {
         self.high = self.high.max(value);
     }
 
-    /// Half of peak to peak.
+    /// Returns half of the peak-to-peak value.
     fn amplitude(self) -> f64 {
         0.5 * (self.high - self.low)
     }
 }
 
-/// What is seen of a run in one window of time.
+/// Measurements in one time window.
 struct Window {
     from: f64,
     to: f64,
     x_p: Extremes,
     theta: Extremes,
-    /// Of f_fric - f_hat.
+    /// Sum of squares of `f_fric - f_hat`.
     squares: f64,
-    /// The largest |f_fric - f_hat|, when it was, and whether that is a stick-slip transition.
+    /// The largest `|f_fric - f_hat|`, its time, and whether it is at a stick-slip transition.
     largest: f64,
     largest_at: f64,
     at_transition: bool,
     count: f64,
-    /// Slides of more than [`SLIDE`] that begin and end at rest, and where the last rest was.
+    /// Number of slides of more than [`SLIDE`] that start and end at rest, and the position of the
+    /// last rest.
     slides: u32,
     rest: Option<f64>,
-    /// The regime last seen, and when it last changed between rest and sliding.
+    /// The last regime, and the time of the last change between rest and sliding.
     regime: f64,
     changed_at: f64,
 }
@@ -114,7 +114,7 @@ impl Window {
     }
 }
 
-/// Everything that the claims need of a run, gathered step by step.
+/// All measurements of a run that the claims need.
 pub(crate) struct Measurement {
     before: Window,
     after: Window,
@@ -129,13 +129,13 @@ pub(crate) struct Claim {
     pub(crate) paper: &'static str,
     pub(crate) measured: f64,
     pub(crate) unit: &'static str,
-    /// None where the run ended before it could be judged.
+    /// `None` if the run ended too early to judge the claim.
     pub(crate) holds: Option<bool>,
 }
 
 impl Measurement {
-    /// For a run whose compensation starts at `t_on`; the linearised pendulum cannot fall, its
-    /// angle has no bound.
+    /// Creates the measurement for a run whose compensation starts at `t_on`. The linearised
+    /// pendulum cannot fall; its angle has no bound.
     pub(crate) fn new(t_on: f64, linearised: bool) -> Self {
         Self {
             before: Window::new((1.0 - CYCLE) * t_on, t_on),
@@ -145,7 +145,7 @@ impl Measurement {
         }
     }
 
-    /// Takes the values of [`WATCHED`] at `time`.
+    /// Adds the values of [`WATCHED`] at `time`.
     pub(crate) fn add(&mut self, time: f64, values: [f64; 5]) {
         self.before.add(time, values);
         self.after.add(time, values);
@@ -154,12 +154,13 @@ impl Measurement {
         }
     }
 
-    /// When the pendulum was first below the horizontal, in s.
+    /// Returns the time in s at which the pendulum first passed the horizontal.
     pub(crate) fn fell(&self) -> Option<f64> {
         self.fell
     }
 
-    /// The claims; `end` is the time reached, `lost` whether that is not the one planned.
+    /// Evaluates the claims. `end` is the time reached; `lost` is true if it is not the planned
+    /// one.
     pub(crate) fn claims(&self, end: f64, lost: bool) -> Vec<Claim> {
         let Self { before, after, .. } = self;
         let whole = before.count > 0.0 && end >= before.to;
@@ -201,7 +202,7 @@ impl Measurement {
     }
 }
 
-/// The table, one line for each claim.
+/// Formats the table, one line for each claim.
 pub(crate) fn table(claims: &[Claim]) -> String {
     let mut lines = vec![format!("{:<44} {:<20} {:>14}  holds", "claim", "paper", "measured")];
     for claim in claims {

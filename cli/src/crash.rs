@@ -1,25 +1,25 @@
-//! The end of the command where an FMU forces it: by a crash, by `exit`, by a call that does not
-//! return after the command was told to end.
+//! Handles an end of the process that an FMU forces: a crash, `exit`, or a call that does not
+//! return after the command received a signal.
 
 use fmu_description::package::remove_temporary_folders;
 use fmu_import::crash::{self, Cause, Ending};
 
 use crate::run;
 
-/// Exit status of a run that is lost, and of one that has not begun.
+/// Exit status after the first step (1) and before it (2).
 const LOST: u8 = 1;
 const NOT_STARTED: u8 = 2;
-const ADVICE: &str = "with --isolate each FMU has a process of its own, and what it does to it is an \
-                      error of the run";
+const ADVICE: &str = "with --isolate each FMU runs in a separate process, and its crash is an error of \
+                      the run";
 
-/// From now on such an end is reported, and the results so far are kept.
+/// Installs the handler, which reports the end and keeps the results so far.
 pub(crate) fn watch() {
     if let Err(error) = crash::watch(ADVICE, end) {
         tracing::warn!("crashes of FMUs cannot be reported: {error}");
     }
 }
 
-/// Says what happened, keeps what there is, leaves nothing behind; the exit status.
+/// Reports the end, completes the results, removes temporary files; returns the exit status.
 fn end(ending: &Ending) -> u8 {
     let interrupted = ending.cause == Cause::GivenUp;
     if interrupted && ending.calls.is_empty() {
@@ -29,11 +29,12 @@ fn end(ending: &Ending) -> u8 {
     } else {
         tracing::error!("{ending}; {ADVICE}");
     }
-    // A panic here is about memory that the FMU wrote over: it is told below as what it leads to.
+    // Suppress panic messages: memory that the FMU has overwritten can cause them; the failure is
+    // reported below.
     std::panic::set_hook(Box::new(|_| {}));
     for (path, kept) in study::keep_results() {
         match kept {
-            Ok(()) => tracing::error!("the results up to there are in {}", path.display()),
+            Ok(()) => tracing::error!("the results up to this step are in {}", path.display()),
             Err(error) => tracing::error!("the last rows are lost: {error}"),
         }
     }

@@ -1,4 +1,4 @@
-//! `aso-ftc design`: from a plant file to a designed controller, its report and its FMU.
+//! `aso-ftc design`: designs a controller from a plant file; writes its report and its FMU.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -9,18 +9,19 @@ use files::whole::Pending;
 
 #[derive(clap::Args)]
 pub(crate) struct Options {
-    /// The plant file: plant, faults and what is wanted of the controller (docs/reference/plant-file.md)
+    /// The plant file: plant, faults and requirements on the controller
+    /// (docs/reference/plant-file.md)
     plant: PathBuf,
-    /// The design file to write; the report goes beside it
+    /// The design file to write; the report goes into the same folder
     #[arg(long, value_name = "FILE", default_value = "design.toml")]
     out: PathBuf,
-    /// The report to write [default: report.html beside the design file]
+    /// The report to write [default: report.html in the folder of the design file]
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
     /// Also make the controller FMU
     #[arg(long, value_name = "FMU")]
     fmu: Option<PathBuf>,
-    /// The packed controller FMU that it is made from
+    /// The packed controller FMU from which it is made
     #[arg(long, value_name = "FMU", default_value = "dist/AsoController.fmu", requires = "fmu")]
     from: PathBuf,
     /// Print the numbers of the report as JSON
@@ -28,7 +29,7 @@ pub(crate) struct Options {
     json: bool,
 }
 
-/// Designs the controller and writes what was asked for; whether all checks hold.
+/// Designs the controller and writes the requested files; returns whether all checks hold.
 pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
     let mut made = design::design(&options.plant)?;
     let fmu = options.fmu.is_some().then(|| made.fmu(&options.from)).transpose()?;
@@ -66,7 +67,7 @@ fn unwritten(path: &Path) -> String {
     format!("cannot write {}", path.display())
 }
 
-/// What a reader wants to know first.
+/// Prints the main results.
 fn summarise(report: &Report) {
     for own in [&report.feedback, &report.observer] {
         println!("{}: {}", own.matrix, own.method);

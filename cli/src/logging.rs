@@ -1,4 +1,4 @@
-//! Messages: on standard error, as text or as JSON, past the bar of progress.
+//! Log messages on standard error, as text or JSON, drawn above the progress bar.
 
 use std::fmt::{self, Write as _};
 use std::io::{self, Write};
@@ -12,10 +12,10 @@ use tracing_subscriber::fmt::format::Writer;
 use tracing_subscriber::fmt::{FmtContext, FormatEvent, FormatFields, MakeWriter};
 use tracing_subscriber::registry::LookupSpan;
 
-/// `target` of the events that the messages of an FMU are.
+/// `target` of the events for messages of FMUs.
 const FMU: &str = "fmu";
 
-/// From now on messages are written: warnings, with `verbose` 1 information, with 2 everything.
+/// Starts logging: warnings; with `verbose` 1, information; with 2, everything.
 pub(crate) fn start(verbose: u8, json: bool) {
     let level = match verbose {
         0 => LevelFilter::WARN,
@@ -23,7 +23,7 @@ pub(crate) fn start(verbose: u8, json: bool) {
         _ => LevelFilter::TRACE,
     };
     let builder = tracing_subscriber::fmt().with_max_level(level).with_writer(StandardError);
-    // There is one already where this was called before.
+    // A second call keeps the existing subscriber.
     let _ = if json {
         tracing::subscriber::set_global_default(builder.json().flatten_event(true).finish())
     } else {
@@ -31,7 +31,8 @@ pub(crate) fn start(verbose: u8, json: bool) {
     };
 }
 
-/// An error with its causes, each said once: some errors quote theirs.
+/// Joins an error and its causes to one sentence. Leaves out a cause that an error above it already
+/// quotes.
 pub(crate) fn sentence(error: &anyhow::Error) -> String {
     let mut said = String::new();
     for cause in error.chain().map(ToString::to_string) {
@@ -44,18 +45,18 @@ pub(crate) fn sentence(error: &anyhow::Error) -> String {
     said
 }
 
-/// Where bars of progress are drawn.
+/// Returns the display of progress bars.
 pub(crate) fn bars() -> &'static MultiProgress {
     static BARS: OnceLock<MultiProgress> = OnceLock::new();
     BARS.get_or_init(MultiProgress::new)
 }
 
-/// Standard error, with the bar taken away meanwhile.
+/// Writes to standard error while the progress bar is hidden.
 struct StandardError;
 
 impl Write for StandardError {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        // Where standard error is closed nobody is left to be told of it.
+        // If standard error is closed, nobody can read the message.
         let _ = bars().suspend(|| io::stderr().write_all(bytes));
         Ok(bytes.len())
     }
@@ -73,7 +74,7 @@ impl MakeWriter<'_> for StandardError {
     }
 }
 
-/// One message as text: `warning: plant, t = 0.5 s, logStatusWarning: ...`.
+/// Formats a message as text: `warning: plant, t = 0.5 s, logStatusWarning: ...`.
 struct Sentence;
 
 impl<S, N> FormatEvent<S, N> for Sentence
@@ -112,7 +113,8 @@ where
     }
 }
 
-/// What an FMU says is text for one line: nothing in it moves the cursor of a terminal.
+/// Makes a message of an FMU a single line without control characters, so that it cannot move the
+/// cursor of a terminal.
 fn plain(text: &str) -> String {
     let text = text.trim_end();
     text.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect()
@@ -149,7 +151,7 @@ impl Visit for Parts {
     fn record_debug(&mut self, field: &Field, value: &dyn fmt::Debug) {
         match field.name() {
             "message" => self.message = format!("{value:?}"),
-            // A number that the message says too.
+            // The message text contains this number already.
             "lost" => {}
             name => {
                 // Writing to a String cannot fail.

@@ -1,8 +1,8 @@
 //! `aso-ftc`: exports the fault-tolerant controller and the friction pendulum as FMUs, couples
-//! FMUs, repeats the experiment of Patton and Klinkhieo (2009).
+//! FMUs, and repeats the experiment of Patton and Klinkhieo (2009).
 //!
-//! Exit status: 0 done, 1 a claim does not hold or a run was lost, 2 misuse or bad input, 130 a run
-//! was interrupted.
+//! Exit status: 0 success; 1 a claim does not hold or a run failed; 2 wrong usage or bad input; 130
+//! a run was interrupted.
 #![forbid(unsafe_code)]
 
 #[macro_use]
@@ -39,13 +39,14 @@ struct Arguments {
 enum Command {
     /// Build and pack both FMUs, run the paper's experiment, compare with its claims
     Reproduce(reproduce::Options),
-    /// Build crates that use fmi2, or those of this workspace, and pack them into FMUs
+    /// Build crates that use the crate fmu, or the models of this workspace, and pack them into
+    /// FMUs
     Pack(pack::Options),
-    /// Write a crate with a small model, to begin with
+    /// Write a crate with a small model as a starting point
     New(new::Options),
-    /// Couple FMUs: of an SSP, an SSD or a system.toml, or named here
+    /// Couple FMUs: from an SSP, an SSD or a system.toml, or named on the command line
     Run(Box<run::Options>),
-    /// Design observer and feedback for the plant of a file
+    /// Design observer and feedback for the plant of a plant file
     Design(design::Options),
     /// Check the model description of an FMU against the rules of FMI 2.0.5
     Check(check::Options),

@@ -1,4 +1,4 @@
-//! `aso-ftc new`: writes a crate with a small model, which is packed as it is.
+//! `aso-ftc new`: writes a crate with a small model that can be packed without changes.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ const MANIFEST: &str = include_str!("new/manifest.toml");
 const README: &str = include_str!("new/readme.md");
 const MODEL: &str = include_str!("new/model.rs");
 
-/// Names that Rust, the template, cargo or Windows have for something else.
+/// Names reserved by Rust, the template, cargo or Windows.
 const TAKEN: &str = "about alloc aux clone con core default deserialize err experiment failure fmu \
     into model none nul ok option path prn result self send serde serialize some std step string \
     test variable vec";
@@ -18,7 +18,7 @@ const TAKEN: &str = "about alloc aux clone con core default deserialize err expe
 pub(crate) struct Options {
     /// Name of the crate, such as heat-pump; the model is then called `HeatPump`
     name: String,
-    /// Folder to be made for it [default: ./NAME]
+    /// Folder to create [default: ./NAME]
     #[arg(long, value_name = "FOLDER")]
     path: Option<PathBuf>,
     /// The crate fmu: its folder, or the URL of a git repository [default: the one in the clone
@@ -27,7 +27,7 @@ pub(crate) struct Options {
     fmu: Option<String>,
 }
 
-/// Writes the crate, all of it or nothing.
+/// Writes the crate completely or not at all.
 pub(crate) fn new(options: &Options) -> anyhow::Result<bool> {
     let model = identifier(&options.name)?;
     let folder = options.path.clone().unwrap_or_else(|| PathBuf::from(&options.name));
@@ -49,7 +49,7 @@ pub(crate) fn new(options: &Options) -> anyhow::Result<bool> {
     Ok(true)
 }
 
-/// The name of the model: that of the crate in camel case, a C identifier.
+/// Returns the name of the model: the name of the crate in camel case, a C identifier.
 fn identifier(name: &str) -> anyhow::Result<String> {
     let expected = "expected lower-case letters and digits in words joined by - or _, a letter \
                     first, such as heat-pump";
@@ -71,7 +71,7 @@ fn identifier(name: &str) -> anyhow::Result<String> {
     Ok(identifier)
 }
 
-/// What stands behind `fmu =` in the manifest.
+/// Returns the value of `fmu =` in the manifest.
 fn dependency(source: Option<&str>) -> anyhow::Result<String> {
     if let Some(url) = source.filter(|source| source.contains("://") || source.contains('@')) {
         return Ok(format!("{{ git = {} }}", quoted(url)));
@@ -93,7 +93,8 @@ fn quoted(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }
 
-/// The folder of fmu in the clone with this program, or else in that with the current folder.
+/// Returns the folder of the crate fmu in the clone that contains this program or, failing that,
+/// the current folder.
 fn clone() -> Option<PathBuf> {
     let places = [std::env::current_exe().ok(), std::env::current_dir().ok()];
     let folders = places.iter().flatten().flat_map(|place| place.ancestors());
@@ -106,7 +107,7 @@ fn is_fmu(folder: &Path) -> bool {
     manifest.parse().ok().and_then(name).unwrap_or(false)
 }
 
-/// Writes the files into a folder beside `target`, which then takes its name.
+/// Writes the files into a temporary folder next to `target` and then renames it.
 fn write(target: &Path, files: &[(&str, String)]) -> std::io::Result<()> {
     let target = std::path::absolute(target)?;
     let mut partial = target.clone().into_os_string();
@@ -117,7 +118,7 @@ fn write(target: &Path, files: &[(&str, String)]) -> std::io::Result<()> {
         fs::rename(&partial, &target)
     });
     written.inspect_err(|_| {
-        // The write has failed already; that its remains cannot be removed adds nothing.
+        // The error of the write is returned; an error of the removal adds nothing.
         let _ = fs::remove_dir_all(&partial);
     })
 }

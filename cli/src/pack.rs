@@ -20,19 +20,20 @@ use figure::rasterise;
 /// The models of this workspace.
 const MODELS: [&str; 2] = ["fmu-plant", "fmu-controller"];
 
-/// The equations of a model and its picture; the packer makes index.html and model.png of them. The
-/// equations stay in the FMU, so that index.html can be made anew for another design.
+/// The equations of a model and its drawing, from which the packer makes index.html and model.png.
+/// The equations stay in the FMU, so that index.html can be made again for another design.
 const FRAGMENT: &str = fmu_description::documentation::FRAGMENT;
 const DRAWING: &str = "model.svg";
 
 #[derive(clap::Args)]
 pub(crate) struct Options {
-    /// Folders of crates that end in `fmu::export!`, in or outside of this workspace [default:
-    /// the plant and the controller of this workspace]
+    /// Folders of crates that end in `fmu::export!`, in or outside of this workspace [default: the
+    /// plant and the controller of this workspace]
     ///
-    /// Into the FMU go, beside the library: `resources`; `documentation`, with an index.html made
-    /// of the description and `documentation/model.html` unless there is one; `model.png`, or one
-    /// drawn from `documentation/model.svg`; the licences of the crate and of its dependencies.
+    /// The FMU contains, besides the library: `resources`; `documentation`, with an index.html made
+    /// from the description and `documentation/model.html` unless there is one; `model.png`, or a
+    /// picture made from `documentation/model.svg`; the licences of the crate and of its
+    /// dependencies.
     #[arg(value_name = "PATH")]
     crates: Vec<PathBuf>,
     /// Folder for the FMUs
@@ -41,13 +42,14 @@ pub(crate) struct Options {
     /// Also write the model descriptions into the folder modelDescription of the workspace
     #[arg(long, conflicts_with = "crates")]
     update_descriptions: bool,
-    /// Also write InvertedPendulum.ssp: both FMUs of this workspace, connected, for 100 s
+    /// Also write InvertedPendulum.ssp: both FMUs of this workspace, connected, with a stop time of
+    /// 100 s
     #[arg(long, conflicts_with = "crates")]
     ssp: bool,
-    /// Pack the libraries in this folder, as FOLDER/win64/MODEL.dll, in place of the one built here
+    /// Pack the libraries in this folder, as FOLDER/win64/MODEL.dll, instead of the one built here
     #[arg(long, value_name = "FOLDER")]
     binaries: Option<PathBuf>,
-    /// Also write a bill of materials beside each FMU; needs a command built with the feature `sbom`
+    /// Also write a bill of materials for each FMU; needs a command built with the feature `sbom`
     #[arg(long)]
     sbom: bool,
 }
@@ -91,7 +93,7 @@ pub(crate) fn pack(options: &Options) -> anyhow::Result<bool> {
     Ok(true)
 }
 
-/// How to pack.
+/// Options of packing.
 struct PackOptions<'a> {
     /// Folder for the FMUs.
     out: &'a Path,
@@ -99,11 +101,11 @@ struct PackOptions<'a> {
     binaries: Option<&'a Path>,
     #[cfg_attr(not(feature = "sbom"), expect(dead_code, reason = "refused without the feature"))]
     sbom: bool,
-    /// As in cargo.
+    /// `--locked` of cargo.
     locked: bool,
 }
 
-/// An FMU as packed.
+/// A packed FMU.
 pub(crate) struct PackedFmu {
     pub(crate) path: PathBuf,
     xml: String,
@@ -119,7 +121,7 @@ fn pack_models(root: &Path, packing: &PackOptions<'_>) -> anyhow::Result<Vec<Pac
     MODELS.iter().map(|model| pack_crate(&root.join(model), packing)).collect()
 }
 
-/// The folder of this workspace: the nearest one upwards that has the models.
+/// Returns the folder of this workspace: the nearest folder upwards with the models.
 pub(crate) fn workspace() -> anyhow::Result<PathBuf> {
     let here = std::env::current_dir()?;
     here.ancestors()
@@ -166,7 +168,7 @@ fn pack_crate(folder: &Path, packing: &PackOptions<'_>) -> anyhow::Result<Packed
     Ok(PackedFmu { path, xml, description })
 }
 
-/// Where the library that was built here goes in the FMU, and its bytes.
+/// Returns path and bytes of the library that was built here, for the FMU.
 fn own_library(
     library: &library::Library,
     description: &ModelDescription,
@@ -189,7 +191,7 @@ fn add_resources(package: &mut Package, folder: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The author's files, and an entry page where there is none among them.
+/// Adds the author's files, and an entry page if they have none.
 fn add_documentation(
     package: &mut Package,
     folder: &Path,
@@ -225,7 +227,7 @@ fn add_documentation(
     Ok(())
 }
 
-/// `model.png`, as it is or from the drawing.
+/// Adds `model.png`, or a picture made from the drawing.
 fn add_picture(package: &mut Package, folder: &Path) -> anyhow::Result<()> {
     let picture = folder.join("model.png");
     let drawing = folder.join("documentation").join(DRAWING);

@@ -1,24 +1,24 @@
-//! Figures 5 and 6 of Patton and Klinkhieo (2009), drawn from the columns of a run.
+//! Draws Figures 5 and 6 of Patton and Klinkhieo (2009) from the columns of a run.
 
 use std::path::Path;
 
 use figure::{Figure, FigureError, Ink, Panel, Series};
 
-/// The transient of the activation is over after this many seconds.
+/// Length of the transient after the activation in s.
 const SETTLING: f64 = 20.0;
-/// Seconds of Figure 6 that show single stick-slip transitions.
+/// Length in s of the close-up in Figure 6 that shows single stick-slip transitions.
 const CLOSE_UP: f64 = 6.0;
-/// A run that is lost is drawn up to here: a cart position in m, an angle in rad, and a force as
-/// a multiple of the largest friction.
+/// Limits up to which a diverging run is drawn: cart position in m, angle in rad, and force as a
+/// multiple of the largest friction.
 const FARTHEST: f64 = 5.0;
 const STEEPEST: f64 = 6.3;
 const STRONGEST: f64 = 4.0;
 
-/// The columns that the figures are drawn from.
+/// The columns used by the figures.
 pub(crate) const COLUMNS: [&str; 5] =
     ["time", "plant.x_p", "plant.theta", "plant.f_fric", "controller.f_hat"];
 
-/// Why the figures of the paper were not written.
+/// Error of writing the figures of the paper.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum PaperFigureError {
     #[error("the results have no column {0:?}, which the figures need")]
@@ -31,13 +31,14 @@ pub(crate) enum PaperFigureError {
 
 /// Writes `figure5.svg`, `figure5.png`, `figure6.svg` and `figure6.png` into the folder `out`.
 ///
-/// `columns` gives the values of a column: `time` in s, `plant.x_p` in m, `plant.theta` in rad,
+/// `columns` returns the values of a column: `time` in s, `plant.x_p` in m, `plant.theta` in rad,
 /// `plant.f_fric` and `controller.f_hat` in N. `activation` is the time in s at which the
-/// compensation starts. A run that ends before it, or that is lost, is drawn as far as it goes.
+/// compensation starts. A run that ends before it, or that diverges, is drawn as far as possible.
 ///
 /// # Errors
 ///
-/// [`PaperFigureError`]: a column is missing or too short or too long, or a file cannot be written.
+/// Returns [`PaperFigureError`] if a column is missing or has the wrong length, or if a file cannot
+/// be written.
 pub(crate) fn write<'a>(
     columns: &dyn Fn(&str) -> Option<&'a [f64]>,
     activation: f64,
@@ -49,7 +50,7 @@ pub(crate) fn write<'a>(
     Ok(())
 }
 
-/// The columns of a run, all equally long, and what the figures derive from them.
+/// The columns of a run, of equal length, and quantities derived from them.
 struct Run<'a> {
     time: &'a [f64],
     x_p: &'a [f64],
@@ -92,7 +93,7 @@ impl<'a> Run<'a> {
         })
     }
 
-    /// Figure 5.
+    /// Draws Figure 5.
     fn motion(&self) -> Figure<'_> {
         let panel = |y_label, y_cap, curve| Panel {
             y_label,
@@ -123,7 +124,7 @@ impl<'a> Run<'a> {
         Figure { title: "Cart position and pendulum angle, before and after compensation", panels }
     }
 
-    /// Figure 6.
+    /// Draws Figure 6.
     fn friction(&self) -> Figure<'_> {
         let strongest = self.f_fric.iter().filter(|force| force.is_finite());
         let cap = STRONGEST * strongest.fold(1.0, |most: f64, force| most.max(force.abs()));
@@ -154,8 +155,9 @@ impl<'a> Run<'a> {
         Series { label, time: self.time, values, ink, broad: false }
     }
 
-    /// From the end of the transient, at most halfway through what follows the activation, to the
-    /// end of the run; nothing if the run ends before the activation or is lost after it.
+    /// Returns the settled part of the run: from the end of the transient, but at most halfway
+    /// through the time after the activation, to the end. `None` if the run ends before the
+    /// activation or diverges after it.
     fn settled(&self) -> Option<(f64, f64)> {
         let motion = || self.time.iter().zip(self.x_p.iter().zip(self.theta));
         let known = motion().filter(|(t, (x, a))| t.is_finite() && x.is_finite() && a.is_finite());
@@ -168,7 +170,7 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Time is named below the last of several panels that share a time range.
+/// Labels the time axis of the last of several panels with the same time range.
 fn name_time_axes(panels: &mut [Panel]) {
     for index in 0..panels.len() {
         let next = panels.get(index + 1).map(|panel| panel.x_range);

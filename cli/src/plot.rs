@@ -1,4 +1,4 @@
-//! `--plot`: variables of a results file over time, as SVG or PNG.
+//! `--plot`: draws variables of a results file over time, as SVG or PNG.
 
 use std::path::Path;
 
@@ -7,13 +7,13 @@ use results::{Column, ColumnKind, Selection, Table};
 
 use figure::{Figure, Ink, Panel, Series, rasterise};
 
-/// Colours in the order of the curves of a panel, and so the most curves that a panel has.
+/// Colours of the curves in a panel; their number is the largest number of curves.
 const INKS: [Ink; 7] =
     [Ink::Blue, Ink::Vermilion, Ink::Green, Ink::Purple, Ink::Sky, Ink::Orange, Ink::Black];
-/// Most curves of a picture that can still be looked at.
+/// Largest number of curves in a picture.
 const CURVES: usize = 64;
 
-/// A variable with what is drawn of it.
+/// A variable with its points.
 struct Curve {
     label: String,
     unit: Option<String>,
@@ -21,15 +21,15 @@ struct Curve {
     values: Vec<f64>,
 }
 
-/// Draws variables of a results file, by name or pattern, over time: one panel for each unit. The
-/// ending of `out`, `.svg` or `.png`, chooses the format. Memory does not depend on the length of
-/// the file. `unit` is asked for the units of variables where the file does not state any, which is
-/// so in CSV.
+/// Draws variables of a results file, selected by name or pattern, over time: one panel for each
+/// unit. The extension of `out`, `.svg` or `.png`, selects the format. The memory used does not
+/// depend on the length of the file. `unit` returns the unit of a variable for files without units,
+/// such as CSV.
 ///
 /// # Errors
 ///
-/// Another ending, a name that the file does not have, texts, a file that cannot be read or
-/// written.
+/// Returns an error if the extension is another one, if a name is not in the file, if a variable is
+/// a text, or if a file cannot be read or written.
 pub(crate) fn plot_with_units(
     results: &Path,
     variables: &[String],
@@ -45,7 +45,7 @@ pub(crate) fn plot_with_units(
     files::whole::write(out, &bytes).with_context(|| format!("cannot write {}", out.display()))
 }
 
-/// Reads what is to be drawn.
+/// Reads the curves.
 fn curves(
     results: &Path,
     variables: &[String],
@@ -54,7 +54,7 @@ fn curves(
     let table = Table::open(results)?;
     let selection = Selection { include: variables.to_vec(), exclude: Vec::new() };
     let mut positions = table.choose(&selection)?;
-    // A pattern means what can be drawn.
+    // A pattern matches only variables that can be drawn.
     positions.retain(|position| {
         let column = &table.columns()[*position];
         let drawable = *position != table.time() && column.kind != ColumnKind::String;
@@ -78,19 +78,19 @@ fn curves(
     Ok(positions.into_iter().zip(envelopes).map(curve).collect())
 }
 
-/// Whether a variable has no values between two samples.
+/// Whether a variable is constant between two samples.
 fn stepwise(column: &Column) -> bool {
     matches!(column.kind, ColumnKind::Integer | ColumnKind::Boolean)
 }
 
-/// Each value lasts until the next one.
+/// Converts samples to a staircase: each value holds until the next one.
 fn stairs(time: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let ends = time.iter().skip(1).chain(time.last());
     let steps = time.iter().zip(ends).zip(values);
     steps.flat_map(|((start, end), value)| [(*start, *value), (*end, *value)]).unzip()
 }
 
-/// Curves of one unit share a panel, as far as there are colours.
+/// Groups curves by unit into panels with at most as many curves as there are colours.
 fn panels(curves: &[Curve]) -> Vec<Panel<'_>> {
     let mut groups: Vec<Vec<&Curve>> = Vec::new();
     for curve in curves {

@@ -1,4 +1,4 @@
-//! `aso-ftc reproduce`: the paper's experiment, from the sources to the figures.
+//! `aso-ftc reproduce`: repeats the paper's experiment, from the sources to the figures.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use crate::scenario::Scenario;
 use crate::summary::{ControllerCertificate, Summary};
 use crate::{pack, paper_figures, summary};
 
-/// The signals, in the folder of the results.
+/// Name of the results file.
 const RESULTS: &str = "results.csv";
 /// Communication step in s.
 const STEP: f64 = 0.001;
@@ -46,7 +46,8 @@ pub(crate) struct Options {
     algorithm: AlgorithmOptions,
 }
 
-/// Packs, runs, writes, compares; true where every claim that could be judged holds.
+/// Packs the FMUs, runs the experiment, writes results and figures, and compares with the claims;
+/// returns true if every claim that could be judged holds.
 pub(crate) fn reproduce(options: &Options) -> anyhow::Result<bool> {
     if options.record_every == Every::Never {
         bail!("--record-every never leaves nothing to draw, expected seconds or `step`");
@@ -62,7 +63,7 @@ pub(crate) fn reproduce(options: &Options) -> anyhow::Result<bool> {
     run.finish()?;
     let lost = match ended {
         RunEnd::Failed(error) => Some(error.sentence()),
-        RunEnd::ByFmu(name) => Some(format!("{name} asked for the end of the simulation")),
+        RunEnd::ByFmu(name) => Some(format!("{name} requested the end of the simulation")),
         RunEnd::AtStop | RunEnd::Interrupted => None,
     };
     let reached = run.simulation.time();
@@ -89,7 +90,7 @@ pub(crate) fn reproduce(options: &Options) -> anyhow::Result<bool> {
     Ok(claims.iter().all(|claim| claim.holds != Some(false)))
 }
 
-/// Plant and controller with these settings, recorded and stepped as the options say.
+/// Returns the configuration of plant and controller with these settings.
 fn experiment(options: &Options, settings: &[(String, String)]) -> LoadedConfig {
     let mut config = Config::default();
     for (name, file) in [("plant", "FrictionPendulum.fmu"), ("controller", "AsoController.fmu")] {
@@ -106,12 +107,12 @@ fn experiment(options: &Options, settings: &[(String, String)]) -> LoadedConfig 
     LoadedConfig { config, source: None }
 }
 
-/// Those of the scenario, then those of the command line.
+/// Returns the settings of the scenario, followed by the settings of the command line.
 fn settings(options: &Options) -> Vec<(String, String)> {
     options.scenario.settings().into_iter().chain(options.settings.iter().cloned()).collect()
 }
 
-/// The columns of a file of results that the figures need, by name.
+/// Reads the columns that the figures need from a results file.
 fn columns(path: &Path) -> anyhow::Result<HashMap<String, Vec<f64>>> {
     let table = Table::open(path)?;
     let mut columns = HashMap::new();
@@ -138,7 +139,7 @@ fn report(options: &Options, written: &Summary) {
     println!("results in {}", options.out.display());
 }
 
-/// What is watched at every communication point.
+/// The variables read at every communication point.
 struct Watch {
     probe: Probe,
     /// `controller.t_on`, `plant.F_s` and `plant.linearised`, read at the start.
@@ -183,7 +184,7 @@ impl Watch {
         self.parameter_values[0]
     }
 
-    /// The largest friction, in N.
+    /// Returns the largest friction in N.
     fn fault_bound(&self) -> f64 {
         self.parameter_values[1]
     }

@@ -21,11 +21,11 @@ pub(crate) use interrupt::{STATUS as INTERRUPTED, has_started};
 pub(crate) use options::{AlgorithmOptions, Options, setting};
 use progress::Progress;
 
-/// Most connections that are listed.
+/// Largest number of connections listed.
 const LISTED: usize = 20;
 
-/// Couples FMUs and writes what comes out. Exit status: 0 the run came to its end, 1 it was lost on
-/// its way, 2 it did not begin, 130 it was interrupted.
+/// Couples FMUs and writes the results. Exit status: 0 the run reached its end, 1 it failed after
+/// the first step, 2 it failed before, 130 it was interrupted.
 pub(crate) fn run(options: &Options) -> ExitCode {
     logging::start(options.verbose, options.log_json);
     if let Err(error) = interrupt::listen() {
@@ -41,7 +41,7 @@ pub(crate) fn run(options: &Options) -> ExitCode {
     }
 }
 
-/// A run that has started.
+/// A started run with the data needed at its end.
 struct Started {
     run: Run,
     /// The current folder at the start.
@@ -50,7 +50,7 @@ struct Started {
     units: Vec<(String, String)>,
 }
 
-/// Everything before the first step; nothing where only the configuration was asked for.
+/// Prepares and starts the run; `None` if only the configuration was requested.
 fn prepare(options: &Options) -> anyhow::Result<Option<Started>> {
     let (loaded, saved) = options.load()?;
     // An FMU may change the current folder.
@@ -75,7 +75,7 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Started>> {
     Ok(Some(Started { run, here, units }))
 }
 
-/// Prints what is connected and, where connections are made `by_name`, what is not.
+/// Prints the connections and, if variables are connected `by_name`, the inputs without one.
 fn describe(options: &Options, system: &System, plan: &Plan, by_name: bool) {
     println!("{}", connections(system));
     let open = if by_name { open_inputs::list(system) } else { String::new() };
@@ -92,8 +92,8 @@ fn open_call_log(path: &Path) -> anyhow::Result<CallLog> {
     CallLog::create(path).with_context(|| format!("cannot write {}", path.display()))
 }
 
-/// Advances `run` to its end with a bar of progress, or to the step at which a signal comes; `watch`
-/// sees the start and every step.
+/// Advances `run` to its end, or to the step at which a signal arrives, with a progress bar. Calls
+/// `watch` at the start and after every step.
 pub(crate) fn advance(
     run: &mut Run,
     mut watch: impl FnMut(&mut Simulation) -> Result<(), SystemError>,
@@ -113,7 +113,7 @@ pub(crate) fn advance(
     ended
 }
 
-/// What cannot be drawn is better known before the run than after it.
+/// Checks before the run that the plot can be drawn.
 fn check_plot(config: &Config, system: &System, ports: &[Port]) -> anyhow::Result<()> {
     let results = &config.results;
     let (false, Some(picture)) = (results.plot.is_empty(), &results.plot_file) else {
@@ -131,7 +131,7 @@ fn check_plot(config: &Config, system: &System, ports: &[Port]) -> anyhow::Resul
     selection.choose(&names).context("plot").map(|_| ())
 }
 
-/// The connections, the first ones by name.
+/// Lists the connections; long lists are shortened.
 fn connections(system: &System) -> String {
     let names = system.connections.iter().map(|connection| {
         format!("{} -> {}", system.name(connection.from), system.name(connection.to))
@@ -158,7 +158,7 @@ fn warn_of_loop(plan: &Plan, system: &System) {
     }
 }
 
-/// How far a run came, in how many steps and how fast.
+/// Formats the time reached, the number of steps and the speed.
 fn summary(tally: RunStatistics, start: f64, time: f64) -> String {
     let RunStatistics { steps, seconds } = tally;
     let steps = if steps == 1 { "1 step".to_owned() } else { format!("{steps} steps") };
@@ -189,7 +189,7 @@ impl Started {
                 let asked = self.run.simulation.ended_at().unwrap_or(time);
                 let ending = apart(asked, time);
                 tracing::warn!(
-                    "{name} asked for the end of the simulation at t = {asked} s{ending}"
+                    "{name} requested the end of the simulation at t = {asked} s{ending}"
                 );
                 0
             }
@@ -227,7 +227,7 @@ impl Started {
         );
     }
 
-    /// Ends the results, draws them, and says what was written.
+    /// Completes the results, draws the plot, and prints the files written.
     fn write(&mut self, ended: &RunEnd) -> anyhow::Result<()> {
         let written = |path: &Path| {
             println!("{}", path.strip_prefix(&self.here).unwrap_or(path).display());
@@ -255,7 +255,8 @@ impl Started {
     }
 }
 
-/// Where results end before the time at which an FMU asked for the end, all in s.
+/// Returns a note if the results end before the time `asked` at which an FMU requested the end, all
+/// in s.
 fn apart(asked: f64, end: f64) -> String {
     if asked <= end {
         return String::new();
@@ -266,16 +267,15 @@ fn apart(asked: f64, end: f64) -> String {
     )
 }
 
-/// The end of a sentence: the command line that goes on from the checkpoint at `path`, as seen from
-/// the folder `here`.
+/// Returns a hint with the command line that resumes from the checkpoint at `path`, from the folder
+/// `here`.
 fn resume_hint(path: &Path, here: &Path) -> String {
     let command = std::env::args().next().unwrap_or_else(|| "aso-ftc".to_owned());
     let path = path.strip_prefix(here).unwrap_or(path).display().to_string();
     format!("; to go on: {} run --resume {}", quoted(&command), quoted(&path))
 }
 
-/// An argument as a shell takes it: in quotation marks where it has other letters than those of
-/// common paths.
+/// Quotes an argument for a shell if it has characters that are unusual in paths.
 fn quoted(argument: &str) -> String {
     let plain = |letter: char| letter.is_alphanumeric() || "-_./:+@%=,".contains(letter);
     if !argument.is_empty() && argument.chars().all(plain) {

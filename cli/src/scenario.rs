@@ -1,4 +1,4 @@
-//! The named scenarios: settings of the two FMUs by variable name.
+//! The named scenarios of `reproduce`: settings of the two FMUs.
 
 /// A scenario of `reproduce`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -7,7 +7,7 @@ pub(crate) enum Scenario {
     Paper,
     /// Linearised plant from the paper's x(0) = [1.1, -1.1, 0, 0], the same controller
     PaperLiteral,
-    /// The paper's printed L with two signs repaired; it loses the nonlinear plant
+    /// The paper's printed L with two signs corrected; the nonlinear plant becomes unstable
     PrintedGains,
 }
 
@@ -17,7 +17,7 @@ const PRINTED_L: [[f64; 2]; 5] =
     [[0.0380, -0.0048], [-0.0038, 0.0518], [0.3792, 0.1690], [-0.1297, 0.8841], [-3.3432, 0.8941]];
 
 impl Scenario {
-    /// The name on the command line.
+    /// Returns the name on the command line.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Scenario::Paper => "paper",
@@ -26,14 +26,14 @@ impl Scenario {
         }
     }
 
-    /// What is known to come out where that is not what the paper claims.
+    /// Returns the expected result if it differs from the claims of the paper.
     pub(crate) fn expectation(self) -> Option<&'static str> {
         (self == Scenario::PrintedGains).then_some(
             "expected: the printed gains lose the nonlinear plant soon after the compensation starts",
         )
     }
 
-    /// `slave.variable` and value, over the start values of the FMUs.
+    /// Returns `slave.variable` and value of each setting.
     pub(crate) fn settings(self) -> Vec<(String, String)> {
         let pair = |name: &str, value: &str| (name.to_owned(), value.to_owned());
         match self {
@@ -48,7 +48,7 @@ impl Scenario {
     }
 }
 
-/// Printed is `col(L_x, L_f)`, so the last row is L_f as in (5).
+/// The paper prints `col(L_x, L_f)`, so the last row is L_f as in (5).
 fn printed_gains() -> Vec<(String, String)> {
     let mut settings = Vec::new();
     for (row, entries) in PRINTED_L.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! `summary.json`: the claims, and theorem 1 for the controller as it ran.
+//! `summary.json`: the claims, and theorem 1 for the controller of the run.
 
 use std::path::Path;
 
@@ -22,21 +22,21 @@ pub(crate) struct Summary<'a> {
     pub(crate) scenario: &'static str,
     pub(crate) method: &'static str,
     pub(crate) extrapolation: &'static str,
-    /// In s.
+    /// Communication step in s.
     pub(crate) communication_step: f64,
-    /// In s.
+    /// Stop time in s.
     pub(crate) stop_time: f64,
-    /// Time reached in s, and why no further where that was not planned.
+    /// Time reached in s, and the reason if it is not the stop time.
     pub(crate) reached: f64,
     pub(crate) lost: Option<&'a str>,
-    /// When the pendulum fell below the horizontal, in s.
+    /// Time in s at which the pendulum passed the horizontal.
     pub(crate) fell: Option<f64>,
     pub(crate) settings: Vec<String>,
     pub(crate) claims: &'a [Claim],
     pub(crate) design: &'a ControllerCertificate,
 }
 
-/// The controller and what theorem 1 says about it.
+/// The controller with the result of theorem 1.
 #[derive(Serialize)]
 pub(crate) struct ControllerCertificate {
     #[serde(rename = "K_x")]
@@ -47,14 +47,14 @@ pub(crate) struct ControllerCertificate {
     l_x: Rows,
     #[serde(rename = "L_f")]
     l_f: Rows,
-    /// Of A + B K_x: real and imaginary parts.
+    /// Eigenvalues of A + B K_x: real and imaginary parts.
     controller_eigenvalues: Vec<[f64; 2]>,
-    /// Of A_0 - L C_0.
+    /// Eigenvalues of A_0 - L C_0.
     observer_eigenvalues: Vec<[f64; 2]>,
     theorem_1: Theorem1,
 }
 
-/// Theorem 1, or why it says nothing.
+/// The result of theorem 1, or the reason why it does not apply.
 #[derive(Serialize)]
 #[serde(untagged)]
 enum Theorem1 {
@@ -71,7 +71,7 @@ struct Numbers {
     p: Rows,
     p_smallest_eigenvalue: f64,
     p_largest_eigenvalue: f64,
-    /// Of (12), each entry relative to the terms it is made of.
+    /// Residual of (12), each entry relative to the terms of its sum.
     residual: f64,
     delta: f64,
     note: &'static str,
@@ -86,8 +86,8 @@ fn rows(matrix: &DMatrix<f64>) -> Rows {
 }
 
 impl ControllerCertificate {
-    /// Certifies the controller in `system`, its matrices read through its parameters; `beta` is
-    /// the bound of the fault in N.
+    /// Evaluates theorem 1 for the controller in `system`, whose matrices are read from its
+    /// parameters. `beta` is the bound of the fault in N.
     pub(crate) fn of(system: &mut System, beta: f64) -> anyhow::Result<Self> {
         let mut matrix = |name: &str| read_matrix(system, name);
         let (a, b, c) = (matrix("A")?, matrix("B")?, matrix("C")?);
@@ -133,7 +133,7 @@ fn numbers(certificate: &Certificate) -> Numbers {
     }
 }
 
-/// The matrix parameter `name` of the controller, all elements `name[i,j]`.
+/// Reads the matrix parameter `name` of the controller, with elements `name[i,j]`.
 fn read_matrix(system: &mut System, name: &str) -> anyhow::Result<DMatrix<f64>> {
     let slave = system.port(&format!("controller.{name}[1,1]"))?.slave;
     let description = system.slaves[slave].1.description();
@@ -161,7 +161,7 @@ fn read_matrix(system: &mut System, name: &str) -> anyhow::Result<DMatrix<f64>> 
     Ok(DMatrix::from_row_slice(row_count, column_count, &values))
 }
 
-/// Writes `value` as JSON to `path`: whole or not at all.
+/// Writes `value` as JSON to `path`, atomically.
 pub(crate) fn write(value: &impl Serialize, path: &Path) -> anyhow::Result<()> {
     let text = serde_json::to_vec_pretty(value)?;
     files::whole::write(path, &text).with_context(|| format!("cannot write {}", path.display()))

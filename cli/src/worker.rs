@@ -1,10 +1,10 @@
-//! The process of an isolated FMU: this program, started by itself.
+//! The worker process of an isolated FMU: this program, started by itself.
 
 use std::process::ExitCode;
 
 use fmu_import::isolate::WORKER;
 
-/// Serves the master that started this process as a worker; none where no master did.
+/// Serves the master that started this process as a worker; `None` if no master did.
 pub(crate) fn worker() -> Option<ExitCode> {
     if std::env::args_os().nth(1)? != WORKER {
         return None;

@@ -1,4 +1,4 @@
-//! The answer to the question of the user: does the FMU run here, and which tools does it not run in?
+//! The summary for the user: whether the FMU runs here, and the tools in which it does not run.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::finding::{Finding, Tool};
 
-/// What came of a trial in this master.
+/// Result of a trial run in this master.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "runs", rename_all = "kebab-case")]
 pub(super) enum TrialResult {
@@ -18,9 +18,9 @@ pub(super) enum TrialResult {
         step: f64,
         /// Start time in s.
         start: f64,
-        /// The tolerance that it was given.
+        /// The tolerance that the FMU received.
         tolerance: Option<f64>,
-        /// Why there were not more steps.
+        /// The reason for fewer steps than planned.
         but: Option<String>,
     },
     /// It failed.
@@ -47,13 +47,13 @@ impl fmt::Display for TrialResult {
     }
 }
 
-/// A tool in which the FMU does not run.
+/// A tool that refuses the FMU.
 #[derive(Debug, Serialize)]
 pub(super) struct ToolRefusal {
     tool: Tool,
-    /// The first finding that stops it.
+    /// The first finding that stops the tool.
     reason: String,
-    /// How many more there are.
+    /// Number of further findings.
     more: usize,
 }
 
@@ -68,7 +68,7 @@ impl fmt::Display for ToolRefusal {
     }
 }
 
-/// The answer.
+/// The summary.
 #[derive(Debug, Serialize)]
 pub(super) struct Answer {
     pub(super) here: TrialResult,
@@ -76,7 +76,7 @@ pub(super) struct Answer {
 }
 
 impl Answer {
-    /// By what was tried and found.
+    /// Creates the summary from the trial and the findings.
     pub(super) fn new(here: TrialResult, findings: &[Finding]) -> Self {
         let mut tools: BTreeMap<Tool, ToolRefusal> = BTreeMap::new();
         for finding in findings {

@@ -1,4 +1,4 @@
-//! The archive (section 2.3): how it is packed, and what is in it.
+//! Checks of the archive (section 2.3): packing, file names, required files.
 
 use std::collections::{HashMap, HashSet};
 use std::fs::File;
@@ -25,10 +25,11 @@ const TOP: [&str; 8] = [
 ];
 const DEVICES: [&str; 4] = ["con", "prn", "aux", "nul"];
 const UTF8: u16 = 1 << 11;
-/// Windows has 260 characters for the whole path; an importer unpacks into some folder.
+/// Length of a path at which unpacking may fail: Windows allows 260 characters including the
+/// importer's folder.
 const LONG: usize = 180;
 
-/// An archive with the names of its files, which can be unpacked safely.
+/// Checks an archive that can be unpacked safely, with the names of its files.
 pub(super) fn check(
     path: &Path,
     names: &[String],
@@ -62,7 +63,7 @@ pub(super) fn check(
     Ok(findings.all)
 }
 
-/// How one entry is packed and called.
+/// Checks packing and name of one entry.
 fn entry<R: std::io::Read>(entry: &ZipFile<'_, R>, findings: &mut Findings) {
     let Ok(name) = entry.name().map(std::borrow::Cow::into_owned) else { return };
     if name.contains('\\') || name.split('/').any(|part| part == ".") {
@@ -174,7 +175,7 @@ fn documentation(names: &[String], findings: &mut Findings) {
     }
 }
 
-/// `SourceFiles` are in `sources`.
+/// Checks that the files in `SourceFiles` exist in `sources`.
 fn sources(names: &[String], description: &ModelDescription, findings: &mut Findings) {
     let there: HashSet<String> = names.iter().filter_map(|name| normal(name)).collect();
     let lower: HashSet<String> = there.iter().map(|name| name.to_lowercase()).collect();
@@ -184,7 +185,7 @@ fn sources(names: &[String], description: &ModelDescription, findings: &mut Find
     ] {
         for file in files.into_iter().flatten() {
             let path = normal(&format!("sources/{file}"));
-            // Some exporters write the folder, too.
+            // Some exporters include the folder in the name.
             let with_folder = normal(file).filter(|path| path.starts_with("sources/"));
             let mut paths = path.iter().chain(&with_folder);
             if paths.any(|path| there.contains(path)) {
@@ -209,7 +210,7 @@ fn sources(names: &[String], description: &ModelDescription, findings: &mut Find
     }
 }
 
-/// A path with slashes and without `.` and `..`; none where it leaves the archive.
+/// Normalises a path to slashes without `.` and `..`; `None` if it leaves the archive.
 fn normal(path: &str) -> Option<String> {
     let mut parts: Vec<&str> = Vec::new();
     for part in path.split(['/', '\\']) {

@@ -1,4 +1,4 @@
-//! What the library does when it is called as an importer calls it.
+//! Checks of the behaviour: runs the library with the calls of an importer.
 
 use std::collections::BTreeSet;
 
@@ -12,24 +12,25 @@ use super::finding::{Finding, Findings, Part, Tool};
 use super::messages::MessageRecorder;
 use super::values::{Value, distance, get, kept, outputs, start, unknown_reference};
 
-/// Steps of a trial.
+/// Number of steps of a trial.
 const STEPS: u32 = 10;
-/// Variables of one kind that are compared; the others are as they are.
+/// Largest number of variables of one kind that are compared.
 const LOOKED_AT: usize = 1000;
-/// A difference relative to a value's size that a solver makes which starts anew from a state.
+/// Relative difference that is accepted after a state is restored, because a solver restarts.
 const ROUNDED: f64 = 1e-6;
 
-/// Messages of a trial from which on they are a flood: a hundred or so for each of its steps.
+/// Number of messages of a trial above which they are a warning: about 1000 for each step.
 const FLOOD: u64 = 10_000;
 
-/// Makes an instance of the name given; in place of another one, in the same process, where there is
-/// one.
+/// Creates an instance with the given name. It replaces the given former instance, in the same
+/// process, if there is one.
 pub(super) type MakeInstance<'a, S> = dyn FnMut(&str, Option<S>) -> anyhow::Result<S> + 'a;
 
-/// The outputs at each communication point of a trial, the start with them.
+/// The outputs at each communication point of a trial, including the start.
 type Trajectory = Vec<Vec<Value>>;
 
-/// Tries the FMU of `description`, of which `make` gives instances: whether it runs, and what is found.
+/// Runs the FMU of `description`, with instances created by `make`; returns the result and the
+/// findings.
 pub(super) fn check<S: Slave>(
     description: &ModelDescription,
     make: &mut MakeInstance<'_, S>,
@@ -49,12 +50,12 @@ pub(super) fn check<S: Slave>(
 struct Trial<'a, S> {
     description: &'a ModelDescription,
     make: &'a mut MakeInstance<'a, S>,
-    /// What came of the first instance.
+    /// Result of the first instance.
     here: TrialResult,
     findings: Findings,
 }
 
-/// Whether the process of the FMU is gone, or as good as that.
+/// Whether the process of the FMU ended or can no longer be used.
 fn gone(error: &CallError) -> bool {
     use Failure::{Exited, InvalidAnswer, Killed, TimedOut};
     matches!(error.failure, Killed(..) | Exited(_) | TimedOut(_) | InvalidAnswer(_))
@@ -63,7 +64,7 @@ fn gone(error: &CallError) -> bool {
 const ENDS_IT: &str =
     "An importer that calls it in its own process ends with it, and loses its results.";
 
-/// What such an end does to an importer.
+/// Describes the effect of this failure on an importer.
 fn harm(failure: &Failure) -> Option<&'static str> {
     match failure {
         Failure::Killed(..) | Failure::Exited(_) => Some(ENDS_IT),
@@ -91,7 +92,7 @@ impl<S: Slave> Trial<'_, S> {
         self.states();
     }
 
-    /// The first instance made its steps.
+    /// Records that the first instance completed its steps.
     fn record_success(&mut self, trajectory: &Trajectory) {
         let steps = u32::try_from(trajectory.len().saturating_sub(1)).unwrap_or(u32::MAX);
         let in_part = self.findings.all.iter().rfind(|own| own.severity == Note);
@@ -104,7 +105,7 @@ impl<S: Slave> Trial<'_, S> {
         };
     }
 
-    /// The first instance failed: the last error says why.
+    /// Records that the first instance failed; the last error is the reason.
     fn record_failure(&mut self) {
         let mut errors = self.findings.all.iter_mut().filter(|own| own.severity == Error);
         let Some(error) = errors.next_back() else { return };
@@ -121,7 +122,7 @@ impl<S: Slave> Trial<'_, S> {
         self.findings.add(Warning, "fmi2DoStep", what, (why, "2.1"));
     }
 
-    /// An instance in initialization mode or beyond; what fails is a finding.
+    /// Creates an instance and brings it to step mode; adds a finding if that fails.
     fn initialized(&mut self, name: &str, stop_time: Option<f64>, before: Option<S>) -> Option<S> {
         let mut slave = match (self.make)(name, before) {
             Ok(slave) => slave,
@@ -145,7 +146,7 @@ impl<S: Slave> Trial<'_, S> {
         }
     }
 
-    /// There is no instance.
+    /// Records that the instance could not be created.
     fn refused(&mut self, error: &anyhow::Error) {
         match error.downcast_ref::<CallError>() {
             Some(error) if error.function == "fmi2FreeInstance" => {
@@ -188,12 +189,13 @@ impl<S: Slave> Trial<'_, S> {
         own.step_size.or(span).filter(|size| *size > 0.0).unwrap_or(0.001)
     }
 
-    /// Time of communication point `k`.
+    /// Returns the time of communication point `k`.
     fn time(&self, k: u32) -> f64 {
         self.start_time() + f64::from(k) * self.step_size()
     }
 
-    /// Runs an instance of that name from begin to end: outputs and instance.
+    /// Runs an instance with the name `name` from start to end; returns its outputs and the
+    /// instance.
     fn trajectory(&mut self, name: &str, before: Option<S>) -> Option<(Trajectory, S)> {
         let mut slave = self.initialized(name, None, before)?;
         if name == "first" {
@@ -222,7 +224,7 @@ impl<S: Slave> Trial<'_, S> {
         Some((trajectory, slave))
     }
 
-    /// The outputs now and after each of the steps from communication point `from` on.
+    /// Returns the outputs now and after each step from communication point `from`.
     fn steps(&mut self, slave: &mut S, from: u32) -> Option<Trajectory> {
         let mut trajectory = vec![self.read(slave)?];
         for k in from..from + STEPS {
@@ -252,7 +254,7 @@ impl<S: Slave> Trial<'_, S> {
             .ok()
     }
 
-    /// Compares start values; none where the process of the FMU ended meanwhile.
+    /// Compares the start values with the description; `None` if the process of the FMU ended.
     fn start_values(&mut self, slave: &mut S) -> Option<()> {
         for variable in kept(self.description).take(LOOKED_AT) {
             let Some(stated) = start(variable) else { continue };
@@ -287,7 +289,7 @@ impl<S: Slave> Trial<'_, S> {
         }
     }
 
-    /// A value reference that no variable has is an error.
+    /// Checks that an unknown value reference is an error.
     fn unknown_reference(&mut self) {
         let Some(mut slave) = self.initialized("unknown", None, None) else { return };
         match slave.get_real(&[unknown_reference(self.description)], &mut [0.0]) {
@@ -312,7 +314,7 @@ impl<S: Slave> Trial<'_, S> {
         }
     }
 
-    /// A step beyond a stop time that was defined is an error.
+    /// Checks that a step beyond a defined stop time is an error.
     fn step_past_stop_time(&mut self) {
         let (start, size) = (self.start_time(), self.step_size());
         let Some(mut slave) = self.initialized("end", Some(start + 0.5 * size), None) else {
@@ -331,7 +333,7 @@ impl<S: Slave> Trial<'_, S> {
         }
     }
 
-    /// A state that is restored, directly or through bytes, goes on as before.
+    /// Checks that a restored state, directly or through bytes, gives the same outputs.
     fn states(&mut self) {
         let Some(flags) = &self.description.co_simulation else { return };
         if !flags.can_get_and_set_fmu_state {
@@ -364,7 +366,7 @@ impl<S: Slave> Trial<'_, S> {
         }
     }
 
-    /// Whether the steps could be made again.
+    /// Repeats the steps and compares the outputs; returns whether the steps could be made.
     fn again(&mut self, slave: &mut S, first: &Trajectory, function: &str) -> bool {
         let second = self.steps(slave, STEPS);
         let apart = second.as_ref().map_or(0.0, |second| distance(first, second));

@@ -1,4 +1,4 @@
-//! The shared libraries of all platforms, looked at without loading them.
+//! Checks of the shared libraries of all platforms, without loading them.
 
 use std::collections::BTreeSet;
 use std::io;
@@ -12,7 +12,7 @@ use super::finding::{Finding, Findings, Part, Tool};
 
 const SECTION: &str = "2.3";
 
-/// A folder of `binaries`: what its libraries must be.
+/// A folder of `binaries` with the file format, processor and extension of its libraries.
 struct Platform {
     folder: &'static str,
     format: BinaryFormat,
@@ -51,10 +51,10 @@ const PLATFORMS: [Platform; 15] = {
     ]
 };
 
-/// The bytes of a file of the FMU, by its name there.
+/// Reads the bytes of a file of the FMU, by its name in the archive.
 pub(crate) type Read<'a> = dyn Fn(&str) -> io::Result<Vec<u8>> + 'a;
 
-/// Checks the folder `binaries` of an FMU that has files of `names`.
+/// Checks the folder `binaries` of an FMU with the files `names`.
 pub(crate) fn check(
     read: &Read<'_>,
     names: &[String],
@@ -89,7 +89,7 @@ pub(crate) fn check(
     findings.all
 }
 
-/// There is no library of the name that importers look for.
+/// Adds a finding for a missing library.
 fn missing(path: String, platform: &Platform, names: &[String], findings: &mut Findings) {
     let folder = format!("binaries/{}/", platform.folder);
     let mut there = names.iter().filter(|own| own.starts_with(&folder) && !own.ends_with('/'));
@@ -103,7 +103,7 @@ fn missing(path: String, platform: &Platform, names: &[String], findings: &mut F
     findings.stopping(&[Tool::Platform(platform.folder)]);
 }
 
-/// The functions without which FMI Library takes a flag for false.
+/// The functions that FMI Library requires only if a capability flag is true.
 const BY_FLAG: [&str; 7] = [
     "fmi2GetFMUstate",
     "fmi2SetFMUstate",
@@ -114,7 +114,7 @@ const BY_FLAG: [&str; 7] = [
     "fmi2GetDirectionalDerivative",
 ];
 
-/// The tools that an error in a library stops: in co-simulation, where it has that.
+/// Returns the tools that an error in a library stops: in co-simulation, if the FMU supports it.
 fn stops(finding: &Finding, platform: &Platform, interfaces: &[InterfaceType]) -> Vec<Tool> {
     if finding.severity != Error {
         return Vec::new();
@@ -133,7 +133,7 @@ fn stops(finding: &Finding, platform: &Platform, interfaces: &[InterfaceType]) -
     }
 }
 
-/// The names of the libraries, each with the interfaces that it serves.
+/// Returns the names of the libraries, each with the interface types that it serves.
 fn interfaces(description: &ModelDescription) -> Vec<(Vec<InterfaceType>, String)> {
     use InterfaceType::{CoSimulation, ModelExchange};
     let exchange = description.model_exchange.as_ref().map(|own| own.model_identifier.clone());
@@ -182,7 +182,7 @@ fn library(
     versions(&file, path, findings);
 }
 
-/// The part for `machine` of a file; of a universal one for macOS that of this machine.
+/// Returns the part of a file for `machine`; a universal file for macOS has several parts.
 fn slice_of(bytes: &[u8], machine: Architecture) -> Option<&[u8]> {
     use object::read::macho::{FatArch as _, MachOFatFile32, MachOFatFile64};
     if let Ok(fat) = MachOFatFile32::parse(bytes) {
@@ -199,7 +199,7 @@ fn slice_of(bytes: &[u8], machine: Architecture) -> Option<&[u8]> {
 /// Functions that need no instance.
 const ALWAYS: [&str; 3] = ["fmi2GetTypesPlatform", "fmi2GetVersion", "fmi2Instantiate"];
 
-/// The functions that every library for `interfaces` exports.
+/// Returns the functions that a library for `interfaces` must export.
 fn required_functions(interfaces: &[InterfaceType]) -> impl Iterator<Item = &'static str> {
     let belongs = |function: &Function| {
         let mut states = State::EVERY.iter();
@@ -222,7 +222,7 @@ fn functions(
     for export in exports.flatten() {
         if let NameOrOrdinal::Name(name) = export.name() {
             let name = String::from_utf8_lossy(name);
-            // Names in C begin with an underscore on macOS, where the list has it.
+            // On macOS, the export list has C names with a leading underscore.
             let plain = name.strip_prefix('_').filter(|rest| rest.starts_with("fmi2"));
             exported.insert(plain.unwrap_or(&name).to_owned());
         }
@@ -244,7 +244,7 @@ fn functions(
     findings.add(Error, path, what, (why, "2.1.1"));
 }
 
-/// Libraries that belong to the system, by the beginnings of their names in lower case.
+/// Start of the names, in lower case, of libraries that belong to the operating system.
 const SYSTEM: [&str; 60] = [
     "libc.so",
     "libm.so",
@@ -335,7 +335,7 @@ fn needs(file: &object::File<'_>, path: &str, names: &[String], findings: &mut F
     }
 }
 
-/// The newest version of glibc that a library for Linux needs.
+/// Reports the newest version of glibc that a library for Linux needs.
 fn versions(file: &object::File<'_>, path: &str, findings: &mut Findings) {
     let mut newest: Option<(Vec<u32>, String)> = None;
     for import in file.imports().into_iter().flatten().flatten() {

@@ -1,4 +1,4 @@
-//! `modelDescription.xml`: what was read with a warning, and the rules on what was read.
+//! Checks of `modelDescription.xml`: warnings of the parser, and rules of the standard.
 
 use fmu_description::{ModelDescription, Warning};
 
@@ -7,7 +7,8 @@ use super::finding::{Finding, Findings, Part, Severity, Tool};
 
 const FILE: &str = "modelDescription.xml";
 
-/// A rule that a description breaks, by words of the text: who stumbles over it, and which tools it stops.
+/// A rule, recognised by words of the finding: its effect on importers, and the tools that it
+/// stops.
 struct Rule {
     words: &'static str,
     why: &'static str,
@@ -34,7 +35,7 @@ const RULES: [Rule; 15] = {
             &[FmpyValidation],
         ),
         rule("has a start value, which", refused, &[FmpyValidation]),
-        // FMPy takes it for the default.
+        // FMPy treats it as the default.
         rule("initial exact is not allowed for discrete input", "", &[]),
         rule("initial exact is not allowed for continuous input", "", &[]),
         rule("is not allowed for", refused, &[FmpyValidation]),
@@ -55,7 +56,7 @@ const RULES: [Rule; 15] = {
     ]
 };
 
-/// The tools that something stops which was read with a warning, and why.
+/// Returns the tools that a warning of the parser stops, and the reason.
 fn stops(warning: &Warning) -> (&'static [Tool], &'static str) {
     if warning.place.contains("fmiVersion") {
         return (&[Tool::Fmpy], "FMPy reads 2.0 only.");
@@ -84,7 +85,7 @@ pub(super) fn check(description: &ModelDescription, warnings: &[Warning]) -> Vec
     }
     for problem in description.problems() {
         let rule = RULES.iter().find(|rule| problem.text.contains(rule.words));
-        // "should be", says the standard.
+        // The standard says "should be".
         let advice = problem.text.starts_with("generationDateAndTime");
         let severity = if advice { Severity::Warning } else { Severity::Error };
         let why = rule.map_or("", |rule| rule.why);
@@ -95,7 +96,7 @@ pub(super) fn check(description: &ModelDescription, warnings: &[Warning]) -> Vec
     findings.all
 }
 
-/// What the standard leaves open and users stumble over.
+/// Adds notes on things that the standard allows and users run into.
 fn notes(description: &ModelDescription, findings: &mut Findings) {
     let experiment = description.default_experiment.unwrap_or_default();
     let stated = [("stopTime", experiment.stop_time), ("stepSize", experiment.step_size)];

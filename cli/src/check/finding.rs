@@ -1,22 +1,22 @@
-//! What a check finds, for people and as JSON.
+//! The findings of a check, as text and as JSON.
 
 use std::fmt;
 
 use serde::Serialize;
 
-/// How much a finding weighs.
+/// The severity of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Severity {
-    /// Breaks the standard, or an importer refuses the FMU.
+    /// Violates the standard, or makes an importer refuse the FMU.
     Error,
-    /// Some importer, some day, will stumble.
+    /// Causes problems in some importers.
     Warning,
-    /// Good to know.
+    /// Information.
     Note,
 }
 
-/// Which part of the FMU a finding is about.
+/// The part of the FMU that a finding concerns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Part {
@@ -26,18 +26,18 @@ pub(crate) enum Part {
     Description,
     /// The shared libraries.
     Binaries,
-    /// What the library of this platform does.
+    /// The behaviour of the library of this platform.
     Behaviour,
 }
 
-/// A tool, or a way of calling an FMU, that a finding is known to stop.
+/// A tool, or a way of calling an FMU, that a finding stops.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) enum Tool {
-    /// FMPy, with every option.
+    /// FMPy with any options.
     Fmpy,
-    /// FMPy's `simulate_fmu` by default.
+    /// FMPy's `simulate_fmu` with its default options.
     FmpyValidation,
-    /// FMI Library of Modelon, by which libcosim and `PyFMI` read FMUs.
+    /// FMI Library (Modelon), which libcosim and `PyFMI` use.
     FmiLibrary,
     /// Importers that call the FMU in their own process.
     InProcess,
@@ -71,13 +71,13 @@ pub(crate) struct Finding {
     /// The file, the place in it, or the function.
     #[serde(rename = "where")]
     pub(crate) place: String,
-    /// What was expected and found.
+    /// What was expected, and what was found.
     pub(crate) what: String,
-    /// Who stumbles, and how.
+    /// The effect on importers.
     pub(crate) why: Option<String>,
-    /// Section of FMI 2.0.5.
+    /// Section of the standard, FMI 2.0.5.
     pub(crate) section: Option<&'static str>,
-    /// The tools in which the FMU does not run because of it.
+    /// The tools that the finding stops.
     pub(crate) stops: Vec<Tool>,
 }
 
@@ -92,7 +92,7 @@ impl fmt::Display for Severity {
 }
 
 impl Finding {
-    /// Writes it as people read it, with `more` after what was found.
+    /// Writes the finding as text; `more` follows the description.
     pub(crate) fn write(&self, formatter: &mut fmt::Formatter<'_>, more: &str) -> fmt::Result {
         let Self { severity, place, what, section, why, .. } = self;
         write!(formatter, "{severity}: {place}: {what}{more}")?;
@@ -112,7 +112,7 @@ impl fmt::Display for Finding {
     }
 }
 
-/// The findings about one part, as they come.
+/// The findings about one part, in the order in which they are made.
 pub(crate) struct Findings {
     part: Part,
     pub(crate) all: Vec<Finding>,
@@ -142,7 +142,7 @@ impl Findings {
         });
     }
 
-    /// Says which tools the last finding stops.
+    /// Adds `tools` to the tools that the last finding stops.
     pub(crate) fn stopping(&mut self, tools: &[Tool]) {
         if let Some(last) = self.all.last_mut() {
             last.stops.extend(tools);

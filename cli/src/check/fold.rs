@@ -1,15 +1,15 @@
-//! Findings that say the same of several variables or files, as one line.
+//! Groups equal findings about several variables or files into one line.
 
 use std::collections::{HashMap, HashSet};
 use std::fmt;
 
 use super::finding::{Finding, Part, Severity, Tool};
 
-/// A finding, and how many others say the same of something else.
+/// A finding with the number of equal findings about other objects.
 pub(super) struct FindingGroup<'a> {
     pub(super) first: &'a Finding,
     pub(super) more: usize,
-    /// What the others are about, in the plural.
+    /// The other objects, as a noun in the plural.
     others: &'static str,
 }
 
@@ -23,11 +23,11 @@ impl fmt::Display for FindingGroup<'_> {
     }
 }
 
-/// What findings of one line have in common.
+/// The common part of the findings in one line.
 type Key<'a> = (Severity, Part, String, String, Option<String>, Option<&'static str>, &'a [Tool]);
 
-/// One line for each kind of finding, in the order of the first ones. Two are of one kind where they
-/// differ in names of variables, quoted texts, paths and numbers only.
+/// Groups findings by kind, in the order of their first occurrence. Two findings have the same kind
+/// if they differ only in names of variables, quoted texts, paths and numbers.
 pub(super) fn fold<'a>(
     findings: &'a [Finding],
     variables: &HashSet<&str>,
@@ -36,7 +36,7 @@ pub(super) fn fold<'a>(
     let mut known: HashMap<Key<'a>, usize> = HashMap::new();
     for finding in findings {
         let mut names = false;
-        // A version or a count in a library says something that is different for each.
+        // Numbers in findings about libraries, such as versions, distinguish them.
         let numbers = finding.part != Part::Binaries;
         let place = kind(&finding.place, variables, true, &mut names);
         let what = kind(&finding.what, variables, numbers, &mut names);
@@ -58,8 +58,8 @@ pub(super) fn fold<'a>(
     lines
 }
 
-/// The text without what distinguishes findings of one kind; `names` becomes true where that is the
-/// name of a variable.
+/// Removes the parts that may differ within a kind; sets `names` to true if a part is the name of a
+/// variable.
 fn kind(text: &str, variables: &HashSet<&str>, numbers: bool, names: &mut bool) -> String {
     let mut kept = String::with_capacity(text.len());
     // Every second part is within quotation marks.

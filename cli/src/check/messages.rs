@@ -1,4 +1,4 @@
-//! The messages of an FMU while it is tried.
+//! Counts the messages of an FMU during a trial.
 
 use std::collections::BTreeSet;
 use std::fmt::Debug;
@@ -8,26 +8,26 @@ use tracing::field::{Field, Visit};
 use tracing::span::{Attributes, Id, Record};
 use tracing::{Event, Metadata, Subscriber};
 
-/// Where the master sends the messages of FMUs.
+/// `target` of the events for messages of FMUs.
 const TARGET: &str = "fmu";
 
-/// What was heard.
+/// Summary of the messages.
 #[derive(Default)]
 pub(super) struct MessageSummary {
-    /// The log categories that are used.
+    /// The log categories used.
     pub(super) categories: BTreeSet<String>,
-    /// Messages, also those that came too fast to be kept.
+    /// Number of messages, including those that arrived too fast to be kept.
     pub(super) messages: u64,
 }
 
-/// Hears the messages.
+/// A subscriber that records the messages.
 #[derive(Clone, Default)]
 pub(super) struct MessageRecorder {
     messages: Arc<Mutex<MessageSummary>>,
 }
 
 impl MessageRecorder {
-    /// Runs `body` and gives what came meanwhile.
+    /// Runs `body`; returns its result and the summary of the messages during the call.
     pub(super) fn during<T>(body: impl FnOnce() -> T) -> (T, MessageSummary) {
         let heard = Self::default();
         let result = tracing::subscriber::with_default(heard.clone(), body);
@@ -36,7 +36,7 @@ impl MessageRecorder {
     }
 }
 
-/// Takes the field `category` of an event, and the number of messages that it stands for.
+/// Reads the field `category` of an event, and the number of messages that the event represents.
 struct Category(Option<String>, u64);
 
 impl Visit for Category {

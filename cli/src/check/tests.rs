@@ -1,4 +1,4 @@
-//! The behaviour of slaves that do one thing wrong.
+//! Findings about slaves with a single fault.
 
 use fmu_description::Experiment;
 use fmu_description::ModelDescription;
@@ -18,7 +18,7 @@ const XML: &str = r#"<fmiModelDescription fmiVersion="2.0" modelName="Sum" guid=
 </ModelVariables><ModelStructure><Outputs><Unknown index="2"/></Outputs></ModelStructure>
 </fmiModelDescription>"#;
 
-/// What a slave does wrong.
+/// The fault of a slave.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fault {
     Nothing,
@@ -35,7 +35,7 @@ enum Fault {
     Step,
 }
 
-/// The integral of its input, without anything else.
+/// A slave whose output is the integral of its input.
 struct Sum {
     description: ModelDescription,
     fault: Fault,

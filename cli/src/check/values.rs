@@ -1,9 +1,9 @@
-//! The values of the variables of a slave, and those that the XML promises.
+//! Values of variables: read from a slave, and stated in the XML.
 
 use fmu_description::{Causality, Kind, ModelDescription, ScalarVariable, Variability};
 use master::{CallError, Slave};
 
-/// A value of any type, comparable by its bits.
+/// A value of any type; equality compares bits.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Value {
     Real(u64),
@@ -24,7 +24,7 @@ impl std::fmt::Display for Value {
 }
 
 impl Value {
-    /// Whether it is the number that the XML states, whose last digit may be rounded.
+    /// Whether the value equals the number in the XML, whose last digit may be rounded.
     pub(super) fn agrees(&self, stated: &Value) -> bool {
         match (self, stated) {
             (Value::Real(found), Value::Real(stated)) => {
@@ -35,14 +35,14 @@ impl Value {
         }
     }
 
-    /// The difference relative to the larger of the two.
+    /// Returns the difference relative to the larger of the two.
     fn apart(&self, other: &Value) -> f64 {
         match (self, other) {
             _ if self == other => 0.0,
             (Value::Real(one), Value::Real(other)) => {
                 let (one, other) = (f64::from_bits(*one), f64::from_bits(*other));
                 let relative = (one - other).abs() / one.abs().max(other.abs());
-                // Zeros of both signs are equal.
+                // Positive and negative zero are equal.
                 if (one - other).abs() <= 0.0 {
                     0.0
                 } else {
@@ -58,8 +58,8 @@ impl Value {
     }
 }
 
-/// The largest difference between two courses of outputs relative to the size of the value; infinite
-/// where they are of another length, or values differ that are not numbers.
+/// Returns the largest difference between two trajectories of outputs, relative to the size of the
+/// values; infinite if the lengths or values other than numbers differ.
 pub(super) fn distance(one: &[Vec<Value>], other: &[Vec<Value>]) -> f64 {
     if one.len() != other.len() {
         return f64::INFINITY;
@@ -96,7 +96,7 @@ pub(super) fn get(slave: &mut dyn Slave, variable: &ScalarVariable) -> Result<Va
     })
 }
 
-/// The start value in the XML.
+/// Returns the start value in the XML.
 pub(super) fn start(variable: &ScalarVariable) -> Option<Value> {
     match &variable.kind {
         Kind::Real(own) => own.start.map(|value| Value::Real(value.to_bits())),
@@ -106,7 +106,7 @@ pub(super) fn start(variable: &ScalarVariable) -> Option<Value> {
     }
 }
 
-/// The variables that keep their start value through the initialization: parameters, inputs,
+/// Returns the variables that keep their start value during the initialization: parameters, inputs,
 /// constants.
 pub(super) fn kept(description: &ModelDescription) -> impl Iterator<Item = &ScalarVariable> {
     description.variables.iter().filter(|own| {
@@ -115,12 +115,12 @@ pub(super) fn kept(description: &ModelDescription) -> impl Iterator<Item = &Scal
     })
 }
 
-/// The variables whose course is compared.
+/// Returns the variables whose trajectories are compared.
 pub(super) fn outputs(description: &ModelDescription) -> impl Iterator<Item = &ScalarVariable> {
     description.variables.iter().filter(|own| own.causality == Causality::Output)
 }
 
-/// A value reference that no variable has.
+/// Returns a value reference that no variable has.
 pub(super) fn unknown_reference(description: &ModelDescription) -> u32 {
     let used: std::collections::HashSet<u32> =
         description.variables.iter().map(|own| own.value_reference).collect();

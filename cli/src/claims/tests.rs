@@ -1,4 +1,4 @@
-//! The verdicts on made-up runs for which every claim is known.
+//! Verdicts on synthetic runs with known answers.
 
 use super::*;
 

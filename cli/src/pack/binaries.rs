@@ -1,4 +1,4 @@
-//! Libraries of other platforms, built elsewhere.
+//! Libraries for other platforms, built elsewhere.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use fmu_description::ModelDescription;
 use super::read;
 use crate::check::{Severity, binaries};
 
-/// What Rust calls the platforms of FMI that crates may differ on.
+/// Rust targets of the FMI platforms on which dependencies may differ.
 const TARGETS: [(&str, &[&str]); 8] = [
     ("linux64", &["x86_64-unknown-linux-gnu"]),
     ("linux32", &["i686-unknown-linux-gnu"]),
@@ -21,11 +21,11 @@ const TARGETS: [(&str, &[&str]); 8] = [
     ("aarch64-darwin", &["aarch64-apple-darwin"]),
 ];
 
-/// The targets of the platforms that are in `folder`.
+/// Returns the targets of the platforms in `folder`.
 ///
 /// # Errors
 ///
-/// Where the folder cannot be read.
+/// Returns an error if the folder cannot be read.
 pub(super) fn targets(folder: &Path) -> anyhow::Result<Vec<&'static str>> {
     let there = folders(folder)?;
     let is_there = |name: &str| there.iter().any(|path| path.ends_with(name));
@@ -33,13 +33,13 @@ pub(super) fn targets(folder: &Path) -> anyhow::Result<Vec<&'static str>> {
     Ok(found.copied().collect())
 }
 
-/// The libraries of a model among those in `folder`, as `win64/MODEL.dll`: where each goes in the
-/// FMU, and its bytes.
+/// Returns the libraries of a model in `folder`, such as `win64/MODEL.dll`: path in the FMU, and
+/// bytes.
 ///
 /// # Errors
 ///
-/// Where there is none, or one that importers would refuse: of another platform than its folder
-/// says, or without a function of the standard.
+/// Returns an error if there is no library, or if importers would refuse one: built for another
+/// platform than its folder, or without a function of the standard.
 pub(super) fn collect(
     folder: &Path,
     description: &ModelDescription,
@@ -86,12 +86,12 @@ fn refuse_broken(
     if faults.is_empty() { Ok(()) } else { bail!("{}", faults.join("\n")) }
 }
 
-/// The folders in `folder`, by name.
+/// Returns the folders in `folder`, sorted by name.
 fn folders(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     Ok(files(folder)?.into_iter().filter(|path| path.is_dir()).collect())
 }
 
-/// What is in `folder`, by name.
+/// Returns the content of `folder`, sorted by name.
 fn files(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let failed = || format!("cannot read {}", folder.display());
     let items = fs::read_dir(folder).with_context(failed)?;

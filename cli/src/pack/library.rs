@@ -1,4 +1,4 @@
-//! Cargo builds the library of a crate and says what is in it.
+//! Builds the library of a crate with cargo and lists its dependencies.
 
 use std::collections::HashSet;
 use std::ffi::OsString;
@@ -12,10 +12,10 @@ use cargo_metadata::{
     TargetKind,
 };
 
-/// The profile `fmu` for workspaces that have none of this name.
+/// The profile `fmu`, for workspaces without a profile of this name.
 const PROFILE: &str = include_str!("fmu-profile.toml");
 
-/// The library of a crate, and what was compiled into it.
+/// The library of a crate with the packages compiled into it.
 pub(super) struct Library {
     pub(super) file: PathBuf,
     pub(super) package: Package,
@@ -31,12 +31,12 @@ pub(super) struct Toolchain {
     host: String,
 }
 
-/// Builds the library of the crate in `folder`; `locked` as in cargo. The dependencies are also those
-/// of the targets `others`, for which it is built elsewhere.
+/// Builds the library of the crate in `folder`; `locked` is `--locked` of cargo. The dependencies
+/// include those of the targets `others`, for which the library is built elsewhere.
 ///
 /// # Errors
 ///
-/// Where there is no such crate, it is no `cdylib`, or it does not compile.
+/// Returns an error if there is no such crate, if it is not a `cdylib`, or if it does not compile.
 pub(super) fn build(folder: &Path, locked: bool, others: &[&str]) -> anyhow::Result<Library> {
     let folder = std::path::absolute(folder)?;
     let manifest = folder.join("Cargo.toml");
@@ -99,7 +99,7 @@ impl Toolchain {
     }
 }
 
-/// The program that the environment names, as cargo does for what it runs.
+/// Returns the program in the environment variable `variable`, as cargo does, or `name`.
 fn program(variable: &str, name: &str) -> OsString {
     std::env::var_os(variable).unwrap_or_else(|| name.into())
 }
@@ -115,7 +115,7 @@ fn metadata(folder: &Path, host: &str, locked: bool) -> anyhow::Result<Metadata>
     })
 }
 
-/// Builds the library in the profile `fmu` and returns all that it is made of.
+/// Builds the library with the profile `fmu` and returns all artifacts.
 fn compile(folder: &Path, metadata: &Metadata, locked: bool) -> anyhow::Result<Vec<Artifact>> {
     let root = &metadata.workspace_root;
     let target = metadata.target_directory.join("libraries");
@@ -128,7 +128,7 @@ fn compile(folder: &Path, metadata: &Metadata, locked: bool) -> anyhow::Result<V
             command.args(["--config", &format!("profile.fmu.{name}={value}")]);
         }
     }
-    // Cargo gives rustc paths relative to the workspace; with absolute ones, a macro may have it.
+    // Cargo passes paths relative to the workspace to rustc; a macro may use absolute paths.
     command.args(["--", &format!("--remap-path-prefix={root}=.")]);
     command.env("CARGO_ENCODED_RUSTFLAGS", remappings(metadata).join("\u{1f}"));
     let mut cargo = command
@@ -150,8 +150,8 @@ fn compile(folder: &Path, metadata: &Metadata, locked: bool) -> anyhow::Result<V
     Ok(artifacts)
 }
 
-/// Flags that keep paths of this machine out of the library, so that the same sources give the same
-/// bytes.
+/// Returns compiler flags that remove local paths from the library, so that the same sources give
+/// the same bytes.
 fn remappings(metadata: &Metadata) -> Vec<String> {
     let cargo_home = std::env::var_os("CARGO_HOME")
         .map(PathBuf::from)
@@ -169,7 +169,7 @@ fn remappings(metadata: &Metadata) -> Vec<String> {
     flags
 }
 
-/// The settings of [`PROFILE`].
+/// Returns the settings of [`PROFILE`].
 fn profile() -> anyhow::Result<toml::Table> {
     let mut file: toml::Table = PROFILE.parse()?;
     let profile = file.get_mut("profile").and_then(|profiles| profiles.get_mut("fmu"));
@@ -184,13 +184,13 @@ fn has_profile(root: &Path) -> anyhow::Result<bool> {
     Ok(manifest.get("profile").is_some_and(|profiles| profiles.get("fmu").is_some()))
 }
 
-/// The packages that are in the library: reached, and built.
+/// Returns the packages in the library: dependencies that were built.
 fn dependencies(metadata: &Metadata, root: &Package, artifacts: &[Artifact]) -> Vec<Package> {
     let built: HashSet<&PackageId> = artifacts.iter().map(|own| &own.package_id).collect();
     reached(metadata, root).into_iter().filter(|own| built.contains(&own.id)).cloned().collect()
 }
 
-/// The packages that `root` needs, without build scripts, tests and procedural macros.
+/// Returns the dependencies of `root`, without build scripts, tests and procedural macros.
 fn reached<'a>(metadata: &'a Metadata, root: &Package) -> Vec<&'a Package> {
     let nodes = metadata.resolve.iter().flat_map(|resolve| &resolve.nodes);
     let nodes: Vec<_> = nodes.collect();

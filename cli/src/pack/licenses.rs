@@ -1,4 +1,4 @@
-//! `documentation/licenses` of an FMU: the texts that come with the crate and its dependencies.
+//! The licences in `documentation/licenses` of an FMU: texts of the crate and its dependencies.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,13 +10,13 @@ use fmu_description::package::Package;
 use super::library::Library;
 use super::read;
 
-/// How the names of files with licences and copyright notices begin, in lower case.
+/// Start of the names, in lower case, of files with licences and copyright notices.
 const NAMES: [&str; 6] = ["license", "licence", "unlicense", "copying", "copyright", "notice"];
-/// Where the compiler keeps the notices of the standard library.
+/// Path of the notices of the standard library in the compiler's folder.
 const STANDARD_LIBRARY: &str = "share/doc/rust/COPYRIGHT-library.html";
 
-/// Adds `license.txt` with the licence of the crate and a list of what else is in the library, and a
-/// folder with the texts of each package in that list.
+/// Adds `license.txt`, with the licence of the crate and a list of the packages in the library, and
+/// a folder with the texts of each package.
 pub(super) fn add(package: &mut Package, library: &Library) -> anyhow::Result<()> {
     let mut entry = line(&library.package).into_bytes();
     for path in texts(&library.package)? {
@@ -54,7 +54,7 @@ fn line(package: &Crate) -> String {
     format!("{} {}: {license}\n", package.name, package.version)
 }
 
-/// Files with texts of licences: in the folder of the package, or else upwards to its workspace.
+/// Returns the files with licence texts, in the folder of the package or upwards to its workspace.
 fn texts(package: &Crate) -> anyhow::Result<Vec<PathBuf>> {
     let stated = package.license_file().map(PathBuf::from).filter(|path| path.is_file());
     for folder in package.manifest_path.as_std_path().ancestors().skip(1) {
@@ -71,7 +71,7 @@ fn texts(package: &Crate) -> anyhow::Result<Vec<PathBuf>> {
     Ok(Vec::new())
 }
 
-/// The files in `folder` whose names say that they are licences, and those in a folder `LICENSES`.
+/// Returns the files in `folder` with names of licences, and the files in a folder `LICENSES`.
 fn named(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     let failed = || format!("cannot read {}", folder.display());

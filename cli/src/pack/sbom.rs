@@ -16,12 +16,12 @@ use fmu_description::ModelDescription;
 
 use super::library::Library;
 
-/// The bill of the FMU with this description, as JSON; `foreign` are libraries that were built
-/// elsewhere, by a compiler whose version is not known here.
+/// Returns the bill of materials of the FMU with this description, as JSON. `foreign` are libraries
+/// that were built elsewhere, by a compiler of unknown version.
 ///
 /// # Errors
 ///
-/// Where a crate states what `CycloneDX` cannot have: a name or an expression of licences.
+/// Returns an error if a crate has a name or a licence expression that `CycloneDX` does not allow.
 pub(super) fn bill(
     description: &ModelDescription,
     library: &Library,
@@ -76,7 +76,7 @@ fn component(package: &Crate, kind: Classification) -> anyhow::Result<Component>
     Ok(component)
 }
 
-/// The licences by a SPDX expression; crates of old have a slash for OR.
+/// Parses a licence as an SPDX expression; old crates use a slash for OR.
 fn licenses(stated: &str) -> anyhow::Result<Licenses> {
     let expression = SpdxExpression::parse_lax(stated.replace('/', " OR "))
         .with_context(|| format!("the licence {stated:?}"))?;

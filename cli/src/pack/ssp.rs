@@ -19,7 +19,7 @@ const LINKS: [[&str; 4]; 3] = [
 ];
 /// Stop time of the paper's experiment in s.
 const STOP_TIME: f64 = 100.0;
-/// The command is sampled at this step in s, the one that both FMUs propose.
+/// Sample time of the command in s; both FMUs propose it as communication step.
 const STEP: f64 = 1e-3;
 
 /// Writes `InvertedPendulum.ssp` into the folder `out`.

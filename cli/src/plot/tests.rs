@@ -54,7 +54,7 @@ fn texts(svg: &str) -> Vec<String> {
     texts.filter_map(|node| node.text()).map(str::to_owned).collect()
 }
 
-/// The points of each curve: to the right, and down.
+/// Returns the points of each curve in pixels: to the right, and down.
 fn curves(svg: &str) -> Vec<Vec<(f64, f64)>> {
     let document = Document::parse(svg).unwrap();
     let paths = document.descendants().filter(|node| node.has_tag_name("path"));

@@ -1,5 +1,5 @@
-//! Ctrl-C and SIGTERM: the run ends at the current step; where that step does not return, without
-//! it.
+//! Handles Ctrl-C and SIGTERM: the run ends after the current step, or without it if the step does
+//! not return.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -11,9 +11,9 @@ use fmu_import::crash;
 /// Exit status of a run that was interrupted.
 pub(crate) const STATUS: u8 = 130;
 
-/// How long the current step may take from the signal on.
+/// Time limit of the current step after the signal.
 const PATIENCE: Duration = Duration::from_millis(800);
-/// Between two looks at the calls of the FMUs after that.
+/// Interval of checks whether FMU calls return after that.
 const LOOK: Duration = Duration::from_millis(50);
 
 static LISTENING: AtomicBool = AtomicBool::new(false);
@@ -21,7 +21,8 @@ static RAISED: AtomicBool = AtomicBool::new(false);
 static NOTICED: AtomicBool = AtomicBool::new(false);
 static STARTED: AtomicBool = AtomicBool::new(false);
 
-/// From now on a signal is noted, and the process ends soon after it; a second one ends it at once.
+/// Starts to handle signals: the first one ends the run soon, a second one ends the process at
+/// once.
 pub(super) fn listen() -> anyhow::Result<()> {
     if LISTENING.swap(true, Ordering::Relaxed) {
         return Ok(());
@@ -31,19 +32,19 @@ pub(super) fn listen() -> anyhow::Result<()> {
             crash::give_up();
             crash::leave(STATUS);
         }
-        // Without the thread only the step itself and a second signal end the run.
+        // If the thread cannot start, only the step itself and a second signal end the run.
         let _ = thread::Builder::new().name("interrupt".to_owned()).spawn(wait);
     };
     ctrlc::set_handler(raised).context("signals cannot be handled")
 }
 
-/// Waits for the end of the run, and ends the process where an FMU keeps it from ending.
+/// Waits for the end of the run, and ends the process if an FMU call does not return.
 fn wait() {
     thread::sleep(PATIENCE);
     if !NOTICED.load(Ordering::Relaxed) {
         crash::give_up();
     }
-    // Results, pictures and checkpoints may take their time, FMUs may not.
+    // Writing results, plots and checkpoints may take time; FMU calls may not.
     let mut before = Vec::new();
     loop {
         let calls = crash::calls();
@@ -55,23 +56,23 @@ fn wait() {
     }
 }
 
-/// Whether a signal has come.
+/// Whether a signal has arrived.
 #[inline]
 pub(super) fn is_raised() -> bool {
     RAISED.load(Ordering::Relaxed)
 }
 
-/// The first step is about to begin.
+/// Records that the first step starts.
 pub(super) fn start() {
     STARTED.store(true, Ordering::Relaxed);
 }
 
-/// Whether a run has begun to step.
+/// Whether the first step has started.
 pub(crate) fn has_started() -> bool {
     STARTED.load(Ordering::Relaxed)
 }
 
-/// The steps have ended: only what follows them is left.
+/// Records that the steps have ended and only the final work remains.
 pub(super) fn notice() {
     NOTICED.store(true, Ordering::Relaxed);
 }

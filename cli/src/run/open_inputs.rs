@@ -1,13 +1,13 @@
-//! What stays unconnected where connections are made by names, and what to type for it.
+//! Lists the inputs without a connection, with options that would set or connect them.
 
 use master::{Port, System};
 
-/// Most inputs that are listed, and most outputs that are proposed for one.
+/// Largest number of inputs listed, and of outputs proposed for one.
 const INPUTS: usize = 20;
 const OUTPUTS: usize = 3;
 
-/// A line for each input without a connection: its start value counts unless it is connected. Empty
-/// where every input has a source.
+/// Returns a line for each input without a connection, which keeps its start value; empty if every
+/// input has a source.
 pub(super) fn list(system: &System) -> String {
     let open = if system.slaves.len() > 1 { system.free_inputs() } else { Vec::new() };
     let mut lines: Vec<_> = open.iter().take(INPUTS).map(|&input| line(system, input)).collect();

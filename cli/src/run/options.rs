@@ -1,4 +1,4 @@
-//! The command line of `aso-ftc run`, put over a `system.toml`.
+//! The options of `aso-ftc run`, which take precedence over a `system.toml`.
 
 use std::path::{Path, PathBuf};
 
@@ -8,16 +8,16 @@ use toml::Spanned;
 
 use study::{Config, ConnectionEntry, Every, LoadedConfig, Memory, SavedRun};
 
-/// Where results go unless told otherwise.
+/// Default folder of the results.
 const OUT: &str = "results/run";
-/// The FMUs that are coupled where nothing is stated.
+/// The FMUs that are coupled by default.
 const PLANT: &str = "dist/FrictionPendulum.fmu";
 const CONTROLLER: &str = "dist/AsoController.fmu";
 
-/// The algorithm. What is not stated is chosen by what the FMUs can do.
+/// Options of the algorithm. Options that are not stated are chosen for the FMUs.
 #[derive(clap::Args)]
 pub(crate) struct AlgorithmOptions {
-    /// Communication step in s; the first one where it is chosen on the way
+    /// Communication step in s; the first one if the step control varies it
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub(crate) step: Option<f64>,
     /// Order of stepping: gauss-seidel (one FMU after the other) or jacobi (all from the same
@@ -30,29 +30,30 @@ pub(crate) struct AlgorithmOptions {
     /// The former name of --extrapolation
     #[arg(long, hide = true, conflicts_with = "extrapolation", value_parser = str::parse::<Extrapolation>)]
     course: Option<Extrapolation>,
-    /// Repetition of a step until inputs and outputs agree: once, newton, anderson or quasi-newton
+    /// Iteration of a step until inputs and outputs agree: once, newton, anderson or quasi-newton
     #[arg(long, value_parser = str::parse::<Coupling>)]
     pub(crate) coupling: Option<Coupling>,
-    /// Choice of the step: fixed, doubling, embedded, increment or energy
+    /// Choice of the step size: fixed, doubling, embedded, increment or energy
     #[arg(long, value_parser = str::parse::<StepControl>)]
     pub(crate) step_control: Option<StepControl>,
-    /// Relative tolerance of iteration and step control, in the master; what the solvers inside the
-    /// FMUs are told is --tolerance
+    /// Relative tolerance of iteration and step control in the master; --tolerance is for the
+    /// solvers inside the FMUs
     #[arg(long, value_name = "FRACTION", allow_negative_numbers = true)]
     pub(crate) relative_tolerance: Option<f64>,
-    /// Absolute tolerance of iteration and step control, in nominal values
+    /// Absolute tolerance of iteration and step control, as a fraction of nominal values
     #[arg(long, value_name = "FRACTION", allow_negative_numbers = true)]
     pub(crate) absolute_tolerance: Option<f64>,
-    /// Repeat a step that an FMU made in part only as far as it came; all FMUs must be able to go back
+    /// Let all FMUs repeat a step that one FMU completed only in part; all FMUs must support saved
+    /// states
     #[arg(long)]
     pub(crate) rollback: bool,
     /// Let an FMU step every N communication steps only; may be repeated
     #[arg(long, value_name = "FMU=N", value_parser = multiple)]
     pub(crate) every: Vec<(String, u32)>,
-    /// Threads that step FMUs side by side where that pays; 0: as many as there are processors
+    /// Number of threads that step FMUs in parallel if this is faster; 0: number of processors
     #[arg(long, value_name = "N")]
     pub(crate) jobs: Option<usize>,
-    /// Let values on connections be no numbers or infinite
+    /// Allow NaN and infinity on connections
     #[arg(long)]
     pub(crate) allow_nan: bool,
 }
@@ -60,11 +61,11 @@ pub(crate) struct AlgorithmOptions {
 #[derive(clap::Args)]
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(crate) struct Options {
-    /// An SSP archive, an SSD or OspSystemStructure.xml beside its FMUs, or a system.toml; or FMUs,
-    /// which get the names of their files
+    /// An SSP archive, an SSD or OspSystemStructure.xml next to its FMUs, or a system.toml; or
+    /// FMUs, which get the names of their files
     #[arg(value_name = "SYSTEM|FMU", conflicts_with_all = ["plant", "controller", "resume"])]
     inputs: Vec<PathBuf>,
-    /// Add an FMU, or put another in the place of one of the system; may be repeated
+    /// Add an FMU, or replace one of the system; may be repeated
     #[arg(long = "fmu", value_name = "NAME=FMU", value_parser = setting)]
     #[arg(conflicts_with_all = ["plant", "controller"])]
     fmus: Vec<(String, String)>,
@@ -85,12 +86,12 @@ pub(crate) struct Options {
     /// Start time in s
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     start_time: Option<f64>,
-    /// Stop time in s [default: that of the system, else the latest of the FMUs, else 1 s after the
-    /// start]
+    /// Stop time in s [default: the stop time of the system, or the latest of the FMUs, or 1 s
+    /// after the start]
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     stop_time: Option<f64>,
-    /// Relative tolerance that the solvers inside the FMUs are told [default: that of the default
-    /// experiment of each FMU]; the tolerance of the coupling is --relative-tolerance
+    /// Relative tolerance for the solvers inside the FMUs [default: from the default experiment of
+    /// each FMU]; the tolerance of the coupling is --relative-tolerance
     #[arg(long, value_name = "FRACTION", allow_negative_numbers = true)]
     tolerance: Option<f64>,
     #[command(flatten)]
@@ -118,42 +119,42 @@ pub(crate) struct Options {
     /// File for the plot, .svg or .png [default: plot.svg in the folder of --out]
     #[arg(long, value_name = "FILE")]
     plot_file: Option<PathBuf>,
-    /// Folder for what is written [default: results/run]
+    /// Folder for all files written [default: results/run]
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
-    /// Run each FMU in a process of its own
+    /// Run each FMU in a separate process
     #[arg(long)]
     isolate: bool,
-    /// How long a call of an FMU may take, with --isolate; without it only an answer that is pending
-    /// has a limit, and a call that hangs is not ended
+    /// Time limit of a call of an FMU in s, with --isolate; without it, only a pending answer has a
+    /// limit, and a call that hangs does not end
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     time_limit: Option<f64>,
-    /// Most memory (address space) for the process of each FMU, in bytes or as in 512MiB, 2GiB; needs
-    /// --isolate
+    /// Memory limit (address space) of the process of each FMU, in bytes or as in 512MiB, 2GiB;
+    /// needs --isolate
     #[arg(long, value_name = "BYTES", value_parser = str::parse::<Memory>)]
     memory_limit: Option<Memory>,
     /// Load a shared library first, its symbols visible to the FMUs; may be repeated
     #[arg(long, value_name = "LIBRARY")]
     preload: Vec<String>,
-    /// Save the state of the run to this file at its end, and where it is interrupted
+    /// Save the state of the run to this file at its end, and when it is interrupted
     #[arg(long, value_name = "FILE")]
     checkpoint: Option<PathBuf>,
-    /// Save it every so many simulated seconds, too
+    /// Interval between checkpoints in s of simulated time
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     checkpoint_every: Option<f64>,
-    /// Go on from a checkpoint, which knows its system
+    /// Resume a run from a checkpoint, which contains its system
     #[arg(long, value_name = "FILE")]
     resume: Option<PathBuf>,
-    /// Print the complete configuration in force as a system.toml, and do not run
+    /// Print the complete configuration as a system.toml, and do not run
     #[arg(long)]
     pub(super) print_config: bool,
     /// Write every FMI call with its arguments, results and status to this file
     #[arg(long, value_name = "FILE")]
     pub(super) log_calls: Option<PathBuf>,
-    /// Print the algorithm and why it is this one
+    /// Print the algorithm and the reasons for its settings
     #[arg(long)]
     pub(super) explain: bool,
-    /// Say more, FMUs included; -vv: everything
+    /// Log more, including messages of FMUs; -vv: everything
     #[arg(short, long, action = clap::ArgAction::Count)]
     pub(crate) verbose: u8,
     /// Write messages as JSON, one object on each line
@@ -192,13 +193,13 @@ fn multiple(text: &str) -> Result<(String, u32), String> {
 
 fn method(text: &str) -> Result<Method, String> {
     if text == "gauss-seidel-hold" {
-        return Err("say `--method gauss-seidel --extrapolation hold`".to_owned());
+        return Err("use `--method gauss-seidel --extrapolation hold`".to_owned());
     }
     text.parse()
 }
 
 impl AlgorithmOptions {
-    /// Puts what is stated over `wanted`.
+    /// Overwrites the settings in `request` with the options stated.
     pub(crate) fn apply(&self, request: &mut AlgorithmRequest) {
         put(&mut request.step, self.step);
         put(&mut request.method, self.method);
@@ -217,7 +218,7 @@ impl AlgorithmOptions {
     }
 }
 
-/// Puts `over` in the place of `value`, where there is something.
+/// Replaces `value` by `over`, if `over` is stated.
 fn put<T>(value: &mut Option<T>, over: Option<T>) {
     if over.is_some() {
         *value = over;
@@ -225,8 +226,8 @@ fn put<T>(value: &mut Option<T>, over: Option<T>) {
 }
 
 impl Options {
-    /// The configuration: the file's or the checkpoint's, with the command line over it; and the
-    /// checkpoint.
+    /// Returns the configuration of the file or the checkpoint, with the options of the command
+    /// line, and the checkpoint.
     pub(super) fn load(&self) -> anyhow::Result<(LoadedConfig, Option<SavedRun>)> {
         let (mut loaded, saved) = self.base()?;
         let config = &mut loaded.config;
@@ -273,8 +274,8 @@ impl Options {
                 path.display()
             ),
             [_, _, ..] => bail!(
-                "expected one system or any number of FMUs, found {}; an FMU is put into a system \
-                 by --fmu NAME=FMU",
+                "expected one system or any number of FMUs, found {}; --fmu NAME=FMU adds \
+                 an FMU to a system",
                 self.inputs
                     .iter()
                     .map(|path| path.display().to_string())
@@ -315,7 +316,7 @@ impl Options {
         Ok(())
     }
 
-    /// Whether FMUs are given by their files alone.
+    /// Whether FMUs are given as paths only.
     pub(super) fn names_fmus_by_file(&self) -> bool {
         self.inputs.first().is_some_and(|path| is_fmu(path))
     }
@@ -334,7 +335,7 @@ impl Options {
         put(&mut results.every, self.record_every);
         let out = self.out.as_deref();
         let format = self.format.as_deref();
-        // The rows before a checkpoint are not lost by going on from it.
+        // A resumed run must not overwrite the rows before the checkpoint.
         let place = |stated: &Option<PathBuf>, known: &Option<PathBuf>, name: &str| {
             if let Some(path) = stated {
                 return path.clone();
@@ -354,21 +355,23 @@ impl Options {
     }
 }
 
-/// The file for what comes after `time`, beside the one for what came before.
+/// Returns the results file for the rows after `time`, in the folder of the file for the rows
+/// before.
 fn resumed(path: &Path, time: f64) -> PathBuf {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    // Of a run that was resumed before.
+    // The file may belong to a run that was itself resumed.
     let stem = stem.split("-from-").next().unwrap_or_default();
     let ending = path.extension().unwrap_or_default().to_string_lossy();
     path.with_file_name(format!("{stem}-from-{time}.{ending}"))
 }
 
-/// Whether that is an FMU, packed or unpacked.
+/// Whether `path` is an FMU, packed or unpacked.
 fn is_fmu(path: &Path) -> bool {
     has_ending(path, "fmu") || path.join("modelDescription.xml").is_file()
 }
 
-/// The name of the file, with a number behind it where there is an FMU of that name already.
+/// Returns the name of the file, with a number if the configuration already has an FMU of this
+/// name.
 fn free_name(path: &Path, config: &Config) -> String {
     let stem = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
     let taken = |name: &String| config.fmus.0.iter().any(|(known, _)| known == name);
@@ -380,8 +383,7 @@ fn has_ending(path: &Path, ending: &str) -> bool {
     path.extension().is_some_and(|found| found.eq_ignore_ascii_case(ending))
 }
 
-/// Refuses numbers of the command line that make no sense; those of a file were looked at with
-/// their place.
+/// Checks the numbers of the command line; numbers of a file were checked when it was read.
 fn check_numbers(config: &Config) -> anyhow::Result<()> {
     let above = [
         ("--tolerance", &config.experiment.tolerance),

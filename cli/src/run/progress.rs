@@ -1,4 +1,4 @@
-//! How far a run is, on the terminal.
+//! The progress bar of a run.
 
 use std::io::IsTerminal;
 
@@ -6,10 +6,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::logging;
 
-/// Parts of the run after which the bar is drawn anew.
+/// Number of updates of the bar during the run.
 const PARTS: f64 = 400.0;
 
-/// A bar of simulated time; nothing where standard error is no terminal.
+/// A progress bar of simulated time; hidden if standard error is not a terminal.
 pub(super) struct Progress {
     bar: Option<ProgressBar>,
     start: f64,
@@ -18,7 +18,7 @@ pub(super) struct Progress {
 }
 
 impl Progress {
-    /// From `start` to `stop`, in s.
+    /// Creates a bar from `start` to `stop`, in s.
     pub(super) fn new(start: f64, stop: f64) -> Self {
         let bar = std::io::stderr().is_terminal().then(|| {
             let style = ProgressStyle::with_template("{bar:40} {msg} of {prefix} s simulated")
@@ -30,7 +30,7 @@ impl Progress {
         Self { bar, start, part: (stop - start) / PARTS, next }
     }
 
-    /// Time is now `time`, in s.
+    /// Updates the bar to `time`, in s.
     #[inline]
     pub(super) fn show(&mut self, time: f64) {
         if time >= self.next {

@@ -158,7 +158,7 @@ fn default_step(system: &System, length: f64, reasons: &mut Vec<String>) -> f64 
     });
     if let Some((name, step)) = stated.min_by(|a, b| a.1.total_cmp(&b.1)) {
         reasons.push(format!(
-            "step {step} s: the smallest stepSize of a DefaultExperiment, that of {name}"
+            "step {step} s: the smallest stepSize of all DefaultExperiments ({name})"
         ));
         step
     } else {

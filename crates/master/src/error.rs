@@ -96,7 +96,7 @@ pub enum SystemError {
     /// An FMU replaced a value that was set.
     #[error(
         "{name}: the value {value} that was set is lost: after the initialization the FMU has \
-         {found}; it ignores or replaces what is set, so leave the setting out"
+         {found}. The FMU ignores or replaces the value; remove the setting"
     )]
     LostSetting {
         /// The variable.
@@ -168,8 +168,8 @@ pub enum SystemError {
     },
     /// The error of the smallest step exceeds the tolerance.
     #[error(
-        "the smallest step, {size} s at t = {time} s, still has an error of {error:.1e} times the \
-         tolerance"
+        "at t = {time} s the smallest step, {size} s, has an error of {error:.1e} times the \
+         tolerance; a larger tolerance or a smaller smallest step helps"
     )]
     Stuck {
         /// Begin of the step in s.
@@ -181,9 +181,9 @@ pub enum SystemError {
     },
     /// The steps are so small that the run cannot reach its stop time.
     #[error(
-        "at t = {time} s the last {steps} steps were {length:.1e} s long together, near the smallest \
-         step of {smallest} s: {left:.0e} more would be needed to the stop time; a larger relative \
-         tolerance, a larger smallest step or fixed steps help"
+        "at t = {time} s the last {steps} steps cover {length:.1e} s in total, close to the \
+         smallest step of {smallest} s each; the stop time needs {left:.0e} more of them. A larger \
+         relative tolerance, a larger smallest step or fixed steps help"
     )]
     TooManySteps {
         /// Number of steps in the observed interval.

@@ -1,4 +1,4 @@
-//! Prints a column of a CSV file as a signal: for each time on the standard input one line with value,
+//! Prints a column of a CSV file as a signal: for each time on standard input, one line with value,
 //! right-hand slope and time of the next break.
 //!
 //! Usage: signal FILE COLUMN line|hold < TIMES

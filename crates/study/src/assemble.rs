@@ -1,4 +1,4 @@
-//! From a configuration to a system of connected FMUs.
+//! Builds a system of connected FMUs from a configuration.
 
 use crate::error::Error;
 use std::collections::{HashMap, HashSet};
@@ -15,36 +15,37 @@ use ssp::{Element, Link, Terminal};
 use crate::config::{Config, ConnectionEntry, LoadedConfig};
 use crate::link::link as link_ports;
 
-/// A system, not yet initialised.
+/// A connected system before initialisation.
 pub struct AssembledSystem {
     /// The FMUs and their connections.
     pub system: System,
-    /// What an SSP says of times and steps.
+    /// Times and step size stated in an SSP.
     pub experiment: DefaultExperiment,
-    /// FMUs with the step in s that an SSP proposes.
+    /// FMUs by name, each with the communication step in s that an SSP proposes for it.
     pub steps: Vec<(String, f64)>,
-    /// Whether it asks for libcosim's fixed-step algorithm.
+    /// Whether the SSP requests libcosim's fixed-step algorithm.
     pub fixed_step: bool,
-    /// What an SSP was unpacked to: is to outlive the system.
+    /// The folders to which an SSP was unpacked; keep them as long as the system.
     pub folders: Option<Folders>,
 }
 
-/// What the command line adds to the configuration.
+/// Options of [`assemble`] that are not part of the configuration.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct AssemblyOptions<'a> {
-    /// FMUs log everything.
+    /// Whether the FMUs log everything.
     pub logging: bool,
-    /// Free outputs and inputs of equal units are connected.
+    /// Whether free outputs and inputs of equal units are connected.
     pub by_unit: bool,
-    /// Where FMI calls are written.
+    /// The log of FMI calls, if any.
     pub log_calls: Option<&'a CallLog>,
 }
 
-/// Loads and connects what the configuration names, and makes its settings.
+/// Loads the FMUs of the configuration, connects them and applies the settings.
 ///
 /// # Errors
 ///
-/// [`Error`] with the reason.
+/// Returns an error if a file cannot be read, an FMU cannot be instantiated, or a connection or a
+/// setting does not fit.
 pub fn assemble(
     loaded: &LoadedConfig,
     making: &AssemblyOptions<'_>,
@@ -67,9 +68,9 @@ pub fn assemble(
         }
     }
     if assembly.elements.is_empty() {
-        return Err(Error::Invalid(
-            "there is no FMU in the system, expected `system` or an entry of [fmus]".to_owned(),
-        ));
+        return Err(Error::Invalid(format!(
+            "the system has no FMU, expected `system` or an entry of [fmus]"
+        )));
     }
     let mut system = instantiate(&assembly.elements, config, making)?;
     for (name, function) in &assembly.functions {
@@ -89,12 +90,12 @@ pub fn assemble(
     Ok(AssembledSystem { system, experiment, steps, fixed_step, folders })
 }
 
-/// The system that the configuration begins with.
+/// Opens the system on which the configuration builds.
 fn open(path: &Path) -> Result<Opened, Error> {
     let opened = ssp::open(path)?;
     let folder = path.parent().unwrap_or(path).to_string_lossy();
     for warning in &opened.warnings {
-        // What is about a file of the system names it.
+        // A warning about a file in the unpacked system names the file.
         if !folder.is_empty() && warning.starts_with(&*folder) {
             tracing::warn!("{warning}");
         } else {
@@ -122,15 +123,14 @@ fn instantiate(
     let memory_limit = config.isolation.memory_limit.map(|memory| memory.0);
     if config.isolation.isolate != Some(true) {
         if memory_limit.is_some() {
-            return Err(Error::Invalid(
-                "--memory-limit is for FMUs in processes of their own, expected --isolate"
-                    .to_owned(),
-            ));
+            return Err(Error::Invalid(format!(
+                "--memory-limit applies to FMUs in separate processes, expected --isolate"
+            )));
         }
         if time_limit.is_some() {
             tracing::warn!(
-                "--time-limit without --isolate cannot end a call that hangs: it is for answers that \
-                 are pending only"
+                "--time-limit without --isolate cannot end a call that hangs; it limits pending \
+                 answers only"
             );
         }
     }
@@ -153,7 +153,7 @@ fn instantiate(
     Ok(system)
 }
 
-/// FMUs on their way into the system; one that several elements use is unpacked once.
+/// Opens the FMUs; unpacks an FMU only once if several elements use it.
 struct Opening<'a> {
     isolation: isolate::Options,
     opened: HashMap<&'a PathBuf, Fmu>,
@@ -161,7 +161,7 @@ struct Opening<'a> {
 }
 
 impl<'a> Opening<'a> {
-    /// An instance in a process of its own.
+    /// Creates an instance in a separate process.
     fn isolated(&mut self, element: &'a Element) -> Result<isolate::Isolated, Error> {
         let package = if let Some(package) = self.isolated.get(&element.fmu) {
             package.clone()
@@ -175,7 +175,7 @@ impl<'a> Opening<'a> {
         Ok(slave)
     }
 
-    /// An instance in this process.
+    /// Creates an instance in this process.
     fn in_process(&mut self, element: &'a Element) -> Result<Instance, Error> {
         let fmu = match self.opened.get(&element.fmu) {
             Some(fmu) => fmu.clone(),
@@ -192,7 +192,8 @@ impl<'a> Opening<'a> {
     }
 }
 
-/// Opens the FMU of an element. What is odd about an FMU of an SSP was said when the SSP was opened.
+/// Opens the FMU of an element. Warnings about an FMU in an SSP were already logged when the SSP
+/// was opened.
 fn open_fmu(element: &Element) -> Result<Fmu, Error> {
     let opened = match &element.shown {
         Some(_) => Fmu::open_quietly(&element.fmu),
@@ -201,7 +202,7 @@ fn open_fmu(element: &Element) -> Result<Fmu, Error> {
     opened.map_err(|error| as_shown(Error::from(error).within(&element.name), element))
 }
 
-/// An error about an FMU that was unpacked from an SSP, with the name that the user knows.
+/// Replaces the unpacked path of an FMU in an error by the path that the user knows.
 fn as_shown(error: Error, element: &Element) -> Error {
     match &element.shown {
         Some(shown) => {
@@ -219,8 +220,9 @@ fn switch_logging_on(name: &str, slave: &mut dyn Slave) {
     }
 }
 
-/// Makes the connections: those of the configuration go before `links` to the same inputs.
-/// Where none are stated, equal names are connected, and `by_unit` also equal units.
+/// Makes the connections. A connection of the configuration takes precedence over one of `links` to
+/// the same input. If none are stated, connects variables of equal names and, with `by_unit`, of
+/// equal units.
 fn connect(
     system: &mut System,
     loaded: &LoadedConfig,
@@ -264,7 +266,7 @@ fn connect(
     if alone && system.slaves.len() > 1 { connect_unstated(system, by_unit) } else { Ok(()) }
 }
 
-/// Connects equal names, and `by_unit` also equal units.
+/// Connects variables of equal names and, with `by_unit`, of equal units.
 fn connect_unstated(system: &mut System, by_unit: bool) -> Result<(), Error> {
     let by_name = system.connect_equal_names()?;
     let by_unit = if by_unit { system.connect_equal_units()? } else { Vec::new() };
@@ -276,9 +278,7 @@ fn connect_unstated(system: &mut System, by_unit: bool) -> Result<(), Error> {
         );
     }
     if by_name + by_unit.len() == 0 {
-        tracing::warn!(
-            "no output has the name of an input of another FMU, so nothing is connected"
-        );
+        tracing::warn!("nothing is connected: no output has the name of an input of another FMU");
     }
     Ok(())
 }

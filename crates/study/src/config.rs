@@ -1,4 +1,4 @@
-//! `system.toml`: what a run is told. The command line puts its own over it.
+//! The configuration `system.toml`. Options of the command line take precedence over it.
 
 mod every;
 mod memory;
@@ -20,38 +20,39 @@ pub use tables::{CheckpointSettings, ConnectionEntry, Experiment, Isolation, Res
 
 use files::{Place, PlaceError, Source};
 
-/// The content of a `system.toml`; what is not stated is chosen.
+/// The content of a `system.toml`. Settings that are not stated are chosen for the system.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct Config {
-    /// An SSP, an SSD or a folder with one, to begin with.
+    /// An SSP, an SSD or a folder with one, on which the configuration builds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub system: Option<PathBuf>,
-    /// Shared libraries whose symbols the FMUs shall see.
+    /// Shared libraries loaded first, whose symbols are visible to the FMUs.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub preload: Vec<String>,
-    /// FMUs by name.
+    /// Paths of FMUs by name.
     #[serde(skip_serializing_if = "Ordered::is_empty")]
     pub fmus: Ordered<PathBuf>,
-    /// Connections; not stated: equal names, where `system` is not stated either.
+    /// Connections. If neither they nor `system` are stated, variables of equal names are
+    /// connected.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub connections: Option<Vec<Spanned<ConnectionEntry>>>,
-    /// Values before the initialization.
+    /// Values of variables, set before the initialization.
     #[serde(skip_serializing_if = "Settings::is_empty")]
     pub settings: Settings,
     /// The algorithm.
     pub algorithm: AlgorithmRequest,
-    /// Times and tolerance that the FMUs are told.
+    /// Times and tolerance for `fmi2SetupExperiment`.
     pub experiment: Experiment,
-    /// What is written.
+    /// Results: file, variables, interval, plot.
     pub results: Results,
-    /// FMUs in processes of their own.
+    /// Isolation: FMUs in separate processes.
     #[serde(skip_serializing_if = "is_default")]
     pub isolation: Isolation,
     /// Checkpoints.
     #[serde(skip_serializing_if = "is_default")]
     pub checkpoint: CheckpointSettings,
-    /// What is done to the system while it runs.
+    /// Signals and faults during the run.
     #[serde(skip_serializing_if = "is_default")]
     pub scenario: Scenario,
 }
@@ -60,12 +61,12 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
 
-/// A configuration and the text that it was read from, to which errors may point.
+/// A configuration with the text from which it was read, so that errors can point at a line.
 #[derive(Default)]
 pub struct LoadedConfig {
     /// The configuration.
     pub config: Config,
-    /// Its text, where it comes from a file.
+    /// The text and the path of the file, if the configuration comes from one.
     pub source: Option<Source>,
 }
 
@@ -74,7 +75,7 @@ impl LoadedConfig {
     ///
     /// # Errors
     ///
-    /// [`Error`] with the reason.
+    /// Returns an error if the file cannot be read or is not a valid `system.toml`.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let source = Source::read(path).map_err(Error::file("read", path))?;
         let config = parse(source.text(), path)?;
@@ -85,7 +86,8 @@ impl LoadedConfig {
         Ok(Self { config, source: Some(source) })
     }
 
-    /// `error`, pointing at `place` of the file; what the command line stated has no place.
+    /// Adds the location `place` in the file to `error`. Values of the command line have no
+    /// location.
     #[must_use]
     pub fn point(&self, place: &Place, error: impl Into<Error>) -> Error {
         let error = error.into();
@@ -96,13 +98,13 @@ impl LoadedConfig {
     }
 }
 
-/// Reads `text`, the content of the file at `path`, beside which the paths in it begin. Opens no
-/// file.
+/// Parses `text`, the content of the file at `path`. Relative paths start at the folder of `path`.
+/// Opens no file.
 ///
 /// # Errors
 ///
-/// [`PlaceError`] with line and column: no TOML, an entry that is not known, a value of a wrong
-/// type or out of its range.
+/// Returns [`PlaceError`] with line and column if `text` is not TOML, or if an entry is unknown,
+/// has the wrong type or is out of range.
 pub fn parse(text: &str, path: &Path) -> Result<Config, PlaceError> {
     let source = Source::new(path, text.to_owned());
     let mut config: Config = toml::from_str(text).map_err(|error| {
@@ -115,11 +117,11 @@ pub fn parse(text: &str, path: &Path) -> Result<Config, PlaceError> {
 }
 
 impl Config {
-    /// As a `system.toml`.
+    /// Renders the configuration as a `system.toml`.
     ///
     /// # Errors
     ///
-    /// [`Error`] with the reason.
+    /// Returns an error if a value has no form in TOML.
     pub fn render(&self) -> Result<String, Error> {
         toml::to_string(self).map_err(|error| Error::Invalid(error.to_string()))
     }
@@ -132,16 +134,16 @@ impl Config {
         wires.try_for_each(|wire| wire.get_ref().check(&wire.span()))
     }
 
-    /// Lets relative paths begin at `folder`.
+    /// Prepends `folder` to relative paths.
     pub fn rebase(&mut self, folder: &Path) {
         self.each_path(|path| *path = folder.join(&*path));
     }
 
-    /// Makes every path absolute, so that the configuration holds wherever it is written to.
+    /// Makes every path absolute, so that the configuration is valid in any folder.
     ///
     /// # Errors
     ///
-    /// [`Error`] with the reason.
+    /// Returns an error if the current folder cannot be determined.
     pub fn make_absolute(&mut self) -> std::io::Result<()> {
         let mut done = Ok(());
         self.each_path(|path| match std::path::absolute(&*path) {
@@ -167,7 +169,7 @@ impl Config {
         for file in signals.chain(tables) {
             let mut path = PathBuf::from(file.get_ref());
             change(&mut path);
-            // A file name that is no Unicode cannot stand in TOML, so nothing is lost.
+            // TOML holds Unicode only, so the conversion loses nothing.
             *file.get_mut() = path.to_string_lossy().into_owned();
         }
     }

@@ -1,4 +1,4 @@
-//! Why a study cannot be read, prepared or run.
+//! Errors of reading, preparing and running a study.
 
 use std::error::Error as _;
 use std::io;
@@ -9,14 +9,14 @@ use master::SystemError;
 use results::{ResultsError, SelectionError};
 use ssp::SspError;
 
-/// Why a study cannot be read, prepared or run.
+/// Error of reading, preparing or running a study.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// An entry of a file, with its line.
+    /// An entry of a file is invalid; the error has its line.
     #[error(transparent)]
     Entry(#[from] PlaceError),
-    /// The system cannot be put together or advanced.
+    /// The system cannot be built or advanced.
     #[error(transparent)]
     System(#[from] SystemError),
     /// A system structure cannot be read.
@@ -26,11 +26,11 @@ pub enum Error {
     #[cfg(feature = "load")]
     #[error(transparent)]
     Fmu(#[from] fmu_import::FmuError),
-    /// An FMU cannot be started in a process of its own.
+    /// An FMU cannot be started in a separate process.
     #[cfg(feature = "load")]
     #[error(transparent)]
     Isolated(#[from] fmu_import::isolate::IsolateError),
-    /// A library cannot be loaded before the FMUs.
+    /// A shared library cannot be loaded before the FMUs.
     #[cfg(feature = "load")]
     #[error(transparent)]
     Library(#[from] fmu_import::LoadError),
@@ -40,40 +40,41 @@ pub enum Error {
     /// A file cannot be read or written.
     #[error("cannot {action} {}", path.display())]
     File {
-        /// What was tried: "read", "write".
+        /// The action that failed: "read" or "write".
         action: &'static str,
         /// The file.
         path: PathBuf,
-        /// The system's reason.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// An entry of a scenario is wrong.
     #[error(transparent)]
     Scenario(#[from] crate::scenario::ScenarioError),
-    /// A pattern of variables to record chooses none.
+    /// A pattern of variables to record matches none.
     #[error(transparent)]
     Selection(#[from] SelectionError),
-    /// An error, and what it is about: an FMU, an entry.
+    /// An error with its context, such as an FMU or an entry.
     #[error("{what}")]
     Within {
-        /// What it is about.
+        /// The context.
         what: String,
         /// The error.
         source: Box<Error>,
     },
-    /// What is asked for makes no sense.
+    /// A requested setting is invalid.
     #[error("{0}")]
     Invalid(String),
 }
 
 impl Error {
-    /// This error, said to be about `what`.
+    /// Adds the context `what` to the error.
     #[must_use]
     pub fn within(self, what: impl Into<String>) -> Self {
         Error::Within { what: what.into(), source: Box::new(self) }
     }
 
-    /// The error and its causes as one sentence; a cause that its effect quotes is left out.
+    /// Joins the error and its causes to one sentence. Leaves out a cause that the error above it
+    /// already quotes.
     #[must_use]
     pub fn sentence(&self) -> String {
         let mut said = self.to_string();

@@ -1,8 +1,9 @@
-//! Runs what a file asks for: `system.toml`, SSP, scenarios with signals and faults.
+//! Runs a study described by a file: `system.toml` or SSP, with signals and faults.
 //!
-//! [`LoadedConfig::read`] reads a `system.toml`; [`PreparedRun::new`] loads and connects the FMUs and decides what
-//! the file leaves open; [`PreparedRun::start`] initialises them; [`Run::advance`] steps to the end and
-//! writes the results. The command `aso-ftc run` is a thin face of this crate.
+//! [`LoadedConfig::read`] reads a `system.toml`. [`PreparedRun::new`] loads and connects the FMUs
+//! and chooses the settings that the file leaves open. [`PreparedRun::start`] initialises the FMUs.
+//! [`Run::advance`] steps to the end and writes the results. The command `aso-ftc run` is a thin
+//! layer on top of this crate.
 #![forbid(unsafe_code)]
 
 #[cfg(feature = "load")]

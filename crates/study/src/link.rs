@@ -1,4 +1,4 @@
-//! Connections of a system structure.
+//! Connections of an SSP system structure.
 
 use master::{System, SystemError};
 use ssp::Link;
@@ -7,8 +7,8 @@ use ssp::Link;
 ///
 /// # Errors
 ///
-/// Where slave or variable do not exist; where causality, type, unit or transformation do not fit; where
-/// the input has a source.
+/// Returns an error if slave or variable do not exist, if causality, type, unit or transformation
+/// do not fit, or if the input already has a source.
 pub fn link(system: &mut System, link: &Link) -> Result<(), SystemError> {
     let from = system.terminal(&link.from.element, &link.from.variable)?;
     let to = system.terminal(&link.to.element, &link.to.variable)?;

@@ -1,4 +1,4 @@
-//! What a configuration leaves open, decided by the system: algorithm, times, how often to record.
+//! Chooses what a configuration leaves open: algorithm, times, interval between rows.
 
 use crate::error::Error;
 use fmu_description::DefaultExperiment;
@@ -12,32 +12,32 @@ use toml::Spanned;
 use crate::assemble::AssembledSystem;
 use crate::config::{Config, ConnectionEntry, Every};
 
-/// Most rows that are recorded where nothing is stated and steps are fixed.
+/// Largest default number of rows with fixed steps.
 const ROWS: f64 = 1e4;
-/// Length in s of a run whose stop time nobody states, as in FMPy.
+/// Default length of a run in s if no stop time is stated, as in FMPy.
 const LENGTH: f64 = 1.0;
-/// Share of a step by which a proposed step may miss a multiple of the communication step.
+/// Largest relative distance of a proposed step from a multiple of the communication step.
 const NEAR: f64 = 1e-6;
 
-/// Everything decided.
+/// All settings of a run, stated or chosen.
 pub struct Plan {
     /// The algorithm.
     pub algorithm: Algorithm,
     /// Start time, stop time and tolerance for the FMUs.
     pub experiment: Experiment,
-    /// In s.
+    /// Stop time in s.
     pub stop: f64,
-    /// How often rows are recorded.
+    /// Interval between rows.
     pub every: Every,
-    /// A sentence for each decision that the user did not make.
+    /// One sentence for each setting that the user did not state.
     pub reasons: Vec<String>,
 }
 
-/// Decides, and completes `config` accordingly.
+/// Chooses all settings that are not stated and completes `config` with them.
 ///
 /// # Errors
 ///
-/// [`Error`] with the reason.
+/// Returns an error if a setting is invalid or needs a capability that an FMU lacks.
 pub fn plan(config: &mut Config, assembled: &AssembledSystem) -> Result<Plan, Error> {
     let system = &assembled.system;
     let mut reasons = Vec::new();
@@ -67,7 +67,7 @@ pub fn plan(config: &mut Config, assembled: &AssembledSystem) -> Result<Plan, Er
     Ok(Plan { algorithm, experiment, stop, every, reasons })
 }
 
-/// What the solvers inside the FMUs are told.
+/// Explains the tolerance that each FMU receives.
 fn explain_tolerances(system: &System, stated: Option<f64>, reasons: &mut Vec<String>) {
     if stated.is_some() {
         return;
@@ -75,13 +75,12 @@ fn explain_tolerances(system: &System, stated: Option<f64>, reasons: &mut Vec<St
     for (name, slave) in &system.slaves {
         let default = slave.description().default_experiment.as_ref();
         if let Some(tolerance) = default.and_then(DefaultExperiment::usable_tolerance) {
-            reasons
-                .push(format!("tolerance {tolerance:e} for {name}: that of its DefaultExperiment"));
+            reasons.push(format!("tolerance {tolerance:e} for {name}: from its DefaultExperiment"));
         }
     }
 }
 
-/// The step, before numbers that follow from it are looked at.
+/// Checks the communication step before other settings are derived from it.
 fn check_step(request: &AlgorithmRequest) -> Result<(), Error> {
     match request.step {
         Some(step) if !(step > 0.0 && step.is_finite()) => {
@@ -91,7 +90,8 @@ fn check_step(request: &AlgorithmRequest) -> Result<(), Error> {
     }
 }
 
-/// Takes of libcosim's algorithm what is not stated, where the system structure asks for it.
+/// Fills in libcosim's fixed-step algorithm if the system structure requests it and nothing else is
+/// stated.
 fn propose_algorithm(
     request: &mut AlgorithmRequest,
     assembled: &AssembledSystem,
@@ -112,7 +112,7 @@ fn propose_algorithm(
     }
 }
 
-/// Takes steps that an SSP proposes where nothing else is said.
+/// Fills in the steps that an SSP proposes if none are stated.
 fn propose_steps(
     request: &mut AlgorithmRequest,
     assembled: &AssembledSystem,
@@ -124,7 +124,7 @@ fn propose_steps(
         let least = hints.clone().map(|(_, step)| *step).reduce(f64::min);
         request.step = assembled.experiment.step_size.filter(sound).or(least);
         if let Some(step) = request.step {
-            reasons.push(format!("step {step} s: that of the system structure"));
+            reasons.push(format!("step {step} s: from the system structure"));
         }
     }
     let plain = request.step_control.is_none_or(|control| control == StepControl::Fixed)
@@ -155,7 +155,7 @@ fn count(multiple: f64) -> u32 {
     multiple as u32
 }
 
-/// Start and stop time in s: stated, of the system structure, or of the FMUs.
+/// Returns start and stop time in s: stated by the user, by the system structure, or by the FMUs.
 fn times(config: &Config, assembled: &AssembledSystem, reasons: &mut Vec<String>) -> (f64, f64) {
     let stated = |time: &Option<Spanned<f64>>| time.as_ref().map(|time| *time.get_ref());
     let defaults = || {
@@ -170,8 +170,7 @@ fn times(config: &Config, assembled: &AssembledSystem, reasons: &mut Vec<String>
         let stated = defaults().filter_map(|(name, one)| Some((name, one.start_time?)));
         match stated.filter(|(_, time)| finite(time)).min_by(|a, b| a.1.total_cmp(&b.1)) {
             Some((name, time)) => {
-                reasons
-                    .push(format!("start time {time} s: that of the DefaultExperiment of {name}"));
+                reasons.push(format!("start time {time} s: from the DefaultExperiment of {name}"));
                 time
             }
             None => 0.0,
@@ -195,12 +194,13 @@ fn times(config: &Config, assembled: &AssembledSystem, reasons: &mut Vec<String>
         return (start, stop);
     };
     reasons.push(format!(
-        "stop time {stop} s: the latest stopTime of a DefaultExperiment, that of {name}"
+        "stop time {stop} s: the latest stopTime of all DefaultExperiments ({name})"
     ));
     (start, stop)
 }
 
-/// Each communication point, unless these would be very many.
+/// Chooses the interval between rows: each communication point, unless that gives more than
+/// [`ROWS`] rows.
 fn rows(algorithm: &Algorithm, length: f64, reasons: &mut Vec<String>) -> Every {
     if algorithm.control == StepControl::Fixed && length > ROWS * algorithm.step * (1.0 + NEAR) {
         let interval = length / ROWS;
@@ -211,7 +211,7 @@ fn rows(algorithm: &Algorithm, length: f64, reasons: &mut Vec<String>) -> Every 
     }
 }
 
-/// States all that was chosen.
+/// Writes the chosen algorithm into the configuration.
 fn complete(request: &mut AlgorithmRequest, algorithm: &Algorithm, system: &System) {
     request.method = Some(algorithm.sweep);
     request.extrapolation = Some(algorithm.extrapolation);
@@ -232,8 +232,7 @@ fn complete(request: &mut AlgorithmRequest, algorithm: &Algorithm, system: &Syst
 }
 
 impl Plan {
-    /// What `--explain` prints.
-    #[must_use]
+    /// Returns the text of `--explain`.
     pub fn explanation(&self, system: &System) -> String {
         let algorithm = &self.algorithm;
         let mut lines = vec![

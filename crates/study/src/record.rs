@@ -1,4 +1,4 @@
-//! Rows of results, read from the FMUs and written as the run goes.
+//! Records rows of results during the run.
 
 use crate::error::Error;
 use std::io;
@@ -13,20 +13,20 @@ use results::{self, Column, ColumnKind, Decimation, Due, ResultsError, Row, Sele
 
 use crate::config::Every;
 
-/// The files that recorders write to.
+/// All open results files, so that they can be completed when the process ends.
 static FILES: Mutex<Vec<Weak<Mutex<Recording>>>> = Mutex::new(Vec::new());
-/// How often, and how long, the end of the process tries to take a file from the thread that has it.
+/// Number of attempts and pause between them to lock a file when the process ends.
 const TRIES: u32 = 50;
 const PAUSE: Duration = Duration::from_millis(10);
 
-/// A file of results as it is written; the end of the process takes it over.
+/// An open results file. The end of the process can take it over.
 struct Recording {
     path: PathBuf,
-    /// None after the end of the file.
+    /// `None` after the file was completed.
     sink: Option<Box<dyn Sink>>,
 }
 
-/// What is recorded, how often, and where to.
+/// Records variables to a results file at given intervals.
 pub struct Recorder {
     recording: Arc<Mutex<Recording>>,
     due: Due,
@@ -35,11 +35,7 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// A recorder of `ports` into the file at `path`; none where nothing is to be recorded.
-    ///
-    /// # Errors
-    ///
-    /// [`Error`] with the reason.
+    /// Creates a recorder of `ports` to the file at `path`; `None` if nothing is recorded.
     pub fn create(
         path: &Path,
         simulation: &mut Simulation,
@@ -65,48 +61,35 @@ impl Recorder {
         Ok(Some(Self { recording, due, readout, slow }))
     }
 
-    /// Goes on with the rows of a run that was resumed.
+    /// Restores the time of the next row in a resumed run.
     pub fn set_due(&mut self, due: &Due) {
         self.due = due.clone();
     }
 
-    /// Which rows come next.
-    #[must_use]
+    /// Returns the schedule of the next rows.
     pub fn due(&self) -> &Due {
         &self.due
     }
 
-    /// Records a row where one is due at the time of `simulation`.
-    ///
-    /// # Errors
-    ///
-    /// [`Error`] with the reason.
+    /// Records a row if one is due at the time of `simulation`.
     #[inline]
     pub fn sample(&mut self, simulation: &mut Simulation) -> Result<(), Error> {
         let time = simulation.time();
         if self.due.at(time) { self.record(simulation, time) } else { Ok(()) }
     }
 
-    /// Before a step: see [`SlowValues::before_step`].
-    ///
-    /// # Errors
-    ///
-    /// [`Error`] with the reason.
+    /// Prepares a step; see [`SlowValues::before_step`].
     #[inline]
     pub fn before_step(&mut self, simulation: &mut Simulation) -> Result<(), Error> {
         Ok(self.slow.before_step(simulation)?)
     }
 
-    /// What a checkpoint holds of the recording.
+    /// Returns the state of the recording for a checkpoint.
     pub fn slow_state(&self, simulation: &mut Simulation) -> SlowState {
         self.slow.state(simulation.system())
     }
 
-    /// Goes on with the recording of a run that was resumed.
-    ///
-    /// # Errors
-    ///
-    /// [`Error`] with the reason.
+    /// Restores the state of the recording in a resumed run.
     pub fn restore(&mut self, simulation: &mut Simulation, state: &SlowState) -> Result<(), Error> {
         Ok(self.slow.restore(simulation, state)?)
     }
@@ -120,27 +103,19 @@ impl Recorder {
         Ok(recording.sink.as_mut().map_or(Ok(()), |sink| sink.row(time, &row))?)
     }
 
-    /// Hands all rows over; the file is whole.
-    ///
-    /// # Errors
-    ///
-    /// [`Error`] with the reason.
+    /// Writes all rows recorded so far to the file.
     pub fn flush(&mut self) -> Result<(), Error> {
         Ok(lock(&self.recording).sink.as_mut().map_or(Ok(()), |sink| sink.flush())?)
     }
 
-    /// Ends the file.
-    ///
-    /// # Errors
-    ///
-    /// [`Error`] with the reason.
+    /// Completes the file.
     pub fn finish(self) -> Result<(), Error> {
         let sink = lock(&self.recording).sink.take();
         Ok(sink.map_or(Ok(()), Sink::finish)?)
     }
 }
 
-/// `ports` without the variables that their FMUs refuse to read, which are named in a warning.
+/// Returns `ports` without the variables that their FMUs refuse to read, with a warning for each.
 fn readable(system: &mut System, ports: &[Port], time: f64) -> Result<Vec<Port>, Error> {
     let refused = Readout::new(system, ports).unreadable(system, ports, time)?;
     for (port, error) in &refused {
@@ -154,8 +129,8 @@ fn lock(recording: &Mutex<Recording>) -> MutexGuard<'_, Recording> {
     recording.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Hands the rows of all open files over, for a process that is about to end: the files, and what
-/// became of them. No recorder writes another row.
+/// Writes the rows of all open files when the process is about to end; returns each file with the
+/// result. No recorder writes a row afterwards.
 pub fn keep_results() -> Vec<(PathBuf, Result<(), ResultsError>)> {
     let files = match FILES.try_lock() {
         Ok(files) => files.iter().filter_map(Weak::upgrade).collect(),
@@ -164,7 +139,7 @@ pub fn keep_results() -> Vec<(PathBuf, Result<(), ResultsError>)> {
     files.iter().filter_map(|file| keep(file)).collect()
 }
 
-/// Hands the rows over where the thread that writes it lets go of it in time.
+/// Writes the rows of a file if its thread releases the lock in time.
 fn keep(file: &Mutex<Recording>) -> Option<(PathBuf, Result<(), ResultsError>)> {
     for _ in 0..TRIES {
         let mut recording = match file.try_lock() {
@@ -176,10 +151,10 @@ fn keep(file: &Mutex<Recording>) -> Option<(PathBuf, Result<(), ResultsError>)> 
             }
         };
         let (path, mut sink) = (recording.path.clone(), recording.sink.take()?);
-        // The FMU may have written over what the sink needs.
+        // The FMU may have overwritten memory of the sink.
         let kept = catch_unwind(AssertUnwindSafe(|| sink.flush()));
         std::mem::forget(sink);
-        let damaged = || io::Error::other("the FMU wrote over memory that is not its own");
+        let damaged = || io::Error::other("the FMU has overwritten memory of the master");
         let lost = |_| Err(ResultsError::Write { path: path.clone(), source: damaged() });
         let kept = kept.unwrap_or_else(lost);
         return Some((path, kept));
@@ -198,8 +173,7 @@ fn column(system: &System, port: Port) -> Column {
     Column { name: system.name(port), kind, unit: unit(system, port) }
 }
 
-/// The unit of a variable, where it has one.
-#[must_use]
+/// Returns the unit of a variable, if it has one.
 pub fn unit(system: &System, port: Port) -> Option<String> {
     match &system.variable(port).kind {
         Kind::Real(real) => real.unit.clone(),
@@ -207,12 +181,12 @@ pub fn unit(system: &System, port: Port) -> Option<String> {
     }
 }
 
-/// The variables that `record` and `exclude` choose. Patterns are of inputs, outputs and locals; a
-/// name may be that of any variable.
+/// Returns the variables selected by `record` and not by `exclude`. A pattern matches inputs,
+/// outputs and locals; a name may be any variable.
 ///
 /// # Errors
 ///
-/// [`Error`] with the reason.
+/// Returns an error if a name or a pattern matches no variable.
 pub fn select(system: &System, record: &[String], exclude: &[String]) -> Result<Vec<Port>, Error> {
     let shown = [Causality::Input, Causality::Output, Causality::Local];
     let mut ports: Vec<Port> =

@@ -1,4 +1,4 @@
-//! Runs that go on from a checkpoint.
+//! Resumes a run from a checkpoint.
 
 use crate::error::Error;
 
@@ -7,7 +7,8 @@ use master::{Checkpoint, Simulation, System, SystemError};
 
 use crate::plan::Plan;
 
-/// The simulation where `checkpoint` left it. What is another than in its run is refused or said.
+/// Restores the simulation of `checkpoint`. Returns an error or logs a warning if settings differ
+/// from the first run.
 pub(crate) fn resume(
     system: System,
     plan: &Plan,
@@ -24,8 +25,8 @@ pub(crate) fn resume(
     })?;
     if let Some(fmu_stop) = checkpoint.fmu_stop_time().filter(|fmu_stop| fmu_stop < stop) {
         tracing::warn!(
-            "resume: the stop time {stop} s is later than {fmu_stop} s, which the FMUs were fmu_stop at \
-             their start: an FMU may refuse to step beyond {fmu_stop} s"
+            "resume: the stop time {stop} s is later than {fmu_stop} s, the stop time that the FMUs \
+             received at their start; an FMU may refuse to step beyond it"
         );
     }
     if simulation.is_finished() && simulation.ended_by().is_none() {

@@ -16,33 +16,33 @@ use crate::resume::resume;
 use crate::saved::SavedRun;
 use crate::scenario::Setup;
 
-/// A run with everything decided, not yet initialised.
+/// A run with all settings chosen, before initialisation.
 pub struct PreparedRun {
-    /// The complete configuration, with everything that was decided.
+    /// The configuration, completed with all chosen settings.
     pub config: Config,
     /// The FMUs and their connections.
     pub system: System,
-    /// What the configuration left open.
+    /// The settings chosen for the run.
     pub plan: Plan,
     /// The variables to record.
     pub ports: Vec<Port>,
     scenario: Scenario,
-    /// What an SSP was unpacked to; outlives the system.
+    /// The folders to which an SSP was unpacked; they outlive the system.
     folders: Option<Folders>,
 }
 
 impl PreparedRun {
-    /// Loads and connects the FMUs, decides what `loaded` leaves open, finds the variables of scenario
-    /// and results. The paths of the configuration become absolute, because an FMU may change the
-    /// current folder.
+    /// Loads and connects the FMUs, chooses what `loaded` leaves open, and resolves the variables
+    /// of scenario and results. Makes the paths of the configuration absolute, because an FMU may
+    /// change the current folder.
     ///
     /// # Errors
     ///
-    /// [`Error`] with the first thing that is wrong, with its line where it is in a file.
+    /// Returns the first error found, with its line if it is in a file.
     pub fn new(mut loaded: LoadedConfig, making: &AssemblyOptions<'_>) -> Result<Self, Error> {
         loaded.config.make_absolute().map_err(Error::file("find", Path::new(".")))?;
         if making.log_calls.is_some() {
-            // In threads the calls would be written in an order of chance.
+            // With threads, the order of the logged calls would be random.
             loaded.config.algorithm.jobs = Some(1);
         }
         let mut assembled = assemble(&loaded, making)?;
@@ -56,12 +56,13 @@ impl PreparedRun {
         Ok(Self { config, system, plan, ports, scenario, folders })
     }
 
-    /// Initialises the FMUs, or brings them to the state of the checkpoint `saved`, and creates the
-    /// file of results.
+    /// Initialises the FMUs, or restores them from the checkpoint `saved`, and creates the results
+    /// file.
     ///
     /// # Errors
     ///
-    /// [`Error`]: an FMU fails, the checkpoint does not fit, the file cannot be written.
+    /// Returns [`Error`] if an FMU fails, if the checkpoint does not match the run, or if the file
+    /// cannot be written.
     pub fn start(self, saved: Option<&SavedRun>) -> Result<Run, Error> {
         let Self { config, system, plan, ports, scenario, folders } = self;
         let text = config.render()?;
@@ -98,9 +99,9 @@ impl PreparedRun {
     }
 }
 
-/// What is done to the system while it runs.
+/// Resolves the signals and faults of the run.
 fn scenario(loaded: &LoadedConfig, system: &System, plan: &Plan) -> Result<Scenario, Error> {
-    // Its paths are absolute already.
+    // The paths are absolute already.
     let folder = Path::new("");
     let setup = Setup { folder, start: plan.experiment.start_time, step: plan.algorithm.step };
     let resolved = loaded.config.scenario.resolve(system, &setup);
@@ -109,12 +110,15 @@ fn scenario(loaded: &LoadedConfig, system: &System, plan: &Plan) -> Result<Scena
         loaded.point(&place, Error::Scenario(error))
     })?;
     for (file, column) in &prepared.unused {
-        tracing::info!("{}: the column {column:?} drives nothing", file.display());
+        tracing::info!(
+            "{}: the column {column:?} has no free input and is not used",
+            file.display()
+        );
     }
     Ok(prepared.scenario)
 }
 
-/// Refuses checkpoints that could not be saved at the end of the run.
+/// Checks before the run that checkpoints can be saved at its end.
 fn check_saving(config: &Config, system: &System) -> Result<(), Error> {
     if config.checkpoint.file.is_none() {
         return Ok(());
@@ -131,31 +135,31 @@ fn check_saving(config: &Config, system: &System) -> Result<(), Error> {
     }
 }
 
-/// How a run ended.
+/// The reason for the end of a run.
 pub enum RunEnd {
-    /// At its stop time.
+    /// The run reached its stop time.
     AtStop,
-    /// Because this FMU asked for it.
+    /// This FMU requested the end.
     ByFmu(String),
-    /// Because the caller asked for it.
+    /// The caller requested the end.
     Interrupted,
-    /// By a failure.
+    /// The run failed.
     Failed(Error),
 }
 
-/// How much a run has done.
+/// Number of steps and wall-clock time of a run.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RunStatistics {
-    /// Communication steps.
+    /// Number of communication steps.
     pub steps: u64,
     /// Wall-clock time in s.
     pub seconds: f64,
 }
 
-/// Where and when checkpoints are written.
+/// File and interval of the checkpoints.
 struct Checkpoints {
     path: PathBuf,
-    /// Simulated seconds between two; none: only at the end.
+    /// Simulated time in s between two checkpoints; `None`: a single checkpoint at the end.
     interval: Option<f64>,
     /// The complete configuration.
     text: String,
@@ -169,26 +173,27 @@ impl Checkpoints {
     }
 }
 
-/// A run that has started.
+/// A running study.
 pub struct Run {
     /// The simulation.
     pub simulation: Simulation,
     /// The complete configuration.
     pub config: Config,
-    /// What the configuration left open.
+    /// The settings chosen for the run.
     pub plan: Plan,
     recorder: Option<Recorder>,
     checkpoints: Option<Checkpoints>,
-    /// The run that was resumed recorded the present communication point.
+    /// Whether the run was resumed at a communication point that the first run has already
+    /// recorded.
     resumed: bool,
     tally: RunStatistics,
-    /// Removed after the simulation.
+    /// Unpacked folders, removed after the simulation.
     _folders: Option<Folders>,
 }
 
 impl Run {
-    /// Steps to the stop time, records rows, writes checkpoints, and terminates the FMUs. `watch` sees
-    /// the start and every step, and may end the run.
+    /// Steps to the stop time, records rows, writes checkpoints and terminates the FMUs. Calls
+    /// `watch` at the start and after every step; `watch` can end the run.
     pub fn advance(
         &mut self,
         watch: impl FnMut(&mut Simulation) -> Result<ControlFlow<()>, SystemError>,
@@ -220,7 +225,7 @@ impl Run {
             self.tally.steps += 1;
             flow = watch(&mut self.simulation)?;
             let time = self.simulation.time();
-            // An end that an FMU asked for may be one that the others have not reached together.
+            // An FMU may request the end at a time that the other FMUs have not reached.
             if time > before {
                 self.sample()?;
             }
@@ -233,7 +238,7 @@ impl Run {
             }
         }
         self.save()?;
-        // From here on an FMU may end the process.
+        // From here on, an FMU may end the process.
         self.recorder.as_mut().map_or(Ok(()), Recorder::flush)?;
         self.simulation.terminate()?;
         self.simulation.free()?;
@@ -250,7 +255,7 @@ impl Run {
         self.recorder.as_mut().map_or(Ok(()), |recorder| recorder.sample(simulation))
     }
 
-    /// Writes a checkpoint, after the rows that belong to it.
+    /// Writes the rows up to now, then a checkpoint.
     fn save(&mut self) -> Result<(), Error> {
         let Some(checkpoints) = &self.checkpoints else { return Ok(()) };
         let (mut due, mut slow) = (None, SlowState::default());
@@ -263,23 +268,23 @@ impl Run {
         saved.write(&checkpoints.path)
     }
 
-    /// How much the run has done.
+    /// Returns the number of steps and the wall-clock time so far.
     #[must_use]
     pub fn tally(&self) -> RunStatistics {
         self.tally
     }
 
-    /// The file of the checkpoints, where they are written.
+    /// Returns the checkpoint file, if checkpoints are written.
     #[must_use]
     pub fn checkpoint_file(&self) -> Option<&Path> {
         self.checkpoints.as_ref().map(|checkpoints| checkpoints.path.as_path())
     }
 
-    /// Completes the file of results; the file, where rows were recorded.
+    /// Completes the results file; returns its path if rows were recorded.
     ///
     /// # Errors
     ///
-    /// [`Error::Results`].
+    /// Returns [`Error::Results`] if the file cannot be completed.
     pub fn finish(&mut self) -> Result<Option<&Path>, Error> {
         match self.recorder.take() {
             Some(recorder) => recorder.finish().map(|()| self.config.results.file.as_deref()),

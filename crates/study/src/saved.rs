@@ -1,4 +1,4 @@
-//! The file of a checkpoint: configuration, simulation, and where the recording stands.
+//! The checkpoint file: configuration, simulation, state of the recording.
 
 use crate::error::Error;
 use std::path::Path;
@@ -9,25 +9,25 @@ use serde::{Deserialize, Serialize};
 
 use crate::config::{self, Config, Every};
 
-/// What a file of this kind and version begins with; four bytes of CRC-32 of the rest follow.
-const MAGIC: &[u8; 16] = b"aso-ftc-state-3\n";
-/// What files of this kind and of every version begin with.
+/// Magic bytes of this version of the format; a CRC-32 of the rest (four bytes) follows.
+const MAGIC: &[u8; 16] = b"aso-ftc-state-2\n";
+/// Magic bytes common to all versions of the format.
 const KIND: &[u8] = b"aso-ftc-state-";
 
-/// A run as it stands.
+/// A saved run.
 #[derive(Serialize, Deserialize)]
 pub struct SavedRun {
     /// The complete configuration, a `system.toml` with absolute paths.
     text: String,
     checkpoint: Checkpoint,
-    /// How often rows are recorded, and when the next one is; none where nothing is recorded.
+    /// Interval between rows and time of the next row; `None` if nothing is recorded.
     due: Option<(String, Due)>,
     slow: SlowState,
 }
 
 impl SavedRun {
-    /// A checkpoint of `checkpoint`, with the configuration `text` and what the recording knows.
-    #[must_use]
+    /// Creates a saved run from the state `checkpoint`, the configuration `text` and the state of
+    /// the recording.
     pub fn new(
         text: &str,
         checkpoint: Checkpoint,
@@ -38,11 +38,11 @@ impl SavedRun {
         Self { text: text.to_owned(), checkpoint, due, slow }
     }
 
-    /// Writes the file: whole or not at all.
+    /// Writes the file atomically.
     ///
     /// # Errors
     ///
-    /// [`Error`] with the reason.
+    /// Returns an error if the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
         let content =
             postcard::to_stdvec(self).map_err(|error| Error::Invalid(error.to_string()))?;
@@ -56,7 +56,7 @@ impl SavedRun {
     ///
     /// # Errors
     ///
-    /// [`Error`] with the reason.
+    /// Returns an error if the file cannot be read, is damaged, or has another version.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let shown = path.display();
         let bytes = std::fs::read(path).map_err(Error::file("read", path))?;
@@ -77,42 +77,39 @@ impl SavedRun {
         })
     }
 
-    /// The configuration of the run, from the checkpoint at `path`.
+    /// Returns the configuration of the run. `path` is the path of the checkpoint, for error
+    /// messages.
     ///
     /// # Errors
     ///
-    /// [`Error`] with the reason.
+    /// Returns an error if the configuration is invalid.
     pub fn config(&self, path: &Path) -> Result<Config, Error> {
         Ok(config::parse(&self.text, path)?)
     }
 
-    /// When the next row is due, where rows are recorded as they were.
-    #[must_use]
+    /// Returns the time of the next row, if rows are recorded at the same interval as before.
     pub fn due(&self, every: Every) -> Option<&Due> {
         let (text, due) = self.due.as_ref()?;
         (*text == every.to_string()).then_some(due)
     }
 
-    /// What the recording knows of FMUs that make several steps at once.
-    #[must_use]
+    /// Returns the recorded values of multirate FMUs.
     pub fn slow(&self) -> &SlowState {
         &self.slow
     }
 
-    /// The simulation.
-    #[must_use]
+    /// Returns the state of the simulation.
     pub fn checkpoint(&self) -> &Checkpoint {
         &self.checkpoint
     }
 
-    /// Time reached in s.
-    #[must_use]
+    /// Returns the time reached in s.
     pub fn time(&self) -> f64 {
         self.checkpoint.time()
     }
 }
 
-/// Why the bytes of a file are no checkpoint for this version.
+/// Explains why a file is not a checkpoint of this version.
 fn unreadable(path: &Path, bytes: &[u8]) -> String {
     let shown = path.display();
     let version = bytes.strip_prefix(KIND).filter(|_| !bytes.starts_with(MAGIC));

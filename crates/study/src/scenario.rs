@@ -1,7 +1,7 @@
-//! Scenarios: what is done to a system while it runs, as it stands in `system.toml`.
+//! Scenarios: signals and faults during a run, as written in `system.toml`.
 //!
-//! [`Scenario`] is the plain data, [`Scenario::resolve`] finds the variables and connections and
-//! gives what the engine calls: [`master::drive::Drives`] and fault lines.
+//! [`Scenario`] holds the data of the file. [`Scenario::resolve`] finds the variables and
+//! connections and returns the drives ([`master::drive::Drives`]) and fault chains of the master.
 
 mod body;
 mod convert;
@@ -32,7 +32,7 @@ pub struct Scenario {
     /// `[[scenario.signal]]`: an input or a tunable parameter follows a signal.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub signal: Vec<Spanned<SignalEntry>>,
-    /// `[[scenario.table]]`: all free inputs that have a column of their name follow it.
+    /// `[[scenario.table]]`: every free input follows the column of its name.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub table: Vec<Spanned<TableEntry>>,
     /// `[[scenario.fault]]`: the values on a connection are disturbed.
@@ -40,13 +40,13 @@ pub struct Scenario {
     pub fault: Vec<Spanned<FaultEntry>>,
 }
 
-/// An entry of `[[scenario.set]]`. Before the first one of a variable it keeps its start value.
+/// An entry of `[[scenario.set]]`. A variable keeps its start value until its first entry.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SetEntry {
     /// `slave.variable`: an input without a connection, or a tunable parameter.
     pub variable: Spanned<String>,
-    /// From when on; it takes effect at the first communication point that is not before it.
+    /// Time in s; the value takes effect at the first communication point at or after it.
     pub at: f64,
     /// The value.
     pub value: Spanned<Literal>,
@@ -55,10 +55,10 @@ pub struct SetEntry {
     pub unit: Option<Spanned<String>>,
 }
 
-/// Times in s and values.
+/// Pairs of time in s and value.
 pub type Steps = Vec<(f64, Spanned<Literal>)>;
 
-/// An entry of `[[scenario.signal]]`: exactly one of the kinds.
+/// An entry of `[[scenario.signal]]`. States exactly one kind of signal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SignalEntry {
@@ -67,16 +67,16 @@ pub struct SignalEntry {
     /// Unit of the values, if not that of the variable.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<Spanned<String>>,
-    /// One value.
+    /// A constant.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub constant: Option<Spanned<Literal>>,
-    /// Times and values; each is held until the next one.
+    /// Times and values; each value is held until the next one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub steps: Option<Spanned<Steps>>,
-    /// Times and values with lines between; a time that stands twice is a jump.
+    /// Times and values with linear interpolation; a time that occurs twice is a jump.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub points: Option<Spanned<Vec<(f64, f64)>>>,
-    /// A line between two constants.
+    /// A ramp between two constants.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ramp: Option<Spanned<Ramp>>,
     /// A sine.
@@ -91,16 +91,16 @@ pub struct SignalEntry {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TableEntry {
-    /// The CSV file, seen from the folder of the file that names it.
+    /// The CSV file, relative to the folder of the `system.toml`.
     pub csv: Spanned<String>,
-    /// The slave whose variables the columns are named after; none: they are named
+    /// The slave whose variables the columns name; if not stated, columns are named
     /// `slave.variable`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub element: Option<Spanned<String>>,
 }
 
-/// An entry of `[[scenario.fault]]`: exactly one of the kinds. Several entries for one connection act
-/// in their order.
+/// An entry of `[[scenario.fault]]`. States exactly one kind of fault. Several faults of one
+/// connection act in the order of the file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FaultEntry {
@@ -109,31 +109,31 @@ pub struct FaultEntry {
     /// Unit of the values, if not that of the input.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<Spanned<String>>,
-    /// Something is added.
+    /// A constant is added.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bias: Option<Spanned<Bias>>,
-    /// A wrong factor.
+    /// The value is multiplied by a factor.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gain: Option<Spanned<Gain>>,
-    /// What is added grows with time.
+    /// The added value grows linearly with time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drift: Option<Spanned<Drift>>,
-    /// The value stays what it is.
+    /// The value sticks.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stuck: Option<Spanned<Stuck>>,
     /// Values are lost.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dropout: Option<Spanned<Dropout>>,
-    /// Values come late.
+    /// Values arrive late.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub delay: Option<Spanned<Delay>>,
-    /// Only some values exist.
+    /// Values are rounded to levels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quantisation: Option<Spanned<Quantisation>>,
-    /// The range is too small.
+    /// Values are limited to a range.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub saturation: Option<Spanned<Saturation>>,
-    /// Something random is added.
+    /// Random noise is added.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<Spanned<Noise>>,
     /// True becomes false.

@@ -1,6 +1,7 @@
-//! Signals in a CSV file, in the layout that FMPy reads and writes: a header with the names, in
-//! quotes or not, `time` first; then one row for each point in time, ascending; a time that stands
-//! twice is a jump.
+//! CSV files of signals, in the layout that FMPy reads and writes.
+//!
+//! The header has the names, quoted or not, with `time` first. Each following row is a point in
+//! time, ascending. A time that occurs twice is a jump.
 
 use std::fs::File;
 use std::io::Read;
@@ -9,24 +10,24 @@ use std::sync::Arc;
 
 use csv::{ByteRecord, ReaderBuilder, Trim};
 
-/// Largest file, in bytes.
+/// Largest size of a file in bytes.
 pub const LARGEST_FILE: u64 = 256 << 20;
 /// Longest quotation in a message, in characters.
 const LONGEST_QUOTATION: usize = 40;
 
-/// The columns of a file.
+/// The columns of a CSV file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
-    /// Names of the columns but the first, in their order.
+    /// Names of the columns after the first, in their order.
     pub names: Vec<String>,
     /// The first column: time in s, ascending.
     pub times: Arc<[f64]>,
-    /// The others, as long as `times`.
+    /// The other columns, with the length of `times`.
     pub columns: Vec<Arc<[f64]>>,
 }
 
 impl Table {
-    /// The column of that name.
+    /// Returns the column called `name`.
     #[must_use]
     pub fn column(&self, name: &str) -> Option<&Arc<[f64]>> {
         let position = self.names.iter().position(|known| known == name)?;
@@ -34,7 +35,7 @@ impl Table {
     }
 }
 
-/// Why a text is no [`Table`]. Lines and columns count from 1.
+/// Error of reading a [`Table`]. Lines and columns count from 1.
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
     /// The file cannot be read.
@@ -43,26 +44,26 @@ pub enum TableError {
     /// The file is larger than [`LARGEST_FILE`].
     #[error("the file is larger than {LARGEST_FILE} bytes")]
     Large,
-    /// It is not text.
+    /// The file is not UTF-8 text.
     #[error("line {line}: expected UTF-8 text, found other bytes")]
     Encoding {
         /// The line.
         line: usize,
     },
-    /// There is nothing in it.
+    /// The file is empty.
     #[error("the file is empty, expected a header such as \"time\",\"u\" and rows of numbers")]
     Empty,
-    /// The first column is not the time.
+    /// The first column is not `time`.
     #[error("line {line}: the first column is {found:?}, expected \"time\"{hint}")]
     NoTime {
         /// The line.
         line: usize,
         /// Name of the first column.
         found: String,
-        /// What is probably wrong.
+        /// A hint at the probable cause.
         hint: &'static str,
     },
-    /// A column without a name.
+    /// A column has no name.
     #[error("line {line}: column {column} has no name")]
     Unnamed {
         /// The line.
@@ -70,7 +71,7 @@ pub enum TableError {
         /// The column.
         column: usize,
     },
-    /// Two columns of one name.
+    /// Two columns have the same name.
     #[error("line {line}: the columns {first} and {second} are both called {name:?}")]
     Twice {
         /// The line.
@@ -82,16 +83,16 @@ pub enum TableError {
         /// The other column.
         second: usize,
     },
-    /// No column but the time.
+    /// There is no column except the time.
     #[error("line {line}: there is no column but the time")]
     NoColumns {
         /// The line.
         line: usize,
     },
-    /// No row.
+    /// There are no rows.
     #[error("there is no row after the header")]
     NoRows,
-    /// A row that is longer or shorter than the header.
+    /// A row has another length than the header.
     #[error("line {line}: expected {expected} entries as in the header, found {found}")]
     Width {
         /// The line.
@@ -101,7 +102,7 @@ pub enum TableError {
         /// Length of the row.
         found: usize,
     },
-    /// An entry that is no finite number.
+    /// An entry is not a finite number.
     #[error("line {line}, column {column:?}: expected a finite number, found {found:?}")]
     Number {
         /// The line.
@@ -111,7 +112,7 @@ pub enum TableError {
         /// The entry.
         found: String,
     },
-    /// A time before the one before it.
+    /// A time is less than the time before it.
     #[error("line {line}: the time {found} s comes after {before} s, expected ascending times")]
     Order {
         /// The line.
@@ -123,11 +124,11 @@ pub enum TableError {
     },
 }
 
-/// Reads a file.
+/// Reads the file at `path`.
 ///
 /// # Errors
 ///
-/// [`TableError`]: where the file cannot be read, is too large, or is no table.
+/// Returns [`TableError`] if the file cannot be read, is too large, or is not a valid table.
 pub fn read(path: &Path) -> Result<Table, TableError> {
     let mut bytes = Vec::new();
     File::open(path)?.take(LARGEST_FILE + 1).read_to_end(&mut bytes)?;
@@ -137,11 +138,11 @@ pub fn read(path: &Path) -> Result<Table, TableError> {
     parse(&bytes)
 }
 
-/// Reads the content of a file. Time and memory are in proportion to its length.
+/// Parses the content of a file, in time and memory proportional to its length.
 ///
 /// # Errors
 ///
-/// [`TableError`]: where it is no table, with the line.
+/// Returns [`TableError`] with the line if the content is not a valid table.
 pub fn parse(bytes: &[u8]) -> Result<Table, TableError> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     if let Err(error) = std::str::from_utf8(bytes) {
@@ -183,13 +184,13 @@ pub fn parse(bytes: &[u8]) -> Result<Table, TableError> {
     Ok(Table { names: names[1..].to_vec(), times, columns: columns.collect() })
 }
 
-/// Reads the next record; whether there was one.
+/// Reads the next record; returns whether there was one.
 fn advance(reader: &mut csv::Reader<&[u8]>, record: &mut ByteRecord) -> Result<bool, TableError> {
-    // Bytes in memory, of any length, are always read.
+    // Reading records from memory cannot fail.
     reader.read_byte_record(record).map_err(|error| TableError::Unreadable(error.into()))
 }
 
-/// The names of all columns.
+/// Returns the names of all columns.
 fn header(record: &ByteRecord, line: usize) -> Result<Vec<String>, TableError> {
     let name = |field: &[u8]| String::from_utf8_lossy(field).into_owned();
     let names: Vec<String> = record.iter().map(name).collect();
@@ -220,12 +221,12 @@ fn number(field: &[u8]) -> Option<f64> {
     number.is_finite().then_some(number)
 }
 
-/// The begin of an entry.
+/// Returns the start of an entry for a message.
 fn quotation(field: &[u8]) -> String {
     String::from_utf8_lossy(field).chars().take(LONGEST_QUOTATION).collect()
 }
 
-/// Line of a record, which begins after the empty lines at its position.
+/// Returns the line of a record; it starts after the empty lines at its position.
 fn line_of(bytes: &[u8], record: &ByteRecord) -> usize {
     let position = record.position().map_or(0, csv::Position::byte);
     let start = usize::try_from(position).unwrap_or(0).min(bytes.len());

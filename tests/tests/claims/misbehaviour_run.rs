@@ -183,7 +183,7 @@ fn an_fmu_that_wants_the_simulation_to_end_ends_it_in_order() {
     let run = Run::pair(&CFmu::that("end at t1"), &MIDDLE);
     run.expect(0, TO_T1);
     // b is beyond: the last row is that of the last time that both had.
-    run.says(&["a asked for the end", "t = 0.53125 s", "the results end at t = 0.5 s"]);
+    run.says(&["a requested the end", "t = 0.53125 s", "the results end at t = 0.5 s"]);
     assert_eq!(run.numbers("time").len(), TO_T1);
     let run = Run::pair(&CFmu::that("end at t1"), &[&MIDDLE[..], &["--rollback"]].concat());
     run.expect(0, TO_T1);

@@ -1,4 +1,4 @@
-//! How often a row is recorded.
+//! The interval between recorded rows.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,20 +6,20 @@ use std::str::FromStr;
 use serde::de::{Error, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// At each communication point.
+/// Name of [`Every::Step`].
 const STEP: &str = "step";
-/// Not at all.
+/// Name of [`Every::Never`].
 const NEVER: &str = "never";
 const EXPECTED: &str = "seconds above 0, \"step\" (each communication point) or \"never\"";
 
-/// When a row is recorded.
+/// The interval between recorded rows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Every {
-    /// At intervals of so many seconds, at the first communication point not before each.
+    /// A row at the first communication point at or after each multiple of this interval in s.
     Seconds(f64),
-    /// At each communication point.
+    /// A row at each communication point.
     Step,
-    /// Never: there are no results.
+    /// No rows, no results.
     Never,
 }
 

@@ -7,7 +7,7 @@ use serde::de::{Error, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 const EXPECTED: &str = "a number of bytes, or one with a unit, for example 512MiB or 2GiB";
-/// Units by their names.
+/// Names of units, with their size in bytes.
 const UNITS: [(&str, u64); 8] = [
     ("kB", 1000),
     ("MB", 1_000_000),
@@ -19,7 +19,7 @@ const UNITS: [(&str, u64); 8] = [
     ("TiB", 1 << 40),
 ];
 
-/// Bytes, at least one.
+/// A number of bytes, at least 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Memory(pub u64);
 

@@ -1,4 +1,4 @@
-//! Tables whose entries keep the order in which they stand in the file.
+//! TOML tables whose entries keep the order of the file.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -20,13 +20,12 @@ impl<T> Default for Ordered<T> {
 }
 
 impl<T> Ordered<T> {
-    /// Whether there is none.
-    #[must_use]
+    /// Whether there are no entries.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// Gives `name` this value, in place of the one that it has.
+    /// Sets the value of `name`, replacing an earlier one.
     pub fn put(&mut self, name: String, value: T) {
         match self.0.iter_mut().find(|(known, _)| *known == name) {
             Some((_, old)) => *old = value,
@@ -50,7 +49,7 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Ordered<T> {
     }
 }
 
-/// Reads a table as a list.
+/// Visitor that reads a table as a list of entries.
 struct Entries<T>(PhantomData<T>);
 
 impl<'de, T: Deserialize<'de>> Visitor<'de> for Entries<T> {
@@ -90,19 +89,18 @@ impl fmt::Display for SettingValue {
     }
 }
 
-/// Values by `slave.variable`, in the order of the file; of several for one variable the last counts.
-/// In the file the parts of a name may also be tables: `[settings.plant]`.
+/// Values by `slave.variable`, in the order of the file; the last value of a variable applies. In
+/// the file, parts of a name may also be tables: `[settings.plant]`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Settings(pub Vec<(String, SettingValue, Place)>);
 
 impl Settings {
-    /// Whether there is none.
-    #[must_use]
+    /// Whether there are no settings.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// Adds one of the command line, which comes after all others.
+    /// Adds a setting of the command line after all others.
     pub fn push(&mut self, name: String, value: String) {
         self.0.retain(|(known, _, _)| *known != name);
         self.0.push((name, SettingValue::Text(value), 0..0));
@@ -130,7 +128,7 @@ impl<'de> Deserialize<'de> for Settings {
     }
 }
 
-/// A value or a table of them.
+/// A value, or a table of values.
 enum Node {
     Value(SettingValue),
     Table(Vec<(String, Spanned<Node>)>),

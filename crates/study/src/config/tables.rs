@@ -8,7 +8,7 @@ use toml::Spanned;
 use super::{Every, Memory};
 use files::Place;
 
-/// Where, and what is wrong there.
+/// Location and text of an error.
 type Wrong = (Place, String);
 
 /// An entry of `[[connections]]`: `to = factor from + offset`.
@@ -19,17 +19,16 @@ pub struct ConnectionEntry {
     pub from: Spanned<String>,
     /// The input, `slave.variable`.
     pub to: Spanned<String>,
-    /// A factor. Where it or an offset is stated, units are not converted.
+    /// Factor of the transformation. If factor or offset is stated, units are not converted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub factor: Option<f64>,
-    /// An offset, in the unit of the input.
+    /// Offset of the transformation, in the unit of the input.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub offset: Option<f64>,
 }
 
 impl ConnectionEntry {
-    /// One of the command line.
-    #[must_use]
+    /// Creates a connection of the command line, without a location.
     pub fn new(from: String, to: String) -> Spanned<Self> {
         let text = |text| Spanned::new(0..0, text);
         Spanned::new(0..0, Self { from: text(from), to: text(to), factor: None, offset: None })
@@ -44,7 +43,7 @@ impl ConnectionEntry {
     }
 }
 
-/// `[experiment]`: what the FMUs are told.
+/// `[experiment]`: the times and tolerance that the FMUs receive in `fmi2SetupExperiment`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct Experiment {
@@ -68,41 +67,41 @@ impl Experiment {
     }
 }
 
-/// `[results]`: what is written.
+/// `[results]`: results file, recorded variables, plot.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct Results {
     /// The file, `.csv` or `.parquet`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
-    /// Variables by name or pattern.
+    /// Variables to record, by name or pattern.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub record: Vec<String>,
-    /// Variables that are left out of them.
+    /// Variables not to record, by name or pattern.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub exclude: Vec<String>,
-    /// How often.
+    /// Interval between rows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every: Option<Every>,
     /// Variables to plot, by name or pattern.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub plot: Vec<String>,
-    /// The picture, `.svg` or `.png`.
+    /// File of the plot, `.svg` or `.png`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub plot_file: Option<PathBuf>,
 }
 
-/// `[isolation]`: FMUs in processes of their own.
+/// `[isolation]`: FMUs in separate processes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct Isolation {
-    /// Whether each FMU gets a process.
+    /// Whether each FMU runs in a separate process.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub isolate: Option<bool>,
-    /// How long a call may take, in s of the clock on the wall.
+    /// Time limit of a call, in s of wall-clock time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time_limit: Option<Spanned<f64>>,
-    /// Most memory that each process may take.
+    /// Memory limit of each process.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub memory_limit: Option<Memory>,
 }
@@ -113,14 +112,14 @@ impl Isolation {
     }
 }
 
-/// `[checkpoint]`: the state of the run, saved to be resumed.
+/// `[checkpoint]`: file and interval of checkpoints.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct CheckpointSettings {
     /// The file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
-    /// Simulated seconds between two checkpoints; not stated: one at the end.
+    /// Simulated time in s between two checkpoints; default: a single checkpoint at the end.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every: Option<Spanned<f64>>,
 }

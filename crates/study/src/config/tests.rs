@@ -56,7 +56,7 @@ fn parsed(text: &str) -> Config {
     parse(text, Path::new("/models/system.toml")).unwrap()
 }
 
-/// The message for `text`.
+/// Returns the error message for `text`.
 fn refused(text: &str) -> String {
     parse(text, Path::new("system.toml")).unwrap_err().to_string()
 }
@@ -159,7 +159,7 @@ fn the_documented_example_has_every_entry_of_the_algorithm() {
     let example = document.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
     let config = parsed(example);
     assert_eq!((config.fmus.0.len(), config.settings.0.len()), (1, 3));
-    // An entry that is not known names those that are.
+    // The error about an unknown entry lists the known entries.
     let message = refused("[algorithm]\nx = 1");
     let known: Vec<_> = message.lines().next().unwrap().split('`').skip(3).step_by(2).collect();
     assert!(known.len() >= 17, "{message}");

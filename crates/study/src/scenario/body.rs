@@ -1,4 +1,5 @@
-//! The bodies of the kinds: `ramp = { .. }`, `bias = { .. }` and so on.
+//! The inline tables of the kinds of signals and faults: `ramp = { .. }`, `bias = { .. }` and so
+//! on.
 
 use serde::{Deserialize, Serialize};
 use serde_spanned::Spanned;
@@ -6,7 +7,7 @@ use serde_spanned::Spanned;
 use super::Literal;
 use master::fault::Window;
 
-/// Declares a table of the file.
+/// Declares a struct for an inline table.
 macro_rules! body {
     ($(#[$meta:meta])* $name:ident { $($(#[$doc:meta])* $field:ident: $kind:ty,)* }) => {
         $(#[$meta])*
@@ -16,24 +17,24 @@ macro_rules! body {
     };
 }
 
-/// Declares the table of a fault, with its time.
+/// Declares a struct for the inline table of a fault, with its window.
 macro_rules! fault {
     ($(#[$meta:meta])* $name:ident { $($(#[$doc:meta])* $field:ident: $kind:ty,)* }) => {
         body! {
             $(#[$meta])*
             $name {
                 $($(#[$doc])* $field: $kind,)*
-                /// Time in s at which it begins; the start of the simulation where it is not said.
+                /// Start time in s; default: the start of the simulation.
                 #[serde(skip_serializing_if = "Option::is_none")]
                 from: Option<f64>,
-                /// Time in s at which it ends; never where it is not said.
+                /// End time in s; default: the fault stays.
                 #[serde(skip_serializing_if = "Option::is_none")]
                 until: Option<f64>,
             }
         }
 
         impl $name {
-            /// When it acts, in a simulation that starts at `start`.
+            /// Returns the window of the fault, in a simulation that starts at `start`.
             pub(super) fn window(&self, start: f64) -> Window {
                 Window { from: self.from.unwrap_or(start), until: self.until }
             }
@@ -42,7 +43,7 @@ macro_rules! fault {
 }
 
 body! {
-    /// `ramp`: `begin` up to the time `from`, `end` after the time `until`, a line between.
+    /// `ramp`: `begin` up to the time `from`, `end` after the time `until`, linear in between.
     Ramp {
         /// Time in s.
         from: f64,
@@ -68,7 +69,7 @@ body! {
         /// Mean.
         #[serde(default)]
         offset: f64,
-        /// Time in s; the start of the simulation where it is not said.
+        /// Time in s; default: the start of the simulation.
         #[serde(skip_serializing_if = "Option::is_none")]
         from: Option<f64>,
     }
@@ -77,13 +78,12 @@ body! {
 body! {
     /// `csv`: a column of a file.
     Csv {
-        /// The file, seen from the folder of the file that names it.
+        /// The file, relative to the folder of the `system.toml`.
         file: Spanned<String>,
-        /// Name of the column; where it is not said, that of the variable, with its slave or
-        /// without.
+        /// Name of the column; default: the name of the variable, with or without its slave.
         #[serde(skip_serializing_if = "Option::is_none")]
         column: Option<Spanned<String>>,
-        /// Each value is held until the next one, also for a continuous Real.
+        /// Whether each value is held until the next one, also for a continuous Real.
         #[serde(default)]
         hold: bool,
     }
@@ -92,7 +92,7 @@ body! {
 fault! {
     /// `bias`: `v + value`.
     Bias {
-        /// What is added.
+        /// The value added.
         value: f64,
     }
 }
@@ -108,54 +108,55 @@ fault! {
 fault! {
     /// `drift`: `v + rate (t - from)`.
     Drift {
-        /// What is added per second.
+        /// The value added per second.
         rate: f64,
     }
 }
 
 fault! {
-    /// `stuck`: the value at its begin, or the one given.
+    /// `stuck`: the value at the start of the fault, or a given value.
     Stuck {
-        /// The value, if not the one at its begin.
+        /// The value; default: the value at the start of the fault.
         #[serde(skip_serializing_if = "Option::is_none")]
         value: Option<Literal>,
     }
 }
 
 fault! {
-    /// `dropout`: all values are lost, or those in the first `lost` s of each `period`, or each with a
-    /// `probability`.
+    /// `dropout`: loses all values, or the values in the first `lost` s of each `period`, or each
+    /// value with a `probability`.
     Dropout {
-        /// What stands in for a lost value, if not the last one that was not lost.
+        /// Replacement for a lost value; default: the last value that was not lost.
         #[serde(skip_serializing_if = "Option::is_none")]
         value: Option<Literal>,
-        /// The period in s, which begins with the fault.
+        /// The period in s; the first one starts with the fault.
         #[serde(skip_serializing_if = "Option::is_none")]
         period: Option<f64>,
-        /// Time in s at the begin of each period in which values are lost.
+        /// Length in s of the lost part at the start of each period.
         #[serde(skip_serializing_if = "Option::is_none")]
         lost: Option<f64>,
         /// Probability of losing a sample.
         #[serde(skip_serializing_if = "Option::is_none")]
         probability: Option<f64>,
-        /// Time in s between samples; where it is not said, each communication point is one.
+        /// Time in s between samples; default: one sample at each communication point.
         #[serde(skip_serializing_if = "Option::is_none")]
         every: Option<f64>,
-        /// Which random series.
+        /// Seed of the random series.
         #[serde(skip_serializing_if = "Option::is_none")]
         seed: Option<u64>,
     }
 }
 
 fault! {
-    /// `delay`: the value of so many seconds ago.
+    /// `delay`: the value from `seconds` ago.
     Delay {
         /// The delay in s.
         seconds: f64,
-        /// The value of a communication point is held until the next one; else lines between.
+        /// Whether the value of a communication point is held until the next one; otherwise values
+        /// are interpolated.
         #[serde(default)]
         hold: bool,
-        /// Value before there is one, if not the first one.
+        /// Value before the first delayed value arrives; default: the first value.
         #[serde(skip_serializing_if = "Option::is_none")]
         initial: Option<Literal>,
     }
@@ -173,7 +174,7 @@ fault! {
 }
 
 fault! {
-    /// `saturation`: `v` within bounds.
+    /// `saturation`: `v`, limited to bounds.
     Saturation {
         /// Lowest value.
         #[serde(skip_serializing_if = "Option::is_none")]
@@ -193,10 +194,10 @@ fault! {
         /// Largest size, for the uniform distribution.
         #[serde(skip_serializing_if = "Option::is_none")]
         amplitude: Option<f64>,
-        /// Time in s between samples; where it is not said, each communication point is one.
+        /// Time in s between samples; default: one sample at each communication point.
         #[serde(skip_serializing_if = "Option::is_none")]
         every: Option<f64>,
-        /// Which random series.
+        /// Seed of the random series.
         #[serde(default)]
         seed: u64,
     }

@@ -1,4 +1,4 @@
-//! Units of stated values.
+//! Conversion of stated values to the units of the variables.
 
 use fmu_description::unit::{BaseUnit, Unit};
 use fmu_description::{Kind, ModelDescription, ScalarVariable};
@@ -13,20 +13,21 @@ pub(super) struct Conversion {
 }
 
 impl Conversion {
-    /// Leaves values as they are.
+    /// The identity.
     pub(super) const NONE: Self = Self { factor: 1.0, offset: 0.0 };
 
-    /// Of a value.
+    /// Converts a value.
     pub(super) fn absolute(self, value: f64) -> f64 {
         self.factor * value + self.offset
     }
 
-    /// Of a difference of values.
+    /// Converts a difference of values.
     pub(super) fn relative(self, difference: f64) -> f64 {
         self.factor * difference
     }
 
-    /// From `stated` to the unit of `variable`, called `name`; none where nothing is stated.
+    /// Returns the conversion from the unit `stated` to the unit of `variable`, called `name`; the
+    /// identity if no unit is stated.
     pub(super) fn find(
         stated: Option<&str>,
         name: &str,
@@ -52,7 +53,7 @@ impl Conversion {
     }
 }
 
-/// Name of the unit of a Real, its own or that of its type.
+/// Returns the name of the unit of a Real: its own, or the unit of its type.
 fn unit_of<'a>(variable: &'a ScalarVariable, description: &'a ModelDescription) -> Option<&'a str> {
     let Kind::Real(real) = &variable.kind else { return None };
     let declared = || {
@@ -65,7 +66,7 @@ fn unit_of<'a>(variable: &'a ScalarVariable, description: &'a ModelDescription) 
     real.unit.as_deref().or_else(declared)
 }
 
-/// A unit as the FMU defines it, or else as its name says.
+/// Returns the base of a unit: from the definition in the FMU, or from the name.
 fn base_of(name: &str, description: &ModelDescription) -> Result<BaseUnit, Reason> {
     let defined = description.units.iter().find(|unit| unit.name == name);
     if let Some(base) = defined.and_then(|unit| unit.base) {

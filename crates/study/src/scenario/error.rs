@@ -1,4 +1,4 @@
-//! What can be wrong with a scenario.
+//! Errors of a scenario.
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -10,26 +10,26 @@ use master::SystemError;
 use master::fault::FaultError;
 use master::signal::TrackError;
 
-/// An entry that cannot be.
+/// An invalid entry of a scenario.
 #[derive(Debug, thiserror::Error)]
 #[error("{entry}: {reason}")]
 pub struct ScenarioError {
-    /// What it points at, in bytes of the text that the scenario was read from; `0..0` where it was not
-    /// read from a text.
+    /// Range of the invalid part in bytes of the text; `0..0` if the scenario was not read from a
+    /// text.
     pub place: Range<usize>,
-    /// The entry, such as `scenario.fault[2]`, which counts from 1.
+    /// Path of the entry, such as `scenario.fault[2]`; entries count from 1.
     pub entry: String,
-    /// Why.
+    /// The reason.
     pub reason: Box<Reason>,
 }
 
-/// Why an entry cannot be.
+/// The reason why an entry is invalid.
 #[derive(Debug, thiserror::Error)]
 pub enum Reason {
-    /// A name that there is not.
+    /// A name does not exist.
     #[error(transparent)]
     Name(#[from] SystemError),
-    /// A variable that cannot be set on the way.
+    /// The variable cannot be set during the run.
     #[error("{name} is {found}, expected an input or a tunable parameter")]
     NotSettable {
         /// The variable.
@@ -37,7 +37,7 @@ pub enum Reason {
         /// Its causality and variability.
         found: String,
     },
-    /// An input that has a source.
+    /// The input already has a source.
     #[error(
         "{name} is connected to {source_name} and gets its values from there; a fault on this \
          connection can hold another one: stuck = {{ value = .. }}"
@@ -48,23 +48,23 @@ pub enum Reason {
         /// Its source.
         source_name: String,
     },
-    /// A variable of two entries.
+    /// Two entries drive the same variable.
     #[error("{name} is driven twice, also by {first}")]
     Twice {
         /// The variable.
         name: String,
-        /// The other entry.
+        /// Path of the other entry.
         first: String,
     },
-    /// A fault where there are no values.
+    /// A fault on a variable without a connection and without a signal.
     #[error("{name} is {found}, expected a connected input, or one that a signal drives")]
     NoConnection {
         /// The variable.
         name: String,
-        /// What it is.
+        /// The kind of the variable.
         found: &'static str,
     },
-    /// A connection that is another one.
+    /// The input has another source than stated.
     #[error("{target} is connected to {found}, expected {stated}")]
     OtherSource {
         /// The input.
@@ -74,15 +74,15 @@ pub enum Reason {
         /// The source stated.
         stated: String,
     },
-    /// Not exactly one kind.
+    /// An entry does not have exactly one kind.
     #[error("found {}, expected exactly one of {expected}", listed(found))]
     Kinds {
-        /// Those there are.
+        /// The kinds found.
         found: Vec<&'static str>,
-        /// Those there could be.
+        /// The kinds possible.
         expected: &'static str,
     },
-    /// A kind that does not fit the type.
+    /// The kind does not fit the type of the variable.
     #[error("{what} does not fit {name}, which is of type {kind}; expected {expected}")]
     Unfit {
         /// The kind of the entry.
@@ -91,41 +91,41 @@ pub enum Reason {
         name: String,
         /// Its type.
         kind: &'static str,
-        /// What would fit.
+        /// The kinds that fit.
         expected: &'static str,
     },
-    /// A number that makes no sense.
+    /// A number is out of range.
     #[error("{what} is {found}, expected {expected}")]
     Number {
-        /// Which one.
+        /// Name of the number.
         what: &'static str,
         /// The number.
         found: f64,
-        /// What it must be.
+        /// The condition it must satisfy.
         expected: &'static str,
     },
-    /// Members of a table that belong together or exclude each other.
+    /// Members of a table are missing or exclude each other.
     #[error("{what}: expected {expected}")]
     Members {
         /// The table.
         what: &'static str,
-        /// What is right.
+        /// The members expected.
         expected: &'static str,
     },
-    /// A value that does not fit the type of the variable.
+    /// A value does not fit the type of the variable.
     #[error("{name} = {found}: expected {expected}")]
     Value {
         /// The variable.
         name: String,
         /// The value.
         found: String,
-        /// What fits.
+        /// The values that fit.
         expected: String,
     },
-    /// A text that is no unit.
+    /// A text is not a unit.
     #[error(transparent)]
     Unit(#[from] UnitError),
-    /// A unit for something that has none.
+    /// A unit is stated for a variable without one.
     #[error("{name} has no unit, expected a value without one, found the unit {stated:?}")]
     NoUnit {
         /// The variable.
@@ -133,7 +133,7 @@ pub enum Reason {
         /// The unit stated.
         stated: String,
     },
-    /// A unit of another dimension.
+    /// The unit has another dimension than the variable.
     #[error("{name} is in {own:?}, to which {stated:?} cannot be converted")]
     Dimension {
         /// The variable.
@@ -143,38 +143,38 @@ pub enum Reason {
         /// The unit of the variable.
         own: String,
     },
-    /// Points that make no signal.
+    /// Points do not define a signal.
     #[error(transparent)]
     Track(#[from] TrackError),
-    /// A fault that cannot be.
+    /// A fault cannot be created.
     #[error(transparent)]
     Fault(#[from] FaultError),
-    /// A file that is no table.
+    /// A file is not a valid table.
     #[error("{}: {error}", path.display())]
     File {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The error of the table.
         error: TableError,
     },
-    /// A file without that column.
+    /// The file does not have the column.
     #[error("{}: there is no column {name:?}, it has {known}", path.display())]
     Column {
         /// The file.
         path: PathBuf,
         /// The column.
         name: String,
-        /// Some of those there are.
+        /// Some of the columns in the file.
         known: String,
     },
-    /// A file without any column that fits.
+    /// The file has no column for a free input.
     #[error("{}: no column is called as {expected}, it has {known}", path.display())]
     NoColumn {
         /// The file.
         path: PathBuf,
-        /// What the columns could be called.
+        /// The form of the column names expected.
         expected: String,
-        /// Some of those there are.
+        /// Some of the columns in the file.
         known: String,
     },
 }

@@ -1,4 +1,4 @@
-//! Faults on connections, resolved.
+//! Resolves `[[scenario.fault]]`.
 
 use fmu_description::{Causality, Kind};
 use serde_spanned::Spanned;
@@ -16,13 +16,13 @@ use master::fault::{Fault, FaultChain, LossPattern, NoiseDistribution, RandomSer
 /// Kinds of a fault.
 const KINDS: &str = "bias, gain, drift, stuck, dropout, delay, quantisation, saturation, noise, \
                      inversion";
-/// Kinds for variables that are no Reals.
+/// Kinds for Integers.
 const OF_INTEGERS: &str = "bias, stuck, dropout, delay or saturation";
 const OF_BOOLEANS: &str = "stuck, dropout, delay or inversion";
 const OF_ENUMERATIONS: &str = "stuck, dropout or delay";
 const OF_REALS: &str = "any kind but inversion";
 
-/// The faults of one input, with the first entry among them.
+/// The faults of one input, with the path of the first entry.
 struct InputFaults<'a> {
     port: Port,
     entry: &'a Spanned<FaultEntry>,
@@ -31,7 +31,8 @@ struct InputFaults<'a> {
 }
 
 impl<'a> Resolver<'a> {
-    /// `[[scenario.fault]]`. Faults on driven variables go to their drives, the others come back.
+    /// Resolves `[[scenario.fault]]`. Adds the faults of driven variables to their drives and
+    /// returns the others.
     pub(super) fn faults(
         &mut self,
         entries: &'a [Spanned<FaultEntry>],
@@ -63,7 +64,7 @@ impl<'a> Resolver<'a> {
         Ok(lines)
     }
 
-    /// The input of a connection, or of a signal.
+    /// Returns the input of a connection or of a signal.
     fn way(&self, stated: &str) -> Result<Target<'a>, Reason> {
         let (source, input) = match stated.split_once('=') {
             Some((source, input)) => (Some(source.trim()), input.trim()),
@@ -92,11 +93,11 @@ impl<'a> Resolver<'a> {
     }
 }
 
-/// Reads the entries for one input.
+/// Converts the entries of one input.
 struct Reader<'a> {
     target: Target<'a>,
     start: f64,
-    /// How many faults there are before it.
+    /// Position among the faults of the input.
     place: u64,
 }
 
@@ -163,7 +164,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Refuses a kind that makes no sense for the type of the input.
+    /// Checks that a kind of fault fits the type of the input.
     fn expect_fit(&self, what: &'static str) -> Result<(), Reason> {
         let anywhere = ["stuck", "dropout", "delay"].contains(&what);
         let (fits, expected) = match self.target.variable.kind {
@@ -180,13 +181,13 @@ impl Reader<'_> {
         Err(Reason::Unfit { what, name: self.target.name.clone(), kind, expected })
     }
 
-    /// A number that is whole where the input is no Real.
+    /// Checks that a number is an integer if the input is not a Real.
     fn whole(&self, what: &'static str, number: f64) -> Result<f64, Reason> {
         let fits = self.target.is_real() || is_integer(number);
         require(what, number, fits, "a whole number, as the input is an Integer")
     }
 
-    /// A value of the type of the input.
+    /// Converts a value to the type of the input.
     fn value(&self, value: Option<&Literal>, unit: Conversion) -> Result<Option<f64>, Reason> {
         let Some(value) = value else { return Ok(None) };
         let refused = |expected| Reason::Value {
@@ -239,7 +240,7 @@ impl Reader<'_> {
             bound.map(|bound| self.whole(what, unit.absolute(bound))).transpose()
         };
         let (one, other) = (bound("min", saturation.min)?, bound("max", saturation.max)?);
-        // A unit of negative factor turns the two around.
+        // A unit with a negative factor exchanges the bounds.
         let (lowest, highest) = if unit.factor < 0.0 { (other, one) } else { (one, other) };
         match (saturation.min, saturation.max) {
             (None, None) => {

@@ -1,4 +1,4 @@
-//! A value as it stands in the file.
+//! Literal values of the file.
 
 use std::fmt;
 
@@ -14,7 +14,7 @@ pub enum Literal {
     Number(f64),
     /// A Boolean.
     Boolean(bool),
-    /// A text: of a String, or the name of an item of an Enumeration.
+    /// A text: the value of a String, or the name of an Enumeration item.
     Text(String),
 }
 
@@ -67,8 +67,8 @@ impl Visitor<'_> for LiteralVisitor {
 }
 
 impl Literal {
-    /// The value for a variable that is no String, as a number: Booleans are 0 and 1, an item of an
-    /// Enumeration is its number. Else what was expected.
+    /// Converts the value to a number for a variable that is not a String: Booleans become 0 or 1,
+    /// an Enumeration item its number. On failure returns a description of the expected value.
     pub(super) fn number(
         &self,
         variable: &ScalarVariable,
@@ -101,7 +101,7 @@ impl Literal {
     }
 }
 
-/// Whether a number is an Integer of the standard.
+/// Whether a number is a 32-bit Integer of the standard.
 pub(super) fn is_integer(number: f64) -> bool {
     number.fract() == 0.0 && (f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&number)
 }

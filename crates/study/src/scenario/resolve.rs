@@ -1,4 +1,5 @@
-//! From a [`Scenario`] to what the engine calls.
+//! Resolves a [`Scenario`]: finds variables and files and creates the drives and faults of the
+//! master.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -13,22 +14,22 @@ use master::SystemError;
 use master::drive::{Drive, DriveKind, DriveSource, Drives};
 use master::{Port, System};
 
-/// What a scenario asks of a system.
+/// The information about a system that a scenario needs.
 pub trait Lookup {
-    /// The variable called `name`, `slave.variable`.
+    /// Returns the port of the variable `name`, in the form `slave.variable`.
     ///
     /// # Errors
     ///
-    /// Where there is none.
+    /// Returns an error if there is no such variable.
     fn port(&self, name: &str) -> Result<Port, SystemError>;
 
-    /// `slave.variable`.
+    /// Returns the name `slave.variable` of a port.
     fn name(&self, port: Port) -> String;
 
-    /// The model description of a slave.
+    /// Returns the model description of a slave.
     fn description(&self, slave: usize) -> &ModelDescription;
 
-    /// The output that an input is connected to.
+    /// Returns the output that is connected to an input.
     fn source(&self, input: Port) -> Option<Port>;
 }
 
@@ -50,23 +51,23 @@ impl Lookup for System {
     }
 }
 
-/// What else a scenario needs to know.
+/// Settings of the run that a scenario needs.
 #[derive(Clone, Copy, Debug)]
 pub struct Setup<'a> {
-    /// Paths of files start here.
+    /// Folder at which relative paths start.
     pub folder: &'a Path,
     /// Start of the simulation in s.
     pub start: f64,
-    /// Communication step in s, or the first one.
+    /// Communication step in s; the first one if it varies.
     pub step: f64,
 }
 
-/// A scenario that fits its system.
+/// A scenario resolved for a system.
 #[derive(Clone, Debug, Default)]
 pub struct ResolvedScenario {
-    /// What the engine takes.
+    /// The scenario for the master.
     pub scenario: master::Scenario,
-    /// Columns of `[[scenario.table]]` that drive nothing, with their file.
+    /// Columns of `[[scenario.table]]` without a free input, with their file.
     pub unused: Vec<(PathBuf, String)>,
 }
 
@@ -75,7 +76,7 @@ impl Scenario {
     ///
     /// # Errors
     ///
-    /// [`ScenarioError`]: the first entry that cannot be, with its place and why.
+    /// Returns [`ScenarioError`] for the first invalid entry, with its location.
     pub fn resolve(
         &self,
         names: &dyn Lookup,
@@ -105,23 +106,23 @@ impl Scenario {
     }
 }
 
-/// An error with the place of the entry that it is about.
+/// Adds the location of an entry to an error.
 pub(super) fn at<T>(entry: &Spanned<T>, path: &str) -> impl FnOnce(Reason) -> ScenarioError {
     let (place, entry) = (entry.span(), path.to_owned());
     move |reason| ScenarioError { place, entry, reason: Box::new(reason) }
 }
 
-/// Work in progress.
+/// The state of the resolution.
 pub(super) struct Resolver<'a> {
     pub(super) names: &'a dyn Lookup,
     pub(super) setup: Setup<'a>,
     files: HashMap<PathBuf, Rc<Table>>,
-    /// Each with the path of its entry.
+    /// The drives, each with the path of its entry.
     pub(super) drives: Vec<(Drive, String)>,
     pub(super) unused: Vec<(PathBuf, String)>,
 }
 
-/// A variable with what is known of it.
+/// A variable with its description.
 pub(super) struct Target<'a> {
     pub(super) port: Port,
     pub(super) name: String,
@@ -130,7 +131,7 @@ pub(super) struct Target<'a> {
 }
 
 impl Target<'_> {
-    /// A Real input that may change at any time.
+    /// Whether it is a continuous Real input.
     pub(super) fn is_continuous(&self) -> bool {
         self.variable.causality == Causality::Input
             && self.variable.variability == Variability::Continuous
@@ -143,7 +144,7 @@ impl Target<'_> {
 }
 
 impl<'a> Resolver<'a> {
-    /// The variable called `name`.
+    /// Returns the variable called `name`.
     pub(super) fn target(&self, name: &str) -> Result<Target<'a>, Reason> {
         let names = self.names;
         let port = names.port(name)?;
@@ -152,7 +153,7 @@ impl<'a> Resolver<'a> {
         Ok(Target { port, name: names.name(port), variable, description })
     }
 
-    /// The variable called `name`, which nothing else sets.
+    /// Returns the variable called `name` if it can be driven and no other entry drives it.
     pub(super) fn free(&self, name: &str) -> Result<Target<'a>, Reason> {
         let target = self.target(name)?;
         let (causality, variability) = (target.variable.causality, target.variable.variability);
@@ -168,7 +169,7 @@ impl<'a> Resolver<'a> {
         Ok(target)
     }
 
-    /// Adds a drive; `path` is that of its entry.
+    /// Adds a drive; `path` is the path of its entry.
     pub(super) fn add(
         &mut self,
         target: &Target<'_>,
@@ -187,12 +188,12 @@ impl<'a> Resolver<'a> {
         Ok(())
     }
 
-    /// What drives a variable, with the path of its entry.
+    /// Returns the drive of a variable with the path of its entry.
     pub(super) fn driver(&self, port: Port) -> Option<&(Drive, String)> {
         self.drives.iter().find(|(drive, _)| drive.port() == port)
     }
 
-    /// A file, read once.
+    /// Reads a CSV file, once even if several entries use it.
     pub(super) fn file(&mut self, name: &str) -> Result<(PathBuf, Rc<Table>), Reason> {
         let path = self.setup.folder.join(name);
         if let Some(known) = self.files.get(&path) {
@@ -206,23 +207,23 @@ impl<'a> Resolver<'a> {
     }
 }
 
-/// `a tunable parameter`, `an independent variable`.
+/// Prepends the indefinite article to a noun.
 fn with_article(noun: &str) -> String {
     let article = if noun.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
     format!("{article} {noun}")
 }
 
-/// A finite number.
+/// Checks that a number is finite.
 pub(super) fn finite(what: &'static str, found: f64) -> Result<f64, Reason> {
     require(what, found, found.is_finite(), "a finite number")
 }
 
-/// A finite number above 0.
+/// Checks that a number is finite and above 0.
 pub(super) fn positive(what: &'static str, found: f64) -> Result<f64, Reason> {
     require(what, found, found.is_finite() && found > 0.0, "a number above 0")
 }
 
-/// A number, if it holds that it is what is `expected`.
+/// Returns `found` if `holds` is true, otherwise an error with the text `expected`.
 pub(super) fn require(
     what: &'static str,
     found: f64,
@@ -232,7 +233,7 @@ pub(super) fn require(
     if holds { Ok(found) } else { Err(Reason::Number { what, found, expected }) }
 }
 
-/// The one kind of an entry; more or fewer are refused.
+/// Returns the only kind of an entry, or an error if there are none or several.
 pub(super) fn only(
     kinds: &[(&'static str, bool)],
     expected: &'static str,

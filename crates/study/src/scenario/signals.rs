@@ -1,4 +1,4 @@
-//! Settings, signals and tables, resolved.
+//! Resolves `[[scenario.set]]`, `[[scenario.signal]]` and `[[scenario.table]]`.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -18,7 +18,7 @@ use master::signal::{Interpolation, Signal, Track};
 
 /// Kinds of a signal.
 const KINDS: &str = "constant, steps, points, ramp, sine, csv";
-/// Most names in a message.
+/// Largest number of names in a message.
 const MOST_NAMES: usize = 10;
 
 /// The settings of one variable.
@@ -31,7 +31,7 @@ struct Settings<'a> {
 }
 
 impl<'a> Resolver<'a> {
-    /// `[[scenario.set]]`.
+    /// Resolves `[[scenario.set]]`.
     pub(super) fn settings(
         &mut self,
         entries: &'a [Spanned<SetEntry>],
@@ -53,7 +53,7 @@ impl<'a> Resolver<'a> {
             let value = conversion(set.unit.as_ref(), target)
                 .and_then(|conversion| encode(set.value.get_ref(), target, conversion, texts))
                 .map_err(at(&set.value, &path))?;
-            // Plus zero, as minus zero is the same time.
+            // Adding zero maps minus zero to plus zero, which is the same time.
             points.push((set.at + 0.0, value));
         }
         for Settings { target, path, entry, points, texts } in variables {
@@ -63,7 +63,7 @@ impl<'a> Resolver<'a> {
         Ok(())
     }
 
-    /// `[[scenario.signal]]`.
+    /// Resolves an entry of `[[scenario.signal]]`.
     pub(super) fn signal(&mut self, entry: &SignalEntry, path: &str) -> Result<(), Reason> {
         let target = self.free(entry.variable.get_ref())?;
         let kinds = [
@@ -112,7 +112,8 @@ impl<'a> Resolver<'a> {
         column_signal(&path, &table, &name, target, csv.hold)
     }
 
-    /// `[[scenario.table]]`; what the first `others` drives drive, it leaves to them.
+    /// Resolves an entry of `[[scenario.table]]`, except inputs that the first `others` drives
+    /// already drive.
     pub(super) fn table(
         &mut self,
         entry: &TableEntry,
@@ -159,7 +160,7 @@ impl<'a> Resolver<'a> {
     }
 }
 
-/// Some of the names of a file.
+/// Lists the first column names of a file.
 fn some(names: &[String]) -> String {
     let more = if names.len() > MOST_NAMES { ", .." } else { "" };
     format!("{}{more}", names[..names.len().min(MOST_NAMES)].join(", "))
@@ -178,7 +179,7 @@ pub(super) fn conversion(
     Conversion::find(stated, &target.name, target.variable, target.description)
 }
 
-/// A value as a number; that of a String is its position among `texts`.
+/// Encodes a value as a number; a String becomes its index in `texts`.
 #[expect(clippy::cast_precision_loss, reason = "a position")]
 fn encode(
     value: &Literal,
@@ -202,7 +203,8 @@ fn encode(
     Ok(conversion.absolute(number))
 }
 
-/// Settings in the order of their times; of several at one time the last one stated.
+/// Returns the signal of settings sorted by time; of several at the same time, the last one stated
+/// applies.
 fn settings_following(
     mut points: Vec<(f64, f64)>,
     texts: Vec<String>,
@@ -255,7 +257,8 @@ fn sine_signal(sine: &Sine, start: f64) -> Result<Signal, Reason> {
     })
 }
 
-/// A column as FMPy takes it: lines for continuous Reals, else held.
+/// Returns the signal of a column as FMPy interprets it: linear interpolation for continuous Reals,
+/// held values otherwise.
 fn column_signal(
     path: &Path,
     table: &Table,

@@ -1,4 +1,4 @@
-//! Tables that are read, and those that are refused in words.
+//! Valid tables, and error messages for invalid ones.
 
 use proptest::prelude::*;
 

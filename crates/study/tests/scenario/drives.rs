@@ -1,11 +1,11 @@
-//! What the slaves are told by settings, signals and tables.
+//! The values that slaves receive from settings, signals and tables.
 
 use std::path::Path;
 
 use super::{Told, scenario, setup, system};
 
-/// What `plant` is told at these communication points, each accepted; the ones where it is told nothing are
-/// left out.
+/// Returns the calls that `plant` receives at the communication points `times`; leaves out points
+/// without calls.
 fn told(text: &str, folder: &Path, times: &[f64]) -> Vec<(f64, Vec<String>)> {
     let (mut system, plant, ctrl) = system();
     let mut prepared = scenario(text).resolve(&system, &setup(folder)).unwrap();
@@ -213,7 +213,7 @@ fn a_step_that_is_taken_back_is_told_again() {
     drives.commit(2.0);
     drives.write(&mut system, 2.0).unwrap();
     assert!(take(&plant).is_empty());
-    // The FMU's own checkpoint holds the value too: it is not set again.
+    // The checkpoint of the FMU holds the value, so it is not set again.
     let state = drives.state();
     let mut resumed = scenario(text).resolve(&system, &setup(here())).unwrap();
     resumed.scenario.drives.restore(state).unwrap();

@@ -2,7 +2,7 @@
 
 use super::{Document, scenario, setup, system};
 
-/// The blocks of the document that are files.
+/// Returns the code blocks of the document that are files.
 fn blocks() -> Vec<String> {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/reference/scenario.md");
     let text = std::fs::read_to_string(path).unwrap();

@@ -1,4 +1,4 @@
-//! Faults as they stand in a file.
+//! Faults, read from a file.
 
 use std::path::Path;
 
@@ -20,7 +20,7 @@ fn line(body: &str) -> FaultChain {
     lines(&text).remove(0).1
 }
 
-/// What arrives of 1, 2, 3, .. at 0 s, 0.5 s, 1 s, ..
+/// Returns the disturbed values of 1, 2, 3, .. at 0 s, 0.5 s, 1 s, ..
 fn series(mut line: FaultChain) -> [f64; 6] {
     [0, 1, 2, 3, 4, 5].map(|step: u8| {
         let (time, value) = (0.5 * f64::from(step), 1.0 + f64::from(step));
@@ -141,7 +141,7 @@ fn integers_are_disturbed_as_integers() {
     assert_eq!(found, [2, 2, 2, 6]);
 }
 
-/// The state of the drives, written and read.
+/// Serialises and deserialises the state of the drives.
 fn checkpoint(prepared: &ResolvedScenario) -> Vec<DriveState> {
     postcard::from_bytes(&postcard::to_allocvec(&prepared.scenario.drives.state()).unwrap())
         .unwrap()
@@ -221,7 +221,7 @@ fn nothing_allocates_between_the_steps() {
             }
             drives.commit(time);
             std::hint::black_box(drives.next_break(time));
-            // From far below to far above the step that was said, 0.5 s.
+            // Steps from far below to far above the expected 0.5 s.
             time += if time < 20.0 { 0.01 } else { 0.9 };
         }
     });

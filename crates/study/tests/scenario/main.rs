@@ -1,4 +1,4 @@
-//! Scenarios as they stand in a file, on slaves that write down what they are told.
+//! Scenarios read from a file, with slaves that record the calls they receive.
 #![expect(clippy::unwrap_used, clippy::float_cmp, reason = "tests; exact by construction")]
 
 mod drives;
@@ -14,10 +14,10 @@ use fmu_description::ModelDescription;
 use master::{CallError, Slave, StepResult, System};
 use study::scenario::{ResolvedScenario, Scenario, ScenarioError, Setup};
 
-/// What a slave was told: function, value references, values.
+/// The calls of a slave: function, value references, values.
 type Told = Arc<Mutex<Vec<String>>>;
 
-/// Writes down what is set.
+/// A slave that records the values set.
 struct Listener {
     description: ModelDescription,
     told: Told,

@@ -1,10 +1,10 @@
-//! What is wrong with a scenario is said, with the place in the file.
+//! Error messages of invalid scenarios, with their location in the file.
 
 use std::path::Path;
 
 use super::{Document, scenario, setup, system};
 
-/// What the error says and the text that it points at.
+/// Returns the error message and the text at its location.
 fn refused(text: &str, folder: &Path) -> (String, String) {
     let error = scenario(text).resolve(&system().0, &setup(folder)).unwrap_err();
     (error.to_string(), text[error.place].to_owned())
@@ -182,7 +182,7 @@ fn files_that_do_not_fit_are_refused() {
     assert!(found.starts_with(&format!("scenario.table[1]: {}: ", path("none.csv"))), "{found}");
 }
 
-/// A fault on that connection is refused with that message.
+/// Checks that a fault on the connection is refused with the message.
 fn expect_of_fault(connection: &str, body: &str, message: &str) {
     let text = fault(&format!("connection = \"{connection}\", {body}"));
     expect(&text, &format!("scenario.fault[1]: {message}"));

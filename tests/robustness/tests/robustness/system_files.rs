@@ -1,10 +1,11 @@
-//! No file that the master reads does any harm, whatever is in it.
+//! The readers of study files neither panic nor hang on any input.
+#![expect(clippy::unwrap_used, reason = "tests")]
 
 use robustness::changes::mutate;
 use robustness::corpus::replay;
 use robustness::system_files as targets;
 
-/// What the XML of SSP lives on.
+/// Fragments of SSP XML, used to change the corpus.
 const XML: [&[u8]; 20] = [
     b"<",
     b">",
@@ -27,7 +28,7 @@ const XML: [&[u8]; 20] = [
     b"<ssd:Elements/>",
     b"<ssd:System name=\"x\"/>",
 ];
-/// What CSV lives on.
+/// Fragments of CSV, used to change the corpus.
 const CSV: [&[u8]; 10] =
     [b",", b"\"", b"\"\"", b"\n", b"\r\n", b"\r", b"time", b"\xef\xbb\xbf", b"1e308", b"-1e-308"];
 

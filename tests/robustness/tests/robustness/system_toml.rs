@@ -1,9 +1,9 @@
-//! No `system.toml` does any harm, whatever is in it.
+//! The parser of `system.toml` neither panics nor hangs on any input.
 
 use robustness::system_toml::system_toml;
 use robustness::{changes, corpus};
 
-/// What TOML and this file live on.
+/// Fragments of TOML and of this format, used to change the corpus.
 const WORDS: [&[u8]; 22] = [
     b"[",
     b"]",

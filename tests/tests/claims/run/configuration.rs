@@ -131,16 +131,14 @@ fn an_explanation_says_what_was_chosen_and_why() {
     let said = bench.coupled_well(&["--stop-time", "0.01", "--explain"]);
     for part in [
         "algorithm: gauss-seidel, extrapolation limited, coupling once, fixed step 0.001 s",
-        "the smallest stepSize of a DefaultExperiment, that of plant",
+        "the smallest stepSize of all DefaultExperiments (plant)",
         "in the order of the direct dependencies: plant, controller",
         "time: 0 to 0.01 s",
     ] {
         assert!(said.contains(part), "{part} is not in {said}");
     }
     let said = printed(&bench.run(&["--fmu", &format!("c={}", fmu("AsoController")), "--explain"]));
-    assert!(
-        said.contains("stop time 100 s: the latest stopTime of a DefaultExperiment, that of c")
-    );
+    assert!(said.contains("stop time 100 s: the latest stopTime of all DefaultExperiments (c)"));
 }
 
 #[test]

@@ -120,7 +120,7 @@ fn a_resumed_run_tells_the_fmus_their_first_stop_time_and_says_where_another_one
     fails(&run, 0, &[]);
     fails(&bench.run(&["--resume", "state"]), 0, &["t = 1 s, which is the end of the run"]);
     let later = bench.run(&["--resume", "state", "--stop-time", "2"]);
-    let warning = "the stop time 2 s is later than 1 s, which the FMUs were told";
+    let warning = "the stop time 2 s is later than 1 s, the stop time that the FMUs received";
     fails(&later, 1, &[warning, "the step ends beyond the stop time"]);
     let other = CFmu::well_behaved().write(bench.folder.path(), "b");
     let fmu = format!("b={}", other.display());
