@@ -68,9 +68,9 @@ pub fn assemble(
         }
     }
     if assembly.elements.is_empty() {
-        return Err(Error::Invalid(format!(
-            "the system has no FMU, expected `system` or an entry of [fmus]"
-        )));
+        return Err(Error::Invalid(
+            "the system has no FMU, expected `system` or an entry of [fmus]".to_owned(),
+        ));
     }
     let mut system = instantiate(&assembly.elements, config, making)?;
     for (name, function) in &assembly.functions {
@@ -123,9 +123,10 @@ fn instantiate(
     let memory_limit = config.isolation.memory_limit.map(|memory| memory.0);
     if config.isolation.isolate != Some(true) {
         if memory_limit.is_some() {
-            return Err(Error::Invalid(format!(
+            return Err(Error::Invalid(
                 "--memory-limit applies to FMUs in separate processes, expected --isolate"
-            )));
+                    .to_owned(),
+            ));
         }
         if time_limit.is_some() {
             tracing::warn!(

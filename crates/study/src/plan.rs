@@ -233,6 +233,7 @@ fn complete(request: &mut AlgorithmRequest, algorithm: &Algorithm, system: &Syst
 
 impl Plan {
     /// Returns the text of `--explain`.
+    #[must_use]
     pub fn explanation(&self, system: &System) -> String {
         let algorithm = &self.algorithm;
         let mut lines = vec![

@@ -36,6 +36,10 @@ pub struct Recorder {
 
 impl Recorder {
     /// Creates a recorder of `ports` to the file at `path`; `None` if nothing is recorded.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`] with the reason.
     pub fn create(
         path: &Path,
         simulation: &mut Simulation,
@@ -67,11 +71,16 @@ impl Recorder {
     }
 
     /// Returns the schedule of the next rows.
+    #[must_use]
     pub fn due(&self) -> &Due {
         &self.due
     }
 
     /// Records a row if one is due at the time of `simulation`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`] with the reason.
     #[inline]
     pub fn sample(&mut self, simulation: &mut Simulation) -> Result<(), Error> {
         let time = simulation.time();
@@ -79,6 +88,10 @@ impl Recorder {
     }
 
     /// Prepares a step; see [`SlowValues::before_step`].
+    ///
+    /// # Errors
+    ///
+    /// [`Error`] with the reason.
     #[inline]
     pub fn before_step(&mut self, simulation: &mut Simulation) -> Result<(), Error> {
         Ok(self.slow.before_step(simulation)?)
@@ -90,6 +103,10 @@ impl Recorder {
     }
 
     /// Restores the state of the recording in a resumed run.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`] with the reason.
     pub fn restore(&mut self, simulation: &mut Simulation, state: &SlowState) -> Result<(), Error> {
         Ok(self.slow.restore(simulation, state)?)
     }
@@ -104,11 +121,19 @@ impl Recorder {
     }
 
     /// Writes all rows recorded so far to the file.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`] with the reason.
     pub fn flush(&mut self) -> Result<(), Error> {
         Ok(lock(&self.recording).sink.as_mut().map_or(Ok(()), |sink| sink.flush())?)
     }
 
     /// Completes the file.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`] with the reason.
     pub fn finish(self) -> Result<(), Error> {
         let sink = lock(&self.recording).sink.take();
         Ok(sink.map_or(Ok(()), Sink::finish)?)
@@ -174,6 +199,7 @@ fn column(system: &System, port: Port) -> Column {
 }
 
 /// Returns the unit of a variable, if it has one.
+#[must_use]
 pub fn unit(system: &System, port: Port) -> Option<String> {
     match &system.variable(port).kind {
         Kind::Real(real) => real.unit.clone(),

@@ -28,6 +28,7 @@ pub struct SavedRun {
 impl SavedRun {
     /// Creates a saved run from the state `checkpoint`, the configuration `text` and the state of
     /// the recording.
+    #[must_use]
     pub fn new(
         text: &str,
         checkpoint: Checkpoint,
@@ -88,22 +89,26 @@ impl SavedRun {
     }
 
     /// Returns the time of the next row, if rows are recorded at the same interval as before.
+    #[must_use]
     pub fn due(&self, every: Every) -> Option<&Due> {
         let (text, due) = self.due.as_ref()?;
         (*text == every.to_string()).then_some(due)
     }
 
     /// Returns the recorded values of multirate FMUs.
+    #[must_use]
     pub fn slow(&self) -> &SlowState {
         &self.slow
     }
 
     /// Returns the state of the simulation.
+    #[must_use]
     pub fn checkpoint(&self) -> &Checkpoint {
         &self.checkpoint
     }
 
     /// Returns the time reached in s.
+    #[must_use]
     pub fn time(&self) -> f64 {
         self.checkpoint.time()
     }

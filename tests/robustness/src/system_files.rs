@@ -1,4 +1,4 @@
-//! The fuzz targets. Each panics if a property does not hold.
+//! What a fuzz target does with its bytes. Each panics where a claim does not hold.
 
 use std::fmt::Debug;
 
@@ -6,8 +6,7 @@ use master::signal::{Cursor, Interpolation, Signal, Track};
 use ssp::{self, SspError};
 use study::table::{self, Table, TableError};
 
-/// Checks that content that was read can be written and reads back as equal, and that an error
-/// states the expected form and a line.
+/// What was read is written, and reads back as the same; an error says what was expected, and where.
 fn both_ways<T: Debug + PartialEq>(
     data: &[u8],
     read: fn(&[u8]) -> Result<T, SspError>,
@@ -53,10 +52,9 @@ pub fn signal_dictionary(data: &[u8]) {
     both_ways(data, ssp::read_ssb, ssp::render_ssb);
 }
 
-/// A CSV file with signals: a table that was read has ascending times, and reads back as equal
-/// after writing; an error names a line. Columns that are valid signals have finite values at all
-/// times.
-pub(crate) fn signal_table(data: &[u8]) {
+/// A CSV file with signals: what was read is a table in order, and written it reads back as the same;
+/// an error names a line. Its columns, if they are signals, have finite values everywhere.
+pub fn signal_table(data: &[u8]) {
     let table = match table::parse(data) {
         Ok(table) => table,
         Err(error) => return refused(data, &error),
@@ -73,7 +71,7 @@ pub(crate) fn signal_table(data: &[u8]) {
     assert_eq!(again, table, "{text}");
     for column in &table.columns {
         for between in [Interpolation::Line, Interpolation::Hold] {
-            // A time may exceed the largest time of a signal.
+            // A time may be beyond what a signal takes.
             if let Ok(track) = Track::new(table.times.clone(), column.clone(), between) {
                 follow(&table, column, &Signal::Track(track));
             }
@@ -81,7 +79,7 @@ pub(crate) fn signal_table(data: &[u8]) {
     }
 }
 
-/// Checks that the error has a reason and, if it has a line, a line of the file.
+/// A line that the file has, where the error has one, and some reason.
 fn refused(data: &[u8], error: &TableError) {
     let message = error.to_string();
     assert!(message.len() > 20, "{message:?}");
@@ -92,7 +90,7 @@ fn refused(data: &[u8], error: &TableError) {
     assert!(line.is_none_or(|line| (1..=lines(data)).contains(&line)), "{message}");
 }
 
-/// Writes the table as a CSV file with all names in quotes.
+/// The table as a CSV file, every name in quotes.
 fn written(table: &Table) -> String {
     let quoted = |name: &String| format!(",\"{}\"", name.replace('"', "\"\""));
     let mut lines = vec![format!("time{}\n", table.names.iter().map(quoted).collect::<String>())];
@@ -103,11 +101,11 @@ fn written(table: &Table) -> String {
     lines.concat()
 }
 
-/// Checks that interpolated values lie between the values of neighbouring points.
+/// The values of a signal at its points and between them lie between those of its points.
 fn follow(table: &Table, column: &[f64], signal: &Signal) {
     let (least, most) =
         column.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
-    // A weighted mean has two rounding errors.
+    // Two roundings of a mean with weights.
     let slack = 4.0 * f64::EPSILON * least.abs().max(most.abs());
     let mut cursor = Cursor::default();
     for pair in table.times.windows(2).chain([&table.times[table.times.len() - 1..]]) {

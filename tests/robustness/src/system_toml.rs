@@ -1,12 +1,11 @@
-//! The fuzz target `system_toml`. It panics if a property does not hold.
+//! What the fuzz target `system_toml` does with its bytes. It panics where a claim does not hold.
 
 use std::path::Path;
 
 use study::config::{Config, parse};
 
-/// A `system.toml` that was read can be written and reads back as equal; an error states its
-/// location.
-pub(crate) fn system_toml(data: &[u8]) {
+/// A `system.toml`: what was read is written, and reads back as the same; an error says where.
+pub fn system_toml(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let mut config = match parse(text, Path::new("/models/system.toml")) {
         Ok(config) => config,
@@ -18,14 +17,14 @@ pub(crate) fn system_toml(data: &[u8]) {
     let again = parse(&written, Path::new("/elsewhere/system.toml"));
     let again = again.unwrap_or_else(|error| panic!("{error}\n{written}"));
     assert_eq!(again.render().ok().as_ref(), Some(&written));
-    // NaN is not equal to itself.
+    // What is no number is not equal to itself.
     assert!(
         without_places(again) == without_places(config) || written.contains("nan"),
         "{written}"
     );
 }
 
-/// Removes the locations of the settings.
+/// Settings know where they stand.
 fn without_places(mut config: Config) -> Config {
     for (_, _, place) in &mut config.settings.0 {
         *place = 0..0;
@@ -33,8 +32,7 @@ fn without_places(mut config: Config) -> Config {
     config
 }
 
-/// Checks that the message starts with a location in the text and a reason, and shows the line with
-/// a mark.
+/// The message begins with a place in the text and a reason, and shows the line with a mark.
 fn located(text: &str, message: &str) {
     let mut parts = message.splitn(4, ':');
     assert_eq!(parts.next(), Some("/models/system.toml"));

@@ -21,6 +21,7 @@ impl<T> Default for Ordered<T> {
 
 impl<T> Ordered<T> {
     /// Whether there are no entries.
+    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
@@ -96,6 +97,7 @@ pub struct Settings(pub Vec<(String, SettingValue, Place)>);
 
 impl Settings {
     /// Whether there are no settings.
+    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }

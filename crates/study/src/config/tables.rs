@@ -29,6 +29,7 @@ pub struct ConnectionEntry {
 
 impl ConnectionEntry {
     /// Creates a connection of the command line, without a location.
+    #[must_use]
     pub fn new(from: String, to: String) -> Spanned<Self> {
         let text = |text| Spanned::new(0..0, text);
         Spanned::new(0..0, Self { from: text(from), to: text(to), factor: None, offset: None })

@@ -1,11 +1,10 @@
-//! The readers of study files neither panic nor hang on any input.
-#![expect(clippy::unwrap_used, reason = "tests")]
+//! No file that the master reads does any harm, whatever is in it.
 
 use robustness::changes::mutate;
 use robustness::corpus::replay;
 use robustness::system_files as targets;
 
-/// Fragments of SSP XML, used to change the corpus.
+/// What the XML of SSP lives on.
 const XML: [&[u8]; 20] = [
     b"<",
     b">",
@@ -28,7 +27,7 @@ const XML: [&[u8]; 20] = [
     b"<ssd:Elements/>",
     b"<ssd:System name=\"x\"/>",
 ];
-/// Fragments of CSV, used to change the corpus.
+/// What CSV lives on.
 const CSV: [&[u8]; 10] =
     [b",", b"\"", b"\"\"", b"\n", b"\r\n", b"\r", b"time", b"\xef\xbb\xbf", b"1e308", b"-1e-308"];
 

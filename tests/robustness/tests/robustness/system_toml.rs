@@ -1,9 +1,9 @@
-//! The parser of `system.toml` neither panics nor hangs on any input.
+//! No `system.toml` does any harm, whatever is in it.
 
 use robustness::system_toml::system_toml;
 use robustness::{changes, corpus};
 
-/// Fragments of TOML and of this format, used to change the corpus.
+/// What TOML and this file live on.
 const WORDS: [&[u8]; 22] = [
     b"[",
     b"]",
