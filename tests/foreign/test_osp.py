@@ -82,7 +82,20 @@ def columns(unpacked):
 
 
 def by_libcosim(path, places):
-    """The values after each step."""
+    """The values after each step, as two runs in a row give them.
+
+    libcosim steps in threads, and a run now and then differs from all others.
+    """
+    runs = [once_by_libcosim(path, places)]
+    for _ in range(5):
+        runs.append(once_by_libcosim(path, places))
+        if all(np.array_equal(one, other) for one, other in zip(*runs[-2:])):
+            return runs[-1]
+    raise AssertionError("libcosim never repeats its values")
+
+
+def once_by_libcosim(path, places):
+    """The values after each step of one run."""
     execution = CosimExecution.from_osp_config_file(str(path))
     index = {info.name.decode(): info.index for info in execution.slave_infos()}
     observer = CosimObserver.create_time_series(COUNT + 1)
