@@ -51,7 +51,7 @@ pub(crate) fn bars() -> &'static MultiProgress {
     BARS.get_or_init(MultiProgress::new)
 }
 
-/// Writes to standard error while the progress bar is hidden.
+/// A writer to standard error that hides the progress bar while it writes.
 struct StandardError;
 
 impl Write for StandardError {

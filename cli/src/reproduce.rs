@@ -71,7 +71,7 @@ pub(crate) fn reproduce(options: &Options) -> anyhow::Result<bool> {
     let certified = ControllerCertificate::of(run.simulation.system(), watch.fault_bound())?;
     let written = Summary {
         scenario: options.scenario.name(),
-        method: run.plan.algorithm.sweep.name(),
+        method: run.plan.algorithm.method.name(),
         extrapolation: run.plan.algorithm.extrapolation.name(),
         communication_step: run.plan.algorithm.step,
         stop_time: options.stop_time,

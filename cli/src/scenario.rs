@@ -48,7 +48,7 @@ impl Scenario {
     }
 }
 
-/// The paper prints `col(L_x, L_f)`, so the last row is L_f as in (5).
+/// Returns the printed gains. The paper prints `col(L_x, L_f)`, so the last row is L_f as in (5).
 fn printed_gains() -> Vec<(String, String)> {
     let mut settings = Vec::new();
     for (row, entries) in PRINTED_L.iter().enumerate() {

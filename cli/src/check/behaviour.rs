@@ -22,8 +22,8 @@ const ROUNDED: f64 = 1e-6;
 /// Number of messages of a trial above which they are a warning: about 1000 for each step.
 const FLOOD: u64 = 10_000;
 
-/// Creates an instance with the given name. It replaces the given former instance, in the same
-/// process, if there is one.
+/// A function that creates an instance with the given name. The instance replaces the given former
+/// one, in the same process, if there is one.
 pub(super) type MakeInstance<'a, S> = dyn FnMut(&str, Option<S>) -> anyhow::Result<S> + 'a;
 
 /// The outputs at each communication point of a trial, including the start.

@@ -51,7 +51,7 @@ const PLATFORMS: [Platform; 15] = {
     ]
 };
 
-/// Reads the bytes of a file of the FMU, by its name in the archive.
+/// A function that reads the bytes of a file of the FMU, by its name in the archive.
 pub(crate) type Read<'a> = dyn Fn(&str) -> io::Result<Vec<u8>> + 'a;
 
 /// Checks the folder `binaries` of an FMU with the files `names`.

@@ -36,7 +36,8 @@ impl MessageRecorder {
     }
 }
 
-/// Reads the field `category` of an event, and the number of messages that the event represents.
+/// A visitor that reads the field `category` of an event, and the number of messages that the event
+/// represents.
 struct Category(Option<String>, u64);
 
 impl Visit for Category {

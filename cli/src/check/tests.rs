@@ -195,7 +195,7 @@ fn each_fault_is_found_with_its_section() {
 }
 
 #[test]
-fn a_finding_says_what_where_why_and_by_which_section() {
+fn a_finding_has_text_place_effect_and_section() {
     let all = findings(Fault::UnknownReference);
     assert_eq!(
         all[0].to_string(),
@@ -205,7 +205,7 @@ fn a_finding_says_what_where_why_and_by_which_section() {
 }
 
 #[test]
-fn the_answer_says_what_was_run_or_why_it_failed() {
+fn the_answer_states_the_trial_or_the_reason_of_its_failure() {
     let (here, _) = tried(Fault::Nothing);
     let expected =
         "yes, 10 steps of 0.125 s from t = 0 s with tolerance 1e-5 and its own start values";
@@ -217,7 +217,7 @@ fn the_answer_says_what_was_run_or_why_it_failed() {
 }
 
 #[test]
-fn what_cannot_be_instantiated_is_one_finding() {
+fn a_failed_instantiation_is_one_finding() {
     let description = ModelDescription::parse(XML).unwrap();
     let mut make = |_: &str, _: Option<Sum>| -> anyhow::Result<Sum> { anyhow::bail!("no licence") };
     let (here, all) = behaviour::check(&description, &mut make);

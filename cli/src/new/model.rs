@@ -6,7 +6,8 @@ use std::path::Path;
 use fmu::{About, Experiment, Failure, Model, Step, Variable};
 use serde::{Deserialize, Serialize};
 
-/// Everything that decides how the model goes on is a field: the state of the FMU is a copy of it.
+/// The model. Every quantity that affects the future is a field: the state of the FMU is a copy of
+/// this struct.
 #[derive(Clone, Serialize, Deserialize)]
 struct NewModel {
     power: f64,
@@ -29,7 +30,7 @@ impl Model for NewModel {
         }
     }
 
-    /// The values given here are the start values in the description.
+    /// Creates the model; the values here are the start values in the model description.
     fn new(_resources: &Path) -> Result<Self, Failure> {
         Ok(Self {
             power: 0.0,
@@ -40,13 +41,14 @@ impl Model for NewModel {
         })
     }
 
-    /// What importers see, each with the field that holds it.
+    /// Lists the variables of the model description, each with its field.
     fn variables(&self) -> Vec<Variable<Self>> {
         vec![
             Variable::real("power", "Heating", |room: &mut Self| &mut room.power)
                 .input()
                 .unit("W"),
-            // An output names the inputs that it depends on without a step in between: none here.
+            // An output lists the inputs on which it depends directly, without a step in between:
+            // none here.
             Variable::real("T", "Temperature of the room", |room: &mut Self| {
                 &mut room.temperature
             })
@@ -73,12 +75,12 @@ impl Model for NewModel {
         ]
     }
 
-    /// Called when parameters and inputs are set, before the first step.
+    /// Runs after parameters and inputs are set and before the first step.
     fn initialize(&mut self, _experiment: &Experiment) -> Result<(), Failure> {
         Ok(())
     }
 
-    /// Advances from `step.start` by `step.size`; here with the exact solution.
+    /// Advances the model from `step.start` by `step.size`; this model has an exact solution.
     fn step(&mut self, step: &Step) -> Result<(), Failure> {
         let rest = self.outside + self.resistance * self.power;
         let decay = (-step.size / self.time_constant).exp();

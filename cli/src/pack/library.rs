@@ -32,7 +32,7 @@ pub(super) struct Toolchain {
 }
 
 /// Builds the library of the crate in `folder`; `locked` is `--locked` of cargo. The dependencies
-/// include those of the targets `others`, for which the library is built elsewhere.
+/// include the dependencies on the targets `others`, for which the library is built elsewhere.
 ///
 /// # Errors
 ///

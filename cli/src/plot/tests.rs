@@ -156,7 +156,7 @@ fn the_ending_png_gives_pixels_with_every_colour_of_the_curves() {
 }
 
 #[test]
-fn what_cannot_be_drawn_is_refused_with_its_name() {
+fn variables_that_cannot_be_drawn_are_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let results = written(folder.path(), "run.parquet", 11);
     let refused = |variables: &[&str], out: &str| {
@@ -194,7 +194,7 @@ fn eight_curves_of_one_unit_are_two_panels_so_that_no_colour_has_two_meanings() 
     assert_eq!((svg.matches("<clipPath").count(), curves(&svg).len()), (2, 8));
 }
 
-/// A plot of a file that states no units.
+/// Plots variables of a file that states no units.
 fn plot(results: &Path, variables: &[String], out: &Path) -> anyhow::Result<()> {
     plot_with_units(results, variables, &|_| None, out)
 }

@@ -305,9 +305,9 @@ impl Options {
                     "{to} has two sources, {first} and {from}, expected one --connect for an input"
                 );
             }
-            let wires = config.connections.get_or_insert_default();
-            wires.retain(|wire| wire.get_ref().to.get_ref() != to);
-            wires.push(ConnectionEntry::new(from.clone(), to.clone()));
+            let connections = config.connections.get_or_insert_default();
+            connections.retain(|entry| entry.get_ref().to.get_ref() != to);
+            connections.push(ConnectionEntry::new(from.clone(), to.clone()));
         }
         for (name, value) in &self.settings {
             config.settings.push(name.clone(), value.clone());

@@ -35,7 +35,7 @@ fn simulation(fmu: &Fmu, count: usize, ports: usize) -> anyhow::Result<Simulatio
         system.connect(&format!("f{from}.y{port}"), &format!("f{to}.u{port}"))?;
     }
     let algorithm = Algorithm {
-        sweep: Method::Jacobi,
+        method: Method::Jacobi,
         extrapolation: Extrapolation::Hold,
         ..Algorithm::new(STEP)
     };

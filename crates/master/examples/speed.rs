@@ -36,7 +36,7 @@ use rustix::time::{ClockId, clock_gettime};
 #[expect(dead_code, reason = "the rings are for the benchmark beside this")]
 mod lag;
 
-/// Processor time of this process in ns.
+/// Returns the processor time of this process in ns.
 fn cpu() -> f64 {
     let now = clock_gettime(ClockId::ProcessCPUTime);
     now.tv_sec as f64 * 1e9 + now.tv_nsec as f64
@@ -80,7 +80,7 @@ fn run(path: &Path, step: f64, steps: u64, results: Option<&Path>) -> anyhow::Re
     let mut readout = Readout::new(&system, &ports);
     let experiment = Experiment { start_time: 0.0, stop_time: None, tolerance: None };
     let algorithm = Algorithm {
-        sweep: Method::Jacobi,
+        method: Method::Jacobi,
         extrapolation: Extrapolation::Hold,
         ..Algorithm::new(step)
     };

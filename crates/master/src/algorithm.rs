@@ -14,6 +14,7 @@ macro_rules! choice {
     ($(#[$meta:meta])* $name:ident { $($(#[$doc:meta])* $variant:ident = $text:literal,)* }) => {
         $(#[$meta])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+        #[non_exhaustive]
         pub enum $name { $($(#[$doc])* #[serde(rename = $text)] $variant,)* }
 
         impl $name {
@@ -118,6 +119,7 @@ choice! {
 
 /// A source of events. A communication step ends at an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum EventSource {
     /// A Real output whose value is the time in s of the next event of its FMU.
     NextTime(Port),
@@ -139,7 +141,7 @@ pub struct PowerBond {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Algorithm {
     /// Order in which the slaves step.
-    pub sweep: Method,
+    pub method: Method,
     /// Extrapolation of the inputs.
     pub extrapolation: Extrapolation,
     /// Iteration of a step.
@@ -179,11 +181,11 @@ pub struct Algorithm {
 }
 
 impl Algorithm {
-    /// Returns an algorithm with the fixed communication step `step` in s, the method `sweep` and
+    /// Returns an algorithm with the fixed communication step `step` in s, the method `method` and
     /// the input extrapolation `extrapolation`; everything else is as in [`Algorithm::new`].
     #[must_use]
-    pub fn fixed(sweep: Method, extrapolation: Extrapolation, step: f64) -> Self {
-        Self { sweep, extrapolation, ..Self::new(step) }
+    pub fn fixed(method: Method, extrapolation: Extrapolation, step: f64) -> Self {
+        Self { method, extrapolation, ..Self::new(step) }
     }
 
     /// Returns the default algorithm: Gauss-Seidel, limited extrapolation and the fixed
@@ -191,7 +193,7 @@ impl Algorithm {
     #[must_use]
     pub fn new(step: f64) -> Self {
         Self {
-            sweep: Method::GaussSeidel,
+            method: Method::GaussSeidel,
             extrapolation: Extrapolation::Limited,
             coupling: Coupling::Once,
             control: StepControl::Fixed,

@@ -105,7 +105,7 @@ pub fn choose(
     let base = Algorithm::new(step);
     let control = request.step_control.unwrap_or(StepControl::Fixed);
     let coupling = request.coupling.unwrap_or_else(|| default_coupling(system, &mut reasons));
-    let sweep = request.method.unwrap_or_else(|| {
+    let method = request.method.unwrap_or_else(|| {
         let order = by_direct_dependencies(system);
         let names: Vec<_> = order.sequence.iter().map(|&k| system.slaves[k].0.as_str()).collect();
         reasons.push(format!(
@@ -119,7 +119,7 @@ pub fn choose(
     let loose = matches!(control, StepControl::Increment | StepControl::Energy);
     let default_relative = if loose { 1e-2 } else { base.relative_tolerance };
     let algorithm = Algorithm {
-        sweep,
+        method,
         extrapolation,
         coupling,
         control,

@@ -4,6 +4,7 @@ use slave::CallError;
 
 /// Error of building, initialising or advancing a system.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SystemError {
     /// A name does not have the form `slave.variable`.
     #[error("{text:?} names no variable, expected the form {form}")]

@@ -34,6 +34,7 @@ impl Window {
 
 /// A kind of fault: the value that replaces `v` at the time `t` while the fault acts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub enum Fault {
     /// `v + b`.
     Bias(f64),
@@ -88,6 +89,7 @@ pub enum Fault {
 
 /// Which values a dropout loses.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub enum LossPattern {
     /// All values.
     All,
@@ -109,6 +111,7 @@ pub enum LossPattern {
 
 /// Error of creating a [`FaultChain`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum FaultError {
     /// A delay spans too many communication steps.
     #[error(

@@ -51,6 +51,7 @@ pub struct Cursor(usize);
 
 /// A function of time. At a jump, the value is the one after the jump.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Signal {
     /// A constant.
     Constant(f64),

@@ -121,7 +121,7 @@ impl Simulation {
         exchange.set_faults(&system, &scenario.faults)?;
         read_at_start(&mut system, &mut exchange, algorithm, experiment.start_time)?;
         scenario.drives.commit(experiment.start_time);
-        let groups = Groups::new(&system, algorithm.sweep, &order);
+        let groups = Groups::new(&system, algorithm.method, &order);
         let control = Control::new(&system, &exchange.reals, algorithm)?;
         let coupled = Coupled::new(&system, &exchange.reals, algorithm, control.scale.clone());
         let background = any_in_background(&mut system);

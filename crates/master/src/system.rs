@@ -50,7 +50,7 @@ pub struct System {
     variables: Vec<HashMap<String, usize>>,
     /// Slaves by name.
     names: HashMap<String, usize>,
-    /// Connection by its input.
+    /// Index of the connection of each input.
     sources: HashMap<Port, usize>,
 }
 

@@ -265,7 +265,7 @@ fn with_sum() -> System {
 }
 
 #[test]
-fn a_function_is_computed_between_the_steps_whatever_the_order_of_the_slaves() {
+fn a_function_is_computed_between_the_steps_in_any_order_of_the_slaves() {
     for method in [JACOBI, GAUSS_SEIDEL_HOLD] {
         let mut simulation = start(with_sum(), method, None);
         let mut x = 1.0;
@@ -282,7 +282,7 @@ fn a_function_is_computed_between_the_steps_whatever_the_order_of_the_slaves() {
 }
 
 #[test]
-fn a_function_of_a_slower_slave_gets_what_that_slave_has_reached_and_not_what_lies_ahead() {
+fn a_function_of_a_slower_slave_gets_its_value_at_the_current_time() {
     // The slow one is x' = 3, the fast one x' = the sum of its own output and the slow one's.
     let mut system = with_sum();
     system.add("three", Integrator::boxed(1.0, 3.0, false)).unwrap();
@@ -304,7 +304,7 @@ fn a_function_of_a_slower_slave_gets_what_that_slave_has_reached_and_not_what_li
 }
 
 #[test]
-fn a_function_that_follows_the_course_of_its_inputs_reaches_the_values_of_the_end() {
+fn a_function_of_extrapolated_inputs_reaches_their_end_values() {
     let mut simulation = start(with_sum(), (Method::GaussSeidel, Extrapolation::Linear), None);
     for _ in 0..3 {
         simulation.step().unwrap();

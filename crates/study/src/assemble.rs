@@ -48,7 +48,7 @@ pub struct AssemblyOptions<'a> {
 /// setting does not fit.
 pub fn assemble(
     loaded: &LoadedConfig,
-    making: &AssemblyOptions<'_>,
+    options: &AssemblyOptions<'_>,
 ) -> Result<AssembledSystem, Error> {
     let config = &loaded.config;
     if config.isolation.isolate != Some(true) {
@@ -72,11 +72,11 @@ pub fn assemble(
             "the system has no FMU, expected `system` or an entry of [fmus]".to_owned(),
         ));
     }
-    let mut system = instantiate(&assembly.elements, config, making)?;
+    let mut system = instantiate(&assembly.elements, config, options)?;
     for (name, function) in &assembly.functions {
         system.add(name, Box::new(function.slave()))?;
     }
-    connect(&mut system, loaded, &assembly.links, making.by_unit)?;
+    connect(&mut system, loaded, &assembly.links, options.by_unit)?;
     for element in &assembly.elements {
         for setting in &element.settings {
             let port = system.terminal(&element.name, &setting.variable)?;
@@ -113,9 +113,9 @@ fn element(name: &str, path: &Path) -> Element {
 fn instantiate(
     elements: &[Element],
     config: &Config,
-    making: &AssemblyOptions<'_>,
+    options: &AssemblyOptions<'_>,
 ) -> Result<System, Error> {
-    let logging = making.logging;
+    let logging = options.logging;
     let limit = config.isolation.time_limit.as_ref().map(|limit| *limit.get_ref());
     let time_limit = limit.map(Duration::try_from_secs_f64).transpose();
     let time_limit = time_limit.map_err(|error| Error::Invalid(format!("time-limit: {error}")))?;
@@ -145,7 +145,7 @@ fn instantiate(
         } else {
             Box::new(opening.in_process(element)?)
         };
-        let slave = match making.log_calls {
+        let slave = match options.log_calls {
             Some(log) => Box::new(log.listen(&element.name, slave)),
             None => slave,
         };

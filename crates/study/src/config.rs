@@ -130,8 +130,8 @@ impl Config {
         self.experiment.check()?;
         self.isolation.check()?;
         self.checkpoint.check()?;
-        let mut wires = self.connections.iter().flatten();
-        wires.try_for_each(|wire| wire.get_ref().check(&wire.span()))
+        let mut connections = self.connections.iter().flatten();
+        connections.try_for_each(|entry| entry.get_ref().check(&entry.span()))
     }
 
     /// Prepends `folder` to relative paths.

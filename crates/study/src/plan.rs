@@ -213,7 +213,7 @@ fn rows(algorithm: &Algorithm, length: f64, reasons: &mut Vec<String>) -> Every 
 
 /// Writes the chosen algorithm into the configuration.
 fn complete(request: &mut AlgorithmRequest, algorithm: &Algorithm, system: &System) {
-    request.method = Some(algorithm.sweep);
+    request.method = Some(algorithm.method);
     request.extrapolation = Some(algorithm.extrapolation);
     request.coupling = Some(algorithm.coupling);
     request.step_control = Some(algorithm.control);
@@ -239,7 +239,7 @@ impl Plan {
         let mut lines = vec![
             format!(
                 "algorithm: {}, extrapolation {}, coupling {}, {} step {} s",
-                algorithm.sweep.name(),
+                algorithm.method.name(),
                 algorithm.extrapolation.name(),
                 algorithm.coupling.name(),
                 algorithm.control.name(),

@@ -26,7 +26,7 @@ struct Recording {
     sink: Option<Box<dyn Sink>>,
 }
 
-/// Records variables to a results file at given intervals.
+/// The recorder of a run: writes variables to a results file at given intervals.
 pub struct Recorder {
     recording: Arc<Mutex<Recording>>,
     due: Due,

@@ -39,13 +39,13 @@ impl PreparedRun {
     /// # Errors
     ///
     /// Returns the first error found, with its line if it is in a file.
-    pub fn new(mut loaded: LoadedConfig, making: &AssemblyOptions<'_>) -> Result<Self, Error> {
+    pub fn new(mut loaded: LoadedConfig, options: &AssemblyOptions<'_>) -> Result<Self, Error> {
         loaded.config.make_absolute().map_err(Error::file("find", Path::new(".")))?;
-        if making.log_calls.is_some() {
+        if options.log_calls.is_some() {
             // With threads, the order of the logged calls would be random.
             loaded.config.algorithm.jobs = Some(1);
         }
-        let mut assembled = assemble(&loaded, making)?;
+        let mut assembled = assemble(&loaded, options)?;
         let plan = plan(&mut loaded.config, &assembled)?;
         let AssembledSystem { system, folders, .. } = &mut assembled;
         let (system, folders) = (std::mem::take(system), folders.take());

@@ -22,7 +22,7 @@ pub use resolve::{Lookup, ResolvedScenario, Setup};
 use serde::{Deserialize, Serialize};
 use serde_spanned::Spanned;
 
-/// The table `scenario`. Times are those of the simulation, in s.
+/// The table `scenario`. Times are simulation times in s.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Scenario {
@@ -50,7 +50,7 @@ pub struct SetEntry {
     pub at: f64,
     /// The value.
     pub value: Spanned<Literal>,
-    /// Unit of the value, if not that of the variable.
+    /// Unit of the value; default: the unit of the variable.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<Spanned<String>>,
 }
@@ -64,7 +64,7 @@ pub type Steps = Vec<(f64, Spanned<Literal>)>;
 pub struct SignalEntry {
     /// `slave.variable`: an input without a connection, or a tunable parameter.
     pub variable: Spanned<String>,
-    /// Unit of the values, if not that of the variable.
+    /// Unit of the values; default: the unit of the variable.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<Spanned<String>>,
     /// A constant.
@@ -106,7 +106,7 @@ pub struct TableEntry {
 pub struct FaultEntry {
     /// The input, `slave.variable`, or the connection, `slave.output=slave.input`.
     pub connection: Spanned<String>,
-    /// Unit of the values, if not that of the input.
+    /// Unit of the values; default: the unit of the input.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<Spanned<String>>,
     /// A constant is added.

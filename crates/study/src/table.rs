@@ -37,6 +37,7 @@ impl Table {
 
 /// Error of reading a [`Table`]. Lines and columns count from 1.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum TableError {
     /// The file cannot be read.
     #[error(transparent)]

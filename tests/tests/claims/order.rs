@@ -55,7 +55,7 @@ fn both() -> [(&'static str, Network); 2] {
 
 /// The order of `algorithm`, which is to be `expected`.
 fn check(network: &Network, able: Abilities, algorithm: &Algorithm, expected: f64) {
-    let mut label = format!("{} {}", algorithm.sweep.name(), algorithm.extrapolation.name());
+    let mut label = format!("{} {}", algorithm.method.name(), algorithm.extrapolation.name());
     if algorithm.coupling != Coupling::Once {
         label = format!("{} {label}", algorithm.coupling.name());
     }

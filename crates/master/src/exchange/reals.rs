@@ -23,7 +23,7 @@ pub(crate) struct Reals {
     /// The fault of each input; empty if there are no faults.
     pub(super) faults: Vec<Option<FaultChain>>,
     pub(super) extrapolation: Extrapolation,
-    pub(super) sweep: Method,
+    pub(super) method: Method,
     /// Whether the latest values are sufficient: all inputs are held, all slaves make equal steps,
     /// no faults.
     pub(super) copies_latest: bool,
@@ -68,7 +68,7 @@ impl Reals {
             input_derivatives: vec![0.0; layout.input_derivatives],
             reported: vec![false; outputs],
             extrapolation: algorithm.extrapolation,
-            sweep: algorithm.sweep,
+            method: algorithm.method,
             copies_latest: algorithm.extrapolation == Extrapolation::Hold
                 && algorithm.coupling == Coupling::Once
                 && algorithm.control == StepControl::Fixed
@@ -216,7 +216,7 @@ impl Reals {
     pub(super) fn uses_end_value(&self, slave: usize, source: usize, end: f64) -> bool {
         let span = &self.trace.spans[source];
         let is_there = || span.start + span.size <= end + ROUNDING * span.size;
-        self.sweep == Method::GaussSeidel || (self.layout.functions[slave] && is_there())
+        self.method == Method::GaussSeidel || (self.layout.functions[slave] && is_there())
     }
 
     /// Whether the source of `output` has already made its step, for a `slave` that steps to `end`.
@@ -234,7 +234,7 @@ impl Reals {
             earlier: trace.earlier[output],
             before: trace.before[output],
             start: trace.start[output],
-            end: if self.assumes && !(span.stepped && self.sweep == Method::GaussSeidel) {
+            end: if self.assumes && !(span.stepped && self.method == Method::GaussSeidel) {
                 self.assumed[output]
             } else {
                 trace.latest[output]
@@ -291,7 +291,7 @@ impl Reals {
     /// Whether [`Reals::pass`] can make a complete sweep of Jacobi's method.
     pub(crate) fn passes(&self) -> bool {
         self.copies_latest
-            && self.sweep == Method::Jacobi
+            && self.method == Method::Jacobi
             && self.layout.plain.iter().all(|plain| *plain)
             && !self.layout.functions.contains(&true)
             && self.layout.from_integers.is_empty()

@@ -15,7 +15,7 @@ pub(super) struct Span {
     pub(super) stepped: bool,
 }
 
-/// Size in s that stands for a missing step; difference quotients over it are 0.
+/// Size in s of a missing step; difference quotients over it are 0.
 const NEVER: f64 = f64::MAX;
 
 impl Default for Span {

@@ -10,10 +10,12 @@ use crate::signal::reached;
 
 /// Distribution of a random number with mean zero.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub enum NoiseDistribution {
     /// Normal distribution with this standard deviation.
     Normal(f64),
-    /// Uniform distribution on `[-a, a]`, with standard deviation `a / sqrt(3)`.
+    /// Uniform distribution from minus to plus this bound `a`, with standard deviation `a /
+    /// sqrt(3)`.
     Uniform(f64),
 }
 

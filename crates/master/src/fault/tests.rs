@@ -28,7 +28,7 @@ fn series(line: &mut FaultChain, values: &[(f64, f64)]) -> Vec<f64> {
 }
 
 #[test]
-fn a_bias_is_added_from_its_begin_until_before_its_end() {
+fn a_bias_acts_from_its_start_to_before_its_end() {
     let mut line = single(Fault::Bias(0.5), 1.0, Some(3.0));
     let found = series(&mut line, &[(0.0, 1.0), (1.0, 2.0), (2.0, 4.0), (3.0, 8.0)]);
     assert_eq!(found, [1.0, 2.5, 4.5, 8.0]);
@@ -53,19 +53,19 @@ fn a_gain_multiplies_the_value_and_its_slope() {
 }
 
 #[test]
-fn what_is_added_leaves_the_curvature_and_what_jumps_has_none() {
-    let course = [1.0, 2.0, 3.0];
-    let of = |fault: Fault| single(fault, 0.0, None).apply_derivatives(4.0, course);
+fn added_values_keep_the_curvature_and_values_that_jump_have_none() {
+    let derivatives = [1.0, 2.0, 3.0];
+    let of = |fault: Fault| single(fault, 0.0, None).apply_derivatives(4.0, derivatives);
     assert_eq!(of(Fault::Bias(1.0)), [2.0, 2.0, 3.0]);
     assert_eq!(of(Fault::Drift(0.5)), [3.0, 2.5, 3.0]);
     assert_eq!(of(Fault::Stuck(Some(9.0))), [9.0, 0.0, 0.0]);
     assert_eq!(of(Fault::Quantisation { step: 2.0, offset: 0.0 }), [2.0, 0.0, 0.0]);
     assert_eq!(of(Fault::Saturation { lowest: None, highest: Some(0.5) }), [0.5, 0.0, 0.0]);
-    assert_eq!(of(Fault::Saturation { lowest: None, highest: Some(5.0) }), course);
+    assert_eq!(of(Fault::Saturation { lowest: None, highest: Some(5.0) }), derivatives);
 }
 
 #[test]
-fn a_drift_grows_from_its_begin_and_is_gone_after_its_end() {
+fn a_drift_grows_from_its_start_and_vanishes_at_its_end() {
     let mut line = single(Fault::Drift(0.25), 2.0, Some(6.0));
     let found = series(&mut line, &[(0.0, 1.0), (2.0, 1.0), (4.0, 1.0), (5.0, 3.0), (6.0, 1.0)]);
     assert_eq!(found, [1.0, 1.0, 1.5, 3.75, 1.0]);
@@ -148,7 +148,7 @@ fn integers_and_booleans_have_faults_too() {
 }
 
 #[test]
-fn breaks_are_begin_and_end_and_the_edges_of_a_periodic_dropout() {
+fn breaks_are_start_end_and_the_edges_of_a_periodic_dropout() {
     let lost = LossPattern::Periodic { period: 2.0, part: 0.5 };
     let dropout = Fault::Dropout { lost, instead: None };
     let faults = vec![(window(1.0, Some(5.2)), dropout), (window(3.2, None), Fault::Bias(1.0))];

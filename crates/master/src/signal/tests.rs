@@ -30,7 +30,7 @@ fn a_ramp_is_a_line_between_two_constants() {
 }
 
 #[test]
-fn a_sine_begins_at_its_time_and_slopes_as_a_cosine() {
+fn a_sine_starts_at_its_time_and_its_slope_is_a_cosine() {
     let sine = Signal::Sine { amplitude: 2.0, frequency: 0.25, phase: 0.0, offset: 1.0, from: 3.0 };
     assert_at(&sine, 2.0, 1.0, 0.0);
     assert_at(&sine, 3.0, 1.0, TAU * 0.25 * 2.0);
@@ -61,7 +61,7 @@ fn lines_go_through_the_points_and_the_ends_are_held() {
 }
 
 #[test]
-fn a_time_that_stands_twice_is_a_jump_with_the_later_value_at_it() {
+fn a_time_that_occurs_twice_is_a_jump_to_the_later_value() {
     let signal =
         track(&[(0.0, 0.0), (1.0, 2.0), (1.0, 5.0), (1.0, 8.0), (3.0, 4.0)], Interpolation::Line);
     assert_at(&signal, 0.5, 1.0, 2.0);
@@ -72,7 +72,7 @@ fn a_time_that_stands_twice_is_a_jump_with_the_later_value_at_it() {
 }
 
 #[test]
-fn held_values_begin_at_their_time() {
+fn held_values_start_at_their_time() {
     let signal = track(&[(0.0, 1.0), (1.0, 2.0), (2.0, 2.0), (3.0, 5.0)], Interpolation::Hold);
     for (time, value) in
         [(-1.0, 1.0), (0.0, 1.0), (0.999, 1.0), (1.0, 2.0), (2.5, 2.0), (3.0, 5.0), (9.0, 5.0)]
@@ -131,7 +131,7 @@ fn scaling_scales_values_slopes_and_offsets() {
 }
 
 #[test]
-fn points_that_are_none_are_refused() {
+fn invalid_points_are_refused() {
     let refused = |points: &[(f64, f64)]| {
         let (times, values): (Vec<_>, Vec<_>) = points.iter().copied().unzip();
         Track::new(times.into(), values.into(), Interpolation::Line).unwrap_err().to_string()

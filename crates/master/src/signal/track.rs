@@ -9,6 +9,7 @@ const LARGEST_TIME: f64 = 1e300;
 
 /// Interpolation between two points of a [`Track`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Interpolation {
     /// Linear interpolation.
     Line,
@@ -38,6 +39,7 @@ pub struct Track {
 
 /// Error of creating a [`Track`]. Points count from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum TrackError {
     /// There are no points.
     #[error("there are no points, expected at least one")]

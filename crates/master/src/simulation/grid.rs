@@ -33,7 +33,7 @@ pub struct EarlyEnd {
     pub step: f64,
     /// The end of the run in s.
     pub end: f64,
-    /// Returns the stop time in s.
+    /// The stop time in s.
     pub stop: f64,
 }
 
@@ -135,7 +135,7 @@ impl Grid {
         }
     }
 
-    /// The stop time in s.
+    /// Returns the stop time in s.
     pub(super) fn stop(&self) -> Option<f64> {
         self.stop
     }

@@ -62,7 +62,7 @@ fn refused(text: &str) -> String {
 }
 
 #[test]
-fn paths_begin_beside_the_file() {
+fn relative_paths_start_at_the_folder_of_the_file() {
     let config = parsed(WHOLE);
     assert_eq!(config.system.as_deref(), Some(Path::new("/models/car.ssp")));
     assert_eq!(config.fmus.0[0].1, Path::new("/models/Z.fmu"));
@@ -90,7 +90,7 @@ fn fmus_and_settings_keep_the_order_of_the_file() {
 }
 
 #[test]
-fn what_is_written_reads_back_as_the_same() {
+fn a_rendered_configuration_reads_back_as_equal() {
     let mut config = parsed(WHOLE);
     config.settings.push("ape.mode".to_owned(), "a \"quoted\" text\n".to_owned());
     let text = config.render().unwrap();
@@ -120,7 +120,7 @@ fn every_interval_reads_back_as_the_same() {
 }
 
 #[test]
-fn errors_say_line_column_and_what_was_expected() {
+fn errors_state_line_column_and_expectation() {
     for (text, parts) in [
         ("sytem = 'a.ssp'", ["system.toml:1:1", "sytem", "`system`"]),
         ("\n[algorithm]\nstpe = 1", ["system.toml:3:1", "stpe", "`step`"]),

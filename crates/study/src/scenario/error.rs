@@ -25,6 +25,7 @@ pub struct ScenarioError {
 
 /// The reason why an entry is invalid.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Reason {
     /// A name does not exist.
     #[error(transparent)]

@@ -93,7 +93,7 @@ impl<'a> Resolver<'a> {
     }
 }
 
-/// Converts the entries of one input.
+/// The converter of the entries of one input.
 struct Reader<'a> {
     target: Target<'a>,
     start: f64,

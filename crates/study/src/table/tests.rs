@@ -9,7 +9,7 @@ fn refused(text: &str) -> String {
 }
 
 #[test]
-fn a_table_is_read_as_it_stands() {
+fn a_table_is_read_completely() {
     let text = "\"time\",\"u\",plain,\"a[1,2]\"\n0,1,-2.5,1e3\n 0.5 , +1,.5,5.\r\n0.5,2,0,0\n";
     let table = parse(text.as_bytes()).unwrap();
     assert_eq!(table.names, ["u", "plain", "a[1,2]"]);
@@ -37,7 +37,7 @@ fn numbers_are_read_to_the_last_bit() {
 }
 
 #[test]
-fn what_is_no_table_is_refused_with_its_line() {
+fn an_invalid_table_is_refused_with_its_line() {
     for (text, expected) in [
         ("", "the file is empty, expected a header such as \"time\",\"u\" and rows of numbers"),
         ("\n\n", "the file is empty, expected a header such as \"time\",\"u\" and rows of numbers"),

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use super::{Told, scenario, setup, system};
+use super::{Calls, scenario, setup, system};
 
 /// Returns the calls that `plant` receives at the communication points `times`; leaves out points
 /// without calls.
-fn told(text: &str, folder: &Path, times: &[f64]) -> Vec<(f64, Vec<String>)> {
+fn calls(text: &str, folder: &Path, times: &[f64]) -> Vec<(f64, Vec<String>)> {
     let (mut system, plant, ctrl) = system();
     let mut prepared = scenario(text).resolve(&system, &setup(folder)).unwrap();
     let mut all = Vec::new();
@@ -23,8 +23,8 @@ fn told(text: &str, folder: &Path, times: &[f64]) -> Vec<(f64, Vec<String>)> {
     all
 }
 
-fn take(told: &Told) -> Vec<String> {
-    std::mem::take(&mut *told.lock().unwrap())
+fn take(calls: &Calls) -> Vec<String> {
+    std::mem::take(&mut *calls.lock().unwrap())
 }
 
 fn here() -> &'static Path {
@@ -52,7 +52,7 @@ fn a_setting_takes_effect_once_at_the_first_communication_point_not_before_its_t
         at = 0.5
         value = 10.5"#;
     let expected: [(f64, &[&str]); 2] = [(0.5, &["real [8] [10.5]"]), (2.0, &["real [8] [20.0]"])];
-    expect(&told(text, here(), &TIMES), &expected);
+    expect(&calls(text, here(), &TIMES), &expected);
 }
 
 #[test]
@@ -62,7 +62,7 @@ fn of_two_settings_at_one_time_the_one_stated_last_holds() {
             { variable = "plant.level", at = 1, value = 3 },
             { variable = "plant.level", at = 1, value = 4 },
         ]"#;
-    expect(&told(text, here(), &TIMES), &[(1.0, &["real [3] [4.0]"])]);
+    expect(&calls(text, here(), &TIMES), &[(1.0, &["real [3] [4.0]"])]);
 }
 
 #[test]
@@ -86,11 +86,11 @@ fn variables_of_every_type_can_be_set() {
         "string [7] [\"run\"]",
     ];
     let second: &[&str] = &["integer [5] [2]", "string [7] [\"idle\"]"];
-    expect(&told(text, here(), &TIMES), &[(1.0, first), (2.0, second)]);
+    expect(&calls(text, here(), &TIMES), &[(1.0, first), (2.0, second)]);
 }
 
 #[test]
-fn a_ramp_is_told_with_its_derivative_to_a_continuous_input_of_an_fmu_that_takes_it() {
+fn a_continuous_input_receives_a_ramp_with_its_derivative_if_the_fmu_takes_derivatives() {
     let text = r#"
         [[scenario.signal]]
         variable = "plant.force"
@@ -104,7 +104,7 @@ fn a_ramp_is_told_with_its_derivative_to_a_continuous_input_of_an_fmu_that_takes
         (1.0, &["real [1, 3] [2.0, -0.5]", "derivative [1] [2.0]"]),
         (1.5, &["real [1, 3] [3.0, -1.0]", "derivative [1] [0.0]"]),
     ];
-    expect(&told(text, here(), &TIMES), &expected);
+    expect(&calls(text, here(), &TIMES), &expected);
 }
 
 #[test]
@@ -123,7 +123,7 @@ fn values_are_converted_from_the_unit_stated() {
         variable = "plant.temperature"
         unit = "K"
         constant = 300"#;
-    let found = told(text, here(), &[0.0, 1.0]);
+    let found = calls(text, here(), &[0.0, 1.0]);
     let numbers = |line: &str| -> Vec<f64> {
         let inside = line.rsplit_once('[').unwrap().1.trim_end_matches(']');
         inside.split(", ").map(|number| number.parse().unwrap()).collect()
@@ -170,7 +170,7 @@ fn columns_of_a_file_are_lines_for_continuous_reals_and_held_for_the_others() {
         ),
         (2.0, &["real [3] [4.0]", "integer [4] [3]"]),
     ];
-    expect(&told(text, folder.path(), &TIMES), &expected);
+    expect(&calls(text, folder.path(), &TIMES), &expected);
     let prepared = scenario(text).resolve(&system().0, &setup(folder.path())).unwrap();
     let unused: Vec<_> = prepared.unused.iter().map(|(_, name)| name.as_str()).collect();
     assert_eq!(unused, ["y", "other"]);
@@ -195,11 +195,11 @@ fn an_entry_of_its_own_goes_before_a_table_and_a_column_may_be_held_or_chosen() 
         (1.0, &["real [2] [6.0]", "derivative [2] [1.0]"]),
         (2.0, &["real [1, 2, 3] [3.0, 7.0, 3.0]", "derivative [1, 2] [0.0, 0.0]"]),
     ];
-    expect(&told(text, folder.path(), &[0.0, 1.0, 2.0]), &expected);
+    expect(&calls(text, folder.path(), &[0.0, 1.0, 2.0]), &expected);
 }
 
 #[test]
-fn a_step_that_is_taken_back_is_told_again() {
+fn a_repeated_step_sets_its_values_again() {
     let (mut system, plant, _) = system();
     let text = r#"scenario.set = [{ variable = "plant.F_c", at = 1, value = 7 }]"#;
     let mut prepared = scenario(text).resolve(&system, &setup(here())).unwrap();

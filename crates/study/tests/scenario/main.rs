@@ -14,18 +14,18 @@ use fmu_description::ModelDescription;
 use master::{CallError, Slave, StepResult, System};
 use study::scenario::{ResolvedScenario, Scenario, ScenarioError, Setup};
 
-/// The calls of a slave: function, value references, values.
-type Told = Arc<Mutex<Vec<String>>>;
+/// The recorded calls of a slave: function, value references, values.
+type Calls = Arc<Mutex<Vec<String>>>;
 
 /// A slave that records the values set.
 struct Listener {
     description: ModelDescription,
-    told: Told,
+    calls: Calls,
 }
 
 impl Listener {
     fn note(&self, function: &str, references: &[u32], values: impl std::fmt::Debug) {
-        self.told.lock().unwrap().push(format!("{function} {references:?} {values:?}"));
+        self.calls.lock().unwrap().push(format!("{function} {references:?} {values:?}"));
     }
 }
 
@@ -87,7 +87,7 @@ fn variable(name: &str, reference: u32, attributes: &str, kind: &str) -> String 
 }
 
 /// A slave with a variable of each sort; `interpolates` is `canInterpolateInputs`.
-fn listener(interpolates: bool) -> (Box<dyn Slave>, Told) {
+fn listener(interpolates: bool) -> (Box<dyn Slave>, Calls) {
     let (input, discrete) = ("causality=\"input\"", "causality=\"input\" variability=\"discrete\"");
     let parameter = |variability| format!("causality=\"parameter\" variability=\"{variability}\"");
     let variables = [
@@ -122,14 +122,14 @@ fn listener(interpolates: bool) -> (Box<dyn Slave>, Told) {
         <Unknown index="10"/><Unknown index="11"/></Outputs></ModelStructure>
         </fmiModelDescription>"#
     );
-    let told = Told::default();
+    let calls = Calls::default();
     let description = ModelDescription::parse(xml).unwrap();
-    (Box::new(Listener { description, told: told.clone() }), told)
+    (Box::new(Listener { description, calls: calls.clone() }), calls)
 }
 
 /// `plant`, which takes input derivatives, and `ctrl`, which does not; `ctrl.force`, `ctrl.count` and
 /// `ctrl.angle` are connected.
-fn system() -> (System, Told, Told) {
+fn system() -> (System, Calls, Calls) {
     let ((plant, plant_told), (ctrl, ctrl_told)) = (listener(true), listener(false));
     let mut system = System::default();
     system.add("plant", plant).unwrap();

@@ -95,7 +95,7 @@ fn units_that_do_not_fit_are_refused() {
 }
 
 #[test]
-fn signals_that_are_none_are_refused() {
+fn invalid_signals_are_refused() {
     for (rest, message) in [
         ("", "found none, expected exactly one of constant, steps, points, ramp, sine, csv"),
         (

@@ -1,7 +1,7 @@
 //! Runs a system.toml and prints the file of its results.
 use std::ops::ControlFlow;
 
-use study::{RunEnd, LoadedConfig, AssemblyOptions, PreparedRun};
+use study::{AssemblyOptions, LoadedConfig, PreparedRun, RunEnd};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = std::env::args().nth(1).ok_or("expected a system.toml")?;

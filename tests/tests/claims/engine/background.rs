@@ -56,7 +56,7 @@ fn all_slaves_of_a_group_begin_before_the_first_is_finished() {
 
 #[test]
 fn slaves_that_are_connected_are_not_begun_together_by_gauss_seidel() {
-    let algorithm = Algorithm { sweep: Method::GaussSeidel, ..jacobi(1) };
+    let algorithm = Algorithm { method: Method::GaussSeidel, ..jacobi(1) };
     let (system, record) = ahead(typed::ring(), all);
     Simulation::new(system, &algorithm, &until(1.0)).unwrap().step().unwrap();
     let found = record.lock().unwrap().join(", ");

@@ -136,7 +136,7 @@ fn a_checkpoint_of_another_step_or_algorithm_is_refused_by_name() {
     let control = StepControl::Doubling;
     refused(Algorithm { control, ..base() }, "step-control fixed; step-control doubling");
     let sweep = Method::Jacobi;
-    refused(Algorithm { sweep, ..base() }, "method gauss-seidel; method jacobi");
+    refused(Algorithm { method: sweep, ..base() }, "method gauss-seidel; method jacobi");
     refused(
         Algorithm { extrapolation: Extrapolation::Hold, ..base() },
         "extrapolation limited; extrapolation hold",

@@ -39,7 +39,7 @@ fn a_line_has_the_given_slope_or_the_last_difference_quotient() {
 }
 
 #[test]
-fn a_limited_line_has_the_smaller_slope_and_none_where_signs_differ() {
+fn a_limited_line_has_the_smaller_slope_or_zero_if_the_signs_differ() {
     for (slope, expected) in [(8.0, 6.5), (5.0, 5.0), (-1.0, 0.0), (0.0, 0.0)] {
         let known = OutputHistory { slope: Some(slope), ..PAST };
         assert_eq!(known.extrapolated(Extrapolation::Limited), line(expected));
@@ -48,13 +48,13 @@ fn a_limited_line_has_the_smaller_slope_and_none_where_signs_differ() {
 }
 
 #[test]
-fn a_held_value_is_that_of_the_begin_or_of_the_known_end() {
+fn a_held_value_is_the_start_value_or_the_known_end_value() {
     assert_eq!(PAST.extrapolated(Extrapolation::Hold), Polynomial::held(6.0));
     assert_eq!(PAST.interpolated(Extrapolation::Hold), Polynomial::held(34.0));
 }
 
 #[test]
-fn between_begin_and_end_is_a_line_or_the_parabola_with_the_slope_or_the_value_before() {
+fn interpolation_is_a_line_or_the_parabola_with_the_slope_or_the_value_before() {
     assert_eq!(PAST.interpolated(Extrapolation::Linear), line(14.0));
     assert_eq!(PAST.interpolated(Extrapolation::Limited), line(14.0));
     assert_eq!(PAST.interpolated(Extrapolation::Quadratic), PARABOLA);
@@ -64,7 +64,7 @@ fn between_begin_and_end_is_a_line_or_the_parabola_with_the_slope_or_the_value_b
 
 /// From 1 s on: 17 at 2 s with slope 14; 34 at 3 s; the integral from 1 to 3 s is 36.
 #[test]
-fn later_end_and_mean_are_those_of_the_parabola() {
+fn shifted_origin_end_value_and_mean_agree_with_the_parabola() {
     let later = Polynomial { value: 17.0, slope: 14.0, curvature: 6.0 };
     assert_eq!(PARABOLA.later(1.0), later);
     assert_eq!((PARABOLA.end(2.0), PARABOLA.mean(2.0)), (34.0, 18.0));
@@ -72,7 +72,7 @@ fn later_end_and_mean_are_those_of_the_parabola() {
 
 /// Without past values an extrapolation uses the given derivatives; with one value before, a line.
 #[test]
-fn what_never_was_bends_nothing() {
+fn missing_past_values_add_no_curvature() {
     let first = OutputHistory {
         earlier: 6.0,
         before: 6.0,

@@ -81,7 +81,7 @@ fn equal_seeds_give_equal_series_and_other_seeds_names_or_places_independent_one
 }
 
 #[test]
-fn noise_of_a_sample_time_stays_between_samples_whatever_the_rounding() {
+fn noise_with_a_sample_time_is_constant_between_samples_with_any_rounding() {
     let line = noise(NoiseDistribution::Normal(1.0), RandomSeries::new(3, "ctrl.y", 0, Some(0.01)));
     let mut before = None;
     for step in 0..5000_u32 {

@@ -32,7 +32,7 @@ fn a_dropout_may_give_another_value() {
 }
 
 #[test]
-fn a_periodic_dropout_takes_the_first_part_of_each_period_whatever_the_rounding() {
+fn a_periodic_dropout_takes_the_first_part_of_each_period_with_any_rounding() {
     let lost = LossPattern::Periodic { period: 1.0, part: 0.3 };
     let mut line = single(dropout(lost, None), 0.1, None);
     let mut last = None;
@@ -85,7 +85,7 @@ fn a_delay_below_the_step_interpolates_to_the_value_on_trial() {
 }
 
 #[test]
-fn a_delay_that_sets_in_knows_what_was_before() {
+fn a_delay_uses_values_from_before_its_window() {
     let mut line = single(delay(1.0), 5.0, Some(7.0));
     let values: Vec<_> = (0..9).map(|step| (f64::from(step), 10.0 * f64::from(step))).collect();
     let found = series(&mut line, &values);

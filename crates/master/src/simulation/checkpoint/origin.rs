@@ -57,7 +57,7 @@ fn settings(
     let mut all = vec![
         ("start-time", seconds(experiment.start_time)),
         ("step", seconds(algorithm.step)),
-        ("method", algorithm.sweep.name().to_owned()),
+        ("method", algorithm.method.name().to_owned()),
         ("extrapolation", algorithm.extrapolation.name().to_owned()),
         ("coupling", algorithm.coupling.name().to_owned()),
         ("step-control", algorithm.control.name().to_owned()),
