@@ -9,8 +9,6 @@ mod command;
 mod engine;
 mod fmi_crate;
 mod fmi_rs;
-mod isolate;
-mod isolate_together;
 mod linearise;
 mod misbehaviour;
 mod misbehaviour_calls;
