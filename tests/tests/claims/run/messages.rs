@@ -49,7 +49,9 @@ fn fmus_without_common_names_run_unconnected_with_a_warning() {
     let fmus = ["a", "b"].map(|name| format!("{name}={}", fmu("FrictionPendulum")));
     let output = bench.run(&["--fmu", &fmus[0], "--fmu", &fmus[1], "--stop-time", "0.01"]);
     assert_eq!(printed(&output).lines().next(), Some("no connections"));
-    assert!(said(&output).contains("warning: nothing is connected: no output has the name of an input"));
+    assert!(
+        said(&output).contains("warning: nothing is connected: no output has the name of an input")
+    );
 }
 
 #[test]
