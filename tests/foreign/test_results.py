@@ -43,7 +43,7 @@ def expected(rows=ROWS):
 @pytest.fixture(scope="module")
 def write_results(root):
     """Runs the example; its exit status comes back."""
-    cargo = ["cargo", "build", "--release", "--locked", "--package", "master"]
+    cargo = ["cargo", "build", "--release", "--locked", "--package", "cosim-results"]
     subprocess.run([*cargo, "--example", "write_results"], cwd=root, check=True)
     program = root / "target" / "release" / "examples" / "write_results"
     return lambda *arguments: subprocess.run([program, *arguments], capture_output=True).returncode

@@ -1,6 +1,6 @@
 //! The order of convergence of every method, against the matrix exponential of the whole system.
 //!
-//! `cargo test --release -p tests --test order -- --nocapture` prints the tables.
+//! `cargo test --release -p tests --test claims order -- --nocapture` prints the tables.
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "tests; the tables are printed")]
 
 use master::{Algorithm, Coupling, Extrapolation, Method, SystemError};
