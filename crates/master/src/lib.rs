@@ -8,14 +8,14 @@
 //! # One communication step, from the top
 //!
 //! 1. [`Simulation::step`] (`simulation.rs`) determines the end of the step: the next point of the
-//! grid, the size chosen by the step control, or the time of an event.
+//!    grid, the size chosen by the step control, or the time of an event.
 //! 2. `simulation/adaptive.rs` repeats a step whose error is too large; `simulation/iterate.rs`
-//! repeats it until inputs and outputs agree. Both need slaves whose state can be saved and
-//! restored.
+//!    repeats it until inputs and outputs agree. Both need slaves whose state can be saved and
+//!    restored.
 //! 3. `simulation/sweep.rs` steps every slave once, in the order of `order.rs`;
-//! `simulation/parallel.rs` uses threads where they are faster.
+//!    `simulation/parallel.rs` uses threads where they are faster.
 //! 4. For each slave, `exchange.rs` gathers the inputs (extrapolation, transformation, fault), sets
-//! them, calls `fmi2DoStep` and reads the outputs.
+//!    them, calls `fmi2DoStep` and reads the outputs.
 //! 5. When the communication point is final, faults and driven variables record it (`commit`).
 //!
 //! The crate reads no files and loads no libraries: the crate `fmu-import` turns FMUs into slaves,
