@@ -39,9 +39,9 @@ impl Groups {
     /// Forms the groups. Jacobi: one group of all slaves, except functions, which follow one by
     /// one. Gauss-Seidel: consecutive slaves without connections between them form a group, because
     /// their order does not matter.
-    pub(super) fn new(system: &System, sweep: Method, order: &Order) -> Self {
+    pub(super) fn new(system: &System, method: Method, order: &Order) -> Self {
         let count = system.slaves.len();
-        if sweep == Method::Jacobi {
+        if method == Method::Jacobi {
             let is_function = |slave: &usize| system.slaves[*slave].1.is_function();
             let mut sequence: Vec<usize> = (0..count).filter(|slave| !is_function(slave)).collect();
             let first = sequence.len();
