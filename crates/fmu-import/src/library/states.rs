@@ -1,4 +1,4 @@
-//! FMU states: kept in numbered slots, as bytes.
+//! FMU states: saved in numbered slots, or serialized to bytes.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
 use std::ptr::null_mut;
@@ -10,7 +10,7 @@ use super::calls::function;
 use slave::{CallError, Failure, absent};
 
 impl Component {
-    /// `fmi2GetFMUstate` into a slot.
+    /// Saves the current state in `slot` (`fmi2GetFMUstate`).
     pub fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
         const NAME: &str = "fmi2GetFMUstate";
         let function = function!(self.get_state, NAME);
@@ -22,12 +22,12 @@ impl Component {
         self.check(NAME, status)
     }
 
-    /// `fmi2SetFMUstate` from a slot.
+    /// Restores the state in `slot` (`fmi2SetFMUstate`).
     pub fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
         const NAME: &str = "fmi2SetFMUstate";
         let state = self.saved.get(slot).copied().unwrap_or(null_mut());
         if state.is_null() {
-            let what = format!("was asked for the state of slot {slot}, which is empty");
+            let what = format!("cannot restore the state of slot {slot}: the slot is empty");
             return Err(self.failed(NAME, Failure::InvalidAnswer(what)));
         }
         self.set_state(state)
@@ -52,7 +52,7 @@ impl Component {
         }
     }
 
-    /// `fmi2SerializeFMUstate` of the state of now.
+    /// Serializes the current state (`fmi2GetFMUstate`, `fmi2SerializeFMUstate`).
     pub fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
         const NAME: &str = "fmi2GetFMUstate";
         let function = function!(self.get_state, NAME);
@@ -81,7 +81,7 @@ impl Component {
         Ok(bytes)
     }
 
-    /// `fmi2DeSerializeFMUstate`, and on to that state.
+    /// Restores a serialized state (`fmi2DeSerializeFMUstate`, `fmi2SetFMUstate`).
     pub fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
         const NAME: &str = "fmi2DeSerializeFMUstate";
         let mut state = null_mut();

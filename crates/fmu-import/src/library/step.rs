@@ -1,4 +1,4 @@
-//! `fmi2DoStep` and what its answers ask for.
+//! `fmi2DoStep` and the evaluation of its status.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
 use std::time::{Duration, Instant};
@@ -13,11 +13,11 @@ const NAME: &str = "fmi2DoStep";
 const SET: &str = "fmi2SetReal";
 const GET: &str = "fmi2GetReal";
 
-/// Longest pause between two questions whether a pending step is done.
+/// Longest pause between two status queries of a pending step.
 const PAUSE: Duration = Duration::from_millis(1);
 
 impl Component {
-    /// `fmi2DoStep` from `time` over `size`.
+    /// Calls `fmi2DoStep` from `time` with the step `size`, both in s.
     #[inline]
     pub fn do_step(
         &mut self,
@@ -33,12 +33,13 @@ impl Component {
         if status == Status::OK as fmi2Status || self.is_warning(status) {
             return Ok(StepResult::Whole);
         }
-        self.unfinished(status, time, size)
+        self.finish_step(status, time, size)
     }
 
-    /// [`slave::Slave::pass`]: the three calls of C one after the other, their statuses
-    /// looked at without a detour. An answer out of the ordinary is left to the methods of its
-    /// own.
+    /// Sets inputs, steps and reads outputs, as [`slave::Slave::pass`] specifies.
+    ///
+    /// `fmi2OK` and `fmi2Warning` are handled inline; every other status goes through the methods of
+    /// the single calls.
     #[inline]
     pub fn pass(
         &mut self,
@@ -66,8 +67,8 @@ impl Component {
         // SAFETY: the instance is alive.
         let status = unsafe { function(hot.pointer, time, size, never_back.into()) };
         if !usual(status) {
-            let done = self.unfinished(status, time, size)?;
-            return self.read_part(outputs, results, done);
+            let done = self.finish_step(status, time, size)?;
+            return self.read_outputs(outputs, results, done);
         }
         if !outputs.is_empty() {
             let Some(function) = hot.get_real else { return Err(absent(GET)) };
@@ -84,9 +85,9 @@ impl Component {
         Ok(StepResult::Whole)
     }
 
-    /// Reads the outputs after a step that was not done at once.
+    /// Reads the outputs after a step that was pending or discarded.
     #[cold]
-    fn read_part(
+    fn read_outputs(
         &mut self,
         outputs: &[u32],
         results: &mut [f64],
@@ -98,17 +99,18 @@ impl Component {
         Ok(done)
     }
 
-    /// What a step that did not answer `fmi2OK` came to.
+    /// Evaluates a step whose status is not `fmi2OK`: waits while it is pending, and asks for the time
+    /// reached if it was discarded.
     #[cold]
-    fn unfinished(
+    fn finish_step(
         &mut self,
         mut status: fmi2Status,
         time: f64,
         size: f64,
     ) -> Result<StepResult, CallError> {
-        let (begin, mut pause) = (Instant::now(), Duration::from_micros(1));
+        let (start, mut pause) = (Instant::now(), Duration::from_micros(1));
         while status == Status::Pending as fmi2Status {
-            if let Some(limit) = self.time_limit.filter(|limit| begin.elapsed() > *limit) {
+            if let Some(limit) = self.time_limit.filter(|limit| start.elapsed() > *limit) {
                 self.cancel();
                 return Err(self.failed(NAME, Failure::TimedOut(limit.as_secs_f64())));
             }
@@ -139,7 +141,7 @@ impl Component {
         Ok(StepResult::Part { reached, terminated })
     }
 
-    /// `fmi2CancelStep`: only then may the instance be freed (section 4.2.4).
+    /// Calls `fmi2CancelStep`. The instance may be freed only if this succeeds (section 4.2.4).
     fn cancel(&mut self) {
         self.place.enter(&"fmi2CancelStep");
         // SAFETY: the instance is alive.
