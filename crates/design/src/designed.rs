@@ -195,7 +195,7 @@ fn check_detectable(
         let states: Vec<_> = hidden.states().iter().map(|&at| state_name(linear, at)).collect();
         let mut hiding = faults.iter().map(|&fault| fault_names[fault].as_str());
         // If no state is involved, the fault is hidden by the other faults.
-        let (told, from): (Vec<_>, String) = match states.as_slice() {
+        let (distinguished, from): (Vec<_>, String) = match states.as_slice() {
             [] => (hiding.by_ref().take(1).collect(), hiding.collect::<Vec<_>>().join(", ")),
             states => (hiding.collect(), format!("a movement of {}", states.join(", "))),
         };
@@ -205,7 +205,7 @@ fn check_detectable(
             hidden.rank,
             hidden.expected,
             if hidden.at.norm() > 0.0 { "change" } else { "constant value" },
-            told.join(", "),
+            distinguished.join(", "),
             from,
         );
         return Err(at_fault(file, linear, faults[0], message).into());

@@ -50,7 +50,7 @@ impl LinearPlant {
                     measurements: file.measurements.clone(),
                     faults: file.faults.clone(),
                     models: file.faults.iter().map(model).collect(),
-                    origin: "The matrices are those of the plant file.".to_owned(),
+                    origin: "The plant file states the matrices.".to_owned(),
                     residual: None,
                 })
             }

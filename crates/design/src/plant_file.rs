@@ -239,7 +239,7 @@ fn linearised(
 /// Reads a plant whose matrices the file states.
 fn stated(file: &Table<'_>) -> Result<(Model, [Vec<Signal>; 2]), PlaceError> {
     if let Some(entry) = file.get("operating_point") {
-        let advice = "it belongs to `plant`; with matrices, `operating` in each signal says it";
+        let advice = "it belongs to `plant`; with matrices, `operating` in each signal states it";
         return Err(entry.error(advice));
     }
     let meaning = "the plant x' = A x + B u + F_a f_a, y = C x; or `plant`, an FMU";

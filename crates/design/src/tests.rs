@@ -1,4 +1,4 @@
-//! What a plant file may say, and where errors in it point.
+//! Valid and invalid plant files, and the places that errors point at.
 
 use std::path::Path;
 

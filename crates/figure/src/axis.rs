@@ -238,7 +238,7 @@ mod tests {
             for (value, label) in &ticks {
                 assert!(axis.contains(*value) || (value - low).abs() < 1e-6 * step);
                 let read: f64 = label.replace('\u{2212}', "-").parse().unwrap();
-                assert!((read - value).abs() <= 1e-3 * step, "{label} stands at {value}");
+                assert!((read - value).abs() <= 1e-3 * step, "{label} is at {value}");
             }
         }
     }

@@ -127,6 +127,7 @@ impl Series<'_> {
 
 /// Why a figure was not written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FigureError {
     /// A curve has different numbers of times and values.
     #[error("curve {label:?}: {times} times, but {values} values")]

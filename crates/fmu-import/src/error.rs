@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 /// Why a library cannot be loaded or used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum LoadError {
     /// The operating system does not load the library.
     #[error("{path}: {message}{hint}")]

@@ -17,6 +17,7 @@ use slave::{CallError, Slave, StepResult};
 
 /// Why an FMU could not be opened or instantiated.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FmuError {
     /// The archive or its model description cannot be read.
     #[error(transparent)]

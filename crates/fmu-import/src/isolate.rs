@@ -81,6 +81,7 @@ pub struct Options {
 
 /// Why an FMU cannot run in a process of its own.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum IsolateError {
     /// The archive or its model description cannot be read.
     #[error(transparent)]
@@ -228,6 +229,7 @@ pub fn open(path: &Path, name: &str, options: &Options) -> Result<Isolated, Isol
 
 /// Why a program cannot become or remain a worker.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum WorkerError {
     /// No master started the program.
     #[error("{WORKER} is for the master's own use: {what}")]

@@ -5,6 +5,7 @@ use slave::CallError;
 
 /// Why an FMU cannot be linearised.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum LineariseError {
     /// The FMU cannot be instantiated.
     #[error(transparent)]

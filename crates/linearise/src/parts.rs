@@ -188,7 +188,7 @@ fn part(
     })
 }
 
-/// Returns an attribute of the variable, otherwise that of its declared type.
+/// Returns an attribute of the variable, otherwise the attribute of its declared type.
 fn attribute<T>(
     description: &ModelDescription,
     real: &RealType,

@@ -8,6 +8,7 @@ use fmu_description::{ParseError, Position};
 
 /// Why a system structure cannot be read, flattened or written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SspError {
     /// The XML is not well-formed.
     #[error(transparent)]

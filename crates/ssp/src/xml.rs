@@ -66,9 +66,9 @@ pub(super) fn read(bytes: &[u8], space: &str, root: &str) -> Result<(Node, Vec<S
 
 fn undeclared((prefix, at): (String, Position)) -> String {
     let assumed = if PREFIXES.contains(&prefix.as_str()) {
-        "taken for the one of SSP"
+        "assumed to be the prefix of SSP"
     } else {
-        "taken for one that is not of SSP"
+        "assumed not to be of SSP"
     };
     format!("{at}: the prefix {prefix}: is used without xmlns:{prefix}; it is {assumed}")
 }

@@ -1,4 +1,4 @@
-//! Every text, number and matrix of a report stands on its page.
+//! The page shows every text, number and matrix of a report.
 
 use std::collections::BTreeSet;
 
