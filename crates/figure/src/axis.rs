@@ -40,6 +40,7 @@ pub struct Axis {
 impl Axis {
     /// Creates a linear axis with exactly this range; an empty or infinite range is replaced by a
     /// usable one.
+    #[must_use]
     pub fn exact((low, high): (f64, f64), pixels: (f64, f64), ticks: u8) -> Self {
         let (low, high) = if low <= high && low.is_finite() && high.is_finite() {
             (low.clamp(-HUGE, HUGE), high.clamp(-HUGE, HUGE))
@@ -60,6 +61,7 @@ impl Axis {
 
     /// Creates a logarithmic axis between two positive values; an invalid range is replaced by a
     /// usable one.
+    #[must_use]
     pub fn logarithmic((low, high): (f64, f64), pixels: (f64, f64), ticks: u8) -> Self {
         let usable = low > 0.0 && low < high && high < HUGE;
         let (low, high) = if usable { (low, high) } else { (0.1, 10.0) };
@@ -67,6 +69,7 @@ impl Axis {
     }
 
     /// Creates an axis that is linear between minus and plus `knee` and logarithmic beyond.
+    #[must_use]
     pub fn symmetric(ends: (f64, f64), knee: f64, pixels: (f64, f64), ticks: u8) -> Self {
         Self { scale: Scale::Symmetric(knee), ..Self::exact(ends, pixels, ticks) }
     }
@@ -89,22 +92,26 @@ impl Axis {
     }
 
     /// Returns the range of the values.
+    #[must_use]
     pub fn range(&self) -> (f64, f64) {
         (self.low, self.high)
     }
 
     /// Returns the page coordinates of both ends of the range.
+    #[must_use]
     pub fn pixels(&self) -> (f64, f64) {
         self.pixels
     }
 
     /// Returns whether a value is in the range.
+    #[must_use]
     pub fn contains(&self, value: f64) -> bool {
         (self.low..=self.high).contains(&value)
     }
 
     /// Returns the page coordinate of a value; a value far outside is clipped to one axis length
     /// outside.
+    #[must_use]
     pub fn place(&self, value: f64) -> f64 {
         let [low, high, value] = [self.low, self.high, value].map(|end| self.scale.stretch(end));
         let share = (value - low) / (high - low);
@@ -113,6 +120,7 @@ impl Axis {
     }
 
     /// Returns round values inside the axis, with their labels.
+    #[must_use]
     pub fn ticks(&self) -> Vec<(f64, String)> {
         match self.scale {
             Scale::Linear => self.multiples(),

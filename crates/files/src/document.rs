@@ -51,16 +51,22 @@ impl Source {
     }
 
     /// Returns the whole text.
+    #[must_use]
     pub fn text(&self) -> &str {
         &self.text
     }
 
     /// Creates a source from a text; `path` is for messages.
+    #[must_use]
     pub fn new(path: &Path, text: String) -> Self {
         Self { path: path.to_owned(), text }
     }
 
     /// Parses the TOML text.
+    ///
+    /// # Errors
+    ///
+    /// [`PlaceError`] at the first syntax error.
     pub fn parse(&self) -> Result<Spanned<DeTable<'_>>, PlaceError> {
         DeTable::parse(&self.text).map_err(|error| {
             let end = self.text.len();
@@ -69,6 +75,7 @@ impl Source {
     }
 
     /// Returns an error that points at `place`.
+    #[must_use]
     pub fn error(&self, place: &Place, message: impl Into<String>) -> PlaceError {
         let start = place.start.min(self.text.len());
         let line_start = self.text[..start].rfind('\n').map_or(0, |newline| newline + 1);
@@ -111,6 +118,7 @@ pub struct Entry<'a> {
 
 impl<'a> Table<'a> {
     /// Returns the top-level table of a parsed file.
+    #[must_use]
     pub fn whole(source: &'a Source, parsed: &'a Spanned<DeTable<'a>>) -> Self {
         Self { source, name: String::new(), place: 0..0, entries: parsed.get_ref() }
     }
@@ -121,6 +129,10 @@ impl<'a> Table<'a> {
 
     /// Returns an error at the first entry that is not in `known`, with the most similar known
     /// name.
+    ///
+    /// # Errors
+    ///
+    /// [`PlaceError`] that points at the unknown entry.
     pub fn allow(&self, known: &[&str]) -> Result<(), PlaceError> {
         let unknown = self.entries.keys().find(|key| !known.contains(&key.get_ref().as_ref()));
         let Some(key) = unknown else {
@@ -138,6 +150,7 @@ impl<'a> Table<'a> {
     }
 
     /// Returns the entry `key`, if it exists.
+    #[must_use]
     pub fn get(&self, key: &str) -> Option<Entry<'a>> {
         let (_, value) = self.entries.iter().find(|(name, _)| name.get_ref() == key)?;
         Some(self.entry(key, value))
@@ -149,6 +162,10 @@ impl<'a> Table<'a> {
     }
 
     /// Returns the entry `key`; if it is missing, the error message explains it by `meaning`.
+    ///
+    /// # Errors
+    ///
+    /// [`PlaceError`] that points at the table if the entry is missing.
     pub fn require(&self, key: &str, meaning: &str) -> Result<Entry<'a>, PlaceError> {
         self.get(key).ok_or_else(|| {
             let message = format!("`{}` is missing: {meaning}", self.path(key));
@@ -167,6 +184,7 @@ impl<'a> Table<'a> {
 
 impl<'a> Entry<'a> {
     /// Returns an error that points at this value; the message starts with its name.
+    #[must_use]
     pub fn error(&self, message: impl fmt::Display) -> PlaceError {
         self.source.error(&self.place, format!("{}: {message}", self.name))
     }
@@ -187,6 +205,10 @@ impl<'a> Entry<'a> {
     }
 
     /// Reads a finite number.
+    ///
+    /// # Errors
+    ///
+    /// [`PlaceError`] if the value is not a finite number.
     pub fn number(&self) -> Result<f64, PlaceError> {
         let text = match self.value {
             DeValue::Integer(integer) => integer.as_str(),
@@ -201,6 +223,10 @@ impl<'a> Entry<'a> {
     }
 
     /// Reads a finite positive number.
+    ///
+    /// # Errors
+    ///
+    /// [`PlaceError`] if the value is not a finite number above 0.
     pub fn positive(&self) -> Result<f64, PlaceError> {
         match self.number()? {
             number if number > 0.0 => Ok(number),
@@ -209,16 +235,28 @@ impl<'a> Entry<'a> {
     }
 
     /// Reads a text.
+    ///
+    /// # Errors
+    ///
+    /// [`PlaceError`] if the value is not a text.
     pub fn text(&self) -> Result<&'a str, PlaceError> {
         self.value.as_str().ok_or_else(|| self.expected("a text in quotes"))
     }
 
     /// Reads a boolean.
+    ///
+    /// # Errors
+    ///
+    /// [`PlaceError`] if the value is not a boolean.
     pub fn flag(&self) -> Result<bool, PlaceError> {
         self.value.as_bool().ok_or_else(|| self.expected("true or false"))
     }
 
     /// Reads a table.
+    ///
+    /// # Errors
+    ///
+    /// [`PlaceError`] if the value is not a table.
     pub fn table(&self) -> Result<Table<'a>, PlaceError> {
         let entries = self.value.as_table().ok_or_else(|| self.expected("a table"))?;
         let (source, name, place) = (self.source, self.name.clone(), self.place.clone());
@@ -226,6 +264,10 @@ impl<'a> Entry<'a> {
     }
 
     /// Reads a list.
+    ///
+    /// # Errors
+    ///
+    /// [`PlaceError`] if the value is not a list.
     pub fn list(&self) -> Result<Vec<Entry<'a>>, PlaceError> {
         let members = self.value.as_array().ok_or_else(|| self.expected("a list"))?;
         let member = |(position, value): (usize, &'a Spanned<DeValue<'a>>)| Entry {
@@ -238,21 +280,28 @@ impl<'a> Entry<'a> {
     }
 
     /// Returns whether the value is a list.
+    #[must_use]
     pub fn is_list(&self) -> bool {
         self.value.is_array()
     }
 
     /// Returns whether the value is a text.
+    #[must_use]
     pub fn is_text(&self) -> bool {
         self.value.is_str()
     }
 
     /// Returns whether the value is a table.
+    #[must_use]
     pub fn is_table(&self) -> bool {
         self.value.is_table()
     }
 
     /// Reads a list of finite numbers.
+    ///
+    /// # Errors
+    ///
+    /// [`PlaceError`] if the value is not a list of finite numbers.
     pub fn numbers(&self) -> Result<Vec<f64>, PlaceError> {
         self.list()?.iter().map(Entry::number).collect()
     }

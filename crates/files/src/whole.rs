@@ -11,6 +11,10 @@ pub struct Pending {
 
 impl Pending {
     /// Writes `bytes` to a temporary file beside `path`; creates the folder if it is missing.
+    ///
+    /// # Errors
+    ///
+    /// [`io::Error`] if the folder or the temporary file cannot be created or written.
     pub fn new(path: &Path, bytes: &[u8]) -> io::Result<Self> {
         let mut name = path.as_os_str().to_owned();
         name.push(format!(".{}.partial", process::id()));
@@ -21,6 +25,10 @@ impl Pending {
     }
 
     /// Renames the file to its final name.
+    ///
+    /// # Errors
+    ///
+    /// [`io::Error`] if the file cannot be renamed.
     pub fn commit(self) -> io::Result<()> {
         fs::rename(&self.partial, &self.path)
     }
@@ -36,6 +44,10 @@ impl Drop for Pending {
 
 /// Writes `bytes` to `path` atomically: to a temporary file beside it, which is then renamed.
 /// Creates the folder if it is missing.
+///
+/// # Errors
+///
+/// [`io::Error`] if the folder or a file cannot be created, written or renamed.
 pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     Pending::new(path, bytes)?.commit()
 }
