@@ -67,6 +67,10 @@ impl ControllerFmu {
     }
 
     /// Writes the FMU to `path`, atomically, with `report` in its documentation.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`] if the archive cannot be written.
     pub fn write(mut self, path: &Path, report: &str) -> Result<(), Error> {
         self.package.add("documentation/report.html", report);
         self.package

@@ -324,11 +324,13 @@ fn or_reason<T: Serialize, S: Serializer>(
 }
 
 /// Returns the rows of a matrix; negative zeros become zeros.
+#[must_use]
 pub fn rows(m: &DMatrix<f64>) -> Vec<Vec<f64>> {
     m.row_iter().map(|row| row.iter().map(|entry| entry + 0.0).collect()).collect()
 }
 
 /// Returns real and imaginary parts.
+#[must_use]
 pub fn pairs(numbers: &[Complex<f64>]) -> Vec<[f64; 2]> {
     numbers.iter().map(|number| [number.re, number.im]).collect()
 }

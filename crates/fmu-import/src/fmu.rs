@@ -196,6 +196,11 @@ impl Fmu {
     }
 
     /// Creates an instance for `interface`, with access to its C functions.
+    ///
+    /// # Errors
+    ///
+    /// [`FmuError::NoInterface`] if the FMU lacks `interface`; [`LoadError`] if the library does not load
+    /// or `fmi2Instantiate` fails.
     pub fn component(&self, interface: Interface, name: &str) -> Result<Component, FmuError> {
         let unpacked = &self.content.unpacked;
         let description = &unpacked.description;

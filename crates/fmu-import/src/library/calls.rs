@@ -28,6 +28,11 @@ macro_rules! calls {
     ($($method:ident($($argument:ident: $type:ty),*) = $name:literal($($c:expr),*);)*) => {
         impl Component {
             $(#[doc = concat!("Calls `", $name, "`.")]
+            ///
+            /// # Errors
+            ///
+            /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK`
+            /// nor `fmi2Warning`.
             #[inline]
             pub fn $method(&mut self, $($argument: $type),*) -> Result<(), CallError> {
                 let function = function!(self.$method, $name);
@@ -82,6 +87,11 @@ pub(super) fn same_length<A, B>(references: &[A], values: &[B]) -> usize {
 
 impl Component {
     /// Calls `fmi2SetDebugLogging` for all categories.
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
+    /// `fmi2Warning`.
     pub fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
         const NAME: &str = "fmi2SetDebugLogging";
         let function = function!(self.set_debug_logging, NAME);
@@ -91,6 +101,11 @@ impl Component {
     }
 
     /// Calls `fmi2SetupExperiment`.
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
+    /// `fmi2Warning`.
     pub fn setup_experiment(&mut self, e: &fmu_description::Experiment) -> Result<(), CallError> {
         const NAME: &str = "fmi2SetupExperiment";
         let (tolerance, stop) = (e.tolerance.unwrap_or(0.0), e.stop_time.unwrap_or(0.0));
@@ -106,6 +121,11 @@ impl Component {
     }
 
     /// Calls `fmi2SetString`.
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
+    /// `fmi2Warning`.
     pub fn set_string(&mut self, references: &[u32], values: &[String]) -> Result<(), CallError> {
         const NAME: &str = "fmi2SetString";
         let function = function!(self.set_string, NAME);
@@ -119,6 +139,11 @@ impl Component {
     }
 
     /// Calls `fmi2GetString` and copies the strings.
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
+    /// `fmi2Warning`.
     pub fn get_string(
         &mut self,
         references: &[u32],
@@ -146,6 +171,11 @@ impl Component {
     }
 
     /// Calls `fmi2NewDiscreteStates`.
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
+    /// `fmi2Warning`.
     pub fn new_discrete_states(&mut self) -> Result<fmi2EventInfo, CallError> {
         const NAME: &str = "fmi2NewDiscreteStates";
         let mut info = fmi2EventInfo::default();
@@ -157,6 +187,11 @@ impl Component {
     }
 
     /// Calls `fmi2GetDirectionalDerivative`.
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
+    /// `fmi2Warning`.
     pub fn directional_derivative(
         &mut self,
         unknowns: &[u32],

@@ -11,6 +11,11 @@ use slave::{CallError, Failure, absent};
 
 impl Component {
     /// Saves the current state in `slot` (`fmi2GetFMUstate`).
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
+    /// `fmi2Warning`.
     pub fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
         const NAME: &str = "fmi2GetFMUstate";
         let function = function!(self.get_state, NAME);
@@ -23,6 +28,11 @@ impl Component {
     }
 
     /// Restores the state in `slot` (`fmi2SetFMUstate`).
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`] if the slot is empty, if the library lacks the function, or if its status is neither
+    /// `fmi2OK` nor `fmi2Warning`.
     pub fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
         const NAME: &str = "fmi2SetFMUstate";
         let state = self.saved.get(slot).copied().unwrap_or(null_mut());
@@ -53,6 +63,11 @@ impl Component {
     }
 
     /// Serializes the current state (`fmi2GetFMUstate`, `fmi2SerializeFMUstate`).
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
+    /// `fmi2Warning`.
     pub fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
         const NAME: &str = "fmi2GetFMUstate";
         let function = function!(self.get_state, NAME);
@@ -82,6 +97,11 @@ impl Component {
     }
 
     /// Restores a serialized state (`fmi2DeSerializeFMUstate`, `fmi2SetFMUstate`).
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
+    /// `fmi2Warning`.
     pub fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
         const NAME: &str = "fmi2DeSerializeFMUstate";
         let mut state = null_mut();

@@ -18,6 +18,11 @@ const PAUSE: Duration = Duration::from_millis(1);
 
 impl Component {
     /// Calls `fmi2DoStep` from `time` with the step `size`, both in s.
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`] if the library lacks the function, if the step fails or exceeds the time limit, or if
+    /// the FMU reports an impossible time for a discarded step.
     #[inline]
     pub fn do_step(
         &mut self,
@@ -40,6 +45,11 @@ impl Component {
     ///
     /// `fmi2OK` and `fmi2Warning` are handled inline; every other status goes through the methods of
     /// the single calls.
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`] if the library lacks a function, if a call or the step fails, or if the step exceeds
+    /// the time limit.
     #[inline]
     pub fn pass(
         &mut self,
