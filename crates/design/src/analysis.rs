@@ -1,4 +1,4 @@
-//! What is known of a design: the numbers of the report.
+//! Analyses the closed loop of a design: the numbers of the report.
 
 use control::response::{
     energy, fault_rate_system, fault_system, frequency_grid, frequency_response, h_infinity,
@@ -7,26 +7,27 @@ use control::response::{
 use control::{Domain, Error, StateSpace};
 use nalgebra::DMatrix;
 
-use super::designed::Designed;
+use super::designed::ControllerDesign;
 use super::report::{Bound, Curve, Frequency, Norm, StepResponse};
 use super::signals::Fault;
 
 /// Relative width of the brackets of peak gains and norms.
 const WIDTH: f64 = 1e-3;
-/// A response has settled when it stays within this part of its largest distance.
+/// Relative band of the settling time: a response has settled when it stays within this fraction of
+/// its largest distance.
 const SETTLED: f64 = 0.02;
 const POINTS_PER_DECADE: u32 = 20;
 
-/// The outputs of the loop: states, errors of their estimates, errors of the faults' estimates.
+/// The outputs of the loop: states, state estimation errors, fault estimation errors.
 pub(crate) struct Outputs {
     pub(crate) names: Vec<String>,
     pub(crate) units: Vec<Option<String>>,
-    /// Positions in [x; e; eps] of those that the plant and the user know: no filters, no rates.
+    /// Positions in [x; e; eps] of quantities known to the user, without filter states and rates.
     positions: Vec<usize>,
 }
 
 impl Outputs {
-    pub(crate) fn of(designed: &Designed) -> Self {
+    pub(crate) fn of(designed: &ControllerDesign) -> Self {
         let (all, states) = (designed.plant.a.nrows(), &designed.linear.states);
         let (mut names, mut units, mut positions) = (Vec::new(), Vec::new(), Vec::new());
         for (offset, prefix) in [(0, ""), (all, "error of ")] {
@@ -45,20 +46,20 @@ impl Outputs {
     }
 }
 
-/// The loop from the faults, and from their rates, to [x; e; eps].
+/// The transfer functions from the faults, and from their rates, to [x; e; eps].
 pub(crate) struct Loops<'a> {
-    designed: &'a Designed,
+    designed: &'a ControllerDesign,
     outputs: Outputs,
     of_faults: StateSpace,
     of_rates: StateSpace,
 }
 
 impl<'a> Loops<'a> {
-    pub(crate) fn of(designed: &'a Designed) -> Result<Self, Error> {
-        let Designed { plant, gains, domain, .. } = designed;
+    pub(crate) fn of(designed: &'a ControllerDesign) -> Result<Self, Error> {
+        let ControllerDesign { plant, gains, domain, .. } = designed;
         let mut of_rates = fault_rate_system(plant, gains, *domain)?;
         if let Domain::Sampled { period } = domain {
-            // What the fault changes by from sample to sample is its rate times the sample time.
+            // The change of a fault per sample is its rate times the sample time.
             of_rates.b.columns_mut(0, plant.f_a.ncols()).scale_mut(*period);
         }
         let of_faults = fault_system(plant, gains, *domain)?;
@@ -71,7 +72,7 @@ impl<'a> Loops<'a> {
         channels.zip(&designed.linear.faults)
     }
 
-    /// Peak-to-peak gains from each fault to each output, and what follows from the stated bounds.
+    /// Returns the peak-to-peak gains from each fault to each output, and the resulting bounds.
     pub(crate) fn bounds(&self) -> Result<Vec<Bound>, Error> {
         let jumping = peak_gain(&self.of_faults, WIDTH)?.upper;
         let gliding = peak_gain(&self.of_rates, WIDTH)?.upper;
@@ -100,7 +101,8 @@ impl<'a> Loops<'a> {
         Ok(found)
     }
 
-    /// The responses to a change of each fault: all at once, and at the bound of its rate.
+    /// Returns the responses to a change of each fault: as a step, or as a ramp at the bound of its
+    /// rate.
     pub(crate) fn steps(&self) -> Result<Vec<StepResponse>, Error> {
         let response = |(column, fault, rate): (usize, &Fault, Option<f64>)| {
             let size = fault.step.or(fault.bound).unwrap_or(1.0);
@@ -131,7 +133,8 @@ impl<'a> Loops<'a> {
         self.faults().flat_map(each).map(response).collect()
     }
 
-    /// From the faults as `system` has them to the errors of their estimates.
+    /// Returns the transfer function from the faults, as `system` has them, to their estimation
+    /// errors.
     fn to_fault_errors(&self, system: &StateSpace) -> StateSpace {
         let channels = &self.designed.extended.channels;
         let columns: Vec<_> = channels.iter().map(|channel| channel.estimate).collect();
@@ -146,7 +149,7 @@ impl<'a> Loops<'a> {
         }
     }
 
-    /// Singular values from the faults to their estimates and to the errors.
+    /// Returns the singular values from the faults to their estimates and to the estimation errors.
     pub(crate) fn frequency(&self) -> Result<Vec<Frequency>, Error> {
         let errors = self.to_fault_errors(&self.of_faults);
         let count = errors.d.ncols();
@@ -170,9 +173,9 @@ impl<'a> Loops<'a> {
         ])
     }
 
-    /// Norms from the rates of the faults to the errors of their estimates.
+    /// Returns the norms from the rates of the faults to their estimation errors.
     pub(crate) fn norms(&self) -> Result<Vec<Norm>, Error> {
-        // The states of the plant do not act on the errors.
+        // The plant's states do not influence the estimation errors.
         let mut rates = self.to_fault_errors(&self.of_rates);
         let all = self.designed.plant.a.nrows();
         let order = rates.a.nrows() - all;

@@ -1,17 +1,17 @@
-//! Theorem 1 for a design: as printed, and with P chosen by linear matrix inequalities.
+//! Theorem 1 for a design: as printed, and with P from linear matrix inequalities.
 
 use control::Domain;
 use control::lmi::Outcome;
 use control::theorem1::{self, certify, largest_decay, smallest_radius, ultimate_bound};
 
-use super::designed::Designed;
+use super::designed::ControllerDesign;
 use super::report::{Certificate, FreeP, Norm, Theorem1, Ultimate, rows};
 
 /// The design parameter alpha of (12); it cancels in delta.
 const ALPHA: f64 = 1.0;
 
-/// Everything that is certified of `designed`; `norms` were computed before.
-pub(crate) fn certificate(designed: &Designed, norms: Vec<Norm>) -> Certificate {
+/// Returns all certificates for `designed`; `norms` were computed before.
+pub(crate) fn certificate(designed: &ControllerDesign, norms: Vec<Norm>) -> Certificate {
     Certificate {
         printed: printed(designed),
         free: free(designed),
@@ -20,19 +20,19 @@ pub(crate) fn certificate(designed: &Designed, norms: Vec<Norm>) -> Certificate 
     }
 }
 
-/// The largest norm of the vector of faults, from the bounds of the plant file.
+/// Returns the largest norm of the fault vector, from the bounds of the plant file.
 fn largest(bounds: impl Iterator<Item = Option<f64>>) -> Option<f64> {
     let squares = bounds.map(|bound| bound.map(|bound| bound * bound));
     squares.sum::<Option<f64>>().map(f64::sqrt)
 }
 
-fn fault_bound(designed: &Designed) -> Result<f64, String> {
+fn fault_bound(designed: &ControllerDesign) -> Result<f64, String> {
     let bounds = designed.linear.faults.iter().map(|fault| fault.bound);
     largest(bounds).ok_or_else(|| "it needs `bound` for every fault".to_owned())
 }
 
-/// The theorem is about a continuous observer of constant faults.
-fn applies(designed: &Designed) -> Result<(), String> {
+/// Checks that the theorem applies: a continuous observer of constant faults.
+fn applies(designed: &ControllerDesign) -> Result<(), String> {
     if designed.domain != Domain::Continuous {
         return Err("the theorem is about a controller in continuous time".to_owned());
     }
@@ -42,7 +42,7 @@ fn applies(designed: &Designed) -> Result<(), String> {
     Ok(())
 }
 
-fn printed(designed: &Designed) -> Result<Theorem1, String> {
+fn printed(designed: &ControllerDesign) -> Result<Theorem1, String> {
     applies(designed)?;
     let beta = fault_bound(designed)?;
     let found = certify(&designed.plant, &designed.gains, ALPHA, beta);
@@ -72,7 +72,7 @@ fn verified<T>(outcome: Result<Outcome<T>, control::Error>) -> Result<T, String>
     }
 }
 
-fn free(designed: &Designed) -> Result<FreeP, String> {
+fn free(designed: &ControllerDesign) -> Result<FreeP, String> {
     applies(designed)?;
     let dynamics = designed.gains.error_dynamics(&designed.plant);
     let decay = verified(largest_decay(&dynamics))?;
@@ -87,8 +87,8 @@ fn free(designed: &Designed) -> Result<FreeP, String> {
     })
 }
 
-/// The ball that the error ends in for bounded rates of the faults.
-fn ultimate(designed: &Designed) -> Result<Ultimate, String> {
+/// Returns the ball that the error converges to for bounded rates of the faults.
+fn ultimate(designed: &ControllerDesign) -> Result<Ultimate, String> {
     applies(designed)?;
     let rates = designed.linear.faults.iter().map(|fault| fault.rate_bound);
     let rate = largest(rates).ok_or_else(|| "it needs `rate_bound` for every fault".to_owned())?;

@@ -1,17 +1,17 @@
-//! The conditions that a design must meet.
+//! The conditions that a design must satisfy.
 
 use control::Domain;
 
-use super::designed::Designed;
+use super::designed::ControllerDesign;
 use super::report::Check;
 
-/// Below this part of a fault's effect the compensation counts as complete.
+/// Relative size of the remaining fault effect below which the compensation counts as complete.
 const CANCELLED: f64 = 1e-9;
-/// An operating point nearer to an equilibrium than this counts as one.
+/// Relative distance from an equilibrium below which an operating point counts as an equilibrium.
 const AT_REST: f64 = 1e-6;
 
-/// All conditions, each with the number behind it.
-pub(crate) fn checks(designed: &Designed) -> Vec<Check> {
+/// Returns all conditions, each with its numerical value.
+pub(crate) fn checks(designed: &ControllerDesign) -> Vec<Check> {
     let mut all = Vec::from(existence(designed));
     all.push(check(
         "the compensation cancels the faults of the actuators",
@@ -48,9 +48,10 @@ pub(crate) fn checks(designed: &Designed) -> Vec<Check> {
     all
 }
 
-/// The conditions for feedback and observer to exist; a design that fails one is not made.
-fn existence(designed: &Designed) -> [Check; 3] {
-    let Designed { controllability, distance, detectability, .. } = designed;
+/// Returns the conditions for the existence of feedback and observer, without which no design is
+/// returned.
+fn existence(designed: &ControllerDesign) -> [Check; 3] {
+    let ControllerDesign { controllability, distance, detectability, .. } = designed;
     let away =
         |what: &str, lower: f64| format!("{what}; distance from losing it, relative: {lower:.2e}");
     let seen = &detectability.observability;

@@ -1,4 +1,5 @@
-//! The controller FMU of a design, made from a packed one: other resources, described anew.
+//! Creates the controller FMU of a design from the packed controller: replaces resources and
+//! description.
 
 use std::fs;
 use std::path::Path;
@@ -10,7 +11,7 @@ use fmu_import::described;
 
 use crate::Error;
 
-/// The files that make a controller FMU another one.
+/// The files that turn the packed controller into the controller of a design.
 pub(crate) struct Content<'a> {
     /// `resources/design.toml`.
     pub(crate) design: &'a str,
@@ -18,14 +19,14 @@ pub(crate) struct Content<'a> {
     pub(crate) plant: &'a str,
 }
 
-/// A controller FMU that is not written yet.
+/// A controller FMU that has not been written yet.
 pub struct ControllerFmu {
     pub(crate) description: ModelDescription,
     package: Package,
 }
 
 impl ControllerFmu {
-    /// Puts `content` into the FMU `base` and lets its library describe itself.
+    /// Inserts `content` into the FMU `base` and lets its library generate the model description.
     pub(crate) fn new(base: &Path, content: &Content<'_>) -> Result<Self, Error> {
         let unpacked = Unpacked::open_whole(base).map_err(|error| {
             let what = format!("cannot open {}, the packed controller", base.display());
@@ -65,11 +66,11 @@ impl ControllerFmu {
         Ok(Self { description, package })
     }
 
-    /// Writes it to `path`, with `report` in its documentation: whole or not at all.
+    /// Writes the FMU to `path`, atomically, with `report` in its documentation.
     ///
     /// # Errors
     ///
-    /// [`Error`] with the reason.
+    /// [`Error`] if the archive cannot be written.
     pub fn write(mut self, path: &Path, report: &str) -> Result<(), Error> {
         self.package.add("documentation/report.html", report);
         self.package

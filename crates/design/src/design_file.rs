@@ -1,4 +1,4 @@
-//! `design.toml`: what the controller FMU reads.
+//! Writes `design.toml`, the input file of the controller FMU.
 
 use control::Domain;
 use control::aso::{FaultyPlant, Gains};
@@ -6,12 +6,12 @@ use fmu_description::unit::Unit;
 use nalgebra::DMatrix;
 use serde::Serialize;
 
-use super::designed::{Designed, fault_names};
+use super::designed::{ControllerDesign, fault_names};
 use super::plant_file::PlantFile;
 use super::reporting::estimator;
-use super::signals::{Entrance, Signal};
+use super::signals::{EntryPoint, Signal};
 
-/// Everything in the file but the matrices.
+/// The content of the file except the matrices.
 #[derive(Serialize)]
 pub(crate) struct DesignFile<'a> {
     pub(crate) description: &'a str,
@@ -30,7 +30,7 @@ pub(crate) struct DesignFile<'a> {
     pub(crate) faults: Vec<Entry>,
 }
 
-/// The experiment that importers run by default, times in s.
+/// The default experiment of importers, times in s.
 #[derive(Serialize)]
 pub(crate) struct Experiment {
     pub(crate) stop_time: f64,
@@ -55,8 +55,8 @@ pub(crate) struct Entry {
     pub(crate) least_command: Option<f64>,
 }
 
-impl Designed {
-    /// The text of the design file.
+impl ControllerDesign {
+    /// Returns the text of the design file.
     pub(crate) fn file(
         &self,
         file: &PlantFile<'_>,
@@ -112,7 +112,7 @@ impl Designed {
         linear.states.iter().chain(&linear.actuators).chain(&linear.measurements)
     }
 
-    /// The faults, then the rates of ramps: one entry per column of F_a.
+    /// Returns the faults, then the rates of ramps: one entry per column of F_a.
     fn fault_entries(&self) -> Vec<Entry> {
         let mut all: Vec<_> = fault_names(&self.linear, &self.extended)
             .into_iter()
@@ -122,7 +122,7 @@ impl Designed {
             let own = &mut all[channel.estimate];
             own.unit.clone_from(&fault.unit);
             own.description.clone_from(&fault.description);
-            if let Entrance::Loss { actuator, least_command } = fault.entrance {
+            if let EntryPoint::Loss { actuator, least_command } = fault.entry_point {
                 own.loss_of = Some(self.linear.actuators[actuator].name.clone());
                 own.least_command = Some(least_command);
             }
@@ -134,10 +134,10 @@ impl Designed {
         all
     }
 
-    /// As stated; else about ten times the slowest time constant of the feedback in 2000 steps, or in
-    /// steps of the sample time.
+    /// Returns the experiment of the plant file. The default covers ten time constants of the
+    /// slowest feedback eigenvalue in 2000 steps, or in steps of the sample time.
     fn experiment(&self, file: &PlantFile<'_>) -> Result<Experiment, control::Error> {
-        let slowest = self.slowest()?;
+        let slowest = self.slowest_rate()?;
         let stop_time = file.stop_time.unwrap_or_else(|| round(10.0 / slowest));
         let step_size = file.step_size.unwrap_or(match self.domain {
             Domain::Continuous => round(stop_time / 2000.0),
@@ -147,13 +147,13 @@ impl Designed {
     }
 }
 
-/// The unit per second, where it can be written.
+/// Returns the unit divided by seconds, if it can be written.
 fn per_second(unit: &str) -> Option<String> {
     let slope = format!("{unit}/s");
     Unit::parse(&slope).is_ok().then_some(slope)
 }
 
-/// The nearest of 1, 2, 5 times a power of ten, on the logarithmic scale.
+/// Rounds to the nearest 1, 2 or 5 times a power of ten, on the logarithmic scale.
 fn round(x: f64) -> f64 {
     let exponent = x.log10().floor();
     let part = x.log10() - exponent;
@@ -165,7 +165,7 @@ fn round(x: f64) -> f64 {
 }
 
 impl DesignFile<'_> {
-    /// The text of the file: scalars, `matrices` with a row on each line, tables.
+    /// Returns the text of the file: scalars, `matrices` with one row per line, tables.
     pub(crate) fn render(
         &self,
         matrices: &[(&str, &DMatrix<f64>)],

@@ -1,9 +1,9 @@
-//! From the plant file to the gains.
+//! Computes the gains for a plant file.
 
-use super::gains::{FeedbackProblem, Found, Refusal, feedback, observer};
+use super::gains::{FeedbackProblem, GainResult, Refusal, feedback, observer};
 use super::linear_plant::LinearPlant;
 use super::plant_file::PlantFile;
-use super::wanted::Request;
+use super::requirements::Request;
 use control::aso::{Estimator, FaultyPlant, Gains};
 use control::controller::{closed_loop, controller};
 use control::detectability::{Detectability, detectability};
@@ -16,22 +16,22 @@ use control::{Domain, Error, StateSpace};
 use files::PlaceError;
 use nalgebra::DMatrix;
 
-/// Where errors about faults point.
+/// The entries that errors about faults point at.
 const FAULTS: [&str; 3] = ["faults", "F_a", "actuator_faults"];
 
-/// A designed controller with all that led to it.
-pub(crate) struct Designed {
+/// A designed controller with the intermediate results.
+pub(crate) struct ControllerDesign {
     pub(crate) linear: LinearPlant,
-    /// With fault models and measurement filter, in continuous time.
+    /// The plant with fault models and measurement filter, in continuous time.
     pub(crate) extended: ExtendedPlant,
     pub(crate) domain: Domain,
-    /// What the observer runs: the extended plant, sampled for a sampled design.
+    /// The model in the observer: the extended plant, sampled for a sampled design.
     pub(crate) plant: FaultyPlant,
-    /// The measurement filter as the controller runs it.
+    /// The measurement filter in the controller.
     pub(crate) filter: Option<Vec<f64>>,
     pub(crate) gains: Gains,
-    pub(crate) feedback: Found,
-    pub(crate) observer: Found,
+    pub(crate) feedback: GainResult,
+    pub(crate) observer: GainResult,
     pub(crate) controllability: Rank,
     pub(crate) distance: Distance,
     pub(crate) detectability: Detectability,
@@ -39,14 +39,15 @@ pub(crate) struct Designed {
     pub(crate) cancellation_residual: f64,
     /// The linear controller, from measurements to commands.
     pub(crate) controller: StateSpace,
-    /// Largest real part of the eigenvalues of the loop, or largest modulus less one; below zero.
+    /// Largest real part of the closed-loop eigenvalues, or largest modulus minus one; negative if
+    /// stable.
     pub(crate) instability: f64,
-    /// The same of the observer's error while the faults are not estimated, where that happens.
+    /// The same for the observer error before `t_on`, if the faults are not estimated then.
     pub(crate) instability_before: Option<f64>,
 }
 
-/// Designs what `file` wants.
-pub(crate) fn design(file: &PlantFile<'_>) -> Result<Designed, crate::Error> {
+/// Designs the controller for `file`.
+pub(crate) fn design(file: &PlantFile<'_>) -> Result<ControllerDesign, crate::Error> {
     let linear = LinearPlant::of(file)?;
     let filter = file.filter.as_deref().unwrap_or_default();
     let LinearPlant { a, b, c, models, .. } = &linear;
@@ -55,7 +56,7 @@ pub(crate) fn design(file: &PlantFile<'_>) -> Result<Designed, crate::Error> {
     let (controllability, distance) = check_controllable(file, &linear)?;
     let detectability = check_detectable(file, &linear, &extended)?;
     let (domain, plant) = in_domain(file, &extended)?;
-    let (feedback, observer) = wanted(file, &extended, (&plant, c), domain)?;
+    let (feedback, observer) = compute_gains(file, &extended, (&plant, c), domain)?;
     let n = plant.a.nrows();
     let gains = Gains {
         estimator: estimator(file),
@@ -66,7 +67,7 @@ pub(crate) fn design(file: &PlantFile<'_>) -> Result<Designed, crate::Error> {
     };
     let controller = controller(&plant, &gains, domain)?;
     let whole = closed_loop(&plant, &controller, &vec![1.0; plant.b.ncols()])?;
-    Ok(Designed {
+    Ok(ControllerDesign {
         cancellation_residual: cancellation_residual(&extended)?,
         instability_before: if file.t_on > 0.0 && !file.monitor {
             Some(instability(&gains.state_error_dynamics(&plant), domain)?)
@@ -96,7 +97,7 @@ fn estimator(file: &PlantFile<'_>) -> Estimator {
     }
 }
 
-/// The plant that the observer runs: sampled for a sampled design.
+/// Returns the model in the observer: sampled for a sampled design.
 fn in_domain(
     file: &PlantFile<'_>,
     extended: &ExtendedPlant,
@@ -106,19 +107,19 @@ fn in_domain(
     };
     let period = sampling.period;
     let refuse =
-        |error: Error| file.error(&["sample_time"], format!("sampled each {period} s: {error}"));
+        |error: Error| file.error(&["sample_time"], format!("sampled every {period} s: {error}"));
     let plant = sampled::sample(extended, period).map_err(refuse)?;
     plant.check_observer_exists().map_err(refuse)?;
     Ok((Domain::Sampled { period }, plant))
 }
 
-/// The gains of feedback and observer for the plant in its domain; `c` is that of the plant alone.
-fn wanted(
+/// Computes the gains of feedback and observer; `c` is the output matrix without extensions.
+fn compute_gains(
     file: &PlantFile<'_>,
     extended: &ExtendedPlant,
     (plant, c): (&FaultyPlant, &DMatrix<f64>),
     domain: Domain,
-) -> Result<(Found, Found), PlaceError> {
+) -> Result<(GainResult, GainResult), PlaceError> {
     let n = extended.states;
     let problem = FeedbackProblem {
         a: &plant.a.view((0, 0), (n, n)).into(),
@@ -126,11 +127,11 @@ fn wanted(
         c,
         f_a: &plant.f_a.rows(0, n).into(),
     };
-    let feedback = feedback(&file.feedback.wanted, &problem, domain)
+    let feedback = feedback(&file.feedback.requirement, &problem, domain)
         .map_err(|refusal| refused(file, &file.feedback, refusal, n, "states"))?;
     let (a_0, c_0) = (plant.augmented_dynamics(), plant.augmented_output());
     let pair = (&a_0, &c_0, plant.f_a.ncols());
-    let observer = observer(&file.observer.wanted, pair, domain, estimator(file));
+    let observer = observer(&file.observer.requirement, pair, domain, estimator(file));
     let observer = observer.map_err(|refusal| {
         let meaning = "states, filters, faults and rates of ramps";
         refused(file, &file.observer, refusal, a_0.nrows(), meaning)
@@ -138,7 +139,8 @@ fn wanted(
     Ok((feedback, observer))
 }
 
-/// The part of the faults' effect on the plant's states that the compensation leaves, relative.
+/// Returns the part of the faults' effect on the plant's states that the compensation leaves,
+/// relative.
 fn cancellation_residual(extended: &ExtendedPlant) -> Result<f64, Error> {
     let ExtendedPlant { plant, states, .. } = extended;
     let left = &plant.b * plant.compensation_gain()? + &plant.f_a;
@@ -164,7 +166,7 @@ fn check_controllable(
     Ok((rank, from_uncontrollable(&linear.a, &linear.b).map_err(refuse)?))
 }
 
-/// The augmented observer exists, or an error that names the faults and the measurements.
+/// Checks that the augmented observer exists; the error names the faults and the measurements.
 fn check_detectable(
     file: &PlantFile<'_>,
     linear: &LinearPlant,
@@ -192,8 +194,8 @@ fn check_detectable(
         let faults = hidden.faults();
         let states: Vec<_> = hidden.states().iter().map(|&at| state_name(linear, at)).collect();
         let mut hiding = faults.iter().map(|&fault| fault_names[fault].as_str());
-        // Without a state, the first fault is hidden by the others.
-        let (told, from): (Vec<_>, String) = match states.as_slice() {
+        // If no state is involved, the fault is hidden by the other faults.
+        let (distinguished, from): (Vec<_>, String) = match states.as_slice() {
             [] => (hiding.by_ref().take(1).collect(), hiding.collect::<Vec<_>>().join(", ")),
             states => (hiding.collect(), format!("a movement of {}", states.join(", "))),
         };
@@ -203,7 +205,7 @@ fn check_detectable(
             hidden.rank,
             hidden.expected,
             if hidden.at.norm() > 0.0 { "change" } else { "constant value" },
-            told.join(", "),
+            distinguished.join(", "),
             from,
         );
         return Err(at_fault(file, linear, faults[0], message).into());
@@ -215,7 +217,7 @@ fn check_detectable(
     Ok(found)
 }
 
-/// Points at the entry of the fault behind column `column` of F_a.
+/// Returns an error at the entry of the fault in column `column` of F_a.
 fn at_fault(
     file: &PlantFile<'_>,
     linear: &LinearPlant,
@@ -228,7 +230,7 @@ fn at_fault(
     }
 }
 
-/// The faults, then the rates of ramps.
+/// Returns the names of the faults, then of the rates of ramps.
 pub(crate) fn fault_names(linear: &LinearPlant, extended: &ExtendedPlant) -> Vec<String> {
     let mut all: Vec<_> = linear.faults.iter().map(|fault| fault.name.clone()).collect();
     all.resize(extended.plant.f_a.ncols(), String::new());
@@ -240,7 +242,7 @@ pub(crate) fn fault_names(linear: &LinearPlant, extended: &ExtendedPlant) -> Vec
     all
 }
 
-/// A state, or the filter of a measurement.
+/// Returns the name of a state, or of the measurement that a filter state belongs to.
 fn state_name(linear: &LinearPlant, state: usize) -> &str {
     let n = linear.states.len();
     let signal = linear.states.get(state).or_else(|| linear.measurements.get(state - n));
@@ -251,7 +253,7 @@ fn names<'a>(list: impl Iterator<Item = &'a str>) -> String {
     list.collect::<Vec<_>>().join(", ")
 }
 
-/// Why a gain was refused, at the place in the file that wants it.
+/// Converts the failure of a gain to an error at the requirement in the file.
 fn refused(
     file: &PlantFile<'_>,
     request: &Request,
@@ -274,16 +276,16 @@ fn refused(
     }
 }
 
-impl Designed {
-    /// The dynamics of the plant under exact state feedback, n x n.
-    pub(crate) fn fed_back(&self) -> DMatrix<f64> {
+impl ControllerDesign {
+    /// Returns A + B K_x, n x n: the dynamics under exact state feedback.
+    pub(crate) fn feedback_dynamics(&self) -> DMatrix<f64> {
         let n = self.extended.states;
         self.plant.a.view((0, 0), (n, n)) + self.plant.b.rows(0, n) * self.gains.k_x.columns(0, n)
     }
 
-    /// The decay rate of its slowest eigenvalue, 1/s.
-    pub(crate) fn slowest(&self) -> Result<f64, Error> {
-        let rate = -instability(&self.fed_back(), self.domain)?;
+    /// Returns the decay rate of the slowest eigenvalue under exact state feedback, 1/s.
+    pub(crate) fn slowest_rate(&self) -> Result<f64, Error> {
+        let rate = -instability(&self.feedback_dynamics(), self.domain)?;
         Ok(match self.domain {
             Domain::Continuous => rate,
             Domain::Sampled { period } => -(-rate).ln_1p() / period,

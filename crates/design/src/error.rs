@@ -1,4 +1,4 @@
-//! Why a controller cannot be designed.
+//! The errors of a design.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -10,40 +10,40 @@ use fmu_description::package::PackageError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// An entry of the plant file, with its line.
+    /// An entry of the plant file is invalid; the message shows its line.
     #[error(transparent)]
     Entry(#[from] PlaceError),
-    /// The mathematics refuses.
+    /// A numerical method failed or rejected its data.
     #[error(transparent)]
     Control(#[from] control::Error),
     /// An archive cannot be read or written.
     #[error(transparent)]
-    Package(Box<PackageError>),
-    /// The library of the controller cannot be loaded.
+    Package(#[from] PackageError),
+    /// The library of the packed controller cannot be loaded.
     #[error(transparent)]
     Library(#[from] fmu_import::LoadError),
-    /// The library of the controller does not describe itself as it should.
+    /// The library of the packed controller generates no valid model description.
     #[error(transparent)]
     Description(#[from] fmu_import::DescriptionError),
     /// A file cannot be read or written.
     #[error("cannot {action} {}", path.display())]
     File {
-        /// What was tried: "read", "write".
+        /// The operation: "read" or "write".
         action: &'static str,
         /// The file.
         path: PathBuf,
-        /// The system's reason.
+        /// The error of the operating system.
         source: io::Error,
     },
-    /// An error, and what it is about.
+    /// An error with its context.
     #[error("{what}")]
     Within {
-        /// What it is about.
+        /// The context.
         what: String,
         /// The error.
         source: Box<Error>,
     },
-    /// What is asked for makes no sense.
+    /// The request is invalid.
     #[error("{0}")]
     Invalid(String),
 }

@@ -1,4 +1,4 @@
-//! The gain that the plant file wants.
+//! Computes the gains that satisfy the requirements of the plant file.
 
 use control::aso::Estimator;
 use control::lmi::{self, Norm, Outcome, Performance, Synthesis};
@@ -8,24 +8,24 @@ use control::sampled::{place_estimator, sampled_poles};
 use control::{Domain, Error};
 use nalgebra::{Complex, DMatrix};
 
-use super::wanted::{Region, Wanted};
+use super::requirements::{Region, Requirement};
 
-/// A gain, and how it was found.
-pub(crate) struct Found {
+/// A gain and the method that found it.
+pub(crate) struct GainResult {
     pub(crate) gain: DMatrix<f64>,
-    /// In a sentence.
+    /// The method, in a sentence.
     pub(crate) method: String,
-    /// The eigenvalues asked for, where there are any, in the plane of the domain.
-    pub(crate) wanted: Vec<Complex<f64>>,
-    /// Of an assignment of eigenvalues.
+    /// The required eigenvalues, if any, in the plane of the domain.
+    pub(crate) required: Vec<Complex<f64>>,
+    /// The quality of an eigenvalue assignment.
     pub(crate) quality: Option<Quality>,
 }
 
-/// Why there is no gain.
+/// Why no gain was found.
 pub(crate) enum Refusal {
-    /// The mathematics refuses the data.
+    /// A numerical method failed or rejected its data.
     Control(Error),
-    /// The requirements contradict each other, or no answer could be verified.
+    /// The requirements contradict each other, or no result could be verified.
     Conflict(String),
 }
 
@@ -35,7 +35,7 @@ impl From<Error> for Refusal {
     }
 }
 
-/// A system whose state feedback is wanted, and the faults that it is to withstand.
+/// The system for the state feedback, and its faults.
 pub(crate) struct FeedbackProblem<'a> {
     pub(crate) a: &'a DMatrix<f64>,
     pub(crate) b: &'a DMatrix<f64>,
@@ -43,32 +43,33 @@ pub(crate) struct FeedbackProblem<'a> {
     pub(crate) f_a: &'a DMatrix<f64>,
 }
 
-/// K of u = K x.
+/// Computes K of u = K x.
 pub(crate) fn feedback(
-    wanted: &Wanted,
+    required: &Requirement,
     problem: &FeedbackProblem<'_>,
     domain: Domain,
-) -> Result<Found, Refusal> {
+) -> Result<GainResult, Refusal> {
     let FeedbackProblem { a, b, c, f_a } = problem;
-    match wanted {
-        Wanted::Eigenvalues(continuous) => {
-            let (wanted, sampled) = in_domain(continuous, domain)?;
-            let found = if sampled { place_discrete(a, b, &wanted) } else { place(a, b, &wanted) };
-            Ok(assigned(found?, wanted))
+    match required {
+        Requirement::Eigenvalues(continuous) => {
+            let (required, sampled) = in_domain(continuous, domain)?;
+            let found =
+                if sampled { place_discrete(a, b, &required) } else { place(a, b, &required) };
+            Ok(assigned(found?, required))
         }
-        Wanted::SampledEigenvalues(wanted) => {
-            Ok(assigned(place_discrete(a, b, wanted)?, wanted.clone()))
+        Requirement::SampledEigenvalues(required) => {
+            Ok(assigned(place_discrete(a, b, required)?, required.clone()))
         }
-        Wanted::Weights { states, channels } => {
+        Requirement::Weights { states, channels } => {
             let weights = Weights { q: states.clone(), r: channels.clone(), n: None };
             let found = lqr(a, b, &weights, domain)?;
             Ok(weighted(found.gain, "Linear-quadratic regulator", found.residual))
         }
-        Wanted::Region(region) => {
+        Requirement::Region(region) => {
             let found = lmi::state_feedback(a, b, &region.stated(), None, domain)?;
             synthesised(found, "Eigenvalues in the region by linear matrix inequalities")
         }
-        Wanted::HInfinity { bound, region } => {
+        Requirement::HInfinity { bound, region } => {
             let (m, p) = (b.ncols(), c.nrows());
             let mut feedthrough = DMatrix::zeros(p + m, m);
             feedthrough.view_mut((p, 0), (m, m)).fill_with_identity();
@@ -86,27 +87,27 @@ pub(crate) fn feedback(
     }
 }
 
-/// L of the observer for the pair (`a_0`, `c_0`), whose last `faults` states are those of the fault
-/// model; of a current estimator the gain of the correction.
+/// Computes L of the observer for the pair (`a_0`, `c_0`), whose last `faults` states are the
+/// states of the fault model. For a current estimator it is the gain of the correction.
 pub(crate) fn observer(
-    wanted: &Wanted,
+    required: &Requirement,
     (a_0, c_0, faults): (&DMatrix<f64>, &DMatrix<f64>, usize),
     domain: Domain,
     estimator: Estimator,
-) -> Result<Found, Refusal> {
+) -> Result<GainResult, Refusal> {
     let seen = estimator.output_matrix(a_0, c_0);
-    match wanted {
-        Wanted::Eigenvalues(continuous) => {
-            let (wanted, sampled) = in_domain(continuous, domain)?;
+    match required {
+        Requirement::Eigenvalues(continuous) => {
+            let (required, sampled) = in_domain(continuous, domain)?;
             if sampled {
-                return estimated(a_0, &seen, wanted);
+                return estimated(a_0, &seen, required);
             }
-            let placed = place_balanced(&a_0.transpose(), &seen.transpose(), &wanted)?;
+            let placed = place_balanced(&a_0.transpose(), &seen.transpose(), &required)?;
             let gain = -placed.gain.transpose();
-            Ok(assigned(Placement { gain, ..placed }, wanted))
+            Ok(assigned(Placement { gain, ..placed }, required))
         }
-        Wanted::SampledEigenvalues(wanted) => estimated(a_0, &seen, wanted.clone()),
-        Wanted::Weights { states, channels } => {
+        Requirement::SampledEigenvalues(required) => estimated(a_0, &seen, required.clone()),
+        Requirement::Weights { states, channels } => {
             let found = kalman(a_0, c_0, states, channels, domain)?;
             let gain = found
                 .current_gain
@@ -114,11 +115,11 @@ pub(crate) fn observer(
                 .unwrap_or(found.gain);
             Ok(weighted(gain, "Kalman filter", found.residual))
         }
-        Wanted::Region(region) => {
+        Requirement::Region(region) => {
             let found = lmi::observer_gain(a_0, &seen, &region.stated(), None, domain)?;
             synthesised(found, "Eigenvalues in the region by linear matrix inequalities")
         }
-        Wanted::HInfinity { bound, region } => {
+        Requirement::HInfinity { bound, region } => {
             let performance = rate_to_error((a_0.nrows(), c_0.nrows(), faults), *bound);
             let region = region.stated();
             let found = lmi::observer_gain(a_0, &seen, &region, Some(&performance), domain)?;
@@ -128,7 +129,8 @@ pub(crate) fn observer(
     }
 }
 
-/// From the rates of the faults, the last states of the observer, to the errors of their estimates.
+/// Returns the performance channel from the rates of the faults, the last states of the observer,
+/// to the fault estimation errors.
 fn rate_to_error(
     (order, measurements, faults): (usize, usize, usize),
     gamma: Option<f64>,
@@ -139,7 +141,7 @@ fn rate_to_error(
     Performance { disturbance: rate, output, feedthrough, norm: Norm::HInfinity, gamma }
 }
 
-/// The eigenvalues in the plane of the domain, and whether that is the z plane.
+/// Returns the eigenvalues in the plane of the domain, and whether that is the z-plane.
 fn in_domain(
     continuous: &[Complex<f64>],
     domain: Domain,
@@ -150,27 +152,27 @@ fn in_domain(
     }
 }
 
-/// The estimator of a sampled loop.
+/// Computes the estimator gain of a sampled loop.
 fn estimated(
     a_0: &DMatrix<f64>,
     seen: &DMatrix<f64>,
-    wanted: Vec<Complex<f64>>,
-) -> Result<Found, Refusal> {
-    let (gain, quality) = place_estimator(a_0, seen, &wanted)?;
-    Ok(assigned(Placement { gain, quality }, wanted))
+    required: Vec<Complex<f64>>,
+) -> Result<GainResult, Refusal> {
+    let (gain, quality) = place_estimator(a_0, seen, &required)?;
+    Ok(assigned(Placement { gain, quality }, required))
 }
 
-fn assigned(found: Placement, wanted: Vec<Complex<f64>>) -> Found {
+fn assigned(found: Placement, required: Vec<Complex<f64>>) -> GainResult {
     let method = "Eigenvalues assigned, with well-conditioned eigenvectors.".to_owned();
-    Found { gain: found.gain, method, wanted, quality: Some(found.quality) }
+    GainResult { gain: found.gain, method, required, quality: Some(found.quality) }
 }
 
-fn weighted(gain: DMatrix<f64>, method: &str, residual: f64) -> Found {
+fn weighted(gain: DMatrix<f64>, method: &str, residual: f64) -> GainResult {
     let method = format!("{method}; relative residual of the Riccati equation {residual:.1e}.");
-    Found { gain, method, wanted: Vec::new(), quality: None }
+    GainResult { gain, method, required: Vec::new(), quality: None }
 }
 
-fn synthesised(found: Outcome<Synthesis>, method: &str) -> Result<Found, Refusal> {
+fn synthesised(found: Outcome<Synthesis>, method: &str) -> Result<GainResult, Refusal> {
     match found {
         Outcome::Optimal(found) => {
             let bound = found.bound.as_ref();
@@ -179,24 +181,24 @@ fn synthesised(found: Outcome<Synthesis>, method: &str) -> Result<Found, Refusal
             });
             let margin = found.region.margin;
             let method = format!("{method}; region verified with margin {margin:.1e}{bound}.");
-            Ok(Found { gain: found.gain, method, wanted: Vec::new(), quality: None })
+            Ok(GainResult { gain: found.gain, method, required: Vec::new(), quality: None })
         }
         Outcome::Infeasible { conflict } => Err(Refusal::Conflict(contradiction(&conflict))),
         Outcome::Inconclusive(reason) => Err(Refusal::Conflict(format!(
-            "no answer could be verified: {reason}; other wanted values or units nearer to the size of \
+            "no answer could be verified: {reason}; other requirements, or units nearer to the size of \
              the signals may help"
         ))),
     }
 }
 
-/// The requirements as the plant file names them.
+/// Names the conflicting requirements as in the plant file.
 fn contradiction(conflict: &[&str]) -> String {
     let name = |requirement: &&str| match *requirement {
         "gain" => "h_infinity".to_owned(),
         other => other.to_owned(),
     };
     match conflict {
-        [one] => format!("this cannot be met, whatever else is wanted: {}", name(one)),
+        [one] => format!("this cannot be met, even without the other requirements: {}", name(one)),
         several => {
             let names: Vec<_> = several.iter().map(name).collect();
             format!("these requirements contradict each other: {}", names.join(", "))
@@ -205,7 +207,7 @@ fn contradiction(conflict: &[&str]) -> String {
 }
 
 impl Region {
-    /// The region for the inequalities, angles in rad.
+    /// Converts the region for the linear matrix inequalities; angles in rad.
     fn stated(self) -> lmi::Region {
         lmi::Region {
             decay: self.decay,

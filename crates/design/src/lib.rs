@@ -1,10 +1,11 @@
-//! From a plant file to a fault-tolerant controller: the design, its checks, a report, the FMU.
+//! Designs a fault-tolerant controller from a plant file: gains, checks, report and controller FMU.
 //!
-//! [`design()`] reads a plant file, which states the plant, its faults and what is required of the
-//! controller, and computes the gains, checks them and examines the closed loop. [`Design`] has the
-//! controller's `design.toml`, the report as data and as a page, and makes the controller FMU.
+//! [`design()`] reads a plant file, which states the plant, its faults and the requirements on the
+//! controller. It computes the gains, checks them and analyses the closed loop. [`Design`] holds
+//! the controller's `design.toml` and the report (as data and as a page), and creates the
+//! controller FMU.
 //!
-//! The mathematics is in the crate `control`; use it directly where there is no plant file.
+//! The crate `control` has the mathematics; use it directly to design without a plant file.
 #![forbid(unsafe_code)]
 
 mod analysis;
@@ -21,10 +22,10 @@ mod page;
 mod plant_file;
 pub mod report;
 mod reporting;
+mod requirements;
 mod signals;
 #[cfg(test)]
 mod tests;
-mod wanted;
 
 use std::path::Path;
 
@@ -35,7 +36,7 @@ pub use error::Error;
 pub use report::Report;
 
 use controller_fmu::Content;
-use designed::Designed;
+use designed::ControllerDesign;
 use plant_file::PlantFile;
 
 /// A designed controller.
@@ -95,7 +96,7 @@ impl Design {
 }
 
 /// The user's sentence, or one that names the faults.
-fn description(file: &PlantFile<'_>, designed: &Designed) -> String {
+fn description(file: &PlantFile<'_>, designed: &ControllerDesign) -> String {
     let faults: Vec<_> = designed.linear.faults.iter().map(|fault| fault.name.as_str()).collect();
     file.description.clone().unwrap_or_else(|| {
         format!("Fault-tolerant controller that estimates and compensates {}", faults.join(", "))

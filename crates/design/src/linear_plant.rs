@@ -1,4 +1,4 @@
-//! The plant as a linear system with faults, out of the plant file's matrices or its FMU.
+//! The plant as a linear system with faults, from the matrices of the plant file or from its FMU.
 
 use control::faults::{Fault as Model, FaultEntry, FaultKind};
 use fmu_import::Fmu;
@@ -6,9 +6,9 @@ use linearise::{Linearisation, Linearise, LineariseError, linearise};
 use nalgebra::{DMatrix, DVector};
 
 use super::plant_file::{self, PlantFile};
-use super::signals::{Course, Entrance, Fault, Signal};
+use super::signals::{EntryPoint, Fault, FaultDynamics, Signal};
 
-/// Largest part of its row that counts as no direct way from an input to a measurement.
+/// Relative size in its row below which an entry of D or G counts as zero.
 const NOTHING: f64 = 1e-9;
 
 /// x' = A x + B u + faults, y = C x + sensor faults, about an operating point.
@@ -19,24 +19,24 @@ pub(crate) struct LinearPlant {
     pub(crate) states: Vec<Signal>,
     pub(crate) actuators: Vec<Signal>,
     pub(crate) measurements: Vec<Signal>,
-    /// The faults as the user named them, with their units.
+    /// The faults as named in the file, with their units.
     pub(crate) faults: Vec<Fault>,
-    /// The same for the mathematics, in this order.
+    /// The fault models, in the same order.
     pub(crate) models: Vec<Model>,
-    /// Where the matrices come from, in a sentence.
+    /// The source of the matrices, in a sentence.
     pub(crate) origin: String,
-    /// Of an FMU: how far its operating point is from an equilibrium, relative.
+    /// For an FMU: the relative distance of the operating point from an equilibrium.
     pub(crate) residual: Option<f64>,
 }
 
 impl LinearPlant {
-    /// Reads the matrices of `file`, or linearises its FMU.
+    /// Takes the matrices of `file`, or linearises its FMU.
     pub(crate) fn of(file: &PlantFile<'_>) -> Result<Self, crate::Error> {
         match &file.model {
             plant_file::Model::Matrices { a, b, c, f_a, states } => {
                 let columns = f_a.clone().unwrap_or_else(|| DMatrix::zeros(a.nrows(), 0));
-                let model = |fault: &Fault| match fault.entrance {
-                    Entrance::Column(at) => {
+                let model = |fault: &Fault| match fault.entry_point {
+                    EntryPoint::Column(at) => {
                         modelled(fault, FaultEntry::Actuator(column(&columns, at)))
                     }
                     _ => on_signals(fault, b, c.nrows()),
@@ -50,7 +50,7 @@ impl LinearPlant {
                     measurements: file.measurements.clone(),
                     faults: file.faults.clone(),
                     models: file.faults.iter().map(model).collect(),
-                    origin: "The matrices are those of the plant file.".to_owned(),
+                    origin: "The plant file states the matrices.".to_owned(),
                     residual: None,
                 })
             }
@@ -59,33 +59,35 @@ impl LinearPlant {
     }
 }
 
-/// Column `at`.
+/// Returns column `at`.
 fn column(m: &DMatrix<f64>, at: usize) -> DVector<f64> {
     m.column(at).into_owned()
 }
 
 fn modelled(fault: &Fault, entry: FaultEntry) -> Model {
-    let kind = match fault.course {
-        Course::Constant => FaultKind::Constant,
-        Course::Ramp => FaultKind::Ramp,
+    let kind = match fault.dynamics {
+        FaultDynamics::Constant => FaultKind::Constant,
+        FaultDynamics::Ramp => FaultKind::Ramp,
     };
     Model { entry, kind }
 }
 
-/// A fault of an actuator or a sensor; `p` measurements.
+/// Returns the model of an actuator or sensor fault; `p` is the number of measurements.
 fn on_signals(fault: &Fault, b: &DMatrix<f64>, p: usize) -> Model {
-    let enters = match fault.entrance {
-        Entrance::Sensor(at) => {
+    let enters = match fault.entry_point {
+        EntryPoint::Sensor(at) => {
             FaultEntry::Sensor(DVector::from_fn(p, |row, _| f64::from(u8::from(row == at))))
         }
-        Entrance::Loss { actuator, .. } => FaultEntry::LossOfEffectiveness(actuator),
-        Entrance::Actuator(at) => FaultEntry::Actuator(column(b, at)),
-        Entrance::Column(_) | Entrance::Input(_) => FaultEntry::Actuator(DVector::zeros(b.nrows())),
+        EntryPoint::Loss { actuator, .. } => FaultEntry::LossOfEffectiveness(actuator),
+        EntryPoint::Actuator(at) => FaultEntry::Actuator(column(b, at)),
+        EntryPoint::Column(_) | EntryPoint::Input(_) => {
+            FaultEntry::Actuator(DVector::zeros(b.nrows()))
+        }
     };
     modelled(fault, enters)
 }
 
-/// The FMU of the file as a linear plant.
+/// Returns the FMU of the file as a linear plant.
 fn linearised(
     file: &PlantFile<'_>,
     own: &plant_file::PlantFmu,
@@ -115,15 +117,15 @@ fn linearised(
     })
 }
 
-/// Linearises the FMU of the file; its name and what was found.
+/// Linearises the FMU of the file; returns its name and the result.
 fn linearisation(
     file: &PlantFile<'_>,
     plant_file::PlantFmu { path, operating_point, states }: &plant_file::PlantFmu,
 ) -> Result<(String, Linearisation), crate::Error> {
     let fmu = Fmu::open_any(path).map_err(|error| file.error(&["plant"], sentence(&error)))?;
     let names = |signals: &[Signal]| signals.iter().map(|signal| signal.name.clone()).collect();
-    let inputs = file.faults.iter().filter_map(|fault| match &fault.entrance {
-        Entrance::Input(name) => Some(name.clone()),
+    let inputs = file.faults.iter().filter_map(|fault| match &fault.entry_point {
+        EntryPoint::Input(name) => Some(name.clone()),
         _ => None,
     });
     let request = Linearise {
@@ -145,7 +147,7 @@ fn linearisation(
     Ok((format!("{} ({name})", fmu.description().model_name), found))
 }
 
-/// The entry of the file that names this variable of the FMU.
+/// Returns the entry of the file that names this variable of the FMU.
 fn stating(file: &PlantFile<'_>, operating_point: &[(String, f64)], name: &str) -> &'static str {
     let among = |signals: &[Signal]| signals.iter().any(|signal| signal.name == name);
     if operating_point.iter().any(|(variable, _)| variable == name) {
@@ -159,7 +161,7 @@ fn stating(file: &PlantFile<'_>, operating_point: &[(String, f64)], name: &str) 
     }
 }
 
-/// The faults of the file with the units of the FMU, and where they enter.
+/// Returns the faults of the file with units of the FMU, and their entry points.
 fn faults(
     file: &PlantFile<'_>,
     found: &Linearisation,
@@ -168,19 +170,19 @@ fn faults(
     let mut faults = file.faults.clone();
     let mut models = Vec::with_capacity(faults.len());
     for fault in &mut faults {
-        let (signal, model) = match fault.entrance {
-            Entrance::Input(_) => {
+        let (signal, model) = match fault.entry_point {
+            EntryPoint::Input(_) => {
                 let at = inputs.next().unwrap_or_default();
                 (&found.faults[at], modelled(fault, entry(file, fault, &found.matrices, at)?))
             }
-            Entrance::Sensor(at) => {
+            EntryPoint::Sensor(at) => {
                 let measurements = found.outputs.len();
                 (&found.outputs[at], on_signals(fault, &found.matrices.b, measurements))
             }
-            Entrance::Actuator(at) | Entrance::Loss { actuator: at, .. } => {
+            EntryPoint::Actuator(at) | EntryPoint::Loss { actuator: at, .. } => {
                 (&found.inputs[at], on_signals(fault, &found.matrices.b, found.outputs.len()))
             }
-            Entrance::Column(_) => {
+            EntryPoint::Column(_) => {
                 let message = format!("fault `{}`: an FMU has no F_a", fault.name);
                 return Err(file.error_at(&fault.place, message).into());
             }
@@ -191,7 +193,7 @@ fn faults(
     Ok((faults, models))
 }
 
-/// The observer is for measurements that the commands do not reach directly.
+/// Rejects direct feedthrough: the observer requires y = C x.
 fn refuse_feedthrough(
     file: &PlantFile<'_>,
     d: &DMatrix<f64>,
@@ -214,7 +216,7 @@ fn refuse_feedthrough(
     Ok(())
 }
 
-/// How fault input `at` of the FMU enters: the states or the measurements.
+/// Returns where the fault input `at` of the FMU enters: the states or the measurements.
 fn entry(
     file: &PlantFile<'_>,
     fault: &Fault,
@@ -245,7 +247,7 @@ fn entry(
     }
 }
 
-/// An error with its causes.
+/// Returns the text of an error and of its causes.
 fn sentence(error: &dyn std::error::Error) -> String {
     let causes = std::iter::successors(error.source(), |cause| cause.source());
     causes.fold(error.to_string(), |said, cause| format!("{said}: {cause}"))

@@ -1,14 +1,14 @@
-//! Matrices in a plant file.
+//! Reads matrices of a plant file.
 
 use files::{Entry, PlaceError};
 use nalgebra::DMatrix;
 
-/// Reads matrices.
+/// Reads an entry as a matrix.
 pub(crate) trait MatrixEntry {
-    /// A matrix: a list of rows of the same length.
+    /// Reads a matrix: a list of rows of the same length.
     fn matrix(&self) -> Result<DMatrix<f64>, PlaceError>;
 
-    /// A matrix of this shape; `meaning` names its rows and columns.
+    /// Reads a matrix and checks its shape; `meaning` names its rows and columns.
     fn shaped(&self, shape: (usize, usize), meaning: &str) -> Result<DMatrix<f64>, PlaceError>;
 }
 

@@ -1,4 +1,4 @@
-//! `report.html`: the design as one page that needs nothing else.
+//! `report.html`: the design report as one self-contained page.
 
 mod certificate;
 mod chart;
@@ -19,13 +19,13 @@ use super::report::Report;
 
 const STYLE: &str = include_str!("page/page.css");
 const SCRIPT: &str = include_str!("page/copy.js");
-/// The page loads nothing, whatever the texts in it say.
+/// The content security policy: the page loads nothing, even if a text contains markup.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
 
-/// The page of a design: a whole HTML document. The same report gives the same bytes.
+/// Returns the page of a design, a complete HTML document. Equal reports give equal bytes.
 ///
-/// `plant.eigenvalues` are those of the continuous plant in 1/s; the eigenvalues of the loops are
-/// those of the z-plane when the design is sampled.
+/// `plant.eigenvalues` are eigenvalues of the continuous plant in 1/s; the eigenvalues of the loops
+/// are in the z-plane if the design is sampled.
 pub(crate) fn page(report: &Report) -> String {
     let title =
         if report.description.is_empty() { &report.plant_file } else { &report.description };
@@ -85,7 +85,7 @@ struct Section {
     content: Markup,
 }
 
-/// Everything that there is something to say about, in the order of reading.
+/// Returns the non-empty sections in reading order.
 fn sections(report: &Report) -> Vec<Section> {
     let all = [
         (true, "plant", "Plant", plant::plant(&report.plant)),

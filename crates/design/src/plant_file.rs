@@ -1,4 +1,4 @@
-//! The plant file: what the user states of the plant and wants of the controller.
+//! Reads a plant file: the plant, its faults and the requirements on the controller.
 
 use crate::matrix::MatrixEntry as _;
 use std::collections::BTreeMap;
@@ -6,19 +6,19 @@ use std::path::PathBuf;
 
 use nalgebra::DMatrix;
 
-use super::signals::{Entrance, Fault, Signal, all_actuator_faults, faults, signals};
-use super::wanted::{Request, request};
+use super::requirements::{Request, request};
+use super::signals::{EntryPoint, Fault, Signal, all_actuator_faults, faults, signals};
 use files::{Entry, Place, PlaceError, Source, Table};
 
-/// A plant file, read and checked in itself.
+/// A plant file whose entries are valid and consistent.
 pub(crate) struct PlantFile<'a> {
     source: &'a Source,
-    /// Where the entries of the file are, for errors that show up later.
+    /// The places of entries, for errors of later steps.
     places: BTreeMap<&'static str, Place>,
     pub(crate) description: Option<String>,
-    /// Start of the compensation, s.
+    /// Start time of the compensation, s.
     pub(crate) t_on: f64,
-    /// Whether the faults are estimated while they are not compensated.
+    /// Whether the faults are also estimated before the compensation starts.
     pub(crate) monitor: bool,
     pub(crate) model: Model,
     pub(crate) actuators: Vec<Signal>,
@@ -33,9 +33,9 @@ pub(crate) struct PlantFile<'a> {
     pub(crate) step_size: Option<f64>,
 }
 
-/// Where the plant's matrices come from.
+/// The source of the plant's matrices.
 pub(crate) enum Model {
-    /// The file states them.
+    /// The file states the matrices.
     Matrices {
         a: DMatrix<f64>,
         b: DMatrix<f64>,
@@ -43,25 +43,25 @@ pub(crate) enum Model {
         f_a: Option<DMatrix<f64>>,
         states: Vec<Signal>,
     },
-    /// An FMU is linearised.
+    /// The matrices are linearised from an FMU.
     Fmu(PlantFmu),
 }
 
-/// The FMU of a plant, and where it is linearised.
+/// The FMU of a plant and its operating point.
 pub(crate) struct PlantFmu {
     pub(crate) path: PathBuf,
-    /// Values of its variables at the operating point.
+    /// Values of variables at the operating point.
     pub(crate) operating_point: Vec<(String, f64)>,
-    /// States, for an FMU that cannot name them itself.
+    /// Names of the states, for an FMU whose description does not list them.
     pub(crate) states: Vec<String>,
 }
 
-/// How the controller samples.
+/// The sampling of the controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Sampling {
     /// Sample time, s.
     pub(crate) period: f64,
-    /// Whether the command uses the newest measurement (current estimator), or only those before.
+    /// Whether the command uses the newest measurement (current estimator), or only earlier ones.
     pub(crate) current: bool,
 }
 
@@ -88,7 +88,7 @@ const KEYS: [&str; 21] = [
     "experiment",
     "D",
 ];
-/// Entries that errors of the design point at.
+/// Entries that errors of later steps point at.
 const PLACES: [&str; 15] = [
     "A",
     "B",
@@ -108,7 +108,7 @@ const PLACES: [&str; 15] = [
 ];
 
 impl<'a> PlantFile<'a> {
-    /// Reads the whole file.
+    /// Reads and checks the file.
     pub(crate) fn read(source: &'a Source, file: &Table<'a>) -> Result<Self, PlaceError> {
         file.allow(&KEYS)?;
         let place = |key: &&'static str| Some((*key, file.get(key)?.place));
@@ -119,7 +119,7 @@ impl<'a> PlantFile<'a> {
         let faults = all_faults(file, &actuators, &measurements)?;
         let sampling = sampling(file)?;
         let sampled = sampling.is_some();
-        let wanted = |key: &str, weights, meaning: &str| {
+        let read = |key: &str, weights, meaning: &str| {
             request(&file.require(key, meaning)?.table()?, weights, sampled)
         };
         let experiment = file.get("experiment").map(|entry| entry.table()).transpose()?;
@@ -140,8 +140,8 @@ impl<'a> PlantFile<'a> {
             t_on: file.get("t_on").map_or(Ok(0.0), |entry| entry.number())?,
             monitor: file.get("monitor").map_or(Ok(false), |entry| entry.flag())?,
             filter: filter(file, &measurements, &faults)?,
-            feedback: wanted("feedback", ["Q", "R"], "what is wanted of A + B K_x")?,
-            observer: wanted("observer", ["W", "V"], "what is wanted of A_0 - L C_0")?,
+            feedback: read("feedback", ["Q", "R"], "the requirement on A + B K_x")?,
+            observer: read("observer", ["W", "V"], "the requirement on A_0 - L C_0")?,
             stop_time: time("stop_time")?,
             step_size: time("step_size")?,
             model,
@@ -154,26 +154,26 @@ impl<'a> PlantFile<'a> {
         Ok(found)
     }
 
-    /// The name of the file, without its folder.
+    /// Returns the file name without its folder.
     pub(crate) fn name(&self) -> String {
         self.source.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
     }
 
-    /// An error that points at the first of `keys` that the file has, else at its beginning.
+    /// Returns an error at the first of `keys` that the file has, otherwise at its first line.
     pub(crate) fn error(&self, keys: &[&str], message: impl Into<String>) -> PlaceError {
         let place = keys.iter().find_map(|key| self.places.get(key)).cloned().unwrap_or(0..0);
         self.source.error(&place, message)
     }
 
-    /// An error that points at `place`.
+    /// Returns an error at `place`.
     pub(crate) fn error_at(&self, place: &Place, message: impl Into<String>) -> PlaceError {
         self.source.error(place, message)
     }
 
-    /// The columns of F_a are those of the faults that enter nowhere else.
+    /// Checks that F_a has one column per fault that enters through F_a.
     fn check_columns(&self, file: &Table<'_>) -> Result<(), PlaceError> {
-        let columns = |fault: &&Fault| matches!(fault.entrance, Entrance::Column(_));
-        let wanted = self.faults.iter().filter(columns).count();
+        let columns = |fault: &&Fault| matches!(fault.entry_point, EntryPoint::Column(_));
+        let expected = self.faults.iter().filter(columns).count();
         if let Some(fault) = self.faults.iter().find(columns) {
             let Model::Matrices { f_a, .. } = &self.model else {
                 let message = format!(
@@ -191,7 +191,7 @@ impl<'a> PlantFile<'a> {
                 );
                 return Err(self.error_at(&fault.place, message));
             };
-            if f_a.ncols() == wanted {
+            if f_a.ncols() == expected {
                 return Ok(());
             }
         }
@@ -199,14 +199,14 @@ impl<'a> PlantFile<'a> {
             None => Ok(()),
             Some(entry) => {
                 let found = entry.matrix()?.ncols();
-                let message = format!("expected {wanted} columns, one per fault, found {found}");
+                let message = format!("expected {expected} columns, one per fault, found {found}");
                 Err(entry.error(message))
             }
         }
     }
 }
 
-/// The plant is an FMU.
+/// Reads a plant that is an FMU.
 fn linearised(
     source: &Source,
     file: &Table<'_>,
@@ -236,10 +236,10 @@ fn linearised(
     Ok((model, [signals(&actuators, true)?, signals(&measurements, false)?]))
 }
 
-/// The file states the plant's matrices.
+/// Reads a plant whose matrices the file states.
 fn stated(file: &Table<'_>) -> Result<(Model, [Vec<Signal>; 2]), PlaceError> {
     if let Some(entry) = file.get("operating_point") {
-        let advice = "it belongs to `plant`; with matrices, `operating` in each signal says it";
+        let advice = "it belongs to `plant`; with matrices, `operating` in each signal states it";
         return Err(entry.error(advice));
     }
     let meaning = "the plant x' = A x + B u + F_a f_a, y = C x; or `plant`, an FMU";
@@ -268,7 +268,7 @@ fn stated(file: &Table<'_>) -> Result<(Model, [Vec<Signal>; 2]), PlaceError> {
     Ok((model, [actuators, measurements]))
 }
 
-/// The signals under `key`, `letter` and a number for those that the file does not name.
+/// Reads the signals under `key`; unnamed signals are called `letter` and a number.
 fn counted(
     file: &Table<'_>,
     key: &str,
@@ -285,7 +285,7 @@ fn counted(
     Err(entry.error(format!("expected {count} {meaning}, found {}", found.len())))
 }
 
-/// `actuator_faults = "all"`, and those under `[[faults]]`.
+/// Reads `actuator_faults = "all"` and the faults under `[[faults]]`.
 fn all_faults(
     file: &Table<'_>,
     actuators: &[Signal],
@@ -303,7 +303,7 @@ fn all_faults(
     } else if let Some(entry) = file.get("F_a") {
         let unnamed = |k: usize| Fault {
             name: format!("f{k}"),
-            entrance: Entrance::Column(k - 1),
+            entry_point: EntryPoint::Column(k - 1),
             ..Fault::constant(&entry.place)
         };
         found.extend((1..=entry.matrix()?.ncols()).map(unnamed));
@@ -338,13 +338,13 @@ fn sampling(file: &Table<'_>) -> Result<Option<Sampling>, PlaceError> {
     Ok(Some(Sampling { period: entry.positive()?, current }))
 }
 
-/// The rates of the measurement filter that sensor faults need.
+/// Reads the rates of the measurement filter, which sensor faults require.
 fn filter(
     file: &Table<'_>,
     measurements: &[Signal],
     faults: &[Fault],
 ) -> Result<Option<Vec<f64>>, PlaceError> {
-    let sensor = faults.iter().find(|fault| matches!(fault.entrance, Entrance::Sensor(_)));
+    let sensor = faults.iter().find(|fault| matches!(fault.entry_point, EntryPoint::Sensor(_)));
     match (file.get("filter"), sensor) {
         (None, None) => Ok(None),
         (None, Some(fault)) => {

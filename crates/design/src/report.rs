@@ -1,12 +1,12 @@
-//! The numbers of a design: what `--json` prints and what the page shows.
+//! The data of a design report: the output of `--json` and the content of the page.
 
 use nalgebra::{Complex, DMatrix};
 use serde::{Serialize, Serializer};
 
-/// Everything that is known of a design.
+/// The data of a design report.
 #[derive(Serialize)]
 pub struct Report {
-    /// What the controller does, in a sentence.
+    /// A description of the controller.
     pub description: String,
     /// Name of the plant file.
     pub plant_file: String,
@@ -14,34 +14,35 @@ pub struct Report {
     pub plant: Plant,
     /// The conditions that were checked.
     pub checks: Vec<Check>,
-    /// K_x, K_f, L_x, L_f and what else the controller runs with.
+    /// K_x, K_f, L_x, L_f and the other matrices of the controller.
     pub gains: Vec<Matrix>,
     /// The loop of the state feedback.
     pub feedback: Loop,
     /// The loop of the observer.
     pub observer: Loop,
-    /// How the controller samples; none in continuous time.
+    /// The sampling of the controller; none in continuous time.
     pub sampling: Option<Sampled>,
-    /// Theorem 1 and what is known beside it.
+    /// Theorem 1 and related certificates.
     pub certificate: Certificate,
-    /// How large each error can get, one entry for each pair of a fault and an error.
+    /// Bounds of the errors, one entry for each pair of a fault and an error.
     pub bounds: Vec<Bound>,
-    /// What a change of each fault does: all at once, and at the bound of its rate where one is stated.
+    /// Responses to a change of each fault: as a step, or as a ramp if the bound of its rate is
+    /// stated.
     pub steps: Vec<StepResponse>,
-    /// Singular values over the frequency.
+    /// Singular values over frequency.
     pub frequency: Vec<Frequency>,
-    /// For which losses of effectiveness the loop is stable, one entry per such fault.
+    /// Stability under loss of effectiveness, one entry per such fault.
     pub effectiveness: Vec<Effectiveness>,
-    /// What all this rests on, in sentences.
+    /// The assumptions of the report, in sentences.
     pub assumptions: Vec<String>,
     /// The variables of the controller FMU; empty without `--fmu`.
     pub interface: Vec<Variable>,
 }
 
-/// The plant as designed for.
+/// The plant of the design.
 #[derive(Serialize)]
 pub struct Plant {
-    /// Where the matrices come from, in a sentence.
+    /// The source of the matrices, in a sentence.
     pub origin: String,
     /// The states.
     pub states: Vec<Signal>,
@@ -51,7 +52,7 @@ pub struct Plant {
     pub measurements: Vec<Signal>,
     /// The faults.
     pub faults: Vec<Signal>,
-    /// A, B, C, F_a of the plant, and the extended ones where they differ.
+    /// A, B, C, F_a of the plant, and the extended matrices if they differ.
     pub matrices: Vec<Matrix>,
     /// Eigenvalues of A.
     pub eigenvalues: Vec<[f64; 2]>,
@@ -62,69 +63,69 @@ pub struct Plant {
 pub struct Signal {
     /// Its name.
     pub name: String,
-    /// Its unit, where one is stated.
+    /// Unit, if stated.
     pub unit: Option<String>,
-    /// What it is.
+    /// Description.
     pub description: String,
     /// Value at the operating point.
     pub operating: f64,
-    /// Limits, bounds, the way it enters and the like, in words.
+    /// Limits, bounds and entry point, in words.
     pub notes: String,
 }
 
 /// A matrix with names of its rows and columns.
 #[derive(Serialize)]
 pub struct Matrix {
-    /// Its letter, `K_x` for one.
+    /// Symbol, for example `K_x`.
     pub name: String,
-    /// What it is.
+    /// Description.
     pub meaning: String,
     /// Names of the rows.
     pub rows: Vec<String>,
     /// Names of the columns.
     pub columns: Vec<String>,
-    /// Row by row.
+    /// The values, row by row.
     pub values: Vec<Vec<f64>>,
 }
 
 /// A condition that was checked.
 #[derive(Serialize)]
 pub struct Check {
-    /// What must hold, in a sentence.
+    /// The condition, in a sentence.
     pub condition: String,
     /// Whether it holds.
     pub holds: bool,
-    /// The number behind it: a rank, a distance.
+    /// The numerical value behind the condition: a rank, a distance.
     pub value: Option<f64>,
-    /// What the number means.
+    /// Explanation of the number.
     pub explanation: String,
 }
 
 /// Eigenvalues of a closed loop.
 #[derive(Serialize)]
 pub struct Loop {
-    /// Which matrix, `A + B K_x` for one.
+    /// The matrix, for example `A + B K_x`.
     pub matrix: String,
-    /// How the gain was found, in a sentence.
+    /// The method that found the gain, in a sentence.
     pub method: String,
-    /// Eigenvalues [re, im] that were asked for; empty where none were.
+    /// Required eigenvalues [re, im]; empty if the requirement is of another kind.
     pub wanted: Vec<[f64; 2]>,
-    /// Eigenvalues [re, im] as reached.
+    /// Eigenvalues [re, im] of the closed loop.
     pub eigenvalues: Vec<[f64; 2]>,
-    /// Condition number of the eigenvectors in the units of the plant file, where they were chosen.
+    /// Condition number of the eigenvectors in the units of the plant file, if they were chosen.
     pub condition: Option<f64>,
-    /// The same in balanced coordinates.
+    /// Condition number of the eigenvectors in balanced coordinates.
     pub balanced_condition: Option<f64>,
-    /// Largest distance of an eigenvalue from the wanted one, relative.
+    /// Largest distance of an eigenvalue from the required one, relative.
     pub pole_error: Option<f64>,
-    /// Boundary of the wanted region, where one was wanted.
+    /// The required region, if there is one.
     pub region: Option<Region>,
 }
 
-/// The region wanted, in 1/s and degrees.
+/// A required region of eigenvalues, in 1/s and degrees.
 #[derive(Serialize)]
 pub struct Region {
-    /// Decay rate in 1/s, at least.
+    /// Minimum decay rate in 1/s.
     pub decay: Option<f64>,
     /// Centre of the disc on the real axis, in 1/s.
     pub disc_center: Option<f64>,
@@ -134,7 +135,7 @@ pub struct Region {
     pub sector: Option<f64>,
 }
 
-/// The sampled design.
+/// The sampling of a design.
 #[derive(Serialize)]
 pub struct Sampled {
     /// Sample time, s.
@@ -143,19 +144,20 @@ pub struct Sampled {
     pub estimator: String,
 }
 
-/// Theorem 1 and what is known beside it.
+/// Theorem 1 and related certificates.
 #[derive(Serialize)]
 pub struct Certificate {
-    /// Theorem 1 as printed, or why it does not hold.
+    /// Theorem 1 as printed, or the reason why it does not hold.
     #[serde(serialize_with = "or_reason")]
     pub printed: Result<Theorem1, String>,
-    /// The same with P chosen by linear matrix inequalities, or why there is none.
+    /// Theorem 1 with P from linear matrix inequalities, or the reason why there is none.
     #[serde(serialize_with = "or_reason")]
     pub free: Result<FreeP, String>,
-    /// Where the error ends for bounded rates of the faults, or why nothing is said.
+    /// The ultimate bound of the error for bounded rates of the faults, or the reason why there is
+    /// none.
     #[serde(serialize_with = "or_reason")]
     pub ultimate: Result<Ultimate, String>,
-    /// Norms from the faults' rates to the errors: name, value and how it was verified.
+    /// Norms from the rates of the faults to the estimation errors.
     pub norms: Vec<Norm>,
 }
 
@@ -178,38 +180,38 @@ pub struct Theorem1 {
     pub delta: f64,
 }
 
-/// P by linear matrix inequalities.
+/// The certificate with P from linear matrix inequalities.
 #[derive(Serialize)]
 pub struct FreeP {
     /// Largest certified decay rate, 1/s.
     pub decay: f64,
-    /// Margin of its inequality, relative.
+    /// Margin of the inequality of the decay rate, relative.
     pub decay_margin: f64,
     /// Smallest certified delta.
     pub delta: f64,
     /// The matrix P, row by row.
     pub p: Vec<Vec<f64>>,
-    /// Smallest eigenvalue by which the inequalities hold, relative.
+    /// Margin of the inequalities of delta, relative.
     pub margin: f64,
 }
 
-/// The ball in which [e; eps] ends, eps = f_hat - f.
+/// The ball that [e; eps] converges to, eps = f_hat - f.
 #[derive(Serialize)]
 pub struct Ultimate {
     /// Bound of the norm of the faults' rates, per s.
     pub rate: f64,
     /// Radius of the ball.
     pub radius: f64,
-    /// Largest value of each component.
+    /// Largest value of each component in the invariant set.
     pub peaks: Vec<f64>,
-    /// Smallest eigenvalue by which the inequalities hold, relative.
+    /// Margin of the inequalities, relative.
     pub margin: f64,
 }
 
-/// A norm of the error's dynamics.
+/// A norm of the error dynamics.
 #[derive(Serialize)]
 pub struct Norm {
-    /// Which norm.
+    /// Name of the norm.
     pub name: String,
     /// The input.
     pub from: String,
@@ -217,11 +219,11 @@ pub struct Norm {
     pub to: String,
     /// Its value.
     pub value: f64,
-    /// How it was found and verified.
+    /// How the value was computed and verified.
     pub method: String,
 }
 
-/// How large an error gets for a bounded fault.
+/// The bound of an error for a bounded fault.
 #[derive(Serialize)]
 pub struct Bound {
     /// The fault.
@@ -230,15 +232,15 @@ pub struct Bound {
     pub error: String,
     /// Unit of the error.
     pub unit: Option<String>,
-    /// Peak-to-peak (L1) gain from the fault, and from its rate.
+    /// Peak-to-peak (L1) gain from the fault.
     pub gain_of_fault: f64,
-    /// Peak-to-peak (L1) gain from its rate.
+    /// Peak-to-peak (L1) gain from the rate of the fault.
     pub gain_of_rate: f64,
-    /// The smaller of gain times bound, where the file states bounds.
+    /// The smallest product of a gain and its bound, if the file states bounds.
     pub largest: Option<f64>,
 }
 
-/// What a change of a fault does to the compensated loop.
+/// The response of the compensated loop to a change of a fault.
 #[derive(Serialize)]
 pub struct StepResponse {
     /// The fault.
@@ -247,39 +249,40 @@ pub struct StepResponse {
     pub unit: Option<String>,
     /// Size of the change, in the unit of the fault.
     pub size: f64,
-    /// How fast it changes, per s; all at once where nothing is stated.
+    /// Rate of the change, per s; none for a step.
     pub rate: Option<f64>,
-    /// The signals that follow.
+    /// The responding signals.
     pub curves: Vec<Curve>,
 }
 
-/// A signal over time after the change.
+/// The response of a signal.
 #[derive(Serialize)]
 pub struct Curve {
     /// The signal.
     pub name: String,
     /// Its unit.
     pub unit: Option<String>,
-    /// Largest absolute value, and when.
+    /// Largest absolute value.
     pub peak: f64,
-    /// When it has that value, in s.
+    /// Time of the largest absolute value, in s.
     pub peak_time: f64,
-    /// When it stays within 2 % of its peak; of an estimate: of its final value, s.
+    /// Settling time in s: the signal then stays within 2 % of its peak, or, for an estimate, of
+    /// its final value.
     pub settling_time: f64,
-    /// Times in s and values.
+    /// Times in s.
     pub times: Vec<f64>,
     /// Values at those times.
     pub values: Vec<f64>,
 }
 
-/// Singular values over the frequency.
+/// Singular values over frequency.
 #[derive(Serialize)]
 pub struct Frequency {
-    /// From what to what, in words.
+    /// Input and output of the transfer function.
     pub name: String,
-    /// rad/s.
+    /// Frequencies in rad/s.
     pub frequencies: Vec<f64>,
-    /// One list per singular value, the largest first.
+    /// Singular values: one list per order, the largest first.
     pub singular_values: Vec<Vec<f64>>,
 }
 
@@ -288,7 +291,7 @@ pub struct Frequency {
 pub struct Effectiveness {
     /// The actuator.
     pub actuator: String,
-    /// Largest loss, between 0 and 1, up to which every smaller one leaves the loop stable.
+    /// The largest loss between 0 and 1 below which every loss leaves the loop stable.
     pub largest_stable_loss: f64,
 }
 
@@ -305,11 +308,11 @@ pub struct Variable {
     pub unit: Option<String>,
     /// Its start value.
     pub start: Option<String>,
-    /// What it is.
+    /// Description.
     pub description: String,
 }
 
-/// What is known as it is, and `{ "reason": ... }` in the place of what is not.
+/// Serializes a value, or `{ "reason": ... }` if there is none.
 fn or_reason<T: Serialize, S: Serializer>(
     found: &Result<T, String>,
     serializer: S,
@@ -320,13 +323,13 @@ fn or_reason<T: Serialize, S: Serializer>(
     }
 }
 
-/// Row by row, a negative zero as zero.
+/// Returns the rows of a matrix; negative zeros become zeros.
 #[must_use]
 pub fn rows(m: &DMatrix<f64>) -> Vec<Vec<f64>> {
     m.row_iter().map(|row| row.iter().map(|entry| entry + 0.0).collect()).collect()
 }
 
-/// Real and imaginary parts.
+/// Returns real and imaginary parts.
 #[must_use]
 pub fn pairs(numbers: &[Complex<f64>]) -> Vec<[f64; 2]> {
     numbers.iter().map(|number| [number.re, number.im]).collect()

@@ -1,4 +1,4 @@
-//! Puts the numbers of a design into the report.
+//! Fills the report with the numbers of a design.
 
 use control::aso::Estimator;
 use control::eigen::eigenvalues;
@@ -12,23 +12,23 @@ use nalgebra::{Complex, DMatrix};
 use super::analysis::Loops;
 use super::certificate::certificate;
 use super::checks::checks;
-use super::designed::{Designed, fault_names};
-use super::gains::Found;
+use super::designed::{ControllerDesign, fault_names};
+use super::gains::GainResult;
 use super::plant_file::PlantFile;
 use super::report::{
     Effectiveness, Loop, Matrix, Plant, Region, Report, Sampled, Signal, pairs, rows,
 };
-use super::signals::{self, Course, Entrance, Fault};
-use super::wanted::{self, Wanted};
+use super::requirements::{self, Requirement};
+use super::signals::{self, EntryPoint, Fault, FaultDynamics};
 
-/// Everything that is known of `designed`.
+/// Returns the report on `designed`.
 pub(crate) fn report(
     file: &PlantFile<'_>,
-    designed: &Designed,
+    designed: &ControllerDesign,
     description: String,
 ) -> Result<Report, Error> {
     let loops = Loops::of(designed)?;
-    let Designed { plant, gains, linear, .. } = designed;
+    let ControllerDesign { plant, gains, linear, .. } = designed;
     let names = Names::of(designed);
     Ok(Report {
         description,
@@ -38,15 +38,15 @@ pub(crate) fn report(
         gains: names.gains(designed),
         feedback: closed(
             "A + B K_x",
-            &designed.fed_back(),
+            &designed.feedback_dynamics(),
             &designed.feedback,
-            &file.feedback.wanted,
+            &file.feedback.requirement,
         )?,
         observer: closed(
             "A_0 - L C_0",
             &gains.error_dynamics(plant),
             &designed.observer,
-            &file.observer.wanted,
+            &file.observer.requirement,
         )?,
         sampling: match designed.domain {
             Domain::Continuous => None,
@@ -65,7 +65,7 @@ pub(crate) fn report(
     })
 }
 
-/// The name of an estimator, as the design file has it.
+/// Returns the name of an estimator in the design file.
 pub(crate) fn estimator(estimator: Estimator) -> &'static str {
     match estimator {
         Estimator::Current => "current",
@@ -73,7 +73,7 @@ pub(crate) fn estimator(estimator: Estimator) -> &'static str {
     }
 }
 
-/// Names of rows and columns.
+/// Names of the rows and columns of the matrices.
 struct Names {
     states: Vec<String>,
     extended: Vec<String>,
@@ -83,7 +83,7 @@ struct Names {
 }
 
 impl Names {
-    fn of(designed: &Designed) -> Self {
+    fn of(designed: &ControllerDesign) -> Self {
         let linear = &designed.linear;
         let names = |signals: &[signals::Signal]| {
             signals.iter().map(|signal| signal.name.clone()).collect::<Vec<_>>()
@@ -102,8 +102,8 @@ impl Names {
         }
     }
 
-    /// A, B, C, F_a of the plant, and what the observer runs where it is another one.
-    fn plant_matrices(&self, designed: &Designed) -> Vec<Matrix> {
+    /// Returns A, B, C, F_a of the plant, and the model in the observer if it differs.
+    fn plant_matrices(&self, designed: &ControllerDesign) -> Vec<Matrix> {
         let Self { states, extended, actuators, measurements, faults } = self;
         let linear = &designed.linear;
         let f_a = designed.extended.plant.f_a.rows(0, states.len()).into_owned();
@@ -134,7 +134,7 @@ impl Names {
         matrices
     }
 
-    fn gains(&self, designed: &Designed) -> Vec<Matrix> {
+    fn gains(&self, designed: &ControllerDesign) -> Vec<Matrix> {
         let gains = &designed.gains;
         let Self { extended, actuators, measurements, faults, .. } = self;
         let mut all = vec![
@@ -167,7 +167,7 @@ fn matrix(
     }
 }
 
-fn plant(designed: &Designed, names: &Names) -> Result<Plant, Error> {
+fn plant(designed: &ControllerDesign, names: &Names) -> Result<Plant, Error> {
     let linear = &designed.linear;
     let signal = |signal: &signals::Signal| Signal {
         name: signal.name.clone(),
@@ -194,23 +194,23 @@ fn plant(designed: &Designed, names: &Names) -> Result<Plant, Error> {
     })
 }
 
-/// How a fault enters and what is known of it, in words.
-fn notes(fault: &Fault, designed: &Designed) -> String {
+/// Describes how a fault enters and what is known about it.
+fn notes(fault: &Fault, designed: &ControllerDesign) -> String {
     let linear = &designed.linear;
-    let mut parts = vec![match &fault.entrance {
-        Entrance::Column(at) => format!("column {} of F_a", at + 1),
-        Entrance::Actuator(at) => format!("adds to {}", linear.actuators[*at].name),
-        Entrance::Sensor(at) => {
+    let mut parts = vec![match &fault.entry_point {
+        EntryPoint::Column(at) => format!("column {} of F_a", at + 1),
+        EntryPoint::Actuator(at) => format!("adds to {}", linear.actuators[*at].name),
+        EntryPoint::Sensor(at) => {
             format!("adds to the measurement {}", linear.measurements[*at].name)
         }
-        Entrance::Loss { actuator, .. } => {
+        EntryPoint::Loss { actuator, .. } => {
             format!("{} loses a part of its effect", linear.actuators[*actuator].name)
         }
-        Entrance::Input(name) => format!("input {name} of the FMU"),
+        EntryPoint::Input(name) => format!("input {name} of the FMU"),
     }];
-    parts.push(match fault.course {
-        Course::Constant => "taken as constant".to_owned(),
-        Course::Ramp => "taken as a ramp".to_owned(),
+    parts.push(match fault.dynamics {
+        FaultDynamics::Constant => "modelled as constant".to_owned(),
+        FaultDynamics::Ramp => "modelled as a ramp".to_owned(),
     });
     let numbers = [("at most", fault.bound), ("rate at most", fault.rate_bound)];
     for (text, value) in numbers.into_iter().chain([("jumps by", fault.step)]) {
@@ -222,28 +222,30 @@ fn notes(fault: &Fault, designed: &Designed) -> String {
 fn closed(
     name: &str,
     dynamics: &DMatrix<f64>,
-    found: &Found,
-    wanted: &Wanted,
+    found: &GainResult,
+    requirement: &Requirement,
 ) -> Result<Loop, Error> {
     let quality = found.quality;
-    let region = match wanted {
-        Wanted::Region(region) | Wanted::HInfinity { region, .. } => Some(*region),
+    let region = match requirement {
+        Requirement::Region(region) | Requirement::HInfinity { region, .. } => Some(*region),
         _ => None,
     };
     let number = |number: fn(&Quality) -> f64| quality.as_ref().map(number);
     Ok(Loop {
         matrix: name.to_owned(),
         method: found.method.clone(),
-        wanted: pairs(&sorted(&found.wanted)),
+        wanted: pairs(&sorted(&found.required)),
         eigenvalues: pairs(&eigenvalues(dynamics)?),
         condition: number(|quality| quality.condition),
         balanced_condition: number(|quality| quality.balanced_condition),
         pole_error: number(|quality| quality.pole_error),
-        region: region.filter(|region| *region != wanted::Region::default()).map(|region| Region {
-            decay: region.decay,
-            disc_center: region.disc.map(|disc| disc.0),
-            disc_radius: region.disc.map(|disc| disc.1),
-            sector: region.sector,
+        region: region.filter(|region| *region != requirements::Region::default()).map(|region| {
+            Region {
+                decay: region.decay,
+                disc_center: region.disc.map(|disc| disc.0),
+                disc_radius: region.disc.map(|disc| disc.1),
+                sector: region.sector,
+            }
         }),
     })
 }
@@ -254,8 +256,8 @@ fn sorted(eigenvalues: &[Complex<f64>]) -> Vec<Complex<f64>> {
     all
 }
 
-/// How much of its effect each actuator may lose.
-fn effectiveness(designed: &Designed) -> Result<Vec<Effectiveness>, Error> {
+/// Returns the largest stable loss of effectiveness of each actuator.
+fn effectiveness(designed: &ControllerDesign) -> Result<Vec<Effectiveness>, Error> {
     let lossy = |model: &control::faults::Fault| match model.entry {
         FaultEntry::LossOfEffectiveness(input) => Some(input),
         _ => None,
@@ -264,7 +266,7 @@ fn effectiveness(designed: &Designed) -> Result<Vec<Effectiveness>, Error> {
     if inputs.is_empty() {
         return Ok(Vec::new());
     }
-    let Designed { plant, controller, .. } = designed;
+    let ControllerDesign { plant, controller, .. } = designed;
     let found = loss_tolerance(plant, controller, &inputs, 1.0)?;
     let one = |(input, loss): (&usize, &f64)| Effectiveness {
         actuator: designed.linear.actuators[*input].name.clone(),
@@ -273,32 +275,31 @@ fn effectiveness(designed: &Designed) -> Result<Vec<Effectiveness>, Error> {
     Ok(inputs.iter().zip(&found.single).map(one).collect())
 }
 
-fn assumptions(designed: &Designed, faults: &[Fault]) -> Vec<String> {
+fn assumptions(designed: &ControllerDesign, faults: &[Fault]) -> Vec<String> {
     let mut all = vec![
-        "The plant is linear, as stated under Plant; what the linearisation leaves out acts as a \
-         fault."
+        "The plant is linear, as stated under Plant; the neglected nonlinear terms act as a fault."
             .to_owned(),
-        "Commands are within the limits of the actuators; the observer is told the command that \
-         was really applied."
+        "Commands are within the limits of the actuators; the observer receives the applied \
+         command."
             .to_owned(),
-        "Bounds and responses begin from rest, with the compensation on.".to_owned(),
+        "Bounds and responses start from rest, with the compensation on.".to_owned(),
     ];
-    if faults.iter().any(|fault| fault.course == Course::Constant) {
+    if faults.iter().any(|fault| fault.dynamics == FaultDynamics::Constant) {
         all.push(
-            "A fault taken as constant is followed with the lag of the observer; its rate is what \
+            "The estimate of a fault modelled as constant lags behind it; the rate of the fault \
              causes the errors."
                 .to_owned(),
         );
     }
     if let Domain::Sampled { period } = designed.domain {
         all.push(format!(
-            "Between samples, {period} s, commands are held; the responses are those at samples."
+            "Commands are constant over a sample time of {period} s; responses are shown at samples."
         ));
     }
     if designed.linear.models.iter().any(|m| matches!(m.entry, FaultEntry::LossOfEffectiveness(_)))
     {
         all.push(
-            "The loss of effectiveness is constant; it is seen only while the command is well \
+            "The loss of effectiveness is constant; it is estimated only while the command is well \
              above its threshold."
                 .to_owned(),
         );
@@ -306,7 +307,7 @@ fn assumptions(designed: &Designed, faults: &[Fault]) -> Vec<String> {
     all
 }
 
-/// The variables of the controller FMU.
+/// Returns the variables of the controller FMU.
 pub(crate) fn interface(description: &ModelDescription) -> Vec<super::report::Variable> {
     let stated = |text: String| Some(text).filter(|text| !text.is_empty());
     let variable = |variable: &ScalarVariable| {

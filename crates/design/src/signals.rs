@@ -1,4 +1,4 @@
-//! The signals of a plant file: states, actuators, measurements, faults.
+//! The signals of a plant file: states, actuators, measurements and faults.
 
 use fmu_description::unit::Unit;
 
@@ -10,19 +10,19 @@ pub(crate) struct Signal {
     pub(crate) name: String,
     pub(crate) unit: Option<String>,
     pub(crate) description: String,
-    /// Its value at the operating point, where the file states one.
+    /// The value at the operating point, if stated.
     pub(crate) operating: Option<f64>,
-    /// The smallest and the largest value, of an actuator.
+    /// The limits of an actuator: smallest and largest value.
     pub(crate) limits: Option<[f64; 2]>,
 }
 
 impl Signal {
-    /// A signal of which only the name is known.
+    /// Creates a signal with a name only.
     pub(crate) fn named(name: String) -> Self {
         Self { name, unit: None, description: String::new(), operating: None, limits: None }
     }
 
-    /// The same, with what `other` knows where this one says nothing.
+    /// Fills missing fields from `other`.
     pub(crate) fn or(self, other: Self) -> Self {
         Self {
             unit: self.unit.or(other.unit),
@@ -32,27 +32,28 @@ impl Signal {
     }
 }
 
-/// How a fault changes in time, as the observer assumes.
+/// The assumed dynamics of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Course {
+pub(crate) enum FaultDynamics {
     /// f' = 0.
     Constant,
     /// f'' = 0.
     Ramp,
 }
 
-/// Where a fault enters the plant.
+/// The point where a fault enters the plant.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Entrance {
+pub(crate) enum EntryPoint {
     /// Column of F_a, from 0.
     Column(usize),
-    /// It adds to the command of this actuator, from 0.
+    /// An actuator, from 0: the fault is added to its command.
     Actuator(usize),
-    /// It adds to this measurement, from 0.
+    /// A measurement, from 0: the fault is added to it.
     Sensor(usize),
-    /// This actuator, from 0, loses a part of its command; the part is estimated where the command is well above `least_command`.
+    /// An actuator, from 0, that loses a fraction of its command. The fraction is estimated while
+    /// the command is well above `least_command`.
     Loss { actuator: usize, least_command: f64 },
-    /// This input of the plant's FMU.
+    /// An input of the plant's FMU.
     Input(String),
 }
 
@@ -62,13 +63,13 @@ pub(crate) struct Fault {
     pub(crate) name: String,
     pub(crate) unit: Option<String>,
     pub(crate) description: String,
-    pub(crate) course: Course,
-    pub(crate) entrance: Entrance,
+    pub(crate) dynamics: FaultDynamics,
+    pub(crate) entry_point: EntryPoint,
     /// Largest absolute value.
     pub(crate) bound: Option<f64>,
     /// Largest absolute rate, per s.
     pub(crate) rate_bound: Option<f64>,
-    /// Largest sudden change.
+    /// Largest step change.
     pub(crate) step: Option<f64>,
     pub(crate) place: Place,
 }
@@ -90,7 +91,7 @@ const FAULT: [&str; 12] = [
     "step",
 ];
 
-/// The signals under `key`: texts that are names, or tables.
+/// Reads the signals under `key`: texts (names) or tables.
 pub(crate) fn signals(entry: &Entry<'_>, limited: bool) -> Result<Vec<Signal>, PlaceError> {
     let members = entry.list()?;
     if members.is_empty() {
@@ -155,7 +156,8 @@ fn limits(entry: &Entry<'_>) -> Result<[f64; 2], PlaceError> {
     }
 }
 
-/// The faults under `[[faults]]`; those that say nothing else take the columns of F_a in turn.
+/// Reads the faults under `[[faults]]`. Faults without an entry point take the columns of F_a in
+/// turn.
 pub(crate) fn faults(
     entry: &Entry<'_>,
     actuators: &[Signal],
@@ -167,7 +169,8 @@ pub(crate) fn faults(
     }
     let mut found: Vec<Fault> = Vec::with_capacity(members.len());
     for member in &members {
-        let columns = found.iter().filter(|fault| matches!(fault.entrance, Entrance::Column(_)));
+        let columns =
+            found.iter().filter(|fault| matches!(fault.entry_point, EntryPoint::Column(_)));
         let fault = fault(member, actuators, measurements, columns.count())?;
         if found.iter().any(|other| other.name == fault.name) {
             return Err(member.error(format!("the name `{}` is there twice", fault.name)));
@@ -186,19 +189,21 @@ fn fault(
     let table = entry.table()?;
     table.allow(&FAULT)?;
     let number = |key: &str| table.get(key).map(|entry| entry.positive()).transpose();
-    let entrance = entrance(&table, actuators, measurements, column)?;
+    let entry_point = entry_point(&table, actuators, measurements, column)?;
     let own_unit = unit(&table)?;
-    let unit = own_unit.or_else(|| match entrance {
-        Entrance::Actuator(at) | Entrance::Loss { actuator: at, .. } => actuators[at].unit.clone(),
-        Entrance::Sensor(at) => measurements[at].unit.clone(),
-        Entrance::Column(_) | Entrance::Input(_) => None,
+    let unit = own_unit.or_else(|| match entry_point {
+        EntryPoint::Actuator(at) | EntryPoint::Loss { actuator: at, .. } => {
+            actuators[at].unit.clone()
+        }
+        EntryPoint::Sensor(at) => measurements[at].unit.clone(),
+        EntryPoint::Column(_) | EntryPoint::Input(_) => None,
     });
     Ok(Fault {
         name: name(&table.require("name", "the name of the fault")?)?,
         unit,
         description: description(&table)?,
-        course: course(&table)?,
-        entrance,
+        dynamics: dynamics(&table)?,
+        entry_point,
         bound: number("bound")?,
         rate_bound: number("rate_bound")?,
         step: number("step")?,
@@ -206,23 +211,23 @@ fn fault(
     })
 }
 
-fn course(table: &Table<'_>) -> Result<Course, PlaceError> {
+fn dynamics(table: &Table<'_>) -> Result<FaultDynamics, PlaceError> {
     let Some(entry) = table.get("kind") else {
-        return Ok(Course::Constant);
+        return Ok(FaultDynamics::Constant);
     };
     match entry.text()? {
-        "constant" => Ok(Course::Constant),
-        "ramp" => Ok(Course::Ramp),
+        "constant" => Ok(FaultDynamics::Constant),
+        "ramp" => Ok(FaultDynamics::Ramp),
         other => Err(entry.error(format!("expected \"constant\" or \"ramp\", found {other:?}"))),
     }
 }
 
-fn entrance(
+fn entry_point(
     table: &Table<'_>,
     actuators: &[Signal],
     measurements: &[Signal],
     column: usize,
-) -> Result<Entrance, PlaceError> {
+) -> Result<EntryPoint, PlaceError> {
     let keys = ["actuator", "sensor", "loss_of", "input"];
     let stated: Vec<_> = keys.iter().filter_map(|key| table.get(key)).collect();
     if let [_, second, ..] = stated.as_slice() {
@@ -233,24 +238,24 @@ fn entrance(
         let at = position(&actuator, actuators, "actuator")?;
         let meaning = "the command, in its unit, below which no loss of effectiveness is estimated";
         let least_command = table.require("least_command", meaning)?.positive()?;
-        return Ok(Entrance::Loss { actuator: at, least_command });
+        return Ok(EntryPoint::Loss { actuator: at, least_command });
     }
     if let Some(entry) = least_command {
         return Err(entry.error("this belongs to a fault with `loss_of`"));
     }
     if let Some(actuator) = table.get("actuator") {
-        return Ok(Entrance::Actuator(position(&actuator, actuators, "actuator")?));
+        return Ok(EntryPoint::Actuator(position(&actuator, actuators, "actuator")?));
     }
     if let Some(sensor) = table.get("sensor") {
-        return Ok(Entrance::Sensor(position(&sensor, measurements, "measurement")?));
+        return Ok(EntryPoint::Sensor(position(&sensor, measurements, "measurement")?));
     }
     match table.get("input") {
-        Some(input) => Ok(Entrance::Input(name(&input)?)),
-        None => Ok(Entrance::Column(column)),
+        Some(input) => Ok(EntryPoint::Input(name(&input)?)),
+        None => Ok(EntryPoint::Column(column)),
     }
 }
 
-/// Which of `signals` the entry names.
+/// Returns the index of the signal that the entry names.
 fn position(entry: &Entry<'_>, signals: &[Signal], what: &str) -> Result<usize, PlaceError> {
     let text = entry.text()?;
     signals.iter().position(|signal| signal.name == text).ok_or_else(|| {
@@ -259,27 +264,27 @@ fn position(entry: &Entry<'_>, signals: &[Signal], what: &str) -> Result<usize, 
     })
 }
 
-/// One fault on each actuator.
+/// Returns one additive fault for each actuator.
 pub(crate) fn all_actuator_faults(actuators: &[Signal], place: &Place) -> Vec<Fault> {
     let fault = |(at, actuator): (usize, &Signal)| Fault {
         name: format!("f_{}", actuator.name),
         unit: actuator.unit.clone(),
         description: format!("fault of {}", actuator.name),
-        entrance: Entrance::Actuator(at),
+        entry_point: EntryPoint::Actuator(at),
         ..Fault::constant(place)
     };
     actuators.iter().enumerate().map(fault).collect()
 }
 
 impl Fault {
-    /// A constant fault on the first column of F_a of which nothing else is known.
+    /// Returns a constant fault on the first column of F_a with no other data.
     pub(crate) fn constant(place: &Place) -> Self {
         Self {
             name: String::new(),
             unit: None,
             description: String::new(),
-            course: Course::Constant,
-            entrance: Entrance::Column(0),
+            dynamics: FaultDynamics::Constant,
+            entry_point: EntryPoint::Column(0),
             bound: None,
             rate_bound: None,
             step: None,

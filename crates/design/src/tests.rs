@@ -1,4 +1,4 @@
-//! What a plant file may say, and where errors in it point.
+//! Valid and invalid plant files, and the places that errors point at.
 
 use std::path::Path;
 
@@ -7,8 +7,8 @@ use nalgebra::Complex;
 use super::checks::checks;
 use super::designed::design;
 use super::plant_file::{Model, PlantFile};
-use super::signals::{Course, Entrance};
-use super::wanted::{Region, Wanted};
+use super::requirements::{Region, Requirement};
+use super::signals::{EntryPoint, FaultDynamics};
 use files::{Source, Table};
 
 const MASS: &str = r#"A = [[0, 1], [0, 0]]
@@ -37,7 +37,7 @@ const REFUSALS: [(&str, &str, &str); 34] = [
     (
         "feedback.eigenvalues = [-1, -2]",
         "",
-        "1:1: `feedback` is missing: what is wanted of A + B K_x",
+        "1:1: `feedback` is missing: the requirement on A + B K_x",
     ),
     (
         "feedback.eigenvalues = [-1, -2]",
@@ -144,9 +144,9 @@ fn signals_that_are_not_named_get_a_letter_and_a_number() {
 
 #[test]
 fn a_pair_of_complex_eigenvalues_counts_twice() {
-    let wanted = read(MASS, |file| file.observer.wanted.clone()).unwrap();
+    let expected = read(MASS, |file| file.observer.requirement.clone()).unwrap();
     let pair = [Complex::new(-6.0, 2.5), Complex::new(-6.0, -2.5)];
-    assert_eq!(wanted, Wanted::Eigenvalues(vec![Complex::new(-5.0, 0.0), pair[0], pair[1]]));
+    assert_eq!(expected, Requirement::Eigenvalues(vec![Complex::new(-5.0, 0.0), pair[0], pair[1]]));
 }
 
 #[test]
@@ -187,22 +187,28 @@ least_command = 0.1
 bound = 1
 "#;
     let faults = read(&(MASS.to_owned() + more), |file| file.faults.clone()).unwrap();
-    let entrances: Vec<_> = faults.iter().map(|fault| fault.entrance.clone()).collect();
-    let loss = Entrance::Loss { actuator: 0, least_command: 0.1 };
-    assert_eq!(entrances, [Entrance::Actuator(0), Entrance::Column(0), Entrance::Sensor(0), loss]);
-    assert_eq!(faults[2].course, Course::Ramp);
+    let entry_points: Vec<_> = faults.iter().map(|fault| fault.entry_point.clone()).collect();
+    let loss = EntryPoint::Loss { actuator: 0, least_command: 0.1 };
+    assert_eq!(
+        entry_points,
+        [EntryPoint::Actuator(0), EntryPoint::Column(0), EntryPoint::Sensor(0), loss]
+    );
+    assert_eq!(faults[2].dynamics, FaultDynamics::Ramp);
     assert_eq!((faults[3].bound, faults[3].rate_bound), (Some(1.0), None));
 }
 
 #[test]
-fn a_region_is_wanted_alone_or_with_a_norm() {
+fn a_region_is_required_alone_or_with_a_norm() {
     let region = Region { decay: Some(3.0), disc: Some((-10.0, 9.0)), sector: Some(45.0) };
     let text = "region = { decay = 3, disc = { center = -10, radius = 9 }, sector = 45 }";
     let alone = MASS.replace("feedback.eigenvalues = [-1, -2]", &format!("feedback.{text}"));
-    assert_eq!(read(&alone, |file| file.feedback.wanted.clone()).unwrap(), Wanted::Region(region));
+    assert_eq!(
+        read(&alone, |file| file.feedback.requirement.clone()).unwrap(),
+        Requirement::Region(region)
+    );
     let norm = alone.replace("feedback.region", "feedback.h_infinity = \"least\"\nfeedback.region");
-    let wanted = Wanted::HInfinity { bound: None, region };
-    assert_eq!(read(&norm, |file| file.feedback.wanted.clone()).unwrap(), wanted);
+    let expected = Requirement::HInfinity { bound: None, region };
+    assert_eq!(read(&norm, |file| file.feedback.requirement.clone()).unwrap(), expected);
 }
 
 #[test]

@@ -1,15 +1,15 @@
-//! From values to places on the page, and the round numbers along an axis.
+//! Axes: the map from values to page coordinates, and the ticks at round values.
 
-/// Beyond this magnitude a value is only "very large": sums of two such values stay finite.
+/// Larger magnitudes are clipped to this value, so that sums of two values stay finite.
 const HUGE: f64 = 1e300;
 
-/// How values are spread along an axis.
+/// The scale of an axis.
 #[derive(Debug, Clone, Copy)]
 enum Scale {
     Linear,
-    /// All decades are equally long; only values above zero have a place.
+    /// Logarithmic: all decades have the same length; only positive values have a place.
     Logarithmic,
-    /// Linear up to this magnitude; beyond it, on both sides, decades of that length.
+    /// Linear up to this magnitude and logarithmic beyond it, on both sides.
     Symmetric(f64),
 }
 
@@ -26,19 +26,20 @@ impl Scale {
     }
 }
 
-/// An axis from an interval of values to an interval of the page.
+/// An axis that maps a range of values to a range of the page.
 #[derive(Debug)]
 pub struct Axis {
     scale: Scale,
     low: f64,
     high: f64,
     pixels: (f64, f64),
-    /// About as many ticks as look well.
+    /// Approximate number of ticks.
     ticks: u8,
 }
 
 impl Axis {
-    /// The axis ends where the interval ends; one that is empty or not finite becomes usable.
+    /// Creates a linear axis with exactly this range; an empty or infinite range is replaced by a
+    /// usable one.
     #[must_use]
     pub fn exact((low, high): (f64, f64), pixels: (f64, f64), ticks: u8) -> Self {
         let (low, high) = if low <= high && low.is_finite() && high.is_finite() {
@@ -58,7 +59,8 @@ impl Axis {
         Self { scale: Scale::Linear, low, high, pixels, ticks }
     }
 
-    /// An axis of decades between two values above zero; others become usable.
+    /// Creates a logarithmic axis between two positive values; an invalid range is replaced by a
+    /// usable one.
     #[must_use]
     pub fn logarithmic((low, high): (f64, f64), pixels: (f64, f64), ticks: u8) -> Self {
         let usable = low > 0.0 && low < high && high < HUGE;
@@ -66,13 +68,13 @@ impl Axis {
         Self { scale: Scale::Logarithmic, low, high, pixels, ticks }
     }
 
-    /// An axis that is linear between minus and plus `knee`, with decades beyond.
+    /// Creates an axis that is linear between minus and plus `knee` and logarithmic beyond.
     #[must_use]
     pub fn symmetric(ends: (f64, f64), knee: f64, pixels: (f64, f64), ticks: u8) -> Self {
         Self { scale: Scale::Symmetric(knee), ..Self::exact(ends, pixels, ticks) }
     }
 
-    /// An axis with some air around finite values, up to a cap of their magnitude.
+    /// Creates a linear axis with a margin around finite values, up to a maximum magnitude.
     pub fn around(
         values: impl Iterator<Item = f64>,
         cap: Option<f64>,
@@ -89,25 +91,26 @@ impl Axis {
         Self { low: tight.low - air, high: tight.high + air, ..tight }
     }
 
-    /// The range of the values.
+    /// Returns the range of the values.
     #[must_use]
     pub fn range(&self) -> (f64, f64) {
         (self.low, self.high)
     }
 
-    /// The positions of both ends of the range.
+    /// Returns the page coordinates of both ends of the range.
     #[must_use]
     pub fn pixels(&self) -> (f64, f64) {
         self.pixels
     }
 
-    /// Whether a value is in the range.
+    /// Returns whether a value is in the range.
     #[must_use]
     pub fn contains(&self, value: f64) -> bool {
         (self.low..=self.high).contains(&value)
     }
 
-    /// The place of a value on the page; a value far outside stops one axis length outside.
+    /// Returns the page coordinate of a value; a value far outside is clipped to one axis length
+    /// outside.
     #[must_use]
     pub fn place(&self, value: f64) -> f64 {
         let [low, high, value] = [self.low, self.high, value].map(|end| self.scale.stretch(end));
@@ -116,7 +119,7 @@ impl Axis {
         first + share.clamp(-1.0, 2.0) * (last - first)
     }
 
-    /// Round values inside the axis, with their labels.
+    /// Returns round values inside the axis, with their labels.
     #[must_use]
     pub fn ticks(&self) -> Vec<(f64, String)> {
         match self.scale {
@@ -141,13 +144,13 @@ impl Axis {
         }
     }
 
-    /// How many decades from one tick to the next.
+    /// Returns the number of decades between two ticks.
     fn stride(&self, decades: f64) -> i32 {
         let most = f64::from(self.ticks);
         (1..=300).find(|stride| decades <= most * f64::from(*stride)).unwrap_or(300)
     }
 
-    /// Multiples of 1, 2 or 5 times a power of ten.
+    /// Returns the ticks at multiples of 1, 2 or 5 times a power of ten.
     fn multiples(&self) -> Vec<(f64, String)> {
         let span = self.high - self.low;
         let step = round_step(span / f64::from(self.ticks));
@@ -161,8 +164,8 @@ impl Axis {
     }
 }
 
-/// The factors times each power of ten whose exponent is a multiple of `stride`, from `low` to
-/// `high`, with their labels.
+/// Returns each factor times each power of ten from `low` to `high` whose exponent is a multiple of
+/// `stride`, with labels.
 fn powers((low, high): (f64, f64), factors: &[f64], stride: i32) -> Vec<(f64, String)> {
     (-300..=300)
         .filter(|power| power % stride == 0)
@@ -172,7 +175,7 @@ fn powers((low, high): (f64, f64), factors: &[f64], stride: i32) -> Vec<(f64, St
         .collect()
 }
 
-/// A factor times a power of ten, as in 0.02, 500 or 2·10⁻⁵.
+/// Formats a factor times a power of ten: 0.02, 500 or 2·10⁻⁵.
 fn power_label(factor: f64, power: i32) -> String {
     if (-3..=3).contains(&power) {
         let decimals = usize::try_from(-power).unwrap_or(0);
@@ -189,14 +192,15 @@ fn power_label(factor: f64, power: i32) -> String {
     if factor > 1.0 { format!("{factor}·10{raised}") } else { format!("10{raised}") }
 }
 
-/// The nearest of 1, 2, 5 times a power of ten, above or at `wanted`.
-fn round_step(wanted: f64) -> f64 {
-    let power = 10_f64.powf(wanted.log10().floor());
-    let factor = [1.0, 2.0, 5.0].into_iter().find(|factor| factor * power >= 0.999 * wanted);
+/// Returns the smallest of 1, 2, 5 times a power of ten that is not below `minimum`.
+fn round_step(minimum: f64) -> f64 {
+    let power = 10_f64.powf(minimum.log10().floor());
+    let factor = [1.0, 2.0, 5.0].into_iter().find(|factor| factor * power >= 0.999 * minimum);
     factor.unwrap_or(10.0) * power
 }
 
-/// The digits that tell neighbouring ticks apart, with a true minus sign.
+/// Formats a tick with the digits that distinguish it from its neighbours, and with a true minus
+/// sign.
 fn label(value: f64, step: f64, largest: f64) -> String {
     if value.abs() < 0.5 * step {
         return "0".to_owned();
@@ -242,7 +246,7 @@ mod tests {
             for (value, label) in &ticks {
                 assert!(axis.contains(*value) || (value - low).abs() < 1e-6 * step);
                 let read: f64 = label.replace('\u{2212}', "-").parse().unwrap();
-                assert!((read - value).abs() <= 1e-3 * step, "{label} stands at {value}");
+                assert!((read - value).abs() <= 1e-3 * step, "{label} is at {value}");
             }
         }
     }

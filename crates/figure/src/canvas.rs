@@ -1,4 +1,4 @@
-//! The page: SVG elements, and their rasterisation.
+//! The page: SVG elements and rasterisation.
 
 use std::sync::Arc;
 
@@ -8,14 +8,14 @@ use resvg::usvg::{Options, Tree};
 
 use super::FigureError;
 
-/// Pixels of the PNG per page unit.
+/// Pixels of the PNG per SVG unit.
 const SCALE: f32 = 2.0;
 const FONTS: &str = "DejaVu Sans, Verdana, Helvetica, Arial, sans-serif";
 
-/// A place on the page: to the right, and down.
+/// A point on the page: to the right, and down.
 type Place = (f64, f64);
 
-/// Which part of a text stands at its place.
+/// The part of a text that is at its position.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Anchor {
     Start,
@@ -33,14 +33,14 @@ impl Anchor {
     }
 }
 
-/// A page under construction, white at first.
+/// A page under construction, initially white.
 #[derive(Debug)]
 pub(super) struct Canvas {
     elements: Vec<String>,
     windows: usize,
 }
 
-/// A part of the page that clips what is drawn in it.
+/// A clipping rectangle.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Window(usize);
 
@@ -99,7 +99,7 @@ impl Canvas {
         self.put_text(at, anchor, size, colour, text, "");
     }
 
-    /// Text that reads from below to above.
+    /// Draws a text rotated by 90 degrees, from bottom to top.
     pub(super) fn upward_text(&mut self, (x, y): Place, size: f64, colour: &str, text: &str) {
         let turn = format!(r#" transform="rotate(-90 {x:.1} {y:.1})""#);
         self.put_text((x, y), Anchor::Middle, size, colour, text, &turn);
@@ -125,17 +125,17 @@ impl Canvas {
     }
 }
 
-/// A generous guess: the viewer of an SVG chooses the font.
+/// Estimates the width of a text generously, because the SVG viewer chooses the font.
 pub(super) fn text_width(text: &str, size: f64) -> f64 {
     text.chars().map(|_| 0.58 * size).sum()
 }
 
-/// Width of a number in the font that is linked in, whose digits are broader than its letters.
+/// Returns the width of a number in the embedded font, whose digits are wider than its letters.
 pub(super) fn digits_width(text: &str, size: f64) -> f64 {
     text.chars().map(|_| 0.64 * size).sum()
 }
 
-/// Text as XML content; characters that XML cannot hold become spaces.
+/// Escapes a text for XML; control characters become spaces.
 fn escape(text: &str) -> String {
     text.chars()
         .map(|letter| match letter {
@@ -148,17 +148,16 @@ fn escape(text: &str) -> String {
         .collect()
 }
 
-/// The PNG of an SVG, two pixels for each of its units. All text is set in the font that is
-/// linked in, whatever font it asks for.
+/// Returns the PNG of an SVG, two pixels per SVG unit. All text uses the embedded font.
 ///
 /// # Errors
 ///
-/// [`FigureError::Pixels`]: not an SVG, or one without area.
+/// [`FigureError::Pixels`] if `svg` is not an SVG or has no area.
 pub fn rasterise(svg: &str) -> Result<Vec<u8>, FigureError> {
     let failed = |reason: &dyn std::fmt::Display| FigureError::Pixels(reason.to_string());
     let mut fonts = Database::new();
     fonts.load_font_source(Source::Binary(Arc::new(dejavu::sans::regular())));
-    // A font that is not known becomes the serif one.
+    // An unknown font falls back to the serif family.
     fonts.set_serif_family("DejaVu Sans");
     fonts.set_sans_serif_family("DejaVu Sans");
     let options = Options { fontdb: Arc::new(fonts), ..Options::default() };

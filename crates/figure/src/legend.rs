@@ -1,9 +1,9 @@
-//! What the lines of a panel mean: entries side by side, in as many lines as they need.
+//! The legend of a panel: entries side by side, on as many lines as needed.
 
 use super::canvas::{Anchor, Canvas, text_width};
 use super::{RIGHT, TEXT, TEXT_SIZE, WIDTH};
 
-/// A stroke like the line's, then its label.
+/// An entry: a sample of the line and its label.
 #[derive(Debug)]
 pub(super) struct Entry<'a> {
     pub(super) colour: &'static str,
@@ -17,7 +17,7 @@ const TEXT_AFTER: f64 = 38.0;
 const SPACE: f64 = 26.0;
 const LINE_HEIGHT: f64 = 22.0;
 
-/// An entry's place from the left, its line, and its label as far as there is room.
+/// Returns the horizontal position, the line and the shortened label of each entry.
 fn places(entries: &[Entry<'_>], left: f64) -> Vec<(f64, usize, String)> {
     let end = WIDTH - RIGHT;
     let (mut x, mut line) = (left, 0);
@@ -34,7 +34,8 @@ fn places(entries: &[Entry<'_>], left: f64) -> Vec<(f64, usize, String)> {
     entries.iter().map(place).collect()
 }
 
-/// The label, or its beginning and its end, which differ more than what lies between.
+/// Shortens a label to its first and last letters, which usually distinguish it better than the
+/// middle.
 fn shortened(label: &str, room: f64) -> String {
     let letters: Vec<char> = label.chars().collect();
     let fits = |count: usize| text_width(&"x".repeat(count), TEXT_SIZE) <= room;
@@ -47,13 +48,13 @@ fn shortened(label: &str, room: f64) -> String {
     format!("{}\u{2026}{}", part(&letters[..half]), part(&letters[letters.len() - half..]))
 }
 
-/// What the lines after the first add to the height of a panel.
+/// Returns the height of all lines after the first.
 pub(super) fn height(entries: &[Entry<'_>], left: f64) -> f64 {
     let last = places(entries, left).last().map_or(0, |place| place.1);
     LINE_HEIGHT * f64::from(u32::try_from(last).unwrap_or(u32::MAX))
 }
 
-/// Draws the entries; the last line stands at `baseline`.
+/// Draws the entries; the baseline of the last line is at `baseline`.
 pub(super) fn draw(canvas: &mut Canvas, entries: &[Entry<'_>], left: f64, baseline: f64) {
     let top = baseline - height(entries, left);
     for (entry, (x, line, label)) in entries.iter().zip(places(entries, left)) {

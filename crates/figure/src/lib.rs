@@ -1,7 +1,7 @@
-//! Line plots of time series: one SVG, and a PNG rasterised from that SVG.
+//! Line plots of time series as SVG and PNG.
 //!
-//! The text of the PNG is set in a font that is linked into the program, so a figure looks the
-//! same on a machine without fonts.
+//! The PNG is rasterised from the SVG with an embedded font, so a figure looks the same on a
+//! machine without fonts.
 
 pub mod axis;
 mod canvas;
@@ -20,7 +20,7 @@ pub use canvas::rasterise;
 /// Width of a figure in SVG units; the PNG has twice as many pixels.
 const WIDTH: f64 = 1000.0;
 
-/// Least room to the left of the frames: for the label of the axis and those of its ticks.
+/// Minimum width of the left margin, for the axis label and the tick labels.
 const LEFT: f64 = 100.0;
 const RIGHT: f64 = 22.0;
 const TITLE_HEIGHT: f64 = 40.0;
@@ -40,7 +40,7 @@ const GRID: &str = "#e2e2e2";
 const LIMIT_DASH: &str = "7 4";
 const MARK_DASH: &str = "4 3";
 
-/// Panels below each other under one title.
+/// A figure: a title and panels below each other.
 #[derive(Debug)]
 pub struct Figure<'a> {
     /// The title.
@@ -49,44 +49,44 @@ pub struct Figure<'a> {
     pub panels: Vec<Panel<'a>>,
 }
 
-/// One pair of axes. Labels carry the unit, as in "time in s".
+/// A panel: one pair of axes. Labels include the unit, as in "time in s".
 #[derive(Debug, Default)]
 pub struct Panel<'a> {
-    /// Text below the axis; an empty one takes no space.
+    /// Label of the horizontal axis; an empty label takes no space.
     pub x_label: &'a str,
-    /// Text beside the vertical axis.
+    /// Label of the vertical axis.
     pub y_label: &'a str,
-    /// Part of the time axis that is shown; without it, all finite times.
+    /// Range of the time axis; `None`: all finite times.
     pub x_range: Option<(f64, f64)>,
-    /// The vertical axis follows the data up to this magnitude; what lies beyond leaves the frame,
-    /// and the legend says so.
+    /// Limit of the automatic range of the vertical axis. Larger values leave the frame, and the
+    /// legend notes it.
     pub y_cap: Option<f64>,
-    /// The curves; later ones cover earlier ones.
+    /// The curves; later curves cover earlier ones.
     pub series: Vec<Series<'a>>,
-    /// Moments in time: vertical dashed lines with a text.
+    /// Times marked by a vertical dashed line with a text.
     pub marks: Vec<(f64, &'a str)>,
-    /// Height of the frame, where it is another than usual.
+    /// Height of the frame in SVG units, if it differs from the default.
     pub frame_height: Option<f64>,
-    /// A magnitude that is claimed: thin lines at plus and minus it, named in the legend.
+    /// A claimed bound of the magnitude and its name: thin lines at plus and minus the bound.
     pub limit: Option<(f64, &'a str)>,
 }
 
-/// A curve. A value that is not finite leaves a gap.
+/// A curve. Values that are not finite leave a gap.
 #[derive(Debug)]
 pub struct Series<'a> {
     /// Name in the legend.
     pub label: &'a str,
     /// The times in s.
     pub time: &'a [f64],
-    /// As long as `time`.
+    /// The values, one per time.
     pub values: &'a [f64],
     /// The colour.
     pub ink: Ink,
-    /// A broad curve stays visible below a later one that covers it.
+    /// Whether the curve is broad, so that it stays visible below a later curve.
     pub broad: bool,
 }
 
-/// Line colours that differ for the colour-blind too (Okabe and Ito, 2008).
+/// Line colours that colour-blind readers can distinguish (Okabe and Ito, 2008).
 #[derive(Debug, Clone, Copy)]
 pub enum Ink {
     /// Blue.
@@ -127,15 +127,16 @@ impl Series<'_> {
 
 /// Why a figure was not written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FigureError {
-    /// Times and values of a curve differ in number.
+    /// A curve has different numbers of times and values.
     #[error("curve {label:?}: {times} times, but {values} values")]
     Lengths {
         /// Name of the curve.
         label: String,
-        /// How many times there are.
+        /// Number of times.
         times: usize,
-        /// How many values there are.
+        /// Number of values.
         values: usize,
     },
     /// The file cannot be written.
@@ -143,21 +144,22 @@ pub enum FigureError {
     Write {
         /// The file.
         path: PathBuf,
-        /// The system's reason.
+        /// The error of the operating system.
         source: io::Error,
     },
-    /// The drawing cannot be turned into pixels.
+    /// The drawing cannot be rasterised.
     #[error("cannot turn the drawing into pixels: {0}")]
     Pixels(String),
 }
 
 impl Figure<'_> {
-    /// Writes `stem`.svg and `stem`.png, each whole or not at all; makes the folder if it is not
-    /// there. The same figure gives the same bytes.
+    /// Writes `stem`.svg and `stem`.png, each atomically; creates the folder if it is missing.
+    /// Equal figures give equal bytes.
     ///
     /// # Errors
     ///
-    /// [`FigureError`]: a curve with unequal lengths, or a file that cannot be written.
+    /// [`FigureError`] if a curve has different numbers of times and values, if the drawing cannot
+    /// be rasterised, or if a file cannot be written.
     pub fn write(&self, stem: &Path) -> Result<(), FigureError> {
         let svg = self.svg()?;
         let png = rasterise(&svg)?;
@@ -165,11 +167,11 @@ impl Figure<'_> {
         write_whole(&with_ending(stem, ".png"), &png)
     }
 
-    /// The drawing as SVG text.
+    /// Returns the drawing as SVG text.
     ///
     /// # Errors
     ///
-    /// [`FigureError::Lengths`].
+    /// [`FigureError::Lengths`] if a curve has different numbers of times and values.
     pub fn svg(&self) -> Result<String, FigureError> {
         for series in self.panels.iter().flat_map(|panel| &panel.series) {
             if series.time.len() != series.values.len() {
@@ -180,7 +182,7 @@ impl Figure<'_> {
                 });
             }
         }
-        // One for all, so that equal times stand below each other.
+        // All panels use the same left margin, so that equal times are aligned.
         let left = self.panels.iter().map(Panel::left).fold(LEFT, f64::max);
         let heights: Vec<f64> = self.panels.iter().map(|panel| panel.height(left)).collect();
         let height = TITLE_HEIGHT + heights.iter().sum::<f64>();
@@ -209,7 +211,7 @@ impl Panel<'_> {
         LEGEND_HEIGHT + legend::height(&self.legend(&self.horizontal(left)), left)
     }
 
-    /// Where the frame has to begin for the labels of the ticks to stay beside that of the axis.
+    /// Returns the left margin that the tick labels and the axis label need.
     fn left(&self) -> f64 {
         let vertical = self.vertical(self.horizontal(LEFT).range(), (PLOT_HEIGHT, 0.0));
         let width = |(_, label): (f64, String)| canvas::digits_width(&label, TEXT_SIZE);
@@ -270,7 +272,7 @@ impl Panel<'_> {
         })
     }
 
-    /// The finite values of all curves inside a stretch of time.
+    /// Returns the finite values of all curves within a time range.
     fn values_between(&self, (start, end): (f64, f64)) -> impl Iterator<Item = f64> + Clone {
         self.series
             .iter()

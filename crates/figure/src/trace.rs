@@ -1,10 +1,11 @@
-//! From a long series to a short path that looks the same.
+//! Reduces a long series to a short SVG path that looks the same.
 
 use super::axis::Axis;
 
-/// The SVG path of a series, to a tenth of a page unit. Of the points that share a column of one
-/// unit, the first, the lowest, the highest and the last remain: no spike is lost, and the length
-/// of the path is bounded by the width of the page. Cost: one pass.
+/// Returns the SVG path of a series, with a resolution of 0.1 page unit.
+///
+/// Of the points in a column of one unit, the first, lowest, highest and last are kept. So no spike
+/// is lost, and the width of the page bounds the length of the path. Takes one pass.
 #[must_use]
 pub fn path(time: &[f64], values: &[f64], horizontal: &Axis, vertical: &Axis) -> String {
     let points: Vec<(f64, f64)> = time
@@ -24,7 +25,7 @@ fn finite_place(axis: &Axis, value: f64) -> f64 {
     if value.is_finite() { axis.place(value) } else { f64::NAN }
 }
 
-/// The points that remain of an unbroken run.
+/// Reduces a run of points without gaps.
 fn outline(run: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let mut kept = Vec::new();
     for column in run.chunk_by(|a, b| (a.0.floor() - b.0.floor()).abs() < 0.5) {
@@ -42,7 +43,7 @@ fn outline(run: &[(f64, f64)]) -> Vec<(f64, f64)> {
     kept
 }
 
-/// One stroke. Its first point is named twice, so that a lone point is a dot.
+/// Formats one stroke. The first point occurs twice, so that a single point is drawn as a dot.
 fn piece(points: &[(f64, f64)]) -> String {
     let write = |point: &(f64, f64)| format!("{:.1} {:.1}", point.0, point.1);
     let texts: Vec<String> = points.iter().take(1).chain(points).map(write).collect();

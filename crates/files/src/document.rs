@@ -1,4 +1,4 @@
-//! A TOML file whose every value knows its place, so that an error can point at it.
+//! Reads TOML and keeps the place of every value, so that errors can point at it.
 
 use std::fmt;
 use std::ops::Range;
@@ -7,17 +7,17 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// The text of a file.
+/// The text of a file and its path.
 pub struct Source {
-    /// Where it is.
+    /// Path of the file.
     pub path: PathBuf,
     text: String,
 }
 
-/// A place in a [`Source`], in bytes.
+/// A range of bytes in a [`Source`].
 pub type Place = Range<usize>;
 
-/// An error with the line that it points at.
+/// An error that shows the line of the file and underlines the place.
 #[derive(Debug)]
 pub struct PlaceError {
     path: PathBuf,
@@ -45,28 +45,28 @@ impl Source {
     ///
     /// # Errors
     ///
-    /// Where the file cannot be read as UTF-8.
+    /// [`std::io::Error`] if the file cannot be read or is not UTF-8.
     pub fn read(path: &Path) -> std::io::Result<Self> {
         Ok(Self::new(path, std::fs::read_to_string(path)?))
     }
 
-    /// The whole text.
+    /// Returns the whole text.
     #[must_use]
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// A file of this text.
+    /// Creates a source from a text; `path` is for messages.
     #[must_use]
     pub fn new(path: &Path, text: String) -> Self {
         Self { path: path.to_owned(), text }
     }
 
-    /// The tables and values of the file.
+    /// Parses the TOML text.
     ///
     /// # Errors
     ///
-    /// [`PlaceError`] that points at the entry, where it is missing or not what is expected.
+    /// [`PlaceError`] at the first syntax error.
     pub fn parse(&self) -> Result<Spanned<DeTable<'_>>, PlaceError> {
         DeTable::parse(&self.text).map_err(|error| {
             let end = self.text.len();
@@ -74,7 +74,8 @@ impl Source {
         })
     }
 
-    /// An error that points at `place`.
+    /// Returns an error that points at `place`.
+    #[must_use]
     pub fn error(&self, place: &Place, message: impl Into<String>) -> PlaceError {
         let start = place.start.min(self.text.len());
         let line_start = self.text[..start].rfind('\n').map_or(0, |newline| newline + 1);
@@ -92,31 +93,31 @@ impl Source {
     }
 }
 
-/// A table of the file, its name as in messages; empty for the whole file.
+/// A table of the file. Its name is as in messages; empty for the whole file.
 #[derive(Clone)]
 pub struct Table<'a> {
     /// The file.
     pub source: &'a Source,
     name: String,
-    /// Its place in the text.
+    /// The place of the table in the text.
     pub place: Place,
     entries: &'a DeTable<'a>,
 }
 
-/// A value of the file, its name as in messages.
+/// A value of the file. Its name is as in messages.
 #[derive(Clone)]
 pub struct Entry<'a> {
     /// The file.
     pub source: &'a Source,
-    /// Its name, `table.key` or `list[1]`.
+    /// The name: `table.key` or `list[1]`.
     pub name: String,
-    /// Its place in the text.
+    /// The place of the value in the text.
     pub place: Place,
     value: &'a DeValue<'a>,
 }
 
 impl<'a> Table<'a> {
-    /// The whole file, as parsed from `source`.
+    /// Returns the top-level table of a parsed file.
     #[must_use]
     pub fn whole(source: &'a Source, parsed: &'a Spanned<DeTable<'a>>) -> Self {
         Self { source, name: String::new(), place: 0..0, entries: parsed.get_ref() }
@@ -126,11 +127,12 @@ impl<'a> Table<'a> {
         if self.name.is_empty() { key.to_owned() } else { format!("{}.{key}", self.name) }
     }
 
-    /// Refuses entries that are not in `known`.
+    /// Returns an error at the first entry that is not in `known`, with the most similar known
+    /// name.
     ///
     /// # Errors
     ///
-    /// [`PlaceError`] that points at the entry, where it is missing or not what is expected.
+    /// [`PlaceError`] that points at the unknown entry.
     pub fn allow(&self, known: &[&str]) -> Result<(), PlaceError> {
         let unknown = self.entries.keys().find(|key| !known.contains(&key.get_ref().as_ref()));
         let Some(key) = unknown else {
@@ -147,7 +149,7 @@ impl<'a> Table<'a> {
         Err(self.source.error(&key.span(), message))
     }
 
-    /// The entry `key`, if it is there.
+    /// Returns the entry `key`, if it exists.
     #[must_use]
     pub fn get(&self, key: &str) -> Option<Entry<'a>> {
         let (_, value) = self.entries.iter().find(|(name, _)| name.get_ref() == key)?;
@@ -159,11 +161,11 @@ impl<'a> Table<'a> {
         Entry { source, name, place: value.span(), value: value.get_ref() }
     }
 
-    /// The entry `key`; `meaning` is for the message when it is missing.
+    /// Returns the entry `key`; if it is missing, the error message explains it by `meaning`.
     ///
     /// # Errors
     ///
-    /// [`PlaceError`] that points at the entry, where it is missing or not what is expected.
+    /// [`PlaceError`] that points at the table if the entry is missing.
     pub fn require(&self, key: &str, meaning: &str) -> Result<Entry<'a>, PlaceError> {
         self.get(key).ok_or_else(|| {
             let message = format!("`{}` is missing: {meaning}", self.path(key));
@@ -171,7 +173,7 @@ impl<'a> Table<'a> {
         })
     }
 
-    /// Every entry with its key.
+    /// Returns all entries with their keys.
     pub fn entries(&self) -> impl Iterator<Item = (&'a str, Entry<'a>)> {
         self.entries.iter().map(|(key, value)| {
             let key = key.get_ref().as_ref();
@@ -181,7 +183,8 @@ impl<'a> Table<'a> {
 }
 
 impl<'a> Entry<'a> {
-    /// An error that points at this value and begins with its name.
+    /// Returns an error that points at this value; the message starts with its name.
+    #[must_use]
     pub fn error(&self, message: impl fmt::Display) -> PlaceError {
         self.source.error(&self.place, format!("{}: {message}", self.name))
     }
@@ -190,7 +193,7 @@ impl<'a> Entry<'a> {
         self.error(format!("expected {what}, found {}", self.kind()))
     }
 
-    /// What it is, with its article.
+    /// Describes the value with an article, for messages.
     fn kind(&self) -> String {
         match self.value {
             DeValue::String(text) => format!("the text {text:?}"),
@@ -201,11 +204,11 @@ impl<'a> Entry<'a> {
         }
     }
 
-    /// A finite number.
+    /// Reads a finite number.
     ///
     /// # Errors
     ///
-    /// [`PlaceError`] that points at the entry, where it is missing or not what is expected.
+    /// [`PlaceError`] if the value is not a finite number.
     pub fn number(&self) -> Result<f64, PlaceError> {
         let text = match self.value {
             DeValue::Integer(integer) => integer.as_str(),
@@ -219,11 +222,11 @@ impl<'a> Entry<'a> {
         }
     }
 
-    /// A finite number above zero.
+    /// Reads a finite positive number.
     ///
     /// # Errors
     ///
-    /// [`PlaceError`] that points at the entry, where it is missing or not what is expected.
+    /// [`PlaceError`] if the value is not a finite number above 0.
     pub fn positive(&self) -> Result<f64, PlaceError> {
         match self.number()? {
             number if number > 0.0 => Ok(number),
@@ -231,40 +234,40 @@ impl<'a> Entry<'a> {
         }
     }
 
-    /// A text.
+    /// Reads a text.
     ///
     /// # Errors
     ///
-    /// [`PlaceError`] that points at the entry, where it is missing or not what is expected.
+    /// [`PlaceError`] if the value is not a text.
     pub fn text(&self) -> Result<&'a str, PlaceError> {
         self.value.as_str().ok_or_else(|| self.expected("a text in quotes"))
     }
 
-    /// True or false.
+    /// Reads a boolean.
     ///
     /// # Errors
     ///
-    /// [`PlaceError`] that points at the entry, where it is missing or not what is expected.
+    /// [`PlaceError`] if the value is not a boolean.
     pub fn flag(&self) -> Result<bool, PlaceError> {
         self.value.as_bool().ok_or_else(|| self.expected("true or false"))
     }
 
-    /// A table.
+    /// Reads a table.
     ///
     /// # Errors
     ///
-    /// [`PlaceError`] that points at the entry, where it is missing or not what is expected.
+    /// [`PlaceError`] if the value is not a table.
     pub fn table(&self) -> Result<Table<'a>, PlaceError> {
         let entries = self.value.as_table().ok_or_else(|| self.expected("a table"))?;
         let (source, name, place) = (self.source, self.name.clone(), self.place.clone());
         Ok(Table { source, name, place, entries })
     }
 
-    /// The members of a list.
+    /// Reads a list.
     ///
     /// # Errors
     ///
-    /// [`PlaceError`] that points at the entry, where it is missing or not what is expected.
+    /// [`PlaceError`] if the value is not a list.
     pub fn list(&self) -> Result<Vec<Entry<'a>>, PlaceError> {
         let members = self.value.as_array().ok_or_else(|| self.expected("a list"))?;
         let member = |(position, value): (usize, &'a Spanned<DeValue<'a>>)| Entry {
@@ -276,29 +279,29 @@ impl<'a> Entry<'a> {
         Ok(members.iter().enumerate().map(member).collect())
     }
 
-    /// Whether it is a list.
+    /// Returns whether the value is a list.
     #[must_use]
     pub fn is_list(&self) -> bool {
         self.value.is_array()
     }
 
-    /// Whether it is a text.
+    /// Returns whether the value is a text.
     #[must_use]
     pub fn is_text(&self) -> bool {
         self.value.is_str()
     }
 
-    /// Whether it is a table.
+    /// Returns whether the value is a table.
     #[must_use]
     pub fn is_table(&self) -> bool {
         self.value.is_table()
     }
 
-    /// Finite numbers.
+    /// Reads a list of finite numbers.
     ///
     /// # Errors
     ///
-    /// [`PlaceError`] that points at the entry, where it is missing or not what is expected.
+    /// [`PlaceError`] if the value is not a list of finite numbers.
     pub fn numbers(&self) -> Result<Vec<f64>, PlaceError> {
         self.list()?.iter().map(Entry::number).collect()
     }

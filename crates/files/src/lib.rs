@@ -1,7 +1,7 @@
-//! Input files whose errors point at the place, and output files that are written whole or not at all.
+//! Input files whose errors point at the place, and atomic output files.
 //!
-//! [`document`] reads TOML by hand-written rules: each value knows its name and its place in the text.
-//! [`whole`] writes a file beside its target and renames it.
+//! [`document`] reads TOML: each value knows its name and its place in the text. [`whole`] writes a
+//! file beside its target and renames it.
 #![forbid(unsafe_code)]
 
 pub mod document;

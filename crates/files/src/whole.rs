@@ -1,20 +1,20 @@
-//! Files that are there as a whole or not at all.
+//! Atomic writing of files: a reader sees the complete file or the previous one.
 
 use std::path::{Path, PathBuf};
 use std::{fs, io, process};
 
-/// A file that is written and not yet there; it goes when this is dropped.
+/// A written file that does not have its final name yet; dropping it removes the file.
 pub struct Pending {
     partial: PathBuf,
     path: PathBuf,
 }
 
 impl Pending {
-    /// Writes `bytes` into a file beside `path`, whose folder is made where it is missing.
+    /// Writes `bytes` to a temporary file beside `path`; creates the folder if it is missing.
     ///
     /// # Errors
     ///
-    /// The file, or the folder around it, cannot be written.
+    /// [`io::Error`] if the folder or the temporary file cannot be created or written.
     pub fn new(path: &Path, bytes: &[u8]) -> io::Result<Self> {
         let mut name = path.as_os_str().to_owned();
         name.push(format!(".{}.partial", process::id()));
@@ -24,11 +24,11 @@ impl Pending {
         Ok(pending)
     }
 
-    /// Gives it its name.
+    /// Renames the file to its final name.
     ///
     /// # Errors
     ///
-    /// The file, or the folder around it, cannot be written.
+    /// [`io::Error`] if the file cannot be renamed.
     pub fn commit(self) -> io::Result<()> {
         fs::rename(&self.partial, &self.path)
     }
@@ -36,17 +36,18 @@ impl Pending {
 
 impl Drop for Pending {
     fn drop(&mut self) {
-        // Gone after a commit; that the remains of a failure cannot be removed adds nothing to it.
+        // Fails after a commit, when the temporary file no longer exists; other failures are
+        // ignored.
         let _ = fs::remove_file(&self.partial);
     }
 }
 
-/// Writes `bytes` to `path`, whose folder is made where it is missing: into a file beside it, which
-/// then takes its name.
+/// Writes `bytes` to `path` atomically: to a temporary file beside it, which is then renamed.
+/// Creates the folder if it is missing.
 ///
 /// # Errors
 ///
-/// The file, or the folder around it, cannot be written.
+/// [`io::Error`] if the folder or a file cannot be created, written or renamed.
 pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     Pending::new(path, bytes)?.commit()
 }

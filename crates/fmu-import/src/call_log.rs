@@ -1,4 +1,4 @@
-//! FMI calls written to a file, one line each: instance, function, arguments, results, status.
+//! The log of FMI calls: one line per call with instance, function, arguments, status and results.
 
 use std::fmt::{Debug, Write as _};
 use std::fs::File;
@@ -11,26 +11,26 @@ use fmu_description::ModelDescription;
 
 use slave::{CallError, Slave, StepResult};
 
-/// A file that FMI calls are written to.
+/// A log file of FMI calls.
 ///
-/// A call is written before it is made and its status behind it, unbuffered: after a crash the last
-/// line names the function that crashed.
+/// Each call is written before its execution and its status afterwards, unbuffered: after a crash the
+/// last line names the function that crashed.
 #[derive(Clone, Debug)]
 pub struct CallLog {
     file: Arc<Mutex<File>>,
 }
 
 impl CallLog {
-    /// Makes the file at `path` anew.
+    /// Creates the file at `path`, or empties an existing one.
     ///
     /// # Errors
     ///
-    /// Where it cannot be written.
+    /// [`io::Error`] if the file cannot be created.
     pub fn create(path: &Path) -> io::Result<Self> {
         Ok(Self { file: Arc::new(Mutex::new(File::create(path)?)) })
     }
 
-    /// `slave`, whose calls are written from now on with the name of its instance.
+    /// Wraps `slave` so that its calls are logged under the name `instance`.
     #[must_use]
     pub fn listen(&self, instance: &str, slave: Box<dyn Slave>) -> LoggedSlave {
         let logged = LoggedSlave { log: self.clone(), instance: instance.to_owned(), slave };
@@ -39,7 +39,7 @@ impl CallLog {
         logged
     }
 
-    /// A debugging aid does not end a run: what cannot be written is missing from the file.
+    /// Appends `text`. A write error is ignored: a debugging aid does not end a run.
     fn write(&self, text: &str) {
         if let Ok(mut file) = self.file.lock() {
             let _ = file.write_all(text.as_bytes());
@@ -47,7 +47,7 @@ impl CallLog {
     }
 }
 
-/// A slave whose calls are written to a [`CallLog`].
+/// A slave whose calls go to a [`CallLog`].
 pub struct LoggedSlave {
     log: CallLog,
     instance: String,
@@ -59,7 +59,7 @@ impl LoggedSlave {
         self.log.write(&format!("{} {call} -> fmi2OK\n", self.instance));
     }
 
-    /// Writes `function(arguments)`, makes the call, and writes what came of it.
+    /// Writes `function(arguments)`, performs the call, and writes its status and results.
     fn call<T>(
         &mut self,
         (function, arguments): (&str, String),

@@ -1,10 +1,10 @@
-//! The end of a process in which FMUs run, where an FMU forces it: a fatal signal, `exit`, a call
-//! that does not return.
+//! Crash reports: an FMU ends the process by a fatal signal, by `exit`, or blocks it in a call that
+//! does not return.
 //!
-//! [`watch`] is for programs, not for libraries: it installs signal handlers. After it an FMU that
-//! crashes in this process or calls `exit` is reported to a function of the program, which runs in a
-//! thread of its own while the FMU's thread stands still: it can log, hand over what is still to be
-//! written, and remove files. The process then ends with the exit status that it gives.
+//! [`watch`] is for programs, not for libraries: it installs signal handlers. Afterwards a crash or an
+//! `exit` of an FMU in this process calls a function of the program in a separate thread, while the
+//! thread of the FMU waits. That function can log, write pending results and remove files. The process
+//! then ends with the exit status that the function returns.
 
 mod place;
 #[cfg(unix)]
@@ -20,25 +20,25 @@ use std::time::Duration;
 pub use place::Name;
 pub(crate) use place::{Place, Slot, last_of_this_thread};
 
-/// How long the program's last function may take.
-const PATIENCE: Duration = Duration::from_secs(5);
+/// How long the program's crash function may take.
+const REPORT_LIMIT: Duration = Duration::from_secs(5);
 
-/// The end of the process has begun.
-static BEGUN: AtomicBool = AtomicBool::new(false);
-/// The process may end by `exit`: its work is done.
+/// Whether the end of the process has started.
+static ENDING: AtomicBool = AtomicBool::new(false);
+/// Whether the program has finished its work and may call `exit`.
 static DONE: AtomicBool = AtomicBool::new(false);
-/// What ends it: a signal's number, or one of the two below; 0 while nothing does.
+/// The cause of the end: the number of a signal, [`EXIT`] or [`GIVEN_UP`]; 0 before.
 static CAUSE: AtomicI32 = AtomicI32::new(0);
 const EXIT: i32 = -1;
 const GIVEN_UP: i32 = -2;
-/// The status that `exit` was called with.
+/// The argument of `exit`.
 static STATUS: AtomicI32 = AtomicI32::new(0);
-/// The place that the ending thread entered last.
+/// The address of the slot that the crashed thread entered last.
 static PLACE: AtomicUsize = AtomicUsize::new(0);
-/// The thread that runs the program's last function.
-static KEEPER: OnceLock<Thread> = OnceLock::new();
+/// The thread that runs the program's crash function.
+static REPORTER: OnceLock<Thread> = OnceLock::new();
 
-/// What is advised where the program's last function cannot say it.
+/// Advice for the line on standard error if the program's crash function fails.
 static ADVICE: OnceLock<&'static str> = OnceLock::new();
 
 /// A call of a function of an FMU.
@@ -46,29 +46,29 @@ static ADVICE: OnceLock<&'static str> = OnceLock::new();
 pub struct Call {
     /// The instance.
     pub instance: Name,
-    /// The function of the standard, or what else was being done.
+    /// The function of the standard, or another activity such as loading the library.
     pub function: &'static str,
-    /// Time in s at which the instance was.
+    /// Time of the instance in s.
     pub time: f64,
 }
 
-/// What ends the process.
+/// The cause of the end of the process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
-    /// A signal: its number.
+    /// A fatal signal, with its number.
     Signal(i32),
-    /// `exit`, with that status where it is known.
+    /// A call of `exit`, with its status if it is known.
     Exit(Option<i32>),
-    /// [`give_up`].
+    /// A call of [`give_up`].
     GivenUp,
 }
 
-/// How the process comes to its end.
+/// The cause of the end of the process and the FMU calls involved.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ending {
-    /// Why.
+    /// The cause.
     pub cause: Cause,
-    /// The call that caused it; where that is not known, all calls that have not returned.
+    /// The call that caused the end; if it is unknown, all calls that have not returned.
     pub calls: Vec<Call>,
 }
 
@@ -80,18 +80,22 @@ impl fmt::Display for Call {
 
 impl fmt::Display for Ending {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        tell(formatter, self.calls.iter().cloned(), self.cause)
+        write_ending(formatter, self.calls.iter().cloned(), self.cause)
     }
 }
 
-/// Writes how the process comes to its end, without the heap.
-fn tell(out: &mut impl fmt::Write, calls: impl Iterator<Item = Call>, cause: Cause) -> fmt::Result {
-    let mut told = false;
+/// Writes the cause of the end and the calls involved, without heap allocation.
+fn write_ending(
+    out: &mut impl fmt::Write,
+    calls: impl Iterator<Item = Call>,
+    cause: Cause,
+) -> fmt::Result {
+    let mut has_call = false;
     for call in calls {
-        write!(out, "{}{call}", if told { ", or " } else { "" })?;
-        told = true;
+        write!(out, "{}{call}", if has_call { ", or " } else { "" })?;
+        has_call = true;
     }
-    if !told {
+    if !has_call {
         out.write_str("outside of the calls of FMUs the program or a thread of an FMU")?;
     }
     match cause {
@@ -104,7 +108,7 @@ fn tell(out: &mut impl fmt::Write, calls: impl Iterator<Item = Call>, cause: Cau
     }
 }
 
-/// Name and meaning of a signal.
+/// Returns the name and the meaning of a signal.
 #[cfg(unix)]
 fn signal_text(signal: i32) -> &'static str {
     signals::FATAL.iter().find(|(known, _)| *known == signal).map_or("no common one", |(_, t)| *t)
@@ -115,33 +119,34 @@ fn signal_text(_: i32) -> &'static str {
     "no common one"
 }
 
-/// From now on a fatal signal and an unexpected `exit` in this process call `last` in a thread of
-/// its own, and the process ends with the status that it returns. Signals are watched on Unix; on
-/// other systems only [`give_up`] calls it. Where `last` itself crashes, because the FMU wrote over
-/// the memory of the program, standard error gets one line about the end, with `advice`. The first
-/// call counts.
+/// Installs `last` as the crash function of this process.
+///
+/// A fatal signal or an unexpected `exit` then runs `last` in a separate thread, and the process ends
+/// with the status that `last` returns. Signals are handled on Unix; on other systems only [`give_up`]
+/// runs `last`. If `last` itself crashes, because the FMU overwrote the memory of the program, one line
+/// with the cause and `advice` goes to standard error. Only the first call of `watch` has an effect.
 ///
 /// # Errors
 ///
-/// Where the thread or the signal handlers are refused.
+/// [`io::Error`] if the operating system refuses the thread or a signal handler.
 pub fn watch(
     advice: &'static str,
     last: impl FnOnce(&Ending) -> u8 + Send + 'static,
 ) -> io::Result<()> {
-    if KEEPER.get().is_some() {
+    if REPORTER.get().is_some() {
         return Ok(());
     }
     ADVICE.get_or_init(|| advice);
-    let keep = move || {
+    let report = move || {
         #[cfg(unix)]
-        signals::keep();
+        signals::mark_reporter();
         while CAUSE.load(Ordering::Acquire) == 0 {
             std::thread::park();
         }
         leave(last(&ending()));
     };
-    let keeper = std::thread::Builder::new().name("keeper".to_owned()).spawn(keep)?;
-    if KEEPER.set(keeper.thread().clone()).is_err() {
+    let reporter = std::thread::Builder::new().name("crash-report".to_owned()).spawn(report)?;
+    if REPORTER.set(reporter.thread().clone()).is_err() {
         return Ok(());
     }
     #[cfg(unix)]
@@ -149,12 +154,12 @@ pub fn watch(
     Ok(())
 }
 
-/// What is known of the end.
+/// Collects the cause of the end and the calls involved.
 fn ending() -> Ending {
     Ending { cause: cause(), calls: place::calls(PLACE.load(Ordering::Relaxed)).collect() }
 }
 
-/// What ends the process.
+/// Reads the cause of the end.
 fn cause() -> Cause {
     match CAUSE.load(Ordering::Acquire) {
         EXIT if cfg!(all(target_os = "linux", target_env = "gnu")) => {
@@ -166,7 +171,7 @@ fn cause() -> Cause {
     }
 }
 
-/// A line for standard error that is written without the heap; what is beyond its end is cut.
+/// A line for standard error, built without heap allocation and cut at its capacity.
 struct Line {
     bytes: [u8; 1024],
     length: usize,
@@ -182,57 +187,57 @@ impl fmt::Write for Line {
     }
 }
 
-/// What is said where the program's last function does not come to its end.
-fn last_words() -> Line {
+/// Returns the message for a crash function that crashes or does not return.
+fn fallback_message() -> Line {
     let mut line = Line { bytes: [b'\n'; 1024], length: 0 };
     // A line that is too long is cut.
-    let _ = write_last_words(&mut line);
+    let _ = write_fallback(&mut line);
     line.length = (line.length + 1).min(line.bytes.len());
     line
 }
 
-fn write_last_words(line: &mut Line) -> fmt::Result {
+fn write_fallback(line: &mut Line) -> fmt::Result {
     line.write_str("error: ")?;
-    tell(line, place::calls(PLACE.load(Ordering::Relaxed)), cause())?;
-    line.write_str(", and this program could not end in order: the last results may be lost; ")?;
+    write_ending(line, place::calls(PLACE.load(Ordering::Relaxed)), cause())?;
+    line.write_str("; this program could not shut down properly: the last results may be lost; ")?;
     line.write_str(ADVICE.get().copied().unwrap_or_default())
 }
 
-/// Hands the end over to the thread of [`watch`]. Nothing here allocates or takes a lock: signal
-/// handlers call it. False where the end has begun already, or nobody watches.
-fn begin(cause: i32, place: usize) -> bool {
-    let Some(keeper) = KEEPER.get() else { return false };
-    if BEGUN.swap(true, Ordering::AcqRel) {
+/// Wakes the thread of [`watch`] to report the end. Signal handlers call this function: it neither
+/// allocates nor locks. Returns false if the end has started already or [`watch`] was not called.
+fn start_report(cause: i32, place: usize) -> bool {
+    let Some(reporter) = REPORTER.get() else { return false };
+    if ENDING.swap(true, Ordering::AcqRel) {
         return false;
     }
     PLACE.store(place, Ordering::Relaxed);
     CAUSE.store(cause, Ordering::Release);
-    keeper.unpark();
+    reporter.unpark();
     true
 }
 
-/// Ends the process in the way of a crash: for a program whose FMU does not return. Returns only
-/// where [`watch`] was not called.
+/// Ends the process as after a crash, for a program whose FMU does not return. This function returns
+/// only if [`watch`] was not called.
 pub fn give_up() {
-    if KEEPER.get().is_some() {
-        begin(GIVEN_UP, 0);
-        std::thread::sleep(PATIENCE);
+    if REPORTER.get().is_some() {
+        start_report(GIVEN_UP, 0);
+        std::thread::sleep(REPORT_LIMIT);
         leave(1);
     }
 }
 
-/// The work of the program is done: an `exit` from now on is its own.
+/// Marks the work of the program as finished: a later `exit` is not reported as an FMU's.
 pub fn done() {
     DONE.store(true, Ordering::Relaxed);
 }
 
-/// The calls of FMUs that have not returned.
+/// Returns the FMU calls that have not returned.
 #[must_use]
 pub fn calls() -> Vec<Call> {
     place::calls(0).collect()
 }
 
-/// Ends the process at once: no destructor runs, neither of this program nor of an FMU.
+/// Ends the process at once, without running destructors of the program or of an FMU.
 pub fn leave(status: u8) -> ! {
     #[cfg(unix)]
     signals::leave(status.into());

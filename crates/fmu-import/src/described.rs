@@ -1,4 +1,4 @@
-//! What the library of a model says of itself.
+//! The model description that the library of a model generates.
 
 use std::path::Path;
 
@@ -7,11 +7,11 @@ use fmu_description::{ModelDescription, ParseError};
 use crate::error::LoadError;
 use crate::library::describe;
 
-/// Why the description that a library gives of itself cannot be used.
+/// Why the model description that a library generates cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DescriptionError {
-    /// The library does not describe itself.
+    /// The library does not generate a model description.
     #[error("the library of {name} does not describe itself")]
     None {
         /// Name of the model for the user.
@@ -19,7 +19,7 @@ pub enum DescriptionError {
         /// The reason.
         source: LoadError,
     },
-    /// The text is no model description.
+    /// The generated text is not a model description.
     #[error("the model description of {name}")]
     Unreadable {
         /// Name of the model for the user.
@@ -27,7 +27,7 @@ pub enum DescriptionError {
         /// The reason.
         source: ParseError,
     },
-    /// It breaks rules of the standard.
+    /// The description breaks rules of the standard.
     #[error("the variables of {name} break rules of FMI 2.0.5:\n{}", problems.join("\n"))]
     Rules {
         /// Name of the model for the user.
@@ -37,12 +37,13 @@ pub enum DescriptionError {
     },
 }
 
-/// The model description that the library at `file`, made by the crate `fmu`, gives of itself with
-/// the folder `resources`: as XML and as data. `name` is for messages.
+/// Returns the model description of the library at `file`, as XML and as data. The crate `fmu`
+/// exported the library; `resources` is the folder of its resources; messages use `name`.
 ///
 /// # Errors
 ///
-/// [`DescriptionError`].
+/// [`DescriptionError`] if the library generates no description, an unreadable one, or one that
+/// breaks rules of the standard.
 pub fn described(
     file: &Path,
     resources: &Path,

@@ -1,18 +1,19 @@
-//! Why a library could not be used.
+//! The error of a library that cannot be loaded or used.
 
 use std::path::PathBuf;
 
-/// Why a library could not be used.
+/// Why a library cannot be loaded or used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum LoadError {
-    /// The operating system refused it.
+    /// The operating system does not load the library.
     #[error("{path}: {message}{hint}")]
     Refused {
         /// The library.
         path: PathBuf,
-        /// What the loader said.
+        /// The message of the operating system's loader.
         message: String,
-        /// What to do about it, where that is known.
+        /// How to solve the problem; empty if unknown.
         hint: &'static str,
     },
     /// A function is missing.
@@ -23,12 +24,12 @@ pub enum LoadError {
         /// The function.
         function: String,
     },
-    /// The functions are not those of FMI 2.0.
+    /// `fmi2GetVersion` returns another version than 2.0.
     #[error("{path}: fmi2GetVersion gives {found:?}, expected \"2.0\"")]
     Version {
         /// The library.
         path: PathBuf,
-        /// What it says it is.
+        /// The version that it returned.
         found: String,
     },
     /// `fmi2Instantiate` returned null.
@@ -38,15 +39,15 @@ pub enum LoadError {
         path: PathBuf,
         /// Name of the instance.
         instance: String,
-        /// The FMU's own words.
+        /// The FMU's messages.
         reason: String,
     },
-    /// The library could not describe itself.
+    /// The library failed to write its model description.
     #[error("{path}: {message}")]
     Describe {
         /// The library.
         path: PathBuf,
-        /// The library's own words.
+        /// The library's message.
         message: String,
     },
 }

@@ -1,4 +1,4 @@
-//! FMUs: an opened archive, and its instances as [`Slave`]s.
+//! An opened FMU archive and its instances, which implement [`Slave`].
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -17,27 +17,28 @@ use slave::{CallError, Slave, StepResult};
 
 /// Why an FMU could not be opened or instantiated.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FmuError {
-    /// The archive or its model description.
+    /// The archive or its model description cannot be read.
     #[error(transparent)]
     Package(Box<PackageError>),
-    /// The place it was unpacked to cannot be written as a URI.
+    /// The path of the unpacked resources cannot be written as a URI.
     #[error(transparent)]
     Location(#[from] LocationError),
-    /// The library.
+    /// The library cannot be loaded or instantiated.
     #[error(transparent)]
     Load(#[from] LoadError),
-    /// There is no co-simulation in it.
+    /// The FMU has no co-simulation interface.
     #[error("{path}: the FMU offers no co-simulation, expected the element CoSimulation")]
     NoCoSimulation {
         /// The FMU.
         path: PathBuf,
     },
-    /// One instance is all that it can have in a process.
+    /// The FMU sets `canBeInstantiatedOnlyOncePerProcess` and already has an instance.
     #[error(
         "{instance}: {model} can be instantiated only once per process \
-         (canBeInstantiatedOnlyOncePerProcess), and it has been; with --isolate each instance gets \
-         a process of its own"
+         (canBeInstantiatedOnlyOncePerProcess) and already has an instance; --isolate runs each \
+         instance in a process of its own"
     )]
     OnlyOnce {
         /// Name of the second instance.
@@ -45,7 +46,7 @@ pub enum FmuError {
         /// `modelName`.
         model: String,
     },
-    /// There is no interface in it, or not the one wanted.
+    /// The FMU has no interface, or lacks the requested one.
     #[error(
         "{path}: the FMU lacks an interface, expected the element CoSimulation or ModelExchange"
     )]
@@ -53,12 +54,12 @@ pub enum FmuError {
         /// The FMU.
         path: PathBuf,
     },
-    /// The library fails, and `needsExecutionTool` may be why.
-    #[error("{source}\nneedsExecutionTool is true: the FMU may run only beside {tool}")]
+    /// The library fails; a possible cause is `needsExecutionTool`.
+    #[error("{source}\nneedsExecutionTool is true: the FMU may need {tool} to be installed")]
     NeedsTool {
-        /// `generationTool`, or a word for it.
+        /// `generationTool`, or a description if the attribute is absent.
         tool: String,
-        /// What failed.
+        /// The failure.
         source: LoadError,
     },
 }
@@ -69,31 +70,33 @@ impl From<PackageError> for FmuError {
     }
 }
 
-/// An opened FMU: unpacked for as long as it or an instance of it lives.
+/// An opened FMU. Its unpacked files are removed when it and all its instances have been dropped.
 #[derive(Clone)]
 pub struct Fmu {
     content: Arc<Content>,
 }
 
-/// The library is unloaded before its file is removed: the fields are dropped in this order.
+/// The library and the unpacked files of an FMU.
+///
+/// Fields are dropped in this order, which unloads the library before its file is removed.
 struct Content {
-    /// For co-simulation; none where the FMU has model exchange only.
+    /// The library for co-simulation; `None` if the FMU offers model exchange only.
     library: Option<Arc<Library>>,
     unpacked: Unpacked,
-    /// Whether there has been an instance.
+    /// Whether an instance has been created.
     instantiated: AtomicBool,
-    /// Positions of variables by type and value reference, made when a message needs one.
+    /// Positions of variables by type and value reference; filled at the first message that needs one.
     names: OnceLock<HashMap<(char, u32), usize>>,
 }
 
 impl Fmu {
-    /// Unpacks the FMU at `path`, which may also be a folder with an unpacked one, reads its
-    /// description and loads its library for co-simulation.
+    /// Unpacks the FMU at `path`, reads its description and loads its library for co-simulation.
+    /// `path` is an archive or a folder with an unpacked FMU.
     ///
     /// # Errors
     ///
-    /// [`FmuError`]: not an FMU of version 2.0, no co-simulation, no library for this platform, or
-    /// a library that does not load.
+    /// [`FmuError`] if the FMU is not of version 2.0, has no co-simulation interface or no library
+    /// for this platform, or if the library does not load.
     pub fn open(path: &Path) -> Result<Self, FmuError> {
         let fmu = Self::open_any(path)?;
         if fmu.content.library.is_none() {
@@ -102,7 +105,8 @@ impl Fmu {
         Ok(fmu)
     }
 
-    /// As [`Fmu::open`], without warnings about what is odd in the FMU.
+    /// Opens an FMU like [`Fmu::open`], but does not log warnings about the archive and the
+    /// description.
     ///
     /// # Errors
     ///
@@ -117,11 +121,12 @@ impl Fmu {
         Ok(fmu)
     }
 
-    /// As [`Fmu::open`] for an FMU to `linearise`, where model exchange alone will do.
+    /// Opens an FMU like [`Fmu::open`], but also accepts one that offers model exchange only.
     ///
     /// # Errors
     ///
-    /// Those of [`Fmu::open`]; [`FmuError::NoInterface`] where the FMU has neither interface.
+    /// [`FmuError`] if the FMU is not of version 2.0, has neither interface
+    /// ([`FmuError::NoInterface`]) or no library for this platform, or if the library does not load.
     pub fn open_any(path: &Path) -> Result<Self, FmuError> {
         let unpacked =
             if path.is_dir() { Unpacked::in_folder(path)? } else { Unpacked::open(path)? };
@@ -148,17 +153,18 @@ impl Fmu {
         Ok(Self { content: Arc::new(Content { library, unpacked, instantiated, names }) })
     }
 
-    /// The model description.
+    /// Returns the model description.
     #[must_use]
     pub fn description(&self) -> &ModelDescription {
         &self.content.unpacked.description
     }
 
-    /// An instance called `name`.
+    /// Creates a co-simulation instance called `name`.
     ///
     /// # Errors
     ///
-    /// [`LoadError::Instantiate`] with what the FMU said.
+    /// [`FmuError::OnlyOnce`] for a forbidden second instance; [`LoadError::Instantiate`] with the
+    /// FMU's messages if `fmi2Instantiate` fails; [`FmuError::NoInterface`] without co-simulation.
     pub fn instantiate(&self, name: &str) -> Result<Instance, FmuError> {
         let description = self.description();
         let once = description.co_simulation.as_ref();
@@ -171,7 +177,8 @@ impl Fmu {
         Ok(Instance { component, fmu: self.clone() })
     }
 
-    /// The names of the variables, for messages: of an alias the one that is declared first.
+    /// Returns the lookup of variable names for messages. Of several aliases it gives the one declared
+    /// first.
     fn names(&self) -> Names {
         let content = self.content.clone();
         Arc::new(move |kind, reference| {
@@ -188,11 +195,12 @@ impl Fmu {
         })
     }
 
-    /// An instance for `interface`, by its C functions.
+    /// Creates an instance for `interface`, with access to its C functions.
     ///
     /// # Errors
     ///
-    /// [`CallError`]: the function is missing, or the FMU returns neither `fmi2OK` nor `fmi2Warning`.
+    /// [`FmuError::NoInterface`] if the FMU lacks `interface`; [`LoadError`] if the library does not load
+    /// or `fmi2Instantiate` fails.
     pub fn component(&self, interface: Interface, name: &str) -> Result<Component, FmuError> {
         let unpacked = &self.content.unpacked;
         let description = &unpacked.description;
@@ -206,12 +214,12 @@ impl Fmu {
         };
         let resources = file_uri(&unpacked.resources())?;
         let names = self.names();
-        let made = library.instantiate(interface, name, &description.guid, &resources, names);
-        made.map_err(|error| explained(description, error))
+        let component = library.instantiate(interface, name, &description.guid, &resources, names);
+        component.map_err(|error| with_tool_hint(description, error))
     }
 }
 
-/// The letter by which messages name a type (section 2.1.5).
+/// Returns the letter of a type in the messages of an FMU (section 2.1.5).
 fn letter(kind: &Kind) -> char {
     match kind {
         Kind::Real(_) => 'r',
@@ -227,11 +235,11 @@ fn open_library(
     interface: Interface,
 ) -> Result<Arc<Library>, FmuError> {
     let library = Library::open(path, interface);
-    Ok(Arc::new(library.map_err(|error| explained(description, error))?))
+    Ok(Arc::new(library.map_err(|error| with_tool_hint(description, error))?))
 }
 
-/// `error`, with the tool that the FMU says it needs.
-fn explained(description: &ModelDescription, error: LoadError) -> FmuError {
+/// Adds the tool that the FMU declares to need (`needsExecutionTool`) to `error`.
+fn with_tool_hint(description: &ModelDescription, error: LoadError) -> FmuError {
     let simulation = description.co_simulation.as_ref().map(|flags| flags.needs_execution_tool);
     let exchange = description.model_exchange.as_ref().map(|flags| flags.needs_execution_tool);
     if simulation != Some(true) && exchange != Some(true) {
@@ -242,7 +250,7 @@ fn explained(description: &ModelDescription, error: LoadError) -> FmuError {
     FmuError::NeedsTool { tool, source: error }
 }
 
-/// An instance of an FMU, by its C functions.
+/// A co-simulation instance of an FMU in this process.
 pub struct Instance {
     component: Component,
     fmu: Fmu,
@@ -369,13 +377,13 @@ impl Slave for Instance {
 }
 
 impl Instance {
-    /// The FMU that it is of.
+    /// Returns the FMU of this instance.
     #[must_use]
     pub fn fmu(&self) -> &Fmu {
         &self.fmu
     }
 
-    /// How long an answer of `fmi2Pending` is waited for; none: as long as it takes.
+    /// Limits how long a step that returned `fmi2Pending` may take; `None`: no limit.
     pub fn set_time_limit(&mut self, limit: Option<Duration>) {
         self.component.time_limit = limit;
     }

@@ -1,23 +1,22 @@
-//! FMUs in processes of their own: what one does to its process leaves the master whole.
+//! Isolation: each FMU instance runs in a separate process, so that a crash does not end the master.
 //!
-//! [`open`] starts a worker, which is the same program called with [`WORKER`] as its only argument
-//! and hands over to [`worker()`]. It loads the FMU and does what the master's side, [`Isolated`],
-//! asks for. Both share memory for arguments, results and messages, and take turns.
+//! [`open`] starts a worker process. The worker is the same program with [`WORKER`] as its only
+//! argument, which calls [`worker()`]. It loads the FMU and executes the commands of the master's
+//! side, [`Isolated`]. Arguments, results and messages pass through shared memory; master and worker
+//! take turns.
 //!
-//! This works on Linux; elsewhere [`open`] says that it does not.
+//! Isolation works on Linux; on other systems [`open`] returns [`IsolateError::Platform`].
 
 #[cfg(target_os = "linux")]
 mod as_slave;
 #[cfg(target_os = "linux")]
+mod channel;
+#[cfg(target_os = "linux")]
 mod command;
-#[cfg(not(target_os = "linux"))]
-mod elsewhere;
 #[cfg(target_os = "linux")]
 mod isolated;
 #[cfg(target_os = "linux")]
 mod layout;
-#[cfg(target_os = "linux")]
-mod line;
 #[cfg(target_os = "linux")]
 mod log;
 #[cfg(target_os = "linux")]
@@ -32,6 +31,8 @@ mod process;
 mod region;
 #[cfg(target_os = "linux")]
 mod strings;
+#[cfg(not(target_os = "linux"))]
+mod unsupported;
 #[cfg(target_os = "linux")]
 mod words;
 #[cfg(target_os = "linux")]
@@ -47,44 +48,45 @@ use fmu_description::package::{PackageError, Unpacked};
 
 use slave::{CallError, Failure};
 
-#[cfg(not(target_os = "linux"))]
-pub use elsewhere::{Isolated, worker};
 #[cfg(target_os = "linux")]
 pub use isolated::Isolated;
+#[cfg(not(target_os = "linux"))]
+pub use unsupported::{Isolated, worker};
 #[cfg(target_os = "linux")]
 pub use worker::worker;
 
-/// The first argument of a program that is to be a worker.
+/// The first argument of a program that shall become a worker.
 pub const WORKER: &str = "--fmu-worker";
 
-/// The environment variable by which a process knows that it is to be a worker: the number of the
-/// process that started it.
+/// The environment variable that marks a process as a worker: the identifier of the process that
+/// started it.
 #[cfg(target_os = "linux")]
 const STARTED_BY: &str = "FMU_WORKER_STARTED_BY";
 
-/// How FMUs are isolated.
+/// Options of isolation.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// How long each call may take; its process is ended then. None: as long as it takes.
+    /// Time limit of each call; a worker that exceeds it is killed. `None`: no limit.
     pub time_limit: Option<Duration>,
-    /// Most bytes of address space that the process of each FMU may take, the program in it included
-    /// (`RLIMIT_AS`). None: no limit of its own.
+    /// Limit of the address space of each worker in bytes, program included (`RLIMIT_AS`). `None`: no
+    /// additional limit.
     pub memory_limit: Option<u64>,
-    /// Libraries to load before that of the FMU, as [`crate::preload`] does.
+    /// Libraries that the worker loads before the FMU, as [`crate::preload`] does.
     pub preload: Vec<OsString>,
-    /// Whether `fmi2SetDebugLogging` is called where the FMU has it.
+    /// Whether to call `fmi2SetDebugLogging` if the FMU has it.
     pub logging: bool,
-    /// The program that becomes the worker; none: this one.
+    /// The program that becomes the worker; `None`: this program.
     pub executable: Option<PathBuf>,
 }
 
-/// Why an FMU could not be isolated.
+/// Why an FMU cannot run in a process of its own.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum IsolateError {
-    /// The archive or its model description.
+    /// The archive or its model description cannot be read.
     #[error(transparent)]
     Package(Box<PackageError>),
-    /// There is no co-simulation in it.
+    /// The FMU has no co-simulation interface.
     #[error("{path}: the FMU offers no co-simulation, expected the element CoSimulation")]
     NoCoSimulation {
         /// The FMU.
@@ -93,11 +95,11 @@ pub enum IsolateError {
     /// The operating system refused shared memory or a connection.
     #[error("{what} for the process of {instance}")]
     System {
-        /// What was wanted.
+        /// The failed action.
         what: &'static str,
         /// The instance.
         instance: String,
-        /// What it said.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// The process could not be started.
@@ -107,13 +109,13 @@ pub enum IsolateError {
         executable: PathBuf,
         /// The instance.
         instance: String,
-        /// What the operating system said.
+        /// The error of the operating system.
         source: io::Error,
     },
-    /// The program was started and did not become a worker.
+    /// The program started but did not become a worker.
     #[error(
         "{}, started for {instance} as `{WORKER}`, did not become a worker: it {failure}; its `main` \
-         has to begin with a call of `fmu_import::isolate::worker()` where its first argument is {WORKER}",
+         must first call `fmu_import::isolate::worker()` if its first argument is {WORKER}",
         executable.display()
     )]
     NoWorker {
@@ -121,27 +123,27 @@ pub enum IsolateError {
         executable: PathBuf,
         /// The instance.
         instance: String,
-        /// What it did instead.
+        /// How the process ended or failed.
         failure: Failure,
     },
-    /// This process was started to be a worker and starts others.
+    /// This process was started as a worker, but tries to start workers itself.
     #[error(
-        "this process was started as `{WORKER}` to run one FMU and did not become a worker; `main` has \
-         to begin with a call of `fmu_import::isolate::worker()` where the first argument is {WORKER}"
+        "this process was started as `{WORKER}` to run one FMU and did not become a worker; `main` must \
+         first call `fmu_import::isolate::worker()` if the first argument is {WORKER}"
     )]
     InWorker,
-    /// The worker could not load a library that was to be loaded before that of the FMU.
+    /// The worker cannot load a library of [`Options::preload`].
     #[error("{reason}")]
     Preload {
-        /// Which, and why.
+        /// The library and the reason.
         reason: String,
     },
-    /// The worker could not load or instantiate the FMU.
+    /// The worker cannot load or instantiate the FMU.
     #[error("{instance}: {reason}")]
     Refused {
         /// The instance.
         instance: String,
-        /// Why.
+        /// The reason.
         reason: String,
     },
     /// The worker ended or did not answer while it loaded or instantiated the FMU.
@@ -149,11 +151,11 @@ pub enum IsolateError {
     Call {
         /// The instance.
         instance: String,
-        /// What happened.
+        /// The failed call.
         source: CallError,
     },
-    /// Not on this operating system.
-    #[error("{instance}: FMUs are isolated on Linux only so far")]
+    /// This operating system does not support isolation.
+    #[error("{instance}: isolation is available on Linux only")]
     Platform {
         /// The instance.
         instance: String,
@@ -168,7 +170,7 @@ impl From<PackageError> for IsolateError {
 
 #[cfg(target_os = "linux")]
 impl IsolateError {
-    /// The same; where the FMU was refused, with the limit of memory, which may be why.
+    /// Adds the memory limit to the reason if the FMU did not load: the limit may be the cause.
     fn with_limit(mut self, limit: Option<u64>) -> Self {
         use std::fmt::Write as _;
         if let (Self::Refused { reason, .. } | Self::Preload { reason }, Some(limit)) =
@@ -181,19 +183,20 @@ impl IsolateError {
     }
 }
 
-/// An FMU, unpacked once for all of its isolated instances.
+/// An unpacked FMU, shared by all its isolated instances.
 #[derive(Clone, Debug)]
 pub struct Package {
     unpacked: Arc<Unpacked>,
 }
 
 impl Package {
-    /// Unpacks the FMU at `path`, which may also be a folder with an unpacked one. Nothing of it is
+    /// Unpacks the FMU at `path`, an archive or a folder with an unpacked FMU. Its library is not
     /// loaded into this process.
     ///
     /// # Errors
     ///
-    /// [`IsolateError::Package`], [`IsolateError::NoCoSimulation`].
+    /// [`IsolateError::Package`] if the FMU cannot be read; [`IsolateError::NoCoSimulation`] if it has
+    /// no co-simulation interface.
     pub fn open(path: &Path) -> Result<Self, IsolateError> {
         let unpacked =
             if path.is_dir() { Unpacked::in_folder(path)? } else { Unpacked::open(path)? };
@@ -203,43 +206,46 @@ impl Package {
         Ok(Self { unpacked: Arc::new(unpacked) })
     }
 
-    /// An instance called `name` in a process of its own.
+    /// Starts a worker process and creates the instance `name` in it.
     ///
     /// # Errors
     ///
-    /// [`IsolateError`]: no process, or an FMU that does not load or that ends its process.
+    /// [`IsolateError`] if no worker can be started, or if the FMU does not load, does not instantiate
+    /// or ends its process.
     pub fn instantiate(&self, name: &str, options: &Options) -> Result<Isolated, IsolateError> {
         Isolated::start(self.unpacked.clone(), name, options)
     }
 }
 
-/// An instance called `name` of the FMU at `path`, in a process of its own.
+/// Unpacks the FMU at `path` and creates the instance `name` in a process of its own.
 ///
 /// # Errors
 ///
-/// Those of [`Package::open`] and [`Package::instantiate`].
+/// [`IsolateError`] if the FMU cannot be read or has no co-simulation interface, if no worker can be
+/// started, or if the FMU does not load, does not instantiate or ends its process.
 pub fn open(path: &Path, name: &str, options: &Options) -> Result<Isolated, IsolateError> {
     Package::open(path)?.instantiate(name, options)
 }
 
-/// Why a program could not be a worker.
+/// Why a program cannot become or remain a worker.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum WorkerError {
-    /// It was not started by a master.
+    /// No master started the program.
     #[error("{WORKER} is for the master's own use: {what}")]
     Alone {
-        /// What is missing.
+        /// What the master did not supply.
         what: &'static str,
-        /// What the operating system said.
+        /// The error of the operating system.
         source: io::Error,
     },
-    /// The master wrote something else than a command.
+    /// The command in shared memory is invalid.
     #[error("the memory shared with the master is corrupted: found {found}, expected a command")]
     Corrupted {
         /// What was found.
         found: u64,
     },
-    /// Not on this operating system.
-    #[error("FMUs are isolated on Linux only so far")]
+    /// This operating system does not support isolation.
+    #[error("isolation is available on Linux only")]
     Platform,
 }

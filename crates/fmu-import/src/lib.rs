@@ -1,10 +1,10 @@
-//! Loads FMUs (FMI 2.0) and calls them: in this process, or each in a process of its own.
+//! Loads FMUs (FMI 2.0) and calls them, in this process or in a separate process for each instance.
 //!
 //! [`Fmu::open`] unpacks an FMU, reads its description and loads its library; [`Fmu::instantiate`]
-//! returns an [`Instance`], which is a [`slave::Slave`]. [`isolate`] does the same in processes of
-//! their own, where a crash ends the process of the FMU and no other.
+//! returns an [`Instance`], which implements [`slave::Slave`]. [`isolate`] runs each instance in a
+//! separate process: a crash of the FMU ends only that process.
 //!
-//! [`crash`] is for programs that run FMUs in their own process and want to report a crash.
+//! [`crash`] reports a crash of an FMU that runs in the process of the program.
 #![deny(unsafe_code)]
 
 mod call_log;

@@ -1,5 +1,5 @@
-//! The shared library of an FMU: loading, symbols, calls. This file and its folder are the one place
-//! of the crate where C is called and pointers are handed out.
+//! The shared library of an FMU: loading, symbols, calls. Only this module of the crate calls C
+//! functions of an FMU and passes pointers to them.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
 mod calls;
@@ -29,10 +29,10 @@ pub(crate) use log::Names;
 use log::Sink;
 use slave::{CallError, Failure};
 
-const PYTHON: &str = "\nThe library expects Python to be in the process already, as those that \
-    PythonFMU exports do: load it first with --preload, for example --preload libpython3.11.so.1.0";
+const PYTHON: &str = "\nThe library expects that the process has loaded Python, as libraries exported \
+    by PythonFMU do: load it first with --preload, for example --preload libpython3.11.so.1.0";
 
-/// What the operating system says.
+/// Returns the message of the operating system.
 fn reason(error: &libloading::Error) -> String {
     std::error::Error::source(error).map_or_else(|| error.to_string(), ToString::to_string)
 }
@@ -44,11 +44,11 @@ fn open(path: &Path) -> Result<Handle, libloading::Error> {
     unsafe { Handle::new(path) }
 }
 
-/// Opens a library; those that it needs are looked for in its folder first.
+/// Opens a library. The system searches its dependencies in the folder of the library first.
 #[cfg(windows)]
 fn open(path: &Path) -> Result<Handle, libloading::Error> {
     use libloading::os::windows::{LOAD_WITH_ALTERED_SEARCH_PATH, Library};
-    // The flag is for absolute paths, written with the separators of Windows.
+    // The flag requires an absolute path with the separators of Windows.
     let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     // SAFETY: runs the initialisers of the library, which is what the user asked for.
     unsafe { Library::load_with_flags(path, LOAD_WITH_ALTERED_SEARCH_PATH) }.map(Handle::from)
@@ -70,12 +70,12 @@ fn load(path: &Path) -> Result<Handle, LoadError> {
     })
 }
 
-/// Loads `library` for the rest of the process, on Unix with its symbols visible to all that come
-/// later.
+/// Loads `library` for the lifetime of the process. On Unix its symbols are visible to all libraries
+/// loaded later (`RTLD_GLOBAL`).
 ///
 /// # Errors
 ///
-/// [`LoadError::Refused`] where the operating system does not find or accept it.
+/// [`LoadError::Refused`] if the operating system does not find or does not load the library.
 pub fn preload(library: &OsStr) -> Result<(), LoadError> {
     #[cfg(unix)]
     // SAFETY: runs the initialisers of the library, which is what the user asked for.
@@ -99,11 +99,12 @@ pub fn preload(library: &OsStr) -> Result<(), LoadError> {
     }
 }
 
-/// Asks the library at `path`, which `fmu::export!` made, for its model description.
+/// Returns the model description that a library exported by `fmu::export!` generates.
 ///
 /// # Errors
 ///
-/// Where it cannot be loaded, was not made by `fmi2`, or refuses `resources`.
+/// [`LoadError`] if the library does not load, was not exported by the crate `fmu`
+/// ([`LoadError::Missing`]), or rejects `resources` ([`LoadError::Describe`]).
 pub fn describe(path: &Path, resources: &Path) -> Result<String, LoadError> {
     unsafe extern "C" fn sink(context: *mut c_void, text: *const c_char, length: usize) {
         // SAFETY: `context` is the buffer below; the library gives `length` bytes.
@@ -133,10 +134,10 @@ fn c_string(text: &str) -> CString {
     CString::new(text.replace('\0', "")).unwrap_or_default()
 }
 
-/// `fmi2Type`: what an instance is made for.
+/// `fmi2Type`: the interface of an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interface {
-    /// `fmi2ModelExchange`: the master integrates the states.
+    /// `fmi2ModelExchange`: the importer integrates the states.
     ModelExchange,
     /// `fmi2CoSimulation`: the FMU integrates its states.
     CoSimulation,
@@ -155,13 +156,13 @@ impl Interface {
 pub(crate) struct Library {
     functions: Functions,
     path: PathBuf,
-    /// An instance returned `fmi2Fatal`: no function of any may be called again (section 2.1.3).
+    /// An instance returned `fmi2Fatal`: no function of any instance may be called (section 2.1.3).
     corrupted: AtomicBool,
     _handle: Handle,
 }
 
 impl Library {
-    /// Loads the library and resolves the functions: those of `interface` must be there.
+    /// Loads the library and checks that it has the functions of `interface`.
     pub(crate) fn open(path: &Path, interface: Interface) -> Result<Self, LoadError> {
         let handle = load(path)?;
         let functions = Functions::load(&handle);
@@ -174,12 +175,12 @@ impl Library {
             let found = found.into_owned();
             return Err(LoadError::Version { path: path.to_owned(), found });
         }
-        functions.demand(interface, path)?;
+        functions.require(interface, path)?;
         let corrupted = AtomicBool::new(false);
         Ok(Self { functions, path: path.to_owned(), corrupted, _handle: handle })
     }
 
-    /// `fmi2Instantiate` for `interface`.
+    /// Calls `fmi2Instantiate` for `interface`.
     pub(crate) fn instantiate(
         self: &Arc<Self>,
         interface: Interface,
@@ -226,11 +227,15 @@ impl Library {
             callbacks,
             library: self.clone(),
         };
-        if pointer.is_null() { Err(self.not_instantiated(name, &component)) } else { Ok(component) }
+        if pointer.is_null() {
+            Err(self.instantiation_error(name, &component))
+        } else {
+            Ok(component)
+        }
     }
 
-    /// The error of an instance that the FMU did not make.
-    fn not_instantiated(&self, name: &str, component: &Component) -> LoadError {
+    /// Returns the error of `fmi2Instantiate`, with the messages of the FMU.
+    fn instantiation_error(&self, name: &str, component: &Component) -> LoadError {
         let messages = component.sink.take();
         let reason =
             if messages.is_empty() { "it gave no reason".to_owned() } else { messages.join("; ") };
@@ -238,8 +243,8 @@ impl Library {
     }
 }
 
-/// What an instance is given to call; `sink` receives its messages.
-#[expect(clippy::arc_with_non_send_sync, reason = "`Component` says why it may be sent")]
+/// Returns the callback functions of an instance; `sink` receives its messages.
+#[expect(clippy::arc_with_non_send_sync, reason = "see the implementation of Send for Component")]
 fn callbacks(sink: &Arc<Sink>) -> Arc<fmi2CallbackFunctions> {
     Arc::new(fmi2CallbackFunctions {
         logger: Some(log::logger()),
@@ -255,7 +260,7 @@ unsafe extern "C" {
     fn free(pointer: *mut c_void);
 }
 
-/// What a step takes, in one line of the processor's cache.
+/// The pointers that every step needs, in one cache line.
 #[repr(C, align(64))]
 struct Hot {
     pointer: fmi2Component,
@@ -265,31 +270,32 @@ struct Hot {
     place: &'static Slot,
 }
 
-/// An instance, freed with its last use; the library stays loaded as long.
+/// An FMU instance and its C functions. Dropping it calls `fmi2FreeInstance`; the library stays
+/// loaded until then.
 pub struct Component {
-    /// What [`Component::pass`] needs.
+    /// The pointers that [`Component::pass`] needs.
     hot: Hot,
-    /// Where the instance is, for reports of its crash.
+    /// The current function and time of the instance, for crash reports.
     place: Arc<Place>,
     pointer: fmi2Component,
-    /// Those of the library, at hand.
+    /// A copy of the library's function table.
     functions: Functions,
-    /// Shared with the FMU, which has its address.
+    /// Receives messages; the FMU holds its address.
     sink: Arc<Sink>,
-    /// FMU states by slot; null where there is none.
+    /// FMU states by slot; null in an empty slot.
     saved: Vec<fmi2FMUstate>,
-    /// How long an answer of `fmi2Pending` is waited for; none: as long as it takes.
+    /// How long a step that returned `fmi2Pending` may take; `None`: no limit.
     pub(crate) time_limit: Option<Duration>,
-    /// It is still busy with a step that could not be canceled, and may not be freed.
+    /// The instance still computes a step that could not be canceled, and must not be freed.
     abandoned: bool,
-    /// A call has returned `fmi2Warning`.
+    /// Whether a call has returned `fmi2Warning`.
     warned: Cell<bool>,
     callbacks: Arc<fmi2CallbackFunctions>,
     library: Arc<Library>,
 }
 
-// SAFETY: an instance may be used from any thread, by one at a time (FMI 2.0.5, section 2.1); the
-// pointers are to the instance, its states, and what is shared with it through `Arc`.
+// SAFETY: any thread may use an instance, one at a time (FMI 2.0.5, section 2.1); the pointers lead to
+// the instance, its states, and data shared with it through `Arc`.
 unsafe impl Send for Component {}
 
 impl Drop for Component {
@@ -298,7 +304,7 @@ impl Drop for Component {
             return;
         }
         if self.abandoned || self.library.corrupted.load(Ordering::Relaxed) {
-            // Whatever it may still use stays: library, callbacks and the receiver of messages.
+            // The instance may still use the library, the callbacks and the sink: they are leaked.
             std::mem::forget((self.library.clone(), self.callbacks.clone(), self.sink.clone()));
             return;
         }
@@ -315,6 +321,7 @@ impl Drop for Component {
 }
 
 impl Component {
+    /// Marks the call as returned and converts its status to a result.
     #[inline]
     fn check(&self, function: &'static str, status: fmi2Status) -> Result<(), CallError> {
         self.place.leave();
@@ -329,7 +336,7 @@ impl Component {
         Err(self.failed(function, failure))
     }
 
-    /// Whether that is `fmi2Warning`, which is noted.
+    /// Returns whether `status` is `fmi2Warning`, and records it for [`Component::take_warning`].
     #[inline]
     fn is_warning(&self, status: fmi2Status) -> bool {
         let warning = status == Status::Warning as fmi2Status;
@@ -339,12 +346,13 @@ impl Component {
         warning
     }
 
-    /// Whether a call has returned `fmi2Warning` since this was last asked; calls by
-    /// [`Component::pass`] do not count.
+    /// Returns whether a call has returned `fmi2Warning` since the last call of this function.
+    /// Calls by [`Component::pass`] are not counted.
     pub fn take_warning(&mut self) -> bool {
         self.warned.take()
     }
 
+    /// Returns the error of a call, with the instance's recent messages.
     #[cold]
     fn failed(&self, function: &'static str, failure: Failure) -> CallError {
         CallError { function, failure, messages: self.sink.take() }

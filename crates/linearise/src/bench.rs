@@ -1,4 +1,4 @@
-//! A co-simulation instance that is stepped again and again from the operating point.
+//! A co-simulation instance that performs many short runs from the operating point.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -12,36 +12,36 @@ use super::{Linearise, LineariseError};
 use fmu_import::Fmu;
 use fmu_import::{Component, Interface};
 
-/// The response of a state to a pulse as a part of its typical size: what is aimed at.
+/// Target for the response of a state to a pulse, relative to the state's typical size.
 const RESPONSE: f64 = 1e-2;
-/// A pulse as a part of the input's typical size: the first trial, and the limits.
+/// Height of the first trial pulse, relative to the typical size of the input.
 const TRIAL: f64 = 1e-2;
 const SMALLEST: f64 = 1e-6;
 const LARGEST: f64 = 0.1;
-/// The drift over a record, in typical sizes, that a fit must know of.
+/// The drift over a record, relative to the typical sizes, above which the fit includes it.
 const DRIFT: f64 = 1e-6;
-/// Heights of the pulses whose responses are extrapolated to the height zero, each half of the last.
+/// Number of pulse heights for the extrapolation to height zero; each is half of the previous one.
 const HEIGHTS: usize = 3;
 
-/// The instance, which is at its saved state before each run, and what is set and read.
+/// The instance, its saved state at the operating point, and the variables to set and read.
 pub(super) struct Bench<'p> {
-    /// Shared by the benches of all step sizes: an FMU may allow one instance only.
+    /// Shared by the benches of all step sizes, because an FMU may allow only one instance.
     component: Rc<RefCell<Component>>,
     parts: &'p Parts<'p>,
     states: &'p [Part],
     inputs: Vec<u32>,
-    /// States, then outputs.
+    /// References of the states, then of the outputs.
     readings: Vec<u32>,
     pub(super) x: Vec<f64>,
     pub(super) u: Vec<f64>,
     pub(super) y: Vec<f64>,
     start: f64,
     pub(super) step: f64,
-    /// The course of the readings with the inputs of the operating point.
+    /// The readings of an undisturbed run, with the inputs of the operating point.
     rest: DMatrix<f64>,
 }
 
-/// A pulse of an input: to which side, how high.
+/// A pulse of an input: direction and height.
 pub(super) type Pulse = (Side, f64);
 
 impl<'p> Bench<'p> {
@@ -64,7 +64,7 @@ impl<'p> Bench<'p> {
         Ok(Self { component, parts, states, inputs, readings, x, u, y, start, step, rest })
     }
 
-    /// The same instance with another step.
+    /// Returns a bench for the same instance with another step.
     pub(super) fn with_step(&self, step: f64) -> Self {
         Self {
             component: Rc::clone(&self.component),
@@ -81,7 +81,7 @@ impl<'p> Bench<'p> {
         }
     }
 
-    /// The typical size of a change of reading `k`: states, then outputs.
+    /// Returns the typical size of reading `k`: states first, then outputs.
     pub(super) fn scale(&self, k: usize) -> f64 {
         match k.checked_sub(self.states.len()) {
             None => self.states[k].scale(self.x[k]),
@@ -89,8 +89,8 @@ impl<'p> Bench<'p> {
         }
     }
 
-    /// The readings at `count` + 1 communication points, one row each, with the inputs
-    /// `deviation`(step, input) off the operating point.
+    /// Runs `count` steps with the inputs of the operating point plus `deviation`(step, input).
+    /// Returns the readings at the `count` + 1 communication points, one row each.
     fn run(
         &mut self,
         count: usize,
@@ -98,7 +98,7 @@ impl<'p> Bench<'p> {
     ) -> Result<DMatrix<f64>, LineariseError> {
         let mut component = self.component.borrow_mut();
         component.restore_state(0)?;
-        let mut course = DMatrix::zeros(count + 1, self.readings.len());
+        let mut readings = DMatrix::zeros(count + 1, self.readings.len());
         let mut row = vec![0.0; self.readings.len()];
         for step in 0..=count {
             component.get_real(&self.readings, &mut row)?;
@@ -108,7 +108,7 @@ impl<'p> Bench<'p> {
                     let name = part.map_or_else(String::new, |part| part.name.clone());
                     return Err(LineariseError::NotFinite { name, value });
                 }
-                course[(step, column)] = value;
+                readings[(step, column)] = value;
             }
             if step < count {
                 let value = |(input, u): (usize, &f64)| u + deviation(step, input);
@@ -118,12 +118,13 @@ impl<'p> Bench<'p> {
                 component.do_step(time, self.step, false)?;
             }
         }
-        Ok(course)
+        Ok(readings)
     }
 
-    /// The change of the readings for a small `shape`(step, input), per unit of the shape, as height
-    /// times shape goes to zero from `height` on through `heights` halvings; and the largest error of
-    /// each reading.
+    /// Returns the linear response of the readings to `shape`(step, input), per unit of the shape,
+    /// and the largest error of each reading.
+    ///
+    /// The limit of small pulses is extrapolated from `heights` heights: `height` and its halves.
     pub(super) fn response(
         &mut self,
         count: usize,
@@ -160,20 +161,20 @@ impl<'p> Bench<'p> {
         Ok((response, errors))
     }
 
-    /// The drift of the states over the first step.
+    /// Returns the drift of the states over the first step.
     pub(super) fn drift(&self) -> Vec<f64> {
         (0..self.states.len()).map(|k| self.rest[(1, k)] - self.rest[(0, k)]).collect()
     }
 
-    /// The largest drift of a state over the whole course, in its typical size.
+    /// Returns the largest drift of a state over the whole run, relative to its typical size.
     fn largest_drift(&self) -> f64 {
         let last = self.rest.nrows() - 1;
         let drift = |k: usize| (self.rest[(last, k)] - self.rest[(0, k)]).abs() / self.scale(k);
         (0..self.states.len()).map(drift).fold(0.0, f64::max)
     }
 
-    /// A pulse of `input` over the first half of `count` steps, small enough for all states, and
-    /// its response per unit with the error of each reading.
+    /// Returns a pulse of `input` over the first half of `count` steps that is small enough for all
+    /// states, its response per unit and the error of each reading.
     fn pulse(
         &mut self,
         input: usize,
@@ -194,7 +195,7 @@ impl<'p> Bench<'p> {
         Ok((pulse, response, errors))
     }
 
-    /// The responses to a pulse of each input over `count` steps.
+    /// Records the responses to a pulse of each input over `count` steps.
     pub(super) fn record(&mut self, count: usize) -> Result<Record, LineariseError> {
         let (n, m) = (self.states.len(), self.inputs.len());
         let rows = m * count;
@@ -236,38 +237,38 @@ impl<'p> Bench<'p> {
     }
 }
 
-/// What the pulses did: one row for each step after each pulse.
+/// The recorded responses: one row for each step after each pulse.
 pub(super) struct Record {
-    /// States at the begin of the step, and inputs during it.
+    /// States at the start of the step, and inputs during the step.
     pub(super) before: DMatrix<f64>,
-    /// States at the end of the step, and inputs during it.
+    /// States at the end of the step, and inputs during the step.
     pub(super) after: DMatrix<f64>,
     /// Change of the states over the step.
     pub(super) change: DMatrix<f64>,
     /// Outputs at the end of the step.
     pub(super) outputs: DMatrix<f64>,
     pub(super) pulses: Vec<Pulse>,
-    /// The error of each reading: rounding, and what is left of the pulses' height.
+    /// The error of each reading: rounding, and the remainder of the extrapolation.
     pub(super) noise: Vec<f64>,
-    /// Steps after each pulse.
+    /// Number of steps after each pulse.
     count: usize,
-    /// The operating point moves meanwhile.
+    /// Whether the operating point drifts during the record.
     pub(super) drifts: bool,
 }
 
 impl Record {
-    /// What the change of the states is fitted to: see `with_time`.
+    /// Returns the regressors of the change of the states; see `with_time`.
     pub(super) fn for_change(&self, degree: usize) -> DMatrix<f64> {
         self.with_time(&self.before, 0, degree)
     }
 
-    /// What the outputs are fitted to.
+    /// Returns the regressors of the outputs; see `with_time`.
     pub(super) fn for_outputs(&self, degree: usize) -> DMatrix<f64> {
         self.with_time(&self.after, 1, degree)
     }
 
-    /// [X, t X, ..., t^degree X] with the part t of the record that is over: coefficients that are a
-    /// polynomial of time.
+    /// Returns [X, t X, ..., t^degree X], where t is the elapsed fraction of the record: the fitted
+    /// coefficients are polynomials of time.
     fn with_time(&self, x: &DMatrix<f64>, first: usize, degree: usize) -> DMatrix<f64> {
         let columns = x.ncols();
         DMatrix::from_fn(x.nrows(), (degree + 1) * columns, |i, j| {
@@ -277,12 +278,12 @@ impl Record {
     }
 }
 
-/// A count as an exponent.
+/// Converts a count to an exponent.
 fn exponent(count: usize) -> i32 {
     i32::try_from(count).unwrap_or(i32::MAX)
 }
 
-/// A count as a number.
+/// Converts a count to a floating-point number.
 pub(super) fn index(count: usize) -> f64 {
     f64::from(u32::try_from(count).unwrap_or(u32::MAX))
 }

@@ -1,4 +1,4 @@
-//! Derivatives by differences: ladders of steps, extrapolated to the step zero.
+//! Derivatives by difference quotients, extrapolated to step zero.
 
 use nalgebra::DMatrix;
 
@@ -6,13 +6,13 @@ use super::LineariseError;
 use super::parts::Part;
 use super::point::{Equations, Known};
 
-/// Steps of a ladder, and the ratio of each to the next.
+/// Number of steps of a ladder.
 const LEVELS: usize = 8;
 const RATIO: f64 = 4.0;
-/// The first step as a part of the typical size of a change.
+/// The first step, relative to the typical size of a change.
 const FIRST: f64 = 1e-2;
 
-/// To which side of the operating point a variable can be changed.
+/// The side of the operating point on which a variable can be changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Side {
     Both,
@@ -21,18 +21,18 @@ pub(super) enum Side {
 }
 
 impl Side {
-    /// The errors of a difference quotient go with these powers of the step.
+    /// Returns the power of the step that the error term `order` of a difference quotient has.
     pub(super) fn exponent(self, order: i32) -> i32 {
         if self == Side::Both { 2 * order } else { order }
     }
 }
 
-/// How far `part` can be changed about `value`, up to `size`, and to which side. At a limit it is
-/// one side.
+/// Returns how far `part` can be changed about `value`, at most `size`, and on which side. At a
+/// limit it is one side only.
 ///
 /// # Errors
 ///
-/// [`LineariseError::Role`] where `min` and `max` leave no room.
+/// [`LineariseError::Role`] if `min` and `max` leave no room for a change.
 pub(super) fn reach(part: &Part, value: f64, size: f64) -> Result<(Side, f64), LineariseError> {
     let (below, above) = (value - part.min, part.max - value);
     if below.max(above) <= 0.0 {
@@ -51,12 +51,13 @@ pub(super) fn reach(part: &Part, value: f64, size: f64) -> Result<(Side, f64), L
     })
 }
 
-/// A number and the estimate of its error.
+/// A value and its estimated error.
 pub(super) type Estimate = (f64, f64);
 
-/// The limit of a sequence whose k-th value belongs to the step h / ratio^k, for errors that go
-/// with h to the powers `exponent`(1), `exponent`(2), ...; of all entries of the extrapolation table
-/// the one with the smallest error. `noise`(k) is the rounding error of the k-th value.
+/// Returns the limit h -> 0 of a sequence whose value k belongs to the step h / ratio^k.
+///
+/// The errors are powers `exponent`(1), `exponent`(2), ... of h; `noise`(k) is the rounding error
+/// of value k. The result is the entry of the extrapolation table with the smallest error.
 ///
 /// C. J. F. Ridders, Accurate computation of F'(x) and F'(x) F''(x), Adv. Eng. Softw. 4 (1982).
 pub(super) fn extrapolate(
@@ -83,14 +84,14 @@ pub(super) fn extrapolate(
     best
 }
 
-/// The components of a function about `value`, by steps from the first down.
+/// The values of a vector function about `value`, for all steps from the first one down.
 struct Samples {
     side: Side,
     /// The function at `value`.
     middle: Vec<f64>,
-    /// What lies between the two points of each step.
+    /// The distance of the two points of each step.
     widths: Vec<f64>,
-    /// Difference quotients, and the difference of the slopes to both sides: component, step.
+    /// Difference quotients, and the difference of the slopes on both sides: component, step.
     slopes: Vec<Vec<f64>>,
     kinks: Vec<Vec<f64>>,
 }
@@ -125,10 +126,11 @@ impl Samples {
         Ok(samples)
     }
 
-    /// The slope of a component whose terms are of the size `magnitude`, which says how it is rounded.
+    /// Returns the slope of a component. `magnitude`, the size of its largest term, determines the
+    /// rounding error.
     ///
-    /// Where both sides can be reached, half of the difference between the slopes to the right and
-    /// to the left counts as an error: at a kink there is no derivative.
+    /// With two sides, half of the difference between the right and the left slope is added to the
+    /// error, because there is no derivative at a kink.
     fn slope(&self, row: usize, magnitude: f64) -> Estimate {
         let noise = |level: usize| f64::EPSILON * magnitude / self.widths[level];
         let exponent = |order| self.side.exponent(order);
@@ -142,15 +144,16 @@ impl Samples {
     }
 }
 
-/// The Jacobian of derivatives and outputs with respect to states and inputs, its errors, and the
-/// first step of each column.
+/// The Jacobian of state derivatives and outputs with respect to states and inputs, its errors, and
+/// the first step of each column.
 pub(super) struct Differences {
     pub(super) jacobian: DMatrix<f64>,
     pub(super) errors: DMatrix<f64>,
     pub(super) steps: Vec<f64>,
 }
 
-/// Differences of `fmi2GetDerivatives` and of the outputs; `scales` are those of the columns.
+/// Differentiates `fmi2GetDerivatives` and the outputs numerically; `scales` are the typical sizes
+/// of the columns.
 pub(super) fn of_equations(
     equations: &mut Equations,
     scales: &[f64],
@@ -163,7 +166,8 @@ pub(super) fn of_equations(
         steps: Vec::with_capacity(n + m),
     };
     let mut columns = Vec::with_capacity(n + m);
-    // A sum is rounded as its largest term is, which the sum itself does not show.
+    // The rounding error of a sum is that of its largest term, which may be much larger than the
+    // sum.
     let mut magnitudes = vec![0.0_f64; rows];
     for (column, scale) in scales.iter().enumerate() {
         let (known, value, part) = if column < n {

@@ -7,9 +7,9 @@ use super::parts::{Parts, State};
 use super::point::row_name;
 use fmu_import::Component;
 
-/// Derivatives of the states' derivatives and of the outputs with respect to states and inputs.
+/// Returns the Jacobian of state derivatives and outputs with respect to states and inputs.
 ///
-/// A row whose variable is itself a state or an input is known without asking.
+/// A row whose variable is itself a state or an input is a unit vector and needs no call.
 pub(super) fn jacobian(
     component: &mut Component,
     parts: &Parts,
@@ -40,7 +40,8 @@ pub(super) fn jacobian(
     Ok(jacobian)
 }
 
-/// Directional derivatives exist for what `Outputs` and `Derivatives` list.
+/// Checks that `Outputs` or `Derivatives` list the variable: only those have directional
+/// derivatives.
 fn listed(
     parts: &Parts,
     states: &[State],

@@ -1,35 +1,36 @@
-//! Why an FMU cannot be linearised as asked.
+//! The errors of a linearisation.
 
 use fmu_import::FmuError;
 use slave::CallError;
 
-/// Why an FMU cannot be linearised as asked.
+/// Why an FMU cannot be linearised.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum LineariseError {
     /// The FMU cannot be instantiated.
     #[error(transparent)]
     Fmu(#[from] FmuError),
-    /// There is no variable of that name.
+    /// The FMU has no variable of this name.
     #[error("{model} has no variable {name:?}{nearest}")]
     UnknownVariable {
         /// `modelName` of the FMU.
         model: String,
-        /// The name.
+        /// The requested name.
         name: String,
         /// Variables of a similar name, as part of a sentence.
         nearest: String,
     },
-    /// The variable cannot have this part.
+    /// The variable cannot play the requested role (state, input or output).
     #[error("{name} is {found}, expected {expected}")]
     Role {
         /// The variable.
         name: String,
-        /// What it is.
+        /// The property of the variable.
         found: String,
-        /// What the part needs.
+        /// The property that the role requires.
         expected: &'static str,
     },
-    /// A variable is named twice in one list.
+    /// A list names a variable twice.
     #[error("{name} is named twice among the {list}")]
     Twice {
         /// The variable.
@@ -37,30 +38,32 @@ pub enum LineariseError {
         /// The list.
         list: &'static str,
     },
-    /// A list that must name something is empty: there is nothing to give a pulse to.
-    #[error("no {list} are named, steps from an FMU state need at least one")]
+    /// A list that needs at least one variable is empty.
+    #[error(
+        "the request names no {list}; linearisation by steps from an FMU state needs at least one"
+    )]
     Empty {
         /// The list.
         list: &'static str,
     },
-    /// A number of the request makes no sense.
+    /// A number of the request is invalid.
     #[error("{what} is {value}, expected {expected}")]
     Number {
-        /// Which one.
+        /// The quantity.
         what: String,
         /// Its value.
         value: f64,
-        /// What it must be.
+        /// The valid range.
         expected: &'static str,
     },
-    /// A text is no value of the variable.
+    /// The text is not a value of the variable's type.
     #[error("{name} = {text:?}: expected {expected}")]
     Value {
         /// The variable.
         name: String,
         /// The text.
         text: String,
-        /// What can be read.
+        /// The expected value.
         expected: String,
     },
     /// The FMU refuses a value.
@@ -73,13 +76,13 @@ pub enum LineariseError {
         /// Function, status and messages.
         source: CallError,
     },
-    /// An event takes a state away from the value asked for.
-    #[error("{name} cannot be held at {wanted}: an event of the FMU makes it {found}")]
+    /// An event changes a state that the operating point prescribes.
+    #[error("{name} cannot be held at {required}: an event of the FMU makes it {found}")]
     Moved {
         /// The state.
         name: String,
-        /// The value asked for.
-        wanted: f64,
+        /// The value of the operating point.
+        required: f64,
         /// The value after the event.
         found: f64,
     },
@@ -94,7 +97,7 @@ pub enum LineariseError {
         "the events at the operating point do not end: {iterations} times fmi2NewDiscreteStates"
     )]
     EndlessEvents {
-        /// Calls made.
+        /// Number of calls.
         iterations: usize,
     },
     /// A value of the FMU is not a number.
@@ -108,91 +111,91 @@ pub enum LineariseError {
     /// The model description contradicts itself.
     #[error("ModelStructure: {text}")]
     Structure {
-        /// What is wrong.
+        /// The contradiction, in a sentence.
         text: String,
     },
-    /// There is no continuous state.
+    /// The FMU has no continuous state.
     #[error("{model} has no continuous states: there is nothing to control")]
     NoStates {
         /// `modelName` of the FMU.
         model: String,
     },
-    /// A state that is left out acts on what is kept.
+    /// A state that is left out influences a remaining state or output.
     #[error("the state {left_out} may not be left out: {kept} depends on it")]
     Coupled {
         /// The state.
         left_out: String,
-        /// What depends on it.
+        /// The state derivative or output that depends on it.
         kept: String,
     },
-    /// The FMU offers none of the three ways.
+    /// The FMU offers none of the three methods.
     #[error(
-        "{model} can be linearised in none of the three ways: it offers no directional derivatives \
-         (providesDirectionalDerivative), no model exchange, and no FMU states to return to \
+        "{model} can be linearised in none of the three ways: it offers neither directional \
+         derivatives (providesDirectionalDerivative), nor model exchange, nor saved FMU states \
          (canGetAndSetFMUstate)"
     )]
     NoWay {
         /// `modelName` of the FMU.
         model: String,
     },
-    /// The states must be named and are not.
+    /// The request must name the states, but does not.
     #[error(
-        "{model} is linearised by steps from an FMU state, its description does not say what its \
-         states are: name the variables that are its states{candidates}"
+        "{model} is linearised by steps from an FMU state, but its description does not list its \
+         states: name the variables that are its states{candidates}"
     )]
     StatesNotNamed {
         /// `modelName` of the FMU.
         model: String,
-        /// Outputs and local variables that can be read, as part of a sentence.
+        /// Candidates: outputs and local variables that can be read, as part of a sentence.
         candidates: String,
     },
-    /// No size of a communication step is known.
+    /// The size of the communication step is unknown.
     #[error("{model} states no stepSize in its DefaultExperiment: give a communication step in s")]
     NoStep {
         /// `modelName` of the FMU.
         model: String,
     },
-    /// Pulses of the inputs do not move all states.
+    /// Pulses of the inputs do not excite all states.
     #[error(
-        "pulses of the inputs reach {rank} of {expected} directions of states and inputs; at a \
-         standstill or not to be told from the others: {}",
+        "pulses of the inputs excite {rank} of {expected} directions of states and inputs; constant \
+         or linearly dependent: {}",
         names.join(", ")
     )]
     Unreachable {
-        /// Directions reached.
+        /// Number of directions excited.
         rank: usize,
-        /// States and inputs.
+        /// Number of states and inputs.
         expected: usize,
-        /// Variables without a direction of their own.
+        /// Variables without an independent direction.
         names: Vec<String>,
     },
-    /// The variables named as states do not determine what comes next.
+    /// The variables named as states do not determine the future of the FMU.
     #[error(
-        "the variables named as states do not say how the FMU goes on: a course of the inputs that \
-         was not used for the fit is missed by {missed:e} of the response, allowed is {allowed:e}; \
-         name all states, take a shorter step, or a point nearer to an equilibrium"
+        "the variables named as states do not determine how the FMU continues: the relative prediction \
+         error for a new input signal is {missed:e}, allowed is {allowed:e}; name all states, take a \
+         shorter step, or a point nearer to an equilibrium"
     )]
     NotStates {
-        /// Largest relative difference.
+        /// Largest relative prediction error.
         missed: f64,
-        /// The largest one allowed.
+        /// Largest allowed relative error.
         allowed: f64,
     },
-    /// The steps tell too little.
+    /// The communication steps do not determine the matrices accurately enough.
     #[error(
-        "steps from an FMU state give the matrices to {relative:e} only, allowed is {allowed}; \
-         take a point nearer to an equilibrium, another step, or an FMU for model exchange"
+        "the matrices from steps of an FMU state have a relative error of {relative:e}, allowed is \
+         {allowed}; take a point nearer to an equilibrium, another step, or an FMU for model exchange"
     )]
     Inaccurate {
         /// The largest relative error.
         relative: f64,
-        /// The largest one allowed.
+        /// The largest allowed relative error.
         allowed: f64,
     },
     /// The step map has no real logarithm.
     #[error(
-        "no continuous system has the steps of {step} s that the FMU makes: their matrix has no \
-         real logarithm; take a shorter step, or the FMU is a sampled system"
+        "no continuous system corresponds to the FMU's steps of {step} s: the step map has no real \
+         logarithm; take a shorter step; a sampled FMU cannot be linearised this way"
     )]
     NoLogarithm {
         /// The communication step in s.

@@ -1,20 +1,20 @@
-//! Least squares with a look at what the data can tell.
+//! Linear least squares with a rank check.
 
 use nalgebra::DMatrix;
 
 /// The least squares solution of X T = Y.
 pub(super) struct Fit {
-    /// T, one row for each column of X.
+    /// T, one row per column of X.
     pub(super) solution: DMatrix<f64>,
-    /// Standard deviation of each entry of T, from what is left of Y.
+    /// Standard deviation of each entry of T, from the residual of Y.
     pub(super) deviations: DMatrix<f64>,
 }
 
-/// How well the columns of X, scaled to length one, can be told apart.
+/// The linear independence of the columns of X, scaled to length one.
 pub(super) struct Directions {
-    /// The smallest diagonal entry of R over the largest, of the QR decomposition with pivoting.
+    /// The smallest diagonal entry of R over the largest, from the QR decomposition with pivoting.
     pub(super) contrast: f64,
-    /// Columns in the order of the pivots: what the last ones add is least.
+    /// Column indices in pivot order: the last columns are the least independent.
     order: Vec<usize>,
     diagonal: Vec<f64>,
 }
@@ -33,26 +33,26 @@ impl Directions {
         Self { contrast, order: order.iter().copied().collect(), diagonal }
     }
 
-    /// The columns that add less than `tolerance` to those before them.
+    /// Returns the columns whose independent part is below `tolerance`.
     pub(super) fn weak(&self, tolerance: f64) -> Vec<usize> {
         let weak = self.order.iter().zip(&self.diagonal).filter(|(_, entry)| **entry < tolerance);
         weak.map(|(&column, _)| column).collect()
     }
 }
 
-/// Columns of length one, and their lengths before; a zero column stays.
+/// Scales the columns to length one; returns also their lengths. A zero column is not changed.
 fn scaled(x: &DMatrix<f64>) -> (DMatrix<f64>, Vec<f64>) {
     let lengths = x.column_iter().map(|column| column.norm());
     let lengths: Vec<f64> = lengths.map(|length| if length > 0.0 { length } else { 1.0 }).collect();
     (DMatrix::from_fn(x.nrows(), x.ncols(), |i, j| x[(i, j)] / lengths[j]), lengths)
 }
 
-/// T with the least norm of X T - Y, by Householder's QR decomposition of X with its columns scaled
-/// to length one; none where X does not have full column rank.
+/// Returns the T with the least norm of X T - Y; `None` if X does not have full column rank.
 ///
-/// `x`: r x c with r > c; `y`: r x k. About 2 r c^2 multiplications.
+/// Method: Householder's QR decomposition of X, its columns scaled to length one. `x`: r x c with r
+/// > c; `y`: r x k. About 2 r c^2 multiplications.
 ///
-/// `noise`: the rounding error of each column of Y; the deviations count it beside what is left of Y.
+/// `noise`: the rounding error of each column of Y, which the standard deviations include.
 pub(super) fn least_squares(x: &DMatrix<f64>, y: &DMatrix<f64>, noise: &[f64]) -> Option<Fit> {
     let (rows, columns) = x.shape();
     let (scaled, lengths) = scaled(x);

@@ -2,14 +2,14 @@
 //!
 //! x' = A (x - `x_0`) + B (u - `u_0`) + F (f - `f_0`) + x'_0, y = `y_0` + C (x - `x_0`) + D (u - `u_0`) + G (f - `f_0`)
 //!
-//! Three ways, the first that the FMU offers:
+//! Three methods; the first one that the FMU offers is used:
 //!
-//! 1. `fmi2GetDirectionalDerivative`, in model exchange rather than in co-simulation. In model
-//!    exchange the answer is compared with the second way.
-//! 2. Model exchange: differences of `fmi2GetDerivatives` and of the outputs in
-//!    continuous-time mode, that is with the discrete states held.
-//! 3. Co-simulation with FMU states: a step map fitted to what small pulses of the inputs do
-//!    from the saved state, and its logarithm. Here the states must be named.
+//! 1. `fmi2GetDirectionalDerivative`, preferably in model exchange, otherwise in co-simulation. In model
+//!    exchange the result is compared with the second method.
+//! 2. Model exchange: finite differences of `fmi2GetDerivatives` and of the outputs in continuous-time
+//!    mode, with constant discrete states.
+//! 3. Co-simulation with FMU states: a step map, fitted to the responses to small pulses of the inputs
+//!    from the saved state, and its logarithm. The request must name the states.
 #![forbid(unsafe_code)]
 
 mod bench;
@@ -32,56 +32,57 @@ use fmu_import::Fmu;
 use fmu_import::Interface;
 use parts::{Part, Parts, State};
 use point::{Equations, all_settable, initialised, read};
-use result::{Findings, How, assemble};
+use result::{MethodResult, RawResult, assemble};
 
-/// What to linearise, and where.
+/// A request: the FMU variables of the linear plant, and its operating point.
 ///
-/// Names are those of the FMU's variables: continuous Reals. The operating point is held as given;
-/// it need not be an equilibrium.
+/// All named variables are continuous Reals. The operating point need not be an equilibrium.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Linearise {
-    /// The inputs by which the plant is controlled, u.
+    /// The control inputs u.
     pub inputs: Vec<String>,
-    /// The inputs that are faults, f; may be empty.
+    /// The inputs that are faults f; may be empty.
     pub faults: Vec<String>,
-    /// The measurements, y: outputs, or local variables where they can be differentiated.
+    /// The measurements y: outputs, or local variables that can be differentiated.
     pub outputs: Vec<String>,
-    /// The states x and their order. Empty: all continuous states in the order of the FMU. Some of
-    /// them: the others are left out, which is an error where something kept depends on one.
+    /// The states x in the requested order. If empty, all continuous states in the order of the
+    /// FMU. States that are not named are left out; it is an error if a remaining state or output
+    /// depends on them.
     pub states: Vec<String>,
-    /// The operating point, variable and value as text: parameters, start values, inputs, and in
-    /// model exchange the continuous states. What is not named has its start value.
+    /// The operating point as names and values: parameters, start values, inputs, and in model
+    /// exchange the continuous states. All other variables have their start values.
     pub at: Vec<(String, String)>,
-    /// Typical sizes of a change in the variable's unit, in place of `nominal`; without both it is
-    /// the value at the operating point, or 1 where that is zero. Steps and errors are relative to
-    /// them.
+    /// Typical sizes of changes, in the unit of the variable. The default is `nominal`, otherwise
+    /// the absolute value at the operating point, or 1 if that is zero. Steps and errors are
+    /// relative to the typical size.
     pub typical: Vec<(String, f64)>,
     /// Time of the operating point in s.
     pub start_time: f64,
-    /// The communication step in s of the third way; without it `stepSize` of the
+    /// The communication step in s of the third method; the default is `stepSize` of the
     /// `DefaultExperiment`.
     pub step: Option<f64>,
 }
 
-/// The matrices of `fmu` about the operating point of `request`.
+/// Returns the matrices of `fmu` about the operating point of `request`.
 ///
-/// The ways are those of this [`crate`]: the first that the FMU offers is taken, and
-/// [`Linearisation::method`] says which.
+/// The [crate documentation](crate) lists the methods. The first one that the FMU offers is used;
+/// [`Linearisation::method`] names it.
 ///
-/// * Directional derivatives: exact as far as the FMU's are. One call per state and input.
-/// * Differences in model exchange: to both sides (to one side at `min` or `max`), eight
-///   steps from 1 % of the typical size down by factors of 4, extrapolated (Ridders 1982). The error
-///   estimate of each entry is that of the extrapolation plus rounding plus half of a jump of the
-///   slope; usually below 1e-9 of the entry.
+/// * Directional derivatives: as exact as those of the FMU. One call per state and input.
+/// * Differences in model exchange: two-sided (one-sided at `min` or `max`), eight steps from 1 % of
+///   the typical size down by factors of 4, extrapolated (Ridders 1982). The error estimate of each
+///   entry is the sum of the extrapolation error, the rounding error and half of a jump of the slope;
+///   usually below 1e-9 of the entry.
 /// * Steps in co-simulation: pulses of each input over 8 to 512 steps, central differences in their
 ///   height, least squares for the step map [Phi, Gamma], its logarithm; for steps of h, 2 h and 4 h,
-///   extrapolated to h = 0. The record is made longer until the errors are small. The map must foretell
-///   another course of the inputs within 1 %. About 60 runs for each input and length. Away from an
-///   equilibrium the FMU drifts while it is tested: the map is then a polynomial of time, and its
-///   value at the begin counts. That serves states on which the inputs act at once; for states
-///   further from the inputs it tells too little and is refused. What the FMU's own integration
-///   errs shows in the error estimates where its inner steps follow the communication step, and is
-///   otherwise part of the plant.
+///   extrapolated to h = 0. The records get longer until the errors are small. The map must predict the
+///   response to another input signal within 1 %. About 60 runs for each input and length.
+///
+///   Away from an equilibrium the FMU drifts during the record. The map is then a polynomial of time,
+///   and its value at the start is used. This works for states on which the inputs act directly; for
+///   other states it is too inaccurate and returns an error. The FMU's integration error appears in the
+///   error estimates if its internal steps follow the communication step; otherwise it is part of the
+///   plant.
 ///
 /// # Example
 ///
@@ -102,8 +103,8 @@ pub struct Linearise {
 ///
 /// # Errors
 ///
-/// [`LineariseError`]: a name or value that does not fit, a refusal of the FMU, or what is missing
-/// for all three ways.
+/// [`LineariseError`] if a name or value is invalid, if a function of the FMU fails, if the FMU offers
+/// none of the three methods, or if the result is not accurate enough.
 pub fn linearise(fmu: &Fmu, request: &Linearise) -> Result<Linearisation, LineariseError> {
     let description = fmu.description();
     let parts = Parts::of(description, request)?;
@@ -127,7 +128,8 @@ pub fn linearise(fmu: &Fmu, request: &Linearise) -> Result<Linearisation, Linear
     Err(LineariseError::NoWay { model: description.model_name.clone() })
 }
 
-/// Model exchange: differences, and directional derivatives where the FMU has them.
+/// Linearises in model exchange: by differences, and by directional derivatives if the FMU has
+/// them.
 fn by_equations(
     fmu: &Fmu,
     parts: &Parts,
@@ -161,18 +163,18 @@ fn by_equations(
             let disagreement = differences.ok().and_then(|differences| {
                 result::disagreement(parts, states, &scales, &jacobian, &differences)
             });
-            (jacobian, How::Derivatives(Interface::ModelExchange, disagreement))
+            (jacobian, MethodResult::Derivatives(Interface::ModelExchange, disagreement))
         }
         (None, differences) => {
             let differences = differences?;
             let columns = with_nominals.iter().chain(&parts.inputs);
             let steps = columns.map(|part| part.name.clone()).zip(differences.steps).collect();
             let how = Differences::OfEquations { steps };
-            (differences.jacobian, How::Differences(how, differences.errors))
+            (differences.jacobian, MethodResult::Differences(how, differences.errors))
         }
     };
     let (x, u) = (equations.x, equations.u);
-    let found = Findings { states: with_nominals, x, u, y: outputs, rates: values, jacobian, how };
+    let found = RawResult { states: with_nominals, x, u, y: outputs, rates: values, jacobian, how };
     assemble(parts, request, found)
 }
 
@@ -181,7 +183,7 @@ fn scales(states: &[Part], x: &[f64], inputs: &[Part], u: &[f64]) -> Vec<f64> {
     pairs.map(|(part, &value)| part.scale(value)).collect()
 }
 
-/// Co-simulation with directional derivatives.
+/// Linearises in co-simulation by directional derivatives.
 fn by_derivatives(
     fmu: &Fmu,
     parts: &Parts,
@@ -194,19 +196,19 @@ fn by_derivatives(
         .iter()
         .map(|state| Part { reference: state.derivative, ..state.part.clone() })
         .collect();
-    let findings = Findings {
+    let findings = RawResult {
         states: states.iter().map(|state| state.part.clone()).collect(),
         x: read(&mut component, states.iter().map(|state| &state.part))?,
         u: read(&mut component, parts.inputs.iter())?,
         y: read(&mut component, parts.outputs.iter())?,
         rates: read(&mut component, rates.iter())?,
         jacobian: directional::jacobian(&mut component, parts, states)?,
-        how: How::Derivatives(Interface::CoSimulation, None),
+        how: MethodResult::Derivatives(Interface::CoSimulation, None),
     };
     assemble(parts, request, findings)
 }
 
-/// Co-simulation with FMU states.
+/// Linearises in co-simulation by communication steps from an FMU state.
 fn by_steps(
     fmu: &Fmu,
     parts: &Parts,
@@ -231,19 +233,19 @@ fn by_steps(
     let found = steps::of_steps(fmu, parts, &states, request, step)?;
     let heights = parts.inputs.iter().map(|part| part.name.clone()).zip(found.heights).collect();
     let how = Differences::OfSteps { step, count: found.count, heights, missed: found.missed };
-    let findings = Findings {
+    let findings = RawResult {
         states,
         x: found.x,
         u: found.u,
         y: found.y,
         rates: found.rates,
         jacobian: found.jacobian,
-        how: How::Differences(how, found.errors),
+        how: MethodResult::Differences(how, found.errors),
     };
     assemble(parts, request, findings)
 }
 
-/// The continuous Reals that may be states, as part of a sentence.
+/// Lists the continuous Reals that may be states, as part of a sentence.
 fn candidates(description: &ModelDescription) -> String {
     let readable = description.variables.iter().filter(|variable| {
         matches!(variable.causality, Causality::Output | Causality::Local)

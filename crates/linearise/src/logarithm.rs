@@ -2,15 +2,15 @@
 
 use nalgebra::DMatrix;
 
-/// Iterations of one square root; about ten are usual.
+/// Maximum number of iterations of one square root; about ten are usual.
 const ITERATIONS: usize = 50;
-/// Square roots taken.
+/// Maximum number of square roots.
 const ROOTS: usize = 60;
 /// The quadrature is exact to double precision up to this 1-norm of E.
 const REACH: f64 = 0.25;
 /// Residual allowed of e^L - (I + E), relative to the norm of I + E.
 const RESIDUAL: f64 = 1e-10;
-/// Positive nodes and weights of Gauss and Legendre of order 8 on [-1, 1].
+/// Positive nodes and weights of the Gauss-Legendre rule of order 8 on [-1, 1].
 const NODES: [(f64, f64); 4] = [
     (0.183_434_642_495_649_8, 0.362_683_783_378_362),
     (0.525_532_409_916_329, 0.313_706_645_877_887_3),
@@ -18,15 +18,17 @@ const NODES: [(f64, f64); 4] = [
     (0.960_289_856_497_536_3, 0.101_228_536_290_376_26),
 ];
 
-/// The principal logarithm L of I + E: e^L = I + E, the eigenvalues of L have imaginary parts
-/// between -pi and pi.
+/// Returns the principal logarithm L of I + E: e^L = I + E, where the eigenvalues of L have
+/// imaginary parts between -pi and pi.
 ///
-/// `e`: n x n, finite. It exists and is real where I + E has no eigenvalue on the closed negative
-/// real axis; none otherwise. Method: inverse scaling and squaring; square roots by the product form
-/// of the Denman-Beavers iteration; then log(I + X) = integral of X (I + t X)^-1 over t from 0 to 1
-/// by the Gauss-Legendre rule of order 8, which is the [8/8] Pade approximant. About 2 n^3
-/// multiplications for each root's iteration, 8 inversions for the rest. A small E keeps its
-/// relative precision. The answer is checked: e^L - (I + E) within 1e-10 of the norm of I + E.
+/// `e`: n x n, finite. The logarithm exists and is real if I + E has no eigenvalue on the closed
+/// negative real axis; otherwise the result is `None`.
+///
+/// Method: inverse scaling and squaring; square roots by the product form of the Denman-Beavers
+/// iteration; then log(I + X) = integral of X (I + t X)^-1 over t from 0 to 1 by the Gauss-Legendre
+/// rule of order 8, which is the [8/8] Pade approximant. About 2 n^3 multiplications per iteration
+/// of a root, then 8 inversions. A small E keeps its relative precision. The result is verified:
+/// e^L - (I + E) is within 1e-10 of the norm of I + E.
 ///
 /// Sources: S. H. Cheng, N. J. Higham, C. S. Kenney, A. J. Laub, Approximating the logarithm of a
 /// matrix to specified accuracy, SIAM J. Matrix Anal. Appl. 22 (2001), (2.2) and section 4; L. Dieci,
@@ -58,7 +60,7 @@ pub(super) fn logarithm_of_one_plus(e: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     (residual <= RESIDUAL).then_some(logarithm)
 }
 
-/// The principal square root, if the iteration converges to one.
+/// Returns the principal square root; `None` if the iteration does not converge.
 fn square_root(a: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = a.nrows();
     let identity = DMatrix::<f64>::identity(n, n);
@@ -79,7 +81,7 @@ fn square_root(a: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     (residual <= RESIDUAL * one_norm(a)).then_some(root)
 }
 
-/// The largest column sum; infinite where an entry is not a number.
+/// Returns the largest column sum; infinite if an entry is NaN.
 fn one_norm(a: &DMatrix<f64>) -> f64 {
     let sums = a.column_iter().map(|column| column.lp_norm(1));
     sums.fold(0.0, |largest, sum| if sum.is_nan() { f64::INFINITY } else { sum.max(largest) })

@@ -1,4 +1,4 @@
-//! Names of the request, resolved: which variable has which part.
+//! Resolves the names of a request to variables and their roles.
 
 use fmu_description::{
     Causality, Initial, Kind, ModelDescription, RealType, ScalarVariable, Variability,
@@ -16,12 +16,13 @@ pub(super) struct Part {
     pub(super) unit: Option<String>,
     pub(super) min: f64,
     pub(super) max: f64,
-    /// The typical size of a change, from the request or `nominal`.
+    /// The typical size of a change, from the request or from `nominal`.
     pub(super) typical: Option<f64>,
 }
 
 impl Part {
-    /// The typical size of a change about `value`: as given, else the value itself, else one.
+    /// Returns the typical size of a change about `value`: `typical`, otherwise |value|, or 1 if
+    /// that is zero.
     pub(super) fn scale(&self, value: f64) -> f64 {
         let own = if value == 0.0 { 1.0 } else { value.abs() };
         self.typical.unwrap_or(own)
@@ -43,16 +44,16 @@ pub(super) struct Setting {
     pub(super) reference: u32,
     pub(super) value: Value,
     pub(super) is_input: bool,
-    /// It may be set as a start value, or is an input.
+    /// Whether the variable is an input or has a start value that may be set.
     pub(super) settable: bool,
 }
 
-/// Everything that the request names.
+/// The resolved variables of a request.
 pub(super) struct Parts<'a> {
     pub(super) description: &'a ModelDescription,
-    /// The controlled inputs, then the faults.
+    /// The control inputs, then the faults.
     pub(super) inputs: Vec<Part>,
-    /// How many of the inputs are controlled.
+    /// Number of control inputs.
     pub(super) controlled: usize,
     pub(super) outputs: Vec<Part>,
     pub(super) settings: Vec<Setting>,
@@ -93,7 +94,7 @@ impl<'a> Parts<'a> {
         })
     }
 
-    /// The continuous states in the order of `Derivatives`.
+    /// Returns the continuous states in the order of `Derivatives`.
     pub(super) fn states(&self, request: &Linearise) -> Result<Vec<State>, LineariseError> {
         let variables = &self.description.variables;
         let at = |index: u32| variables.get((index as usize).checked_sub(1)?);
@@ -116,7 +117,7 @@ impl<'a> Parts<'a> {
         Ok(states)
     }
 
-    /// The variables that the request names as states.
+    /// Returns the variables that the request names as states.
     pub(super) fn named_states(&self, request: &Linearise) -> Result<Vec<Part>, LineariseError> {
         let allowed = [Causality::Output, Causality::Local];
         let named = request.states.iter().map(|name| {
@@ -152,7 +153,7 @@ pub(super) fn find<'a>(
     })
 }
 
-/// The variable as a part, if it is a continuous Real of one of the causalities.
+/// Resolves a continuous Real with one of the allowed causalities.
 fn part(
     description: &ModelDescription,
     request: &Linearise,
@@ -187,7 +188,7 @@ fn part(
     })
 }
 
-/// An attribute of the variable, or else of its declared type.
+/// Returns an attribute of the variable, otherwise the attribute of its declared type.
 fn attribute<T>(
     description: &ModelDescription,
     real: &RealType,

@@ -1,4 +1,4 @@
-//! An instance at the operating point.
+//! An FMU instance at the operating point.
 
 use fmu_description::Experiment;
 use fmu_description::{Causality, DefaultExperiment};
@@ -10,11 +10,11 @@ use fmu_import::{Component, Interface};
 use slave::CallError;
 use slave::Value;
 
-/// Calls of `fmi2NewDiscreteStates` at one event.
+/// Maximum number of calls of `fmi2NewDiscreteStates` per event.
 const EVENT_ITERATIONS: usize = 1000;
 
-/// An instance that has left initialization mode, with the values of the operating point; states
-/// that have no start value are not set yet.
+/// Creates an instance and initialises it with the values of the operating point. States without a
+/// start value are not set yet.
 pub(super) fn initialised(
     fmu: &Fmu,
     interface: Interface,
@@ -55,7 +55,7 @@ fn refused(name: &str, value: &impl ToString, source: CallError) -> LineariseErr
     LineariseError::Refused { name: name.to_owned(), value: value.to_string(), source }
 }
 
-/// Refuses settings that have no way into the FMU but those of `states`.
+/// Returns an error if a setting can neither be set as a start value nor as one of `states`.
 pub(super) fn all_settable(parts: &Parts, states: &[State]) -> Result<(), LineariseError> {
     let is_state = |name: &String| states.iter().any(|state| state.part.name == *name);
     let lost = |setting: &&Setting| !setting.settable && !is_state(&setting.name);
@@ -73,7 +73,7 @@ pub(super) fn all_settable(parts: &Parts, states: &[State]) -> Result<(), Linear
     Err(LineariseError::Role { name: setting.name.clone(), found, expected })
 }
 
-/// Reads Reals; each must be finite.
+/// Reads Reals and checks that they are finite.
 pub(super) fn read<'p>(
     component: &mut Component,
     parts: impl Iterator<Item = &'p Part> + Clone,
@@ -96,7 +96,7 @@ fn finite(name: &str, value: f64) -> Result<f64, LineariseError> {
     Err(LineariseError::NotFinite { name: name.to_owned(), value })
 }
 
-/// What to change about the operating point.
+/// The variable to change about the operating point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Known {
     State(usize),
@@ -112,7 +112,7 @@ pub(super) struct Equations<'p> {
     pub(super) u: Vec<f64>,
     inputs: Vec<u32>,
     outputs: Vec<u32>,
-    /// There is an FMU state to return to.
+    /// Whether the FMU can save and restore its state.
     returns: bool,
 }
 
@@ -133,10 +133,10 @@ impl<'p> Equations<'p> {
             settle(&mut component)?;
             let mut reached = x.clone();
             component.get_continuous_states(&mut reached)?;
-            for (state, (&wanted, &found)) in states.iter().zip(x.iter().zip(&reached)) {
-                if (wanted - found).abs() > 1e-12 * state.part.scale(wanted) {
+            for (state, (&required, &found)) in states.iter().zip(x.iter().zip(&reached)) {
+                if (required - found).abs() > 1e-12 * state.part.scale(required) {
                     let name = state.part.name.clone();
-                    return Err(LineariseError::Moved { name, wanted, found });
+                    return Err(LineariseError::Moved { name, required, found });
                 }
             }
         }
@@ -151,14 +151,15 @@ impl<'p> Equations<'p> {
         Ok(Self { component, parts, states, x, u, inputs, outputs, returns })
     }
 
-    /// `nominal` of each state as the FMU says it now; 1 stands for unknown.
+    /// Returns the current nominal value of each state; 1 if the FMU does not state it.
     pub(super) fn nominals(&mut self) -> Vec<f64> {
         let mut nominals = vec![1.0; self.states.len()];
         let told = self.component.get_nominals(&mut nominals);
         if told.is_err() { vec![1.0; self.states.len()] } else { nominals }
     }
 
-    /// Derivatives and outputs with one known at `value`, all others at the operating point.
+    /// Evaluates derivatives and outputs with one variable at `value` and all others at the
+    /// operating point.
     pub(super) fn evaluate(
         &mut self,
         change: Option<(Known, f64)>,
@@ -201,7 +202,7 @@ impl<'p> Equations<'p> {
     }
 }
 
-/// The name of a row of the Jacobian: the derivative of a state, or an output.
+/// Returns the name of a row of the Jacobian: a state derivative or an output.
 pub(super) fn row_name(states: &[State], parts: &Parts, row: usize) -> String {
     match states.get(row) {
         Some(state) => format!("der({})", state.part.name),
@@ -209,13 +210,13 @@ pub(super) fn row_name(states: &[State], parts: &Parts, row: usize) -> String {
     }
 }
 
-/// Puts the states of the operating point among the values; whether there are any.
+/// Inserts the states of the operating point into `x`; returns whether there are any.
 fn place(parts: &Parts, states: &[State], x: &mut [f64]) -> bool {
     let mut any = false;
     for (state, value) in states.iter().zip(x) {
         let setting = parts.settings.iter().find(|setting| setting.name == state.part.name);
-        if let Some(Value::Real(wanted)) = setting.map(|setting| &setting.value) {
-            *value = *wanted;
+        if let Some(Value::Real(required)) = setting.map(|setting| &setting.value) {
+            *value = *required;
             any = true;
         }
     }
@@ -234,7 +235,7 @@ fn set_states(
     })
 }
 
-/// From event mode to continuous-time mode.
+/// Iterates the event and enters continuous-time mode.
 fn settle(component: &mut Component) -> Result<(), LineariseError> {
     for _ in 0..EVENT_ITERATIONS {
         let info = component.new_discrete_states()?;

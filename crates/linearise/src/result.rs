@@ -1,4 +1,4 @@
-//! What comes out: matrices, the values at the operating point, and how they were found.
+//! The result: matrices, operating point and method.
 
 use std::fmt::{self, Display, Formatter};
 
@@ -9,8 +9,8 @@ use super::point::row_name;
 use super::{Linearise, LineariseError, differences};
 use fmu_import::Interface;
 
-/// The part of a row below which the effect of a state that is left out is rounding.
-const NOTHING: f64 = 1e-12;
+/// Relative size in its row below which an entry counts as rounding error.
+const NEGLIGIBLE: f64 = 1e-12;
 
 /// x' = A x + B u + F f, y = C x + D u + G f, in the units of the variables.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,27 +60,27 @@ pub struct Signal {
     pub typical: f64,
 }
 
-/// How the matrices were found. Its text is a sentence for a report.
+/// The method of a linearisation. `Display` writes a sentence for a report.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Method {
     /// `fmi2GetDirectionalDerivative`.
     DirectionalDerivatives {
-        /// Of an instance for this interface.
+        /// The interface of the instance.
         interface: Interface,
-        /// Where they differ most from differences of the same FMU; none where that was not tested
-        /// or no difference is larger than the error of the differences.
+        /// The largest contradiction to differences of the same FMU; `None` if there was no
+        /// comparison or all contradictions are within the error of the differences.
         disagreement: Option<Disagreement>,
     },
-    /// Differences.
+    /// Finite differences.
     FiniteDifferences {
-        /// Of what.
+        /// The differentiated quantity.
         how: Differences,
         /// Estimated error of each entry.
         errors: Box<Matrices>,
     },
 }
 
-/// What the differences are taken of.
+/// The quantity that finite differences are taken of.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Differences {
     /// `fmi2GetDerivatives` and outputs in model exchange.
@@ -92,28 +92,28 @@ pub enum Differences {
     OfSteps {
         /// The shortest communication step in s.
         step: f64,
-        /// Steps of a run.
+        /// Number of steps of a run.
         count: usize,
-        /// The height of the pulse of each input, in its unit.
+        /// The height of the pulse of each input, in the unit of the input.
         heights: Vec<(String, f64)>,
-        /// The part of the response to a course of the inputs outside of the fit that was missed.
+        /// Relative prediction error for an input signal that the fit did not use.
         missed: f64,
     },
 }
 
-/// An entry for which directional derivatives and differences are not the same.
+/// An entry for which directional derivative and difference quotient disagree.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Disagreement {
-    /// The derivative of what.
+    /// The differentiated quantity.
     pub of: String,
-    /// With respect to what.
+    /// The variable of differentiation.
     pub to: String,
     /// `fmi2GetDirectionalDerivative`.
     pub derivative: f64,
     /// The difference quotient, extrapolated.
     pub difference: f64,
-    /// What lies between them beyond the error, relative to the largest entry of the row in units of
-    /// the typical sizes.
+    /// The disagreement beyond the estimated error, relative to the largest entry of the row in
+    /// units of the typical sizes.
     pub relative: f64,
 }
 
@@ -132,17 +132,17 @@ pub struct Linearisation {
     pub outputs: Vec<Signal>,
     /// x' at the operating point, in the states' units per s; zero at an equilibrium.
     pub rates: Vec<f64>,
-    /// The largest of `rates`, each relative to what changes of typical size contribute to that
-    /// rate: the sum of |`A_ij`| and |`B_ij`|, |`F_ij`| times the typical sizes. Far below one: an
-    /// equilibrium for all that a controller can do.
+    /// The largest of `rates`, each relative to the sum of |`A_ij`|, |`B_ij`| and |`F_ij`| times
+    /// the typical sizes. A value far below one means that the operating point is practically an
+    /// equilibrium.
     pub residual: f64,
     /// How the matrices were found.
     pub method: Method,
 }
 
 impl Linearisation {
-    /// The largest estimated error of an entry, relative to the largest entry of its row in units of
-    /// the typical sizes; none for directional derivatives.
+    /// Returns the largest estimated error of an entry, relative to the largest entry of its row in
+    /// units of the typical sizes; `None` for directional derivatives.
     #[must_use]
     pub fn relative_error(&self) -> Option<f64> {
         let Method::FiniteDifferences { errors, .. } = &self.method else { return None };
@@ -179,14 +179,14 @@ impl Display for Method {
             } => write!(
                 formatter,
                 "finite differences over FMU states in co-simulation: {count} steps of {step} s \
-                 and its multiples, another course of the inputs foretold within {missed:.1e}"
+                 and its multiples, relative prediction error for another input signal {missed:.1e}"
             ),
         }
     }
 }
 
-/// What each way finds, with all states of the FMU.
-pub(super) struct Findings {
+/// The result of one method, with all states of the FMU.
+pub(super) struct RawResult {
     pub(super) states: Vec<Part>,
     pub(super) x: Vec<f64>,
     pub(super) u: Vec<f64>,
@@ -194,32 +194,34 @@ pub(super) struct Findings {
     pub(super) rates: Vec<f64>,
     /// Rows: derivatives of the states, outputs. Columns: states, inputs, faults.
     pub(super) jacobian: DMatrix<f64>,
-    pub(super) how: How,
+    pub(super) how: MethodResult,
 }
 
-/// [`Method`] before the errors are cut into blocks.
-pub(super) enum How {
+/// The method, before the errors are split into blocks.
+pub(super) enum MethodResult {
     Derivatives(Interface, Option<Disagreement>),
     Differences(Differences, DMatrix<f64>),
 }
 
-/// The part of `whole` that `part` is; zero of zero is zero.
+/// Returns `part` / `whole`; 0 / 0 is 0.
 fn ratio(part: f64, whole: f64) -> f64 {
     if part == 0.0 { 0.0 } else { part / whole }
 }
 
-/// The largest entry of a row in units of the typical sizes.
+/// Returns the largest entry of a row in units of the typical sizes.
 fn row_size(jacobian: &DMatrix<f64>, row: usize, scales: &[f64]) -> f64 {
     scales.iter().enumerate().map(|(j, scale)| jacobian[(row, j)].abs() * scale).fold(0.0, f64::max)
 }
 
-/// The largest error relative to the largest entry of its row, in units of the typical sizes.
+/// Returns the largest error relative to the largest entry of its row, in units of the typical
+/// sizes.
 pub(super) fn relative_error(errors: &DMatrix<f64>, values: &DMatrix<f64>, scales: &[f64]) -> f64 {
     let relative = |row| ratio(row_size(errors, row, scales), row_size(values, row, scales));
     (0..values.nrows()).map(relative).fold(0.0, f64::max)
 }
 
-/// Where directional derivatives and differences lie furthest apart, beyond their error.
+/// Returns the largest contradiction between directional derivatives and differences beyond their
+/// error.
 pub(super) fn disagreement(
     parts: &Parts,
     states: &[State],
@@ -251,11 +253,11 @@ pub(super) fn disagreement(
     worst
 }
 
-/// Chooses the states of the request and cuts the Jacobian into its blocks.
+/// Selects the states of the request and splits the Jacobian into its blocks.
 pub(super) fn assemble(
     parts: &Parts,
     request: &Linearise,
-    found: Findings,
+    found: RawResult,
 ) -> Result<Linearisation, LineariseError> {
     let chosen = chosen(parts, request, &found)?;
     let all = found.states.len();
@@ -286,18 +288,17 @@ pub(super) fn assemble(
         inputs,
         faults,
         method: match found.how {
-            How::Derivatives(interface, disagreement) => {
+            MethodResult::Derivatives(interface, disagreement) => {
                 Method::DirectionalDerivatives { interface, disagreement }
             }
-            How::Differences(how, errors) => {
+            MethodResult::Differences(how, errors) => {
                 Method::FiniteDifferences { how, errors: Box::new(blocks(&errors)) }
             }
         },
     })
 }
 
-/// The blocks of a matrix whose first rows and columns belong to `all` states, of which some are
-/// chosen.
+/// Splits a matrix whose first rows and columns belong to `all` states, of which `chosen` are kept.
 fn blocks(m: &DMatrix<f64>, chosen: &[usize], all: usize, parts: &Parts) -> Matrices {
     let rates = m.select_rows(chosen);
     let outputs = m.rows(all, parts.outputs.len()).into_owned();
@@ -312,12 +313,12 @@ fn blocks(m: &DMatrix<f64>, chosen: &[usize], all: usize, parts: &Parts) -> Matr
     }
 }
 
-/// Positions of the states of the request among those found; nothing that is kept depends on one
-/// that is not.
+/// Returns the positions of the requested states. It is an error if a remaining row depends on a
+/// state that is left out.
 fn chosen(
     parts: &Parts,
     request: &Linearise,
-    found: &Findings,
+    found: &RawResult,
 ) -> Result<Vec<usize>, LineariseError> {
     let all = found.states.len();
     if request.states.is_empty() {
@@ -342,11 +343,11 @@ fn chosen(
         let size = row_size(&found.jacobian, row, &scales);
         for left_out in (0..all).filter(|column| !chosen.contains(column)) {
             let error = match &found.how {
-                How::Derivatives(..) => 0.0,
-                How::Differences(_, errors) => errors[(row, left_out)],
+                MethodResult::Derivatives(..) => 0.0,
+                MethodResult::Differences(_, errors) => errors[(row, left_out)],
             };
             let entry = found.jacobian[(row, left_out)].abs();
-            if entry > error && entry * scales[left_out] > NOTHING * size {
+            if entry > error && entry * scales[left_out] > NEGLIGIBLE * size {
                 let kept = match found.states.get(row) {
                     Some(state) => format!("der({})", state.name),
                     None => parts.outputs[row - all].name.clone(),

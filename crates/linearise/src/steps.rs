@@ -1,5 +1,5 @@
-//! The Jacobian from communication steps: pulses of the inputs from a saved FMU state, a step map
-//! fitted to what they do, and its logarithm.
+//! The Jacobian from communication steps: short runs with pulses of the inputs from a saved FMU
+//! state, a step map fitted to the responses, and its logarithm.
 
 use nalgebra::DMatrix;
 
@@ -12,26 +12,26 @@ use super::result::relative_error;
 use super::{Linearise, LineariseError};
 use fmu_import::Fmu;
 
-/// Steps of the record: the first trial at least, and the last.
-const FEWEST: usize = 8;
-const MOST: usize = 512;
-/// Relative error of the answer that is good enough.
-const ENOUGH: f64 = 1e-8;
-/// The largest relative error of an answer.
-const ALLOWED: f64 = 0.1;
+/// Minimum and maximum number of steps of a record.
+const MIN_STEPS: usize = 8;
+const MAX_STEPS: usize = 512;
+/// Relative error at which longer records are no longer tried.
+const SUFFICIENT_ERROR: f64 = 1e-8;
+/// The largest accepted relative error.
+const MAX_ERROR: f64 = 0.1;
 const INACCURATE: LineariseError =
-    LineariseError::Inaccurate { relative: f64::INFINITY, allowed: ALLOWED };
-/// The degree in time of the coefficients where the operating point drifts.
+    LineariseError::Inaccurate { relative: f64::INFINITY, allowed: MAX_ERROR };
+/// Degree in time of the coefficients if the operating point drifts.
 const DEGREE: usize = 2;
-/// The least contrast of the directions that is accepted.
-const LEAST: f64 = 1e-8;
-/// The step map is found for these multiples of the step, and extrapolated to the step zero.
+/// The smallest accepted contrast of the directions.
+const MIN_CONTRAST: f64 = 1e-8;
+/// The step map is determined for these multiples of the step and extrapolated to step zero.
 const MULTIPLES: [f64; 3] = [4.0, 2.0, 1.0];
-/// The part of the response to a new course of the inputs that may be missed.
-const MISSED: f64 = 1e-2;
+/// The largest accepted relative prediction error for an input signal that the fit did not use.
+const MAX_PREDICTION_ERROR: f64 = 1e-2;
 
-/// What the steps tell.
-pub(super) struct Found {
+/// The result of records of one length.
+pub(super) struct RecordResult {
     pub(super) x: Vec<f64>,
     pub(super) u: Vec<f64>,
     pub(super) y: Vec<f64>,
@@ -39,17 +39,17 @@ pub(super) struct Found {
     pub(super) rates: Vec<f64>,
     pub(super) jacobian: DMatrix<f64>,
     pub(super) errors: DMatrix<f64>,
-    /// Steps of the record.
+    /// Number of steps of the record.
     pub(super) count: usize,
-    /// Height of each input's pulse.
+    /// Height of the pulse of each input.
     pub(super) heights: Vec<f64>,
-    /// The part of the response to a new course of the inputs that was missed.
+    /// Relative prediction error for an input signal that the fit did not use.
     pub(super) missed: f64,
-    /// Largest of the errors, relative to its row.
+    /// The largest error relative to its row.
     relative: f64,
 }
 
-/// [A, B, x'; C, D, 0] of one step size, and the standard deviations.
+/// [A, B, x'; C, D, 0] for one step size, and the standard deviations.
 struct Map {
     values: DMatrix<f64>,
     deviations: DMatrix<f64>,
@@ -59,13 +59,14 @@ struct Map {
 struct Discrete {
     change: DMatrix<f64>,
     outputs: DMatrix<f64>,
-    /// What belongs to the powers of time in both; no columns where nothing drifts.
+    /// The coefficients of the powers of time; no columns without drift.
     powers: [DMatrix<f64>; 2],
     deviations: DMatrix<f64>,
 }
 
 impl Discrete {
-    /// `change` or `outputs` times [x; u] at a part of the record.
+    /// Returns `change` (0) or `outputs` (1) times [x; u] at the elapsed fraction `part` of the
+    /// record.
     fn times(&self, which: usize, part: f64, known: &DMatrix<f64>) -> DMatrix<f64> {
         let mut product = [&self.change, &self.outputs][which] * known;
         let (powers, width) = (&self.powers[which], known.nrows());
@@ -78,25 +79,25 @@ impl Discrete {
     }
 }
 
-/// Linearises by steps of `step` s and its multiples, with records of growing length until the
-/// errors are small: a short one sees little of slow states, a long one drifts.
+/// Linearises by steps of `step` s and its multiples. The records get longer until the errors are
+/// small: a short record sees little of slow states, a long one drifts.
 pub(super) fn of_steps(
     fmu: &Fmu,
     parts: &Parts,
     states: &[Part],
     request: &Linearise,
     step: f64,
-) -> Result<Found, LineariseError> {
+) -> Result<RecordResult, LineariseError> {
     let bench = Bench::new(fmu, parts, states, request, step)?;
     let mut benches: Vec<_> =
         MULTIPLES.iter().map(|multiple| bench.with_step(multiple * step)).collect();
-    let mut count = FEWEST.max(2 * (states.len() + 1));
-    let mut best: Option<Found> = None;
+    let mut count = MIN_STEPS.max(2 * (states.len() + 1));
+    let mut best: Option<RecordResult> = None;
     let mut refusal = None;
-    while count <= MOST {
+    while count <= MAX_STEPS {
         match of_count(&mut benches, parts, states, count) {
             Ok(found) if best.as_ref().is_none_or(|known| found.relative < known.relative) => {
-                let enough = found.relative < ENOUGH;
+                let enough = found.relative < SUFFICIENT_ERROR;
                 best = Some(found);
                 if enough {
                     break;
@@ -112,30 +113,30 @@ pub(super) fn of_steps(
     best.ok_or_else(|| refusal.unwrap_or_else(|| unreachable(None, parts, states)))
 }
 
-/// Whether a record of another length may do.
+/// Returns whether a record of another length may succeed.
 fn is_about_length(refusal: &LineariseError) -> bool {
     matches!(refusal, LineariseError::Unreachable { .. })
 }
 
-/// The same by records of `count` steps; the last bench has the shortest step.
+/// Linearises by records of `count` steps; the last bench has the shortest step.
 fn of_count(
     benches: &mut [Bench],
     parts: &Parts,
     states: &[Part],
     count: usize,
-) -> Result<Found, LineariseError> {
+) -> Result<RecordResult, LineariseError> {
     let Some((bench, longer)) = benches.split_last_mut() else {
         return Err(unreachable(None, parts, states));
     };
     let record = bench.record(count)?;
     let directions = Directions::of(&record.before);
-    if directions.contrast < LEAST {
+    if directions.contrast < MIN_CONTRAST {
         return Err(unreachable(Some(directions), parts, states));
     }
     let discrete = fit(&record, parts, states, degree(&record)).ok_or(INACCURATE)?;
-    let missed = missed(bench, &discrete, &record, count)?;
-    if missed.is_nan() || missed > MISSED {
-        return Err(LineariseError::NotStates { missed, allowed: MISSED });
+    let missed = prediction_error(bench, &discrete, &record, count)?;
+    if missed.is_nan() || missed > MAX_PREDICTION_ERROR {
+        return Err(LineariseError::NotStates { missed, allowed: MAX_PREDICTION_ERROR });
     }
     let maps = maps(bench, longer, &record, count, parts, states)?;
     let (values, errors) = at_step_zero(&maps);
@@ -144,10 +145,10 @@ fn of_count(
         (values.columns(0, columns).into_owned(), errors.columns(0, columns).into_owned());
     let scales = super::scales(states, &bench.x, &parts.inputs, &bench.u);
     let relative = relative_error(&errors, &jacobian, &scales);
-    if relative.is_nan() || relative > ALLOWED {
-        return Err(LineariseError::Inaccurate { relative, allowed: ALLOWED });
+    if relative.is_nan() || relative > MAX_ERROR {
+        return Err(LineariseError::Inaccurate { relative, allowed: MAX_ERROR });
     }
-    Ok(Found {
+    Ok(RecordResult {
         rates: (0..n).map(|k| values[(k, columns)]).collect(),
         relative,
         jacobian,
@@ -163,7 +164,7 @@ fn of_count(
 
 fn unreachable(directions: Option<Directions>, parts: &Parts, states: &[Part]) -> LineariseError {
     let names: Vec<&Part> = states.iter().chain(&parts.inputs).collect();
-    let weak = directions.map(|directions| directions.weak(LEAST)).unwrap_or_default();
+    let weak = directions.map(|directions| directions.weak(MIN_CONTRAST)).unwrap_or_default();
     LineariseError::Unreachable {
         rank: names.len() - weak.len(),
         expected: names.len(),
@@ -171,7 +172,8 @@ fn unreachable(directions: Option<Directions>, parts: &Parts, states: &[Part]) -
     }
 }
 
-/// The continuous systems of all step sizes that have one, the shortest last; at least two.
+/// Returns the continuous systems of all step sizes that have one, the shortest step last; at least
+/// two.
 fn maps(
     bench: &Bench,
     longer: &mut [Bench],
@@ -182,7 +184,7 @@ fn maps(
 ) -> Result<Vec<Map>, LineariseError> {
     let mut maps = Vec::new();
     for bench in longer {
-        // A longer step may be too long for the FMU or for a logarithm.
+        // A longer step may be too long for the FMU or for a real logarithm.
         match bench.record(count).map(|record| map(bench, &record, parts, states)) {
             Ok(Some(map)) => maps.push(map),
             _ => maps.clear(),
@@ -196,13 +198,13 @@ fn maps(
     Ok(maps)
 }
 
-/// The degree of the polynomials of time that the coefficients are.
+/// Returns the degree in time of the coefficients.
 fn degree(record: &Record) -> usize {
     if record.drifts { DEGREE } else { 0 }
 }
 
-/// The continuous system of a record; where the operating point drifts, what the last degree of
-/// the polynomials changes counts as an error.
+/// Fits the continuous system to a record. If the operating point drifts, the effect of the last
+/// degree in time is added to the error.
 fn map(bench: &Bench, record: &Record, parts: &Parts, states: &[Part]) -> Option<Map> {
     let of = |degree| continuous(bench, &fit(record, parts, states, degree)?, record);
     let degree = degree(record);
@@ -241,8 +243,8 @@ fn fit(record: &Record, parts: &Parts, states: &[Part], degree: usize) -> Option
     Some(discrete)
 }
 
-/// The system whose exact step the map is: [A, B, x'] = log([Phi, Gamma, g; 0, I]) / h, where g is
-/// the drift over one step; in units of the typical sizes.
+/// Returns the continuous system whose exact step is the map, in units of the typical sizes: [A, B,
+/// x'] = log([Phi, Gamma, g; 0, I]) / h, where g is the drift over one step.
 fn continuous(bench: &Bench, discrete: &Discrete, record: &Record) -> Option<Map> {
     let (n, width) = discrete.change.shape();
     let mut scales: Vec<f64> = (0..n).map(|k| bench.scale(k)).collect();
@@ -267,8 +269,8 @@ fn continuous(bench: &Bench, discrete: &Discrete, record: &Record) -> Option<Map
     Some(Map { values, deviations })
 }
 
-/// Extrapolates each entry to the step zero: an FMU that steps exactly gives the same for every step, one
-/// that integrates with order q errs by the power q of the step.
+/// Extrapolates each entry to step zero. An exact FMU gives the same entry for every step; the
+/// error of an integration method of order q is of order h^q.
 fn at_step_zero(maps: &[Map]) -> (DMatrix<f64>, DMatrix<f64>) {
     let (rows, columns) = maps[0].values.shape();
     let mut values = DMatrix::zeros(rows, columns);
@@ -283,9 +285,9 @@ fn at_step_zero(maps: &[Map]) -> (DMatrix<f64>, DMatrix<f64>) {
     (values, errors)
 }
 
-/// The largest difference between the FMU and the map in their response to all inputs at once, on
-/// and off in the order of Thue and Morse, relative to the response of each reading.
-fn missed(
+/// Returns the largest prediction error of the map, relative to the response of each reading, for
+/// all inputs switched on and off in the Thue-Morse sequence.
+fn prediction_error(
     bench: &mut Bench,
     discrete: &Discrete,
     record: &Record,

@@ -1,54 +1,54 @@
-//! What to couple, as plain data: read from an SSP, a `system.toml` or the command line.
+//! A coupled system as plain data, read from an SSP, a `system.toml` or the command line.
 
 use std::path::{Path, PathBuf};
 
 use crate::function::Function;
 use slave::Transformation;
 
-/// FMUs by name, the connections between them, settings, times.
+/// A coupled system: FMUs with settings, functions, connections, start and stop time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Assembly {
-    /// Name of the system, where it has one.
+    /// Name of the system, if it has one.
     pub name: Option<String>,
     /// The FMUs, in the order in which they are instantiated.
     pub elements: Vec<Element>,
-    /// Functions that are computed between the steps, by name.
+    /// Functions evaluated at communication points, by name.
     pub functions: Vec<(String, Function)>,
     /// The connections.
     pub links: Vec<Link>,
-    /// Start time in s, where it is stated.
+    /// Start time in s, if stated.
     pub start_time: Option<f64>,
-    /// Stop time in s, where it is stated.
+    /// Stop time in s, if stated.
     pub stop_time: Option<f64>,
 }
 
 /// One instance of an FMU.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Element {
-    /// Name of the instance; those of nested systems are joined by dots, `drive.motor`.
+    /// Name of the instance; names of nested systems are joined by dots: `drive.motor`.
     pub name: String,
     /// The archive, or a folder with the unpacked FMU.
     pub fmu: PathBuf,
-    /// Name of the FMU for the user, where `fmu` is an unpacked copy: `system.ssp/resources/m.fmu`.
+    /// Name of the FMU for messages if `fmu` is an unpacked copy: `system.ssp/resources/m.fmu`.
     pub shown: Option<PathBuf>,
-    /// Values before the initialization, in this order; later ones win.
+    /// Values set before the initialization, in this order; later values override earlier ones.
     pub settings: Vec<Setting>,
 }
 
 impl Element {
-    /// The name of the FMU for the user.
+    /// Returns the name of the FMU for messages.
     #[must_use]
     pub fn shown(&self) -> &Path {
         self.shown.as_deref().unwrap_or(&self.fmu)
     }
 }
 
-/// A value for a variable before the initialization.
+/// A value that a variable gets before the initialization.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
     /// Name of the variable in the FMU.
     pub variable: String,
-    /// The value as text; for an enumeration the number or the name of an item.
+    /// The value as text; for an enumeration, the number or the name of an item.
     pub value: String,
 }
 
@@ -74,9 +74,9 @@ pub struct Link {
     pub from: Terminal,
     /// The input.
     pub to: Terminal,
-    /// What becomes of the value on its way.
+    /// The transformation of the value.
     pub transformation: Transformation,
-    /// Units are taken care of by `transformation`, or shall be left alone; otherwise units of the
-    /// two variables that differ are converted.
+    /// Whether unit conversion is complete: `transformation` includes it, or it is suppressed. If
+    /// false, the value is converted between the units of the two variables.
     pub units_settled: bool,
 }

@@ -1,4 +1,4 @@
-//! Units and transformations: what becomes of a value on its way (SSP 1.0.1, section 4.5.2).
+//! Unit conversions and transformations along connections (SSP 1.0.1, section 4.5.2).
 
 use std::borrow::Cow;
 
@@ -8,11 +8,11 @@ use fmu_description::{Kind, ModelDescription, ScalarVariable};
 use super::structure::{Conversion, Definitions, Transformation as Stated, Type};
 use slave::Transformation;
 
-/// Relative difference of factors below which units of one name are the same unit, written with
-/// fewer digits.
+/// Relative difference of factors below which two units of the same name count as equal: one of the
+/// files states fewer digits.
 const SAME_FACTOR: f64 = 1e-6;
 
-/// What is known of the values at a connector.
+/// The unit or enumeration of the values at a connector.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Measure {
     /// The unit: its name and its definition.
@@ -22,7 +22,7 @@ pub(super) struct Measure {
 }
 
 impl Measure {
-    /// Of a type that is stated in a file with these definitions.
+    /// Creates the measure of a type stated in a file with these definitions.
     pub(super) fn stated(kind: Option<&Type>, definitions: &Definitions) -> Self {
         match kind {
             Some(Type::Real(Some(unit))) => Measure::unit(unit, definitions),
@@ -34,13 +34,13 @@ impl Measure {
         }
     }
 
-    /// Of a unit that `definitions` may define.
+    /// Creates the measure of a unit that `definitions` may define.
     pub(super) fn unit(name: &str, definitions: &Definitions) -> Self {
         let base = definitions.units.iter().find(|unit| unit.name == name).map(|unit| unit.base);
         Measure { unit: Some((name.to_owned(), base)), items: None }
     }
 
-    /// Of a variable, by the description of its FMU.
+    /// Creates the measure of a variable from the description of its FMU.
     pub(super) fn of_variable(variable: &ScalarVariable, description: &ModelDescription) -> Self {
         match &variable.kind {
             Kind::Real(real) => {
@@ -51,15 +51,15 @@ impl Measure {
                 Measure { unit, items: None }
             }
             Kind::Enumeration(kind) => {
-                let wanted = kind.declared_type.as_ref();
-                let known = description.types.iter().find(|each| Some(&each.name) == wanted);
+                let declared = kind.declared_type.as_ref();
+                let known = description.types.iter().find(|each| Some(&each.name) == declared);
                 Measure { unit: None, items: known.map(|each| each.items.clone()) }
             }
             _ => Measure::default(),
         }
     }
 
-    /// What is stated here, the rest from `other`.
+    /// Fills missing fields from `other`.
     pub(super) fn or(self, other: Measure) -> Self {
         Measure { unit: self.unit.or(other.unit), items: self.items.or(other.items) }
     }
@@ -69,9 +69,12 @@ impl Measure {
     }
 }
 
-/// Factor and offset from values in `from` to values in `to`: `base = factor * unit + offset` holds
-/// for both. Values without a unit, or with units of one name, are left alone. None where a
-/// definition is missing; a sentence where the units measure different quantities.
+/// Returns factor and offset that convert values from the unit of `from` to the unit of `to`; both
+/// units satisfy `base = factor * unit + offset`.
+///
+/// The result is (1, 0) if one side has no unit, or if both units have the same name and equal
+/// definitions. It is `None` if a definition is missing. It is an error sentence if the units measure
+/// different quantities.
 pub(super) fn between(from: &Measure, to: &Measure) -> Result<Option<(f64, f64)>, String> {
     const SAME: (f64, f64) = (1.0, 0.0);
     let (Some((from_name, from_base)), Some((to_name, to_base))) = (&from.unit, &to.unit) else {
@@ -92,31 +95,35 @@ pub(super) fn between(from: &Measure, to: &Measure) -> Result<Option<(f64, f64)>
     Ok(Some(if same_name && nearly_one { SAME } else { (factor, offset) }))
 }
 
-/// A value on its way: what is known of it, and what has become of it so far.
+/// The composed conversion along a path of connections, and the unit or enumeration at its end.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Way {
+pub(super) struct ConversionChain {
     pub(super) measure: Measure,
     pub(super) transformation: Transformation,
-    /// Conversions that could not be made.
-    pub(super) doubts: Vec<String>,
+    /// Conversions that were skipped, a sentence each.
+    pub(super) warnings: Vec<String>,
 }
 
-impl Way {
-    /// From a place where `measure` holds.
+impl ConversionChain {
+    /// Starts a path at a connector with `measure`.
     pub(super) fn from(measure: Measure) -> Self {
-        Way { measure, ..Way::default() }
+        ConversionChain { measure, ..ConversionChain::default() }
     }
 
-    /// One connection further, to a place of which `there` is known: first the units are converted,
-    /// unless that is suppressed, then the transformation is applied.
-    pub(super) fn over(self, conversion: &Conversion, there: Measure) -> Result<Way, String> {
-        let (mut transformation, mut doubts) = (self.transformation, self.doubts);
+    /// Appends a connection to a connector with the measure `there`: first the unit conversion, unless
+    /// it is suppressed, then the transformation.
+    pub(super) fn append(
+        self,
+        conversion: &Conversion,
+        there: Measure,
+    ) -> Result<ConversionChain, String> {
+        let (mut transformation, mut warnings) = (self.transformation, self.warnings);
         if !conversion.suppress_units {
             match between(&self.measure, &there)? {
                 Some((factor, offset)) => {
                     transformation = then(transformation, linear(factor, offset))?;
                 }
-                None => doubts.push(format!(
+                None => warnings.push(format!(
                     "{} is not converted to {}: a definition is missing",
                     self.measure.name(),
                     there.name()
@@ -128,11 +135,11 @@ impl Way {
             let stated = resolve(stated, &self.measure, &there)?;
             transformation = then(transformation, stated)?;
         }
-        // After a suppressed conversion the old unit says nothing.
+        // After a suppressed conversion the unit of the source is no longer valid.
         let kept = if conversion.suppress_units { None } else { self.measure.unit };
         let items = if stated.is_some() { None } else { self.measure.items };
         let measure = there.or(Measure { unit: kept, items });
-        Ok(Way { measure, transformation, doubts })
+        Ok(ConversionChain { measure, transformation, warnings })
     }
 }
 
@@ -144,7 +151,7 @@ fn linear(factor: f64, offset: f64) -> Transformation {
     }
 }
 
-/// The transformation with the names of items as numbers.
+/// Replaces the names of enumeration items in a transformation by their numbers.
 fn resolve(stated: &Stated, here: &Measure, there: &Measure) -> Result<Transformation, String> {
     Ok(match stated {
         Stated::Linear { factor, offset } => linear(*factor, *offset),
@@ -180,7 +187,7 @@ fn listed<'a>(items: &[&'a str]) -> Cow<'a, str> {
     format!("the enumeration {}", items.join(", ")).into()
 }
 
-/// First `first`, then `second`.
+/// Composes two transformations: `second` after `first`.
 pub(super) fn then(
     first: Transformation,
     second: Transformation,
@@ -207,12 +214,12 @@ pub(super) fn then(
     })
 }
 
-/// The target of `value`; unchanged where there is none.
+/// Returns the target of `value`; `value` itself if it has none.
 fn mapped(pairs: &[(i32, i32)], value: i32) -> i32 {
     pairs.iter().find(|(source, _)| *source == value).map_or(value, |(_, target)| *target)
 }
 
-/// What the units say of a connector whose file states another one than its FMU.
+/// Returns a warning if the file and the FMU state different units for a connector.
 pub(super) fn contradiction(stated: &Measure, own: &Measure) -> Option<String> {
     match between(stated, own) {
         Ok(Some((factor, offset))) if (factor, offset) == (1.0, 0.0) => None,

@@ -1,4 +1,4 @@
-//! Why a system structure cannot be read, put together or written.
+//! The errors of reading, flattening and writing a system structure.
 
 use std::io;
 use std::path::PathBuf;
@@ -6,75 +6,76 @@ use std::path::PathBuf;
 use fmu_description::package::PackageError;
 use fmu_description::{ParseError, Position};
 
-/// What is wrong with an SSP, SSD, SSV, SSM or SSB file.
+/// Why a system structure cannot be read, flattened or written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SspError {
-    /// Not well-formed XML.
+    /// The XML is not well-formed.
     #[error(transparent)]
     Xml(#[from] ParseError),
-    /// Something other than SSP 1.0 has there.
+    /// An element has content that SSP does not allow.
     #[error("{at}: <{element}>: expected {expected}, found {found}")]
     Content {
-        /// Where the element begins.
+        /// Position of the element.
         at: Position,
         /// The element.
         element: String,
-        /// What it must have.
+        /// The allowed content.
         expected: String,
-        /// What it has.
+        /// The content found.
         found: String,
     },
-    /// A statement that is well-formed but cannot be followed.
+    /// The content is valid but contradictory or not supported.
     #[error("{at}: {sentence}")]
     Meaning {
-        /// Where the element begins.
+        /// Position of the element.
         at: Position,
-        /// What is wrong, in a sentence.
+        /// The problem, in a sentence.
         sentence: String,
     },
-    /// The file that the reason belongs to.
+    /// An error in a file.
     #[error("{}: {reason}", file.display())]
     In {
         /// The file.
         file: PathBuf,
-        /// What is wrong in it.
+        /// The error.
         reason: Box<SspError>,
     },
-    /// The file system refused.
+    /// An operation on a file failed.
     #[error("cannot {action} {}", path.display())]
     File {
-        /// What was tried.
+        /// The operation.
         action: &'static str,
-        /// With which file.
+        /// The file.
         path: PathBuf,
-        /// The system's reason.
+        /// The error of the operating system.
         source: io::Error,
     },
-    /// An archive, an SSP or an FMU.
+    /// An archive (SSP or FMU) cannot be read.
     #[error(transparent)]
     Package(Box<PackageError>),
-    /// More than is read.
+    /// The file exceeds a limit of the reader.
     #[error("expected at most {limit} {what}, found more")]
     Limit {
-        /// How many are accepted.
+        /// The limit.
         limit: usize,
-        /// Of what.
+        /// The limited quantity.
         what: &'static str,
     },
-    /// Something is not there, or not as it must be.
+    /// A file, element or variable is missing or unsuitable.
     #[error("{what}: expected {expected}, found {found}")]
     Missing {
         /// The file, element or variable.
         what: String,
-        /// What it must be or have.
+        /// The expected kind or property.
         expected: String,
-        /// What it is or has.
+        /// The kind or property found.
         found: String,
     },
 }
 
 impl SspError {
-    /// This error as one of `file`.
+    /// Adds the name of `file` to an error that has none.
     #[must_use]
     pub fn in_file(self, file: impl Into<PathBuf>) -> Self {
         match self {
@@ -93,7 +94,7 @@ impl From<PackageError> for SspError {
     }
 }
 
-/// A sentence about what stands at `at`.
-pub(super) fn meaning(at: Position, sentence: impl Into<String>) -> SspError {
+/// Returns an error about the element at `at`.
+pub(super) fn semantic_error(at: Position, sentence: impl Into<String>) -> SspError {
     SspError::Meaning { at, sentence: sentence.into() }
 }

@@ -1,33 +1,34 @@
-//! The connections of all systems to links between FMUs (SSP 1.0.1, section 5.3.2).
+//! Flattens the connections of all systems to links between FMUs (SSP 1.0.1, section 5.3.2).
 
 use std::collections::HashMap;
 
 use fmu_description::{Causality, Position};
 
-use super::conversion::{Measure, Way};
-use super::error::{SspError, meaning};
+use super::conversion::{ConversionChain, Measure};
+use super::error::{SspError, semantic_error};
 use super::structure::{Connection, ConnectorKind, Conversion, End, Type};
 use super::tree::{Content, Tree, Vertex};
 use crate::assembly::{Link, Terminal};
 use slave::Transformation;
 
-/// Every connection in the direction of its values, found by where it leads to.
+/// The graph of all connections, directed from source to target and indexed by target.
 pub(super) struct Flow {
     pub(super) edges: Vec<Edge>,
     inbound: HashMap<Vertex, usize>,
 }
 
-/// A connection in the direction of its values.
+/// A connection, directed from source to target.
 pub(super) struct Edge {
     pub(super) from: Vertex,
     pub(super) to: Vertex,
     conversion: Conversion,
-    /// The system it stands in, and where.
+    /// The system that contains the connection.
     system: usize,
+    /// Position in the file of that system.
     at: Position,
 }
 
-/// An end of a connection: its connector, and whether that is one of the system itself.
+/// An end of a connection: its connector, and whether the connector belongs to the system itself.
 struct Side {
     vertex: Vertex,
     kind: ConnectorKind,
@@ -35,7 +36,8 @@ struct Side {
 }
 
 impl Side {
-    fn gives(&self) -> bool {
+    /// Returns whether the connector can be the source of a connection in the system.
+    fn is_source(&self) -> bool {
         use ConnectorKind::{Input, Parameter, StructuralParameter, Unspecified};
         match self.kind {
             Unspecified => true,
@@ -44,7 +46,8 @@ impl Side {
         }
     }
 
-    fn takes(&self) -> bool {
+    /// Returns whether the connector can be the target of a connection in the system.
+    fn is_target(&self) -> bool {
         use ConnectorKind::{CalculatedParameter, Constant, Local, Output, Unspecified};
         match self.kind {
             Unspecified => true,
@@ -53,7 +56,7 @@ impl Side {
         }
     }
 
-    /// How often values at the connector may change: never, before the run, or while it runs.
+    /// Returns how often values at the connector may change: 0 never, 1 before the run, 2 during it.
     fn rate(&self, as_source: bool) -> u32 {
         use ConnectorKind::{
             CalculatedParameter, Constant, Parameter, StructuralParameter, Unspecified,
@@ -66,20 +69,22 @@ impl Side {
         }
     }
 
-    /// The tables of section 5.3.2.1, of SSP 1.0 and 2.0.
-    fn leads_to(&self, other: &Side) -> bool {
+    /// Returns whether a connection from here to `other` is allowed (tables of section 5.3.2.1, SSP 1.0
+    /// and 2.0).
+    fn can_drive(&self, other: &Side) -> bool {
         let both = (self.kind, other.kind) == (ConnectorKind::Inout, ConnectorKind::Inout);
-        self.gives() && other.takes() && !both && self.rate(true) <= other.rate(false)
+        self.is_source() && other.is_target() && !both && self.rate(true) <= other.rate(false)
     }
 
-    fn words(&self) -> String {
+    /// Describes the connector for messages.
+    fn describe(&self) -> String {
         let owner = if self.of_system { "system" } else { "element" };
         format!("{} of the {owner}", self.kind.as_str())
     }
 }
 
 impl Flow {
-    /// Finds the direction of every connection.
+    /// Determines the direction of every connection and builds the graph.
     pub(super) fn new(tree: &Tree, warnings: &mut Vec<String>) -> Result<Self, SspError> {
         let mut flow = Flow { edges: Vec::new(), inbound: HashMap::new() };
         for (system, node) in tree.nodes.iter().enumerate() {
@@ -100,17 +105,17 @@ impl Flow {
     ) -> Result<(), String> {
         let start = side(tree, system, &connection.start, warnings)?;
         let end = side(tree, system, &connection.end, warnings)?;
-        let (source, target) = if start.leads_to(&end) {
+        let (source, target) = if start.can_drive(&end) {
             (start, end)
-        } else if end.leads_to(&start) {
+        } else if end.can_drive(&start) {
             (end, start)
         } else {
             return Err(format!(
                 "{} and {} cannot be connected: one is {}, the other {}",
                 connection.start,
                 connection.end,
-                start.words(),
-                end.words()
+                start.describe(),
+                end.describe()
             ));
         };
         let edge = Edge {
@@ -129,7 +134,7 @@ impl Flow {
         Ok(())
     }
 
-    /// The edges from a source without inbound connections to `target`, in that order.
+    /// Returns the path of edges to `target`, from an FMU or a connector without inbound connection.
     pub(super) fn upstream(&self, tree: &Tree, target: &Vertex) -> Result<Vec<&Edge>, SspError> {
         let mut path = Vec::new();
         let mut vertex = target;
@@ -149,19 +154,23 @@ impl Flow {
         Ok(path)
     }
 
-    /// What becomes of values over `path`.
-    pub(super) fn over(tree: &Tree, path: &[&Edge], start: Measure) -> Result<Way, SspError> {
-        let mut way = Way::from(start);
+    /// Composes the conversions along `path`.
+    pub(super) fn convert_along(
+        tree: &Tree,
+        path: &[&Edge],
+        start: Measure,
+    ) -> Result<ConversionChain, SspError> {
+        let mut chain = ConversionChain::from(start);
         for edge in path {
-            way = way.over(&edge.conversion, tree.measure(&edge.to)).map_err(|sentence| {
+            chain = chain.append(&edge.conversion, tree.measure(&edge.to)).map_err(|sentence| {
                 let (from, to) = (tree.name(&edge.from), tree.name(&edge.to));
                 at(tree, edge.system, edge.at, format!("from {from} to {to}: {sentence}"))
             })?;
         }
-        Ok(way)
+        Ok(chain)
     }
 
-    /// The links between FMUs, in the order of the connections that end at one.
+    /// Returns the links between FMUs, in the order of the connections that end at an FMU.
     pub(super) fn links(
         &self,
         tree: &Tree,
@@ -179,14 +188,15 @@ impl Flow {
                 warnings.push(format!("{input} is connected to {source}, which nothing drives"));
                 continue;
             }
-            let way = Self::over(tree, &path, tree.measure(source))?;
-            check(tree, edge, &way.transformation)?;
+            let chain = Self::convert_along(tree, &path, tree.measure(source))?;
+            check(tree, edge, &chain.transformation)?;
             let (from, to) = (tree.name(source), tree.name(&edge.to));
-            warnings.extend(way.doubts.iter().map(|doubt| format!("from {from} to {to}: {doubt}")));
+            warnings
+                .extend(chain.warnings.iter().map(|text| format!("from {from} to {to}: {text}")));
             links.push(Link {
                 from: terminal(tree, source),
                 to: terminal(tree, &edge.to),
-                transformation: way.transformation,
+                transformation: chain.transformation,
                 units_settled: true,
             });
         }
@@ -194,9 +204,9 @@ impl Flow {
     }
 }
 
-/// The error about what stands at a place in the file of a system.
+/// Returns an error about a position in the file of a system.
 fn at(tree: &Tree, system: usize, at: Position, sentence: impl Into<String>) -> SspError {
-    meaning(at, sentence).in_file(&tree.nodes[system].file.shown)
+    semantic_error(at, sentence).in_file(&tree.nodes[system].file.shown)
 }
 
 fn terminal(tree: &Tree, vertex: &Vertex) -> Terminal {
@@ -204,7 +214,7 @@ fn terminal(tree: &Tree, vertex: &Vertex) -> Terminal {
     Terminal { element, variable: vertex.connector.clone() }
 }
 
-/// Which transformation suits which type, by the variable at the end.
+/// Checks that the transformation suits the type of the target variable.
 fn check(tree: &Tree, edge: &Edge, transformation: &Transformation) -> Result<(), SspError> {
     let expected = match transformation {
         Transformation::Identity => return Ok(()),
@@ -222,7 +232,7 @@ fn check(tree: &Tree, edge: &Edge, transformation: &Transformation) -> Result<()
     Err(at(tree, edge.system, edge.at, sentence))
 }
 
-/// The connector at an end of a connection of `system`.
+/// Resolves an end of a connection in `system`.
 fn side(tree: &Tree, system: usize, end: &End, warnings: &mut Vec<String>) -> Result<Side, String> {
     let node = match &end.element {
         None => system,
@@ -272,7 +282,7 @@ fn side(tree: &Tree, system: usize, end: &End, warnings: &mut Vec<String>) -> Re
     Ok(Side { vertex, kind, of_system })
 }
 
-/// The kind of the connector of a variable of FMI 2.0.
+/// Returns the connector kind of an FMI 2.0 causality.
 pub(super) fn kind_of(causality: Causality) -> Option<ConnectorKind> {
     match causality {
         Causality::Input => Some(ConnectorKind::Input),

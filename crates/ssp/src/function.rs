@@ -1,4 +1,4 @@
-//! Functions between FMUs: sums of connected values, computed between the steps.
+//! Functions between FMUs: sums of connected values, evaluated at every communication point.
 
 use fmu_description::Experiment;
 use fmu_description::{
@@ -8,19 +8,19 @@ use fmu_description::{
 
 use slave::{CallError, Failure, Slave, StepResult};
 
-/// A function of the values on connections.
+/// A function of connected values.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Function {
     /// `out = in[0] + in[1] + ...`, added in this order.
     Sum {
-        /// How many inputs there are.
+        /// Number of inputs.
         inputs: usize,
     },
     /// `out[j] = in[0][j] + in[1][j] + ...` for every component j of vectors.
     VectorSum {
-        /// How many vectors are added.
+        /// Number of vectors.
         inputs: usize,
-        /// How many components a vector has.
+        /// Number of components of each vector.
         dimension: usize,
     },
 }
@@ -33,7 +33,7 @@ impl Function {
         }
     }
 
-    /// Name of the component `component` of the input `input`.
+    /// Returns the name of the component `component` of the input `input`.
     #[must_use]
     pub fn input(&self, input: usize, component: usize) -> String {
         match self {
@@ -42,7 +42,7 @@ impl Function {
         }
     }
 
-    /// Name of the component `component` of the output.
+    /// Returns the name of the component `component` of the output.
     #[must_use]
     pub fn output(&self, component: usize) -> String {
         match self {
@@ -51,14 +51,14 @@ impl Function {
         }
     }
 
-    /// Names of all inputs, vector by vector.
+    /// Returns the names of all inputs, vector by vector.
     pub fn inputs(&self) -> impl Iterator<Item = String> {
         let (inputs, dimension) = self.shape();
         let places = (0..inputs).flat_map(move |input| (0..dimension).map(move |j| (input, j)));
         places.map(|(input, component)| self.input(input, component))
     }
 
-    /// Whether there is an input or an output of this name.
+    /// Returns the causality of the signal `name`; `None` if there is no such signal.
     #[must_use]
     pub fn signal(&self, name: &str) -> Option<Causality> {
         let (_, dimension) = self.shape();
@@ -68,7 +68,7 @@ impl Function {
         self.inputs().any(|input| input == name).then_some(Causality::Input)
     }
 
-    /// The function as a slave.
+    /// Returns the function as a slave.
     #[must_use]
     pub fn slave(&self) -> FunctionSlave {
         let (inputs, dimension) = self.shape();
@@ -81,7 +81,8 @@ impl Function {
         }
     }
 
-    /// The inputs, vector by vector, then the outputs; value references count from 0.
+    /// Returns the model description: the inputs, vector by vector, then the outputs; value
+    /// references count from 0.
     fn description(&self) -> ModelDescription {
         let (inputs, dimension) = self.shape();
         let names = self.inputs().map(|name| (name, Causality::Input));
@@ -136,12 +137,12 @@ fn variable(reference: usize, name: String, causality: Causality) -> ScalarVaria
     }
 }
 
-/// A position as a value reference.
+/// Converts a position to a value reference.
 fn number(position: usize) -> u32 {
     u32::try_from(position).unwrap_or(u32::MAX)
 }
 
-/// The value of an input at the last communication point and its derivatives from there on.
+/// The value of an input at the last communication point and its derivatives there.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Polynomial {
     value: f64,
@@ -149,8 +150,8 @@ struct Polynomial {
     curvature: f64,
 }
 
-/// A [`Function`] in a system. It has no state: its outputs follow from its inputs at any time, and a
-/// step takes the inputs to its end.
+/// A [`Function`] as a slave. It has no state: its outputs are a function of its inputs, and a step
+/// extrapolates the inputs to the end of the step.
 #[derive(Clone, Debug)]
 pub struct FunctionSlave {
     description: ModelDescription,
@@ -160,7 +161,7 @@ pub struct FunctionSlave {
 }
 
 impl FunctionSlave {
-    /// The output with the component `component`.
+    /// Returns the component `component` of the output.
     fn sum(&self, component: usize) -> f64 {
         let inputs = self.inputs.iter().skip(component).step_by(self.dimension);
         // The sum of one value is this value, -0 included.

@@ -1,8 +1,8 @@
 //! System Structure and Parameterization (SSP 1.0.1 and 2.0): SSD, SSV, SSM and SSB files and SSP
-//! archives; and the files `OspSystemStructure.xml` of the Open Simulation Platform.
+//! archives; also `OspSystemStructure.xml` of the Open Simulation Platform.
 //!
-//! [`open`] makes an [`Assembly`] of a file, [`write()`] makes an SSP of an assembly. [`read_ssd`] and
-//! its like only read.
+//! [`open`] loads a system structure as an [`Assembly`]; [`write()`] exports an assembly as an SSP.
+//! [`read_ssd`], [`read_ssv`], [`read_ssm`] and [`read_ssb`] parse single files.
 #![forbid(unsafe_code)]
 
 mod assembly;
@@ -39,57 +39,59 @@ use flatten::Flow;
 use structure::{DefaultExperiment, Type};
 use tree::{Content, Tree, Vertex};
 
-/// A system structure, ready to be coupled.
+/// A loaded system structure with its unpacked FMUs.
 #[derive(Debug)]
 pub struct Opened {
-    /// The FMUs, their settings and their connections. The paths of the FMUs are folders with
-    /// unpacked ones, and hold as long as [`Opened::folders`] lives.
+    /// The FMUs, their settings and their connections. The paths of the FMUs are folders with unpacked
+    /// FMUs, which exist as long as [`Opened::folders`].
     pub assembly: Assembly,
-    /// `DefaultExperiment`; nothing where the file has none.
+    /// `DefaultExperiment`; all fields are `None` if the file has none.
     pub experiment: DefaultExperiment,
-    /// Elements with the step in s that an annotation `osp:StepSizeHint` proposes.
+    /// Elements with the communication step in s that an annotation `osp:StepSizeHint` proposes.
     pub steps: Vec<(String, f64)>,
-    /// Whether the file asks for libcosim's fixed-step algorithm: all FMUs step from the same values,
-    /// inputs are held, and nothing is repeated.
+    /// Whether the file requests libcosim's fixed-step algorithm: all FMUs step from the same values,
+    /// inputs are constant within a step, and no step is repeated.
     pub fixed_step: bool,
-    /// What is odd about the files and does not hinder a run, a sentence each.
+    /// Warnings about the files; none of them prevents a run.
     pub warnings: Vec<String>,
-    /// Removes what was unpacked when it is dropped: libraries must be unloaded before.
+    /// The unpacked files, removed on drop. Unload the libraries of the FMUs before.
     pub folders: Folders,
 }
 
-/// Unpacked archives.
+/// The folders of unpacked archives, removed on drop.
 #[derive(Debug)]
 pub struct Folders {
     _fmus: Vec<Unpacked>,
     _packages: Vec<TemporaryFolder>,
 }
 
-/// Reads the SSP archive at `path`, or an SSD file beside its FMUs, or a folder with a file
-/// `SystemStructure.ssd`; unpacks the FMUs and flattens the systems. A file `.xml`, or a folder with an
-/// `OspSystemStructure.xml` only, is read as one of libcosim, with its functions and variable groups.
+/// Loads the system structure at `path`, unpacks its FMUs and flattens nested systems.
 ///
-/// Nested systems, other SSDs and SSPs become part of the assembly: names are joined by dots, without
-/// that of the root system. Along a connection through systems, units are converted and
-/// transformations applied connection by connection. Parameter bindings of outer systems win over
-/// those of inner ones, later ones over earlier ones.
+/// `path` is an SSP archive, an SSD file, or a folder with a file `SystemStructure.ssd`. A file `.xml`,
+/// or a folder with `OspSystemStructure.xml` and without an SSD, is read in the format of libcosim,
+/// with its functions and variable groups.
+///
+/// Elements of nested systems, other SSDs and SSPs become part of the assembly. Their names are joined
+/// by dots, without the name of the root system. Along a path of connections, units are converted and
+/// transformations applied connection by connection. Parameter bindings of outer systems override
+/// bindings of inner systems, later bindings override earlier ones.
 ///
 /// # Errors
 ///
 /// [`SspError`] with file, line and column.
 pub fn open(path: &Path) -> Result<Opened, SspError> {
     let is_xml = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("xml"));
-    if is_xml || osp::is_folder_with_one(path) {
+    if is_xml || osp::is_osp_folder(path) {
         return osp::open(path);
     }
     open_variant(path, None)
 }
 
-/// As [`open`], with the SSD called `variant` at the root of the SSP.
+/// Loads a system structure like [`open`], but uses the SSD called `variant` at the root of the SSP.
 ///
 /// # Errors
 ///
-/// Those of [`open`].
+/// [`SspError`] with file, line and column, also if there is no such SSD.
 pub fn open_variant(path: &Path, variant: Option<&str>) -> Result<Opened, SspError> {
     let (mut tree, document) = load::load(path, variant)?;
     let mut warnings = std::mem::take(&mut tree.warnings);
@@ -103,7 +105,7 @@ pub fn open_variant(path: &Path, variant: Option<&str>) -> Result<Opened, SspErr
         let Content::Fmu(fmu) = node.content else { continue };
         if !names.insert(node.path.as_str()) {
             let sentence = format!("two components have the hierarchical name {}", node.path);
-            return Err(error::meaning(node.at, sentence).in_file(&node.file.shown));
+            return Err(error::semantic_error(node.at, sentence).in_file(&node.file.shown));
         }
         elements.push(Element {
             name: node.path.clone(),
@@ -121,14 +123,14 @@ pub fn open_variant(path: &Path, variant: Option<&str>) -> Result<Opened, SspErr
         start_time: experiment.start_time,
         stop_time: experiment.stop_time,
     };
-    // What this program writes has the step in the way of libcosim, but asks for no algorithm.
+    // Files of this program state the step as libcosim does, but request no algorithm.
     let is_own = document.structure.generation_tool.as_deref() == Some(write::TOOL);
     let fixed_step = experiment.step_size.is_some() && !is_own;
     let folders = Folders { _fmus: tree.fmus, _packages: tree.folders };
     Ok(Opened { assembly, experiment, steps, fixed_step, warnings, folders })
 }
 
-/// What the connectors of the FMUs say against the FMUs.
+/// Warns about connectors that contradict the variables of their FMUs.
 fn check_connectors(tree: &Tree, warnings: &mut Vec<String>) {
     for (index, node) in tree.nodes.iter().enumerate() {
         let Content::Fmu(_) = node.content else { continue };
@@ -157,7 +159,7 @@ fn check_connectors(tree: &Tree, warnings: &mut Vec<String>) {
     }
 }
 
-/// The name of the element that states a type of FMI 2.0.
+/// Returns the XML element of a type of FMI 2.0; `None` for other types.
 fn element(kind: &Type) -> Option<&'static str> {
     match kind {
         Type::Real(_) => Some("Real"),

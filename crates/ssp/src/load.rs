@@ -1,4 +1,4 @@
-//! Files to a [`Tree`].
+//! Loads a system structure from files into a [`Tree`].
 
 pub(super) mod files;
 
@@ -9,7 +9,7 @@ use std::rc::Rc;
 use fmu_description::Position;
 use fmu_description::package::Unpacked;
 
-use super::error::{SspError, meaning};
+use super::error::{SspError, semantic_error};
 use super::source::{Base, Target};
 use super::structure::{
     Component, Connector, ConnectorKind, Content as Kind, DictionaryReference, DictionarySource,
@@ -18,30 +18,30 @@ use super::structure::{
 use super::tree::{Binding, Content, Document, File, Node, Tree};
 use files::{Files, Finished};
 
-/// Deepest nesting of systems, over all files.
+/// Maximum nesting of systems over all files.
 const DEPTH: usize = 64;
-/// Most elements of all systems together.
+/// Maximum number of elements of all systems.
 const ELEMENTS: usize = 100_000;
-/// Most elements, connectors, connections and parameters of all instances together.
+/// Maximum number of elements, connectors, connections and parameters of all instances.
 const PARTS: usize = 2_000_000;
 
-/// Where a node goes.
+/// The position of a new node in the tree.
 struct Place<'a> {
     parent: Option<usize>,
     path: String,
     depth: usize,
-    /// The bindings of the component that refers to a system, and the file they stand in.
+    /// The bindings of the component that refers to a system, and the file that contains them.
     outer: Option<(&'a [ParameterBinding], &'a Rc<File>)>,
 }
 
-/// Reads the SSD or the SSP at `path` with all that it refers to.
+/// Reads the SSD or the SSP at `path` and all files that it refers to.
 pub(super) fn load(path: &Path, variant: Option<&str>) -> Result<(Tree, Rc<Document>), SspError> {
     let mut loader = Loader::default();
     let document = loader.files.document(&Target {
         path: path.to_owned(),
         shown: path.to_owned(),
         fragment: variant.map(str::to_owned),
-        doubt: None,
+        warning: None,
     })?;
     let place = Place { parent: None, path: String::new(), depth: 0, outer: None };
     loader.system(&document.structure.system, &document, place)?;
@@ -103,7 +103,7 @@ impl Loader {
         let (depth, outer) = (place.depth, place.outer);
         if depth == DEPTH {
             let sentence = format!("systems are nested in each other {DEPTH} times");
-            return Err(meaning(at, sentence).in_file(&file.shown));
+            return Err(semantic_error(at, sentence).in_file(&file.shown));
         }
         let path = place.path.clone();
         let node = self.add(&system.base, place, file)?;
@@ -139,7 +139,7 @@ impl Loader {
         place: Place<'_>,
     ) -> Result<usize, SspError> {
         let (file, at) = (&document.file, component.base.at.0);
-        let here = |sentence: String| meaning(at, sentence).in_file(&file.shown);
+        let here = |sentence: String| semantic_error(at, sentence).in_file(&file.shown);
         let place = Place { outer: Some((&component.base.bindings, file)), ..place };
         if let Some(id) = component.source.strip_prefix('#') {
             let system = with_id(&document.structure.system, id);
@@ -153,8 +153,8 @@ impl Loader {
             return self.add(&component.base, place, file);
         }
         let target = file.base.resolve(&component.source).map_err(here)?;
-        if let Some(doubt) = &target.doubt {
-            self.files.warnings.push(here(format!("{}: {doubt}", place.path)).to_string());
+        if let Some(warning) = &target.warning {
+            self.files.warnings.push(here(format!("{}: {warning}", place.path)).to_string());
         }
         if component.content == Kind::Fmu {
             return self.fmu(component, &target, file, place);
@@ -177,7 +177,7 @@ impl Loader {
     ) -> Result<usize, SspError> {
         let here = |sentence: &str| {
             let sentence = format!("{}: {sentence}", component.base.name);
-            meaning(component.base.at.0, sentence).in_file(&file.shown)
+            semantic_error(component.base.at.0, sentence).in_file(&file.shown)
         };
         let index = self.files.fmu(target)?;
         let fmu = &self.files.fmus[index];
@@ -203,7 +203,7 @@ impl Loader {
         file: &Rc<File>,
         system: usize,
     ) -> Result<usize, SspError> {
-        let here = |sentence| meaning(source.at.0, sentence).in_file(&file.shown);
+        let here = |sentence| semantic_error(source.at.0, sentence).in_file(&file.shown);
         let (dictionary, shown) =
             self.files.dictionary(&source.content, file).map_err(|error| error.or(here))?;
         let connectors = dictionary.entries.iter().map(|(name, kind)| Connector {
@@ -227,7 +227,7 @@ impl Loader {
         Ok(node)
     }
 
-    /// A dictionary is looked up in the system around the reference, then further out.
+    /// Resolves a reference: searches the dictionary in the surrounding system, then further out.
     fn reference(
         &mut self,
         reference: &DictionaryReference,
@@ -238,7 +238,7 @@ impl Loader {
         let found = loop {
             let Some(index) = system else {
                 let sentence = format!("no signal dictionary {:?}", reference.dictionary);
-                return Err(meaning(reference.base.at.0, sentence).in_file(&file.shown));
+                return Err(semantic_error(reference.base.at.0, sentence).in_file(&file.shown));
             };
             let node = &self.tree.nodes[index];
             if let Some(found) = node.dictionaries.get(&reference.dictionary) {
@@ -251,7 +251,7 @@ impl Loader {
         Ok(node)
     }
 
-    /// Bindings with the files they name; `component` is the base of those in the component.
+    /// Loads the files of the bindings; `component` is the base of URIs relative to the component.
     fn bindings(
         &mut self,
         bindings: &[ParameterBinding],
@@ -260,7 +260,8 @@ impl Loader {
     ) -> Result<Vec<Binding>, SspError> {
         let mut loaded = Vec::new();
         for binding in bindings {
-            let here = |sentence: String| meaning(binding.at.0, sentence).in_file(&file.shown);
+            let here =
+                |sentence: String| semantic_error(binding.at.0, sentence).in_file(&file.shown);
             let values = self.files.values(&binding.values, file, component);
             let values = values.map_err(|error| error.or(here))?;
             let mapping = binding.mapping.as_ref();
@@ -275,7 +276,7 @@ impl Loader {
     }
 }
 
-/// Why the FMU cannot run here, a sentence; it is known before the library is loaded.
+/// Returns an error sentence if the FMU cannot run here, before its library is loaded.
 pub(super) fn check_runnable(fmu: &Unpacked) -> Result<(), String> {
     let Some(flags) = &fmu.description.co_simulation else {
         return Err(
@@ -285,7 +286,7 @@ pub(super) fn check_runnable(fmu: &Unpacked) -> Result<(), String> {
     fmu.library(&flags.model_identifier).map(|_| ()).map_err(|error| error.to_string())
 }
 
-/// The system with that `id`, at any depth.
+/// Returns the system with the identifier `id` at any depth.
 fn with_id<'a>(system: &'a System, id: &str) -> Option<&'a System> {
     if system.base.id.as_deref() == Some(id) {
         return Some(system);

@@ -1,4 +1,4 @@
-//! `OspSystemStructure.xml`, the system structure of the Open Simulation Platform (libcosim).
+//! Reads `OspSystemStructure.xml`, the system structure of the Open Simulation Platform (libcosim).
 
 mod document;
 mod groups;
@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use fmu_description::{Causality, ModelDescription, Position};
 
-use super::error::{SspError, meaning};
+use super::error::{SspError, semantic_error};
 use super::load::check_runnable;
 use super::load::files::{Files, Finished};
 use super::source::{Base, Target};
@@ -19,25 +19,25 @@ use document::{Connection, Document, End, Kind, Simulator};
 use groups::Group;
 use slave::Transformation;
 
-/// Name of the file in a folder.
+/// File name in a folder.
 const DEFAULT: &str = "OspSystemStructure.xml";
-/// The unit of time of libcosim in s: steps are whole multiples of it.
+/// The resolution of time in libcosim in s; steps are multiples of it.
 const TICK: f64 = 1e-9;
 
-/// Whether `path` is a folder with such a file, and without an SSD.
-pub(super) fn is_folder_with_one(path: &Path) -> bool {
+/// Returns whether `path` is a folder with this file and without an SSD.
+pub(super) fn is_osp_folder(path: &Path) -> bool {
     path.join(DEFAULT).is_file() && !path.join("SystemStructure.ssd").is_file()
 }
 
-/// Reads the file at `path`, or the one in the folder `path`, with the FMUs that it names.
+/// Reads the file at `path`, or the file in the folder `path`, and the FMUs that it refers to.
 pub(super) fn open(path: &Path) -> Result<Opened, SspError> {
     let path = if path.is_dir() { path.join(DEFAULT) } else { path.to_owned() };
     let outside = Base { folder: PathBuf::new(), shown: PathBuf::new(), archive: None };
     let target = Target::new(path.clone(), path.clone());
-    let mut opening = Opening { base: outside.below(&target), ..Opening::default() };
-    let document = opening.files.read(&target, document::read)?;
-    opening.add(&document).map_err(|error| error.in_file(&path))?;
-    let Opening { files, assembly, steps, .. } = opening;
+    let mut loader = Loader { base: outside.below(&target), ..Loader::default() };
+    let document = loader.files.read(&target, document::read)?;
+    loader.add(&document).map_err(|error| error.in_file(&path))?;
+    let Loader { files, assembly, steps, .. } = loader;
     let Finished { fmus, folders, warnings, .. } = files.finish();
     let experiment = DefaultExperiment {
         start_time: document.start,
@@ -48,16 +48,16 @@ pub(super) fn open(path: &Path) -> Result<Opened, SspError> {
     Ok(Opened { assembly, experiment, steps, fixed_step: true, warnings, folders })
 }
 
-/// A file on its way to an assembly.
+/// A file during its conversion to an assembly.
 #[derive(Default)]
-struct Opening {
+struct Loader {
     base: Base,
     files: Files,
     assembly: Assembly,
     steps: Vec<(String, f64)>,
-    /// Index of the FMU of each simulator among those of `files`, and the groups of its variables.
+    /// Index of each simulator's FMU in `files`, and the groups of its variables.
     simulators: HashMap<String, (usize, Vec<Group>)>,
-    /// Each linear transformation: factor, offset, its source and its targets.
+    /// The linear transformations by name.
     linear: Vec<(String, Linear)>,
 }
 
@@ -69,7 +69,7 @@ struct Linear {
     targets: Vec<Terminal>,
 }
 
-impl Opening {
+impl Loader {
     fn add(&mut self, document: &Document) -> Result<(), SspError> {
         for simulator in &document.simulators {
             self.simulator(simulator, document.step)?;
@@ -85,7 +85,8 @@ impl Opening {
             }
         }
         for connection in &document.connections {
-            self.connection(connection).map_err(|sentence| meaning(connection.at, sentence))?;
+            self.connection(connection)
+                .map_err(|sentence| semantic_error(connection.at, sentence))?;
         }
         self.finish_functions();
         let (start, stop) = (document.start, document.stop);
@@ -95,10 +96,10 @@ impl Opening {
 
     fn simulator(&mut self, simulator: &Simulator, step: f64) -> Result<(), SspError> {
         let Simulator { name, at, .. } = simulator;
-        let here = |sentence: String| meaning(*at, format!("{name}: {sentence}"));
+        let here = |sentence: String| semantic_error(*at, format!("{name}: {sentence}"));
         let target = self.base.resolve(&simulator.source).map_err(here)?;
-        if let Some(doubt) = &target.doubt {
-            self.files.warnings.push(format!("{at}: {name}: {doubt}"));
+        if let Some(warning) = &target.warning {
+            self.files.warnings.push(format!("{at}: {name}: {warning}"));
         }
         let index = self.files.fmu(&target)?;
         let fmu = &self.files.fmus[index];
@@ -113,14 +114,14 @@ impl Opening {
         let model = fmu.description.model_name.clone();
         let groups = self.groups(&target, &model)?;
         if self.simulators.insert(name.clone(), (index, groups)).is_some() {
-            return Err(meaning(*at, format!("two simulators are called {name}")));
+            return Err(semantic_error(*at, format!("two simulators are called {name}")));
         }
         self.step(simulator, step, *at);
         Ok(())
     }
 
-    /// The step of a simulator: as in libcosim the largest multiple of the base step that is not
-    /// longer than what is stated.
+    /// Determines the step of a simulator. As in libcosim it is the largest multiple of the base
+    /// step that does not exceed the stated step.
     fn step(&mut self, simulator: &Simulator, base: f64, at: Position) {
         let Some(stated) = simulator.step_size.filter(|stated| *stated > 0.0) else { return };
         let ticks = |time: f64| (time / TICK).round();
@@ -136,7 +137,8 @@ impl Opening {
         self.steps.push((simulator.name.clone(), step));
     }
 
-    /// The variable groups of an FMU: of a file beside it, or beside the system structure.
+    /// Returns the variable groups of an FMU, from a file beside the FMU or beside the system
+    /// structure.
     fn groups(&mut self, fmu: &Target, model: &str) -> Result<Vec<Group>, SspError> {
         let name = format!("{model}_OspModelDescription.xml");
         let beside = [self.base.below(fmu), self.base.clone()];
@@ -176,7 +178,7 @@ impl Opening {
         })
     }
 
-    /// The components of a group of signals, `in[0]` or `out`, with the variables of a group.
+    /// Pairs the components of a group of signals, `in[0]` or `out`, with the variables of a group.
     fn signals(&self, signals: &End, variables: &End) -> Result<Vec<[End; 2]>, String> {
         let group = self.group(variables)?;
         let components = (0..group.variables.len()).map(|k| {
@@ -195,13 +197,13 @@ impl Opening {
         self.known(simulator).map(|(index, _)| &self.files.fmus[*index].description)
     }
 
-    /// Connects two variables, or a variable and a signal, in the direction of the values.
+    /// Connects two variables, or a variable and a signal, from output to input.
     fn join(&mut self, first: &End, second: &End) -> Result<(), String> {
-        let (source, target) = match (self.gives(first)?, self.gives(second)?) {
+        let (source, target) = match (self.is_source(first)?, self.is_source(second)?) {
             (true, false) => (first, second),
             (false, true) => (second, first),
-            (gives, _) => {
-                let role = if gives { "outputs" } else { "inputs" };
+            (is_source, _) => {
+                let role = if is_source { "outputs" } else { "inputs" };
                 return Err(format!("{first} and {second} are both {role}"));
             }
         };
@@ -220,15 +222,15 @@ impl Opening {
         Ok(())
     }
 
-    /// libcosim converts no units.
+    /// Adds a connection without unit conversion, as in libcosim.
     fn link(&mut self, from: Terminal, to: Terminal, transformation: Transformation) {
         self.assembly.links.push(Link { from, to, transformation, units_settled: true });
     }
 
-    /// Whether values come from this end of a connection.
-    fn gives(&self, end: &End) -> Result<bool, String> {
+    /// Returns whether this end of a connection is the source.
+    fn is_source(&self, end: &End) -> Result<bool, String> {
         if end.is_signal {
-            return self.signal_gives(end);
+            return self.signal_is_source(end);
         }
         let variable = self.description(&end.owner)?.variable(&end.name);
         let variable = variable.ok_or_else(|| format!("the FMU has no variable {end}"))?;
@@ -236,7 +238,7 @@ impl Opening {
         Ok(matches!(causality, Causality::Output | Causality::CalculatedParameter))
     }
 
-    fn signal_gives(&self, end: &End) -> Result<bool, String> {
+    fn signal_is_source(&self, end: &End) -> Result<bool, String> {
         let unknown = |names: &str| format!("{end} is no signal of the function, expected {names}");
         if self.linear.iter().any(|(name, _)| *name == end.owner) {
             return match end.name.as_str() {
@@ -254,7 +256,8 @@ impl Opening {
         Ok(causality == Causality::Output)
     }
 
-    /// Makes links of linear transformations, and names what the functions lack.
+    /// Converts linear transformations to connections, and warns about unconnected signals of
+    /// functions.
     fn finish_functions(&mut self) {
         for (name, linear) in std::mem::take(&mut self.linear) {
             let Linear { factor, offset, source, targets } = linear;
@@ -288,7 +291,7 @@ impl Opening {
 }
 
 impl End {
-    /// Another variable or signal of the same owner.
+    /// Returns another variable or signal of the same owner.
     fn named(&self, name: &str) -> End {
         End { name: name.to_owned(), ..self.clone() }
     }

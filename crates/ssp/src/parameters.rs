@@ -1,4 +1,5 @@
-//! Parameter bindings to settings of FMUs (SSP 1.0.1, sections 5.2.3, 6 and 7).
+//! Applies parameter bindings: converts them to settings of FMUs (SSP 1.0.1, sections 5.2.3, 6 and
+//! 7).
 
 mod value;
 
@@ -6,60 +7,66 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use fmu_description::{Causality, Initial, Kind, ScalarVariable, Variability};
 
-use super::error::{SspError, meaning};
+use super::error::{SspError, semantic_error};
 use super::flatten::Flow;
 use super::structure::{ConnectorKind, MappingEntry, Parameter, ParameterSet};
 use super::tree::{Binding, Content, Tree, Vertex};
 use crate::assembly::Setting;
 use value::Value;
 
-/// Names of a binding that match nothing and are still named in a warning.
+/// Maximum number of names in a warning about unmatched names.
 const NAMED: usize = 5;
 
-/// Settings of each FMU by the index of its node.
+/// Settings of each FMU, by the index of its node.
 pub(super) type Settings = BTreeMap<usize, Vec<Setting>>;
 
-/// Applies all bindings: those of inner elements first, so that those of outer ones win.
+/// Applies all bindings, inner elements first, so that outer bindings override inner ones.
 pub(super) fn settings(
     tree: &Tree,
     flow: &Flow,
     warnings: &mut Vec<String>,
 ) -> Result<Settings, SspError> {
-    let mut applied =
-        Applied { tree, below: below(flow), flow, settings: Settings::new(), warnings };
-    // A system stands before all that is in it; its dictionaries and elements in their order.
+    let mut binder = Binder {
+        tree,
+        targets: targets_by_source(flow),
+        flow,
+        settings: Settings::new(),
+        warnings,
+    };
+    // The tree lists a system before its content; the sort is stable.
     let mut order: Vec<usize> = (0..tree.nodes.len()).collect();
     order.sort_by_cached_key(|node| std::cmp::Reverse(depth(tree, *node)));
     for node in order {
         for binding in &tree.nodes[node].bindings {
-            applied.bind(node, binding).map_err(|error| error.in_file(&binding.file.shown))?;
+            binder.bind(node, binding).map_err(|error| error.in_file(&binding.file.shown))?;
         }
     }
-    Ok(applied.settings)
+    Ok(binder.settings)
 }
 
 fn depth(tree: &Tree, node: usize) -> usize {
     std::iter::successors(Some(node), |node| tree.nodes[*node].parent).count()
 }
 
-/// Edges by where they begin.
-fn below(flow: &Flow) -> HashMap<&Vertex, Vec<&Vertex>> {
-    let mut below: HashMap<&Vertex, Vec<&Vertex>> = HashMap::new();
+/// Returns the targets of all edges, by source.
+fn targets_by_source(flow: &Flow) -> HashMap<&Vertex, Vec<&Vertex>> {
+    let mut targets: HashMap<&Vertex, Vec<&Vertex>> = HashMap::new();
     for edge in &flow.edges {
-        below.entry(&edge.from).or_default().push(&edge.to);
+        targets.entry(&edge.from).or_default().push(&edge.to);
     }
-    below
+    targets
 }
 
-struct Applied<'a> {
+/// The state of the application of bindings.
+struct Binder<'a> {
     tree: &'a Tree,
     flow: &'a Flow,
-    below: HashMap<&'a Vertex, Vec<&'a Vertex>>,
+    targets: HashMap<&'a Vertex, Vec<&'a Vertex>>,
     settings: Settings,
     warnings: &'a mut Vec<String>,
 }
 
-impl Applied<'_> {
+impl Binder<'_> {
     fn bind(&mut self, node: usize, binding: &Binding) -> Result<(), SspError> {
         let mut unmatched = Vec::new();
         let values = &binding.values;
@@ -94,7 +101,7 @@ impl Applied<'_> {
         Ok(())
     }
 
-    /// Names that occur twice with different values; the last one counts.
+    /// Warns about names that occur twice with different values; the last value counts.
     fn warn_repeated(&mut self, values: &ParameterSet) {
         let mut known: HashMap<&str, &Parameter> = HashMap::new();
         let mut repeated = BTreeSet::new();
@@ -136,7 +143,7 @@ impl Applied<'_> {
         self.warnings.push(format!("parameter set {set:?}: {owner} has no {names}{more}: ignored"));
     }
 
-    /// One parameter to every variable that its name means.
+    /// Applies one parameter to every variable that the target name matches.
     fn apply(
         &mut self,
         node: usize,
@@ -152,35 +159,38 @@ impl Applied<'_> {
         for target in targets {
             let wrong = |sentence| {
                 let name = self.tree.name(&target);
-                meaning(binding.at, format!("parameter {} for {name}: {sentence}", parameter.name))
+                semantic_error(
+                    binding.at,
+                    format!("parameter {} for {name}: {sentence}", parameter.name),
+                )
             };
             let measure = self.tree.measure(&target);
             let value = Value::of(parameter, &binding.values.definitions);
-            let (value, doubts) = value.converted(&entry.conversion, measure).map_err(wrong)?;
+            let (value, warnings) = value.convert(&entry.conversion, measure).map_err(wrong)?;
             let name = self.tree.name(&target);
-            self.warnings.extend(doubts.iter().map(|doubt| format!("setting of {name}: {doubt}")));
+            self.warnings.extend(warnings.iter().map(|text| format!("setting of {name}: {text}")));
             self.set(&target, &value).map_err(wrong)?;
         }
         Ok(())
     }
 
-    /// Sets an FMU's variable, or what is connected to a system's connector.
+    /// Sets a variable of an FMU, or the variables connected to a system's connector.
     fn set(&mut self, target: &Vertex, value: &Value) -> Result<(), String> {
         if matches!(self.tree.nodes[target.node].content, Content::Fmu(_)) {
             return self.set_variable(target, value);
         }
         let kind = self.tree.connector(target.node, &target.connector).map(|each| each.kind);
-        let gives = matches!(kind, Some(ConnectorKind::Input | ConnectorKind::Parameter));
-        if gives { self.set_downstream(target, value) } else { self.set_upstream(target, value) }
+        let is_input = matches!(kind, Some(ConnectorKind::Input | ConnectorKind::Parameter));
+        if is_input { self.set_downstream(target, value) } else { self.set_upstream(target, value) }
     }
 
-    /// All variables that the connector leads to.
+    /// Sets all variables that the connector drives.
     fn set_downstream(&mut self, target: &Vertex, value: &Value) -> Result<(), String> {
         let mut waiting = vec![target];
         let mut steps = self.flow.edges.len();
         let mut ends = Vec::new();
         while let Some(vertex) = waiting.pop() {
-            for next in self.below.get(vertex).into_iter().flatten() {
+            for next in self.targets.get(vertex).into_iter().flatten() {
                 steps = steps.checked_sub(1).ok_or("a ring of connections")?;
                 match self.tree.nodes[next.node].content {
                     Content::Fmu(_) => ends.push((*next).clone()),
@@ -191,27 +201,28 @@ impl Applied<'_> {
         ends.sort_unstable();
         for end in ends {
             let path = self.flow.upstream(self.tree, &end).map_err(|error| error.to_string())?;
-            // The source may lie further up than the connector that is set.
-            let begin = path.iter().position(|edge| edge.from == *target).unwrap_or(0);
+            // The source may be upstream of the connector that is set.
+            let start = path.iter().position(|edge| edge.from == *target).unwrap_or(0);
             let measure = self.tree.measure(target).or(value.measure().clone());
-            let way = Flow::over(self.tree, &path[begin..], measure);
-            let way = way.map_err(|error| error.to_string())?;
-            let number = value.number.transformed(&way.transformation)?;
-            self.set_variable(&end, &Value::new(number, way.measure))?;
+            let chain = Flow::convert_along(self.tree, &path[start..], measure);
+            let chain = chain.map_err(|error| error.to_string())?;
+            let number = value.number.transformed(&chain.transformation)?;
+            self.set_variable(&end, &Value::new(number, chain.measure))?;
         }
         Ok(())
     }
 
-    /// The output that the connector shows; its start value is what the connector shall show.
+    /// Sets the start value of the output that drives the connector, so that the connector gets
+    /// `value`.
     fn set_upstream(&mut self, target: &Vertex, value: &Value) -> Result<(), String> {
         let path = self.flow.upstream(self.tree, target).map_err(|error| error.to_string())?;
         let is_fmu =
             |vertex: &Vertex| matches!(self.tree.nodes[vertex.node].content, Content::Fmu(_));
         let Some(first) = path.first().filter(|first| is_fmu(&first.from)) else { return Ok(()) };
         let measure = self.tree.measure(&first.from);
-        let way =
-            Flow::over(self.tree, &path, measure.clone()).map_err(|error| error.to_string())?;
-        let number = value.number.before(&way.transformation)?;
+        let chain = Flow::convert_along(self.tree, &path, measure.clone())
+            .map_err(|error| error.to_string())?;
+        let number = value.number.inverted(&chain.transformation)?;
         self.set_variable(&first.from.clone(), &Value::new(number, measure))
     }
 
@@ -240,7 +251,7 @@ impl Applied<'_> {
     }
 }
 
-/// All variables and connectors of `node` that `name` means: hierarchical names need not be unique.
+/// Finds all connectors of `node` with the hierarchical name `name`, which need not be unique.
 fn find(tree: &Tree, node: usize, name: &str, found: &mut Vec<Vertex>) {
     let here = &tree.nodes[node];
     match here.content {
@@ -264,7 +275,8 @@ fn find(tree: &Tree, node: usize, name: &str, found: &mut Vec<Vertex>) {
     }
 }
 
-/// Whether a value before the initialization is legal: an input, or one that has a start value.
+/// Returns whether a variable may be set before the initialization: an input, or a variable with a
+/// start value.
 fn settable(variable: &ScalarVariable) -> bool {
     let has_start = match &variable.kind {
         Kind::Real(real) => real.start.is_some(),

@@ -1,4 +1,4 @@
-//! XML to the plain data of [`super::structure`]. Nothing here opens a file.
+//! Parses XML into the plain data of [`super::structure`]. Nothing here opens a file.
 
 mod definitions;
 mod system;
@@ -12,49 +12,49 @@ use super::structure::{
 use super::xml::{self, Node};
 use definitions::{conversion, definitions, value_type};
 
-/// Reads an SSD file.
+/// Parses an SSD file.
 ///
-/// Versions 1.x and 2.x are accepted; geometry, metadata and annotations are skipped, but for the step
-/// sizes of `com.opensimulationplatform`.
+/// Versions 1.x and 2.x are accepted. Geometry, metadata and annotations are skipped, except the
+/// step sizes of `com.opensimulationplatform`.
 ///
 /// # Errors
 ///
-/// [`SspError`] with line and column, what is expected and what was found.
+/// [`SspError`] with line and column, the expected and the found content.
 pub fn read_ssd(bytes: &[u8]) -> Result<SystemStructure, SspError> {
     ssd(bytes).map(|(read, _)| read)
 }
 
-/// Reads an SSV file.
+/// Parses an SSV file.
 ///
 /// # Errors
 ///
-/// As for [`read_ssd`].
+/// Same as [`read_ssd`].
 pub fn read_ssv(bytes: &[u8]) -> Result<ParameterSet, SspError> {
     ssv(bytes).map(|(read, _)| read)
 }
 
-/// Reads an SSM file.
+/// Parses an SSM file.
 ///
 /// # Errors
 ///
-/// As for [`read_ssd`].
+/// Same as [`read_ssd`].
 pub fn read_ssm(bytes: &[u8]) -> Result<ParameterMapping, SspError> {
     ssm(bytes).map(|(read, _)| read)
 }
 
-/// Reads an SSB file.
+/// Parses an SSB file.
 ///
 /// # Errors
 ///
-/// As for [`read_ssd`].
+/// Same as [`read_ssd`].
 pub fn read_ssb(bytes: &[u8]) -> Result<SignalDictionary, SspError> {
     ssb(bytes).map(|(read, _)| read)
 }
 
-/// What was read, and a sentence with its place for everything that is wrong or not understood.
+/// The parsed content, and warnings with positions about wrong or unknown content.
 type Read<T> = Result<(T, Vec<String>), SspError>;
 
-/// As [`read_ssd`], with warnings.
+/// Parses an SSD file; also returns warnings.
 pub(super) fn ssd(bytes: &[u8]) -> Read<SystemStructure> {
     let name = "SystemStructureDescription";
     let (root, warnings) = xml::read(bytes, name, name)?;
@@ -70,19 +70,19 @@ pub(super) fn ssd(bytes: &[u8]) -> Read<SystemStructure> {
     Ok((structure, warnings))
 }
 
-/// As [`read_ssv`], with warnings.
+/// Parses an SSV file; also returns warnings.
 pub(super) fn ssv(bytes: &[u8]) -> Read<ParameterSet> {
     let (root, warnings) = xml::read(bytes, "SystemStructureParameterValues", "ParameterSet")?;
     Ok((parameter_set(&root)?, warnings))
 }
 
-/// As [`read_ssm`], with warnings.
+/// Parses an SSM file; also returns warnings.
 pub(super) fn ssm(bytes: &[u8]) -> Read<ParameterMapping> {
     let (root, warnings) = xml::read(bytes, "SystemStructureParameterMapping", "ParameterMapping")?;
     Ok((parameter_mapping(&root)?, warnings))
 }
 
-/// As [`read_ssb`], with warnings.
+/// Parses an SSB file; also returns warnings.
 pub(super) fn ssb(bytes: &[u8]) -> Read<SignalDictionary> {
     let (root, warnings) = xml::read(bytes, "SystemStructureSignalDictionary", "SignalDictionary")?;
     Ok((signal_dictionary(&root)?, warnings))
@@ -107,7 +107,7 @@ fn parameter(node: &Node) -> Result<Parameter, SspError> {
     Ok(Parameter { name: node.required("name")?.to_owned(), value })
 }
 
-/// The value that an element is, if it is one.
+/// Reads the value that an element states; `None` if the element is not a value.
 fn parameter_value(node: &Node) -> Result<Option<ParameterValue>, SspError> {
     if let Some(values) = array(node)? {
         return Ok(Some(ParameterValue::Array(node.name.clone(), values)));
@@ -130,7 +130,7 @@ fn parameter_value(node: &Node) -> Result<Option<ParameterValue>, SspError> {
     }))
 }
 
-/// The values of an array of SSP 2.0: several in one attribute, texts in elements `Value`.
+/// Reads an array of SSP 2.0: several values in one attribute, or texts in elements `Value`.
 fn array(node: &Node) -> Result<Option<Vec<String>>, SspError> {
     if matches!(node.name.as_str(), "String" | "Enumeration" | "Binary") {
         let values = node.children_named("Value").map(|value| value.required("value"));

@@ -1,4 +1,4 @@
-//! The plain data of [`super::structure`] to XML. Equal data give equal bytes.
+//! Writes the plain data of [`super::structure`] as XML. Equal data give equal bytes.
 
 mod tag;
 
@@ -12,7 +12,7 @@ use super::structure::{
 };
 use tag::Tag;
 
-/// The SSD file.
+/// Returns the text of an SSD file.
 #[must_use]
 pub fn render_ssd(structure: &SystemStructure) -> String {
     let mut root = Tag::root("ssd:SystemStructureDescription")
@@ -23,19 +23,19 @@ pub fn render_ssd(structure: &SystemStructure) -> String {
     root.maybe_add(structure.experiment.as_ref().map(experiment)).versioned().render()
 }
 
-/// The SSV file.
+/// Returns the text of an SSV file.
 #[must_use]
 pub fn render_ssv(set: &ParameterSet) -> String {
     parameter_set(Tag::root("ssv:ParameterSet"), set).render()
 }
 
-/// The SSM file.
+/// Returns the text of an SSM file.
 #[must_use]
 pub fn render_ssm(mapping: &ParameterMapping) -> String {
     parameter_mapping(Tag::root("ssm:ParameterMapping"), mapping).render()
 }
 
-/// The SSB file.
+/// Returns the text of an SSB file.
 #[must_use]
 pub fn render_ssb(dictionary: &SignalDictionary) -> String {
     signal_dictionary(Tag::root("ssb:SignalDictionary"), dictionary).render()
@@ -106,7 +106,7 @@ fn connector(connector: &Connector) -> Tag {
     }
 }
 
-/// With the elements that state the type.
+/// Adds the elements that state the type.
 fn of_type(tag: Tag, kind: &Type) -> Tag {
     match kind {
         Type::Array(sizes) => sizes.iter().fold(tag, |tag, size| {
@@ -150,7 +150,7 @@ fn conversion(tag: Tag, conversion: &Conversion) -> Tag {
         .maybe_add(conversion.transformation.as_ref().map(transformation))
 }
 
-/// Both attributes of a linear one are written: Ecos takes a missing factor for zero.
+/// Writes both attributes of a linear transformation, because Ecos reads a missing factor as zero.
 fn transformation(transformation: &Transformation) -> Tag {
     fn entries<T: ToString>(tag: Tag, pairs: &[(T, T)]) -> Tag {
         pairs.iter().fold(tag, |tag, (source, target)| {
@@ -243,7 +243,7 @@ fn parameter(parameter: &Parameter) -> Tag {
     Tag::new("ssv:Parameter").with("name", &parameter.name).add(value)
 }
 
-/// Numbers stand in one attribute, texts in elements of their own.
+/// Writes numbers in one attribute, texts in separate elements.
 fn array(kind: &str, values: &[String]) -> Tag {
     let tag = Tag::new(&format!("ssv:{kind}")).newer(true);
     if matches!(kind, "String" | "Enumeration" | "Binary") {
@@ -263,7 +263,8 @@ fn parameter_mapping(tag: Tag, mapping: &ParameterMapping) -> Tag {
     entries.versioned()
 }
 
-/// `Enumerations` and `Units` of the namespace of the file, with content of the common one.
+/// Writes `Enumerations` and `Units` in the namespace of the file, their content in the common
+/// namespace.
 fn definitions(tag: Tag, space: &str, definitions: &Definitions) -> Tag {
     let enumerations = definitions.enumerations.iter().map(|enumeration| {
         let items = enumeration.items.iter().map(|(name, value)| {
@@ -286,7 +287,7 @@ fn definitions(tag: Tag, space: &str, definitions: &Definitions) -> Tag {
     tag.list(&format!("{space}:Enumerations"), enumerations).list(&format!("{space}:Units"), units)
 }
 
-/// The step stands where libcosim looks for it.
+/// Writes the step size into the annotation that libcosim reads.
 fn experiment(experiment: &DefaultExperiment) -> Tag {
     let time = |time: Option<f64>| time.map(number);
     let step = experiment.step_size.map(|size| {
@@ -299,7 +300,7 @@ fn experiment(experiment: &DefaultExperiment) -> Tag {
         .maybe_add(step)
 }
 
-/// The shortest text that is read as the same number.
+/// Returns the shortest text that parses to the same number.
 fn number(value: f64) -> String {
     format!("{value:?}")
 }

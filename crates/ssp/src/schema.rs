@@ -1,4 +1,5 @@
-//! What the standard has where (the XSDs of SSP 1.0 and 2.0): everything else is named in a warning.
+//! The elements and attributes that the XSDs of SSP 1.0 and 2.0 allow; other content gives
+//! warnings.
 
 use std::collections::BTreeMap;
 
@@ -6,9 +7,9 @@ use fmu_description::Position;
 
 use super::xml::Node;
 
-/// Attributes that every element may have.
+/// Attributes of every element.
 const ANYWHERE: [&str; 2] = ["id", "description"];
-/// Attributes that root elements may have.
+/// Additional attributes of root elements.
 const TOP: [&str; 8] = [
     "version",
     "name",
@@ -19,7 +20,7 @@ const TOP: [&str; 8] = [
     "generationTool",
     "generationDateAndTime",
 ];
-/// Types of connectors, and elements of parameter values.
+/// Names of type elements of connectors and parameter values.
 pub(super) const TYPES: [&str; 17] = [
     "Real",
     "Float64",
@@ -45,9 +46,9 @@ const TRANSFORMATIONS: [&str; 4] = [
     "IntegerMappingTransformation",
     "EnumerationMappingTransformation",
 ];
-/// Elements that many others may have.
+/// Elements that most other elements may contain.
 const COMMON: [&str; 3] = ["MetaData", "Signature", "Annotations"];
-/// Lists that the standard has once, and that are read however often they are there.
+/// Lists that the standard allows once; the reader accepts several.
 const LISTS: [&str; 6] = [
     "Connectors",
     "ParameterBindings",
@@ -60,8 +61,8 @@ const ELEMENT: [&str; 3] = ["Connectors", "ElementGeometry", "ParameterBindings"
 const SYSTEM: [&str; 5] =
     ["Elements", "Connections", "SignalDictionaries", "SystemGeometry", "GraphicalElements"];
 
-/// Adds a sentence for each kind of element or attribute below `node` that the standard does not
-/// have there, for lists that are repeated, and for signatures, which are not verified.
+/// Adds a warning for each unknown element or attribute below `node`, for repeated lists, and for
+/// signatures, which are not verified.
 pub(super) fn check(node: &Node, warnings: &mut Vec<String>) {
     let mut found = BTreeMap::new();
     visit(node, &mut found);
@@ -73,10 +74,10 @@ pub(super) fn check(node: &Node, warnings: &mut Vec<String>) {
     }
 }
 
-/// Sentences with the place of the first case, and the number of cases.
-type Found = BTreeMap<String, (Position, usize)>;
+/// Warnings with the position of the first case and the number of cases.
+type Findings = BTreeMap<String, (Position, usize)>;
 
-fn visit(node: &Node, found: &mut Found) {
+fn visit(node: &Node, found: &mut Findings) {
     let name = node.name.as_str();
     let Some((children, attributes)) = content(name) else { return };
     for attribute in node.attribute_names() {
@@ -106,14 +107,14 @@ fn visit(node: &Node, found: &mut Found) {
     }
 }
 
-fn add(found: &mut Found, sentence: String, at: Position) {
+fn add(found: &mut Findings, sentence: String, at: Position) {
     found.entry(sentence).or_insert((at, 0)).1 += 1;
 }
 
-/// Lists of names of elements.
+/// Lists of element names.
 type Names = &'static [&'static [&'static str]];
 
-/// The elements and the attributes of an element; none for one whose content does not matter.
+/// Returns the allowed children and attributes of an element; `None` if its content is not checked.
 fn content(name: &str) -> Option<(Names, &'static [&'static str])> {
     Some(match name {
         "SystemStructureDescription" => {

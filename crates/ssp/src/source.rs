@@ -1,49 +1,49 @@
-//! What a URI in an SSD names (SSP 1.0.1, sections 2.3 and 5.4).
+//! Resolves the URIs in an SSD (SSP 1.0.1, sections 2.3 and 5.4).
 
 use std::path::{Path, PathBuf};
 
 use fmu_description::location::path_from_uri;
 use percent_encoding::percent_decode_str;
 
-/// The folder that relative URIs of a file start from.
+/// The base of relative URIs in a file.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Base {
-    /// The folder, or below it after [`Base::below`].
+    /// The folder, or a folder below it after [`Base::below`].
     pub(super) folder: PathBuf,
-    /// The folder as the user knows it: `plant.ssp/resources` for one in a temporary folder.
+    /// The folder for messages: `plant.ssp/resources` instead of a temporary folder.
     pub(super) shown: PathBuf,
-    /// The unpacked archive that nothing may lead out of.
+    /// The unpacked archive that URIs must not leave.
     pub(super) archive: Option<PathBuf>,
 }
 
-/// A file that a URI names.
+/// The file that a URI refers to.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Target {
-    /// Its place.
+    /// Path of the file.
     pub(super) path: PathBuf,
-    /// Its name for the user.
+    /// Name of the file for messages.
     pub(super) shown: PathBuf,
-    /// What follows `#`.
+    /// The fragment after `#`.
     pub(super) fragment: Option<String>,
-    /// What the URI asks for and does not get: a sentence.
-    pub(super) doubt: Option<String>,
+    /// A warning: a part of the URI that is ignored.
+    pub(super) warning: Option<String>,
 }
 
 impl Target {
-    /// A file without a fragment.
+    /// Creates a target without a fragment.
     pub(super) fn new(path: PathBuf, shown: PathBuf) -> Self {
-        Target { path, shown, fragment: None, doubt: None }
+        Target { path, shown, fragment: None, warning: None }
     }
 }
 
 impl Base {
-    /// The base of a file in the unpacked archive `folder`, shown as `shown`.
+    /// Returns the base of a file in the unpacked archive `folder`, shown as `shown`.
     pub(super) fn archive(folder: &Path, shown: &Path) -> Self {
         let (folder, shown) = (folder.to_owned(), shown.to_owned());
         Base { archive: Some(folder.clone()), folder, shown }
     }
 
-    /// The base of the file `target`, which was found from here.
+    /// Returns the base for URIs in the file `target`.
     pub(super) fn below(&self, target: &Target) -> Self {
         let folder = |path: &Path| path.parent().map(Path::to_path_buf).unwrap_or_default();
         Base {
@@ -53,17 +53,17 @@ impl Base {
         }
     }
 
-    /// The file that `uri` names, or what is wrong with it: a sentence.
+    /// Returns the file that `uri` refers to, or an error sentence.
     ///
-    /// For `proxyfmu://HOST?file=URI`, which libcosim and Ecos run in another process or on another
-    /// machine, it is the file itself, with a doubt.
+    /// libcosim and Ecos run `proxyfmu://HOST?file=URI` in another process or on another machine.
+    /// Here the result is the file itself, with a warning.
     pub(super) fn resolve(&self, uri: &str) -> Result<Target, String> {
-        // One proxy in another is nothing that a file can mean.
+        // A proxy URI must not contain another one.
         if let Some(file) = proxied(uri).filter(|file| proxied(file).is_none()) {
             let target = self.resolve(file)?;
-            let doubt =
+            let warning =
                 format!("{uri} is taken for the file {file}, which runs here without proxyfmu");
-            return Ok(Target { doubt: Some(doubt), ..target });
+            return Ok(Target { warning: Some(warning), ..target });
         }
         let (path, fragment) = match uri.split_once('#') {
             Some((path, fragment)) => (path, Some(decoded(fragment)?)),
@@ -80,20 +80,20 @@ impl Base {
             }
             self.refuse_absolute(uri)?;
             let path = path_from_uri(path).map_err(|error| error.to_string())?;
-            return Ok(Target { shown: path.clone(), path, fragment, doubt: None });
+            return Ok(Target { shown: path.clone(), path, fragment, warning: None });
         }
         let stated = decoded(path)?;
         let decoded = stated.replace('\\', "/");
         let sentence = || format!("{uri:?} has backslashes, which are taken for slashes");
-        let doubt = (decoded != stated).then(sentence);
+        let warning = (decoded != stated).then(sentence);
         if decoded.starts_with('/') {
             self.refuse_absolute(uri)?;
             let path = PathBuf::from(decoded);
-            return Ok(Target { shown: path.clone(), path, fragment, doubt });
+            return Ok(Target { shown: path.clone(), path, fragment, warning });
         }
         let (folder, shown) = (self.walk(&self.folder, &decoded), self.walk(&self.shown, &decoded));
         match (folder, shown) {
-            (Some(path), Some(shown)) => Ok(Target { path, shown, fragment, doubt }),
+            (Some(path), Some(shown)) => Ok(Target { path, shown, fragment, warning }),
             _ => Err(format!("{uri:?} leads out of the archive")),
         }
     }
@@ -105,7 +105,7 @@ impl Base {
         }
     }
 
-    /// `relative` from `folder`, part by part; none where it leaves the archive.
+    /// Appends the path `relative` to `folder`; `None` if the result leaves the archive.
     fn walk(&self, folder: &Path, relative: &str) -> Option<PathBuf> {
         let inside = |path: &Path| path.parent().map(Path::to_path_buf);
         let mut depth = match &self.archive {
@@ -130,7 +130,7 @@ impl Base {
     }
 }
 
-/// The URI of the file in `proxyfmu://localhost?file=a.fmu`.
+/// Returns the URI of the file in `proxyfmu://localhost?file=a.fmu`.
 fn proxied(uri: &str) -> Option<&str> {
     let scheme = scheme(uri).filter(|scheme| scheme.eq_ignore_ascii_case("proxyfmu"))?;
     let (_, query) = uri[scheme.len()..].split_once('?')?;
@@ -146,7 +146,7 @@ fn decoded(text: &str) -> Result<String, String> {
     Ok(decoded.into_owned())
 }
 
-/// The scheme of an absolute URI (RFC 3986, section 3.1).
+/// Returns the scheme of an absolute URI (RFC 3986, section 3.1).
 fn scheme(uri: &str) -> Option<&str> {
     let (scheme, _) = uri.split_once(':')?;
     let mut characters = scheme.chars();
@@ -203,10 +203,10 @@ mod tests {
     }
 
     #[test]
-    fn the_file_of_a_proxy_is_taken_itself_with_a_doubt() {
+    fn the_file_of_a_proxy_is_used_itself_with_a_warning() {
         let found = disk().resolve("proxyfmu://localhost?file=../f%20g/a.fmu").unwrap();
         assert_eq!(found.path, Path::new("/data/s/../f g/a.fmu"));
-        assert!(found.doubt.unwrap().ends_with("which runs here without proxyfmu"));
+        assert!(found.warning.unwrap().ends_with("which runs here without proxyfmu"));
         let found = disk().resolve("proxyfmu://h:9090?a=b&file=file:///a.fmu").unwrap();
         assert_eq!(found.path, Path::new("/a.fmu"));
         let sentence = archive().resolve("proxyfmu://localhost?file=../../a").unwrap_err();
@@ -214,10 +214,10 @@ mod tests {
     }
 
     #[test]
-    fn backslashes_are_taken_for_slashes_with_a_doubt() {
+    fn backslashes_are_taken_for_slashes_with_a_warning() {
         let found = archive().resolve("..\\b c\\d.fmu").unwrap();
         assert_eq!(found.path, Path::new("/tmp/x/b c/d.fmu"));
-        assert!(found.doubt.unwrap().ends_with("has backslashes, which are taken for slashes"));
+        assert!(found.warning.unwrap().ends_with("has backslashes, which are taken for slashes"));
         for uri in ["..\\..\\a", "..%5c..%5Ca", "b\\../..\\../a"] {
             let sentence = archive().resolve(uri).unwrap_err();
             assert!(sentence.ends_with("leads out of the archive"), "{sentence}");

@@ -1,7 +1,7 @@
 //! The content of SSD, SSV, SSM and SSB files (SSP 1.0.1 and 2.0, sections 4 to 8) as plain data.
 //!
-//! Geometry, graphical elements and annotations are left out, but for the step sizes that the
-//! annotations of the Open Simulation Platform give.
+//! Geometry, graphical elements and annotations are left out, except the step sizes in annotations of
+//! the Open Simulation Platform.
 
 mod kinds;
 
@@ -25,7 +25,7 @@ pub struct SystemStructure {
     pub generation_tool: Option<String>,
 }
 
-/// The definitions that hold within one file (section 4.4).
+/// The definitions of enumerations and units in one file (section 4.4).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Definitions {
     /// `Enumerations`.
@@ -76,22 +76,22 @@ pub struct System {
     pub dictionaries: Vec<DictionarySource>,
 }
 
-/// What systems, components and references to signal dictionaries have in common (section 5.2).
+/// The common content of systems, components and references to signal dictionaries (section 5.2).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ElementBase {
-    /// `name`, unique within the system around it.
+    /// `name`, unique within the parent system.
     pub name: String,
     /// `id`, unique in the file.
     pub id: Option<String>,
     /// `Connectors`.
     pub connectors: Vec<Connector>,
-    /// `ParameterBindings`; later ones win.
+    /// `ParameterBindings`; later bindings override earlier ones.
     pub bindings: Vec<ParameterBinding>,
-    /// Where it begins in its file.
+    /// Position in the file.
     pub at: Place,
 }
 
-/// A place in a file; the first one in what was made otherwise.
+/// A position in a file; line 1, column 1 for data that was not read from a file.
 #[derive(Clone, Copy, Debug)]
 pub struct Place(pub Position);
 
@@ -101,7 +101,7 @@ impl Default for Place {
     }
 }
 
-/// The same content is the same content wherever it stands.
+/// All places are equal, so that the comparison of two structures ignores positions.
 impl PartialEq for Place {
     fn eq(&self, _: &Self) -> bool {
         true
@@ -120,7 +120,7 @@ pub enum Element {
 }
 
 impl Element {
-    /// What every element has.
+    /// Returns the common content of all elements.
     #[must_use]
     pub fn base(&self) -> &ElementBase {
         match self {
@@ -138,7 +138,7 @@ pub struct Component {
     pub base: ElementBase,
     /// `type`.
     pub content: Content,
-    /// `source`, a URI; empty where there is none (SSP 2.0): the component has connectors only.
+    /// `source`, a URI; empty if absent (SSP 2.0): the component then has connectors only.
     pub source: String,
     /// `implementation`.
     pub implementation: Implementation,
@@ -146,7 +146,7 @@ pub struct Component {
     pub step_size: Option<f64>,
 }
 
-/// `type` of a component: what its source is.
+/// `type` of a component: the media type of its source.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Content {
     /// `application/x-fmu-sharedlibrary`.
@@ -177,7 +177,7 @@ pub enum Implementation {
 pub struct DictionaryReference {
     /// What every element has.
     pub base: ElementBase,
-    /// `dictionary`: name of a dictionary of the system around it, or of one further out.
+    /// `dictionary`: name of a dictionary of the parent system or of one further out.
     pub dictionary: String,
 }
 
@@ -204,31 +204,31 @@ pub struct SignalDictionary {
 /// `Connector` (section 5.2.1).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Connector {
-    /// `name`; of a component the name of the FMU's variable.
+    /// `name`; for a component, the name of the FMU's variable.
     pub name: String,
     /// `kind`.
     pub kind: ConnectorKind,
-    /// Type, where it is stated.
+    /// Type, if stated.
     pub kind_of_value: Option<Type>,
 }
 
-/// `Connection` (section 5.3.2). Which end is the source follows from the kinds of the connectors.
+/// `Connection` (section 5.3.2). The kinds of the connectors determine which end is the source.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Connection {
     /// `startElement` and `startConnector`.
     pub start: End,
     /// `endElement` and `endConnector`.
     pub end: End,
-    /// What becomes of the value.
+    /// Unit conversion and transformation of the value.
     pub conversion: Conversion,
-    /// Where it begins.
+    /// Position in the file.
     pub at: Place,
 }
 
 /// One end of a connection.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct End {
-    /// The element; the system itself if there is none.
+    /// The element; `None` for the system itself.
     pub element: Option<String>,
     /// The connector.
     pub connector: String,
@@ -243,7 +243,8 @@ impl std::fmt::Display for End {
     }
 }
 
-/// What becomes of a value on a connection or in a mapping: first the units, then the transformation.
+/// The conversion of a value on a connection or in a mapping: first unit conversion, then the
+/// transformation.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Conversion {
     /// The transformation, if there is one.
@@ -252,7 +253,7 @@ pub struct Conversion {
     pub suppress_units: bool,
 }
 
-/// A transformation as it stands in the file (section 4.5.2).
+/// A transformation as the file states it (section 4.5.2).
 #[derive(Clone, Debug, PartialEq)]
 pub enum Transformation {
     /// `LinearTransformation`: `target = factor source + offset`.
@@ -273,17 +274,17 @@ pub enum Transformation {
 /// `ParameterBinding` (section 5.2.3).
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParameterBinding {
-    /// `prefix` of all names in the source.
+    /// `prefix` of all parameter names in the source.
     pub prefix: String,
     /// The parameter values.
     pub values: Source<ParameterSet>,
-    /// `ParameterMapping`; with one, only what it maps is applied.
+    /// `ParameterMapping`; if present, only mapped parameters are applied.
     pub mapping: Option<Source<ParameterMapping>>,
     /// Where it begins.
     pub at: Place,
 }
 
-/// Something that stands in the file or in another one.
+/// Content in the same file or in another one.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Source<T> {
     /// In this file.
@@ -331,8 +332,8 @@ pub struct MappingEntry {
     pub source: String,
     /// `target`: name in the system or component.
     pub target: String,
-    /// What becomes of the value.
+    /// Unit conversion and transformation of the value.
     pub conversion: Conversion,
-    /// Where it begins.
+    /// Position in the file.
     pub at: Place,
 }

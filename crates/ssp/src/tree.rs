@@ -1,4 +1,4 @@
-//! A system structure with everything that it refers to: what the loader makes of files.
+//! The loaded system structure: all elements of all files and the FMUs that they refer to.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -13,34 +13,34 @@ use super::structure::{
     Connection, Connector, Definitions, ParameterMapping, ParameterSet, SystemStructure,
 };
 
-/// All elements of all files, the root system first, every element after the system around it.
+/// All elements of all files. The root system is first; every system precedes its elements.
 #[derive(Debug, Default)]
 pub(super) struct Tree {
     pub(super) nodes: Vec<Node>,
-    /// Each FMU once, however many components it has.
+    /// The FMUs; components of the same FMU share one entry.
     pub(super) fmus: Vec<Unpacked>,
-    /// Their names for the user.
+    /// Names of the FMUs for messages.
     pub(super) shown: Vec<PathBuf>,
-    /// Unpacked SSPs.
+    /// Folders of the unpacked SSPs.
     pub(super) folders: Vec<TemporaryFolder>,
-    /// What is odd about the files.
+    /// Warnings about the files.
     pub(super) warnings: Vec<String>,
 }
 
 /// A system, a component, a signal dictionary, or a reference to one.
 #[derive(Debug)]
 pub(super) struct Node {
-    /// Names from the root system's elements down, joined by dots; empty for the root.
+    /// Hierarchical name without the root system, joined by dots; empty for the root.
     pub(super) path: String,
-    /// The system around it.
+    /// The parent system.
     pub(super) parent: Option<usize>,
-    /// Elements of a system by name; an index into [`Tree::nodes`].
+    /// Elements of a system by name, as indices into [`Tree::nodes`].
     pub(super) children: HashMap<String, usize>,
-    /// Signal dictionaries of a system by name.
+    /// Signal dictionaries of a system by name, as indices into [`Tree::nodes`].
     pub(super) dictionaries: HashMap<String, usize>,
-    /// The file that its connectors and connections stand in.
+    /// The file that declares the connectors and connections.
     pub(super) file: Rc<File>,
-    /// Where it begins there.
+    /// Position of the element in that file.
     pub(super) at: Position,
     pub(super) connectors: Vec<Connector>,
     pub(super) connections: Vec<Connection>,
@@ -50,7 +50,7 @@ pub(super) struct Node {
     pub(super) content: Content,
 }
 
-/// What a node is.
+/// The kind of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Content {
     System,
@@ -62,35 +62,35 @@ pub(super) enum Content {
     Reference(usize),
 }
 
-/// A file, as far as what it defines matters elsewhere.
+/// A file: the data that other files need.
 #[derive(Debug)]
 pub(super) struct File {
-    /// Its name for the user.
+    /// Name of the file for messages.
     pub(super) shown: PathBuf,
-    /// Where its URIs start.
+    /// The folder that relative URIs in the file start from.
     pub(super) base: Base,
     pub(super) definitions: Definitions,
 }
 
-/// An SSD file.
+/// A parsed SSD file.
 #[derive(Debug)]
 pub(super) struct Document {
     pub(super) structure: SystemStructure,
     pub(super) file: Rc<File>,
 }
 
-/// A parameter binding with its contents.
+/// A parameter binding with the contents of its files.
 #[derive(Clone, Debug)]
 pub(super) struct Binding {
     pub(super) prefix: String,
     pub(super) values: Rc<ParameterSet>,
     pub(super) mapping: Option<Rc<ParameterMapping>>,
-    /// Where the binding stands.
+    /// The file that contains the binding.
     pub(super) file: Rc<File>,
     pub(super) at: Position,
 }
 
-/// A connector of a node.
+/// A connector of a node: a vertex of the connection graph.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) struct Vertex {
     pub(super) node: usize,
@@ -98,7 +98,8 @@ pub(super) struct Vertex {
 }
 
 impl Tree {
-    /// The connector called `name` of the node; that of the dictionary for a reference to one.
+    /// Returns the vertex of the connector `name` of `node`; follows a reference to its signal
+    /// dictionary.
     pub(super) fn vertex(&self, node: usize, name: &str) -> Vertex {
         let node = match self.nodes[node].content {
             Content::Reference(dictionary) => dictionary,
@@ -107,7 +108,7 @@ impl Tree {
         Vertex { node, connector: name.to_owned() }
     }
 
-    /// The description of the FMU that the node is.
+    /// Returns the description of the node's FMU.
     pub(super) fn description(&self, node: usize) -> Option<&ModelDescription> {
         match self.nodes[node].content {
             Content::Fmu(index) => Some(&self.fmus[index].description),
@@ -115,17 +116,18 @@ impl Tree {
         }
     }
 
-    /// The variable behind a connector of an FMU.
+    /// Returns the FMU variable of a connector.
     pub(super) fn variable(&self, vertex: &Vertex) -> Option<&ScalarVariable> {
         self.description(vertex.node)?.variable(&vertex.connector)
     }
 
-    /// The connector as its file states it.
+    /// Returns the connector as its file declares it.
     pub(super) fn connector(&self, node: usize, name: &str) -> Option<&Connector> {
         self.nodes[node].connectors.iter().find(|connector| connector.name == name)
     }
 
-    /// What the file states of the values at a connector, and what the FMU says.
+    /// Returns the unit or enumeration of a connector: as the file states it, and as the FMU states
+    /// it.
     pub(super) fn measures(&self, vertex: &Vertex) -> (Measure, Measure) {
         let node = &self.nodes[vertex.node];
         let connector = self.connector(vertex.node, &vertex.connector);
@@ -136,13 +138,14 @@ impl Tree {
         (stated, own.unwrap_or_default())
     }
 
-    /// What is known of the values at a connector: what is stated, else what the FMU says.
+    /// Returns the unit or enumeration of a connector: as the file states it, otherwise as the FMU
+    /// states it.
     pub(super) fn measure(&self, vertex: &Vertex) -> Measure {
         let (stated, own) = self.measures(vertex);
         stated.or(own)
     }
 
-    /// Name of a connector for messages.
+    /// Returns the name of a connector for messages.
     pub(super) fn name(&self, vertex: &Vertex) -> String {
         match self.nodes[vertex.node].path.as_str() {
             "" => vertex.connector.clone(),

@@ -1,4 +1,4 @@
-//! An assembly to an SSP archive.
+//! Exports an assembly as an SSP archive.
 
 mod archive;
 
@@ -20,27 +20,27 @@ use crate::assembly::{Assembly, Link, Setting, Terminal};
 use archive::Archive;
 use slave::Transformation;
 
-/// Name of every parameter set: Ecos applies the sets of one name, and only when told that name.
+/// Name of every parameter set. Ecos applies parameter sets by name.
 const SETTINGS: &str = "settings";
-/// `generationTool` of what is written.
+/// `generationTool` of exported files.
 pub(super) const TOOL: &str = "aso-ftc";
 
-/// Writes `assembly` as the SSP archive `target`, whose folder is created.
+/// Writes `assembly` as the SSP archive `target`; creates the folder of `target`.
 ///
-/// The FMUs go into `resources`, the settings of each element into a parameter set `settings` in a
-/// file of its own, bound to its component. Connectors are what is connected and the outputs of
-/// type Real, Integer and Boolean, with the types and units of the FMUs. `step_size` in s is stated as
-/// libcosim wants it. The bytes depend on nothing but the assembly and the content of its FMUs.
+/// The FMUs go into `resources`. The settings of each element go into a parameter set `settings` in
+/// a file of its own, bound to the component. Connectors are the connected variables and the
+/// outputs of type Real, Integer and Boolean, with the types and units of the FMUs. `step_size` in
+/// s goes into the annotation that libcosim reads. Equal assemblies and FMUs give equal bytes.
 ///
 /// # Errors
 ///
-/// [`SspError`] for an element or variable that does not exist, a setting that is not of the type of
-/// its variable, or a file that cannot be read or written.
+/// [`SspError`] if an element or variable does not exist, if a setting does not have the type of
+/// its variable, or if a file cannot be read or written.
 pub fn write(assembly: &Assembly, step_size: Option<f64>, target: &Path) -> Result<(), SspError> {
     if let Some((name, _)) = assembly.functions.first() {
         return Err(missing(name, "an FMU", "a function, which SSP does not have"));
     }
-    let mut writer = Writing::default();
+    let mut writer = Exporter::default();
     let ends = assembly.links.iter().flat_map(|link| [&link.from, &link.to]);
     let linked = ends.map(|end| (end.element.as_str(), end.variable.as_str())).collect();
     for element in &assembly.elements {
@@ -64,21 +64,21 @@ pub fn write(assembly: &Assembly, step_size: Option<f64>, target: &Path) -> Resu
     writer.archive.write(&render_ssd(&structure), target)
 }
 
-/// Elements and variables that are connected.
+/// Pairs of element and variable that are connected.
 type Linked<'a> = HashSet<(&'a str, &'a str)>;
 
-/// What has been collected so far.
+/// The data collected during an export.
 #[derive(Default)]
-struct Writing {
+struct Exporter {
     archive: Archive,
     elements: Vec<Element>,
     definitions: Definitions,
     descriptions: HashMap<String, ModelDescription>,
-    /// Path in the archive of each FMU.
+    /// Path of each FMU in the archive.
     fmus: BTreeMap<PathBuf, String>,
 }
 
-impl Writing {
+impl Exporter {
     fn element(
         &mut self,
         element: &crate::assembly::Element,
@@ -131,9 +131,8 @@ impl Writing {
         Ok(connectors)
     }
 
-    /// The type of a variable; its unit or enumeration is added to the definitions. A unit of which
-    /// the FMU says no more than the name, or of which another FMU says something else, is left to
-    /// the FMU.
+    /// Returns the type of a variable and adds its unit or enumeration to the definitions. A unit
+    /// is not stated if the FMU gives only its name, or if another FMU defines it differently.
     fn value_type(
         &mut self,
         variable: &ScalarVariable,
@@ -226,7 +225,7 @@ impl Writing {
         })
     }
 
-    /// The unit of a variable, by name.
+    /// Returns the name of the unit of a variable.
     fn unit(&self, terminal: &Terminal) -> Result<Option<&str>, SspError> {
         let known = self.descriptions.get(&terminal.element);
         let description = known.ok_or_else(|| {
@@ -248,7 +247,7 @@ fn missing(what: &str, expected: &str, found: &str) -> SspError {
     SspError::Missing { what, expected, found }
 }
 
-/// A setting as a value of the type of its variable.
+/// Converts a setting to a value of the type of its variable.
 fn value(
     element: &str,
     setting: &Setting,

@@ -1,4 +1,4 @@
-//! Elements of SSP's namespaces, with typed access to what they hold.
+//! XML elements of the SSP namespaces, with typed access to attributes and children.
 
 use std::collections::{HashMap, HashSet};
 use std::str::FromStr;
@@ -9,32 +9,32 @@ use fmu_description::xml;
 use super::error::SspError;
 use super::schema;
 
-/// All namespaces of SSP 1.0 and 2.0 begin so.
+/// Common start of all namespaces of SSP 1.0 and 2.0.
 const NAMESPACE: &str = "http://ssp-standard.org/SSP1/";
-/// The usual prefixes of these namespaces, which are known even where they are not declared.
+/// The usual prefixes of these namespaces; they are accepted without a declaration.
 const PREFIXES: [&str; 5] = ["ssd", "ssc", "ssv", "ssm", "ssb"];
-/// Largest file that is read.
+/// Largest accepted file in bytes.
 const CAPACITY: usize = 64 << 20;
-/// Most tags that are read, which bounds the memory that a file of short tags takes.
+/// Maximum number of tags; limits the memory for a file of many short tags.
 const TAGS: usize = 4_000_000;
 /// The white space of XML.
 const WHITE_SPACE: [char; 4] = [' ', '\t', '\r', '\n'];
 
-/// An element. Which of SSP's namespaces it is of does not matter: names do not collide, and some
-/// tools write `ssd:Real` for `ssc:Real`.
+/// An element. The SSP namespaces are not distinguished: their names do not collide, and some tools
+/// write `ssd:Real` for `ssc:Real`.
 #[derive(Debug)]
 pub(super) struct Node {
     /// Name without prefix.
     pub(super) name: String,
-    /// Whether it is of a namespace of SSP.
+    /// Whether the element belongs to an SSP namespace.
     own: bool,
     attributes: Vec<(String, String)>,
     children: Vec<Node>,
     pub(super) at: Position,
 }
 
-/// Reads a file whose root element is `root` of the namespace that ends in `space`; and what in it
-/// breaks a rule or is not understood, a sentence with its place each.
+/// Reads a file whose root element is `root` in the namespace that ends in `space`. Also returns
+/// warnings with positions about broken rules and unknown content.
 pub(super) fn read(bytes: &[u8], space: &str, root: &str) -> Result<(Node, Vec<String>), SspError> {
     if bytes.len() > CAPACITY {
         return Err(SspError::Limit { limit: CAPACITY, what: "bytes" });
@@ -43,18 +43,18 @@ pub(super) fn read(bytes: &[u8], space: &str, root: &str) -> Result<(Node, Vec<S
         return Err(SspError::Limit { limit: TAGS, what: "tags" });
     }
     let element = xml::read(bytes)?;
-    let wanted = format!("{NAMESPACE}{space}");
+    let required = format!("{NAMESPACE}{space}");
     let mut scope = Scope::default();
     scope.open(&element);
     let found = scope.space(&element).unwrap_or_default().to_owned();
     let local = element.name.rsplit(':').next().unwrap_or_default().to_owned();
-    let is_root = found == wanted || (found.is_empty() && scope.assumes(&element));
+    let is_root = found == required || (found.is_empty() && scope.assumes(&element));
     if !is_root || local != root {
         return Err(SspError::Content {
             at: element.at,
             found: format!("namespace {found:?}"),
             element: element.name,
-            expected: format!("the root element {root} of the namespace {wanted:?}"),
+            expected: format!("the root element {root} of the namespace {required:?}"),
         });
     }
     let node = scope.node(element)?;
@@ -66,43 +66,44 @@ pub(super) fn read(bytes: &[u8], space: &str, root: &str) -> Result<(Node, Vec<S
 
 fn undeclared((prefix, at): (String, Position)) -> String {
     let assumed = if PREFIXES.contains(&prefix.as_str()) {
-        "taken for the one of SSP"
+        "assumed to be the prefix of SSP"
     } else {
-        "taken for one that is not of SSP"
+        "assumed not to be of SSP"
     };
     format!("{at}: the prefix {prefix}: is used without xmlns:{prefix}; it is {assumed}")
 }
 
-/// The namespaces that are declared where the reader is, by prefix, the innermost last.
+/// The declared namespaces by prefix; the innermost declaration is last.
 #[derive(Default)]
 struct Scope {
     spaces: HashMap<String, Vec<String>>,
-    /// Prefixes that are used without a declaration, and where first.
+    /// Undeclared prefixes with the position of their first use.
     undeclared: Vec<(String, Position)>,
 }
 
 impl Scope {
-    /// Adds what `element` declares.
+    /// Adds the declarations of `element`.
     fn open(&mut self, element: &xml::Element) {
         for (prefix, space) in declarations(&element.attributes) {
             self.spaces.entry(prefix.to_owned()).or_default().push(space.to_owned());
         }
     }
 
-    /// Takes back what an element with these attributes declared.
+    /// Removes the declarations of an element with these attributes.
     fn close(&mut self, attributes: &[(String, String)]) {
         for (prefix, _) in declarations(attributes) {
             self.spaces.get_mut(prefix).map(Vec::pop);
         }
     }
 
-    /// The namespace of an element whose declarations were added; none without a declaration.
+    /// Returns the namespace of an element whose declarations were added; `None` without a
+    /// declaration.
     fn space(&self, element: &xml::Element) -> Option<&str> {
         let spaces = self.spaces.get(prefix(element))?;
         spaces.last().map(String::as_str)
     }
 
-    /// Whether the element has no namespace, but a prefix that is known for one of SSP.
+    /// Returns whether the element has an undeclared prefix that is usual for SSP.
     fn assumes(&self, element: &xml::Element) -> bool {
         self.space(element).is_none() && PREFIXES.contains(&prefix(element))
     }
@@ -130,7 +131,7 @@ fn prefix(element: &xml::Element) -> &str {
     element.name.split_once(':').map_or("", |(prefix, _)| prefix)
 }
 
-/// Prefixes and namespaces that attributes declare; an empty prefix for the default.
+/// Returns the declared prefixes and namespaces; the prefix is empty for the default namespace.
 fn declarations(attributes: &[(String, String)]) -> impl Iterator<Item = (&str, &str)> {
     attributes.iter().filter_map(|(name, space)| {
         let prefix = name.strip_prefix("xmlns")?;
@@ -139,20 +140,20 @@ fn declarations(attributes: &[(String, String)]) -> impl Iterator<Item = (&str, 
     })
 }
 
-/// Whether XML 1.0 can hold `character` (its production 2).
+/// Returns whether XML 1.0 allows `character` (production 2).
 pub(super) fn is_character(character: char) -> bool {
     matches!(character, '\t' | '\n' | '\r' | ' '..='\u{d7ff}' | '\u{e000}'..='\u{fffd}')
         || character >= '\u{10000}'
 }
 
 impl Node {
-    /// The error for something that is not as it must be.
+    /// Returns an error about the content of this element.
     pub(super) fn wrong(&self, expected: impl Into<String>, found: impl Into<String>) -> SspError {
         let (at, element) = (self.at, self.name.clone());
         SspError::Content { at, element, expected: expected.into(), found: found.into() }
     }
 
-    /// The attributes hold characters of XML only, so that what was read can be written.
+    /// Checks that the attributes contain XML characters only, so that they can be written again.
     fn characters(&self) -> Result<(), SspError> {
         for (name, value) in &self.attributes {
             if let Some(found) = value.chars().find(|character| !is_character(*character)) {
@@ -163,7 +164,8 @@ impl Node {
         Ok(())
     }
 
-    /// Every root element has a version; 1.x and 2.x can be read (section 2.2).
+    /// Checks the attribute `version` of a root element; versions 1.x and 2.x are accepted (section
+    /// 2.2).
     fn version(&self) -> Result<(), SspError> {
         let version = self.required("version")?.trim_matches(WHITE_SPACE);
         if let Some(("1" | "2", minor)) = version.split_once('.')
@@ -174,7 +176,7 @@ impl Node {
         Err(self.wrong("version 1.0 or 2.0", format!("{version:?}")))
     }
 
-    /// Names of the attributes, without those of XML itself and of other namespaces.
+    /// Returns the names of the attributes, except `xmlns` and names with a prefix.
     pub(super) fn attribute_names(&self) -> impl Iterator<Item = &str> {
         let names = self.attributes.iter().map(|(name, _)| name.as_str());
         names.filter(|name| *name != "xmlns" && !name.contains(':'))
@@ -189,7 +191,7 @@ impl Node {
         self.attribute(name).map(str::to_owned)
     }
 
-    /// An attribute that says something: an empty one is as good as none.
+    /// Returns the attribute `name`; an empty attribute counts as absent.
     pub(super) fn stated(&self, name: &str) -> Option<String> {
         self.text(name).filter(|text| !text.is_empty())
     }
@@ -199,7 +201,7 @@ impl Node {
         value.ok_or_else(|| self.wrong(format!("the attribute {name}"), "none"))
     }
 
-    /// The attribute `name` read by `read`, which gives none for what is not `expected`.
+    /// Parses the attribute `name` with `read`, which returns `None` for invalid text.
     fn parsed<T>(
         &self,
         name: &str,
@@ -215,30 +217,30 @@ impl Node {
             .transpose()
     }
 
-    /// The values of an attribute that is a list, as arrays of SSP 2.0 are.
+    /// Splits the attribute `name` at white space, for arrays of SSP 2.0.
     pub(super) fn words(&self, name: &str) -> impl Iterator<Item = &str> {
         let value = self.attribute(name).unwrap_or_default();
         value.split(WHITE_SPACE).filter(|word| !word.is_empty())
     }
 
-    /// `xs:long` or `xs:unsignedLong`.
+    /// Reads an `xs:long` or `xs:unsignedLong`.
     pub(super) fn long(&self, name: &str) -> Result<Option<i128>, SspError> {
         self.parsed(name, "an integer", |text| i128::from_str(text).ok())
     }
 
-    /// A finite `xs:double`.
+    /// Reads a finite `xs:double`.
     pub(super) fn number(&self, name: &str) -> Result<Option<f64>, SspError> {
         let finite = |text: &str| f64::from_str(text).ok().filter(|value| value.is_finite());
         self.parsed(name, "a finite number", finite)
     }
 
-    /// `xs:int`.
+    /// Reads an `xs:int`.
     pub(super) fn integer(&self, name: &str) -> Result<Option<i32>, SspError> {
         let expected = "an integer from -2147483648 to 2147483647";
         self.parsed(name, expected, |text| i32::from_str(text).ok())
     }
 
-    /// `xs:boolean`.
+    /// Reads an `xs:boolean`.
     pub(super) fn boolean(&self, name: &str) -> Result<Option<bool>, SspError> {
         self.parsed(name, "true, false, 1 or 0", |text| match text {
             "true" | "1" => Some(true),
@@ -247,7 +249,7 @@ impl Node {
         })
     }
 
-    /// An attribute that must be there, read by one of the methods above.
+    /// Reads a required attribute with one of the methods above.
     pub(super) fn needed<T>(
         &self,
         name: &str,
@@ -257,12 +259,12 @@ impl Node {
         read(self, name)?.ok_or_else(|| self.wrong(format!("the attribute {name}"), "none"))
     }
 
-    /// The children of SSP's namespaces.
+    /// Returns the children in SSP namespaces.
     pub(super) fn own_children(&self) -> impl Iterator<Item = &Node> {
         self.children.iter().filter(|child| child.own)
     }
 
-    /// Children of whatever namespace, for annotations.
+    /// Returns the first child called `name` in any namespace, for annotations.
     pub(super) fn any_child(&self, name: &str) -> Option<&Node> {
         self.children.iter().find(|child| child.name == name)
     }
@@ -271,7 +273,7 @@ impl Node {
         self.own_children().filter(move |child| child.name == name)
     }
 
-    /// The child called `name`, which may be absent but not repeated.
+    /// Returns the child called `name`; more than one is an error.
     pub(super) fn child(&self, name: &str) -> Result<Option<&Node>, SspError> {
         let mut children = self.children_named(name);
         let first = children.next();
@@ -283,8 +285,8 @@ impl Node {
         }
     }
 
-    /// What `read` makes of each child of the child called `list`; none if there is no such list.
-    /// Several lists of one name count as one, with a warning of [`schema::check`].
+    /// Reads each child `item` of the child `list` with `read`; empty if there is no such list.
+    /// Several lists of one name are joined; [`schema::check`] warns about them.
     pub(super) fn list<T>(
         &self,
         list: &str,
@@ -294,7 +296,7 @@ impl Node {
         self.children_named(list).flat_map(|list| list.children_named(item)).map(read).collect()
     }
 
-    /// Fails at the first name that two of `names` have.
+    /// Returns an error if two of `names` are equal.
     pub(super) fn unique<'a>(
         &self,
         what: &str,

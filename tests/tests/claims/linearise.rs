@@ -369,7 +369,7 @@ fn what_is_missing_for_steps_from_an_fmu_state_is_said() {
     expect_refusal(&fmu, &["name the variables", "among level, drained, flow"], states(&[]));
     expect_refusal(
         &fmu,
-        &["do not say how the FMU goes on", "name all states"],
+        &["do not determine how the FMU continues", "name all states"],
         states(&["level"]),
     );
     let unmoved = refusal(&fmu, |request| {

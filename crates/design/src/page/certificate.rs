@@ -1,4 +1,4 @@
-//! Theorem 1, the free P, norms and bounds.
+//! The sections on theorem 1, the free P, norms and bounds.
 
 use maud::{Markup, html};
 
@@ -56,9 +56,9 @@ pub(super) fn certificate(report: &Report) -> Markup {
         h3 { "The same with free P" }
         @match &certificate.free {
             Ok(free) => (self::free(report, free)),
-            Err(reason) => p { strong { "There is none: " } (reason) },
+            Err(reason) => p { strong { "It was not found: " } (reason) },
         }
-        h3 { "Where the error ends for bounded rates" }
+        h3 { "Ultimate bound of the error for bounded rates" }
         @match &certificate.ultimate {
             Ok(ultimate) => (self::ultimate(report, ultimate)),
             Err(reason) => p { strong { "It is not known: " } (reason) },
@@ -133,7 +133,7 @@ fn numbers(caption: &str, rows: &[(&str, f64)]) -> Markup {
     table(caption, &["quantity", "value"], &rows)
 }
 
-/// The names of the rows of L_x and L_f, or numbers.
+/// Returns the row names of L_x and L_f; numbers if they do not match.
 fn error_names(report: &Report, count: usize) -> Vec<String> {
     let rows = |gain| report.gains.iter().filter(move |matrix| matrix.name == gain);
     let named: Vec<String> =
@@ -142,7 +142,7 @@ fn error_names(report: &Report, count: usize) -> Vec<String> {
     if fits { named } else { (1..=count).map(|k| k.to_string()).collect() }
 }
 
-/// P, its rows named as those of L_x and L_f, or numbered.
+/// Returns P with the row names of L_x and L_f, or with numbers.
 fn p_matrix(report: &Report, name: &str, meaning: &str, values: &[Vec<f64>]) -> Matrix {
     let names = error_names(report, values.len());
     Matrix {

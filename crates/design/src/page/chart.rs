@@ -1,4 +1,4 @@
-//! The frame of a figure: axes, grid, labels. Colours and sizes of text are those of the page.
+//! The frame of a figure: axes, grid and labels. Colours and text sizes follow the page.
 
 use maud::{Markup, PreEscaped, html};
 
@@ -18,12 +18,12 @@ pub(super) struct Size {
 }
 
 impl Size {
-    /// Where the horizontal axis begins and ends.
+    /// Returns the ends of the horizontal axis.
     pub(super) fn horizontal(self) -> (f64, f64) {
         (LEFT, self.width - RIGHT)
     }
 
-    /// Where the vertical axis begins, below, and ends.
+    /// Returns the ends of the vertical axis, from bottom to top.
     pub(super) fn vertical(self) -> (f64, f64) {
         (self.height - BOTTOM, TOP)
     }
@@ -34,7 +34,7 @@ pub(super) struct Chart<'a> {
     /// Identifier on the page.
     pub(super) id: &'a str,
     pub(super) title: &'a str,
-    /// What there is to see, for those who do not see it.
+    /// A description of the figure for screen readers.
     pub(super) description: &'a str,
     pub(super) size: Size,
     pub(super) x: Axis,
@@ -44,7 +44,7 @@ pub(super) struct Chart<'a> {
 }
 
 impl Chart<'_> {
-    /// The figure; `content` stays inside the frame.
+    /// Draws the figure; `content` is clipped to the frame.
     pub(super) fn draw(&self, content: &Markup) -> Markup {
         let Size { width, height } = self.size;
         let (title, description) = (format!("{}-title", self.id), format!("{}-what", self.id));
@@ -91,12 +91,12 @@ impl Chart<'_> {
         }
     }
 
-    /// A curve. A value without a place leaves a gap.
+    /// Draws a curve; a value that is not finite leaves a gap.
     pub(super) fn curve(&self, xs: &[f64], ys: &[f64], class: &str) -> Markup {
         html! { path.curve.(class) d=(trace::path(xs, ys, &self.x, &self.y)) {} }
     }
 
-    /// A line through points in any order; one without a place divides it.
+    /// Draws a line through points in any order; a point that is not finite interrupts it.
     pub(super) fn outline(&self, points: &[(f64, f64)], class: &str) -> Markup {
         let place =
             |(x, y): &(f64, f64)| format!("{:.1} {:.1}", self.x.place(*x), self.y.place(*y));
@@ -109,13 +109,13 @@ impl Chart<'_> {
         html! { path.(class) d=(strokes.map(stroke).collect::<String>()) {} }
     }
 
-    /// A line from below to above.
+    /// Draws a vertical line.
     pub(super) fn upright(&self, at: f64, class: &str) -> Markup {
         let ((bottom, top), x) = (self.y.pixels(), self.x.place(at));
         html! { @if self.x.contains(at) { (line((x, top), (x, bottom), class)) } }
     }
 
-    /// A line from left to right.
+    /// Draws a horizontal line.
     pub(super) fn level(&self, at: f64, class: &str) -> Markup {
         let ((left, right), y) = (self.x.pixels(), self.y.place(at));
         html! { @if self.y.contains(at) { (line((left, y), (right, y), class)) } }
@@ -126,12 +126,12 @@ pub(super) fn line((x1, y1): (f64, f64), (x2, y2): (f64, f64), class: &str) -> M
     html! { line.(class) x1=(tenth(x1)) y1=(tenth(y1)) x2=(tenth(x2)) y2=(tenth(y2)) {} }
 }
 
-/// A coordinate in a figure.
+/// Formats a coordinate in a figure.
 pub(super) fn tenth(value: f64) -> PreEscaped<String> {
     PreEscaped(format!("{value:.1}"))
 }
 
-/// What the lines and signs of a figure mean: a sample of each and its name.
+/// Draws the legend: a sample of each line or marker and its name.
 pub(super) fn legend(entries: &[(Markup, String)]) -> Markup {
     html! {
         ul.legend {
@@ -142,7 +142,7 @@ pub(super) fn legend(entries: &[(Markup, String)]) -> Markup {
     }
 }
 
-/// A line in a legend.
+/// Draws a sample line for a legend.
 pub(super) fn line_sample(class: &str) -> Markup {
     line((1.0, 9.0), (29.0, 9.0), class)
 }

@@ -1,4 +1,4 @@
-//! Singular values over the frequency and responses over time.
+//! The figures of singular values over frequency and of responses over time.
 
 use maud::{Markup, html};
 
@@ -10,12 +10,12 @@ use figure::axis::Axis;
 
 const FREQUENCY_SIZE: Size = Size { width: 480.0, height: 310.0 };
 const RESPONSE_SIZE: Size = Size { width: 400.0, height: 220.0 };
-/// Singular values that are smaller than the largest by more than this are rounding.
+/// Singular values below this fraction of the largest one are rounding errors.
 const SMALLEST: f64 = 1e-16;
-/// Line styles tell apart as many curves as this; further ones repeat.
+/// Number of line styles; further curves repeat them.
 const STYLES: usize = 6;
 
-/// Singular values, both axes in decades.
+/// Shows the singular values on logarithmic axes.
 pub(super) fn frequencies(report: &Report) -> Markup {
     let limit = report.sampling.as_ref();
     let limit = limit.map(|sampled| std::f64::consts::PI / sampled.sample_time);
@@ -75,7 +75,7 @@ fn frequency(id: &str, response: &Frequency, limit: Option<f64>) -> Markup {
     }
 }
 
-/// The course of the largest singular value in words.
+/// Describes the largest singular value over frequency in words.
 fn describe(response: &Frequency) -> String {
     let (frequencies, all) = (&response.frequencies, &response.singular_values);
     let values =
@@ -90,7 +90,7 @@ fn describe(response: &Frequency) -> String {
     format!("From {} to {}{largest}.", say(0), say(last))
 }
 
-/// What a sudden change of each fault does, the time in decades.
+/// Shows the responses to a change of each fault on a logarithmic time axis.
 pub(super) fn responses(report: &Report) -> Markup {
     html! {
         p {
@@ -182,7 +182,7 @@ fn curve(id: &str, curve: &Curve, response: &StepResponse) -> Markup {
     }
 }
 
-/// The least value above zero and the largest.
+/// Returns the smallest positive value and the largest value.
 fn positive_ends(values: &[f64]) -> (f64, f64) {
     let positive = values.iter().copied().filter(|value| *value > 0.0);
     positive.fold((f64::INFINITY, 0.0), |(low, high), value| (value.min(low), value.max(high)))

@@ -1,4 +1,4 @@
-//! The eigenvalues of the loops: maps, tables, conditioning.
+//! The sections on the eigenvalues of the loops: maps, tables, conditioning.
 
 use maud::{Markup, html};
 
@@ -8,9 +8,9 @@ use super::pole_map::{Group, Map, Sign};
 use super::table::{Cell, table};
 use crate::report::{Loop, Region, Report};
 
-/// The wanted and the reached eigenvalues of a loop, shown where `place` says.
+/// Returns the required and the actual eigenvalues of a loop, mapped by `place`.
 fn groups(system: &Loop, place: impl Fn(Pole) -> Pole) -> Vec<Group> {
-    [("wanted", Sign::Ring, &system.wanted), ("reached", Sign::Cross, &system.eigenvalues)]
+    [("required", Sign::Ring, &system.wanted), ("reached", Sign::Cross, &system.eigenvalues)]
         .into_iter()
         .map(|(name, sign, poles)| group(name, sign, poles, &place))
         .filter(|group| !group.poles.is_empty())
@@ -22,7 +22,7 @@ fn group(name: &'static str, sign: Sign, poles: &[Pole], place: impl Fn(Pole) ->
     Group { name, sign, poles: places.collect() }
 }
 
-/// The maps in 1/s; of a sampled loop, those of the z-plane as well.
+/// Shows the maps in 1/s; for a sampled loop, also the maps of the z-plane.
 fn maps(report: &Report, plane: Plane) -> Markup {
     let (feedback, observer) = (&report.feedback, &report.observer);
     let (slow, fast) = (feedback.region.as_ref(), observer.region.as_ref());
@@ -59,7 +59,7 @@ fn maps(report: &Report, plane: Plane) -> Markup {
     }
 }
 
-/// Maps and tables of the eigenvalues.
+/// Shows maps and tables of the eigenvalues.
 pub(super) fn poles(report: &Report) -> Markup {
     let plane = Plane::of(report);
     let (feedback, observer) = (&report.feedback, &report.observer);
@@ -88,7 +88,7 @@ fn region(name: &str, region: Option<&Region>) -> Markup {
     let Some(region) = region else { return html! {} };
     html! {
         p {
-            "Wanted of the eigenvalues of the " (name) ":"
+            "Requirements on the eigenvalues of the " (name) ":"
             @if let Some(decay) = region.decay {
                 " real parts below −" (number(decay)) " 1/s;"
             }
@@ -104,20 +104,20 @@ fn region(name: &str, region: Option<&Region>) -> Markup {
     }
 }
 
-/// A row for each eigenvalue: wanted, reached, and what it means.
+/// Shows a row for each eigenvalue: required, actual, and its properties.
 fn eigenvalues(name: &str, system: &Loop, plane: Plane) -> Markup {
     let rows: Vec<_> = system
         .pairs()
         .into_iter()
         .enumerate()
-        .map(|(index, (wanted, reached))| {
+        .map(|(index, (required, reached))| {
             let rate = reached.map(|pole| plane.rate(pole)).filter(|rate| rate[0].is_finite());
             let equivalent = if matches!(plane, Plane::Continuous) { None } else { rate };
             let frequency = rate.map(|rate| rate[0].hypot(rate[1]));
             let damping = rate.zip(frequency).map(|(rate, size)| -rate[0] / size);
             vec![
                 Cell::Text((index + 1).to_string()),
-                wanted.into(),
+                required.into(),
                 reached.into(),
                 equivalent.into(),
                 frequency.into(),
@@ -128,7 +128,7 @@ fn eigenvalues(name: &str, system: &Loop, plane: Plane) -> Markup {
     let unit = plane.unit();
     let heads = [
         "no.",
-        &format!("wanted{unit}"),
+        &format!("required{unit}"),
         &format!("reached{unit}"),
         "equivalent ln z / T (1/s)",
         "natural frequency (rad/s)",
@@ -146,7 +146,7 @@ fn open_loop(eigenvalues: &[Pole]) -> Markup {
     table("Open loop, A", &["no.", "eigenvalue (1/s)", "on its own"], &rows)
 }
 
-/// How the gains were found and how well.
+/// Shows how the gains were found and how well conditioned the loops are.
 pub(super) fn conditioning(report: &Report) -> Markup {
     let row = |name: &str, system: &Loop| {
         vec![
@@ -161,7 +161,7 @@ pub(super) fn conditioning(report: &Report) -> Markup {
     let heads =
         ["loop", "matrix", "method", "condition", "condition, balanced", "pole error, relative"];
     html! {
-        (table("Condition of the eigenvectors, and distance from what was wanted", &heads, &[
+        (table("Condition of the eigenvectors, and distance from the required eigenvalues", &heads, &[
             row("feedback", &report.feedback),
             row("observer", &report.observer),
         ]))
@@ -170,7 +170,7 @@ pub(super) fn conditioning(report: &Report) -> Markup {
              norm of the change (Bauer and Fike, 1960). Balanced: in coordinates \
              scaled so that rows and columns of the matrix have similar size, with little of the \
              part that comes from the units of the states. The pole error is the largest distance of an eigenvalue from the \
-             wanted one, relative to that."
+             required one, relative to that."
         }
     }
 }

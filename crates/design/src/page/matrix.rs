@@ -1,4 +1,4 @@
-//! A matrix: as a table, and as text for TOML, numpy and MATLAB.
+//! A matrix as a table, and as text for TOML, numpy and MATLAB.
 
 use maud::{Markup, html};
 
@@ -6,7 +6,8 @@ use super::number::{exact, rounded};
 use super::table::scrolled;
 use crate::report::Matrix;
 
-/// The matrices as tables, each with its text below; `id` begins their identifiers on the page.
+/// Returns the matrices as tables, each followed by its text; identifiers on the page start with
+/// `id`.
 pub(super) fn matrices(id: &str, matrices: &[Matrix]) -> Markup {
     html! {
         div.side {
@@ -51,7 +52,7 @@ pub(super) fn matrix(id: &str, matrix: &Matrix) -> Markup {
     }
 }
 
-/// What can be copied in one go: the same matrices in three languages.
+/// Returns the text of the same matrices in three languages, with buttons to copy it.
 pub(super) fn literals(id: &str, name: &str, matrices: &[&Matrix]) -> Markup {
     let text = |write: fn(&Matrix) -> String| -> String {
         matrices.iter().map(|matrix| write(matrix)).collect()
@@ -77,7 +78,7 @@ pub(super) fn literals(id: &str, name: &str, matrices: &[&Matrix]) -> Markup {
     }
 }
 
-/// Each row in `open` and `close`, those between rows in `between`.
+/// Writes each row between `open` and `close`, separated by `between`.
 fn rows(matrix: &Matrix, [open, close, between]: [&str; 3]) -> String {
     let row = |row: &Vec<f64>| {
         let entries: Vec<String> = row.iter().map(|value| exact(*value)).collect();
@@ -102,7 +103,7 @@ fn matlab(matrix: &Matrix) -> String {
     format!("{} = [\n{}\n];\n", variable(&matrix.name), rows(matrix, ["", "", ";\n"]))
 }
 
-/// A name that Python and MATLAB accept for a variable.
+/// Returns a variable name that Python and MATLAB accept.
 fn variable(name: &str) -> String {
     let plain = |sign: char| if sign.is_ascii_alphanumeric() { sign } else { '_' };
     let text: String = name.chars().map(plain).collect();

@@ -1,13 +1,13 @@
-//! Numbers as text.
+//! Formats numbers.
 
 use maud::{Markup, html};
 
-/// The shortest text that reads back as the same number, in TOML, numpy and MATLAB alike.
+/// Returns the shortest text that parses to the same number in TOML, numpy and MATLAB.
 pub(super) fn exact(value: f64) -> String {
     format!("{value:?}")
 }
 
-/// Five digits, more for whole numbers.
+/// Returns the number with five digits, more for whole numbers.
 pub(super) fn rounded(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
@@ -34,12 +34,12 @@ pub(super) fn rounded(value: f64) -> String {
     }
 }
 
-/// Without zeros at the end of the decimals.
+/// Removes trailing zeros of the decimals.
 fn trimmed(text: &str) -> &str {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text }
 }
 
-/// A complex number, each part written by `part`.
+/// Formats a complex number; `part` formats each part.
 pub(super) fn complex([re, im]: [f64; 2], part: fn(f64) -> String) -> String {
     if im == 0.0 {
         return part(re);
@@ -48,7 +48,7 @@ pub(super) fn complex([re, im]: [f64; 2], part: fn(f64) -> String) -> String {
     format!("{} {sign} {}i", part(re), part(im.abs()))
 }
 
-/// A number in a sentence: rounded, with all its digits for the pointer.
+/// Formats a number in a sentence: rounded, with all digits in the tooltip.
 pub(super) fn number(value: f64) -> Markup {
     html! { data value=(exact(value)) title=(exact(value)) { (rounded(value)) } }
 }

@@ -1,4 +1,4 @@
-//! The plane in which eigenvalues lie, and what they say there.
+//! The s-plane or z-plane of the eigenvalues.
 
 use nalgebra::Complex;
 
@@ -7,7 +7,7 @@ use crate::report::{Loop, Report};
 /// An eigenvalue: real and imaginary part.
 pub(super) type Pole = [f64; 2];
 
-/// The s-plane of a continuous loop, or the z-plane of one that is sampled with this period in s.
+/// The s-plane of a continuous loop, or the z-plane of a loop sampled with this period in s.
 #[derive(Clone, Copy)]
 pub(super) enum Plane {
     Continuous,
@@ -34,7 +34,7 @@ impl Plane {
         }
     }
 
-    /// The eigenvalue of the continuous system whose samples move like that, 1/s.
+    /// Returns the eigenvalue ln z / T of the equivalent continuous system, 1/s.
     pub(super) fn rate(self, [re, im]: Pole) -> Pole {
         match self {
             Self::Continuous => [re, im],
@@ -42,7 +42,7 @@ impl Plane {
         }
     }
 
-    /// Where an eigenvalue of a continuous system comes to lie.
+    /// Maps an eigenvalue of a continuous system into this plane.
     pub(super) fn place(self, [re, im]: Pole) -> Pole {
         match self {
             Self::Continuous => [re, im],
@@ -54,11 +54,11 @@ impl Plane {
     }
 }
 
-/// A wanted eigenvalue and a reached one.
+/// A required eigenvalue and an actual one.
 type Pair = (Option<Pole>, Option<Pole>);
 
 impl Loop {
-    /// The real part, 1/s, of the slowest eigenvalue.
+    /// Returns the real part of the slowest eigenvalue, 1/s.
     pub(super) fn slowest(&self, plane: Plane) -> Option<f64> {
         self.eigenvalues.iter().map(|pole| plane.rate(*pole)[0]).max_by(f64::total_cmp)
     }
@@ -67,16 +67,16 @@ impl Loop {
         self.eigenvalues.iter().all(|pole| plane.is_stable(*pole))
     }
 
-    /// Each wanted eigenvalue beside the nearest reached one that is left, then the reached ones
-    /// that were not asked for.
+    /// Pairs each required eigenvalue with the nearest remaining actual one, then lists the other
+    /// actual eigenvalues.
     pub(super) fn pairs(&self) -> Vec<Pair> {
         let mut left = self.eigenvalues.clone();
         let mut pairs = Vec::new();
-        for wanted in &self.wanted {
-            let distance = |pole: &Pole| (pole[0] - wanted[0]).hypot(pole[1] - wanted[1]);
+        for required in &self.wanted {
+            let distance = |pole: &Pole| (pole[0] - required[0]).hypot(pole[1] - required[1]);
             let nearest =
                 (0..left.len()).min_by(|a, b| distance(&left[*a]).total_cmp(&distance(&left[*b])));
-            pairs.push((Some(*wanted), nearest.map(|index| left.remove(index))));
+            pairs.push((Some(*required), nearest.map(|index| left.remove(index))));
         }
         pairs.extend(left.into_iter().map(|pole| (None, Some(pole))));
         pairs
@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn each_wanted_eigenvalue_stands_beside_the_nearest_reached_one() {
+    fn each_required_eigenvalue_is_paired_with_the_nearest_reached_one() {
         let system = Loop {
             matrix: String::new(),
             method: String::new(),

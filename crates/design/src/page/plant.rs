@@ -1,4 +1,4 @@
-//! The plant, the checks, the gains, the interface.
+//! The sections on the plant, the checks, the gains and the interface.
 
 use maud::{Markup, html};
 

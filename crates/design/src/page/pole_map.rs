@@ -1,4 +1,4 @@
-//! Maps of eigenvalues.
+//! Pole maps.
 
 use maud::{Markup, html};
 
@@ -10,10 +10,10 @@ use crate::report::Region;
 use figure::axis::Axis;
 
 const SIZE: Size = Size { width: 440.0, height: 370.0 };
-/// Eigenvalues that differ by more than this factor need decades.
+/// Ratio of the eigenvalues above which the axes are logarithmic.
 const LINEAR_UP_TO: f64 = 30.0;
 
-/// The sign of a group of eigenvalues.
+/// The marker of a group of eigenvalues.
 #[derive(Clone, Copy)]
 pub(super) enum Sign {
     Cross,
@@ -43,7 +43,7 @@ impl Sign {
     }
 }
 
-/// Eigenvalues of one kind.
+/// Eigenvalues with a common marker.
 pub(super) struct Group {
     pub(super) name: &'static str,
     pub(super) sign: Sign,
@@ -71,7 +71,7 @@ impl Map<'_> {
         self.groups.iter().flat_map(|group| &group.poles)
     }
 
-    /// Axes around the circle of radius one and all eigenvalues.
+    /// Returns axes that contain the unit circle and all eigenvalues.
     fn sampled_view(&self) -> (Axis, Axis) {
         let reach = self.poles().flatten().fold(1.0, |most: f64, part| most.max(part.abs()));
         let (wide, tall) = (size_of(SIZE.horizontal()), size_of(SIZE.vertical()));
@@ -79,7 +79,7 @@ impl Map<'_> {
         (Axis::exact((-x, x), SIZE.horizontal(), 5), Axis::exact((-y, y), SIZE.vertical(), 5))
     }
 
-    /// Axes for the s-plane: both of the same scale, or both in decades.
+    /// Returns axes of the s-plane: both with the same linear scale, or both logarithmic.
     fn continuous_view(&self) -> (Axis, Axis) {
         let sizes = self.poles().map(|pole| pole[0].hypot(pole[1]));
         let largest = sizes.clone().fold(0.0, f64::max);
@@ -147,7 +147,7 @@ impl Map<'_> {
         }
     }
 
-    /// The part of the plane where a loop is unstable, and its boundary.
+    /// Draws the unstable part of the plane and its boundary.
     fn stability(&self, chart: &Chart<'_>) -> Markup {
         let ((left, right), (bottom, top)) = (chart.x.pixels(), chart.y.pixels());
         match self.plane {
@@ -186,7 +186,7 @@ impl Map<'_> {
             .map(|group| (group.sign.at(15.0, 9.0), group.name.to_owned()))
             .collect();
         if self.region.is_some() {
-            entries.push((line_sample("region"), "boundary of the wanted region".to_owned()));
+            entries.push((line_sample("region"), "boundary of the required region".to_owned()));
         }
         let edge = match self.plane {
             Plane::Continuous => "edge of stability",

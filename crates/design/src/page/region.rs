@@ -1,15 +1,15 @@
-//! The boundary of a wanted region of the plane.
+//! The boundary of a required region of eigenvalues.
 
 use std::f64::consts::PI;
 
 use super::plane::Plane;
 use crate::report::Region;
 
-/// Steps along a part of the boundary.
+/// Number of points along a part of the boundary.
 const STEPS: u16 = 400;
 
-/// Points of `plane` along the boundary of each part of the region, densest near the real axis.
-/// In the z-plane only the strip up to half the sample rate has a place.
+/// Returns points of `plane` along the boundary of each part of the region, densest near the real
+/// axis. In the z-plane only frequencies up to half the sample rate are shown.
 pub(super) fn boundary(region: &Region, plane: Plane) -> Vec<Vec<(f64, f64)>> {
     let mut parts = Vec::new();
     let both_sides = |share: f64| (2.0 * share - 1.0).powi(3);
@@ -34,7 +34,7 @@ pub(super) fn boundary(region: &Region, plane: Plane) -> Vec<Vec<(f64, f64)>> {
     parts
 }
 
-/// Farther than any frequency of interest; in the z-plane the end of its strip.
+/// Returns a frequency beyond all frequencies of interest; in the z-plane, half the sample rate.
 fn far(plane: Plane) -> f64 {
     match plane {
         Plane::Continuous => 1e9,
@@ -60,7 +60,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn boundaries_have_the_decay_the_distance_and_the_angle_wanted_in_both_planes() {
+    fn boundaries_have_the_decay_the_distance_and_the_angle_required_in_both_planes() {
         let region = Region {
             decay: Some(3.0),
             disc_center: Some(-40.0),

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::number::{complex, exact, rounded};
 
-/// What stands in a cell.
+/// The content of a cell.
 pub(super) enum Cell {
     Text(String),
     Number(f64),
@@ -68,8 +68,8 @@ impl Cell {
     }
 }
 
-/// A table whose first column names its rows. Columns in which nothing stands are left out, and
-/// so is a table without rows.
+/// Returns a table whose first column names its rows. Empty columns are left out; a table without
+/// rows is empty.
 pub(super) fn table(caption: &str, heads: &[&str], rows: &[Vec<Cell>]) -> Markup {
     let filled = |column: usize| rows.iter().any(|row| !row[column].is_missing());
     let numeric = |column: usize| rows.iter().any(|row| row[column].is_number());
@@ -118,7 +118,7 @@ fn row_name(cell: &Cell) -> Markup {
     }
 }
 
-/// Something wide: it scrolls, by keys too, where the page is narrow.
+/// Returns a scrollable container for wide content, also scrollable by keys.
 pub(super) fn scrolled(name: &str, content: &Markup) -> Markup {
     html! { div.scroll role="region" tabindex="0" aria-label=(name) { (content) } }
 }

@@ -230,7 +230,7 @@ fn map<'a>(document: &'a Document<'_>, id: &str) -> Node<'a, 'a> {
 }
 
 #[test]
-fn maps_show_every_eigenvalue_inside_the_frame_wanted_around_reached() {
+fn maps_show_every_eigenvalue_inside_the_frame_required_around_actual() {
     with_pages(|report, document| {
         for (id, system) in [("map-feedback", &report.feedback), ("map-observer", &report.observer)]
         {
@@ -244,7 +244,7 @@ fn maps_show_every_eigenvalue_inside_the_frame_wanted_around_reached() {
                 }
                 for (x, y) in signs(map, "sign ink-1") {
                     let near = |place: &(f64, f64)| (place.0 - x).hypot(place.1 - y) < 1.0;
-                    assert!(reached.iter().any(near), "{id}: nothing near the wanted {x} {y}");
+                    assert!(reached.iter().any(near), "{id}: nothing near the required {x} {y}");
                 }
             }
         }

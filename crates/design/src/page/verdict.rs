@@ -1,4 +1,4 @@
-//! The verdict: what holds, what fails, and the few numbers that matter first.
+//! The summary: which checks hold, which fail, and the most important numbers.
 
 use maud::{Markup, html};
 
@@ -117,7 +117,7 @@ fn slowest(name: &str, system: &Loop, plane: Plane) -> Markup {
     }
 }
 
-/// The curve that takes longest to settle, whatever fault changed.
+/// Shows the curve with the longest settling time over all faults.
 fn settling(report: &Report) -> Markup {
     let curves = report.steps.iter().flat_map(|step| &step.curves);
     let last = curves.max_by(|a, b| a.settling_time.total_cmp(&b.settling_time));

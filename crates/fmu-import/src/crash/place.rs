@@ -1,5 +1,5 @@
-//! Where the FMUs are: for each instance the function that it is in, and the time.
-#![expect(unsafe_code, reason = "names of functions are kept by address")]
+//! The current function and time of each FMU instance, for crash reports.
+#![expect(unsafe_code, reason = "names of functions are stored by address")]
 
 use std::cell::Cell;
 use std::fmt;
@@ -10,24 +10,24 @@ use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicU8, AtomicU64, AtomicUsize,
 
 use super::Call;
 
-/// Most instances that are told apart in reports.
-const MOST: usize = 4096;
+/// Number of instances with a slot of their own.
+const SLOT_COUNT: usize = 4096;
 /// Bytes of an instance's name that reports show.
-const NAME: usize = 96;
+const NAME_LENGTH: usize = 96;
 
-/// Where the instances are. No part of the heap, which an FMU may write over before it crashes; the
-/// last one is shared by the instances for which there is no other.
-static SLOTS: [Slot; MOST] = [const { Slot::new() }; MOST];
+/// The slots of all instances. They are static because an FMU may overwrite the heap before it
+/// crashes. Instances beyond [`SLOT_COUNT`] share the last slot.
+static SLOTS: [Slot; SLOT_COUNT] = [const { Slot::new() }; SLOT_COUNT];
 
 thread_local! {
-    /// Address of the place that this thread entered last; a signal handler reads it.
+    /// Address of the slot that this thread entered last; a signal handler reads it.
     static LAST: Cell<usize> = const { Cell::new(0) };
 }
 
-/// The name of an instance, cut after 96 bytes. No part of the heap, as all that is told of a crash.
+/// The name of an instance, cut after 96 bytes and stored without heap allocation.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Name {
-    bytes: [u8; NAME],
+    bytes: [u8; NAME_LENGTH],
     length: usize,
 }
 
@@ -53,44 +53,44 @@ impl fmt::Debug for Name {
     }
 }
 
-/// Where one instance is. Entering and leaving a function are a few stores.
+/// The current function and time of one instance. Entering and leaving a function cost a few stores.
 pub(crate) struct Slot {
     taken: AtomicBool,
-    /// The function that the instance is in; null between the calls.
+    /// The function that the instance executes; null between calls.
     function: AtomicPtr<&'static str>,
-    /// Bits of the time at which the instance is, in s.
+    /// Bits of the time of the instance, in s.
     time: AtomicU64,
-    /// Name of the instance, and how many bytes it has.
-    name: [AtomicU8; NAME],
+    /// Name of the instance; `length` is its number of bytes.
+    name: [AtomicU8; NAME_LENGTH],
     length: AtomicUsize,
 }
 
-/// The slot of an instance, for as long as it lives.
+/// A claimed [`Slot`], released when the instance is dropped.
 pub(crate) struct Place {
     slot: &'static Slot,
     instance: String,
 }
 
 impl Place {
-    /// The place of a new instance.
+    /// Claims a slot for a new instance.
     pub(crate) fn new(instance: &str) -> Arc<Self> {
         let free = SLOTS.iter().find(|slot| !slot.taken.swap(true, Ordering::AcqRel));
-        let slot = free.unwrap_or(&SLOTS[MOST - 1]);
+        let slot = free.unwrap_or(&SLOTS[SLOT_COUNT - 1]);
         let bytes = instance.as_bytes();
         for (place, byte) in slot.name.iter().zip(bytes) {
             place.store(*byte, Ordering::Relaxed);
         }
-        slot.length.store(bytes.len().min(NAME), Ordering::Relaxed);
+        slot.length.store(bytes.len().min(NAME_LENGTH), Ordering::Relaxed);
         slot.time.store(0, Ordering::Relaxed);
         Arc::new(Self { slot, instance: instance.to_owned() })
     }
 
-    /// What outlives the instance.
+    /// Returns the slot, which lives as long as the process.
     pub(crate) fn slot(&self) -> &'static Slot {
         self.slot
     }
 
-    /// The name of the instance.
+    /// Returns the name of the instance.
     pub(crate) fn instance(&self) -> &str {
         &self.instance
     }
@@ -110,46 +110,46 @@ impl Slot {
             taken: AtomicBool::new(false),
             function: AtomicPtr::new(ptr::null_mut()),
             time: AtomicU64::new(0),
-            name: [const { AtomicU8::new(0) }; NAME],
+            name: [const { AtomicU8::new(0) }; NAME_LENGTH],
             length: AtomicUsize::new(0),
         }
     }
 
-    /// The calling thread is about to call this function of the instance.
+    /// Records that the calling thread is about to call `function` of the instance.
     #[inline]
     pub(crate) fn enter(&self, function: &'static &'static str) {
         self.function.store(ptr::from_ref(function).cast_mut(), Ordering::Relaxed);
         LAST.set(ptr::from_ref(self).addr());
     }
 
-    /// The call has returned.
+    /// Records that the call has returned.
     #[inline]
     pub(crate) fn leave(&self) {
         self.function.store(ptr::null_mut(), Ordering::Relaxed);
     }
 
-    /// The time at which the instance is from now on, in s.
+    /// Sets the time of the instance, in s.
     #[inline]
     pub(crate) fn set_time(&self, time: f64) {
         self.time.store(time.to_bits(), Ordering::Relaxed);
     }
 
-    /// The time at which the instance is, in s.
+    /// Returns the time of the instance, in s.
     pub(crate) fn time(&self) -> f64 {
         f64::from_bits(self.time.load(Ordering::Relaxed))
     }
 
-    /// The call that the instance is in.
+    /// Returns the call that the instance executes.
     fn call(&self) -> Option<Call> {
         let function = self.function.load(Ordering::Relaxed);
-        // SAFETY: null, or the address of a static reference that `enter` was given.
+        // SAFETY: null, or the address of the static reference passed to `enter`.
         let function = *unsafe { function.as_ref() }?;
         let bytes = self.name.each_ref().map(|byte| byte.load(Ordering::Relaxed));
-        let instance = Name { bytes, length: self.length.load(Ordering::Relaxed).min(NAME) };
+        let instance = Name { bytes, length: self.length.load(Ordering::Relaxed).min(NAME_LENGTH) };
         Some(Call { instance, function, time: self.time() })
     }
 
-    /// Whether that is the address of this slot.
+    /// Returns whether `address` is the address of this slot.
     pub(crate) fn is_at(&self, address: usize) -> bool {
         ptr::from_ref(self).addr() == address
     }
@@ -162,14 +162,14 @@ impl Drop for Place {
     }
 }
 
-/// The address of the place that this thread entered last; 0 where it never did.
+/// Returns the address of the slot that this thread entered last; 0 if it entered none.
 #[inline]
 pub(crate) fn last_of_this_thread() -> usize {
     LAST.try_with(Cell::get).unwrap_or(0)
 }
 
-/// The call that the instance at that place is in; where there is no such place or call, the calls
-/// that all instances are in. Nothing here allocates.
+/// Returns the call that the slot at `address` executes. Without such a slot or call, returns the
+/// current calls of all instances. Does not allocate.
 pub(super) fn calls(address: usize) -> impl Iterator<Item = Call> {
     let own = SLOTS.iter().find(|slot| slot.is_at(address) && slot.call().is_some());
     SLOTS

@@ -1,4 +1,4 @@
-//! The functions of the standard, each one round trip to the worker.
+//! Implements [`Slave`] for an isolated instance: one round trip to the worker per function.
 
 use fmu_description::Experiment;
 use fmu_description::ModelDescription;
@@ -9,28 +9,29 @@ use super::strings;
 use super::words::{Reader, Writer};
 use slave::{Advance, Background, CallError, Slave, StepResult};
 
-/// For commands without arguments, or without results.
-fn nothing(_: &mut Writer<'_>) {}
+/// Writes the arguments of a command without arguments.
+fn no_arguments(_: &mut Writer<'_>) {}
 
-#[expect(clippy::unnecessary_wraps, reason = "the form of what reads an answer")]
+/// Reads the results of a command without results.
+#[expect(clippy::unnecessary_wraps, reason = "the signature of all readers of answers")]
 fn no_result(_: &mut Reader<'_>) -> Option<()> {
     Some(())
 }
 
-/// How many bytes are there to be fetched.
-fn count(reader: &mut Reader<'_>) -> Option<usize> {
+/// Reads the number of bytes to download.
+fn read_count(reader: &mut Reader<'_>) -> Option<usize> {
     reader.take()
 }
 
-/// References, and one value for each.
+/// Writes references and one value for each.
 #[inline]
-fn pairs<T: super::words::Word>(writer: &mut Writer<'_>, references: &[u32], values: &[T]) {
+fn write_pairs<T: super::words::Word>(writer: &mut Writer<'_>, references: &[u32], values: &[T]) {
     assert_eq!(references.len(), values.len(), "references and values are equally many");
     writer.put_list(references);
     writer.put_all(values);
 }
 
-fn stepped(reader: &mut Reader<'_>) -> Option<StepResult> {
+fn read_step_result(reader: &mut Reader<'_>) -> Option<StepResult> {
     let whole: bool = reader.take()?;
     let (reached, terminated) = (reader.take()?, reader.take()?);
     Some(if whole { StepResult::Whole } else { StepResult::Part { reached, terminated } })
@@ -38,7 +39,7 @@ fn stepped(reader: &mut Reader<'_>) -> Option<StepResult> {
 
 impl Isolated {
     fn plain(&mut self, command: Command) -> Result<(), CallError> {
-        self.call(command, nothing, no_result)
+        self.call(command, no_arguments, no_result)
     }
 }
 
@@ -50,21 +51,21 @@ impl Background for Isolated {
             writer.put(step.time);
             writer.put(step.size);
             writer.put(step.never_back);
-            pairs(writer, step.inputs, step.input_values);
-            pairs(writer, step.derived_inputs, step.input_derivatives);
+            write_pairs(writer, step.inputs, step.input_values);
+            write_pairs(writer, step.derived_inputs, step.input_derivatives);
             writer.put_all(step.input_orders);
             writer.put_list(step.outputs);
             writer.put_list(step.derived_outputs);
             writer.put_all(step.output_orders);
         })?;
-        self.left_alone();
+        self.start_timer();
         Ok(())
     }
 
     #[inline]
     fn finish_advance(&mut self, step: &mut Advance<'_>) -> Result<StepResult, CallError> {
         self.answer(Command::Advance, |reader| {
-            let done = stepped(reader)?;
+            let done = read_step_result(reader)?;
             reader.take_all(step.output_values)?;
             reader.take_all(step.output_derivatives)?;
             Some(done)
@@ -115,7 +116,7 @@ impl Slave for Isolated {
     }
 
     fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), CallError> {
-        self.call(Command::SetReal, |writer| pairs(writer, references, values), no_result)
+        self.call(Command::SetReal, |writer| write_pairs(writer, references, values), no_result)
     }
 
     fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
@@ -124,7 +125,7 @@ impl Slave for Isolated {
     }
 
     fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
-        self.call(Command::SetInteger, |writer| pairs(writer, references, values), no_result)
+        self.call(Command::SetInteger, |writer| write_pairs(writer, references, values), no_result)
     }
 
     fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
@@ -133,20 +134,20 @@ impl Slave for Isolated {
     }
 
     fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
-        self.call(Command::SetBoolean, |writer| pairs(writer, references, values), no_result)
+        self.call(Command::SetBoolean, |writer| write_pairs(writer, references, values), no_result)
     }
 
     fn get_string(&mut self, references: &[u32], values: &mut [String]) -> Result<(), CallError> {
         let command = Command::GetString;
         let write = |writer: &mut Writer<'_>| writer.put_list(references);
-        let total = self.call(command, write, count)?;
-        let bytes = self.fetch(command, total)?;
-        strings::read(&bytes, values).ok_or_else(|| self.senseless(command))
+        let total = self.call(command, write, read_count)?;
+        let bytes = self.download(command, total)?;
+        strings::read(&bytes, values).ok_or_else(|| self.invalid_answer(command))
     }
 
     fn set_string(&mut self, references: &[u32], values: &[String]) -> Result<(), CallError> {
         assert_eq!(references.len(), values.len(), "references and values are equally many");
-        self.bring(&strings::write(values))?;
+        self.upload(&strings::write(values))?;
         let write = |writer: &mut Writer<'_>| writer.put_list(references);
         self.call(Command::SetString, write, no_result)
     }
@@ -158,7 +159,7 @@ impl Slave for Isolated {
         values: &[f64],
     ) -> Result<(), CallError> {
         let write = |writer: &mut Writer<'_>| {
-            pairs(writer, references, values);
+            write_pairs(writer, references, values);
             writer.put_all(orders);
         };
         self.call(Command::SetInputDerivatives, write, no_result)
@@ -184,7 +185,7 @@ impl Slave for Isolated {
             writer.put(size);
             writer.put(never_back);
         };
-        self.call(Command::DoStep, write, stepped)
+        self.call(Command::DoStep, write, read_step_result)
     }
 
     fn directional_derivative(
@@ -196,7 +197,7 @@ impl Slave for Isolated {
     ) -> Result<(), CallError> {
         let write = |writer: &mut Writer<'_>| {
             writer.put_list(unknowns);
-            pairs(writer, knowns, seed);
+            write_pairs(writer, knowns, seed);
         };
         self.call(Command::DirectionalDerivative, write, |reader| reader.take_all(changes))
     }
@@ -211,12 +212,12 @@ impl Slave for Isolated {
 
     fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
         let command = Command::SerializeState;
-        let total = self.call(command, nothing, count)?;
-        self.fetch(command, total)
+        let total = self.call(command, no_arguments, read_count)?;
+        self.download(command, total)
     }
 
     fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
-        self.bring(bytes)?;
+        self.upload(bytes)?;
         let write = |writer: &mut Writer<'_>| writer.put(bytes.len());
         self.call(Command::DeserializeState, write, no_result)
     }

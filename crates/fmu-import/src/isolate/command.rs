@@ -1,14 +1,14 @@
-//! What the master asks of a worker, and how an error comes back.
+//! The commands that a master sends to a worker, and the encoding of errors.
 
 use fmu_description::abi::Status;
 
 use super::words::{Reader, Writer};
 use slave::{CallError, Failure};
 
-/// Defines the commands, each with the function that its errors name.
+/// Defines the commands, each with the FMI function that its errors name.
 macro_rules! commands {
     ($($command:ident = $function:literal,)*) => {
-        /// What a worker can be asked.
+        /// A command for a worker.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub(super) enum Command {
             $($command,)*
@@ -17,12 +17,12 @@ macro_rules! commands {
         impl Command {
             const ALL: &[Command] = &[$(Command::$command,)*];
 
-            /// The function that it is about.
+            /// Returns the FMI function of the command.
             pub(super) fn function(self) -> &'static str {
                 self.name()
             }
 
-            /// The same, with a place of its own.
+            /// Returns a static reference to the name of the FMI function.
             #[inline]
             pub(super) fn name(self) -> &'static &'static str {
                 match self {
@@ -31,7 +31,7 @@ macro_rules! commands {
             }
         }
 
-        /// The functions that a worker can be in, or fail in.
+        /// The functions that a worker can execute; a [`place`] is an index into this list.
         const FUNCTIONS: &[&str] = &[
             $($function,)*
             LOADING,
@@ -43,7 +43,7 @@ macro_rules! commands {
     };
 }
 
-/// Where a worker is before there is an instance.
+/// The activity of a worker before it has an instance.
 pub(super) const LOADING: &str = "loading the library";
 
 commands! {
@@ -70,11 +70,11 @@ commands! {
     SerializeState = "fmi2SerializeFMUstate",
     DeserializeState = "fmi2DeSerializeFMUstate",
     Advance = "fmi2DoStep",
-    // Bytes that belong to the next command, or to the last answer.
-    Bring = "the transfer of data to it",
-    Fetch = "the transfer of data from it",
+    // Transfer bytes of the next command, or of the last answer.
+    Upload = "the transfer of data to it",
+    Download = "the transfer of data from it",
     Free = "fmi2FreeInstance",
-    // Frees the instance and makes another one.
+    // Frees the instance and creates another one.
     Renew = "fmi2Instantiate",
 }
 
@@ -88,37 +88,38 @@ impl Command {
     }
 }
 
-/// The place of a function among those that a worker can be in; one too large where it is none.
+/// Returns the number of a function in [`FUNCTIONS`]; an invalid number for an unknown function.
 pub(super) fn place(function: &str) -> u64 {
     let known = FUNCTIONS.iter().position(|known| *known == function);
     known.unwrap_or(FUNCTIONS.len()) as u64
 }
 
-/// The function at that place.
+/// Returns the function with the number `place`.
 pub(super) fn function_at(place: u64) -> Option<&'static str> {
     FUNCTIONS.get(usize::try_from(place).ok()?).copied()
 }
 
-/// How an answer begins where results follow.
+/// First word of an answer with results.
 pub(super) const DONE: u64 = 0;
-/// How an answer begins where a [`CallError`] follows.
+/// First word of an answer with a [`CallError`].
 pub(super) const FAILED: u64 = 1;
 
-/// What came of an instantiation: there is an instance, the FMU does not load or instantiate, a
-/// library to be loaded before it does not load. A reason follows the last two.
+/// Result of an instantiation: the instance exists.
 pub(super) const INSTANTIATED: u64 = 0;
+/// Result of an instantiation: the FMU does not load or instantiate. A reason follows.
 pub(super) const REFUSED: u64 = 1;
+/// Result of an instantiation: a library of `preload` does not load. A reason follows.
 pub(super) const NOT_PRELOADED: u64 = 2;
 
-/// Most bytes of one text of an error.
+/// Maximum number of bytes of one text in an error.
 const TEXT: usize = 8192;
 
-/// As much of `text` as an error takes with it.
+/// Returns the first [`TEXT`] bytes of `text`.
 fn clipped(text: &str) -> &[u8] {
     &text.as_bytes()[..text.len().min(TEXT)]
 }
 
-/// Writes an error; messages that do not fit are left out, the last ones go first.
+/// Writes an error. If not all messages fit, the last ones are written.
 pub(super) fn write_error(error: &CallError, writer: &mut Writer<'_>) {
     writer.put(FAILED);
     writer.put(place(error.function));
@@ -129,7 +130,7 @@ pub(super) fn write_error(error: &CallError, writer: &mut Writer<'_>) {
         Failure::TimedOut(seconds) => (3, seconds.to_bits(), ""),
         Failure::Panicked(text) => (4, 0, text),
         Failure::InvalidAnswer(text) => (5, 0, text),
-        // What happens to a process it cannot tell itself.
+        // A worker cannot report its own end: these failures arise in the master only.
         Failure::Killed(..) | Failure::Exited(_) | Failure::OutOfMemory(_) => {
             (5, 0, "ended a process of its own")
         }

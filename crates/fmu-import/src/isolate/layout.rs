@@ -1,4 +1,4 @@
-//! What stands where in the shared memory.
+//! The layout of the shared memory.
 
 use std::fs::File;
 use std::io;
@@ -6,52 +6,54 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::region::Region;
 
-/// Words between fields that different processes write: one or two lines of a cache.
-const APART: usize = 16;
+/// Distance in words between fields that different processes write: one or two cache lines.
+const SPACING: usize = 16;
 const TURN: usize = 0;
-const MASTER_SLEEPS: usize = APART;
-const WORKER_SLEEPS: usize = 2 * APART;
-const COMMAND: usize = 3 * APART;
-const PLACE: usize = 4 * APART;
-const LOG_HEAD: usize = 5 * APART;
-const LOG_DROPPED: usize = 5 * APART + 1;
-const LOG_TAIL: usize = 6 * APART;
-const MARK: usize = 7 * APART;
-const ATTACHED: usize = 7 * APART + 1;
-const NO_MEMORY: usize = 7 * APART + 2;
-const AREA: usize = 8 * APART;
+const MASTER_SLEEPS: usize = SPACING;
+const WORKER_SLEEPS: usize = 2 * SPACING;
+const COMMAND: usize = 3 * SPACING;
+const PLACE: usize = 4 * SPACING;
+const LOG_HEAD: usize = 5 * SPACING;
+const LOG_DROPPED: usize = 5 * SPACING + 1;
+const LOG_TAIL: usize = 6 * SPACING;
+const MAGIC: usize = 7 * SPACING;
+const ATTACHED: usize = 7 * SPACING + 1;
+const NO_MEMORY: usize = 7 * SPACING + 2;
+const AREA: usize = 8 * SPACING;
 
 /// Words of the ring of messages: 256 KiB.
 const RING: usize = 1 << 15;
-/// Words for arguments and results beside those that depend on the FMU: 64 KiB.
-const LEAST: usize = 1 << 13;
-/// Words for each variable: `advance` with its derivatives of two orders needs 16 where each
-/// variable is input and output.
-const FOR_EACH: usize = 16;
-/// What [`MARK`] holds: "fmu" and the version of this layout.
-const MARKED: u64 = 0x666d_7500_0000_0002;
+/// Minimum number of words for arguments and results: 64 KiB.
+const MIN_AREA: usize = 1 << 13;
+/// Words for arguments and results per variable: `advance` with derivatives of two orders needs 16 if
+/// each variable is input and output.
+const WORDS_PER_VARIABLE: usize = 16;
+/// The content of [`MAGIC`]: "fmu" and the version of this layout.
+const MAGIC_NUMBER: u64 = 0x666d_7500_0000_0002;
 
-/// The shared memory by its parts.
+/// The shared memory, with access to its fields.
 pub(super) struct Shared {
     region: Region,
 }
 
 impl Shared {
-    /// New memory for an FMU with that many variables, and the file behind it.
+    /// Creates memory for an FMU with `variables` variables; returns it and the file behind it.
     pub(super) fn create(variables: usize) -> io::Result<(Self, File)> {
-        let area = FOR_EACH.saturating_mul(variables).saturating_add(LEAST);
+        let area = WORDS_PER_VARIABLE.saturating_mul(variables).saturating_add(MIN_AREA);
         let (region, file) = Region::create(area.saturating_add(AREA + RING))?;
         let shared = Self { region };
-        shared.word(MARK).store(MARKED, Ordering::SeqCst);
+        shared.word(MAGIC).store(MAGIC_NUMBER, Ordering::SeqCst);
         Ok((shared, file))
     }
 
-    /// The memory that a master made.
+    /// Maps the memory that a master created.
     pub(super) fn attach(file: &File) -> io::Result<Self> {
         let shared = Self { region: Region::attach(file)? };
         let words = shared.region.words();
-        if words.len() < AREA + LEAST + RING || words[MARK].load(Ordering::SeqCst) != MARKED {
-            return Err(io::Error::other("it is no memory of this version of the program"));
+        if words.len() < AREA + MIN_AREA + RING
+            || words[MAGIC].load(Ordering::SeqCst) != MAGIC_NUMBER
+        {
+            return Err(io::Error::other("another version of the program created the memory"));
         }
         Ok(shared)
     }
@@ -61,65 +63,65 @@ impl Shared {
         &self.region.words()[position]
     }
 
-    /// Counts the turns: odd when the worker is to act, even when the master is.
+    /// The turn counter: odd when it is the worker's turn, even when it is the master's.
     #[inline]
     pub(super) fn turn(&self) -> &AtomicU64 {
         self.word(TURN)
     }
 
-    /// Whether the master waits to be woken.
+    /// Not 0 while the master sleeps until it is woken.
     #[inline]
     pub(super) fn master_sleeps(&self) -> &AtomicU64 {
         self.word(MASTER_SLEEPS)
     }
 
-    /// Whether the worker waits to be woken.
+    /// Not 0 while the worker sleeps until it is woken.
     #[inline]
     pub(super) fn worker_sleeps(&self) -> &AtomicU64 {
         self.word(WORKER_SLEEPS)
     }
 
-    /// What the worker is to do.
+    /// The command for the worker.
     #[inline]
     pub(super) fn command(&self) -> &AtomicU64 {
         self.word(COMMAND)
     }
 
-    /// The function that the worker is in.
+    /// The number of the function that the worker executes.
     #[inline]
     pub(super) fn place(&self) -> &AtomicU64 {
         self.word(PLACE)
     }
 
-    /// Words of messages written so far.
+    /// Number of words written to the message ring.
     #[inline]
     pub(super) fn log_head(&self) -> &AtomicU64 {
         self.word(LOG_HEAD)
     }
 
-    /// Words of messages read so far.
+    /// Number of words read from the message ring.
     #[inline]
     pub(super) fn log_tail(&self) -> &AtomicU64 {
         self.word(LOG_TAIL)
     }
 
-    /// Messages for which there was no room.
+    /// Number of messages dropped because the ring was full.
     #[inline]
     pub(super) fn log_dropped(&self) -> &AtomicU64 {
         self.word(LOG_DROPPED)
     }
 
-    /// Not 0 once a worker serves.
+    /// Not 0 once the worker is ready for commands.
     pub(super) fn attached(&self) -> &AtomicU64 {
         self.word(ATTACHED)
     }
 
-    /// Not 0 where the FMU crashed after an allocation had failed.
+    /// Not 0 if the FMU crashed after a failed allocation.
     pub(super) fn no_memory(&self) -> &AtomicU64 {
         self.word(NO_MEMORY)
     }
 
-    /// Arguments, then results.
+    /// The area for the arguments of a command, then for its results.
     #[inline]
     pub(super) fn area(&self) -> &[AtomicU64] {
         let words = self.region.words();

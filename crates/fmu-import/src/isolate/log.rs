@@ -1,5 +1,5 @@
-//! Messages of an FMU on their way to the master: a ring in the shared memory, which outlives the
-//! worker. Where it is full, messages are counted instead.
+//! Passes the messages of an FMU to the master through a ring buffer in shared memory, which survives
+//! a crash of the worker. Messages that do not fit are counted.
 
 use std::collections::VecDeque;
 use std::fmt::{self, Write as _};
@@ -14,27 +14,29 @@ use tracing::{Event, Level, Metadata, Subscriber};
 use super::layout::Shared;
 use slave::CallError;
 
-/// `target` of the events that an instance's messages are.
+/// The `target` of `tracing` events that carry messages of an FMU.
 const TARGET: &str = "fmu";
-/// Most bytes of a category and of a text.
+/// Maximum number of bytes of a category.
 const CATEGORY: usize = 256;
+/// Maximum number of bytes of a text.
 const TEXT: usize = 4096;
-/// Most messages that are kept for an error.
+/// Maximum number of messages kept for an error.
 const KEPT: usize = 10;
-/// Most messages that are passed on in [`WINDOW`], and bytes of messages in all.
+/// Maximum number of messages logged in one [`WINDOW`].
 const MESSAGES: u32 = 1000;
+/// Maximum number of bytes of messages logged per instance.
 const BYTES: usize = 16 << 20;
-/// How often the count of the others is told.
+/// Interval between two reports of the number of lost messages.
 const WINDOW: Duration = Duration::from_secs(1);
-/// Words before the bytes of a message: lengths, time.
+/// Words of a message before its text: lengths, time.
 const HEAD: usize = 2;
-/// The levels as they are numbered in the ring.
+/// The levels; the ring holds the index into this list.
 const LEVELS: [Level; 5] = [Level::ERROR, Level::WARN, Level::INFO, Level::DEBUG, Level::TRACE];
 
-/// Sends the messages that [`tracing`] gets in the worker.
+/// Sends the [`tracing`] events of the worker to the master.
 pub(super) struct Forward {
     shared: Arc<Shared>,
-    /// Words written so far.
+    /// Number of words written.
     head: Mutex<u64>,
 }
 
@@ -73,7 +75,7 @@ impl Forward {
     }
 }
 
-/// The word of the ring at a count of words; the length of the ring is a power of two.
+/// Returns the word of the ring for the running word number `count`.
 #[expect(clippy::cast_possible_truncation, reason = "the remainder is below the length")]
 fn at(ring: &[AtomicU64], count: u64) -> &AtomicU64 {
     &ring[(count % ring.len() as u64) as usize]
@@ -107,7 +109,7 @@ impl Subscriber for Forward {
     fn exit(&self, _: &Id) {}
 }
 
-/// What there is to a message.
+/// A message of an FMU.
 #[derive(Debug, Default, PartialEq)]
 struct Message {
     category: String,
@@ -138,12 +140,12 @@ impl Visit for Message {
     }
 }
 
-/// How much an FMU may say.
+/// Limits the number of messages that an FMU may log.
 struct Quota {
     since: Instant,
     messages: u32,
     bytes: usize,
-    /// Messages that nobody has been told of.
+    /// Number of lost messages that has not been reported.
     lost: u64,
 }
 
@@ -154,9 +156,9 @@ impl Default for Quota {
 }
 
 impl Quota {
-    /// Whether another message of that many bytes is passed on; one that is not is counted.
+    /// Returns whether a message of `bytes` bytes is logged; counts it as lost otherwise.
     fn admits(&mut self, instance: &str, bytes: usize) -> bool {
-        self.tell_late(instance);
+        self.end_window(instance);
         let admitted = self.messages < MESSAGES && self.bytes + bytes <= BYTES;
         if admitted {
             self.messages += 1;
@@ -167,16 +169,16 @@ impl Quota {
         admitted
     }
 
-    /// Begins a new window where one is over, and tells the count of the messages lost in it.
-    fn tell_late(&mut self, instance: &str) {
-        // The clock is looked at where the count could be told or has to begin anew.
+    /// Starts a new window if the current one is over, and reports the messages lost in it.
+    fn end_window(&mut self, instance: &str) {
+        // Reads the clock only if messages were lost or the limit is reached.
         if (self.lost > 0 || self.messages == MESSAGES) && self.since.elapsed() >= WINDOW {
             (self.since, self.messages) = (Instant::now(), 0);
-            self.tell(instance);
+            self.report_lost(instance);
         }
     }
 
-    fn tell(&mut self, instance: &str) {
+    fn report_lost(&mut self, instance: &str) {
         let count = std::mem::take(&mut self.lost);
         if count > 0 {
             tracing::warn!(target: "fmu", instance, lost = count, "{count} more messages came too fast and are lost");
@@ -186,19 +188,19 @@ impl Quota {
 
 impl Drop for Inbox {
     fn drop(&mut self) {
-        self.quota.tell(&self.instance);
+        self.quota.report_lost(&self.instance);
     }
 }
 
-/// Receives the messages in the master.
+/// Receives the messages of one instance in the master.
 #[derive(Default)]
 pub(super) struct Inbox {
     instance: String,
-    /// Words read so far.
+    /// Number of words read.
     tail: u64,
     dropped: u64,
     quota: Quota,
-    /// The last messages since they were last asked for.
+    /// The last messages since the last [`Inbox::take`].
     kept: VecDeque<String>,
 }
 
@@ -209,33 +211,33 @@ impl Inbox {
         inbox
     }
 
-    /// From now on the messages are those of this instance.
+    /// Sets the name of the instance for later messages.
     pub(super) fn rename(&mut self, instance: &str) {
-        self.quota.tell(&self.instance);
+        self.quota.report_lost(&self.instance);
         instance.clone_into(&mut self.instance);
     }
 
-    /// Hands over what has come to [`tracing`].
+    /// Logs all messages in the ring.
     #[inline]
-    pub(super) fn empty(&mut self, shared: &Shared) {
+    pub(super) fn drain(&mut self, shared: &Shared) {
         if shared.log_head().load(Ordering::Acquire) != self.tail
             || shared.log_dropped().load(Ordering::Relaxed) != self.dropped
         {
-            self.hear(shared);
+            self.receive(shared);
         }
     }
 
     #[cold]
-    fn hear(&mut self, shared: &Shared) {
+    fn receive(&mut self, shared: &Shared) {
         let head = shared.log_head().load(Ordering::Acquire);
         while self.tail != head {
             let Some((level, message)) = self.next(shared.ring(), head) else {
-                // Not what a worker writes: nothing up to `head` can be trusted.
+                // The ring is corrupted: skip everything up to `head`.
                 self.tail = head;
                 break;
             };
             if self.quota.admits(&self.instance, message.text.len()) {
-                say(&self.instance, level, &message);
+                log_message(&self.instance, level, &message);
             }
             if self.kept.len() == KEPT {
                 self.kept.pop_front();
@@ -247,10 +249,10 @@ impl Inbox {
         let count = dropped.wrapping_sub(self.dropped);
         self.dropped = dropped;
         self.quota.lost += count;
-        self.quota.tell_late(&self.instance);
+        self.quota.end_window(&self.instance);
     }
 
-    /// The message at the tail, which goes on to the next one; none where there cannot be one.
+    /// Reads the message at the tail and advances the tail; `None` if the ring holds no valid message.
     fn next(&mut self, ring: &[AtomicU64], head: u64) -> Option<(Level, Message)> {
         let available = head.wrapping_sub(self.tail);
         if available > ring.len() as u64 || available < HEAD as u64 {
@@ -279,28 +281,28 @@ impl Inbox {
         Some((level, message))
     }
 
-    /// The last messages since this was last asked.
+    /// Returns and clears the kept messages.
     pub(super) fn take(&mut self) -> Vec<String> {
         std::mem::take(&mut self.kept).into()
     }
 
-    /// Says what no caller is there to be told.
-    pub(super) fn complain(&self, error: &CallError) {
+    /// Logs an error that has no caller to return to.
+    pub(super) fn log_error(&self, error: &CallError) {
         let instance = self.instance.as_str();
         tracing::warn!(target: "fmu", instance, "{error}");
     }
 
-    /// Forgets the messages of calls that went well.
+    /// Discards the kept messages, before a new call.
     #[inline]
-    pub(super) fn forget(&mut self) {
+    pub(super) fn clear(&mut self) {
         if !self.kept.is_empty() {
             self.kept.clear();
         }
     }
 }
 
-/// Says a message as the FMU's instance in this process would.
-fn say(instance: &str, level: Level, Message { category, time, text }: &Message) {
+/// Logs a message in the same form as an FMU in this process.
+fn log_message(instance: &str, level: Level, Message { category, time, text }: &Message) {
     let category = category.as_str();
     match level {
         Level::ERROR => tracing::error!(target: "fmu", instance, category, time, "{text}"),
@@ -347,11 +349,11 @@ mod tests {
         let dropped = shared.log_dropped().load(Ordering::Relaxed);
         let words = 2 + 1 + 1;
         assert_eq!(100_000 - dropped, shared.ring().len() as u64 / words);
-        inbox.empty(&shared);
+        inbox.drain(&shared);
         assert_eq!(inbox.dropped, dropped);
         assert_eq!(inbox.take().last(), Some(&(100_000 - dropped - 1).to_string()));
         forward.send(Level::INFO, &message("after"));
-        inbox.empty(&shared);
+        inbox.drain(&shared);
         assert_eq!(inbox.take(), ["after"]);
     }
 
@@ -362,7 +364,7 @@ mod tests {
         assert_eq!((admitted, quota.lost), (1000, 4000));
         quota.since = quota.since.checked_sub(WINDOW).unwrap();
         assert!(quota.admits("one", 100), "the next second");
-        assert_eq!(quota.lost, 0, "it has been told");
+        assert_eq!(quota.lost, 0, "reported");
         let mut quota = Quota::default();
         let admitted = (0..100).filter(|_| quota.admits("one", 1 << 20)).count();
         assert_eq!((admitted, quota.lost), (16, 84));
@@ -379,7 +381,7 @@ mod tests {
             }
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             shared.log_head().store(state >> (state >> 58), Ordering::Relaxed);
-            inbox.empty(&shared);
+            inbox.drain(&shared);
             assert!(inbox.kept.len() <= KEPT);
             assert_eq!(shared.log_tail().load(Ordering::Relaxed), inbox.tail);
         }

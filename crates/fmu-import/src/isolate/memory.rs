@@ -1,4 +1,4 @@
-//! The limit of a worker's memory, and the crash that follows an allocation that failed.
+//! The memory limit of a worker, and the detection of a crash after a failed allocation.
 #![expect(unsafe_code, reason = "signal handlers")]
 
 use std::io;
@@ -12,10 +12,10 @@ use rustix::process::{Resource, Rlimit, setrlimit};
 
 use super::layout::Shared;
 
-/// Where a crash is noted.
+/// The memory in which a crash is recorded.
 static SHARED: OnceLock<Arc<Shared>> = OnceLock::new();
 
-/// Limits the address space of this process. A crash after a failed allocation is noted from now on.
+/// Limits the address space of this process, and records a later crash after a failed allocation.
 pub(super) fn limit(shared: &Arc<Shared>, bytes: u64) -> io::Result<()> {
     if SHARED.set(shared.clone()).is_ok() {
         for signal in [libc::SIGSEGV, libc::SIGBUS, libc::SIGABRT] {
@@ -27,26 +27,26 @@ pub(super) fn limit(shared: &Arc<Shared>, bytes: u64) -> io::Result<()> {
 }
 
 fn note_crash(signal: c_int) -> io::Result<()> {
-    // SAFETY: all zero is a value of this structure.
+    // SAFETY: all zeros is a valid value of this structure.
     let mut action: libc::sigaction = unsafe { MaybeUninit::zeroed().assume_init() };
     let handler: extern "C" fn(c_int, *mut siginfo_t, *mut c_void) = on_signal;
     action.sa_sigaction = handler as usize;
-    // The handler is left for the default, which ends the process as the crash would have.
+    // RESETHAND restores the default action, which ends the process as the crash would have.
     action.sa_flags = libc::SA_SIGINFO | libc::SA_ONSTACK | libc::SA_RESETHAND;
     // SAFETY: the handler has the signature of SA_SIGINFO, and uses atomics only.
     let result = unsafe { libc::sigaction(signal, &raw const action, null_mut()) };
     if result == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
 }
 
-/// `malloc` leaves ENOMEM in `errno`, which calls that succeed do not change: the crash is most likely
-/// the use of what was not given.
+/// Records the crash if `errno` is ENOMEM. `malloc` sets it on failure and successful calls do not
+/// change it, so the FMU most likely used a null pointer from `malloc`.
 extern "C" fn on_signal(signal: c_int, _: *mut siginfo_t, _: *mut c_void) {
     if io::Error::last_os_error().raw_os_error() == Some(libc::ENOMEM)
         && let Some(shared) = SHARED.get()
     {
         shared.no_memory().store(1, Ordering::Relaxed);
     }
-    // An invalid access happens again on return; a signal that was sent does not.
+    // An invalid access is repeated on return, but a signal that was sent is not: raise it again.
     // SAFETY: no conditions.
     unsafe { libc::raise(signal) };
 }

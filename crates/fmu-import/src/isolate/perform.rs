@@ -1,4 +1,5 @@
-//! What the worker does for each command: arguments out of the shared memory, the call, results in.
+//! Executes the commands of the master: reads the arguments from shared memory, calls the FMU and
+//! writes the results.
 
 use std::sync::atomic::Ordering;
 
@@ -11,11 +12,11 @@ use super::words::{Reader, Word, Writer};
 use crate::fmu::{Fmu, Instance};
 use slave::{CallError, Slave, StepResult};
 
-/// What came of a command; none where its arguments make no sense.
-type Done = Option<Result<(), CallError>>;
+/// The result of a command; `None` if its arguments are invalid.
+type CommandResult = Option<Result<(), CallError>>;
 
-/// An instance and the arrays that its calls need, kept so that a step allocates nothing.
-pub(super) struct Work {
+/// An instance and the buffers of its calls, kept so that a step does not allocate.
+pub(super) struct Executor {
     instance: Instance,
     references: Vec<u32>,
     knowns: Vec<u32>,
@@ -24,9 +25,10 @@ pub(super) struct Work {
     changes: Vec<f64>,
     integers: Vec<i32>,
     step: Step,
-    /// Bytes brought for the next command, and those that the last one left to be fetched.
-    brought: Vec<u8>,
-    left: Vec<u8>,
+    /// Bytes received for the next command.
+    uploaded: Vec<u8>,
+    /// Bytes of the last command that the master will download.
+    to_download: Vec<u8>,
 }
 
 /// The arguments and results of [`Slave::advance`].
@@ -46,10 +48,10 @@ struct Step {
     output_derivatives: Vec<f64>,
 }
 
-impl Work {
+impl Executor {
     pub(super) fn new(mut instance: Instance, logging: bool) -> Self {
         if logging {
-            // An FMU without the function says what it likes without.
+            // An FMU without the function logs by its own rules.
             let _ = instance.set_debug_logging(true);
         }
         Self {
@@ -61,17 +63,17 @@ impl Work {
             changes: Vec::new(),
             integers: Vec::new(),
             step: Step::default(),
-            brought: Vec::new(),
-            left: Vec::new(),
+            uploaded: Vec::new(),
+            to_download: Vec::new(),
         }
     }
 
-    /// The FMU of the instance.
+    /// Returns the FMU of the instance.
     pub(super) fn fmu(&self) -> Fmu {
         self.instance.fmu().clone()
     }
 
-    /// Does `command` with the arguments in `reader`; the results go to `writer`.
+    /// Executes `command` with the arguments in `reader`; writes the results to `writer`.
     #[inline]
     pub(super) fn perform(
         &mut self,
@@ -79,25 +81,25 @@ impl Work {
         shared: &Shared,
         reader: &mut Reader<'_>,
         writer: &mut Writer<'_>,
-    ) -> Done {
+    ) -> CommandResult {
         if command == Command::Advance {
             return self.advance(shared, reader, writer);
         }
         let done = self
             .values(command, reader, writer)
-            .or_else(|| self.courses(command, reader, writer))
-            .or_else(|| self.phases(command, reader, writer))
-            .or_else(|| self.bytes(command, reader, writer));
+            .or_else(|| self.derivatives_and_steps(command, reader, writer))
+            .or_else(|| self.modes_and_states(command, reader, writer))
+            .or_else(|| self.transfers(command, reader, writer));
         done?
     }
 
-    /// Values of Real, Integer and Boolean variables; the outer none for other commands.
+    /// Gets and sets Real, Integer and Boolean variables; the outer `None` for other commands.
     fn values(
         &mut self,
         command: Command,
         reader: &mut Reader<'_>,
         writer: &mut Writer<'_>,
-    ) -> Option<Done> {
+    ) -> Option<CommandResult> {
         let Self { instance, references, reals, integers, .. } = self;
         Some(match command {
             Command::GetReal => {
@@ -122,13 +124,13 @@ impl Work {
         })
     }
 
-    /// Derivatives and steps; the outer none for other commands.
-    fn courses(
+    /// Executes steps and the calls for derivatives; the outer `None` for other commands.
+    fn derivatives_and_steps(
         &mut self,
         command: Command,
         reader: &mut Reader<'_>,
         writer: &mut Writer<'_>,
-    ) -> Option<Done> {
+    ) -> Option<CommandResult> {
         match command {
             Command::SetInputDerivatives
             | Command::GetOutputDerivatives
@@ -141,7 +143,7 @@ impl Work {
             if command == Command::DoStep {
                 let (time, size) = (reader.take()?, reader.take()?);
                 let done = instance.do_step(time, size, reader.take()?);
-                return Some(done.map(|done| write_stepped(done, writer)));
+                return Some(done.map(|done| write_step_result(done, writer)));
             }
             reader.take_list(references)?;
             let count = references.len();
@@ -169,13 +171,13 @@ impl Work {
         })())
     }
 
-    /// From phase to phase, states in slots; the outer none for other commands.
-    fn phases(
+    /// Changes the mode, saves and restores states; the outer `None` for other commands.
+    fn modes_and_states(
         &mut self,
         command: Command,
         reader: &mut Reader<'_>,
         writer: &mut Writer<'_>,
-    ) -> Option<Done> {
+    ) -> Option<CommandResult> {
         let instance = &mut self.instance;
         let done = match command {
             Command::EnterInitializationMode => Some(instance.enter_initialization_mode()),
@@ -183,7 +185,7 @@ impl Work {
             Command::Terminate => Some(instance.terminate()),
             Command::SetDebugLogging => reader.take().map(|on| instance.set_debug_logging(on)),
             Command::SetupExperiment => {
-                experiment(reader).map(|experiment| instance.setup_experiment(&experiment))
+                read_experiment(reader).map(|experiment| instance.setup_experiment(&experiment))
             }
             Command::SaveState => reader.take().map(|slot| instance.save_state(slot)),
             Command::RestoreState => reader.take().map(|slot| instance.restore_state(slot)),
@@ -193,24 +195,24 @@ impl Work {
         Some(done)
     }
 
-    /// What is too long for one turn.
-    fn bytes(
+    /// Executes commands whose data may need several turns; the outer `None` for other commands.
+    fn transfers(
         &mut self,
         command: Command,
         reader: &mut Reader<'_>,
         writer: &mut Writer<'_>,
-    ) -> Option<Done> {
+    ) -> Option<CommandResult> {
         Some(match command {
-            Command::Bring => self.bring(reader, writer),
-            Command::Fetch => self.fetch(reader, writer),
+            Command::Upload => self.upload(reader, writer),
+            Command::Download => self.download(reader, writer),
             Command::GetString => self.get_string(reader, writer),
             Command::SetString => self.set_string(reader, writer),
             Command::SerializeState => {
                 let done = self.instance.serialize_state();
-                Some(done.map(|bytes| self.leave(bytes, writer)))
+                Some(done.map(|bytes| self.offer(bytes, writer)))
             }
             Command::DeserializeState => {
-                let bytes = std::mem::take(&mut self.brought);
+                let bytes = std::mem::take(&mut self.uploaded);
                 let whole = reader.take() == Some(bytes.len());
                 writer.put(DONE);
                 whole.then(|| self.instance.deserialize_state(&bytes))
@@ -219,42 +221,44 @@ impl Work {
         })
     }
 
-    fn bring(&mut self, reader: &mut Reader<'_>, writer: &mut Writer<'_>) -> Done {
+    /// Receives a piece of the data of the next command.
+    fn upload(&mut self, reader: &mut Reader<'_>, writer: &mut Writer<'_>) -> CommandResult {
         let first: bool = reader.take()?;
         if first {
-            self.brought.clear();
+            self.uploaded.clear();
         }
-        reader.take_bytes(&mut self.brought)?;
+        reader.take_bytes(&mut self.uploaded)?;
         writer.put(DONE);
         Some(Ok(()))
     }
 
-    /// Keeps `bytes` to be fetched and announces them.
-    fn leave(&mut self, bytes: Vec<u8>, writer: &mut Writer<'_>) {
+    /// Keeps `bytes` for download and writes their number.
+    fn offer(&mut self, bytes: Vec<u8>, writer: &mut Writer<'_>) {
         writer.put(DONE);
         writer.put(bytes.len());
-        self.left = bytes;
+        self.to_download = bytes;
     }
 
-    fn fetch(&mut self, reader: &mut Reader<'_>, writer: &mut Writer<'_>) -> Done {
+    /// Sends a piece of the data of the last command.
+    fn download(&mut self, reader: &mut Reader<'_>, writer: &mut Writer<'_>) -> CommandResult {
         let offset: usize = reader.take()?;
-        let rest = self.left.get(offset..)?;
+        let rest = self.to_download.get(offset..)?;
         writer.put(DONE);
         let most = 8 * writer.room().saturating_sub(1);
         writer.put_bytes(&rest[..rest.len().min(most)]);
         Some(Ok(()))
     }
 
-    fn get_string(&mut self, reader: &mut Reader<'_>, writer: &mut Writer<'_>) -> Done {
+    fn get_string(&mut self, reader: &mut Reader<'_>, writer: &mut Writer<'_>) -> CommandResult {
         reader.take_list(&mut self.references)?;
         let mut values = vec![String::new(); self.references.len()];
         let done = self.instance.get_string(&self.references, &mut values);
-        Some(done.map(|()| self.leave(strings::write(&values), writer)))
+        Some(done.map(|()| self.offer(strings::write(&values), writer)))
     }
 
-    fn set_string(&mut self, reader: &mut Reader<'_>, writer: &mut Writer<'_>) -> Done {
+    fn set_string(&mut self, reader: &mut Reader<'_>, writer: &mut Writer<'_>) -> CommandResult {
         reader.take_list(&mut self.references)?;
-        let bytes = std::mem::take(&mut self.brought);
+        let bytes = std::mem::take(&mut self.uploaded);
         let mut values = vec![String::new(); self.references.len()];
         strings::read(&bytes, &mut values)?;
         writer.put(DONE);
@@ -266,11 +270,11 @@ impl Work {
         shared: &Shared,
         reader: &mut Reader<'_>,
         writer: &mut Writer<'_>,
-    ) -> Done {
+    ) -> CommandResult {
         self.step.read(reader)?;
         let Self { instance, step, .. } = self;
-        Some(step.make(instance, shared).map(|done| {
-            write_stepped(done, writer);
+        Some(step.run(instance, shared).map(|done| {
+            write_step_result(done, writer);
             writer.put_all(&step.output_values);
             writer.put_all(&step.output_derivatives);
         }))
@@ -294,8 +298,9 @@ impl Step {
         Some(())
     }
 
-    /// The calls of [`Slave::advance`], each with its place left for the master to find.
-    fn make(&mut self, instance: &mut Instance, shared: &Shared) -> Result<StepResult, CallError> {
+    /// Makes the calls of [`Slave::advance`]. Stores each function in shared memory, so that the
+    /// master can name the function that crashed.
+    fn run(&mut self, instance: &mut Instance, shared: &Shared) -> Result<StepResult, CallError> {
         let at = |command: Command| shared.place().store(command.to_word(), Ordering::Relaxed);
         if !self.inputs.is_empty() {
             at(Command::SetReal);
@@ -327,7 +332,7 @@ fn get<T: Word + Default>(
     references: &mut Vec<u32>,
     values: &mut Vec<T>,
     call: impl FnOnce(&[u32], &mut [T]) -> Result<(), CallError>,
-) -> Done {
+) -> CommandResult {
     reader.take_list(references)?;
     values.resize(references.len(), T::default());
     writer.put(DONE);
@@ -340,14 +345,14 @@ fn set<T: Word>(
     references: &mut Vec<u32>,
     values: &mut Vec<T>,
     call: impl FnOnce(&[u32], &[T]) -> Result<(), CallError>,
-) -> Done {
+) -> CommandResult {
     reader.take_list(references)?;
     reader.take_counted(references.len(), values)?;
     writer.put(DONE);
     Some(call(references, values))
 }
 
-fn experiment(reader: &mut Reader<'_>) -> Option<Experiment> {
+fn read_experiment(reader: &mut Reader<'_>) -> Option<Experiment> {
     let start_time = reader.take()?;
     let mut optional = || {
         let (defined, value): (bool, f64) = (reader.take()?, reader.take()?);
@@ -356,7 +361,7 @@ fn experiment(reader: &mut Reader<'_>) -> Option<Experiment> {
     Some(Experiment { start_time, stop_time: optional()?, tolerance: optional()? })
 }
 
-fn write_stepped(done: StepResult, writer: &mut Writer<'_>) {
+fn write_step_result(done: StepResult, writer: &mut Writer<'_>) {
     let (whole, reached, terminated) = match done {
         StepResult::Whole => (true, 0.0, false),
         StepResult::Part { reached, terminated } => (false, reached, terminated),

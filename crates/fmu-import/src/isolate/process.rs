@@ -1,4 +1,4 @@
-//! The process of a worker: start, end, and why it ended.
+//! The process of a worker: its start, its end and the cause of its end.
 
 use std::fs::File;
 use std::io;
@@ -15,21 +15,21 @@ use super::output::Output;
 use super::{STARTED_BY, WORKER};
 use slave::Failure;
 
-/// Between two looks whether the process has ended.
+/// Pause between two checks whether the process has ended.
 const PAUSE: Duration = Duration::from_millis(1);
 
-/// The process of one worker, which does not outlive this, and neither do those that it started,
-/// unless they left its process group.
+/// The process of one worker. Dropping it kills the process and its whole process group.
 pub(super) struct Process {
     child: Child,
     output: Output,
-    /// How it ended, once that is known.
+    /// How the process ended; `None` while it runs.
     ended: Option<Failure>,
 }
 
 impl Process {
-    /// Starts `executable` as a worker: the connection is its standard input, the shared memory its
-    /// standard output, until it has taken both over. Signals of the terminal are not for it.
+    /// Starts `executable` as a worker in a process group of its own, so that signals of the terminal
+    /// do not reach it. The worker takes over the connection from its standard input and the shared
+    /// memory from its standard output.
     pub(super) fn start(
         executable: &Path,
         instance: &str,
@@ -48,7 +48,7 @@ impl Process {
         Ok(Self { child, output, ended: None })
     }
 
-    /// Its number.
+    /// Returns the process identifier.
     pub(super) fn id(&self) -> u32 {
         self.child.id()
     }
@@ -57,11 +57,11 @@ impl Process {
         i32::try_from(self.child.id()).ok().and_then(Pid::from_raw)
     }
 
-    /// How it ended, if it has.
+    /// Returns how the process ended; `None` while it runs.
     pub(super) fn ended(&mut self) -> Option<Failure> {
         let pid = self.pid()?;
         if self.ended.is_none() {
-            // The process is left a zombie: until it is gone its number means its group only.
+            // NOWAIT keeps the zombie, so that its identifier still names its process group only.
             let options = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
             waitid(WaitId::Pid(pid), options).ok().flatten()?;
             self.end_group();
@@ -69,29 +69,29 @@ impl Process {
         self.ended.clone()
     }
 
-    /// How it ended, if it does within `patience`.
-    pub(super) fn ends_within(&mut self, patience: Duration) -> Option<Failure> {
-        let begin = Instant::now();
+    /// Waits up to `limit` for the end of the process; returns how it ended.
+    pub(super) fn wait_for_end(&mut self, limit: Duration) -> Option<Failure> {
+        let start = Instant::now();
         loop {
             let ended = self.ended();
-            if ended.is_some() || begin.elapsed() > patience {
+            if ended.is_some() || start.elapsed() > limit {
                 return ended;
             }
             std::thread::sleep(PAUSE);
         }
     }
 
-    /// Ends it, and the processes that it started.
+    /// Kills the process and its process group.
     pub(super) fn kill(&mut self) {
         if self.ended.is_none() {
             self.end_group();
         }
     }
 
-    /// Ends what there is of its group, then takes note of its own end.
+    /// Kills the process group and records how the process ended.
     fn end_group(&mut self) {
         if let Some(pid) = self.pid() {
-            // Fails where nothing of the group is alive.
+            // Fails if no process of the group is alive.
             let _ = kill_process_group(pid, Signal::KILL);
         }
         let _ = self.child.kill();
@@ -115,7 +115,7 @@ fn failure(status: ExitStatus) -> Failure {
     }
 }
 
-/// The name of a signal.
+/// Returns the name of a signal.
 fn name(signal: i32) -> &'static str {
     let known = [
         (Signal::HUP, "SIGHUP"),

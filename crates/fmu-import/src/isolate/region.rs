@@ -1,4 +1,4 @@
-//! The memory that master and worker share: 64-bit words, every access atomic.
+//! The shared memory of master and worker: 64-bit words, every access atomic.
 #![expect(unsafe_code, reason = "a mapping becomes a slice of atomics")]
 
 use std::fs::File;
@@ -11,13 +11,13 @@ use rustix::fs::{MemfdFlags, SealFlags, fcntl_add_seals, fcntl_get_seals, memfd_
 /// Bytes of a word.
 const WORD: usize = size_of::<AtomicU64>();
 
-/// A mapping of a file without a name, whose length is sealed.
+/// A mapping of an anonymous file with sealed length (`memfd`).
 pub(super) struct Region {
     map: MmapRaw,
 }
 
 impl Region {
-    /// New memory of that many words, all zero, and the file by which another process maps it.
+    /// Creates memory of `words` zeros; returns it and the file through which another process maps it.
     pub(super) fn create(words: usize) -> io::Result<(Self, File)> {
         let flags = MemfdFlags::CLOEXEC | MemfdFlags::ALLOW_SEALING;
         let file = File::from(memfd_create("fmu", flags)?);
@@ -27,11 +27,11 @@ impl Region {
         Ok((Self::map(&file)?, file))
     }
 
-    /// Maps the memory behind `file`, which [`Region::create`] made in another process.
+    /// Maps the memory behind `file`, which [`Region::create`] created in another process.
     pub(super) fn attach(file: &File) -> io::Result<Self> {
         let sealed = fcntl_get_seals(file)?;
         if !sealed.contains(SealFlags::SHRINK) {
-            return Err(io::Error::other("its length is not sealed"));
+            return Err(io::Error::other("the length of the shared file is not sealed"));
         }
         Self::map(file)
     }
@@ -40,15 +40,15 @@ impl Region {
         Ok(Self { map: MmapOptions::new().map_raw(file)? })
     }
 
-    /// The words.
+    /// Returns the words.
     #[inline]
     pub(super) fn words(&self) -> &[AtomicU64] {
         let length = self.map.len() / WORD;
-        #[expect(clippy::cast_ptr_alignment, reason = "a mapping begins at a page")]
+        #[expect(clippy::cast_ptr_alignment, reason = "a mapping starts at a page")]
         let first = self.map.as_mut_ptr().cast::<AtomicU64>();
-        // SAFETY: the mapping begins at a page, so it is aligned; it is `length` words long and lives
-        // as long as `self`; its file is sealed, so no process can take the memory away; every process
-        // that has it accesses it by atomics only, for which any bits are a value.
+        // SAFETY: the mapping starts at a page, so it is aligned; it is `length` words long and lives
+        // as long as `self`; its file is sealed, so no process can shrink it; every process accesses
+        // it by atomics only, for which all bit patterns are valid.
         unsafe { std::slice::from_raw_parts(first, length) }
     }
 }

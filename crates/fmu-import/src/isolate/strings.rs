@@ -1,6 +1,6 @@
-//! Strings as bytes: the length of each in eight bytes, then its own.
+//! Strings as bytes: for each string its length in eight bytes (little endian), then its bytes.
 
-/// The bytes of `values`.
+/// Encodes `values`.
 pub(super) fn write(values: &[String]) -> Vec<u8> {
     let mut bytes = Vec::new();
     for value in values {
@@ -10,7 +10,7 @@ pub(super) fn write(values: &[String]) -> Vec<u8> {
     bytes
 }
 
-/// Fills `values` from all of `bytes`; none where they do not hold as many strings.
+/// Decodes `bytes` into `values`; `None` if `bytes` holds another number of strings.
 pub(super) fn read(mut bytes: &[u8], values: &mut [String]) -> Option<()> {
     for value in values {
         let (length, rest) = bytes.split_first_chunk()?;

@@ -1,15 +1,15 @@
-//! Values as words of the shared memory. What is read was written by a process that may have gone
-//! wrong: each word is read once and checked before it counts.
+//! Encodes values as words of the shared memory. The other process may have written anything, so the
+//! reader loads each word once and checks it.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Bytes in a word.
 const BYTES: usize = 8;
 
-/// How a value stands in a word.
+/// A type that is encoded in one word.
 pub(super) trait Word: Copy {
     fn to_word(self) -> u64;
-    /// None where the word is no such value.
+    /// Decodes a word; `None` if it is not a value of this type.
     fn from_word(word: u64) -> Option<Self>;
 }
 
@@ -73,7 +73,7 @@ impl Word for bool {
     }
 }
 
-/// Writes from the front of an area; what does not fit is not written.
+/// Writes values to an area from its start. Values that do not fit are not written.
 pub(super) struct Writer<'a> {
     words: &'a [AtomicU64],
     at: usize,
@@ -84,12 +84,12 @@ impl<'a> Writer<'a> {
         Self { words, at: 0 }
     }
 
-    /// Whether everything fitted.
+    /// Returns whether all values fitted.
     pub(super) fn fits(&self) -> bool {
         self.at <= self.words.len()
     }
 
-    /// Words that are left.
+    /// Returns the number of free words.
     pub(super) fn room(&self) -> usize {
         self.words.len().saturating_sub(self.at)
     }
@@ -102,7 +102,7 @@ impl<'a> Writer<'a> {
         self.at = self.at.saturating_add(1);
     }
 
-    /// Values without their number.
+    /// Writes the values without their number.
     #[inline]
     pub(super) fn put_all<T: Word>(&mut self, values: &[T]) {
         let end = self.at.saturating_add(values.len());
@@ -114,14 +114,14 @@ impl<'a> Writer<'a> {
         self.at = end;
     }
 
-    /// The number of values, and the values.
+    /// Writes the number of values and the values.
     #[inline]
     pub(super) fn put_list<T: Word>(&mut self, values: &[T]) {
         self.put(values.len());
         self.put_all(values);
     }
 
-    /// The number of bytes, and the bytes.
+    /// Writes the number of bytes and the bytes.
     pub(super) fn put_bytes(&mut self, bytes: &[u8]) {
         self.put(bytes.len());
         for chunk in bytes.chunks(BYTES) {
@@ -132,7 +132,8 @@ impl<'a> Writer<'a> {
     }
 }
 
-/// Reads from the front of an area; none where nothing sensible is left.
+/// Reads values from an area from its start. All methods return `None` if the area ends or a word is
+/// invalid.
 pub(super) struct Reader<'a> {
     words: &'a [AtomicU64],
     at: usize,
@@ -143,7 +144,7 @@ impl<'a> Reader<'a> {
         Self { words, at: 0 }
     }
 
-    /// The next words, that many.
+    /// Returns the next `count` words.
     #[inline]
     fn next(&mut self, count: usize) -> Option<&'a [AtomicU64]> {
         let end = self.at.checked_add(count)?;
@@ -158,7 +159,7 @@ impl<'a> Reader<'a> {
         T::from_word(word.load(Ordering::Relaxed))
     }
 
-    /// As many values as `values` holds.
+    /// Fills `values`.
     #[inline]
     pub(super) fn take_all<T: Word>(&mut self, values: &mut [T]) -> Option<()> {
         let words = self.next(values.len())?;
@@ -168,14 +169,14 @@ impl<'a> Reader<'a> {
         Some(())
     }
 
-    /// As many values as the memory says, in place of what `values` held.
+    /// Reads a number, then that many values, and replaces the content of `values`.
     #[inline]
     pub(super) fn take_list<T: Word>(&mut self, values: &mut Vec<T>) -> Option<()> {
         let count = self.take()?;
         self.take_counted(count, values)
     }
 
-    /// `count` values in place of what `values` held.
+    /// Reads `count` values and replaces the content of `values`.
     #[inline]
     pub(super) fn take_counted<T: Word>(
         &mut self,
@@ -190,7 +191,7 @@ impl<'a> Reader<'a> {
         Some(())
     }
 
-    /// Appends the bytes to `bytes`.
+    /// Reads a number, then that many bytes, and appends them to `bytes`.
     pub(super) fn take_bytes(&mut self, bytes: &mut Vec<u8>) -> Option<()> {
         let mut left: usize = self.take()?;
         for word in self.next(left.div_ceil(BYTES))? {
@@ -202,7 +203,7 @@ impl<'a> Reader<'a> {
         Some(())
     }
 
-    /// Bytes as text; what is no UTF-8 is replaced.
+    /// Reads a text; invalid UTF-8 is replaced.
     pub(super) fn take_text(&mut self) -> Option<String> {
         let mut bytes = Vec::new();
         self.take_bytes(&mut bytes)?;

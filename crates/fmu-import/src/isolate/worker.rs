@@ -1,4 +1,4 @@
-//! The process of an isolated FMU, from its start to its end.
+//! The main loop of a worker process: setup, commands of the master, end.
 
 use std::ffi::OsStr;
 use std::fs::File;
@@ -15,30 +15,31 @@ use rustix::event::{PollFd, PollFlags, poll};
 use rustix::process::{Pid, Signal, getppid, kill_current_process_group};
 use rustix::stdio::{dup2_stdin, dup2_stdout};
 
+use super::channel::{Channel, Side, WaitResult};
 use super::command::{
     Command, DONE, INSTANTIATED, LOADING, NOT_PRELOADED, REFUSED, place, write_error,
 };
 use super::layout::Shared;
-use super::line::{Line, Seen, Side};
 use super::log::Forward;
-use super::perform::Work;
+use super::perform::Executor;
 use super::words::{Reader, Writer};
 use super::{IsolateError, STARTED_BY, WorkerError, memory};
 use crate::{Fmu, FmuError, Instance};
 use slave::{CallError, Failure};
 
-/// This process has become a worker.
+/// Whether this process has become a worker.
 static IS_WORKER: AtomicBool = AtomicBool::new(false);
 
-/// Between two looks whether the master is there, where the connection cannot tell.
-const LOOK: Duration = Duration::from_millis(100);
+/// Interval between two checks whether the master lives, if the connection has been closed locally.
+const PARENT_CHECK: Duration = Duration::from_millis(100);
 
-/// Makes this process the worker of the master that started it, until the master has it end or is
-/// gone. What is printed to standard output goes to standard error.
+/// Runs this process as a worker of the master that started it. Returns when the master frees the
+/// instance or ends. Standard output is redirected to standard error.
 ///
 /// # Errors
 ///
-/// [`WorkerError`]: not started by a master, or lost in memory that the FMU wrote over.
+/// [`WorkerError::Alone`] if no master started this process; [`WorkerError::Corrupted`] if the FMU
+/// overwrote the shared memory.
 pub fn worker() -> Result<(), WorkerError> {
     IS_WORKER.store(true, Ordering::Relaxed);
     let alone = |what| move |source| WorkerError::Alone { what, source };
@@ -48,16 +49,16 @@ pub fn worker() -> Result<(), WorkerError> {
     let socket = stdin().as_fd().try_clone_to_owned().map_err(alone("no connection"))?;
     let socket = UnixStream::from(socket);
     socket.peer_addr().map_err(alone("no connection"))?;
-    leave_standard_streams().map_err(alone("no standard streams"))?;
-    end_with_master(&socket).map_err(alone("no watch over the connection"))?;
-    // Fails only where one is set already, which then hears the messages instead.
+    redirect_standard_streams().map_err(alone("no standard streams"))?;
+    end_with_master(&socket).map_err(alone("no thread to watch the connection"))?;
+    // Fails only if the program has set a subscriber, which then receives the messages.
     let _ = tracing::subscriber::set_global_default(Forward::new(shared.clone()));
     shared.attached().store(1, Ordering::Relaxed);
-    serve(&mut Line::new(shared, socket, Side::Worker))
+    serve(&mut Channel::new(shared, socket, Side::Worker))
 }
 
-/// A program that does not know of workers starts itself as one, does the same again, and would do
-/// so without end.
+/// Returns an error if this process was started as a worker but did not become one. Without this check
+/// a program that ignores the argument would start itself again and again.
 pub(super) fn refuse_in_worker() -> Result<(), IsolateError> {
     let started_by = std::env::var(STARTED_BY).ok().and_then(|number| number.parse().ok());
     let parent = getppid().map(Pid::as_raw_pid);
@@ -67,85 +68,89 @@ pub(super) fn refuse_in_worker() -> Result<(), IsolateError> {
     Ok(())
 }
 
-/// Nothing to read from standard input; output goes where errors go.
-fn leave_standard_streams() -> io::Result<()> {
+/// Redirects standard input to `/dev/null` and standard output to standard error.
+fn redirect_standard_streams() -> io::Result<()> {
     dup2_stdin(File::open("/dev/null")?)?;
     dup2_stdout(stderr())?;
     Ok(())
 }
 
-/// Ends this process, and those that it started, as soon as the master is gone, wherever the FMU is.
+/// Starts a thread that kills this process group as soon as the master has ended.
 fn end_with_master(socket: &UnixStream) -> io::Result<()> {
     let (socket, master) = (socket.try_clone()?, getppid());
     let watch = move || {
-        // Without events asked for, only the end of the connection is reported.
+        // With no requested events, `poll` reports only the end of the connection.
         let mut ends = [PollFd::new(&socket, PollFlags::empty())];
         while poll(&mut ends, None).is_err() {}
-        // An FMU that closes all files closes the connection: only its master can tell of that.
+        // NVAL: the FMU has closed the connection. Then the parent process shows whether the master lives.
         while ends[0].revents().contains(PollFlags::NVAL) && getppid() == master {
-            std::thread::sleep(LOOK);
+            std::thread::sleep(PARENT_CHECK);
         }
         let _ = kill_current_process_group(Signal::KILL);
     };
     std::thread::Builder::new().name("master".to_owned()).spawn(watch).map(|_| ())
 }
 
-/// Does what the master asks for.
-fn serve(line: &mut Line) -> Result<(), WorkerError> {
-    let (shared, mut work, mut turn) = (line.shared.clone(), None, 0_u64);
+/// Executes the commands of the master until it frees the instance.
+fn serve(channel: &mut Channel) -> Result<(), WorkerError> {
+    let (shared, mut executor, mut turn) = (channel.shared.clone(), None, 0_u64);
     loop {
-        match line.wait(turn) {
-            Seen::Turn(posted) if posted == turn.wrapping_add(1) => {}
-            Seen::Turn(found) => return Err(WorkerError::Corrupted { found }),
-            Seen::Nothing => continue,
-            Seen::Closed => return Ok(()),
+        match channel.wait(turn) {
+            WaitResult::Turn(posted) if posted == turn.wrapping_add(1) => {}
+            WaitResult::Turn(found) => return Err(WorkerError::Corrupted { found }),
+            WaitResult::TimedOut => continue,
+            WaitResult::Closed => return Ok(()),
         }
         let found = shared.command().load(Ordering::Relaxed);
         let command = Command::from_word(found).ok_or(WorkerError::Corrupted { found })?;
         let mut reader = Reader::new(shared.area());
         let mut writer = Writer::new(shared.area());
-        let done = match (command, &mut work) {
-            (Command::Open, work @ None) => open(&shared, work, &mut reader, &mut writer),
-            (Command::Renew, work @ Some(_)) => renew(&shared, work, &mut reader, &mut writer),
-            (Command::Free, work) => {
-                *work = None;
+        let done = match (command, &mut executor) {
+            (Command::Open, executor @ None) => open(&shared, executor, &mut reader, &mut writer),
+            (Command::Renew, executor @ Some(_)) => {
+                renew(&shared, executor, &mut reader, &mut writer)
+            }
+            (Command::Free, executor) => {
+                *executor = None;
                 writer.put(DONE);
                 Some(Ok(()))
             }
-            (_, Some(work)) => work.perform(command, &shared, &mut reader, &mut writer),
+            (_, Some(executor)) => executor.perform(command, &shared, &mut reader, &mut writer),
             (_, None) => None,
         };
-        let done = done.unwrap_or_else(|| Err(lost(command)));
-        if let Err(error) = done.and_then(|()| fitting(command, &writer)) {
+        let done = done.unwrap_or_else(|| Err(invalid_command(command)));
+        if let Err(error) = done.and_then(|()| check_fit(command, &writer)) {
             write_error(&error, &mut Writer::new(shared.area()));
         }
         turn = turn.wrapping_add(2);
-        line.post(turn);
+        channel.post(turn);
         if command == Command::Free {
             return Ok(());
         }
     }
 }
 
+/// Returns the error of a command whose arguments are invalid or that comes out of order.
 #[cold]
-fn lost(command: Command) -> CallError {
-    let what = "was asked for something else than a master asks: shared memory is corrupted";
+fn invalid_command(command: Command) -> CallError {
+    let what = "received an invalid command: the shared memory is corrupted";
     let failure = Failure::InvalidAnswer(what.to_owned());
     CallError { function: command.function(), failure, messages: Vec::new() }
 }
 
-fn fitting(command: Command, writer: &Writer<'_>) -> Result<(), CallError> {
+/// Checks that the results fitted into the shared memory.
+fn check_fit(command: Command, writer: &Writer<'_>) -> Result<(), CallError> {
     if writer.fits() {
         return Ok(());
     }
-    let failure = Failure::InvalidAnswer("gave more than its shared memory holds".to_owned());
+    let failure = Failure::InvalidAnswer("returned more than the shared memory holds".to_owned());
     Err(CallError { function: command.function(), failure, messages: Vec::new() })
 }
 
 /// Loads and instantiates the FMU.
 fn open(
     shared: &Arc<Shared>,
-    work: &mut Option<Work>,
+    executor: &mut Option<Executor>,
     reader: &mut Reader<'_>,
     writer: &mut Writer<'_>,
 ) -> Option<Result<(), CallError>> {
@@ -172,7 +177,7 @@ fn open(
         if let Err(error) = crate::preload(OsStr::from_bytes(library)) {
             writer.put(DONE);
             writer.put(NOT_PRELOADED);
-            writer.put_bytes(explained(&error).as_bytes());
+            writer.put_bytes(with_causes(&error).as_bytes());
             return Some(Ok(()));
         }
     }
@@ -180,45 +185,46 @@ fn open(
         shared.place().store(Command::Open.to_word(), Ordering::Relaxed);
         fmu.instantiate(&name)
     });
-    *work = tell(opened, writer).map(|instance| Work::new(instance, logging));
+    *executor = write_outcome(opened, writer).map(|instance| Executor::new(instance, logging));
     Some(Ok(()))
 }
 
-/// Frees the instance and makes another one.
+/// Frees the instance and creates another one.
 fn renew(
     shared: &Shared,
-    work: &mut Option<Work>,
+    executor: &mut Option<Executor>,
     reader: &mut Reader<'_>,
     writer: &mut Writer<'_>,
 ) -> Option<Result<(), CallError>> {
     let name = reader.take_text()?;
     let logging: bool = reader.take()?;
-    let fmu = work.as_ref()?.fmu();
+    let fmu = executor.as_ref()?.fmu();
     shared.place().store(Command::Free.to_word(), Ordering::Relaxed);
-    *work = None;
+    *executor = None;
     shared.place().store(Command::Open.to_word(), Ordering::Relaxed);
-    *work = tell(fmu.instantiate(&name), writer).map(|instance| Work::new(instance, logging));
+    let created = fmu.instantiate(&name);
+    *executor = write_outcome(created, writer).map(|instance| Executor::new(instance, logging));
     Some(Ok(()))
 }
 
-/// Writes whether there is an instance, or why not.
-fn tell(made: Result<Instance, FmuError>, writer: &mut Writer<'_>) -> Option<Instance> {
+/// Writes whether the instance was created, and the reason if not.
+fn write_outcome(created: Result<Instance, FmuError>, writer: &mut Writer<'_>) -> Option<Instance> {
     writer.put(DONE);
-    match made {
+    match created {
         Ok(instance) => {
             writer.put(INSTANTIATED);
             Some(instance)
         }
         Err(error) => {
             writer.put(REFUSED);
-            writer.put_bytes(explained(&error).as_bytes());
+            writer.put_bytes(with_causes(&error).as_bytes());
             None
         }
     }
 }
 
-/// An error and its causes.
-fn explained(error: &dyn std::error::Error) -> String {
+/// Returns the text of an error and of its causes.
+fn with_causes(error: &dyn std::error::Error) -> String {
     let mut text = error.to_string();
     let mut cause = error.source();
     while let Some(error) = cause {

@@ -1,4 +1,4 @@
-//! What can be asked of an instance, one method for each function of the standard.
+//! The calls of an instance: one method for each function of the standard.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
 use std::ffi::CStr;
@@ -8,8 +8,8 @@ use fmu_description::abi::{fmi2Boolean, fmi2EventInfo};
 use super::{Component, c_string};
 use slave::{CallError, absent};
 
-/// The function of that field, which is called next, or the error that it is missing.
-/// [`Component::check`] takes note of its return.
+/// Evaluates to the C function in `$field` and marks it as entered; returns an error from the caller
+/// if the library lacks it. [`Component::check`] marks its return.
 macro_rules! function {
     ($self:ident.$field:ident, $name:expr) => {
         match $self.functions.$field {
@@ -23,7 +23,7 @@ macro_rules! function {
 }
 pub(super) use function;
 
-/// Defines a method for each function: its arguments, and the C arguments made of them.
+/// Defines a method for each function: its arguments, and the C arguments built from them.
 macro_rules! calls {
     ($($method:ident($($argument:ident: $type:ty),*) = $name:literal($($c:expr),*);)*) => {
         impl Component {
@@ -31,11 +31,12 @@ macro_rules! calls {
             ///
             /// # Errors
             ///
-            /// [`CallError`]: the function is missing, or the FMU returns neither `fmi2OK` nor `fmi2Warning`.
+            /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK`
+            /// nor `fmi2Warning`.
             #[inline]
             pub fn $method(&mut self, $($argument: $type),*) -> Result<(), CallError> {
                 let function = function!(self.$method, $name);
-                // SAFETY: the instance is alive; slices that belong together are equally long.
+                // SAFETY: the instance is alive; slices that belong together have the same length.
                 let status = unsafe { function(self.pointer, $($c),*) };
                 self.check($name, status)
             })*
@@ -77,7 +78,7 @@ calls! {
         "fmi2GetNominalsOfContinuousStates"(values.as_mut_ptr(), values.len());
 }
 
-/// The length that both slices have.
+/// Returns the common length of both slices.
 #[inline]
 pub(super) fn same_length<A, B>(references: &[A], values: &[B]) -> usize {
     assert_eq!(references.len(), values.len(), "references and values are equally many");
@@ -85,11 +86,12 @@ pub(super) fn same_length<A, B>(references: &[A], values: &[B]) -> usize {
 }
 
 impl Component {
-    /// `fmi2SetDebugLogging` of all categories.
+    /// Calls `fmi2SetDebugLogging` for all categories.
     ///
     /// # Errors
     ///
-    /// [`CallError`]: the function is missing, or the FMU returns neither `fmi2OK` nor `fmi2Warning`.
+    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
+    /// `fmi2Warning`.
     pub fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
         const NAME: &str = "fmi2SetDebugLogging";
         let function = function!(self.set_debug_logging, NAME);
@@ -98,11 +100,12 @@ impl Component {
         self.check(NAME, status)
     }
 
-    /// `fmi2SetupExperiment`.
+    /// Calls `fmi2SetupExperiment`.
     ///
     /// # Errors
     ///
-    /// [`CallError`]: the function is missing, or the FMU returns neither `fmi2OK` nor `fmi2Warning`.
+    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
+    /// `fmi2Warning`.
     pub fn setup_experiment(&mut self, e: &fmu_description::Experiment) -> Result<(), CallError> {
         const NAME: &str = "fmi2SetupExperiment";
         let (tolerance, stop) = (e.tolerance.unwrap_or(0.0), e.stop_time.unwrap_or(0.0));
@@ -117,11 +120,12 @@ impl Component {
         self.check(NAME, status)
     }
 
-    /// `fmi2SetString`.
+    /// Calls `fmi2SetString`.
     ///
     /// # Errors
     ///
-    /// [`CallError`]: the function is missing, or the FMU returns neither `fmi2OK` nor `fmi2Warning`.
+    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
+    /// `fmi2Warning`.
     pub fn set_string(&mut self, references: &[u32], values: &[String]) -> Result<(), CallError> {
         const NAME: &str = "fmi2SetString";
         let function = function!(self.set_string, NAME);
@@ -134,11 +138,12 @@ impl Component {
         self.check(NAME, status)
     }
 
-    /// `fmi2GetString`.
+    /// Calls `fmi2GetString` and copies the strings.
     ///
     /// # Errors
     ///
-    /// [`CallError`]: the function is missing, or the FMU returns neither `fmi2OK` nor `fmi2Warning`.
+    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
+    /// `fmi2Warning`.
     pub fn get_string(
         &mut self,
         references: &[u32],
@@ -148,14 +153,14 @@ impl Component {
         let function = function!(self.get_string, NAME);
         let count = same_length(references, values);
         let mut pointers = vec![std::ptr::null(); count];
-        // SAFETY: the instance is alive; as many references as places for pointers.
+        // SAFETY: the instance is alive; as many references as pointers to write.
         let status =
             unsafe { function(self.pointer, references.as_ptr(), count, pointers.as_mut_ptr()) };
         self.check(NAME, status)?;
         self.place.enter(&NAME);
         for (value, pointer) in values.iter_mut().zip(pointers) {
             value.clear();
-            // SAFETY: the FMU gives null or terminated strings, which live until the next call.
+            // SAFETY: the FMU returns null or terminated strings, which live until the next call.
             let text = unsafe { pointer.as_ref().map(|text| CStr::from_ptr(text)) };
             if let Some(text) = text {
                 value.push_str(&text.to_string_lossy());
@@ -165,11 +170,12 @@ impl Component {
         Ok(())
     }
 
-    /// `fmi2NewDiscreteStates`.
+    /// Calls `fmi2NewDiscreteStates`.
     ///
     /// # Errors
     ///
-    /// [`CallError`]: the function is missing, or the FMU returns neither `fmi2OK` nor `fmi2Warning`.
+    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
+    /// `fmi2Warning`.
     pub fn new_discrete_states(&mut self) -> Result<fmi2EventInfo, CallError> {
         const NAME: &str = "fmi2NewDiscreteStates";
         let mut info = fmi2EventInfo::default();
@@ -180,11 +186,12 @@ impl Component {
         Ok(info)
     }
 
-    /// `fmi2GetDirectionalDerivative`.
+    /// Calls `fmi2GetDirectionalDerivative`.
     ///
     /// # Errors
     ///
-    /// [`CallError`]: the function is missing, or the FMU returns neither `fmi2OK` nor `fmi2Warning`.
+    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
+    /// `fmi2Warning`.
     pub fn directional_derivative(
         &mut self,
         unknowns: &[u32],
@@ -195,7 +202,7 @@ impl Component {
         const NAME: &str = "fmi2GetDirectionalDerivative";
         let function = function!(self.get_directional_derivative, NAME);
         let (unknown, known) = (same_length(unknowns, changes), same_length(knowns, seed));
-        // SAFETY: the instance is alive; arrays that belong together are equally long.
+        // SAFETY: the instance is alive; arrays that belong together have the same length.
         let status = unsafe {
             function(
                 self.pointer,

@@ -1,12 +1,13 @@
-//! Texts behind pointers of an FMU that need not be pointers to texts.
+//! Strings behind pointers that an FMU passes and that may be invalid.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
 use std::ffi::c_char;
 
-/// Most bytes of a text.
+/// Maximum number of bytes read.
 const MOST: usize = 1024;
 
-/// The text at `pointer`, as much of it as can be read; none for null and where there is no memory.
+/// Returns the text at `pointer`, up to the first unreadable page; `None` if `pointer` is null or
+/// unreadable.
 pub(super) fn text(pointer: *const c_char) -> Option<String> {
     if pointer.is_null() {
         return None;
@@ -15,8 +16,8 @@ pub(super) fn text(pointer: *const c_char) -> Option<String> {
     bytes.map(|bytes| String::from_utf8_lossy(&bytes).into_owned())
 }
 
-/// The kernel copies: it refuses where there is no memory. What can be read of the next bytes ends
-/// at a page that cannot.
+/// Lets the kernel copy the bytes, page by page: it reports an unreadable page instead of raising
+/// SIGSEGV.
 #[cfg(target_os = "linux")]
 fn read(pointer: *const u8) -> Option<Vec<u8>> {
     const PAGE: usize = 4096;
@@ -41,10 +42,10 @@ fn read(pointer: *const u8) -> Option<Vec<u8>> {
     (length > 0).then(|| bytes[..length].to_vec())
 }
 
-/// Without a kernel that copies the text is trusted.
+/// Trusts the pointer: this platform has no checked copy.
 #[cfg(not(target_os = "linux"))]
 fn read(pointer: *const u8) -> Option<Vec<u8>> {
-    // SAFETY: the FMU's promise by the standard: terminated.
+    // SAFETY: the standard requires a terminated string.
     let text = unsafe { std::ffi::CStr::from_ptr(pointer.cast()) }.to_bytes();
     Some(text[..text.len().min(MOST)].to_vec())
 }

@@ -1,4 +1,4 @@
-//! The functions of the standard by name and signature.
+//! The C functions of FMI 2.0: names and signatures.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
 use std::path::Path;
@@ -12,11 +12,11 @@ use libloading::Library as Handle;
 use super::Interface;
 use crate::error::LoadError;
 
-/// Declares the table of functions and its loading.
+/// Declares the function table and its loader.
 macro_rules! functions {
     ($($field:ident = $name:literal: fn($($argument:ty),*) $(-> $result:ty)?;)*) => {
-        /// What a library offers. The standard wants every function in every library; what is
-        /// missing is missed by who calls it.
+        /// The functions of a library. The standard requires every function in every library; here a
+        /// missing function fails only when it is called.
         #[derive(Clone, Copy)]
         pub(super) struct Functions {
             $(pub(super) $field: Option<unsafe extern "C" fn($($argument),*) $(-> $result)?>,)*
@@ -31,7 +31,7 @@ macro_rules! functions {
                 },)* }
             }
 
-            /// Whether the function of that name is there.
+            /// Returns whether the library exports `function`.
             fn has(&self, function: &str) -> bool {
                 match function {
                     $($name => self.$field.is_some(),)*
@@ -115,8 +115,8 @@ pub(super) type GetReal =
 pub(super) type DoStep =
     unsafe extern "C" fn(Component, fmi2Real, fmi2Real, fmi2Boolean) -> fmi2Status;
 
-/// What no instance can do without.
-const ALWAYS: [&str; 5] = [
+/// The functions that both interfaces require.
+const COMMON: [&str; 5] = [
     "fmi2Instantiate",
     "fmi2FreeInstance",
     "fmi2SetupExperiment",
@@ -125,15 +125,15 @@ const ALWAYS: [&str; 5] = [
 ];
 
 impl Functions {
-    /// The functions without which `interface` cannot be used are there.
-    pub(super) fn demand(&self, interface: Interface, path: &Path) -> Result<(), LoadError> {
+    /// Checks that the library exports the functions that `interface` cannot do without.
+    pub(super) fn require(&self, interface: Interface, path: &Path) -> Result<(), LoadError> {
         let more: &[&str] = match interface {
             Interface::CoSimulation => &["fmi2DoStep"],
             Interface::ModelExchange => {
                 &["fmi2NewDiscreteStates", "fmi2GetDerivatives", "fmi2SetContinuousStates"]
             }
         };
-        let missing = ALWAYS.iter().chain(more).find(|function| !self.has(function));
+        let missing = COMMON.iter().chain(more).find(|function| !self.has(function));
         missing.map_or(Ok(()), |function| {
             Err(LoadError::Missing { path: path.to_owned(), function: (*function).to_owned() })
         })

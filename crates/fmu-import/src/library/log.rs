@@ -1,4 +1,4 @@
-//! The messages of an instance: to `tracing` as they come, the last ones kept for errors.
+//! The messages of an instance: passed to `tracing` at once, and the last ones kept for errors.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
 use std::collections::VecDeque;
@@ -10,7 +10,7 @@ use fmu_description::abi::{Status, fmi2CallbackLogger};
 use super::foreign;
 use crate::crash::{Place, last_of_this_thread};
 
-/// Most messages that are kept for an error.
+/// Maximum number of messages kept for an error.
 const KEPT: usize = 10;
 
 /// The receivers of all instances of this process.
@@ -20,11 +20,13 @@ unsafe extern "C" {
     fn master_logger();
 }
 
-/// Names of variables: of a letter for the type (r, i, b, s) and a value reference.
+/// Looks up the name of a variable by the letter of its type (r, i, b, s) and its value reference.
 pub(crate) type Names = Arc<dyn Fn(char, u32) -> Option<String> + Send + Sync>;
 
-/// Receives the messages of one instance. Its address is the environment that the FMU is given, and
-/// is never used but to be compared: FMUs hand over others, and null.
+/// Receives the messages of one instance.
+///
+/// Its address is the `componentEnvironment` of the FMU. It is compared with the addresses of known
+/// sinks and never dereferenced, because some FMUs pass null or another pointer.
 pub(super) struct Sink {
     place: Arc<Place>,
     names: Names,
@@ -40,15 +42,16 @@ impl Sink {
         sink
     }
 
-    /// The last messages since this was last asked.
+    /// Returns and clears the kept messages.
     pub(super) fn take(&self) -> Vec<String> {
         let kept = self.messages.lock().map(|mut kept| std::mem::take(&mut *kept));
         kept.map(Vec::from).unwrap_or_default()
     }
 
-    fn hear(&self, status: c_int, category: &str, text: &str) {
+    /// Logs a message and keeps it for the next error.
+    fn receive(&self, status: c_int, category: &str, text: &str) {
         let text = with_names(text, &*self.names);
-        say(self.place.instance(), Some(self.place.time()), status, category, &text);
+        log_message(self.place.instance(), Some(self.place.time()), status, category, &text);
         if let Ok(mut kept) = self.messages.lock() {
             if kept.len() == KEPT {
                 kept.pop_front();
@@ -58,7 +61,7 @@ impl Sink {
     }
 }
 
-fn say(instance: &str, time: Option<f64>, status: c_int, category: &str, text: &str) {
+fn log_message(instance: &str, time: Option<f64>, status: c_int, category: &str, text: &str) {
     match Status::from_c(status) {
         Some(Status::OK) => {
             tracing::info!(target: "fmu", instance, category, time, "{text}");
@@ -70,8 +73,8 @@ fn say(instance: &str, time: Option<f64>, status: c_int, category: &str, text: &
     }
 }
 
-/// Puts the names of variables for `#r12#` and a `#` for `##` (FMI 2.0.5, section 2.1.5). Anything
-/// else with a `#` stays as it is.
+/// Replaces `#r12#` by the name of the variable and `##` by `#` (FMI 2.0.5, section 2.1.5). Other
+/// text with a `#` is not changed.
 fn with_names(text: &str, name: &dyn Fn(char, u32) -> Option<String>) -> String {
     let mut done = String::with_capacity(text.len());
     let mut rest = text;
@@ -98,29 +101,29 @@ fn with_names(text: &str, name: &dyn Fn(char, u32) -> Option<String>) -> String 
     done
 }
 
-/// The sink of which `is_wanted` is true.
-fn find(is_wanted: impl Fn(&Sink) -> bool) -> Option<Arc<Sink>> {
+/// Returns the first sink for which `matches` is true.
+fn find(matches: impl Fn(&Sink) -> bool) -> Option<Arc<Sink>> {
     let sinks = SINKS.read().unwrap_or_else(PoisonError::into_inner);
-    sinks.iter().filter_map(Weak::upgrade).find(|sink| is_wanted(sink))
+    sinks.iter().filter_map(Weak::upgrade).find(|sink| matches(sink))
 }
 
-/// A message with an environment that is no sink's: of the instance whose call this thread is in, or
-/// else of the instance of that name.
-fn hear_stranger(instance: Option<&str>, status: c_int, category: &str, text: &str) {
+/// Receives a message whose environment matches no sink. It goes to the instance that this thread
+/// called last, otherwise to the instance named `instance`.
+fn receive_unmatched(instance: Option<&str>, status: c_int, category: &str, text: &str) {
     let sink = find(|sink| sink.place.is_at(last_of_this_thread()))
         .or_else(|| find(|sink| Some(sink.place.instance()) == instance));
     match sink {
-        Some(sink) => sink.hear(status, category, text),
-        None => say(instance.unwrap_or("an FMU"), None, status, category, text),
+        Some(sink) => sink.receive(status, category, text),
+        None => log_message(instance.unwrap_or("an FMU"), None, status, category, text),
     }
 }
 
-/// What `logger.c` calls.
+/// Receives a formatted message from `logger.c`.
 ///
 /// # Safety
 ///
-/// `text` is terminated. The other pointers are the FMU's; where the environment is that of an
-/// instance, the category is terminated or null.
+/// `text` is terminated. The FMU supplies the other pointers; if `environment` is the address of a
+/// sink, `category` is null or terminated.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn master_receive(
     environment: *mut c_void,
@@ -133,14 +136,15 @@ unsafe extern "C" fn master_receive(
     let text = unsafe { CStr::from_ptr(text) }.to_string_lossy();
     let Some(sink) = find(|sink| std::ptr::from_ref(sink).addr() == environment.addr()) else {
         let category = foreign::text(category).unwrap_or_default();
-        return hear_stranger(foreign::text(instance).as_deref(), status, &category, &text);
+        return receive_unmatched(foreign::text(instance).as_deref(), status, &category, &text);
     };
-    // SAFETY: of an FMU that does as the standard says: terminated or null.
+    // SAFETY: the FMU passed the environment that the standard requires; its category is null or
+    // terminated.
     let category = unsafe { category.as_ref().map(|category| CStr::from_ptr(category)) };
-    sink.hear(status, &category.map(CStr::to_string_lossy).unwrap_or_default(), &text);
+    sink.receive(status, &category.map(CStr::to_string_lossy).unwrap_or_default(), &text);
 }
 
-/// The callback of `logger.c`.
+/// Returns the callback that `logger.c` defines.
 pub(super) fn logger() -> fmi2CallbackLogger {
     // SAFETY: both are pointers to functions; C calls it with the logger's signature.
     unsafe { std::mem::transmute::<unsafe extern "C" fn(), fmi2CallbackLogger>(master_logger) }

@@ -1,4 +1,4 @@
-//! FMU states: kept in numbered slots, as bytes.
+//! FMU states: saved in numbered slots, or serialized to bytes.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
 use std::ptr::null_mut;
@@ -10,11 +10,12 @@ use super::calls::function;
 use slave::{CallError, Failure, absent};
 
 impl Component {
-    /// `fmi2GetFMUstate` into a slot.
+    /// Saves the current state in `slot` (`fmi2GetFMUstate`).
     ///
     /// # Errors
     ///
-    /// [`CallError`]: the function is missing, or the FMU returns neither `fmi2OK` nor `fmi2Warning`.
+    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
+    /// `fmi2Warning`.
     pub fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
         const NAME: &str = "fmi2GetFMUstate";
         let function = function!(self.get_state, NAME);
@@ -26,16 +27,17 @@ impl Component {
         self.check(NAME, status)
     }
 
-    /// `fmi2SetFMUstate` from a slot.
+    /// Restores the state in `slot` (`fmi2SetFMUstate`).
     ///
     /// # Errors
     ///
-    /// [`CallError`]: the function is missing, or the FMU returns neither `fmi2OK` nor `fmi2Warning`.
+    /// [`CallError`] if the slot is empty, if the library lacks the function, or if its status is neither
+    /// `fmi2OK` nor `fmi2Warning`.
     pub fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
         const NAME: &str = "fmi2SetFMUstate";
         let state = self.saved.get(slot).copied().unwrap_or(null_mut());
         if state.is_null() {
-            let what = format!("was asked for the state of slot {slot}, which is empty");
+            let what = format!("cannot restore the state of slot {slot}: the slot is empty");
             return Err(self.failed(NAME, Failure::InvalidAnswer(what)));
         }
         self.set_state(state)
@@ -60,11 +62,12 @@ impl Component {
         }
     }
 
-    /// `fmi2SerializeFMUstate` of the state of now.
+    /// Serializes the current state (`fmi2GetFMUstate`, `fmi2SerializeFMUstate`).
     ///
     /// # Errors
     ///
-    /// [`CallError`]: the function is missing, or the FMU returns neither `fmi2OK` nor `fmi2Warning`.
+    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
+    /// `fmi2Warning`.
     pub fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
         const NAME: &str = "fmi2GetFMUstate";
         let function = function!(self.get_state, NAME);
@@ -93,11 +96,12 @@ impl Component {
         Ok(bytes)
     }
 
-    /// `fmi2DeSerializeFMUstate`, and on to that state.
+    /// Restores a serialized state (`fmi2DeSerializeFMUstate`, `fmi2SetFMUstate`).
     ///
     /// # Errors
     ///
-    /// [`CallError`]: the function is missing, or the FMU returns neither `fmi2OK` nor `fmi2Warning`.
+    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
+    /// `fmi2Warning`.
     pub fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
         const NAME: &str = "fmi2DeSerializeFMUstate";
         let mut state = null_mut();

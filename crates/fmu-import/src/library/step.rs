@@ -1,4 +1,4 @@
-//! `fmi2DoStep` and what its answers ask for.
+//! `fmi2DoStep` and the evaluation of its status.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
 use std::time::{Duration, Instant};
@@ -13,15 +13,16 @@ const NAME: &str = "fmi2DoStep";
 const SET: &str = "fmi2SetReal";
 const GET: &str = "fmi2GetReal";
 
-/// Longest pause between two questions whether a pending step is done.
+/// Longest pause between two status queries of a pending step.
 const PAUSE: Duration = Duration::from_millis(1);
 
 impl Component {
-    /// `fmi2DoStep` from `time` over `size`.
+    /// Calls `fmi2DoStep` from `time` with the step `size`, both in s.
     ///
     /// # Errors
     ///
-    /// [`CallError`]: the function is missing, or the FMU returns neither `fmi2OK` nor `fmi2Warning`.
+    /// [`CallError`] if the library lacks the function, if the step fails or exceeds the time limit, or if
+    /// the FMU reports an impossible time for a discarded step.
     #[inline]
     pub fn do_step(
         &mut self,
@@ -37,16 +38,18 @@ impl Component {
         if status == Status::OK as fmi2Status || self.is_warning(status) {
             return Ok(StepResult::Whole);
         }
-        self.unfinished(status, time, size)
+        self.finish_step(status, time, size)
     }
 
-    /// [`slave::Slave::pass`]: the three calls of C one after the other, their statuses
-    /// looked at without a detour. An answer out of the ordinary is left to the methods of its
-    /// own.
+    /// Sets inputs, steps and reads outputs, as [`slave::Slave::pass`] specifies.
+    ///
+    /// `fmi2OK` and `fmi2Warning` are handled inline; every other status goes through the methods of
+    /// the single calls.
     ///
     /// # Errors
     ///
-    /// [`CallError`]: the function is missing, or the FMU returns neither `fmi2OK` nor `fmi2Warning`.
+    /// [`CallError`] if the library lacks a function, if a call or the step fails, or if the step exceeds
+    /// the time limit.
     #[inline]
     pub fn pass(
         &mut self,
@@ -74,8 +77,8 @@ impl Component {
         // SAFETY: the instance is alive.
         let status = unsafe { function(hot.pointer, time, size, never_back.into()) };
         if !usual(status) {
-            let done = self.unfinished(status, time, size)?;
-            return self.read_part(outputs, results, done);
+            let done = self.finish_step(status, time, size)?;
+            return self.read_outputs(outputs, results, done);
         }
         if !outputs.is_empty() {
             let Some(function) = hot.get_real else { return Err(absent(GET)) };
@@ -92,9 +95,9 @@ impl Component {
         Ok(StepResult::Whole)
     }
 
-    /// Reads the outputs after a step that was not done at once.
+    /// Reads the outputs after a step that was pending or discarded.
     #[cold]
-    fn read_part(
+    fn read_outputs(
         &mut self,
         outputs: &[u32],
         results: &mut [f64],
@@ -106,17 +109,18 @@ impl Component {
         Ok(done)
     }
 
-    /// What a step that did not answer `fmi2OK` came to.
+    /// Evaluates a step whose status is not `fmi2OK`: waits while it is pending, and asks for the time
+    /// reached if it was discarded.
     #[cold]
-    fn unfinished(
+    fn finish_step(
         &mut self,
         mut status: fmi2Status,
         time: f64,
         size: f64,
     ) -> Result<StepResult, CallError> {
-        let (begin, mut pause) = (Instant::now(), Duration::from_micros(1));
+        let (start, mut pause) = (Instant::now(), Duration::from_micros(1));
         while status == Status::Pending as fmi2Status {
-            if let Some(limit) = self.time_limit.filter(|limit| begin.elapsed() > *limit) {
+            if let Some(limit) = self.time_limit.filter(|limit| start.elapsed() > *limit) {
                 self.cancel();
                 return Err(self.failed(NAME, Failure::TimedOut(limit.as_secs_f64())));
             }
@@ -147,7 +151,7 @@ impl Component {
         Ok(StepResult::Part { reached, terminated })
     }
 
-    /// `fmi2CancelStep`: only then may the instance be freed (section 4.2.4).
+    /// Calls `fmi2CancelStep`. The instance may be freed only if this succeeds (section 4.2.4).
     fn cancel(&mut self) {
         self.place.enter(&"fmi2CancelStep");
         // SAFETY: the instance is alive.

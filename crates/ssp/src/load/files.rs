@@ -1,4 +1,4 @@
-//! Every file once, however often it is referred to.
+//! Reads files; each file is read once even if several elements refer to it.
 
 use std::collections::HashMap;
 use std::fs;
@@ -16,19 +16,19 @@ use crate::tree::{Document, File};
 
 /// Name of the default SSD in an SSP (section 3).
 const DEFAULT: &str = "SystemStructure.ssd";
-/// Largest XML file that is read.
+/// Largest accepted XML file in bytes.
 const CAPACITY: u64 = 64 << 20;
 
-/// Why something that an SSD refers to is not there.
+/// Why the target of a reference cannot be used.
 pub(super) enum Missing {
-    /// The reference itself is wrong; the sentence belongs to the place where it stands.
+    /// The reference is wrong; the sentence belongs to the position of the reference.
     Reference(String),
-    /// What it refers to is wrong.
+    /// The target is wrong.
     Content(SspError),
 }
 
 impl Missing {
-    /// The error, with `here` for a sentence about the reference.
+    /// Returns the error; `here` converts a sentence about the reference.
     pub(super) fn or(self, here: impl Fn(String) -> SspError) -> SspError {
         match self {
             Missing::Reference(sentence) => here(sentence),
@@ -37,7 +37,7 @@ impl Missing {
     }
 }
 
-/// What has been read so far, by path.
+/// The files read so far, by path.
 #[derive(Default)]
 pub(crate) struct Files {
     documents: HashMap<PathBuf, Rc<Document>>,
@@ -47,13 +47,13 @@ pub(crate) struct Files {
     archives: HashMap<PathBuf, PathBuf>,
     folders: Vec<TemporaryFolder>,
     pub(crate) fmus: Vec<Unpacked>,
-    /// Names of the FMUs for the user.
+    /// Names of the FMUs for messages.
     shown: Vec<PathBuf>,
-    /// What is odd about the files, a sentence each, which names the file.
+    /// Warnings about the files; each names its file.
     pub(crate) warnings: Vec<String>,
 }
 
-/// What must live as long as the files are used, and what is to be said of them.
+/// The unpacked files, which must outlive their use, and the warnings.
 pub(crate) struct Finished {
     pub(crate) fmus: Vec<Unpacked>,
     pub(crate) shown: Vec<PathBuf>,
@@ -67,7 +67,7 @@ impl Files {
         Finished { fmus, shown, folders, warnings }
     }
 
-    /// The SSD at a path that the user gave, or the one called `fragment` in an SSP.
+    /// Returns the SSD at a path given by the user, or the SSD `fragment` of an SSP.
     pub(super) fn document(&mut self, target: &Target) -> Result<Rc<Document>, SspError> {
         let is_ssd = target.path.extension().is_some_and(|extension| extension == "ssd");
         if target.path.is_dir() {
@@ -79,7 +79,7 @@ impl Files {
         self.referred(target, &outside, !is_ssd)
     }
 
-    /// The SSD that a component refers to.
+    /// Returns the SSD that a component refers to.
     pub(super) fn referred(
         &mut self,
         target: &Target,
@@ -119,13 +119,13 @@ impl Files {
         Ok(document)
     }
 
-    /// The folder of an SSP.
+    /// Unpacks an SSP; returns its folder.
     fn unpacked(&mut self, target: &Target) -> Result<PathBuf, SspError> {
         if let Some(known) = self.archives.get(&target.path) {
             return Ok(known.clone());
         }
         let unpacked = unpack_archive(&target.path);
-        let (folder, warnings) = unpacked.map_err(|error| as_shown(error, target))?;
+        let (folder, warnings) = unpacked.map_err(|error| with_shown_path(error, target))?;
         self.warn(&target.shown, warnings);
         let place = folder.path().to_owned();
         self.folders.push(folder);
@@ -138,14 +138,14 @@ impl Files {
         self.warnings.extend(sentences.map(|text| format!("{}: {text}", shown.display())));
     }
 
-    /// Index of the FMU, an archive or a folder.
+    /// Returns the index of the FMU `target`, an archive or a folder.
     pub(crate) fn fmu(&mut self, target: &Target) -> Result<usize, SspError> {
         if let Some(known) = self.fmu_indices.get(&target.path) {
             return Ok(*known);
         }
         let path = &target.path;
         let unpacked = if path.is_dir() { Unpacked::in_folder(path) } else { Unpacked::open(path) };
-        let unpacked = unpacked.map_err(|error| as_shown(error, target))?;
+        let unpacked = unpacked.map_err(|error| with_shown_path(error, target))?;
         self.warn(&target.shown, unpacked.archive_warnings.clone());
         self.warn(&target.shown, unpacked.warnings.iter().map(ToString::to_string));
         self.fmus.push(unpacked);
@@ -160,9 +160,9 @@ impl Files {
         file: &File,
         component: Option<&Base>,
     ) -> Result<Rc<ParameterSet>, Missing> {
-        let target = match wanted(source, file, component)? {
-            Wanted::Inline(content) => return Ok(Rc::new(content)),
-            Wanted::File(target) => target,
+        let target = match resolve_source(source, file, component)? {
+            ResolvedSource::Inline(content) => return Ok(Rc::new(content)),
+            ResolvedSource::File(target) => target,
         };
         if let Some(known) = self.values.get(&target.path) {
             return Ok(known.clone());
@@ -178,9 +178,9 @@ impl Files {
         file: &File,
         component: Option<&Base>,
     ) -> Result<Rc<ParameterMapping>, Missing> {
-        let target = match wanted(source, file, component)? {
-            Wanted::Inline(content) => return Ok(Rc::new(content)),
-            Wanted::File(target) => target,
+        let target = match resolve_source(source, file, component)? {
+            ResolvedSource::Inline(content) => return Ok(Rc::new(content)),
+            ResolvedSource::File(target) => target,
         };
         if let Some(known) = self.mappings.get(&target.path) {
             return Ok(known.clone());
@@ -190,7 +190,7 @@ impl Files {
         Ok(content)
     }
 
-    /// The content of a file; what is odd about it becomes a warning.
+    /// Reads and parses a file; adds its warnings.
     pub(crate) fn read<T>(
         &mut self,
         target: &Target,
@@ -204,12 +204,12 @@ impl Files {
         let mut bytes = Vec::new();
         file.take(CAPACITY + 1).read_to_end(&mut bytes).map_err(failed)?;
         let (content, warnings) = read(&bytes).map_err(|error| error.in_file(&target.shown))?;
-        self.warn(&target.shown, target.doubt.clone());
+        self.warn(&target.shown, target.warning.clone());
         self.warn(&target.shown, warnings);
         Ok(content)
     }
 
-    /// The dictionary and the name of the file that it stands in.
+    /// Returns the dictionary and the name of its file.
     pub(super) fn dictionary(
         &mut self,
         source: &Source<SignalDictionary>,
@@ -226,19 +226,19 @@ impl Files {
     }
 }
 
-/// What a source holds, or the file that it names.
-enum Wanted<T> {
+/// The inline content of a source, or the file that it refers to.
+enum ResolvedSource<T> {
     Inline(T),
     File(Target),
 }
 
-fn wanted<T: Clone>(
+fn resolve_source<T: Clone>(
     source: &Source<T>,
     file: &File,
     component: Option<&Base>,
-) -> Result<Wanted<T>, Missing> {
+) -> Result<ResolvedSource<T>, Missing> {
     let (uri, in_component) = match source {
-        Source::Inline(content) => return Ok(Wanted::Inline(content.clone())),
+        Source::Inline(content) => return Ok(ResolvedSource::Inline(content.clone())),
         Source::File { uri, in_component } => (uri, *in_component),
     };
     let base = match (in_component, component) {
@@ -249,11 +249,11 @@ fn wanted<T: Clone>(
             return Err(Missing::Reference(sentence.to_owned()));
         }
     };
-    base.resolve(uri).map(Wanted::File).map_err(Missing::Reference)
+    base.resolve(uri).map(ResolvedSource::File).map_err(Missing::Reference)
 }
 
-/// The error of an archive by the name that the user knows, not by that of its unpacked copy.
-fn as_shown(error: PackageError, target: &Target) -> SspError {
+/// Replaces the path of the unpacked copy in the error by the name that the user knows.
+fn with_shown_path(error: PackageError, target: &Target) -> SspError {
     let path = target.shown.clone();
     let is_itself = |named: &Path| named == target.path;
     let error = match error {
@@ -270,7 +270,7 @@ fn as_shown(error: PackageError, target: &Target) -> SspError {
     error.into()
 }
 
-/// The SSD files at the root of an unpacked SSP.
+/// Lists the SSD files at the root of an unpacked SSP.
 fn definitions_in(folder: &Path) -> String {
     let names = fs::read_dir(folder).into_iter().flatten().flatten();
     let is_ssd = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "ssd");

@@ -1,4 +1,4 @@
-//! The content of an `OspSystemStructure.xml`. Nothing here opens a file.
+//! Parses `OspSystemStructure.xml`. Nothing here opens a file.
 
 use std::str::FromStr;
 
@@ -9,12 +9,12 @@ use crate::assembly::Setting;
 use crate::error::SspError;
 use crate::function::Function as Sum;
 
-/// Base step in s where none is stated.
+/// Default base step in s.
 const STEP: f64 = 0.1;
-/// Most inputs and most components of a sum.
+/// Maximum number of inputs and of components of a sum.
 const COUNT: usize = 100_000;
 
-/// The whole file.
+/// The content of the file.
 #[derive(Debug)]
 pub(super) struct Document {
     pub(super) start: Option<f64>,
@@ -35,14 +35,14 @@ pub(super) struct Simulator {
     pub(super) at: Position,
 }
 
-/// A function with its name.
+/// A named function.
 #[derive(Debug)]
 pub(super) struct Function {
     pub(super) name: String,
     pub(super) kind: Kind,
 }
 
-/// What a function computes.
+/// The kind of a function.
 #[derive(Debug)]
 pub(super) enum Kind {
     /// `LinearTransformation`.
@@ -51,11 +51,11 @@ pub(super) enum Kind {
     Sum(Sum),
 }
 
-/// A connection of two variables, or of a variable and a signal of a function; or of groups.
+/// A connection of two variables, of a variable and a signal of a function, or of two groups.
 #[derive(Debug)]
 pub(super) struct Connection {
     pub(super) ends: [End; 2],
-    /// Whether the ends are groups.
+    /// Whether the ends are groups of variables.
     pub(super) groups: bool,
     pub(super) at: Position,
 }
@@ -63,7 +63,7 @@ pub(super) struct Connection {
 /// An end of a connection.
 #[derive(Clone, Debug)]
 pub(super) struct End {
-    /// The simulator or the function.
+    /// Name of the simulator or function.
     pub(super) owner: String,
     pub(super) name: String,
     /// Whether the owner is a function.
@@ -76,7 +76,7 @@ impl std::fmt::Display for End {
     }
 }
 
-/// Reads the file; and what in it is not understood, a sentence with its place each.
+/// Parses the file; also returns warnings with positions about unknown content.
 pub(super) fn read(bytes: &[u8]) -> Result<(Document, Vec<String>), SspError> {
     let root = xml::read(bytes)?;
     if local(&root) != "OspSystemStructure" {
@@ -205,7 +205,7 @@ fn end(element: &Element) -> Result<End, SspError> {
     })
 }
 
-/// What `read` makes of each child called `name`; others are refused.
+/// Reads each child with `read`; a child that is not called `name` is an error.
 fn all<T>(
     element: &Element,
     name: &str,
@@ -218,7 +218,7 @@ fn all<T>(
     each.collect()
 }
 
-/// The name without prefix: libcosim has one namespace for all.
+/// Returns the name without prefix, because libcosim uses one namespace.
 pub(super) fn local(element: &Element) -> &str {
     element.name.rsplit(':').next().unwrap_or_default()
 }
@@ -250,7 +250,7 @@ fn count(element: &Element, name: &str) -> Result<usize, SspError> {
     count.ok_or_else(|| wrong(element, expected(), format!("{text:?}")))
 }
 
-/// A time in s as the text of an element.
+/// Reads the text of an element as a time in s.
 fn time(element: &Element) -> Result<f64, SspError> {
     let wrong = || wrong(element, "a finite number", format!("{:?}", element.text));
     finite(&element.text).ok_or_else(wrong)

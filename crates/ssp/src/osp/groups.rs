@@ -1,11 +1,12 @@
-//! Variable groups, which `NAME_OspModelDescription.xml` states for the FMU with that model name.
+//! Reads variable groups from `NAME_OspModelDescription.xml`, where NAME is the model name of the
+//! FMU.
 
 use fmu_description::xml::{self, Element};
 
 use super::document::{attribute, local};
 use crate::error::SspError;
 
-/// Variables and groups that are connected together.
+/// A named group of variables and nested groups.
 #[derive(Debug)]
 pub(super) struct Group {
     name: String,
@@ -13,14 +14,14 @@ pub(super) struct Group {
     pub(super) groups: Vec<Group>,
 }
 
-/// The groups of a model description.
+/// Reads the groups of a model description.
 pub(super) fn read(bytes: &[u8]) -> Result<(Vec<Group>, Vec<String>), SspError> {
     let root = xml::read(bytes)?;
     let lists = root.children.iter().filter(|child| local(child) == "VariableGroups");
     Ok((lists.flat_map(|list| &list.children).map(group).collect(), Vec::new()))
 }
 
-/// Whatever an element is called, it is a group: of a force, a velocity, a port.
+/// Reads a group; the name of the element (force, velocity, port, ...) does not matter.
 fn group(element: &Element) -> Group {
     let (variables, groups): (Vec<&Element>, Vec<&Element>) =
         element.children.iter().partition(|child| local(child) == "Variable");
@@ -32,15 +33,15 @@ fn group(element: &Element) -> Group {
     }
 }
 
-/// The group of that name: those of the model first, then those within them.
+/// Returns the group called `name`: searches the groups of the model first, then nested groups.
 pub(super) fn find<'a>(groups: &'a [Group], name: &str) -> Option<&'a Group> {
     let own = groups.iter().find(|group| group.name == name);
     own.or_else(|| groups.iter().find_map(|group| find(&group.groups, name)))
 }
 
 impl Group {
-    /// The variables of two groups in pairs: their own, then those of the groups within them, in
-    /// their order. A sentence where the groups have different shapes.
+    /// Pairs the variables of two groups in order: their own variables, then the variables of
+    /// nested groups. Returns an error sentence if the groups differ in shape.
     pub(super) fn pairs<'a>(&'a self, other: &'a Group) -> Result<Vec<[&'a str; 2]>, String> {
         let sizes = [
             (self.variables.len(), other.variables.len(), "variables"),

@@ -1,32 +1,32 @@
-//! The value of a parameter on its way to a variable.
+//! Conversion of a parameter value to the unit and type of a variable.
 
 use fmu_description::Kind;
 
-use crate::conversion::{Measure, Way};
+use crate::conversion::{ConversionChain, Measure};
 use crate::structure::{
     Conversion, Definitions, Parameter, ParameterValue, Transformation as Stated, Type,
 };
 use slave::Transformation;
 
-/// A value and what is known of its unit or its enumeration.
+/// A value with its unit or enumeration.
 #[derive(Clone, Debug)]
 pub(super) struct Value {
     pub(super) number: Number,
     measure: Measure,
 }
 
-/// A value alone.
+/// A value without its unit.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Number {
     Real(f64),
     Integer(i32),
     Boolean(bool),
     Text(String),
-    /// An item of an enumeration, and its number where the file defines it.
+    /// An item of an enumeration, with its number if the file defines it.
     Item(String, Option<i32>),
     Binary,
-    /// What FMI 2.0 does not have, in words.
-    Foreign(String),
+    /// The description of a value whose type FMI 2.0 does not have.
+    Unsupported(String),
 }
 
 impl Value {
@@ -50,11 +50,11 @@ impl Value {
             }
             ParameterValue::Binary(_) => (Number::Binary, Measure::default()),
             ParameterValue::Long(value) => {
-                (Number::Foreign(format!("{value}, of more than 32 bits")), Measure::default())
+                (Number::Unsupported(format!("{value}, of more than 32 bits")), Measure::default())
             }
             ParameterValue::Array(_, values) => {
                 let words = format!("an array of {} elements", values.len());
-                (Number::Foreign(words), Measure::default())
+                (Number::Unsupported(words), Measure::default())
             }
         };
         Value { number, measure }
@@ -64,13 +64,13 @@ impl Value {
         &self.measure
     }
 
-    /// First the unit, then the transformation of a mapping; and what could not be done.
-    pub(super) fn converted(
+    /// Converts the unit, then applies the transformation of a mapping; also returns warnings.
+    pub(super) fn convert(
         self,
         conversion: &Conversion,
         there: Measure,
     ) -> Result<(Value, Vec<String>), String> {
-        // Names of items need no numbers.
+        // A mapping of item names needs no numbers.
         if let (Some(Stated::Enumeration(pairs)), Number::Item(item, _)) =
             (&conversion.transformation, &self.number)
         {
@@ -79,9 +79,9 @@ impl Value {
                 .map_or(self.number.clone(), |(_, target)| Number::Item(target.clone(), None));
             return Ok((Value::new(number, there), Vec::new()));
         }
-        let way = Way::from(self.measure).over(conversion, there)?;
-        let number = self.number.transformed(&way.transformation)?;
-        Ok((Value::new(number, way.measure), way.doubts))
+        let chain = ConversionChain::from(self.measure).append(conversion, there)?;
+        let number = self.number.transformed(&chain.transformation)?;
+        Ok((Value::new(number, chain.measure), chain.warnings))
     }
 }
 
@@ -112,14 +112,14 @@ impl Number {
             _ => {
                 return Err(format!(
                     "the transformation is not for a value such as {}",
-                    self.spelt()
+                    self.to_text()
                 ));
             }
         })
     }
 
-    /// The value that `transformation` makes this one of.
-    pub(super) fn before(&self, transformation: &Transformation) -> Result<Number, String> {
+    /// Applies the inverse of `transformation`.
+    pub(super) fn inverted(&self, transformation: &Transformation) -> Result<Number, String> {
         match (transformation, self) {
             (Transformation::Identity, _) => Ok(self.clone()),
             (Transformation::Linear { factor, offset }, Number::Real(value)) if *factor != 0.0 => {
@@ -129,19 +129,19 @@ impl Number {
         }
     }
 
-    /// The value as the text of a setting of a variable of that kind.
+    /// Returns the text of a setting for a variable of type `kind`.
     pub(super) fn text(
         &self,
         kind: &Kind,
         items: Option<&[(String, i32)]>,
     ) -> Result<String, String> {
         let wrong =
-            || format!("expected a value of type {}, found {}", kind.element(), self.spelt());
+            || format!("expected a value of type {}, found {}", kind.element(), self.to_text());
         match (kind, self) {
             (Kind::Real(_), Number::Real(_) | Number::Integer(_))
             | (Kind::Integer(_) | Kind::Enumeration(_), Number::Integer(_))
             | (Kind::Boolean(_), Number::Boolean(_))
-            | (Kind::String(_), Number::Text(_)) => Ok(self.spelt()),
+            | (Kind::String(_), Number::Text(_)) => Ok(self.to_text()),
             (Kind::Integer(_), Number::Real(value))
                 if value.fract() == 0.0 && value.abs() < 2e9 =>
             {
@@ -160,7 +160,7 @@ impl Number {
         }
     }
 
-    pub(super) fn spelt(&self) -> String {
+    pub(super) fn to_text(&self) -> String {
         match self {
             Number::Real(value) => format!("{value:?}"),
             Number::Integer(value) => value.to_string(),
@@ -168,7 +168,7 @@ impl Number {
             Number::Text(text) => text.clone(),
             Number::Item(item, _) => item.clone(),
             Number::Binary => "binary data".to_owned(),
-            Number::Foreign(words) => words.clone(),
+            Number::Unsupported(words) => words.clone(),
         }
     }
 }

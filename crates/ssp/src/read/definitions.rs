@@ -1,4 +1,5 @@
-//! Units, enumerations, types, transformations: what several kinds of files have (section 4).
+//! Parses units, enumerations, types and transformations, which several kinds of files contain
+//! (section 4).
 
 use std::collections::HashSet;
 use std::hash::Hash;
@@ -43,7 +44,7 @@ fn unit(node: &Node) -> Result<Unit, SspError> {
     Ok(Unit { name: node.required("name")?.to_owned(), base })
 }
 
-/// The type that one of the children is; what FMI 2.0 does not have in words.
+/// Reads the type that a child element states.
 pub(super) fn value_type(node: &Node) -> Result<Option<Type>, SspError> {
     let mut found = None;
     for child in node.own_children() {
@@ -55,7 +56,7 @@ pub(super) fn value_type(node: &Node) -> Result<Option<Type>, SspError> {
             "String" => Type::String,
             "Enumeration" => Type::Enumeration(child.required("name")?.to_owned()),
             "Binary" => Type::Binary,
-            // Another element Clock has the name of a clock.
+            // A connector may contain a second element `Clock`, which names the clock of the value.
             "Clock" if child.attribute("name").is_none() => Type::Clock,
             _ => continue,
         };
@@ -67,7 +68,7 @@ pub(super) fn value_type(node: &Node) -> Result<Option<Type>, SspError> {
     Ok(array(node)?.or_else(|| clocked(node)).or(found))
 }
 
-/// The type of an array; none where its dimensions have one element.
+/// Reads the dimensions; `None` if there is exactly one element in all.
 fn array(node: &Node) -> Result<Option<Type>, SspError> {
     let dimensions = node.children_named("Dimension").map(|dimension| {
         let expected = "a size of at least 0 and below 2^64";
@@ -84,13 +85,13 @@ fn array(node: &Node) -> Result<Option<Type>, SspError> {
     Ok((!is_one).then_some(Type::Array(dimensions)))
 }
 
-/// The type of a connector that belongs to a clock.
+/// Reads the clock of a clocked value.
 fn clocked(node: &Node) -> Option<Type> {
     let clock = node.children_named("Clock").find_map(|clock| clock.attribute("name"))?;
     Some(Type::Clocked(clock.to_owned()))
 }
 
-/// The transformation that one of the children is, and `suppressUnitConversion`.
+/// Reads the transformation in a child element and `suppressUnitConversion`.
 pub(super) fn conversion(node: &Node) -> Result<Conversion, SspError> {
     let mut transformation = None;
     for child in node.own_children().filter(|child| child.name.ends_with("Transformation")) {
@@ -125,7 +126,7 @@ fn read_transformation(node: &Node) -> Result<Transformation, SspError> {
     }
 }
 
-/// Source and target of each `MapEntry`; no source may occur twice.
+/// Reads source and target of each `MapEntry`; a repeated source is an error.
 fn entries<T: Clone + Eq + Hash>(
     node: &Node,
     read: impl Fn(&Node, &str) -> Result<Option<T>, SspError>,

@@ -1,4 +1,4 @@
-//! Systems and what they hold (section 5).
+//! Parses systems and their content (section 5).
 
 use super::definitions::{conversion, value_type};
 use super::{parameter_mapping, parameter_set, signal_dictionary};
@@ -10,7 +10,7 @@ use crate::structure::{
 };
 use crate::xml::Node;
 
-/// `type` of the annotations of libcosim, which Ecos reads too.
+/// `type` of libcosim's annotations, which Ecos reads too.
 const OPEN_SIMULATION_PLATFORM: &str = "com.opensimulationplatform";
 
 pub(super) fn system(node: &Node) -> Result<System, SspError> {
@@ -58,7 +58,7 @@ fn component(node: &Node) -> Result<Component, SspError> {
         None | Some("application/x-fmu-sharedlibrary") => Content::Fmu,
         Some("application/x-ssp-definition") => Content::Definition,
         Some("application/x-ssp-package") => Content::Package,
-        // What has no source is nothing but its connectors, whatever it will be.
+        // A component without a source has only connectors; its type does not matter.
         Some(_) if node.attribute("source").is_none() => Content::Fmu,
         Some(other) => {
             let expected = "the type application/x-fmu-sharedlibrary, application/x-ssp-definition \
@@ -88,7 +88,7 @@ fn component(node: &Node) -> Result<Component, SspError> {
     })
 }
 
-/// The source of a component; empty where it has none.
+/// Returns the source of a component; empty if it has none.
 fn source_of(node: &Node) -> Result<String, SspError> {
     match node.attribute("source") {
         Some("") => Err(node.wrong("the path of a file in the attribute source", "nothing")),
@@ -121,7 +121,7 @@ fn connection(node: &Node) -> Result<Connection, SspError> {
     }
     let end = |element: &str, connector: &str| {
         let connector = node.required(connector)?.to_owned();
-        // Some tools write an empty name for the system around the connection.
+        // Some tools write an empty name for the surrounding system.
         Ok::<_, SspError>(End { element: node.stated(element), connector })
     };
     Ok(Connection {
@@ -167,7 +167,7 @@ fn media_type(node: &Node, known: &str) -> Result<(), SspError> {
     }
 }
 
-/// The file that `source` names, or what `inline` holds.
+/// Reads the URI in `source`, otherwise the inline content.
 fn source<T>(
     node: &Node,
     inline: Option<&Node>,
@@ -207,7 +207,7 @@ pub(super) fn experiment(node: &Node) -> Result<DefaultExperiment, SspError> {
     Ok(experiment)
 }
 
-/// The annotation of the Open Simulation Platform.
+/// Returns the annotation of the Open Simulation Platform.
 fn annotation(node: &Node) -> Result<Option<&Node>, SspError> {
     let list = node.child("Annotations")?.into_iter().flat_map(Node::own_children);
     let is_theirs = |each: &&Node| each.attribute("type") == Some(OPEN_SIMULATION_PLATFORM);

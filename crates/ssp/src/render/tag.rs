@@ -20,7 +20,7 @@ pub(super) struct Tag {
     name: String,
     attributes: Vec<(String, String)>,
     children: Vec<Tag>,
-    /// Whether something in it is of SSP 2.0 only.
+    /// Whether the element or its content requires SSP 2.0.
     newer: bool,
 }
 
@@ -30,7 +30,7 @@ impl Tag {
         Tag { name, attributes, children, newer: false }
     }
 
-    /// With the declarations of all prefixes.
+    /// Creates a root element that declares all prefixes.
     pub(super) fn root(name: &str) -> Self {
         PREFIXES.iter().fold(Tag::new(name), |tag, (prefix, space)| tag.with(prefix, space))
     }
@@ -54,13 +54,13 @@ impl Tag {
         self
     }
 
-    /// Marks an element that SSP 1.0 does not have, if it is one.
+    /// Marks the element as one that SSP 1.0 does not have.
     pub(super) fn newer(mut self, is_newer: bool) -> Self {
         self.newer |= is_newer;
         self
     }
 
-    /// The attribute `version`, the first one: the lowest that has all that was added.
+    /// Inserts `version` as the first attribute: the lowest version that has all added content.
     pub(super) fn versioned(mut self) -> Self {
         let version = if self.newer { "2.0" } else { "1.0" };
         let is_space = |(name, _): &&(String, String)| name.starts_with("xmlns");
@@ -76,7 +76,7 @@ impl Tag {
         }
     }
 
-    /// An element that holds `items`; none if there are none.
+    /// Adds an element `name` with `items`; adds nothing if there are no items.
     pub(super) fn list(self, name: &str, items: impl Iterator<Item = Tag>) -> Self {
         let list = items.fold(Tag::new(name), Tag::add);
         if list.children.is_empty() { self } else { self.add(list) }
@@ -108,6 +108,6 @@ impl Tag {
 }
 
 fn write(writer: &mut Writer<Vec<u8>>, event: Event<'_>) {
-    // Writing into memory cannot fail.
+    // Exporter into memory cannot fail.
     let _ = writer.write_event(event);
 }

@@ -1,4 +1,5 @@
-//! Kinds and types of connectors, and values of parameters (SSP 1.0.1 and 2.0, sections 4.5.1, 5.2.1, 6).
+//! Kinds and types of connectors and values of parameters (SSP 1.0.1 and 2.0, sections 4.5.1, 5.2.1
+//! and 6).
 
 /// `kind` of a connector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,12 +20,12 @@ pub enum ConnectorKind {
     Constant,
     /// `local` (SSP 2.0).
     Local,
-    /// `unspecified` (SSP 2.0): whatever a connection needs.
+    /// `unspecified` (SSP 2.0): the connection determines the kind.
     Unspecified,
 }
 
 impl ConnectorKind {
-    /// All kinds.
+    /// All kinds, in the order of the declaration.
     pub const ALL: [ConnectorKind; 9] = [
         ConnectorKind::Input,
         ConnectorKind::Output,
@@ -37,7 +38,7 @@ impl ConnectorKind {
         ConnectorKind::Unspecified,
     ];
 
-    /// The spelling of the standard.
+    /// Returns the attribute value of the standard.
     #[must_use]
     pub fn as_str(self) -> &'static str {
         match self {
@@ -71,7 +72,7 @@ pub enum Type {
     Binary,
     /// `Clock` (SSP 2.0), which FMI 2.0 does not have.
     Clock,
-    /// An array with these dimensions (SSP 2.0), whatever its elements are.
+    /// An array with these dimensions (SSP 2.0), of any element type.
     Array(Vec<Dimension>),
     /// A value that belongs to the clock of this name (SSP 2.0).
     Clocked(String),
@@ -84,12 +85,12 @@ pub enum Dimension {
     Size(u64),
     /// `sizeConnector`: the connector that states the size.
     Connector(String),
-    /// Neither.
+    /// Neither `size` nor `sizeConnector`.
     Open,
 }
 
 impl Type {
-    /// What FMI 2.0 does not have, in words.
+    /// Describes a type that FMI 2.0 does not have; `None` for the types of FMI 2.0.
     #[must_use]
     pub fn beyond_fmi2(&self) -> Option<String> {
         Some(match self {
@@ -126,7 +127,7 @@ pub enum ParameterValue {
     Binary(String),
     /// An integer of more than 32 bits (SSP 2.0), which FMI 2.0 does not have.
     Long(i128),
-    /// An array (SSP 2.0), which FMI 2.0 does not have: name of the element that states the type, and
-    /// the values as they stand in the file.
+    /// An array (SSP 2.0), which FMI 2.0 does not have: the name of the element that states the
+    /// type, and the values as text.
     Array(String, Vec<String>),
 }

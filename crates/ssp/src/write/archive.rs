@@ -1,4 +1,4 @@
-//! The ZIP archive of an SSP (SSP 1.0.1, section 3).
+//! Writes the ZIP archive of an SSP (SSP 1.0.1, section 3).
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -11,19 +11,19 @@ use zip::{CompressionMethod, DateTime, System, ZipWriter};
 
 use crate::error::SspError;
 
-/// Bytes that fit into an archive without Zip64, with room for its directory.
+/// Maximum size of an archive without Zip64, with room for its directory.
 const CAPACITY: usize = 1 << 31;
 
-/// Files below `resources`, by path in the archive.
+/// The files below `resources`, by path in the archive.
 #[derive(Default)]
 pub(super) struct Archive {
     entries: BTreeMap<String, Vec<u8>>,
 }
 
 impl Archive {
-    /// Adds a file to `resources` under `name` or, where that is taken, one like it, and gives its
-    /// path. Only characters are used that a URI and every file system leave alone: importers are
-    /// known that do not decode URIs.
+    /// Adds a file to `resources` and returns its path. If `name` is taken, a similar name is used.
+    /// The path contains only characters that need no encoding in a URI, because some importers do
+    /// not decode URIs.
     pub(super) fn add(&mut self, name: &str, bytes: Vec<u8>) -> String {
         let plain = |character: char| {
             if character.is_ascii_alphanumeric() || "._-".contains(character) {
@@ -43,7 +43,7 @@ impl Archive {
         path
     }
 
-    /// Adds the FMU at `path`: an archive as it is, a folder packed.
+    /// Adds the FMU at `path`: copies an archive, packs a folder.
     pub(super) fn add_fmu(&mut self, path: &Path, fmu: &Unpacked) -> Result<String, SspError> {
         let name = &fmu.description.model_name;
         if path.is_dir() {
@@ -62,7 +62,7 @@ impl Archive {
         Ok(self.add(&format!("{stem}.fmu"), fs::read(path).map_err(failed("read", path))?))
     }
 
-    /// Writes the archive with `ssd` as its system structure, as a whole or not at all.
+    /// Writes the archive with `ssd` as its system structure, atomically.
     pub(super) fn write(&self, ssd: &str, target: &Path) -> Result<(), SspError> {
         let mut entries = vec![("SystemStructure.ssd", ssd.as_bytes())];
         entries.extend(self.entries.iter().map(|(path, bytes)| (path.as_str(), bytes.as_slice())));
@@ -92,7 +92,7 @@ fn failed(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> SspErr
     move |source| SspError::File { action, path, source }
 }
 
-/// All files in `folder` and below; links are left out.
+/// Collects all files in `folder` recursively; symbolic links are skipped.
 fn collect(
     folder: &Path,
     prefix: &str,
@@ -112,7 +112,8 @@ fn collect(
     Ok(())
 }
 
-/// The entries in the order given, dated 1980-01-01; FMUs, which are compressed, are stored.
+/// Packs the entries in the given order, dated 1980-01-01. FMUs are stored uncompressed, because
+/// they are compressed already.
 fn zip(target: &Path, entries: &[(&str, &[u8])]) -> Result<Vec<u8>, SspError> {
     let total = entries.iter().fold(0_usize, |sum, (_, bytes)| sum.saturating_add(bytes.len()));
     if total > CAPACITY {

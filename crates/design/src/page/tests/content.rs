@@ -1,4 +1,4 @@
-//! Every text, number and matrix of a report stands on its page.
+//! The page shows every text, number and matrix of a report.
 
 use std::collections::BTreeSet;
 
@@ -44,9 +44,9 @@ fn every_text_appears_as_it_is() {
             _ => None,
         });
         assert!(texts.clone().count() > 10);
-        for wanted in texts {
-            let wanted = wanted.replace(char::is_control, " ");
-            assert!(page.contains(&wanted), "{wanted:?} is missing");
+        for expected in texts {
+            let expected = expected.replace(char::is_control, " ");
+            assert!(page.contains(&expected), "{expected:?} is missing");
         }
     });
 }
@@ -134,9 +134,9 @@ fn matrices_read_back_bit_by_bit_in_each_language() {
         if !report.gains.is_empty() {
             let together = read("numpy", &literal(document.root(), "all", "numpy"));
             let matrices = report.plant.matrices.iter().chain(&report.gains);
-            let wanted: Vec<_> = matrices.map(|matrix| bits(&matrix.values)).collect();
+            let expected: Vec<_> = matrices.map(|matrix| bits(&matrix.values)).collect();
             let found: Vec<_> = together.iter().map(|(_, rows)| bits(rows)).collect();
-            assert_eq!(found, wanted);
+            assert_eq!(found, expected);
         }
         for (id, p) in [
             ("p-printed", report.certificate.printed.as_ref().ok().map(|theorem| &theorem.p)),

@@ -1,29 +1,30 @@
-//! What a plant file wants of feedback and observer.
+//! The requirements of a plant file on state feedback and observer.
 
 use crate::matrix::MatrixEntry as _;
 use nalgebra::{Complex, DMatrix};
 
 use files::{Entry, Place, PlaceError, Table};
 
-/// What is wanted of a gain.
+/// A requirement on a gain.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Wanted {
-    /// These eigenvalues of the continuous loop, 1/s; a sampled one gets e^(p T).
+pub(crate) enum Requirement {
+    /// These eigenvalues of the continuous loop in 1/s; for a sampled loop they become e^(p T).
     Eigenvalues(Vec<Complex<f64>>),
     /// These eigenvalues of the sampled loop.
     SampledEigenvalues(Vec<Complex<f64>>),
     /// Eigenvalues in a region.
     Region(Region),
-    /// The least integral of x'Q x + u'R u, or the least variance for noise of intensity W and V.
+    /// The least integral of x'Q x + u'R u (LQR), or the least variance for noise of intensity W
+    /// and V (Kalman).
     Weights { states: DMatrix<f64>, channels: DMatrix<f64> },
-    /// The least H-infinity norm, or one below a bound; eigenvalues in a region as well.
+    /// The least H-infinity norm, or a norm below a bound; the eigenvalues also lie in a region.
     HInfinity { bound: Option<f64>, region: Region },
 }
 
-/// A region of the left half plane; the intersection of what is stated.
+/// A region of the left half plane: the intersection of the given parts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Region {
-    /// Real parts below minus this, 1/s.
+    /// Real parts are below the negative of this rate, 1/s.
     pub(crate) decay: Option<f64>,
     /// Centre and radius, 1/s.
     pub(crate) disc: Option<(f64, f64)>,
@@ -31,12 +32,12 @@ pub(crate) struct Region {
     pub(crate) sector: Option<f64>,
 }
 
-/// What is wanted, and where the file says so.
+/// A requirement and its place in the file.
 #[derive(Clone, Debug)]
 pub(crate) struct Request {
-    pub(crate) wanted: Wanted,
+    pub(crate) requirement: Requirement,
     pub(crate) place: Place,
-    /// Of the second weight and its name.
+    /// Name and place of the second weight.
     pub(crate) other: Option<(String, Place)>,
 }
 
@@ -60,35 +61,36 @@ pub(crate) fn request(
             let message = format!("expected one of {}", known.join(", "));
             return Err(table.source.error(&table.place, message));
         };
-        let wanted = Wanted::Region(self::region(&entry)?);
-        return Ok(Request { wanted, place: entry.place, other: None });
+        let requirement = Requirement::Region(self::region(&entry)?);
+        return Ok(Request { requirement, place: entry.place, other: None });
     };
     if one.name.ends_with(".h_infinity") {
         let region = region.as_ref().map(self::region).transpose()?.unwrap_or_default();
-        let wanted = Wanted::HInfinity { bound: bound(&one, region)?, region };
-        return Ok(Request { wanted, place: one.place, other: None });
+        let requirement = Requirement::HInfinity { bound: bound(&one, region)?, region };
+        return Ok(Request { requirement, place: one.place, other: None });
     }
     if let Some(entry) = region {
-        return Err(entry.error("a region goes alone or with `h_infinity`"));
+        return Err(entry.error("a region can be combined with `h_infinity` only"));
     }
     if one.name.ends_with(".eigenvalues") {
-        let wanted = Wanted::Eigenvalues(stable(&one, false)?);
-        return Ok(Request { wanted, place: one.place, other: None });
+        let requirement = Requirement::Eigenvalues(stable(&one, false)?);
+        return Ok(Request { requirement, place: one.place, other: None });
     }
     if one.name.ends_with(".sampled_eigenvalues") {
         if !sampled {
             return Err(one.error("the design has no `sample_time`"));
         }
-        let wanted = Wanted::SampledEigenvalues(stable(&one, true)?);
-        return Ok(Request { wanted, place: one.place, other: None });
+        let requirement = Requirement::SampledEigenvalues(stable(&one, true)?);
+        return Ok(Request { requirement, place: one.place, other: None });
     }
     let other = table.require(weights[1], "the weight of the other signals")?;
-    let wanted = Wanted::Weights { states: weight(&one)?, channels: weight(&other)? };
+    let requirement = Requirement::Weights { states: weight(&one)?, channels: weight(&other)? };
     let other = Some((weights[1].to_owned(), other.place));
-    Ok(Request { wanted, place: one.place, other })
+    Ok(Request { requirement, place: one.place, other })
 }
 
-/// The shape of a disc or a sector is lost between the planes of s and z; a decay rate is not.
+/// Rejects a disc or a sector for a sampled design: the map z = e^(s T) does not preserve their
+/// shape.
 fn refuse_unsampled(region: &Entry<'_>) -> Result<(), PlaceError> {
     let table = region.table()?;
     match ["disc", "sector"].iter().find_map(|key| table.get(key)) {
@@ -97,7 +99,7 @@ fn refuse_unsampled(region: &Entry<'_>) -> Result<(), PlaceError> {
     }
 }
 
-/// The one method that the table states beside a region.
+/// Returns the only method of the table besides a region; several methods are an error.
 fn only_one<'a>(table: &Table<'a>, weight: &str) -> Result<Option<Entry<'a>>, PlaceError> {
     let keys = ["eigenvalues", "sampled_eigenvalues", "h_infinity", weight];
     let mut stated = keys.iter().filter_map(|key| table.get(key));
@@ -105,13 +107,13 @@ fn only_one<'a>(table: &Table<'a>, weight: &str) -> Result<Option<Entry<'a>>, Pl
     match stated.next() {
         Some(second) => {
             let keys = keys.join(", ");
-            Err(second.error(format!("only one of {keys} can be wanted")))
+            Err(second.error(format!("only one of {keys} is possible")))
         }
         None => Ok(first),
     }
 }
 
-/// Eigenvalues of a stable loop.
+/// Reads the eigenvalues and checks that they are stable.
 fn stable(entry: &Entry<'_>, sampled: bool) -> Result<Vec<Complex<f64>>, PlaceError> {
     let found = eigenvalues(entry)?;
     let unstable =
@@ -127,7 +129,7 @@ fn stable(entry: &Entry<'_>, sampled: bool) -> Result<Vec<Complex<f64>>, PlaceEr
     }
 }
 
-/// Numbers, or `{ re = -3.0, im = 4.0 }` for a pair of complex conjugates.
+/// Reads numbers, and `{ re = -3.0, im = 4.0 }` for a complex conjugate pair.
 fn eigenvalues(entry: &Entry<'_>) -> Result<Vec<Complex<f64>>, PlaceError> {
     let mut found = Vec::new();
     for member in entry.list()? {
@@ -156,7 +158,7 @@ fn region(entry: &Entry<'_>) -> Result<Region, PlaceError> {
     Ok(Region { decay, disc, sector })
 }
 
-/// An angle between 0 and 90 degrees.
+/// Reads an angle between 0 and 90 degrees.
 fn angle(entry: &Entry<'_>) -> Result<f64, PlaceError> {
     match entry.positive()? {
         degrees if degrees < 90.0 => Ok(degrees),
@@ -179,7 +181,7 @@ fn disc(entry: &Entry<'_>) -> Result<(f64, f64), PlaceError> {
     }
 }
 
-/// A bound of the norm, or the text "least".
+/// Reads a bound of the norm, or the text "least" (`None`).
 fn bound(entry: &Entry<'_>, region: Region) -> Result<Option<f64>, PlaceError> {
     if !entry.is_text() {
         return entry.positive().map(Some);
@@ -194,7 +196,7 @@ fn bound(entry: &Entry<'_>, region: Region) -> Result<Option<f64>, PlaceError> {
     }
 }
 
-/// A symmetric matrix, or a list of numbers for a diagonal one.
+/// Reads a symmetric matrix, or a list of numbers as a diagonal matrix.
 fn weight(entry: &Entry<'_>) -> Result<DMatrix<f64>, PlaceError> {
     let members = entry.list()?;
     if members.iter().any(Entry::is_list) {

@@ -1,4 +1,4 @@
-//! What stands for isolation where there is none: nothing can be made of it.
+//! Replaces isolation on operating systems that do not support it: every attempt returns an error.
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use fmu_description::package::Unpacked;
 use super::{IsolateError, Options, WorkerError};
 use slave::{CallError, Slave, StepResult};
 
-/// An instance in a process of its own: there is none on this operating system.
+/// An instance in a process of its own. It cannot be created on this operating system.
 #[derive(Debug)]
 pub struct Isolated {
     never: Infallible,
@@ -21,17 +21,17 @@ impl Isolated {
         Err(IsolateError::Platform { instance: name.to_owned() })
     }
 
-    /// Makes another instance in its place: there is none.
+    /// Replaces the instance. It cannot be called on this operating system.
     ///
     /// # Errors
     ///
-    /// None, as there is nothing to call this on.
+    /// None.
     pub fn renew(&mut self, _: &str, _: &Options) -> Result<(), IsolateError> {
         match self.never {}
     }
 }
 
-/// Refuses to be a worker.
+/// Returns the error that this operating system does not support workers.
 ///
 /// # Errors
 ///
