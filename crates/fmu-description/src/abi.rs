@@ -56,7 +56,7 @@ pub enum Status {
 }
 
 impl Status {
-    /// The status behind a C value; none for a value that the standard does not know.
+    /// Converts a C value to a status; `None` if it is no `fmi2Status`.
     #[must_use]
     pub fn from_c(status: fmi2Status) -> Option<Self> {
         use Status::{Discard, Error, Fatal, OK, Pending, Warning};
@@ -65,7 +65,7 @@ impl Status {
             .find(|known| *known as fmi2Status == status)
     }
 
-    /// The name in the C header.
+    /// Returns the name in the C header.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -131,7 +131,7 @@ pub type fmi2StepFinished = unsafe extern "C" fn(fmi2ComponentEnvironment, fmi2S
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct fmi2CallbackFunctions {
-    /// `logger`; tolerated when null.
+    /// `logger`; may be null.
     pub logger: Option<fmi2CallbackLogger>,
     /// `allocateMemory`.
     pub allocate_memory: Option<fmi2CallbackAllocateMemory>,
@@ -139,15 +139,17 @@ pub struct fmi2CallbackFunctions {
     pub free_memory: Option<fmi2CallbackFreeMemory>,
     /// `stepFinished`.
     pub step_finished: Option<fmi2StepFinished>,
-    /// `componentEnvironment`, handed back with every callback.
+    /// `componentEnvironment`, passed back with every callback.
     pub component_environment: fmi2ComponentEnvironment,
 }
 
-/// Receives text from `fmuDescribe`: context, bytes (not terminated), length.
+/// Callback that receives text from `fmuDescribe`: context, bytes (not terminated), length.
 pub type DescribeSink = unsafe extern "C" fn(*mut c_void, *const c_char, usize);
 
-/// Name of the one function beyond the standard: it renders the description of a library.
+/// Name of the function that renders the model description of a library, the only one beyond the
+/// standard.
 ///
 /// `int fmuDescribe(const char *resources, void *context, void (*sink)(void *context, const char
-/// *text, size_t length))` gives the XML to `sink` and returns 0, or a message and returns 1.
+/// *text, size_t length))` passes the XML to `sink` and returns 0, or passes an error message and
+/// returns 1.
 pub const DESCRIBE: &str = "fmuDescribe";

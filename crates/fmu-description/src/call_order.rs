@@ -1,10 +1,11 @@
-//! Which function may be called in which state: the tables of FMI 2.0.5, sections 3.2.3 and 4.2.4.
+//! Call order: the functions allowed in each state, as in the tables of FMI 2.0.5, sections 3.2.3 and
+//! 4.2.4.
 
 use serde::{Deserialize, Serialize};
 
 use crate::{Causality, Initial, Variability};
 
-/// `fmi2Type`: for which of the two interfaces an instance was made.
+/// `fmi2Type`: the interface of an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum InterfaceType {
     /// `fmi2ModelExchange`.
@@ -15,7 +16,7 @@ pub enum InterfaceType {
 
 macro_rules! states {
     ($($(#[$doc:meta])* $name:ident,)*) => {
-        /// State of an instance.
+        /// The state of an instance.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
         pub enum State { $($(#[$doc])* $name,)* }
 
@@ -23,7 +24,7 @@ macro_rules! states {
             /// Every state, in the order of the tables.
             pub const EVERY: [State; [$(stringify!($name)),*].len()] = [$(State::$name),*];
 
-            /// The state as a set of states.
+            /// Returns the set that contains only this state.
             pub const fn bit(self) -> u16 {
                 1 << self as u16
             }
@@ -66,14 +67,14 @@ const F: u16 = State::StepFailed.bit();
 const K: u16 = State::StepCanceled.bit();
 const T: u16 = State::Terminated.bit();
 const E: u16 = State::Error.bit();
-/// Every state in which an instance is at rest.
+/// Every state except during a step and after `fmi2Fatal`.
 const ALL: u16 = I | M | V | N | C | F | K | T | E;
-/// The states in which values can be read.
+/// The states in which values may be read.
 const READ: u16 = ALL & !I;
 
 macro_rules! functions {
     ($($name:ident: $exchange:expr, $simulation:expr;)*) => {
-        /// A function of the standard that works on an instance.
+        /// A function of FMI that takes an instance.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum Function { $(#[doc = concat!("`fmi2", stringify!($name), "`")] $name,)* }
 
@@ -81,13 +82,13 @@ macro_rules! functions {
             /// Every function, in the order of the tables.
             pub const EVERY: &[Function] = &[$(Function::$name,)*];
 
-            /// The name in the C ABI.
+            /// Returns the name in the C ABI.
             #[must_use]
             pub fn name(self) -> &'static str {
                 match self { $(Function::$name => concat!("fmi2", stringify!($name)),)* }
             }
 
-            /// The states in which it may be called, by interface.
+            /// Returns the states in which the function may be called for an interface.
             fn states(self, interface: InterfaceType) -> u16 {
                 match (self, interface) {
                     $((Function::$name, InterfaceType::ModelExchange) => $exchange,
@@ -143,7 +144,7 @@ functions! {
     GetStringStatus: 0, C | P | F | T;
 }
 
-/// Whether `function` may return `fmi2Discard`: section 2.1.3 lists them.
+/// Whether `function` may return `fmi2Discard` (section 2.1.3).
 #[must_use]
 pub fn may_discard(interface: InterfaceType, function: Function) -> bool {
     use Function as F;
@@ -164,17 +165,16 @@ pub fn may_discard(interface: InterfaceType, function: Function) -> bool {
     }
 }
 
-/// Whether `function` may be called in `state` of an instance made for `interface`.
+/// Whether `function` may be called in `state` of an instance for `interface`.
 ///
-/// Conditions on single variables (the numbers in the cells) are tested where values are set.
+/// Conditions on single variables (the numbers in the cells of the tables) are covered by [`settable`].
 #[must_use]
 pub fn allowed(interface: InterfaceType, function: Function, state: State) -> bool {
     function.states(interface) & state.bit() != 0
 }
 
-/// The states in which a variable may be set: conditions 1, 3 and 6 of section 4.2.4, 4 and 5 of
-/// 3.2.3; inputs also before initialization mode, as importers do.
-#[must_use]
+/// Returns the set of states in which a variable may be set: conditions 1, 3 and 6 of section 4.2.4,
+/// 4 and 5 of section 3.2.3. Inputs may also be set before initialization mode, as importers do.
 pub fn settable(
     (causality, variability): (Causality, Variability),
     initial: Option<Initial>,

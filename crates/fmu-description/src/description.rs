@@ -1,6 +1,5 @@
-//! The content of `modelDescription.xml` (FMI 2.0.5, section 2.2) as plain data.
-//!
-//! The same types are rendered by an exporter and parsed by an importer.
+//! The content of `modelDescription.xml` (FMI 2.0.5, section 2.2) as plain data, for exporters and
+//! importers.
 
 mod guid;
 mod parse;
@@ -25,8 +24,8 @@ pub struct ModelDescription {
     pub fmi_version: String,
     /// `modelName`.
     pub model_name: String,
-    /// `guid`: the string that pairs this XML with its binary. Not part of the serialized form, of
-    /// which it is a hash.
+    /// `guid`: the string that must be equal in the XML and in the binary. It is a hash of the serialised
+    /// description, which therefore does not contain it.
     #[serde(skip)]
     pub guid: String,
     /// `description`.
@@ -45,11 +44,11 @@ pub struct ModelDescription {
     pub generation_date_and_time: Option<String>,
     /// `variableNamingConvention`: `true` for `structured`, `false` for `flat`.
     pub structured_names: bool,
-    /// `numberOfEventIndicators`, of model exchange.
+    /// `numberOfEventIndicators` (model exchange).
     pub number_of_event_indicators: Option<u32>,
-    /// `ModelExchange`, when the FMU has that interface.
+    /// `ModelExchange`, if the FMU has this interface.
     pub model_exchange: Option<ModelExchange>,
-    /// `CoSimulation`, when the FMU has that interface.
+    /// `CoSimulation`, if the FMU has this interface.
     pub co_simulation: Option<CoSimulation>,
     /// `UnitDefinitions` (section 2.2.2).
     pub units: Vec<Unit>,
@@ -66,7 +65,7 @@ pub struct ModelDescription {
 }
 
 impl ModelDescription {
-    /// The variable called `name`.
+    /// Finds the variable called `name`.
     #[must_use]
     pub fn variable(&self, name: &str) -> Option<&ScalarVariable> {
         self.variables.iter().find(|variable| variable.name == name)
@@ -132,7 +131,7 @@ pub struct CoSimulation {
 /// `SimpleType` of `TypeDefinitions`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SimpleType {
-    /// `name`, unique, different from every variable's.
+    /// `name`, unique, also different from the names of all variables.
     pub name: String,
     /// `description`.
     pub description: Option<String>,
@@ -165,7 +164,7 @@ pub struct DefaultExperiment {
 }
 
 impl DefaultExperiment {
-    /// The tolerance, where it is one that an FMU can be told: finite and above 0.
+    /// Returns the tolerance if it is valid for `fmi2SetupExperiment`: finite and above 0.
     #[must_use]
     pub fn usable_tolerance(&self) -> Option<f64> {
         self.tolerance.filter(|tolerance| *tolerance > 0.0 && tolerance.is_finite())
@@ -177,22 +176,23 @@ impl DefaultExperiment {
 pub struct ScalarVariable {
     /// `name`, unique.
     pub name: String,
-    /// `valueReference`, unique per base type but for aliases.
+    /// `valueReference`, unique per base type except for aliases.
     pub value_reference: u32,
     /// `description`.
     pub description: Option<String>,
-    /// `causality`; `local` when absent.
+    /// `causality`; `local` if absent.
     pub causality: Causality,
-    /// `variability`; `continuous` when absent, whatever the type.
+    /// `variability`; `continuous` if absent, for every type.
     pub variability: Variability,
-    /// `initial`; when absent the default of the table in section 2.2.7 applies.
+    /// `initial`; if absent, the default of the table in section 2.2.7 applies.
     pub initial: Option<Initial>,
-    /// Type and what belongs to it.
+    /// Type, with its attributes and start value.
     pub kind: Kind,
 }
 
 impl ScalarVariable {
-    /// The value of `initial` in force: the one given, or the default of section 2.2.7's table.
+    /// Returns the effective value of `initial`: the attribute, or the default of the table in section
+    /// 2.2.7.
     #[must_use]
     pub fn initial_in_force(&self) -> Option<Initial> {
         use Causality::{Independent, Input, Parameter};
@@ -215,12 +215,12 @@ pub enum Kind {
     Boolean(Option<bool>),
     /// `String` with its `start`.
     String(Option<String>),
-    /// `Enumeration`: as an integer; `declared_type` names the items.
+    /// `Enumeration` as an integer; the type `declared_type` has the names of its items.
     Enumeration(IntegerType),
 }
 
 impl Kind {
-    /// The element's name in the XML.
+    /// Returns the name of the XML element.
     #[must_use]
     pub fn element(&self) -> &'static str {
         match self {
@@ -252,7 +252,7 @@ pub struct RealType {
     pub nominal: Option<f64>,
     /// `start`.
     pub start: Option<f64>,
-    /// `derivative`: 1-based index of the variable that this one is the derivative of.
+    /// `derivative`: 1-based index of the state of which this variable is the derivative.
     pub derivative: Option<u32>,
     /// `reinit`: an event may change this continuous state.
     pub reinit: bool,
@@ -273,7 +273,7 @@ pub struct IntegerType {
     pub start: Option<i32>,
 }
 
-/// Declares an enumeration whose values are spelt in the XML as given.
+/// Declares an enumeration with the spelling of its values in the XML.
 macro_rules! spelt {
     ($(#[$meta:meta])* $name:ident { $($(#[$doc:meta])* $variant:ident = $text:literal,)* }) => {
         $(#[$meta])*
@@ -281,7 +281,7 @@ macro_rules! spelt {
         pub enum $name { $($(#[$doc])* $variant,)* }
 
         impl $name {
-            /// The spelling of the standard.
+            /// Returns the spelling of the standard.
             #[must_use]
             pub fn as_str(self) -> &'static str {
                 match self { $(Self::$variant => $text,)* }
@@ -305,9 +305,9 @@ spelt! {
         Parameter = "parameter",
         /// Computed from parameters.
         CalculatedParameter = "calculatedParameter",
-        /// Given by the environment.
+        /// Set by the importer's environment.
         Input = "input",
-        /// Given to the environment.
+        /// Read by the importer's environment.
         Output = "output",
         /// Internal.
         Local = "local",
@@ -327,7 +327,7 @@ spelt! {
         Tunable = "tunable",
         /// Changes at events or communication points only.
         Discrete = "discrete",
-        /// Any Real.
+        /// Changes at any time; only for a Real.
         Continuous = "continuous",
     }
 }
@@ -376,8 +376,8 @@ pub struct ModelStructure {
 pub struct Unknown {
     /// `index`, 1-based.
     pub index: u32,
-    /// `dependencies`: `None` (absent) means "may depend on everything", an empty list on nothing.
+    /// `dependencies`: `None` (absent) means a dependency on all knowns, an empty list on none.
     pub dependencies: Option<Vec<u32>>,
-    /// `dependenciesKind`, as long as `dependencies`.
+    /// `dependenciesKind`, with one entry for each of `dependencies`.
     pub kinds: Option<Vec<DependencyKind>>,
 }

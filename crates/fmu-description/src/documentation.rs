@@ -1,4 +1,4 @@
-//! `documentation/index.html` of an FMU: what a reader needs to use the model.
+//! `documentation/index.html` of an FMU: the page for users of the model.
 
 use std::borrow::Cow;
 
@@ -13,15 +13,14 @@ table { border-collapse: collapse; margin: 1rem 0; } \
 th, td { border: 1px solid #ccc; padding: .2rem .6rem; text-align: left; vertical-align: top; } \
 th { background: #f2f2f2; } code { font-family: monospace; white-space: pre-wrap; }";
 
-/// Name of the author's part of the page, among the files of `documentation/`.
+/// Name of the file in `documentation/` with the author's part of the page.
 pub const FRAGMENT: &str = "model.html";
 
-/// The page about a model: its description, `model_html` with the equations in the author's words,
-/// the variables, the default experiment, the capabilities and the licence.
+/// Renders the page of a model: its description, `model_html` with the author's equations and text, the
+/// variables, the default experiment, the capabilities and the licence.
 ///
-/// One self-contained file without scripts, well-formed both as HTML and as XML if `model_html` is.
-/// Everything from `description` is escaped; `model_html` is the author's HTML fragment and goes in
-/// as it is.
+/// The page is one self-contained file without scripts, well-formed as HTML and as XML if `model_html`
+/// is. Texts of `description` are escaped; the author's fragment `model_html` is inserted unchanged.
 ///
 /// ```
 /// use fmu_description::{ModelDescription, documentation};
@@ -60,7 +59,7 @@ fn escaped(text: &str) -> Cow<'_, str> {
     quick_xml::escape::escape(text)
 }
 
-/// A section with a heading; nothing if it is empty.
+/// Renders a section with a heading; empty if the content is empty.
 fn section(heading: &str, content: &str) -> String {
     if content.trim().is_empty() {
         return String::new();
@@ -68,14 +67,14 @@ fn section(heading: &str, content: &str) -> String {
     format!("<h2>{heading}</h2>\n{content}\n")
 }
 
-/// Text in a paragraph, its line breaks kept.
+/// Renders text as a paragraph with its line breaks.
 fn paragraph(text: Option<&str>) -> String {
     let text = text.filter(|text| !text.trim().is_empty());
     text.map(|text| format!("<p>{}</p>\n", escaped(text).replace('\n', "<br/>\n")))
         .unwrap_or_default()
 }
 
-/// A table with a header row; nothing if it has no other row. Cells are HTML.
+/// Renders a table with a header row; empty without further rows. Cells are HTML.
 fn table(header: &[&str], rows: &[Vec<String>]) -> String {
     if rows.is_empty() {
         return String::new();
@@ -142,9 +141,9 @@ fn type_name(kind: &Kind) -> String {
     }
 }
 
-/// Unit, and start, min and max as text; empty where there is none.
+/// Returns the unit, and start, min and max as text; an absent value is an empty text.
 ///
-/// `types` are those of the description, in which an enumeration finds the names of its items.
+/// `types` are the types of the description, with the names of the items of enumerations.
 #[must_use]
 pub fn texts(kind: &Kind, types: &[SimpleType]) -> (String, [String; 3]) {
     let none = String::new;
@@ -259,7 +258,7 @@ mod tests {
     use quick_xml::events::Event;
     use quick_xml::reader::Reader;
 
-    /// The texts of a page, element by element, as an XML reader sees them.
+    /// Returns the texts of a page, element by element, read by an XML parser.
     fn texts(page: &str) -> Vec<String> {
         let mut reader = Reader::from_str(page);
         let (mut texts, mut depth) = (vec![String::new()], 0);

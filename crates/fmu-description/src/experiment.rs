@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 pub struct Experiment {
     /// `startTime` in s.
     pub start_time: f64,
-    /// `stopTime` in s, where defined: no step goes past it.
+    /// `stopTime` in s, if defined: no step may end after it.
     pub stop_time: Option<f64>,
-    /// `tolerance`, relative, where defined.
+    /// `tolerance`, relative, if defined.
     pub tolerance: Option<f64>,
 }

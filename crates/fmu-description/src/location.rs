@@ -1,36 +1,36 @@
-//! Paths and `file:` URIs, as used for `fmuResourceLocation` (FMI 2.0.5, section 2.1.5).
+//! Conversion between paths and `file:` URIs for `fmuResourceLocation` (FMI 2.0.5, section 2.1.5).
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, percent_decode_str, percent_encode};
 
-/// What RFC 3986, section 2.3, leaves unencoded, and the separator.
+/// All characters except the unreserved ones of RFC 3986, section 2.3, and the separator.
 const ENCODED: AsciiSet =
     NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~').remove(b'/');
-/// The same for a path with a drive letter.
+/// The same set for a path with a drive letter, without the colon.
 const ENCODED_AFTER_DRIVE: AsciiSet = ENCODED.remove(b':');
 
-/// What a model gets as folder of its resources where the importer names none. Because of the first
-/// character no file has such a path, on no platform, and so the working directory is never read.
+/// The resource folder that a model receives if the importer names none. Its first character, NUL, makes
+/// it an invalid path on every platform, so that a model cannot read the working directory instead.
 pub const NO_FOLDER: &str = "\0(no fmuResourceLocation)";
 
-/// Why a path and a URI cannot be turned into each other.
+/// The error of a conversion between a path and a URI.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LocationError {
-    /// A relative path has no URI.
+    /// The path is relative.
     #[error("expected an absolute path, found {}", path.display())]
     Relative {
         /// The path.
         path: PathBuf,
     },
-    /// A path that this platform cannot write as text.
+    /// The path is not valid Unicode.
     #[error("expected a path in Unicode, found {}", path.display())]
     NotUnicode {
         /// The path.
         path: PathBuf,
     },
-    /// Not a URI of a file.
+    /// The URI is not a valid `file:` URI.
     #[error(
         "expected a file URI with an absolute path, such as file:///tmp/fmu/resources, \
          found {uri:?}"
@@ -39,7 +39,7 @@ pub enum LocationError {
         /// The URI.
         uri: String,
     },
-    /// A file on another machine.
+    /// The URI names another machine.
     #[error("expected a file on this machine, found host {host:?} in {uri:?}")]
     Host {
         /// The host.
@@ -49,7 +49,7 @@ pub enum LocationError {
     },
 }
 
-/// The URI `file:///...` of an absolute path (RFC 8089, appendix B), without a trailing slash.
+/// Converts an absolute path to a URI `file:///...` (RFC 8089, appendix B) without a trailing slash.
 ///
 /// # Errors
 ///
@@ -69,11 +69,11 @@ pub fn file_uri(path: &Path) -> Result<String, LocationError> {
     Ok(encode(&bytes_of(path)?, cfg!(windows)))
 }
 
-/// The path that a `file:` URI names.
+/// Converts a `file:` URI to a path.
 ///
-/// Accepted are `file:///p`, `file:/p` and `file://localhost/p`, with or without a trailing slash,
-/// percent-encoded or not; on Windows also a drive letter, `file:///C:/p`. `?` and `#` are taken
-/// as part of the path: a file has no query, and some importers encode nothing.
+/// Accepts `file:///p`, `file:/p` and `file://localhost/p`, with or without a trailing slash,
+/// percent-encoded or not; on Windows also a drive letter, `file:///C:/p`. `?` and `#` are part of the
+/// path: a file has no query, and some importers do not encode paths.
 ///
 /// # Errors
 ///
@@ -91,14 +91,14 @@ pub fn path_from_uri(uri: &str) -> Result<PathBuf, LocationError> {
     path_of(bytes).ok_or_else(|| LocationError::NotAFile { uri: uri.to_owned() })
 }
 
-/// `drives`: the path is one of Windows, with drive letter and backslashes.
+/// Encodes a path. `drives` selects paths of Windows, with drive letter and backslashes.
 fn encode(path: &[u8], drives: bool) -> String {
     if !drives {
         return format!("file://{}", percent_encode(path, &ENCODED));
     }
     let slashes: Vec<u8> =
         path.iter().map(|byte| if *byte == b'\\' { b'/' } else { *byte }).collect();
-    // `\\?\` marks a long path and says nothing about the place.
+    // `\\?\` only marks a long path.
     let plain = slashes.strip_prefix(b"//?/").unwrap_or(&slashes);
     let encoded = percent_encode(plain, &ENCODED_AFTER_DRIVE).to_string();
     if encoded.starts_with("//") { format!("file:{encoded}") } else { format!("file:///{encoded}") }
@@ -189,7 +189,7 @@ mod tests {
         assert_eq!(path_from_uri("file:///a?b#c"), Ok(PathBuf::from("/a?b#c")));
     }
 
-    /// Left: what `pathlib.PurePosixPath.as_uri` and RFC 8089 give.
+    /// The URIs on the left are the results of `pathlib.PurePosixPath.as_uri` and RFC 8089.
     #[cfg(unix)]
     #[test]
     fn a_path_comes_back_from_its_uri() {

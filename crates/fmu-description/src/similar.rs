@@ -1,13 +1,13 @@
-//! Names that are similar to one that does not exist, for messages.
+//! Suggestions of similar names for error messages about an unknown name.
 
 use strsim::levenshtein;
 
 use crate::ModelDescription;
 
-/// Most edits between two similar names.
+/// Largest edit distance of two similar names.
 const EDITS: usize = 2;
 
-/// Up to five variables that are near `name`, as part of a sentence.
+/// Returns up to five variables similar to `name` as part of a message: ", it has a, b", or empty.
 #[must_use]
 pub fn nearest(description: &ModelDescription, name: &str) -> String {
     let names = description.variables.iter().map(|known| known.name.as_str());
@@ -15,8 +15,8 @@ pub fn nearest(description: &ModelDescription, name: &str) -> String {
     if similar.is_empty() { String::new() } else { format!(", it has {}", similar.join(", ")) }
 }
 
-/// Up to five of `names` that contain `name`, are contained in it or differ by two letters; case
-/// does not count.
+/// Returns up to five of `names` that contain `name`, are contained in it, or have an edit distance of at
+/// most two, ignoring case.
 #[must_use]
 pub fn among<'a>(names: impl Iterator<Item = &'a str>, name: &str) -> Vec<&'a str> {
     let wanted = name.to_lowercase();

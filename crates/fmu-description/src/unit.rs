@@ -1,4 +1,4 @@
-//! Units with their SI base units (FMI 2.0.5, section 2.2.2).
+//! Units and their conversion to SI base units (FMI 2.0.5, section 2.2.2).
 
 mod expression;
 mod names;
@@ -10,12 +10,12 @@ use expression::Cursor;
 /// Degrees in a radian, 180 / pi.
 const DEGREES_PER_RADIAN: f64 = 57.295_779_513_082_32;
 
-/// `Unit`: a name, its conversion to SI base units and the units to display it in.
+/// `Unit`: a name, the conversion to SI base units, and display units.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Unit {
     /// `name`, unique in `UnitDefinitions`.
     pub name: String,
-    /// `BaseUnit`; without it nothing is known but the name.
+    /// `BaseUnit`: the conversion to SI base units, if known.
     pub base: Option<BaseUnit>,
     /// `DisplayUnit`s.
     pub display_units: Vec<DisplayUnit>,
@@ -54,24 +54,24 @@ impl Default for BaseUnit {
 }
 
 impl BaseUnit {
-    /// What the exponents are called in XML, in the order of [`BaseUnit::exponents`].
+    /// Names of the exponents in XML, in the order of [`BaseUnit::exponents`].
     pub const EXPONENTS: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
 
-    /// Of exponents in the order of [`BaseUnit::EXPONENTS`].
+    /// Creates a base unit from exponents in the order of [`BaseUnit::EXPONENTS`].
     #[must_use]
     pub fn from_exponents(exponents: [i32; 8], factor: f64, offset: f64) -> Self {
         let [kg, m, s, a, k, mol, cd, rad] = exponents;
         BaseUnit { kg, m, s, a, k, mol, cd, rad, factor, offset }
     }
 
-    /// The exponents in the order of [`BaseUnit::EXPONENTS`].
+    /// Returns the exponents in the order of [`BaseUnit::EXPONENTS`].
     #[must_use]
     pub fn exponents(&self) -> [i32; 8] {
         [self.kg, self.m, self.s, self.a, self.k, self.mol, self.cd, self.rad]
     }
 
-    /// Factor and offset from values in this unit to values in `other`, as `base = factor * unit +
-    /// offset` holds for both; none where they measure different quantities.
+    /// Returns factor and offset of the conversion `value_in_other = factor * value + offset` from this unit
+    /// to `other`; `None` if the exponents differ.
     #[must_use]
     pub fn conversion(&self, other: &BaseUnit) -> Option<(f64, f64)> {
         let factor = self.factor / other.factor;
@@ -80,7 +80,7 @@ impl BaseUnit {
     }
 }
 
-/// `DisplayUnit`: `display = factor * unit + offset`, the other way round than in [`BaseUnit`].
+/// `DisplayUnit`: `display = factor * unit + offset`, in the direction opposite to [`BaseUnit`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DisplayUnit {
     /// `name`, unique within its unit.
@@ -91,10 +91,10 @@ pub struct DisplayUnit {
     pub offset: f64,
 }
 
-/// Why an expression is not a unit. Columns count characters from 1.
+/// The error of parsing a unit expression. Columns count characters from 1.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum UnitError {
-    /// A name that is no unit.
+    /// A name is not a known unit.
     #[error(
         "unit {expression:?}, column {column}: expected a unit such as kg, m, s, rad, N, J, W, Pa, \
          degC or %, with or without an SI prefix, found {name:?}"
@@ -107,19 +107,19 @@ pub enum UnitError {
         /// The name.
         name: String,
     },
-    /// A character where something else must stand.
+    /// A character does not fit the syntax.
     #[error("unit {expression:?}, column {column}: expected {expected}, found {found}")]
     Syntax {
         /// The whole expression.
         expression: String,
-        /// Where it stops being a unit.
+        /// Column of the character.
         column: usize,
-        /// What may stand there.
+        /// The allowed symbols.
         expected: &'static str,
-        /// What stands there.
+        /// The character found.
         found: String,
     },
-    /// A scale with an offset as part of a larger expression, where it has no meaning.
+    /// A unit with an offset (such as degC) is part of a larger expression, where it has no meaning.
     #[error(
         "unit {expression:?}, column {column}: {name} has an offset and can only stand alone, \
          expected a unit without one, such as K"
@@ -132,7 +132,7 @@ pub enum UnitError {
         /// The name.
         name: String,
     },
-    /// A factor too large or too small for a double.
+    /// The conversion factor is too large or too small for a double.
     #[error(
         "unit {expression:?}: expected a conversion factor from 1e-300 to 1e300, found {found}"
     )]
@@ -145,21 +145,20 @@ pub enum UnitError {
 }
 
 impl Unit {
-    /// Reads a unit expression and finds its conversion to SI base units.
+    /// Parses a unit expression and computes its conversion to SI base units.
     ///
     /// `expression` is a product of units separated by `.`, `*` or a blank, each with an optional
     /// integer exponent (`m2`, `m^2`, `s-1`), and any number of divisions by one unit (`m/s`) or by
     /// a product in parentheses (`J/(kg.K)`). `""` and `"1"` are dimensionless. The name of the
-    /// result is the expression, unchanged. SI prefixes stand before metric units (`km`, `us`).
+    /// result is the expression, unchanged. Metric units accept SI prefixes (`km`, `us`).
     /// `Hz` is a revolution per second, 2 pi rad/s, as in the table of section 2.2.2.
     ///
-    /// `rad` is also displayed in `deg`, `rad/s` in `deg/s`.
-    ///
-    /// The factor is rounded a few times at most: powers of ten are collected and applied once.
+    /// `rad` gets the display unit `deg`, `rad/s` gets `deg/s`. Powers of ten are collected and applied
+    /// once, so that the factor has few rounding errors.
     ///
     /// # Errors
     ///
-    /// [`UnitError`] names the place and what is expected there.
+    /// [`UnitError`] with the column, the expected and the found symbol.
     ///
     /// ```
     /// let unit = fmu_description::unit::Unit::parse("km/h")?;
@@ -173,7 +172,7 @@ impl Unit {
     }
 }
 
-/// Degrees for angles and angular velocities in radians.
+/// Returns the display unit in degrees for angles and angular velocities in radians.
 fn displays(base: &BaseUnit) -> Vec<DisplayUnit> {
     let radian = BaseUnit { rad: 1, ..BaseUnit::default() };
     let name = if *base == radian {

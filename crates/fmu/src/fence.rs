@@ -1,17 +1,17 @@
-//! The panic fence: a panic of the model becomes [`Failure::Fatal`], with the file and line of the panic.
+//! The panic fence: turns a panic of the model into [`Failure::Fatal`], with the file and line of the panic.
 //!
-//! What `catch_unwind` returns does not say where the panic happened; only the panic hook is told, and
-//! the hook belongs to the process (in an FMU, whose library has a standard library of its own, to that
-//! library). Therefore:
+//! `catch_unwind` does not return the location of a panic. Only the panic hook receives it, and the
+//! hook is global: to the process, or, in an FMU, to the library, which has its own standard library.
+//! Therefore:
 //!
-//! * The hook is replaced when the first instance is made, and put back when the last one is freed.
-//! * The hook acts only on a panic inside a fence of the same thread. It prints nothing there; every
-//!   other panic goes to the hook that was there before.
-//! * A hook that someone else installed meanwhile is left alone.
+//! * The first instance replaces the hook; freeing the last instance restores it.
+//! * Our hook handles only a panic inside a fence of the same thread, and prints nothing. It passes
+//!   every other panic to the previous hook.
+//! * If other code has replaced our hook in the meantime, its hook stays.
 //!
-//! This is the one place with state outside of instances, because the hook gets no other argument
-//! than the panic: how many watches there are, and for each thread how deep it is inside fences and
-//! what its last panic was. No result of a model depends on it.
+//! This module has the only global state of the crate, because a hook receives nothing but the panic:
+//! the number of guards and, for each thread, the depth of nested fences and the last panic. No result
+//! of a model depends on it.
 
 use std::any::Any;
 use std::cell::Cell;
@@ -24,12 +24,12 @@ use crate::model::Failure;
 
 type Hook = Box<dyn Fn(&PanicHookInfo<'_>) + Send + Sync>;
 
-/// What the hook and the fences of one thread tell each other.
+/// The state that the hook and the fences of one thread share.
 struct Fence {
-    /// How many fences the thread is inside of.
+    /// Depth of nested fences.
     depth: Cell<u32>,
-    /// The last panic inside a fence. Without a destructor: one in thread-local storage would keep
-    /// the library loaded until the thread ends.
+    /// The last panic inside a fence. It has no destructor: a destructor in thread-local storage would
+    /// keep the library loaded until the thread ends.
     last: Cell<ManuallyDrop<Option<Panic>>>,
 }
 
@@ -54,7 +54,7 @@ impl Fence {
     #[cold]
     fn failure(&self, payload: &dyn Any) -> Failure {
         let text = text(payload);
-        // Of `resume_unwind` the hook hears nothing; the last panic may be one that the model caught.
+        // `resume_unwind` does not call the hook, so the last panic may be one that the model caught.
         Failure::Fatal(match self.replace(None).filter(|last| last.text == text) {
             Some(Panic { place, .. }) => format!("the model panicked at {place}: {text}"),
             None => format!("the model panicked: {text}"),
@@ -67,9 +67,9 @@ fn text(payload: &dyn Any) -> &str {
     text.or_else(|| payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message")
 }
 
-/// Runs `body`, which is the model's code; a panic becomes [`Failure::Fatal`].
+/// Runs `body`, code of the model, and turns a panic into [`Failure::Fatal`].
 ///
-/// The message has the place of the panic while there is a [`Watch`].
+/// The message contains the location of the panic while a [`HookGuard`] exists.
 pub(crate) fn guarded<T>(body: impl FnOnce() -> Result<T, Failure>) -> Result<T, Failure> {
     FENCE.with(|fence| {
         fence.depth.set(fence.depth.get() + 1);
@@ -79,7 +79,7 @@ pub(crate) fn guarded<T>(body: impl FnOnce() -> Result<T, Failure>) -> Result<T,
     })
 }
 
-/// Runs `callback`, which is the importer's code, outside of all fences.
+/// Runs `callback`, code of the importer, outside of all fences.
 pub(crate) fn outside<T>(callback: impl FnOnce() -> T) -> T {
     FENCE.with(|fence| {
         let depth = fence.depth.replace(0);
@@ -89,43 +89,43 @@ pub(crate) fn outside<T>(callback: impl FnOnce() -> T) -> T {
     })
 }
 
-/// Keeps the hook installed.
-pub(crate) struct Watch(());
+/// A guard that keeps the hook installed while it exists.
+pub(crate) struct HookGuard(());
 
-/// The hook, while it is installed.
+/// Our installed hook and the previous one.
 struct Installed {
-    /// Tells the hook from those of others.
+    /// Address of our hook, to recognise it.
     address: usize,
     previous: Arc<Hook>,
 }
 
-struct Watches {
+struct Guards {
     count: usize,
     installed: Option<Installed>,
 }
 
-static WATCHES: Mutex<Watches> = Mutex::new(Watches { count: 0, installed: None });
+static GUARDS: Mutex<Guards> = Mutex::new(Guards { count: 0, installed: None });
 
-impl Watch {
+impl HookGuard {
     pub(crate) fn new() -> Self {
-        let mut watches = WATCHES.lock().unwrap_or_else(PoisonError::into_inner);
-        watches.count += 1;
-        // From a thread that panics the hook cannot be changed. Where a panic aborts, the message of
-        // the previous hook is the only one.
-        if watches.installed.is_none() && !thread::panicking() && cfg!(panic = "unwind") {
-            watches.installed = Some(install());
+        let mut guards = GUARDS.lock().unwrap_or_else(PoisonError::into_inner);
+        guards.count += 1;
+        // A panicking thread cannot change the hook. If panics abort, the previous hook must print
+        // the message.
+        if guards.installed.is_none() && !thread::panicking() && cfg!(panic = "unwind") {
+            guards.installed = Some(install());
         }
         Self(())
     }
 }
 
-impl Drop for Watch {
+impl Drop for HookGuard {
     fn drop(&mut self) {
-        let mut watches = WATCHES.lock().unwrap_or_else(PoisonError::into_inner);
-        watches.count -= 1;
-        if watches.count == 0
+        let mut guards = GUARDS.lock().unwrap_or_else(PoisonError::into_inner);
+        guards.count -= 1;
+        if guards.count == 0
             && !thread::panicking()
-            && let Some(installed) = watches.installed.take()
+            && let Some(installed) = guards.installed.take()
         {
             uninstall(installed);
         }
@@ -160,7 +160,7 @@ fn install() -> Installed {
 fn uninstall(installed: Installed) {
     let current = panic::take_hook();
     if address(&current) != installed.address {
-        // Somebody else's, which may lead to ours.
+        // Other code replaced our hook; its hook may still call ours.
         panic::set_hook(current);
         return;
     }

@@ -1,6 +1,6 @@
-//! The C ABI of an exported model: the one place of the crate where pointers are followed.
+//! The C ABI of an exported model: the only module of the crate that dereferences pointers.
 //!
-//! Every entry point that has an instance goes through `door`; what stands behind it is safe.
+//! Every entry point with an instance calls `dispatch`, which calls safe code.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
 mod entry;
@@ -20,25 +20,25 @@ use fmu_description::abi::{
 pub use entry::*;
 pub use exports::signature;
 
-use crate::fence::{Watch, guarded, outside};
+use crate::fence::{HookGuard, guarded, outside};
 use crate::instance::Instance;
 use crate::model::{Failure, Model};
 use fmu_description::call_order::{Function, InterfaceType};
 use fmu_description::location::{NO_FOLDER, path_from_uri};
 
-/// What an instance keeps of the importer's callbacks.
+/// The importer's callbacks and the name of the instance.
 #[derive(Clone)]
 pub(crate) struct Callbacks {
     functions: fmi2CallbackFunctions,
     instance_name: CString,
 }
 
-// SAFETY: the standard has the environment's callbacks usable from whatever thread calls the FMU;
-// the instance only hands the environment pointer back.
+// SAFETY: by the standard the importer's callbacks may be called from any thread that calls the FMU;
+// the instance only passes the environment pointer back.
 unsafe impl Send for Callbacks {}
 
 impl Callbacks {
-    /// No importer behind it.
+    /// Callbacks that do nothing.
     #[cfg(test)]
     pub(crate) fn silent() -> Self {
         let functions = fmi2CallbackFunctions {
@@ -51,8 +51,8 @@ impl Callbacks {
         Self { functions, instance_name: CString::default() }
     }
 
-    /// Hands a message to the importer's logger, once formatted: the format string is `%s`, and
-    /// `#`, by which the standard marks value references, is doubled.
+    /// Sends a message to the importer's logger. The format string is `%s`; `#`, by which the standard
+    /// marks value references, is doubled.
     pub(crate) fn log(&self, status: Status, category: &str, message: &str) {
         let Some(logger) = self.functions.logger else { return };
         let c_string = |text: &str| CString::new(text.replace('\0', "")).unwrap_or_default();
@@ -71,20 +71,20 @@ impl Callbacks {
     }
 }
 
-/// What `fmi2Component` points to: an instance that one call at a time may use.
+/// The target of `fmi2Component`: an instance that allows one call at a time.
 struct Component<M: Model> {
     busy: AtomicBool,
     instance: UnsafeCell<Instance<M>>,
 }
 
-/// Null check, one call at a time, then call order, panic fence, error to message and status: see
-/// [`Instance::call`].
+/// Runs a call of an instance: checks for null and for a call in progress, then calls
+/// [`Instance::call`] (call order, panic fence, message and status).
 ///
-/// A call of an instance from inside another one, from a callback, is answered by `fmi2Error` and
-/// nothing else happens: to a synchronous slave that is the state stepInProgress. Calls from
-/// several threads at once, which section 2.1 forbids, are mostly, but not surely, found: a locked
-/// exchange would double the cost of reading one value.
-unsafe fn door<M: Model>(
+/// A call from a callback during another call of the same instance returns `fmi2Error` without effect
+/// (for a synchronous slave this is the state stepInProgress). Simultaneous calls from several threads,
+/// which section 2.1 forbids, are detected in most cases only: an atomic exchange would double the
+/// cost of reading one value.
+unsafe fn dispatch<M: Model>(
     component: fmi2Component,
     function: Function,
     body: impl FnOnce(&mut Instance<M>) -> Result<(), Failure>,
@@ -97,44 +97,47 @@ unsafe fn door<M: Model>(
         return Status::Error as fmi2Status;
     }
     component.busy.store(true, Ordering::Relaxed);
-    // SAFETY: one thread at a time uses an instance (section 2.1), and as `busy` was not set, that
+    // SAFETY: one thread at a time uses an instance (section 2.1); `busy` was false, so this
     // thread is not inside another call.
     let status = unsafe { &mut *component.instance.get() }.call(function, body);
     component.busy.store(false, Ordering::Relaxed);
     status as fmi2Status
 }
 
-fn missing(what: &str) -> Failure {
+fn null_pointer(what: &str) -> Failure {
     Failure::Error(format!("{what} is null or misaligned"))
 }
 
-/// `count` elements to read; a null pointer is fine when there are none.
+/// Borrows `count` elements to read; the pointer may be null if `count` is 0.
 unsafe fn read<'a, T>(pointer: *const T, count: usize) -> Result<&'a [T], Failure> {
     if count == 0 {
         return Ok(&[]);
     }
     if pointer.is_null() || !pointer.is_aligned() || count > isize::MAX as usize / size_of::<T>() {
-        return Err(missing("an array to read"));
+        return Err(null_pointer("an array to read"));
     }
     // SAFETY: not null, aligned, and the caller gives `count` elements.
     Ok(unsafe { std::slice::from_raw_parts(pointer, count) })
 }
 
-/// Room for `count` elements, which the importer need not have initialised; a null pointer is fine
-/// when there are none.
-unsafe fn room<'a, T>(pointer: *mut T, count: usize) -> Result<&'a mut [MaybeUninit<T>], Failure> {
+/// Borrows memory for `count` elements, possibly uninitialised; the pointer may be null if `count` is
+/// 0.
+unsafe fn borrow_output<'a, T>(
+    pointer: *mut T,
+    count: usize,
+) -> Result<&'a mut [MaybeUninit<T>], Failure> {
     if count == 0 {
         return Ok(&mut []);
     }
     if pointer.is_null() || !pointer.is_aligned() || count > isize::MAX as usize / size_of::<T>() {
-        return Err(missing("an array to write"));
+        return Err(null_pointer("an array to write"));
     }
-    // SAFETY: not null, aligned, and the caller gives room for `count` elements, of which nothing is
-    // assumed.
+    // SAFETY: not null, aligned, and the caller provides memory for `count` elements, which may be
+    // uninitialised.
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer.cast(), count) })
 }
 
-/// The room, filled with `value`.
+/// Fills the memory with `value` and returns it as initialised.
 pub(crate) fn filled<T: Copy>(room: &mut [MaybeUninit<T>], value: T) -> &mut [T] {
     for place in &mut *room {
         place.write(value);
@@ -143,25 +146,25 @@ pub(crate) fn filled<T: Copy>(room: &mut [MaybeUninit<T>], value: T) -> &mut [T]
     unsafe { &mut *(std::ptr::from_mut(room) as *mut [T]) }
 }
 
-/// Values as room for others.
+/// Converts values to memory for output values.
 #[cfg(test)]
 pub(crate) fn room_of<T: Copy>(values: &mut [T]) -> &mut [MaybeUninit<T>] {
     // SAFETY: the tests hand this to functions that only write values.
     unsafe { &mut *(std::ptr::from_mut(values) as *mut [MaybeUninit<T>]) }
 }
 
-/// The state of the importer behind `pointer`, which it has initialised (section 2.1.8).
-unsafe fn state_at<'a>(pointer: *mut fmi2FMUstate) -> Result<&'a mut fmi2FMUstate, Failure> {
+/// Borrows the importer's FMU state pointer, which it has initialised (section 2.1.8).
+unsafe fn borrow_state<'a>(pointer: *mut fmi2FMUstate) -> Result<&'a mut fmi2FMUstate, Failure> {
     if !pointer.is_aligned() {
-        return Err(missing("FMUstate"));
+        return Err(null_pointer("FMUstate"));
     }
     // SAFETY: null or aligned, and initialised by the importer.
-    unsafe { pointer.as_mut() }.ok_or_else(|| missing("FMUstate"))
+    unsafe { pointer.as_mut() }.ok_or_else(|| null_pointer("FMUstate"))
 }
 
 unsafe fn text(pointer: fmi2String, what: &str) -> Result<String, Failure> {
     if pointer.is_null() {
-        return Err(missing(what));
+        return Err(null_pointer(what));
     }
     // SAFETY: not null, and zero-terminated by the standard.
     let text = unsafe { CStr::from_ptr(pointer) };
@@ -174,9 +177,9 @@ unsafe fn texts(pointer: *const fmi2String, count: usize) -> Result<Vec<String>,
     unsafe { read(pointer, count)?.iter().map(|&each| text(each, "a string")).collect() }
 }
 
-unsafe fn put<T>(target: *mut T, value: T) -> Result<(), Failure> {
+unsafe fn write_one<T>(target: *mut T, value: T) -> Result<(), Failure> {
     // SAFETY: the caller gives a place for one value.
-    unsafe { room(target, 1)?[0].write(value) };
+    unsafe { borrow_output(target, 1)?[0].write(value) };
     Ok(())
 }
 
@@ -190,7 +193,7 @@ pub fn version<M: Model>() -> fmi2String {
     abi::VERSION.as_ptr()
 }
 
-/// The folder that `fmuResourceLocation` names; [`NO_FOLDER`] when it is null or empty.
+/// Returns the folder named by `fmuResourceLocation`; [`NO_FOLDER`] if it is null or empty.
 unsafe fn resources(location: fmi2String) -> Result<PathBuf, Failure> {
     if location.is_null() {
         return Ok(PathBuf::from(NO_FOLDER));
@@ -248,15 +251,15 @@ pub unsafe fn instantiate<M: Model>(
     }
 }
 
-/// Frees the instance; during another call of it (stepInProgress) nothing.
+/// Frees the instance. Does nothing during another call of the instance (stepInProgress).
 pub unsafe fn free_instance<M: Model>(component: fmi2Component) {
     let component = component.cast::<Component<M>>();
     // SAFETY: a component that is not null is one that `instantiate` made for this `M`.
     let Some(shared) = (unsafe { component.as_ref() }) else { return };
     if !shared.busy.load(Ordering::Relaxed) {
         shared.busy.store(true, Ordering::Relaxed);
-        // SAFETY: not in use and, by the standard, freed once. `busy` lasts until the message about
-        // a destructor that panics is out, in case the logger calls the instance.
+        // SAFETY: not in use and, by the standard, freed once. `busy` stays set while `free` logs a
+        // panic of a destructor, because the logger may call the instance.
         unsafe {
             shared.instance.get().read().free();
             drop(Box::from_raw(component.cast::<MaybeUninit<Component<M>>>()));
@@ -264,7 +267,12 @@ pub unsafe fn free_instance<M: Model>(component: fmi2Component) {
     }
 }
 
-/// The description of `M`, which must break no rule of the standard.
+/// Renders the description of `M`.
+///
+/// # Errors
+///
+/// [`Failure::Error`] if the description breaks rules of the standard; the failures of
+/// [`describe`](crate::describe).
 fn description_of<M: Model>(resources: &Path) -> Result<String, Failure> {
     let description = crate::interface::describe::<M>(resources)?;
     let problems = description.problems();
@@ -275,19 +283,19 @@ fn description_of<M: Model>(resources: &Path) -> Result<String, Failure> {
     Err(Failure::Error(format!("the model's variables break rules: {}", list.join("; "))))
 }
 
-/// [`abi::DESCRIBE`]: gives the model description, or why there is none, to `sink`.
+/// [`abi::DESCRIBE`]: passes the model description, or an error message, to `sink`.
 pub unsafe fn describe<M: Model>(
     resources: *const c_char,
     context: *mut c_void,
     sink: DescribeSink,
 ) -> fmi2Integer {
-    let watch = Watch::new();
+    let hook_guard = HookGuard::new();
     // SAFETY: the caller gives a zero-terminated path.
     let described = unsafe { text(resources, "resources") }.and_then(|folder| {
         let folder = if folder.is_empty() { NO_FOLDER } else { &folder };
         guarded(|| description_of::<M>(Path::new(folder)))
     });
-    drop(watch);
+    drop(hook_guard);
     let (status, answer) = match described {
         Ok(xml) => (0, xml),
         Err(failure) => (1, failure.to_string()),

@@ -1,4 +1,4 @@
-//! One instance of a model: the state machine behind the C ABI, in safe Rust.
+//! An instance of a model: the state machine of FMI in safe Rust, called by the C ABI.
 
 mod derivatives;
 mod exchange;
@@ -13,7 +13,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::Experiment;
-use crate::fence::{Watch, guarded};
+use crate::fence::{HookGuard, guarded};
 use crate::ffi::Callbacks;
 use crate::interface::{CATEGORIES, Interface, new_model};
 use crate::model::{Failure, Model, Step};
@@ -23,7 +23,7 @@ use fmu_description::call_order::{Function, InterfaceType, State, allowed, may_d
 
 pub(crate) use snapshot::Snapshot;
 
-/// What an FMU state consists of: everything that decides how the instance continues.
+/// The content of an FMU state: everything that determines the further simulation.
 #[derive(Clone, Serialize, Deserialize)]
 #[serde(bound = "")]
 #[expect(clippy::struct_excessive_bools, reason = "four facts that are independent")]
@@ -31,31 +31,31 @@ pub(crate) struct Core<M: Model> {
     model: M,
     interface_type: InterfaceType,
     state: State,
-    /// The last step ended because the model wants the simulation to end.
+    /// Whether the last step ended because the model requested the end of the simulation.
     terminated: bool,
     experiment: Experiment,
     time: f64,
-    /// Something was set since the model last computed its outputs.
+    /// Whether a value was set since the model last computed its outputs.
     stale: bool,
-    /// A parameter was set since [`Model::check`] last passed.
+    /// Whether a parameter was set since [`Model::check`] last passed.
     unchecked: bool,
-    /// An input derivative was set for the coming step.
+    /// Whether an input derivative is set for the next step.
     sloped: bool,
 }
 
-/// An instance: the model with its state, and what does not belong to the FMU state.
+/// An instance: the FMU state and the data that is not part of it.
 pub(crate) struct Instance<M: Model> {
     core: Core<M>,
     fresh: M,
     interface: Interface<M>,
     callbacks: Callbacks,
-    /// Log categories that `fmi2SetDebugLogging` chose; all of them when none.
+    /// Log categories selected by `fmi2SetDebugLogging`; `None` selects all.
     categories: Option<Vec<String>>,
-    /// The strings that the last `fmi2GetString` handed out.
+    /// The strings returned by the last `fmi2GetString`, which must stay valid until the next call.
     strings: Vec<std::ffi::CString>,
-    /// Space for `fmi2GetDirectionalDerivative`, once it was called.
+    /// Buffer for `fmi2GetDirectionalDerivative`, created by its first call.
     direction: Option<M>,
-    watch: Watch,
+    hook_guard: HookGuard,
 }
 
 impl<M: Model> Core<M> {
@@ -75,15 +75,15 @@ impl<M: Model> Core<M> {
 }
 
 impl<M: Model> Core<M> {
-    /// Refuses a time past `stopTime`, where that is defined (section 2.1.6).
+    /// Checks that `time` is not after `stopTime`, if `stopTime` is defined (section 2.1.6).
     fn before_stop(&self, time: f64) -> Result<(), Failure> {
-        match self.experiment.stop_time.filter(|stop| time > stop + slack(*stop)) {
+        match self.experiment.stop_time.filter(|stop| time > stop + time_tolerance(*stop)) {
             Some(stop) => Err(Failure::Error(format!("{time} s is past stopTime {stop} s"))),
             None => Ok(()),
         }
     }
 
-    /// Has the model check its parameters, where one was set since.
+    /// Calls [`Model::check`] if a parameter was set since its last success.
     fn check(&mut self) -> Result<(), Failure> {
         if self.unchecked {
             self.model.check()?;
@@ -101,7 +101,7 @@ impl<M: Model> Instance<M> {
         guid: &str,
         callbacks: Callbacks,
     ) -> Result<Self, Failure> {
-        let watch = Watch::new();
+        let hook_guard = HookGuard::new();
         let (core, fresh, interface) = guarded(|| {
             let mut model = new_model::<M>(resources)?;
             let (interface, description) = Interface::new(&mut model)?;
@@ -129,11 +129,12 @@ impl<M: Model> Instance<M> {
             categories: None,
             strings: Vec::new(),
             direction: None,
-            watch,
+            hook_guard,
         })
     }
 
-    /// The way of every call: order, fence, state afterwards, message, status.
+    /// Runs one FMI call: checks the call order, runs `body` inside the panic fence, and converts a
+    /// failure to state, log message and status.
     pub(crate) fn call(
         &mut self,
         function: Function,
@@ -146,7 +147,7 @@ impl<M: Model> Instance<M> {
         let done = if allowed(self.core.interface_type, function, state) {
             guarded(|| body(self))
         } else {
-            Err(Failure::Error(format!("may not be called in the state {state:?}")))
+            Err(Failure::Error(format!("must not be called in state {state:?}")))
         };
         match done {
             Ok(()) => Status::OK,
@@ -166,7 +167,7 @@ impl<M: Model> Instance<M> {
             _ => (Status::Error, "logStatusError"),
         };
         match status {
-            Status::Discard if function == Function::DoStep => self.stop_half_way(failure),
+            Status::Discard if function == Function::DoStep => self.record_partial_step(failure),
             Status::Error => self.core.state = State::Error,
             Status::Fatal => self.core.state = State::Fatal,
             _ => {}
@@ -175,8 +176,9 @@ impl<M: Model> Instance<M> {
         status
     }
 
-    /// The step ended before its end: at the time that the model says, if it can be.
-    fn stop_half_way(&mut self, failure: &Failure) {
+    /// Records a step that ended early, at the time reported by the model if that is finite and not
+    /// before the start of the step.
+    fn record_partial_step(&mut self, failure: &Failure) {
         self.core.state = State::StepFailed;
         self.core.terminated = matches!(failure, Failure::Terminated { .. });
         if let Failure::Incomplete { time, .. } | Failure::Terminated { time, .. } = failure
@@ -186,30 +188,31 @@ impl<M: Model> Instance<M> {
         }
     }
 
-    /// Frees the instance. The models are dropped one by one, so that a destructor that panics
-    /// meets no other one.
+    /// Frees the instance. Drops its models one after another, so that a panic in one destructor does
+    /// not abort the process in another.
     pub(crate) fn free(self) {
-        let Self { core, fresh, direction, callbacks, categories, watch, .. } = self;
-        let dropped = [dropped(core), dropped(fresh), dropped(direction)];
+        let Self { core, fresh, direction, callbacks, categories, hook_guard, .. } = self;
+        let dropped =
+            [drop_inside_fence(core), drop_inside_fence(fresh), drop_inside_fence(direction)];
         if let Some(failure) = dropped.into_iter().find_map(Result::err) {
             let message = format!("fmi2FreeInstance: {failure}");
             log(&callbacks, categories.as_deref(), Status::Fatal, "logStatusFatal", &message);
         }
-        drop(watch);
+        drop(hook_guard);
     }
 
-    /// Sends a message of a category that the importer wants to see.
+    /// Logs a message if its category is selected.
     fn log(&self, status: Status, category: &str, message: &str) {
         log(&self.callbacks, self.categories.as_deref(), status, category, message);
     }
 
-    /// `fmi2SetDebugLogging`. Messages that belong to a status are sent whether debug logging is on
-    /// or off (section 2.1.3); naming categories restricts them to those.
+    /// `fmi2SetDebugLogging`. Messages that explain a status are sent even if debug logging is off
+    /// (section 2.1.3). If categories are given, only their messages are sent.
     pub(crate) fn set_debug_logging(&mut self, categories: Vec<String>) -> Result<(), Failure> {
         let known = CATEGORIES.map(|(name, _)| name);
         if let Some(unknown) = categories.iter().find(|name| !known.contains(&name.as_str())) {
             return Err(Failure::Error(format!(
-                "{unknown} is no log category of this FMU; it has {}",
+                "{unknown} is not a log category of this FMU, expected one of {}",
                 known.join(", ")
             )));
         }
@@ -258,13 +261,13 @@ impl<M: Model> Instance<M> {
         self.core.state = State::Terminated;
     }
 
-    /// `fmi2Reset`: as after `fmi2Instantiate`.
+    /// `fmi2Reset`: restores the state after `fmi2Instantiate`.
     pub(crate) fn reset(&mut self) {
         self.core = Core::new(self.fresh.clone(), self.core.interface_type);
         self.strings.clear();
     }
 
-    /// Brings the outputs up to date with what was set.
+    /// Recomputes the outputs if a value was set since the last computation.
     fn refresh(&mut self) -> Result<(), Failure> {
         let core = &mut self.core;
         if core.stale {
@@ -306,18 +309,18 @@ impl<M: Model> Instance<M> {
     }
 
     /// `fmi2GetBooleanStatus(fmi2Terminated)`.
-    pub(crate) fn wants_to_end(&self) -> bool {
+    pub(crate) fn is_terminated(&self) -> bool {
         self.core.terminated
     }
 
-    /// The GUID of the description that this instance was made for.
+    /// Returns the GUID of the model description.
     pub(crate) fn guid(&self) -> Guid {
         self.interface.guid
     }
 }
 
-/// Drops `value`; its destructor may panic.
-fn dropped<T>(value: T) -> Result<(), Failure> {
+/// Drops `value` inside the panic fence.
+fn drop_inside_fence<T>(value: T) -> Result<(), Failure> {
     guarded(|| {
         drop(value);
         Ok(())
@@ -336,19 +339,20 @@ fn log(
     }
 }
 
-/// Times closer than this (in s) are the same: importers add up their step size, with rounding.
-fn slack(time: f64) -> f64 {
+/// Returns the tolerance for comparing times near `time`, in s. Importers accumulate their step size
+/// with rounding errors.
+fn time_tolerance(time: f64) -> f64 {
     1e-9 * time.abs().max(1.0)
 }
 
-/// The step from the instance's `time` to `start + size`.
+/// Returns the step from the instance's `time` to `start + size`.
 ///
-/// Where `start` differs from `time` by rounding alone, the size is the one given, so that equal
-/// communication steps stay equal for the model.
+/// If `start` differs from `time` only by rounding, the step has the given size, so that the model
+/// sees equal communication steps as equal.
 ///
-/// Section 4.2.2 wants a step size greater than zero and a slave that then is at `start + size`. A
-/// step that does not reach a later number of 64 bits cannot end there, and is an error: importers
-/// continue after `fmi2OK` and some (FMPy) after `fmi2Discard`, and the model would stand still.
+/// Section 4.2.2 requires a step size greater than zero and an end at `start + size`. A step so small
+/// that `start + size` rounds to `start` is an error: importers continue after `fmi2OK`, some (FMPy)
+/// also after `fmi2Discard`, and the time would never advance.
 fn communication_step(time: f64, start: f64, size: f64) -> Result<Step, Failure> {
     if !(size > 0.0 && size.is_finite()) {
         return Err(Failure::Error(format!(
@@ -356,7 +360,7 @@ fn communication_step(time: f64, start: f64, size: f64) -> Result<Step, Failure>
         )));
     }
     let mismatch = start - time;
-    if mismatch.is_nan() || mismatch.abs() > slack(time) {
+    if mismatch.is_nan() || mismatch.abs() > time_tolerance(time) {
         return Err(Failure::Error(format!(
             "currentCommunicationPoint is {start} s, but the instance is at {time} s"
         )));
@@ -369,13 +373,13 @@ fn communication_step(time: f64, start: f64, size: f64) -> Result<Step, Failure>
     };
     let ends_later = start + size > time && step.size > 0.0;
     if size < start.next_up() - start || !ends_later {
-        return Err(too_small(time, start, size));
+        return Err(step_too_small(time, start, size));
     }
     Ok(step)
 }
 
 #[cold]
-fn too_small(time: f64, start: f64, size: f64) -> Failure {
+fn step_too_small(time: f64, start: f64, size: f64) -> Failure {
     let smallest = start.max(time).next_up() - start;
     Failure::Error(format!(
         "communicationStepSize is {size:e} s, too small at currentCommunicationPoint = {start} s: \

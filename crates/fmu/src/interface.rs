@@ -1,4 +1,4 @@
-//! The variables of one model by value reference, and the description rendered from them.
+//! The variables of a model by value reference, and the model description made from them.
 
 mod general;
 mod slot;
@@ -15,17 +15,17 @@ use fmu_description::{
 };
 
 pub(crate) use general::CATEGORIES;
-use slot::Blank;
 pub(crate) use slot::Slot;
+use slot::SlotBuilder;
 
-/// A continuous state: positions among the Reals, and the scale of its error.
+/// A continuous state: positions of state and derivative among the Reals, and the nominal value.
 pub(crate) struct ContinuousState {
     pub(crate) state: usize,
     pub(crate) derivative: usize,
     pub(crate) nominal: f64,
 }
 
-/// The variables of a model, by base type and value reference.
+/// The variables of a model by base type and value reference.
 pub(crate) struct Interface<M> {
     /// Value reference 0 is time and has no slot: the Real with reference `r` is `reals[r - 1]`.
     pub(crate) reals: Vec<Slot<M, f64>>,
@@ -33,17 +33,18 @@ pub(crate) struct Interface<M> {
     pub(crate) booleans: Vec<Slot<M, bool>>,
     pub(crate) strings: Vec<Slot<M, String>>,
     pub(crate) states: Vec<ContinuousState>,
-    /// None without `fmi2ModelExchange`.
+    /// Number of event indicators; `None` without model exchange.
     pub(crate) event_indicators: Option<usize>,
     pub(crate) max_output_derivative_order: u32,
     pub(crate) guid: Guid,
 }
 
 /// Type and value reference of a variable.
-type Filed = (Kind, u32);
+type TypedReference = (Kind, u32);
 
 impl<M: Model> Interface<M> {
-    /// Sorts the variables of `model` by type and describes them, start values included.
+    /// Assigns slots and value references to the variables of `model` and makes their description with
+    /// start values.
     pub(crate) fn new(model: &mut M) -> Result<(Self, ModelDescription), Failure> {
         let variables = model.variables();
         let mut description = general::general::<M>(model);
@@ -65,7 +66,7 @@ impl<M: Model> Interface<M> {
             description.variables.push(described(&variables, variable)?);
         }
         let states = structure::states(&variables)?;
-        interface.file_all(model, variables, &mut description)?;
+        interface.assign_references(model, variables, &mut description)?;
         interface.states = states
             .into_iter()
             .map(|(state, derivative)| continuous_state(&description, state, derivative))
@@ -83,7 +84,7 @@ impl<M: Model> Interface<M> {
         Ok((interface, description))
     }
 
-    /// Marks the states and the unknowns of `ModelStructure`.
+    /// Marks the slots of the unknowns of `ModelStructure` and lists the continuous states.
     fn mark(&mut self, description: &ModelDescription) {
         for state in &self.states {
             let slot = &mut self.reals[state.state];
@@ -103,8 +104,9 @@ impl<M: Model> Interface<M> {
         }
     }
 
-    /// Gives each variable its slot, value reference and type; aliases get those of their variable.
-    fn file_all(
+    /// Assigns slot, value reference and type to each variable. An alias shares the value reference and
+    /// type of its variable.
+    fn assign_references(
         &mut self,
         model: &mut M,
         variables: Vec<Variable<M>>,
@@ -118,7 +120,7 @@ impl<M: Model> Interface<M> {
                 continue;
             }
             let (kind, value_reference) = self
-                .file(model, variable)
+                .assign_reference(model, variable)
                 .map_err(|reason| Failure::Error(format!("variable {name}: {reason}")))?;
             let own = &mut description.variables[position + 1];
             keep_derivative(&mut own.kind, kind);
@@ -136,9 +138,13 @@ impl<M: Model> Interface<M> {
         Ok(())
     }
 
-    /// Files the variable under the next value reference of its type; its type, with the field's
-    /// value as start where one is given.
-    fn file(&mut self, model: &mut M, variable: Variable<M>) -> Result<Filed, String> {
+    /// Assigns the next value reference of its type to the variable. Returns it with the type, whose start
+    /// value is the field's value if the variable has a start value.
+    fn assign_reference(
+        &mut self,
+        model: &mut M,
+        variable: Variable<M>,
+    ) -> Result<TypedReference, String> {
         let start_given = variable.initial != Some(Initial::Calculated);
         if variable.causality == Causality::Output {
             let order = u32::try_from(variable.derivatives.len()).unwrap_or(u32::MAX);
@@ -146,12 +152,12 @@ impl<M: Model> Interface<M> {
         }
         let (number, reinit) = (variable.number.clone(), variable.reinit);
         let enumeration = variable.enumeration.clone();
-        let (blank, access) = Blank::of(variable);
+        let (builder, access) = SlotBuilder::new(variable);
         Ok(match access {
             Access::Real(field) => {
                 let start = start_given.then(|| *field(model));
                 let real = RealType { start, reinit, ..real(number) };
-                (Kind::Real(real), blank.fill(&mut self.reals, field) + 1)
+                (Kind::Real(real), builder.build(&mut self.reals, field) + 1)
             }
             Access::Integer(field) => {
                 let start = start_given.then(|| *field(model));
@@ -163,15 +169,15 @@ impl<M: Model> Interface<M> {
                     }),
                     None => Kind::Integer(IntegerType { start, ..integer(number)? }),
                 };
-                (kind, blank.fill(&mut self.integers, field))
+                (kind, builder.build(&mut self.integers, field))
             }
             Access::Boolean(field) => {
                 let start = start_given.then(|| *field(model));
-                (Kind::Boolean(start), blank.fill(&mut self.booleans, field))
+                (Kind::Boolean(start), builder.build(&mut self.booleans, field))
             }
             Access::String(field) => {
                 let start = start_given.then(|| field(model).clone());
-                (Kind::String(start), blank.fill(&mut self.strings, field))
+                (Kind::String(start), builder.build(&mut self.strings, field))
             }
             Access::Alias(of) => return Err(format!("it is an alias of {of}")),
         })
@@ -203,7 +209,7 @@ fn integer(number: Number) -> Result<IntegerType, String> {
     Ok(IntegerType { quantity: number.quantity, min, max, ..IntegerType::default() })
 }
 
-/// The state at position `state` of the variables, with its derivative.
+/// Returns the continuous state at position `state` of the variables, with its derivative.
 fn continuous_state(
     description: &ModelDescription,
     state: usize,
@@ -223,7 +229,7 @@ fn continuous_state(
     Ok(ContinuousState { state, derivative, nominal: nominal.unwrap_or(1.0) })
 }
 
-/// Replaces the type but for the attribute `derivative`, which is known before the type.
+/// Replaces the type but keeps the attribute `derivative`, which is set before the type.
 fn keep_derivative(place: &mut Kind, mut kind: Kind) {
     if let (Kind::Real(RealType { derivative, .. }), Kind::Real(new)) = (&*place, &mut kind) {
         new.derivative = *derivative;
@@ -241,7 +247,7 @@ fn without_start(kind: Kind) -> Kind {
     }
 }
 
-/// The variable without type and value reference.
+/// Describes the variable; type and value reference are set later.
 fn described<M>(
     variables: &[Variable<M>],
     variable: &Variable<M>,
@@ -274,7 +280,7 @@ fn described<M>(
     })
 }
 
-/// The independent variable, value reference 0 of the Reals.
+/// Returns the independent variable, time, the Real with value reference 0.
 fn time() -> ScalarVariable {
     ScalarVariable {
         name: "time".to_owned(),
@@ -317,18 +323,18 @@ fn define_type<M>(types: &mut Vec<SimpleType>, variable: &Variable<M>) -> Result
     Ok(())
 }
 
-/// The model description of `M` with the resources in a folder: what packing writes as
+/// Makes the model description of `M`, with the folder `resources`, as packing writes it to
 /// `modelDescription.xml`.
 ///
 /// # Errors
 ///
-/// What keeps the model from being made or described at all: [`Model::new`] failed, a unit that
-/// cannot be read, a reference to a variable that does not exist.
+/// [`Failure::Error`] for an unknown unit, a reference to an unknown variable or another declaration
+/// that cannot be described; the failure of [`Model::new`].
 pub fn describe<M: Model>(resources: &std::path::Path) -> Result<ModelDescription, Failure> {
     Interface::new(&mut new_model::<M>(resources)?).map(|(_, description)| description)
 }
 
-/// [`Model::new`]; where the importer named no folder, its failure says so.
+/// Calls [`Model::new`]. If it fails and the importer named no folder, the message says so.
 pub(crate) fn new_model<M: Model>(resources: &std::path::Path) -> Result<M, Failure> {
     M::new(resources).map_err(|failure| {
         if resources != std::path::Path::new(NO_FOLDER) {
@@ -342,13 +348,13 @@ pub(crate) fn new_model<M: Model>(resources: &std::path::Path) -> Result<M, Fail
     })
 }
 
-/// Which static rules of FMI 2.0.5 the variables of `M` break; none, if they are in order.
+/// Returns the static rules of FMI 2.0.5 that the description of `M` breaks.
 ///
-/// The first test of a model: a description with problems is not packed either.
+/// Use it as the first test of a model: `aso-ftc pack` rejects a model with problems.
 ///
 /// # Errors
 ///
-/// As [`describe`].
+/// Same as [`describe`].
 pub fn problems<M: Model>(resources: &std::path::Path) -> Result<Vec<Problem>, Failure> {
     describe::<M>(resources).map(|description| description.problems())
 }

@@ -1,4 +1,4 @@
-//! What the author of a model writes: the trait [`Model`] and what it receives and returns.
+//! The trait [`Model`], which the author of a model implements, with its argument and return types.
 
 use std::path::Path;
 
@@ -10,135 +10,140 @@ use fmu_description::{DefaultExperiment, Experiment};
 
 /// A model that can be exported as an FMU.
 ///
-/// The struct holds everything: parameters, inputs, outputs, states. A copy of it is the FMU state
-/// (`fmi2GetFMUstate`), its serialised form the serialised FMU state, so whatever decides how the
-/// model continues must be a field. [`Model::variables`] says which fields the importer sees. A
-/// serialised state is read by builds whose fields have the same names, types and order, and refused
-/// by others.
+/// The struct holds parameters, inputs, outputs and states. A copy of it is the FMU state
+/// (`fmi2GetFMUstate`), its serialised form the serialised FMU state, so everything that determines
+/// the further simulation must be a field. [`Model::variables`] declares the fields that the importer
+/// sees. Only a build whose fields have the same names, types and order accepts a serialised state.
 ///
 /// # Life of an instance
 ///
 /// 1. `fmi2Instantiate` calls [`Model::new`] and [`Model::variables`].
 /// 2. The importer sets parameters and inputs; [`Model::check`] and [`Model::initialize`] then
-///    compute the start (`fmi2EnterInitializationMode`, and again after each change until
+///    compute the initial values (`fmi2EnterInitializationMode`, and again after each change until
 ///    `fmi2ExitInitializationMode`).
-/// 3. Co-simulation: each `fmi2DoStep` calls [`Model::step`]. Where something was set since,
-///    [`Model::update`] comes before the next value is read.
-/// 4. Model exchange, for models with [`Model::model_exchange`]: the importer integrates. It sets
-///    time, states and inputs; [`Model::update`] comes before it reads a value, a derivative or
+/// 3. Co-simulation: each `fmi2DoStep` calls [`Model::step`]. If a value was set since,
+///    [`Model::update`] runs before the next value is read.
+/// 4. Model exchange, if [`Model::model_exchange`] returns `Some`: the importer integrates. It sets
+///    time, states and inputs; [`Model::update`] runs before it reads a value, a derivative or
 ///    an event indicator ([`Model::event_indicators`]); `fmi2NewDiscreteStates` calls
 ///    [`Model::event`].
-/// 5. `fmi2GetDirectionalDerivative` calls [`Model::differentiate`], for models that have it.
-/// 6. `fmi2Reset` puts back the struct that [`Model::new`] returned.
+/// 5. `fmi2GetDirectionalDerivative` calls [`Model::differentiate`], if the model implements it.
+/// 6. `fmi2Reset` restores the struct that [`Model::new`] returned.
 pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
     /// `modelIdentifier` and `modelName`: a C identifier, the name of the library in the FMU.
     const IDENTIFIER: &'static str;
 
-    /// `providesDirectionalDerivative`: whether [`Model::differentiate`] is written.
+    /// `providesDirectionalDerivative`: whether the model implements [`Model::differentiate`].
     const PROVIDES_DIRECTIONAL_DERIVATIVE: bool = false;
 
-    /// The general part of the model description.
+    /// Returns the general part of the model description.
     fn about(&self) -> About;
 
-    /// The model as instantiated; its field values are the start values of the description.
+    /// Creates the model as instantiated; its field values are the start values of the description.
     ///
-    /// `resources` is the FMU's `resources` folder. Where the importer names none, it is a path at which
-    /// nothing can be read, and an error of this function becomes one about `fmuResourceLocation`.
+    /// `resources` is the FMU's `resources` folder. If the importer names none, it is a path at which
+    /// nothing can be read, and the message of an error adds that `fmuResourceLocation` is missing.
     ///
     /// # Errors
     ///
-    /// When something in `resources` is missing or wrong.
+    /// [`Failure::Error`] if a file in `resources` is missing or wrong.
     fn new(resources: &Path) -> Result<Self, Failure>;
 
-    /// The variables in the order of the description. Value references follow from the position.
+    /// Returns the variables in the order of the description. Their positions determine the value
+    /// references.
     fn variables(&self) -> Vec<Variable<Self>>;
 
-    /// Whether the parameters make sense, one by one and together.
+    /// Checks the parameters, each alone and all together.
     ///
-    /// Called before [`Model::initialize`], and before a step or an event when a parameter was set
+    /// Called before [`Model::initialize`], and before a step or an event if a parameter was set
     /// since.
     ///
     /// # Errors
     ///
-    /// A message that names the parameter, its value and the rule.
+    /// [`Failure::Error`] with the parameter, its value and the rule that it breaks.
     fn check(&self) -> Result<(), Failure> {
         Ok(())
     }
 
     /// Computes states and outputs at the start time from parameters and inputs.
     ///
-    /// In initialization mode the importer may set and read in turn, so this may be called several
-    /// times and must not depend on the result of an earlier call. Variables with a start value
-    /// ([`Variable::exact`]) are left as they are. As it is, it calls [`Model::update`].
+    /// In initialization mode the importer may set and read values alternately, so this function may be
+    /// called several times and must not depend on the result of an earlier call. It must not change
+    /// variables with a start value ([`Variable::exact`]). The default implementation calls
+    /// [`Model::update`].
     ///
     /// # Errors
     ///
-    /// When the model cannot start from these values.
+    /// [`Failure::Error`] if the model cannot start from these values.
     fn initialize(&mut self, experiment: &Experiment) -> Result<(), Failure> {
         self.update(experiment.start_time)
     }
 
-    /// Advances from `step.start` to `step.end()` (co-simulation).
+    /// Advances the model from `step.start` to `step.end()` (co-simulation).
     ///
     /// # Errors
     ///
-    /// [`Failure::Incomplete`] or [`Failure::Terminated`] where the model stopped before the end,
-    /// any other where not even that is known.
+    /// [`Failure::Incomplete`] or [`Failure::Terminated`] if the model stopped before the end at a known
+    /// time, another failure if the time reached is unknown.
     fn step(&mut self, step: &Step) -> Result<(), Failure>;
 
-    /// Recomputes what depends directly on inputs, tunable parameters and, in model exchange, on
-    /// states and time, as the fields stand: outputs and derivatives of states. What changes at
-    /// events only stays as it is.
+    /// Recomputes the outputs and the derivatives of the states from the present values of inputs,
+    /// parameters and, in model exchange, states and `time` (in s). It must not change variables that
+    /// change at events only. The default implementation does nothing.
     ///
     /// # Errors
     ///
-    /// [`Failure::Discard`] where the equations have no value at these states.
+    /// [`Failure::Discard`] if the equations have no solution at these states.
     fn update(&mut self, time: f64) -> Result<(), Failure> {
         let _ = time;
         Ok(())
     }
 
-    /// Directional derivatives `dv_unknown = (dh/dv_known) dv_known` of `v_unknown = h(v_known)`
-    /// (section 2.1.9), at the values that the fields have now.
+    /// Computes the directional derivative `dv_unknown = (dh/dv_known) dv_known` of
+    /// `v_unknown = h(v_known)` (section 2.1.9) at the present values of the fields.
     ///
     /// `direction` is a struct in which the field of each Real variable holds its component of the
     /// direction: on entry `dv_known` in the fields of the knowns and zero in all others; on
-    /// return `dv_unknown` in the fields of the unknowns. Its other fields have values of an
-    /// earlier moment and mean nothing. [`At::Initialization`]: the unknowns are the initial values of outputs, states and
-    /// derivatives, the knowns inputs and variables with an exact start value. [`At::Point`]: the
-    /// unknowns are the outputs and the derivatives of the states, the knowns inputs and states.
-    /// A field that is both (a state that is an output) keeps what it holds.
+    /// return `dv_unknown` in the fields of the unknowns. Its other fields hold old values; ignore them.
+    ///
+    /// * [`At::Initialization`]: the unknowns are the initial values of outputs, states and derivatives;
+    ///   the knowns are inputs and variables with an exact start value.
+    /// * [`At::Point`]: the unknowns are the outputs and the derivatives of the states; the knowns are
+    ///   inputs and states.
+    ///
+    /// A field that is both unknown and known (a state that is an output) keeps its value.
     ///
     /// # Errors
     ///
-    /// [`Failure::Error`] where there is no derivative: the function may not discard.
+    /// [`Failure::Error`] if the derivative does not exist. `fmi2Discard` is not allowed here.
     fn differentiate(&self, at: &At, direction: &mut Self) -> Result<(), Failure> {
         let _ = (at, direction);
         Err(Failure::Error("providesDirectionalDerivative is false".to_owned()))
     }
 
-    /// What `fmi2ModelExchange` needs beyond the variables; `None` for co-simulation only.
+    /// Returns the properties of the model exchange interface; `None` for co-simulation only.
     ///
-    /// The continuous states are the variables that another one is the derivative of
-    /// ([`Variable::derivative_of`]), in the order of those derivatives.
+    /// The continuous states are the variables that have a derivative ([`Variable::derivative_of`]), in
+    /// the order of the derivatives.
     fn model_exchange(&self) -> Option<ModelExchange> {
         None
     }
 
-    /// `fmi2GetEventIndicators`: a state event happens where one of them changes from positive to
-    /// not positive or back. Of the order of one, and not zero right after an event (section 3.2.2).
+    /// `fmi2GetEventIndicators`: computes the event indicators z. A state event occurs when an indicator
+    /// changes between z > 0 and z <= 0 (section 3.2.2). Indicators should have a magnitude of about 1
+    /// and must not be zero directly after an event.
     ///
-    /// As many as [`Model::model_exchange`] says; [`Model::update`] came before.
+    /// Their number is [`ModelExchange::event_indicators`]. [`Model::update`] was called before.
     fn event_indicators(&self, time: f64, indicators: &mut [f64]) {
         let _ = (time, indicators);
     }
 
-    /// `fmi2NewDiscreteStates`: recomputes at an event what changes at events only, from the fields
-    /// as they stand. Called at least once before the first continuous-time mode.
+    /// `fmi2NewDiscreteStates`: handles an event at `time` (in s), that is, recomputes the variables that
+    /// change at events only. Called at least once before the first continuous-time mode.
     ///
     /// # Errors
     ///
-    /// When the model cannot go on.
+    /// [`Failure::Error`] if the model cannot continue.
     fn event(&mut self, time: f64) -> Result<Event, Failure> {
         let _ = time;
         Ok(Event::default())
@@ -148,29 +153,29 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
 /// The general part of a model description.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct About {
-    /// What the model is, in one sentence.
+    /// Description of the model in one sentence.
     pub description: String,
-    /// Who wrote it.
+    /// Author of the model.
     pub author: String,
     /// Version of the model.
     pub version: String,
     /// Licence, an SPDX expression.
     pub license: String,
-    /// The experiment that an importer runs when it is told nothing else.
+    /// The experiment that an importer runs by default.
     pub default_experiment: DefaultExperiment,
 }
 
-/// What model exchange needs beyond the variables.
+/// Properties of the model exchange interface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ModelExchange {
     /// `numberOfEventIndicators`.
     pub event_indicators: usize,
 }
 
-/// What happened at an event: `fmi2EventInfo` of `fmi2NewDiscreteStates` (section 3.2.2).
+/// The result of an event: `fmi2EventInfo` of `fmi2NewDiscreteStates` (section 3.2.2).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Event {
-    /// `newDiscreteStatesNeeded`: the event is not finished, one more call is needed.
+    /// `newDiscreteStatesNeeded`: the event iteration needs another call.
     pub new_discrete_states_needed: bool,
     /// `terminateSimulation`, with the reason.
     pub terminate_simulation: Option<String>,
@@ -180,16 +185,16 @@ pub struct Event {
     pub next_event_time: Option<f64>,
 }
 
-/// Where derivatives are taken.
+/// The point at which [`Model::differentiate`] computes derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum At {
-    /// In initialization mode: of the initial values.
+    /// Initialization mode: derivatives of the initial values.
     Initialization,
-    /// At a communication point, or between integration steps.
+    /// A communication point, or a point between integration steps.
     Point {
         /// The time in s.
         time: f64,
-        /// The component of the direction that belongs to time.
+        /// The component of the direction along time, in s.
         delta_time: f64,
     },
 }
@@ -197,28 +202,29 @@ pub enum At {
 /// One communication step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
-    /// Time at the begin, in s.
+    /// Time at the start, in s.
     pub start: f64,
-    /// Length in s: at least the distance from `start` to the next number of 64 bits.
+    /// Size in s: large enough that `start + size > start` in double precision.
     pub size: f64,
 }
 
 impl Step {
-    /// Time at the end, in s.
+    /// Returns the time at the end, in s.
     #[must_use]
     pub fn end(&self) -> f64 {
         self.start + self.size
     }
 }
 
-/// Why a call did not do what it was asked; the message reaches the importer's logger.
+/// The failure of a call, with a message for the importer's logger.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Failure {
-    /// `fmi2Discard`: refused, the instance is as before. From functions that may not discard
-    /// (section 2.1.3: initialization, events, directional derivatives) `fmi2Error`.
+    /// `fmi2Discard`: the call was rejected; the instance is unchanged. Becomes `fmi2Error` in functions
+    /// that must not return `fmi2Discard` (section 2.1.3: initialization, events, directional
+    /// derivatives).
     #[error("{0}")]
     Discard(String),
-    /// `fmi2Discard` of `fmi2DoStep`: the model reached `time` (in s) and no further.
+    /// `fmi2Discard` from `fmi2DoStep`: the step ended early at `time` (in s).
     #[error("stopped at t = {time} s: {message}")]
     Incomplete {
         /// Last time reached, in s.
@@ -226,8 +232,8 @@ pub enum Failure {
         /// The reason.
         message: String,
     },
-    /// `fmi2Discard` of `fmi2DoStep` with `fmi2Terminated`: the model reached `time` (in s) and wants
-    /// the simulation to end there.
+    /// `fmi2Discard` from `fmi2DoStep` with `fmi2Terminated`: the model reached `time` (in s) and
+    /// requests the end of the simulation.
     #[error("the simulation ends at t = {time} s: {message}")]
     Terminated {
         /// Last time reached, in s.
@@ -235,10 +241,10 @@ pub enum Failure {
         /// The reason.
         message: String,
     },
-    /// `fmi2Error`: the instance can be read, reset, restored and freed, nothing else.
+    /// `fmi2Error`: the instance can only be read, reset, restored to a saved state, or freed.
     #[error("{0}")]
     Error(String),
-    /// `fmi2Fatal`: the instance is lost.
+    /// `fmi2Fatal`: the instance cannot be used any more.
     #[error("{0}")]
     Fatal(String),
 }

@@ -1,21 +1,21 @@
-//! The statement of one variable, from which description, value references and access follow.
+//! Declaration of a variable: the source of its description, value reference and field access.
 
 use fmu_description::{Causality, DependencyKind, Initial, Variability};
 
-/// Reaches one field of a model.
+/// A function that borrows one field of a model.
 pub(crate) type Field<M, T> = Box<dyn for<'a> Fn(&'a mut M) -> &'a mut T + Send + Sync>;
 
-/// The field behind a variable, by type.
+/// The field of a variable, by base type.
 pub(crate) enum Access<M> {
     Real(Field<M, f64>),
     Integer(Field<M, i32>),
     Boolean(Field<M, bool>),
     String(Field<M, String>),
-    /// The field of the variable with this name.
+    /// An alias of the variable with this name.
     Alias(String),
 }
 
-/// `Enumeration`: the name of the type and of its values.
+/// An enumeration type: its name and its items.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Enumeration {
     pub(crate) name: String,
@@ -23,7 +23,7 @@ pub struct Enumeration {
 }
 
 impl Enumeration {
-    /// The type `name` with the `items`, each a name and its value.
+    /// Creates the type `name` with the `items`, pairs of name and value.
     pub fn new<S: Into<String>>(
         name: impl Into<String>,
         items: impl IntoIterator<Item = (S, i32)>,
@@ -33,7 +33,7 @@ impl Enumeration {
     }
 }
 
-/// Attributes of a number.
+/// Attributes of a Real, Integer or Enumeration variable.
 #[derive(Clone, Default)]
 pub(crate) struct Number {
     pub(crate) unit: Option<String>,
@@ -44,13 +44,13 @@ pub(crate) struct Number {
     pub(crate) nominal: Option<f64>,
 }
 
-/// One variable of a model: name, role and the field that holds its value.
+/// A variable of a model: name, role, attributes and the field that holds its value.
 ///
-/// Made by [`Variable::real`], [`Variable::integer`], [`Variable::boolean`], [`Variable::string`],
-/// [`Variable::enumeration`] or [`Variable::alias`]; then the role ([`input`](Variable::input),
-/// [`output`](Variable::output), [`parameter`](Variable::parameter),
-/// [`tunable`](Variable::tunable), [`calculated_parameter`](Variable::calculated_parameter); a
-/// local variable without any), then unit, limits and dependencies.
+/// Create it by [`Variable::real`], [`Variable::integer`], [`Variable::boolean`],
+/// [`Variable::string`], [`Variable::enumeration`] or [`Variable::alias`]. Then set the role
+/// ([`input`](Variable::input), [`output`](Variable::output), [`parameter`](Variable::parameter),
+/// [`tunable`](Variable::tunable), [`calculated_parameter`](Variable::calculated_parameter); the
+/// default is a local variable), then unit, limits and dependencies.
 pub struct Variable<M> {
     pub(crate) name: String,
     pub(crate) description: String,
@@ -68,7 +68,7 @@ pub struct Variable<M> {
 }
 
 impl<M> Variable<M> {
-    /// A `Real` variable held in the field that `field` reaches.
+    /// Creates a `Real` variable with the value in the field that `field` borrows.
     pub fn real<F>(name: impl Into<String>, description: impl Into<String>, field: F) -> Self
     where
         F: for<'a> Fn(&'a mut M) -> &'a mut f64 + Send + Sync + 'static,
@@ -76,7 +76,7 @@ impl<M> Variable<M> {
         Self::local(name, description, Variability::Continuous, Access::Real(Box::new(field)))
     }
 
-    /// An `Integer` variable.
+    /// Creates an `Integer` variable.
     pub fn integer<F>(name: impl Into<String>, description: impl Into<String>, field: F) -> Self
     where
         F: for<'a> Fn(&'a mut M) -> &'a mut i32 + Send + Sync + 'static,
@@ -84,7 +84,7 @@ impl<M> Variable<M> {
         Self::local(name, description, Variability::Discrete, Access::Integer(Box::new(field)))
     }
 
-    /// A `Boolean` variable.
+    /// Creates a `Boolean` variable.
     pub fn boolean<F>(name: impl Into<String>, description: impl Into<String>, field: F) -> Self
     where
         F: for<'a> Fn(&'a mut M) -> &'a mut bool + Send + Sync + 'static,
@@ -92,7 +92,7 @@ impl<M> Variable<M> {
         Self::local(name, description, Variability::Discrete, Access::Boolean(Box::new(field)))
     }
 
-    /// A `String` variable.
+    /// Creates a `String` variable.
     pub fn string<F>(name: impl Into<String>, description: impl Into<String>, field: F) -> Self
     where
         F: for<'a> Fn(&'a mut M) -> &'a mut String + Send + Sync + 'static,
@@ -100,7 +100,7 @@ impl<M> Variable<M> {
         Self::local(name, description, Variability::Discrete, Access::String(Box::new(field)))
     }
 
-    /// An `Enumeration` variable: its value is that of one of the items.
+    /// Creates an `Enumeration` variable. The field holds the value of an item.
     pub fn enumeration<F>(
         name: impl Into<String>,
         description: impl Into<String>,
@@ -113,8 +113,8 @@ impl<M> Variable<M> {
         Self { enumeration: Some(enumeration), ..Self::integer(name, description, field) }
     }
 
-    /// Another name for the variable `of`: same type, unit and value reference. It has no start
-    /// value of its own and cannot be set.
+    /// Creates an alias of the variable `of`, with the same type, unit and value reference. An alias has
+    /// no start value and cannot be set.
     pub fn alias(
         name: impl Into<String>,
         description: impl Into<String>,
@@ -146,28 +146,28 @@ impl<M> Variable<M> {
         }
     }
 
-    /// An input.
+    /// Makes the variable an input.
     #[must_use]
     pub fn input(self) -> Self {
         Self { causality: Causality::Input, initial: None, ..self }
     }
 
-    /// An output. `direct` names what it depends on without a step in between: inputs and, in a
-    /// model with continuous states, states or `time` (`ModelStructure`, section 2.2.8); none for
-    /// an output that a step alone changes.
+    /// Makes the variable an output. `direct` names the inputs (and, in a model with continuous states,
+    /// states or `time`) on which it depends directly (direct feedthrough; `ModelStructure`, section
+    /// 2.2.8). It is empty if only a step changes the output.
     #[must_use]
     pub fn output(self, direct: &[&str]) -> Self {
         let output = Self { causality: Causality::Output, ..self };
         output.depends(DependencyKind::Dependent, direct.iter().copied())
     }
 
-    /// A parameter that is fixed after initialization.
+    /// Makes the variable a parameter that is fixed after initialization.
     #[must_use]
     pub fn parameter(self) -> Self {
         self.any_parameter(Variability::Fixed)
     }
 
-    /// A parameter that may be changed between steps.
+    /// Makes the variable a parameter that the importer may change between steps.
     #[must_use]
     pub fn tunable(self) -> Self {
         self.any_parameter(Variability::Tunable)
@@ -178,90 +178,93 @@ impl<M> Variable<M> {
         Self { causality: Causality::Parameter, variability, initial, ..self }
     }
 
-    /// A parameter that [`Model::initialize`](crate::Model::initialize) computes from others.
+    /// Makes the variable a parameter that [`Model::initialize`](crate::Model::initialize) computes from
+    /// other parameters.
     #[must_use]
     pub fn calculated_parameter(self) -> Self {
         let variability = Variability::Fixed;
         Self { causality: Causality::CalculatedParameter, variability, ..self }
     }
 
-    /// A local variable or output that never changes.
+    /// Makes a local variable or output constant.
     #[must_use]
     pub fn constant(self) -> Self {
         Self { variability: Variability::Constant, initial: Some(Initial::Exact), ..self }
     }
 
-    /// A Real that changes at events or communication points only.
+    /// Makes a Real discrete: it changes at events or communication points only.
     #[must_use]
     pub fn discrete(self) -> Self {
         Self { variability: Variability::Discrete, ..self }
     }
 
-    /// A local variable or output that starts with the value of its field in the fresh model; the
-    /// importer may set another one before the first step.
+    /// Sets `initial = exact` for a local variable or output: it starts with the value of its field after
+    /// [`Model::new`](crate::Model::new), unless the importer sets another value before the first step.
     #[must_use]
     pub fn exact(self) -> Self {
         Self { initial: Some(Initial::Exact), ..self }
     }
 
-    /// A local variable or output whose initial value is computed, by an iteration that starts with
-    /// the value of its field; the importer may set another one before initialization mode.
+    /// Sets `initial = approx` for a local variable or output: an iteration computes the initial value
+    /// from the value of its field, a guess that the importer may set before initialization mode.
     #[must_use]
     pub fn approximate(self) -> Self {
         Self { initial: Some(Initial::Approx), ..self }
     }
 
-    /// The unit, as [`Unit::parse`](fmu_description::unit::Unit::parse) reads it.
+    /// Sets the unit, an expression for [`Unit::parse`](fmu_description::unit::Unit::parse).
     #[must_use]
     pub fn unit(mut self, unit: impl Into<String>) -> Self {
         self.number.unit = Some(unit.into());
         self
     }
 
-    /// The unit to display the value in: one of the display units of the variable's unit.
+    /// Sets the display unit, one of the display units of the variable's unit.
     #[must_use]
     pub fn display_unit(mut self, unit: impl Into<String>) -> Self {
         self.number.display_unit = Some(unit.into());
         self
     }
 
-    /// `quantity`: the physical quantity, such as `Force`.
+    /// Sets `quantity`, the physical quantity, such as `Force`.
     #[must_use]
     pub fn quantity(mut self, quantity: impl Into<String>) -> Self {
         self.number.quantity = Some(quantity.into());
         self
     }
 
-    /// The smallest and the largest value that may be set; what lies outside is discarded.
+    /// Sets the smallest and the largest allowed value. Setting a value outside the range returns
+    /// `fmi2Discard`.
     #[must_use]
     pub fn range(mut self, min: f64, max: f64) -> Self {
         (self.number.min, self.number.max) = (Some(min), Some(max));
         self
     }
 
-    /// The typical magnitude, greater than zero; of a state, what an integrator scales its error with.
+    /// Sets the nominal value, greater than zero: the typical magnitude. Integrators scale the error of a
+    /// state with it.
     #[must_use]
     pub fn nominal(mut self, nominal: f64) -> Self {
         self.number.nominal = Some(nominal);
         self
     }
 
-    /// The derivative with respect to time of the continuous state called `state`.
+    /// Declares the variable as the time derivative of the continuous state called `state`.
     ///
-    /// In model exchange this is what the importer integrates.
+    /// In model exchange the importer integrates it.
     #[must_use]
     pub fn derivative_of(self, state: impl Into<String>) -> Self {
         Self { derivative_of: Some(state.into()), ..self }
     }
 
-    /// A continuous state that an event may change (`reinit`).
+    /// Sets `reinit`: an event may change this continuous state.
     #[must_use]
     pub fn reinit(self) -> Self {
         Self { reinit: true, ..self }
     }
 
-    /// What an output or the derivative of a state depends on at a communication point: inputs,
-    /// states, `time`, with the kind of the dependency (`dependenciesKind`, section 2.2.8).
+    /// Adds the inputs, states or `time` on which an output or the derivative of a state depends at a
+    /// communication point, with the kind of the dependency (`dependenciesKind`, section 2.2.8).
     #[must_use]
     pub fn depends<S: Into<String>>(
         mut self,
@@ -272,17 +275,18 @@ impl<M> Variable<M> {
         self
     }
 
-    /// The inputs and variables with exact start values (or `time`) on which the initial value
-    /// depends. Without this an importer has to assume all of them.
+    /// Sets the inputs and variables with exact start values (or `time`) on which the initial value
+    /// depends. By default an importer must assume that it depends on all of them.
     #[must_use]
     pub fn initially<S: Into<String>>(self, names: impl IntoIterator<Item = S>) -> Self {
         Self { initially: Some(names.into_iter().map(Into::into).collect()), ..self }
     }
 
-    /// The field of the next derivative with respect to time: first call first order, and so on.
+    /// Adds the field of the next time derivative: the first call adds the first derivative, the second
+    /// call the second derivative, and so on.
     ///
-    /// Of an input: the field that `fmi2SetRealInputDerivatives` sets; the derivatives belong to
-    /// the begin of the step and are set back to zero after it. Of an output: the field that
+    /// For an input it is the field that `fmi2SetRealInputDerivatives` sets; the value holds at the start
+    /// of the step and is reset to zero after it. For an output it is the field that
     /// `fmi2GetRealOutputDerivatives` reads.
     #[must_use]
     pub fn derivative<F>(mut self, field: F) -> Self

@@ -1,10 +1,10 @@
-//! What a recorded row costs, beside the same table written by C's `fprintf("%.17g")`.
+//! Measures the time to write a row, compared with C's `fprintf("%.17g")`.
 //!
 //!     cargo bench --package cosim-results --bench results
 //!
-//! `printf.c` writes the table in C, in a process of its own. All take turns in each sample and
-//! report the processor time that they took, the writing to the file in it; the last lines are the
-//! table of `docs/reference/results.md`. Needs a C compiler; Unix only.
+//! `printf.c` writes the table in C, in its own process. The writers take turns in each sample and
+//! report their processor time, including the writing to the file. The last lines of the output are
+//! the table of `docs/reference/results.md`. Needs a C compiler; Unix only.
 #![forbid(unsafe_code)]
 #![expect(clippy::print_stdout, reason = "the result")]
 #![expect(clippy::cast_precision_loss, reason = "figures for a table")]
@@ -20,31 +20,31 @@ use criterion::Criterion;
 use results::{Column, ColumnKind, Row, create};
 use rustix::time::{ClockId, clock_gettime};
 
-/// Columns of the tables.
+/// Numbers of columns of the tables.
 const WIDTHS: [usize; 3] = [4, 40, 400];
 /// Rows after which the tables repeat.
 const PERIOD: u64 = 1024;
 
-/// A writer of tables.
+/// A writer of tables to be measured.
 struct Subject {
     name: &'static str,
     path: PathBuf,
-    /// Processor time of writing a number of rows.
+    /// Returns the processor time to write a number of rows.
     time: Box<dyn FnMut(u64) -> Duration>,
 }
 
-/// Smooth, as the variables of a model are: every value has all its digits.
+/// Returns a value of a smooth signal, as of a model: most values need 17 digits.
 fn value(row: u64, column: usize) -> f64 {
     (0.001 * row as f64 * (column as f64 + 1.0)).sin()
 }
 
-/// Processor time of this thread.
+/// Returns the processor time of this thread.
 fn processor_time() -> Duration {
     let now = clock_gettime(ClockId::ThreadCPUTime);
     Duration::new(now.tv_sec.cast_unsigned(), u32::try_from(now.tv_nsec).unwrap())
 }
 
-/// Our sink that the ending of `path` chooses.
+/// Returns the sink for the extension of `path`.
 fn ours(name: &'static str, path: PathBuf, width: usize) -> Subject {
     let column = |k| Column { name: format!("x{k}"), kind: ColumnKind::Real, unit: None };
     let columns: Vec<Column> = (0..width).map(column).collect();
@@ -63,7 +63,7 @@ fn ours(name: &'static str, path: PathBuf, width: usize) -> Subject {
     Subject { name, path, time }
 }
 
-/// The process of `printf.c`; it ends with its input.
+/// The process of `printf.c`, which ends at the end of its input.
 struct Printf {
     child: Child,
     input: Option<ChildStdin>,
@@ -109,8 +109,8 @@ fn compiled(folder: &Path) -> PathBuf {
     program
 }
 
-/// Median time of a row in s and bytes of a row for each of the `subjects`; criterion reports the
-/// first, a period of the table as one iteration.
+/// Returns the median time per row in s and the bytes per row of each of the `subjects`. Criterion
+/// reports the first, with a period of the table as one iteration.
 fn measure(criterion: &mut Criterion, id: &str, subjects: &mut [Subject]) -> Vec<(f64, f64)> {
     let mut figures = vec![Vec::new(); subjects.len()];
     criterion.bench_function(id, |bencher| {

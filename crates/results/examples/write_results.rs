@@ -1,11 +1,10 @@
-//! Writes a table of hard values with a sink, for other readers to read.
+//! Writes a table of difficult values with a sink, to test other readers.
 //!
 //!     cargo run --release --package cosim-results --example write_results -- results.parquet numbers.csv
 //!
-//! Each file, whose ending is its format, has the rows of `rows`: every Real is given by its bits,
-//! so that a reader in another language can state the same values. With `--interrupt` in front
-//! the process ends by abort after a flush and one more row, as a crash would end it; with
-//! `--numbers` strings are left out.
+//! The extension of each file selects its format. Every Real is generated from its bits, so that a
+//! reader in another language can compute the same values. With `--interrupt` as the first argument
+//! the process aborts after a flush and one more row, to simulate a crash; `--numbers` omits strings.
 #![forbid(unsafe_code)]
 
 use std::path::Path;
@@ -13,7 +12,7 @@ use std::process::ExitCode;
 
 use results::{Column, ColumnKind, ResultsError, Row, Sink, create};
 
-/// Rows of a file: more than a row group of Parquet holds.
+/// Number of rows of a file, more than in a row group of Parquet.
 const ROWS: u32 = 70_000;
 
 fn columns(numbers: bool) -> Vec<Column> {
@@ -34,12 +33,12 @@ fn columns(numbers: bool) -> Vec<Column> {
     columns
 }
 
-/// Bits of the next Real: a linear congruential generator (Knuth's MMIX) over all doubles.
+/// Returns the bits of the next Real, by a linear congruential generator (Knuth's MMIX).
 fn next(bits: u64) -> u64 {
     bits.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407)
 }
 
-/// Row `k` with Reals of the generator; a text with what CSV has to escape.
+/// Writes row `k` with Reals of the generator and a text that CSV must escape.
 fn give(sink: &mut dyn Sink, k: u32, bits: &mut u64, numbers: bool) -> Result<(), ResultsError> {
     let mut real = || {
         *bits = next(*bits);

@@ -1,4 +1,4 @@
-//! Comma-separated values in the layout of `FMPy`, RFC 4180.
+//! Writes comma-separated values (RFC 4180) in the layout of `FMPy`.
 
 mod lines;
 
@@ -11,35 +11,36 @@ use super::pace::Pace;
 use super::{Column, ColumnKind, ResultsError, Row, Sink, TIME, Widths, check_names, create_file};
 use lines::Lines;
 
-/// Bytes that are gathered before they go to the operating system.
+/// Number of buffered bytes at which the sink writes to the file.
 const BUFFER: usize = 256 * 1024;
-/// Longest time that a row waits for it while rows keep coming.
+/// Longest time that a row stays in the buffer while further rows arrive.
 const INTERVAL: Duration = Duration::from_millis(100);
 
-/// Writes one line for each row: the time, then the columns in their order.
+/// A sink that writes CSV: one line per row, the time first, then the columns in their order.
 ///
-/// The first line has the names, quoted. A Real has the fewest digits that read back as the same
-/// number (Schubfach; Giulietti 2020), not-a-number is `NaN`, infinity `inf`; a Boolean is 0 or 1;
-/// a String is quoted. Units have no place in this layout.
+/// The first line contains the names, quoted. A Real has the fewest digits that read back as the same
+/// number (Schubfach; Giulietti 2020), NaN is `NaN`, infinity `inf`; a Boolean is 0 or 1; a String is
+/// quoted. The layout has no units.
 #[derive(Debug)]
 pub struct CsvSink {
     path: PathBuf,
     file: File,
     widths: Widths,
     kinds: Vec<ColumnKind>,
-    /// Whole lines that are not yet in the file.
+    /// Complete lines that are not yet in the file.
     lines: Lines,
-    /// Length of the file: always whole lines.
+    /// Length of the file, at the end of a line.
     written: u64,
     pace: Pace,
 }
 
 impl CsvSink {
-    /// Makes the file and writes its first line.
+    /// Creates the file and writes its first line.
     ///
     /// # Errors
     ///
-    /// [`ResultsError::Duplicate`], [`ResultsError::Write`].
+    /// [`ResultsError::Duplicate`] for two columns of one name, [`ResultsError::InUse`] if another run is
+    /// writing the file, [`ResultsError::Write`] if the file cannot be created.
     pub fn create(path: &Path, columns: &[Column]) -> Result<Self, ResultsError> {
         check_names(columns)?;
         let mut lines = Lines::new(columns, 2 * BUFFER);
@@ -60,12 +61,12 @@ impl CsvSink {
             written: 0,
             pace: Pace::new(INTERVAL),
         };
-        sink.hand_over()?;
+        sink.write_rows()?;
         Ok(sink)
     }
 
-    /// Appends the lines to the file, or leaves it as it was.
-    fn hand_over(&mut self) -> Result<(), ResultsError> {
+    /// Appends the lines to the file; after a failure the file keeps its former content.
+    fn write_rows(&mut self) -> Result<(), ResultsError> {
         match self.file.write_all(self.lines.bytes()) {
             Ok(()) => {
                 self.written += self.lines.bytes().len() as u64;
@@ -73,7 +74,7 @@ impl CsvSink {
                 Ok(())
             }
             Err(source) => {
-                // Half a line would be read as a row; what cannot be cut, as a pipe, stays.
+                // A reader could take an incomplete line for a row. A pipe cannot be truncated.
                 let _ = self.file.set_len(self.written);
                 let _ = self.file.seek(SeekFrom::Start(self.written));
                 Err(ResultsError::Write { path: self.path.clone(), source })
@@ -108,25 +109,25 @@ impl Sink for CsvSink {
         }
         lines.push(b'\n');
         if self.lines.bytes().len() >= BUFFER || self.pace.due() {
-            self.hand_over()
+            self.write_rows()
         } else {
             Ok(())
         }
     }
 
     fn flush(&mut self) -> Result<(), ResultsError> {
-        self.hand_over()
+        self.write_rows()
     }
 
     fn finish(mut self: Box<Self>) -> Result<(), ResultsError> {
-        self.hand_over()
+        self.write_rows()
     }
 }
 
 impl Drop for CsvSink {
     fn drop(&mut self) {
-        // Nobody is left to be told of a failure.
-        let _ = self.hand_over();
+        // No caller is left to receive the error.
+        let _ = self.write_rows();
     }
 }
 

@@ -1,30 +1,30 @@
-//! At which communication points a row is recorded.
+//! Decimation: the communication points at which a row is recorded.
 
 use serde::{Deserialize, Serialize};
 
-/// Share of the interval by which a communication point may lie before an instant of the grid and
-/// still stand for it: time is rounded.
+/// Tolerance, relative to the interval, by which a communication point may precede an instant of the
+/// grid and still count as at the instant, because times are rounded.
 const TOLERANCE: f64 = 1e-9;
 
-/// Which communication points are recorded.
+/// The communication points to record.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Decimation {
-    /// All of them.
+    /// Every communication point.
     All,
-    /// The first one at or after each instant start + k interval; interval in s, above zero. A
-    /// step over several instants gives one row.
+    /// The first communication point at or after each instant `start + k interval`; interval in s, above
+    /// zero. A step over several instants gives one row.
     Every(f64),
-    /// The first one and every n-th after it; n above zero.
+    /// The first communication point and every n-th after it; n above zero.
     Nth(u64),
 }
 
 impl Decimation {
-    /// An interval or a count that can be kept to; otherwise the sentence that says why not.
+    /// Checks that the interval or the count is above zero.
     ///
     /// # Errors
     ///
-    /// The sentence.
+    /// The message for the user.
     pub fn check(self) -> Result<Self, String> {
         match self {
             Self::Every(interval) if !(interval > 0.0 && interval.is_finite()) => {
@@ -36,27 +36,27 @@ impl Decimation {
     }
 }
 
-/// Tells for each communication point whether it is recorded. Serialisable, so that a resumed run
+/// Decides for each communication point whether it is recorded. Serialisable, so that a resumed run
 /// records the same points.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Due {
     decimation: Decimation,
-    /// In s.
+    /// Start of the grid in s.
     start: f64,
-    /// Number of the next instant of the grid, or of communication points so far.
+    /// Number of the next instant of the grid, or number of communication points so far.
     next: f64,
     points: u64,
 }
 
 impl Due {
-    /// Counts from `start` in s.
+    /// Creates the decision for a grid from `start` in s.
     #[must_use]
     pub fn new(decimation: Decimation, start: f64) -> Self {
         Self { decimation, start, next: 0.0, points: 0 }
     }
 
-    /// Whether the communication point at `time` in s is recorded. To be asked once for each, in
-    /// their order.
+    /// Whether the communication point at `time` in s is recorded. Call it once for each communication
+    /// point, in their order.
     pub fn at(&mut self, time: f64) -> bool {
         match self.decimation {
             Decimation::All => true,

@@ -1,10 +1,10 @@
-//! A long series in bounded memory, so that it looks the same when drawn.
+//! Reduction of a long time series to the samples that a plot shows, in bounded memory.
 
-/// Stretches of time that a series is divided into at most: several for each pixel of a plot.
+/// Largest number of buckets: several for each pixel of a plot.
 const BUCKETS: usize = 8192;
 
-/// What remains of the samples of one stretch: the first, the lowest, the highest, the last, and
-/// whether there was one that is not finite.
+/// A time interval of the series: its first, lowest, highest and last finite sample, and the time of a
+/// sample that is not finite, if any.
 #[derive(Debug, Clone, Copy)]
 struct Bucket {
     kept: Option<[(f64, f64); 4]>,
@@ -27,14 +27,16 @@ impl Bucket {
     }
 }
 
-/// Takes samples in the order of time and keeps those that a drawing shows. Stretches are equally
-/// long; where time goes beyond the last, neighbours merge and all become twice as long. So
-/// between half and all of 8192 stretches are in use, whatever the length of the series.
+/// The envelope of a time series: the samples that a plot shows.
+///
+/// Samples are added in the order of time, to buckets of equal length in time. When time passes the
+/// last bucket, neighbouring buckets are merged and the length doubles. Thus 4096 to 8192 buckets
+/// cover a series of any length.
 #[derive(Debug, Clone)]
 pub struct Envelope {
     /// Time of the first sample, in s.
     start: f64,
-    /// Length of a stretch in s; 0 until two samples differ in time.
+    /// Length of a bucket in s; 0 until two samples differ in time.
     length: f64,
     buckets: Vec<Bucket>,
 }
@@ -46,8 +48,8 @@ impl Default for Envelope {
 }
 
 impl Envelope {
-    /// Takes a sample. One without a finite time is left out; one that goes back in time counts
-    /// to the last stretch.
+    /// Adds a sample. A sample without a finite time is ignored; one that goes back in time belongs to the
+    /// last bucket.
     pub fn push(&mut self, time: f64, value: f64) {
         if !time.is_finite() {
             return;
@@ -55,7 +57,7 @@ impl Envelope {
         if self.start.is_nan() {
             self.start = time;
         }
-        // Halves, so that the difference of any two times is finite.
+        // The factor 0.5 keeps the difference of any two times finite.
         let passed = (0.5 * time - 0.5 * self.start).max(0.0);
         if self.length == 0.0 && passed > 0.0 {
             self.length = 2.0 * passed.min(f64::MAX / 4.0);
@@ -66,7 +68,7 @@ impl Envelope {
             place = self.place(passed);
         }
         let last = self.buckets.len() - 1;
-        // Not negative, and below the number of stretches.
+        // Not negative, and below the number of buckets.
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "as said")]
         let place = (place as usize).max(last);
         self.buckets.resize(place + 1, EMPTY);
@@ -78,7 +80,7 @@ impl Envelope {
         self.buckets[place] = self.buckets[place].merge(sample);
     }
 
-    /// Number of the stretch, as a float, for half the time since the start.
+    /// Returns the number of the bucket, as a float, for half the time since the start.
     fn place(&self, passed: f64) -> f64 {
         if self.length > 0.0 { (passed / (0.5 * self.length)).floor() } else { 0.0 }
     }
@@ -90,8 +92,8 @@ impl Envelope {
             pairs.map(|pair| pair.iter().fold(EMPTY, |all, one| all.merge(*one))).collect();
     }
 
-    /// The samples that were kept: times and values. A value that is not finite stands for all
-    /// such of its stretch, behind the others.
+    /// Returns the kept samples: times and values. One NaN represents all values of a bucket that are not
+    /// finite and follows its other samples.
     #[must_use]
     pub fn samples(&self) -> (Vec<f64>, Vec<f64>) {
         let (mut times, mut values) = (Vec::new(), Vec::new());
@@ -107,7 +109,7 @@ impl Envelope {
     }
 }
 
-/// The number of stretches as a float.
+/// Returns the largest number of buckets as a float.
 fn ends() -> f64 {
     f64::from(u16::try_from(BUCKETS).unwrap_or(u16::MAX))
 }

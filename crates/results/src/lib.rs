@@ -1,7 +1,8 @@
-//! Results of a run: the columns, the files they are written to as the run goes, and the way back.
+//! Result files of simulations: writes CSV and Parquet row by row during a run, and reads them.
 //!
-//! [`create`] opens a [`Sink`] by the ending of the file: [`CsvSink`] or [`ParquetSink`].
-//! [`Selection`] chooses the variables, [`Decimation`] the instants; [`Table`] reads a file.
+//! [`create`] opens a [`Sink`] by the extension of the file: [`CsvSink`] or [`ParquetSink`].
+//! [`Selection`] selects variables, [`Decimation`] selects communication points; [`Table`] reads a
+//! file.
 #![forbid(unsafe_code)]
 
 mod csv;
@@ -24,124 +25,125 @@ pub use parquet::ParquetSink;
 pub use read::Table;
 pub use select::{Selection, SelectionError};
 
-/// Name of the first column of every file, in s.
+/// Name of the first column of every file: time in s.
 pub const TIME: &str = "time";
 
-/// One recorded variable.
+/// A recorded variable.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Column {
-    /// As in `plant.x_p`.
+    /// Name, such as `plant.x_p`.
     pub name: String,
-    /// What its values are.
+    /// Type of the values.
     pub kind: ColumnKind,
-    /// Unit of the values, where one is stated.
+    /// Unit of the values, if known.
     pub unit: Option<String>,
 }
 
-/// The types of FMI 2.0; an Enumeration is an Integer here.
+/// The type of a column: a base type of FMI 2.0; an Enumeration is an Integer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ColumnKind {
-    /// fmi2Real.
+    /// `fmi2Real`.
     Real,
-    /// fmi2Integer.
+    /// `fmi2Integer`.
     Integer,
-    /// fmi2Boolean.
+    /// `fmi2Boolean`.
     Boolean,
-    /// fmi2String.
+    /// `fmi2String`.
     String,
 }
 
-/// The values of one instant, each list in the order of the columns of its kind.
+/// The values of a row except its time, by type, each in the order of the columns of that type.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Row<'a> {
-    /// Of the Real columns.
+    /// Values of the Real columns.
     pub reals: &'a [f64],
-    /// Of the Integer columns.
+    /// Values of the Integer columns.
     pub integers: &'a [i32],
-    /// Of the Boolean columns: zero is false.
+    /// Values of the Boolean columns: zero is false.
     pub booleans: &'a [i32],
-    /// Of the String columns.
+    /// Values of the String columns.
     pub strings: &'a [String],
 }
 
-/// A place that takes the rows of a run, one after another. One that is dropped without
-/// [`Sink::finish`] keeps every row that it was given, as far as the disk allows.
+/// A writer of result rows. A sink that is dropped without [`Sink::finish`] still writes every row, if
+/// the disk allows it.
 pub trait Sink: Send {
-    /// Takes the values at `time` in s. CSV allocates nothing here; Parquet does where it hands a
-    /// block of rows over.
+    /// Writes the row at `time` in s. CSV allocates no memory here; Parquet allocates when it writes a
+    /// block of rows.
     ///
     /// # Errors
     ///
-    /// [`ResultsError::Values`] where the row does not fit the columns; [`ResultsError::Write`].
+    /// [`ResultsError::Values`] if the row does not match the columns; [`ResultsError::Write`] if the file
+    /// cannot be written.
     fn row(&mut self, time: f64, row: &Row<'_>) -> Result<(), ResultsError>;
 
-    /// Hands every row so far to the operating system; the file is then whole and readable.
+    /// Passes every row so far to the operating system; the file is then complete and readable.
     ///
     /// # Errors
     ///
-    /// [`ResultsError::Write`].
+    /// [`ResultsError::Write`] if the file cannot be written.
     fn flush(&mut self) -> Result<(), ResultsError>;
 
-    /// Ends the file.
+    /// Completes and closes the file.
     ///
     /// # Errors
     ///
-    /// [`ResultsError::Write`].
+    /// [`ResultsError::Write`] if the file cannot be written.
     fn finish(self: Box<Self>) -> Result<(), ResultsError>;
 }
 
-/// Why results cannot be written or read.
+/// The error of writing or reading results.
 #[derive(Debug, thiserror::Error)]
 pub enum ResultsError {
-    /// The ending says no format.
+    /// The extension of the file is neither `.csv` nor `.parquet`.
     #[error("{}: results are written as .csv or .parquet", path.display())]
     Format {
         /// The file.
         path: PathBuf,
     },
-    /// Two columns of one name cannot be told apart by a reader.
+    /// Two columns have the same name.
     #[error("two columns of the results have the name {name:?}")]
     Duplicate {
         /// The name.
         name: String,
     },
-    /// A row with more or fewer values than columns.
+    /// The number of values of a row differs from the number of columns.
     #[error("a row has {found} values of type {kind:?}, expected {expected}")]
     Values {
-        /// Their type.
+        /// Type of the values.
         kind: ColumnKind,
-        /// Columns of that type.
+        /// Number of columns of this type.
         expected: usize,
-        /// Values in the row.
+        /// Number of values of this type in the row.
         found: usize,
     },
-    /// Another process, or another sink of this one, writes to the file.
+    /// Another process or another sink is writing the file.
     #[error(
-        "{}: another run writes its results to this file, expected one that ends first, or another \
-         folder or file (--out, --results)",
+    "{}: another run writes its results to this file; wait for its end or select another \
+     folder or file (--out, --results)",
         path.display()
     )]
     InUse {
         /// The file.
         path: PathBuf,
     },
-    /// The file cannot be made or has no more room.
+    /// The file cannot be created, or the disk is full.
     #[error("cannot write {}: {source}", path.display())]
     Write {
         /// The file.
         path: PathBuf,
-        /// What the operating system says.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// The file cannot be read, or is not what its ending says.
+    /// The file cannot be read, or its content does not match its extension.
     #[error("cannot read {}: {reason}", path.display())]
     Read {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The reason.
         reason: String,
     },
-    /// A cell that holds no number.
+    /// A cell does not contain a number.
     #[error("{}, line {line}: {name} is {text:?}, expected a number", path.display())]
     Number {
         /// The file.
@@ -150,10 +152,10 @@ pub enum ResultsError {
         line: u64,
         /// The column.
         name: String,
-        /// The cell.
+        /// Content of the cell.
         text: String,
     },
-    /// A column of texts where numbers are wanted.
+    /// A column contains texts; numbers are required.
     #[error("{}: {name} holds texts, expected numbers", path.display())]
     Text {
         /// The file.
@@ -161,17 +163,17 @@ pub enum ResultsError {
         /// The column.
         name: String,
     },
-    /// A name that the file does not have.
+    /// A requested column does not exist.
     #[error("{}: {source}", path.display())]
     Selection {
         /// The file.
         path: PathBuf,
-        /// Which name.
+        /// The pattern that matches no column.
         source: SelectionError,
     },
 }
 
-/// The formats of results, by the ending of the file.
+/// The format of a result file, by its extension.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Format {
     Csv,
@@ -191,13 +193,14 @@ impl Format {
     }
 }
 
-/// Makes the file of results, whose folder is made where it is missing; the ending chooses the
-/// format: `.csv` or `.parquet`.
+/// Creates a result file, and its folder if that is missing. The extension `.csv` or `.parquet` selects
+/// the format.
 ///
 /// # Errors
 ///
-/// [`ResultsError::Format`], [`ResultsError::Duplicate`], [`ResultsError::InUse`],
-/// [`ResultsError::Write`].
+/// [`ResultsError::Format`] for another extension, [`ResultsError::Duplicate`] for two columns of one
+/// name, [`ResultsError::InUse`] if another run is writing the file, [`ResultsError::Write`] if the
+/// file cannot be created.
 pub fn create(path: &Path, columns: &[Column]) -> Result<Box<dyn Sink>, ResultsError> {
     Ok(match Format::of(path)? {
         Format::Csv => Box::new(CsvSink::create(path, columns)?),
@@ -205,7 +208,7 @@ pub fn create(path: &Path, columns: &[Column]) -> Result<Box<dyn Sink>, ResultsE
     })
 }
 
-/// Names that differ from each other and from the time's.
+/// Checks that the names of the columns differ from each other and from [`TIME`].
 fn check_names(columns: &[Column]) -> Result<(), ResultsError> {
     let mut known = HashSet::from([TIME]);
     match columns.iter().find(|column| !known.insert(&column.name)) {
@@ -214,7 +217,7 @@ fn check_names(columns: &[Column]) -> Result<(), ResultsError> {
     }
 }
 
-/// How many columns there are of each kind, to hold rows against.
+/// The number of columns of each type.
 #[derive(Debug, Clone, Copy)]
 struct Widths {
     reals: usize,
@@ -249,7 +252,7 @@ impl Widths {
     }
 }
 
-/// An empty file in a folder that is made where it is missing. It is this process's alone as long as
+/// Creates an empty file, and its folder if that is missing. No other process can write the file while
 /// it is open.
 fn create_file(path: &Path) -> Result<File, ResultsError> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
@@ -265,23 +268,23 @@ fn create_file(path: &Path) -> Result<File, ResultsError> {
     Ok(file)
 }
 
-/// Opens a file for writing, its content as it is; none where another process has it open so. The
-/// lock ends with the process, however that ends.
+/// Opens a file for exclusive writing without changing its content; `None` if another process has it
+/// open for writing. The lock is released when the process ends, even by a crash.
 #[cfg(not(windows))]
 fn open_alone(path: &Path) -> io::Result<Option<File>> {
     let file = File::options().write(true).create(true).truncate(false).open(path)?;
-    // A device or a pipe may be for many.
+    // Several processes may share a device or a pipe.
     if !file.metadata()?.is_file() {
         return Ok(Some(file));
     }
     match file.try_lock() {
-        // A file system without locks cannot tell.
+        // The file system has no locks: assume that the file is free.
         Ok(()) | Err(fs::TryLockError::Error(_)) => Ok(Some(file)),
         Err(fs::TryLockError::WouldBlock) => Ok(None),
     }
 }
 
-/// As on other systems; readers may open the file, writers may not.
+/// Opens a file for exclusive writing, as on other systems. Readers may open it at the same time.
 #[cfg(windows)]
 fn open_alone(path: &Path) -> io::Result<Option<File>> {
     use std::os::windows::fs::OpenOptionsExt as _;

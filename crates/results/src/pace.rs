@@ -1,18 +1,18 @@
-//! How often a sink hands its rows over though it could still hold them.
+//! Timing of the automatic writes of a sink.
 
 use std::time::{Duration, Instant};
 
-/// Most rows between two looks at the clock.
+/// Largest number of rows between two readings of the clock.
 const STRIDE: u32 = 256;
 
-/// Tells when an interval of wall-clock time has passed. Where rows come fast the clock is looked
-/// at only now and then, because a look costs as much as several cells.
+/// A timer of an interval of wall-clock time. If rows arrive fast, it reads the clock for a few of them
+/// only, because a reading takes as long as writing several cells.
 #[derive(Debug)]
 pub(super) struct Pace {
     interval: Duration,
-    handed_over: Instant,
-    looked: Instant,
-    /// Rows until the next look, and between two looks.
+    last_write: Instant,
+    last_reading: Instant,
+    /// Rows until the next reading of the clock; then rows between two readings.
     left: u32,
     stride: u32,
 }
@@ -20,22 +20,22 @@ pub(super) struct Pace {
 impl Pace {
     pub(super) fn new(interval: Duration) -> Self {
         let now = Instant::now();
-        Self { interval, handed_over: now, looked: now, left: 1, stride: 1 }
+        Self { interval, last_write: now, last_reading: now, left: 1, stride: 1 }
     }
 
-    /// Counts a row; true where the interval has passed since it last was.
+    /// Counts a row. Returns true if the interval has passed since it last returned true.
     pub(super) fn due(&mut self) -> bool {
         self.left -= 1;
         if self.left > 0 {
             return false;
         }
         let now = Instant::now();
-        let slow = now.duration_since(self.looked) > self.interval / 16;
+        let slow = now.duration_since(self.last_reading) > self.interval / 16;
         self.stride = if slow { 1 } else { (2 * self.stride).min(STRIDE) };
-        (self.left, self.looked) = (self.stride, now);
-        let due = now.duration_since(self.handed_over) >= self.interval;
+        (self.left, self.last_reading) = (self.stride, now);
+        let due = now.duration_since(self.last_write) >= self.interval;
         if due {
-            self.handed_over = now;
+            self.last_write = now;
         }
         due
     }

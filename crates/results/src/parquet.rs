@@ -24,21 +24,20 @@ use footer::Footer;
 
 pub(super) use footer::units;
 
-/// What a Parquet file begins and ends with.
+/// The first and the last bytes of a Parquet file.
 const MAGIC: &[u8] = b"PAR1";
-/// Longest time that a row is in memory only, while rows keep coming.
+/// Longest time that a row stays in memory only, while further rows arrive.
 const INTERVAL: Duration = Duration::from_secs(1);
-/// Bytes of a page of a column.
+/// Size of a page of a column in bytes.
 const PAGE: usize = 1 << 20;
 
-/// Writes typed columns: `time` and Real as DOUBLE, Integer as INT32, Boolean as BOOLEAN, String
-/// as UTF-8; no value is null. Units stand in the footer's metadata.
+/// A sink that writes Parquet: `time` and Real as DOUBLE, Integer as INT32, Boolean as BOOLEAN, String
+/// as UTF-8; no value is null. The footer's metadata contains the units.
 ///
-/// Rows gather in a block of bounded size, which becomes a row group. Every hand-over, of a full
-/// block or of one that is still filling, writes the row group with a footer behind it in one
-/// piece over the footer before: the file is readable after each. A block that is still filling
-/// is written again by the next one. Where the disk has no room for a hand-over the file is what it
-/// was after the last one.
+/// Rows are collected in a block of bounded size, which becomes a row group. A single write replaces
+/// the previous footer by the row group and a new footer, so that the file is always readable. A partly
+/// filled block is written again by the next write. If the disk is full, the file keeps the content of
+/// the last successful write.
 #[derive(Debug)]
 pub struct ParquetSink {
     path: PathBuf,
@@ -47,23 +46,24 @@ pub struct ParquetSink {
     properties: Arc<WriterProperties>,
     footer: Footer,
     block: Block,
-    /// Where the row groups of full blocks end.
+    /// End of the row groups of full blocks.
     end: u64,
     /// Length of the file.
     length: u64,
-    /// Rows of the block that are in the file.
+    /// Number of rows of the present block that are in the file.
     written: usize,
-    /// What is written next; kept for its memory.
+    /// Buffer for the next write, reused to save allocations.
     bytes: Vec<u8>,
     pace: Pace,
 }
 
 impl ParquetSink {
-    /// Makes the file, without rows at first.
+    /// Creates the file without rows.
     ///
     /// # Errors
     ///
-    /// [`ResultsError::Duplicate`], [`ResultsError::Write`].
+    /// [`ResultsError::Duplicate`] for two columns of one name, [`ResultsError::InUse`] if another run is
+    /// writing the file, [`ResultsError::Write`] if the file cannot be created.
     pub fn create(path: &Path, columns: &[Column]) -> Result<Self, ResultsError> {
         check_names(columns)?;
         let failed = |source| write_error(path, source);
@@ -86,15 +86,15 @@ impl ParquetSink {
         Ok(sink)
     }
 
-    /// Writes the rows of the block and the footer; starts the next block where this one is full.
-    fn hand_over(&mut self) -> Result<(), ResultsError> {
+    /// Writes the rows of the block and the footer; starts the next block if this one is full.
+    fn write_rows(&mut self) -> Result<(), ResultsError> {
         let rows = self.block.rows();
         if rows == self.written && !self.block.is_full() {
             return Ok(());
         }
         let (group, size) = self.compose(rows)?;
         if let Err(error) = self.write() {
-            self.go_back();
+            self.restore_end();
             return Err(error);
         }
         self.written = rows;
@@ -107,8 +107,8 @@ impl ParquetSink {
         Ok(())
     }
 
-    /// Puts the first `rows` of the block as a row group into `bytes`, and the footer behind it: the
-    /// group and its size.
+    /// Encodes the first `rows` of the block as a row group, followed by the footer, to `bytes`. Returns the
+    /// metadata of the row group and its size.
     fn compose(&mut self, rows: usize) -> Result<(RowGroupMetaData, u64), ResultsError> {
         let group = self.encode(rows).map_err(|source| write_error(&self.path, source))?;
         let size = self.bytes.len() as u64;
@@ -117,10 +117,10 @@ impl ParquetSink {
         Ok((group, size))
     }
 
-    /// Makes the file what it was before a hand-over that failed: its end has been written over. What
-    /// is written had its place in the file, and needs no more of the disk. Where even that fails the
-    /// row groups of full blocks are left, with a footer that is shorter than any before.
-    fn go_back(&mut self) {
+    /// Restores the end of the file, which a failed write has overwritten. This needs no additional
+    /// space on the disk. If it also fails, the file keeps the row groups of full blocks, with a shorter
+    /// footer.
+    fn restore_end(&mut self) {
         let _ = self.file.set_len(self.length);
         let composed = match self.written {
             0 => {
@@ -135,13 +135,13 @@ impl ParquetSink {
         let _ = self.file.set_len(self.end);
         self.bytes.clear();
         if self.footer.append(&mut self.bytes, None).is_ok() {
-            // The error that led here is the one that is told.
+            // The caller reports the error of the write instead.
             let _ = self.write();
         }
         self.written = 0;
     }
 
-    /// The first `rows` of the block as a row group, in `bytes`.
+    /// Encodes the first `rows` of the block as a row group to `bytes`.
     fn encode(&mut self, rows: usize) -> Result<RowGroupMetaData, ParquetError> {
         self.bytes.clear();
         let mut bytes = TrackedWrite::new(std::mem::take(&mut self.bytes));
@@ -172,7 +172,7 @@ impl ParquetSink {
         footer::moved(&metadata, self.end)
     }
 
-    /// Puts `bytes` behind the row groups of full blocks, and nothing behind them.
+    /// Writes `bytes` after the row groups of full blocks, as the end of the file.
     fn write(&mut self) -> Result<(), ResultsError> {
         let length = self.end + self.bytes.len() as u64;
         self.file
@@ -189,29 +189,30 @@ impl Sink for ParquetSink {
     fn row(&mut self, time: f64, row: &Row<'_>) -> Result<(), ResultsError> {
         self.widths.check(row)?;
         if self.block.is_full() {
-            self.hand_over()?;
+            self.write_rows()?;
         }
         self.block.push(time, row);
-        if self.block.is_full() || self.pace.due() { self.hand_over() } else { Ok(()) }
+        if self.block.is_full() || self.pace.due() { self.write_rows() } else { Ok(()) }
     }
 
     fn flush(&mut self) -> Result<(), ResultsError> {
-        self.hand_over()
+        self.write_rows()
     }
 
     fn finish(mut self: Box<Self>) -> Result<(), ResultsError> {
-        self.hand_over()
+        self.write_rows()
     }
 }
 
 impl Drop for ParquetSink {
     fn drop(&mut self) {
-        // Nobody is left to be told of a failure.
-        let _ = self.hand_over();
+        // No caller is left to receive the error.
+        let _ = self.write_rows();
     }
 }
 
-/// Numbers plain, which is a copy of the memory; texts, which repeat, by a dictionary.
+/// Returns the encodings: plain for numbers, which copies the memory; a dictionary for texts, which
+/// repeat.
 fn properties(columns: &[Column]) -> WriterProperties {
     let mut properties = WriterProperties::builder()
         .set_dictionary_enabled(false)

@@ -1,4 +1,4 @@
-//! Results read back, row by row in bounded memory.
+//! Reads result files row by row in bounded memory.
 
 mod groups;
 mod lines;
@@ -7,26 +7,28 @@ use std::path::{Path, PathBuf};
 
 use super::{Column, Envelope, Format, ResultsError, Selection};
 
-/// A file of results, of a [`super::Sink`] or another with a column `time` or with the time first.
+/// A result file, written by a [`super::Sink`] or by another program. The time must be in the column
+/// `time` or in the first column.
 #[derive(Debug)]
 pub struct Table {
     path: PathBuf,
     format: Format,
-    /// Every column, the time among them.
+    /// All columns, including the time.
     columns: Vec<Column>,
-    /// Which of them is the time.
+    /// Position of the time column.
     time: usize,
 }
 
-/// Told the time and the values of the columns asked for.
+/// A function of the time and the values of the requested columns.
 type Visitor<'a> = dyn FnMut(f64, &[f64]) + 'a;
 
 impl Table {
-    /// Reads the names of the columns; Parquet also has their types and units.
+    /// Opens a file and reads the names of the columns; for Parquet also their types and units.
     ///
     /// # Errors
     ///
-    /// [`ResultsError::Format`], [`ResultsError::Read`].
+    /// [`ResultsError::Format`] for an extension other than `.csv` and `.parquet`, [`ResultsError::Read`]
+    /// if the file cannot be read.
     pub fn open(path: &Path) -> Result<Self, ResultsError> {
         let format = Format::of(path)?;
         let columns = match format {
@@ -40,24 +42,24 @@ impl Table {
         Ok(Self { path: path.to_owned(), format, columns, time })
     }
 
-    /// The columns in the order of the file, the time among them. What CSV says nothing of is
-    /// taken for Real, without unit.
+    /// Returns the columns in the order of the file, including the time. Columns of CSV have the type Real
+    /// and no unit.
     #[must_use]
     pub fn columns(&self) -> &[Column] {
         &self.columns
     }
 
-    /// Position of the column that is the time: the one of that name, otherwise the first.
+    /// Returns the position of the time column: the column `time` or else the first.
     #[must_use]
     pub fn time(&self) -> usize {
         self.time
     }
 
-    /// Positions of the columns that a selection chooses.
+    /// Returns the positions of the columns in a selection.
     ///
     /// # Errors
     ///
-    /// [`ResultsError::Selection`].
+    /// [`ResultsError::Selection`] if a pattern matches no column or no column is left.
     pub fn choose(&self, selection: &Selection) -> Result<Vec<usize>, ResultsError> {
         let names: Vec<&str> = self.columns.iter().map(|column| column.name.as_str()).collect();
         selection
@@ -65,16 +67,17 @@ impl Table {
             .map_err(|source| ResultsError::Selection { path: self.path.clone(), source })
     }
 
-    /// Goes through all rows with the values of the columns at `positions`: Boolean as 0 or 1, a
-    /// missing value as NaN. A last line of CSV that is cut short counts as no row.
+    /// Calls a function for each row, with the time and the values of the columns at `positions`: a
+    /// Boolean is 0 or 1, a missing value NaN. An incomplete last line of CSV is ignored.
     ///
     /// # Errors
     ///
-    /// [`ResultsError::Number`], [`ResultsError::Text`], [`ResultsError::Read`].
+    /// [`ResultsError::Number`] if a cell is no number, [`ResultsError::Text`] if a column contains texts,
+    /// [`ResultsError::Read`] if the file cannot be read.
     ///
     /// # Panics
     ///
-    /// Where there is no column at a position.
+    /// If a position is not below the number of columns.
     pub fn visit(
         &self,
         positions: &[usize],
@@ -88,23 +91,23 @@ impl Table {
         }
     }
 
-    /// The whole of one column.
+    /// Reads a whole column.
     ///
     /// # Errors
     ///
-    /// As [`Table::visit`].
+    /// Same as [`Table::visit`].
     pub fn column(&self, position: usize) -> Result<Vec<f64>, ResultsError> {
         let mut values = Vec::new();
         self.visit(&[position], &mut |_, row| values.push(row[0]))?;
         Ok(values)
     }
 
-    /// What a drawing needs of the columns at `positions`, in memory that does not depend on the
-    /// length of the file.
+    /// Reduces the columns at `positions` to the samples that a plot needs, in memory that does not
+    /// depend on the length of the file.
     ///
     /// # Errors
     ///
-    /// As [`Table::visit`].
+    /// Same as [`Table::visit`].
     pub fn envelopes(&self, positions: &[usize]) -> Result<Vec<Envelope>, ResultsError> {
         let mut envelopes = vec![Envelope::default(); positions.len()];
         self.visit(positions, &mut |time, row| {

@@ -1,48 +1,49 @@
-//! Which variables are recorded or drawn.
+//! Selection of variables to record or to plot.
 
-/// Most names that an error lists.
+/// Largest number of names in an error message.
 const SHOWN: usize = 5;
 
-/// Variables by name or pattern: those that one of `include` meets and none of `exclude`.
+/// A selection of variables by names and patterns: all variables that match a pattern of `include` and
+/// no pattern of `exclude`.
 ///
-/// A pattern that is the name of a variable, letter by letter, means that variable. Otherwise `*`
-/// stands for any number of letters, points among them, and `?` for one. Everything else stands
-/// for itself, brackets too: they are part of FMI's names, as in `x_hat[1]`.
+/// A pattern that equals the name of a variable selects only that variable. Otherwise `*` matches any
+/// characters, including dots, and `?` matches one character. Every other character matches itself,
+/// also brackets, which are part of names in FMI, as in `x_hat[1]`.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Selection {
-    /// Without any, all variables.
+    /// Patterns to include; empty includes all variables.
     pub include: Vec<String>,
-    /// What is left out of them.
+    /// Patterns to exclude from the included variables.
     pub exclude: Vec<String>,
 }
 
-/// Why variables cannot be chosen.
+/// The error of a selection.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SelectionError {
-    /// A pattern without any variable.
-    #[error("no variable is called {pattern:?}{near}")]
-    Nothing {
-        /// As it was given.
+    /// A pattern matches no variable.
+    #[error("no variable matches {pattern:?}{near}")]
+    NoMatch {
+        /// The pattern.
         pattern: String,
-        /// What there is instead, as part of the sentence.
+        /// Names of similar variables, as part of the message.
         near: String,
     },
-    /// Every variable that was included was excluded again.
-    #[error("no variable is left: all that are included are excluded too")]
+    /// `exclude` excludes every included variable.
+    #[error("the selection is empty: all included variables are also excluded")]
     Empty,
 }
 
 impl Selection {
-    /// Positions of the chosen among `names`: pattern by pattern in the order of `include`, within
-    /// a pattern in the order of `names`, none twice. Cost: patterns times names.
+    /// Returns the positions of the selected `names` without duplicates: in the order of `include`, within
+    /// a pattern in the order of `names`. The cost is proportional to patterns times names.
     ///
     /// # Errors
     ///
-    /// [`SelectionError`]: a pattern that meets no name, or nothing that is left.
+    /// [`SelectionError`] if a pattern matches no name or no name is left.
     pub fn choose<N: AsRef<str>>(&self, names: &[N]) -> Result<Vec<usize>, SelectionError> {
         let mut open = vec![true; names.len()];
         for pattern in &self.exclude {
-            for position in met(pattern, names)? {
+            for position in matching(pattern, names)? {
                 open[position] = false;
             }
         }
@@ -56,15 +57,15 @@ impl Selection {
             (0..names.len()).for_each(take);
         } else {
             for pattern in &self.include {
-                met(pattern, names)?.into_iter().for_each(&mut take);
+                matching(pattern, names)?.into_iter().for_each(&mut take);
             }
         }
         if chosen.is_empty() && !names.is_empty() { Err(SelectionError::Empty) } else { Ok(chosen) }
     }
 }
 
-/// The names that a pattern meets: at least one.
-fn met<N: AsRef<str>>(pattern: &str, names: &[N]) -> Result<Vec<usize>, SelectionError> {
+/// Returns the positions of the names that match a pattern, at least one.
+fn matching<N: AsRef<str>>(pattern: &str, names: &[N]) -> Result<Vec<usize>, SelectionError> {
     if let Some(same) = names.iter().position(|name| name.as_ref() == pattern) {
         return Ok(vec![same]);
     }
@@ -72,21 +73,21 @@ fn met<N: AsRef<str>>(pattern: &str, names: &[N]) -> Result<Vec<usize>, Selectio
     let found: Vec<usize> = names
         .iter()
         .enumerate()
-        .filter(|(_, name)| meets(&pieces, name.as_ref()))
+        .filter(|(_, name)| matches_pattern(&pieces, name.as_ref()))
         .map(|(position, _)| position)
         .collect();
     if found.is_empty() {
-        return Err(SelectionError::Nothing {
+        return Err(SelectionError::NoMatch {
             pattern: pattern.to_owned(),
-            near: near(pattern, names),
+            near: similar_hint(pattern, names),
         });
     }
     Ok(found)
 }
 
-/// Whether the whole name is what the pattern says. Goes back to the last `*` only, so the cost is
-/// at most the product of both lengths.
-fn meets(pattern: &[char], name: &str) -> bool {
+/// Whether the whole name matches the pattern. Backtracks to the last `*` only, so the cost is at most
+/// the product of both lengths.
+fn matches_pattern(pattern: &[char], name: &str) -> bool {
     let name: Vec<char> = name.chars().collect();
     let (mut at, mut letter) = (0, 0);
     let mut star: Option<(usize, usize)> = None;
@@ -96,7 +97,7 @@ fn meets(pattern: &[char], name: &str) -> bool {
                 star = Some((at, letter));
                 at += 1;
             }
-            Some(wanted) if *wanted == '?' || *wanted == name[letter] => {
+            Some(own) if *own == '?' || *own == name[letter] => {
                 at += 1;
                 letter += 1;
             }
@@ -112,10 +113,11 @@ fn meets(pattern: &[char], name: &str) -> bool {
     pattern[at..].iter().all(|rest| *rest == '*')
 }
 
-/// Most edits between two similar names.
+/// Largest edit distance of two similar names.
 const EDITS: usize = 2;
 
-/// Up to five of `names` that contain `name`, are contained in it or differ by two edits.
+/// Returns up to five of `names` that contain `name`, are contained in it, or have an edit distance of
+/// at most two.
 fn similar<'a>(names: impl Iterator<Item = &'a str>, name: &str) -> Vec<&'a str> {
     let edits = |known: &str| strsim::levenshtein(&known.to_lowercase(), &name.to_lowercase());
     let near = |known: &&str| {
@@ -129,21 +131,21 @@ fn similar<'a>(names: impl Iterator<Item = &'a str>, name: &str) -> Vec<&'a str>
     found
 }
 
-/// Names that may be meant: like the pattern without its wildcards, or where there are none such,
-/// the first ones.
-fn near<N: AsRef<str>>(pattern: &str, names: &[N]) -> String {
+/// Returns a hint for a message: names similar to the pattern without its wildcards, or else the first
+/// names.
+fn similar_hint<N: AsRef<str>>(pattern: &str, names: &[N]) -> String {
     let plain: String = pattern.chars().filter(|letter| !"*?".contains(*letter)).collect();
     let all = || names.iter().map(AsRef::as_ref);
     let similar = similar(all(), &plain);
     let count = names.len();
     match similar.is_empty() {
-        false => format!(", near it are {}", similar.join(", ")),
-        true if count == 0 => ", there are none at all".to_owned(),
+        false => format!("; similar names: {}", similar.join(", ")),
+        true if count == 0 => "; there are no variables".to_owned(),
         true => {
             let first: Vec<&str> = all().take(SHOWN).collect();
             let more =
                 if count > SHOWN { format!(" and {} more", count - SHOWN) } else { String::new() };
-            format!(", there are {}{more}", first.join(", "))
+            format!("; available: {}{more}", first.join(", "))
         }
     }
 }
@@ -175,8 +177,8 @@ mod tests {
 
     #[test]
     fn names_come_in_the_order_asked_for_and_once() {
-        let wanted = ["plant.theta", "plant.x_p", "plant.*"];
-        assert_eq!(chosen(&wanted, &[]).unwrap(), ["plant.theta", "plant.x_p"]);
+        let patterns = ["plant.theta", "plant.x_p", "plant.*"];
+        assert_eq!(chosen(&patterns, &[]).unwrap(), ["plant.theta", "plant.x_p"]);
     }
 
     #[test]
@@ -211,18 +213,21 @@ mod tests {
         let message = |include| chosen(&[include], &[]).unwrap_err().to_string();
         assert_eq!(
             message("plant.x_q"),
-            "no variable is called \"plant.x_q\", near it are plant.x_p"
+            "no variable matches \"plant.x_q\"; similar names: plant.x_p"
         );
         assert!(message("plant.tehta").contains("plant.theta"), "{}", message("plant.tehta"));
         assert!(message("*.inner.z").contains("ctrl.inner.y"), "{}", message("*.inner.z"));
         let strange = message("motor.*");
-        assert!(strange.contains("there are plant.x_p") && strange.contains("2 more"), "{strange}");
+        assert!(
+            strange.contains("available: plant.x_p") && strange.contains("2 more"),
+            "{strange}"
+        );
         assert!(chosen(&[], &["motor.*"]).is_err(), "an exclusion is held to the same");
     }
 
     #[test]
     fn many_stars_cost_no_more_than_the_product_of_the_lengths() {
         let pattern: Vec<char> = "*a".repeat(200).chars().chain(['b']).collect();
-        assert!(!meets(&pattern, &"a".repeat(5000)));
+        assert!(!matches_pattern(&pattern, &"a".repeat(5000)));
     }
 }

@@ -1,11 +1,11 @@
 use super::*;
 
-/// A column without a unit.
+/// Returns a column without a unit.
 pub(super) fn column(name: &str, kind: ColumnKind) -> Column {
     Column { name: name.to_owned(), kind, unit: None }
 }
 
-/// One column of each kind, twice, mixed.
+/// Returns two columns of each type, mixed.
 pub(super) fn mixed() -> Vec<Column> {
     let mut columns = vec![
         column("ctrl.mode", ColumnKind::Integer),
@@ -21,7 +21,7 @@ pub(super) fn mixed() -> Vec<Column> {
     columns
 }
 
-/// Row number `k` of a table with those columns.
+/// Writes row `k` of a table with the columns of [`mixed`].
 pub(super) fn give(sink: &mut dyn Sink, k: i32) {
     let texts = [format!("line\n{k}"), "say \"yes\", then".to_owned()];
     let row = Row {
@@ -91,7 +91,7 @@ fn a_file_that_cannot_be_made_is_named() {
 
 #[test]
 fn a_full_disk_is_an_error_with_the_name_of_the_file() {
-    // Linux alone has a device that is always full.
+    // Only Linux has a device that is always full.
     let full = Path::new("/dev/full");
     if !full.exists() {
         return;

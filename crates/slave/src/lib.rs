@@ -1,6 +1,6 @@
-//! The trait [`Slave`]: all that a co-simulation master knows of an FMU.
+//! The trait [`Slave`]: the interface through which a co-simulation master calls an FMU.
 //!
-//! Implement it for anything that a master shall step beside FMUs: a model in Rust, a proxy for a
+//! Implement it for anything that a master steps together with FMUs: a model in Rust, a proxy for a
 //! process, a test double. `fmu-import` implements it for FMUs; `master` couples slaves.
 #![forbid(unsafe_code)]
 
@@ -15,27 +15,23 @@ pub use fmu_description::abi::Status;
 pub use transformation::Transformation;
 pub use value::Value;
 
-/// An instance of a co-simulation FMU, by the functions of FMI 2.0.5, sections 2.1 and 4.2.
+/// An instance of a co-simulation FMU, with the functions of FMI 2.0.5, sections 2.1 and 4.2.
 ///
-/// Arrays that belong together have the same length. Every call either did what was asked
-/// (`fmi2OK`, `fmi2Warning`) or is an error. What a kind of slave does not have, it leaves to the
-/// method given here, which says that the function is missing.
-#[expect(clippy::missing_errors_doc, reason = "said at setup_experiment for all")]
+/// Arrays that belong together have the same length. A call succeeds (`fmi2OK`, `fmi2Warning`) or
+/// returns a [`CallError`]. The default implementation of an optional function returns
+/// [`Failure::Missing`].
+#[expect(clippy::missing_errors_doc, reason = "the trait documents the error of every function")]
 pub trait Slave: Send {
-    /// The model description that the instance belongs to.
+    /// Returns the model description of the FMU.
     fn description(&self) -> &ModelDescription;
 
-    /// Whether the outputs follow from the inputs alone: then it is stepped when its inputs are known,
-    /// in Jacobi's method after all others.
+    /// Whether the outputs depend on the present inputs only, with no state in between. The Jacobi
+    /// method steps such a slave after all others, when its inputs are known.
     fn is_function(&self) -> bool {
         false
     }
 
-    /// `fmi2SetDebugLogging` of all categories.
-    ///
-    /// # Errors
-    ///
-    /// As every function here: [`CallError`] with what went wrong and the FMU's own words.
+    /// `fmi2SetDebugLogging` for all categories.
     fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
         let _ = on;
         Err(absent("fmi2SetDebugLogging"))
@@ -53,8 +49,8 @@ pub trait Slave: Send {
     /// `fmi2Terminate`.
     fn terminate(&mut self) -> Result<(), CallError>;
 
-    /// `fmi2FreeInstance` at once, where it can be told whether that works: of an instance in a
-    /// process of its own. No other call may follow. The others are freed when they are dropped.
+    /// Calls `fmi2FreeInstance` now and reports its outcome, if the instance runs in its own process.
+    /// No other call may follow. Any other instance is freed when it is dropped.
     fn free(&mut self) -> Result<(), CallError> {
         Ok(())
     }
@@ -123,11 +119,12 @@ pub trait Slave: Send {
         Err(absent("fmi2GetRealOutputDerivatives"))
     }
 
-    /// `fmi2DoStep` from `time` over `size`, both in s. `never_back` is
-    /// `noSetFMUStatePriorToCurrentPoint`. An answer of `fmi2Pending` is waited for.
+    /// `fmi2DoStep` from `time` to `time + size`, both in s. `never_back` is
+    /// `noSetFMUStatePriorToCurrentPoint`. After `fmi2Pending` the call waits for the end of the step.
     fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError>;
 
-    /// `fmi2GetDirectionalDerivative`: the change of `unknowns` when `knowns` change by `seed`.
+    /// `fmi2GetDirectionalDerivative` (section 2.1.9): `changes = (dh/dv) seed` for the `unknowns` h and
+    /// the `knowns` v.
     fn directional_derivative(
         &mut self,
         unknowns: &[u32],
@@ -139,31 +136,33 @@ pub trait Slave: Send {
         Err(absent("fmi2GetDirectionalDerivative"))
     }
 
-    /// `fmi2GetFMUstate`: keeps the state of now in `slot` (0, 1, 2, ...), in place of the one there.
+    /// `fmi2GetFMUstate`: saves the present state in `slot` (0, 1, 2, ...) and overwrites an earlier one.
     fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
         let _ = slot;
         Err(absent("fmi2GetFMUstate"))
     }
 
-    /// `fmi2SetFMUstate`: back to the state kept in `slot`, which stays there.
+    /// `fmi2SetFMUstate`: restores the state saved in `slot`. The slot keeps it.
     fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
         let _ = slot;
         Err(absent("fmi2SetFMUstate"))
     }
 
-    /// `fmi2SerializeFMUstate` of the state of now.
+    /// `fmi2SerializeFMUstate`: returns the present state as bytes.
     fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
         Err(absent("fmi2SerializeFMUstate"))
     }
 
-    /// `fmi2DeSerializeFMUstate`, and on to that state.
+    /// `fmi2DeSerializeFMUstate` and `fmi2SetFMUstate`: restores a serialised state.
     fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
         let _ = bytes;
         Err(absent("fmi2DeSerializeFMUstate"))
     }
 
-    /// Sets Real inputs and their derivatives, steps, reads Real outputs and their derivatives:
-    /// one call, so that a slave in another process is asked once. A step done in part reads too.
+    /// Sets Real inputs and their derivatives, steps, and reads Real outputs and their derivatives.
+    ///
+    /// One call does all of it, so that a slave in another process receives one request. The outputs
+    /// are also read after a partial step.
     fn advance(&mut self, step: &mut Advance<'_>) -> Result<StepResult, CallError> {
         if !step.inputs.is_empty() {
             self.set_real(step.inputs, step.input_values)?;
@@ -183,9 +182,8 @@ pub trait Slave: Send {
         Ok(done)
     }
 
-    /// [`Slave::advance`] without derivatives, in the shape that costs least: the values of the
-    /// inputs with these references are set, the span (time and size in s) is stepped over, the
-    /// outputs with these references are read.
+    /// [`Slave::advance`] without derivatives, the fastest form: sets the inputs (references and
+    /// values), steps from `time` over `size` (in s), reads the outputs (references and values).
     fn pass(
         &mut self,
         inputs: (&[u32], &[f64]),
@@ -196,39 +194,41 @@ pub trait Slave: Send {
         self.advance(&mut Advance::held(inputs, (time, size), never_back, outputs))
     }
 
-    /// Whether a call has returned `fmi2Warning` since this was last asked; false where that is not
-    /// known, as of an instance in another process.
+    /// Whether a call has returned `fmi2Warning` since the last call of this function. False if this
+    /// is unknown, as for an instance in another process.
     fn take_warning(&mut self) -> bool {
         false
     }
 
-    /// The same slave to begin steps that are finished later; always `None` where stepping blocks the
+    /// Returns the interface for steps that run in the background; `None` if stepping blocks the
     /// calling thread.
     fn in_background(&mut self) -> Option<&mut dyn Background> {
         None
     }
 }
 
-/// A slave that steps while its caller goes on, for example to begin the steps of others.
+/// A slave that steps in the background, so that its caller can start the steps of other slaves.
 pub trait Background {
-    /// The first half of [`Slave::advance`]: sets the inputs and begins the step. What comes next is
-    /// [`Background::finish_advance`]; any other call waits for the end of the step, whose outcome
-    /// is then lost.
+    /// The first half of [`Slave::advance`]: sets the inputs and starts the step.
+    ///
+    /// Call [`Background::finish_advance`] next. Any other call waits for the end of the step and
+    /// discards its result.
     ///
     /// # Errors
     ///
-    /// Where the step cannot be begun: there is nothing to finish then.
+    /// [`CallError`] if the step cannot be started. Do not call [`Background::finish_advance`] then.
     fn begin_advance(&mut self, step: &Advance<'_>) -> Result<(), CallError>;
 
-    /// The second half of [`Slave::advance`]: waits for the step that was begun and reads the outputs.
+    /// The second half of [`Slave::advance`]: waits for the end of the step and reads the outputs.
     ///
     /// # Errors
     ///
-    /// As [`Slave::advance`], and where no step was begun.
+    /// [`CallError`] if the step or the reading of the outputs fails, or if no step was started.
     fn finish_advance(&mut self, step: &mut Advance<'_>) -> Result<StepResult, CallError>;
 }
 
-/// [`Background::finish_advance`] of a slave in the background, [`Slave::advance`] of another.
+/// Finishes a step: calls [`Background::finish_advance`] if the slave steps in the background, otherwise
+/// [`Slave::advance`].
 ///
 /// # Errors
 ///
@@ -240,40 +240,40 @@ pub fn finish(slave: &mut dyn Slave, step: &mut Advance<'_>) -> Result<StepResul
     }
 }
 
-/// What [`Slave::advance`] sets, steps over and reads.
+/// The arguments of [`Slave::advance`]: inputs, communication step and outputs.
 #[derive(Debug)]
 pub struct Advance<'a> {
-    /// Value references of the inputs to set, and their values.
+    /// Value references of the inputs to set.
     pub inputs: &'a [u32],
-    /// One for each of `inputs`.
+    /// Values of `inputs`.
     pub input_values: &'a [f64],
-    /// Value references of the inputs whose derivatives are set, with orders and values.
+    /// Value references of the inputs whose derivatives are set.
     pub derived_inputs: &'a [u32],
-    /// One for each of `derived_inputs`.
+    /// Orders of the derivatives of `derived_inputs`.
     pub input_orders: &'a [i32],
-    /// One for each of `derived_inputs`.
+    /// Values of the derivatives of `derived_inputs`.
     pub input_derivatives: &'a [f64],
-    /// Begin of the step in s.
+    /// Start of the step in s.
     pub time: f64,
-    /// Its size in s.
+    /// Size of the step in s.
     pub size: f64,
     /// `noSetFMUStatePriorToCurrentPoint`.
     pub never_back: bool,
     /// Value references of the outputs to read.
     pub outputs: &'a [u32],
-    /// One for each of `outputs`.
+    /// Receives the values of `outputs`.
     pub output_values: &'a mut [f64],
-    /// Value references of the outputs whose derivatives are read, with orders and values.
+    /// Value references of the outputs whose derivatives are read.
     pub derived_outputs: &'a [u32],
-    /// One for each of `derived_outputs`.
+    /// Orders of the derivatives of `derived_outputs`.
     pub output_orders: &'a [i32],
-    /// One for each of `derived_outputs`.
+    /// Receives the derivatives of `derived_outputs`.
     pub output_derivatives: &'a mut [f64],
 }
 
 impl<'a> Advance<'a> {
-    /// A step from `time` over `size` without derivatives: references and values of the inputs, and
-    /// of the outputs.
+    /// A step from `time` over `size` (in s) with constant inputs: references and values of the inputs
+    /// and of the outputs, no derivatives.
     #[must_use]
     pub fn held(
         (inputs, input_values): (&'a [u32], &'a [f64]),
@@ -299,35 +299,35 @@ impl<'a> Advance<'a> {
     }
 }
 
-/// How far a step came.
+/// The result of a communication step: complete or partial.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StepResult {
-    /// To its end.
+    /// The step reached its end.
     Whole,
-    /// `fmi2Discard`: only to `fmi2LastSuccessfulTime`.
+    /// `fmi2Discard`: the step ended early.
     Part {
-        /// That time in s.
+        /// `fmi2LastSuccessfulTime`: the time reached, in s.
         reached: f64,
-        /// `fmi2Terminated`: the FMU wants the simulation to end there.
+        /// `fmi2Terminated`: the FMU requests the end of the simulation at that time.
         terminated: bool,
     },
 }
 
-/// A call that an FMU refused or failed.
+/// The error of a call of an FMU.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{function} {failure}{}", quoted(.messages))]
 pub struct CallError {
-    /// The function of the standard.
+    /// Name of the FMI function.
     pub function: &'static str,
-    /// How it failed.
+    /// How the call failed.
     pub failure: Failure,
-    /// What the FMU said to the logger during the call.
+    /// Messages that the FMU logged during the call.
     pub messages: Vec<String>,
 }
 
 impl CallError {
-    /// Whether the instance may be used on: the call was refused, without `fmi2Fatal` and without the
-    /// end of a process.
+    /// Whether the instance can still be used: the call returned a status other than `fmi2Fatal`, or the
+    /// function is missing.
     #[must_use]
     pub fn leaves_the_instance_usable(&self) -> bool {
         match &self.failure {
@@ -341,23 +341,23 @@ impl CallError {
 /// How a call failed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Failure {
-    /// It returned this status.
+    /// The function returned this status.
     Status(Status),
-    /// It returned a value that the standard does not know.
+    /// The function returned a value that is no `fmi2Status`.
     UnknownStatus(i32),
-    /// The library, or this way in, does not have the function.
+    /// The FMU does not have the function, or this kind of slave does not offer it.
     Missing,
-    /// It panicked inside the crate through which it was called.
+    /// The importer panicked during the call; the text is the panic's message.
     Panicked(String),
-    /// The process of the FMU was ended by this signal: number and name.
+    /// A signal ended the process of the FMU: number and name.
     Killed(i32, &'static str),
     /// The FMU ended its process with this exit status.
     Exited(i32),
-    /// It did not return within this time in s; its process was ended.
+    /// The function did not return within this time in s; the importer ended the FMU's process.
     TimedOut(f64),
-    /// Its process crashed after it had not been given memory beyond this limit in bytes.
+    /// The process of the FMU crashed when it needed more memory than this limit in bytes.
     OutOfMemory(u64),
-    /// It answered something impossible: what.
+    /// The function returned an impossible result; the text describes it.
     InvalidAnswer(String),
 }
 
@@ -386,7 +386,7 @@ impl fmt::Display for Failure {
     }
 }
 
-/// The error that a function is missing.
+/// Returns the error [`Failure::Missing`] for `function`.
 #[cold]
 #[must_use]
 pub fn absent(function: &'static str) -> CallError {

@@ -1,25 +1,25 @@
-//! What becomes of a value between an output and an input (SSP 1.0, section 4.5.4).
+//! Transformations of values on connections (SSP 1.0, section 4.5.4).
 
-/// A change of values on a connection.
+/// A transformation of the values of a connection.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Transformation {
-    /// None.
+    /// `target = source`.
     #[default]
     Identity,
-    /// `target = factor source + offset`, of Reals. An Integer source is taken as a Real.
+    /// `target = factor source + offset` for Reals. An Integer source is converted to Real.
     Linear {
         /// The factor.
         factor: f64,
         /// The offset, in the unit of the target.
         offset: f64,
     },
-    /// Source and target of each pair, of Integers or of the numbers of enumerations.
+    /// A map of Integers or enumeration values: pairs of source and target.
     Integer(Vec<(i32, i32)>),
-    /// `false` and `true` become these.
+    /// A map of Booleans.
     Boolean {
-        /// What becomes of `false`.
+        /// The target for the source `false`.
         from_false: bool,
-        /// What becomes of `true`.
+        /// The target for the source `true`.
         from_true: bool,
     },
 }

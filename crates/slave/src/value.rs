@@ -1,13 +1,13 @@
-//! The value of a variable, read from text.
+//! Values of variables, parsed from text.
 
 use std::fmt;
 
 use fmu_description::{IntegerType, Kind, SimpleType};
 
-/// Relative difference of a Real that an FMU may make of a value that it is given.
-const NEAR: f64 = 1e-9;
+/// Relative tolerance of [`Value::is_near`] for Reals.
+const TOLERANCE: f64 = 1e-9;
 
-/// A value of one of the types of the standard; an Enumeration is an Integer.
+/// A value of one of the base types of FMI; an Enumeration is an Integer.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
     /// Real.
@@ -46,7 +46,7 @@ impl Value {
 }
 
 impl Value {
-    /// The start value in a description, where there is a number or a Boolean.
+    /// Returns the start value in a model description; `None` for a String or without start value.
     #[must_use]
     pub fn start(kind: &Kind) -> Option<Self> {
         match kind {
@@ -59,13 +59,14 @@ impl Value {
         }
     }
 
-    /// Whether `found`, read from an FMU, is this value: Reals but for a relative difference of 1e-9.
+    /// Whether `found`, read from an FMU, equals this value; for Reals within a relative difference of
+    /// 1e-9.
     #[must_use]
     pub fn is_near(&self, found: &Self) -> bool {
         match (self, found) {
             (Value::Real(value), Value::Real(found)) => {
                 value.total_cmp(found).is_eq()
-                    || (found - value).abs() <= NEAR * value.abs()
+                    || (found - value).abs() <= TOLERANCE * value.abs()
                     || value.is_nan() && found.is_nan()
             }
             _ => self == found,

@@ -1,21 +1,21 @@
-//! The next step from the error of the last.
+//! Step size control: the size of the next step from the error of the last one.
 
 use serde::{Deserialize, Serialize};
 
-/// Part of the step that would just meet the tolerance.
+/// Ratio of the chosen step to the largest step that meets the tolerance.
 const SAFETY: f64 = 0.9;
-/// Limits of one change of the step.
+/// Smallest and largest ratio of two consecutive steps.
 const SHRINK: f64 = 0.2;
 const GROW: f64 = 5.0;
-/// Errors below this count as this much, so that one error of zero is no reason for a leap.
-const LEAST: f64 = 1e-10;
-/// Part of the size asked for below which a step was cut short, and not by the rounding of times.
-const CUT: f64 = 1.0 - 1e-9;
+/// Lower bound of errors, so that one error of zero does not cause a very large step.
+const ERROR_FLOOR: f64 = 1e-10;
+/// Ratio of the actual to the requested size below which a step counts as shortened, not as rounded.
+const SHORTENED: f64 = 1.0 - 1e-9;
 
 /// Smallest and largest step in s.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SizeBounds {
-    /// The smallest step that is tried.
+    /// The smallest step.
     pub smallest: f64,
     /// The largest step.
     pub largest: f64,
@@ -27,17 +27,17 @@ impl SizeBounds {
     }
 }
 
-/// The law of both controllers, for an error that goes as `H^q`:
+/// The control law of all controllers, for an error proportional to `H^q`:
 ///
 /// `H_next / H = (e / e_0)^(-0.7/q) (e_before / e_0)^(0.4/q)`, `e_0 = 0.9^q`,
 ///
-/// proportional and integral in log H and log e; it settles where `e = e_0`, at 0.9 times the step for
+/// a PI controller in log H and log e. Its steady state is `e = e_0`, at 0.9 times the step for
 /// which `e = 1`. Gustafsson 1991, "Control theoretic techniques for stepsize selection in explicit
 /// Runge-Kutta methods"; exponents: Hairer and Wanner 1996, section IV.2.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Law {
     exponent: f64,
-    /// `e_before / e_0`; 1 where there is none.
+    /// `e_before / e_0`; 1 without a previous error.
     before: f64,
 }
 
@@ -47,66 +47,66 @@ impl Law {
     }
 
     fn factor(&mut self, error: f64) -> f64 {
-        let now = error.max(LEAST) / SAFETY.powf(self.exponent);
+        let now = error.max(ERROR_FLOOR) / SAFETY.powf(self.exponent);
         let (proportional, integral) = (0.4 / self.exponent, 0.3 / self.exponent);
         let factor = now.powf(-integral - proportional) * self.before.powf(proportional);
         self.before = now;
         factor.clamp(SHRINK, GROW)
     }
 
-    /// 0.9 times the step with an error of 1, by one of `size` with that error.
-    fn tolerable(&self, size: f64, error: f64) -> f64 {
-        size * SAFETY * error.max(LEAST).powf(-1.0 / self.exponent)
+    /// Returns 0.9 times the step for which the error is 1, given the error of a step of `size`.
+    fn tolerable_size(&self, size: f64, error: f64) -> f64 {
+        size * SAFETY * error.max(ERROR_FLOOR).powf(-1.0 / self.exponent)
     }
 
-    /// Errors of a step cut short, or before an event, are no measure for those to come.
+    /// Clears the previous error, which does not predict the next one after a shortened step or an event.
     fn forget(&mut self) {
         self.before = 1.0;
     }
 }
 
-/// What becomes of a step.
+/// The result of the error test of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Verdict {
-    /// It stands.
+    /// The step is accepted.
     Accepted {
-        /// Size of the next one in s.
+        /// Size of the next step in s.
         next: f64,
     },
-    /// To be repeated from its begin.
+    /// The step must be repeated from its start.
     Rejected {
-        /// With this size in s: half of it at most.
+        /// Size of the repeated step in s, at most half of the rejected one.
         retry: f64,
     },
-    /// Even the smallest step does not meet the tolerance.
+    /// The smallest step does not meet the tolerance.
     Stuck,
 }
 
-/// Steps by an estimate of their error, to be repeated where it is too large.
+/// Step size control by an error estimate; a step with too large an error is repeated.
 ///
-/// The error e is relative to the tolerance: up to 1 the step stands ([`super::Scale::distance`]).
+/// The error e is relative to the tolerance: a step with `e <= 1` is accepted
+/// ([`super::Scale::distance`]).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ErrorControl {
     bounds: SizeBounds,
     law: Law,
     /// The size asked for last.
-    wanted: f64,
+    requested: f64,
     rejected: bool,
 }
 
 impl ErrorControl {
-    /// `exponent`: q of the estimate, `e = O(H^q)`; one more than the order of the method where
-    /// it estimates the error of one step. At least 1 is taken.
+    /// Creates a controller for an estimate `e = O(H^q)` with q = `exponent`, at least 1. For the local
+    /// error of a method q is the order of the method plus 1.
     #[must_use]
     pub fn new(bounds: SizeBounds, exponent: f64) -> Self {
         let law = Law::new(exponent.max(1.0));
-        Self { bounds, law, wanted: bounds.smallest, rejected: false }
+        Self { bounds, law, requested: bounds.smallest, rejected: false }
     }
 
-    /// Judges a step of `size` s with that error; not a number counts as infinite.
+    /// Accepts or rejects a step of `size` s with this error; NaN counts as infinite.
     ///
-    /// A step that was shorter than asked for, to end at an event or a stop time, does not make the
-    /// following ones short.
+    /// A step that was shortened to end at an event or a stop time does not shorten the following steps.
     pub fn judge(&mut self, size: f64, error: f64) -> Verdict {
         if error.is_nan() || error > 1.0 {
             return self.reject(size, error);
@@ -115,13 +115,13 @@ impl ErrorControl {
         if self.rejected {
             next = next.min(size);
         }
-        if size < CUT * self.wanted {
-            next = next.max(self.wanted.min(self.law.tolerable(size, error)));
+        if size < SHORTENED * self.requested {
+            next = next.max(self.requested.min(self.law.tolerable_size(size, error)));
             self.law.forget();
         }
         self.rejected = false;
-        self.wanted = self.bounds.clamp(next);
-        Verdict::Accepted { next: self.wanted }
+        self.requested = self.bounds.clamp(next);
+        Verdict::Accepted { next: self.requested }
     }
 
     fn reject(&mut self, size: f64, error: f64) -> Verdict {
@@ -131,88 +131,89 @@ impl ErrorControl {
         let fit = SAFETY * error.powf(-1.0 / self.law.exponent);
         let factor = if fit.is_finite() { fit.clamp(SHRINK, 0.5) } else { SHRINK };
         self.rejected = true;
-        self.wanted = self.bounds.clamp(size * factor);
-        Verdict::Rejected { retry: self.wanted }
+        self.requested = self.bounds.clamp(size * factor);
+        Verdict::Rejected { retry: self.requested }
     }
 
-    /// Forgets the last error, as after an event.
+    /// Clears the previous error, for example after an event.
     pub fn forget(&mut self) {
         self.law.forget();
     }
 }
 
-/// Steps by a measure that goes as `H^q`, nothing repeated: the increment of the connected signals
-/// (q = 1), or the residual of energy.
+/// Step size control without repeated steps, by a measure proportional to `H^q`: the increment of the
+/// connected signals (q = 1) or the energy residual.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ForwardControl {
     bounds: SizeBounds,
     law: Law,
     /// The size asked for last.
-    wanted: f64,
+    requested: f64,
 }
 
 impl ForwardControl {
-    /// `exponent`: q of the measure. At least 1 is taken.
+    /// Creates a controller for a measure proportional to `H^q` with q = `exponent`, at least 1.
     #[must_use]
     pub fn new(bounds: SizeBounds, exponent: f64) -> Self {
-        Self { bounds, law: Law::new(exponent.max(1.0)), wanted: bounds.smallest }
+        Self { bounds, law: Law::new(exponent.max(1.0)), requested: bounds.smallest }
     }
 
-    /// The next step in s after one of `size` s, which was to have a measure of at most 1; not a
-    /// number counts as infinite.
+    /// Returns the size of the next step in s after a step of `size` s with this measure, whose target is
+    /// at most 1; NaN counts as infinite.
     ///
-    /// A step that was shorter than asked for does not make the following ones short.
+    /// A step that was shortened to end at an event or a stop time does not shorten the following steps.
     pub fn next(&mut self, size: f64, measure: f64) -> f64 {
         let measure = if measure.is_nan() { f64::INFINITY } else { measure };
-        let measure = measure.min(1.0 / LEAST);
+        let measure = measure.min(1.0 / ERROR_FLOOR);
         let mut next = size * self.law.factor(measure);
-        if size < CUT * self.wanted {
-            next = next.max(self.wanted.min(self.law.tolerable(size, measure)));
+        if size < SHORTENED * self.requested {
+            next = next.max(self.requested.min(self.law.tolerable_size(size, measure)));
             self.law.forget();
         }
-        self.wanted = self.bounds.clamp(next);
-        self.wanted
+        self.requested = self.bounds.clamp(next);
+        self.requested
     }
 
-    /// Forgets the last measure, as after an event.
+    /// Clears the previous measure, for example after an event.
     pub fn forget(&mut self) {
         self.law.forget();
     }
 }
 
-/// A power bond at the end of a step: two signals whose product is a power, as the receiving FMUs
-/// took them to be and as the sending ones then found them. Both in the unit of the sending end.
+/// A power bond at the end of a step: two signals whose product is a power, each as extrapolated for
+/// the receiving FMU and as computed by the sending FMU, in the unit of the sending end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bond {
-    /// The first signal: its extrapolation at the end of the step, its value there.
+    /// The first signal at the end of the step: extrapolated and computed value.
     pub first: (f64, f64),
-    /// The second signal, likewise.
+    /// The second signal at the end of the step: extrapolated and computed value.
     pub second: (f64, f64),
 }
 
 impl Bond {
-    /// `first_taken second_found - first_found second_taken`: power that one FMU gave and the
-    /// other did not get. Zero where both extrapolations are right.
+    /// Returns the power residual `first_extrapolated second_computed - first_computed
+    /// second_extrapolated`: power that one FMU sent and the other did not receive. It is zero if both
+    /// extrapolations are exact.
     #[must_use]
     pub fn residual(&self) -> f64 {
         self.first.0 * self.second.1 - self.first.1 * self.second.0
     }
 
-    /// `|first_found second_found|`.
+    /// Returns the transferred power `|first_computed second_computed|`.
     #[must_use]
     pub fn power(&self) -> f64 {
         (self.first.1 * self.second.1).abs()
     }
 }
 
-/// Steps by the energy that power bonds lost or made, nothing repeated (ECCO).
+/// Energy-conservation-based step size control (ECCO), without repeated steps.
 ///
-/// `e = sqrt(1/n sum_k (dP_k / (absolute N_k + relative P_k))^2)` with the power residual `dP_k` of
-/// [`Bond::residual`], `P_k` the largest power that bond k has had so far, `N_k` the product of the nominals of its
-/// signals. What a bond loses until t is then about `relative P_k (t - t0)`.
-/// Sadjina, Kyllingstad, Skjong and Pedersen 2017, "Energy conservation and power bonds in
-/// co-simulations: non-iterative adaptive step size control and error estimation", weigh the energy
-/// `dP_k H` by an energy that has to be stated; the power so far takes its place here.
+/// The measure is `e = sqrt(1/n sum_k (dP_k / (absolute N_k + relative P_k))^2)` with the power
+/// residual `dP_k` of [`Bond::residual`], the largest power `P_k` of bond k so far, and the product
+/// `N_k` of the nominals of its signals. The energy error of a bond until t is then about
+/// `relative P_k (t - t0)`. Sadjina, Kyllingstad, Skjong and Pedersen 2017, "Energy conservation and
+/// power bonds in co-simulations: non-iterative adaptive step size control and error estimation",
+/// relate the energy `dP_k H` to an energy given by the user; here the largest power replaces it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EnergyControl {
     control: ForwardControl,
@@ -222,8 +223,8 @@ pub struct EnergyControl {
 }
 
 impl EnergyControl {
-    /// `exponent`: that of the power residual, the order of the extrapolation and one: 1 for held
-    /// inputs, 2 for lines. `nominals`: `N_k`.
+    /// Creates a controller. `exponent` is the exponent q of the power residual, the order of the
+    /// extrapolation plus 1: 1 for constant, 2 for linear extrapolation. `nominals` are the `N_k`.
     #[must_use]
     pub fn new(
         bounds: SizeBounds,
@@ -240,7 +241,7 @@ impl EnergyControl {
         }
     }
 
-    /// The measure e of a step after which the bonds are as given.
+    /// Returns the measure e of a step from the bonds at its end.
     pub fn measure(&mut self, bonds: &[Bond]) -> f64 {
         if bonds.is_empty() {
             return 0.0;
@@ -254,7 +255,7 @@ impl EnergyControl {
         f64::sqrt(sum / count)
     }
 
-    /// The next step in s after one of `size` s, after which the bonds are as given.
+    /// Returns the size of the next step in s from the `size` of the last one in s and the bonds at its end.
     pub fn next(&mut self, size: f64, bonds: &[Bond]) -> f64 {
         let measure = self.measure(bonds);
         self.control.next(size, measure)

@@ -1,13 +1,13 @@
-//! Linear equations in place: what the stepping loop may call.
+//! Dense linear equations, solved in place without allocation.
 
 use serde::{Deserialize, Serialize};
 
-/// `P M = L U` of a square matrix, by Gauss' elimination with row pivoting (Golub and Van Loan 2013,
-/// algorithm 3.4.1). `2/3 n^3` operations; no allocation after the construction.
+/// LU factorisation `P M = L U` of a square matrix, by Gaussian elimination with row pivoting (Golub
+/// and Van Loan 2013, algorithm 3.4.1). `2/3 n^3` operations; no allocation after construction.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Factors {
     n: usize,
-    /// L below the diagonal, U from it on, column by column.
+    /// L below the diagonal, U on and above it, column by column.
     entries: Vec<f64>,
     pivots: Vec<usize>,
     unit: Vec<f64>,
@@ -18,8 +18,8 @@ impl Factors {
         Self { n, entries: vec![0.0; n * n], pivots: vec![0; n], unit: vec![0.0; n] }
     }
 
-    /// Takes over `matrix` (column by column) and factors it; `|M^-1|_1`, infinite where a pivot is
-    /// zero or not finite.
+    /// Factorises `matrix` (column by column) and returns `|M^-1|_1`, infinite if a pivot is zero or not
+    /// finite.
     pub(super) fn factor(&mut self, matrix: &[f64]) -> f64 {
         self.entries.copy_from_slice(matrix);
         for column in 0..self.n {
@@ -93,8 +93,8 @@ impl Factors {
     }
 }
 
-/// `|M|_1` of a matrix of n rows, column by column.
-pub(super) fn largest_column(matrix: &[f64], n: usize) -> f64 {
+/// Returns `|M|_1` of a matrix of n rows, stored column by column.
+pub(super) fn norm_1(matrix: &[f64], n: usize) -> f64 {
     let sums = matrix.chunks_exact(n.max(1)).map(|column| column.iter().map(|x| x.abs()).sum());
     sums.fold(0.0, f64::max)
 }
@@ -104,7 +104,7 @@ mod tests {
     use super::*;
     use nalgebra::DMatrix;
 
-    /// Entries between -1 and 1 that follow from their place.
+    /// Deterministic pseudo-random entries between -1 and 1.
     fn scattered(n: usize) -> DMatrix<f64> {
         let mut state = 7_u64;
         DMatrix::from_fn(n, n, |_, _| {
@@ -119,8 +119,7 @@ mod tests {
             let matrix = scattered(n);
             let right = scattered(n).column(0).into_owned();
             let mut factors = Factors::new(n);
-            let condition =
-                factors.factor(matrix.as_slice()) * largest_column(matrix.as_slice(), n);
+            let condition = factors.factor(matrix.as_slice()) * norm_1(matrix.as_slice(), n);
             let mut found = right.clone();
             factors.solve(found.as_mut_slice());
             let expected = matrix.clone().lu().solve(&right).unwrap();
@@ -134,7 +133,7 @@ mod tests {
     fn the_norm_is_that_of_the_inverse() {
         // Inverse of [[1, 2], [3, 4]]: [[-2, 1], [1.5, -0.5]].
         assert!((Factors::new(2).factor(&[1.0, 3.0, 2.0, 4.0]) - 3.5).abs() < 1e-13);
-        assert!((largest_column(&[1.0, 3.0, 2.0, 4.0], 2) - 6.0).abs() < 1e-15);
+        assert!((norm_1(&[1.0, 3.0, 2.0, 4.0], 2) - 6.0).abs() < 1e-15);
         // The inverse of the Hilbert matrix of order 3 is [[9, -36, 30], [-36, 192, -180],
         // [30, -180, 180]].
         let hilbert = [1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 4.0, 1.0 / 5.0];

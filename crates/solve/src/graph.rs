@@ -1,61 +1,62 @@
-//! The order of what depends on each other.
+//! Dependency graphs: strongly connected components and their topological order.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// The strongly connected components of a graph, each before those that need it.
+/// The strongly connected components of a graph in topological order: each before its dependents.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Components {
     /// The nodes, component after component; ascending within each.
     nodes: Vec<usize>,
-    /// Where each component begins in `nodes`, and the end of the last.
-    begins: Vec<usize>,
-    /// Whether each is a loop.
+    /// Start of each component in `nodes`, and the end of the last.
+    starts: Vec<usize>,
+    /// Whether each component is a loop.
     loops: Vec<bool>,
 }
 
 impl Components {
-    /// Number of components.
+    /// Returns the number of components.
     #[must_use]
     pub fn len(&self) -> usize {
         self.loops.len()
     }
 
-    /// Whether there are none.
+    /// Whether there are no components.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.loops.is_empty()
     }
 
-    /// The nodes of component `index`, ascending.
+    /// Returns the nodes of component `index`, ascending.
     #[must_use]
     pub fn nodes(&self, index: usize) -> &[usize] {
-        &self.nodes[self.begins[index]..self.begins[index + 1]]
+        &self.nodes[self.starts[index]..self.starts[index + 1]]
     }
 
-    /// Whether the nodes of component `index` need each other, or one itself.
+    /// Whether component `index` is a loop: several nodes, or one that depends on itself.
     #[must_use]
     pub fn is_loop(&self, index: usize) -> bool {
         self.loops[index]
     }
 
-    /// All nodes: the order in which to go through them.
+    /// Returns all nodes, component by component in topological order.
     #[must_use]
     pub fn sequence(&self) -> &[usize] {
         &self.nodes
     }
 }
 
-/// The strongly connected components of the graph of `count` nodes, in an order in which each
-/// comes after all that it needs; of those that are free the one with the lowest node first.
+/// Returns the strongly connected components of a graph of `count` nodes in topological order: each
+/// component follows all components on which it depends. Among several possible next components the
+/// one with the lowest node comes first.
 ///
-/// `edges`: pairs (needed, needing) of numbers below `count`; others are passed over, repeated ones
-/// do not matter. Components by Tarjan 1972, "Depth-first search and linear graph algorithms", without
-/// recursion, `O(V + E)`; their order by Kahn 1962, "Topological sorting of large networks",
-/// with a heap, `O(E + V log V)`.
+/// `edges` are pairs (from, to): node `to` depends on node `from`. Edges with a node not below `count`
+/// are ignored, repeated edges have no effect. Components by Tarjan 1972, "Depth-first search and
+/// linear graph algorithms", without recursion, `O(V + E)`; their order by Kahn 1962, "Topological
+/// sorting of large networks", with a heap, `O(E + V log V)`.
 #[must_use]
 pub fn components(count: usize, edges: &[(usize, usize)]) -> Components {
-    let successors = Lists::new(count, edges.iter().copied());
+    let successors = AdjacencyLists::new(count, edges.iter().copied());
     let (component, number) = tarjan(&successors);
     let between = edges.iter().filter(|(from, to)| *from < count && *to < count);
     let between = between.map(|(from, to)| (component[*from], component[*to]));
@@ -69,55 +70,56 @@ pub fn components(count: usize, edges: &[(usize, usize)]) -> Components {
     let selves = edges.iter().filter(|(from, to)| from == to && *from < count);
     selves.for_each(|(node, _)| looped[component[*node]] = true);
 
-    let order = kahn(&Lists::new(number, between.filter(|(from, to)| from != to)), &lowest);
-    let mut begins = vec![0; number + 1];
+    let order =
+        kahn(&AdjacencyLists::new(number, between.filter(|(from, to)| from != to)), &lowest);
+    let mut starts = vec![0; number + 1];
     for (place, &owner) in order.iter().enumerate() {
-        begins[place + 1] = begins[place] + size[owner];
+        starts[place + 1] = starts[place] + size[owner];
     }
     let mut fill = vec![0; number];
-    order.iter().enumerate().for_each(|(place, &owner)| fill[owner] = begins[place]);
+    order.iter().enumerate().for_each(|(place, &owner)| fill[owner] = starts[place]);
     let mut nodes = vec![0; count];
     for (node, &owner) in component.iter().enumerate() {
         nodes[fill[owner]] = node;
         fill[owner] += 1;
     }
-    Components { nodes, begins, loops: order.iter().map(|&owner| looped[owner]).collect() }
+    Components { nodes, starts, loops: order.iter().map(|&owner| looped[owner]).collect() }
 }
 
-/// For each node a list of others, one after the other.
-struct Lists {
-    begins: Vec<usize>,
+/// Adjacency lists of a graph, stored consecutively.
+struct AdjacencyLists {
+    starts: Vec<usize>,
     entries: Vec<usize>,
 }
 
-impl Lists {
+impl AdjacencyLists {
     fn new(count: usize, edges: impl Iterator<Item = (usize, usize)> + Clone) -> Self {
         let edges = edges.filter(|(from, to)| *from < count && *to < count);
-        let mut begins = vec![0; count + 1];
-        edges.clone().for_each(|(from, _)| begins[from + 1] += 1);
+        let mut starts = vec![0; count + 1];
+        edges.clone().for_each(|(from, _)| starts[from + 1] += 1);
         for node in 0..count {
-            begins[node + 1] += begins[node];
+            starts[node + 1] += starts[node];
         }
-        let mut fill = begins.clone();
-        let mut entries = vec![0; begins[count]];
+        let mut fill = starts.clone();
+        let mut entries = vec![0; starts[count]];
         for (from, to) in edges {
             entries[fill[from]] = to;
             fill[from] += 1;
         }
-        Self { begins, entries }
+        Self { starts, entries }
     }
 
     fn len(&self) -> usize {
-        self.begins.len() - 1
+        self.starts.len() - 1
     }
 
-    fn of(&self, node: usize) -> &[usize] {
-        &self.entries[self.begins[node]..self.begins[node + 1]]
+    fn neighbours(&self, node: usize) -> &[usize] {
+        &self.entries[self.starts[node]..self.starts[node + 1]]
     }
 }
 
-/// The component of each node, and how many there are.
-fn tarjan(successors: &Lists) -> (Vec<usize>, usize) {
+/// Returns the component of each node and the number of components (Tarjan 1972).
+fn tarjan(successors: &AdjacencyLists) -> (Vec<usize>, usize) {
     const NEW: usize = usize::MAX;
     let count = successors.len();
     let (mut index, mut low) = (vec![NEW; count], vec![0; count]);
@@ -135,7 +137,7 @@ fn tarjan(successors: &Lists) -> (Vec<usize>, usize) {
                 next += 1;
                 stack.push(node);
             }
-            if let Some(&other) = successors.of(node).get(edge) {
+            if let Some(&other) = successors.neighbours(node).get(edge) {
                 calls.push((node, edge + 1));
                 if index[other] == NEW {
                     calls.push((other, 0));
@@ -161,8 +163,9 @@ fn tarjan(successors: &Lists) -> (Vec<usize>, usize) {
     (component, number)
 }
 
-/// The nodes of a graph without loops, each after all that lead to it, free ones by their `rank`.
-fn kahn(successors: &Lists, rank: &[usize]) -> Vec<usize> {
+/// Returns the nodes of an acyclic graph in topological order, by `rank` where several are possible
+/// (Kahn 1962).
+fn kahn(successors: &AdjacencyLists, rank: &[usize]) -> Vec<usize> {
     let mut waits = vec![0_usize; successors.len()];
     successors.entries.iter().for_each(|&to| waits[to] += 1);
     let free = (0..waits.len()).filter(|&node| waits[node] == 0);
@@ -170,7 +173,7 @@ fn kahn(successors: &Lists, rank: &[usize]) -> Vec<usize> {
     let mut order = Vec::with_capacity(waits.len());
     while let Some(Reverse((_, node))) = heap.pop() {
         order.push(node);
-        for &to in successors.of(node) {
+        for &to in successors.neighbours(node) {
             waits[to] -= 1;
             if waits[to] == 0 {
                 heap.push(Reverse((rank[to], to)));

@@ -1,10 +1,10 @@
-//! Numerics of the master, free of FMUs: solvers for coupled values, step control, location of
-//! events, order of dependencies.
+//! Numerics of a co-simulation master, independent of FMUs: solvers for algebraic loops, step size
+//! control, location of events, topological order of dependencies.
 //!
-//! A loop of connected values u is a fixed point, `u = G(u)`: G takes the inputs u, steps the slaves
-//! or evaluates their outputs, and answers with what the connections then carry. A [`Solver`] is
-//! told u and G(u) and says where to evaluate next; it never calls anything, so that whoever owns
-//! the slaves stays in charge:
+//! The connected values u of a loop are a fixed point, `u = G(u)`: G sets the inputs u, steps the
+//! slaves or evaluates their outputs, and returns the resulting values of the connections. A
+//! [`Solver`] receives u and G(u) and returns the next u to evaluate. It never calls G, so that the
+//! caller keeps control of the slaves:
 //!
 //! ```
 //! use solve::{Anderson, Progress, Scale, Solver};
@@ -46,13 +46,13 @@ pub use root::Bracket;
 
 use serde::{Deserialize, Serialize};
 
-/// A residual so many times the first one ends an iteration.
-const GROWTH: f64 = 1e12;
-/// A residual that is small beside a u that ran away is no solution: it must also be this part of
-/// the first one.
-const SMALLER: f64 = 0.1;
+/// Ratio of a residual to the first one above which the iteration counts as diverged.
+const DIVERGENCE: f64 = 1e12;
+/// Ratio of the last residual to the first one required for convergence. A residual that is only small
+/// relative to a growing u is no solution.
+const REDUCTION: f64 = 0.1;
 
-/// What a difference of values is measured by, component by component:
+/// The weights of a difference of values, component by component:
 /// `w_i = absolute nominal_i + relative max(|a_i|, |b_i|)`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scale {
@@ -62,10 +62,10 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// Tolerances, and the magnitude of each component.
+    /// Creates a scale from a relative and an absolute tolerance and the nominal value of each component.
     ///
-    /// What is not a number above zero is taken as: tolerances the smallest that make sense (the
-    /// rounding of a double), nominals 1.
+    /// A tolerance that is not above zero is replaced by the machine epsilon. Nominals count by their
+    /// absolute value; zero, NaN and infinity are replaced by 1.
     #[must_use]
     pub fn new(relative: f64, absolute: f64, nominals: Vec<f64>) -> Self {
         let positive = |value: f64, other: f64| if value > 0.0 { value } else { other };
@@ -77,32 +77,32 @@ impl Scale {
         Self { relative, absolute: positive(absolute, f64::EPSILON), nominals }
     }
 
-    /// Number of components.
+    /// Returns the number of components.
     #[must_use]
     pub fn len(&self) -> usize {
         self.nominals.len()
     }
 
-    /// Whether there are none.
+    /// Whether there are no components.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.nominals.is_empty()
     }
 
-    /// Magnitude of each component.
+    /// Returns the nominal value of each component.
     #[must_use]
     pub fn nominals(&self) -> &[f64] {
         &self.nominals
     }
 
-    /// The weight w of component `index` between the values `a` and `b`.
+    /// Returns the weight `w_i` of component `index` for the values `a` and `b`.
     #[must_use]
     pub fn weight(&self, index: usize, a: f64, b: f64) -> f64 {
         self.absolute * self.nominals[index] + self.relative * a.abs().max(b.abs())
     }
 
-    /// `max_i |a_i - b_i| / w_i`: at most 1 where a and b agree within the tolerances; infinite
-    /// where one of them is not finite.
+    /// Returns `max_i |a_i - b_i| / w_i`: at most 1 if a and b agree within the tolerances; infinite if
+    /// a value is not finite.
     #[must_use]
     pub fn distance(&self, a: &[f64], b: &[f64]) -> f64 {
         let mut largest = 0.0_f64;
@@ -117,84 +117,85 @@ impl Scale {
     }
 }
 
-/// What a [`Solver`] wants next, or how it ended.
+/// The next request of a [`Solver`], or the end of its iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Progress {
     /// Evaluate G at `u_next`, then call `next` with both.
     Evaluate,
-    /// Give the matrix `dG/du` at this u, column by column ([`Solver::set_column`]), then call `next`
-    /// with the same u and G(u) again.
+    /// Set the matrix `dG/du` at this u, column by column ([`Solver::set_column`]), then call `next`
+    /// again with the same u and G(u).
     Matrix,
-    /// `|G(u) - u| <= w`: u and G(u) agree, `u_next` is not set.
+    /// The iteration has converged, `|G_i(u) - u_i| <= w_i`. `u_next` is not set.
     Converged {
         /// Evaluations of G.
         iterations: u32,
     },
-    /// Not within the evaluations allowed.
+    /// The iteration has not converged within the allowed number of evaluations.
     NotConverged {
         /// Evaluations of G.
         iterations: u32,
-        /// `max_i |G_i(u) - u_i| / w_i`, to be 1.
+        /// `max_i |G_i(u) - u_i| / w_i`, required to be at most 1.
         residual: f64,
     },
-    /// A value is not finite, or the residual has become 1e12 times the first one.
+    /// A value is not finite, or the residual exceeds 1e12 times the first one.
     Diverged {
         /// Evaluations of G.
         iterations: u32,
     },
-    /// `I - dG/du` is singular as far as one can tell: the loop has no solution or many.
+    /// `I - dG/du` is numerically singular: the loop has no solution or no unique one.
     Singular {
-        /// Its condition number, the unknowns measured by their nominals.
+        /// Condition number of the matrix, with the unknowns divided by their nominals.
         condition: f64,
     },
 }
 
-/// An iteration for `u = G(u)`. Nothing here allocates but the constructors.
+/// An iterative solver of `u = G(u)`. Only the constructors allocate memory.
 pub trait Solver: Send {
-    /// Begins a new solution.
+    /// Starts a new solution.
     fn begin(&mut self);
 
-    /// Is told `g = G(u)`; where the answer is [`Progress::Evaluate`], `u_next` is where next.
-    /// All three have the length of the [`Scale`].
+    /// Takes `g = G(u)` and computes the next u: `u_next`, if the result is [`Progress::Evaluate`].
+    /// All three slices have the length of the [`Scale`].
     fn next(&mut self, u: &[f64], g: &[f64], u_next: &mut [f64]) -> Progress;
 
-    /// Column `column` of `dG/du`: the change of G per change of that component of u.
-    /// Asked for by [`Progress::Matrix`] alone.
+    /// Sets column `column` of `dG/du`, the derivative of G with respect to this component of u.
+    /// Call it only after [`Progress::Matrix`].
     fn set_column(&mut self, column: usize, values: &[f64]) {
         let _ = (column, values);
     }
 
-    /// By how much to change component `column` of `u` for a difference quotient in place of a
-    /// derivative: far above what slaves that integrate with a tolerance of their own add by chance,
-    /// as the iteration needs the matrix to a few digits only.
+    /// Returns the perturbation of component `column` of `u` for a difference quotient of G.
+    ///
+    /// It is large compared with the integration errors of slaves, because the iteration needs only a
+    /// few digits of the matrix.
     fn perturbation(&self, column: usize, u: &[f64]) -> f64 {
         1e-4 * u[column].abs().max(self.scale().nominals()[column])
     }
 
-    /// The scale that it was made with.
+    /// Returns the scale of the unknowns.
     fn scale(&self) -> &Scale;
 
-    /// Drops what was learned in earlier solutions: G has changed, as after an event or with another
-    /// step.
+    /// Drops information from earlier solutions, because G has changed, for example after an event or with
+    /// another step size.
     fn forget(&mut self);
 }
 
-/// The residual of an iteration, and when to end it.
+/// The residual and the termination test of an iteration.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-struct Watch {
+struct Convergence {
     scale: Scale,
     limit: u32,
     iterations: u32,
     /// G(u) - u.
     residual: Vec<f64>,
-    /// The weights of the first evaluation, which stay, so that residuals can be compared.
+    /// The weights of the first evaluation, kept so that residuals of one solution are comparable.
     weights: Vec<f64>,
     first: f64,
     /// `max_i |residual_i| / weights_i`.
     merit: f64,
 }
 
-impl Watch {
+impl Convergence {
     fn new(scale: Scale, limit: u32) -> Self {
         let n = scale.len();
         let (residual, weights) = (vec![0.0; n], vec![1.0; n]);
@@ -205,8 +206,8 @@ impl Watch {
         self.iterations = 0;
     }
 
-    /// Takes in an evaluation; the answer is how the iteration ends, if it does.
-    fn look(&mut self, u: &[f64], g: &[f64]) -> Option<Progress> {
+    /// Computes the residual of an evaluation; returns `Some` if the iteration ends.
+    fn check(&mut self, u: &[f64], g: &[f64]) -> Option<Progress> {
         let first = self.iterations == 0;
         self.iterations += 1;
         let iterations = self.iterations;
@@ -222,10 +223,10 @@ impl Watch {
         if first {
             self.first = self.merit;
         }
-        if distance <= 1.0 && self.merit <= f64::max(1.0, SMALLER * self.first) {
+        if distance <= 1.0 && self.merit <= f64::max(1.0, REDUCTION * self.first) {
             return Some(Progress::Converged { iterations });
         }
-        if !distance.is_finite() || self.merit > GROWTH * self.first {
+        if !distance.is_finite() || self.merit > DIVERGENCE * self.first {
             return Some(Progress::Diverged { iterations });
         }
         let ended = iterations >= self.limit;

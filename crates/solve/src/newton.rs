@@ -1,50 +1,51 @@
-//! Newton's method with a matrix that is kept as long as it serves.
+//! Simplified Newton iteration, which reuses its matrix while it converges fast enough.
 
 use serde::{Deserialize, Serialize};
 
-use super::dense::{Factors, largest_column};
-use super::{Progress, Scale, Solver, Watch};
+use super::dense::{Factors, norm_1};
+use super::{Convergence, Progress, Scale, Solver};
 
-/// A residual that falls to more than this part asks for a new matrix.
-const SLOW: f64 = 0.3;
-/// The smallest part of a step that is tried.
+/// Ratio of two consecutive residuals above which the solver requests a new matrix.
+const SLOW_DECREASE: f64 = 0.3;
+/// The smallest damping factor.
 const SHORTEST: f64 = 1.0 / 64.0;
-/// The residual must fall by at least this part of what a whole step would take away
-/// (Armijo's condition).
+/// Required decrease of the residual relative to the decrease that a linear model predicts (Armijo
+/// condition).
 const DESCENT: f64 = 1e-4;
-/// Above this condition number nothing is left of the digits of a difference quotient.
+/// Condition number above which a difference quotient has no significant digits left.
 const SINGULAR: f64 = 1e10;
 
-/// What the last call led to.
+/// The result of the last call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 enum Stage {
-    /// There was none in this solution.
+    /// No call in this solution.
     First,
-    /// The matrix was asked for, and belongs to the same point.
-    Asked,
-    /// A step with the matrix made where the step begins.
+    /// A request for the matrix at the same point.
+    MatrixRequested,
+    /// A step with the matrix computed at its start.
     NewMatrix,
-    /// A step with one made elsewhere.
+    /// A step with a matrix computed elsewhere.
     OldMatrix,
-    /// Back to the begin of a bad step, to ask for the matrix there.
-    Back,
+    /// A return to the start of a rejected step, to request the matrix there.
+    Returned,
 }
 
 /// Newton's method: `u_next = u + s d`, `(I - dG/du) d = G(u) - u`.
 ///
-/// The matrix is asked for at the first evaluation ([`Progress::Matrix`]) and kept, also for later
-/// solutions, until the residual falls too slowly: the simplified Newton iteration of implicit
-/// integrators (Hairer and Wanner 1996, section IV.8). `s` is 1; where that makes the residual larger it is halved
-/// (Armijo 1966). Solved by LU factorisation with row pivoting, the unknowns measured by their
-/// nominals, and refined once. Linear loops need one matrix and two evaluations, whatever their gain.
+/// The solver requests the matrix at the first evaluation ([`Progress::Matrix`]) and reuses it, also in
+/// later solutions, until the residual decreases too slowly: the simplified Newton iteration of
+/// implicit integrators (Hairer and Wanner 1996, section IV.8). The damping factor `s` is 1 and is
+/// halved while the residual increases (Armijo 1966). The linear system, with unknowns divided by their
+/// nominals, is solved by LU factorisation with row pivoting and one step of iterative refinement.
+/// Linear loops need one matrix and two evaluations for any gain.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Newton {
-    watch: Watch,
-    /// `I - dG/du`, column by column, in nominals.
+    convergence: Convergence,
+    /// `I - dG/du`, column by column, for unknowns divided by their nominals.
     matrix: Vec<f64>,
     factors: Factors,
     known: bool,
-    /// Where the last step began, its direction, the part of it taken, the residual at its begin.
+    /// Start of the last step; then its direction, its damping factor and the residual at its start.
     base: Vec<f64>,
     direction: Vec<f64>,
     part: f64,
@@ -54,12 +55,12 @@ pub struct Newton {
 }
 
 impl Newton {
-    /// At most `limit` evaluations of G, those for matrices not counted.
+    /// Creates a solver with at most `limit` evaluations of G, not counting evaluations for matrices.
     #[must_use]
     pub fn new(scale: Scale, limit: u32) -> Self {
         let n = scale.len();
         Self {
-            watch: Watch::new(scale, limit),
+            convergence: Convergence::new(scale, limit),
             matrix: vec![0.0; n * n],
             factors: Factors::new(n),
             known: false,
@@ -72,46 +73,50 @@ impl Newton {
         }
     }
 
-    fn ask(&mut self) -> Progress {
-        self.stage = Stage::Asked;
+    fn request_matrix(&mut self) -> Progress {
+        self.stage = Stage::MatrixRequested;
         Progress::Matrix
     }
 
-    /// Whether the matrix that was asked for can be solved with.
-    fn take_matrix(&mut self) -> Result<(), Progress> {
-        let norm = largest_column(&self.matrix, self.base.len());
+    /// Factorises the requested matrix.
+    ///
+    /// # Errors
+    ///
+    /// [`Progress::Singular`] if the matrix is numerically singular.
+    fn factorise_matrix(&mut self) -> Result<(), Progress> {
+        let norm = norm_1(&self.matrix, self.base.len());
         let condition = self.factors.factor(&self.matrix) * (1.0 + norm);
         self.known = condition <= SINGULAR;
         if self.known { Ok(()) } else { Err(Progress::Singular { condition }) }
     }
 
-    /// A step in the direction of the last matrix; none where that cannot be solved for.
+    /// Computes a step with the last matrix; `None` if its direction is not finite.
     fn step(&mut self, u: &[f64], u_next: &mut [f64]) -> Option<Progress> {
-        let nominals = self.watch.scale.nominals();
+        let nominals = self.convergence.scale.nominals();
         for ((entry, residual), nominal) in
-            self.direction.iter_mut().zip(&self.watch.residual).zip(nominals)
+            self.direction.iter_mut().zip(&self.convergence.residual).zip(nominals)
         {
             *entry = residual / nominal;
         }
         self.factors.solve(&mut self.direction);
         self.refine();
-        for (entry, nominal) in self.direction.iter_mut().zip(self.watch.scale.nominals()) {
+        for (entry, nominal) in self.direction.iter_mut().zip(self.convergence.scale.nominals()) {
             *entry *= nominal;
         }
         if self.direction.iter().any(|entry| !entry.is_finite()) {
             return None;
         }
         self.base.copy_from_slice(u);
-        (self.before, self.part) = (self.watch.merit, 1.0);
-        Some(self.place(u_next))
+        (self.before, self.part) = (self.convergence.merit, 1.0);
+        Some(self.write_next(u_next))
     }
 
-    /// One step of iterative refinement (Golub and Van Loan 2013, section 3.5.3).
+    /// Does one step of iterative refinement (Golub and Van Loan 2013, section 3.5.3).
     fn refine(&mut self) {
         let n = self.base.len();
-        let nominals = self.watch.scale.nominals();
+        let nominals = self.convergence.scale.nominals();
         for ((left, residual), nominal) in
-            self.left.iter_mut().zip(&self.watch.residual).zip(nominals)
+            self.left.iter_mut().zip(&self.convergence.residual).zip(nominals)
         {
             *left = residual / nominal;
         }
@@ -126,50 +131,50 @@ impl Newton {
         }
     }
 
-    fn place(&self, u_next: &mut [f64]) -> Progress {
+    fn write_next(&self, u_next: &mut [f64]) -> Progress {
         for ((next, base), direction) in u_next.iter_mut().zip(&self.base).zip(&self.direction) {
             *next = base + self.part * direction;
         }
         Progress::Evaluate
     }
 
-    /// What to do instead of a step from here, if the last one was not good.
+    /// Corrects the last step if the residual did not decrease enough: damps it, or returns to its start.
     fn correct(&mut self, u_next: &mut [f64]) -> Option<Progress> {
-        let merit = self.watch.merit;
+        let merit = self.convergence.merit;
         if merit > self.before * (1.0 - DESCENT * self.part) {
             if self.stage == Stage::OldMatrix {
-                self.stage = Stage::Back;
+                self.stage = Stage::Returned;
                 u_next.copy_from_slice(&self.base);
                 return Some(Progress::Evaluate);
             }
             if self.part > SHORTEST {
                 self.part /= 2.0;
-                return Some(self.place(u_next));
+                return Some(self.write_next(u_next));
             }
-            return Some(self.ask());
+            return Some(self.request_matrix());
         }
-        (merit > SLOW * self.before).then(|| self.ask())
+        (merit > SLOW_DECREASE * self.before).then(|| self.request_matrix())
     }
 }
 
 impl Solver for Newton {
     fn begin(&mut self) {
-        self.watch.begin();
+        self.convergence.begin();
         self.stage = Stage::First;
     }
 
     fn next(&mut self, u: &[f64], g: &[f64], u_next: &mut [f64]) -> Progress {
-        let next = if self.stage == Stage::Asked {
-            if let Err(end) = self.take_matrix() {
+        let next = if self.stage == Stage::MatrixRequested {
+            if let Err(end) = self.factorise_matrix() {
                 return end;
             }
             Stage::NewMatrix
         } else {
-            if let Some(end) = self.watch.look(u, g) {
+            if let Some(end) = self.convergence.check(u, g) {
                 return end;
             }
-            if !self.known || self.stage == Stage::Back {
-                return self.ask();
+            if !self.known || self.stage == Stage::Returned {
+                return self.request_matrix();
             }
             if self.stage != Stage::First
                 && let Some(other) = self.correct(u_next)
@@ -179,13 +184,13 @@ impl Solver for Newton {
             Stage::OldMatrix
         };
         self.stage = next;
-        let iterations = self.watch.iterations;
+        let iterations = self.convergence.iterations;
         self.step(u, u_next).unwrap_or(Progress::Diverged { iterations })
     }
 
     fn set_column(&mut self, column: usize, values: &[f64]) {
         let n = self.base.len();
-        let nominals = self.watch.scale.nominals();
+        let nominals = self.convergence.scale.nominals();
         let entries = &mut self.matrix[column * n..(column + 1) * n];
         for (row, (entry, value)) in entries.iter_mut().zip(values).enumerate() {
             let unit = if row == column { 1.0 } else { 0.0 };
@@ -194,7 +199,7 @@ impl Solver for Newton {
     }
 
     fn scale(&self) -> &Scale {
-        &self.watch.scale
+        &self.convergence.scale
     }
 
     fn forget(&mut self) {

@@ -1,38 +1,38 @@
-//! The time of a change of sign.
+//! Root finding: the time of a change of sign.
 
 use serde::{Deserialize, Serialize};
 
-/// A change of sign between two times, made narrower by each further value.
+/// An interval of time that contains a change of sign; each further value narrows it.
 ///
-/// Signs as FMI has them for event indicators: above zero, or not. Interpolate, truncate and project
-/// (Oliveira and Takahashi 2021, "An enhancement of the bisection method average performance
-/// preserving minmax optimality", ACM Trans. Math. Softw. 47, with `kappa_1 = 0.2 / (b - a)`, `kappa_2 = 2`,
-/// `n_0 = 1`): superlinear where the function is smooth, and never more than one value above what
-/// bisection needs, `ceil(log2((b - a) / width)) + 1`.
+/// The sign is defined as for event indicators of FMI: z > 0 or z <= 0. The method is interpolate,
+/// truncate and project (ITP; Oliveira and Takahashi 2021, "An enhancement of the bisection method
+/// average performance preserving minmax optimality", ACM Trans. Math. Softw. 47, with
+/// `kappa_1 = 0.2 / (b - a)`, `kappa_2 = 2`, `n_0 = 1`). It converges superlinearly for a smooth
+/// function and needs at most one value more than bisection, `ceil(log2((b - a) / width)) + 1`.
 ///
-/// A value that is not a number has no sign and does not move the bracket. The search then bisects
-/// between the bracket's left time and the first such time, then, where no change of sign is found
-/// there, between the last such time and the right one. Where neither part has a change of sign, the
-/// bracket stays as wide as the gap between them: [`ask`](Self::ask) ends, the signs at
-/// [`before`](Self::before) and [`after`](Self::after) still differ. This takes at most
-/// `ceil(log2((b - a) / width))` more values for each part.
+/// A NaN has no sign and does not narrow the bracket. The search then bisects between the left end of
+/// the bracket and the first NaN and, if it finds no change of sign there, between the last NaN and the
+/// right end. If neither part has a change of sign, the bracket remains as wide as the gap of NaN:
+/// [`ask`](Self::ask) returns `None`, and the signs at [`before`](Self::before) and
+/// [`after`](Self::after) still differ. This takes at most `ceil(log2((b - a) / width))` more values
+/// for each part.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bracket {
     left: (f64, f64),
     right: (f64, f64),
     width: f64,
     truncation: f64,
-    /// Half the width that bisection would have reached, had it one value more.
+    /// Half the widest bracket that bisection can still narrow to `width` with the remaining values.
     radius: f64,
-    /// The first and the last time within the bracket at which the value is not a number.
+    /// The first and the last time within the bracket with a NaN.
     gap: Option<(f64, f64)>,
 }
 
 impl Bracket {
-    /// A change of sign between the times `left` and `right`, given with the values there, to be known
-    /// to `width` s; none where there is no change, or one of the four is not finite.
+    /// Creates a bracket from two points (time in s, value), to be narrowed to `width` s; `None` if the
+    /// signs are equal or a number is not finite.
     ///
-    /// A width below what the numbers can tell apart is taken as that.
+    /// A width below the resolution of double precision is replaced by that resolution.
     #[must_use]
     pub fn new(left: (f64, f64), right: (f64, f64), width: f64) -> Option<Self> {
         let all = [left.0, left.1, right.0, right.1];
@@ -48,8 +48,8 @@ impl Bracket {
         Some(Self { left, right, width, truncation: 0.2 / whole, radius, gap: None })
     }
 
-    /// Where to evaluate next; none where the change of sign is known to the width, or to a gap whose
-    /// values are not numbers.
+    /// Returns the time of the next evaluation; `None` if the bracket is as narrow as required, or as a
+    /// gap of NaN allows.
     #[must_use]
     pub fn ask(&self) -> Option<f64> {
         let ((a, fa), (b, fb)) = (self.left, self.right);
@@ -74,7 +74,7 @@ impl Bracket {
         Some(if inside { projected } else { middle })
     }
 
-    /// Takes the value at the time asked for.
+    /// Narrows the bracket by the value at the time that [`ask`](Self::ask) returned.
     pub fn tell(&mut self, time: f64, value: f64) {
         if value.is_nan() {
             let (first, last) = self.gap.unwrap_or((time, time));
@@ -91,13 +91,14 @@ impl Bracket {
         self.gap = self.gap.filter(within);
     }
 
-    /// The last time known to be before the change of sign.
+    /// Returns the left end of the bracket, before the change of sign.
     #[must_use]
     pub fn before(&self) -> f64 {
         self.left.0
     }
 
-    /// The first time known to be after it: where a step has to end so that the event has happened.
+    /// Returns the right end of the bracket, after the change of sign: a step that handles the event must
+    /// end here.
     #[must_use]
     pub fn after(&self) -> f64 {
         self.right.0
@@ -108,7 +109,7 @@ impl Bracket {
 mod tests {
     use super::*;
 
-    /// The bracket at the end, and how many values it took.
+    /// Returns the final bracket and the number of evaluations.
     fn locate(function: impl Fn(f64) -> f64, a: f64, b: f64, width: f64) -> (Bracket, u32) {
         let mut bracket = Bracket::new((a, function(a)), (b, function(b)), width).unwrap();
         let mut count = 0;
@@ -168,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_bracket_is_refused() {
+    fn invalid_brackets_are_refused() {
         assert!(Bracket::new((0.0, 1.0), (1.0, 2.0), 1e-3).is_none());
         assert!(Bracket::new((1.0, 1.0), (0.0, -1.0), 1e-3).is_none());
         assert!(Bracket::new((0.0, f64::NAN), (1.0, 1.0), 1e-3).is_none());
@@ -181,7 +182,7 @@ mod tests {
         assert!(found.after() - found.before() < 1e-12 && count < 60);
     }
 
-    /// A function that is not a number between two times and elsewhere 1 before `root`, -1 after it.
+    /// Returns a function that is NaN between two times, and otherwise 1 before `root` and -1 after it.
     fn broken(from: f64, to: f64, root: f64) -> impl Fn(f64) -> f64 {
         move |t| {
             let sign = if t < root { 1.0 } else { -1.0 };

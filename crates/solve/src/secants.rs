@@ -1,28 +1,28 @@
-//! The matrix of an iteration, learned from its steps.
+//! Secant information: a least squares model of the inverse matrix from past iterates.
 
 use serde::{Deserialize, Serialize};
 
-/// A change of the residual that is less than this part of that of the values is their rounding.
+/// Ratio of the changes of residual and values below which the change of the residual is rounding.
 const ROUNDING: f64 = 1e-11;
 
-/// Pairs of differences: dR of residuals and dG of values, the newest first.
+/// Pairs of differences, dR of residuals and dG of values, the newest first.
 ///
 /// The least squares problem `min |r - dR c|` in the weighted norm is solved by Gram-Schmidt
-/// orthogonalisation, done twice, from the newest column to the oldest. A column of which less than a given
-/// part is left beside the newer ones says nothing new, and is dropped: the filter QR2 of
-/// Haelterman, Bogaers, Scheufele, Uekermann and Mehl 2016, "Improving the performance of the
-/// partitioned QN-ILS procedure for fluid-structure interaction problems: Filtering".
+/// orthogonalisation, done twice, from the newest column to the oldest. A column whose norm falls
+/// below a given ratio by orthogonalisation against the newer ones is linearly dependent and is
+/// dropped: the filter QR2 of Haelterman, Bogaers, Scheufele, Uekermann and Mehl 2016, "Improving the
+/// performance of the partitioned QN-ILS procedure for fluid-structure interaction problems: Filtering".
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Secants {
     n: usize,
     capacity: usize,
-    /// Slots in use, the newest first, and the solution to which each belongs.
+    /// Slots in use, the newest first; then the age of each slot in solutions.
     order: Vec<usize>,
     ages: Vec<u32>,
     free: Vec<usize>,
     residuals: Vec<f64>,
     values: Vec<f64>,
-    /// Orthonormal columns, the triangle R (column by column), `Q' r` and then c.
+    /// The factor Q; then the triangle R (column by column), and `Q' r`, overwritten by c.
     orthonormal: Vec<f64>,
     triangle: Vec<f64>,
     coefficients: Vec<f64>,
@@ -53,8 +53,8 @@ impl Secants {
         self.order.is_empty()
     }
 
-    /// A solution has ended: all pairs are one older, those older than `oldest` are dropped.
-    pub(super) fn grow_older(&mut self, oldest: u32) {
+    /// Increments the age of all pairs after a solution and drops pairs older than `oldest`.
+    pub(super) fn age_pairs(&mut self, oldest: u32) {
         for &slot in &self.order {
             self.ages[slot] += 1;
         }
@@ -68,7 +68,7 @@ impl Secants {
         });
     }
 
-    /// Adds the pair `after - before`; the oldest one makes room.
+    /// Adds the pair `after - before` and drops the oldest pair if no slot is free.
     fn push(&mut self, residual: (&[f64], &[f64]), value: (&[f64], &[f64])) {
         let Some(slot) = self.free.pop().or_else(|| self.order.pop()) else { return };
         let place = slot * self.n..(slot + 1) * self.n;
@@ -78,8 +78,8 @@ impl Secants {
         self.order.insert(0, slot);
     }
 
-    /// The evaluation `now`, residual and value: adds what it differs from `last`, unless it is the
-    /// `first`, and takes its place there.
+    /// Adds the difference between the evaluations `now` and `last` (residual and value), unless `now` is
+    /// the `first`, and copies `now` to `last`.
     pub(super) fn learn(
         &mut self,
         last: &mut (Vec<f64>, Vec<f64>),
@@ -93,9 +93,9 @@ impl Secants {
         last.1.copy_from_slice(now.1);
     }
 
-    /// `u_next = g - dG c`, where c is the least squares solution of `dR c = residual`.
+    /// Computes `u_next = g - dG c`, where c is the least squares solution of `dR c = residual`.
     ///
-    /// `filters`: parts below which pairs of this solution and of earlier ones are dropped.
+    /// `filters` are the ratios below which pairs of this and of earlier solutions are dropped.
     pub(super) fn apply(
         &mut self,
         residual: &[f64],
@@ -124,7 +124,8 @@ impl Secants {
         }
     }
 
-    /// Makes column `kept` of Q and R of `slot`; false where less than `filter` of it is new.
+    /// Computes column `kept` of Q and R from `slot`; returns false if its norm falls below the ratio
+    /// `filter`.
     fn orthogonalise(&mut self, slot: usize, kept: usize, weights: &[f64], filter: f64) -> bool {
         let n = self.n;
         let (done, rest) = self.orthonormal.split_at_mut(kept * n);
@@ -159,7 +160,7 @@ impl Secants {
         true
     }
 
-    /// The coefficients c: `R c = Q' residual`.
+    /// Computes the coefficients c from `R c = Q' residual`.
     fn project(&mut self, kept: usize, residual: &[f64], weights: &[f64]) {
         for (column, entry) in self.orthonormal.chunks_exact(self.n).zip(&mut self.coefficients) {
             let products = column.iter().zip(residual).zip(weights);

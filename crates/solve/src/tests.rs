@@ -1,8 +1,8 @@
-//! The solvers on loops whose solution is known.
+//! Tests of the solvers on loops with a known solution.
 
 use super::*;
 
-/// The solution and how it ended; `matrix` gives column j of dG/du at u.
+/// Returns the solution and the end of the iteration; `matrix` computes column j of dG/du at u.
 fn solve(
     solver: &mut dyn Solver,
     start: &[f64],
@@ -57,7 +57,7 @@ fn evaluations(progress: Progress) -> u32 {
 }
 
 #[test]
-fn a_scalar_loop_is_solved_whatever_its_gain() {
+fn a_scalar_loop_is_solved_for_any_gain() {
     for gain in [-1e6, -1000.0, -3.0, -1.0, 0.0, 0.5, 0.999, 1.5, 30.0, 1e6] {
         // u = 2 + gain u
         let expected = 2.0 / (1.0 - gain);
@@ -81,7 +81,7 @@ fn a_linear_loop_of_two_has_the_solution_computed_by_hand() {
     }
 }
 
-/// `G(u) = M u + b` with scattered entries of M between -size and size.
+/// Returns M and b of `G(u) = M u + b`, M with pseudo-random entries between -size and size.
 fn scattered(n: usize, size: f64) -> (nalgebra::DMatrix<f64>, nalgebra::DVector<f64>) {
     let mut state = 11_u64;
     let mut draw = move || {
@@ -121,7 +121,7 @@ fn plain_iteration_diverges_on_the_loops_that_these_solve() {
 }
 
 #[test]
-fn units_do_not_matter_where_the_nominals_tell_them() {
+fn nominals_make_the_solution_independent_of_units() {
     // Pa against m3/s: u1 = 2e5 - 3e10 u2, u2 = 1e-5 + 1e-10 u1.
     let expected = [(2e5 - 3e10 * 1e-5) / 4.0, 1e-5 + 1e-10 * (2e5 - 3e5) / 4.0];
     let scale = || Scale::new(1e-10, 1e-10, vec![1e5, 1e-5]);
@@ -188,7 +188,7 @@ fn newton_keeps_its_matrix_and_asks_for_a_new_one_when_it_no_longer_serves() {
 }
 
 #[test]
-fn what_quasi_newton_learned_serves_the_next_solution() {
+fn quasi_newton_reuses_differences_in_the_next_solution() {
     let (matrix, right) = scattered(5, 2.0);
     let mut solver = QuasiNewton::new(scale(5), 30, 5);
     let mut counts = Vec::new();

@@ -1,11 +1,11 @@
-//! What the stepping loop calls allocates nothing.
+//! Solvers, controllers and brackets allocate no memory in the stepping loop.
 
 use solve::{
     Anderson, Bond, Bracket, EnergyControl, ErrorControl, ForwardControl, Newton, Progress,
     QuasiNewton, Scale, SizeBounds, Solver,
 };
 
-/// A ring of tanh with gains up to 3.
+/// Computes `g_i = 0.3 - 3 tanh(u_(i+1) + 0.1 u_i)`, a ring with gains up to 3.
 fn ring(u: &[f64], g: &mut [f64]) {
     for (index, value) in g.iter_mut().enumerate() {
         let other = u[(index + 1) % u.len()];
@@ -13,7 +13,7 @@ fn ring(u: &[f64], g: &mut [f64]) {
     }
 }
 
-/// Solutions one after the other; how many of them converged.
+/// Computes several solutions in a row and returns how many converged.
 fn solve(solver: &mut dyn Solver, buffers: &mut [Vec<f64>; 4], solutions: usize) -> usize {
     let [u, g, next, column] = buffers;
     let mut converged = 0;

@@ -1,4 +1,4 @@
-//! The GUID that follows from a description.
+//! The GUID as a hash of the model description.
 
 use std::fmt::{self, Display, Formatter};
 
@@ -6,7 +6,7 @@ use sha2::{Digest, Sha256};
 
 use super::ModelDescription;
 
-/// The first 128 bits of the SHA-256 of a description.
+/// The GUID of an FMU: the first 128 bits of the SHA-256 of its description.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Guid(pub [u8; 16]);
 

@@ -1,10 +1,10 @@
-//! Reads a unit expression.
+//! The parser of unit expressions.
 
 use super::names::{self, Named};
 use super::{BaseUnit, UnitError};
 
-/// What has been multiplied so far. Numerator and denominator are kept apart, and so are powers of
-/// ten: `mm3` is then 1e-9 exactly as a literal would be.
+/// The product of the units parsed so far. Numerator, denominator and powers of ten are kept
+/// separately, so that `mm3` has exactly the factor of the literal 1e-9.
 struct Product {
     exponents: [i32; 8],
     numerator: f64,
@@ -36,8 +36,8 @@ impl Product {
     }
 }
 
-/// `base` to the power `exponent`, with roundings that are the same everywhere: the GUID of a
-/// description follows from them, and those of `powi` are left open.
+/// Returns `base` to the power `exponent`, with the same rounding on every platform, because the factor
+/// determines the GUID of a description. The rounding of `powi` is unspecified.
 fn power(mut base: f64, mut exponent: u32) -> f64 {
     let mut result = 1.0;
     while exponent > 0 {
@@ -50,7 +50,7 @@ fn power(mut base: f64, mut exponent: u32) -> f64 {
     result
 }
 
-/// A place in an expression.
+/// A position in an expression.
 pub(super) struct Cursor<'a> {
     expression: &'a str,
     at: usize,

@@ -1,19 +1,19 @@
-//! The units that an expression may name.
+//! The table of known units and prefixes.
 
 use std::f64::consts::PI;
 
-/// A unit in base units: `base = factor * 10^ten * unit`.
+/// A unit with its conversion `base = factor * 10^ten * unit`.
 #[derive(Clone, Copy)]
 pub(super) struct Named {
     name: &'static str,
-    /// Of kg, m, s, A, K, mol, cd, rad.
+    /// Exponents of kg, m, s, A, K, mol, cd, rad.
     pub(super) exponents: [i32; 8],
     pub(super) factor: f64,
     pub(super) ten: i32,
     prefixes: bool,
 }
 
-/// A unit with an offset: `base = factor * unit + offset`.
+/// A unit with an offset, `base = factor * unit + offset`.
 pub(super) struct Scale {
     name: &'static str,
     pub(super) exponents: [i32; 8],
@@ -29,7 +29,7 @@ const fn plain(name: &'static str, exponents: [i32; 8], factor: f64, ten: i32) -
     Named { name, exponents, factor, ten, prefixes: false }
 }
 
-/// SI units (the SI brochure, 9th edition, tables 2, 4, 8) and a few others in daily use.
+/// SI units (SI brochure, 9th edition, tables 2, 4, 8) and some others in common use.
 const UNITS: [Named; 37] = [
     plain("kg", [1, 0, 0, 0, 0, 0, 0, 0], 1.0, 0),
     metric("g", [1, 0, 0, 0, 0, 0, 0, 0], -3),
@@ -94,7 +94,7 @@ const PREFIXES: [(&str, i32); 11] = [
     ("p", -12),
 ];
 
-/// The unit called `name`, where a unit's own name (`min`, `cd`) goes before prefix and unit.
+/// Finds the unit called `name`. A full match (`min`, `cd`) has priority over prefix and unit.
 pub(super) fn find(name: &str) -> Option<Named> {
     let own = UNITS.iter().find(|unit| unit.name == name).copied();
     own.or_else(|| {
@@ -106,7 +106,7 @@ pub(super) fn find(name: &str) -> Option<Named> {
     })
 }
 
-/// The unit with an offset called `name`.
+/// Finds the unit with an offset called `name`.
 pub(super) fn scale(name: &str) -> Option<&'static Scale> {
     SCALES.iter().find(|scale| scale.name == name)
 }

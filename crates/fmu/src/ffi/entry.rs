@@ -1,6 +1,6 @@
-//! The C functions that have an instance: what stands behind the door, one entry each.
+//! The C functions with an instance, one entry each.
 
-use super::{door, missing, put, read, room, state_at, texts};
+use super::{borrow_output, borrow_state, dispatch, null_pointer, read, texts, write_one};
 use crate::Experiment;
 use crate::instance::Snapshot;
 use crate::model::{Failure, Model};
@@ -10,17 +10,17 @@ use fmu_description::abi::{
 };
 use fmu_description::call_order::Function;
 
-/// Defines functions that pass through the door: C arguments, then what happens behind it.
-macro_rules! behind_the_door {
+/// Defines C functions that call `dispatch`: their arguments, then the safe code.
+macro_rules! entry_points {
     ($($name:ident = $function:ident($($argument:ident: $type:ty),*), $instance:ident => $body:expr;)*) => {
         $(pub unsafe fn $name<M: Model>(component: fmi2Component, $($argument: $type),*) -> fmi2Status {
-            // SAFETY: pointers and lengths are as the standard demands them; null is handled.
-            unsafe { door::<M>(component, Function::$function, |$instance| $body) }
+            // SAFETY: pointers and lengths are as the standard requires; null is handled.
+            unsafe { dispatch::<M>(component, Function::$function, |$instance| $body) }
         })*
     };
 }
 
-behind_the_door! {
+entry_points! {
     set_debug_logging = SetDebugLogging(_on: fmi2Boolean, n: usize, categories: *const fmi2String),
         instance => instance.set_debug_logging(texts(categories, n)?);
     setup_experiment = SetupExperiment(
@@ -38,13 +38,13 @@ behind_the_door! {
     terminate = Terminate(), instance => { instance.terminate(); Ok(()) };
     reset = Reset(), instance => { instance.reset(); Ok(()) };
     get_real = GetReal(vr: *const fmi2ValueReference, n: usize, value: *mut fmi2Real),
-        instance => instance.get_real(read(vr, n)?, room(value, n)?);
+        instance => instance.get_real(read(vr, n)?, borrow_output(value, n)?);
     get_integer = GetInteger(vr: *const fmi2ValueReference, n: usize, value: *mut fmi2Integer),
-        instance => instance.get_integer(read(vr, n)?, room(value, n)?);
+        instance => instance.get_integer(read(vr, n)?, borrow_output(value, n)?);
     get_boolean = GetBoolean(vr: *const fmi2ValueReference, n: usize, value: *mut fmi2Boolean),
-        instance => instance.get_boolean(read(vr, n)?, room(value, n)?);
+        instance => instance.get_boolean(read(vr, n)?, borrow_output(value, n)?);
     get_string = GetString(vr: *const fmi2ValueReference, n: usize, value: *mut fmi2String),
-        instance => instance.get_string(read(vr, n)?, room(value, n)?);
+        instance => instance.get_string(read(vr, n)?, borrow_output(value, n)?);
     set_real = SetReal(vr: *const fmi2ValueReference, n: usize, value: *const fmi2Real),
         instance => instance.set_real(read(vr, n)?, read(value, n)?);
     set_integer = SetInteger(vr: *const fmi2ValueReference, n: usize, value: *const fmi2Integer),
@@ -58,11 +58,11 @@ behind_the_door! {
     ), instance => instance.set_real_input_derivatives(read(vr, n)?, read(order, n)?, read(value, n)?);
     get_real_output_derivatives = GetRealOutputDerivatives(
         vr: *const fmi2ValueReference, n: usize, order: *const fmi2Integer, value: *mut fmi2Real
-    ), instance => instance.get_real_output_derivatives(read(vr, n)?, read(order, n)?, room(value, n)?);
+    ), instance => instance.get_real_output_derivatives(read(vr, n)?, read(order, n)?, borrow_output(value, n)?);
     do_step = DoStep(start: fmi2Real, size: fmi2Real, _no_set_fmu_state: fmi2Boolean),
         instance => instance.do_step(start, size);
     cancel_step = CancelStep(), _instance =>
-        Err(Failure::Error("no step is pending: every step is finished on return".to_owned()));
+        Err(Failure::Error("no step is pending: fmi2DoStep completes every step".to_owned()));
     get_directional_derivative = GetDirectionalDerivative(
         unknown: *const fmi2ValueReference, n_unknown: usize,
         known: *const fmi2ValueReference, n_known: usize,
@@ -70,11 +70,11 @@ behind_the_door! {
     ), instance => instance.get_directional_derivative(
         read(unknown, n_unknown)?,
         (read(known, n_known)?, read(known_delta, n_known)?),
-        room(unknown_delta, n_unknown)?,
+        borrow_output(unknown_delta, n_unknown)?,
     );
     enter_event_mode = EnterEventMode(), instance => instance.enter_event_mode();
     new_discrete_states = NewDiscreteStates(info: *mut fmi2EventInfo), instance => {
-        let place = room(info, 1)?;
+        let place = borrow_output(info, 1)?;
         place[0].write(instance.new_discrete_states()?);
         Ok(())
     };
@@ -86,22 +86,22 @@ behind_the_door! {
         _no_set_fmu_state: fmi2Boolean, enter: *mut fmi2Boolean, terminate: *mut fmi2Boolean
     ), instance => {
         instance.completed_integrator_step()?;
-        put(enter, 0)?;
-        put(terminate, 0)
+        write_one(enter, 0)?;
+        write_one(terminate, 0)
     };
     set_time = SetTime(time: fmi2Real), instance => instance.set_time(time);
     set_continuous_states = SetContinuousStates(x: *const fmi2Real, n: usize),
         instance => instance.set_continuous_states(read(x, n)?);
     get_event_indicators = GetEventIndicators(z: *mut fmi2Real, n: usize),
-        instance => instance.get_event_indicators(room(z, n)?);
+        instance => instance.get_event_indicators(borrow_output(z, n)?);
     get_continuous_states = GetContinuousStates(x: *mut fmi2Real, n: usize),
-        instance => instance.get_continuous_states(room(x, n)?);
+        instance => instance.get_continuous_states(borrow_output(x, n)?);
     get_derivatives = GetDerivatives(derivatives: *mut fmi2Real, n: usize),
-        instance => instance.get_derivatives(room(derivatives, n)?);
+        instance => instance.get_derivatives(borrow_output(derivatives, n)?);
     get_nominals = GetNominalsOfContinuousStates(nominals: *mut fmi2Real, n: usize),
-        instance => instance.get_nominals(room(nominals, n)?);
+        instance => instance.get_nominals(borrow_output(nominals, n)?);
     get_fmu_state = GetFMUstate(state: *mut fmi2FMUstate), instance => {
-        let place = state_at(state)?;
+        let place = borrow_state(state)?;
         if let Some(snapshot) = place.cast::<Snapshot<M>>().as_mut() {
             *snapshot = instance.snapshot();
         } else {
@@ -110,9 +110,9 @@ behind_the_door! {
         Ok(())
     };
     set_fmu_state = SetFMUstate(state: fmi2FMUstate), instance =>
-        instance.restore(state.cast::<Snapshot<M>>().as_ref().ok_or_else(|| missing("FMUstate"))?);
+        instance.restore(state.cast::<Snapshot<M>>().as_ref().ok_or_else(|| null_pointer("FMUstate"))?);
     free_fmu_state = FreeFMUstate(state: *mut fmi2FMUstate), _instance => {
-        let place = state_at(state)?;
+        let place = borrow_state(state)?;
         if !place.is_null() {
             let state = std::mem::replace(place, std::ptr::null_mut());
             drop(Box::from_raw(state.cast::<Snapshot<M>>()));
@@ -121,19 +121,19 @@ behind_the_door! {
     };
     serialized_fmu_state_size = SerializedFMUstateSize(state: fmi2FMUstate, size: *mut usize),
         _instance => {
-            let state = state.cast::<Snapshot<M>>().as_ref().ok_or_else(|| missing("FMUstate"))?;
-            put(size, state.size()?)
+            let state = state.cast::<Snapshot<M>>().as_ref().ok_or_else(|| null_pointer("FMUstate"))?;
+            write_one(size, state.size()?)
         };
     serialize_fmu_state = SerializeFMUstate(state: fmi2FMUstate, bytes: *mut fmi2Byte, size: usize),
         _instance => {
-            let state = state.cast::<Snapshot<M>>().as_ref().ok_or_else(|| missing("FMUstate"))?;
-            state.write(room(bytes.cast::<u8>(), size)?)
+            let state = state.cast::<Snapshot<M>>().as_ref().ok_or_else(|| null_pointer("FMUstate"))?;
+            state.write(borrow_output(bytes.cast::<u8>(), size)?)
         };
     de_serialize_fmu_state = DeSerializeFMUstate(
         bytes: *const fmi2Byte, size: usize, state: *mut fmi2FMUstate
     ), instance => {
         let snapshot = Snapshot::<M>::from_bytes(read(bytes.cast::<u8>(), size)?, instance.guid())?;
-        let place = state_at(state)?;
+        let place = borrow_state(state)?;
         if let Some(old) = place.cast::<Snapshot<M>>().as_mut() {
             *old = snapshot;
         } else {
@@ -145,7 +145,7 @@ behind_the_door! {
         _instance => Err(unavailable(kind));
     get_real_status = GetRealStatus(kind: fmi2StatusKind, value: *mut fmi2Real), instance =>
         if kind == StatusKind::LastSuccessfulTime as fmi2StatusKind {
-            put(value, instance.last_successful_time())
+            write_one(value, instance.last_successful_time())
         } else {
             Err(unavailable(kind))
         };
@@ -153,7 +153,7 @@ behind_the_door! {
         _instance => Err(unavailable(kind));
     get_boolean_status = GetBooleanStatus(kind: fmi2StatusKind, value: *mut fmi2Boolean),
         instance => if kind == StatusKind::Terminated as fmi2StatusKind {
-            put(value, instance.wants_to_end().into())
+            write_one(value, instance.is_terminated().into())
         } else {
             Err(unavailable(kind))
         };
@@ -161,7 +161,7 @@ behind_the_door! {
         _instance => Err(unavailable(kind));
 }
 
-/// A status that a synchronous slave cannot give is answered by `fmi2Discard` (section 4.2.3).
+/// Returns `fmi2Discard` for a status kind that a synchronous slave does not have (section 4.2.3).
 fn unavailable(kind: fmi2StatusKind) -> Failure {
-    Failure::Discard(format!("no step is pending, the status kind {kind} cannot be given"))
+    Failure::Discard(format!("no step is pending: status kind {kind} is not available"))
 }

@@ -1,8 +1,10 @@
-//! The export line of a model, and the C signatures behind it.
+//! The macro [`export!`](crate::export) and the C signatures that it defines.
 
-/// Exports a [`Model`](crate::Model) as all functions of FMI 2.0: the last line of a model's
-/// library, which is a `cdylib`. The functions of model exchange are there in any case; a model
-/// without that interface is not instantiated for it.
+/// Exports a [`Model`](crate::Model) with all C functions of FMI 2.0. Write it as the last line of the
+/// model's library, which must be a `cdylib`.
+///
+/// The library also has the functions of model exchange if the model has no such interface;
+/// `fmi2Instantiate` for model exchange then fails.
 ///
 /// ```
 /// use std::path::Path;
@@ -59,8 +61,8 @@
 /// # fn main() {}
 /// ```
 ///
-/// Beside the standard's functions the library gets
-/// [`fmuDescribe`](fmu_description::abi::DESCRIBE), by which the packer asks for the model description.
+/// The library also exports [`fmuDescribe`](fmu_description::abi::DESCRIBE), from which `aso-ftc pack`
+/// gets the model description.
 #[macro_export]
 macro_rules! export {
     ($model:ty) => {
@@ -69,7 +71,7 @@ macro_rules! export {
             "an FMU needs panic = \"unwind\": an aborting panic takes the importer down"
         );
 
-        // A block and whole paths: no name of the model's module is imported, and none is defined in it.
+        // A block and absolute paths, so that no name conflicts with names of the model's module.
         const _: () = {
             $crate::entry_points! { $model;
                 fmi2GetTypesPlatform = types_platform() -> fmi2String;
@@ -170,10 +172,10 @@ macro_rules! export {
     };
 }
 
-/// One exported C function for each line, each a call of the generic function for the model.
+/// Defines one exported C function per line, which calls the generic function for the model.
 ///
-/// The arguments have names with a prefix: a constant of the model called `n` would turn an argument
-/// `n` into a pattern that it has to match.
+/// The names of the arguments have a prefix, because a constant `n` of the model would turn an
+/// argument `n` into a pattern.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! entry_points {
@@ -184,7 +186,7 @@ macro_rules! entry_points {
             unsafe extern "C" fn $name(
                 $($argument: $(*$access)? $crate::ffi::signature::$type),*
             ) -> $crate::ffi::signature::$result {
-                // SAFETY: the arguments are handed on as the importer gave them.
+                // SAFETY: the arguments are passed on unchanged from the importer.
                 unsafe { $crate::ffi::$function::<$model>($($argument),*) }
             }
         )*

@@ -8,7 +8,7 @@ use crate::model::{At, Failure, Model};
 use fmu_description::call_order::State;
 use fmu_description::{Causality, Initial, Variability};
 
-/// Whether the variable is a known of the equations solved now.
+/// Whether the variable is a known of the present equations (initialization mode or not).
 fn is_known<M>(slot: &Slot<M, f64>, initializing: bool) -> bool {
     if initializing {
         let exact = slot.initial == Some(Initial::Exact);
@@ -19,7 +19,7 @@ fn is_known<M>(slot: &Slot<M, f64>, initializing: bool) -> bool {
 }
 
 impl<M: Model> Instance<M> {
-    /// `fmi2GetDirectionalDerivative`: `to` = (dh/dv) `delta` for the unknowns h and the knowns v.
+    /// `fmi2GetDirectionalDerivative`: `to = (dh/dv) delta` for the unknowns h and the knowns v.
     pub(crate) fn get_directional_derivative(
         &mut self,
         unknowns: &[u32],
@@ -27,7 +27,7 @@ impl<M: Model> Instance<M> {
         to: &mut [MaybeUninit<f64>],
     ) -> Result<(), Failure> {
         if !M::PROVIDES_DIRECTIONAL_DERIVATIVE {
-            let message = "not offered: providesDirectionalDerivative is false";
+            let message = "not available: providesDirectionalDerivative is false";
             return Err(Failure::Error(message.to_owned()));
         }
         self.refresh()?;
@@ -38,7 +38,7 @@ impl<M: Model> Instance<M> {
                 if initializing { slot.is_initial_unknown } else { slot.is_unknown }
             });
             if !is_unknown {
-                return Err(no_part("unknown", slot, self.core.state));
+                return Err(not_part("an unknown", slot, self.core.state));
             }
         }
         let model = &self.core.model;
@@ -51,7 +51,7 @@ impl<M: Model> Instance<M> {
             match self.interface.real(reference)? {
                 None => delta_time += delta,
                 Some(slot) if is_known(slot, initializing) => *(slot.field)(direction) += delta,
-                slot => return Err(no_part("known", slot, self.core.state)),
+                slot => return Err(not_part("a known", slot, self.core.state)),
             }
         }
         let at = if initializing {
@@ -69,9 +69,9 @@ impl<M: Model> Instance<M> {
     }
 }
 
-fn no_part<M>(part: &str, slot: Option<&Slot<M, f64>>, state: State) -> Failure {
+fn not_part<M>(role: &str, slot: Option<&Slot<M, f64>>, state: State) -> Failure {
     let name = slot.map_or("time", |slot| &slot.name);
     Failure::Error(format!(
-        "{name} is no {part} of the equations in the state {state:?} (ModelStructure)"
+        "{name} is not {role} of the equations in state {state:?}, see ModelStructure"
     ))
 }

@@ -2,18 +2,18 @@
 
 use std::mem::MaybeUninit;
 
-use super::{Instance, slack};
+use super::{Instance, time_tolerance};
 use crate::ffi::filled;
 use crate::model::{Failure, Model};
 use fmu_description::abi::{Status, fmi2EventInfo};
 use fmu_description::call_order::State;
 
-/// Refuses an array whose length is not the one of the description.
-fn length(what: &str, found: usize, expected: usize) -> Result<(), Failure> {
+/// Checks that the length of an array is as the model description states.
+fn check_length(what: &str, found: usize, expected: usize) -> Result<(), Failure> {
     if found == expected {
         return Ok(());
     }
-    Err(Failure::Error(format!("{found} {what} given, expected {expected}")))
+    Err(Failure::Error(format!("expected {expected} {what}, found {found}")))
 }
 
 impl<M: Model> Instance<M> {
@@ -56,19 +56,19 @@ impl<M: Model> Instance<M> {
         self.core.stale = true;
     }
 
-    /// `fmi2SetTime`. In event mode only where there is no continuous state (condition 8).
+    /// `fmi2SetTime`. Allowed in event mode only for an FMU without continuous states (condition 8).
     ///
-    /// An integrator may look past `stopTime` on its way; a step or an event there is refused.
+    /// An integrator may evaluate the model after `stopTime`; a step or an event there is an error.
     pub(crate) fn set_time(&mut self, time: f64) -> Result<(), Failure> {
         if self.core.state == State::EventMode && !self.interface.states.is_empty() {
-            let message = "in EventMode only an FMU without continuous states may be given a time";
+            let message = "allowed in EventMode only for an FMU without continuous states";
             return Err(Failure::Error(message.to_owned()));
         }
         if !time.is_finite() {
             return Err(Failure::Error(format!("time is {time}, expected a time in s")));
         }
         let start = self.core.experiment.start_time;
-        if time < start - slack(start) {
+        if time < start - time_tolerance(start) {
             return Err(Failure::Error(format!("{time} s is before startTime {start} s")));
         }
         self.core.time = time;
@@ -76,10 +76,10 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// `fmi2SetContinuousStates`: all or none.
+    /// `fmi2SetContinuousStates`: sets all states or, after a failure, none.
     pub(crate) fn set_continuous_states(&mut self, values: &[f64]) -> Result<(), Failure> {
         let states = &self.interface.states;
-        length("states", values.len(), states.len())?;
+        check_length("states", values.len(), states.len())?;
         for (state, value) in states.iter().zip(values) {
             if !value.is_finite() {
                 let name = &self.interface.reals[state.state].name;
@@ -100,7 +100,7 @@ impl<M: Model> Instance<M> {
         &mut self,
         values: &mut [MaybeUninit<f64>],
     ) -> Result<(), Failure> {
-        length("states", values.len(), self.interface.states.len())?;
+        check_length("states", values.len(), self.interface.states.len())?;
         self.refresh()?;
         for (state, value) in self.interface.states.iter().zip(values) {
             value.write(*(self.interface.reals[state.state].field)(&mut self.core.model));
@@ -113,7 +113,7 @@ impl<M: Model> Instance<M> {
         &mut self,
         values: &mut [MaybeUninit<f64>],
     ) -> Result<(), Failure> {
-        length("derivatives", values.len(), self.interface.states.len())?;
+        check_length("derivatives", values.len(), self.interface.states.len())?;
         self.refresh()?;
         for (state, value) in self.interface.states.iter().zip(values) {
             value.write(*(self.interface.reals[state.derivative].field)(&mut self.core.model));
@@ -123,7 +123,7 @@ impl<M: Model> Instance<M> {
 
     /// `fmi2GetNominalsOfContinuousStates`.
     pub(crate) fn get_nominals(&self, values: &mut [MaybeUninit<f64>]) -> Result<(), Failure> {
-        length("nominal values", values.len(), self.interface.states.len())?;
+        check_length("nominal values", values.len(), self.interface.states.len())?;
         for (state, value) in self.interface.states.iter().zip(values) {
             value.write(state.nominal);
         }
@@ -136,7 +136,7 @@ impl<M: Model> Instance<M> {
         values: &mut [MaybeUninit<f64>],
     ) -> Result<(), Failure> {
         let expected = self.interface.event_indicators.unwrap_or_default();
-        length("event indicators", values.len(), expected)?;
+        check_length("event indicators", values.len(), expected)?;
         self.refresh()?;
         self.core.model.event_indicators(self.core.time, filled(values, 0.0));
         Ok(())

@@ -1,9 +1,9 @@
-//! The layout of a serialised value: which fields it has, in which order, and of which types.
+//! The layout of a serialised value: its fields, their order and their types.
 //!
-//! The bytes of a serialised state have no names. A build of the same FMU whose private fields have
-//! another order would read them into the wrong fields, and nothing else would tell. So the state
-//! has a hash of the layout beside it, which the reader computes again from the value that it read:
-//! if that was written into other fields, names, order or types differ.
+//! The bytes of a serialised state contain no names. Another build of the same FMU, with its private
+//! fields in another order, would read them into the wrong fields without an error. Therefore a
+//! serialised state contains a hash of the layout. The reader computes the hash of the value that it
+//! has read; the two differ if names, order or types of fields differ.
 
 use std::fmt::Display;
 
@@ -12,25 +12,25 @@ use serde::ser::{
     SerializeTuple, SerializeTupleStruct, SerializeTupleVariant,
 };
 
-/// A hash of the layout.
+/// A hash of a layout.
 pub(super) type Layout = [u8; 8];
 
-/// The layout of `value`.
+/// Computes the hash of the layout of `value`.
 ///
-/// It holds, in the order of serialisation, the names of structs, fields, enums and variants, the
-/// type of each number or text, and the kind of each collection. The values of numbers, texts and
-/// lengths are not part of it, but which elements, variants and options there are is.
+/// It covers, in the order of serialisation, the names of structs, fields, enums and variants, the
+/// type of each number or text, the kind of each collection, and which elements, variants and options
+/// are present. It does not cover the values of numbers, texts and lengths.
 ///
 /// # Errors
 ///
-/// What the value's own `Serialize` refuses.
+/// [`Refusal`] if the value's `Serialize` implementation fails.
 pub(super) fn layout(value: &impl Serialize) -> Result<Layout, Refusal> {
-    let mut walk = Walk(0);
+    let mut walk = LayoutHasher(0);
     value.serialize(&mut walk)?;
     Ok(walk.0.to_le_bytes())
 }
 
-/// Why a value cannot be serialised.
+/// The error of a value that cannot be serialised.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub(super) struct Refusal(String);
@@ -41,9 +41,9 @@ impl ser::Error for Refusal {
     }
 }
 
-type Done = Result<(), Refusal>;
+type Hashed = Result<(), Refusal>;
 
-/// Up to eight bytes as a number.
+/// Converts up to eight bytes to a number.
 const fn number(bytes: &[u8]) -> u64 {
     let (mut number, mut k) = (0, 0);
     while k < bytes.len() {
@@ -53,19 +53,19 @@ const fn number(bytes: &[u8]) -> u64 {
     number
 }
 
-/// A serialiser that hashes what it is told of the types.
-struct Walk(u64);
+/// A serialiser that hashes the types of a value.
+struct LayoutHasher(u64);
 
-impl Walk {
-    /// Adds a number to the hash: for each number a bijection of what was there, so that a difference
-    /// stays one unless another one happens to undo it (1 in 2^64). The factor is 2^64 divided by the
-    /// golden ratio, and odd.
+impl LayoutHasher {
+    /// Adds a number to the hash by a bijection of the former hash. A difference between two hashes
+    /// persists unless a later difference cancels it (probability 2^-64). The factor is the odd number
+    /// next to 2^64 divided by the golden ratio.
     fn add(&mut self, number: u64) {
         let product = (self.0 ^ number).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         self.0 = product ^ (product >> 32);
     }
 
-    /// Adds a word, with its length.
+    /// Adds a word and its length.
     fn word(&mut self, word: &str) {
         for eight in word.as_bytes().chunks(8) {
             self.add(number(eight));
@@ -79,7 +79,7 @@ impl Walk {
         }
     }
 
-    /// A variant of an enum: its name and its number, which is what the bytes hold.
+    /// Adds a variant of an enum: its name and its number, which the bytes contain.
     fn variant(&mut self, kind: &str, name: &str, number: u32, variant: &str) {
         self.words([kind, name]);
         self.add(u64::from(number));
@@ -87,17 +87,17 @@ impl Walk {
     }
 }
 
-/// Types without a part: their names are short, and known to the compiler.
+/// Serialises types without parts by their names.
 macro_rules! plain {
     ($($function:ident $type:ty;)*) => {
-        $(fn $function(self, _: $type) -> Done {
+        $(fn $function(self, _: $type) -> Hashed {
             self.add(const { number(stringify!($type).as_bytes()) });
             Ok(())
         })*
     };
 }
 
-impl ser::Serializer for &mut Walk {
+impl ser::Serializer for &mut LayoutHasher {
     type Ok = ();
     type Error = Refusal;
     type SerializeSeq = Self;
@@ -127,27 +127,27 @@ impl ser::Serializer for &mut Walk {
         serialize_bytes &[u8];
     }
 
-    fn serialize_none(self) -> Done {
+    fn serialize_none(self) -> Hashed {
         self.word("none");
         Ok(())
     }
 
-    fn serialize_some<T: ?Sized + Serialize>(self, value: &T) -> Done {
+    fn serialize_some<T: ?Sized + Serialize>(self, value: &T) -> Hashed {
         self.word("some");
         value.serialize(self)
     }
 
-    fn serialize_unit(self) -> Done {
+    fn serialize_unit(self) -> Hashed {
         self.word("unit");
         Ok(())
     }
 
-    fn serialize_unit_struct(self, name: &'static str) -> Done {
+    fn serialize_unit_struct(self, name: &'static str) -> Hashed {
         self.words(["unit struct", name]);
         Ok(())
     }
 
-    fn serialize_unit_variant(self, name: &'static str, k: u32, variant: &'static str) -> Done {
+    fn serialize_unit_variant(self, name: &'static str, k: u32, variant: &'static str) -> Hashed {
         self.variant("unit variant", name, k, variant);
         Ok(())
     }
@@ -156,7 +156,7 @@ impl ser::Serializer for &mut Walk {
         self,
         name: &'static str,
         value: &T,
-    ) -> Done {
+    ) -> Hashed {
         self.words(["newtype", name]);
         value.serialize(self)
     }
@@ -167,7 +167,7 @@ impl ser::Serializer for &mut Walk {
         k: u32,
         variant: &'static str,
         value: &T,
-    ) -> Done {
+    ) -> Hashed {
         self.variant("newtype variant", name, k, variant);
         value.serialize(self)
     }
@@ -219,29 +219,29 @@ impl ser::Serializer for &mut Walk {
         Ok(self)
     }
 
-    fn collect_str<T: ?Sized + Display>(self, _: &T) -> Done {
+    fn collect_str<T: ?Sized + Display>(self, _: &T) -> Hashed {
         self.word("&str");
         Ok(())
     }
 
-    /// As postcard, which writes the bytes.
+    /// False, as in postcard, which writes the bytes.
     fn is_human_readable(&self) -> bool {
         false
     }
 }
 
-/// Collections whose parts have no names.
+/// Serialises collections whose parts have no names.
 macro_rules! elements {
     ($($collection:ident $function:ident;)*) => {
-        $(impl $collection for &mut Walk {
+        $(impl $collection for &mut LayoutHasher {
             type Ok = ();
             type Error = Refusal;
 
-            fn $function<T: ?Sized + Serialize>(&mut self, value: &T) -> Done {
+            fn $function<T: ?Sized + Serialize>(&mut self, value: &T) -> Hashed {
                 value.serialize(&mut **self)
             }
 
-            fn end(self) -> Done {
+            fn end(self) -> Hashed {
                 self.word("end");
                 Ok(())
             }
@@ -256,10 +256,10 @@ elements! {
     SerializeTupleVariant serialize_field;
 }
 
-/// Collections whose parts have names.
+/// Serialises collections whose parts have names.
 macro_rules! fields {
     ($($collection:ident)*) => {
-        $(impl $collection for &mut Walk {
+        $(impl $collection for &mut LayoutHasher {
             type Ok = ();
             type Error = Refusal;
 
@@ -267,12 +267,12 @@ macro_rules! fields {
                 &mut self,
                 name: &'static str,
                 value: &T,
-            ) -> Done {
+            ) -> Hashed {
                 self.word(name);
                 value.serialize(&mut **self)
             }
 
-            fn end(self) -> Done {
+            fn end(self) -> Hashed {
                 self.word("end");
                 Ok(())
             }
@@ -282,19 +282,19 @@ macro_rules! fields {
 
 fields! { SerializeStruct SerializeStructVariant }
 
-impl SerializeMap for &mut Walk {
+impl SerializeMap for &mut LayoutHasher {
     type Ok = ();
     type Error = Refusal;
 
-    fn serialize_key<T: ?Sized + Serialize>(&mut self, key: &T) -> Done {
+    fn serialize_key<T: ?Sized + Serialize>(&mut self, key: &T) -> Hashed {
         key.serialize(&mut **self)
     }
 
-    fn serialize_value<T: ?Sized + Serialize>(&mut self, value: &T) -> Done {
+    fn serialize_value<T: ?Sized + Serialize>(&mut self, value: &T) -> Hashed {
         value.serialize(&mut **self)
     }
 
-    fn end(self) -> Done {
+    fn end(self) -> Hashed {
         self.word("end");
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! FMU states: copies of an instance's core, and their form as bytes.
+//! FMU states: copies of an instance's core, and their serialised form.
 
 use std::mem::MaybeUninit;
 
@@ -15,10 +15,10 @@ const HEAD: usize = MAGIC.len() + size_of::<Guid>() + size_of::<Layout>();
 /// Length of the checksum at the end.
 const CHECKSUM: usize = 4;
 
-/// What `fmi2FMUstate` points to.
+/// The target of `fmi2FMUstate`.
 ///
-/// Some importers hand the state itself to `fmi2FreeFMUstate`, where section 2.1.8 wants its
-/// address. They find the pointer `none`: there is nothing to free.
+/// Some importers pass the state itself to `fmi2FreeFMUstate` instead of its address (section 2.1.8).
+/// The function then reads `none` as a null pointer and frees nothing.
 #[repr(C)]
 pub(crate) struct Snapshot<M: Model> {
     none: usize,
@@ -37,13 +37,13 @@ impl<M: Model> Instance<M> {
         if snapshot.guid != self.guid() {
             let (of, own) = (snapshot.guid, self.guid());
             return Err(Failure::Error(format!(
-                "the state belongs to the FMU {of}, this one is {own}"
+                "the state belongs to the FMU with GUID {of}, this FMU has GUID {own}"
             )));
         }
         let (of, own) = (snapshot.core.interface_type, self.core.interface_type);
         if of != own {
             return Err(Failure::Error(format!(
-                "the state is one of {of:?}, this instance is {own:?}"
+                "the state belongs to an instance for {of:?}, this instance is for {own:?}"
             )));
         }
         self.core.clone_from(&snapshot.core);
@@ -52,11 +52,11 @@ impl<M: Model> Instance<M> {
 }
 
 fn failed(error: &dyn std::fmt::Display) -> Failure {
-    Failure::Error(format!("cannot serialize: {error}"))
+    Failure::Error(format!("the state cannot be serialized: {error}"))
 }
 
 impl<M: Model> Snapshot<M> {
-    /// How many bytes [`Snapshot::write`] needs.
+    /// Returns the number of bytes that [`Snapshot::write`] needs.
     pub(crate) fn size(&self) -> Result<usize, Failure> {
         let core = postcard::experimental::serialized_size(&self.core);
         core.map(|core| HEAD + core + CHECKSUM).map_err(|error| failed(&error))
@@ -67,7 +67,7 @@ impl<M: Model> Snapshot<M> {
         let bytes = self.to_bytes()?;
         let (found, needed) = (room.len(), bytes.len());
         if found < needed {
-            return Err(Failure::Error(format!("{found} bytes given, {needed} needed")));
+            return Err(Failure::Error(format!("expected {needed} bytes, found {found}")));
         }
         for (place, byte) in room.iter_mut().zip(bytes) {
             place.write(byte);
@@ -75,8 +75,8 @@ impl<M: Model> Snapshot<M> {
         Ok(())
     }
 
-    /// The state as bytes: magic, GUID, layout, core in postcard's little-endian form, CRC-32 of all
-    /// that.
+    /// Serialises the state: magic, GUID, layout, core in postcard's little-endian form, CRC-32 of all
+    /// before.
     pub(crate) fn to_bytes(&self) -> Result<Vec<u8>, Failure> {
         let layout = layout(&self.core).map_err(|error| failed(&error))?;
         let head = [MAGIC.as_slice(), &self.guid.0, &layout].concat();
@@ -85,27 +85,31 @@ impl<M: Model> Snapshot<M> {
         Ok(bytes)
     }
 
-    /// The state in `bytes`; refused unless it is whole, of the FMU `guid`, and of a model with the
-    /// fields of `M`.
+    /// Reads a serialised state.
+    ///
+    /// # Errors
+    ///
+    /// [`Failure::Error`] if `bytes` is truncated or altered, belongs to an FMU other than `guid`, or was
+    /// written by a build whose model has other fields.
     pub(crate) fn from_bytes(bytes: &[u8], guid: Guid) -> Result<Self, Failure> {
         let refused = |reason: &str| Failure::Error(format!("serialized state: {reason}"));
         if !bytes.starts_with(&MAGIC[..6]) {
-            return Err(refused("not of this exporter"));
+            return Err(refused("not written by an FMU of this exporter"));
         }
         if !bytes.starts_with(MAGIC) {
-            return Err(refused("unknown version"));
+            return Err(refused("unknown version of the format"));
         }
         let (content, _) = bytes
             .split_last_chunk::<CHECKSUM>()
             .filter(|(content, sum)| crc32fast::hash(content).to_le_bytes() == **sum)
-            .ok_or_else(|| refused("truncated or altered, its checksum does not hold"))?;
+            .ok_or_else(|| refused("truncated or altered: the checksum does not match"))?;
         let core = content[MAGIC.len()..]
             .strip_prefix(&guid.0)
-            .ok_or_else(|| refused("of another FMU, its GUID differs"))?;
+            .ok_or_else(|| refused("it belongs to another FMU: the GUID differs"))?;
         let another_build = |reason: &dyn std::fmt::Display| {
             refused(&format!(
-                "of another build of this FMU, whose model has fields of other names, types or order: \
-                 only a library with the same model can read it ({reason})"
+                "it was written by another build of this FMU, whose model has fields of other names, \
+                 types or order; use a library with the same model ({reason})"
             ))
         };
         let (stored, core) = core
@@ -116,16 +120,16 @@ impl<M: Model> Snapshot<M> {
         if layout(&core).map_err(|error| another_build(&error))? != *stored {
             return Err(another_build(&"the layouts differ"));
         }
-        if !rest.is_empty() || !core.is_possible() {
-            return Err(refused("no instance can be in that state"));
+        if !rest.is_empty() || !core.is_reachable() {
+            return Err(refused("no instance can reach this state"));
         }
         Ok(Self { none: 0, guid, core })
     }
 }
 
 impl<M: Model> Core<M> {
-    /// Whether an instance can be like that when its state is read.
-    fn is_possible(&self) -> bool {
+    /// Checks that an instance can reach this state.
+    fn is_reachable(&self) -> bool {
         let reached = match self.state {
             State::Instantiated | State::InitializationMode | State::Terminated | State::Error => {
                 true

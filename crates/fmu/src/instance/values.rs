@@ -10,7 +10,7 @@ use fmu_description::Causality;
 use fmu_description::abi::fmi2String;
 use fmu_description::call_order::State;
 
-/// The slot with value reference `reference`.
+/// Returns the slot with value reference `reference`.
 fn slot<'a, M, T>(
     slots: &'a [Slot<M, T>],
     reference: u32,
@@ -22,7 +22,7 @@ fn slot<'a, M, T>(
 }
 
 impl<M> Interface<M> {
-    /// The Real with value reference `reference`; `None` for time.
+    /// Returns the Real with value reference `reference`; `None` for time.
     pub(super) fn real(&self, reference: u32) -> Result<Option<&Slot<M, f64>>, Failure> {
         match reference.checked_sub(1) {
             None => Ok(None),
@@ -42,7 +42,7 @@ impl<M> Interface<M> {
     }
 }
 
-/// Whether the variable may be set now.
+/// Checks that the variable may be set in `state`.
 fn settable<M, T>(slot: &Slot<M, T>, state: State) -> Result<(), Failure> {
     if slot.settable & state.bit() != 0 {
         return Ok(());
@@ -50,11 +50,11 @@ fn settable<M, T>(slot: &Slot<M, T>, state: State) -> Result<(), Failure> {
     let (name, variability) = (&slot.name, slot.variability.as_str());
     let causality = slot.causality.as_str();
     Err(Failure::Error(format!(
-        "{name} ({causality}, {variability}) may not be set in the state {state:?}"
+        "{name} ({causality}, {variability}) must not be set in state {state:?}"
     )))
 }
 
-/// Whether `value` is one that the variable can take: its range is finite.
+/// Checks that `value` is in the variable's range, which is finite.
 fn acceptable<M>(slot: &Slot<M, f64>, value: f64) -> Result<(), Failure> {
     let (min, max) = slot.range;
     if min <= value && value <= max {
@@ -67,7 +67,7 @@ fn acceptable<M>(slot: &Slot<M, f64>, value: f64) -> Result<(), Failure> {
     Err(Failure::Discard(format!("{name} = {value}, expected {min} to {max}")))
 }
 
-/// Whether the Integer or Enumeration can take `value`.
+/// Checks that `value` is in the range of the Integer or an item of the Enumeration.
 fn acceptable_integer<M>(slot: &Slot<M, i32>, value: i32) -> Result<(), Failure> {
     let (min, max) = slot.range;
     let name = &slot.name;
@@ -82,12 +82,12 @@ fn acceptable_integer<M>(slot: &Slot<M, i32>, value: i32) -> Result<(), Failure>
 }
 
 impl<M: Model> Core<M> {
-    fn touched<T>(&mut self, slot: &Slot<M, T>) {
+    fn mark_stale<T>(&mut self, slot: &Slot<M, T>) {
         self.stale = true;
         self.unchecked |= slot.causality == Causality::Parameter;
     }
 
-    /// Sets all of `values` or, where one cannot be set, none.
+    /// Sets all `values`, or none if one of them cannot be set.
     fn set<T, V>(
         &mut self,
         slots: &[Slot<M, T>],
@@ -105,7 +105,7 @@ impl<M: Model> Core<M> {
         for (&reference, value) in references.iter().zip(values) {
             let slot = slot(slots, reference, kind)?;
             assign((slot.field)(&mut self.model), value);
-            self.touched(slot);
+            self.mark_stale(slot);
         }
         Ok(())
     }
@@ -156,7 +156,7 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// `fmi2GetString`: the pointers stay valid until the next call.
+    /// `fmi2GetString`. The pointers stay valid until the next call.
     pub(crate) fn get_string(
         &mut self,
         from: &[u32],
@@ -175,7 +175,7 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// `fmi2SetReal`: all values or none.
+    /// `fmi2SetReal`: sets all values or, after a failure, none.
     pub(crate) fn set_real(&mut self, to: &[u32], values: &[f64]) -> Result<(), Failure> {
         let Self { core, interface, .. } = self;
         let reals = interface.reals.as_slice();
@@ -187,7 +187,7 @@ impl<M: Model> Instance<M> {
                 slot.settable & now != 0 && slot.range.0 <= value && value <= slot.range.1
             };
             let Some(slot) = slot(reference).filter(takes) else {
-                return self.refuse(to, values);
+                return self.rejection(to, values);
             };
             parameters |= slot.causality == Causality::Parameter;
         }
@@ -202,36 +202,36 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// Says why `values` cannot be set.
+    /// Returns the failure of the first value that cannot be set.
     #[cold]
-    fn refuse(&self, to: &[u32], values: &[f64]) -> Result<(), Failure> {
+    fn rejection(&self, to: &[u32], values: &[f64]) -> Result<(), Failure> {
         for (&reference, &value) in to.iter().zip(values) {
-            let slot = self.interface.real(reference)?.ok_or_else(time_is_given)?;
+            let slot = self.interface.real(reference)?.ok_or_else(time_is_independent)?;
             settable(slot, self.core.state)?;
             acceptable(slot, value)?;
         }
         Ok(())
     }
 
-    /// `fmi2SetInteger`: all values or none.
+    /// `fmi2SetInteger`: sets all values or, after a failure, none.
     pub(crate) fn set_integer(&mut self, to: &[u32], values: &[i32]) -> Result<(), Failure> {
         let accept = |slot: &Slot<M, i32>, value: &i32| acceptable_integer(slot, *value);
         self.core.set(&self.interface.integers, to, values, i32::clone_from, accept, "Integer")
     }
 
-    /// `fmi2SetBoolean`: all values or none.
+    /// `fmi2SetBoolean`: sets all values or, after a failure, none.
     pub(crate) fn set_boolean(&mut self, to: &[u32], values: &[i32]) -> Result<(), Failure> {
         let assign = |field: &mut bool, value: &i32| *field = *value != 0;
         self.core.set(&self.interface.booleans, to, values, assign, |_, _| Ok(()), "Boolean")
     }
 
-    /// `fmi2SetString`: all values or none.
+    /// `fmi2SetString`: sets all values or, after a failure, none.
     pub(crate) fn set_string(&mut self, to: &[u32], values: &[String]) -> Result<(), Failure> {
         let accept = |_: &Slot<M, String>, _: &String| Ok(());
         self.core.set(&self.interface.strings, to, values, String::clone_from, accept, "String")
     }
 
-    /// `fmi2SetRealInputDerivatives`. Orders above those that the model uses have no effect.
+    /// `fmi2SetRealInputDerivatives`. Orders that the model does not use have no effect.
     pub(crate) fn set_real_input_derivatives(
         &mut self,
         to: &[u32],
@@ -239,10 +239,10 @@ impl<M: Model> Instance<M> {
         values: &[f64],
     ) -> Result<(), Failure> {
         for ((&reference, &order), &value) in to.iter().zip(orders).zip(values) {
-            let slot = self.interface.real(reference)?.ok_or_else(time_is_given)?;
+            let slot = self.interface.real(reference)?.ok_or_else(time_is_independent)?;
             let name = &slot.name;
             if slot.causality != Causality::Input {
-                return Err(Failure::Error(format!("{name} is no input")));
+                return Err(Failure::Error(format!("{name} is not an input")));
             }
             if order < 1 {
                 return Err(Failure::Error(format!("{name}: order {order}, expected 1 or more")));
@@ -255,7 +255,7 @@ impl<M: Model> Instance<M> {
         }
         for ((&reference, &order), &value) in to.iter().zip(orders).zip(values) {
             let slot = self.interface.real(reference)?;
-            if let Some(field) = slot.and_then(|slot| of_order(slot, order)) {
+            if let Some(field) = slot.and_then(|slot| derivative_field(slot, order)) {
                 *field(&mut self.core.model) = value;
                 self.core.sloped = true;
             }
@@ -273,29 +273,29 @@ impl<M: Model> Instance<M> {
         self.refresh()?;
         let highest = self.interface.max_output_derivative_order;
         for ((&reference, &order), value) in from.iter().zip(orders).zip(values) {
-            let slot = self.interface.real(reference)?.ok_or_else(time_is_given)?;
+            let slot = self.interface.real(reference)?.ok_or_else(time_is_independent)?;
             let name = &slot.name;
             if slot.causality != Causality::Output {
-                return Err(Failure::Error(format!("{name} is no output")));
+                return Err(Failure::Error(format!("{name} is not an output")));
             }
             if u32::try_from(order).map_or(true, |order| order < 1 || order > highest) {
                 return Err(Failure::Error(format!(
                     "{name}: order {order}, expected 1 to maxOutputDerivativeOrder = {highest}"
                 )));
             }
-            let field = of_order(slot, order);
+            let field = derivative_field(slot, order);
             value.write(field.map_or(0.0, |field| *field(&mut self.core.model)));
         }
         Ok(())
     }
 }
 
-/// The field of the derivative of that order, where the model has one.
-fn of_order<M>(slot: &Slot<M, f64>, order: i32) -> Option<&crate::variable::Field<M, f64>> {
+/// Returns the field of the derivative of this order, if the model has one.
+fn derivative_field<M>(slot: &Slot<M, f64>, order: i32) -> Option<&crate::variable::Field<M, f64>> {
     let position = usize::try_from(order).ok()?.checked_sub(1)?;
     slot.derivatives.get(position)
 }
 
-fn time_is_given() -> Failure {
+fn time_is_independent() -> Failure {
     Failure::Error("time is the independent variable, neither input nor output".to_owned())
 }

@@ -4,7 +4,7 @@ use crate::model::Model;
 use fmu_description::unit::Unit;
 use fmu_description::{CoSimulation, LogCategory, ModelDescription, ModelExchange};
 
-/// Log categories of every exported FMU: standardized names of section 2.2.4.
+/// Log categories of every exported FMU, with the standardised names of section 2.2.4.
 pub(crate) const CATEGORIES: [(&str, &str); 4] = [
     ("logEvents", "Events at which the model wants the simulation to end"),
     ("logStatusDiscard", "Calls that were refused without harm"),

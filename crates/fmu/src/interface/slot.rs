@@ -1,23 +1,24 @@
-//! One variable as an instance reaches it.
+//! Run-time data of a variable, indexed by value reference.
 
 use crate::variable::{Access, Field, Variable};
 use fmu_description::call_order::settable;
 use fmu_description::{Causality, Initial, Variability};
 
-/// One variable of base type `T`; its position in [`Interface`] is its value reference.
+/// A variable of base type `T`; its position in [`Interface`] follows from its value reference.
 pub(crate) struct Slot<M, T> {
     pub(crate) name: String,
     pub(crate) causality: Causality,
     pub(crate) variability: Variability,
     pub(crate) initial: Option<Initial>,
     pub(crate) is_state: bool,
-    /// Listed under `Outputs` or `Derivatives`, by this name or an alias.
+    /// Whether `Outputs` or `Derivatives` lists the variable or an alias of it.
     pub(crate) is_unknown: bool,
-    /// Listed under `InitialUnknowns`, by this name or an alias.
+    /// Whether `InitialUnknowns` lists the variable or an alias of it.
     pub(crate) is_initial_unknown: bool,
     /// Smallest and largest value of a Real or Integer; finite.
     pub(crate) range: (f64, f64),
-    /// The states in which it may be set, as a set of [`State::bit`](fmu_description::call_order::State).
+    /// The states in which the variable may be set: a set of
+    /// [`State::bit`](fmu_description::call_order::State)s.
     pub(crate) settable: u16,
     /// The values of an enumeration; empty for all other types.
     pub(crate) items: Vec<i32>,
@@ -25,8 +26,8 @@ pub(crate) struct Slot<M, T> {
     pub(crate) derivatives: Vec<Field<M, f64>>,
 }
 
-/// A slot whose field is still to come.
-pub(super) struct Blank<M> {
+/// A slot without its field, which determines the base type.
+pub(super) struct SlotBuilder<M> {
     name: String,
     causality: Causality,
     variability: Variability,
@@ -36,10 +37,10 @@ pub(super) struct Blank<M> {
     derivatives: Vec<Field<M, f64>>,
 }
 
-impl<M> Blank<M> {
-    pub(super) fn of(variable: Variable<M>) -> (Self, Access<M>) {
+impl<M> SlotBuilder<M> {
+    pub(super) fn new(variable: Variable<M>) -> (Self, Access<M>) {
         let (min, max) = (variable.number.min, variable.number.max);
-        let blank = Self {
+        let builder = Self {
             name: variable.name,
             causality: variable.causality,
             variability: variable.variability,
@@ -51,11 +52,11 @@ impl<M> Blank<M> {
                 .unwrap_or_default(),
             derivatives: variable.derivatives,
         };
-        (blank, variable.access)
+        (builder, variable.access)
     }
 
-    /// Appends the slot and returns its position.
-    pub(super) fn fill<T>(self, slots: &mut Vec<Slot<M, T>>, field: Field<M, T>) -> u32 {
+    /// Adds the field, appends the slot and returns its position.
+    pub(super) fn build<T>(self, slots: &mut Vec<Slot<M, T>>, field: Field<M, T>) -> u32 {
         slots.push(Slot {
             name: self.name,
             causality: self.causality,

@@ -1,21 +1,21 @@
-//! `ModelStructure` of a model, from the dependencies that its variables state.
+//! `ModelStructure` of a model, from the declared dependencies of its variables.
 
 use crate::model::Failure;
 use crate::variable::{Access, Variable};
 use fmu_description::{Causality, DependencyKind, Initial, ModelStructure, Unknown};
 
-/// The 1-based index of the variable at `position`: `time` is the first.
+/// Returns the 1-based index of the variable at `position`. Index 1 is `time`.
 pub(super) fn index(position: usize) -> u32 {
     u32::try_from(position + 2).unwrap_or(u32::MAX)
 }
 
-/// The position of the variable called `name`, which `of` refers to.
+/// Returns the position of the variable called `name`, to which `of` refers.
 pub(super) fn find<M>(variables: &[Variable<M>], of: &str, name: &str) -> Result<usize, Failure> {
     let found = variables.iter().position(|variable| variable.name == name);
     found.ok_or_else(|| Failure::Error(format!("{of} refers to {name}, which is no variable")))
 }
 
-/// Positions of the continuous states and of their derivatives, in the order of the derivatives.
+/// Returns the positions of each continuous state and its derivative, in the order of the derivatives.
 pub(super) fn states<M>(variables: &[Variable<M>]) -> Result<Vec<(usize, usize)>, Failure> {
     let mut states = Vec::new();
     for (derivative, variable) in variables.iter().enumerate() {
@@ -26,8 +26,8 @@ pub(super) fn states<M>(variables: &[Variable<M>]) -> Result<Vec<(usize, usize)>
     Ok(states)
 }
 
-/// `Outputs`, `Derivatives`, and as `InitialUnknowns` those of them, of the states and of the
-/// calculated parameters that are not given by a start value.
+/// Returns `ModelStructure`. `InitialUnknowns` are the outputs, derivatives, states and calculated
+/// parameters without an exact start value.
 pub(super) fn structure<M>(variables: &[Variable<M>]) -> Result<ModelStructure, Failure> {
     let mut structure = ModelStructure::default();
     let states = states(variables)?;
@@ -36,8 +36,8 @@ pub(super) fn structure<M>(variables: &[Variable<M>]) -> Result<ModelStructure, 
         let is_output = variable.causality == Causality::Output;
         let is_derivative = variable.derivative_of.is_some();
         if is_output || is_derivative {
-            let own_state = state_behind(variables, position)?.filter(|state| is_state(*state));
-            let row = at_a_point(variables, position, own_state)?;
+            let own_state = resolve_alias(variables, position)?.filter(|state| is_state(*state));
+            let row = dependency_row(variables, position, own_state)?;
             if is_output {
                 structure.outputs.push(row.clone());
             }
@@ -50,14 +50,14 @@ pub(super) fn structure<M>(variables: &[Variable<M>]) -> Result<ModelStructure, 
             || is_state(position)
             || variable.causality == Causality::CalculatedParameter;
         if exposed && matches!(variable.initial, Some(Initial::Calculated | Initial::Approx)) {
-            structure.initial_unknowns.push(at_the_start(variables, position)?);
+            structure.initial_unknowns.push(initial_row(variables, position)?);
         }
     }
     Ok(structure)
 }
 
-/// The variable itself, or the one that it is an alias of.
-fn state_behind<M>(variables: &[Variable<M>], position: usize) -> Result<Option<usize>, Failure> {
+/// Returns the position of the state, if the variable is a state or an alias of a state.
+fn resolve_alias<M>(variables: &[Variable<M>], position: usize) -> Result<Option<usize>, Failure> {
     let variable = &variables[position];
     match &variable.access {
         Access::Real(_) => Ok(Some(position)),
@@ -66,9 +66,9 @@ fn state_behind<M>(variables: &[Variable<M>], position: usize) -> Result<Option<
     }
 }
 
-/// The row of an output or derivative. One that is a state, perhaps by another name, depends on
-/// that state.
-fn at_a_point<M>(
+/// Returns the row of an output or derivative. If the variable is a state or an alias of a state, it
+/// depends on that state.
+fn dependency_row<M>(
     variables: &[Variable<M>],
     position: usize,
     own_state: Option<usize>,
@@ -91,8 +91,8 @@ fn at_a_point<M>(
     })
 }
 
-/// The row of an initial value.
-fn at_the_start<M>(variables: &[Variable<M>], position: usize) -> Result<Unknown, Failure> {
+/// Returns the row of an initial unknown.
+fn initial_row<M>(variables: &[Variable<M>], position: usize) -> Result<Unknown, Failure> {
     let variable = &variables[position];
     let Some(names) = &variable.initially else {
         return Ok(Unknown { index: index(position), dependencies: None, kinds: None });

@@ -1,18 +1,20 @@
-//! Text that is put together cell by cell.
+//! A buffer of CSV lines, written cell by cell.
 
 use super::{Column, ColumnKind};
 
-/// Most letters of a Real and of an Integer: -1.7976931348623157e+308, -2147483648.
+/// Largest length of a Real and of an Integer: -1.7976931348623157e+308, -2147483648.
 const REAL: usize = 24;
 const INTEGER: usize = 11;
 
-/// Bytes with room for the next row, so that no cell asks for more. A cell is copied by two moves
-/// of fixed length that may overlap: a copy of any length costs as much as the digits of a number.
+/// A buffer with room for the next row, so that cells need no check of the capacity.
+///
+/// A cell is copied by two moves of fixed length that may overlap, because a copy of variable length
+/// takes as long as formatting a number.
 #[derive(Debug)]
 pub(super) struct Lines {
     bytes: Vec<u8>,
     used: usize,
-    /// Room of the time, the numbers and the commas of a row.
+    /// Largest length of a row without its texts.
     row: usize,
 }
 
@@ -36,7 +38,7 @@ impl Lines {
         self.used = 0;
     }
 
-    /// Makes room for a line with these texts.
+    /// Reserves memory for a line with these texts.
     pub(super) fn begin<'a>(&mut self, texts: impl Iterator<Item = &'a str>) {
         let texts: usize = texts.map(|text| 2 * text.len() + 3).sum();
         let room = self.row + texts;
@@ -50,8 +52,8 @@ impl Lines {
         self.used += 1;
     }
 
-    /// The shortest decimal that reads back as the same bits; always with a point or an exponent,
-    /// so that no reader takes a column for integers by its first rows.
+    /// Writes the shortest decimal that reads back as the same bits, always with a point or an exponent,
+    /// so that no reader infers the type integer from the first rows.
     pub(super) fn real(&mut self, value: f64) {
         if value.is_finite() {
             self.cell(zmij::Buffer::new().format_finite(value));
@@ -83,7 +85,7 @@ impl Lines {
         }
     }
 
-    /// A text in quotation marks; those inside are doubled.
+    /// Writes a text in quotation marks and doubles the quotation marks inside.
     pub(super) fn quote(&mut self, text: &str) {
         self.push(b'"');
         for (place, part) in text.split('"').enumerate() {

@@ -3,8 +3,8 @@ use std::fs;
 use super::super::tests::{column, give, mixed};
 use super::*;
 
-/// Doubles at which writers and readers of decimals have failed: powers of two and ten, halfway
-/// cases, the ends of the normal and the subnormal numbers.
+/// Returns doubles at which writers and readers of decimals have failed: powers of two and ten, halfway
+/// cases, the limits of the normal and the subnormal numbers.
 fn extremes() -> Vec<f64> {
     let mut values = vec![0.0, 0.1, 1.0 / 3.0, 5e-324];
     let texts = ["2.2250738585072011e-308", "9007199254740993", "6.631236871469758276e-316"];
@@ -40,7 +40,7 @@ fn every_double_comes_back_with_the_same_bits() {
     for value in values {
         let cell = lines.next().unwrap().strip_prefix("1.0,").unwrap();
         assert_eq!(cell.parse::<f64>().unwrap().to_bits(), value.to_bits(), "{cell}");
-        // Rust's own formatting is another algorithm (Grisu with Dragon): equally many digits.
+        // The standard library formats by another algorithm (Grisu with Dragon) to as many digits.
         let digits = |text: &str| {
             let mantissa = text.split('e').next().unwrap();
             let all: String = mantissa.chars().filter(char::is_ascii_digit).collect();
@@ -99,7 +99,7 @@ fn a_flush_and_a_drop_leave_whole_lines_only() {
         rows += 1;
         assert!(rows < 100_000, "the file does not grow as the run goes");
     }
-    // What the buffer handed over by itself are whole lines too.
+    // The automatic writes of the full buffer are complete lines, too.
     let text = fs::read_to_string(&path).unwrap();
     assert!(text.ends_with('\n') && text.lines().all(|line| line.split(',').count() == 41));
     sink.row(9.0, &Row { reals: &[0.0; 40], ..Row::default() }).unwrap();

@@ -1,30 +1,30 @@
-//! Rows that wait to become a row group, column by column.
+//! A block of rows, stored by column, which becomes a row group.
 
 use ::parquet::data_type::ByteArray;
 
 use super::{Column, ColumnKind, Row};
 
-/// Bytes of values in a block, about.
+/// Approximate size of the values of a block in bytes.
 const BYTES: usize = 16 << 20;
-/// Rows of a block: where there are many columns the first, where there are few the last.
+/// Range of the number of rows of a block: few rows for many columns, many rows for few columns.
 const ROWS: std::ops::RangeInclusive<usize> = 512..=65_536;
-/// Values between the ends of neighbouring columns: one cache line, or a row whose columns lie a
-/// power of two apart would use one set of the cache only.
+/// Unused values between neighbouring columns: one cache line. With a distance of a power of two all
+/// columns of a row would map to the same set of the cache.
 const PADDING: usize = 8;
 
-/// Columns of fixed room. Texts lie row by row in one.
+/// Columns of fixed capacity. Texts of all columns are stored together, row by row.
 #[derive(Debug)]
 pub(super) struct Block {
-    /// Rows that it holds, and that it can hold.
+    /// Number of rows; then the capacity in rows.
     rows: usize,
     room: usize,
     reals: Vec<f64>,
     integers: Vec<i32>,
     booleans: Vec<bool>,
     texts: Vec<u8>,
-    /// Where each text ends.
+    /// End of each text.
     ends: Vec<usize>,
-    /// Texts in a row.
+    /// Number of texts in a row.
     strings: usize,
 }
 
@@ -67,14 +67,14 @@ impl Block {
         self.ends.clear();
     }
 
-    /// Adds a row to a block that is not full.
+    /// Adds a row. The block must not be full.
     pub(super) fn push(&mut self, time: f64, row: &Row<'_>) {
         let stride = self.room + PADDING;
         let reals = self.reals[self.rows..].iter_mut().step_by(stride);
         for (place, value) in reals.zip(std::iter::once(&time).chain(row.reals)) {
             *place = *value;
         }
-        // A kind without columns has no room to start in.
+        // A type without columns has no storage, so `skip` yields nothing.
         let integers = self.integers.iter_mut().skip(self.rows).step_by(stride);
         for (place, value) in integers.zip(row.integers) {
             *place = *value;
@@ -90,14 +90,14 @@ impl Block {
         self.rows += 1;
     }
 
-    /// Gives the first `rows` of the columns one after another.
+    /// Returns a reader of the first `rows` of the columns.
     pub(super) fn reader(&self, rows: usize) -> Reader<'_> {
         let rows = rows.min(self.rows);
         Reader { block: self, rows, reals: 0, integers: 0, booleans: 0, strings: 0 }
     }
 }
 
-/// The next column of each kind.
+/// A reader that returns the columns of each type one after another.
 pub(super) struct Reader<'a> {
     block: &'a Block,
     rows: usize,

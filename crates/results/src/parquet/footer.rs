@@ -1,4 +1,4 @@
-//! The footer: schema, units, and where the row groups lie.
+//! The footer of a Parquet file: schema, units and positions of the row groups.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -12,14 +12,14 @@ use ::parquet::schema::types::{SchemaDescPtr, SchemaDescriptor, Type, TypePtr};
 
 use super::{Column, ColumnKind, TIME};
 
-/// Key of the units: a JSON object from name to unit.
+/// Metadata key of the units: a JSON object from name to unit.
 const UNITS: &str = "units";
-/// Key under which pandas looks for the attributes of a table.
+/// Metadata key from which pandas reads the attributes of a table.
 const PANDAS: &str = "PANDAS_ATTRS";
 /// Version of the format in the footer.
 const VERSION: i32 = 1;
 
-/// What the footer says, for any number of row groups.
+/// The content of the footer, for any number of row groups.
 #[derive(Debug)]
 pub(super) struct Footer {
     schema: SchemaDescPtr,
@@ -51,12 +51,12 @@ impl Footer {
         self.schema.clone()
     }
 
-    /// Holds a row group for this and all later footers.
+    /// Adds a row group to this and all later footers.
     pub(super) fn keep(&mut self, group: RowGroupMetaData) {
         self.groups.push(group);
     }
 
-    /// Appends the footer of the row groups so far and one more.
+    /// Appends the footer with all row groups so far and an optional further one.
     pub(super) fn append(
         &mut self,
         bytes: &mut Vec<u8>,
@@ -82,7 +82,7 @@ impl Footer {
     }
 }
 
-/// A column without nulls.
+/// Returns the schema of a column without nulls.
 fn field(name: &str, kind: ColumnKind) -> Result<TypePtr, ParquetError> {
     let (physical, logical) = match kind {
         ColumnKind::Real => (Physical::DOUBLE, None),
@@ -97,7 +97,7 @@ fn field(name: &str, kind: ColumnKind) -> Result<TypePtr, ParquetError> {
     Ok(Arc::new(built))
 }
 
-/// A row group that was written from offset 0 on, as it is `by` bytes further on.
+/// Returns the metadata of a row group, written at offset 0, for the offset `by`.
 pub(super) fn moved(group: &RowGroupMetaData, by: u64) -> Result<RowGroupMetaData, ParquetError> {
     let by = i64::try_from(by).map_err(|error| ParquetError::General(error.to_string()))?;
     let columns = group.columns().iter().map(|column| {
@@ -107,7 +107,7 @@ pub(super) fn moved(group: &RowGroupMetaData, by: u64) -> Result<RowGroupMetaDat
         builder.set_data_page_offset(data).set_dictionary_page_offset(dictionary).build()
     });
     let columns = columns.collect::<Result<Vec<_>, _>>()?;
-    // The writer's ordinal would be that of a file with this one row group.
+    // The writer has set the ordinal for a file with this row group only.
     RowGroupMetaData::builder(group.schema_descr_ptr())
         .set_num_rows(group.num_rows())
         .set_total_byte_size(group.total_byte_size())
@@ -116,7 +116,7 @@ pub(super) fn moved(group: &RowGroupMetaData, by: u64) -> Result<RowGroupMetaDat
         .build()
 }
 
-/// The units that a footer states, by name.
+/// Returns the units in the footer, by name.
 pub(crate) fn units(metadata: &FileMetaData) -> BTreeMap<String, String> {
     metadata
         .key_value_metadata()

@@ -8,7 +8,7 @@ use super::*;
 
 type Cells = Vec<(String, Field)>;
 
-/// Everything in a file by the record reader of the crate.
+/// Reads all rows of a file by the record reader of the crate `parquet`.
 fn rows(path: &Path) -> Vec<Cells> {
     let reader = SerializedFileReader::new(File::open(path).unwrap()).unwrap();
     let rows = reader.get_row_iter(None).unwrap();
@@ -126,7 +126,7 @@ fn long_texts_end_a_row_group_before_its_rows_do() {
 }
 
 #[test]
-fn a_killed_run_leaves_the_rows_up_to_its_last_hand_over() {
+fn a_killed_run_leaves_the_rows_up_to_its_last_write() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.parquet");
     let mut sink = ParquetSink::create(&path, &mixed()).unwrap();

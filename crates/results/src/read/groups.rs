@@ -1,4 +1,4 @@
-//! Parquet without nesting.
+//! Reads Parquet files without nested columns.
 
 use std::fs::File;
 use std::path::Path;
@@ -13,7 +13,7 @@ use super::{Column, ResultsError, Visitor, unreadable};
 use crate::ColumnKind;
 use crate::parquet::units;
 
-/// Rows read at once.
+/// Number of rows read at once.
 const ROWS: usize = 8192;
 
 fn open(path: &Path) -> Result<SerializedFileReader<File>, ResultsError> {
@@ -47,32 +47,33 @@ pub(super) fn columns(path: &Path) -> Result<Vec<Column>, ResultsError> {
 pub(super) fn visit(
     path: &Path,
     columns: &[Column],
-    wanted: &[usize],
+    positions: &[usize],
     visitor: &mut Visitor<'_>,
 ) -> Result<(), ResultsError> {
-    if let Some(text) = wanted.iter().find(|place| columns[**place].kind == ColumnKind::String) {
+    if let Some(text) = positions.iter().find(|place| columns[**place].kind == ColumnKind::String) {
         let name = columns[*text].name.clone();
         return Err(ResultsError::Text { path: path.to_owned(), name });
     }
     let reader = open(path)?;
     let length = std::fs::metadata(path).map_err(|error| unreadable(path, &error))?.len();
     for group in 0..reader.num_row_groups() {
-        check_places(&reader, group, wanted, length)
-            .and_then(|()| visit_group(&reader, group, wanted, visitor))
+        check_places(&reader, group, positions, length)
+            .and_then(|()| visit_group(&reader, group, positions, visitor))
             .map_err(|error| unreadable(path, &error))?;
     }
     Ok(())
 }
 
-/// That the footer places the columns inside the file: the crate panics where it does not.
+/// Checks that the columns lie inside the file according to the footer. The crate `parquet` panics
+/// otherwise.
 fn check_places(
     reader: &SerializedFileReader<File>,
     group: usize,
-    wanted: &[usize],
+    positions: &[usize],
     length: u64,
 ) -> Result<(), ParquetError> {
     let group = reader.metadata().row_group(group);
-    for position in wanted {
+    for position in positions {
         let column = group.columns().get(*position);
         let inside = column.is_some_and(|column| {
             let data = column.data_page_offset();
@@ -94,16 +95,16 @@ fn check_places(
 fn visit_group(
     reader: &SerializedFileReader<File>,
     group: usize,
-    wanted: &[usize],
+    positions: &[usize],
     visitor: &mut Visitor<'_>,
 ) -> Result<(), ParquetError> {
     let group = reader.get_row_group(group)?;
-    let mut readers = wanted
+    let mut readers = positions
         .iter()
         .map(|position| group.get_column_reader(*position))
         .collect::<Result<Vec<_>, _>>()?;
-    let mut cells = vec![Vec::with_capacity(ROWS); wanted.len()];
-    let mut row = vec![0.0; wanted.len()];
+    let mut cells = vec![Vec::with_capacity(ROWS); positions.len()];
+    let mut row = vec![0.0; positions.len()];
     loop {
         for (reader, cells) in readers.iter_mut().zip(&mut cells) {
             read(reader, cells)?;
@@ -124,7 +125,7 @@ fn visit_group(
     }
 }
 
-/// The next cells of a column, as numbers.
+/// Reads the next cells of a column as numbers.
 fn read(reader: &mut ColumnReader, cells: &mut Vec<f64>) -> Result<(), ParquetError> {
     match reader {
         ColumnReader::DoubleColumnReader(reader) => batch(reader, cells, |value| *value),

@@ -1,4 +1,4 @@
-//! CSV with names in the first line.
+//! Reads CSV files with names in the first line.
 
 use std::fs::File;
 use std::path::Path;
@@ -8,12 +8,12 @@ use ::csv::{ByteRecord, Reader, ReaderBuilder};
 use super::{Column, ResultsError, Visitor, unreadable};
 use crate::ColumnKind;
 
-/// Bytes read at once.
+/// Number of bytes read at once.
 const BUFFER: usize = 256 * 1024;
 
 fn reader(path: &Path) -> Result<Reader<File>, ResultsError> {
     let file = File::open(path).map_err(|error| unreadable(path, &error))?;
-    // Flexible, because the last line may have been cut.
+    // Flexible, because the last line may be incomplete.
     Ok(ReaderBuilder::new().flexible(true).buffer_capacity(BUFFER).from_reader(file))
 }
 
@@ -31,13 +31,13 @@ pub(super) fn columns(path: &Path) -> Result<Vec<Column>, ResultsError> {
 pub(super) fn visit(
     path: &Path,
     columns: &[Column],
-    wanted: &[usize],
+    positions: &[usize],
     visitor: &mut Visitor<'_>,
 ) -> Result<(), ResultsError> {
     let mut reader = reader(path)?;
     let mut record = ByteRecord::new();
-    let mut row = vec![0.0; wanted.len()];
-    // A line that is no row is one cut short if nothing follows, and an error otherwise.
+    let mut row = vec![0.0; positions.len()];
+    // A line that is no row counts as incomplete if it is the last one, otherwise as an error.
     let mut wrong: Option<ResultsError> = None;
     while reader.read_byte_record(&mut record).map_err(|error| unreadable(path, &error))? {
         if let Some(error) = wrong {
@@ -50,7 +50,7 @@ pub(super) fn visit(
             wrong = Some(unreadable(path, &reason));
             continue;
         }
-        for (value, position) in row.iter_mut().zip(wanted) {
+        for (value, position) in row.iter_mut().zip(positions) {
             let cell = &record[*position];
             *value = number(cell).ok_or_else(|| ResultsError::Number {
                 path: path.to_owned(),
@@ -64,7 +64,7 @@ pub(super) fn visit(
     Ok(())
 }
 
-/// A decimal, a Boolean in words, or nothing.
+/// Parses a decimal number or a Boolean; an empty cell is NaN.
 fn number(cell: &[u8]) -> Option<f64> {
     match std::str::from_utf8(cell).ok()?.trim() {
         "" => Some(f64::NAN),

@@ -27,7 +27,7 @@ fn both_formats_give_back_every_number_that_was_written() {
         let table = Table::open(&path).unwrap();
         let names: Vec<&str> = table.columns().iter().map(|one| one.name.as_str()).collect();
         let place = |name: &str| names.iter().position(|known| *known == name).unwrap();
-        let wanted = ["plant.x_p", "plant.count", "plant.stuck", "ctrl.on"].map(place);
+        let positions = ["plant.x_p", "plant.count", "plant.stuck", "ctrl.on"].map(place);
         let mut k = 0;
         let check = &mut |time: f64, row: &[f64]| {
             let number = f64::from(k);
@@ -35,7 +35,7 @@ fn both_formats_give_back_every_number_that_was_written() {
             assert_eq!((time, row), (number * 1e-3, &expected[..]));
             k += 1;
         };
-        table.visit(&wanted, check).unwrap();
+        table.visit(&positions, check).unwrap();
         assert_eq!(k, 20_000);
         let unit = table.columns()[place("plant.x_p")].unit.as_deref();
         assert_eq!(unit, if name == "a.parquet" { Some("m") } else { None });
@@ -79,8 +79,8 @@ fn what_is_no_results_file_is_refused_by_name() {
     assert!(matches!(Table::open(&path("none.csv")), Err(ResultsError::Read { .. })));
     assert!(matches!(Table::open(&path("a.mat")), Err(ResultsError::Format { .. })));
     let table = written(folder.path(), "d.csv", "time,speed\n0,1\n");
-    let wanted = Selection { include: vec!["sped".to_owned()], exclude: vec![] };
-    let refused = table.choose(&wanted).unwrap_err().to_string();
+    let selection = Selection { include: vec!["sped".to_owned()], exclude: vec![] };
+    let refused = table.choose(&selection).unwrap_err().to_string();
     assert!(refused.contains("d.csv") && refused.contains("speed"), "{refused}");
 }
 

@@ -2,7 +2,7 @@ use super::*;
 
 const BOUNDS: SizeBounds = SizeBounds { smallest: 1e-6, largest: 10.0 };
 
-/// The sizes of the accepted steps on a problem whose error is `factor(t) H^q`.
+/// Returns the sizes of the accepted steps on a problem with the error `factor(t) H^q`.
 fn run(control: &mut ErrorControl, q: f64, factor: impl Fn(f64) -> f64) -> Vec<f64> {
     let (mut time, mut size, mut sizes) = (0.0, 1e-3, Vec::new());
     for _ in 0..200 {
@@ -94,7 +94,7 @@ fn steps_after_one_cut_short_are_as_they_were() {
 }
 
 #[test]
-fn without_repetition_the_increment_settles_at_nine_tenths_of_what_is_wanted() {
+fn without_repetition_the_increment_settles_at_nine_tenths_of_the_target() {
     let mut control = ForwardControl::new(BOUNDS, 1.0);
     let mut size = 1e-3;
     for _ in 0..100 {

@@ -13,7 +13,7 @@ fn a_chain_is_ordered_and_free_nodes_keep_their_order() {
 
 #[test]
 fn loops_are_found_where_tarjan_1972_has_them() {
-    // Figure 3 of the paper, nodes 1 to 8 here 0 to 7, edges as needed -> needing.
+    // Figure 3 of the paper, its nodes 1 to 8 numbered 0 to 7 here.
     let edges = [(0, 1), (1, 2), (1, 7), (2, 3), (2, 6), (3, 4), (4, 2), (4, 5), (6, 3), (6, 5)];
     let edges = [&edges[..], &[(7, 0), (7, 6)]].concat();
     let found = components(8, &edges);
@@ -33,7 +33,7 @@ fn repeated_edges_and_edges_to_nowhere_change_nothing() {
     assert!(components(0, &[(0, 0)]).is_empty());
 }
 
-/// Whether `to` can be reached from `from`, by Warshall's closure of the matrix.
+/// Returns the transitive closure by Warshall's algorithm: whether a path leads from one node to another.
 fn reachable(count: usize, edges: &[(usize, usize)]) -> Vec<Vec<bool>> {
     let mut matrix = vec![vec![false; count]; count];
     for &(from, to) in edges {

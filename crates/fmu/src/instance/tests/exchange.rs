@@ -235,10 +235,10 @@ fn a_model_that_wants_to_end_is_discarded_and_says_so() {
     set(&mut instance, ANGLE, 2.0);
     instance.call(Function::EnterInitializationMode, Instance::enter_initialization_mode);
     instance.call(Function::ExitInitializationMode, Instance::exit_initialization_mode);
-    assert!(!instance.wants_to_end());
+    assert!(!instance.is_terminated());
     let status = instance.call(Function::DoStep, |own| own.do_step(0.0, 0.25));
     assert_eq!((status, instance.core.state), (Status::Discard, State::StepFailed));
-    assert!(instance.wants_to_end());
+    assert!(instance.is_terminated());
     assert_eq!(instance.last_successful_time(), 0.0);
 }
 
