@@ -18,7 +18,7 @@ pub enum Error {
     Control(#[from] control::Error),
     /// An archive cannot be read or written.
     #[error(transparent)]
-    Package(#[from] PackageError),
+    Package(Box<PackageError>),
     /// The library of the packed controller cannot be loaded.
     #[error(transparent)]
     Library(#[from] fmu_import::LoadError),

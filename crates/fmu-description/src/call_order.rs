@@ -175,6 +175,7 @@ pub fn allowed(interface: InterfaceType, function: Function, state: State) -> bo
 
 /// Returns the set of states in which a variable may be set: conditions 1, 3 and 6 of section 4.2.4,
 /// 4 and 5 of section 3.2.3. Inputs may also be set before initialization mode, as importers do.
+#[must_use]
 pub fn settable(
     (causality, variability): (Causality, Variability),
     initial: Option<Initial>,
