@@ -21,9 +21,9 @@ use fmu_description::Kind;
 use serde::{Deserialize, Serialize};
 
 use crate::algorithm::Algorithm;
+use crate::engine::Task;
 use crate::error::SystemError;
 use crate::fault::FaultChain;
-use crate::simulation::Task;
 use crate::system::{Port, System};
 use discrete::{BOOLEANS, Channel, INTEGERS, STRINGS};
 pub(crate) use layout::Refusal;

@@ -7,42 +7,52 @@
 //!
 //! # One communication step, from the top
 //!
-//! 1. [`Simulation::step`] (`simulation.rs`) determines the end of the step: the next point of the
-//!    grid, the size chosen by the step control, or the time of an event.
-//! 2. `simulation/adaptive.rs` repeats a step whose error is too large; `simulation/iterate.rs`
-//!    repeats it until inputs and outputs agree. Both need slaves whose state can be saved and
-//!    restored.
-//! 3. `simulation/sweep.rs` steps every slave once, in the order of `order.rs`;
-//!    `simulation/parallel.rs` uses threads where they are faster.
-//! 4. For each slave, `exchange.rs` gathers the inputs (extrapolation, transformation, fault), sets
+//! 1. [`Simulation::step`] (`simulation.rs`) makes a step with the four objects below; each makes
+//!    its steps by those of the next.
+//! 2. `events.rs` ends the step at an event within it.
+//! 3. `step_control.rs` plans the end of the step and repeats a step whose error is too large;
+//!    `coupling.rs` repeats it until inputs and outputs agree. Both need slaves whose state can be
+//!    saved and restored.
+//! 4. `engine.rs` makes a sweep: it steps every slave once, in the sequence of `engine/groups.rs`;
+//!    `engine/threads.rs` uses threads where they are faster.
+//! 5. For each slave, `exchange.rs` gathers the inputs (extrapolation, transformation, fault), sets
 //!    them, calls `fmi2DoStep` and reads the outputs.
-//! 5. When the communication point is final, faults and driven variables record it (`commit`).
+//! 6. When the communication point is final, faults and driven variables record it (`commit`).
 //!
 //! The crate reads no files and loads no libraries: the crate `fmu-import` turns FMUs into slaves,
 //! the crate `study` runs a `system.toml` or an SSP.
 #![forbid(unsafe_code)]
 
 pub mod algorithm;
+mod capabilities;
 mod choose;
+mod coupling;
 pub mod drive;
+mod engine;
 mod error;
+mod events;
 mod exchange;
 pub mod fault;
+mod grid;
+mod initial;
 mod order;
 mod probe;
 mod readout;
 pub mod signal;
 mod simulation;
+mod step_control;
 mod system;
 
 pub use algorithm::{Algorithm, Coupling, Extrapolation, Method, StepControl};
 pub use choose::{AlgorithmChoice, AlgorithmRequest, choose};
+pub use coupling::Fallbacks;
 pub use drive::Scenario;
 pub use error::SystemError;
+pub use grid::EarlyEnd;
 pub use order::{Order, by_direct_dependencies};
 pub use probe::Probe;
 pub use readout::{Readout, SlowState, SlowValues};
-pub use simulation::{Checkpoint, EarlyEnd, Fallbacks, Simulation};
+pub use simulation::{Checkpoint, Simulation};
 pub use slave::{Advance, Background, CallError, Failure, Slave, StepResult, Transformation};
 pub use system::{Connection, Port, System};
 

@@ -1,72 +1,43 @@
 //! The simulation: initialisation and communication steps.
 //!
-//! [`Simulation::step`] is the entry point. The submodules hold one part each: `initial`
-//! (initialisation), `grid` (communication points), `sweep` (one step of all slaves), `adaptive`
-//! and `control` (step control), `iterate` (coupling), `events`, `parallel` and `together` (threads
-//! and background slaves), `checkpoint`.
+//! [`Simulation::step`] is the entry point. It reads from the top: [`SizeControl`] plans a step,
+//! [`Events`] shorten it, [`Coupler`] repeats it until inputs and outputs agree, and [`Engine`]
+//! makes each sweep over the slaves.
 
-mod adaptive;
-mod capabilities;
 mod checkpoint;
-mod control;
-mod events;
-mod grid;
-mod initial;
-mod iterate;
-mod parallel;
-mod sweep;
-mod together;
 
 use fmu_description::Experiment;
 
 use crate::algorithm::{Algorithm, Extrapolation, StepControl};
-use crate::drive::{Drives, Scenario};
+use crate::capabilities;
+use crate::coupling::{Coupler, Fallbacks};
+use crate::drive::Scenario;
+use crate::engine::Engine;
 use crate::error::SystemError;
+use crate::events::Events;
 use crate::exchange::{Exchange, call};
+use crate::grid::{self, EarlyEnd, Grid};
+use crate::initial::initialise;
 use crate::order::{Order, by_direct_dependencies};
 use crate::readout::Readout;
+use crate::step_control::{Pace, SizeControl};
 use crate::system::{Port, System};
-use adaptive::Repetition;
-use control::Control;
-use events::Events;
-use grid::{Grid, size_between};
-use iterate::Coupled;
-use parallel::Parallel;
 use slave::{CallError, Failure};
-use sweep::{Groups, SweepResult};
-use together::any_in_background;
 
 pub use checkpoint::Checkpoint;
 use checkpoint::Origin;
-pub use grid::EarlyEnd;
-pub use iterate::Fallbacks;
-pub(crate) use parallel::Task;
 
 /// A running co-simulation of a [`System`].
 pub struct Simulation {
-    system: System,
-    exchange: Exchange,
-    drives: Drives,
+    engine: Engine,
+    coupler: Coupler,
+    control: SizeControl,
+    events: Option<Events>,
+    /// The check of the step sizes, if they vary.
+    pace: Option<Pace>,
     order: Order,
-    grid: Grid,
     early_end: Option<EarlyEnd>,
     origin: Origin,
-    control: Control,
-    coupled: Option<Coupled>,
-    repetition: Repetition,
-    /// Whether steps may be repeated; every slave can then restore its state.
-    repeats: bool,
-    events: Option<Events>,
-    groups: Groups,
-    parallel: Option<Parallel>,
-    /// For each slave: the number of communication steps in one of its steps, and the size in s of
-    /// its current step, 0 if it makes none.
-    multiples: Vec<u32>,
-    sizes: Vec<f64>,
-    /// Whether a sweep is a single pass over the slaves.
-    passes: bool,
-    /// Whether some slaves step in the background.
-    background: bool,
     /// The slave that requested the end of the simulation, and the time in s.
     ended: Option<(usize, f64)>,
 }
@@ -115,35 +86,27 @@ impl Simulation {
         let (grid, early_end) = Grid::new(&system, algorithm.step, &multiples, span)?;
         let origin = Origin::new(&system, algorithm, experiment);
         let order = by_direct_dependencies(&system);
-        initial::initialise(&mut system, experiment, &mut scenario)?;
+        initialise(&mut system, experiment, &mut scenario)?;
         let algorithm = &capabilities::confirm_rollback(&mut system, algorithm);
         let mut exchange = capabilities::build_exchange(&mut system, algorithm);
         exchange.set_faults(&system, &scenario.faults)?;
         read_at_start(&mut system, &mut exchange, algorithm, experiment.start_time)?;
         scenario.drives.commit(experiment.start_time);
-        let groups = Groups::new(&system, algorithm.method, &order);
-        let control = Control::new(&system, &exchange.reals, algorithm)?;
-        let coupled = Coupled::new(&system, &exchange.reals, algorithm, control.scale.clone());
-        let background = any_in_background(&mut system);
+        let drives = scenario.drives;
+        let ordering = (&order, multiples);
+        let engine = Engine::new(system, exchange, drives, grid, algorithm, ordering)?;
+        let control = SizeControl::new(&engine.system, &engine.exchange.reals, algorithm)?;
+        let events = Events::new(&algorithm.events);
+        let varies = algorithm.control != StepControl::Fixed || events.is_some();
         Ok(Self {
-            passes: algorithm.jobs <= 1 && exchange.passes() && !background,
-            background,
-            system,
-            exchange,
-            drives: scenario.drives,
+            coupler: Coupler::new(&engine, algorithm, control.scale.clone()),
+            engine,
+            control,
+            events,
+            pace: varies.then(|| Pace::new(algorithm.smallest_step)),
             order,
-            grid,
             early_end,
             origin,
-            control,
-            coupled,
-            repetition: Repetition::default(),
-            repeats: algorithm.repeats(),
-            events: Events::new(&algorithm.events),
-            parallel: Parallel::new(algorithm.jobs, groups.len())?,
-            groups,
-            sizes: vec![0.0; multiples.len()],
-            multiples,
             ended: None,
         })
     }
@@ -152,19 +115,19 @@ impl Simulation {
     /// time.
     #[must_use]
     pub fn time(&self) -> f64 {
-        self.grid.time
+        self.engine.grid.time
     }
 
     /// Whether the stop time is reached or an FMU requested the end.
     #[must_use]
     pub fn is_finished(&self) -> bool {
-        self.ended.is_some() || self.grid.is_finished()
+        self.ended.is_some() || self.engine.grid.is_finished()
     }
 
     /// Returns the FMU that requested the end of the simulation (`fmi2Terminated`).
     #[must_use]
     pub fn ended_by(&self) -> Option<&str> {
-        self.ended.map(|(slave, _)| self.system.slaves[slave].0.as_str())
+        self.ended.map(|(slave, _)| self.engine.system.slaves[slave].0.as_str())
     }
 
     /// Returns the time in s at which an FMU requested the end.
@@ -185,13 +148,13 @@ impl Simulation {
 
     /// Returns the slaves that step every several communication steps.
     pub(crate) fn slow_slaves(&self) -> impl Iterator<Item = usize> {
-        (0..self.multiples.len()).filter(|&slave| self.multiples[slave] != 1)
+        self.engine.slow_slaves()
     }
 
     /// Returns start and end in s of the current step of a slave that is ahead of
     /// [`Simulation::time`].
     pub(crate) fn current_step(&self, slave: usize) -> Option<(f64, f64)> {
-        self.exchange.reals.step_ahead(slave, self.grid.time)
+        self.engine.exchange.reals.step_ahead(slave, self.engine.grid.time)
     }
 
     /// Returns the order in which the slaves step.
@@ -202,14 +165,14 @@ impl Simulation {
 
     /// Returns the system, to read values between steps.
     pub fn system(&mut self) -> &mut System {
-        &mut self.system
+        &mut self.engine.system
     }
 
     /// Creates a readout of `ports` for [`Simulation::read`].
     #[must_use]
     pub fn readout(&self, ports: &[Port]) -> Readout {
-        let mut readout = Readout::new(&self.system, ports);
-        readout.follow(&self.drives, &self.system, ports);
+        let mut readout = Readout::new(&self.engine.system, ports);
+        readout.follow(&self.engine.drives, &self.engine.system, ports);
         readout
     }
 
@@ -220,8 +183,8 @@ impl Simulation {
     ///
     /// Returns an error if an FMU refuses a read.
     pub fn read(&mut self, readout: &mut Readout) -> Result<(), SystemError> {
-        readout.read(&mut self.system, self.grid.time)?;
-        readout.apply(&mut self.drives, self.grid.time);
+        readout.read(&mut self.engine.system, self.engine.grid.time)?;
+        readout.apply(&mut self.engine.drives, self.engine.grid.time);
         Ok(())
     }
 
@@ -236,38 +199,26 @@ impl Simulation {
     /// Returns an error if an FMU does not complete the step or an output is not finite. Some
     /// slaves are then at the start of the step and others at its end.
     pub fn step(&mut self) -> Result<(), SystemError> {
-        let start = self.grid.time;
-        let swept = match (self.events.take(), self.control.kind) {
-            (None, StepControl::Fixed) if !self.repeats => {
-                let (end, size) = self.grid.next();
-                let swept = self.sweep(self.grid.time, size, true)?;
-                self.grid.advance(end);
-                swept
-            }
-            (None, _) => {
-                let (end, swept) = self.step_to(self.grid.time, self.planned_end())?;
-                self.grid.reach(end);
-                swept
-            }
-            (Some(mut events), _) => {
-                let done = self.step_to_event(&mut events);
-                self.events = Some(events);
-                done?
-            }
+        let Self { engine, coupler, control, events, .. } = self;
+        let start = engine.grid.time;
+        let planned = control.plan(engine);
+        let made = match events {
+            None => control.step(engine, coupler, planned)?,
+            Some(events) => events.step(engine, coupler, control, planned)?,
         };
-        if let Some((slave, reached)) = swept.terminated {
+        engine.grid.reach(made.end);
+        if let Some((slave, reached)) = made.terminated {
             self.end_early(slave, (start, reached));
         }
-        if self.grid.time > start {
-            self.exchange.commit(self.grid.time);
-            self.drives.commit(self.grid.time);
+        if self.time() > start {
+            self.engine.commit();
         }
-        let varies = self.control.kind != StepControl::Fixed || self.events.is_some();
-        if varies && !self.is_finished() {
-            let (time, stop) = (self.grid.time, self.grid.stop());
-            self.control.check_pace(time, time - start, stop)?;
+        match &mut self.pace {
+            Some(pace) if self.ended.is_none() && !self.engine.grid.is_finished() => {
+                pace.check(self.engine.grid.time - start, &self.engine.grid)
+            }
+            _ => Ok(()),
         }
-        Ok(())
     }
 
     /// Ends the run because a slave requested it at the time `reached` in the step from `start`.
@@ -275,58 +226,14 @@ impl Simulation {
     #[cold]
     fn end_early(&mut self, slave: usize, (start, reached): (f64, f64)) {
         self.ended = Some((slave, reached));
-        let alone = self.system.slaves.len() == 1;
-        self.grid.time = if alone || self.repeats { reached } else { start };
+        let alone = self.engine.system.slaves.len() == 1;
+        self.engine.grid.time = if alone || self.engine.repeats { reached } else { start };
     }
 
-    /// Returns the planned end of the next step. A step of variable size ends where a signal or a
-    /// fault starts, ends or has a kink.
-    fn planned_end(&self) -> f64 {
-        if self.control.kind == StepControl::Fixed {
-            return self.grid.next().0;
-        }
-        let end = self.grid.end_of(self.control.size);
-        let least = self.grid.time + 1e-9 * self.control.size;
-        let breaks = [self.drives.next_break(least), self.exchange.next_break(least)];
-        breaks.into_iter().flatten().fold(end, f64::min)
-    }
-
-    /// Attempts a step from `time` to `end`; returns the time actually reached.
-    fn step_to(&mut self, time: f64, end: f64) -> Result<(f64, SweepResult), SystemError> {
-        if self.repeats {
-            let mut repetition = std::mem::take(&mut self.repetition);
-            let done = self.controlled_step(&mut repetition, time, end);
-            self.repetition = repetition;
-            return done;
-        }
-        let size = size_between(time, end);
-        let swept = self.sweep(time, size, true)?;
-        self.control.update_size(&self.exchange.reals, size);
-        Ok((end, swept))
-    }
-
-    fn step_to_event(&mut self, events: &mut Events) -> Result<SweepResult, SystemError> {
-        let time = self.grid.time;
-        let planned_end = self.planned_end();
-        let next = self.next_event(events, time, planned_end)?;
-        let limit = next.unwrap_or(planned_end);
-        self.read_crossings(events, time)?;
-        let (mut end, mut swept) = self.step_to(time, limit)?;
-        if swept.terminated.is_some() {
-            self.grid.reach(end);
-            return Ok(swept);
-        }
-        let crossing = self.locate(events, time, end)?;
-        let happened = crossing.is_some() || (next.is_some() && end >= limit);
-        if let Some(crossing) = crossing {
-            (end, swept) = crossing;
-        }
-        if happened {
-            self.exchange.reals.clear_history();
-            self.control.clear_history();
-        }
-        self.grid.reach(end);
-        Ok(swept)
+    /// Returns the count of steps whose iteration failed; `None` without iteration.
+    #[must_use]
+    pub fn fallbacks(&self) -> Option<&Fallbacks> {
+        self.coupler.fallbacks()
     }
 
     /// Calls [`crate::Slave::free`] of every slave, even if one fails; call it after
@@ -336,9 +243,9 @@ impl Simulation {
     ///
     /// Returns the first failure.
     pub fn free(&mut self) -> Result<(), SystemError> {
-        let time = self.grid.time;
+        let time = self.engine.grid.time;
         let mut first = Ok(());
-        for (name, slave) in &mut self.system.slaves {
+        for (name, slave) in &mut self.engine.system.slaves {
             let done = slave.free().map_err(|source| call(name, time, source));
             first = first.and(done);
         }
@@ -351,9 +258,9 @@ impl Simulation {
     ///
     /// Returns the first failure.
     pub fn terminate(&mut self) -> Result<(), SystemError> {
-        let time = self.grid.time;
+        let time = self.engine.grid.time;
         let mut first = Ok(());
-        for (name, slave) in &mut self.system.slaves {
+        for (name, slave) in &mut self.engine.system.slaves {
             match slave.terminate() {
                 // A slave without `fmi2Terminate` needs no end.
                 Ok(()) | Err(CallError { failure: Failure::Missing, .. }) => {}

@@ -1,7 +1,7 @@
 //! Steps of several slaves at once: in the background, in threads, or one after the other.
 
 use super::reals::Reals;
-use crate::simulation::Task;
+use crate::engine::Task;
 use crate::system::System;
 use slave::{Advance, CallError, Slave, StepResult, finish};
 

@@ -6,13 +6,13 @@ use fmu_description::Experiment;
 use serde::{Deserialize, Serialize};
 
 use super::Simulation;
-use super::control::Controller;
-use super::iterate::Iteration;
 use crate::algorithm::Algorithm;
+use crate::coupling::Iteration;
 use crate::drive::{DriveState, Scenario};
 use crate::error::SystemError;
 use crate::exchange::{Values, call};
 use crate::fault::FaultChain;
+use crate::step_control::Controller;
 use crate::system::System;
 pub(super) use origin::Origin;
 
@@ -57,9 +57,9 @@ impl Simulation {
     /// Returns an error if an FMU cannot serialise its state (`canSerializeFMUstate` is false) or
     /// fails to do so.
     pub fn checkpoint(&mut self) -> Result<Checkpoint, SystemError> {
-        let time = self.grid.time;
+        let time = self.engine.grid.time;
         let mut slaves = Vec::new();
-        for (name, slave) in &mut self.system.slaves {
+        for (name, slave) in &mut self.engine.system.slaves {
             let flags = slave.description().co_simulation.as_ref();
             if !flags.is_some_and(|flags| flags.can_serialize_fmu_state) {
                 return Err(SystemError::Capability {
@@ -72,17 +72,17 @@ impl Simulation {
             slaves.push((name.clone(), slave.description().guid.clone(), bytes));
         }
         let mut values = Values::default();
-        self.exchange.save(&mut values);
+        self.engine.exchange.save(&mut values);
         Ok(Checkpoint {
             origin: self.origin.clone(),
             time,
-            count: self.grid.count,
+            count: self.engine.grid.count,
             size: self.control.size,
             controller: self.control.controller.clone(),
-            iteration: self.coupled.as_ref().map(|coupled| coupled.iteration.clone()),
+            iteration: self.coupler.iterated.as_ref().map(|iterated| iterated.iteration.clone()),
             values,
-            faults: self.exchange.faults().map(|fault| fault.clone()).collect(),
-            drives: self.drives.state(),
+            faults: self.engine.exchange.faults().map(|fault| fault.clone()).collect(),
+            drives: self.engine.drives.state(),
             slaves,
             ended: self.ended,
         })
@@ -109,29 +109,33 @@ impl Simulation {
         let mut simulation = Self::start(system, algorithm, &first_experiment, stop, scenario)?;
         simulation.expect_origin_of(checkpoint)?;
         let states = checkpoint.slaves.iter();
-        for ((name, slave), (_, _, bytes)) in simulation.system.slaves.iter_mut().zip(states) {
+        for ((name, slave), (_, _, bytes)) in simulation.engine.system.slaves.iter_mut().zip(states)
+        {
             slave.deserialize_state(bytes).map_err(|source| call(name, checkpoint.time, source))?;
         }
-        simulation.exchange.restore(&checkpoint.values);
-        for (fault, kept) in simulation.exchange.faults().zip(&checkpoint.faults) {
+        simulation.engine.exchange.restore(&checkpoint.values);
+        for (fault, kept) in simulation.engine.exchange.faults().zip(&checkpoint.faults) {
             fault.clone_from(kept);
         }
         simulation
+            .engine
             .drives
             .restore(checkpoint.drives.clone())
             .map_err(|error| SystemError::Algorithm { what: error.to_string() })?;
-        simulation.grid.resume(checkpoint.time, checkpoint.count);
+        simulation.engine.grid.resume(checkpoint.time, checkpoint.count);
         simulation.ended = checkpoint.ended;
         simulation.control.size = checkpoint.size;
         simulation.control.controller = checkpoint.controller.clone();
-        if let (Some(coupled), Some(iteration)) = (&mut simulation.coupled, &checkpoint.iteration) {
-            coupled.iteration = iteration.clone();
+        let iterated = &mut simulation.coupler.iterated;
+        if let (Some(iterated), Some(iteration)) = (iterated, &checkpoint.iteration) {
+            iterated.iteration = iteration.clone();
         }
         Ok(simulation)
     }
 
     fn expect_origin_of(&mut self, checkpoint: &Checkpoint) -> Result<(), SystemError> {
         let own = self
+            .engine
             .system
             .slaves
             .iter()
@@ -150,9 +154,9 @@ impl Simulation {
             return Err(SystemError::Algorithm { what });
         }
         let mut values = Values::default();
-        self.exchange.save(&mut values);
+        self.engine.exchange.save(&mut values);
         let same = values.has_shape_of(&checkpoint.values)
-            && self.exchange.faults().count() == checkpoint.faults.len();
+            && self.engine.exchange.faults().count() == checkpoint.faults.len();
         if same {
             return Ok(());
         }

@@ -64,7 +64,7 @@ fn no_step_ends_beyond_the_stop_time_and_the_last_one_ends_at_it() {
                 assert!(grid.time + size == stop || longer > stop, "{step} {start} {stop}");
                 assert_eq!(end, stop);
             }
-            grid.advance(end);
+            grid.reach(end);
         }
         assert_eq!(grid.time, stop);
     }
@@ -76,12 +76,12 @@ fn a_run_that_goes_on_after_a_shorter_last_step_returns_to_the_grid() {
     let mut first = grid(0.1, 0.0, 1.05);
     while !first.is_finished() {
         let (end, _) = first.next();
-        first.advance(end);
+        first.reach(end);
     }
     let mut second = grid(0.1, 0.0, 2.0);
     second.resume(first.time, first.count);
     let (end, size) = second.next();
     assert_eq!((end, 1.05 + size), (1.1, 1.1));
-    second.advance(end);
+    second.reach(end);
     assert_eq!(second.next(), (0.0 + 12.0 * 0.1, 0.1));
 }

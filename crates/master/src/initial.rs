@@ -24,7 +24,7 @@ const EVALUATIONS: u32 = 100;
 /// Initialises all slaves: settings, initialization mode, values of connections, end of
 /// initialization mode. Settings follow `fmi2SetupExperiment`, because some FMUs reset them in this
 /// call.
-pub(super) fn initialise(
+pub(crate) fn initialise(
     system: &mut System,
     experiment: &Experiment,
     scenario: &mut Scenario,

@@ -1,12 +1,10 @@
-//! Iterated (implicit) coupling: repeats a step until the input values assumed at its end equal the
-//! outputs.
+//! The coupling of a step: a single sweep, or iterated (implicit) coupling, which repeats the sweep
+//! until the input values assumed at its end equal the outputs.
 
-use super::Simulation;
-use super::sweep::SweepResult;
 use crate::algorithm::{Algorithm, Coupling};
+use crate::engine::{Engine, SavedState, Swept};
 use crate::error::SystemError;
-use crate::exchange::{Reals, Values, call};
-use crate::system::System;
+use crate::exchange::call;
 use solve::{Anderson, Newton, Progress, QuasiNewton, Scale, Solver};
 
 use fmu_description::CoSimulation;
@@ -21,7 +19,7 @@ const REUSE: u32 = 5;
 
 /// The solver of the iteration, with its state.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub(super) enum Iteration {
+pub(crate) enum Iteration {
     Newton(Newton),
     Anderson(Anderson),
     QuasiNewton(QuasiNewton),
@@ -37,15 +35,21 @@ impl Iteration {
     }
 }
 
-/// The iteration of a simulation.
-pub(super) struct Coupled {
-    pub(super) iteration: Iteration,
+/// Makes a step with the selected coupling: a single sweep, or the sweeps of an iteration.
+pub(crate) struct Coupler {
+    pub(crate) iterated: Option<Iterated>,
+}
+
+/// Iterated coupling: solves `u = G(u)`, where G(u) are the connected values that the slaves return
+/// at the end of a step if they assume the values u there.
+pub(crate) struct Iterated {
+    pub(crate) iteration: Iteration,
     /// Connected values: assumed by the slaves, returned by the slaves, and next to assume.
     u: Vec<f64>,
     g: Vec<f64>,
     next: Vec<f64>,
     column: Vec<f64>,
-    start: Values,
+    start: SavedState,
     /// Whether all slaves have directional derivatives.
     directional: bool,
     /// Whether a step whose iteration fails is made once without iteration.
@@ -62,14 +66,34 @@ pub struct Fallbacks {
     pub first: String,
 }
 
-impl Coupled {
-    pub(super) fn new(
-        system: &System,
-        reals: &Reals,
-        algorithm: &Algorithm,
-        scale: Scale,
-    ) -> Option<Self> {
-        let (count, limit) = (reals.outputs().len(), algorithm.iterations);
+impl Coupler {
+    pub(crate) fn new(engine: &Engine, algorithm: &Algorithm, scale: Scale) -> Self {
+        Self { iterated: Iterated::new(engine, algorithm, scale) }
+    }
+
+    /// Makes one step from `time` over `size`.
+    pub(crate) fn step(
+        &mut self,
+        engine: &mut Engine,
+        time: f64,
+        size: f64,
+    ) -> Result<Swept, SystemError> {
+        match &mut self.iterated {
+            None => engine.sweep(time, size),
+            Some(iterated) => iterated.step(engine, time, size),
+        }
+    }
+
+    /// Returns the count of steps whose iteration failed; `None` without iteration.
+    pub(crate) fn fallbacks(&self) -> Option<&Fallbacks> {
+        self.iterated.as_ref().map(|iterated| &iterated.fallbacks)
+    }
+}
+
+impl Iterated {
+    /// Returns `None` for coupling without iteration.
+    fn new(engine: &Engine, algorithm: &Algorithm, scale: Scale) -> Option<Self> {
+        let (count, limit) = (engine.exchange.reals.outputs().len(), algorithm.iterations);
         let iteration = match algorithm.coupling {
             Coupling::Once => return None,
             Coupling::Newton => Iteration::Newton(Newton::new(scale, limit)),
@@ -79,10 +103,9 @@ impl Coupled {
             Coupling::QuasiNewton => Iteration::QuasiNewton(QuasiNewton::new(scale, limit, REUSE)),
         };
         let able = |flags: &CoSimulation| flags.provides_directional_derivative;
-        let directional = system
-            .slaves
-            .iter()
-            .all(|(_, slave)| slave.description().co_simulation.as_ref().is_some_and(able));
+        let mut slaves = engine.system.slaves.iter();
+        let directional =
+            slaves.all(|(_, slave)| slave.description().co_simulation.as_ref().is_some_and(able));
         let zeros = || vec![0.0; count];
         Some(Self {
             iteration,
@@ -90,88 +113,53 @@ impl Coupled {
             g: zeros(),
             next: zeros(),
             column: zeros(),
-            start: Values::default(),
+            start: SavedState::new(SLOT),
             directional,
             falls_back: algorithm.fallback,
             fallbacks: Fallbacks::default(),
         })
     }
-}
 
-impl Simulation {
-    /// Makes one step from `time` over `size`: once, or iterated with the selected coupling.
-    pub(super) fn attempt(
-        &mut self,
-        time: f64,
-        size: f64,
-        never_back: bool,
-    ) -> Result<SweepResult, SystemError> {
-        let Some(mut coupled) = self.coupled.take() else {
-            return self.sweep(time, size, never_back);
-        };
-        let mut done = self.solve(&mut coupled, time, size);
-        if let Err(error) = &done
-            && coupled.falls_back
-            && is_recoverable(error)
-        {
-            coupled.fallbacks.add(error);
-            done = self.fall_back(&coupled, time, size);
+    /// Makes one step from `time` over `size`. If the iteration fails and a fallback is allowed,
+    /// makes the step once, from the same state.
+    fn step(&mut self, engine: &mut Engine, time: f64, size: f64) -> Result<Swept, SystemError> {
+        match self.solve(engine, time, size) {
+            Err(error) if self.falls_back && is_recoverable(&error) => {
+                self.fallbacks.add(&error);
+                engine.restore(&self.start)?;
+                engine.sweep(time, size)
+            }
+            done => done,
         }
-        self.coupled = Some(coupled);
-        done
     }
 
-    /// Restores the state before the iteration and makes the step once.
-    #[cold]
-    fn fall_back(
-        &mut self,
-        coupled: &Coupled,
-        time: f64,
-        size: f64,
-    ) -> Result<SweepResult, SystemError> {
-        self.restore_states(SLOT, time)?;
-        self.exchange.restore(&coupled.start);
-        self.sweep(time, size, false)
-    }
-
-    /// Returns the count of steps whose iteration failed; `None` without iteration.
-    #[must_use]
-    pub fn fallbacks(&self) -> Option<&Fallbacks> {
-        self.coupled.as_ref().map(|coupled| &coupled.fallbacks)
-    }
-
-    fn solve(
-        &mut self,
-        coupled: &mut Coupled,
-        time: f64,
-        size: f64,
-    ) -> Result<SweepResult, SystemError> {
-        self.save_states(SLOT, time)?;
-        self.exchange.save(&mut coupled.start);
-        self.exchange.reals.predictions(size, &mut coupled.u);
+    /// Solves `u = G(u)` for the step from `time` over `size`.
+    fn solve(&mut self, engine: &mut Engine, time: f64, size: f64) -> Result<Swept, SystemError> {
+        engine.save(time, &mut self.start)?;
+        engine.exchange.reals.predictions(size, &mut self.u);
         let mut matrices = 0;
-        let mut swept = self.evaluate(coupled, time, size, true)?;
-        coupled.iteration.solver().begin();
+        let mut swept = self.evaluate(engine, time, size)?;
+        self.iteration.solver().begin();
         loop {
             if swept.reached.is_some() || swept.terminated.is_some() {
                 return Ok(swept);
             }
-            coupled.g.copy_from_slice(self.exchange.reals.outputs());
-            let (solver, u, g) = (coupled.iteration.solver(), &coupled.u, &coupled.g);
-            let why = match solver.next(u, g, &mut coupled.next) {
+            self.g.copy_from_slice(engine.exchange.reals.outputs());
+            let why = match self.iteration.solver().next(&self.u, &self.g, &mut self.next) {
                 Progress::Converged { .. } => return Ok(swept),
                 Progress::Evaluate => {
-                    coupled.u.copy_from_slice(&coupled.next);
-                    swept = self.evaluate(coupled, time, size, false)?;
+                    self.u.copy_from_slice(&self.next);
+                    engine.restore(&self.start)?;
+                    swept = self.evaluate(engine, time, size)?;
                     continue;
                 }
                 Progress::Matrix => {
-                    if coupled.directional && matrices == 0 {
-                        self.derive(coupled, time + size)?;
+                    if self.directional && matrices == 0 {
+                        self.derive(engine, time + size)?;
                     } else {
-                        self.differentiate(coupled, time, size)?;
+                        self.differentiate(engine, time, size)?;
                     }
-                    self.exchange.reals.outputs_mut().copy_from_slice(&coupled.g);
+                    engine.exchange.reals.outputs_mut().copy_from_slice(&self.g);
                     matrices += 1;
                     continue;
                 }
@@ -181,35 +169,30 @@ impl Simulation {
         }
     }
 
-    /// Evaluates `G(u)`: restores the start of the step and steps all slaves with the values `u` at
-    /// its end.
+    /// Evaluates `G(u)`: steps all slaves with the values `u` at the end of the step.
     fn evaluate(
         &mut self,
-        coupled: &Coupled,
+        engine: &mut Engine,
         time: f64,
         size: f64,
-        first: bool,
-    ) -> Result<SweepResult, SystemError> {
-        if !first {
-            self.restore_states(SLOT, time)?;
-            self.exchange.restore(&coupled.start);
-        }
-        self.exchange.reals.assume(Some(&coupled.u));
-        let swept = self.sweep(time, size, false);
-        self.exchange.reals.assume(None);
+    ) -> Result<Swept, SystemError> {
+        engine.exchange.reals.assume(Some(&self.u));
+        let swept = engine.sweep(time, size);
+        engine.exchange.reals.assume(None);
         swept
     }
 
     /// Computes the Jacobian `dG/du` from the directional derivatives at the end of the step. It
     /// contains direct dependencies only.
-    fn derive(&mut self, coupled: &mut Coupled, time: f64) -> Result<(), SystemError> {
-        for column in 0..coupled.u.len() {
-            coupled.column.fill(0.0);
-            self.exchange
+    fn derive(&mut self, engine: &mut Engine, time: f64) -> Result<(), SystemError> {
+        for column in 0..self.u.len() {
+            self.column.fill(0.0);
+            engine
+                .exchange
                 .reals
-                .derivatives_to(&mut self.system, column, &mut coupled.column)
-                .map_err(|(slave, source)| call(&self.system.slaves[slave].0, time, source))?;
-            coupled.iteration.solver().set_column(column, &coupled.column);
+                .derivatives_to(&mut engine.system, column, &mut self.column)
+                .map_err(|(slave, source)| call(&engine.system.slaves[slave].0, time, source))?;
+            self.iteration.solver().set_column(column, &self.column);
         }
         Ok(())
     }
@@ -217,21 +200,22 @@ impl Simulation {
     /// Computes the Jacobian `dG/du` by finite differences of whole steps.
     fn differentiate(
         &mut self,
-        coupled: &mut Coupled,
+        engine: &mut Engine,
         time: f64,
         size: f64,
     ) -> Result<(), SystemError> {
-        for column in 0..coupled.u.len() {
-            let here = coupled.u[column];
-            let change = coupled.iteration.solver().perturbation(column, &coupled.u);
-            coupled.u[column] = here + change;
-            self.evaluate(coupled, time, size, false)?;
-            coupled.u[column] = here;
-            let there = self.exchange.reals.outputs();
-            for ((quotient, there), here) in coupled.column.iter_mut().zip(there).zip(&coupled.g) {
+        for column in 0..self.u.len() {
+            let here = self.u[column];
+            let change = self.iteration.solver().perturbation(column, &self.u);
+            self.u[column] = here + change;
+            engine.restore(&self.start)?;
+            self.evaluate(engine, time, size)?;
+            self.u[column] = here;
+            let there = engine.exchange.reals.outputs();
+            for ((quotient, there), here) in self.column.iter_mut().zip(there).zip(&self.g) {
                 *quotient = (there - here) / change;
             }
-            coupled.iteration.solver().set_column(column, &coupled.column);
+            self.iteration.solver().set_column(column, &self.column);
         }
         Ok(())
     }

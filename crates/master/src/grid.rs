@@ -12,15 +12,15 @@ const ROUNDING: f64 = 1e-6;
 
 /// The communication points of a run, and the one reached.
 #[derive(Clone, Debug)]
-pub(super) struct Grid {
+pub(crate) struct Grid {
     start: f64,
     /// End of the run in s.
     stop: Option<f64>,
     step: f64,
     /// Number of grid points passed.
-    pub(super) count: u64,
+    pub(crate) count: u64,
     /// Time reached in s.
-    pub(super) time: f64,
+    pub(crate) time: f64,
 }
 
 /// The reason why a run ends before its stop time: an FMU that takes equal steps only, with its
@@ -53,7 +53,7 @@ impl fmt::Display for EarlyEnd {
 /// equals `end` if a floating-point number allows it, and is never greater: an FMU may refuse a
 /// step that ends one ulp beyond its stop time.
 #[inline]
-pub(super) fn size_between(start: f64, end: f64) -> f64 {
+pub(crate) fn size_between(start: f64, end: f64) -> f64 {
     let mut size = end - start;
     while start + size > end {
         size = size.next_down();
@@ -65,7 +65,7 @@ impl Grid {
     /// Creates the grid from start to stop time with steps of `step` s. `multiples` are the
     /// communication steps in one step of each slave. Also returns the reason if the run ends
     /// early.
-    pub(super) fn new(
+    pub(crate) fn new(
         system: &System,
         step: f64,
         multiples: &[u32],
@@ -122,7 +122,7 @@ impl Grid {
         })
     }
 
-    pub(super) fn is_finished(&self) -> bool {
+    pub(crate) fn is_finished(&self) -> bool {
         self.stop.is_some_and(|stop| self.time >= stop)
     }
 
@@ -136,18 +136,18 @@ impl Grid {
     }
 
     /// Returns the stop time in s.
-    pub(super) fn stop(&self) -> Option<f64> {
+    pub(crate) fn stop(&self) -> Option<f64> {
         self.stop
     }
 
     /// Returns the end of a step of `size` s from the time reached.
-    pub(super) fn end_of(&self, size: f64) -> f64 {
+    pub(crate) fn end_of(&self, size: f64) -> f64 {
         self.limited(self.time + size, size)
     }
 
     /// Returns end and size of the next step: H, or the rest up to the stop time.
     #[expect(clippy::cast_precision_loss, reason = "2^53 steps take longer than anyone waits")]
-    pub(super) fn next(&self) -> (f64, f64) {
+    pub(crate) fn next(&self) -> (f64, f64) {
         let start = self.start + self.count as f64 * self.step;
         let end = self.start + (self.count + 1) as f64 * self.step;
         let on_grid = self.time.total_cmp(&start).is_eq();
@@ -165,21 +165,15 @@ impl Grid {
     /// Returns the size of the step from `time` of a slave whose step covers `multiple`
     /// communication steps. The step ends at the next grid point whose number is a multiple.
     #[expect(clippy::cast_precision_loss, reason = "2^53 steps take longer than anyone waits")]
-    pub(super) fn size_of(&self, multiple: u32, time: f64) -> f64 {
+    pub(crate) fn size_of(&self, multiple: u32, time: f64) -> f64 {
         let multiple = u64::from(multiple);
         let number = (self.count / multiple + 1) * multiple;
         let end = self.start + number as f64 * self.step;
         size_between(time, self.limited(end, self.step))
     }
 
-    /// Records the completion of a step to `end`, which [`Grid::next`] has returned.
-    pub(super) fn advance(&mut self, end: f64) {
-        self.count += 1;
-        self.time = end;
-    }
-
     /// Records the completion of a step to `end`, on the grid or not.
-    pub(super) fn reach(&mut self, end: f64) {
+    pub(crate) fn reach(&mut self, end: f64) {
         if end >= self.next().0 {
             self.count += 1;
         }
@@ -189,7 +183,7 @@ impl Grid {
     /// Resumes at `time` after `count` grid points. The end of the first run may have been counted
     /// without lying on the grid.
     #[expect(clippy::cast_precision_loss, reason = "2^53 steps take longer than anyone waits")]
-    pub(super) fn resume(&mut self, time: f64, count: u64) {
+    pub(crate) fn resume(&mut self, time: f64, count: u64) {
         let point = self.start + count as f64 * self.step;
         let beyond = count > 0 && point > time + ROUNDING * self.step;
         (self.time, self.count) = (time, if beyond { count - 1 } else { count });
@@ -206,7 +200,7 @@ fn least_common(a: u64, b: u64) -> u64 {
 }
 
 /// Returns the number of communication steps in one step of each slave.
-pub(super) fn multiples(system: &System, algorithm: &Algorithm) -> Result<Vec<u32>, SystemError> {
+pub(crate) fn multiples(system: &System, algorithm: &Algorithm) -> Result<Vec<u32>, SystemError> {
     let count = system.slaves.len();
     if algorithm.multiples.is_empty() {
         return Ok(vec![1; count]);

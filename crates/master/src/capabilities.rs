@@ -7,7 +7,7 @@ use slave::CallError;
 
 /// Lays out the connections of an initialised system. Derivatives that an FMU promises and refuses
 /// are not used, with a warning.
-pub(super) fn build_exchange(system: &mut System, algorithm: &Algorithm) -> Exchange {
+pub(crate) fn build_exchange(system: &mut System, algorithm: &Algorithm) -> Exchange {
     let exchange = Exchange::new(system, algorithm, &[]);
     let mut refusing = vec![Refusal::default(); system.slaves.len()];
     for (slave, (name, instance)) in system.slaves.iter_mut().enumerate() {
@@ -39,7 +39,7 @@ fn is_refused(name: &str, done: Result<(), CallError>, flag: &str, what: &str) -
 
 /// Returns `algorithm`, without iteration if the iteration was chosen by default and the state of
 /// an FMU cannot be restored.
-pub(super) fn confirm_rollback(system: &mut System, algorithm: &Algorithm) -> Algorithm {
+pub(crate) fn confirm_rollback(system: &mut System, algorithm: &Algorithm) -> Algorithm {
     let mut confirmed = algorithm.clone();
     let optional = algorithm.fallback
         && algorithm.coupling != Coupling::Once

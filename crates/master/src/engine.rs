@@ -1,0 +1,362 @@
+//! The engine: the slaves with their connections and driven variables. It makes sweeps, in which
+//! every slave makes one step, and saves and restores the state of all slaves and connections.
+
+mod groups;
+mod threads;
+
+use std::ops::Range;
+
+use crate::algorithm::Algorithm;
+use crate::drive::Drives;
+use crate::error::SystemError;
+use crate::exchange::{Exchange, Values, call};
+use crate::grid::{Grid, size_between};
+use crate::order::Order;
+use crate::system::{Port, System};
+use groups::Groups;
+use slave::{CallError, Failure, StepResult, Value};
+pub(crate) use threads::Task;
+use threads::{Threads, run};
+
+/// Largest number of partial steps in which a slave may complete a step.
+const PARTS: u32 = 1000;
+/// Part of a step below which the missing rest is rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// Advice for an FMU that fails after `fmi2Discard`.
+const ADVICE: &str = "the step before it was discarded; with rollback all FMUs repeat it";
+
+/// The slaves with their connections and driven variables.
+pub(crate) struct Engine {
+    pub(crate) system: System,
+    pub(crate) exchange: Exchange,
+    pub(crate) drives: Drives,
+    pub(crate) grid: Grid,
+    /// Whether steps may be repeated; every slave can then restore its state. Otherwise a slave
+    /// that completes only a part of its step (`fmi2Discard`) continues until the end.
+    pub(crate) repeats: bool,
+    groups: Groups,
+    /// For each slave: the number of communication steps in one of its steps, and the size in s of
+    /// its current step, 0 if it makes none.
+    multiples: Vec<u32>,
+    sizes: Vec<f64>,
+    /// Whether some slaves step in the background.
+    background: bool,
+    threads: Option<Threads>,
+    /// Whether a sweep is a single loop over the slaves; see [`Engine::pass`].
+    passes: bool,
+}
+
+/// Result of a sweep.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Swept {
+    /// The slave that requested the end of the simulation, and the time in s.
+    pub(crate) terminated: Option<(usize, f64)>,
+    /// The time in s that every slave can reach; `None`: the end of the step.
+    pub(crate) reached: Option<f64>,
+}
+
+/// The state of all slaves and connections at the start of a step.
+pub(crate) struct SavedState {
+    /// The slot in which every slave keeps its FMU state.
+    slot: usize,
+    time: f64,
+    values: Values,
+}
+
+impl SavedState {
+    pub(crate) fn new(slot: usize) -> Self {
+        Self { slot, time: 0.0, values: Values::default() }
+    }
+}
+
+impl Engine {
+    pub(crate) fn new(
+        mut system: System,
+        exchange: Exchange,
+        drives: Drives,
+        grid: Grid,
+        algorithm: &Algorithm,
+        (order, multiples): (&Order, Vec<u32>),
+    ) -> Result<Self, SystemError> {
+        let groups = Groups::new(&system, algorithm.method, order);
+        let background = system.slaves.iter_mut().any(|(_, slave)| slave.in_background().is_some());
+        let threads = Threads::new(algorithm.jobs, groups.len())?;
+        Ok(Self {
+            passes: threads.is_none() && !background && exchange.passes(),
+            repeats: algorithm.repeats(),
+            sizes: vec![0.0; multiples.len()],
+            system,
+            exchange,
+            drives,
+            grid,
+            groups,
+            multiples,
+            background,
+            threads,
+        })
+    }
+
+    /// Makes a sweep: sets the driven variables and steps all slaves from `time` over `size`.
+    pub(crate) fn sweep(&mut self, time: f64, size: f64) -> Result<Swept, SystemError> {
+        if !self.drives.is_empty() {
+            self.drives.write(&mut self.system, time)?;
+        }
+        if self.passes { self.pass(time, size) } else { self.step_groups(time, size) }
+    }
+
+    /// Saves the state of all slaves (`fmi2GetFMUstate`) and connections at `time`.
+    pub(crate) fn save(&mut self, time: f64, state: &mut SavedState) -> Result<(), SystemError> {
+        for (name, slave) in &mut self.system.slaves {
+            slave.save_state(state.slot).map_err(|source| call(name, time, source))?;
+        }
+        state.time = time;
+        self.exchange.save(&mut state.values);
+        Ok(())
+    }
+
+    /// Restores the state of all slaves (`fmi2SetFMUstate`) and connections.
+    pub(crate) fn restore(&mut self, state: &SavedState) -> Result<(), SystemError> {
+        for (name, slave) in &mut self.system.slaves {
+            slave.restore_state(state.slot).map_err(|source| call(name, state.time, source))?;
+        }
+        self.exchange.restore(&state.values);
+        Ok(())
+    }
+
+    /// Records the time reached as a final communication point in faults and driven variables.
+    pub(crate) fn commit(&mut self) {
+        self.exchange.commit(self.grid.time);
+        self.drives.commit(self.grid.time);
+    }
+
+    /// Returns the times after `after`, all in s, at which the next signal and the next fault on a
+    /// connection starts, ends or has a kink.
+    pub(crate) fn next_breaks(&self, after: f64) -> impl Iterator<Item = f64> {
+        [self.drives.next_break(after), self.exchange.next_break(after)].into_iter().flatten()
+    }
+
+    /// Reads the Real output at `port`.
+    pub(crate) fn read_real(&mut self, port: Port, time: f64) -> Result<f64, SystemError> {
+        let value = self.system.get_value(port);
+        let value =
+            value.map_err(|source| call(&self.system.slaves[port.slave].0, time, source))?;
+        Ok(if let Value::Real(value) = value { value } else { f64::NAN })
+    }
+
+    /// Returns the slaves that step every several communication steps.
+    pub(crate) fn slow_slaves(&self) -> impl Iterator<Item = usize> {
+        (0..self.multiples.len()).filter(|&slave| self.multiples[slave] != 1)
+    }
+
+    /// Makes a sweep of Jacobi's method whose inputs are copies of Real outputs, as a single loop
+    /// over contiguous arrays. A pair of tiny FMUs takes half the time of
+    /// [`Engine::step_groups`] (`docs/explanation/speed.md`).
+    fn pass(&mut self, time: f64, size: f64) -> Result<Swept, SystemError> {
+        let mut swept = Swept::default();
+        let never_back = !self.repeats;
+        let parts = self.exchange.reals.pass(&mut self.system, (time, size), never_back)?;
+        if !parts.is_empty() {
+            for (slave, done) in std::mem::take(parts) {
+                self.finish_in_parts(slave, (time, size), done, &mut swept)?;
+            }
+        }
+        if !self.exchange.reals.is_finite() {
+            for slave in 0..self.system.slaves.len() {
+                self.exchange.check_finite(&self.system, slave, time + size)?;
+            }
+        }
+        Ok(swept)
+    }
+
+    /// Makes a sweep group by group: gathers the inputs of a group, then steps its slaves. A
+    /// separate function keeps the loop of [`Engine::pass`] small.
+    #[inline(never)]
+    fn step_groups(&mut self, time: f64, size: f64) -> Result<Swept, SystemError> {
+        let mut swept = Swept::default();
+        self.shift(time, size);
+        for group in 0..self.groups.len() {
+            let members = self.groups.members(group);
+            for position in members.clone() {
+                let slave = self.groups.sequence[position];
+                self.exchange.gather(slave, time, self.sizes[slave]);
+                self.exchange.check_inputs(&self.system, slave, time)?;
+            }
+            if members.len() > 1 && self.threads.is_some() {
+                self.step_measured(group, time, &mut swept)?;
+            } else {
+                self.step_members(members, time, &mut swept)?;
+            }
+        }
+        Ok(swept)
+    }
+
+    /// Determines which slaves step in the sweep from `time` over `size`, and how far; the end
+    /// values of their last steps become the start values.
+    fn shift(&mut self, time: f64, size: f64) {
+        for slave in 0..self.multiples.len() {
+            self.sizes[slave] = match self.multiples[slave] {
+                1 => size,
+                _ if self.exchange.reals.is_ahead(slave, time) => 0.0,
+                multiple => self.grid.size_of(multiple, time),
+            };
+            if self.sizes[slave] > 0.0 {
+                self.exchange.shift(slave, time, self.sizes[slave]);
+            }
+        }
+    }
+
+    /// Steps the slaves at `members` of the sequence. Background slaves start before the first
+    /// result is waited for; results are evaluated in the order of the slaves. Returns the first
+    /// error in this order; does not wait for steps started after it.
+    fn step_members(
+        &mut self,
+        members: Range<usize>,
+        time: f64,
+        swept: &mut Swept,
+    ) -> Result<(), SystemError> {
+        let never_back = !self.repeats;
+        let failed = if self.background { self.start_members(members.clone(), time) } else { None };
+        for position in members {
+            if failed.as_ref().is_some_and(|(failed, _)| *failed == position) {
+                break;
+            }
+            let slave = self.groups.sequence[position];
+            let span = (time, self.sizes[slave]);
+            if span.1 == 0.0 {
+                continue;
+            }
+            let done = if self.background {
+                self.exchange.finish(&mut self.system, slave, span, never_back)?
+            } else {
+                self.exchange.advance(&mut self.system, slave, span, never_back)?
+            };
+            self.finish(slave, time, done, swept)?;
+        }
+        failed.map_or(Ok(()), |(_, error)| Err(error))
+    }
+
+    /// Starts the steps of background slaves up to the first failure; returns its position and
+    /// error.
+    fn start_members(&mut self, members: Range<usize>, time: f64) -> Option<(usize, SystemError)> {
+        for position in members {
+            let slave = self.groups.sequence[position];
+            let span = (time, self.sizes[slave]);
+            if span.1 > 0.0 {
+                let started = self.exchange.start(&mut self.system, slave, span, !self.repeats);
+                if let Err(error) = started {
+                    return Some((position, error));
+                }
+            }
+        }
+        None
+    }
+
+    /// As [`Engine::step_members`], in threads if measurements show that this is faster.
+    #[cold]
+    fn step_measured(
+        &mut self,
+        group: usize,
+        time: f64,
+        swept: &mut Swept,
+    ) -> Result<(), SystemError> {
+        let Some(threads) = &self.threads else { return Ok(()) };
+        let members = self.groups.members(group);
+        let trial = threads.begin(group);
+        if trial.in_threads {
+            self.step_in_threads(members, time, swept)?;
+        } else {
+            self.step_members(members, time, swept)?;
+        }
+        if let Some(threads) = &mut self.threads {
+            threads.end(group, &trial);
+        }
+        Ok(())
+    }
+
+    /// As [`Engine::step_members`], in threads.
+    fn step_in_threads(
+        &mut self,
+        members: Range<usize>,
+        time: f64,
+        swept: &mut Swept,
+    ) -> Result<(), SystemError> {
+        let (sizes, threads) = (&self.sizes, &self.threads);
+        let due = self.groups.sequence[members].iter().copied();
+        let due: Vec<usize> = due.filter(|&slave| sizes[slave] > 0.0).collect();
+        let done = self.exchange.advance_all(
+            &mut self.system,
+            &due,
+            &|slave| (time, sizes[slave]),
+            !self.repeats,
+            |tasks| run(threads.as_ref(), tasks),
+        )?;
+        for (slave, done) in due.into_iter().zip(done) {
+            self.finish(slave, time, done, swept)?;
+        }
+        Ok(())
+    }
+
+    #[inline]
+    fn finish(
+        &mut self,
+        slave: usize,
+        time: f64,
+        done: StepResult,
+        swept: &mut Swept,
+    ) -> Result<(), SystemError> {
+        let size = self.sizes[slave];
+        if done != StepResult::Whole {
+            self.finish_in_parts(slave, (time, size), done, swept)?;
+        }
+        self.exchange.check_finite(&self.system, slave, time + size)
+    }
+
+    /// Handles a slave that completed only a part of its step.
+    #[cold]
+    fn finish_in_parts(
+        &mut self,
+        slave: usize,
+        (time, size): (f64, f64),
+        mut done: StepResult,
+        swept: &mut Swept,
+    ) -> Result<(), SystemError> {
+        let end = time + size;
+        let mut start = time;
+        for _ in 0..PARTS {
+            let StepResult::Part { reached, terminated } = done else {
+                return self.exchange.read(&mut self.system, slave, end);
+            };
+            if terminated {
+                swept.terminated = Some((slave, reached));
+                return Ok(());
+            }
+            if reached <= start {
+                break;
+            }
+            if reached >= end - ROUNDING * size {
+                return self.exchange.read(&mut self.system, slave, end);
+            }
+            if self.repeats {
+                swept.reached = Some(swept.reached.map_or(reached, |least| least.min(reached)));
+                return Ok(());
+            }
+            start = reached;
+            let (name, instance) = &mut self.system.slaves[slave];
+            done =
+                instance.do_step(start, size_between(start, end), true).map_err(|mut source| {
+                    source.messages.push(ADVICE.to_owned());
+                    call(name, start, source)
+                })?;
+        }
+        let what = format!(
+            "returned fmi2Discard and came to {start} s only, on the way from {time} to {end} s"
+        );
+        let source = CallError {
+            function: "fmi2DoStep",
+            failure: Failure::InvalidAnswer(what),
+            messages: Vec::new(),
+        };
+        Err(call(&self.system.slaves[slave].0, start, source))
+    }
+}

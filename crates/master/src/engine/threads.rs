@@ -1,0 +1,87 @@
+//! Threads that step the slaves of a group at the same time, where measurements show that this is
+//! faster: handing a step to another thread costs some microseconds, more than many FMUs need.
+
+use std::time::{Duration, Instant};
+
+use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::error::SystemError;
+use slave::{Advance, CallError, Slave, StepResult};
+
+/// Number of steps measured with and without threads.
+const TRIALS: u32 = 16;
+/// Threads are used if their time is below this fraction of the time without threads.
+const WORTH: f64 = 0.9;
+
+/// The step of one slave.
+pub(crate) struct Task<'a> {
+    pub(crate) slave: usize,
+    pub(crate) instance: &'a mut dyn Slave,
+    pub(crate) step: Advance<'a>,
+    pub(crate) done: Result<StepResult, CallError>,
+}
+
+/// The thread pool, and the measured times of each group of slaves.
+pub(super) struct Threads {
+    pool: ThreadPool,
+    groups: Vec<Measured>,
+}
+
+/// The times of a group: number of steps measured, their total time without and with threads.
+#[derive(Clone, Copy, Default)]
+struct Measured {
+    steps: u32,
+    alone: Duration,
+    together: Duration,
+}
+
+/// How a group makes one step.
+pub(super) struct Trial {
+    pub(super) in_threads: bool,
+    /// Start of the step while it is measured.
+    start: Option<Instant>,
+}
+
+impl Threads {
+    /// Creates a pool of `jobs` threads for `groups` groups of slaves; `None` for a single thread.
+    pub(super) fn new(jobs: usize, groups: usize) -> Result<Option<Self>, SystemError> {
+        if jobs < 2 {
+            return Ok(None);
+        }
+        let pool = ThreadPoolBuilder::new().num_threads(jobs).build();
+        let pool = pool.map_err(|error| SystemError::Algorithm {
+            what: format!("{jobs} threads cannot be started: {error}"),
+        })?;
+        Ok(Some(Self { pool, groups: vec![Measured::default(); groups] }))
+    }
+
+    /// Decides how the group makes its next step: the first trials without threads, the following
+    /// with them, then the faster way.
+    pub(super) fn begin(&self, group: usize) -> Trial {
+        let Measured { steps, alone, together } = self.groups[group];
+        if steps < 2 * TRIALS {
+            return Trial { in_threads: steps >= TRIALS, start: Some(Instant::now()) };
+        }
+        let in_threads = together.as_secs_f64() < WORTH * alone.as_secs_f64();
+        Trial { in_threads, start: None }
+    }
+
+    /// Records the time of a measured step.
+    pub(super) fn end(&mut self, group: usize, trial: &Trial) {
+        let Some(start) = trial.start else { return };
+        let measured = &mut self.groups[group];
+        let total = if trial.in_threads { &mut measured.together } else { &mut measured.alone };
+        *total += start.elapsed();
+        measured.steps += 1;
+    }
+}
+
+/// Makes all steps in the threads of the pool.
+pub(super) fn run(threads: Option<&Threads>, tasks: &mut [Task<'_>]) {
+    let step = |task: &mut Task<'_>| task.done = task.instance.advance(&mut task.step);
+    match threads {
+        Some(threads) => threads.pool.install(|| tasks.par_iter_mut().for_each(step)),
+        None => tasks.iter_mut().for_each(step),
+    }
+}

@@ -1,0 +1,135 @@
+//! Events: finds the time of an event and ends a step there.
+
+use crate::algorithm::EventSource;
+use crate::coupling::Coupler;
+use crate::engine::{Engine, SavedState, Swept};
+use crate::error::SystemError;
+use crate::grid::size_between;
+use crate::step_control::{PlannedStep, SizeControl, StepMade};
+use crate::system::Port;
+use solve::Bracket;
+
+/// Slot of the FMU states to which the location of a crossing returns.
+const SLOT: usize = 2;
+/// Relative width, as a part of a step, within which a crossing is located.
+const WIDTH: f64 = 1e-9;
+/// Part of a step below which a difference of times is rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// The event sources, and the state from which a crossing is located.
+pub(crate) struct Events {
+    times: Vec<Port>,
+    crossings: Vec<Port>,
+    /// Values of the crossing outputs at the start of the step.
+    before: Vec<f64>,
+    start: SavedState,
+}
+
+impl Events {
+    /// Returns `None` if the algorithm has no event sources.
+    pub(crate) fn new(sources: &[EventSource]) -> Option<Self> {
+        let mut events = Self {
+            times: Vec::new(),
+            crossings: Vec::new(),
+            before: Vec::new(),
+            start: SavedState::new(SLOT),
+        };
+        for source in sources {
+            match source {
+                EventSource::NextTime(port) => events.times.push(*port),
+                EventSource::Crossing(port) => events.crossings.push(*port),
+            }
+        }
+        (!sources.is_empty()).then_some(events)
+    }
+
+    /// Makes the planned step, or a shorter one that ends at the first event within it.
+    pub(crate) fn step(
+        &mut self,
+        engine: &mut Engine,
+        coupler: &mut Coupler,
+        control: &mut SizeControl,
+        planned: PlannedStep,
+    ) -> Result<StepMade, SystemError> {
+        let time = engine.grid.time;
+        let next = self.next_event(engine, time, planned.end)?;
+        let limit = next.unwrap_or(planned.end);
+        self.read_crossings(engine, time)?;
+        let mut made = control.step(engine, coupler, PlannedStep::between(time, limit))?;
+        if made.terminated.is_some() {
+            return Ok(made);
+        }
+        let crossing = self.locate(engine, coupler, time, made.end)?;
+        let happened = crossing.is_some() || (next.is_some() && made.end >= limit);
+        if let Some((end, swept)) = crossing {
+            made = StepMade { end, terminated: swept.terminated };
+        }
+        if happened {
+            engine.exchange.reals.clear_history();
+            control.clear_history();
+        }
+        Ok(made)
+    }
+
+    /// Returns the time of the first announced event before `end`, or `end` itself if the event
+    /// differs from it by rounding.
+    fn next_event(
+        &self,
+        engine: &mut Engine,
+        time: f64,
+        end: f64,
+    ) -> Result<Option<f64>, SystemError> {
+        let rounding = ROUNDING * (end - time);
+        let mut first: Option<f64> = None;
+        for &port in &self.times {
+            let next = engine.read_real(port, time)?;
+            if next > time + rounding && next <= end + rounding {
+                let next = if next < end - rounding { next } else { end };
+                first = Some(first.map_or(next, |first| first.min(next)));
+            }
+        }
+        Ok(first)
+    }
+
+    /// Saves the state and reads the crossing outputs before a step.
+    fn read_crossings(&mut self, engine: &mut Engine, time: f64) -> Result<(), SystemError> {
+        if self.crossings.is_empty() {
+            return Ok(());
+        }
+        self.before.clear();
+        for &port in &self.crossings {
+            self.before.push(engine.read_real(port, time)?);
+        }
+        engine.save(time, &mut self.start)
+    }
+
+    /// Ends the step from `time` to `end` at the first zero crossing within it, if there is one.
+    fn locate(
+        &mut self,
+        engine: &mut Engine,
+        coupler: &mut Coupler,
+        time: f64,
+        end: f64,
+    ) -> Result<Option<(f64, Swept)>, SystemError> {
+        let mut found: Option<(f64, Swept)> = None;
+        let (mut end, width) = (end, WIDTH * (end - time));
+        for (&port, &before) in self.crossings.iter().zip(&self.before) {
+            let after = engine.read_real(port, end)?;
+            let Some(mut bracket) = Bracket::new((time, before), (end, after), width) else {
+                continue;
+            };
+            let mut repeat_until = |engine: &mut Engine, end: f64| {
+                engine.restore(&self.start)?;
+                coupler.step(engine, time, size_between(time, end))
+            };
+            while let Some(asked) = bracket.ask() {
+                repeat_until(engine, asked)?;
+                let value = engine.read_real(port, asked)?;
+                bracket.tell(asked, value);
+            }
+            end = bracket.after();
+            found = Some((end, repeat_until(engine, end)?));
+        }
+        Ok(found)
+    }
+}
