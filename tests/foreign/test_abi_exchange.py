@@ -49,7 +49,7 @@ def test_vectors_of_a_wrong_length_are_an_error_that_gives_both_lengths(fmu, fun
         with exchange(fmu) as instance:
             instance.start_exchange()
             assert instance.call(function, reals(*[0.0] * wrong), wrong) == ERROR
-            assert f"{wrong} " in instance.last_message()
+            assert f"found {wrong}" in instance.last_message()
             assert f"expected {expected}" in instance.last_message()
 
 

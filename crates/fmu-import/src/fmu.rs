@@ -363,12 +363,14 @@ impl Slave for Instance {
 
     fn pass(
         &mut self,
-        inputs: (&[u32], &[f64]),
+        inputs: &[u32],
+        values: &[f64],
         span: (f64, f64),
         never_back: bool,
-        outputs: (&[u32], &mut [f64]),
+        outputs: &[u32],
+        results: &mut [f64],
     ) -> Result<StepResult, CallError> {
-        self.component.pass(inputs, span, never_back, outputs)
+        self.component.pass(inputs, values, span, never_back, outputs, results)
     }
 
     fn take_warning(&mut self) -> bool {

@@ -141,7 +141,7 @@ impl Iterated {
         let mut swept = self.evaluate(engine, time, size)?;
         self.iteration.solver().begin();
         loop {
-            if swept.reached.is_some() || swept.terminated.is_some() {
+            if swept != Swept::Whole {
                 return Ok(swept);
             }
             self.g.copy_from_slice(engine.exchange.reals.outputs());

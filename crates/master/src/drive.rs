@@ -293,6 +293,7 @@ impl Drives {
     }
 
     /// Records that the communication point `time`, in s, is final.
+    #[inline]
     pub fn commit(&mut self, time: f64) {
         for drive in &mut self.all {
             drive.accepted = drive.written;

@@ -47,13 +47,23 @@ pub(crate) struct Engine {
     passes: bool,
 }
 
-/// Result of a sweep.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Swept {
-    /// The slave that requested the end of the simulation, and the time in s.
-    pub(crate) terminated: Option<(usize, f64)>,
-    /// The time in s that every slave can reach; `None`: the end of the step.
-    pub(crate) reached: Option<f64>,
+/// How far a sweep came.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) enum Swept {
+    /// All slaves completed the step.
+    #[default]
+    Whole,
+    /// Some slaves completed only a part of the step: the time in s that every slave can reach.
+    Part(f64),
+    /// A slave requested the end of the simulation.
+    Ended(Ending),
+}
+
+/// The slave that requested the end of the simulation, and the time in s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Ending {
+    pub(crate) slave: usize,
+    pub(crate) time: f64,
 }
 
 /// The state of all slaves and connections at the start of a step.
@@ -98,6 +108,7 @@ impl Engine {
     }
 
     /// Makes a sweep: sets the driven variables and steps all slaves from `time` over `size`.
+    #[inline]
     pub(crate) fn sweep(&mut self, time: f64, size: f64) -> Result<Swept, SystemError> {
         if !self.drives.is_empty() {
             self.drives.write(&mut self.system, time)?;
@@ -125,6 +136,7 @@ impl Engine {
     }
 
     /// Records the time reached as a final communication point in faults and driven variables.
+    #[inline]
     pub(crate) fn commit(&mut self) {
         self.exchange.commit(self.grid.time);
         self.drives.commit(self.grid.time);
@@ -152,6 +164,7 @@ impl Engine {
     /// Makes a sweep of Jacobi's method whose inputs are copies of Real outputs, as a single loop
     /// over contiguous arrays. A pair of tiny FMUs takes half the time of
     /// [`Engine::step_groups`] (`docs/explanation/speed.md`).
+    #[inline]
     fn pass(&mut self, time: f64, size: f64) -> Result<Swept, SystemError> {
         let mut swept = Swept::default();
         let never_back = !self.repeats;
@@ -328,7 +341,7 @@ impl Engine {
                 return self.exchange.read(&mut self.system, slave, end);
             };
             if terminated {
-                swept.terminated = Some((slave, reached));
+                *swept = Swept::Ended(Ending { slave, time: reached });
                 return Ok(());
             }
             if reached <= start {
@@ -338,7 +351,11 @@ impl Engine {
                 return self.exchange.read(&mut self.system, slave, end);
             }
             if self.repeats {
-                swept.reached = Some(swept.reached.map_or(reached, |least| least.min(reached)));
+                *swept = match *swept {
+                    Swept::Whole => Swept::Part(reached),
+                    Swept::Part(least) => Swept::Part(least.min(reached)),
+                    Swept::Ended(ending) => Swept::Ended(ending),
+                };
                 return Ok(());
             }
             start = reached;

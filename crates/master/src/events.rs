@@ -56,13 +56,13 @@ impl Events {
         let limit = next.unwrap_or(planned.end);
         self.read_crossings(engine, time)?;
         let mut made = control.step(engine, coupler, PlannedStep::between(time, limit))?;
-        if made.terminated.is_some() {
+        if made.ending.is_some() {
             return Ok(made);
         }
         let crossing = self.locate(engine, coupler, time, made.end)?;
         let happened = crossing.is_some() || (next.is_some() && made.end >= limit);
         if let Some((end, swept)) = crossing {
-            made = StepMade { end, terminated: swept.terminated };
+            made = StepMade::new(end, swept);
         }
         if happened {
             engine.exchange.reals.clear_history();

@@ -19,6 +19,8 @@ pub(crate) struct Grid {
     step: f64,
     /// Number of grid points passed.
     pub(crate) count: u64,
+    /// The last grid point passed and the next one, in s.
+    points: (f64, f64),
     /// Time reached in s.
     pub(crate) time: f64,
 }
@@ -81,7 +83,8 @@ impl Grid {
             let (what, rule) = ("the stop time", "more than the start time".to_owned());
             return Err(SystemError::Time { what, value: stop, rule });
         }
-        let mut grid = Self { start, stop, step, count: 0, time: start };
+        let points = (start, start + step);
+        let mut grid = Self { start, stop, step, count: 0, points, time: start };
         let early = stop.and_then(|stop| grid.last_whole_step(system, multiples, stop));
         if let Some(early) = &early {
             grid.stop = Some(early.end);
@@ -146,10 +149,9 @@ impl Grid {
     }
 
     /// Returns end and size of the next step: H, or the rest up to the stop time.
-    #[expect(clippy::cast_precision_loss, reason = "2^53 steps take longer than anyone waits")]
+    #[inline]
     pub(crate) fn next(&self) -> (f64, f64) {
-        let start = self.start + self.count as f64 * self.step;
-        let end = self.start + (self.count + 1) as f64 * self.step;
+        let (start, end) = self.points;
         let on_grid = self.time.total_cmp(&start).is_eq();
         match self.stop {
             Some(stop) if end > stop - ROUNDING * self.step => {
@@ -173,20 +175,28 @@ impl Grid {
     }
 
     /// Records the completion of a step to `end`, on the grid or not.
+    #[inline]
     pub(crate) fn reach(&mut self, end: f64) {
-        if end >= self.next().0 {
-            self.count += 1;
+        if end >= self.limited(self.points.1, self.step) {
+            self.set_count(self.count + 1);
         }
         self.time = end;
     }
 
+    #[expect(clippy::cast_precision_loss, reason = "2^53 steps take longer than anyone waits")]
+    fn set_count(&mut self, count: u64) {
+        let point = |count: u64| self.start + count as f64 * self.step;
+        (self.count, self.points) = (count, (point(count), point(count + 1)));
+    }
+
     /// Resumes at `time` after `count` grid points. The end of the first run may have been counted
     /// without lying on the grid.
-    #[expect(clippy::cast_precision_loss, reason = "2^53 steps take longer than anyone waits")]
     pub(crate) fn resume(&mut self, time: f64, count: u64) {
-        let point = self.start + count as f64 * self.step;
-        let beyond = count > 0 && point > time + ROUNDING * self.step;
-        (self.time, self.count) = (time, if beyond { count - 1 } else { count });
+        self.set_count(count);
+        if count > 0 && self.points.0 > time + ROUNDING * self.step {
+            self.set_count(count - 1);
+        }
+        self.time = time;
     }
 }
 

@@ -12,7 +12,7 @@ use crate::algorithm::{Algorithm, Extrapolation, StepControl};
 use crate::capabilities;
 use crate::coupling::{Coupler, Fallbacks};
 use crate::drive::Scenario;
-use crate::engine::Engine;
+use crate::engine::{Ending, Engine};
 use crate::error::SystemError;
 use crate::events::Events;
 use crate::exchange::{Exchange, call};
@@ -207,8 +207,8 @@ impl Simulation {
             Some(events) => events.step(engine, coupler, control, planned)?,
         };
         engine.grid.reach(made.end);
-        if let Some((slave, reached)) = made.terminated {
-            self.end_early(slave, (start, reached));
+        if let Some(ending) = made.ending {
+            self.end_early(start, ending);
         }
         if self.time() > start {
             self.engine.commit();
@@ -221,13 +221,13 @@ impl Simulation {
         }
     }
 
-    /// Ends the run because a slave requested it at the time `reached` in the step from `start`.
-    /// The time of the run becomes `reached` if all slaves could end there, otherwise `start`.
+    /// Ends the run because a slave requested it in the step from `start`. The time of the run
+    /// becomes that of the request if all slaves could end there, otherwise `start`.
     #[cold]
-    fn end_early(&mut self, slave: usize, (start, reached): (f64, f64)) {
-        self.ended = Some((slave, reached));
+    fn end_early(&mut self, start: f64, ending: Ending) {
+        self.ended = Some((ending.slave, ending.time));
         let alone = self.engine.system.slaves.len() == 1;
-        self.engine.grid.time = if alone || self.engine.repeats { reached } else { start };
+        self.engine.grid.time = if alone || self.engine.repeats { ending.time } else { start };
     }
 
     /// Returns the count of steps whose iteration failed; `None` without iteration.

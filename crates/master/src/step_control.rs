@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::algorithm::{Algorithm, Extrapolation, StepControl};
 use crate::coupling::Coupler;
-use crate::engine::{Engine, SavedState, Swept};
+use crate::engine::{Ending, Engine, SavedState, Swept};
 use crate::error::SystemError;
 use crate::exchange::Reals;
 use crate::grid::{Grid, size_between};
@@ -61,8 +61,15 @@ impl PlannedStep {
 pub(crate) struct StepMade {
     /// Its end in s.
     pub(crate) end: f64,
-    /// The slave that requested the end of the simulation, and the time in s.
-    pub(crate) terminated: Option<(usize, f64)>,
+    /// Whether a slave requested the end of the simulation.
+    pub(crate) ending: Option<Ending>,
+}
+
+impl StepMade {
+    pub(crate) fn new(end: f64, swept: Swept) -> Self {
+        let ending = if let Swept::Ended(ending) = swept { Some(ending) } else { None };
+        Self { end, ending }
+    }
 }
 
 /// Slot of the FMU states to which a rejected step returns.
@@ -130,6 +137,7 @@ impl SizeControl {
 
     /// Plans the next step. A step of variable size ends where a signal or a fault starts, ends or
     /// has a kink.
+    #[inline]
     pub(crate) fn plan(&self, engine: &Engine) -> PlannedStep {
         if self.kind == StepControl::Fixed {
             let (end, size) = engine.grid.next();
@@ -142,6 +150,7 @@ impl SizeControl {
 
     /// Makes the planned step, or a shorter one that all slaves complete and whose error is within
     /// the tolerance.
+    #[inline]
     pub(crate) fn step(
         &mut self,
         engine: &mut Engine,
@@ -153,8 +162,10 @@ impl SizeControl {
             return self.step_within_tolerance(engine, coupler, end);
         }
         let swept = engine.sweep(engine.grid.time, size)?;
-        self.update_size(&engine.exchange.reals, size);
-        Ok(StepMade { end, terminated: swept.terminated })
+        if self.kind != StepControl::Fixed {
+            self.update_size(&engine.exchange.reals, size);
+        }
+        Ok(StepMade::new(end, swept))
     }
 
     /// Attempts a step towards `end`; repeats it with a smaller size until it is accepted.
@@ -172,34 +183,33 @@ impl SizeControl {
                 StepControl::Doubling => self.step_by_halves(engine, coupler, time, size)?,
                 _ => self.step_and_estimate(engine, coupler, time, size)?,
             };
-            if let Some((_, reached)) = swept.terminated {
-                engine.restore(&self.start)?;
-                if reached > time {
-                    coupler.step(engine, time, size_between(time, reached))?;
+            end = match swept {
+                Swept::Ended(ending) => {
+                    engine.restore(&self.start)?;
+                    if ending.time > time {
+                        coupler.step(engine, time, size_between(time, ending.time))?;
+                    }
+                    return Ok(StepMade::new(ending.time, swept));
                 }
-                return Ok(StepMade { end: reached, terminated: swept.terminated });
-            }
-            // A partial step has no error estimate.
-            end = if let Some(reached) = swept.reached {
-                reached
-            } else {
-                match self.judge(size, error) {
+                // A partial step has no error estimate.
+                Swept::Part(reached) => reached,
+                Swept::Whole => match self.judge(size, error) {
                     // With rounded times, the retry may be as long as the last attempt.
                     Verdict::Rejected { retry } if time + retry < end => time + retry,
                     // After a break, values jump in a step of any size; accept the step.
                     Verdict::Rejected { .. } | Verdict::Stuck if is_break(engine, time) => {
                         engine.exchange.reals.clear_history();
                         self.clear_history();
-                        return Ok(StepMade { end, terminated: None });
+                        return Ok(StepMade::new(end, swept));
                     }
                     Verdict::Rejected { .. } | Verdict::Stuck => {
                         return Err(SystemError::Stuck { time, size, error });
                     }
                     Verdict::Accepted { .. } => {
                         self.update_size(&engine.exchange.reals, size);
-                        return Ok(StepMade { end, terminated: None });
+                        return Ok(StepMade::new(end, swept));
                     }
-                }
+                },
             };
             engine.restore(&self.start)?;
         }
@@ -215,7 +225,7 @@ impl SizeControl {
         size: f64,
     ) -> Result<(f64, Swept), SystemError> {
         let whole = coupler.step(engine, time, size)?;
-        if whole.reached.is_some() || whole.terminated.is_some() {
+        if whole != Swept::Whole {
             return Ok((0.0, whole));
         }
         self.whole.clear();
@@ -224,12 +234,12 @@ impl SizeControl {
         let middle = time + 0.5 * size;
         for (start, size) in [(time, middle - time), (middle, size_between(middle, time + size))] {
             let half = coupler.step(engine, start, size)?;
-            if half.reached.is_some() || half.terminated.is_some() {
+            if half != Swept::Whole {
                 return Ok((0.0, half));
             }
         }
         let halves = engine.exchange.reals.outputs();
-        Ok((self.doubling_error(halves, &self.whole), Swept::default()))
+        Ok((self.doubling_error(halves, &self.whole), Swept::Whole))
     }
 
     /// Makes one step and returns the error estimated from the input extrapolation.

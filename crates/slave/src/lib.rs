@@ -186,11 +186,14 @@ pub trait Slave: Send {
     /// values), steps from `time` over `size` (in s), reads the outputs (references and values).
     fn pass(
         &mut self,
-        inputs: (&[u32], &[f64]),
+        inputs: &[u32],
+        values: &[f64],
         (time, size): (f64, f64),
         never_back: bool,
-        outputs: (&[u32], &mut [f64]),
+        outputs: &[u32],
+        results: &mut [f64],
     ) -> Result<StepResult, CallError> {
+        let (inputs, outputs) = ((inputs, values), (outputs, results));
         self.advance(&mut Advance::held(inputs, (time, size), never_back, outputs))
     }
 

@@ -53,10 +53,12 @@ impl Component {
     #[inline]
     pub fn pass(
         &mut self,
-        (inputs, values): (&[u32], &[f64]),
+        inputs: &[u32],
+        values: &[f64],
         (time, size): (f64, f64),
         never_back: bool,
-        (outputs, results): (&[u32], &mut [f64]),
+        outputs: &[u32],
+        results: &mut [f64],
     ) -> Result<StepResult, CallError> {
         let hot = &self.hot;
         let usual =
@@ -68,7 +70,7 @@ impl Component {
             // SAFETY: the instance is alive; as many references as values.
             let status = unsafe { function(hot.pointer, inputs.as_ptr(), count, values.as_ptr()) };
             if !usual(status) {
-                self.check(SET, status)?;
+                return self.refuse(SET, status);
             }
         }
         let Some(function) = hot.do_step else { return Err(absent(NAME)) };
@@ -77,8 +79,7 @@ impl Component {
         // SAFETY: the instance is alive.
         let status = unsafe { function(hot.pointer, time, size, never_back.into()) };
         if !usual(status) {
-            let done = self.finish_step(status, time, size)?;
-            return self.read_outputs(outputs, results, done);
+            return self.finish_pass(status, (time, size), outputs, results);
         }
         if !outputs.is_empty() {
             let Some(function) = hot.get_real else { return Err(absent(GET)) };
@@ -88,21 +89,33 @@ impl Component {
             let status =
                 unsafe { function(hot.pointer, outputs.as_ptr(), count, results.as_mut_ptr()) };
             if !usual(status) {
-                self.check(GET, status)?;
+                return self.refuse(GET, status);
             }
         }
-        self.place.leave();
+        hot.place.leave();
         Ok(StepResult::Whole)
     }
 
-    /// Reads the outputs after a step that was pending or discarded.
+    /// Returns the error of a call in [`Component::pass`]. A separate function keeps the pass small.
     #[cold]
-    fn read_outputs(
+    fn refuse(
         &mut self,
+        function: &'static str,
+        status: fmi2Status,
+    ) -> Result<StepResult, CallError> {
+        self.check(function, status).map(|()| StepResult::Whole)
+    }
+
+    /// Ends a pass whose step was pending or discarded, or failed.
+    #[cold]
+    fn finish_pass(
+        &mut self,
+        status: fmi2Status,
+        (time, size): (f64, f64),
         outputs: &[u32],
         results: &mut [f64],
-        done: StepResult,
     ) -> Result<StepResult, CallError> {
+        let done = self.finish_step(status, time, size)?;
         if !outputs.is_empty() {
             self.get_real(outputs, results)?;
         }

@@ -52,6 +52,7 @@ impl Pass {
     /// # Errors
     ///
     /// Returns the first failure with its slave; `latest` then has its former values.
+    #[inline]
     pub(super) fn run(
         &mut self,
         slaves: &mut [(String, Box<dyn Slave>)],
@@ -66,10 +67,12 @@ impl Pass {
                 *value = latest[source as usize];
             }
             let done = instance.pass(
-                (&self.inputs[place.inputs.clone()], values),
+                &self.inputs[place.inputs.clone()],
+                values,
                 span,
                 never_back,
-                (&self.outputs[place.outputs.clone()], &mut self.next[place.outputs.clone()]),
+                &self.outputs[place.outputs.clone()],
+                &mut self.next[place.outputs.clone()],
             );
             match done {
                 Ok(StepResult::Whole) => {}

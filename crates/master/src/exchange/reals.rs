@@ -382,10 +382,17 @@ impl Reals {
     }
 }
 
-/// Whether all values are finite. Multiplies by zero: only NaN and infinity then give a nonzero
-/// result.
+/// Number of values below which [`all_finite`] looks at one after the other. A vector load would wait
+/// for the values that an FMU has just stored one by one.
+const FEW: usize = 16;
+
+/// Whether all values are finite. Of many values, sums up the products with zero: only NaN and
+/// infinity give a nonzero result.
 #[inline]
 fn all_finite(values: &[f64]) -> bool {
+    if values.len() <= FEW {
+        return values.iter().all(|value| value.is_finite());
+    }
     let mut sums = [0.0; 4];
     let chunks = values.chunks_exact(4);
     let rest: f64 = chunks.remainder().iter().map(|value| 0.0 * value).sum();
