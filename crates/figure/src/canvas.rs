@@ -1,12 +1,10 @@
 //! The page: SVG elements and rasterisation.
 
-use std::sync::Arc;
-
 use resvg::tiny_skia::{Pixmap, Transform};
-use resvg::usvg::fontdb::{Database, Source};
 use resvg::usvg::{Options, Tree};
 
 use super::FigureError;
+use super::outline::outline_texts;
 
 /// Pixels of the PNG per SVG unit.
 const SCALE: f32 = 2.0;
@@ -152,16 +150,12 @@ fn escape(text: &str) -> String {
 ///
 /// # Errors
 ///
-/// [`FigureError::Pixels`] if `svg` is not an SVG or has no area.
+/// [`FigureError::Pixels`] if `svg` is not an SVG or has no area, or if one of its texts is not
+/// plain: has elements in it, or several positions.
 pub fn rasterise(svg: &str) -> Result<Vec<u8>, FigureError> {
     let failed = |reason: &dyn std::fmt::Display| FigureError::Pixels(reason.to_string());
-    let mut fonts = Database::new();
-    fonts.load_font_source(Source::Binary(Arc::new(dejavu::sans::regular())));
-    // An unknown font falls back to the serif family.
-    fonts.set_serif_family("DejaVu Sans");
-    fonts.set_sans_serif_family("DejaVu Sans");
-    let options = Options { fontdb: Arc::new(fonts), ..Options::default() };
-    let tree = Tree::from_str(svg, &options).map_err(|reason| failed(&reason))?;
+    let outlined = outline_texts(svg).map_err(|reason| failed(&reason))?;
+    let tree = Tree::from_str(&outlined, &Options::default()).map_err(|reason| failed(&reason))?;
     let size =
         tree.size().to_int_size().scale_by(SCALE).ok_or_else(|| failed(&"the page has no area"))?;
     let mut pixels =

@@ -6,6 +6,7 @@
 pub mod axis;
 mod canvas;
 mod legend;
+mod outline;
 pub mod trace;
 
 use std::io;

@@ -197,3 +197,38 @@ fn a_file_that_cannot_be_written_is_named_and_leaves_nothing_behind() {
     assert!(error.to_string().contains(&taken.display().to_string()), "{error}");
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
+
+#[test]
+fn a_text_is_drawn_where_its_anchor_and_its_size_say() {
+    let page = |text: &str| {
+        let svg = format!(
+            r#"<svg xmlns="http://www.w3.org/2000/svg" width="200" height="60"><g font-size="20">{text}</g></svg>"#
+        );
+        Pixmap::decode_png(&rasterise(&svg).unwrap()).unwrap()
+    };
+    let extent = |pixels: &Pixmap| {
+        let width = pixels.width() as usize;
+        let inked = pixels.pixels().iter().enumerate().filter(|(_, pixel)| pixel.alpha() > 128);
+        let columns: Vec<usize> = inked.map(|(at, _)| at % width).collect();
+        (*columns.iter().min().unwrap(), *columns.iter().max().unwrap())
+    };
+    // DejaVu Sans: the advance of a capital H is 1540 of 2048 units, its left side bearing 201.
+    let text = |anchor: &str| {
+        extent(&page(&format!(r#"<text x="100" y="40" text-anchor="{anchor}">HHH</text>"#)))
+    };
+    let (bearing, width) = (201.0 / 2048.0 * 40.0, 3.0 * 1540.0 / 2048.0 * 40.0);
+    for (anchor, start) in
+        [("start", 200.0), ("middle", 200.0 - width / 2.0), ("end", 200.0 - width)]
+    {
+        let (left, right) = text(anchor);
+        assert!((left as f64 - (start + bearing)).abs() <= 1.5, "{anchor}: from {left}");
+        assert!((right as f64 - (start + width - bearing)).abs() <= 1.5, "{anchor}: to {right}");
+    }
+}
+
+#[test]
+fn a_text_that_is_not_plain_is_refused_with_its_place() {
+    let svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"9\" height=\"9\">\n <text>x<tspan>2</tspan></text></svg>";
+    let error = rasterise(svg).unwrap_err().to_string();
+    assert!(error.contains("line 2, column 2: <text>: expected plain text"), "{error}");
+}

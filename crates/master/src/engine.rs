@@ -162,7 +162,7 @@ impl Engine {
     }
 
     /// Makes a sweep of Jacobi's method whose inputs are copies of Real outputs, as a single loop
-    /// over contiguous arrays. A pair of tiny FMUs takes half the time of
+    /// over contiguous arrays. A pair of tiny FMUs takes 50 ns instead of 137 ns a step by
     /// [`Engine::step_groups`] (`docs/explanation/speed.md`).
     #[inline]
     fn pass(&mut self, time: f64, size: f64) -> Result<Swept, SystemError> {
