@@ -6,6 +6,8 @@ mod threads;
 
 use std::ops::Range;
 
+use serde::{Deserialize, Serialize};
+
 use crate::algorithm::Algorithm;
 use crate::drive::Drives;
 use crate::error::SystemError;
@@ -60,7 +62,7 @@ pub(crate) enum Swept {
 }
 
 /// The slave that requested the end of the simulation, and the time in s.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Ending {
     pub(crate) slave: usize,
     pub(crate) time: f64,

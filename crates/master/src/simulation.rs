@@ -38,8 +38,8 @@ pub struct Simulation {
     order: Order,
     early_end: Option<EarlyEnd>,
     origin: Origin,
-    /// The slave that requested the end of the simulation, and the time in s.
-    ended: Option<(usize, f64)>,
+    /// Whether a slave requested the end of the simulation.
+    ended: Option<Ending>,
 }
 
 impl Simulation {
@@ -127,7 +127,7 @@ impl Simulation {
     /// Returns the FMU that requested the end of the simulation (`fmi2Terminated`).
     #[must_use]
     pub fn ended_by(&self) -> Option<&str> {
-        self.ended.map(|(slave, _)| self.engine.system.slaves[slave].0.as_str())
+        self.ended.map(|ending| self.engine.system.slaves[ending.slave].0.as_str())
     }
 
     /// Returns the time in s at which an FMU requested the end.
@@ -137,7 +137,7 @@ impl Simulation {
     /// different times.
     #[must_use]
     pub fn ended_at(&self) -> Option<f64> {
-        self.ended.map(|(_, time)| time)
+        self.ended.map(|ending| ending.time)
     }
 
     /// Returns the reason if the run ends before its stop time.
@@ -225,7 +225,7 @@ impl Simulation {
     /// becomes that of the request if all slaves could end there, otherwise `start`.
     #[cold]
     fn end_early(&mut self, start: f64, ending: Ending) {
-        self.ended = Some((ending.slave, ending.time));
+        self.ended = Some(ending);
         let alone = self.engine.system.slaves.len() == 1;
         self.engine.grid.time = if alone || self.engine.repeats { ending.time } else { start };
     }

@@ -9,6 +9,7 @@ use super::Simulation;
 use crate::algorithm::Algorithm;
 use crate::coupling::Iteration;
 use crate::drive::{DriveState, Scenario};
+use crate::engine::Ending;
 use crate::error::SystemError;
 use crate::exchange::{Values, call};
 use crate::fault::FaultChain;
@@ -30,8 +31,7 @@ pub struct Checkpoint {
     drives: Vec<DriveState>,
     /// For each slave: its name, the GUID of its FMU, its serialised FMU state.
     slaves: Vec<(String, String, Vec<u8>)>,
-    /// The slave that requested the end, and the time in s.
-    ended: Option<(usize, f64)>,
+    ended: Option<Ending>,
 }
 
 impl Checkpoint {
