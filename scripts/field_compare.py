@@ -24,7 +24,7 @@ QUESTIONS = {
     "set": ["kept", "not judged", "lost"],
     "check": ["agrees", "finds more", "finds less", "not judged", "failed"],
 }
-# The verdicts that fall short.
+# The verdicts that are failures.
 SHORT = {
     "defaults": {"lost", "crashed"},
     "values": {"differ", "lost", "crashed"},
