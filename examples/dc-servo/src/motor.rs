@@ -44,7 +44,8 @@ impl<D: Number> Motor<D> {
 
     /// Evaluates `J w' = k i - F_v w - T_f` with the current from `R i = v - k w`.
     ///
-    /// The dry friction `T_f` is `T_c sign(w)` while the load slides. At rest it balances the torque, up to `T_s`.
+    /// The dry friction `T_f` is `T_c sign(w)` while the load slides. At rest it balances the
+    /// torque, up to `T_s`.
     pub(crate) fn response(&self, regime: i32, omega: D, voltage: D) -> Response<D> {
         let [resistance, k, inertia, viscous, coulomb, holding, ..] = self.parameters;
         let current = (voltage - k * omega) / resistance;

@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A PID controller: every `T_s`, `u = K (e - T_d y') + sum of K e T_s / T_i` with `e = w - y`, limited to `u_max`.
+/// A PID controller: every `T_s`, `u = K (e - T_d y') + sum of K e T_s / T_i` with `e = w - y`,
+/// limited to `u_max`.
 #[derive(Clone, Default, Serialize, Deserialize)]
 pub(crate) struct Law {
     pub(crate) mode: i32,

@@ -1,4 +1,4 @@
-//! A model with a variable of every type and role, for both interfaces, that misbehaves on demand.
+//! A model with a variable of every type and role, for both interfaces, that fails on demand.
 //!
 //! x' = q (u - x), y = p x + u.
 
@@ -10,7 +10,7 @@ use fmu::{
 };
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// Where the model's code runs.
+/// The methods of the model in which a failure can be planned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     New,
@@ -52,7 +52,7 @@ impl Place {
     ];
 }
 
-/// What the model does there instead of its work.
+/// The failure that replaces the model's work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mischief {
     Panic,
@@ -80,7 +80,8 @@ thread_local! {
     static ALIVE: Cell<isize> = const { Cell::new(0) };
 }
 
-/// Runs `work` while the models of this thread follow `plan`; whether they came to it.
+/// Runs `work` while the models of this thread fail by `plan`; returns whether the failure
+/// happened.
 pub fn with_plan<T>(plan: Option<(Place, Mischief)>, work: impl FnOnce() -> T) -> (T, bool) {
     HAPPENED.set(false);
     PLAN.set(plan);
@@ -89,17 +90,17 @@ pub fn with_plan<T>(plan: Option<(Place, Mischief)>, work: impl FnOnce() -> T) -
     (done, happened())
 }
 
-/// Whether the models of this thread came to what the plan says.
+/// Whether the planned failure has happened in this thread.
 pub fn happened() -> bool {
     HAPPENED.get()
 }
 
-/// How many models exist in this thread.
+/// Number of models that exist in this thread.
 pub fn alive() -> isize {
     ALIVE.get()
 }
 
-/// The model's code reaches `place`.
+/// Reports that the model's code has reached `place`, and fails if this is planned.
 fn reach(place: Place, time: f64) -> Result<(), Failure> {
     let Some((_, mischief)) = PLAN.get().filter(|(planned, _)| *planned == place) else {
         return Ok(());
@@ -116,7 +117,7 @@ fn reach(place: Place, time: f64) -> Result<(), Failure> {
     })
 }
 
-/// The same where the code has no way to fail but a panic.
+/// The same for code that can fail by a panic only.
 fn reach_infallible(place: Place) {
     if PLAN.get() == Some((place, Mischief::Panic)) {
         HAPPENED.set(true);
@@ -124,7 +125,7 @@ fn reach_infallible(place: Place) {
     }
 }
 
-/// Sees the model come and go.
+/// Counts the models that exist.
 struct Witness;
 
 impl Witness {

@@ -1,4 +1,4 @@
-//! Sequences of calls, legal and illegal, against what the standard says of each.
+//! Runs sequences of legal and illegal calls and compares each with the standard.
 
 use std::ffi::c_int;
 
@@ -11,10 +11,10 @@ use crate::importer::{HEARS, Importer, Message, Order, Saved};
 use crate::machine::{Mischief, Place, alive, happened, with_plan};
 use crate::prediction::{Core, DISCARD, OK, in_table};
 
-/// How many bytes one call may use.
+/// Maximum number of bytes that determine one call.
 pub const LENGTH: usize = 24;
 
-/// First bytes of a call from which on its arguments may be hostile.
+/// First bytes from which on the arguments of a call may be hostile.
 pub const HOSTILE: u8 = 0xd0;
 /// The same for calls that need not be legal.
 pub const ILLEGAL: u8 = 0xf0;
@@ -23,11 +23,11 @@ const NOBODY: u8 = 0xf8;
 /// The second byte of `fmi2FreeInstance`.
 pub const FREE: u8 = 0xff;
 
-/// An instance and what is predicted of it.
+/// An instance and its predicted state.
 struct Life {
     importer: Importer,
     core: Core,
-    /// The categories chosen; all of them when none.
+    /// The chosen log categories; empty means all.
     chosen: Option<Vec<String>>,
     logger: bool,
 }
@@ -35,7 +35,7 @@ struct Life {
 struct World {
     lives: [Option<Life>; 2],
     stores: Stores,
-    /// Frees what others cannot free any more.
+    /// Frees an instance that can no longer be freed otherwise.
     caretaker: Importer,
     nobody: Importer,
     reached: u32,
@@ -43,8 +43,8 @@ struct World {
 
 type Plan = Option<(Place, Mischief)>;
 
-/// Makes the calls that `bytes` say: the places of mischief that were reached, as bits, or what was
-/// not as predicted.
+/// Makes the calls that `bytes` encode. Returns the planned failures that happened, as bits, or the
+/// first difference from the prediction.
 pub fn run(bytes: &[u8]) -> Result<u32, String> {
     let before = alive();
     let mut world = World::new();
@@ -125,7 +125,7 @@ impl World {
         }
     }
 
-    /// A call with a null component is an error and nothing else.
+    /// A call with a null component returns an error and does nothing else.
     fn call_nobody(&mut self, which: u8, choice: Choice) -> Result<(), String> {
         let (function, caller) = CALLS[usize::from(which) % CALLS.len()];
         let core = Core::new(true);
@@ -141,7 +141,7 @@ impl World {
         Err(format!("{} of a null component gives {}", function.name(), outcome.status))
     }
 
-    /// Compares what came with what was predicted, and predicts the state afterwards.
+    /// Compares the outcome with the prediction, and predicts the next state.
     fn settle(
         &mut self,
         life: &mut Life,
@@ -183,7 +183,7 @@ impl World {
     }
 }
 
-/// How often a legal call is made: those that lead on more often than others.
+/// Frequencies of legal calls: calls that lead to new states are more frequent.
 fn weight(function: Function, core: &Core) -> usize {
     use Function as F;
     match function {
@@ -201,13 +201,14 @@ fn weight(function: Function, core: &Core) -> usize {
     }
 }
 
-/// Whether a step went half way.
+/// Whether the step stopped half way.
 fn stops(place: Place, mischief: Mischief) -> bool {
     place == Place::Step && [Mischief::Incomplete, Mischief::Terminated].contains(&mischief)
 }
 
 impl Life {
-    /// One message for each status but `fmi2OK`, naming the function; none from a lost instance.
+    /// Expects one message, naming the function, for each status but `fmi2OK`, and none from an
+    /// instance after `fmi2Fatal`.
     fn check_messages(
         &self,
         function: Function,
@@ -245,7 +246,7 @@ fn silence<'a>(messages: impl IntoIterator<Item = &'a Message>) -> Result<(), St
     messages.into_iter().next().map_or(Ok(()), |one| Err(format!("nothing happened, but {one:?}")))
 }
 
-/// `fmi2Instantiate`; the instance, where there should be one.
+/// Calls `fmi2Instantiate`; returns the instance if there should be one.
 fn instantiate(choice: &mut Choice, plan: Plan) -> Result<Option<Life>, String> {
     let exchange = choice.byte().is_multiple_of(2);
     let mut order = order(c_int::from(!exchange));
@@ -278,7 +279,7 @@ fn instantiate(choice: &mut Choice, plan: Plan) -> Result<Option<Life>, String> 
     Ok(fine.then_some(Life { importer, core, chosen: None, logger }))
 }
 
-/// `fmi2FreeInstance`, in any state; a panic is heard of.
+/// Calls `fmi2FreeInstance` in any state; a panic must be reported.
 fn free(mut life: Life) -> Result<(), String> {
     life.importer.free();
     let heard = life.importer.take_messages();
