@@ -74,7 +74,7 @@ def test_the_table_of_the_page_has_the_results(runs):
     outside = np.flatnonzero(abs(both[0]["plant.theta"]) > 1e-3)[-1]
     assert row("below 1 mrad from")[0] == pytest.approx(both[0]["time"][outside + 1], abs=1e-9)
     friction = -both[0]["plant.T_f"][-1] * 4.0 / 0.0274
-    assert f"friction takes, {friction:.4f} V" in TEXT
+    assert f"friction, which takes {friction:.4f} V" in TEXT
     assert final[0] == pytest.approx(3 + friction, abs=1e-4)
 
 
@@ -104,4 +104,4 @@ def test_the_error_of_the_constant_model_is_the_one_shown(aso_ftc, python, tmp_p
     settings = {"plant.friction": "false", "plant.r_u": 10}
     table, _ = coupled(python, designed, packed_plant(aso_ftc, "DcServo"), settings)
     error = 10 * table["time"][-1] - table["controller.f_hat"][-1]
-    assert f"one of {error:.4f} V" in TEXT
+    assert f"an error of {error:.4f} V" in TEXT
