@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn columns_that_say_nothing_new_are_named() {
+    fn dependent_columns_are_named() {
         let x = DMatrix::from_row_slice(3, 3, &[1.0, 2e6, 0.0, 1.0, 2e6, 1.0, 0.0, 0.0, 1e-3]);
         let directions = Directions::of(&x);
         assert!(directions.contrast < 1e-15);

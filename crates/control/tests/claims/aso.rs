@@ -13,7 +13,7 @@ fn designed() -> AsoDesign {
 }
 
 #[test]
-fn the_error_dynamics_of_the_pendulum_have_the_wanted_eigenvalues() {
+fn the_error_dynamics_of_the_pendulum_have_the_required_eigenvalues() {
     let (plant, design) = (plant(), designed());
     let mut wanted = OBSERVER_POLES;
     wanted.sort_by(f64::total_cmp);

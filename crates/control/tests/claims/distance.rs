@@ -20,7 +20,7 @@ fn the_bounds_enclose_the_distance_that_a_search_in_scipy_finds() {
 /// The change that removes the small entry of B takes one mode away, and nothing smaller can be much
 /// smaller: the other entries are one.
 #[test]
-fn a_mode_that_is_nearly_lost_is_found_where_it_is() {
+fn a_nearly_uncontrollable_mode_is_found_with_its_eigenvalue() {
     let a = DMatrix::from_diagonal(&DVector::from_vec(vec![-1.0, -0.5, 0.25]));
     for weak in [1e-3, 1e-8] {
         let found = from_uncontrollable(&a, &matrix(3, 1, &[1.0, weak, 1.0])).unwrap();

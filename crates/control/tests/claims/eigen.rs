@@ -52,7 +52,7 @@ fn the_instability_is_the_largest_real_part_or_the_spectral_radius_less_one() {
 /// Three equal pairs -1.5 +- 2i and four others in many bases: rounding keeps the entries between
 /// equal pairs from vanishing. Their error is rounding times the square of the condition number.
 #[test]
-fn pairs_that_come_several_times_are_found() {
+fn repeated_pairs_are_found() {
     let mut blocks = DMatrix::from_diagonal_element(10, 10, -1.5);
     for first in [0, 2, 4] {
         blocks[(first, first + 1)] = 2.0;

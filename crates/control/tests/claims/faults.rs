@@ -266,7 +266,7 @@ fn the_loss_that_a_sampled_loop_survives_is_that_of_scipy() {
 /// A position that is measured only once, and the only one: its bias is the same as another
 /// position, because the cart at rest may stand anywhere.
 #[test]
-fn the_bias_of_a_position_that_nothing_else_shows_is_refused() {
+fn the_bias_of_a_position_without_another_measurement_of_it_is_refused() {
     let FaultyPlant { a, b, c, .. } = plant();
     let bias = fault(FaultEntry::Sensor(column(&[1.0, 0.0])), FaultKind::Constant);
     let extended = ExtendedPlant::new(&a, &b, &c, &[bias], &[100.0, 100.0]).unwrap();

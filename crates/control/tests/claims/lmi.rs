@@ -160,7 +160,7 @@ fn assert_bounds(case: &Case, domain: Domain) {
 }
 
 #[test]
-fn bounds_of_gains_lie_just_above_what_hamiltonians_and_lyapunov_equations_give() {
+fn bounds_of_gains_are_just_above_those_of_hamiltonians_and_lyapunov_equations() {
     for case in cases(DATA, "norms") {
         assert_bounds(&case, Domain::Continuous);
     }
@@ -212,7 +212,7 @@ fn wish(case: &Case, norm: Norm, gamma: Option<f64>) -> Performance {
 
 /// Within the 5 % that the design gives up, and what the reference is inaccurate by.
 #[test]
-fn state_feedback_comes_near_the_best_bound_that_other_methods_find() {
+fn state_feedback_is_close_to_the_best_bound_of_other_methods() {
     let nothing = Region::default();
     for case in cases(DATA, "feedback") {
         let (a, b) = (case.get("A"), case.get("B"));
@@ -265,7 +265,7 @@ fn regions_without_a_common_point_are_a_conflict() {
 
 /// The second state, at -1, is not seen.
 #[test]
-fn an_eigenvalue_that_no_gain_moves_is_a_conflict_with_the_region_it_lies_outside_of() {
+fn an_uncontrollable_eigenvalue_outside_of_the_region_is_a_conflict() {
     let a = matrix(2, 2, &[1., 0., 0., -1.]);
     let c = matrix(1, 2, &[1., 0.]);
     assert_eq!(conflict(observer_gain(&a, &c, &decay(2.0), None, Domain::Continuous)), ["decay"]);
@@ -290,7 +290,7 @@ fn intersections_of_regions_are_reached_by_feedback_and_by_observer() {
 
 /// Sampled double integrator with a constant disturbance, its position measured.
 #[test]
-fn a_sampled_observer_comes_into_its_disc() {
+fn the_eigenvalues_of_a_sampled_observer_are_in_its_disc() {
     let (t, half) = (0.1, 0.005);
     let a = matrix(3, 3, &[1., t, half, 0., 1., t, 0., 0., 1.]);
     let c = matrix(1, 3, &[1., 0., 0.]);
@@ -376,7 +376,7 @@ fn bad_arguments_are_refused_by_name() {
 /// One output, five states coupled at random, eigenvalues a thousand times faster than the plant's: the
 /// observer exists, but rounding its gain moves the eigenvalues out of the disc.
 #[test]
-fn what_is_lost_in_rounding_is_no_conflict() {
+fn rounding_errors_do_not_give_a_conflict() {
     let a = crate::integers(5, 5, |i, j| (7 * i * i + 3 * j + 5 * i * j) % 11 - 5);
     let c = crate::integers(1, 5, |_, j| (3 * j) % 5 - 1);
     let found = observer_gain(&a, &c, &disc(-20000.0, 2000.0), None, Domain::Continuous).unwrap();

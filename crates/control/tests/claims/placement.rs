@@ -68,7 +68,7 @@ fn one_input_gives_the_gain_of_scipy() {
 /// (s + 1) (s^2 + 6 s + 25) (s^2 + 2 s + 1.0625) by hand; in this form K is the difference of the
 /// coefficients.
 #[test]
-fn one_input_and_pairs_give_the_coefficients_of_the_wanted_polynomial() {
+fn with_one_input_and_pairs_the_closed_loop_has_the_required_polynomial() {
     let mut a = DMatrix::zeros(5, 5);
     a.view_mut((0, 1), (4, 4)).fill_with_identity();
     a.row_mut(4).copy_from(&matrix(1, 5, &[3.0, -1.0, 4.0, 1.0, -5.0]));
@@ -133,7 +133,7 @@ fn as_many_inputs_as_states_give_orthogonal_eigenvectors() {
 }
 
 #[test]
-fn an_eigenvalue_or_a_pair_may_come_as_often_as_there_are_inputs() {
+fn the_multiplicity_of_an_eigenvalue_may_equal_the_number_of_inputs() {
     let a = integers(4, 4, |i, j| (7 * i * i + 3 * i * j + 5 * j + i * j * j) % 11 - 5);
     let b = integers(4, 2, |i, j| (5 * i * i + 3 * j + 2 * i * j + i) % 7 - 3);
     let twice = real_poles(&[-2.0, -1.0, -2.0, -1.0]);
@@ -146,7 +146,7 @@ fn an_eigenvalue_or_a_pair_may_come_as_often_as_there_are_inputs() {
 }
 
 #[test]
-fn an_eigenvalue_or_a_pair_that_comes_more_often_than_there_are_inputs_is_refused() {
+fn a_multiplicity_above_the_number_of_inputs_is_refused() {
     let a = integers(6, 6, |i, j| (7 * i * i + 3 * i * j + 5 * j + i * j * j) % 11 - 5);
     let b = integers(6, 2, |i, j| (5 * i * i + 3 * j + 2 * i * j + i) % 7 - 3);
     let refused = place(&a, &b, &real_poles(&[-2.0, -1.0, -2.0, -2.0, -3.0, -4.0])).unwrap_err();

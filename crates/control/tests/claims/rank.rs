@@ -92,7 +92,7 @@ fn the_vectors_of_unobservable_modes_are_eigenvectors_that_the_measurements_do_n
 
 /// A double eigenvalue with two eigenvectors gives both.
 #[test]
-fn two_states_at_rest_that_nothing_shows_are_two_modes() {
+fn two_constant_unmeasured_states_are_two_modes() {
     let modes = unobservable_modes(&DMatrix::zeros(3, 3), &matrix(1, 3, &[0., 1., 0.])).unwrap();
     let mut states: Vec<_> = modes.iter().flat_map(|mode| mode.dominant.clone()).collect();
     states.sort_unstable();

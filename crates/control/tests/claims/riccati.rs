@@ -113,7 +113,7 @@ fn a_mode_on_the_limit_of_stability_that_the_weight_does_not_see_is_named() {
 }
 
 #[test]
-fn weights_that_are_not_definite_enough_are_named() {
+fn weights_that_are_not_definite_are_refused_by_name() {
     let (a, b) = (-DMatrix::identity(2, 2), DMatrix::identity(2, 2));
     let mut weights = identity_weights(2, 2);
     weights.r[(1, 1)] = 0.0;

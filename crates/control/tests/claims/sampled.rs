@@ -146,7 +146,7 @@ fn the_pendulum_with_a_ramp_model_is_stable_at_every_sample_time() {
 
 /// e[k+1] = (I - M `C_0`) `A_0` e[k], formed here from the controller's equations for u = 0.
 #[test]
-fn the_estimation_error_has_the_wanted_eigenvalues() {
+fn the_estimation_error_has_the_required_eigenvalues() {
     for period in [1e-4, 1e-3, 1e-2] {
         let found = pendulum(period, Estimator::Current);
         let (a_0, c_0) = (found.plant.augmented_dynamics(), found.plant.augmented_output());

@@ -61,7 +61,7 @@ fn units_do_not_move_the_zeros() {
 
 /// Two copies of one input: every combination that cancels stays unseen, the zeros are those of one.
 #[test]
-fn a_transfer_function_without_full_rank_is_told() {
+fn a_transfer_function_without_full_rank_is_reported() {
     let a = integers(5, 5, |i, j| (7 * i * i + 3 * i * j + 5 * j + i * j * j) % 11 - 5);
     let b = matrix(5, 1, &[1., 0., 2., -1., 1.]);
     let c = matrix(1, 5, &[0., 1., 1., 0., -3.]);

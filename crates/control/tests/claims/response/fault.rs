@@ -100,7 +100,7 @@ fn a_reversal_at_the_rate_of_the_simulation_predicts_every_quantity_within_a_qua
 /// fault alone, errors from its rate. The simulated rate is rounded to 521 N/s, and the friction
 /// jumps by 0.07 N when the cart stops: hence the 1 %.
 #[test]
-fn the_bounds_exceed_what_the_simulation_shows_by_less_than_a_factor_of_three() {
+fn the_bounds_exceed_the_simulated_peaks_by_less_than_a_factor_of_three() {
     let (plant, gains, _) = paper();
     let slow = fault_bounds(&plant, &gains, CONTINUOUS, &[STATIC], &[RATE]).unwrap();
     let any = fault_bounds(&plant, &gains, CONTINUOUS, &[STATIC], &[f64::INFINITY]).unwrap();
