@@ -1,4 +1,7 @@
 //! Conversion between paths and `file:` URIs for `fmuResourceLocation` (FMI 2.0.5, section 2.1.5).
+//!
+//! Written here because the crate `url` ends a path at an unencoded `?` or `#`, which some importers
+//! pass, and would add tables for international host names to every exported FMU.
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};

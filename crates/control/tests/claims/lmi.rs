@@ -67,7 +67,7 @@ fn a_conflict_is_named_without_the_requirements_that_take_no_part() {
     assert_eq!(conflict(problem.solve()), expected);
 }
 
-/// Smallest trace of X with [X, M; M', I] semidefinite: X = M M'.
+/// The smallest trace of X with [X, M; M', I] semidefinite belongs to X = M M'.
 #[test]
 fn the_smallest_matrix_above_a_square_is_the_square() {
     let m = crate::integers(3, 2, |i, j| (3 * i + 5 * j + i * j) % 7 - 3);
@@ -86,7 +86,7 @@ fn the_smallest_matrix_above_a_square_is_the_square() {
     assert!(solution.margins[0].1 >= 0.5e-7);
 }
 
-/// A certificate P of each kind of region, checked by eigenvalues of its inequality.
+/// For each kind of region, the eigenvalues of the inequality with the certificate P.
 #[test]
 fn certificates_of_regions_satisfy_their_inequalities() {
     let a = matrix(3, 3, &[-2., 3., 0., -3., -2., 1., 0., 0., -5.]);
@@ -144,7 +144,7 @@ fn system(case: &Case, domain: Domain) -> StateSpace {
     StateSpace { a: get("A"), b: get("B"), c: get("C"), d: get("D"), domain }
 }
 
-/// A bound is one: it lies above the norm that another method finds, and close to it.
+/// The bound is above the norm that another method finds, and close to it.
 fn assert_bounds(case: &Case, domain: Domain) {
     let names = [
         ("infinity", Norm::HInfinity),
@@ -210,7 +210,7 @@ fn wish(case: &Case, norm: Norm, gamma: Option<f64>) -> Performance {
     }
 }
 
-/// Within the 5 % that the design gives up, and what the reference is inaccurate by.
+/// Tolerance: the 5 % that the design allows, and the error of the reference.
 #[test]
 fn state_feedback_is_close_to_the_best_bound_of_other_methods() {
     let nothing = Region::default();
@@ -227,7 +227,7 @@ fn state_feedback_is_close_to_the_best_bound_of_other_methods() {
                 optimal(state_feedback(a, b, &region, Some(&wish(&case, norm, None)), domain));
             let gamma = found.bound.unwrap().gamma;
             assert!(gamma < 1.06 * case.number(name), "{} {name}: {gamma}", case.name);
-            // One P for region and bound makes the reference of the disc too large.
+            // The reference uses one P for region and bound, which is conservative for the disc.
             let least = if name == "disc" { "infinity" } else { name };
             assert!(gamma > 0.999 * case.number(least), "{} {name}: {gamma}", case.name);
             if let Some(disc) = region.disc {
@@ -263,7 +263,7 @@ fn regions_without_a_common_point_are_a_conflict() {
     assert_eq!(conflict(observer_gain(&a, &c, &region, None, SAMPLED)), ["decay", "disc"]);
 }
 
-/// The second state, at -1, is not seen.
+/// The second state, with the eigenvalue -1, is not measured.
 #[test]
 fn an_uncontrollable_eigenvalue_outside_of_the_region_is_a_conflict() {
     let a = matrix(2, 2, &[1., 0., 0., -1.]);
@@ -307,8 +307,8 @@ fn fault_rate(norm: Norm, gamma: Option<f64>) -> Performance {
     Performance { disturbance, output, feedthrough, norm, gamma }
 }
 
-/// The observer of the paper at its own scale: eigenvalues around -2100, entries from 1 to 1e9. The gain
-/// from the fault rate is smaller than that of the observer with the paper's eigenvalues.
+/// The observer of the paper in its own units: eigenvalues around -2100, entries from 1 to 1e9. The
+/// gain from the fault rate is smaller than with the paper's eigenvalues.
 #[test]
 fn the_observer_of_the_paper_is_designed_by_inequalities() {
     let plant = plant();

@@ -1,4 +1,4 @@
-//! Bad arguments: one matrix at a time, the error names it.
+//! Invalid arguments: one matrix at a time, which the error must name.
 
 use crate::paper::{CONTROLLER_POLES, OBSERVER_POLES, plant, repaired_gains};
 use crate::{integers, matrix};
