@@ -45,7 +45,7 @@ impl Law {
         Self { gain, integral_time, sample_time, limit, hold: true, ..Self::default() }
     }
 
-    /// Creates the controller before its first sample.
+    /// Resets the controller to the time before its first sample; returns the status.
     pub(crate) fn start(&mut self) -> String {
         (self.u, self.integral, self.last_measurement) = (0.0, 0.0, self.measurement);
         "no sample yet".to_owned()

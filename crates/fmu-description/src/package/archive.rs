@@ -19,9 +19,9 @@ const ENTRIES: usize = 100_000;
 const DIRECTORY: u64 = 32 << 20;
 /// Maximum unpacked size of any archive in bytes.
 const CAPACITY: u64 = 4 << 30;
-/// Unpacked bytes allowed for even the smallest archive ...
+/// Unpacked bytes allowed for even the smallest archive.
 const BASE: u64 = 64 << 20;
-/// ... and the further bytes allowed for each byte of the archive. FMUs have ratios of 2 to 10;
+/// Unpacked bytes allowed in addition for each byte of the archive. FMUs have ratios of 2 to 10;
 /// deflate reaches 1032.
 const RATIO: u64 = 100;
 

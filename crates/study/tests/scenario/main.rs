@@ -140,7 +140,7 @@ fn system() -> (System, Calls, Calls) {
     (system, plant_told, ctrl_told)
 }
 
-/// Returns a complete file.
+/// A complete file.
 #[derive(serde::Deserialize, serde::Serialize)]
 struct Document {
     scenario: Scenario,
