@@ -36,7 +36,7 @@ pub(crate) struct Flows<D> {
     pub(crate) pumps: [D; 2],
     /// `q_13`, `q_32`, `q_20`: through the pipes.
     pub(crate) pipes: [D; 3],
-    /// Inflow less outflow of each tank.
+    /// Inflow minus outflow of each tank.
     pub(crate) net: [D; 3],
 }
 
