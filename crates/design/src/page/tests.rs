@@ -11,7 +11,7 @@ use crate::report::Report;
 use hostile::{bare, hostile};
 use pendulum::pendulum;
 
-/// The page as XML: the only elements that HTML leaves open are those of its head.
+/// Converts the page to XML: only the `meta` elements of its head lack an end tag.
 fn xml(html: &str) -> String {
     let body = html.strip_prefix("<!DOCTYPE html>").expect("begins with the document type");
     let mut parts = body.split("<meta");

@@ -20,8 +20,8 @@ fn an_algebraic_loop_starts_at_its_solution() {
     assert!((outputs[0] - 0.5).abs() < 1e-9 && (outputs[1] - 0.25).abs() < 1e-9, "{outputs:?}");
 }
 
-/// Two loops in sequence: `y_a = 3 - y_b`, `y_b = 2 y_a` give 1 and 2; then `y_c = y_b - y_d`, `y_d
-/// = 3 y_c` give 0.5 and 1.5.
+/// Two loops in sequence: `y_a = 3 - y_b`, `y_b = 2 y_a` give 1 and 2; then `y_c = y_b - y_d` and
+/// `y_d = 3 y_c` give 0.5 and 1.5.
 #[test]
 fn loops_in_sequence_are_solved_in_their_order() {
     let scale = |gain: f64, offset: f64, inputs: usize| {
