@@ -50,7 +50,7 @@ impl<'a> Choice<'a> {
         Array { items: (0..count).map(|_| item(self)).collect(), shape }
     }
 
-    /// One place to write to.
+    /// Chooses an array of one element for a function that writes to it; `before` is its content.
     pub fn place<T: Clone>(&mut self, before: T) -> Array<T> {
         let shape = match self.shape() {
             Shape::Huge => Shape::Right,
