@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use fmu::call_order::{Function, State};
 
-use crate::machine::Mischief;
+use crate::machine::Misbehaviour;
 
 /// Sets of statuses, as bit masks.
 pub const OK: u8 = 1;
@@ -110,29 +110,34 @@ impl Core {
     }
 
     /// The statuses that the call may return; `verdict` is the set that its arguments allow.
-    pub fn statuses(&self, function: Function, verdict: u8, mischief: Option<Mischief>) -> u8 {
+    pub fn statuses(
+        &self,
+        function: Function,
+        verdict: u8,
+        misbehaviour: Option<Misbehaviour>,
+    ) -> u8 {
         if self.state == State::Fatal {
             return FATAL;
         }
         if !in_table(self.exchange, function, self.state) {
             return ERROR;
         }
-        match mischief {
+        match misbehaviour {
             None if verdict & DISCARD != 0 && !may_discard(self.exchange, function) => ERROR,
             None => verdict,
-            Some(Mischief::Panic | Mischief::Fatal) => FATAL,
-            Some(Mischief::Error) => ERROR,
+            Some(Misbehaviour::Panic | Misbehaviour::Fatal) => FATAL,
+            Some(Misbehaviour::Error) => ERROR,
             Some(_) if may_discard(self.exchange, function) => DISCARD,
             Some(_) => ERROR,
         }
     }
 
     /// Updates the predicted state after a call that returned `status`.
-    pub fn after(&mut self, function: Function, status: u8, mischief: Option<Mischief>) {
+    pub fn after(&mut self, function: Function, status: u8, misbehaviour: Option<Misbehaviour>) {
         match status {
             DISCARD if function == Function::DoStep => {
                 self.state = State::StepFailed;
-                self.ended = mischief == Some(Mischief::Terminated);
+                self.ended = misbehaviour == Some(Misbehaviour::Terminated);
             }
             ERROR => self.state = State::Error,
             FATAL => self.state = State::Fatal,

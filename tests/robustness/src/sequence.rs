@@ -8,7 +8,7 @@ use crate::calls::{CALLS, Call, Kept, Outcome, Stores};
 use crate::choice::Choice;
 use crate::exporter::{c_text, guid, order};
 use crate::importer::{HEARS, Importer, Message, Order, Saved};
-use crate::machine::{Mischief, Place, alive, happened, with_plan};
+use crate::machine::{Misbehaviour, Place, alive, happened, with_plan};
 use crate::prediction::{Core, DISCARD, OK, in_table};
 
 /// Maximum number of bytes that determine one call.
@@ -35,13 +35,14 @@ struct Life {
 struct World {
     lives: [Option<Life>; 2],
     stores: Stores,
-    /// Frees an instance that can no longer be freed otherwise.
-    caretaker: Importer,
-    nobody: Importer,
+    /// Frees FMU states whose own instance no longer can.
+    spare: Importer,
+    /// An importer whose component is null.
+    null: Importer,
     reached: u32,
 }
 
-type Plan = Option<(Place, Mischief)>;
+type Plan = Option<(Place, Misbehaviour)>;
 
 /// Makes the calls that `bytes` encode. Returns the planned failures that happened, as bits, or the
 /// first difference from the prediction.
@@ -63,8 +64,8 @@ impl World {
         Self {
             lives: [None, None],
             stores: Stores { kept: [kept(), kept(), kept()], records: [None, None] },
-            caretaker: Importer::new(&order(1)),
-            nobody: Importer::new(&Order { guid: None, ..order(1) }),
+            spare: Importer::new(&order(1)),
+            null: Importer::new(&Order { guid: None, ..order(1) }),
             reached: 0,
         }
     }
@@ -72,7 +73,7 @@ impl World {
     fn close(&mut self) {
         self.lives = [None, None];
         for kept in &mut self.stores.kept {
-            self.caretaker.free_fmu_state(Some(&mut kept.saved));
+            self.spare.free_fmu_state(Some(&mut kept.saved));
         }
     }
 
@@ -80,10 +81,10 @@ impl World {
         let mut choice = Choice::new(bytes);
         let (who, which, planned) = (choice.byte(), choice.byte(), choice.byte());
         let plan =
-            (planned >= 224).then(|| (choice.of(&Place::EVERY), choice.of(&Mischief::EVERY)));
+            (planned >= 224).then(|| (choice.of(&Place::EVERY), choice.of(&Misbehaviour::EVERY)));
         choice.hostile = who >= HOSTILE;
         if who >= NOBODY {
-            return self.call_nobody(which, choice);
+            return self.call_null(which, choice);
         }
         let number = usize::from(who % 2);
         let Some(mut life) = self.lives[number].take() else {
@@ -126,11 +127,11 @@ impl World {
     }
 
     /// A call with a null component returns an error and does nothing else.
-    fn call_nobody(&mut self, which: u8, choice: Choice) -> Result<(), String> {
+    fn call_null(&mut self, which: u8, choice: Choice) -> Result<(), String> {
         let (function, caller) = CALLS[usize::from(which) % CALLS.len()];
         let core = Core::new(true);
         let outcome = caller(&mut Call {
-            importer: &self.nobody,
+            importer: &self.null,
             core: &core,
             stores: &mut self.stores,
             choice,
@@ -149,8 +150,8 @@ impl World {
         outcome: Outcome,
         plan: Plan,
     ) -> Result<(), String> {
-        let mischief = plan.map(|(_, mischief)| mischief);
-        let predicted = life.core.statuses(function, outcome.verdict, mischief);
+        let misbehaviour = plan.map(|(_, misbehaviour)| misbehaviour);
+        let predicted = life.core.statuses(function, outcome.verdict, misbehaviour);
         let status = 1_u8.checked_shl(outcome.status.unsigned_abs()).unwrap_or(0);
         if status & predicted == 0 {
             return Err(format!("status {}, predicted {predicted:#b}", outcome.status));
@@ -161,19 +162,20 @@ impl World {
         let was_fatal = life.core.state == State::Fatal;
         life.check_messages(function, outcome.status, was_fatal, plan.is_some())?;
         let step = (life.core.time, outcome.half_way);
-        life.core.after(function, status, mischief);
+        life.core.after(function, status, misbehaviour);
         if status == OK {
             (outcome.effect)(&mut life.core, &mut self.stores);
             if let Some(chosen) = outcome.chosen {
                 life.chosen = (!chosen.is_empty()).then_some(chosen);
             }
         }
-        if status == DISCARD && plan.is_some_and(|(place, mischief)| stops(place, mischief)) {
+        if status == DISCARD && plan.is_some_and(|(place, misbehaviour)| stops(place, misbehaviour))
+        {
             life.core.time = step.0.max(step.1);
         }
         for kept in &mut self.stores.kept {
-            if plan == Some((Place::Drop, Mischief::Panic)) {
-                self.caretaker.free_fmu_state(Some(&mut kept.saved));
+            if plan == Some((Place::Drop, Misbehaviour::Panic)) {
+                self.spare.free_fmu_state(Some(&mut kept.saved));
             }
             if kept.saved.is_null() {
                 kept.of = None;
@@ -202,8 +204,9 @@ fn weight(function: Function, core: &Core) -> usize {
 }
 
 /// Whether the step stopped half way.
-fn stops(place: Place, mischief: Mischief) -> bool {
-    place == Place::Step && [Mischief::Incomplete, Mischief::Terminated].contains(&mischief)
+fn stops(place: Place, misbehaviour: Misbehaviour) -> bool {
+    place == Place::Step
+        && [Misbehaviour::Incomplete, Misbehaviour::Terminated].contains(&misbehaviour)
 }
 
 impl Life {
@@ -214,7 +217,7 @@ impl Life {
         function: Function,
         status: c_int,
         was_fatal: bool,
-        by_mischief: bool,
+        by_misbehaviour: bool,
     ) -> Result<(), String> {
         let messages = self.importer.take_messages();
         let category = match status {
@@ -233,7 +236,7 @@ impl Life {
                 if one.status == status
                     && one.category == category
                     && one.text.starts_with(&format!("{}: ", function.name()))
-                    && (!by_mischief || one.text.ends_with("100 % mischief ##1")) =>
+                    && (!by_misbehaviour || one.text.ends_with("100 % misbehaviour ##1")) =>
             {
                 Ok(())
             }

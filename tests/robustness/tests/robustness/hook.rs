@@ -11,7 +11,7 @@ use fmu_description::abi::fmi2EventInfo;
 use robustness::array::Array;
 use robustness::exporter::order;
 use robustness::importer::{HEARS, Importer};
-use robustness::machine::{Mischief, Place, with_plan};
+use robustness::machine::{Misbehaviour, Place, with_plan};
 
 const FATAL: i32 = 4;
 
@@ -65,7 +65,7 @@ fn started() -> Importer {
 
 /// A step in which the model panics.
 fn panic_in_a_step(importer: &Importer) {
-    let plan = Some((Place::Step, Mischief::Panic));
+    let plan = Some((Place::Step, Misbehaviour::Panic));
     assert_eq!(with_plan(plan, || importer.do_step(0.0, 0.5)), (FATAL, true));
 }
 
@@ -84,11 +84,11 @@ fn the_message_of_a_panic_has_its_file_and_line() {
     let importer = started();
     panic_in_a_step(&importer);
     let text = importer.take_messages().pop().unwrap().text;
-    let place = place_of("Mischief::Panic => panic!");
-    assert!(text.contains(&place) && text.contains("mischief"), "{text}, expected {place}");
+    let place = place_of("Misbehaviour::Panic => panic!");
+    assert!(text.contains(&place) && text.contains("misbehaviour"), "{text}, expected {place}");
     // In another function, so the place differs from that of the previous panic.
     let (other, happened) =
-        with_plan(Some((Place::Variables, Mischief::Panic)), || Importer::new(&order(1)));
+        with_plan(Some((Place::Variables, Misbehaviour::Panic)), || Importer::new(&order(1)));
     assert!(happened && !other.exists());
     let text = other.take_messages().pop().unwrap().text;
     assert!(text.contains("machine.rs:") && !text.contains(&place), "{text}");
@@ -149,7 +149,7 @@ fn the_hook_of_the_process_is_restored_when_the_last_instance_is_freed() {
         assert_ne!(installed(), own);
         drop(other);
         assert_eq!(installed(), own, "after the last instance");
-        let plan = Some((Place::New, Mischief::Panic));
+        let plan = Some((Place::New, Misbehaviour::Panic));
         assert!(!with_plan(plan, || Importer::new(&order(1))).0.exists());
         assert_eq!(installed(), own, "after an instance that could not be made");
         robustness::importer::describe().unwrap();

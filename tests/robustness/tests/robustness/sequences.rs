@@ -8,7 +8,7 @@ use proptest::test_runner::{Config, TestRunner};
 use robustness::calls::CALLS;
 use robustness::exporter::order;
 use robustness::importer::{Importer, describe};
-use robustness::machine::{Mischief, Place, with_plan};
+use robustness::machine::{Misbehaviour, Place, with_plan};
 use robustness::sequence::{FREE, HOSTILE, ILLEGAL, LENGTH, run};
 
 /// Bytes for up to `calls` calls; `first` says which instance and whether calls may be illegal.
@@ -104,9 +104,11 @@ fn failures_and_panics_anywhere_are_answered_and_reported_while_another_instance
     let (mut reached, mut number) = (0, 0_u32);
     let every = CALLS.iter().map(|(function, _)| *function).chain([Function::FreeInstance]);
     let plans = (0..Place::EVERY.len()).flat_map(|place| {
-        let mischief =
-            if is_fallible(Place::EVERY[place]) { 0..Mischief::EVERY.len() } else { 0..1 };
-        mischief.map(move |mischief| [0xff, place, mischief].map(|own| u8::try_from(own).unwrap()))
+        let misbehaviour =
+            if is_fallible(Place::EVERY[place]) { 0..Misbehaviour::EVERY.len() } else { 0..1 };
+        misbehaviour.map(move |misbehaviour| {
+            [0xff, place, misbehaviour].map(|own| u8::try_from(own).unwrap())
+        })
     });
     for plan in plans {
         reached |= run(&call(0, 0, plan)).unwrap();
@@ -133,10 +135,12 @@ fn failures_and_panics_anywhere_are_answered_and_reported_while_another_instance
 #[test]
 fn a_panic_in_the_description_of_a_model_is_reported() {
     for place in Place::EVERY {
-        let (described, happened) = with_plan(Some((place, Mischief::Panic)), describe);
+        let (described, happened) = with_plan(Some((place, Misbehaviour::Panic)), describe);
         match described {
             Ok(xml) => assert!(!happened && xml.contains("<ModelStructure>")),
-            Err(message) => assert!(happened && message.contains("100 % mischief #1"), "{message}"),
+            Err(message) => {
+                assert!(happened && message.contains("100 % misbehaviour #1"), "{message}")
+            }
         }
     }
 }
