@@ -139,7 +139,7 @@ fn a_panic_in_the_description_of_a_model_is_reported() {
         match described {
             Ok(xml) => assert!(!happened && xml.contains("<ModelStructure>")),
             Err(message) => {
-                assert!(happened && message.contains("100 % misbehaviour #1"), "{message}")
+                assert!(happened && message.contains("100 % misbehaviour #1"), "{message}");
             }
         }
     }
