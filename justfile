@@ -1,4 +1,4 @@
-# The recipes of a working day; scripts/test is the whole test. `just --list` prints them.
+# Recipes for daily work; `just --list` prints them. scripts/test runs all tests.
 
 features := "tests/fmi,aso-control/lmi"
 
@@ -8,19 +8,19 @@ quick:
     cargo clippy --release --workspace --locked -- -D warnings
     cargo test --release --workspace --lib --locked --quiet
 
-# Everything that proves a claim.
+# All tests.
 test:
     scripts/test
 
-# Random sequences, corpora, FMUs for Windows under wine.
+# FMUs for Windows, built and tested under wine.
 test-long:
     scripts/test-long
 
-# Regenerates what is generated: modelDescription/ and the packed FMUs in dist/.
+# Regenerates the generated files: modelDescription/ and the packed FMUs in dist/.
 bless:
     cargo run --release --locked -- pack --ssp --update-descriptions
 
-# The benchmarks of the book's page on speed; wants a quiet machine.
+# The benchmarks of the book; they need a machine without other load.
 bench:
     .venv/bin/python scripts/benchmark-peers
     cargo bench --package cosim-master --bench step

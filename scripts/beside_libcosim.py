@@ -61,7 +61,7 @@ def by_aso_ftc(command, path, step, stop, options):
 
 
 def main():
-    """Compares, prints what differs, and counts."""
+    """Compares, prints the differences, and counts."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("system", type=Path)
     parser.add_argument("--step", type=float, help="communication step in s [default: the file's]")
@@ -75,13 +75,13 @@ def main():
     differing = 0
     for name, value in sorted(expected.items()):
         own = float(found.get(name) or "nan")
-        # libcosim writes six digits; half a unit of the last digit is rounding.
+        # libcosim writes six digits; half a unit of the last digit may be rounding.
         agrees = abs(own - value) <= 0.5 * 10 ** (1 - arguments.digits) * max(abs(own), abs(value))
         if not agrees:
             differing += 1
             print(f"{name}: {own!r}, libcosim {value!r}")
     print(f"{path.name}: {len(expected)} outputs, {differing} differ in {arguments.digits} digits")
-    # libcosim may crash when Python ends.
+    # libcosim may crash when Python exits.
     sys.stdout.flush()
     os._exit(1 if differing else 0)
 

@@ -1,4 +1,4 @@
-"""Checks what mkdocs does not: the links of README.md and its neighbours, and that the built book asks no other host.
+"""Makes the checks that mkdocs lacks: links of README.md and its neighbours, and no requests to other hosts.
 
 Usage: python scripts/book_check.py FOLDER. Prints what is wrong, with status 1.
 """
@@ -10,14 +10,15 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 BESIDE = ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md")
 LINK = re.compile(r"\]\(([^)\s]+)\)")
-# What a browser fetches without a click: sources, style sheets, icons, preconnections, imports.
+# Elements that make a browser load something without a click: sources, style sheets, icons,
+# imports.
 FETCHED = re.compile(
     r"""(?:\bsrc=["']?|<link\b(?![^>]*rel=["']?canonical)[^>]*\bhref=["']?|@import\s+["']?|url\(["']?)((?:https?:)?//[^\s"')>]+)"""
 )
 
 
 def anchor(heading):
-    """The anchor that a heading has, as GitHub and mkdocs make it."""
+    """The anchor of a heading, as GitHub and mkdocs form it."""
     text = re.sub(r"[^\w\s-]", "", heading.strip().lower())
     return re.sub(r"\s", "-", text)
 
@@ -29,7 +30,7 @@ def anchors(page):
 
 
 def broken_links(page):
-    """The links of a page to files or anchors that are not there."""
+    """The links of a page to missing files or anchors."""
     for target in LINK.findall(page.read_text(encoding="utf-8")):
         if target.startswith(("https://", "http://", "mailto:")):
             continue
@@ -42,7 +43,7 @@ def broken_links(page):
 
 
 def foreign_requests(site):
-    """What the pages and style sheets of the built book fetch from other hosts."""
+    """The requests of the built book's pages and style sheets to other hosts."""
     for file in sorted(site.rglob("*")):
         if file.suffix in (".html", ".css"):
             for found in FETCHED.findall(file.read_text(encoding="utf-8")):
@@ -50,7 +51,7 @@ def foreign_requests(site):
 
 
 def main():
-    """Prints every finding."""
+    """Prints all findings."""
     if len(sys.argv) != 2:
         sys.exit(__doc__.strip().splitlines()[-1])
     found = [line for name in BESIDE for line in broken_links(ROOT / name)]

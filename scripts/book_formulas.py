@@ -1,4 +1,4 @@
-"""A hook of mkdocs: formulas become MathML while the book is built, so that pages need no script."""
+"""A hook of mkdocs that converts formulas to MathML while the book is built, so that pages need no script."""
 
 import html
 import re
@@ -9,7 +9,7 @@ FORMULA = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.*?)\\[)\]]</\1>
 
 
 def mathml(found):
-    """The formula as MathML, inline or as a paragraph of its own."""
+    """The formula as MathML, inline or as a separate paragraph."""
     display = "block" if found[2] == "[" else "inline"
     return convert(html.unescape(found[3]), display=display)
 

@@ -48,7 +48,7 @@ class Slave:
         return self.fmu.getReal([self.reference[name] for name in names])
 
     def slopes(self, names):
-        """Derivatives of the named outputs, zero where the FMU gives none."""
+        """Derivatives of the named outputs; zero if the FMU gives none."""
         if not self.gives_slopes:
             return [0.0] * len(names)
         references = [self.reference[name] for name in names]
@@ -79,7 +79,7 @@ def split(text):
 
 
 def links(source, target, stated):
-    """Outputs of `source`, and the inputs of `target` that they go to, in two lists."""
+    """Outputs of `source` and the inputs of `target` connected to them, in two lists."""
     found = {name: name for name in target.inputs if name in source.outputs}
     for text in stated:
         (begin, output), (end, own) = map(split, text.rsplit("=", 1))
@@ -93,7 +93,7 @@ def links(source, target, stated):
 
 
 def limited(slope, quotient):
-    """The smaller one of both, zero where their signs differ (minmod)."""
+    """The smaller one in magnitude, or zero if their signs differ (minmod)."""
     return 0.0 if slope * quotient <= 0.0 else min(slope, quotient, key=abs)
 
 
@@ -129,7 +129,7 @@ def run(plant, controller, wires, step, stop_time):
 
 
 def summary(table, measured, t_on, compared):
-    """The final outputs and what is left when the compensation has settled."""
+    """The final outputs, and the residual after the compensation has settled."""
     found = {"final": {name: column[-1] for name, column in table.items()}}
     settled = table["time"] > (t_on + table["time"][-1]) / 2
     if settled.any():
@@ -142,7 +142,7 @@ def summary(table, measured, t_on, compared):
 
 
 def write(path, table, every):
-    """Every so many rows as CSV."""
+    """Writes every n-th row as CSV."""
     rows = np.transpose(list(table.values()))[::every].tolist()
     lines = [",".join(table), *(",".join(map(repr, row)) for row in rows)]
     Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
@@ -167,7 +167,7 @@ def options():
 
 
 def couple(chosen, folder):
-    """Runs the coupling and writes what is asked for; its summary."""
+    """Runs the coupling and writes the requested files; returns its summary."""
     values = {"plant": {}, "controller": {}}
     for text in chosen.set:
         name, _, value = text.partition("=")

@@ -16,7 +16,8 @@ SIDE = Path(__file__).resolve().with_name("field_fmpy.py")
 CLOSE = 1e-9  # of a variable's largest magnitude
 CHAINED_STEPS = 20
 
-# The verdicts of each question, the best first. docs/how-to/field.md explains them.
+# The verdicts of each question, in order from the best to the worst. docs/how-to/field.md explains
+# them.
 QUESTIONS = {
     "defaults": ["ok", "only aso-ftc", "neither", "lost", "crashed"],
     "values": ["bits", "close", "steps", "times", "only aso-ftc", "neither", "differ", "lost", "crashed"],
@@ -24,7 +25,7 @@ QUESTIONS = {
     "set": ["kept", "not judged", "lost"],
     "check": ["agrees", "finds more", "finds less", "not judged", "failed"],
 }
-# The verdicts that fall short.
+# The verdicts that are failures.
 SHORT = {
     "defaults": {"lost", "crashed"},
     "values": {"differ", "lost", "crashed"},
@@ -35,7 +36,7 @@ SHORT = {
 
 
 def verdict(word, detail=""):
-    """A verdict as it is printed and written."""
+    """A verdict and its detail."""
     return {"verdict": word, "detail": detail}
 
 
@@ -64,7 +65,7 @@ class Trial:
         self.stop = min(fmu.stop, fmu.start + judge.steps * fmu.step)
 
     def fmpy(self, task, *arguments):
-        """FMPy's answer to a task; `error` in it where it has none."""
+        """FMPy's result of a task; its entry `error` has the reason if there is none."""
         out = self.folder / f"{task}.json"
         ended = run([sys.executable, SIDE, task, self.fmu.path, out, *arguments], self.judge.limit, self.folder)
         if ended.status == 0 and out.is_file():
@@ -72,13 +73,13 @@ class Trial:
         return {"error": ended.why()}
 
     def file(self, name, content):
-        """A file with that content as JSON."""
+        """Writes a file with that content as JSON."""
         path = self.folder / f"{name}.json"
         path.write_text(json.dumps(content), encoding="utf-8")
         return path
 
     def ours(self, name, *arguments):
-        """Runs the FMU, called m, in aso-ftc: how it ended and the file of its results."""
+        """Runs the FMU, called m, in aso-ftc; returns how it ended and the file of its results."""
         out = self.folder / name
         command = [self.judge.command, "run", "--fmu", f"m={self.fmu.path}", *arguments, "--out", out]
         return run(command, self.judge.limit, self.folder), out / "results.csv"
@@ -90,14 +91,14 @@ class Trial:
         return [*times, "--record-every", "step", *names]
 
     def defaults(self):
-        """Without options: does it run wherever FMPy's default does?"""
+        """Question `defaults`: does it run without options wherever FMPy's default does?"""
         theirs = self.fmpy("defaults")
         ended, _ = self.ours("defaults")
         return self.both(ended, theirs) or verdict("ok")
 
     @staticmethod
     def both(ended, theirs):
-        """The verdict where one of the two tools has no result."""
+        """The verdict if one of the two tools has no result."""
         if "error" not in theirs:
             return None if ended.status == 0 else verdict("lost", ended.why())
         if ended.status == 0:
@@ -107,7 +108,7 @@ class Trial:
         return verdict("neither", f"aso-ftc: {ended.why()}; FMPy: {theirs['error']}")
 
     def values(self):
-        """With stated step and stop time: are the outputs the same?"""
+        """Question `values`: are the outputs the same with stated step and stop time?"""
         names = self.file("names", self.fmu.compared)
         theirs = self.fmpy("timed", repr(self.stop), repr(self.fmu.step), names)
         ended, results = self.ours("values", *self.timed(self.stop, *self.fmu.compared))
@@ -119,7 +120,7 @@ class Trial:
         return self.replayed(found) if found["verdict"] == "differ" else found
 
     def replayed(self, found):
-        """Where values differ: do they still, when FMPy's functions take the step sizes of aso-ftc?"""
+        """If values differ: do they still differ when FMPy's functions use the step sizes of aso-ftc?"""
         log = self.folder / "calls.txt"
         options = [*self.timed(self.stop, *self.fmu.compared), "--log-calls", log]
         ended, results = self.ours("replayed", *options)
@@ -138,7 +139,7 @@ class Trial:
         return verdict("steps", found["detail"]) if same else found
 
     def chained(self):
-        """Connected to another FMU, with the default algorithm: are the results those of the FMU alone?"""
+        """Question `chained`: are the results those of the FMU alone if it is connected to another one?"""
         port = next((name for name in self.fmu.real_outputs if "=" not in name), None)
         if port is None:
             return verdict("not judged", "no Real output")
@@ -164,7 +165,7 @@ class Trial:
         return verdict("differ", f"{port} in row {row} is {found[row]}, alone {alone[row]}")
 
     def set(self):
-        """Are parameters kept that FMPy can set?"""
+        """Question `set`: are parameters kept that FMPy can set?"""
         if not self.fmu.parameters:
             return verdict("not judged", "no Real parameter with a start value")
         stop = self.fmu.start + 2 * self.fmu.step
@@ -186,7 +187,7 @@ class Trial:
         return verdict("lost", f"not as set: {', '.join(lost)}") if lost else verdict("kept")
 
     def check(self):
-        """Does `aso-ftc check` end, and find errors where FMPy's validation finds problems?"""
+        """Question `check`: does `aso-ftc check` end, and find errors where FMPy's validation finds problems?"""
         command = [self.judge.command, "check", self.fmu.path]
         ended = run(command, 4 * self.judge.limit, self.folder)
         if ended.status not in (0, 1):
@@ -216,7 +217,7 @@ def number(text):
 
 
 def compared(theirs, ours, step):
-    """Compares FMPy's rows with our columns: bits, close, or where they differ most."""
+    """Compares FMPy's rows with our columns: equal bits, close, or the largest difference."""
     names = theirs.dtype.names[1:]
     if len(theirs) != len(ours["time"]):
         ends = f"the last at {ours['time'][-1]} s, FMPy {len(theirs)}, the last at {float(theirs['time'][-1])!r} s"
@@ -243,7 +244,7 @@ def compared(theirs, ours, step):
 
 
 def distance(theirs, column):
-    """The largest difference relative to the largest magnitude; None where all bits agree."""
+    """The largest difference relative to the largest magnitude; None if all bits agree."""
     if theirs.dtype.kind not in "fiub":
         texts = [own.decode("utf-8", "replace") if isinstance(own, bytes) else str(own) for own in theirs]
         return None if texts == column else math.inf

@@ -1,4 +1,4 @@
-"""FMPy's side of scripts/field: does one thing with one FMU in this process and writes what came of it as JSON.
+"""FMPy's side of scripts/field: does one task with one FMU in this process and writes the result as JSON.
 
     field_fmpy.py validate FMU OUT
     field_fmpy.py defaults FMU OUT
@@ -20,7 +20,7 @@ COMMON = {"fmi_type": "CoSimulation", "validate": False}
 
 
 def validate(fmu):
-    """Says how many problems FMPy's validation finds."""
+    """Counts the problems that FMPy's validation finds."""
     return {"problems": [str(problem) for problem in fmpy.validation.validate_fmu(fmu)]}
 
 
@@ -31,14 +31,14 @@ def defaults(fmu):
 
 
 def timed(fmu, out, stop, step, names):
-    """Simulates with a stated stop time and step and records the variables named."""
+    """Simulates with a stated stop time and step, and records the named variables."""
     rows = fmpy.simulate_fmu(fmu, stop_time=stop, output_interval=step, output=names, **COMMON)
     numpy.save(Path(out).with_suffix(".npy"), rows)
     return {"reached": float(rows["time"][-1])}
 
 
 def replay(fmu, out, stop, chosen):
-    """Makes the calls of another importer by FMPy's functions; the rows are of the time that each step ends at."""
+    """Makes the calls of another importer by FMPy's functions; each row has the time at which its step ends."""
     description = fmpy.read_model_description(fmu, validate=False)
     variables = [v for name in chosen["names"] for v in description.modelVariables if v.name == name]
     experiment = description.defaultExperiment
@@ -71,7 +71,7 @@ def replay(fmu, out, stop, chosen):
 
 
 def kept(fmu, stop, step, values):
-    """Simulates with start values; says which of them are in the first row."""
+    """Simulates with start values; returns which of them are in the first row."""
     rows = fmpy.simulate_fmu(
         fmu, stop_time=stop, output_interval=step, start_values=values, output=list(values), **COMMON
     )
@@ -80,7 +80,7 @@ def kept(fmu, stop, step, values):
 
 
 def main():
-    """Does what the arguments say."""
+    """Does the task of the arguments."""
     task, fmu, out, *rest = sys.argv[1:]
     numbers = [float(text) for text in rest[:2]]
     chosen = json.loads(Path(rest[2]).read_text(encoding="utf-8")) if len(rest) > 2 else None

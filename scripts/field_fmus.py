@@ -1,4 +1,4 @@
-"""Finds FMUs in folders and reads of their descriptions what scripts/field needs."""
+"""Finds FMUs in folders and reads the entries of their descriptions that scripts/field needs."""
 
 import hashlib
 import platform
@@ -22,7 +22,7 @@ HERE = FOLDERS.get((platform.system(), platform.machine()), set())
 
 @dataclass
 class Fmu:
-    """An FMU and how it is run."""
+    """An FMU and the settings of its runs."""
 
     path: Path
     start: float = 0.0
@@ -52,11 +52,11 @@ def find(folders, only=""):
 
 
 class LeftOut(Exception):
-    """Why an FMU is not compared."""
+    """The reason why an FMU is not compared."""
 
 
 def read(path):
-    """Reads the description; raises LeftOut where the FMU cannot be compared."""
+    """Reads the description; raises LeftOut if the FMU cannot be compared."""
     try:
         with zipfile.ZipFile(path) as archive:
             names = {plain(name): name for name in archive.namelist()}
@@ -91,7 +91,7 @@ def number(text):
 
 
 def experiment(fmu, element):
-    """Start, stop and step as FMPy chooses them: 1 s and 500 steps where the FMU states nothing."""
+    """Start, stop and step as FMPy chooses them: 1 s and 500 steps if the FMU states nothing."""
     stated = element.attrib if element is not None else {}
     fmu.start = number(stated.get("startTime")) or 0.0
     stop = number(stated.get("stopTime"))
@@ -100,7 +100,7 @@ def experiment(fmu, element):
 
 
 def variables(fmu, root):
-    """What is compared and connected, and parameters with a value a thousandth above their start value."""
+    """The outputs to compare and to connect, and parameters with a value a thousandth above their start value."""
     outputs, local = [], []
     types = {own.get("name"): own.find("Real") for own in root.iter("SimpleType")}
     for variable in root.iter("ScalarVariable"):
@@ -122,7 +122,7 @@ def variables(fmu, root):
 
 
 def within(value, real, declared):
-    """Whether the variable's own range, or else that of its type, has the value."""
+    """Whether the value is within the range of the variable, or else of its type."""
     bounds = {}
     for key in ("min", "max"):
         stated = real.get(key) if real.get(key) is not None or declared is None else declared.get(key)

@@ -1,4 +1,4 @@
-"""Runs a command with a time limit and keeps the end of what it prints."""
+"""Runs a command with a time limit and keeps the end of its output."""
 
 import os
 import signal
@@ -11,7 +11,7 @@ KEPT = 1 << 16  # bytes
 
 @dataclass
 class Ended:
-    """How a process ended: its exit status, minus the signal that ended it, or None at the time limit."""
+    """How a process ended: its exit status, the negative signal number, or None at the time limit."""
 
     status: int | None
     text: str
@@ -33,7 +33,7 @@ class Ended:
 
 
 def run(command, limit, folder):
-    """Runs a command in a folder, which holds its temporary files, too; ends all its processes with it."""
+    """Runs a command in a folder, which also holds its temporary files; ends all its processes with it."""
     process = subprocess.Popen(
         [str(part) for part in command],
         stdin=subprocess.DEVNULL,

@@ -10,7 +10,8 @@ ACROSS_TICKS = [0.1, 0.2, 0.5, 1, 2, 5, 10]
 UP_TICKS = [0.001, 0.01, 0.1, 1, 10, 100]
 FONT = "DejaVu Sans, Verdana, Helvetica, Arial, sans-serif"
 TEXT, GRID, FINE = "#222222", "#d0d0d0", "#eeeeee"
-# Colours of Okabe and Ito (2008), with a marker each: a polygon of so many corners, 0 for a disc.
+# Colours of Okabe and Ito (2008), each with a marker: a polygon with this number of corners, 0 for
+# a disc.
 STYLES = [("#d55e00", 0), ("#0072b2", 4), ("#009e73", 3), ("#aa3377", 6)]
 # The first prototype of this controller (constant, prediction), and the claim of the paper, in mm.
 PROTOTYPE = [(0.1, 1.3), (0.5, 1.3), (1, 1.8), (10, 18)]
@@ -26,7 +27,7 @@ class Curve:
 
 
 def at(point):
-    """Where a point in ms and mm lies in the drawing."""
+    """The position of a point in ms and mm in the drawing."""
     part = lambda value, low, high: math.log(value / low) / math.log(high / low)
     x = LEFT + part(point[0], *ACROSS) * (RIGHT - LEFT)
     return x, BOTTOM - part(point[1], *UP) * (BOTTOM - TOP)

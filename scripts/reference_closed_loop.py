@@ -29,7 +29,7 @@ UNDECIDED_FORCE = 1e-6  # N: closer to the static friction, rounding chooses sli
 
 # file name: (activation time of the compensation in s, stop time in s)
 SCENARIOS = {"closed_loop_paper.csv": (40.0, 7.0), "closed_loop_compensated.csv": (1.0, 5.0)}
-# The first setting is written to the file, the others say how far it can be trusted:
+# The first setting is written to the file, the others show how accurate it is:
 # (solver, relative tolerance, absolute tolerance, largest step in s)
 SETTINGS = [
     (DOP853, 1e-12, 1e-13, 2.5e-4),
@@ -137,7 +137,7 @@ class ClosedLoop:
         return self.regime * state[2]
 
     def choose_regime(self, state):
-        """Decides what a cart at rest does; `state` loses what is left of its velocity."""
+        """Decides what a cart at rest does, and sets the rest of its velocity in `state` to zero."""
         needed = self.plant.holding_friction(state[:4], self.force(state))
         static = self.plant.static
         released = self.regime == STICK and self.margin(state) < 0.0
@@ -233,7 +233,7 @@ def disagreement(first, second):
 
 
 def header(design, scenario, trajectories):
-    """Comment lines: where the numbers come from and how far they agree with themselves."""
+    """Comment lines: the origin of the numbers, and how well the settings agree."""
     activation, stop = scenario
     written, *others = trajectories
     gap = min(abs(t - round(t / ROW_INTERVAL) * ROW_INTERVAL) for t in written.jumps)

@@ -36,7 +36,7 @@ def zeros(a, b, c):
 
 
 def levelled(a):
-    """Rows and columns of equal sums without the diagonal, by a diagonal scaling: nothing is left to balance."""
+    """Scales A diagonally until rows and columns have equal sums without the diagonal: it is balanced."""
     for _ in range(200):
         for i in range(len(a)):
             others = np.delete(np.arange(len(a)), i)
@@ -80,7 +80,7 @@ def pendulum():
 
 
 def loss(data):
-    """Two carts joined by a spring on an unstable slope, a force on each; both forces lose effect."""
+    """Two carts connected by a spring on an unstable slope, a force on each; both forces lose effectiveness."""
     a = np.array([[0, 0, 1, 0], [0, 0, 0, 1], [3.0, 1, -0.2, 0], [1, 2.0, 0, -0.1]])
     b = np.array([[0, 0], [0, 0], [1.0, 0], [0, 0.5]])
     c = np.eye(2, 4)
@@ -104,7 +104,7 @@ def loss(data):
 
 
 def limits(instability):
-    """The loss up to which the loop is stable: both inputs alike, the first alone, the second alone."""
+    """The loss up to which the loop is stable: of both inputs alike, of the first alone, of the second alone."""
     def limit(direction):
         end = next(t for t in np.linspace(0.01, 1.0, 100) if instability(t * np.array(direction)) > 0.0)
         return brentq(lambda t: instability(t * np.array(direction)), end - 0.01, end, xtol=1e-14)
@@ -113,7 +113,7 @@ def limits(instability):
 
 
 def sampled_loss(data, a, b, c):
-    """The same with a current estimator at 0.1 s: the loop is written as one step of the algorithm."""
+    """The same with a current estimator at 0.1 s; the loop is one step of the algorithm as a matrix."""
     phi, gamma, *_ = cont2discrete((a, b, c, np.zeros((2, 2))), 0.1, method="zoh")
     k_x = -place_poles(phi, gamma, np.exp([-0.1, -0.15, -0.2, -0.25])).gain_matrix
     a_0 = np.block([[phi, -gamma], [np.zeros((2, 4)), np.eye(2)]])

@@ -35,7 +35,7 @@ def hamiltonian_has_imaginary(a, b, c, d, gamma):
 
 
 def h_infinity(a, b, c, d):
-    """Least gamma without imaginary eigenvalues; below the largest gain on a fine grid it cannot lie."""
+    """The least gamma without imaginary eigenvalues; it cannot be below the largest gain on a fine grid."""
     low = max(np.linalg.norm(d, 2), 1e-12)
     for frequency in np.concatenate([[0.0], np.logspace(-4, 5, 4000)]):
         response = d + c @ np.linalg.solve(1j * frequency * np.eye(len(a)) - a, b)
@@ -97,7 +97,7 @@ def solved(problem):
 
 
 def within(q):
-    """The least bound is often a limit that Q reaches nowhere."""
+    """The infimum of the bound is often not attained by any Q."""
     return q >> np.eye(q.shape[0]) / LARGEST, q << LARGEST * np.eye(q.shape[0])
 
 

@@ -30,7 +30,7 @@ KINDS = ["real", "complex", "repeated", "discrete"]
 
 
 def poles_of(kind, n, m, random):
-    """n eigenvalues, closed under conjugation, none more often than m times."""
+    """n eigenvalues, closed under conjugation, none with a multiplicity above m."""
     size = 0.5 + 0.1 * random.choice(60, n, replace=False)
     if kind == "real":
         return -np.sort(size) + 0j
@@ -68,7 +68,8 @@ def best(a, b, wanted):
                 result = place_poles(a, b, wanted, method=method, rtol=1e-14, maxiter=iterations)
             except (ValueError, np.linalg.LinAlgError):
                 continue
-            # For B of full row rank scipy leaves out X: A - B K is then block diagonal with normal blocks.
+            # If B has full row rank, scipy omits X: A - B K is then block diagonal with normal
+            # blocks.
             vectors = np.eye(a.shape[0]) if np.linalg.matrix_rank(b) == a.shape[0] else result.X
             condition = np.linalg.cond(vectors / np.linalg.norm(vectors, axis=0))
             error = distance(np.linalg.eigvals(a - b @ result.gain_matrix), wanted)
@@ -78,7 +79,7 @@ def best(a, b, wanted):
 
 
 def pendulum():
-    """(A_0', C_0') with A_0 = [A, -F_a; 0, 0], C_0 = [C, 0], and the wanted eigenvalues."""
+    """(A_0', C_0') with A_0 = [A, -F_a; 0, 0], C_0 = [C, 0], and the required eigenvalues."""
     plant = tomllib.loads((ROOT / "fmu-controller" / "pendulum.toml").read_text())
     a, c, f = (np.array(plant[name]) for name in ["A", "C", "F_a"])
     a_0 = np.block([[a, -f], [np.zeros((1, 5))]])

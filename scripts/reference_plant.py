@@ -22,7 +22,8 @@ MOMENT = PENDULUM_MASS * LENGTH
 AMPLITUDE, FREQUENCY, HOLD = 55.0, 1.0, 0.01
 INITIAL = [0.1, 1.0, 0.0, 0.0]
 ROWS, HOLDS_PER_ROW = 50, 8
-# SciPy sees an event only as a sign change from step to step: short steps keep a slide of a few ms from hiding in one.
+# SciPy finds an event only by a sign change between steps: with short steps it does not miss a
+# slide of a few ms.
 OPTIONS = dict(method="DOP853", rtol=1e-12, atol=1e-14, max_step=2e-4)
 
 
@@ -46,14 +47,14 @@ def sticking(t, state):
 
 
 def balancing(state, force):
-    """The friction that leaves the resting cart without acceleration."""
+    """The friction for which the resting cart has no acceleration."""
     _, theta, _, omega = state
     turn = sticking(0.0, state)[3]
     return force - MOMENT * (turn * np.cos(theta) - omega**2 * np.sin(theta))
 
 
 def rest(state, force):
-    """What a cart at rest does: 0 held, else the direction in which it breaks away."""
+    """The regime of a cart at rest: 0 held, otherwise the direction in which it breaks away."""
     needed = balancing(state, force)
     return 0 if abs(needed) <= STATIC else int(np.sign(needed))
 
@@ -63,7 +64,7 @@ def node(k):
 
 
 def interval(k, state, direction, events):
-    """Follows one interval of the polygon from event to event."""
+    """Integrates over one interval of the polygon from event to event."""
     start, end = k * HOLD, (k + 1) * HOLD
     begin = start
 

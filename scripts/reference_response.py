@@ -51,13 +51,13 @@ class Modes:
         return self.outputs(lambda s, t: mp.expm1(s * t) / s, times)
 
     def ramp(self, duration, times):
-        """After an input that rises from 0 to 1 over the duration."""
+        """The response to an input that rises from 0 to 1 over the duration."""
         def risen(s, t):
             return (mp.expm1(s * t) / s - t) / s if t > 0 else mp.mpf(0)
         return self.outputs(lambda s, t: (risen(s, t) - risen(s, t - duration)) / duration, times)
 
     def variation(self, output):
-        """The total variation of the step response of one output, its turning points located."""
+        """The total variation of the step response of one output, from its located turning points."""
         row = self.residues[output]
         def impulse(t): return mp.re(mp.fdot(row, [mp.exp(s * t) for s in self.values]))
         def step(t): return mp.re(mp.fdot(row, [mp.expm1(s * t) / s for s in self.values]))

@@ -27,7 +27,7 @@ STEM = ROOT / "docs" / "figures" / "residual_over_sample_time"
 SAMPLE_TIMES = [0.1, 0.2, 0.5, 1, 2, 3, 5, 7, 10]  # ms
 SETTLED = 60.0  # s: compensation starts at 40 s
 RECORDED = 1e-3  # s: the cart turns so slowly that smaller steps change no digit of the tables
-# Rate up to which the observer by weights works, in 1/s, and at most as part of a sample.
+# Bandwidth of the observer designed by weights: in 1/s, and its maximum in 1/sample time.
 BANDWIDTH, OF_A_SAMPLE = 300.0, 0.5
 # Method, communication step in sample times.
 COUPLINGS = [
@@ -44,7 +44,7 @@ TRUE_START = {"controller.x_hat_0[1]": 0.1, "controller.x_hat_0[2]": -0.1}
 
 @dataclass(frozen=True)
 class Choice:
-    """What is chosen in a plant file."""
+    """The choices in a plant file."""
 
     kind: str
     estimator: str
@@ -52,7 +52,7 @@ class Choice:
 
     @property
     def label(self):
-        """Name in tables and figure."""
+        """The name in tables and figure."""
         return f"{self.kind}, {self.estimator}" + (", weights" if self.weighted else "")
 
 
@@ -64,7 +64,7 @@ CHOICES = [CONSTANT_PREDICTION, CONSTANT, RAMP, WEIGHTED]
 
 
 def plant_file(choice, sample_time):
-    """The text of fmu-controller/pendulum.toml, changed; `sample_time` in s."""
+    """The text of fmu-controller/pendulum.toml with these changes; `sample_time` in s."""
     text = (ROOT / "fmu-controller" / "pendulum.toml").read_text(encoding="utf-8")
     before, after = text.split("observer.eigenvalues = ")
     wanted, after = after.split("\n", 1)
@@ -79,7 +79,7 @@ def plant_file(choice, sample_time):
 
 
 def design(choice, sample_time, folder):
-    """Makes the controller FMU in `folder`; its path. The design file is beside it."""
+    """Makes the controller FMU in `folder` and returns its path. The design file is beside it."""
     plant, fmu = folder / "plant.toml", folder / "Controller.fmu"
     plant.write_text(plant_file(choice, sample_time), encoding="utf-8")
     options = ["--out", folder / "design.toml", "--fmu", fmu]
@@ -142,7 +142,7 @@ def noise_gain(design_file):
 
 
 def root(a, column):
-    """R with R R' the sum of a^k column column' a'^k."""
+    """R with R R' = sum of a^k column column' a'^k."""
     while np.linalg.norm(a) > 1e-12:
         column = np.linalg.qr(np.hstack([column, a @ column]).T, mode="r").T
         a = a @ a

@@ -15,7 +15,8 @@ TOP, BOTTOM = 70.0, 480.0
 PANELS = [(90.0, 480.0), (590.0, 980.0)]
 FONT = "DejaVu Sans, Verdana, Helvetica, Arial, sans-serif"
 TEXT, GRID = "#222222", "#dddddd"
-# Colours of Okabe and Ito (2008), with a marker each: a polygon of so many corners, 0 for a disc.
+# Colours of Okabe and Ito (2008), each with a marker: a polygon with this number of corners, 0 for
+# a disc.
 STYLES = {
     "fixed": ("#777777", 0),
     "doubling": ("#d55e00", 4),
@@ -62,7 +63,7 @@ def marker(centre, colour, corners):
 
 
 def decades(values):
-    """Exponents of ten from the one below the least to the one above the largest."""
+    """Powers of ten from the one below the smallest value to the one above the largest."""
     return range(math.floor(math.log10(min(values))), math.ceil(math.log10(max(values))) + 1)
 
 

@@ -30,7 +30,7 @@ pub(crate) struct AsoController {
     pub(crate) f_hat_0: Vec<f64>,
     /// Estimates, measurements and commands as the importer sees them.
     pub(crate) values: Values,
-    /// The operating point of `design`, as it was at the start.
+    /// The operating point of `design` at the start of the run.
     operating_point: OperatingPoint,
     /// The signals as deviations from the operating point.
     pub(crate) deviations: Signals,

@@ -73,7 +73,7 @@ pub(crate) struct Design {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Estimator {
-    /// All measurements, those of the sample itself included.
+    /// All measurements, including those of the sample itself.
     Current,
     /// The measurements before the sample.
     Prediction,
@@ -132,7 +132,7 @@ pub(crate) struct Fault {
 #[serde(deny_unknown_fields)]
 pub(crate) struct Defaults {
     pub(crate) stop_time: f64,
-    /// `None` stands for the sample time of a sampled controller.
+    /// `None` means the sample time of a sampled controller.
     #[serde(default)]
     pub(crate) step_size: Option<f64>,
 }
@@ -156,7 +156,7 @@ pub(crate) enum DesignError {
 #[derive(Clone, Copy)]
 pub(crate) struct Label<'a> {
     pub(crate) unit: Option<&'a String>,
-    /// Its description, or its name where it has none.
+    /// Its description, or its name if it has none.
     pub(crate) meaning: &'a str,
 }
 

@@ -1,4 +1,4 @@
-//! The numbers that the equations are written in, and where they are stored.
+//! The number types of the equations, and views of where their values are stored.
 
 use num_dual::{Dual64, DualNum};
 

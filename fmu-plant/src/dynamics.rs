@@ -90,7 +90,7 @@ struct Position<D> {
 }
 
 impl<D: Number> RigidBody<D> {
-    /// The body of checked parameters.
+    /// The body with these parameters, which must have passed their check.
     #[must_use]
     pub fn new(parameters: &Parameters<D>) -> Self {
         let coupling = parameters.pendulum_mass * parameters.length;

@@ -1,4 +1,4 @@
-//! The numbers that the equations of the plant are written in.
+//! The number types of the plant's equations.
 //!
 //! Sine, exponential and power are functions of the crate `libm`, which have the same bits on every
 //! platform; the functions of the standard library differ between platforms.

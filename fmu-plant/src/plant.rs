@@ -12,7 +12,7 @@ pub(crate) struct Plant<'a> {
     law: StribeckLaw,
     /// As a polynomial of the time elapsed in the communication step.
     force: Force,
-    /// Terms of the start and the end of the last steps.
+    /// Remembered values of functions at the start and the end of the last steps.
     memory: &'a Memory,
 }
 

@@ -55,8 +55,8 @@ fn describe(folder: &Path) -> Result<String, String> {
     if status == 0 { Ok(text) } else { Err(text) }
 }
 
-/// A file is refused with a message, or described by a description in order, and the controller
-/// then lives: statuses of the standard only, no panic and no crash.
+/// A design file is either refused with a message, or gives a valid description and a controller
+/// that runs with statuses of the standard only, without a panic or a crash.
 pub(crate) fn design_file(data: &[u8]) {
     let folder = folder();
     std::fs::write(folder.join("design.toml"), data).expect("a file");

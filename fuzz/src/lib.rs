@@ -1,10 +1,10 @@
-//! The fuzz targets: those of the crate `robustness`, and one for the controller's design file.
+//! The fuzz targets of the crate `robustness`, and one for the controller's design file.
 
 use robustness::{exporter, system_files, system_toml};
 
 mod design;
 
-/// Runs a target; where it panics, prints the message and ends the process.
+/// Runs a target; if it panics, prints the message and ends the process.
 fn spoken(body: impl FnOnce()) {
     let Err(payload) = std::panic::catch_unwind(std::panic::AssertUnwindSafe(body)) else { return };
     let text = payload.downcast_ref::<String>().map(String::as_str);

@@ -1,4 +1,4 @@
-//! What a call of an exported model costs, beside the same call of the Reference-FMUs.
+//! Measures how long a call of an exported model takes, compared with the Reference-FMUs.
 //!
 //!     cargo bench --package tests --bench exporter
 //!     REFERENCE_FMU=Feedthrough.fmu:Dahlquist.fmu cargo bench --package tests --bench exporter
@@ -23,7 +23,7 @@ use tests::root;
 
 /// The crates in `tests/models`.
 const MODELS: [&str; 2] = ["feedthrough", "dahlquist"];
-/// Operation of the host, number of values, what it is in the table.
+/// An operation of the host: its name, the number of values, its description in the table.
 const OPERATIONS: [(&str, u64, &str); 14] = [
     ("load", 0, "dlopen, instantiate, free, dlclose"),
     ("instance", 0, "fmi2Instantiate and fmi2FreeInstance"),
@@ -49,7 +49,7 @@ struct Subject {
     arguments: Vec<String>,
 }
 
-/// A running host.
+/// A running host process.
 struct Running {
     child: Child,
     input: Option<ChildStdin>,
@@ -57,7 +57,8 @@ struct Running {
 }
 
 impl Subject {
-    /// `library`, described by `own`, with the Reals that `names` has, by name.
+    /// Starts the host with `library`, the model description `own`, and the Reals that `names` has
+    /// too.
     fn new(host: &Path, library: &Path, own: &ModelDescription, names: &ModelDescription) -> Self {
         let reals = |wanted: &dyn Fn(Causality) -> bool| {
             let found = names
@@ -85,7 +86,7 @@ impl Subject {
         Self { host: host.to_owned(), arguments }
     }
 
-    /// Bytes of the library without its symbols.
+    /// Size in bytes of the stripped library.
     fn stripped_size(&self) -> f64 {
         let stripped = self.host.with_file_name("stripped");
         let status =
@@ -105,7 +106,7 @@ impl Subject {
         Running { child, input, output }
     }
 
-    /// Instructions of one call: what more calls add to those that valgrind counts.
+    /// Instructions of one call: the difference of valgrind's counts with more and fewer calls.
     fn instructions(&self, operation: &str, values: u64) -> f64 {
         let (few, more) = if operation == "load" { (1_u32, 10_u32) } else { (50, 200) };
         (self.counted(operation, values, few + more) - self.counted(operation, values, few))
@@ -139,17 +140,18 @@ impl Running {
 }
 
 impl Drop for Running {
-    /// The host ends with its input.
+    /// The host ends when its standard input is closed.
     fn drop(&mut self) {
         self.input = None;
         self.child.wait().unwrap();
     }
 }
 
-/// The median time of a call in ns for each of the `subjects`, which take turns in each sample so
-/// that what else the machine does meets all of them. Criterion reports the first, ours.
+/// Returns the median time of a call in ns for each of the `subjects`; Criterion reports the first,
+/// ours.
 ///
-/// Empty where the command line chose other benchmarks.
+/// The subjects take turns in each sample, so that other load on the machine affects all of them
+/// alike. Empty if the command line selects other benchmarks.
 fn medians(
     criterion: &mut Criterion,
     id: &str,
@@ -175,7 +177,7 @@ fn medians(
     times.into_iter().filter_map(median).collect()
 }
 
-/// A line of the table: ours, the reference's where there is one, and the ratio.
+/// A line of the table: ours, the reference's if there is one, and the ratio.
 fn line(name: &str, figures: &[f64]) -> String {
     match figures {
         [ours, reference] => {
@@ -186,7 +188,8 @@ fn line(name: &str, figures: &[f64]) -> String {
     }
 }
 
-/// Measures all operations of the `subjects`, ours and perhaps the reference; lines of the table.
+/// Measures all operations of the `subjects`, ours and possibly the reference; returns the lines of
+/// the table.
 fn compare(criterion: &mut Criterion, model: &str, subjects: &[Subject]) -> Vec<String> {
     let mut lines = vec![
         format!("\n| {model}, ns | ours | Reference-FMUs | ratio |"),
@@ -227,7 +230,7 @@ fn build_host(folder: &Path) -> PathBuf {
     host
 }
 
-/// Builds the models as FMUs carry them; the folder of the libraries.
+/// Builds the models with the profile of packed FMUs; returns the folder of the libraries.
 fn build_models() -> PathBuf {
     let target = root().join("target/libraries");
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());

@@ -1,5 +1,5 @@
-//! What a step costs more when the FMU has a process of its own: microseconds per step of a tiny C
-//! FMU and of the pendulum, in this process and isolated, one instance and several.
+//! Measures the time that isolation adds to a step: microseconds per step of a tiny C FMU and of
+//! the pendulum, in this process and isolated, for one instance and for several.
 //!
 //! `cargo bench --package tests --bench isolation` prints the table of `docs/how-to/isolation.md`.
 #![forbid(unsafe_code)]
@@ -22,7 +22,7 @@ mod linux {
     use ssp::{Link, Terminal};
     use tests::{dist, troubles};
 
-    /// Steps of one sample, and samples.
+    /// Number of steps in a sample, and number of samples.
     const STEPS: u32 = 2000;
     const SAMPLES: usize = 41;
     const SIZE: f64 = 1e-4;
@@ -95,7 +95,7 @@ mod linux {
         }
     }
 
-    /// An isolated instance of which the master does not know that it steps in the background.
+    /// An isolated instance that does not tell the master that it steps in the background.
     struct Alone(Isolated);
 
     impl Slave for Alone {
@@ -142,7 +142,7 @@ mod linux {
                 variable: variable.to_owned(),
             };
             let (from, to) = (end(position, output), end((position + 1) % count, input));
-            // A position goes to a force: only the calls matter.
+            // A position is connected to a force, because only the cost of the calls matters.
             let transformation = Transformation::Identity;
             study::link(&mut system, &Link { from, to, transformation, units_settled: true })
                 .unwrap();

@@ -1,4 +1,4 @@
-/* What a slave does when it is told to misbehave. */
+/* The misbehaviours of a slave, on request. */
 #define _GNU_SOURCE
 #include "slave.h"
 
@@ -12,7 +12,7 @@
 
 enum { FLOOD = 1000000, LONG = 1000000, LEAK = 1 << 16 };
 
-/* Some instance returned fmi2Fatal: no function of any may be called again (section 2.1.3). */
+/* Whether some instance returned fmi2Fatal: then no function of any instance may be called (section 2.1.3). */
 static int corrupted;
 
 int is(const Slave *slave, const char *behaviour) {
@@ -65,7 +65,7 @@ static void talk(const Slave *slave, const char *deed) {
     }
 }
 
-/* Calls itself for ever. */
+/* Recurses without end. */
 static int fill_stack(int depth) {
     volatile char frame[4096];
     static volatile int for_ever = 1;
@@ -73,7 +73,7 @@ static int fill_stack(int depth) {
     return for_ever ? fill_stack(depth + 1) + frame[0] : 0;
 }
 
-/* What the FMU does to the process that it is in. */
+/* Misbehaviours that affect the process of the FMU. */
 static void meddle(const char *deed) {
     if (strcmp(deed, "crash") == 0) {
         volatile int *volatile nowhere = NULL;

@@ -1,4 +1,4 @@
-/* What a co-simulation slave needs of the types of FMI 2.0.5, sections 2.1 and 4.2. */
+/* The types of FMI 2.0.5, sections 2.1 and 4.2, that a co-simulation slave needs. */
 #ifndef FMI2_H
 #define FMI2_H
 

@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* Instances of this process. */
+/* Number of instances in this process. */
 static int instances;
 
 EXPORT const char *fmi2GetTypesPlatform(void) {

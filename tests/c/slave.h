@@ -3,15 +3,15 @@
  * der(x) = u, y = x, the input held over a step; the values of the other types go from input to
  * output with a step. Without a connection y is the time since the start.
  *
- * Its parameter `behaviour` says what it does otherwise. "DEED in FUNCTION" does that deed when
- * that function is called, in fmi2DoStep and fmi2GetReal from the time `t1` on; the deeds stand in
- * deeds.c. The other behaviours stand where they act, most in steps.c. As fmi2Instantiate gets no
- * parameters, the GUID is the start value of `behaviour`.
+ * Its parameter `behaviour` selects the misbehaviour. "DEED in FUNCTION" does that deed when that
+ * function is called, in fmi2DoStep and fmi2GetReal from the time `t1` on; deeds.c defines the
+ * deeds. The other behaviours are implemented where they act, most in steps.c. As fmi2Instantiate
+ * gets no parameters, the GUID is the start value of `behaviour`.
  *
  * It is strict: a call that section 4.2.4 forbids in its state ends the process by SIGABRT.
  *
- * A function is left out by another name for it, for example -Dfmi2GetString=left_out; VERSION is
- * what fmi2GetVersion gives. */
+ * To leave a function out, rename it, for example by -Dfmi2GetString=left_out; VERSION is the
+ * result of fmi2GetVersion. */
 #ifndef SLAVE_H
 #define SLAVE_H
 
@@ -23,7 +23,7 @@
 #define EXPORT __attribute__((visibility("default")))
 
 enum { TEXT = 20000 };
-/* Value references: of every type 0 is the input and 1 the output, the others are parameters. */
+/* Value references: for every type, 0 is the input and 1 the output; the others are parameters. */
 enum {
     INPUT,
     OUTPUT,
@@ -45,7 +45,7 @@ typedef enum {
     FAILED
 } State;
 
-/* What fmi2GetFMUstate saves. */
+/* The content of an FMU state. */
 typedef struct {
     State state;
     double time, u, x;
@@ -70,17 +70,17 @@ typedef struct {
     char name[100];
 } Slave;
 
-/* Whether that is the behaviour. */
+/* Whether the slave has this behaviour. */
 int is(const Slave *slave, const char *behaviour);
 /* Logs a message with the category of the status. */
 void say(const Slave *slave, fmi2Status status, const char *text);
-/* Logs the reason; fmi2Error. */
+/* Logs the reason and returns fmi2Error. */
 fmi2Status refuse(Slave *slave, const char *text);
-/* Does the deed that `behaviour` names for this function; the status to return. */
+/* Does the misbehaviour that `behaviour` names for this function; returns the status to return. */
 fmi2Status misbehave(Slave *slave, const char *function);
-/* Whether the deeds of the functions that are called again and again are due. */
+/* Whether the misbehaviour of repeatedly called functions has started. */
 int due(const Slave *slave);
-/* Ends the process where a call is forbidden. */
+/* Ends the process if the call is forbidden. */
 void demand(int allowed);
 
 #endif

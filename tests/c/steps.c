@@ -1,10 +1,10 @@
-/* fmi2DoStep and the questions about it. */
+/* fmi2DoStep and the status functions for it. */
 #include "slave.h"
 
 #include <math.h>
 #include <string.h>
 
-/* Goes on to `end` in one Euler step, which is exact for a held input. */
+/* Advances to `end` in one Euler step, which is exact for a held input. */
 static void integrate(Values *now, double end) {
     now->x += (end - now->time) * now->u;
     now->time = now->reached = end;
@@ -21,7 +21,7 @@ static fmi2Status discard(Slave *slave, double end) {
     return fmi2Discard;
 }
 
-/* Makes the step, or the part of it that the behaviour allows: some discard one across t1. */
+/* Makes the step, or the part of it that the behaviour allows: some discard a step across t1. */
 static fmi2Status make(Slave *slave) {
     Values *now = &slave->now;
     double end = now->time + now->step;
@@ -88,7 +88,7 @@ EXPORT fmi2Status fmi2CancelStep(fmi2Component c) {
     return fmi2OK;
 }
 
-/* The answer to the question what became of a pending step. */
+/* The result of a status function about a pending step. */
 static fmi2Status finish(Slave *slave) {
     if (slave->now.left != 0) {
         slave->now.left--;

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Where the value of an Integer, Boolean or Enumeration is; null where there is none. */
+/* The address of an Integer, Boolean or Enumeration value; null if there is none. */
 static int *place(Slave *slave, int boolean, fmi2ValueReference reference) {
     Values *now = &slave->now;
     if (boolean) {
@@ -147,9 +147,9 @@ EXPORT fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference refere
     return misbehave(slave, "fmi2SetString");
 }
 
-/* ---- derivatives: none, but of the output in behaviours that begin with "derivative" ---- */
+/* ---- derivatives: none, except those of the output in behaviours that start with "derivative" ---- */
 
-/* A function that the description promises is refused, which harms nothing. */
+/* Refuses a function that the description declares, which is harmless. */
 static fmi2Status break_promise(const Slave *slave) {
     say(slave, fmi2Error, "not implemented");
     return fmi2Error;
@@ -195,7 +195,7 @@ EXPORT fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueR
 
 /* ---- states ---- */
 
-/* Whether states may be used now: not by a slave without rollback, nor while a step is pending. */
+/* Whether states may be used now: not if the slave has no rollback or a step is pending. */
 static int stateless(const Slave *slave) {
     demand(slave->now.state != PENDING);
     return is(slave, "no way back");

@@ -1,4 +1,4 @@
-//! Error over the number of steps, for fixed steps and for every choice of the step.
+//! Computes the error over the number of steps, for fixed steps and for every step control.
 //!
 //! `cargo run --release -p tests --example work_precision > docs/figures/work_precision.csv`, then
 //! `python scripts/work_precision.py` draws the figure.
@@ -12,7 +12,7 @@ use tests::problems;
 
 use StepControl::{Doubling, Embedded, Energy, Increment};
 
-/// The span of every run in s.
+/// Length of every run in s.
 const STOP: f64 = 5.0;
 
 fn print(problem: &str, control: StepControl, parameter: f64, run: &Run) {
@@ -27,7 +27,7 @@ fn study(problem: &str, network: &Network, bonds: &[PowerBond]) {
         print(problem, StepControl::Fixed, step, &network.run(ABLE, &fixed(step), STOP).unwrap());
     }
     for control in [Doubling, Embedded, Increment, Energy] {
-        // An increment of the tolerance is a whole step's; that of the others an error.
+        // `increment` bounds the change in a step by the tolerance, the others bound an error.
         let powers = if control == Increment { 2..=7 } else { 4..=14 };
         for power in powers {
             let tolerance = 10.0_f64.powf(-0.5 * f64::from(power));

@@ -1,4 +1,4 @@
-"""Runs of any FMUs by `aso-ftc run`, and the same by FMPy's C functions."""
+"""Runs any FMUs by `aso-ftc run`, and makes the same calls by FMPy's C functions."""
 
 import csv
 from contextlib import contextmanager
@@ -7,12 +7,12 @@ import numpy as np
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 
-# Every input held over a step at the value of its begin.
+# Every input is held over a step at its value at the start.
 HELD = ("--method", "jacobi", "--extrapolation", "hold")
 
 
 def run(aso_ftc, folder, fmus, step, stop, *more, links=(), status=0, **options):
-    """Couples `fmus`, paths by name; the columns of results.csv as texts, or what was said."""
+    """Couples `fmus`, paths by name; returns the columns of results.csv as texts, or the messages."""
     arguments = [part for name, path in fmus.items() for part in ("--fmu", f"{name}={path}")]
     arguments += [part for link in links for part in ("--connect", link)]
     arguments += ["--step", step, "--stop-time", stop, "--out", folder / "out", *HELD, *more]

@@ -1,4 +1,4 @@
-"""The C interface of FMI 2.0 by ctypes: an importer that may also make mistakes."""
+"""The C interface of FMI 2.0 by ctypes: an importer that can also make wrong calls."""
 
 import ctypes
 import math
@@ -94,7 +94,7 @@ STANDARD_FUNCTIONS = {*WITHOUT_INSTANCE, *(f"fmi2{name}" for name in FUNCTIONS)}
 
 
 def load(path):
-    """The library at `path`, its functions typed."""
+    """Loads the library at `path` and declares the types of its functions."""
     library = ctypes.CDLL(str(path))
     for name, arguments in FUNCTIONS.items():
         function = getattr(library, f"fmi2{name}")
@@ -151,7 +151,7 @@ class Fmu:
 
 
 class Message(NamedTuple):
-    """One call of the importer's logger."""
+    """A call of the importer's logger."""
 
     environment: int
     instance: str
@@ -162,7 +162,7 @@ class Message(NamedTuple):
 
 
 class Instance:
-    """One instance; every call by the name of the C function, checked only where said so."""
+    """An instance with methods named like the C functions; only methods that say so check the status."""
 
     def __init__(self, fmu, name=b"one", guid=None, resources=None, kind=CO_SIMULATION, log=True):
         self.fmu, self.kind, self.messages = fmu, kind, []
@@ -182,38 +182,38 @@ class Instance:
         self.free()
 
     def free(self):
-        """`fmi2FreeInstance`, once."""
+        """Calls `fmi2FreeInstance` once."""
         if self.component:
             self.fmu.library.fmi2FreeInstance(self.component)
             self.component = None
 
     def receive(self, environment, instance, status, category, form, text):
-        """The logger."""
+        """The logger of the instance."""
         parts = (part.decode() for part in (instance, category, form, text))
         instance, category, form, text = parts
         self.messages.append(Message(environment, instance, status, category, form, text))
 
     def call(self, function, *arguments):
-        """Status of a function."""
+        """Calls a function and returns its status."""
         return getattr(self.fmu.library, f"fmi2{function}")(self.component, *arguments)
 
     def must(self, function, *arguments):
-        """Calls a function that has to succeed."""
+        """Calls a function that must succeed."""
         status = self.call(function, *arguments)
         assert status == OK, f"fmi2{function} gives {status}: {self.messages[-1:]}"
 
     def last_message(self):
-        """The text of the newest message, the logger's escape of # undone."""
+        """The text of the newest message, with ## read as #."""
         return self.messages[-1].text.replace("##", "#")
 
     def set_one(self, name, value):
-        """Status of setting one variable."""
+        """Sets one variable and returns the status."""
         kind = self.fmu.variables[name].type
         place = (C_TYPES[kind] * 1)(value)
         return self.call(f"Set{kind}", self.fmu.references(name), 1, place)
 
     def set(self, values):
-        """Sets variables that have to take their values."""
+        """Sets variables and checks that they take the values."""
         for name, value in values.items():
             assert self.set_one(name, value) == OK, self.messages[-1:]
 
@@ -234,20 +234,20 @@ class Instance:
         self.must("SetupExperiment", *tolerance, start, stop is not None, stop or 0.0)
 
     def enter(self, values=None, **experiment):
-        """Goes to initialization mode with these values set before."""
+        """Enters initialization mode, with these values set before."""
         self.setup(**experiment)
         self.set(values or {})
         self.must("EnterInitializationMode")
         return self
 
     def start(self, values=None, **experiment):
-        """Goes through initialization."""
+        """Runs through initialization."""
         self.enter(values, **experiment)
         self.must("ExitInitializationMode")
         return self
 
     def start_exchange(self, values=None, **experiment):
-        """Goes through initialization and the first event to continuous-time mode."""
+        """Runs through initialization and the first event to continuous-time mode."""
         self.start(values, **experiment)
         info = EventInfo(new_discrete_states_needed=1)
         while info.new_discrete_states_needed:
@@ -279,18 +279,18 @@ class Instance:
         return status, dict(zip(unknowns, result))
 
     def directional(self, unknowns, direction):
-        """Directional derivatives that have to be there, by name."""
+        """Directional derivatives by name; the call must succeed."""
         status, result = self.try_directional(unknowns, direction)
         assert status == OK, self.messages[-1:]
         return result
 
     def step(self, time, size):
-        """A communication step that has to succeed."""
+        """Makes a communication step that must succeed."""
         self.must("DoStep", time, size, 1)
 
 
 def describe(library, resources):
-    """Status of `fmuDescribe` and what it says about the folder `resources`."""
+    """Returns the status of `fmuDescribe` and its description for the folder `resources`."""
     said = []
     sink = SINK(lambda _, text, length: said.append(ctypes.string_at(text, length).decode()))
     return library.fmuDescribe(str(resources).encode(), None, sink), "".join(said)

@@ -1,7 +1,7 @@
 """Friction-free cart with inverted pendulum, exported with PythonFMU.
 
-Equation (20) of Patton and Klinkhieo (2009), repaired, with f_fric = 0. Only the standard library
-is used, see lqr_controller.py.
+Equation (20) of Patton and Klinkhieo (2009), corrected, with f_fric = 0. Uses the standard library
+only, see lqr_controller.py.
 """
 
 from math import ceil, cos, sin
@@ -29,7 +29,7 @@ def derivative(state, force):
 
 
 def moved(state, slope, step):
-    """The state after going along `slope` for `step` seconds."""
+    """The state after a step of `step` seconds with the derivative `slope`."""
     return tuple(value + step * rate for value, rate in zip(state, slope))
 
 

@@ -1,4 +1,4 @@
-"""What the tests share: the packed FMUs, unpacked, and the command. `aso-ftc pack` comes first."""
+"""Shared fixtures: the packed FMUs, unpacked, and the command. They need `aso-ftc pack` first."""
 
 import subprocess
 import sys
@@ -59,7 +59,7 @@ def controller(unpacked):
 
 @pytest.fixture(scope="session")
 def hostile(aso_ftc, root, tmp_path_factory):
-    """HostileNames, whose module has the names of everything, and which panics on request."""
+    """HostileNames: its module defines names that the export macro could confuse, and it panics on request."""
     folder = tmp_path_factory.mktemp("hostile")
     done = aso_ftc("pack", root / "tests" / "models" / "hostile-names", "--out", folder)
     assert done.returncode == 0, done.stderr
@@ -74,7 +74,7 @@ def fmu(request, unpacked):
 
 @pytest.fixture(scope="session")
 def aso_ftc():
-    """Runs the command; exit status and output come back."""
+    """Runs the command; returns exit status and output."""
 
     def run(*arguments, **options):
         command = [ROOT / "target" / "release" / "aso-ftc", *map(str, arguments)]
@@ -85,7 +85,7 @@ def aso_ftc():
 
 @pytest.fixture(scope="session")
 def python():
-    """Runs this interpreter with arguments; exit status and output come back."""
+    """Runs this Python interpreter with arguments; returns exit status and output."""
 
     def run(*arguments, **options):
         command = [sys.executable, *map(str, arguments)]

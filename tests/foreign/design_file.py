@@ -1,4 +1,4 @@
-"""Controllers of other designs: the design file as text, and the FMU that belongs to it."""
+"""Controllers with other designs: the design file as text, and the FMU with this file."""
 
 import json
 import shutil
@@ -8,12 +8,12 @@ from c_abi import Fmu, describe
 
 MATRICES = ["A", "B", "C", "F_a", "K_x", "K_f", "L_x", "L_f"]
 LISTS = ["states", "actuators", "measurements", "faults"]
-# What a design need not state.
+# Entries that a design may omit.
 OPTIONAL = ["filter", "sample_time", "estimator"]
 
 
 def vector(name, count):
-    """Names of a signal with so many channels."""
+    """Names for the channels of a signal."""
     return [name] if count == 1 else [f"{name}[{k + 1}]" for k in range(count)]
 
 
@@ -43,7 +43,7 @@ def design_text(design):
 
 
 def redesigned(controller, text, folder):
-    """The FMU that the library of `controller` makes of another design file, unpacked."""
+    """The FMU that the library of `controller` gives for another design file, unpacked."""
     shutil.copytree(controller.folder, folder)
     (folder / "resources" / "design.toml").write_text(text, encoding="utf-8")
     status, xml = describe(controller.library, folder / "resources")

@@ -14,7 +14,7 @@ EXAMPLES = {"DcServo": "dc-servo", "ThreeTank": "three-tank"}
 
 
 def packed_plant(aso_ftc, name):
-    """The packed FMU of a plant, where the plant files look for it."""
+    """Returns the packed FMU of a plant, at the path that the plant files state."""
     path = ROOT / "dist" / f"{name}.fmu"
     if not path.is_file():
         done = aso_ftc("pack", ROOT / "examples" / EXAMPLES[name])
@@ -23,7 +23,7 @@ def packed_plant(aso_ftc, name):
 
 
 def changed(plant_file, folder, *changes):
-    """A copy of a plant file in `folder`, with texts replaced."""
+    """Copies a plant file into `folder` and replaces texts in it."""
     text = (ROOT / plant_file).read_text(encoding="utf-8")
     for old, new in [("../../dist", str(ROOT / "dist")), *changes]:
         assert old in text or old == "../../dist", old
@@ -34,7 +34,7 @@ def changed(plant_file, folder, *changes):
 
 
 class Designed:
-    """What `aso-ftc design PLANT_FILE --fmu` wrote into `folder` and printed."""
+    """Files in `folder` and output of `aso-ftc design PLANT_FILE --fmu`."""
 
     def __init__(self, aso_ftc, plant_file, folder):
         self.folder, self.fmu = Path(folder), Path(folder) / "Designed.fmu"
@@ -47,7 +47,7 @@ class Designed:
         self.page = (self.folder / "report.html").read_text(encoding="utf-8")
 
     def must_be_sound(self):
-        """All checks hold, FMPy has no objection, the report is there and in the FMU."""
+        """Checks that all checks of the design hold, FMPy accepts the FMU, and the report exists, also in the FMU."""
         assert all(check["holds"] for check in self.report["checks"])
         assert validate_fmu(str(self.fmu)) == []
         unpacked = Path(extract(str(self.fmu), unzipdir=str(self.folder / "unpacked")))
@@ -68,24 +68,24 @@ class Designed:
         return qualified("E_hat", names.index(name), len(names))
 
     def response(self, fault, name):
-        """The report's curve of `name` after a jump of `fault`, and the size of that jump."""
+        """The report's curve of `name` after a jump of `fault`, and the size of this jump."""
         jumps = [steps for steps in self.report["steps"] if steps["rate"] is None]
         (steps,) = (steps for steps in jumps if steps["fault"] == fault)
         (curve,) = (curve for curve in steps["curves"] if curve["name"] == name)
         return curve, steps["size"]
 
     def settling_time(self, fault):
-        """When the estimate of `fault` stays within 2 % of a change, by the report."""
+        """The time, by the report, after which the estimate of `fault` stays within 2 % of a change."""
         return self.response(fault, f"error of {fault}")[0]["settling_time"]
 
 
 def qualified(letter, position, count):
-    """The name of channel `position`, from 0, of a signal of the controller."""
+    """The name of channel number `position`, from 0, of a signal of the controller."""
     return f"controller.{letter}" if count == 1 else f"controller.{letter}[{position + 1}]"
 
 
 def coupled(python, designed, plant, settings, *arguments):
-    """Runs plant and controller in FMPy; columns by name and the summary."""
+    """Runs plant and controller in FMPy; returns columns by name and the summary."""
     out = designed.folder / "results.csv"
     stated = [text for name, value in settings.items() for text in ("--set", f"{name}={value}")]
     done = python(

@@ -1,7 +1,8 @@
-"""The loop of a plant and a designed controller by numpy and scipy, from the design file alone.
+"""The loop of a plant and a designed controller by numpy and scipy, computed from the design file alone.
 
-Its states are those of plant, observer and fault estimate, [x; x_hat; f_hat], of a sampled loop the
-predictions; input is the fault f, outputs are [x; x - x_hat; f_hat - f].
+The states are those of plant, observer and fault estimate, [x; x_hat; f_hat]; in a sampled loop
+x_hat and f_hat are the predictions. The input is the fault f, the outputs are
+[x; x - x_hat; f_hat - f].
 """
 
 import numpy as np
@@ -9,7 +10,7 @@ from scipy.linalg import expm, matrix_balance, solve_continuous_lyapunov, solve_
 
 
 class Matrices:
-    """The matrices of a design file as arrays; a fault model that is not stated is a constant."""
+    """The matrices of a design file as arrays; without a fault model the fault is constant."""
 
     def __init__(self, design):
         self.period = design.get("sample_time")
@@ -36,13 +37,13 @@ class Matrices:
 
     @property
     def error_dynamics(self):
-        """A_0 - L C_0, of a current estimator A_0 - L C_0 A_0."""
+        """A_0 - L C_0, or A_0 - L C_0 A_0 for a current estimator."""
         a_0, c_0, gain = self.augmented
         return a_0 - gain @ c_0 @ (a_0 if self.current else np.eye(len(a_0)))
 
 
 def closed_loop(own, losses=None):
-    """A, B, C, D of the loop; `losses` take a part of the effect of each actuator of the plant."""
+    """A, B, C, D of the loop; `losses` reduce the effect of each actuator of the plant."""
     n, q = own.n, own.q
     left = np.eye(own.B.shape[1]) - np.diag(losses if losses is not None else [0] * own.B.shape[1])
     x, x_hat, f_hat = np.split(np.eye(2 * n + q), [n, 2 * n])
@@ -93,7 +94,7 @@ def responses(system, period, horizon):
 
 
 def total(times, values, period):
-    """The integral or the sum of all values."""
+    """The integral of the values, or their sum in sampled time."""
     if period is not None:
         return values.sum(axis=0)
     return (np.diff(times)[:, None, None] * (values[1:] + values[:-1]) / 2).sum(axis=0)

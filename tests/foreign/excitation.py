@@ -1,4 +1,4 @@
-"""Runs an FMU by inputs that lead through stick, slip and, in the controller, the compensation.
+"""Runs an FMU by inputs that cause stick, slip and, in the controller, the compensation.
 
 Usage: python excitation.py FOLDER STATE FROM COUNT
 
@@ -21,7 +21,7 @@ START = {
 
 
 def drive(instance, begin, count, shift=0.0):
-    """Steps number `begin` to `begin + count`; all outputs after each step."""
+    """Makes the steps `begin` to `begin + count`; returns all outputs after each step."""
     rows = []
     for k in range(begin, begin + count):
         time = k * STEP
@@ -38,7 +38,7 @@ def drive(instance, begin, count, shift=0.0):
 
 
 def begun(fmu, count, shift=0.0, **options):
-    """A new instance, `count` steps on its way."""
+    """A new instance after `count` steps."""
     instance = Instance(fmu, **options).start(START[fmu.identifier])
     drive(instance, 0, count, shift)
     return instance

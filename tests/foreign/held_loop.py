@@ -1,7 +1,7 @@
-"""The closed loop by FMPy with held inputs, all of them given at once (Jacobi).
+"""The closed loop by FMPy with held inputs, all set at once (Jacobi).
 
-What libcosim, Ecos and the FMU container do, on whatever time grid they do it; the judges' results
-are compared with these bit by bit.
+libcosim, Ecos and the FMU container do the same, each on its own time grid. Their results are
+compared with these bit by bit.
 """
 
 import numpy as np
@@ -14,7 +14,7 @@ LINKS = [
     ("plant", "theta", "controller", "theta"),
     ("controller", "u", "plant", "u"),
 ]
-# None of them is a default; F_s is twice that of the paper, so the cart sticks for a while.
+# None of these is a default; F_s is twice that of the paper, so the cart sticks for a while.
 SETTINGS = {
     "plant": {"x_p_0": 0.0625, "F_s": 60.0, "linearised": True},
     "controller": {"t_on": 0.5, "f_hat_0": 3.0},
@@ -55,7 +55,7 @@ class Slave:
 
 
 class HeldLoop:
-    """The plant and the controller; `exchange` and `step` are for the caller to order."""
+    """The plant and the controller; the caller decides when to `exchange` and to `step`."""
 
     def __init__(self, fmus, settings):
         self.slaves = {name: Slave(fmus[name], name, settings[name]) for name in fmus}
@@ -81,7 +81,7 @@ class HeldLoop:
         return [value for slave in self.slaves.values() for value in slave.get(slave.outputs)]
 
     def names(self):
-        """What `row` holds: (slave, variable)."""
+        """The variables in `row`, as (slave, variable)."""
         return [(slave.name, name) for slave in self.slaves.values() for name in slave.outputs]
 
     def close(self):
@@ -94,7 +94,8 @@ class HeldLoop:
 def held_loop(fmus, grid, settings=SETTINGS, exchange_before_reading=False):
     """Names and rows of all Real outputs after each step of `grid`, pairs of time and step in s.
 
-    Values that depend on an input at once differ by what is read first, them or the new input.
+    The values of outputs that depend directly on an input differ, depending on whether they are read
+    before or after the new input is set.
     """
     loop = HeldLoop(fmus, settings)
     for _ in LINKS:
@@ -114,7 +115,7 @@ def held_loop(fmus, grid, settings=SETTINGS, exchange_before_reading=False):
 
 
 def expect_equal(names, expected, found):
-    """Fails at the first value that is not the same bit by bit."""
+    """Fails at the first value whose bits differ."""
     assert expected.shape == found.shape
     for (slave, name), reference, column in zip(names, expected.T, found.T):
         different = np.flatnonzero(reference.view(np.int64) != column.view(np.int64))

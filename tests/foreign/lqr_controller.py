@@ -1,7 +1,7 @@
 """LQR state feedback for the cart with inverted pendulum, exported with PythonFMU.
 
-Only the standard library is used: the importer's process decides which Python runs this, and that
-one need not have numpy.
+Uses the standard library only: the importer's process decides which Python runs this code, and this
+Python may have no numpy.
 """
 
 from xml.etree.ElementTree import SubElement
@@ -10,7 +10,7 @@ from pythonfmu import Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Re
 
 STATES = {"x_p": "m", "theta": "rad", "v_p": "m/s", "omega": "rad/s"}
 
-# Largest values meant to be reached: each is weighted by the inverse of its square (Bryson's rule).
+# Largest values to be reached: each is weighted by the inverse of its square (Bryson's rule).
 LARGEST_STATES = (0.1, 0.1, 1.0, 1.0)  # m, rad, m/s, rad/s
 LARGEST_FORCE = 30.0  # N
 
@@ -59,13 +59,13 @@ class LqrController(Fmi2Slave):
         )
 
     def force(self):
-        """The force that belongs to the present inputs."""
+        """The force for the present inputs."""
         gains = (self.k1, self.k2, self.k3, self.k4)
         states = (self.x_p, self.theta, self.v_p, self.omega)
         return -sum(gain * state for gain, state in zip(gains, states))
 
     def to_xml(self, *options):
-        """The model description with the list of initial unknowns, which PythonFMU leaves out."""
+        """The model description with the list of initial unknowns, which PythonFMU omits."""
         root = super().to_xml(*options)
         structure = root.find("ModelStructure")
         initial_unknowns = SubElement(structure, "InitialUnknowns")
@@ -74,5 +74,5 @@ class LqrController(Fmi2Slave):
         return root
 
     def do_step(self, current_time, step_size):
-        """Nothing moves inside: the output follows the inputs at once."""
+        """Does nothing: the output depends directly on the inputs."""
         return True

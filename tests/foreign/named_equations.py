@@ -15,7 +15,7 @@ def size_of(design):
 
 
 def losses(design):
-    """Of each loss of effectiveness: its output, positions of fault and actuator, least command."""
+    """For each loss of effectiveness: its output, the positions of fault and actuator, the least command."""
     actuators = [actuator["name"] for actuator in design["actuators"]]
     names = vector("E_hat", len(design["faults"]))
     for k, (name, fault) in enumerate(zip(names, design["faults"])):
@@ -24,7 +24,7 @@ def losses(design):
 
 
 def limited(values, j, command, count):
-    """The limit that the command of channel j is at, if it has limits and is at one."""
+    """The limit at which the command of channel j is; none if it is free or has no limits."""
     low, high = (values.get(vector(name, count)[j]) for name in ("u_min", "u_max"))
     if low is None or low.real <= command.real <= high.real:
         return None
@@ -38,12 +38,12 @@ class Named:
         self.values, self.design = values, design
 
     def vector(self, name, count):
-        """The channels of a signal; zero, where the controller has none."""
+        """The channels of a signal; zeros if the controller has none."""
         names = vector(name, count)
         return np.array([self.values.get(name, 0.0) for name in names])
 
     def matrix(self, name, rows, columns):
-        """The elements of a matrix; zero, where the controller has none."""
+        """The elements of a matrix; zeros if the controller has none."""
         names = [element_name(name, i, j) for i in range(rows) for j in range(columns)]
         return np.array([self.values.get(name, 0.0) for name in names]).reshape(rows, columns)
 
@@ -51,8 +51,8 @@ class Named:
 def evaluated(values, design, switches, start=False, minus=-1.0):
     """All unknowns by name, from the values of all knowns by name.
 
-    `switches`: whether it compensates and whether it estimates. `minus` stands at each subtraction:
-    with 1 and positive values, the sum of all terms comes out.
+    `switches`: whether it compensates and whether it estimates. `minus` is the factor of subtracted
+    terms, usually -1; with 1 and positive values the result is the sum of all terms.
     """
     n, m, p, q = size_of(design)
     named, (compensating, estimating) = Named(values, design), switches
@@ -94,7 +94,7 @@ def state_names(design):
 
 
 def rounding(values, direction, design, start):
-    """What rounding may do to the derivatives, by name: 1e-13 of all terms, each taken positive."""
+    """Bounds of rounding errors of the derivatives, by name: 1e-13 of the sum of absolute terms."""
     size = {"inputs": values["inputs"]}
     for name, value in values.items():
         if name != "inputs" and not name.startswith(("u_min", "u_max")):

@@ -1,4 +1,4 @@
-"""The controller's equations in the general form, by numpy, mpmath and scipy: what must come out.
+"""The controller's equations in the general form, by numpy, mpmath and scipy: the expected values.
 
 x_hat' = A x_hat + B u + F_a f_hat + L_x (y - C x_hat)
 f_hat' = L_f (y - C x_hat)              while estimating, else 0

@@ -10,7 +10,7 @@ DERIVATIVES = [f"der({name})" for name in STATES]
 
 
 def trigonometry(values, angle, rate):
-    """Sine, cosine and centrifugal term, as the rigid body takes them."""
+    """Sine, cosine and centrifugal term of the rigid body, linearised or not."""
     if values["linearised"]:
         return angle, 1.0, 0.0
     return np.sin(angle), np.cos(angle), rate**2 * np.sin(angle)

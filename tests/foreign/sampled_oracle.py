@@ -32,7 +32,7 @@ class SampledController:
         self.predicted, self.filtered = np.asarray(z) - self.x_op, np.asarray(y)
 
     def sample(self, y):
-        """Takes one sample; the values of [x_hat; f_hat], y_f and u at it."""
+        """Takes one sample; returns [x_hat; f_hat], y_f and u at it."""
         y, z, y_f = np.asarray(y), self.predicted, self.filtered
         source = y if self.filter is None else y_f
         correction = self.gain @ (source - self.y_op - self.view @ z)

@@ -1,8 +1,8 @@
-"""System structures written by hand, each in the style of the tool that it is named after.
+"""System structures for the tests, each in the style of the tool that it is named after.
 
-All couple the plant and the controller as `held_loop` does, with its settings. `libcosim`: all
-in one SSD, annotations of the Open Simulation Platform, FMUs beside it. `ecos`: parameter sets in
-files of their own. `nested`: what only the standard has, systems in systems, units and
+All couple the plant and the controller as `held_loop` does, with its settings. `libcosim`: one SSD
+with annotations of the Open Simulation Platform, FMUs beside it. `ecos`: parameter sets in
+files of their own. `nested`: features that these tools lack, such as nested systems, units and
 transformations that cancel, a mapping, bindings that override each other.
 """
 
@@ -34,7 +34,7 @@ KINDS = {bool: "Boolean", int: "Integer", float: "Real"}
 
 
 def problems(text, suffix):
-    """What the schema of the standard finds wrong with a file."""
+    """The errors of a file by the schema of the standard."""
     schema = etree.XMLSchema(file=str(SCHEMAS / SCHEMA_OF[suffix]))
     schema.validate(etree.fromstring(text))
     return [str(entry) for entry in schema.error_log]
@@ -65,13 +65,13 @@ def parameters(values, name="initialValues", declaration=""):
 
 
 def inline(parameter_set, attributes="", mapping=""):
-    """A binding that holds its parameters."""
+    """A parameter binding with inline parameters."""
     values = f"<ssd:ParameterValues>{parameter_set}</ssd:ParameterValues>"
     return f"<ssd:ParameterBinding {attributes}>{values}{mapping}</ssd:ParameterBinding>"
 
 
 def bindings(*each):
-    """The list of bindings."""
+    """The list of parameter bindings."""
     return "<ssd:ParameterBindings>" + "".join(each) + "</ssd:ParameterBindings>"
 
 
@@ -125,7 +125,7 @@ def libcosim_style(packed, folder):
 
 
 def archive(target, ssd, files):
-    """An SSP of an SSD and other files: text, or the path of a file."""
+    """Packs an SSP from an SSD and other files: text, or the path of a file."""
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as package:
         package.writestr("SystemStructure.ssd", ssd)
         for name, content in files.items():
@@ -137,7 +137,7 @@ def archive(target, ssd, files):
 
 
 def ecos_style(packed, folder):
-    """An SSP with parameter sets of one name in files of their own."""
+    """An SSP with parameter sets of the same name, in files of their own."""
     declaration = f'xmlns:ssv="{SPACE}ParameterValues"'
     elements, files = "", {}
     for role, path in packed.items():
@@ -152,7 +152,7 @@ def ecos_style(packed, folder):
 
 
 def nested_style(packed, folder):
-    """The plant inside a system that scales its outputs by powers of two, which cancel exactly."""
+    """The plant inside of a system that scales its outputs by powers of two, without rounding errors."""
     outputs = [name for source, name, _, _ in LINKS if source == "plant"]
     own = {f"{key}.value": value for key, value in SETTINGS["plant"].items()}
     rows = "".join(

@@ -1,4 +1,4 @@
-"""Calls in the wrong order, without an instance, or with arrays that are not there."""
+"""Calls in the wrong order, without an instance, or with null arrays."""
 
 import csv
 import ctypes
@@ -32,9 +32,9 @@ COMMON = ["Instantiated", "InitializationMode", "Terminated", "Error"]
 
 
 def cells():
-    """Interface, function, state and whether the call is allowed, for the states that a call can
-    find: a step is never in progress or canceled when DoStep has returned, and only a panic of the
-    model is fatal."""
+    """Interface, function, state and whether the call is allowed, for all states that can occur: a
+    step is never in progress or canceled after DoStep has returned, and only a panic of the model is
+    fatal."""
     for kind, (file, states) in TABLES.items():
         path = ROOT / "crates" / "fmu-description" / "src" / "call_order" / file
         with path.open() as lines:
@@ -48,7 +48,7 @@ CASES = [case for case in cells() if case[1] != "FreeInstance"]
 
 
 def arguments(name, indicators):
-    """Arguments with which the function of the plant is right where it may be called."""
+    """Arguments with which the function of the plant succeeds if the call is allowed."""
     none = (None, 0, None)
     if name[3:] in ("Real", "Integer", "Boolean", "String"):
         return none
@@ -94,7 +94,7 @@ def bring(instance, state):
 
 
 def call_with_states(instance, name):
-    """Calls one of the functions on FMU states, with a state and its bytes at hand."""
+    """Calls one of the functions on FMU states, with a saved state and its bytes."""
     state, copy, size = c_void_p(), c_void_p(), c_size_t()
     before = Instance(instance.fmu, kind=instance.kind)
     before.must("GetFMUstate", byref(state))
@@ -118,14 +118,14 @@ def call_with_states(instance, name):
 
 
 def call(instance, name):
-    """Calls the function with arguments that are right."""
+    """Calls the function with valid arguments."""
     if "FMUstate" in name:
         return call_with_states(instance, name)
     return instance.call(name, *arguments(name, instance.fmu.indicators))
 
 
 @pytest.mark.parametrize(("kind", "name", "state", "allowed"), CASES)
-def test_calls_pass_and_fail_as_the_tables_of_the_standard_say(plant, kind, name, state, allowed):
+def test_calls_succeed_and_fail_as_the_tables_of_the_standard_say(plant, kind, name, state, allowed):
     with Instance(plant, kind=kind) as instance:
         bring(instance, state)
         status = call(instance, name)
@@ -173,7 +173,7 @@ KINDS = ["Real", "Integer", "Boolean", "String"]
 
 @pytest.mark.parametrize("way", ["Get", "Set"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_null_arrays_are_fine_when_empty_and_an_error_when_not(fmu, way, kind):
+def test_null_arrays_are_accepted_if_they_are_empty_and_otherwise_an_error(fmu, way, kind):
     with Instance(fmu) as instance:
         instance.start()
         function = f"{way}{kind}"
@@ -187,7 +187,7 @@ def test_null_arrays_are_fine_when_empty_and_an_error_when_not(fmu, way, kind):
 
 
 @pytest.mark.parametrize("function", ["SetRealInputDerivatives", "GetRealOutputDerivatives"])
-def test_derivatives_with_null_arrays_are_an_error_when_not_empty(plant, function):
+def test_derivatives_with_null_arrays_are_an_error_if_not_empty(plant, function):
     name = "u" if function.startswith("Set") else "x_p"
     whole = (plant.references(name), 1, integers(1), reals(0))
     for missing in (0, 2, 3):
@@ -200,7 +200,7 @@ def test_derivatives_with_null_arrays_are_an_error_when_not_empty(plant, functio
             assert "null" in instance.last_message()
 
 
-def test_null_states_and_null_places_are_an_error(fmu):
+def test_null_pointers_to_states_are_an_error(fmu):
     size = c_size_t()
     calls = [
         ("GetFMUstate", None),
@@ -221,7 +221,7 @@ def test_null_states_and_null_places_are_an_error(fmu):
             assert f"fmi2{name}" in instance.last_message()
 
 
-def test_freeing_no_state_is_fine(fmu):
+def test_freeing_a_null_state_is_accepted(fmu):
     with Instance(fmu) as instance:
         nothing = c_void_p()
         assert instance.call("FreeFMUstate", byref(nothing)) == OK and not instance.messages

@@ -1,4 +1,4 @@
-"""Model exchange and directional derivatives through the C interface, with right and wrong calls."""
+"""Model exchange and directional derivatives through the C interface, with valid and invalid calls."""
 
 import ctypes
 import math
@@ -35,7 +35,7 @@ def exchange(fmu, **options):
 
 
 def vector(instance, function, count=None):
-    """The values that a function of model exchange gives."""
+    """The values that a function of model exchange returns."""
     count = getattr(instance.fmu, VECTORS[function]) if count is None else count
     values = reals(*[0.0] * count)
     instance.must(function, values, count)
@@ -54,7 +54,7 @@ def test_vectors_of_a_wrong_length_are_an_error_that_gives_both_lengths(fmu, fun
 
 
 @pytest.mark.parametrize("function", VECTORS)
-def test_null_vectors_are_an_error_when_not_empty(fmu, function):
+def test_null_vectors_are_an_error_if_not_empty(fmu, function):
     expected = getattr(fmu, VECTORS[function])
     with exchange(fmu) as instance:
         instance.start_exchange()
@@ -64,7 +64,7 @@ def test_null_vectors_are_an_error_when_not_empty(fmu, function):
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_states_that_are_no_numbers_are_discarded_and_change_nothing(fmu, value):
+def test_states_that_are_nan_or_infinite_are_discarded_and_change_nothing(fmu, value):
     with exchange(fmu) as instance:
         instance.start_exchange()
         before = vector(instance, "GetContinuousStates")
@@ -77,7 +77,7 @@ def test_states_that_are_no_numbers_are_discarded_and_change_nothing(fmu, value)
 
 
 @pytest.mark.parametrize("time", [math.nan, math.inf, -1.0])
-def test_times_that_are_none_or_before_the_start_are_an_error(fmu, time):
+def test_times_that_are_nan_infinite_or_before_the_start_are_an_error(fmu, time):
     with exchange(fmu) as instance:
         instance.start_exchange(start=0.0, stop=10.0)
         assert instance.call("SetTime", time) == ERROR
@@ -156,7 +156,7 @@ def test_a_state_of_the_other_interface_is_refused(fmu, kind):
         one.must("FreeFMUstate", byref(state))
 
 
-def test_reset_gives_the_same_start_again(fmu):
+def test_a_run_after_a_reset_starts_in_the_same_way(fmu):
     def run(instance):
         instance.start_exchange()
         instance.must("SetTime", 0.1)
@@ -219,7 +219,7 @@ def test_directional_derivatives_with_null_or_unknown_references_are_an_error(fm
             assert "4711" in instance.last_message()
 
 
-def test_an_event_info_is_whole(fmu):
+def test_every_field_of_the_event_info_is_written(fmu):
     with exchange(fmu) as instance:
         instance.start()
         info = EventInfo(7, 7, 7, 7, 7, math.nan)

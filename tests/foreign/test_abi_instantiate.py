@@ -1,4 +1,4 @@
-"""What fmi2Instantiate takes and what it refuses, always with one clear message."""
+"""Arguments that fmi2Instantiate accepts and refuses, always with one clear message."""
 
 import ctypes
 import re
@@ -13,7 +13,7 @@ from design_file import design_text, redesigned, shipped_design
 
 
 def refusal(fmu, **options):
-    """The one message with which an instantiation is refused."""
+    """The single message with which an instantiation is refused."""
     instance = Instance(fmu, **options)
     assert not instance.component
     assert len(instance.messages) == 1, instance.messages
@@ -23,7 +23,7 @@ def refusal(fmu, **options):
     return instance.last_message()
 
 
-def test_the_logger_gets_environment_name_category_and_a_harmless_format(fmu):
+def test_the_logger_gets_environment_name_category_and_a_safe_format(fmu):
     with Instance(fmu, name=b"tank #3 %s%n") as instance:
         instance.call("DoStep", 0.0, 0.1, 1)
         message = instance.messages[0]
@@ -82,12 +82,12 @@ def test_null_arguments_are_refused(fmu):
 
 
 def starts(fmu, resources):
-    """Whether an instance with these resources can be made and initialised."""
+    """Whether an instance can be created and initialised with these resources."""
     with Instance(fmu, resources=resources) as instance:
         return instance.start().outputs() is not None
 
 
-def test_every_form_of_a_resource_location_is_understood(controller, tmp_path):
+def test_every_form_of_a_resource_location_is_accepted(controller, tmp_path):
     folder = tmp_path / "a model, 50% größer #2 +&"
     shutil.copytree(controller.folder / "resources", folder)
     path, plain = quote(str(folder)), str(folder)
@@ -116,11 +116,11 @@ def test_every_form_of_a_resource_location_is_understood(controller, tmp_path):
         "nonsense",
     ],
 )
-def test_a_location_that_is_no_local_file_is_refused(controller, uri):
+def test_a_location_that_is_not_a_local_file_is_refused(controller, uri):
     assert "fmuResourceLocation" in refusal(controller, resources=uri)
 
 
-def test_without_a_location_a_model_that_needs_resources_says_so_and_reads_no_other_folder(
+def test_without_a_location_a_model_that_needs_resources_reports_it_and_reads_no_other_folder(
     controller, monkeypatch
 ):
     monkeypatch.chdir(controller.folder / "resources")
@@ -182,7 +182,7 @@ DAMAGE = [
 
 
 @pytest.mark.parametrize(("damage", "words"), DAMAGE, ids=[" ".join(words) for _, words in DAMAGE])
-def test_a_broken_design_is_refused_with_what_is_wrong_in_it(controller, tmp_path, damage, words):
+def test_a_broken_design_is_refused_and_the_message_states_the_fault(controller, tmp_path, damage, words):
     text = (controller.folder / "resources" / "design.toml").read_text(encoding="utf-8")
     broken = damage(text)
     assert broken != text
@@ -209,7 +209,7 @@ def test_measurements_named_like_another_variable_are_refused(controller, tmp_pa
 
 
 @pytest.mark.parametrize("name", ["", "two words", "1st", "x-p", "x[1"])
-def test_measurements_whose_name_is_no_structured_name_are_refused(controller, tmp_path, name):
+def test_measurements_without_a_structured_name_are_refused(controller, tmp_path, name):
     design = shipped_design(controller)
     design["measurements"][0]["name"] = name
     (tmp_path / "design.toml").write_text(design_text(design), encoding="utf-8")
@@ -217,7 +217,7 @@ def test_measurements_whose_name_is_no_structured_name_are_refused(controller, t
     assert status == 1 and name in said
 
 
-def test_another_design_has_another_guid_and_does_not_fit_the_old_description(controller, tmp_path):
+def test_another_design_has_another_guid_and_does_not_match_the_old_description(controller, tmp_path):
     design = shipped_design(controller)
     design["t_on"] = 41.0
     other = redesigned(controller, design_text(design), tmp_path / "other")
@@ -227,7 +227,7 @@ def test_another_design_has_another_guid_and_does_not_fit_the_old_description(co
     assert other.description.guid in message and controller.description.guid in message
 
 
-def test_the_same_design_written_otherwise_has_the_same_guid(controller, tmp_path):
+def test_the_same_design_in_another_notation_has_the_same_guid(controller, tmp_path):
     text = "# a comment\n" + design_text(shipped_design(controller))
     same = redesigned(controller, text, tmp_path / "same")
     assert same.description.guid == controller.description.guid
@@ -258,7 +258,7 @@ def test_every_category_in_use_is_declared(fmu):
     assert used == {"logStatusDiscard", "logStatusError"} and used <= declared
 
 
-def test_naming_a_category_restricts_the_messages_to_it(fmu):
+def test_only_messages_of_the_chosen_categories_are_logged(fmu):
     with Instance(fmu) as instance:
         instance.start()
         chosen = (ctypes.c_char_p * 1)(b"logStatusError")

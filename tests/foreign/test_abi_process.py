@@ -1,4 +1,4 @@
-"""Instances and their process: second runs, many at once, loading, unloading, side effects."""
+"""Instances and their process: second runs, many instances, loading, unloading, side effects."""
 
 import _ctypes
 import ctypes
@@ -30,7 +30,7 @@ INSTANCES, ROUNDS, STEPS = 200, 5, 12
 
 
 def happen(instance, what):
-    """Brings a new instance into the situation from which it will be reset."""
+    """Brings a new instance into the state in which it will be reset."""
     name = instance.fmu.names(causality="parameter", variability="fixed", type="Real")[0]
     if what == "values set":
         instance.set({name: 7.0})
@@ -61,7 +61,7 @@ def test_a_run_after_a_reset_has_the_same_bits_as_the_first(fmu, before):
         assert drive(instance, 0, 200) == wanted
 
 
-def test_two_hundred_instances_in_threads_do_what_each_does_alone(fmu):
+def test_two_hundred_instances_in_threads_give_the_results_of_each_alone(fmu):
     alone = []
     for k in range(INSTANCES):
         with begun(fmu, 0) as instance:
@@ -80,7 +80,7 @@ def test_two_hundred_instances_in_threads_do_what_each_does_alone(fmu):
 
 
 def in_own_process(python, function, *arguments):
-    """What a function of this module prints when it is called in a process of its own."""
+    """The output of a function of this module that is called in a process of its own."""
     code = f"import sys, test_abi_process as t; t.{function}(*sys.argv[1:])"
     return python("-c", code, *arguments, cwd=HERE)
 
@@ -105,7 +105,7 @@ def load_and_unload(folder):
     print(json.dumps(results))
 
 
-def test_libraries_can_be_loaded_and_unloaded_again_and_again(fmu, python):
+def test_libraries_can_be_loaded_and_unloaded_repeatedly(fmu, python):
     done = in_own_process(python, "load_and_unload", fmu.folder)
     assert done.returncode == 0, done.stderr
     results = json.loads(done.stdout)
@@ -114,7 +114,7 @@ def test_libraries_can_be_loaded_and_unloaded_again_and_again(fmu, python):
 
 
 def err_and_succeed(folder):
-    """Makes all kinds of calls, right and wrong, and prints nothing."""
+    """Makes many valid and invalid calls, and prints nothing."""
     fmu = Fmu(folder)
     for log in (True, False):
         Instance(fmu, guid=b"%s%n", log=log)
@@ -132,13 +132,13 @@ def err_and_succeed(folder):
             instance.call("CancelStep")
 
 
-def test_nothing_is_ever_printed(fmu, python):
+def test_nothing_is_printed(fmu, python):
     done = in_own_process(python, "err_and_succeed", fmu.folder)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
 def panic_in_a_step(folder):
-    """Prints status and message of panics in two threads, and what an instance beside them does."""
+    """Prints status and message of panics in two threads, and the results of another instance."""
     fmu = Fmu(folder)
 
     def panic(_):
@@ -186,7 +186,7 @@ def test_a_library_exports_the_same_functions_whatever_its_module_defines(hostil
 
 
 def settings_of_the_process():
-    """What an FMU has to leave as it was."""
+    """The settings of the process that an FMU must not change."""
     libm = ctypes.CDLL("libm.so.6")
     mask = os.umask(0)
     os.umask(mask)
@@ -221,12 +221,12 @@ def leave_the_process_alone(folder, place):
     print([(key, before[key], after[key]) for key in before if before[key] != after[key]])
 
 
-def test_locale_folder_signals_and_rounding_stay_as_they_were(fmu, python, tmp_path):
+def test_locale_folder_signals_and_rounding_are_unchanged(fmu, python, tmp_path):
     done = in_own_process(python, "leave_the_process_alone", fmu.folder, tmp_path)
     assert (done.returncode, done.stdout.strip(), done.stderr) == (0, "[]", "")
 
 
-def test_instances_of_one_library_do_not_touch_each_other(fmu):
+def test_instances_of_one_library_do_not_affect_each_other(fmu):
     with begun(fmu, 0) as calm, begun(fmu, 0) as wild, begun(fmu, 0) as alone:
         for k in range(60):
             if k == 20:

@@ -32,7 +32,7 @@ def refused(instance, data, size=None):
     return message
 
 
-def test_the_excitation_leads_through_all_that_matters(plant, controller):
+def test_the_excitation_covers_stick_slip_and_compensation(plant, controller):
     with begun(plant, 0) as instance:
         regimes = [
             drive(instance, k, 1) and instance.get("regime")[0] for k in range(BEFORE + AFTER)
@@ -47,7 +47,7 @@ def test_the_excitation_leads_through_all_that_matters(plant, controller):
 
 
 @pytest.mark.parametrize("mark", [0, 1, 37, BEFORE, 160])
-def test_a_state_set_again_gives_the_same_bits(fmu, mark):
+def test_restoring_a_state_gives_the_same_bits(fmu, mark):
     with begun(fmu, mark) as instance:
         state = taken(instance)
         first = drive(instance, mark, AFTER)
@@ -78,14 +78,14 @@ def test_a_serialized_state_continues_bit_by_bit_in_another_process(fmu, mark, p
         assert continued == drive(instance, mark, AFTER)
 
 
-def test_taking_and_serializing_a_state_changes_nothing(fmu):
+def test_saving_and_serializing_a_state_changes_nothing(fmu):
     with begun(fmu, 0) as watched, begun(fmu, 0) as left_alone:
         for k in range(AFTER):
             serialized(watched)
             assert drive(watched, k, 1) == drive(left_alone, k, 1)
 
 
-def test_a_state_holds_inputs_and_slopes_that_wait_for_their_step(fmu):
+def test_a_state_contains_inputs_and_slopes_set_for_the_next_step(fmu):
     names = fmu.names(causality="input", type="Real")
     with begun(fmu, BEFORE) as instance:
         for name in names:
@@ -104,7 +104,7 @@ def test_a_state_holds_inputs_and_slopes_that_wait_for_their_step(fmu):
         assert instance.outputs() != wanted
 
 
-def test_a_state_holds_parameters_start_time_and_stop_time(plant):
+def test_a_state_contains_parameters_start_time_and_stop_time(plant):
     with Instance(plant) as instance:
         instance.start({"F_c": 11.0, "u": 4.0}, start=3.0, stop=3.5)
         data = serialized(instance)
@@ -117,7 +117,7 @@ def test_a_state_holds_parameters_start_time_and_stop_time(plant):
         assert "stopTime" in instance.last_message()
 
 
-def test_a_state_brings_an_instance_back_from_every_end(fmu):
+def test_a_state_restores_an_instance_after_every_kind_of_end(fmu):
     with begun(fmu, BEFORE) as instance:
         data = serialized(instance)
         wanted = drive(instance, BEFORE, 20)
@@ -129,7 +129,7 @@ def test_a_state_brings_an_instance_back_from_every_end(fmu):
         assert drive(instance, BEFORE, 20) == wanted
 
 
-def test_a_state_taken_before_initialization_is_one_too(fmu):
+def test_a_state_can_be_saved_before_initialization(fmu):
     with Instance(fmu) as instance:
         instance.set(START[fmu.identifier])
         data = serialized(instance)
@@ -140,7 +140,7 @@ def test_a_state_taken_before_initialization_is_one_too(fmu):
         assert drive(instance, 0, 40) == wanted
 
 
-def test_a_state_can_be_overwritten_and_freed_twice(fmu):
+def test_a_state_can_be_overwritten_and_freed_and_freeing_null_is_accepted(fmu):
     with begun(fmu, 10) as instance:
         state = taken(instance)
         drive(instance, 10, 10)
@@ -153,7 +153,7 @@ def test_a_state_can_be_overwritten_and_freed_twice(fmu):
         instance.must("FreeFMUstate", byref(state))
 
 
-def test_a_place_too_small_for_the_bytes_is_refused_and_left_alone(fmu):
+def test_a_buffer_too_small_for_the_bytes_is_refused_and_unchanged(fmu):
     with begun(fmu, 3) as instance:
         state, size = taken(instance), c_size_t()
         instance.must("SerializedFMUstateSize", state, byref(size))
@@ -173,7 +173,7 @@ def test_every_truncated_state_is_refused(fmu):
         restore(instance, data)
 
 
-def test_every_altered_byte_is_noticed(fmu):
+def test_every_altered_byte_is_detected(fmu):
     with begun(fmu, BEFORE) as instance:
         data = serialized(instance)
         for position in range(len(data)):
@@ -185,7 +185,7 @@ def test_every_altered_byte_is_noticed(fmu):
         restore(instance, data)
 
 
-def test_bytes_that_are_no_state_are_refused(fmu):
+def test_bytes_that_are_not_a_state_are_refused(fmu):
     chance = random.Random(20)
     with begun(fmu, 5) as instance:
         for length in (0, 1, 8, 39, 40, 41, 100, 5000):

@@ -1,4 +1,4 @@
-"""Communication steps: their time and size, the stop time, what the status functions say."""
+"""Communication steps: their time and size, the stop time, the results of the status functions."""
 
 import re
 from ctypes import c_int
@@ -27,7 +27,7 @@ def last_successful_time(instance):
 
 
 @pytest.mark.parametrize("size", [0.0, -0.0, -1e-3, nan, inf, -inf])
-def test_step_sizes_that_are_no_positive_number_are_an_error(fmu, size):
+def test_step_sizes_that_are_not_positive_are_an_error(fmu, size):
     with Instance(fmu) as instance:
         instance.start()
         assert instance.call("DoStep", 0.0, size, 1) == ERROR
@@ -46,7 +46,7 @@ def test_a_communication_point_other_than_the_time_reached_is_an_error(fmu, poin
         assert "0.01" in instance.last_message()
 
 
-def test_a_communication_point_off_by_rounding_is_fine(fmu):
+def test_a_communication_point_off_by_rounding_is_accepted(fmu):
     with Instance(fmu) as instance:
         instance.start(stop=100.0)
         time = 0.0
@@ -58,7 +58,7 @@ def test_a_communication_point_off_by_rounding_is_fine(fmu):
 
 
 @pytest.mark.parametrize(("time", "size"), [(1e3, 1e-20), (1e9, 1e-8), (1.0, 1e-16), (-4.0, 1e-17)])
-def test_a_step_below_the_resolution_of_time_is_an_error_with_the_smallest_one(fmu, time, size):
+def test_a_step_below_the_resolution_of_time_is_an_error_with_the_smallest_step(fmu, time, size):
     smallest = nextafter(time, inf) - time
     assert size < smallest
     with Instance(fmu) as instance:
@@ -83,7 +83,7 @@ def test_a_step_that_ends_before_the_time_reached_is_an_error(fmu):
         assert instance.get("time") == [5e-10]
 
 
-def test_time_is_what_the_steps_add_up_to(fmu):
+def test_time_is_the_sum_of_the_steps(fmu):
     with Instance(fmu) as instance:
         instance.start(start=-2.5)
         assert instance.get("time") == [-2.5] and last_successful_time(instance) == -2.5
@@ -123,13 +123,13 @@ def test_a_step_past_the_stop_time_is_an_error(fmu):
         ((1, inf, 0.0, 0, 0.0), "tolerance"),
     ],
 )
-def test_experiments_that_make_no_sense_are_refused(fmu, experiment, word):
+def test_invalid_experiments_are_refused(fmu, experiment, word):
     with Instance(fmu) as instance:
         assert instance.call("SetupExperiment", *experiment) == ERROR
         assert "fmi2SetupExperiment" in instance.last_message() and word in instance.last_message()
 
 
-def test_undefined_tolerance_and_stop_time_are_not_looked_at(fmu):
+def test_undefined_tolerance_and_stop_time_are_ignored(fmu):
     with Instance(fmu) as instance:
         instance.must("SetupExperiment", 0, nan, 0.0, 0, -1.0)
         instance.must("EnterInitializationMode")
@@ -144,7 +144,7 @@ def test_without_setup_the_run_starts_at_zero(fmu):
         instance.step(0.0, 0.001)
 
 
-def test_a_step_that_cannot_be_finished_is_discarded_and_says_how_far_it_came(plant):
+def test_a_step_that_cannot_be_completed_is_discarded_with_the_time_reached(plant):
     with Instance(plant) as instance:
         instance.start()
         instance.step(0.0, 0.5)
@@ -157,7 +157,7 @@ def test_a_step_that_cannot_be_finished_is_discarded_and_says_how_far_it_came(pl
         instance.must("Terminate")
 
 
-def test_nothing_ever_pends_and_no_instance_ends_by_itself(fmu):
+def test_no_call_is_pending_and_no_instance_requests_the_end(fmu):
     with Instance(fmu) as instance:
         instance.start()
         instance.step(0.0, 0.001)
@@ -174,7 +174,7 @@ def test_nothing_ever_pends_and_no_instance_ends_by_itself(fmu):
         instance.step(0.001, 0.001)
 
 
-def test_steps_from_a_microsecond_to_a_second_are_taken(fmu):
+def test_steps_from_a_microsecond_to_a_second_are_accepted(fmu):
     with Instance(fmu) as instance:
         instance.start()
         time = 0.0

@@ -1,4 +1,4 @@
-"""Values: what may be set when, what is refused, and that start values are what the XML says."""
+"""Values: when each variable can be set, which values are refused, and start values against the XML."""
 
 import math
 
@@ -39,7 +39,7 @@ def names_value(text, value):
     return any(is_number(word) and float(word) == value for word in words)
 
 
-def test_start_values_are_those_of_the_description(fmu):
+def test_start_values_equal_those_of_the_description(fmu):
     for entered in (True, False):
         with Instance(fmu) as instance:
             instance.enter() if entered else instance.start()
@@ -53,7 +53,7 @@ def test_start_values_are_those_of_the_description(fmu):
                 assert instance.get(name) == [float(start) if wanted is None else wanted], name
 
 
-def test_every_parameter_and_input_keeps_what_is_set_before_the_start(fmu):
+def test_every_parameter_and_input_keeps_a_value_set_before_the_start(fmu):
     with Instance(fmu) as instance:
         names = fmu.names(causality="parameter", type="Real") + fmu.names(
             causality="input", type="Real"
@@ -78,7 +78,7 @@ def test_numbers_that_are_not_finite_are_discarded_and_change_nothing(fmu, value
         assert instance.get(*names) == [float(fmu.variables[name].start) for name in names]
 
 
-def test_a_discarded_number_takes_its_whole_call_with_it(plant):
+def test_a_discarded_number_discards_its_whole_call(plant):
     with Instance(plant) as instance:
         instance.enter()
         refused = instance.call("SetReal", plant.references("u", "f_a"), 2, reals(5, math.nan))
@@ -98,14 +98,14 @@ def test_input_derivatives_that_are_not_finite_are_an_error(fmu, value):
 
 
 def same_reference(fmu, name):
-    """The variable and its aliases, which cannot be told apart by their value reference."""
+    """The variable and its aliases, which have the same value reference."""
     own = fmu.variables[name]
     alike = lambda v: (v.type, v.valueReference) == (own.type, own.valueReference)
     return [other.name for other in fmu.variables.values() if alike(other)]
 
 
 def refused_in_each_phase(fmu, name, phases):
-    """Sets the variable to zero in each phase: an error that names it, every time."""
+    """Sets the variable to zero in each phase; each time the error must name it."""
     for phase in phases:
         with Instance(fmu) as instance:
             if phase == "initialization mode":
@@ -128,14 +128,14 @@ def test_outputs_locals_and_time_can_never_be_set(fmu):
             refused_in_each_phase(fmu, name, PHASES)
 
 
-def test_fixed_parameters_cannot_be_set_once_the_run_goes(fmu):
+def test_fixed_parameters_cannot_be_set_during_the_run(fmu):
     fixed = fmu.names(causality="parameter", variability="fixed")
     assert len(fixed) > 10
     for name in fixed:
         refused_in_each_phase(fmu, name, PHASES[2:])
 
 
-def test_tunable_parameters_and_inputs_can_be_set_while_the_run_goes(plant):
+def test_tunable_parameters_and_inputs_can_be_set_during_the_run(plant):
     with Instance(plant) as instance:
         instance.start({"v_p_0": 0.4})
         before = instance.get("f_fric")
@@ -173,7 +173,7 @@ def test_tunable_parameters_out_of_range_are_refused_by_the_next_step(plant, nam
         assert instance.get("x_p", "theta", "v_p", "omega") == state
 
 
-def test_parameters_that_break_a_rule_only_between_two_calls_are_fine(plant):
+def test_parameters_that_break_a_rule_only_between_two_calls_are_accepted(plant):
     with Instance(plant) as instance:
         instance.setup()
         instance.set({"F_c": 40.0})
@@ -185,7 +185,7 @@ def test_parameters_that_break_a_rule_only_between_two_calls_are_fine(plant):
         assert not instance.messages
 
 
-def test_derivatives_are_for_inputs_and_outputs_of_an_order_of_at_least_one(plant):
+def test_derivatives_are_only_for_inputs_and_outputs_with_an_order_of_at_least_one(plant):
     wrong = [
         ("SetRealInputDerivatives", "x_p", 1),
         ("SetRealInputDerivatives", "F_c", 1),

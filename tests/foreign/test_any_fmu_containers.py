@@ -1,4 +1,4 @@
-"""Containers with both of our FMUs inside, run by our master: the same result as their parts.
+"""Containers with both of our FMUs, run by our master: the results equal those of their parts.
 
 The containers are those of Renault's fmu-manipulation-toolbox and of FMPy.
 """
@@ -42,7 +42,7 @@ def parts(aso_ftc, packed, tmp_path_factory):
 
 
 def of_the_toolbox(packed, unpacked, folder):
-    """A container of the toolbox; its outputs are called as in the parts."""
+    """A container of the toolbox; its outputs have the names of the parts' outputs."""
     made = FMUContainer("loop", packed["plant"].parent)
     for role, path in packed.items():
         made.get_fmu(path.name)
@@ -59,7 +59,7 @@ def of_the_toolbox(packed, unpacked, folder):
 
 
 def of_fmpy(packed, folder):
-    """A container of FMPy: Real outputs, and the settings as parameters that start with them."""
+    """A container of FMPy: Real outputs, and the settings as start values of parameters."""
     components, exposed, outputs = {}, {}, []
     for role, path in packed.items():
         description = read_model_description(str(path))
@@ -77,7 +77,7 @@ def of_fmpy(packed, folder):
             else:
                 outer.initial, outer.start = variable.initial or "exact", text(start)
             exposed[outer] = [(components[role], variable)]
-    # FMPy 0.3.32 writes the type of a connection as FMI 2.0 has it, its container wants FMI 3.0.
+    # FMPy 0.3.32 writes the type of a connection as in FMI 2.0, but its container expects FMI 3.0.
     ends = {
         (role, v.name): evolve(v, type="Float64")
         for role, component in components.items()
@@ -92,7 +92,7 @@ def of_fmpy(packed, folder):
     interface = CoSimulation("container_fmu", fixedInternalStepSize=STEP)
     interface.canHandleVariableCommunicationStepSize = True
     description = ModelDescription("2.0", "loop", "own", coSimulation=interface)
-    # The container gives value reference 0 to the time, whether it is described or not.
+    # The container gives value reference 0 to the time, even if it is not in the description.
     time = ModelVariable("time", None, "Real")
     time.causality, time.variability = "independent", "continuous"
     description.modelVariables, description.outputs = [time, *exposed], outputs
@@ -106,7 +106,7 @@ def of_fmpy(packed, folder):
 
 
 def expect_parts(table, parts, names):
-    """The container has the bits of its parts from the first step on."""
+    """Checks that the container has the bits of its parts from the first step on."""
     assert numbers(table, "time") == pytest.approx(np.arange(COUNT + 1) * STEP, abs=1e-12)
     assert {"plant.x_p", "controller.u"} < set(names)
     for name in names:
@@ -116,7 +116,7 @@ def expect_parts(table, parts, names):
 
 
 def outputs(unpacked):
-    """All Real outputs, and those of them that no input changes at once."""
+    """All Real outputs, and those that depend directly on no input."""
     every = [
         f"{role}.{name}"
         for role, fmu in unpacked.items()
@@ -141,7 +141,7 @@ def test_a_container_of_the_toolbox_has_the_bits_of_its_parts(
 
 
 def test_a_container_of_fmpy_has_the_bits_of_its_parts(aso_ftc, packed, unpacked, parts, tmp_path):
-    """It sets the inputs of the next step before outputs are read: those they change are ahead."""
+    """FMPy sets inputs of the next step before it reads outputs: directly dependent outputs are ahead."""
     path = of_fmpy(packed, tmp_path)
     every, held = outputs(unpacked)
     assert set(every) - set(held) == {"plant.f_fric"}

@@ -1,4 +1,4 @@
-"""The examples of this workspace, each alone in our master, to the bits of FMPy's fmi2DoStep."""
+"""The examples of this workspace, each alone in our master: the bits equal those of FMPy's fmi2DoStep."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from any_fmu import numbers, run, stepped
 from conftest import EXAMPLES
 
 STEP, COUNT = 2.0**-7, 384  # s; three seconds
-# One input of each FMU that has some, so that something happens.
+# One input of each FMU that has inputs, so that its outputs move.
 DRIVEN = {
     "Pid": {"w": 1.0, "mode": 2},
     "LookupTable": {"speed": 90.0},
@@ -18,7 +18,7 @@ DRIVEN = {
 
 
 def driven(model, variables):
-    """Settings of an example: those inputs of DRIVEN that it has."""
+    """Settings of an example: the inputs of DRIVEN that it has."""
     return {name: value for name, value in DRIVEN.get(model, {}).items() if name in variables}
 
 

@@ -1,6 +1,6 @@
 """FMUs that PythonFMU exported, coupled by our master.
 
-Its libraries expect Python in the process: without --preload the refusal says so, with it they run.
+Their libraries expect Python in the process: without --preload the error says so, with it they run.
 """
 
 import os
@@ -14,7 +14,7 @@ from any_fmu import numbers, run
 from lqr_controller import GAINS, STATES
 from test_swap import foreign, preload  # noqa: F401
 
-# An embedded Python looks for its modules beside the python3 of PATH, whichever that is.
+# An embedded Python searches its modules beside the first python3 in PATH.
 ENVIRONMENT = {**os.environ, "PYTHONHOME": sys.base_prefix}
 STEP, COUNT = 2.0**-8, 512  # s; two seconds
 EVERY_TYPE = '''
@@ -47,7 +47,7 @@ def loop(foreign, packed):  # noqa: F811
     return {"plant": packed["plant"], "controller": foreign / "LqrController.fmu"}, links
 
 
-def test_a_regulator_of_pythonfmu_answers_the_outputs_of_the_step_before(
+def test_a_regulator_of_pythonfmu_uses_the_outputs_of_the_previous_step(
     aso_ftc, loop, preload, tmp_path  # noqa: F811
 ):
     fmus, links = loop
@@ -57,12 +57,12 @@ def test_a_regulator_of_pythonfmu_answers_the_outputs_of_the_step_before(
     states = np.array([numbers(table, f"plant.{name}") for name in STATES]).T
     force = numbers(table, "controller.u")
     assert len(force) == COUNT + 1 and abs(force).max() > 1
-    # The law of lqr_controller.py, summed in its order.
+    # The law of lqr_controller.py, with the same order of summation.
     expected = np.array([-sum(k * x for k, x in zip(GAINS, row)) for row in states.tolist()])
     assert np.array_equal(force[2:], expected[1:-1]), "each from the begin of its step"
 
 
-def test_a_regulator_of_pythonfmu_gives_the_same_in_a_process_of_its_own(
+def test_a_regulator_of_pythonfmu_gives_the_same_results_in_a_process_of_its_own(
     aso_ftc, loop, preload, tmp_path  # noqa: F811
 ):
     fmus, links = loop
@@ -87,7 +87,7 @@ def test_variables_of_every_type_of_pythonfmu_are_recorded(
     assert even == [k % 2 == 0 for k in range(9)]
 
 
-def test_without_python_in_the_process_the_refusal_explains_preload(aso_ftc, loop, tmp_path):
+def test_without_python_in_the_process_the_error_explains_preload(aso_ftc, loop, tmp_path):
     fmus, links = loop
     message = run(aso_ftc, tmp_path, fmus, STEP, 1, links=links, status=2)
     assert "undefined symbol" in message, "what the loader said"

@@ -1,8 +1,8 @@
-"""README.md and the book: every command in them runs, and what they show of it is what it prints.
+"""README.md and the book: every command in them runs, and the outputs shown are those of the commands.
 
-The blocks marked `sh` of a page run in the order of the page, with the built command, in a copy of the folder, in
-which the FMUs are packed. A comment on the line before a block says that it cannot run here, and why, or with which
-status it ends: `<!-- not run: REASON -->`, `<!-- ends with status N -->`.
+The blocks marked `sh` of a page run in the order of the page, with the built command, in a copy of the folder with
+packed FMUs. A comment on the line before a block says why it cannot run here, or which exit status it has:
+`<!-- not run: REASON -->`, `<!-- ends with status N -->`.
 """
 
 import os
@@ -21,8 +21,8 @@ BLOCK = re.compile(r"(?:^<!-- ([^\n]*) -->\n)?^```(\w*)\n(.*?)^```$", re.MULTILI
 LANGUAGES = {"sh", "text", "toml", "python", "rust", "lua", "xml"}
 LEFT_OUT = shutil.ignore_patterns(".git", ".venv", "target", "results", "dist", "__pycache__", "fuzz")
 
-# Stands on PATH for `aso-ftc` and `cargo run --release --`. What builds libraries runs in the real folder, where they
-# are built already, and writes into the copy.
+# Replaces `aso-ftc` and `cargo run --release --` on PATH. Commands that build libraries run in the
+# real folder, where the libraries are built already, and write into the copy.
 STAND_IN = f'''#!{sys.executable}
 import os, shutil, sys
 from pathlib import Path
@@ -51,7 +51,7 @@ os.execv(command, [command, *arguments])
 
 
 def blocks(page):
-    """Each block of a page: the remark before it, its language, its text."""
+    """Each block of a page: the comment before it, its language, its text."""
     return BLOCK.findall(page.read_text(encoding="utf-8"))
 
 
@@ -62,7 +62,7 @@ def name(page):
 
 @pytest.fixture(scope="module")
 def copy(tmp_path_factory):
-    """Runs a shell text in a copy of the folder, once: a later call gets the same exit status and output."""
+    """Runs a shell text in a copy of the folder, once: a later call returns the same exit status and output."""
     home = tmp_path_factory.mktemp("book")
     folder, programs = home / "copy", home / "programs"
     shutil.copytree(ROOT, folder, ignore=LEFT_OUT, symlinks=True)
@@ -116,7 +116,7 @@ def shown(page, index):
     return [b[2] for b in blocks(page) if b[1] == "text"][index].splitlines()
 
 
-def test_the_first_tutorial_shows_what_is_printed_and_files_as_they_are(copy):
+def test_the_first_tutorial_shows_the_printed_output_and_the_files_unchanged(copy):
     page = ROOT / "docs" / "tutorials" / "first-coupled-system.md"
     commands = [b[2] for b in blocks(page) if b[1] == "sh"]
     for index, command in ((0, 0), (1, 1), (2, 3)):
@@ -128,7 +128,7 @@ def test_the_first_tutorial_shows_what_is_printed_and_files_as_they_are(copy):
     assert (files / "biased.toml").read_text(encoding="utf-8") == f"{whole}\n{added}"
 
 
-def test_the_swapped_controller_has_the_residual_that_is_shown(copy):
+def test_the_swapped_controller_has_the_residual_shown_on_the_page(copy):
     page = ROOT / "docs" / "tutorials" / "swap.md"
     build, theirs, ours = [b[2] for b in blocks(page) if b[1] == "sh"][:3]
     assert copy(build).returncode == 0

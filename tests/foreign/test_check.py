@@ -1,4 +1,4 @@
-"""`aso-ftc check` on FMUs with one fault each; the schema, FMPy and Python's zipfile are the judges."""
+"""`aso-ftc check` on FMUs with one fault each; the references are the schema, FMPy and Python's zipfile."""
 
 import json
 import random
@@ -17,7 +17,7 @@ REFUSES = "FMPy refuses what the schema does not allow"
 
 @pytest.fixture
 def check(aso_ftc):
-    """Checks an FMU: exit status and findings as (severity, part, where, what, why, section)."""
+    """Checks an FMU; returns exit status and findings as (severity, part, where, what, why, section)."""
 
     def run(path, *more):
         done = aso_ftc("check", "--json", *more, path)
@@ -32,7 +32,7 @@ def check(aso_ftc):
 
 @pytest.fixture(scope="session")
 def files(packed):
-    """Name and content of the files in the plant."""
+    """Name and content of the files in the plant's FMU."""
     with zipfile.ZipFile(packed["plant"]) as archive:
         return {name: archive.read(name) for name in archive.namelist()}
 
@@ -43,7 +43,7 @@ def library(files):
 
 @pytest.fixture
 def fmu(tmp_path, files):
-    """Packs the plant with changed files (None: left out) into an FMU."""
+    """Packs the plant with changed files (None: omitted) into an FMU."""
 
     def pack(changes, method=zipfile.ZIP_DEFLATED, name="Changed.fmu"):
         path = tmp_path / name
@@ -74,7 +74,7 @@ def test_our_fmus_break_no_rule_and_need_the_glibc_that_is_in_their_symbols(chec
     assert f"glibc {newest} " in the_one(findings, "binaries", "glibc")["what"]
 
 
-def test_what_cannot_be_read_ends_with_status_2(aso_ftc, fmu, tmp_path):
+def test_a_file_that_cannot_be_read_as_an_fmu_ends_with_status_2(aso_ftc, fmu, tmp_path):
     (tmp_path / "Text.fmu").write_text("no archive")
     for path in [tmp_path / "Text.fmu", tmp_path / "Nowhere.fmu", fmu({"modelDescription.xml": "<a"})]:
         done = aso_ftc("check", path)
@@ -82,7 +82,7 @@ def test_what_cannot_be_read_ends_with_status_2(aso_ftc, fmu, tmp_path):
 
 
 def mutated(xml, seed):
-    """The description with one change, made by chance."""
+    """The description with one random change."""
     chance = random.Random(seed)
     root = etree.fromstring(xml)
     element = chance.choice([own for own in root.iter() if isinstance(own.tag, str)])
@@ -102,7 +102,7 @@ def mutated(xml, seed):
     return etree.tostring(root, xml_declaration=True, encoding="UTF-8")
 
 
-def test_what_the_schema_refuses_is_an_error_and_what_fmpy_is_said_to_refuse_it_refuses(
+def test_what_the_schema_refuses_is_an_error_and_fmpy_refuses_what_check_says(
     aso_ftc, tmp_path, files
 ):
     schema = etree.XMLSchema(etree.parse(SCHEMA))
@@ -130,18 +130,18 @@ def test_compression_that_importers_cannot_read_is_refused(aso_ftc, fmu):
         assert "expected compression by deflate, or none" in done.stderr, (name, done)
 
 
-def test_paths_with_backslashes_are_an_error_and_the_fmu_is_read_all_the_same(check, fmu, files):
+def test_paths_with_backslashes_are_an_error_and_the_fmu_is_still_read(check, fmu, files):
     name = library(files)
     path = fmu({name: None, name.replace("/", "\\"): files[name]})
     status, findings = check(path, "--no-run")
     assert status == 1
     found = the_one(findings, "archive", "backslashes")
     assert found["severity"] == "error" and found["where"] == name.replace("/", "\\")
-    # The library is found: it is only its path that is wrong.
+    # The library is found: only its path is wrong.
     assert not [own for own in findings if own["part"] == "binaries" and own["severity"] == "error"]
 
 
-def test_stored_entries_of_a_stream_are_an_error(check, tmp_path, files):
+def test_stored_entries_with_data_descriptors_are_an_error(check, tmp_path, files):
     path = tmp_path / "Stream.fmu"
 
     class Stream:
@@ -174,12 +174,12 @@ def test_stored_entries_of_a_stream_are_an_error(check, tmp_path, files):
         ({"extra/data": "1"}, "reverse domain name", "warning"),
     ],
 )
-def test_odd_files_are_found(check, fmu, changes, words, severity):
+def test_unusual_files_are_reported(check, fmu, changes, words, severity):
     _, findings = check(fmu(changes), "--no-run")
     assert the_one(findings, "archive", words)["severity"] == severity
 
 
-def test_source_files_that_are_not_there_are_an_error(check, fmu, files):
+def test_missing_source_files_are_an_error(check, fmu, files):
     xml = files["modelDescription.xml"].decode()
     with_sources = re.sub(
         r"(<CoSimulation[^>]*)/>", r'\1><SourceFiles><File name="a.c"/></SourceFiles></CoSimulation>', xml
@@ -192,7 +192,7 @@ def test_source_files_that_are_not_there_are_an_error(check, fmu, files):
 
 
 @pytest.mark.parametrize("name", ["./a.c", "sub/a.c", "sub\\a.c", "sources/a.c", "sub/../a.c", "./sub/./a.c"])
-def test_source_files_are_found_however_their_path_is_written(check, fmu, files, name):
+def test_source_files_are_found_in_every_notation_of_their_path(check, fmu, files, name):
     xml = files["modelDescription.xml"].decode()
     stated = rf'\1><SourceFiles><File name="{name}"/></SourceFiles></CoSimulation>'.replace("sub\\", "sub\\\\")
     xml = re.sub(r"(<CoSimulation[^>]*)/>", stated, xml)
@@ -203,7 +203,7 @@ def test_source_files_are_found_however_their_path_is_written(check, fmu, files,
     assert the_one(findings, "archive", "SourceFiles")["severity"] == "error"
 
 
-def test_a_source_file_in_another_case_is_a_warning_and_one_outside_an_error(check, fmu, files):
+def test_a_source_file_in_another_case_is_a_warning_and_one_outside_of_sources_an_error(check, fmu, files):
     xml = files["modelDescription.xml"].decode()
     for name, severity, words in [("A.c", "warning", "SourceFiles"), ("../../a.c", "error", "a file in sources")]:
         stated = rf'\1><SourceFiles><File name="{name}"/></SourceFiles></CoSimulation>'
@@ -225,7 +225,7 @@ def answer(aso_ftc, path, *more):
     return report["here"], {own["tool"]: own["reason"] for own in report["not_in"]}
 
 
-def test_the_answer_comes_first_and_says_with_what_the_fmu_ran(aso_ftc, packed):
+def test_the_report_starts_with_how_the_fmu_ran(aso_ftc, packed):
     done = aso_ftc("check", packed["plant"])
     first, second, *_ = done.stdout.splitlines()
     assert re.fullmatch(r"runs in this master: yes, 10 steps of \S+ s from t = 0 s .* its own start values", first)
@@ -234,13 +234,13 @@ def test_the_answer_comes_first_and_says_with_what_the_fmu_ran(aso_ftc, packed):
     assert here == {"runs": "not-tried", "reason": "--no-run"} and not tools
 
 
-def test_an_fmu_without_a_library_for_this_platform_is_said_not_to_run_here(aso_ftc, fmu, files):
+def test_an_fmu_without_a_library_for_this_platform_is_reported_not_to_run_here(aso_ftc, fmu, files):
     here, _ = answer(aso_ftc, fmu({library(files): None, "binaries/darwin64/a.dylib": ""}))
     assert here["runs"] == "no" and "linux64" in here["reason"]
 
 
 def validated(path):
-    """Whether FMPy's simulate_fmu takes the description by default."""
+    """Whether FMPy's simulate_fmu accepts the description with its default options."""
     try:
         read_model_description(str(path), validate=True)
     except Exception:
@@ -262,7 +262,7 @@ LIBRARY = "FMI Library (libcosim, PyFMI)"
         ("<InitialUnknowns>.*?</InitialUnknowns>", "", set()),
     ],
 )
-def test_fmpy_refuses_by_default_what_it_is_said_to_refuse(aso_ftc, fmu, files, before, after, tools):
+def test_fmpy_refuses_by_default_what_check_says(aso_ftc, fmu, files, before, after, tools):
     xml, count = re.subn(before, after, files["modelDescription.xml"].decode(), flags=re.DOTALL)
     if "generationDate" in before and not count:
         xml, count = re.subn("<fmiModelDescription", f"<fmiModelDescription {after}", xml, count=1)
@@ -293,7 +293,7 @@ def loads_in_libcosim(python, path):
 @pytest.mark.parametrize(
     "function, tools", [("fmi2GetDirectionalDerivative", {"FMPy"}), ("fmi2DoStep", {"FMPy", LIBRARY})]
 )
-def test_a_missing_function_stops_the_tools_that_need_it(aso_ftc, python, fmu, files, function, tools):
+def test_a_missing_function_is_reported_for_the_tools_that_need_it(aso_ftc, python, fmu, files, function, tools):
     xml = files["modelDescription.xml"].decode().replace(' providesDirectionalDerivative="true"', "")
     name = library(files)
     other = function[:-1] + "X"
@@ -307,7 +307,7 @@ def test_a_missing_function_stops_the_tools_that_need_it(aso_ftc, python, fmu, f
     assert loads_in_libcosim(python, path) == (LIBRARY not in tools)
 
 
-def test_no_tool_is_said_to_refuse_an_identifier_that_libcosim_and_fmpy_take(aso_ftc, python, fmu, files):
+def test_an_identifier_that_libcosim_and_fmpy_accept_is_reported_for_no_tool(aso_ftc, python, fmu, files):
     xml = files["modelDescription.xml"].decode()
     xml = xml.replace('modelIdentifier="FrictionPendulum"', 'modelIdentifier="1-Pendulum"')
     name = library(files)
@@ -317,7 +317,7 @@ def test_no_tool_is_said_to_refuse_an_identifier_that_libcosim_and_fmpy_take(aso
     assert not said and validated(path) and loads_in_libcosim(python, path)
 
 
-def test_equal_findings_are_one_line_with_a_count_and_all_are_in_the_json(aso_ftc, check, fmu, files):
+def test_equal_findings_are_one_line_with_a_count_and_the_json_lists_all(aso_ftc, check, fmu, files):
     xml = files["modelDescription.xml"].decode()
     xml = re.sub(r' unit="[^"]*"', ' unit="?"', xml)
     path = fmu({"modelDescription.xml": xml})
@@ -354,12 +354,12 @@ def test_a_library_of_another_name_is_an_error(check, fmu, files):
     assert other in the_one(findings, "binaries", "expected this library")["what"]
 
 
-def test_functions_that_are_missing_or_have_a_prefix_are_an_error(check, fmu, files):
+def test_functions_that_are_missing_or_prefixed_are_an_error(check, fmu, files):
     name = library(files)
     code = files[name].replace(b"\0fmi2DoStep\0", b"\0fmi2DoStap\0")
     _, findings = check(fmu({name: code}), "--no-run")
     assert the_one(findings, "binaries", "lacks")["what"] == "lacks fmi2DoStep"
-    # Of the same length, as the text has its place in the table.
+    # The new name has the same length, because the text has a fixed place in the table.
     code = files[name].replace(b"\0fmi2CompletedIntegratorStep\0", b"\0FrictionPendulu_fmi2DoStep\0".replace(b"F", b"FF", 1)[:29])
     code = code.replace(b"\0fmi2DoStep\0", b"\0fmi2DoStap\0")
     _, findings = check(fmu({name: code}), "--no-run")
@@ -382,7 +382,7 @@ def test_a_category_that_is_not_declared_is_an_error(check, fmu, files):
     assert {own["section"] for own in findings if own["where"] == "logger"} == {"2.2.4"}
 
 
-def test_people_read_each_finding_with_its_place_section_and_reason(aso_ftc, fmu, files):
+def test_the_text_report_has_each_finding_with_its_place_section_and_reason(aso_ftc, fmu, files):
     xml = files["modelDescription.xml"].decode().replace("<ModelVariables>", '<ModelVariables colour="red">')
     done = aso_ftc("check", "--no-run", fmu({"modelDescription.xml": xml}))
     line = xml[: xml.index("<ModelVariables")].count("\n") + 1

@@ -22,14 +22,14 @@ def design(controller):
 
 
 def begun(controller, values):
-    """An instance after initialization at `Z_0` with the measurements `Y`."""
+    """An instance after initialization with the estimate `Z_0` and the measurements `Y`."""
     instance = Instance(controller)
     start = {**dict(zip(STARTS, Z_0)), "x_p": Y[0], "theta": Y[1], **values}
     return instance.start(start)
 
 
 def advance(instance, time, size, y=Y, slope=SLOPE):
-    """One step with measurements that start at `y`; the estimate afterwards."""
+    """Makes one step with measurements that start at `y`; returns the estimate at its end."""
     instance.set({"x_p": y[0], "theta": y[1]})
     if any(slope):
         instance.set_slopes(x_p=slope[0], theta=slope[1])
@@ -37,7 +37,7 @@ def advance(instance, time, size, y=Y, slope=SLOPE):
     return np.array(instance.get(*ESTIMATES))
 
 
-def test_the_shipped_design_has_the_eigenvalues_that_were_asked_for(design):
+def test_the_shipped_design_has_the_required_eigenvalues(design):
     A, B, C, K_x, K_f, L_x, L_f = (design[n] for n in ("A", "B", "C", "K_x", "K_f", "L_x", "L_f"))
     feedback = np.sort(np.linalg.eigvals(A + B @ K_x))
     assert feedback == pytest.approx([-9.0, -7.5, -6.0, -4.5], rel=1e-6)
@@ -61,7 +61,7 @@ def test_the_shipped_matrices_are_those_of_the_paper(design):
 )
 @pytest.mark.parametrize("slope", [np.zeros(2), SLOPE], ids=["held", "sloped"])
 @pytest.mark.parametrize("size", [1e-5, 1e-3, 0.1])
-def test_one_step_of_any_size_is_the_matrix_exponential(
+def test_a_step_of_any_size_equals_the_matrix_exponential(
     controller, design, size, slope, switch, monitor
 ):
     compensating = switch is ON
@@ -74,7 +74,7 @@ def test_one_step_of_any_size_is_the_matrix_exponential(
         assert instance.get("u") == pytest.approx(u, rel=1e-12)
 
 
-def test_a_small_step_is_what_scipy_makes_of_it_too(controller, design):
+def test_a_small_step_also_equals_scipys_integration(controller, design):
     size = 1e-4
     M, N = linear_system(design, True, True)
     scale = np.array([1, 1, 1e3, 1e3, 1e6])
@@ -86,7 +86,7 @@ def test_a_small_step_is_what_scipy_makes_of_it_too(controller, design):
         assert advance(instance, 0.0, size) == pytest.approx(wanted, rel=1e-9)
 
 
-def test_a_hundred_steps_end_where_one_long_one_ends(controller):
+def test_a_hundred_steps_end_where_one_step_of_their_total_size_ends(controller):
     with begun(controller, ON) as one, begun(controller, ON) as many:
         whole = advance(one, 0.0, 0.05)
         for k in range(100):
@@ -95,7 +95,7 @@ def test_a_hundred_steps_end_where_one_long_one_ends(controller):
 
 
 @pytest.mark.parametrize("monitor", [False, True])
-def test_the_compensation_starts_inside_a_step_where_t_on_lies_there(controller, design, monitor):
+def test_the_compensation_starts_inside_of_the_step_that_contains_t_on(controller, design, monitor):
     switch, size = 0.00037, 0.001
     with begun(controller, {"t_on": switch, "monitor": monitor}) as instance:
         found = advance(instance, 0.0, size)
@@ -105,7 +105,7 @@ def test_the_compensation_starts_inside_a_step_where_t_on_lies_there(controller,
         assert instance.get("u") == pytest.approx(command(design, found, True), rel=1e-12)
 
 
-def test_the_compensation_is_on_from_t_on_itself_and_off_just_before(controller, design):
+def test_the_compensation_is_on_at_t_on_and_off_just_before(controller, design):
     for t_on, compensating in ((0.003, True), (0.0030001, False)):
         with begun(controller, {"t_on": t_on}) as instance:
             for k in range(3):
@@ -116,7 +116,7 @@ def test_the_compensation_is_on_from_t_on_itself_and_off_just_before(controller,
             assert found[4] == Z_0[4]
 
 
-def test_without_compensate_t_on_passes_unnoticed(controller):
+def test_without_compensate_t_on_has_no_effect(controller):
     values = {"t_on": 0.002, "compensate": False}
     with begun(controller, values) as instance, begun(controller, OFF) as never:
         for k in range(5):
@@ -126,7 +126,7 @@ def test_without_compensate_t_on_passes_unnoticed(controller):
         assert (advance(instance, 0.005, 0.001) != advance(never, 0.005, 0.001)).any()
 
 
-def test_slopes_of_the_outputs_are_the_right_hand_side(controller, design):
+def test_slopes_of_the_outputs_are_those_of_the_right_hand_side(controller, design):
     M, N = linear_system(design, True, True)
     with begun(controller, ON) as instance:
         z = advance(instance, 0.0, 1e-3)
@@ -139,7 +139,7 @@ def test_slopes_of_the_outputs_are_the_right_hand_side(controller, design):
         assert abs(instance.slopes_of("u")[0] - slope) <= 1e-13 * scale
 
 
-def test_slopes_of_the_measurements_hold_for_one_step_only(controller, design):
+def test_slopes_of_the_measurements_apply_to_one_step_only(controller, design):
     with begun(controller, ON) as instance:
         z = advance(instance, 0.0, 1e-3)
         found = advance(instance, 1e-3, 1e-3, slope=np.zeros(2))
@@ -149,7 +149,7 @@ def test_slopes_of_the_measurements_hold_for_one_step_only(controller, design):
 
 
 @pytest.mark.parametrize("changed", [{"x_p": 5.0}, {"theta": -3.0}, {"compensate": False}])
-def test_outputs_do_not_follow_inputs_that_are_set_between_steps(controller, changed):
+def test_outputs_do_not_change_when_inputs_are_set_between_steps(controller, changed):
     for unknown in controller.description.outputs:
         assert all(known.causality != "input" for known in unknown.dependencies)
     with begun(controller, ON) as instance:
@@ -176,7 +176,7 @@ def at_start(controller, values, time=1.0):
         return dict(zip(names, instance.enter({**BASE, **values}, start=time).get(*names)))
 
 
-def test_each_initial_output_depends_on_the_listed_variables_and_no_other(controller):
+def test_each_initial_output_depends_on_the_listed_variables_only(controller):
     before = at_start(controller, {})
     variants = {"time": at_start(controller, {}, time=0.25)}
     for name, variable in controller.variables.items():
@@ -196,7 +196,7 @@ def test_each_initial_output_depends_on_the_listed_variables_and_no_other(contro
     assert found == listed
 
 
-def test_parameters_act_on_the_steps(controller, design):
+def test_parameters_affect_the_steps(controller, design):
     changed = {**design, "L_f": design["L_f"] * 0.5, "A": design["A"] + np.eye(4)}
     values = {f"A[{k},{k}]": changed["A"][k - 1, k - 1] for k in range(1, 5)}
     values |= {f"L_f[1,{k}]": changed["L_f"][0, k - 1] for k in (1, 2)}

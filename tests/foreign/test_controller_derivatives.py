@@ -11,7 +11,7 @@ from test_designs import LIMITED, SIZES, made, random_design
 STEP = 1e-30
 T_ON = 0.25
 KINDS = {"co-simulation": CO_SIMULATION, "model exchange": MODEL_EXCHANGE}
-# Time, compensate, monitor: what decides which equations are in force.
+# Time, compensate, monitor: they decide which equations apply.
 SWITCHES = [(0.0, True, False), (0.5, True, False), (0.0, True, True), (0.5, False, False)]
 WIDE = [-9.0, 9.0]
 # Sizes, limits and extras of `random_design`.
@@ -29,7 +29,7 @@ EXTENDED = [
 
 
 def check(instance, unknowns, direction, switches, start=False):
-    """The directional derivative is the complex step along that direction."""
+    """Checks that the directional derivative equals the complex step along the direction."""
     design, values = instance.fmu.design, present_values(instance)
     time, compensate, monitor = switches
     compensating = compensate and time >= T_ON
@@ -50,7 +50,7 @@ def real_names(fmu, **attributes):
 
 
 def present_values(instance):
-    """Values of all Real variables by name, the names of the measurements under `inputs`."""
+    """Values of all Real variables by name; `inputs` has the names of the measurements."""
     names = real_names(instance.fmu)
     inputs = real_names(instance.fmu, causality="input")
     return {**dict(zip(names, instance.get(*names))), "inputs": inputs}
@@ -73,7 +73,7 @@ def fmus(controller, tmp_path_factory):
 
 
 def starts(fmu, switches):
-    """Values to start with."""
+    """Start values."""
     n, _, p, q = size_of(fmu.design)
     _, compensate, monitor = switches
     names = vector("x_hat_0", n) + vector("f_hat_0", q) + real_names(fmu, causality="input")
@@ -84,7 +84,7 @@ def starts(fmu, switches):
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("switches", SWITCHES, ids=str)
-def test_at_initialization_they_are_exact_by_every_known(fmus, switches, kind):
+def test_at_initialization_they_are_exact_for_every_known(fmus, switches, kind):
     for fmu in fmus:
         knowns = real_names(fmu, causality="parameter") + real_names(fmu, causality="input")
         unknowns = [unknown.variable.name for unknown in fmu.description.initialUnknowns]
@@ -98,7 +98,7 @@ def test_at_initialization_they_are_exact_by_every_known(fmus, switches, kind):
 
 
 def at_a_point(instance, fmu, switches):
-    """Takes the instance to a point of its run; the equations that are in force there."""
+    """Steps the instance to a point of its run; returns the equations that apply there."""
     time, compensate, monitor = switches
     if instance.kind == CO_SIMULATION:
         instance.start(starts(fmu, switches), start=time)
@@ -112,7 +112,7 @@ def at_a_point(instance, fmu, switches):
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("switches", SWITCHES, ids=str)
-def test_during_the_run_they_are_exact_by_every_input_and_state(fmus, switches, kind):
+def test_during_the_run_they_are_exact_for_every_input_and_state(fmus, switches, kind):
     for fmu in fmus:
         states = [unknown.variable.derivative.name for unknown in fmu.description.derivatives]
         unknowns = [u.variable.name for u in fmu.description.outputs + fmu.description.derivatives]
@@ -126,7 +126,7 @@ def test_during_the_run_they_are_exact_by_every_input_and_state(fmus, switches, 
             assert set(time.values()) == {0.0}
 
 
-def test_these_tests_meet_commands_at_both_limits_and_between(fmus):
+def test_these_tests_cover_commands_at_both_limits_and_between(fmus):
     met = set()
     for fmu in fmus:
         for switches in SWITCHES:
@@ -152,7 +152,7 @@ def jacobian(instance, fmu):
 
 
 def factors(fmu, parameters):
-    """Each entry of the Jacobian in one situation after the other."""
+    """Each entry of the Jacobian in several situations."""
     found = []
     for time, compensate, monitor in SWITCHES:
         for limit in (-1e6, 0.0, 1e6):
@@ -168,8 +168,8 @@ def factors(fmu, parameters):
 
 
 def kind_of(own, other, cut_off):
-    """The kind that factors show, with one set of parameters and with another one; with a limit
-    that may cut the unknown off or without."""
+    """The kind of a dependency, from its factors with two sets of parameters, for an unknown with or
+    without limits."""
     if not any(own):
         return None
     if len(set(own)) > 1:
@@ -178,7 +178,7 @@ def kind_of(own, other, cut_off):
 
 
 def listed_kinds(fmu):
-    """Kinds of dependencies by the names of both variables, as the description states them."""
+    """Kinds of dependencies by the names of both variables, from the description."""
     found = {}
     for unknown in fmu.description.outputs + fmu.description.derivatives:
         kinds = unknown.dependenciesKind or ["dependent"] * len(unknown.dependencies)
@@ -187,7 +187,7 @@ def listed_kinds(fmu):
     return found
 
 
-def test_outputs_and_derivatives_depend_on_what_is_listed_in_the_way_listed(fmus):
+def test_outputs_and_derivatives_have_exactly_the_listed_dependencies_with_their_kinds(fmus):
     for fmu in fmus:
         n, m, _, _ = size_of(fmu.design)
         matrices = {name: 0.5 + k for k, name in enumerate(fmu.variables) if "," in name}
@@ -207,7 +207,7 @@ def test_outputs_and_derivatives_depend_on_what_is_listed_in_the_way_listed(fmus
         assert {pair: kind for pair, kind in found.items() if kind} == listed_kinds(fmu)
 
 
-def test_each_initial_value_depends_on_the_listed_variables_and_on_no_other(fmus):
+def test_each_initial_value_depends_on_exactly_the_listed_variables(fmus):
     for fmu in fmus:
         unknowns = [unknown.variable.name for unknown in fmu.description.initialUnknowns]
         full = {name: 0.5 + k / 64 for k, name in enumerate(fmu.variables) if "," in name}

@@ -1,8 +1,8 @@
-"""The controller as model exchange, integrated by FMPy's CVODE.
+"""The controller in model exchange, integrated by FMPy's CVODE.
 
-FMPy sets inputs between integrator steps only, never inside one; so the measurements are held here
-between the instants at which they jump. CVODE evaluates the model past the end of its last step,
-so no stop time is defined (section 2.1.6).
+FMPy sets inputs between integrator steps only, so the measurements are constant between their jumps.
+CVODE evaluates the model beyond the end of its last step, so no stop time is defined (section
+2.1.6).
 """
 
 from ctypes import byref
@@ -59,7 +59,7 @@ class Run(NamedTuple):
 
     @property
     def times(self):
-        """The instants of the results."""
+        """The times of the results."""
         return np.arange(round(STOP / self.step) + 1) * self.step
 
     @property
@@ -78,7 +78,7 @@ class Run(NamedTuple):
 
 
 def input_signals(run):
-    """The inputs for FMPy: two rows at each jump. `compensate` only where it switches."""
+    """The inputs for FMPy: two rows at each jump. `compensate` has a row only where it switches."""
     instants = sorted({*JUMPS, *(since for since, _ in run.compensate), STOP})
     names, rows = [("time", float), *((name, float) for name in run.inputs)], []
     for begin, end in zip(instants, instants[1:]):
@@ -91,7 +91,7 @@ def input_signals(run):
 
 
 def integrated(run, **options):
-    """FMPy's result for model exchange, a row for each instant."""
+    """FMPy's result for model exchange, a row for each time."""
     result = simulate_fmu(
         str(run.fmu.folder),
         fmi_type="ModelExchange",
@@ -123,7 +123,7 @@ def stepped(run):
 
 
 def solved(run):
-    """scipy's solution of the equations, between the instants at which something switches."""
+    """scipy's solution of the equations, piece by piece between the times of switches."""
     given, states = constants(run), run.states
 
     def at(z, y, on):
@@ -157,9 +157,9 @@ def constants(run):
 
 
 def check(run):
-    """Model exchange, co-simulation and scipy agree; what came out.
+    """Model exchange, co-simulation and scipy must agree; returns their result.
 
-    Where `compensate` switches, co-simulation follows with the next step: no comparison there.
+    Not compared when `compensate` switches, because co-simulation follows with the next step.
     """
     found, oracle, co_simulated = integrated(run), solved(run), stepped(run)
     allowed = FRACTION * np.ptp(oracle, axis=0)
@@ -202,7 +202,7 @@ def shipped_run(controller, folder, limits=None, **options):
 
 
 def leaves_and_reaches(run, table):
-    """Whether a command is at a limit at some instants and between its limits at others."""
+    """Whether a command is at a limit at some times and between its limits at others."""
     commands = table[:, len(run.states) :][:, : len(run.limits)]
     at_limit = (commands == np.transpose(run.limits)[0]) | (commands == np.transpose(run.limits)[1])
     return np.diff(at_limit, axis=0).any()
@@ -210,18 +210,18 @@ def leaves_and_reaches(run, table):
 
 @pytest.mark.parametrize("monitor", [False, True])
 @pytest.mark.parametrize(("sizes", "limits", "extras"), CASES, ids=str)
-def test_integrated_by_cvode_it_is_its_co_simulation_and_what_scipy_integrates(
+def test_cvode_gives_the_results_of_co_simulation_and_of_scipy(
     controller, tmp_path, sizes, limits, extras, monitor
 ):
     run = random_run(controller, tmp_path, sizes, limits, extras, monitor=monitor)
     assert leaves_and_reaches(run, check(run)) == bool(limits)
 
 
-def test_the_shipped_controller_is_integrated_by_cvode_too(controller, tmp_path):
+def test_cvode_gives_the_same_results_for_the_shipped_controller(controller, tmp_path):
     check(shipped_run(controller, tmp_path))
 
 
-def test_the_shipped_controller_with_limits_is_integrated_by_cvode_too(controller, tmp_path):
+def test_cvode_gives_the_same_results_for_the_shipped_controller_with_limits(controller, tmp_path):
     run = shipped_run(controller, tmp_path, limits=[-0.4, 0.3])
     assert leaves_and_reaches(run, check(run))
 
@@ -235,7 +235,7 @@ def test_compensate_takes_effect_at_the_events_at_which_it_changes(controller, t
 
 
 @pytest.mark.parametrize("limits", [None, [[-1.0, 1.0], [-0.2, 4.0]]], ids=str)
-def test_after_a_reset_the_same_comes_out_to_the_bit(controller, tmp_path, limits):
+def test_after_a_reset_the_results_have_the_same_bits(controller, tmp_path, limits):
     run = random_run(controller, tmp_path, (2, 2, 2, 2), limits)
     instance = instantiate_fmu(str(run.fmu.folder), run.fmu.description, "ModelExchange")
     first = integrated(run, fmu_instance=instance)
@@ -245,13 +245,13 @@ def test_after_a_reset_the_same_comes_out_to_the_bit(controller, tmp_path, limit
 
 
 def new_discrete_states(instance):
-    """What the event says."""
+    """The content of the event info."""
     info = EventInfo()
     instance.must("NewDiscreteStates", byref(info))
     return info
 
 
-def test_the_activation_is_a_time_event_while_it_is_to_come_and_wanted(controller):
+def test_the_activation_is_a_time_event_while_it_is_pending_and_enabled(controller):
     with Instance(controller, kind=MODEL_EXCHANGE) as instance:
         instance.start({"t_on": T_ON})
         info = new_discrete_states(instance)

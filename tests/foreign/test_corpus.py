@@ -1,4 +1,4 @@
-"""The corpus of the fuzz target `design_file`, once more, on the built library."""
+"""Replays the corpus of the fuzz target `design_file` on the built library."""
 
 import re
 from pathlib import Path

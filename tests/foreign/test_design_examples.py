@@ -1,4 +1,4 @@
-"""The examples, each from its plant file over `aso-ftc design --fmu` to a run in FMPy."""
+"""The examples, each from its plant file through `aso-ftc design --fmu` to a run in FMPy."""
 
 import csv
 
@@ -32,11 +32,11 @@ def after(table, time):
 
 
 def must_settle(table, designed, fault, value, begin, others=()):
-    """The estimate comes to `value`, in the time that the report predicts.
+    """Checks that the estimate reaches `value` within the time that the report predicts.
 
-    Within 2 % by the report, 4 % here: the plant is not linear, and a communication step is between
-    measurement and command. `others` are faults that change at the same time; the band is that of
-    the largest.
+    The report's band is 2 %; here it is 4 %, because the plant is nonlinear and a communication step
+    delays the command. `others` are faults that change at the same time; the band is relative to the
+    largest.
     """
     band = 0.04 * max(map(abs, [value, *others]))
     error = table[designed.estimate(fault)] - value
@@ -45,7 +45,7 @@ def must_settle(table, designed, fault, value, begin, others=()):
 
 
 @pytest.mark.parametrize(("name", "cart", "angle"), PENDULUMS)
-def test_on_the_pendulum_less_than_1_mm_and_2_mrad_are_left_after_compensation(
+def test_the_pendulum_stays_within_1_mm_and_2_mrad_after_compensation(
     name, cart, angle, aso_ftc, python, packed, tmp_path
 ):
     designed = Designed(aso_ftc, f"fmu-controller/{name}.toml", tmp_path)
@@ -88,7 +88,7 @@ def test_the_levels_move_as_the_report_predicts(aso_ftc, python, tanks, tmp_path
         assert abs(found - predicted).max() < 0.12 * abs(predicted).max(), level
 
 
-def test_without_compensation_the_same_faults_move_the_levels_for_good(
+def test_without_compensation_the_same_faults_move_the_levels_permanently(
     aso_ftc, python, tanks, tmp_path
 ):
     designed = Designed(aso_ftc, "examples/three-tank/plant.toml", tmp_path)
@@ -96,7 +96,7 @@ def test_without_compensation_the_same_faults_move_the_levels_for_good(
     assert abs(table["plant.h_1"][-1] - LEVELS["h_1"]) > 1e-3
 
 
-def test_losses_of_effectiveness_of_both_pumps_are_found(aso_ftc, python, tanks, tmp_path):
+def test_losses_of_effectiveness_of_both_pumps_are_estimated(aso_ftc, python, tanks, tmp_path):
     designed = Designed(aso_ftc, "examples/three-tank/loss-of-effectiveness.toml", tmp_path)
     designed.must_be_sound()
     losses = {"E_1": 0.3, "E_2": 0.2}
@@ -108,7 +108,7 @@ def test_losses_of_effectiveness_of_both_pumps_are_found(aso_ftc, python, tanks,
         found = table[designed.loss(fault)]
         assert found[after(table, 300 + 5 / slowest)] == pytest.approx(loss, rel=0.02), name
         command = table[f"controller.{pump}"][-1]
-        # The threshold of excitation takes u_e^2 / (u^2 + u_e^2) of it.
+        # The excitation threshold reduces it by u_e^2 / (u^2 + u_e^2).
         seen = loss * command**2 / (command**2 + 1e-6**2)
         assert found[-1] == pytest.approx(seen, rel=1e-6)
     for level, operating in LEVELS.items():
@@ -118,14 +118,14 @@ def test_losses_of_effectiveness_of_both_pumps_are_found(aso_ftc, python, tanks,
 
 
 def plane(eigenvalues, period=1.0):
-    """Eigenvalues of a loop that is sampled each `period` s, in 1/s."""
+    """Eigenvalues in 1/s of a loop that is sampled every `period` s."""
     return [
         (value.real, value.imag)
         for value in np.log([complex(*own) for own in eigenvalues]) / period
     ]
 
 
-def test_the_fault_of_a_sensor_is_told_from_that_of_a_pump(aso_ftc, python, tanks, tmp_path):
+def test_a_sensor_fault_is_distinguished_from_a_pump_fault(aso_ftc, python, tanks, tmp_path):
     designed = Designed(aso_ftc, "examples/three-tank/sensor-fault.toml", tmp_path)
     designed.must_be_sound()
     settings = {"plant.f_1": 1e-5, "plant.t_fault_1": 300, "plant.b_1": 0.02, "plant.t_bias": 1500}
@@ -167,10 +167,10 @@ def test_fmpy_and_the_rust_master_agree_on_the_tanks(
 @pytest.mark.parametrize("estimator", ["current", "prediction"])
 @pytest.mark.parametrize("step", [0.25, 0.37, 1.0, 2.5])
 @pytest.mark.parametrize("inputs", [(), ("--hold",)], ids=["slopes", "held"])
-def test_a_sampled_controller_stands_any_communication_step(
+def test_a_sampled_controller_tolerates_any_communication_step(
     estimator, step, inputs, aso_ftc, python, tanks, tmp_path
 ):
-    """With steps that are no part of the sample time, commands and held measurements jitter."""
+    """If the step does not divide the sample time, commands and held measurements jitter."""
     change = ("sample_time = 1.0", f'sample_time = 1.0\nestimator = "{estimator}"')
     file = changed("examples/three-tank/plant.toml", tmp_path, change)
     designed = Designed(aso_ftc, file, tmp_path)
@@ -184,7 +184,7 @@ def test_a_sampled_controller_stands_any_communication_step(
         assert set(np.diff(changes)) >= {2, 3}, "samples each 1 s, seen at steps of 0.37 s"
 
 
-def test_without_friction_the_servo_does_what_the_report_says(aso_ftc, python, servo, tmp_path):
+def test_without_friction_the_servo_moves_as_the_report_predicts(aso_ftc, python, servo, tmp_path):
     designed = Designed(aso_ftc, "examples/dc-servo/plant.toml", tmp_path)
     designed.must_be_sound()
     settings = {"plant.friction": "false", "plant.f_u": 3, "plant.t_fault": 0.1}
@@ -203,7 +203,7 @@ def test_without_friction_the_servo_does_what_the_report_says(aso_ftc, python, s
     assert abs(table["plant.theta"][-1]) < 1e-6
 
 
-def test_the_servo_returns_in_spite_of_fault_and_friction(aso_ftc, python, servo, tmp_path):
+def test_the_servo_returns_despite_fault_and_friction(aso_ftc, python, servo, tmp_path):
     designed = Designed(aso_ftc, "examples/dc-servo/plant.toml", tmp_path)
     settings = {"plant.f_u": 3, "plant.t_fault": 0.1}
     table, _ = coupled(python, designed, servo, settings, "--stop-time", 1, "--step", 1e-4)
@@ -212,7 +212,7 @@ def test_the_servo_returns_in_spite_of_fault_and_friction(aso_ftc, python, servo
     slowest = -max(re for re, _ in designed.report["feedback"]["wanted"])
     assert turned[after(table, 0.1 + 10 / slowest)].max() < 0.02 * turned.max()
     assert turned[-1] < 1e-3
-    # Friction is a fault to the observer: the voltage that makes the same torque.
+    # To the observer friction is a fault: the voltage that gives the same torque.
     acting = 3 - table["plant.T_f"] * RESISTANCE / K
     late = after(table, 0.5)
     assert table["controller.f_hat"][late] == pytest.approx(acting[late], abs=0.01)
@@ -227,7 +227,7 @@ def test_the_servo_returns_in_spite_of_fault_and_friction(aso_ftc, python, servo
 
 
 @pytest.mark.parametrize(("name", "lag"), [("ramp", 0.0), ("plant", 1 / 300 + 1 / 350 + 1 / 400)])
-def test_a_fault_that_grows_is_followed_without_lag_by_the_ramp_model_only(
+def test_only_the_ramp_model_follows_a_growing_fault_without_lag(
     name, lag, aso_ftc, python, servo, tmp_path
 ):
     """With a constant fault model the lag is the sum of the observer's time constants."""

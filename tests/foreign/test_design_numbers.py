@@ -1,4 +1,4 @@
-"""The numbers of `aso-ftc design --json`, computed again by numpy and scipy."""
+"""The numbers of `aso-ftc design --json`, compared with numpy and scipy."""
 
 import tomllib
 
@@ -20,7 +20,7 @@ from design_oracle import (
 )
 
 PENDULUM = "fmu-controller/pendulum.toml"
-# Plant files, and where their responses have ended: s, or samples.
+# Plant files, and when their responses have settled: in s, or in samples.
 DESIGNS = {
     PENDULUM: 8.0,
     "fmu-controller/pendulum-three-measurements.toml": 8.0,
@@ -39,7 +39,7 @@ def read(file):
 
 @pytest.fixture(scope="module", params=DESIGNS, ids=lambda file: file.partition("/")[2][:-5])
 def case(request, aso_ftc, tmp_path_factory):
-    """A design, its matrices, and where its responses have ended."""
+    """A design, its matrices, and when its responses have settled."""
     for plant in ("DcServo", "ThreeTank"):
         packed_plant(aso_ftc, plant)
     designed = Designed(aso_ftc, request.param, tmp_path_factory.mktemp("design"))
@@ -69,7 +69,7 @@ def faults(designed):
 
 
 def stated_faults(designed):
-    """Positions among those of the faults that the report knows, which are no rates."""
+    """Positions of the faults that the report has, without the rates."""
     return [faults(designed).index(own["name"]) for own in designed.report["plant"]["faults"]]
 
 
@@ -129,7 +129,7 @@ def test_the_ranks_are_full(case):
     controllable = checks["(A, B) is controllable"]
     assert controllable["holds"] and controllable["explanation"].startswith(f"rank {reached} of ")
     assert reached == len(a)
-    # With constant faults: no invariant zero at 0, of the sampled plant at 1.
+    # For constant faults: no invariant zero at 0, or at 1 for the sampled plant.
     shift = 0.0 if own.period is None else 1.0
     first = stated_faults(designed)
     pencil = np.block(
@@ -155,7 +155,7 @@ def test_the_compensation_cancels_the_faults(case):
 
 
 def test_the_peak_gains_are_integrals_of_the_impulse_response(case):
-    """That from the rate of a fault, a constant one, is the integral of the step response."""
+    """The gain from the rate of a constant fault is the integral of the step response."""
     designed, own, horizon = case
     system = closed_loop(own)
     times, impulse, step = responses(system, own.period, horizon)
@@ -164,7 +164,7 @@ def test_the_peak_gains_are_integrals_of_the_impulse_response(case):
     stated = {own["name"]: own for own in designed.file.get("faults", [])}
     for bound in designed.report["bounds"]:
         at = outputs(designed).index(bound["error"]), faults(designed).index(bound["fault"])
-        # Where a state does not feel a fault at all, both are rounding errors.
+        # If a fault does not affect a state, both values are rounding errors.
         tiny = 1e-9 * of_fault[:, at[1]].max()
         assert bound["gain_of_fault"] == pytest.approx(of_fault[at], rel=1e-2, abs=tiny)
         tiny = 1e-9 * of_rate[:, at[1]].max()
@@ -179,7 +179,7 @@ def test_the_peak_gains_are_integrals_of_the_impulse_response(case):
 
 
 def driven(system, fault, rate, size, period, times):
-    """States and fault after a jump by `size`, or a rise to it at a rate: one row each time."""
+    """States and fault after a jump by `size`, or a rise to it at a rate: one row for each time."""
     a, b, *_ = system
     n = len(a)
     # [states; fault; its rate]
@@ -212,7 +212,7 @@ def test_the_responses_to_changes_of_faults_are_those_of_scipy(case):
             change = (fault, steps["rate"], steps["size"], own.period, times[::7])
             wanted = driven(system, *change)[:, : order + 1] @ row[at]
             found = np.array(curve["values"])
-            # An error that does not feel the fault is rounding.
+            # If the fault does not affect an error, the error is due to rounding.
             band = 1e-5 * abs(found).max() + 1e-17 * steps["size"]
             assert found[::7] == pytest.approx(wanted, abs=band), curve["name"]
             assert abs(found).max() <= abs(curve["peak"]) * (1 + 1e-12)
@@ -300,8 +300,8 @@ def test_theorem_1_is_that_of_scipy(case):
     assert 0.99 * slowest < free["decay"] < slowest
 
 
-def test_the_largest_stable_loss_is_where_an_eigenvalue_crosses(aso_ftc, tmp_path):
-    """The pendulum whose actuator loses effect: the loop falls before all of it is lost."""
+def test_the_largest_stable_loss_is_where_an_eigenvalue_becomes_unstable(aso_ftc, tmp_path):
+    """The pendulum's actuator loses effectiveness: the loop becomes unstable before all of it is lost."""
     begin, end = "F_a = [\n", "[experiment]"
     file = changed(PENDULUM, tmp_path)
     text = file.read_text(encoding="utf-8")
@@ -323,19 +323,19 @@ def test_the_largest_stable_loss_is_where_an_eigenvalue_crosses(aso_ftc, tmp_pat
     assert low - 1e-3 <= found["largest_stable_loss"] <= high + 1e-3
 
 
-def test_bounds_and_predictions_bracket_what_the_simulation_shows(
+def test_bounds_and_predictions_bracket_the_simulation(
     aso_ftc, python, packed, tmp_path
 ):
-    """As control::response::fault_bounds and reversal say: within a factor of 3.
+    """Within a factor of 3, as control::response::fault_bounds and reversal state.
 
-    Bounds of positions and error of the estimate, the peaks of the positions after a reversal at
-    once, all peaks after one at the bound of the rate.
+    Compares bounds of positions and of the error of the estimate, the peaks of the positions after a
+    sudden reversal, and all peaks after a reversal at the bound of the rate.
     """
     designed = Designed(aso_ftc, PENDULUM, tmp_path)
     table, _ = coupled(python, designed, packed["plant"], {})
     late = {name: column[table["time"] > 60] for name, column in table.items()}
     friction, (fault,) = late["plant.f_fric"], read(PENDULUM)["faults"]
-    # While the cart sticks the friction moves; it does not jump.
+    # While the cart sticks the friction varies without jumps.
     rate = abs(np.diff(friction)).max() / np.diff(late["time"])[0]
     assert fault["rate_bound"] == pytest.approx(rate, rel=1e-2)
     names = ["x_p", "theta", "v_p", "omega"]
@@ -352,7 +352,7 @@ def test_bounds_and_predictions_bracket_what_the_simulation_shows(
             assert shown[name] / 3 < peaks[name] < 3 * shown[name], name
 
 
-def test_an_fmu_is_made_where_no_compiler_is(aso_ftc, tmp_path):
+def test_an_fmu_is_made_without_a_compiler(aso_ftc, tmp_path):
     made = [tmp_path / name for name in ("with.fmu", "without.fmu")]
     for fmu, environment in zip(made, ({}, {"env": {"PATH": "/nonexistent"}})):
         arguments = (PENDULUM, "--out", tmp_path / "design.toml", "--fmu", fmu)
@@ -362,10 +362,10 @@ def test_an_fmu_is_made_where_no_compiler_is(aso_ftc, tmp_path):
 
 
 @pytest.mark.parametrize("period", [0.001, 0.004])
-def test_the_bound_from_a_rate_in_seconds_holds_for_any_sample_time(
+def test_the_bound_for_a_rate_in_seconds_holds_for_any_sample_time(
     aso_ftc, python, tmp_path, period
 ):
-    """A fault that grows at its largest rate leads to nearly the largest error."""
+    """A fault that grows at its largest rate causes nearly the largest error."""
     rate = 10.0  # V/s
     fault = f'faults = [{{ name = "f_u", actuator = "u", bound = 100, rate_bound = {rate} }}]'
     sampled = f"sample_time = {period}\n{fault}"

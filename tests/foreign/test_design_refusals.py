@@ -1,4 +1,4 @@
-"""Bad input of `aso-ftc design`: exit status 2, one message that points into the file."""
+"""Bad input of `aso-ftc design`: exit status 2, one message with a position in the file."""
 
 import re
 import tomllib
@@ -31,7 +31,7 @@ NO_FMU_STATE = ('canGetAndSetFMUstate="true" canSerializeFMUstate="true"', "")
 
 
 def poorer(source, target, *changes):
-    """A copy of an FMU whose description says less."""
+    """A copy of an FMU with parts of its description removed."""
     with zipfile.ZipFile(source) as whole, zipfile.ZipFile(target, "w") as copy:
         for entry in whole.infolist():
             content = whole.read(entry)
@@ -46,7 +46,7 @@ def poorer(source, target, *changes):
 
 @pytest.fixture
 def refusal(aso_ftc, tmp_path):
-    """The message for a plant file, which has to be the only file in its folder afterwards."""
+    """The message for a plant file; afterwards its folder must contain no other file."""
 
     def run(text, *options):
         file = tmp_path / "plant.toml"
@@ -116,7 +116,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("old", "new", "expected"), WRONG, ids=lambda text: text[:40])
-def test_what_cannot_be_designed_is_refused_where_the_file_says_it(refusal, old, new, expected):
+def test_a_plant_file_that_cannot_be_designed_is_refused_at_the_faulty_entry(refusal, old, new, expected):
     assert old in MASS
     message = refusal(MASS.replace(old, new))
     first, bar, line, underlined = message.splitlines()
@@ -135,7 +135,7 @@ def test_what_cannot_be_designed_is_refused_where_the_file_says_it(refusal, old,
         ("DcServo", "Other.fmu has no resources/design.toml; expected an AsoController.fmu"),
     ],
 )
-def test_a_controller_cannot_be_made_of_any_file(aso_ftc, refusal, tmp_path, source, expected):
+def test_a_controller_can_be_made_from_a_packed_controller_only(aso_ftc, refusal, tmp_path, source, expected):
     other = tmp_path / "Other.fmu"
     if source == "text":
         other.write_text("no archive", encoding="utf-8")
@@ -152,7 +152,7 @@ POORER = [
 
 
 @pytest.mark.parametrize(("changes", "expected"), POORER, ids=["missing", "states", "nothing"])
-def test_an_fmu_that_cannot_be_linearised_is_refused_with_what_is_missing(
+def test_an_fmu_that_cannot_be_linearised_is_refused_with_the_missing_capability(
     aso_ftc, refusal, tmp_path, changes, expected
 ):
     if changes:
@@ -161,7 +161,7 @@ def test_an_fmu_that_cannot_be_linearised_is_refused_with_what_is_missing(
     assert message.startswith("error: plant.toml:1:9: ") and expected in message
 
 
-def test_the_way_of_linearisation_does_not_change_the_design(aso_ftc, tmp_path):
+def test_the_method_of_linearisation_does_not_change_the_design(aso_ftc, tmp_path):
     """By derivatives, by differences of the equations, by steps from an FMU state."""
     found = []
     for changes, states in (
@@ -180,7 +180,7 @@ def test_the_way_of_linearisation_does_not_change_the_design(aso_ftc, tmp_path):
 
 
 @pytest.mark.parametrize(("name", "line"), [("friction", 2), ("u", 3), ("theta_m", 4)])
-def test_a_misspelt_variable_of_the_fmu_is_named_with_the_nearest(
+def test_a_misspelt_variable_of_the_fmu_is_named_with_the_most_similar_one(
     aso_ftc, refusal, tmp_path, name, line
 ):
     poorer(packed_plant(aso_ftc, "DcServo"), tmp_path / "Servo.fmu")
@@ -190,7 +190,7 @@ def test_a_misspelt_variable_of_the_fmu_is_named_with_the_nearest(
     assert f'has no variable "{name}x", it has {name}, ' in message
 
 
-def test_a_plant_held_by_friction_cannot_be_moved(aso_ftc, refusal, tmp_path):
+def test_a_plant_held_by_friction_is_refused_as_uncontrollable(aso_ftc, refusal, tmp_path):
     poorer(packed_plant(aso_ftc, "DcServo"), tmp_path / "Servo.fmu")
     message = refusal(SERVO.replace("friction = 0", "friction = 1"))
     assert "plant.toml:3:13: the commands u reach 0 of 2 states only" in message
@@ -206,7 +206,7 @@ def test_an_operating_point_that_is_no_equilibrium_is_a_check_that_fails(aso_ftc
 
 
 @pytest.mark.parametrize("output", ["--out", "--report", "--fmu"])
-def test_of_an_output_that_cannot_be_written_nothing_is_left(aso_ftc, tmp_path, output):
+def test_if_an_output_cannot_be_written_no_files_are_left(aso_ftc, tmp_path, output):
     (tmp_path / "plant.toml").write_text(MASS, encoding="utf-8")
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
     paths = {name: tmp_path / f"made{name}.fmu" for name in ("--out", "--report", "--fmu")}

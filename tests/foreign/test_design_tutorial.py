@@ -1,4 +1,4 @@
-"""docs/tutorials/controller.md: its commands run, its numbers come out."""
+"""docs/tutorials/controller.md: its commands run and give its numbers."""
 
 import json
 import re
@@ -28,7 +28,7 @@ def row(name):
 
 @pytest.fixture(scope="module")
 def runs(aso_ftc, python, tmp_path_factory):
-    """What both runs of the tutorial write, by name, and the report of the design."""
+    """The output of both runs of the tutorial, by name, and the report of the design."""
     packed_plant(aso_ftc, "DcServo")
     results = tmp_path_factory.mktemp("results")
     found, report = {}, None
@@ -47,7 +47,7 @@ def runs(aso_ftc, python, tmp_path_factory):
     return found, json.loads(report)
 
 
-def test_the_commands_are_the_ones_that_are_run_here():
+def test_the_commands_of_the_page_are_those_run_here():
     assert len(COMMANDS) == 9 and sys.version_info >= (3, 11)
     assert COMMANDS[:4] == [
         "aso-ftc pack",
@@ -57,13 +57,13 @@ def test_the_commands_are_the_ones_that_are_run_here():
     ]
 
 
-def test_the_plant_file_is_the_one_in_the_example_and_below_ten_lines():
+def test_the_plant_file_of_the_page_is_that_of_the_example_and_below_ten_lines():
     (block,) = re.findall(r"```toml\n(.*?)```", TEXT, flags=re.DOTALL)
     assert block == (ROOT / "examples/dc-servo/plant.toml").read_text(encoding="utf-8")
     assert len(block.splitlines()) == 7
 
 
-def test_the_table_is_what_comes_out(runs):
+def test_the_table_of_the_page_has_the_results(runs):
     both = [runs[0][name] for name in ("compensated", "uncompensated")]
     largest = [abs(columns["plant.theta"]).max() for columns in both]
     assert row("largest angle") == pytest.approx(largest, abs=5.1e-5)
@@ -74,11 +74,11 @@ def test_the_table_is_what_comes_out(runs):
     outside = np.flatnonzero(abs(both[0]["plant.theta"]) > 1e-3)[-1]
     assert row("below 1 mrad from")[0] == pytest.approx(both[0]["time"][outside + 1], abs=1e-9)
     friction = -both[0]["plant.T_f"][-1] * 4.0 / 0.0274
-    assert f"friction takes, {friction:.4f} V" in TEXT
+    assert f"friction, which takes {friction:.4f} V" in TEXT
     assert final[0] == pytest.approx(3 + friction, abs=1e-4)
 
 
-def test_the_report_says_what_the_text_repeats(runs):
+def test_the_text_repeats_the_numbers_of_the_report(runs):
     report = runs[1]
     (k_x,) = next(own["values"] for own in report["gains"] if own["name"] == "K_x")
     assert f"K_x = [{k_x[0]:.4f}, {k_x[1]:.6f}]" in TEXT
@@ -104,4 +104,4 @@ def test_the_error_of_the_constant_model_is_the_one_shown(aso_ftc, python, tmp_p
     settings = {"plant.friction": "false", "plant.r_u": 10}
     table, _ = coupled(python, designed, packed_plant(aso_ftc, "DcServo"), settings)
     error = 10 * table["time"][-1] - table["controller.f_hat"][-1]
-    assert f"one of {error:.4f} V" in TEXT
+    assert f"an error of {error:.4f} V" in TEXT

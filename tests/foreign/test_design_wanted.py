@@ -1,4 +1,4 @@
-"""What a plant file can want: weights, regions, norms; each judged by numpy and scipy."""
+"""Requirements of a plant file: weights, regions, norms; each checked by numpy and scipy."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ OBSERVER = {
 
 @pytest.fixture
 def wanting(aso_ftc, tmp_path):
-    """Designs for a plant file with other wishes."""
+    """Makes designs for a plant file with other requirements."""
     packed_plant(aso_ftc, "ThreeTank")
 
     def design(file, *changes):
@@ -79,7 +79,7 @@ def test_intensities_give_the_kalman_filter_of_scipy(wanting, file, estimator, p
     assert designed.report["observer"]["method"].startswith("Kalman filter")
 
 
-def test_the_eigenvalues_lie_in_all_parts_of_a_region(wanting):
+def test_the_eigenvalues_satisfy_all_parts_of_a_region(wanting):
     region = "{ decay = 3.0, disc = { center = -12.0, radius = 8.0 }, sector = 30.0 }"
     observer = "{ decay = 100.0, disc = { center = -800.0, radius = 600.0 }, sector = 30.0 }"
     designed = wanting(
@@ -100,7 +100,7 @@ def test_the_eigenvalues_lie_in_all_parts_of_a_region(wanting):
         assert designed.report[name]["region"] == stated
 
 
-def test_a_decay_rate_of_a_sampled_loop_is_that_between_samples(wanting):
+def test_a_sampled_loop_has_the_required_decay_rate(wanting):
     designed = wanting(
         TANKS,
         (FEEDBACK[TANKS], "feedback.region = { decay = 0.03 }"),
@@ -129,7 +129,7 @@ def feedback_gain(own):
     return largest_gain(a, own.F_a, np.vstack([own.C, own.K_x]), np.zeros((len(own.C) + m, 1)), 1e4)
 
 
-def test_an_h_infinity_bound_is_kept(wanting):
+def test_an_h_infinity_bound_is_met(wanting):
     designed = wanting(
         PENDULUM,
         (FEEDBACK[PENDULUM], "feedback.h_infinity = 2.0\nfeedback.region = { decay = 1.0 }"),

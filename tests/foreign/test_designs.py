@@ -51,7 +51,7 @@ ESTIMATORS = {"c": "current", "p": "prediction"}
 
 
 def extended(design, extras, chance):
-    """The design with what `extras` say."""
+    """The design with the entries that `extras` names."""
     n, _, p, q = (len(design[name]) for name in LISTS)
     if "a" in extras:
         design["A_f"] = chance.normal(size=(q, q)) - 2 * np.eye(q)
@@ -72,7 +72,7 @@ def extended(design, extras, chance):
 
 
 def made(controller, design, folder):
-    """The FMU of a design, which it carries along."""
+    """The FMU with this design in it."""
     fmu = redesigned(controller, design_text(design), folder / "fmu")
     fmu.design = design
     return fmu
@@ -147,7 +147,7 @@ LIMITED = [
 
 @pytest.mark.parametrize("size", [0.005, 0.05, 0.25])
 @pytest.mark.parametrize(("sizes", "limits"), LIMITED, ids=str)
-def test_with_limited_actuators_the_observer_is_the_one_scipy_integrates(
+def test_with_limited_actuators_the_observer_follows_scipys_integration(
     controller, tmp_path, sizes, limits, size
 ):
     n, m, p, q = sizes
@@ -171,7 +171,7 @@ def test_with_limited_actuators_the_observer_is_the_one_scipy_integrates(
 
 
 @pytest.mark.parametrize("size", [1e-4, 1e-3, 5e-3])
-def test_the_shipped_controller_with_limits_is_the_one_scipy_integrates(controller, tmp_path, size):
+def test_the_shipped_controller_with_limits_follows_scipys_integration(controller, tmp_path, size):
     design = shipped_design(controller)
     limits = [-40.0, 30.0]
     design["actuators"][0]["limits"], design["t_on"] = limits, 0.0
@@ -192,7 +192,7 @@ def test_the_shipped_controller_with_limits_is_the_one_scipy_integrates(controll
     assert found == pytest.approx(list(wanted[-1]), rel=1e-6)
 
 
-def test_limits_can_be_changed_while_the_run_goes_and_only_in_order(controller, tmp_path):
+def test_limits_can_be_changed_during_the_run_and_must_be_in_order(controller, tmp_path):
     sizes = (1, 1, 1, 1)
     fmu = made(controller, random_design(sizes, [[-0.3, 0.4]]), tmp_path)
     with begun(fmu, sizes, [9.0, 9.0], [0.0]) as instance:

@@ -1,4 +1,4 @@
-"""Ecos, a co-simulation engine in C++, as a judge."""
+"""Ecos, a co-simulation engine in C++, as an independent importer."""
 
 import ctypes
 import re
@@ -8,7 +8,8 @@ import numpy as np
 
 from held_loop import COUNT, LINKS, SETTINGS, STEP, expect_equal, held_loop
 
-# libecosc needs this library; the package tbb keeps it where the dynamic linker does not look.
+# libecosc needs this library; the package tbb installs it outside of the dynamic linker's search
+# path.
 (TBB,) = (file for file in metadata.files("tbb") if file.name == "libtbb.so.12")
 ctypes.CDLL(str(TBB.locate()))
 
@@ -16,10 +17,11 @@ from ecospy import EcosLib, EcosSimulation, EcosSimulationStructure  # noqa: E40
 
 COLUMNS = {"Real": "REAL", "Integer": "INT", "Boolean": "BOOL", "String": "STR"}
 GETTERS = {"Real": "real", "Integer": "integer", "Boolean": "bool", "String": "string"}
-# Names of arrays hold commas, which Ecos does not quote.
+# Names of array elements contain commas, which Ecos does not quote.
 HEADING = re.compile(r"\w+::.+?\[(?:REAL|INT|BOOL|STR)\]")
 LOG_LINE = re.compile(r"\[[^]]*\] \[ecos\] \[(\w+)\] (.*)")
-# Ecos ignores the status of each call and logs what an FMU reports as debug: so no line but these.
+# Ecos ignores the status of each call and logs messages of FMUs at the level debug: only these
+# lines may appear.
 USUAL = {
     "Initializing simulation..",
     "Parameterset 'settings' applied to 2 instances",
@@ -61,7 +63,7 @@ def grid():
         time += STEP
 
 
-def test_ecos_lists_every_variable_as_it_is_described(packed, unpacked, tmp_path):
+def test_ecos_lists_every_variable_as_described(packed, unpacked, tmp_path):
     path = tmp_path / "all.csv"
     with simulation(packed) as running:
         running.add_csv_writer(str(path))
@@ -80,7 +82,7 @@ def test_ecos_lists_every_variable_as_it_is_described(packed, unpacked, tmp_path
     assert len(listed) == len(described) and set(listed) == described
 
 
-def test_ecos_reads_the_described_start_values_where_nothing_is_set(packed, unpacked):
+def test_ecos_reads_the_described_start_values_if_nothing_is_set(packed, unpacked):
     with simulation(packed) as running:
         assert running.init()
         for role, fmu in unpacked.items():
@@ -90,7 +92,7 @@ def test_ecos_reads_the_described_start_values_where_nothing_is_set(packed, unpa
                 assert value(running, role, variable) == start_value(variable), variable.name
 
 
-def test_ecos_couples_both_fmus_to_the_bits_of_fmpy_and_no_fmu_reports_anything(
+def test_ecos_couples_both_fmus_with_the_bits_of_fmpy_and_no_fmu_reports_anything(
     packed, unpacked, capfd
 ):
     names, expected = held_loop(unpacked, grid(), exchange_before_reading=True)

@@ -1,4 +1,4 @@
-"""The plants of examples/three-tank and examples/dc-servo, judged and simulated by FMPy.
+"""The plants of examples/three-tank and examples/dc-servo, checked and simulated by FMPy.
 
 Oracles: scipy's integration of the equations, with the events found by scipy, and linear models by
 formula.
@@ -30,7 +30,7 @@ def plants(aso_ftc, root, tmp_path_factory):
 
 
 def held(names, begins, values):
-    """An input for FMPy that jumps to the next row at each begin."""
+    """An input for FMPy that jumps to the next row at each start time."""
     rows = []
     for begin, end, row in zip(begins, [*begins[1:], 1e9], values):
         rows += [(begin, *row), (end, *row)]
@@ -81,7 +81,7 @@ def test_fmpy_finds_no_problem(plants, model, python):
 
 @pytest.mark.parametrize("model", PLANTS.values())
 @pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
-def test_fmpy_simulates_it_without_being_told_anything(plants, model, kind):
+def test_fmpy_simulates_it_with_its_default_options(plants, model, kind):
     result = simulate_fmu(plants[model], fmi_type=kind, output_interval=0.1)
     assert len(result) > 1 and all(np.isfinite(result[name]).all() for name in result.dtype.names)
 
@@ -91,7 +91,7 @@ def torricelli(mu, drop):
 
 
 def net_flows(h, pumps):
-    """Inflow less outflow of the tanks."""
+    """Inflow minus outflow of the tanks."""
     q_13, q_32 = torricelli(MU[0], h[0] - h[2]), torricelli(MU[1], h[2] - h[1])
     return np.array([pumps[0] - q_13, pumps[1] + q_32 - torricelli(MU[2], h[1]), q_13 - q_32])
 
@@ -107,7 +107,7 @@ BIAS = {"b_1": 0.02, "b_3": -0.03, "t_bias": 500.25}
 
 
 def delivered(time):
-    """What the pumps deliver by the commands and faults above."""
+    """The flows that the pumps deliver for the commands and faults above."""
     command = [row for begin, row in COMMANDS if begin <= time][-1]
     first, second = np.clip(command, 0, LARGEST)
     if time >= FAULTS["t_fault_1"]:
@@ -118,7 +118,7 @@ def delivered(time):
 
 
 def levels(h, times, stop):
-    """The levels at the times, by scipy; tank 1 spills where it is full."""
+    """The levels at the times, by scipy; tank 1 spills while it is full."""
     edges = sorted({begin for begin, _ in COMMANDS} | {100.5, 333.3, stop})
     values, begin = np.empty((len(times), 3)), 0.0
     spills = np.array([0, 1, 1])
@@ -143,7 +143,7 @@ def levels(h, times, stop):
 
 
 @pytest.mark.parametrize("step", [0.5, 10.0])
-def test_the_tanks_are_where_scipy_has_them_faults_and_overflow_included(plants, step):
+def test_the_levels_are_those_of_scipy_including_faults_and_overflow(plants, step):
     signal = held(("Q_1", "Q_2"), *zip(*COMMANDS))
     result = simulate_fmu(
         plants["ThreeTank"],
@@ -163,7 +163,7 @@ def test_the_tanks_are_where_scipy_has_them_faults_and_overflow_included(plants,
     assert table(result, ["y_1", "y_2", "y_3"]) == pytest.approx(found + bias, abs=1e-15)
 
 
-def test_the_tanks_integrated_by_cvode_are_their_co_simulation(plants):
+def test_cvode_gives_the_levels_of_the_co_simulation(plants):
     names = ["h_1", "h_2", "h_3", "y_1", "y_2", "y_3", "q_01", "q_02", "q_over"]
     results = [
         simulate_fmu(
@@ -185,7 +185,7 @@ def test_the_tanks_integrated_by_cvode_are_their_co_simulation(plants):
     assert (apart < 1e-6 * np.ptp(simulated, axis=0)).all(), apart
 
 
-def test_the_directional_derivatives_of_the_tanks_are_the_linear_model(plants, tmp_path):
+def test_the_directional_derivatives_of_the_tanks_give_the_linear_model(plants, tmp_path):
     states, inputs = ["h_1", "h_2", "h_3"], ["Q_1", "Q_2"]
     slopes, measured = [f"der({name})" for name in states], ["y_1", "y_2", "y_3"]
     h = np.array([0.45, 0.15, 0.28])
@@ -206,7 +206,7 @@ NAMES = ["theta", "omega"]
 
 
 def command(begin):
-    """The voltage that is held from `begin` on; it makes the load stick, slip and turn."""
+    """The voltage that is held from `begin` on; it causes stick, slip and reversals."""
     return 3.0 * np.sin(20.0 * begin)
 
 
@@ -218,7 +218,7 @@ def voltage(time, held, faulty):
 
 
 def slid(begin, end, drive, state, direction):
-    """Slides until the end or a stop; the time and the state there."""
+    """Slides until the end or a stop; returns the time and the state at that point."""
 
     def right_side(time, state):
         current = (voltage(time, *drive) - K * state[1]) / RESISTANCE
@@ -248,7 +248,7 @@ def moved(begin, end, drive, state):
 
 
 def servo_by_scipy():
-    """Angle and velocity at the multiples of the hold."""
+    """Angle and velocity at the multiples of the hold time."""
     state, values, onset = np.zeros(2), [np.zeros(2)], DRIVE["t_fault"]
     for k in range(STEPS):
         begin, end = k * HOLD, (k + 1) * HOLD
@@ -272,7 +272,7 @@ def servo_by_fmpy(plants, **options):
     )
 
 
-def test_the_servo_is_where_scipy_has_it_stick_slip_and_faults_included(plants):
+def test_the_servo_moves_as_by_scipy_including_stick_slip_and_faults(plants):
     wanted = servo_by_scipy()
     for interval in (HOLD, HOLD / 5):
         result = servo_by_fmpy(plants, fmi_type="CoSimulation", output_interval=interval)
@@ -282,7 +282,7 @@ def test_the_servo_is_where_scipy_has_it_stick_slip_and_faults_included(plants):
         assert (abs(found - wanted).max(axis=0) < 1e-9 * np.ptp(wanted, axis=0)).all()
 
 
-def test_the_servo_integrated_by_cvode_is_its_co_simulation(plants):
+def test_cvode_gives_the_motion_of_the_servo_in_co_simulation(plants):
     options = {"output_interval": HOLD / 2, "relative_tolerance": 1e-11, "solver": "CVode"}
     simulated = servo_by_fmpy(plants, fmi_type="CoSimulation", **options)[1::2]
     integrated = servo_by_fmpy(plants, fmi_type="ModelExchange", **options)[1::2]
@@ -291,7 +291,7 @@ def test_the_servo_integrated_by_cvode_is_its_co_simulation(plants):
     assert (abs(one - other).max(axis=0) < 1e-6 * np.ptp(one, axis=0)).all()
 
 
-def test_the_servo_does_not_move_by_less_than_its_static_friction(plants):
+def test_a_torque_below_the_static_friction_does_not_move_the_servo(plants):
     for fraction, moves in ((0.999, False), (1.001, True)):
         start = {"u": fraction * HOLDING * RESISTANCE / K, "theta": 0.7}
         for kind in ("CoSimulation", "ModelExchange"):
@@ -301,7 +301,7 @@ def test_the_servo_does_not_move_by_less_than_its_static_friction(plants):
             assert result["T_f"][-1] == pytest.approx(friction, rel=1e-12)
 
 
-def test_the_directional_derivatives_of_the_servo_without_friction_are_the_linear_motor(
+def test_the_directional_derivatives_of_the_servo_without_friction_give_the_linear_motor(
     plants, tmp_path
 ):
     damping = VISCOUS + K**2 / RESISTANCE

@@ -1,4 +1,4 @@
-"""The examples of `fmu` and a new crate, packed, judged and simulated by FMPy.
+"""The examples of `fmu` and a new crate, packed, checked and simulated by FMPy.
 
 Oracles: the published output of the Reference-FMUs, closed forms, and numpy.
 """
@@ -38,12 +38,12 @@ def test_fmpy_finds_no_problem(examples, model, python):
 
 
 @pytest.mark.parametrize("model", EXAMPLES.values())
-def test_fmpy_simulates_it_without_being_told_anything(examples, model):
+def test_fmpy_simulates_it_with_its_default_options(examples, model):
     result = simulate_fmu(str(examples[model]))
     assert len(result) > 1
 
 
-def test_the_van_der_pol_oscillator_gives_the_published_output_to_rounding(examples, root):
+def test_the_van_der_pol_oscillator_gives_the_published_output_up_to_rounding(examples, root):
     table = published(root, "published_van_der_pol.csv")
     result = simulate_fmu(str(examples["VanDerPol"]), stop_time=20.0, output_interval=0.01)
     assert result["time"][::100] == pytest.approx(table["time"])
@@ -55,7 +55,7 @@ def van_der_pol(_, x):
     return [x[1], (1 - x[0] ** 2) * x[1] - x[0]]
 
 
-def test_the_van_der_pol_oscillator_integrated_by_cvode_solves_its_equation(examples):
+def test_cvode_gives_the_solution_of_the_van_der_pol_equation(examples):
     result = simulate_fmu(
         str(examples["VanDerPol"]),
         fmi_type="ModelExchange",
@@ -74,7 +74,7 @@ def test_the_van_der_pol_oscillator_integrated_by_cvode_solves_its_equation(exam
     assert slopes == pytest.approx(np.array(van_der_pol(0, found)), abs=1e-12)
 
 
-def test_the_directional_derivatives_of_the_van_der_pol_oscillator_are_its_jacobian(
+def test_the_directional_derivatives_of_the_van_der_pol_oscillator_give_its_jacobian(
     examples, tmp_path
 ):
     with slave(examples["VanDerPol"], tmp_path, {"x0": 0.7, "x1": -1.3}) as (instance, names):
@@ -85,7 +85,7 @@ def test_the_directional_derivatives_of_the_van_der_pol_oscillator_are_its_jacob
 
 
 def euler_ball(size, e=0.7, v_min=0.1):
-    """The bouncing ball by forward Euler steps, each impact at the first step below the ground."""
+    """The bouncing ball by forward Euler steps; each impact is at the first step below the ground."""
     height, velocity, gravity, heights = 1.0, 0.0, -9.81, [1.0]
     for _ in range(round(3 / size)):
         height, velocity = height + size * velocity, velocity + size * gravity
@@ -111,7 +111,7 @@ def test_the_ball_is_the_limit_of_the_published_output_for_small_steps(examples,
 
 
 def closed_form_ball(time, e, v_min=0.1, g=9.81):
-    """Height and velocity: the times of the impacts are a geometric sum."""
+    """Height and velocity; the times of the impacts are a geometric series."""
     impact, speed = np.sqrt(2 / g), np.sqrt(2 * g)
     if time < impact:
         return 1.0 - g * time**2 / 2, -g * time
@@ -125,7 +125,7 @@ def closed_form_ball(time, e, v_min=0.1, g=9.81):
 
 @pytest.mark.parametrize("size", [3.0, 0.5, 0.01])
 @pytest.mark.parametrize("e", [0.5, 0.7, 0.9])
-def test_the_ball_is_where_the_closed_form_has_it_whatever_the_step(examples, tmp_path, e, size):
+def test_the_ball_follows_the_closed_form_for_every_step(examples, tmp_path, e, size):
     with slave(examples["BouncingBall"], tmp_path, {"e": e}) as (ball, names):
         for k in range(round(3.0 / size)):
             ball.doStep(k * size, size)
@@ -138,7 +138,7 @@ def limited(signal, limit):
 
 
 class VelocityForm:
-    """The same controller written with increments of u."""
+    """The same controller in velocity form, which computes increments of u."""
 
     def __init__(self, gain, integral_time, derivative_time, sample_time, limit):
         self.gain, self.limit = gain, limit
@@ -147,7 +147,7 @@ class VelocityForm:
         self.before = None
 
     def sample(self, mode, setpoint, measurement, manual):
-        """u and whether it is at a limit."""
+        """Returns u and whether it is at a limit."""
         error = setpoint - measurement
         last = self.before or (0.0, None, measurement)
         rest = self.gain * (error - self.derivative * (measurement - last[2]))
@@ -164,7 +164,7 @@ WORDS = {0: "off", 1: "manual", 2: "automatic"}
 
 
 def drive(fmu, folder, steps, size, inputs, anti_windup=True):
-    """u, samples and status after each step; `inputs(k)` gives w, y, u_manual and the mode."""
+    """Returns u, samples and status after each step; `inputs(k)` gives w, y, u_manual and the mode."""
     rows = []
     with slave(fmu, folder, PARAMETERS) as (pid, names):
         reals = [names[name] for name in ("w", "y", "u_manual")]
@@ -214,7 +214,7 @@ def test_the_pid_samples_at_multiples_of_its_sample_time(examples, tmp_path, siz
     assert [row[1] for row in rows] == samples
 
 
-def test_the_table_agrees_with_numpy_between_at_and_beyond_its_rows(examples, root, tmp_path):
+def test_the_table_agrees_with_numpy_between_at_and_outside_of_its_rows(examples, root, tmp_path):
     path = root / "examples/lookup-table/resources/table.csv"
     table = np.genfromtxt(path, delimiter=",", names=True)
     x, *outputs = table.dtype.names
@@ -234,7 +234,7 @@ def test_a_new_crate_is_tested_packed_and_simulated_outside_of_the_workspace(
     crate = tmp_path / "heat-pump"
     done = aso_ftc("new", "heat-pump", "--path", crate)
     assert done.returncode == 0, done.stderr
-    # The versions of this workspace: nothing has to be fetched.
+    # The dependency versions of this workspace, so that nothing is downloaded.
     shutil.copy(root / "Cargo.lock", crate)
     shared = {**os.environ, "CARGO_TARGET_DIR": str(root / "target" / "author")}
     done = subprocess.run(["cargo", "test"], cwd=crate, env=shared, capture_output=True, text=True)

@@ -33,7 +33,7 @@ def fmu(request, controller, tmp_path):
 
 
 def stated(design):
-    """The parameters that the design has beyond those of every design."""
+    """The parameters that only this kind of design has."""
     n, m, p, q = size_of(design)
     names = []
     if "A_f" in design:
@@ -45,7 +45,7 @@ def stated(design):
     return set(names)
 
 
-def test_it_has_the_variables_of_what_it_states_and_no_others(fmu):
+def test_it_has_exactly_the_variables_of_its_entries(fmu):
     design = fmu.design
     n, m, p, q = size_of(design)
     shapes = [(n, n), (n, m), (p, n), (n, q), (m, n), (m, q), (n, p), (q, p)]
@@ -74,7 +74,7 @@ def test_it_describes_itself_validly(fmu):
     assert validate_fmu(str(fmu.folder)) == []
 
 
-def test_the_operating_point_is_where_the_estimate_starts(fmu):
+def test_the_estimate_starts_at_the_operating_point(fmu):
     design = fmu.design
     n, m, p, _ = size_of(design)
     with Instance(fmu) as instance:
@@ -91,7 +91,7 @@ def test_the_operating_point_is_where_the_estimate_starts(fmu):
 
 @pytest.mark.parametrize("size", [0.005, 0.05, 0.25])
 @pytest.mark.parametrize("case", IN_TIME, ids=str)
-def test_steps_follow_measurements_with_slopes_as_scipy_does(controller, tmp_path, case, size):
+def test_steps_with_slopes_of_the_measurements_equal_scipys(controller, tmp_path, case, size):
     fmu = made(controller, random_design(*case), tmp_path)
     design = fmu.design
     n, m, p, q = size_of(design)
@@ -126,7 +126,7 @@ def test_steps_follow_measurements_with_slopes_as_scipy_does(controller, tmp_pat
             assert instance.slopes_of(*states) == pytest.approx(wanted, rel=1e-9, abs=1e-9)
 
 
-def test_the_slope_of_a_loss_is_that_of_its_quotient(controller, tmp_path):
+def test_the_slope_of_a_loss_is_the_derivative_of_its_quotient(controller, tmp_path):
     fmu = made(controller, random_design((2, 2, 1, 2), None, "e"), tmp_path)
     (name, k, j, least), *_ = losses(fmu.design)
     with begun(fmu, (2, 2, 1, 2), [1.0, -0.5, 0.3, 0.7], [0.4]) as instance:
@@ -138,7 +138,7 @@ def test_the_slope_of_a_loss_is_that_of_its_quotient(controller, tmp_path):
         assert instance.slopes_of(name) == pytest.approx([wanted], rel=1e-12)
 
 
-def test_a_step_is_rolled_back_to_the_bit(fmu):
+def test_a_step_is_rolled_back_with_the_same_bits(fmu):
     n, _, p, q = size_of(fmu.design)
     with begun(fmu, size_of(fmu.design), np.ones(n + q), np.ones(p)) as instance:
         instance.step(0.0, 0.13)
@@ -154,7 +154,7 @@ def test_a_step_is_rolled_back_to_the_bit(fmu):
         assert instance.start().outputs() == Instance(fmu).start().outputs()
 
 
-def test_a_filter_that_is_set_to_what_it_cannot_be_stops_the_initialization(controller, tmp_path):
+def test_an_invalid_filter_rate_stops_the_initialization(controller, tmp_path):
     for extras, value in (("w", 0.0), ("w", -1.0), ("cw", 1.01)):
         folder = tmp_path / f"{extras}{value}"
         folder.mkdir()
@@ -183,7 +183,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("change", "message"), WRONG, ids=lambda value: str(value)[:40])
-def test_a_design_that_does_not_fit_is_refused(controller, tmp_path, change, message):
+def test_a_design_with_entries_that_do_not_fit_is_refused(controller, tmp_path, change, message):
     design = random_design((1, 1, 1, 1)) | change
     (tmp_path / "design.toml").write_text(design_text(design), encoding="utf-8")
     status, said = describe(controller.library, tmp_path)

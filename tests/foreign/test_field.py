@@ -1,4 +1,4 @@
-"""`scripts/field` on our own FMUs, and with commands that do one thing wrong; FMPy is the judge."""
+"""`scripts/field` on our own FMUs, and with commands that have one fault each; FMPy is the reference."""
 
 import json
 import stat
@@ -9,7 +9,7 @@ import pytest
 
 @pytest.fixture(scope="session")
 def fmus(packed, tmp_path_factory):
-    """A folder with the plant, a copy of it, and what is to be left out."""
+    """A folder with the plant, a copy of it, and files to be ignored."""
     folder = tmp_path_factory.mktemp("fmus")
     plant = packed["plant"].read_bytes()
     (folder / "Plant.fmu").write_bytes(plant)
@@ -22,7 +22,7 @@ def fmus(packed, tmp_path_factory):
 
 @pytest.fixture
 def field(python, root, packed, tmp_path):
-    """Runs the script: exit status, output and the written verdicts by the FMU's file name."""
+    """Runs the script; returns exit status, output and the written verdicts by the FMU's file name."""
 
     def run(folder, *options):
         out = tmp_path / "field.json"
@@ -37,7 +37,7 @@ def field(python, root, packed, tmp_path):
 
 @pytest.fixture
 def faulty(root, tmp_path):
-    """A command that calls ours with something changed by lines of shell."""
+    """A command that calls ours with a change by lines of shell."""
 
     def make(before="", after=""):
         path = tmp_path / "faulty"
@@ -53,7 +53,7 @@ def words(verdicts):
     return {question: own["verdict"] for question, own in verdicts.items()}
 
 
-def test_our_plant_gives_fmpys_values_alone_and_chained_and_keeps_what_is_set(field, fmus):
+def test_our_plant_gives_fmpys_values_alone_and_chained_and_keeps_settings(field, fmus):
     status, said, verdicts = field(fmus)
     assert status == 0, said
     assert list(verdicts) == ["Copy.fmu"], "of two copies the first"
@@ -81,7 +81,7 @@ NO_SETTING = 'kept=(); while [ $# -gt 0 ]; do if [ "$1" = --set ]; then shift 2;
         ('[ "$1" = check ] && sleep 1000', "", {"check": "failed"}),
     ],
 )
-def test_a_fault_of_the_command_falls_short_by_name(field, fmus, faulty, before, after, expected):
+def test_a_fault_of_the_command_is_reported_as_a_failure(field, fmus, faulty, before, after, expected):
     limit = ("--time-limit", "5") if "sleep" in before else ()
     status, said, verdicts = field(fmus, "--command", faulty(before, after), *limit)
     assert status == 1, said
@@ -91,7 +91,7 @@ def test_a_fault_of_the_command_falls_short_by_name(field, fmus, faulty, before,
     assert {line.split(":")[0] for line in short} == set(expected), said
 
 
-def test_an_explained_difference_does_not_fall_short(field, fmus, faulty, tmp_path):
+def test_an_explained_difference_is_no_failure(field, fmus, faulty, tmp_path):
     known = tmp_path / "known"
     known.write_text("# evidence: the test\nset: Copy.fmu: the command drops it\nvalues: Copy.fmu: not needed\n")
     status, said, verdicts = field(fmus, "--command", faulty(NO_SETTING), "--known", known)

@@ -1,4 +1,4 @@
-"""The two FMUs coupled by FMPy: the same end and the same residual as by the Rust master."""
+"""The two FMUs coupled by FMPy: final state and residual equal those of our master."""
 
 import csv
 import json
@@ -17,7 +17,7 @@ OTHER = {
 
 
 def by_fmpy(scenario, python, root, packed):
-    """Summary of the FMPy script."""
+    """The summary that the FMPy script prints."""
     settings = [part for setting in scenario["settings"] for part in ("--set", setting)]
     done = python(
         root / "scripts" / "couple_with_fmpy.py",
@@ -38,7 +38,7 @@ def by_fmpy(scenario, python, root, packed):
 
 
 def by_rust(scenario, aso_ftc, packed, folder):
-    """Every communication point of the Rust master, as a table with named columns."""
+    """Every communication point of our master, as a table with named columns."""
     settings = [part for setting in scenario["settings"] for part in ("--set", setting)]
     done = aso_ftc(
         "run",
@@ -64,7 +64,7 @@ def by_rust(scenario, aso_ftc, packed, folder):
 
 
 def residual(table, t_on):
-    """Half of peak to peak of position and angle, and the rms of the estimation error.
+    """Half of the peak-to-peak values of position and angle, and the rms of the estimation error.
 
     Over the second half of the time with compensation, as in scripts/couple_with_fmpy.py.
     """
@@ -79,7 +79,7 @@ def residual(table, t_on):
     [(PAPER, 40.0), (EARLY, 0.5), (OTHER, 8.0)],
     ids=["paper", "early", "other"],
 )
-def test_fmpy_and_the_rust_master_agree_in_final_state_and_residual(
+def test_fmpy_and_our_master_agree_in_final_state_and_residual(
     scenario, t_on, python, root, packed, aso_ftc, tmp_path
 ):
     mine = by_fmpy(scenario, python, root, packed)

@@ -1,4 +1,4 @@
-"""The FMU container of Renault's fmu-manipulation-toolbox as a judge: both FMUs in one."""
+"""The FMU container of Renault's fmu-manipulation-toolbox as an independent tool: both FMUs in one."""
 
 import logging
 import re
@@ -21,13 +21,13 @@ KINDS = {
     "Boolean": "boolean",
     "String": "string",
 }
-# The toolbox looks at the connections of FMUs as a whole and finds a loop. There is none: by
+# The toolbox treats each FMU as a whole and reports a loop. There is none: by
 # ModelStructure/InitialUnknowns (section 2.2.8) x_p and theta do not depend on u.
 LOOP = (
     "Loop of links through the embedded FMU 'FrictionPendulum.fmu': "
     "it is initialized without the values its inputs get from the loop."
 )
-# Of every container, whatever is in it: statements of progress, given as warning and as error.
+# Every container reports these progress messages as warning and as error.
 PROGRESS = {
     ("WARNING", "FMUContainer 'V2.0'"),
     ("WARNING", "Container use PARALLEL mode with MONO thread."),
@@ -76,7 +76,7 @@ def test_the_checkers_of_the_toolbox_find_nothing(packed, role, complaints):
     assert complaints() == []
 
 
-def test_the_toolbox_lists_every_variable_as_it_is_described(packed, unpacked, complaints):
+def test_the_toolbox_lists_every_variable_as_described(packed, unpacked, complaints):
     made = FMUContainer("loop", packed["plant"].parent)
     for role, fmu in unpacked.items():
         embedded = made.get_fmu(packed[role].name)
@@ -99,7 +99,7 @@ def test_a_container_of_both_fmus_is_valid(packed, unpacked, tmp_path, complaint
     assert complaints() == [LOOP]
 
 
-def test_a_container_couples_both_fmus_to_the_bits_of_fmpy(packed, unpacked, tmp_path, capfd):
+def test_a_container_couples_both_fmus_with_the_bits_of_fmpy(packed, unpacked, tmp_path, capfd):
     path = container(packed, unpacked, tmp_path)
     names, expected = held_loop(unpacked, [(k * STEP, STEP) for k in range(COUNT)])
     columns = [f"{role}.{name}" for role, name in names]

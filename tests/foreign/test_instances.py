@@ -1,4 +1,4 @@
-"""Lives of many instances in a host of C: nothing is left over after loading and unloading.
+"""Many instances in a host program in C: nothing is leaked after loading and unloading.
 
 The same host runs under valgrind, see docs/explanation/robustness.md.
 """
@@ -25,7 +25,7 @@ def host(tmp_path_factory):
     return program
 
 
-def test_loading_living_and_unloading_leaves_no_memory_no_files_and_no_threads(fmu, host):
+def test_loading_running_and_unloading_leaks_no_memory_no_files_and_no_threads(fmu, host):
     arguments = [fmu.path, fmu.description.guid, fmu.resources, str(ROUNDS), str(THREADS)]
     environment = {**os.environ, "GLIBC_TUNABLES": "glibc.malloc.tcache_count=0"}
     done = subprocess.run([host, *arguments], capture_output=True, text=True, env=environment)

@@ -1,4 +1,4 @@
-"""libcosim, the co-simulation library of the Open Simulation Platform, as a judge."""
+"""libcosim, the co-simulation library of the Open Simulation Platform, as an independent importer."""
 
 import ctypes
 import re
@@ -27,7 +27,7 @@ NO_START = (
 NO_ENUMERATION = (
     "FMI 2.0 Enumeration variable type not supported, variable with name {} will be ignored"
 )
-# libcosim knows no independent variable (section 2.2.7) and calls it local.
+# libcosim does not support independent variables (section 2.2.7) and calls them local.
 CAUSALITIES = {"independent": "LOCAL", "calculatedParameter": "CALCULATED_PARAMETER"}
 
 
@@ -45,7 +45,7 @@ class Execution:
             assert self.execution.connect_real_variables(*ends) == 0
 
     def address(self, role, name):
-        """Slave and value reference."""
+        """Index of the slave and value reference."""
         return self.index[role], self.variables[role][name].valueReference
 
     def set(self, role, name, value):
@@ -54,7 +54,7 @@ class Execution:
         assert getattr(self.execution, f"{kind}_initial_value")(*self.address(role, name), value)
 
     def listed(self, role):
-        """What libcosim knows of each variable."""
+        """The properties of each variable that libcosim reads."""
         return {
             variable.name.decode(): (
                 variable.reference,
@@ -82,9 +82,9 @@ class Execution:
 
 
 def start_missing_at(folder):
-    """Line of the description on which libcosim misses the start value of the independent variable.
+    """The line of the description at which libcosim reports a missing start value of the independent variable.
 
-    Section 2.2.7 forbids that value: "If initial = calculated or causality = independent, it is not
+    Section 2.2.7 forbids such a value: "If initial = calculated or causality = independent, it is not
     allowed to provide a start value."
     """
     lines = (folder / "modelDescription.xml").read_text(encoding="utf-8").splitlines()
@@ -94,7 +94,7 @@ def start_missing_at(folder):
 
 
 def complaints(capfd):
-    """Warnings and errors with the place that the line before them names; none is of an FMU."""
+    """Warnings and errors with the place that the previous line names; none may come from an FMU."""
     ctypes.CDLL(None).fflush(None)
     log, errors = capfd.readouterr()
     assert errors == "" and "[FMI status=" not in log, log
@@ -110,14 +110,14 @@ def complaints(capfd):
 
 
 def known_complaints(fmu):
-    """What libcosim is wrong about or cannot do."""
+    """Messages that are due to errors or limitations of libcosim."""
     variables = fmu.variables.values()
     enumerations = [variable.name for variable in variables if variable.type == "Enumeration"]
     limits = {(None, NO_ENUMERATION.format(name)) for name in enumerations}
     return {(start_missing_at(fmu.folder), NO_START), *limits}
 
 
-def test_libcosim_lists_every_variable_as_it_is_described(packed, unpacked):
+def test_libcosim_lists_every_variable_as_described(packed, unpacked):
     execution = Execution(packed, unpacked)
     for role, fmu in unpacked.items():
         described = {
@@ -133,7 +133,7 @@ def test_libcosim_lists_every_variable_as_it_is_described(packed, unpacked):
         assert execution.listed(role) == described
 
 
-def test_libcosim_couples_both_fmus_to_the_bits_of_fmpy(packed, unpacked, capfd):
+def test_libcosim_couples_both_fmus_with_the_bits_of_fmpy(packed, unpacked, capfd):
     execution = Execution(packed, unpacked)
     for role, settings in SETTINGS.items():
         for name, value in settings.items():
@@ -155,7 +155,7 @@ def test_libcosim_couples_both_fmus_to_the_bits_of_fmpy(packed, unpacked, capfd)
 
 
 @pytest.mark.parametrize("role", ["plant", "controller"])
-def test_libcosim_misses_no_more_than_a_start_value_that_the_standard_forbids(
+def test_libcosim_reports_only_a_missing_start_value_that_the_standard_forbids(
     role, packed, unpacked, capfd
 ):
     log_output_level(CosimLogLevel.TRACE)

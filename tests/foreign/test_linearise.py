@@ -31,7 +31,7 @@ def cart_pendulum(tmp_path_factory):
 
 @pytest.fixture
 def linearise(root):
-    """The example `linearise` of the crate master; what it prints, or its message."""
+    """Runs the example `linearise` of the crate; returns its output, or its error message."""
     library = shared_python()
     if library is None:
         pytest.skip("this machine has no shared libpython")
@@ -63,12 +63,12 @@ def test_a_cart_pendulum_of_pythonfmu_is_linearised_over_its_fmu_states(linearis
     assert "over FMU states in co-simulation" in found["method"]
 
 
-def test_without_names_for_the_states_the_refusal_lists_candidates(linearise, cart_pendulum):
+def test_without_names_for_the_states_the_error_lists_candidates(linearise, cart_pendulum):
     message = linearise(cart_pendulum, "inputs=u", "outputs=x_p", "step=0.01", status=1)
     assert "name the variables that are its states among x_p, theta, v_p, omega" in message
 
 
-def test_without_fmu_states_the_refusal_says_what_is_missing(linearise, tmp_path):
+def test_without_fmu_states_the_error_says_so(linearise, tmp_path):
     fmu = FmuBuilder.build_FMU(HERE / "cart_pendulum.py", dest=tmp_path)
     message = linearise(fmu, "inputs=u", "outputs=x_p", f"states={STATES}", status=1)
     assert "canGetAndSetFMUstate" in message and "providesDirectionalDerivative" in message

@@ -1,9 +1,9 @@
-"""The closed loop of both FMUs in model exchange, as three importers integrate it.
+"""The closed loop of both FMUs in model exchange, integrated in three ways.
 
 FMPy's functions of FMI 2.0 couple the FMUs; the states of both are one vector. It is integrated by
 FMPy's CVODE, by scipy's Radau, which locates events by a search of its own, and by Euler steps
-of 0.1 ms, at whose ends an event is noticed and not located. Each has to come to the figures of
-the paper, as co-simulation does.
+of 0.1 ms, which detect an event at the end of a step and do not locate it. Each must give the
+figures of the paper, as co-simulation does.
 """
 
 from ctypes import c_double
@@ -25,7 +25,7 @@ NOMINALS = [0.1, 0.1, 0.1, 1.0, 0.1, 0.1, 0.1, 1.0, 10.0]
 
 
 class Side:
-    """One FMU with its parts of the common vectors."""
+    """One FMU and its parts of the common vectors."""
 
     def __init__(self, unpacked, states, slopes, indicators):
         self.names = unpacked.variables
@@ -42,7 +42,7 @@ class Side:
         self.states, self.slopes, self.indicators = map(place, (states, slopes, indicators))
 
     def value(self, name):
-        """One variable."""
+        """The value of one variable."""
         variable = self.names[name]
         get = getattr(self.fmu, f"get{variable.type}")
         return get([variable.valueReference])[0]
@@ -81,7 +81,7 @@ class Loop:
         plant.fmu.fmi2SetReal(plant.component, *self.commands)
 
     def move(self, time, states):
-        """The loop at another time and other states."""
+        """Sets time and states of the loop."""
         self.time = time
         self.states[:] = states
         for side in self.sides:
@@ -108,12 +108,12 @@ class Loop:
         return self.indicators
 
     def complete(self):
-        """`fmi2CompletedIntegratorStep`: no event of the step is asked for."""
+        """Calls `fmi2CompletedIntegratorStep`; no FMU may request an event."""
         for side in self.sides:
             assert side.fmu.completedIntegratorStep() == (False, False)
 
     def iterate(self):
-        """The event iteration, and back to continuous time; whether states changed."""
+        """Iterates the event and returns to continuous time; returns whether states changed."""
         changed, needed = False, True
         while needed:
             needed, self.next = False, np.inf
@@ -129,7 +129,7 @@ class Loop:
         return changed
 
     def handle_event(self):
-        """Event mode at the present time and states."""
+        """Enters and leaves event mode at the present time and states."""
         before = self.plant.value("regime")
         for side in self.sides:
             side.fmu.enterEventMode()
@@ -138,20 +138,20 @@ class Loop:
         self.events.append((self.time, before, self.plant.value("regime"), changed))
 
     def record(self):
-        """A row of what the claims are about."""
+        """One row of the recorded values."""
         values = (self.plant.value(name) for name in ("x_p", "theta", "v_p", "regime", "f_fric"))
         self.rows.append((self.time, *values, self.controller.value("f_hat")))
 
 
 class AsInput:
-    """What FMPy's CVODE applies at a time: nothing, the inputs are connected."""
+    """The inputs for FMPy's CVODE: none, because the FMUs are connected."""
 
     def apply(self, time):
-        """Nothing."""
+        """Sets nothing."""
 
 
 def by_cvode(loop, tolerance):
-    """FMPy's CVODE on the common vectors, as FMPy's own loop drives it."""
+    """FMPy's CVODE on the common vectors, driven as in FMPy's own loop."""
 
     def put(states, count):
         loop.move(loop.time, states[:count])
@@ -186,7 +186,7 @@ def by_cvode(loop, tolerance):
 
 
 def by_radau(loop, tolerance):
-    """scipy's Radau, which ends at the first event function that changes its sign."""
+    """scipy's Radau, which stops at the first sign change of an event function."""
 
     def slopes(time, states):
         loop.move(time, states)
@@ -254,7 +254,7 @@ IMPORTERS = {
 
 @pytest.fixture(scope="module", params=IMPORTERS)
 def run(request, plant, controller):
-    """The loop after a run, and its rows by name."""
+    """The loop after a run, and the recorded rows by name."""
     loop = Loop(plant, controller)
     integrate, accuracy = IMPORTERS[request.param]
     integrate(loop, accuracy)
@@ -263,24 +263,24 @@ def run(request, plant, controller):
 
 
 def amplitude(values):
-    """Half of peak to peak."""
+    """Half of the peak-to-peak value."""
     return np.ptp(values) / 2
 
 
 def slides(run, window):
-    """Slides of more than a millimetre between two rests."""
+    """Number of slides of more than a millimetre between two rests."""
     rests = run.x_p[window & (run.regime == 0)]
     return (abs(np.diff(rests)) > SLIDE).sum()
 
 
-def test_the_loop_is_in_the_limit_cycle_of_the_paper_before_the_compensation(run):
+def test_before_the_compensation_the_loop_is_in_the_limit_cycle_of_the_paper(run):
     before = (run.time >= 10) & (run.time <= T_ON)
     assert amplitude(run.x_p[before]) == pytest.approx(0.1647, abs=1e-4)
     assert amplitude(run.theta[before]) == pytest.approx(0.112, abs=5e-4)
     assert slides(run, before) == 2
 
 
-def test_the_compensation_leaves_what_the_paper_says(run):
+def test_the_residual_after_compensation_is_within_the_bounds_of_the_paper(run):
     after = run.time > T_ON + 20
     assert amplitude(run.x_p[after]) == pytest.approx(0.962e-3, rel=5e-3)
     assert amplitude(run.theta[after]) == pytest.approx(1.75e-3, rel=5e-3)
@@ -288,7 +288,7 @@ def test_the_compensation_leaves_what_the_paper_says(run):
     assert np.sqrt(np.mean(difference**2)) == pytest.approx(0.29, abs=0.02)
 
 
-def test_the_cart_is_held_at_velocity_zero_and_does_not_creep(run):
+def test_a_stopped_cart_is_held_and_does_not_creep(run):
     held = run.regime == 0
     assert 0.2 < held.mean() < 0.6
     assert (run.v_p[held] == 0.0).all()

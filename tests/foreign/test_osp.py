@@ -82,9 +82,9 @@ def columns(unpacked):
 
 
 def by_libcosim(path, places):
-    """The values after each step, as two runs in a row give them.
+    """The values after each step, identical in two successive runs.
 
-    libcosim steps in threads, and a run now and then differs from all others.
+    libcosim steps in threads, and occasionally one run differs from all others.
     """
     runs = [once_by_libcosim(path, places)]
     for _ in range(5):
@@ -131,7 +131,7 @@ def test_functions_and_groups_give_the_values_of_libcosim(
     assert len(rows) == COUNT
     for (name, output, _), values in zip(places, expected, strict=True):
         found = np.array([float(row[f"{name}.{output}"]) for row in rows])
-        # The slower plant has a value at the end of each of its own steps.
+        # The slower plant has new values only at the end of each of its own steps.
         each = round(second / STEP) if name == "second" else 1
         at_ends = found[each - 1 :: each]
         # libcosim's times are whole nanoseconds, ours multiples of the step.

@@ -16,7 +16,7 @@ FREE = {"F_c": 0.0, "F_s": 0.0}
 
 
 def derivative(state, force):
-    """Equation (20) as a linear system for the two accelerations, `force` less the friction."""
+    """Equation (20) as a linear system for the two accelerations, with `force` minus the friction."""
     _, theta, v, omega = state
     matrix = [[M + m, m * l * cos(theta)], [m * l * cos(theta), J]]
     right = [
@@ -27,12 +27,12 @@ def derivative(state, force):
 
 
 def start_values(state):
-    """The start of the run at this state."""
+    """Starts a run in this state."""
     return {f"{name}_0": value for name, value in zip(STATES, state)}
 
 
 def run(plant, end, size, values=None, force=None, tolerance=None, begin=0.0):
-    """The state at `end`; `force(t)` gives u and its first two derivatives before each step."""
+    """Returns the state at `end`; `force(t)` gives u and its first two derivatives before each step."""
     with Instance(plant) as instance:
         instance.start(values, start=begin, tolerance=tolerance)
         count = round((end - begin) / size)
@@ -48,7 +48,7 @@ def run(plant, end, size, values=None, force=None, tolerance=None, begin=0.0):
 
 
 def cut(plant, size):
-    """The states after each half second of steps of a size, under a force that changes then."""
+    """The states after each half second, for a force that changes at these times."""
     states = []
     with Instance(plant) as instance:
         instance.start({"theta_0": 0.05})
@@ -65,7 +65,7 @@ def cut(plant, size):
     return np.array(states)
 
 
-def test_the_result_does_not_depend_on_how_the_interval_is_cut(plant):
+def test_the_result_does_not_depend_on_how_the_interval_is_divided_into_steps(plant):
     reference = cut(plant, 1e-3)
     span = np.ptp(reference, axis=0)
     assert (span > 0.05).all()
@@ -73,7 +73,7 @@ def test_the_result_does_not_depend_on_how_the_interval_is_cut(plant):
         assert (abs(cut(plant, size) - reference) <= 1e-5 * span).all(), size
 
 
-def test_steps_of_a_second_lead_where_steps_of_a_millisecond_lead(plant):
+def test_steps_of_a_second_give_the_result_of_steps_of_a_millisecond(plant):
     force = lambda _: (38.0,)
     values = {"theta_0": 0.02}
     by_second, by_milli = (run(plant, 2.0, size, values, force) for size in (1.0, 1e-3))
@@ -99,7 +99,7 @@ def polynomial(time):
     return 34.0 + 900.0 * time - 6e4 * time**2, 900.0 - 1.2e5 * time, -1.2e5
 
 
-def test_derivatives_of_the_force_act_as_the_finely_sampled_polynomial_does(plant):
+def test_derivatives_of_the_force_give_the_result_of_a_finely_sampled_polynomial(plant):
     values = {"theta_0": 0.02, "v_p_0": 0.05}
     one = run(plant, 0.01, 0.01, values, polynomial)
     middle = lambda time: polynomial(time + 5e-7)[:1]
@@ -110,7 +110,7 @@ def test_derivatives_of_the_force_act_as_the_finely_sampled_polynomial_does(plan
         assert abs(held[2] - many[2]) > 1e-4, f"derivative {order} matters"
 
 
-def test_slopes_hold_for_one_step_only(plant):
+def test_slopes_apply_to_one_step_only(plant):
     with Instance(plant) as sloped, Instance(plant) as plain:
         for instance in (sloped, plain):
             instance.start({"v_p_0": 0.5})
@@ -130,7 +130,7 @@ def test_slopes_hold_for_one_step_only(plant):
         assert slopes[0] != pytest.approx(slopes[1], rel=1e-3)
 
 
-def test_friction_at_rest_is_what_balances_the_other_forces(plant):
+def test_friction_at_rest_balances_the_other_forces(plant):
     for theta, omega, u, f_a in (
         (0.1, 0.3, 12.0, 4.0),
         (-0.2, -1.0, -3.0, 0.0),
@@ -164,7 +164,7 @@ def test_the_slope_of_the_friction_is_its_difference_quotient_held_and_sliding(p
         assert abs(change) > 1e-4
 
 
-def test_friction_of_a_sliding_cart_follows_the_law_of_stribeck(plant):
+def test_friction_of_a_sliding_cart_follows_stribecks_law(plant):
     with Instance(plant) as instance:
         instance.start({"v_p_0": 0.6, "theta_0": 0.3, "delta": 1.3, "u": 10.0})
         for k in range(40):
@@ -175,7 +175,7 @@ def test_friction_of_a_sliding_cart_follows_the_law_of_stribeck(plant):
             instance.step(k * 1e-3, 1e-3)
 
 
-def test_more_force_than_the_static_friction_is_needed_to_move_the_cart(plant):
+def test_only_a_force_above_the_static_friction_moves_the_cart(plant):
     level = {"theta_0": 0.0}
     for force, moves in ((29.999, False), (30.001, True), (-29.999, False), (-30.001, True)):
         state = run(plant, 0.5, 0.1, level, lambda _: (force,))
@@ -192,7 +192,7 @@ def test_without_friction_the_pendulum_moves_as_scipy_integrates_equation_20(pla
     assert mine == pytest.approx(reference.y[:, -1], rel=1e-6)
 
 
-def test_a_sliding_cart_stops_when_and_where_scipy_says(plant):
+def test_a_sliding_cart_stops_at_scipys_time_and_position(plant):
     state = (0.0, 0.2, 0.8, -0.1)
 
     def right(_, state):
@@ -238,19 +238,19 @@ def test_the_linearised_body_follows_the_matrix_exponential(plant):
         assert instance.slopes_of(*STATES) == pytest.approx(A @ state + B[:, 0] * force, rel=1e-12)
 
 
-def test_upright_rest_stays_and_hanging_rest_is_reached(plant):
+def test_the_upright_equilibrium_is_kept_and_the_hanging_one_is_reached(plant):
     assert (run(plant, 5.0, 1.0, {"theta_0": 0.0}) == [0.1, 0, 0, 0]).all()
     end = run(plant, 60.0, 1.0, {"theta_0": 0.5, "F_theta": 0.2})
     assert end[1] == pytest.approx(np.pi, abs=1e-6) and abs(end[2:]).max() < 1e-6
 
 
-def test_a_run_may_begin_at_any_time(plant):
+def test_a_run_may_start_at_any_time(plant):
     force = lambda begin: lambda time: polynomial((time - begin) / 10)[:1]
     zero, late = (run(plant, b + 0.1, 0.01, {"v_p_0": 0.2}, force(b), begin=b) for b in (0.0, 64.0))
     assert late == pytest.approx(zero, rel=1e-9)
 
 
-def test_each_initial_output_depends_on_the_listed_variables_and_no_other(plant):
+def test_each_initial_output_depends_on_the_listed_variables_only(plant):
     order = plant.description.modelVariables
     listed = {
         u.variable.name: {v.name for v in u.dependencies} for u in plant.description.initialUnknowns

@@ -30,22 +30,22 @@ ALMOST_EXACT = 1e-13  # of a derivative, or of one where that is less
 
 
 def starts(point, linearised, parameters):
-    """Values to start with at a point."""
+    """Start values at a point."""
     _, *state, u = point
     given = {f"{name}_0": value for name, value in zip(STATES, state)}
     return {**given, "u": u, "f_a": 1.5, "linearised": linearised, **parameters}
 
 
 def values_of(instance):
-    """The values of all numbers by name, and which body it is."""
+    """The values of all numbers by name, and whether the body is linearised."""
     names = instance.fmu.names(type="Real")
     return {**dict(zip(names, instance.get(*names))), "linearised": instance.get("linearised")[0]}
 
 
 def errors(instance, unknowns, knowns, start=False, rise=0.0):
-    """How far the derivatives along each known, and along all at once, are from complex steps.
+    """Differences between the derivatives and complex steps, for each known and for all together.
 
-    Since the last step began u has risen.
+    u has risen since the start of the last step.
     """
     values, regime = values_of(instance), instance.get("regime")[0]
     values["u"] += rise
@@ -64,12 +64,12 @@ def initial_unknowns(fmu):
 
 
 def unknowns_of(fmu):
-    """Names of the unknowns afterwards."""
+    """Names of the unknowns after initialization."""
     return [u.variable.name for u in fmu.description.outputs + fmu.description.derivatives]
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_at_initialization_they_are_exact_by_every_known(plant, kind):
+def test_at_initialization_they_are_exact_for_every_known(plant, kind):
     knowns = plant.names(type="Real", causality="parameter") + INPUTS
     unknowns = initial_unknowns(plant)
     assert len(knowns) == 17 and unknowns == [*STATES, "f_fric", *DERIVATIVES]
@@ -81,7 +81,7 @@ def test_at_initialization_they_are_exact_by_every_known(plant, kind):
 
 
 def at_a_point(instance, point, linearised, parameters):
-    """Takes the instance to a point of its run; how far u has risen since the last step began."""
+    """Steps the instance to a point of its run; returns the increase of u since the start of the last step."""
     values = starts(point, linearised, parameters)
     if instance.kind == MODEL_EXCHANGE:
         instance.start_exchange(values)
@@ -93,7 +93,7 @@ def at_a_point(instance, point, linearised, parameters):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_during_the_run_they_are_exact_by_every_input_and_state(plant, kind):
+def test_during_the_run_they_are_exact_for_every_input_and_state(plant, kind):
     for case in CASES:
         with Instance(plant, kind=KINDS[kind]) as instance:
             rise, unknowns = at_a_point(instance, *case), unknowns_of(plant)
@@ -103,7 +103,7 @@ def test_during_the_run_they_are_exact_by_every_input_and_state(plant, kind):
             assert set(along_time.values()) == {0.0}
 
 
-def test_more_force_than_can_be_held_does_not_change_the_friction_before_the_event(plant):
+def test_a_force_above_the_static_friction_does_not_change_the_friction_before_the_event(plant):
     for kind, (u, slope) in product(KINDS.values(), ((29.0, 1.0), (30.5, 0.0), (-30.5, 0.0))):
         with Instance(plant, kind=kind) as instance:
             at_a_point(instance, (0, 0.0, 0.0, 0.0, 0.0, 0.0), False, {})
@@ -114,7 +114,7 @@ def test_more_force_than_can_be_held_does_not_change_the_friction_before_the_eve
             assert found == {"f_fric": slope, "der(v_p)": 0.0}
 
 
-def test_what_is_no_known_or_no_unknown_is_refused(plant):
+def test_variables_that_are_no_known_or_no_unknown_are_refused(plant):
     wrong = [("u", "v_p"), ("M", "v_p"), ("f_fric", "M"), ("f_fric", "x_p_0"), ("f_fric", "f_fric")]
     for unknown, known in wrong:
         with Instance(plant) as instance:
@@ -130,7 +130,7 @@ def test_what_is_no_known_or_no_unknown_is_refused(plant):
 
 
 def factors(plant):
-    """Entries of the Jacobian by pair of names, then by parameters and regime."""
+    """Entries of the Jacobian by pair of names, for all parameters and regimes."""
     found = {}
     for (point, linearised, parameters), jump in product(CASES, (0.0, 40.0)):
         with Instance(plant, kind=MODEL_EXCHANGE) as instance:
@@ -153,7 +153,7 @@ def kind_of(by_case):
     return "dependent" if any(len(part) > 1 for part in by_case.values()) else "discrete or less"
 
 
-def test_outputs_and_derivatives_depend_on_what_is_listed_in_the_way_listed(plant):
+def test_outputs_and_derivatives_have_exactly_the_listed_dependencies_with_their_kinds(plant):
     listed = {}
     for unknown in plant.description.outputs + plant.description.derivatives:
         kinds = unknown.dependenciesKind or ["dependent"] * len(unknown.dependencies)
@@ -163,7 +163,7 @@ def test_outputs_and_derivatives_depend_on_what_is_listed_in_the_way_listed(plan
     assert {pair: kind for pair, kind in found.items() if kind} == listed
 
 
-def test_values_change_with_the_listed_inputs_and_states_and_with_no_other(plant):
+def test_values_change_with_the_listed_inputs_and_states_only(plant):
     listed = {
         unknown.variable.name: {known.name for known in unknown.dependencies}
         for unknown in plant.description.outputs + plant.description.derivatives

@@ -1,4 +1,4 @@
-"""The plant as model exchange: integrated by FMPy's CVODE, and event by event through the C ABI."""
+"""The plant in model exchange: integrated by FMPy's CVODE, and event by event through the C interface."""
 
 from ctypes import byref
 
@@ -20,7 +20,7 @@ START = {"theta_0": 0.02, "v_p_0": 0.1}
 
 
 class CvodeWithInput(fmpy.sundials.CVodeSolver):
-    """FMPy's CVODE, made to set inputs inside integrator steps too, not only between them."""
+    """FMPy's CVODE, changed to set inputs inside of integrator steps too, not only between them."""
 
     def f(self, t, y, ydot, user_data):
         """The right-hand side at the input of its time."""
@@ -79,14 +79,14 @@ def apart(one, other):
     return np.abs(one - other).max(axis=0) / np.ptp(other, axis=0)
 
 
-def test_integrated_by_cvode_it_is_its_co_simulation(plant):
+def test_cvode_gives_the_results_of_co_simulation(plant):
     result = integrated(plant, held_force(), STOP, HOLD / 2, START)[1::2]
     changes = np.abs(np.diff(result["regime"]))
     assert set(result["regime"]) == {-1, 0, 1} and changes.sum() > 10
     assert (apart(table(result), stepped(plant)) < FRACTION).all()
 
 
-def test_integrated_by_cvode_it_is_what_scipy_integrates(plant, root, monkeypatch):
+def test_cvode_gives_the_results_of_scipy(plant, root, monkeypatch):
     monkeypatch.setattr(fmpy.sundials, "CVodeSolver", CvodeWithInput)
     lines = (root / "tests" / "data" / "plant_reference.csv").read_text().splitlines()
     rows = [line for line in lines if not line.startswith("#")]
@@ -104,7 +104,7 @@ def test_integrated_by_cvode_it_is_what_scipy_integrates(plant, root, monkeypatc
 
 
 def event(instance):
-    """Event mode, its iteration, and back: whether the states changed, and the regime."""
+    """Enters event mode, iterates, and returns; returns whether the states changed, and the regime."""
     instance.must("EnterEventMode")
     changed = iterated(instance)
     instance.must("EnterContinuousTimeMode")
@@ -112,7 +112,7 @@ def event(instance):
 
 
 def iterated(instance):
-    """Calls fmi2NewDiscreteStates as long as it is needed, then once more in vain."""
+    """Calls fmi2NewDiscreteStates as long as needed, then once more, which must change nothing."""
     changed = []
     for _ in range(2):
         info = EventInfo()
@@ -126,7 +126,7 @@ def iterated(instance):
 
 
 def vector(instance, function, count):
-    """What a function of model exchange writes."""
+    """The values that a function of model exchange writes."""
     place = reals(*[np.nan] * count)
     instance.must(function, place, count)
     return np.array(place)
@@ -157,7 +157,7 @@ def begun(plant, values=None):
     return Instance(plant, kind=MODEL_EXCHANGE).start_exchange(values)
 
 
-def test_states_derivatives_and_nominal_values_are_those_of_the_description(plant):
+def test_states_derivatives_and_nominal_values_equal_those_of_the_description(plant):
     listed = [unknown.variable for unknown in plant.description.derivatives]
     assert [variable.derivative.name for variable in listed] == STATES
     nominals = [float(plant.variables[name].nominal) for name in STATES]
@@ -181,7 +181,7 @@ def test_a_jump_of_the_force_is_an_event_that_frees_the_cart(plant):
             assert np.sign(slopes(instance)[2]) == regime
 
 
-def test_a_jump_of_the_force_inside_event_mode_counts_too(plant):
+def test_a_jump_of_the_force_in_event_mode_frees_the_cart_too(plant):
     with begun(plant, {"theta_0": 0.0}) as instance:
         instance.must("EnterEventMode")
         instance.set({"u": 40.0})
@@ -206,7 +206,7 @@ def test_a_cart_that_crosses_zero_velocity_stops_there_or_turns(plant):
 
 
 def follow(instance, begin, count, size=1e-3):
-    """Steps of Heun's method with an event after each that calls for one; the states."""
+    """Heun steps, each followed by an event if an indicator requires one; returns the states."""
     rows = []
     for k in range(begin, begin + count):
         start = states(instance)
@@ -233,7 +233,7 @@ def test_a_restored_state_continues_with_the_same_bits(plant):
         assert follow(other, 333, 500) == wanted
 
 
-def test_after_a_reset_the_same_comes_again(plant):
+def test_after_a_reset_the_results_are_the_same(plant):
     with begun(plant, START) as instance:
         wanted = follow(instance, 0, 500)
         instance.must("Reset")

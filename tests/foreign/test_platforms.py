@@ -1,8 +1,8 @@
-"""The FMUs for every platform, as scripts/cross packed them: each binary on its platform, or read.
+"""The FMUs of scripts/cross: each binary runs on its platform, or its file is examined.
 
-Linux runs as it is and with an old glibc, Windows under wine, ARM Linux under qemu. Nothing here runs
-macOS; its files are read. The folder of the FMUs is target/cross/dist, or what the variable
-PLATFORM_FMUS names.
+Libraries for Linux run directly and with an old glibc, those for Windows under wine, those for ARM
+Linux under qemu. Files for macOS are examined only. The folder of the FMUs is target/cross/dist, or
+the one that the environment variable PLATFORM_FMUS names.
 """
 
 import hashlib
@@ -25,11 +25,11 @@ from fmpy.util import add_remoting
 STEPS = 5000
 MODELS = {"plant": "FrictionPendulum", "controller": "AsoController"}
 CONNECTED = ("x_p", "theta", "u")
-# The root of another glibc, and a compiler for it, where scripts/cross got them.
+# The root of another glibc, and a compiler for it, if scripts/cross has installed them.
 GLIBC = Path(os.environ.get("OLD_GLIBC") or "/nowhere")
 ZIG = os.environ.get("ZIG", "").split()
 LIBRARIES = GLIBC / "lib" / "x86_64-linux-gnu"
-# What is run: the platform, how it compiles the host, and how it runs it.
+# For each platform: how the host is compiled, and how it is run.
 RUN = {
     "linux64": ("linux64", ["cc"], []),
     "glibc 2.31": (
@@ -64,7 +64,7 @@ def fmus(root):
 
 
 def binary(fmus, role, platform):
-    """The name of a library in its FMU; skips what was not built."""
+    """The name of a library in its FMU; skips the test if it was not built."""
     name = f"binaries/{platform}/{MODELS[role]}.{SUFFIX[platform]}"
     if name not in zipfile.ZipFile(fmus[role]).namelist():
         pytest.skip(f"scripts/cross was not asked for {platform}")
@@ -76,13 +76,13 @@ def wine(tmp_path_factory):
     """Variables for wine in a folder of its own, with the one library that wine 8 lacks."""
     folder = tmp_path_factory.mktemp("wine")
     variables = {"WINEPREFIX": str(folder / "prefix"), "WINEARCH": "win64", "WINEDEBUG": "-all"}
-    # FMPy calls it by this name.
+    # FMPy calls wine by this name.
     (folder / "wine64").write_text('#!/bin/sh\nexec wine "$@"\n')
     (folder / "wine64").chmod(0o755)
     variables["PATH"] = f"{folder}:{os.environ['PATH']}"
     environment = {**os.environ, **variables}
     subprocess.run(["wineboot", "--init"], env=environment, check=True, capture_output=True)
-    # Random numbers of Windows, by the function that stands behind them in wine.
+    # Windows' random numbers, from the function that wine uses internally.
     source = folder / "bcryptprimitives.c"
     source.write_text(
         "#include <windows.h>\n#include <ntsecapi.h>\n"
@@ -98,7 +98,7 @@ def wine(tmp_path_factory):
 
 
 def words(fmu, library, folder, windows):
-    """What the host wants to know of an FMU."""
+    """The arguments of the host for an FMU."""
     description = read_model_description(str(fmu))
     reference = {v.name: str(v.valueReference) for v in description.modelVariables}
     drive = "Z:" if windows else ""
@@ -108,7 +108,7 @@ def words(fmu, library, folder, windows):
 
 @pytest.fixture(scope="session")
 def hosted(fmus, root, tmp_path_factory, request):
-    """What the host prints where it is run, with the binaries in the FMUs."""
+    """The output of the host on each platform, with the binaries in the FMUs."""
     printed = {}
 
     def run(where):
@@ -137,7 +137,7 @@ def hosted(fmus, root, tmp_path_factory, request):
 
 
 def skip_unless_built(fmus, where):
-    """Skips what scripts/cross was not asked for, and what it could not get."""
+    """Skips the test if scripts/cross did not build or install what it needs."""
     if where == "glibc 2.31" and not GLIBC.is_dir():
         pytest.skip("scripts/cross --test got no glibc 2.31")
     binary(fmus, "plant", RUN[where][0])
@@ -161,7 +161,7 @@ def test_the_closed_loop_has_the_bits_of_the_fmus_for_this_machine(
 
 
 def native(packed, unpacked, root):
-    """What the host prints with the FMUs of `aso-ftc pack`, built for this machine alone."""
+    """The output of the host with the FMUs of `aso-ftc pack`, built for this machine alone."""
     program = Path(unpacked["plant"].path).parent / "host"
     source = root / "tests" / "platforms" / "host.c"
     subprocess.run(["cc", "-std=c11", "-O2", "-o", program, source, "-ldl"], check=True)
@@ -183,8 +183,8 @@ numpy.save(sys.argv[2], simulate_fmu(sys.argv[1], **settings))
 def simulated(fmu, target, environment=None):
     """FMPy's results of an FMU, from a process of its own.
 
-    FMPy 0.3.32 and its server now and then wait for each other for ever, where the one connects while
-    the other begins to listen: then again.
+    FMPy 0.3.32 and its server sometimes wait for each other for ever, if the one connects while the
+    other starts to listen. The test then starts them again.
     """
     command = [sys.executable, "-c", SIMULATE, fmu, target]
     for _ in range(10):
@@ -200,7 +200,7 @@ def simulated(fmu, target, environment=None):
 
 
 @pytest.mark.parametrize("role", MODELS)
-def test_fmpys_windows_server_has_the_results_of_linux(fmus, packed, role, wine, tmp_path):
+def test_fmpys_windows_server_gives_the_results_of_linux(fmus, packed, role, wine, tmp_path):
     binary(fmus, role, "win64")
     alone = tmp_path / "windows.fmu"
     with zipfile.ZipFile(fmus[role]) as whole, zipfile.ZipFile(alone, "w") as part:
@@ -214,7 +214,7 @@ def test_fmpys_windows_server_has_the_results_of_linux(fmus, packed, role, wine,
     assert there.tobytes() == here.tobytes()
 
 
-def test_the_master_for_windows_writes_the_file_of_linux(fmus, packed, aso_ftc, wine, tmp_path):
+def test_the_master_for_windows_writes_the_results_file_of_linux(fmus, packed, aso_ftc, wine, tmp_path):
     command = os.environ.get("WINDOWS_COMMAND")
     if not command:
         pytest.skip("scripts/cross was not asked for aso-ftc.exe")
@@ -235,7 +235,7 @@ def test_the_master_for_windows_writes_the_file_of_linux(fmus, packed, aso_ftc, 
 
 @pytest.mark.parametrize("role", MODELS)
 @pytest.mark.parametrize("platform", SUFFIX)
-def test_nothing_but_the_functions_of_fmi_is_exported(fmus, role, platform):
+def test_only_the_functions_of_fmi_are_exported(fmus, role, platform):
     library = zipfile.ZipFile(fmus[role]).read(binary(fmus, role, platform))
     for part in slices(library):
         names = exported(part)
@@ -249,19 +249,19 @@ def slices(library):
     if isinstance(parsed, lief.MachO.Binary):
         whole = lief.MachO.parse(list(library))
         machines = [part.header.cpu_type for part in whole]
-        # Taken out, as the parts of a file that is forgotten are so, too.
+        # Copied, because the parts become invalid together with the file.
         return [whole.take(machine) for machine in machines]
     return [parsed]
 
 
 def exported(part):
-    """The names that a loader finds."""
+    """The names that a loader can find."""
     if isinstance(part, lief.ELF.Binary):
         return {symbol.name for symbol in part.exported_symbols}
     if isinstance(part, lief.PE.Binary):
         return {entry.name for entry in part.get_export().entries}
     trie = part.dyld_exports_trie if part.has_dyld_exports_trie else part.dyld_info
-    # In C every name of macOS begins with an underscore.
+    # On macOS, C names start with an underscore.
     return {info.symbol.name.removeprefix("_") for info in trie.exports}
 
 
@@ -279,7 +279,7 @@ def test_linux_needs_glibc_of_2012_and_nothing_else(fmus, role, platform):
 
 
 @pytest.mark.parametrize("role", MODELS)
-def test_windows_needs_libraries_of_the_system_only(fmus, role):
+def test_windows_needs_system_libraries_only(fmus, role):
     (part,) = slices(zipfile.ZipFile(fmus[role]).read(binary(fmus, role, "win64")))
     assert {name.lower() for name in part.libraries} <= WINDOWS
     assert part.header.time_date_stamps == 0
@@ -287,7 +287,7 @@ def test_windows_needs_libraries_of_the_system_only(fmus, role):
 
 @pytest.mark.parametrize("role", MODELS)
 @pytest.mark.parametrize("platform", ["darwin64", "aarch64-darwin"])
-def test_macos_finds_what_it_asks_for_in_each_part(fmus, role, platform):
+def test_macos_finds_the_needed_libraries_in_each_part(fmus, role, platform):
     parts = slices(zipfile.ZipFile(fmus[role]).read(binary(fmus, role, platform)))
     machines = {part.header.cpu_type.name: part for part in parts}
     assert set(machines) == ({"X86_64", "ARM64"} if platform == "darwin64" else {"ARM64"})
@@ -303,7 +303,7 @@ def test_macos_finds_what_it_asks_for_in_each_part(fmus, role, platform):
 
 @pytest.mark.parametrize("role", MODELS)
 @pytest.mark.parametrize("platform", ["darwin64", "aarch64-darwin"])
-def test_the_signature_for_arm_macs_is_that_of_the_pages(fmus, role, platform):
+def test_the_signature_for_arm_macs_has_the_hash_of_each_page(fmus, role, platform):
     library = zipfile.ZipFile(fmus[role]).read(binary(fmus, role, platform))
     (part,) = [part for part in slices(library) if part.header.cpu_type.name == "ARM64"]
     start = part.fat_offset
@@ -324,7 +324,7 @@ def test_the_signature_for_arm_macs_is_that_of_the_pages(fmus, role, platform):
         assert hashlib.sha256(code).digest() == stated, f"page {k}"
 
 
-def test_sums_and_bills_belong_to_the_fmus(fmus):
+def test_checksums_and_bills_of_materials_match_the_fmus(fmus):
     folder = fmus["plant"].parent
     done = subprocess.run(["sha256sum", "--check", "SHA256SUMS"], cwd=folder, capture_output=True)
     assert done.returncode == 0 and done.stdout.count(b": OK") == 5

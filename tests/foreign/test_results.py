@@ -1,7 +1,7 @@
-"""Files of results, read by those who read CSV and Parquet: FMPy, numpy, pandas, polars, pyarrow.
+"""Files of results, read by FMPy, numpy, pandas, polars and pyarrow.
 
-The example write_results writes a table whose Reals have the bits of a generator, which is stated
-here again: every number has to come back with the same bits.
+The example write_results writes a table whose Reals have the bits of a random generator. The same
+generator is here in Python: every number must be read with the same bits.
 """
 
 import json
@@ -22,7 +22,7 @@ UNITS = {"time": "s", "plant.x_p": "m", "ctrl.x_hat[1]": "rad/s"}
 
 
 def expected(rows=ROWS):
-    """The table of the example: Knuth's MMIX generator over all doubles."""
+    """The table of the example: Knuth's MMIX generator for arbitrary doubles."""
     bits, state = np.empty(2 * rows, dtype=np.uint64), 1
     for place in range(2 * rows):
         state = (state * 6364136223846793005 + 1442695040888963407) % 2**64
@@ -42,7 +42,7 @@ def expected(rows=ROWS):
 
 @pytest.fixture(scope="module")
 def write_results(root):
-    """Runs the example; its exit status comes back."""
+    """Runs the example; returns its exit status."""
     cargo = ["cargo", "build", "--release", "--locked", "--package", "cosim-results"]
     subprocess.run([*cargo, "--example", "write_results"], cwd=root, check=True)
     program = root / "target" / "release" / "examples" / "write_results"
@@ -51,7 +51,7 @@ def write_results(root):
 
 @pytest.fixture(scope="module")
 def files(write_results, tmp_path_factory):
-    """A file of each format with all types, a CSV without texts, and what is in them."""
+    """A file of each format with all types, a CSV file without texts, and their content."""
     folder = tmp_path_factory.mktemp("results")
     csv, parquet, numbers = (folder / name for name in ("a.csv", "a.parquet", "numbers.csv"))
     assert write_results(csv, parquet) == 0
@@ -60,7 +60,7 @@ def files(write_results, tmp_path_factory):
 
 
 def same(found, wanted):
-    """The same bits; one not-a-number is as good as another."""
+    """Checks that the bits are equal; all NaN values count as equal."""
     found, wanted = np.asarray(found, dtype=np.float64), np.asarray(wanted, dtype=np.float64)
     either = np.isnan(wanted)
     assert np.array_equal(np.isnan(found), either)
@@ -68,7 +68,7 @@ def same(found, wanted):
 
 
 def assert_table(column, names, table, rows=ROWS):
-    """Every column of a reader, given as a function of its name."""
+    """Checks every column of a reader, which is a function of the column's name."""
     for name in names:
         found = column(name)
         assert len(found) == rows
@@ -78,7 +78,7 @@ def assert_table(column, names, table, rows=ROWS):
             assert same(found, table[name][:rows]), name
 
 
-def test_the_table_has_hard_numbers(files):
+def test_the_table_contains_difficult_numbers(files):
     reals = files.table["plant.x_p"]
     assert np.isnan(reals).any() and (np.abs(reals[np.isfinite(reals)]) < 1e-300).any()
     assert (np.abs(reals[np.isfinite(reals)]) > 1e300).any()

@@ -1,4 +1,4 @@
-"""Sampled controllers: whatever the communication step, they act at their samples."""
+"""Sampled controllers act at their samples, for every communication step."""
 
 from ctypes import byref
 
@@ -46,7 +46,7 @@ def signals(fmu):
 
 
 def expected(fmu):
-    """The signals at each sample, for measurements on a straight line."""
+    """The signals at each sample, for measurements that grow linearly."""
     z, y, slope = start_of(fmu)
     controller = SampledController(fmu.design, z, y)
     rows = []
@@ -56,7 +56,7 @@ def expected(fmu):
     return np.array(rows)
 
 
-def test_the_recursion_of_these_tests_meets_limits(fmu):
+def test_these_tests_include_commands_at_limits(fmu):
     limits = [own.get("limits") for own in fmu.design["actuators"]]
     commands = expected(fmu)[:, -len(limits) :].T
     for command, pair in zip(commands, limits):
@@ -64,7 +64,7 @@ def test_the_recursion_of_these_tests_meets_limits(fmu):
 
 
 @pytest.mark.parametrize("parts", [10, 3, 10 / 7, 1, 1 / 2, 1 / 2.7, 1 / 13])
-def test_whatever_the_communication_step_it_acts_at_its_samples(fmu, parts):
+def test_it_acts_at_its_samples_for_every_communication_step(fmu, parts):
     size, rows = T / parts, expected(fmu)
     z, y, slope = start_of(fmu)
     names = [f"y{k + 1}" for k in range(len(y))]
@@ -92,7 +92,7 @@ def test_its_commands_have_no_slopes(fmu):
         assert set(instance.slopes_of(*fmu.names(causality="output"))) == {0.0}
 
 
-def test_outputs_do_not_follow_what_is_set_between_steps(fmu):
+def test_outputs_do_not_change_when_inputs_are_set_between_steps(fmu):
     assert not any(unknown.dependencies for unknown in fmu.description.outputs)
     z, y, _ = start_of(fmu)
     with begun(fmu, size_of(fmu.design), z, y) as instance:
@@ -103,7 +103,7 @@ def test_outputs_do_not_follow_what_is_set_between_steps(fmu):
         assert instance.outputs() == before
 
 
-def test_what_its_description_says(fmu):
+def test_it_has_discrete_outputs_no_states_and_a_constant_sample_time(fmu):
     assert fmu.states == fmu.indicators == 0
     assert not any(name.startswith("der(") for name in fmu.variables)
     assert fmu.names(causality="output") == fmu.names(variability="discrete", causality="output")
@@ -121,7 +121,7 @@ def test_the_step_size_of_the_default_experiment_is_the_sample_time(controller, 
     assert float(fmu.description.defaultExperiment.stepSize) == T
 
 
-def test_a_step_is_rolled_back_to_the_bit(fmu):
+def test_a_step_is_rolled_back_with_the_same_bits(fmu):
     z, y, slope = start_of(fmu)
     names = [f"y{k + 1}" for k in range(len(y))]
     with begun(fmu, size_of(fmu.design), z, y) as instance, Instance(fmu) as other:
@@ -188,10 +188,10 @@ def test_fmpy_runs_it_in_model_exchange(fmu):
 @pytest.mark.parametrize("parts", [1, 4, 10])
 @pytest.mark.parametrize("slopes", [False, True])
 @pytest.mark.parametrize("estimator", ["current", "prediction"])
-def test_in_a_loop_with_a_plant_that_is_stepped_first_there_is_no_delay(
+def test_there_is_no_delay_in_a_loop_with_a_plant_that_is_stepped_first(
     controller, tmp_path, estimator, slopes, parts
 ):
-    # A double integrator; the loop below is exact where steps are a part of the sample time.
+    # A double integrator; the loop below is exact if steps divide the sample time.
     A, B, C = np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1.0]]), np.array([[1.0, 0.0]])
     whole = lambda h: expm(np.block([[A, B], [np.zeros((1, 3))]]) * h)[:2]
     Phi, Gamma = whole(T)[:, :2], whole(T)[:, 2:]

@@ -1,4 +1,4 @@
-"""The paper's pendulum with sampled controllers: what scripts/residual_over_sample_time.py draws."""
+"""The paper's pendulum with sampled controllers: the claims of docs/explanation/sampled.md."""
 
 import json
 import re
@@ -26,18 +26,18 @@ PROTOTYPE = [(1e-4, 1.3), (5e-4, 1.3), (1e-3, 1.8), (1e-2, 18.0)]
 
 
 @pytest.mark.parametrize("period, prototype", PROTOTYPE)
-def test_the_residual_is_no_worse_than_that_of_the_prototype(tmp_path, period, prototype):
+def test_the_residual_is_at_most_that_of_the_prototype(tmp_path, period, prototype):
     assert couple(design(CONSTANT, period, tmp_path), period) < prototype
 
 
 @pytest.mark.parametrize("choice", [RAMP, WEIGHTED], ids=lambda choice: choice.label)
 @pytest.mark.parametrize("period, prototype", PROTOTYPE)
-def test_with_the_ramp_model_it_is_less_than_a_tenth(tmp_path, choice, period, prototype):
+def test_with_the_ramp_model_the_residual_is_below_a_tenth_of_the_prototypes(tmp_path, choice, period, prototype):
     assert couple(design(choice, period, tmp_path), period) < 0.1 * prototype
 
 
 @pytest.mark.parametrize("period", [2e-3, 5e-3, 1e-2])
-def test_the_current_estimator_gains_a_third_over_the_prediction(tmp_path, period):
+def test_the_current_estimator_has_a_third_less_residual_than_the_prediction(tmp_path, period):
     early, late = (
         couple(design(choice, period, tmp_path), period) for choice in (CONSTANT, CONSTANT_PREDICTION)
     )
@@ -46,14 +46,14 @@ def test_the_current_estimator_gains_a_third_over_the_prediction(tmp_path, perio
 
 @pytest.mark.parametrize("choice", [CONSTANT, RAMP], ids=lambda choice: choice.label)
 @pytest.mark.parametrize("part", [1 / 3, 1 / 2.7, 0.7])
-def test_the_communication_step_need_be_no_part_of_the_sample_time(tmp_path, choice, part):
+def test_the_communication_step_need_not_divide_the_sample_time(tmp_path, choice, part):
     period = 5e-3
     fmu = design(choice, period, tmp_path)
     whole = couple(fmu, period, settings=TRUE_START)
     assert couple(fmu, part * period, settings=TRUE_START) == pytest.approx(whole, rel=0.02)
 
 
-def test_a_sample_of_delay_fells_the_pendulum_with_the_ramp_model_a_tenth_does_not(tmp_path):
+def test_with_the_ramp_model_a_delay_of_a_sample_fells_the_pendulum_and_of_a_tenth_does_not(tmp_path):
     period = 5e-3
     fmu = design(RAMP, period, tmp_path)
     assert couple(fmu, period, "jacobi", TRUE_START) is None
@@ -61,12 +61,12 @@ def test_a_sample_of_delay_fells_the_pendulum_with_the_ramp_model_a_tenth_does_n
     assert couple(fmu, period / 10, "jacobi", TRUE_START) == pytest.approx(whole, rel=0.01)
 
 
-def test_the_constant_model_bears_a_sample_of_delay(tmp_path):
+def test_the_constant_model_tolerates_a_delay_of_a_sample(tmp_path):
     fmu = design(CONSTANT, 1e-2, tmp_path)
     assert couple(fmu, 1e-2, "jacobi") == pytest.approx(couple(fmu, 1e-2), rel=0.05)
 
 
-def test_fmpy_finds_the_same_residual(tmp_path, python, packed):
+def test_fmpy_gives_the_same_residual(tmp_path, python, packed):
     period = 5e-3
     fmu = design(CONSTANT, period, tmp_path)
     done = python(
@@ -78,7 +78,7 @@ def test_fmpy_finds_the_same_residual(tmp_path, python, packed):
     assert found == pytest.approx(couple(fmu, period), rel=1e-3)
 
 
-def test_by_weights_the_ramp_model_needs_less_gain(tmp_path):
+def test_designed_by_weights_the_ramp_model_amplifies_noise_less(tmp_path):
     gains = []
     for choice in (RAMP, WEIGHTED):
         design(choice, 5e-3, tmp_path)
@@ -87,7 +87,7 @@ def test_by_weights_the_ramp_model_needs_less_gain(tmp_path):
     assert weighted[0] < 0.1 * placed[0] and weighted[1] < 0.5 * placed[1]
 
 
-def test_the_tables_of_the_documentation_are_those_of_the_figure():
+def test_the_tables_of_the_page_are_those_of_the_figure():
     page = (ROOT / "docs" / "explanation" / "sampled.md").read_text(encoding="utf-8")
     lines = (ROOT / "docs" / "figures" / "residual_over_sample_time.csv").read_text(encoding="utf-8").splitlines()
     found = {}

@@ -1,4 +1,4 @@
-"""Calls from inside the logger, while the instance is busy: section 4.2.4, stepInProgress."""
+"""Calls from inside of the logger, while the instance is busy: section 4.2.4, stepInProgress."""
 
 from ctypes import byref, c_double, c_int, c_size_t, c_void_p
 from math import nan
@@ -22,7 +22,7 @@ from excitation import START, begun, drive
 
 
 class Meddler(Instance):
-    """Calls every function of itself from its own logger; the statuses come to `answers`."""
+    """An instance whose logger calls every function of that instance and stores the statuses in `answers`."""
 
     answers = None
 
@@ -39,16 +39,16 @@ class Meddler(Instance):
         super().__init__(fmu, **options)
 
     def keep(self):
-        """Holds the present state."""
+        """Saves the present state."""
         self.must("GetFMUstate", byref(self.state))
 
     def let_go(self):
-        """Frees the state held."""
+        """Frees the saved state."""
         self.must("FreeFMUstate", byref(self.state))
 
 
 def arguments(name, state):
-    """Arguments that are in order at another moment."""
+    """Arguments that are valid outside of the logger."""
     one, real = references(1), reals(0.5)
     values = {f"{way}{kind}": kind for way in ("Get", "Set") for kind in C_TYPES}
     if name in values:
@@ -103,7 +103,7 @@ def test_every_call_from_the_logger_of_a_failing_call_is_an_error_and_does_nothi
         instance.let_go()
 
 
-def test_a_run_goes_on_with_the_same_bits_after_calls_from_the_logger(fmu):
+def test_a_run_continues_with_the_same_bits_after_calls_from_the_logger(fmu):
     with begun(fmu, 0) as alone, Meddler(fmu) as instance:
         instance.start(START[fmu.identifier])
         assert drive(instance, 0, 40) == drive(alone, 0, 40)

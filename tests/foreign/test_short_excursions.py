@@ -1,4 +1,4 @@
-"""What a command that is at its limit for a part of a step costs: docs/reference/plant-file.md, "Limits"."""
+"""The error of an excursion beyond a limit within a step: docs/reference/plant-file.md, "Limits"."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ def stepped(fmu, size):
         return instance.get(*ESTIMATES)
 
 
-def test_an_excursion_is_exact_where_the_middle_or_the_end_of_the_step_sees_it(
+def test_an_excursion_is_exact_if_the_middle_or_the_end_of_the_step_is_in_it(
     controller, tmp_path
 ):
     design = shipped_design(controller)

@@ -1,5 +1,5 @@
-"""Signals from CSV files against FMPy, which reads the same files: `fmpy.util.read_csv`, and
-`fmpy.simulation.Input`, which sets the inputs of an FMU that writes them down."""
+"""Signals from CSV files, compared with FMPy, which reads the same files: `fmpy.util.read_csv`, and
+`fmpy.simulation.Input`, which sets the inputs of a recording FMU."""
 
 import subprocess
 from math import isclose
@@ -21,7 +21,7 @@ VARIABLES = {"line": CONTINUOUS, "hold": DISCRETE}
 
 
 class Listener(FMU2Slave):
-    """An FMU without a library that keeps what it is told."""
+    """An FMU without a library that records the calls of its setters."""
 
     def __init__(self):
         self.component = None
@@ -38,7 +38,7 @@ class Listener(FMU2Slave):
 def of_fmpy(file, between, times):
     """Value, slope and time of the next event, by FMPy after the event at each time.
 
-    The slopes are asked for: FMPy 0.3.32 sets derivatives for exactly nine inputs, and none else."""
+    The test reads the slopes from FMPy's object: FMPy 0.3.32 sets derivatives for exactly nine inputs only."""
     listener = Listener()
     description = SimpleNamespace(modelVariables=[VARIABLES[between]])
     source = Input(listener, description, read_csv(file))
@@ -82,7 +82,7 @@ def around(times):
 
 
 def with_jumps(seed):
-    """Random points, some times two or three times."""
+    """Random points, some of them with the same time two or three times."""
     random = np.random.default_rng(seed)
     times = np.cumsum(random.uniform(0.01, 0.3, 60)) - random.uniform(0, 5)
     times = np.sort(np.concatenate([times, random.choice(times, 12), random.choice(times, 4)]))
@@ -109,7 +109,7 @@ BOTH.remove(("of one row", "hold"))
 
 
 @pytest.mark.parametrize(("case", "between"), BOTH)
-def test_values_are_those_of_fmpy_to_the_last_bit(case, between, of_ours, tmp_path):
+def test_values_equal_those_of_fmpy_to_the_last_bit(case, between, of_ours, tmp_path):
     file = tmp_path / "inputs.csv"
     write(file, *CASES[case])
     times = around(CASES[case][0])
@@ -119,21 +119,21 @@ def test_values_are_those_of_fmpy_to_the_last_bit(case, between, of_ours, tmp_pa
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_slopes_between_the_points_are_those_of_fmpy(case, of_ours, tmp_path):
+def test_slopes_between_the_points_equal_those_of_fmpy(case, of_ours, tmp_path):
     file = tmp_path / "inputs.csv"
     write(file, *CASES[case])
     points = CASES[case][0]
     times = np.array([t for t in around(points) if not any(isclose(t, p) for p in points)])
     expected, found = of_fmpy(file, "line", times), of_ours(file, "line", times)
     assert (expected[:, 1] == found[:, 1]).all()
-    # At a point it is the slope of the line that begins there, where FMPy gives that of the one
-    # that ends there.
+    # At a point, ours is the slope of the line that starts there, FMPy's that of the line that ends
+    # there.
     write(file, [0, 1, 2], [0, 1, 5])
     assert of_fmpy(file, "line", [1.0])[0, 1] == 1
     assert of_ours(file, "line", [1.0])[0, 1] == 4
 
 
-# FMPy jumps where times differ by rounding, but has no event there.
+# FMPy jumps if times differ by rounding only, but has no event there.
 EVENTS = [pair for pair in BOTH if pair != ("with times that differ by rounding", "line")]
 
 
@@ -148,7 +148,8 @@ def test_steps_end_at_the_events_of_fmpy(case, between, of_ours, tmp_path):
     if between == "line":
         assert (found[:, 2] == expected[:, 2]).all()
         return
-    # FMPy's events of repeated times are those of any column, here also those without a change.
+    # FMPy's events at repeated times belong to all columns, so some are without a change of this
+    # one.
     changes = {float(t) for t, before, after in zip(points[1:], values, values[1:]) if before != after}
     for time, theirs, ours in zip(times, expected[:, 2], found[:, 2]):
         later = [t for t in changes if t > time and not isclose(t, time)]

@@ -1,4 +1,4 @@
-"""The files that we write, by the schemas of the standard; those written by hand, likewise."""
+"""The SSP files that we write, and those written for the tests, checked by the schemas of the standard."""
 
 import zipfile
 
@@ -23,17 +23,17 @@ def test_the_packed_system_structure_follows_the_schema(package):
 
 @pytest.mark.parametrize("name", SAMPLES)
 def test_files_with_everything_that_can_be_written_follow_the_schemas(root, name):
-    """crates/ssp/tests/ssp/writing.rs holds these files and what is written together."""
+    """crates/ssp/tests/ssp/writing.rs contains these files and writes the same content."""
     path = root / "crates" / "ssp" / "tests" / "ssp" / "data" / name
     assert problems(path.read_bytes(), path.suffix) == []
 
 
-def test_the_schemas_find_what_is_wrong(package):
+def test_the_schemas_detect_errors(package):
     wrong = ssd_of(package).replace(b'kind="output"', b'kind="outlet"', 1)
     assert any("outlet" in problem for problem in problems(wrong, ".ssd"))
 
 
-def test_the_archive_is_as_section_3_demands(package):
+def test_the_archive_satisfies_section_3(package):
     with zipfile.ZipFile(package) as archive:
         entries = archive.infolist()
         assert archive.testzip() is None
@@ -49,5 +49,5 @@ def test_the_archive_is_as_section_3_demands(package):
 
 
 @pytest.mark.parametrize("style", [libcosim_style, ecos_style, nested_style])
-def test_the_structures_written_by_hand_follow_the_schema(packed, tmp_path, style):
+def test_the_structures_written_for_the_tests_follow_the_schema(packed, tmp_path, style):
     assert problems(ssd_of(style(packed, tmp_path)), ".ssd") == []

@@ -1,4 +1,4 @@
-"""Our SSP, and those written by hand, in FMPy, libcosim and Ecos."""
+"""Our SSP, and those written for the tests, in FMPy, libcosim and Ecos."""
 
 import ctypes
 from importlib import metadata
@@ -14,7 +14,8 @@ from libcosimpy.CosimObserver import CosimObserver
 from held_loop import COUNT, LINKS, SETTINGS, STEP, HeldLoop, expect_equal, held_loop, real_outputs
 from ssp_files import ecos_style, libcosim_style
 
-# libecosc needs this library; the package tbb keeps it where the dynamic linker does not look.
+# libecosc needs this library; the package tbb installs it outside of the dynamic linker's search
+# path.
 (TBB,) = (file for file in metadata.files("tbb") if file.name == "libtbb.so.12")
 ctypes.CDLL(str(TBB.locate()))
 
@@ -35,7 +36,7 @@ def package(root):
 
 
 def sums(step, count):
-    """The times of tools that add the step to the time."""
+    """The times of tools that add the step to the previous time."""
     time = 0.0
     for _ in range(count):
         yield time, step
@@ -54,7 +55,7 @@ def columns(unpacked):
 
 
 def by_libcosim(path, step, count, unpacked):
-    """Every Real output after each step; without a step in s, libcosim takes that of the SSD."""
+    """Every Real output after each step; if no step is given, libcosim uses that of the SSD."""
     nanoseconds_each = None if step is None else round(step * NANOSECOND)
     execution = CosimExecution.from_ssp_file(str(path), nanoseconds_each)
     infos = execution.slave_infos()
@@ -116,25 +117,25 @@ def test_fmpy_reads_elements_connectors_and_connections_of_our_ssp(package, unpa
     assert found == set(LINKS)
 
 
-def test_libcosim_runs_our_ssp_to_the_bits_of_the_loop_by_hand(package, unpacked):
+def test_libcosim_runs_our_ssp_with_the_bits_of_the_loop_in_fmpy(package, unpacked):
     grid = nanoseconds(OWN_STEP, OWN_COUNT)
     names, expected = held_loop(unpacked, grid, NO_SETTINGS)
     times, found = by_libcosim(package, None, OWN_COUNT, unpacked)
-    # Without being told it takes the step that our SSP states.
+    # Without a stated step it uses the step of our SSP.
     assert times == [(k + 1) * 1_000_000 / NANOSECOND for k in range(OWN_COUNT)]
     expect_equal(names, expected, found)
 
 
-def test_ecos_runs_our_ssp_to_the_bits_of_the_loop_by_hand(package, unpacked):
+def test_ecos_runs_our_ssp_with_the_bits_of_the_loop_in_fmpy(package, unpacked):
     grid = sums(OWN_STEP, OWN_COUNT)
     names, expected = held_loop(unpacked, grid, NO_SETTINGS, exchange_before_reading=True)
     expect_equal(names, expected, by_ecos(package, OWN_STEP, OWN_COUNT, unpacked))
 
 
 def test_fmpy_runs_our_ssp_with_its_first_exchange_one_step_late(package, unpacked):
-    """simulate_ssp leaves the initialization without having exchanged anything: the first step is
-    made with all inputs 0, whatever the outputs are. Its times are those at which steps begin, the
-    values those at which they end."""
+    """simulate_ssp leaves the initialization mode without an exchange of values, so the first step has
+    all inputs 0, whatever the outputs are. Each row has the time at which its step starts and the
+    values at its end."""
     result = simulate_ssp(str(package), stop_time=OWN_COUNT * OWN_STEP - 1e-9, step_size=OWN_STEP)
     grid = list(sums(OWN_STEP, OWN_COUNT))
     assert list(result["time"]) == [time for time, _ in grid]
@@ -143,8 +144,8 @@ def test_fmpy_runs_our_ssp_with_its_first_exchange_one_step_late(package, unpack
     expect_equal(names, late, found)
     _, right = held_loop(unpacked, grid, NO_SETTINGS)
     u = names.index(("controller", "u"))
-    # What the controller first commands, seeing the pendulum where it stands at the start, comes
-    # one step late; the pendulum has hardly moved meanwhile.
+    # The controller's first command, computed from the initial position of the pendulum, arrives
+    # one step late; the pendulum has hardly moved by then.
     assert found[0, u] == 0.0
     assert abs(right[0, u]) > 1000.0 and found[1, u] == pytest.approx(right[0, u], rel=1e-4)
 
@@ -162,7 +163,7 @@ def test_ecos_runs_a_structure_of_its_own_style(packed, unpacked, tmp_path):
     expect_equal(names, expected, by_ecos(path, STEP, COUNT, unpacked, "initialValues"))
 
 
-def test_libcosim_runs_a_structure_of_the_style_of_ecos_where_both_mean_the_same(
+def test_libcosim_runs_a_structure_in_the_style_of_ecos_if_both_read_it_alike(
     packed, unpacked, tmp_path
 ):
     assert set(SETTINGS) == set(unpacked)

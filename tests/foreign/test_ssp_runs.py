@@ -1,6 +1,7 @@
-"""`aso-ftc run` on system structures: ours and those written for other tools, to the same bits.
+"""`aso-ftc run` on system structures, ours and those in the style of other tools, with the same bits.
 
-The loop by hand (`held_loop`) is what libcosim, Ecos and FMPy agree with in test_ssp_judges.py.
+The loop in FMPy (`held_loop`) is the one that libcosim, Ecos and FMPy agree with in
+test_ssp_judges.py.
 """
 
 import csv
@@ -19,7 +20,7 @@ NO_SETTINGS = {"plant": {}, "controller": {}}
 
 @pytest.fixture
 def run(aso_ftc, tmp_path):
-    """Runs a system structure; the named columns of what it recorded, and the times."""
+    """Runs a system structure; returns the named columns of its results, and the times."""
 
     def run(path, step, stop, names):
         out = tmp_path / "out"
@@ -43,7 +44,7 @@ def grid(step, count):
     ("style", "plant"),
     [(libcosim_style, "plant"), (ecos_style, "plant"), (nested_style, "cart.plant")],
 )
-def test_structures_of_every_style_run_to_the_bits_of_the_loop_by_hand(
+def test_structures_of_every_style_run_with_the_bits_of_the_loop_in_fmpy(
     run, packed, unpacked, tmp_path, style, plant
 ):
     names, expected = held_loop(unpacked, grid(STEP, COUNT))
@@ -54,7 +55,7 @@ def test_structures_of_every_style_run_to_the_bits_of_the_loop_by_hand(
     expect_equal(names, expected, found[1:])
 
 
-def test_our_ssp_runs_in_our_master_to_the_bits_of_the_loop_by_hand(run, root, unpacked):
+def test_our_ssp_runs_in_our_master_with_the_bits_of_the_loop_in_fmpy(run, root, unpacked):
     step = 1e-3
     names, expected = held_loop(unpacked, grid(step, COUNT), NO_SETTINGS)
     columns = [f"{role}.{name}" for role, name in names]
@@ -62,7 +63,7 @@ def test_our_ssp_runs_in_our_master_to_the_bits_of_the_loop_by_hand(run, root, u
     expect_equal(names, expected, found[1:])
 
 
-def test_a_structure_that_cannot_be_read_is_refused_with_its_place(aso_ftc, tmp_path):
+def test_a_structure_that_cannot_be_read_is_refused_with_its_position(aso_ftc, tmp_path):
     path = tmp_path / "SystemStructure.ssd"
     path.write_text("<x>\n <y a='1' a='2'/></x>", encoding="utf-8")
     done = aso_ftc("run", path, "--out", tmp_path / "out")
@@ -71,7 +72,7 @@ def test_a_structure_that_cannot_be_read_is_refused_with_its_place(aso_ftc, tmp_
 
 
 def for_windows(data):
-    """The FMU in `data` with its library for Linux where that for Windows is expected."""
+    """The FMU in `data`, with its library for Linux in the folder for Windows."""
     made = io.BytesIO()
     with zipfile.ZipFile(io.BytesIO(data)) as fmu, zipfile.ZipFile(made, "w") as other:
         for name in fmu.namelist():
@@ -80,7 +81,7 @@ def for_windows(data):
     return made.getvalue()
 
 
-def test_an_fmu_without_a_library_for_this_platform_is_named_with_those_it_has(
+def test_an_fmu_without_a_library_for_this_platform_is_refused_with_the_platforms_it_has(
     aso_ftc, root, packed, tmp_path
 ):
     path = tmp_path / "half.ssp"

@@ -1,7 +1,7 @@
-"""Plant and controller exchanged for FMUs that PythonFMU exported.
+"""Plant and controller, each replaced by an FMU that PythonFMU exported.
 
 The library of PythonFMU 0.7 uses some 45 symbols of Python and does not say which library has
-them: they must be in the process already. So the command, no Python, loads libpython first.
+them: they must be in the process already. So the command, which has no Python, loads libpython first.
 """
 
 import csv
@@ -27,7 +27,7 @@ def foreign(python, tmp_path_factory):
 
 
 def shared_python():
-    """The shared library of this Python; none where it was built without and none is installed."""
+    """The shared library of this Python; None if it was built without one and none is installed."""
     names = sysconfig.get_config_vars("LIBDIR", "INSTSONAME")
     beside = Path(*filter(None, names))
     if ".so" in beside.name and beside.is_file():
@@ -48,10 +48,10 @@ def preload():
 
 @pytest.fixture
 def run(aso_ftc, packed, tmp_path):
-    """`aso-ftc run` for 20 s with our FMUs unless told otherwise; the columns of results.csv."""
+    """Runs `aso-ftc run` for 20 s, by default with our FMUs; returns the columns of results.csv."""
 
     def simulate(*options, plant=packed["plant"], controller=packed["controller"], status=0):
-        # An embedded Python looks for its modules beside the python3 of PATH, whichever that is.
+        # An embedded Python searches its modules beside the first python3 in PATH.
         environment = {**os.environ, "PYTHONHOME": sys.base_prefix}
         done = aso_ftc(
             "run",
@@ -96,14 +96,14 @@ def test_the_aso_controller_brings_a_pendulum_of_pythonfmu_to_rest(run, foreign,
 
 
 @pytest.mark.parametrize("role", ["plant", "controller"])
-def test_without_python_in_the_process_the_refusal_explains_preload(run, foreign, role):
+def test_without_python_in_the_process_the_error_explains_preload(run, foreign, role):
     name = {"plant": "CartPendulum.fmu", "controller": "LqrController.fmu"}[role]
     message = run(**{role: foreign / name}, status=2)
     assert "--preload" in message and "libpython" in message
     assert "undefined symbol" in message, "what the loader said"
 
 
-def test_a_library_to_preload_that_does_not_exist_is_refused_by_name_and_reason(run):
+def test_a_missing_library_to_preload_is_refused_by_name_and_reason(run):
     message = run("--preload", "libnowhere.so.7", status=2)
     assert "libnowhere.so.7" in message
     assert "No such file" in message or "cannot open shared object" in message

@@ -1,4 +1,4 @@
-"""The packages and their descriptions, judged by FMPy, by the schema and by the standard's text."""
+"""The packages and their descriptions, checked by FMPy, by the schema and against the standard's text."""
 
 import re
 import struct
@@ -32,7 +32,7 @@ def test_the_command_fmpy_validate_finds_no_problem(packed, role, python):
 
 
 @pytest.mark.parametrize("role", ROLES)
-def test_the_schema_holds_for_the_packed_and_the_committed_description(packed, role, root):
+def test_the_packed_and_the_committed_description_follow_the_schema(packed, role, root):
     schema = etree.XMLSchema(etree.parse(SCHEMA))
     committed = root / "modelDescription" / f"{packed[role].stem}.xml"
     inside = zipfile.ZipFile(packed[role]).read("modelDescription.xml")
@@ -42,7 +42,7 @@ def test_the_schema_holds_for_the_packed_and_the_committed_description(packed, r
 
 
 @pytest.mark.parametrize("role", ROLES)
-def test_the_description_is_as_the_text_of_the_standard_wants_it(packed, role):
+def test_the_description_follows_the_text_of_the_standard(packed, role):
     text = zipfile.ZipFile(packed[role]).read("modelDescription.xml").decode("utf-8")
     assert text.startswith('<?xml version="1.0" encoding="UTF-8"?>\n<fmiModelDescription')
     assert not re.search(r'="[+-]?(NaN|INF)"', text, re.IGNORECASE)
@@ -73,7 +73,7 @@ def test_exactly_the_required_initial_unknowns_are_listed_in_ascending_order(pac
 
 
 @pytest.mark.parametrize("role", ROLES)
-def test_the_archive_uses_only_what_every_importer_reads(packed, role):
+def test_the_archive_uses_only_features_that_every_importer_supports(packed, role):
     data = packed[role].read_bytes()
     names = set()
     for entry in zipfile.ZipFile(packed[role]).infolist():

@@ -1,6 +1,6 @@
-/* What an importer in C does with the libraries of an FMU, on any platform: checks of the interface,
- * then the closed loop of plant and controller. Prints nothing that the platform decides, so that two
- * platforms give the same text; the first check that fails ends it with status 1.
+/* An importer in C for any platform. It checks the interface of two FMUs, then runs the closed loop of
+ * plant and controller. Its output does not depend on the platform; the first check that fails ends it
+ * with status 1.
  *
  *     host STEPS PLANT GUID RESOURCES X_P THETA U CONTROLLER GUID RESOURCES X_P THETA U
  *
@@ -47,7 +47,7 @@ struct fmu {
     component component;
 };
 
-/* Every function of both interfaces. */
+/* All functions of both interfaces. */
 static const text names[] = {
     "fmi2GetTypesPlatform", "fmi2GetVersion", "fmi2SetDebugLogging", "fmi2Instantiate",
     "fmi2FreeInstance", "fmi2SetupExperiment", "fmi2EnterInitializationMode",
@@ -139,7 +139,7 @@ static void end(struct fmu *fmu)
     fmu->component = NULL;
 }
 
-/* The bits of values, one after the other (FNV-1a). */
+/* A hash of the bits of values (FNV-1a). */
 static uint64_t sum(uint64_t sum, const double *values, size_t count)
 {
     for (size_t k = 0; k < count; k++) {
@@ -153,7 +153,7 @@ static uint64_t sum(uint64_t sum, const double *values, size_t count)
 
 static const uint64_t nothing = UINT64_C(14695981039346656037);
 
-/* A second run from a saved state, and from its bytes, has the values of the first. */
+/* A run continued from a saved state, and from its bytes, must have the values of the first. */
 static void states(struct fmu *fmu)
 {
     component c = fmu->component;

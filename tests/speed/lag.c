@@ -3,11 +3,11 @@
  *     T dx_i/dt = u_i/2 + (i + 1) s(t) - x_i,   x_i(0) = 0,   y_i = x_i,   i = 0 ... PORTS - 1
  *
  * s(t) = t - floor(t) is a sawtooth that keeps the outputs moving. Over a step inputs and sawtooth are
- * held at their begin, and the equation is solved exactly: x_i += (1 - exp(-h/T)) (u_i/2 + (i + 1) s - x_i).
+ * held at their start values, and the equation is solved exactly: x_i += (1 - exp(-h/T)) (u_i/2 + (i + 1) s - x_i).
  *
  * Value references: u_i is i, y_i is PORTS + i, T (in s, a parameter) is 2 PORTS. lag.rs writes the
- * description. All the functions of the standard are here; what the description does not promise
- * answers fmi2Error. */
+ * description. All the functions of the standard are here; functions that the description does not
+ * declare return fmi2Error. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -161,7 +161,7 @@ status fmi2CancelStep(component c)
     return ERROR;
 }
 
-/* What the description does not promise. No such variables: none may be asked for. */
+/* Functions of types without variables: they accept empty lists only. */
 #define NO_VARIABLES(name, type) \
     status name(component c, references which, size_t count, type values) \
     { \

@@ -1,4 +1,4 @@
-//! The tiny FMU for measuring masters, built from `lag.c`, and rings of it.
+//! The tiny FMU with which masters are measured, built from `lag.c`, and rings of it.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -6,12 +6,12 @@ use std::process::Command;
 
 use fmu_description::package::{Package, platforms};
 
-/// Builds the FMU with `ports` inputs `u0`, `u1`, ... and as many outputs `y0`, `y1`, ...;
+/// Builds the FMU with `ports` inputs `u0`, `u1`, ... and as many outputs `y0`, `y1`, ... as
 /// `folder/Lag<ports>.fmu`.
 ///
 /// # Errors
 ///
-/// Where there is no C compiler (`cc`, or what `CC` names), or a file cannot be written.
+/// If there is no C compiler (`cc`, or the program that `CC` names), or a file cannot be written.
 pub(crate) fn pack(folder: &Path, ports: usize) -> anyhow::Result<PathBuf> {
     let (name, guid) = (format!("Lag{ports}"), format!("{{lag-{ports}}}"));
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/speed/lag.c");
@@ -71,9 +71,9 @@ fn description(name: &str, guid: &str, ports: usize) -> String {
     )
 }
 
-/// The connections of `count` FMUs in a ring, each port of each FMU used once: output `port` of FMU
-/// `from` to input `port` of FMU `to`, as `(from, to, port)`. Even ports lead to the FMUs behind
-/// (1, 2, ... places), odd ones to those before; a pair is coupled both ways.
+/// Returns the connections of `count` FMUs in a ring, as `(from, to, port)`: output `port` of FMU
+/// `from` to input `port` of FMU `to`. Each port is used once. Even ports are connected to the FMUs
+/// behind (1, 2, ... places), odd ports to those before; a pair is coupled both ways.
 pub(crate) fn ring(count: usize, ports: usize) -> impl Iterator<Item = (usize, usize, usize)> {
     (0..count).flat_map(move |from| {
         (0..ports).map(move |port| {

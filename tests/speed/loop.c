@@ -1,14 +1,14 @@
-/* The bare loop that masters are measured against: Jacobi over FMI 2.0 FMUs, and nothing else.
+/* The bare loop with which masters are compared: Jacobi's method for FMI 2.0 FMUs, and nothing else.
  *
  *     loop SYSTEM STEP STEPS [CSV]
  *
  * Each step it sets the connected inputs, steps and reads the outputs of one FMU after the other, one
  * call of fmi2SetReal, fmi2DoStep and fmi2GetReal each; between them it copies doubles. With CSV it
  * reads every Real output and prints all of them at every step, with "%.17g". Prints a JSON object: the
- * processor time in ns of the start and of one step, the peak memory in KiB, the sum of all values
- * that were read last.
+ * processor time in ns of the start and of one step, the peak memory in KiB, and the sum of the last
+ * values.
  *
- * SYSTEM is a file with one word after the other:
+ * SYSTEM is a text file of words:
  *
  *     fmu LIBRARY GUID RESOURCES     number 0, 1, ... in this order
  *     set FMU REFERENCE VALUE        a Real, before initialisation
@@ -94,7 +94,7 @@ static double cpu(void)
     return 1e9 * (double)now.tv_sec + (double)now.tv_nsec;
 }
 
-/* Peak memory in KiB, where Linux says it; else 0. That of getrusage counts the parent's too. */
+/* Peak memory in KiB on Linux, otherwise 0. (getrusage would include the parent's.) */
 static long peak(void)
 {
     char line[256];
@@ -118,7 +118,7 @@ static void *grown(void *array, size_t count, size_t size)
     return array;
 }
 
-/* A function of the library, as the pointer that it is. */
+/* The address of a function of the library. */
 static void symbol(void *library, text name, void *function)
 {
     void *found = dlsym(library, name);
@@ -237,7 +237,7 @@ static void read_system(text path, int recording)
     fclose(file);
 }
 
-/* Places of all values and, for each input, where its value is. */
+/* Addresses of all values and, for each input, of the value connected to it. */
 static void lay_out(void)
 {
     for (size_t k = 0; k < fmu_count; k++) {
@@ -285,7 +285,7 @@ static void for_all(text name)
     }
 }
 
-/* Connected values pass through initialization mode as often as an FMU may pass them on. */
+/* Connected values are exchanged in initialization mode often enough to pass through all FMUs. */
 static void initialise(double *values)
 {
     for_all("fmi2EnterInitializationMode");

@@ -1,10 +1,10 @@
-"""What a step of a system costs in one master: the child processes of scripts/benchmark-peers.
+"""Measures the time of a step in one master: a child process of scripts/benchmark-peers.
 
     python peers.py MASTER SYSTEM STEPS [CSV]
 
 SYSTEM is a JSON file: step in s; fmus, each with name, path, set (Reals by name) and outputs (names);
-links, each [FMU, output, FMU, input]. The MASTER makes STEPS steps by Jacobi's method, held inputs,
-with CSV every output at every step written there. Prints what tests/speed/loop.c prints: processor
+links, each [FMU, output, FMU, input]. The MASTER makes STEPS steps by Jacobi's method with held
+inputs, and writes every output at every step to CSV, if given. Prints the same as tests/speed/loop.c: processor
 time in ns of the start (from the archives to the end of initialisation) and of one step, peak memory
 in KiB, and the sum of all outputs at the end.
 """
@@ -24,7 +24,7 @@ NANOSECONDS = 1_000_000_000
 
 
 def peak():
-    """Peak memory in KiB, where Linux says it."""
+    """Peak memory in KiB, if the system is Linux."""
     try:
         lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
     except OSError:
@@ -33,7 +33,7 @@ def peak():
 
 
 def measured(start, steps, outputs):
-    """Times `start`, which gives a function that makes so many steps, and calls it."""
+    """Times `start`, which returns a function that makes a number of steps, and that function."""
     begin = time.process_time_ns()
     run = start()
     started = time.process_time_ns()
@@ -53,7 +53,7 @@ def names(system):
 
 
 def libcosim(system, steps, csv):
-    """libcosim by libcosimpy, its fixed-step algorithm; with CSV its file observer,
+    """libcosim by libcosimpy, with its fixed-step algorithm; with CSV its file observer,
     which writes all variables, a file for each FMU."""
     from libcosimpy.CosimEnums import CosimVariableType
     from libcosimpy.CosimExecution import CosimExecution
@@ -83,7 +83,7 @@ def libcosim(system, steps, csv):
             folder.mkdir()
             assert made.add_observer(CosimObserver.create_to_dir(str(folder)))
         made.step(0)
-        # The last step is made below, where its outputs are observed.
+        # The last step follows below, with its outputs observed.
         return lambda count: made.step(count - 1) or sys.exit("libcosim fails")
 
     def outputs():
@@ -96,7 +96,7 @@ def libcosim(system, steps, csv):
 
 
 def ecos(system, steps, csv):
-    """Ecos by ecospy, its fixed-step algorithm; with CSV its CSV writer."""
+    """Ecos by ecospy, with its fixed-step algorithm; with CSV its CSV writer."""
     (tbb,) = (file for file in metadata.files("tbb") if file.name == "libtbb.so.12")
     ctypes.CDLL(str(tbb.locate()))
     from ecospy import EcosLib, EcosSimulation, EcosSimulationStructure
@@ -132,7 +132,7 @@ def ecos(system, steps, csv):
 
 
 def fmpy_loop(system, steps, csv):
-    """A loop in Python over FMPy's FMU2Slave, calls batched; with CSV a row of repr of each value."""
+    """A loop in Python over FMPy's FMU2Slave, with batched calls; with CSV a row of repr of each value."""
     from fmpy import extract, read_model_description
     from fmpy.fmi2 import FMU2Slave
 
@@ -200,7 +200,7 @@ def fmpy_loop(system, steps, csv):
 
 
 def fmpy_container(system, folder):
-    """Packs the system as FMPy's FMU container; its path."""
+    """Packs the system as FMPy's FMU container; returns its path."""
     from fmpy import read_model_description
     from fmpy.container_fmu.cli import create_container_fmu
     from fmpy.container_fmu.config import Component, Configuration, Connection
@@ -212,8 +212,8 @@ def fmpy_container(system, folder):
         components[fmu["name"]] = Component(fmu["name"], Path(fmu["path"]), description)
         variables[fmu["name"]] = {v.name: v for v in description.modelVariables}
         for variable in description.modelVariables:
-            # The runtime knows the types of FMI 3 only; FMPy 0.3.32 renames those of the container's
-            # own variables, not those of connections.
+            # The runtime knows the types of FMI 3 only. FMPy 0.3.32 renames the types of the
+            # container's own variables, but not those of connections.
             variable.type = {"Real": "Float64"}.get(variable.type, variable.type)
         for name, value in fmu["set"].items():
             variable = ModelVariable(f"{fmu['name']}.{name}", 0, start=str(value))
@@ -234,7 +234,7 @@ def fmpy_container(system, folder):
         modelIdentifier="container_fmu", fixedInternalStepSize=system["step"]
     )
     made.coSimulation.canHandleVariableCommunicationStepSize = True
-    # The runtime has the time at the value reference 0.
+    # In the runtime, the time has value reference 0.
     clock = ModelVariable("time", 0, causality="independent", variability="continuous")
     clock.type = "Real"
     made.modelVariables = [clock, *mapped]
@@ -263,7 +263,7 @@ def fmpy_container(system, folder):
 
 
 def toolbox_container(system, folder):
-    """Packs the system as a container of Renault's fmu-manipulation-toolbox; its path."""
+    """Packs the system as a container of Renault's fmu-manipulation-toolbox; returns its path."""
     from fmu_manipulation_toolbox.container import FMUContainer
 
     logging.getLogger("fmu_manipulation_toolbox").setLevel(logging.CRITICAL)
@@ -296,7 +296,7 @@ def main():
     # Libraries print to stdout too.
     sys.stdout.flush()
     print("\n" + json.dumps(result), flush=True)
-    # Some of them fail in their destructors.
+    # Some libraries fail in their destructors.
     os._exit(0)
 
 

@@ -13,10 +13,10 @@ use crate::root;
 
 const SOURCES: [&str; 4] = ["deeds.c", "life.c", "steps.c", "values.c"];
 
-/// Libraries that this process has built, by what the compiler was told.
+/// Libraries that this process has built, by the definitions given to the compiler.
 static LIBRARIES: Mutex<BTreeMap<Vec<String>, Vec<u8>>> = Mutex::new(BTreeMap::new());
 
-/// An FMU in C to be built.
+/// An FMU in C that is still to be built.
 #[derive(Clone, Debug)]
 pub struct CFmu {
     behaviour: String,
@@ -24,14 +24,14 @@ pub struct CFmu {
     definitions: Vec<String>,
     root_attributes: String,
     experiment: String,
-    /// More variables, as XML.
+    /// Further variables, as XML.
     variables: String,
     /// Units of u and y.
     units: Option<[String; 2]>,
 }
 
 impl CFmu {
-    /// One whose parameter `behaviour` starts as that.
+    /// An FMU whose parameter `behaviour` has this start value.
     #[must_use]
     pub fn that(behaviour: &str) -> Self {
         let flags = [
@@ -52,7 +52,7 @@ impl CFmu {
         }
     }
 
-    /// One without misbehaviour.
+    /// An FMU without misbehaviour.
     #[must_use]
     pub fn well_behaved() -> Self {
         Self::that("as it should")
@@ -65,7 +65,7 @@ impl CFmu {
         self
     }
 
-    /// The same that cannot go back to an earlier state.
+    /// The same, without saving and restoring of its state.
     #[must_use]
     pub fn without_rollback(self) -> Self {
         self.flag("canGetAndSetFMUstate", false).flag("canSerializeFMUstate", false)
@@ -79,14 +79,14 @@ impl CFmu {
         self
     }
 
-    /// The same with another answer of `fmi2GetVersion`.
+    /// The same, with another result of `fmi2GetVersion`.
     #[must_use]
     pub fn version(mut self, version: &str) -> Self {
         self.definitions.push(format!("-DVERSION=\"{version}\""));
         self
     }
 
-    /// The same with a local Real `hidden` that it refuses to read.
+    /// The same, with a local Real `hidden` that cannot be read.
     #[must_use]
     pub fn with_unreadable_variable(mut self) -> Self {
         self.variables.push_str(
@@ -95,36 +95,36 @@ impl CFmu {
         self
     }
 
-    /// The same whose input u and output y have units.
+    /// The same, with units for input u and output y.
     #[must_use]
     pub fn with_units(mut self, u: &str, y: &str) -> Self {
         self.units = Some([u.to_owned(), y.to_owned()]);
         self
     }
 
-    /// The same that promises first derivatives of its outputs.
+    /// The same, declaring first derivatives of its outputs.
     #[must_use]
     pub fn promising_output_derivatives(mut self) -> Self {
         self.flags.insert("maxOutputDerivativeOrder".to_owned(), "1".to_owned());
         self
     }
 
-    /// The same whose default experiment has these attributes.
+    /// The same, with these attributes of the default experiment.
     #[must_use]
     pub fn experiment(mut self, attributes: &str) -> Self {
         self.experiment = format!("<DefaultExperiment {attributes}/>\n");
         self
     }
 
-    /// The same that proposes steps of `size` s.
+    /// The same, with a default step of `size` s.
     #[must_use]
     pub fn proposing(mut self, size: f64) -> Self {
         self.experiment = format!("<DefaultExperiment stopTime=\"1\" stepSize=\"{size}\"/>\n");
         self
     }
 
-    /// The same whose answer of `fmi2GetVersion` is the text that `symbol` points to, which another
-    /// library in the process has to define.
+    /// The same, whose `fmi2GetVersion` returns the text that `symbol` points to; another library
+    /// in the process must define it.
     #[must_use]
     pub fn expecting(mut self, symbol: &str) -> Self {
         let value = format!("({{ extern const char *{symbol}; {symbol}; }})");
@@ -132,7 +132,7 @@ impl CFmu {
         self
     }
 
-    /// The same, exported by that tool and in need of it.
+    /// The same, exported by this tool and needing it to run.
     #[must_use]
     pub fn needing(mut self, tool: &str) -> Self {
         let _ = write!(self.root_attributes, " generationTool=\"{tool}\"");
@@ -143,7 +143,7 @@ impl CFmu {
     ///
     /// # Panics
     ///
-    /// Where it cannot be built or written.
+    /// If it cannot be built or written.
     #[must_use]
     pub fn write(&self, folder: &Path, name: &str) -> PathBuf {
         let mut package = Package::new(self.description());
@@ -189,7 +189,7 @@ impl CFmu {
         )
     }
 
-    /// The shared library, built once for each set of definitions.
+    /// Builds the shared library, once for each set of definitions.
     fn library(&self) -> Vec<u8> {
         let mut known = LIBRARIES.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         if let Some(library) = known.get(&self.definitions) {

@@ -1,4 +1,4 @@
-//! FMUs in C coupled by the command `aso-ftc run`, and what became of the run.
+//! FMUs in C coupled by the command `aso-ftc run`, and the outcome of the run.
 
 use std::fs::{self, File};
 use std::path::Path;
@@ -13,11 +13,11 @@ use crate::command;
 /// Communication step of the runs in s, a power of two: sums of it are exact.
 pub const STEP: f64 = 1.0 / 16.0;
 
-/// Rows of the results of a whole run.
+/// Number of rows of a complete run.
 pub const ALL: usize = 17;
-/// Rows of one that ends at the last successful step, to t1.
+/// Number of rows of a run that ends at the last successful step, to t1.
 pub const TO_T1: usize = 9;
-/// Behaviour that is unusual and harms nobody.
+/// Behaviour that is unusual and harmless.
 pub const UNUSUAL: [&str; 15] = [
     "as it should",
     "pend",
@@ -36,25 +36,25 @@ pub const UNUSUAL: [&str; 15] = [
     "leak in fmi2DoStep",
 ];
 
-/// Longest that a run may take before it counts as hung.
+/// A run that takes longer than this counts as hung.
 const PATIENCE: Duration = Duration::from_secs(300);
 
 /// A run of `aso-ftc run` that has ended.
 pub struct Run {
     folder: TempDir,
-    /// Exit status; none where a signal ended the command.
+    /// Exit status; `None` if a signal ended the command.
     pub status: Option<i32>,
     /// Standard error.
     pub message: String,
 }
 
 impl Run {
-    /// Couples `fmus` by name in steps of [`STEP`] to 1 s, unless `more` says otherwise. An FMU whose
-    /// behaviour is the same as that of another one is given as the same file.
+    /// Couples `fmus` by name in steps of [`STEP`] to 1 s; `more` can change that. FMUs with the
+    /// same behaviour share one file.
     ///
     /// # Panics
     ///
-    /// Where the FMUs cannot be built, or the command cannot be started or does not end.
+    /// If the FMUs cannot be built, or the command cannot be started or does not end.
     #[must_use]
     pub fn of(fmus: &[(&str, &CFmu)], more: &[&str]) -> Self {
         let folder = tempfile::tempdir().unwrap_or_else(|error| panic!("{error}"));
@@ -91,11 +91,11 @@ impl Run {
         Self::of(&[("a", a), ("b", &CFmu::well_behaved())], &recorded.collect::<Vec<_>>())
     }
 
-    /// The values of a column of `results.csv`; none where there is no such file.
+    /// The values of a column of `results.csv`; `None` if there is no such file.
     ///
     /// # Panics
     ///
-    /// Where a line is not whole, or there is no such column.
+    /// If a line is incomplete, or there is no such column.
     #[must_use]
     pub fn column(&self, name: &str) -> Vec<String> {
         let Ok(text) = fs::read_to_string(self.folder.path().join("out/results.csv")) else {
@@ -114,7 +114,7 @@ impl Run {
     ///
     /// # Panics
     ///
-    /// As [`Run::column`], and where an entry is no number.
+    /// As [`Run::column`], and if an entry is no number.
     #[must_use]
     pub fn numbers(&self, name: &str) -> Vec<f64> {
         let number = |entry: &String| {
@@ -123,12 +123,12 @@ impl Run {
         self.column(name).iter().map(number).collect()
     }
 
-    /// Checks that a [`Run::pair`] ended with `status` and that its first `count` rows are there
-    /// and right: a.y is the time, b.y the sum of a.y over the steps.
+    /// Checks that a [`Run::pair`] ended with `status` and that its first `count` rows exist and
+    /// are right: a.y is the time, b.y the sum of a.y over the steps.
     ///
     /// # Panics
     ///
-    /// Where not.
+    /// If a check fails.
     pub fn expect(&self, status: i32, count: usize) {
         assert_eq!(self.status, Some(status), "{}", self.message);
         assert!(!self.message.contains("panicked"), "{}", self.message);
@@ -143,11 +143,11 @@ impl Run {
         }
     }
 
-    /// Checks that the command said each of `parts`.
+    /// Checks that the messages of the command contain each of `parts`.
     ///
     /// # Panics
     ///
-    /// Where it did not.
+    /// If one of them is missing.
     pub fn says(&self, parts: &[&str]) {
         for part in parts {
             assert!(self.message.contains(part), "{part:?} is not in {:?}", self.message);
@@ -155,7 +155,7 @@ impl Run {
     }
 }
 
-/// Exit status and standard error of the command, run in `folder`.
+/// Runs the command in `folder`; returns exit status and standard error.
 fn end(folder: &Path, arguments: &[&str]) -> (Option<i32>, String) {
     let file = |name: &str| File::create(folder.join(name)).map(Stdio::from);
     let streams = file("stdout").and_then(|out| Ok((out, file("stderr")?)));

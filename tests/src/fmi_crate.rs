@@ -1,13 +1,13 @@
-//! FMUs through the crate `fmi`, as an independent check of our own loader.
+//! Loads FMUs with the crate `fmi`, as an independent check of our own loader.
 //!
-//! What that crate does not do well is kept away from it. [`Fmu::open`] goes first: its model
-//! description is the one in use, and it refuses archives that lead out of their folder and
-//! libraries that lack a function which no instance can do without. Panics of the crate become
-//! errors: it panics where another function is called that the library lacks.
+//! Weaknesses of that crate are avoided. [`Fmu::open`] reads the FMU first: its model description
+//! is used, and it refuses archives with paths outside of their folder and libraries that lack a
+//! function which every instance needs. The crate panics if another missing function is called;
+//! such a panic becomes an error.
 //!
-//! Two things stay as they are. The FMU's messages go to the crate `log` and are not in the
-//! errors. An FMU that logs with a null category, or with the status `fmi2Pending`, ends the
-//! process; logging is therefore off, as it is with our own loader.
+//! Two limitations remain. The crate passes messages of FMUs to the crate `log`, so errors do not
+//! contain them. An FMU that logs with a null category, or with the status `fmi2Pending`, ends the
+//! process; logging is therefore off, as with our own loader.
 
 use std::ffi::CString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -24,10 +24,10 @@ use fmu_description::abi::Status;
 use fmu_import::{Fmu, FmuError};
 use master::{CallError, Failure, Slave, StepResult};
 
-/// Why an FMU could not be opened or instantiated through the crate `fmi`.
+/// The reason why an FMU could not be opened or instantiated through the crate `fmi`.
 #[derive(Debug, thiserror::Error)]
 pub enum FmiCrateError {
-    /// Our own loader refuses it already.
+    /// Our own loader already refuses it.
     #[error(transparent)]
     Fmu(#[from] FmuError),
     /// The crate refuses it.
@@ -43,16 +43,16 @@ pub enum FmiCrateError {
     Panic {
         /// The FMU.
         path: PathBuf,
-        /// What it panics with.
+        /// The message of the panic.
         message: String,
     },
 }
 
-/// An instance of an FMU, by the crate `fmi`.
+/// An instance of an FMU, loaded by the crate `fmi`.
 ///
 /// That crate has no function for the derivatives of inputs and outputs. So the description says
-/// that the FMU has none, whatever it says itself, and the master holds its inputs. Its instances are
-/// bound to a thread, so each has one of its own.
+/// that the FMU has none, and the master holds its inputs. Its instances are bound to a thread, so
+/// each has a thread of its own.
 pub struct FmiSlave {
     jobs: Option<Sender<Job>>,
     thread: Option<JoinHandle<()>>,
@@ -60,7 +60,7 @@ pub struct FmiSlave {
 }
 
 type Job = Box<dyn FnOnce(&mut InstanceCS) + Send>;
-/// What comes of opening: nothing, a refusal, or the message of a panic.
+/// The outcome of opening: success, a refusal, or the message of a panic.
 type Opened = Result<Result<(), Box<fmi::Error>>, String>;
 
 impl FmiSlave {
@@ -73,7 +73,7 @@ impl FmiSlave {
     ///
     /// # Panics
     ///
-    /// Where no thread can be started.
+    /// If no thread can be started.
     pub fn open(path: &Path, name: &str) -> Result<Self, FmiCrateError> {
         let mut description = Fmu::open(path)?.description().clone();
         if let Some(co_simulation) = &mut description.co_simulation {
@@ -99,7 +99,7 @@ impl FmiSlave {
     ) -> Result<T, CallError> {
         let (tell, done) = channel();
         let job: Job = Box::new(move |instance| {
-            // Nobody is left to hear where the slave is gone.
+            // If the slave has been dropped, nobody receives the answer.
             let _ = tell.send(fenced(|| call(instance)));
         });
         let jobs = self.jobs.as_ref().expect("open until it is dropped");
@@ -109,7 +109,7 @@ impl FmiSlave {
             Ok(Err(Fmi2Error::Discard)) => Status::Discard,
             Ok(Err(Fmi2Error::Fatal)) => Status::Fatal,
             Ok(Err(Fmi2Error::Error | Fmi2Error::TypesPlatformMismatch(_))) => Status::Error,
-            // The crate knows no fmi2Pending, nor what the standard does not know.
+            // The crate knows neither fmi2Pending nor statuses that the standard does not have.
             Err(message) => {
                 let (failure, messages) = (Failure::Panicked(message), Vec::new());
                 return Err(CallError { function, failure, messages });
@@ -119,14 +119,14 @@ impl FmiSlave {
     }
 }
 
-/// The thread of an instance: opens it, then does the jobs until there are no more.
+/// The thread of an instance: opens the instance, then does its jobs until the channel is closed.
 fn serve(path: &Path, name: &str, tell: &Sender<Opened>, jobs: &Receiver<Job>) {
     let opened = fenced(|| {
         let folder: Fmi2Import = fmi::import::from_path(path)?;
         let instance = folder.instantiate_cs(name, false, false)?;
         Ok((instance, folder))
     });
-    // The instance is freed before its folder goes.
+    // The instance is freed before its folder is removed.
     let (mut instance, _folder) = match opened {
         Ok(Ok(both)) => both,
         Ok(Err(error)) => return drop(tell.send(Ok(Err(Box::new(error))))),
@@ -143,13 +143,13 @@ impl Drop for FmiSlave {
     fn drop(&mut self) {
         drop(self.jobs.take());
         if let Some(thread) = self.thread.take() {
-            // A panic while it is freed was printed.
+            // A panic during freeing has already been printed.
             let _ = thread.join();
         }
     }
 }
 
-/// The result of `action`, or what it panicked with.
+/// The result of `action`, or the message of its panic.
 fn fenced<T>(action: impl FnOnce() -> T) -> Result<T, String> {
     catch_unwind(AssertUnwindSafe(action)).map_err(|payload| {
         let text = payload.downcast_ref::<&str>().copied();
@@ -158,7 +158,7 @@ fn fenced<T>(action: impl FnOnce() -> T) -> Result<T, String> {
     })
 }
 
-/// Methods that read, and methods that write, values of one type.
+/// Methods that read and write values of one type.
 macro_rules! values {
     ($($get:ident $set:ident $type:ty, $read:literal $write:literal;)*) => {$(
         fn $get(&mut self, references: &[u32], values: &mut [$type]) -> Result<(), CallError> {

@@ -1,4 +1,4 @@
-//! The troublesome FMU in a process of its own.
+//! The misbehaving FMU `troubles` in a process of its own.
 
 use std::time::Duration;
 
@@ -8,23 +8,23 @@ use master::Slave as _;
 
 use crate::{command, troubles};
 
-/// Isolation by the command `aso-ftc`, without a limit of time.
+/// Options for isolation by the command `aso-ftc`, without a time limit.
 #[must_use]
 pub fn options() -> Options {
     Options { executable: Some(command().to_owned()), ..Options::default() }
 }
 
-/// As [`options`], with a limit of time for each call.
+/// As [`options`], with a time limit for each call.
 #[must_use]
 pub fn limited(milliseconds: u64) -> Options {
     Options { time_limit: Some(Duration::from_millis(milliseconds)), ..options() }
 }
 
-/// The troublesome FMU, ready to step.
+/// The misbehaving FMU, ready to step.
 ///
 /// # Panics
 ///
-/// Where it cannot be isolated or initialized.
+/// If it cannot be isolated or initialised.
 #[must_use]
 pub fn ready(options: &Options) -> Isolated {
     let mut slave = isolate::open(troubles(), "one", options).expect("it can be isolated");

@@ -1,5 +1,5 @@
-//! What the tests share: the packed FMUs, the command, the coupled system; FMUs that misbehave; linear
-//! slaves, networks of them and their exact solution.
+//! Shared parts of the tests: the packed FMUs, the command, the coupled system; FMUs that
+//! misbehave; linear slaves, networks of them and their exact solution.
 #![forbid(unsafe_code)]
 
 pub mod c_fmu;
@@ -29,7 +29,7 @@ pub fn root() -> PathBuf {
     tests.parent().unwrap_or(tests).to_owned()
 }
 
-/// The built command `aso-ftc`; builds it where that was not done yet.
+/// The built command `aso-ftc`; builds it if necessary.
 ///
 /// # Panics
 ///
@@ -49,7 +49,7 @@ pub fn command() -> &'static Path {
     })
 }
 
-/// What the command prints and returns, run in the workspace.
+/// Runs the command in the workspace; returns its status and output.
 ///
 /// # Panics
 ///
@@ -77,7 +77,7 @@ pub fn dist() -> &'static Path {
     })
 }
 
-/// The plant and the controller, connected, with `settings` (`slave.variable`, value) made.
+/// The plant and the controller, connected, with these `settings` (`slave.variable`, value).
 ///
 /// # Panics
 ///
@@ -98,7 +98,7 @@ pub fn closed_loop(settings: &[(&str, &str)]) -> System {
     system
 }
 
-/// A simulation of `system` from 0 s, and a probe for `names`.
+/// Returns a simulation of `system` from 0 s, and a probe for `names`.
 ///
 /// # Panics
 ///

@@ -1,4 +1,4 @@
-//! A slave for the tests of convergence: a linear system, stepped exactly.
+//! A slave for the tests of convergence: a linear system with an exact step.
 #![expect(clippy::unwrap_used, reason = "for tests, which are to fail")]
 
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use fmu_description::ModelDescription;
 use master::{CallError, Slave, StepResult};
 use nalgebra::{DMatrix, DVector};
 
-/// Value reference of the first output; those of the inputs begin at 0.
+/// Value reference of the first output; inputs start at 0.
 pub const OUTPUTS: u32 = 100;
 
 /// `x' = A x + B u`, `y = C x + D u`, from `x(0)`.
@@ -39,7 +39,7 @@ impl Block {
     }
 }
 
-/// What a slave can do.
+/// The capabilities of a slave.
 #[derive(Clone, Copy)]
 pub struct Abilities {
     /// `canInterpolateInputs`.
@@ -50,18 +50,18 @@ pub struct Abilities {
     pub directional: bool,
 }
 
-/// All of them.
+/// All capabilities.
 pub const ABLE: Abilities = Abilities { interpolates: true, derivatives: 2, directional: true };
 
-/// Everything that changes: x, then u, u' and u''.
+/// The variable data: x, then u, u' and u''.
 type State = DVector<f64>;
 
-/// A slave made of a [`Block`].
+/// A slave that simulates a [`Block`].
 pub struct Linear {
     description: ModelDescription,
     block: Block,
     state: State,
-    /// `exp(M h)` for the h of the last step, M the matrix of x, u, u', u''.
+    /// `exp(M h)` for the size h of the last step, M the matrix of x, u, u', u''.
     matrix: DMatrix<f64>,
     propagator: (f64, DMatrix<f64>),
     slots: Vec<Option<State>>,
@@ -180,7 +180,7 @@ impl Slave for Linear {
         Ok(())
     }
 
-    /// A value alone is held: its derivatives become 0 until they are set.
+    /// Setting a value alone holds it: its derivatives are 0 until they are set.
     fn set_real(&mut self, references: &[u32], values: &[f64]) -> Done {
         for (&value, &reference) in values.iter().zip(references) {
             for (order, value) in [value, 0.0, 0.0].into_iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Blocks in a network, and the solution of the whole as one system.
+//! Blocks in a network, and the solution of the whole network as one system.
 #![expect(clippy::unwrap_used, reason = "for tests, which are to fail")]
 
 use std::sync::Arc;
@@ -10,28 +10,28 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::linear::{Abilities, Block, Linear, OUTPUTS};
 
-/// Blocks a, b, ..., and how they are linked.
+/// Blocks a, b, ..., and their connections.
 #[derive(Clone)]
 pub struct Network {
-    /// In the order of their names.
+    /// The blocks, in the order of their names.
     pub blocks: Vec<Block>,
-    /// From (block, output) to (block, input).
+    /// The connections, from (block, output) to (block, input).
     pub links: Vec<((usize, usize), (usize, usize))>,
 }
 
-/// What a run gave.
+/// The results of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct Run {
     /// Largest error of an output at a communication point, absolute.
     pub error: f64,
-    /// The same in the second half, where what happened in the first steps has come down to its
-    /// order.
+    /// The same in the second half of the run, when errors of lower order from the first steps have
+    /// decayed.
     pub late: f64,
-    /// As `late`, at the points between those where slaves with steps of their own meet the others.
+    /// As `late`, at communication points between the ends of the steps of slaves with multiples.
     pub between: f64,
-    /// Communication steps made.
+    /// Number of communication steps.
     pub points: usize,
-    /// `fmi2DoStep` of all slaves, repetitions included.
+    /// Number of `fmi2DoStep` calls of all slaves, repetitions included.
     pub calls: usize,
     /// Smallest and largest step in s.
     pub sizes: (f64, f64),
@@ -47,7 +47,7 @@ impl Network {
     ///
     /// # Panics
     ///
-    /// Where a link names what the blocks do not have.
+    /// If a connection names an input or output that the blocks do not have.
     #[must_use]
     pub fn system(&self, able: Abilities, steps: &Arc<AtomicUsize>) -> System {
         let mut system = System::default();
@@ -61,7 +61,9 @@ impl Network {
         system
     }
 
-    /// `x' = M x`, `y = N x` of the whole: with `u = P y` is `y = (I - D P)^-1 C x`.
+    /// Returns M, N and x(0) of the whole network, `x' = M x`, `y = N x`.
+    ///
+    /// With the connections `u = P y`, `N = (I - D P)^-1 C` and `M = A + B P N`.
     fn whole(&self) -> (DMatrix<f64>, DMatrix<f64>, DVector<f64>) {
         let stack = |of: fn(&Block) -> &DMatrix<f64>| {
             let parts: Vec<_> = self.blocks.iter().map(of).collect();
@@ -104,7 +106,7 @@ impl Network {
     ///
     /// # Panics
     ///
-    /// Where a slave does not have them.
+    /// If a slave does not have them.
     pub fn outputs(&self, system: &mut System) -> Vec<f64> {
         let mut all = Vec::new();
         for ((_, slave), block) in system.slaves.iter_mut().zip(&self.blocks) {
@@ -117,15 +119,15 @@ impl Network {
         all
     }
 
-    /// A run from 0 to `stop` s against the matrix exponential of the whole.
+    /// Runs from 0 to `stop` s and compares with the matrix exponential of the whole network.
     ///
     /// # Errors
     ///
-    /// Those of the simulation.
+    /// Same as the simulation.
     ///
     /// # Panics
     ///
-    /// Where the loops through the blocks have no solution.
+    /// If the loops through the blocks have no solution.
     pub fn run(
         &self,
         able: Abilities,
@@ -162,7 +164,7 @@ impl Network {
             slow.apply(&simulation, &mut readout);
             let found = DVector::from_column_slice(&readout.reals);
             let error = largest(&(found - exact));
-            // A slave with a step of its own is on its way.
+            // A slave with a multiple of the step is within its step.
             if !run.points.is_multiple_of(common) {
                 run.between = run.between.max(if time > 0.5 * stop { error } else { 0.0 });
                 continue;
@@ -177,7 +179,7 @@ impl Network {
     }
 }
 
-/// The largest magnitude; infinity where one is no number.
+/// The largest magnitude; infinity if one value is NaN.
 fn largest(errors: &DVector<f64>) -> f64 {
     errors.iter().fold(
         0.0,

@@ -1,10 +1,10 @@
-//! The problems: all numbers are our choice, in SI units.
+//! The test problems; all numbers are our choice, in SI units.
 
 use crate::linear::Block;
 use crate::network::Network;
 
 /// Two oscillators, each of 1 kg on a spring and a damper to a wall, with a spring of 2 N/m between
-/// them. Each gets the other's displacement and gives its own: no direct dependency.
+/// them. Each gets the displacement of the other: there is no direct dependency.
 #[must_use]
 pub fn coupled_oscillators() -> Network {
     let oscillator = |stiffness: f64, damping: f64, start: &[f64]| {
@@ -22,9 +22,11 @@ pub fn coupled_oscillators() -> Network {
     }
 }
 
-/// The linear two-mass oscillator, cut by force and displacement: the first mass gets the force of
-/// the coupling spring and damper, the second one has these and gets displacement and velocity, on
-/// which its force depends directly. Stiffness in N/m and damping in N s/m of the coupling.
+/// The linear two-mass oscillator, coupled by force and displacement, with the given stiffness in
+/// N/m and damping in N s/m of the coupling.
+///
+/// The first mass gets the force of the coupling spring and damper. They belong to the second mass,
+/// which gets displacement and velocity of the first; its force depends directly on these.
 #[must_use]
 pub fn two_masses(stiffness: f64, damping: f64) -> Network {
     let first = Block::new(
@@ -47,8 +49,8 @@ pub fn two_masses(stiffness: f64, damping: f64) -> Network {
     }
 }
 
-/// Two first-order lags with direct feedthrough in a circle: `y = x + g u` each, with the gain `g1 g2`
-/// of the algebraic loop.
+/// Two first-order lags with direct feedthrough in a circle: `y = x + g u` each. The algebraic loop
+/// has the gain `g1 g2`.
 #[must_use]
 pub fn algebraic_loop(first: f64, second: f64) -> Network {
     let lag = |rate: f64, gain: f64, start: f64| {
@@ -60,7 +62,8 @@ pub fn algebraic_loop(first: f64, second: f64) -> Network {
     }
 }
 
-/// A fast lag (10 ms) from rest at 1 behind a slow oscillator: a short transient, then a smooth course.
+/// A fast lag (10 ms), with initial value 1, behind a slow oscillator: a short transient, then a
+/// smooth solution.
 #[must_use]
 pub fn transient() -> Network {
     let fast = Block::new(&[&[-100.0]], &[&[100.0]], &[&[1.0]], &[&[0.0]], &[1.0]);

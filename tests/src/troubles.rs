@@ -1,7 +1,7 @@
-//! An FMU in C that does whatever an FMU must not do, mostly to its process.
+//! An FMU in C that misbehaves on request, mostly towards its process.
 //!
-//! Unlike those of [`c_fmu`](crate::c_fmu), which are strict, it takes any call at any time: it is
-//! told between two steps what to do next, and has texts and a state that are long.
+//! Unlike the strict FMUs of [`c_fmu`](crate::c_fmu), it accepts any call at any time: a test sets
+//! between two steps what it does next. It has long strings and a long state.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -9,7 +9,8 @@ use std::sync::OnceLock;
 
 use crate::root;
 
-/// What the FMU does when its Integer `trouble` is this; as `enum trouble` of `troubles.c`.
+/// The misbehaviour for each value of the FMU's Integer `trouble`, as in `enum trouble` of
+/// `troubles.c`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[expect(missing_docs, reason = "the names say it")]
 #[repr(i32)]
@@ -57,7 +58,7 @@ pub fn troubles() -> &'static Path {
         let description = "modelDescription.xml";
         let copied = std::fs::copy(sources.join(description), folder.join(description));
         copied.unwrap_or_else(|_| panic!("{description} cannot be copied"));
-        // The crashes are meant: the compiler is not to put others in their place.
+        // The crashes are intended: the compiler must not replace them.
         let status = Command::new("cc")
             .args(["-std=c11", "-O1", "-fno-delete-null-pointer-checks", "-Wall", "-Wextra"])
             .args(["-fno-optimize-sibling-calls", "-pthread", "-shared", "-fPIC", "-o"])

@@ -1,4 +1,5 @@
-//! What isolated FMUs leave behind. Each test runs in a process of its own: this program again.
+//! Resources that isolated FMUs leave behind. Each test runs in a process of its own, started from
+//! this program.
 #![cfg(target_os = "linux")]
 #![forbid(unsafe_code)]
 #![expect(clippy::unwrap_used, reason = "tests")]
@@ -12,7 +13,7 @@ use fmu_import::isolate::{self, Isolated, Options};
 use master::{Failure, Slave as _};
 use tests::{Trouble, command, troubles};
 
-/// Set in the processes that the tests start, to the part they have.
+/// Environment variable that tells a started process its part.
 const PART: &str = "ISOLATE_TEST_PART";
 
 fn open(time_limit: Option<Duration>) -> Isolated {
@@ -26,7 +27,7 @@ fn step(slave: &mut Isolated, trouble: Trouble) -> Result<master::StepResult, ma
     slave.do_step(0.0, 0.1, true)
 }
 
-/// This program again, with only the test `name`, in the part `part`.
+/// Starts this program again, with only the test `name`, in the part `part`.
 fn again(name: &str, part: &str) -> Command {
     let mut again = Command::new(std::env::current_exe().unwrap());
     again.args(["--exact", name, "--nocapture", "--test-threads", "1"]).env(PART, part);
@@ -37,7 +38,7 @@ fn part() -> Option<String> {
     std::env::var(PART).ok()
 }
 
-/// Open files, mappings of shared memory, children.
+/// Open files, mappings of shared memory, child processes.
 fn belongings() -> (usize, usize, Vec<String>) {
     let maps = std::fs::read_to_string("/proc/self/maps").unwrap();
     let mut children = Vec::new();
@@ -105,7 +106,7 @@ fn kill_master(name: &str, part: &str) {
     let worker = lines.find_map(|line| line.split("worker ").nth(1).map(str::to_owned)).unwrap();
     let worker = Path::new("/proc").join(worker);
     assert!(worker.exists());
-    // Into the hanging step.
+    // Wait until the step hangs.
     std::thread::sleep(Duration::from_millis(200));
     assert!(worker.exists());
     master.kill().unwrap();
@@ -117,13 +118,13 @@ fn kill_master(name: &str, part: &str) {
     }
 }
 
-/// The group of processes that a process is in, of those that run.
+/// The process group of a process, if it runs.
 fn group(process: u32) -> Vec<String> {
     let processes = std::fs::read_dir("/proc").unwrap().flatten();
     let stats =
         processes.filter_map(|entry| std::fs::read_to_string(entry.path().join("stat")).ok());
     let in_group = |stat: &String| {
-        // After the name in brackets: state, parent, group.
+        // After the name in parentheses: state, parent, group.
         let fields: Vec<_> = stat.rsplit(") ").next().unwrap_or("").split(' ').collect();
         fields.get(2) == Some(&process.to_string().as_str()) && fields.first() != Some(&"Z")
     };
@@ -131,7 +132,7 @@ fn group(process: u32) -> Vec<String> {
 }
 
 #[test]
-fn what_an_fmu_started_ends_with_it_even_where_it_ends_by_itself() {
+fn processes_started_by_an_fmu_end_with_it_even_if_it_ends_by_itself() {
     let mut slave = open(None);
     let process = slave.process_id();
     let error = step(&mut slave, Trouble::LeaveWithChild).unwrap_err();
@@ -144,7 +145,7 @@ fn what_an_fmu_started_ends_with_it_even_where_it_ends_by_itself() {
 }
 
 #[test]
-fn memory_beyond_the_limit_is_the_reason_of_the_crash() {
+fn a_crash_from_memory_beyond_the_limit_is_reported_as_such() {
     let executable = Some(command().to_owned());
     let limit = 1 << 30;
     let options = Options { executable, memory_limit: Some(limit), ..Options::default() };
@@ -153,7 +154,7 @@ fn memory_beyond_the_limit_is_the_reason_of_the_crash() {
     let error = step(&mut slave, Trouble::TakeMemory).unwrap_err();
     assert_eq!(error.failure, Failure::OutOfMemory(limit));
     assert!(error.to_string().contains("limit of 1073741824 bytes"), "{error}");
-    // A crash for another reason is none of the limit.
+    // A crash for another reason is not attributed to the limit.
     let mut slave = isolate::open(troubles(), "one", &options).unwrap();
     let error = step(&mut slave, Trouble::CrashInStep).unwrap_err();
     assert!(matches!(error.failure, Failure::Killed(11, _)), "{error}");
@@ -163,12 +164,13 @@ fn memory_beyond_the_limit_is_the_reason_of_the_crash() {
 }
 
 #[test]
-fn a_program_that_is_no_worker_starts_itself_once_and_says_what_it_lacks() {
-    let name = "a_program_that_is_no_worker_starts_itself_once_and_says_what_it_lacks";
+fn a_program_that_does_not_check_for_its_worker_argument_starts_itself_once_and_says_what_is_missing()
+ {
+    let name = "a_program_that_does_not_check_for_its_worker_argument_starts_itself_once_and_says_what_is_missing";
     let folder = tempfile::tempdir().unwrap();
     let (log, script) = (folder.path().join("starts"), folder.path().join("program"));
     if let Some(part) = part() {
-        // The program: each start leaves a line.
+        // Each start of the program writes a line.
         let executable = Some(Path::new(&part).to_owned());
         let options = Options { executable, ..Options::default() };
         let error = isolate::open(troubles(), "one", &options).err().unwrap();
@@ -192,8 +194,8 @@ fn a_program_that_is_no_worker_starts_itself_once_and_says_what_it_lacks() {
 }
 
 #[test]
-fn of_what_an_fmu_prints_without_end_a_part_is_passed_on() {
-    let name = "of_what_an_fmu_prints_without_end_a_part_is_passed_on";
+fn of_endless_output_of_an_fmu_a_part_is_passed_on() {
+    let name = "of_endless_output_of_an_fmu_a_part_is_passed_on";
     if part().is_some() {
         step(&mut open(None), Trouble::PrintFlood).unwrap();
         return;
@@ -202,13 +204,13 @@ fn of_what_an_fmu_prints_without_end_a_part_is_passed_on() {
     let said = String::from_utf8_lossy(&done.stderr);
     assert!(done.status.success(), "{said}");
     let lines = said.lines().filter(|line| line.starts_with("again and again")).count();
-    // Of 40 MB, 1 MiB.
+    // 1 MiB of 40 MB.
     assert!((20_000..32_000).contains(&lines), "{lines} lines");
 }
 
 #[test]
-fn what_the_fmu_prints_does_not_reach_standard_output() {
-    let name = "what_the_fmu_prints_does_not_reach_standard_output";
+fn output_of_an_fmu_does_not_reach_standard_output() {
+    let name = "output_of_an_fmu_does_not_reach_standard_output";
     if part().is_some() {
         step(&mut open(None), Trouble::Print).unwrap();
         return;

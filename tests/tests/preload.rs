@@ -1,4 +1,4 @@
-//! `--preload`: libraries that FMUs expect in their process, in this one and in ones of their own.
+//! `--preload`: libraries that FMUs expect in their process, without and with isolation.
 #![cfg(target_os = "linux")]
 #![forbid(unsafe_code)]
 #![expect(clippy::unwrap_used, reason = "tests")]
@@ -10,10 +10,10 @@ use tempfile::TempDir;
 use tests::c_fmu::CFmu;
 use tests::coupled::Run;
 
-/// Rows of a whole run.
+/// Number of rows of a complete run.
 const ALL: usize = 17;
 
-/// Builds `lib<name>.so` of a line of C in `folder`.
+/// Builds `lib<name>.so` from a line of C in `folder`.
 fn library(folder: &Path, name: &str, code: &str) -> String {
     let (source, target) = (folder.join(name).with_extension("c"), folder.join(name));
     let target = target.with_file_name(format!("lib{name}.so"));
@@ -24,7 +24,7 @@ fn library(folder: &Path, name: &str, code: &str) -> String {
     target.display().to_string()
 }
 
-/// An FMU that takes the answer of `fmi2GetVersion` from a library that it does not name.
+/// An FMU that takes the result of `fmi2GetVersion` from a library that it does not name.
 fn needy() -> CFmu {
     CFmu::well_behaved().expecting("provided_version")
 }
@@ -40,7 +40,7 @@ fn provider(version: &str) -> (TempDir, String) {
 const WAYS: [&[&str]; 2] = [&[], &["--isolate"]];
 
 #[test]
-fn without_its_library_an_fmu_is_refused_by_the_name_of_the_symbol() {
+fn without_its_library_an_fmu_is_refused_with_the_name_of_the_symbol() {
     for way in WAYS {
         let run = Run::pair(&needy(), way);
         assert_eq!(run.status, Some(2), "{way:?}: {}", run.message);
@@ -49,7 +49,7 @@ fn without_its_library_an_fmu_is_refused_by_the_name_of_the_symbol() {
 }
 
 #[test]
-fn with_its_library_an_fmu_runs_in_this_process_and_in_its_own() {
+fn with_its_library_an_fmu_runs_with_and_without_isolation() {
     let (_folder, path) = provider("2.0");
     for way in WAYS {
         Run::pair(&needy(), &[way, &["--preload", &path]].concat()).expect(0, ALL);
@@ -84,7 +84,7 @@ fn libraries_are_loaded_in_the_order_given() {
 }
 
 #[test]
-fn a_library_that_does_not_exist_is_refused_by_name_alike() {
+fn a_missing_library_is_refused_by_name_in_both_cases() {
     let [near, far] = WAYS.map(|way| {
         let run = Run::pair(&needy(), &[way, &["--preload", "libnowhere.so.7"]].concat());
         assert_eq!(run.status, Some(2), "{way:?}: {}", run.message);
@@ -95,7 +95,7 @@ fn a_library_that_does_not_exist_is_refused_by_name_alike() {
 }
 
 #[test]
-fn a_library_that_crashes_takes_nothing_but_its_own_process() {
+fn a_library_that_crashes_ends_only_its_own_process() {
     let folder = tempfile::tempdir().unwrap();
     let code = "#include <stdlib.h>\n__attribute__((constructor)) void f(void) { abort(); }";
     let path = library(folder.path(), "crashing", code);

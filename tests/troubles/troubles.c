@@ -1,5 +1,5 @@
-/* An FMU for co-simulation that integrates y' = u by Euler's method, until its Integer `trouble` asks
- * for one of the troubles below. It has a long state and lacks directional derivatives. */
+/* An FMU for co-simulation that integrates y' = u by Euler's method, until its Integer `trouble`
+ * selects one of the misbehaviours below. It has a long state and lacks directional derivatives. */
 #define _GNU_SOURCE
 #include <pthread.h>
 #include <stdint.h>
@@ -191,7 +191,7 @@ static uint64_t *find_shared(size_t *count) {
     return found;
 }
 
-/* Fills it with numbers of all magnitudes, for ever. */
+/* Overwrites it with numbers of all magnitudes, for ever. */
 static void *overwrite_shared(void *unused) {
     size_t count = 0;
     volatile uint64_t *words = find_shared(&count);

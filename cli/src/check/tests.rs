@@ -166,7 +166,7 @@ fn tried(fault: Fault) -> (TrialResult, Vec<Finding>) {
 }
 
 #[test]
-fn a_slave_that_does_nothing_wrong_has_no_findings() {
+fn a_correct_slave_has_no_findings() {
     assert_eq!(findings(Fault::Nothing), []);
 }
 

@@ -132,7 +132,7 @@ fn refusal(from: &str, to: &str) -> String {
 }
 
 #[test]
-fn signals_that_are_not_named_get_a_letter_and_a_number() {
+fn unnamed_signals_get_a_letter_and_a_number() {
     let names = read(MASS, |file| {
         let Model::Matrices { states, .. } = &file.model else { panic!("matrices") };
         let signals = states.iter().chain(&file.actuators).chain(&file.measurements);
@@ -161,7 +161,7 @@ fn an_error_shows_the_line_and_underlines_the_value() {
 }
 
 #[test]
-fn each_error_says_where_and_what_was_expected_and_found() {
+fn each_error_states_position_expectation_and_finding() {
     for (from, to, expected) in REFUSALS {
         let message = refusal(from, to);
         assert!(message.contains(expected), "{to}: {message}");
@@ -170,7 +170,7 @@ fn each_error_says_where_and_what_was_expected_and_found() {
 }
 
 #[test]
-fn faults_enter_where_the_file_says() {
+fn faults_enter_at_the_points_that_the_file_states() {
     let more = r#"
 filter = [50]
 F_a = [[1], [1]]
@@ -212,7 +212,7 @@ fn a_region_is_required_alone_or_with_a_norm() {
 }
 
 #[test]
-fn an_fmu_stands_for_the_matrices_and_lies_beside_the_file() {
+fn an_fmu_beside_the_file_can_replace_the_matrices() {
     let text = r#"
 plant = "Plant.fmu"
 actuators = ["u"]

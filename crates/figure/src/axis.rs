@@ -252,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn labels_have_the_digits_of_the_step_and_no_more() {
+    fn labels_have_as_many_digits_as_the_step() {
         let labels = |low, high| -> Vec<String> {
             let axis = Axis::exact((low, high), (0.0, 1.0), 5);
             axis.ticks().into_iter().map(|(_, label)| label).collect()

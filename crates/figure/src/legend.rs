@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn a_label_longer_than_the_page_keeps_its_beginning_and_its_end() {
+    fn a_label_longer_than_the_page_keeps_its_start_and_its_end() {
         let long = format!("plant.{}.x_p in m", "deeply_nested.".repeat(20));
         let places = places(&entries(&["a", &long, "b"]), LEFT);
         let label = &places[1].2;

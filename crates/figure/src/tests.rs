@@ -30,7 +30,7 @@ fn texts(svg: &str) -> Vec<String> {
 }
 
 #[test]
-fn the_svg_is_well_formed_and_says_title_axes_units_legend_and_marks() {
+fn the_svg_is_well_formed_and_contains_title_axes_units_legend_and_marks() {
     let svg = example(&TIME, &VALUES).svg().unwrap();
     let texts = texts(&svg);
     let count = |wanted: &str| texts.iter().filter(|text| *text == wanted).count();
@@ -150,7 +150,7 @@ fn a_font_that_is_not_linked_in_is_replaced() {
 }
 
 #[test]
-fn what_is_not_an_svg_is_refused() {
+fn a_file_that_is_not_an_svg_is_refused() {
     assert!(matches!(rasterise("no drawing"), Err(FigureError::Pixels(_))));
 }
 
@@ -175,7 +175,7 @@ fn a_curve_beyond_the_cap_leaves_the_frame_and_the_legend_says_so() {
 }
 
 #[test]
-fn nothing_to_draw_is_said_in_the_panel() {
+fn a_panel_without_data_says_so() {
     for (time, values) in [(&[][..], &[][..]), (&TIME, &[f64::NAN; 4]), (&[f64::NAN; 4], &TIME)] {
         let texts = texts(&example(time, values).svg().unwrap());
         assert_eq!(texts.iter().filter(|text| *text == "no finite data").count(), 2);

@@ -1,4 +1,8 @@
 //! Reads TOML and keeps the place of every value, so that errors can point at it.
+//!
+//! Deserialising into structs with `serde` would lose name and place of a value before later checks,
+//! which compare several values or compute with them. The few lines that show an error replace a
+//! crate such as `miette` or `annotate-snippets`, because an error has one place and one message.
 
 use std::fmt;
 use std::ops::Range;

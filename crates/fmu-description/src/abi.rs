@@ -32,7 +32,7 @@ pub type fmi2StatusKind = c_int;
 pub const MODEL_EXCHANGE: fmi2Type = 0;
 /// `fmi2CoSimulation`.
 pub const CO_SIMULATION: fmi2Type = 1;
-/// `fmi2GetTypesPlatform` of a FMU with the default types.
+/// The result of `fmi2GetTypesPlatform` for the default types.
 pub const TYPES_PLATFORM: &std::ffi::CStr = c"default";
 /// `fmi2GetVersion`.
 pub const VERSION: &std::ffi::CStr = c"2.0";

@@ -1,4 +1,7 @@
 //! Conversion between paths and `file:` URIs for `fmuResourceLocation` (FMI 2.0.5, section 2.1.5).
+//!
+//! Written here because the crate `url` ends a path at an unencoded `?` or `#`, which some importers
+//! pass, and would add tables for international host names to every exported FMU.
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -192,7 +195,7 @@ mod tests {
     /// The URIs on the left are the results of `pathlib.PurePosixPath.as_uri` and RFC 8089.
     #[cfg(unix)]
     #[test]
-    fn a_path_comes_back_from_its_uri() {
+    fn a_path_is_recovered_from_its_uri() {
         for (uri, path) in [
             ("file:///tmp/x", "/tmp/x"),
             ("file:///a%20b/50%25/%23%3F", "/a b/50%/#?"),
@@ -207,7 +210,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn bytes_that_are_no_text_survive() {
+    fn bytes_that_are_not_utf_8_survive() {
         use std::os::unix::ffi::OsStrExt as _;
         let path = Path::new(std::ffi::OsStr::from_bytes(b"/tmp/\xff\xfe"));
         let uri = file_uri(path).unwrap();

@@ -1,4 +1,4 @@
-//! `.fmu` archives (FMI 2.0.5, section 2.3): writing one, and unpacking one to use it.
+//! Writes `.fmu` archives (FMI 2.0.5, section 2.3), and unpacks them.
 
 mod archive;
 mod paths;
@@ -15,23 +15,23 @@ pub use read::{Unpacked, unpack_archive};
 pub use temporary::{TemporaryFolder, remove_temporary_folders};
 pub use write::Package;
 
-/// Name of the file that describes an FMU, at the root of the archive.
+/// Name of the file at the root of the archive that describes the FMU.
 pub const DESCRIPTION: &str = "modelDescription.xml";
 
-/// Why an archive cannot be written or used.
+/// The error of writing or reading an archive.
 #[derive(Debug, thiserror::Error)]
 pub enum PackageError {
-    /// The file system refused.
+    /// An operation of the file system failed.
     #[error("cannot {action} {}", path.display())]
     File {
-        /// What was tried.
+        /// The operation.
         action: &'static str,
-        /// With which file.
+        /// The file.
         path: PathBuf,
-        /// The system's reason.
+        /// The reason given by the system.
         source: io::Error,
     },
-    /// Not a ZIP archive, or one that cannot be decompressed.
+    /// The file is not a ZIP archive, or cannot be decompressed.
     #[error("{} is no ZIP archive that can be used", path.display())]
     Archive {
         /// The archive.
@@ -39,30 +39,30 @@ pub enum PackageError {
         /// The reason.
         source: zip::result::ZipError,
     },
-    /// An entry with a path that an FMU must not have.
+    /// An entry has a path that an FMU must not have.
     #[error("entry {entry:?}: expected {expected}")]
     Entry {
-        /// Path of the entry.
+        /// The path of the entry.
         entry: String,
-        /// What is allowed.
+        /// The rule.
         expected: &'static str,
     },
-    /// Something that an FMU must have.
+    /// The FMU lacks a required part.
     #[error("expected {expected}, found {found}")]
     Missing {
-        /// What is missing.
+        /// The missing part.
         expected: String,
-        /// What there is instead.
+        /// The parts that exist instead.
         found: String,
     },
-    /// More data than this crate writes or unpacks.
+    /// The archive exceeds a limit of this crate.
     #[error("{}: expected at most {limit} {unit}, found more", path.display())]
     Limit {
         /// The archive.
         path: PathBuf,
-        /// How much is accepted.
+        /// The limit.
         limit: u64,
-        /// Of what.
+        /// The limited quantity.
         unit: &'static str,
     },
     /// The model description cannot be read.
@@ -84,8 +84,8 @@ fn file_error(
     move |source| PackageError::File { action, path, source }
 }
 
-/// Folders of `binaries` that hold libraries for the platform of this program, the preferred one
-/// first: the names of FMI 2.0 for x86, the platform tuples of FMI 3.0 (since FMI 2.0.4) otherwise.
+/// Folders of `binaries` for libraries of this platform, in order of preference: the names of FMI
+/// 2.0 for x86, otherwise the platform tuples of FMI 3.0 (allowed since FMI 2.0.4).
 #[must_use]
 pub fn platforms() -> &'static [&'static str] {
     folders(std::env::consts::OS, std::env::consts::ARCH)
@@ -100,7 +100,7 @@ fn folders(system: &str, processor: &str) -> &'static [&'static str] {
         ("windows", "x86") => &["win32", "x86-windows"],
         ("windows", "aarch64") => &["aarch64-windows"],
         ("macos", "x86_64") => &["darwin64", "x86_64-darwin"],
-        // A library in darwin64 may serve both processors.
+        // A library in darwin64 may contain code for both processors.
         ("macos", "aarch64") => &["aarch64-darwin", "darwin64"],
         _ => &[],
     }

@@ -67,7 +67,7 @@ impl<T: Number> Target<T> {
 ///
 /// # Safety
 ///
-/// The arrays are valid for what the arguments say.
+/// The pointers are valid for the sizes that the arguments state.
 pub(crate) unsafe fn general<T: Number>(
     (m, n, k): (i32, i32, i32),
     a: &Operand<T>,
@@ -85,7 +85,7 @@ pub(crate) unsafe fn general<T: Number>(
 ///
 /// # Safety
 ///
-/// The arrays are valid for what the arguments say.
+/// The pointers are valid for the sizes that the arguments state.
 pub(crate) unsafe fn rank_k<T: Number>(
     (n, k): (i32, i32),
     a: &Operand<T>,
@@ -102,7 +102,7 @@ pub(crate) unsafe fn rank_k<T: Number>(
 ///
 /// # Safety
 ///
-/// The arrays are valid for what the arguments say.
+/// The pointers are valid for the sizes that the arguments state.
 pub(crate) unsafe fn rank_2k<T: Number>(
     (n, k): (i32, i32),
     a: &Operand<T>,
@@ -121,7 +121,7 @@ pub(crate) unsafe fn rank_2k<T: Number>(
 ///
 /// # Safety
 ///
-/// The arrays are valid for what the arguments say.
+/// The pointers are valid for the sizes that the arguments state.
 pub(crate) unsafe fn matrix_vector<T: Number>(
     (m, n): (i32, i32),
     a: &Operand<T>,
@@ -143,7 +143,7 @@ pub(crate) unsafe fn matrix_vector<T: Number>(
 ///
 /// # Safety
 ///
-/// The arrays are valid for what the arguments say.
+/// The pointers are valid for the sizes that the arguments state.
 pub(crate) unsafe fn symmetric_vector<T: Number>(
     (triangle, n): (u8, i32),
     (a, leading): (*const T, i32),

@@ -40,7 +40,7 @@ fn from_one(index: usize) -> i32 {
 ///
 /// # Safety
 ///
-/// The array is valid for what the arguments say.
+/// The pointer is valid for the sizes that the arguments state.
 pub(crate) unsafe fn potrf<T: Number>(triangle: u8, n: i32, a: Array<T>) -> Result<(), i32> {
     let part = Part::triangle(triangle).ok_or(-1)?;
     let layout = a.layout(size(n, 2)?, n, 4)?;
@@ -58,7 +58,7 @@ pub(crate) unsafe fn potrf<T: Number>(triangle: u8, n: i32, a: Array<T>) -> Resu
 ///
 /// # Safety
 ///
-/// The arrays are valid for what the arguments say.
+/// The pointers are valid for the sizes that the arguments state.
 pub(crate) unsafe fn potrs<T: Number>(
     triangle: u8,
     (n, right_sides): (i32, i32),
@@ -81,7 +81,7 @@ pub(crate) unsafe fn potrs<T: Number>(
 ///
 /// # Safety
 ///
-/// The arrays are valid for what the arguments say.
+/// The pointers are valid for the sizes that the arguments state.
 pub(crate) unsafe fn gesv<T: Number>(
     (n, right_sides): (i32, i32),
     a: Array<T>,
@@ -120,7 +120,7 @@ pub(crate) struct Spectrum<T> {
 ///
 /// # Safety
 ///
-/// The arrays are valid for what the arguments say.
+/// The pointers are valid for the sizes that the arguments state.
 pub(crate) unsafe fn syevr<T: Number>(
     (job, range, triangle): (u8, u8, u8),
     n: i32,
@@ -199,7 +199,7 @@ pub(crate) struct Factors<T> {
 ///
 /// # Safety
 ///
-/// The arrays are valid for what the arguments say.
+/// The pointers are valid for the sizes that the arguments state.
 pub(crate) unsafe fn singular_values<T: Number>(
     (m, n): (i32, i32),
     a: Array<T>,

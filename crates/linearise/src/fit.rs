@@ -49,8 +49,8 @@ fn scaled(x: &DMatrix<f64>) -> (DMatrix<f64>, Vec<f64>) {
 
 /// Returns the T with the least norm of X T - Y; `None` if X does not have full column rank.
 ///
-/// Method: Householder's QR decomposition of X, its columns scaled to length one. `x`: r x c with r
-/// > c; `y`: r x k. About 2 r c^2 multiplications.
+/// Method: Householder's QR decomposition of X, its columns scaled to length one. `x`: r x c with
+/// more rows than columns; `y`: r x k. About 2 r c^2 multiplications.
 ///
 /// `noise`: the rounding error of each column of Y, which the standard deviations include.
 pub(super) fn least_squares(x: &DMatrix<f64>, y: &DMatrix<f64>, noise: &[f64]) -> Option<Fit> {
@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn columns_that_say_nothing_new_are_named() {
+    fn dependent_columns_are_named() {
         let x = DMatrix::from_row_slice(3, 3, &[1.0, 2e6, 0.0, 1.0, 2e6, 1.0, 0.0, 0.0, 1e-3]);
         let directions = Directions::of(&x);
         assert!(directions.contrast < 1e-15);

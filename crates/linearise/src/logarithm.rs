@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_real_logarithm_there_is_none() {
+    fn a_matrix_without_a_real_logarithm_gives_none() {
         for entries in [[-2.0, 0.0, 0.0, 0.5], [-1.0, 0.0, 0.0, 0.0], [f64::NAN, 0.0, 0.0, 0.0]] {
             let e = DMatrix::from_row_slice(2, 2, &entries);
             assert_eq!(logarithm_of_one_plus(&e), None, "{entries:?}");

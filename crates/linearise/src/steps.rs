@@ -118,7 +118,8 @@ fn is_about_length(refusal: &LineariseError) -> bool {
     matches!(refusal, LineariseError::Unreachable { .. })
 }
 
-/// Linearises by records of `count` steps; the last bench has the shortest step.
+/// Linearises by records of `count` steps; `benches` differ in their step, and the last one has the
+/// shortest.
 fn of_count(
     benches: &mut [Bench],
     parts: &Parts,

@@ -103,20 +103,20 @@ mod tests {
     }
 
     #[test]
-    fn a_step_over_several_instants_gives_one_row_and_an_event_none_of_its_own() {
+    fn a_step_over_several_grid_times_gives_one_row_and_an_event_no_further_row() {
         let times = [0.0, 0.0, 3.5, 3.5, 3.9, 4.0];
         assert_eq!(recorded(Decimation::Every(1.0), 0.0, &times), [0.0, 3.5, 4.0]);
         assert_eq!(recorded(Decimation::All, 0.0, &times), times);
     }
 
     #[test]
-    fn every_third_point_begins_with_the_first() {
+    fn every_third_point_starts_with_the_first() {
         let times: Vec<f64> = (0..8).map(f64::from).collect();
         assert_eq!(recorded(Decimation::Nth(3), 0.0, &times), [0.0, 3.0, 6.0]);
     }
 
     #[test]
-    fn a_saved_state_goes_on_with_the_same_points() {
+    fn a_restored_state_continues_with_the_same_points() {
         let times: Vec<f64> = (0..100).map(|k| f64::from(k) * 0.07).collect();
         for decimation in [Decimation::Every(0.2), Decimation::Nth(7), Decimation::All] {
             let mut due = Due::new(decimation, 0.0);

@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_finite_stays_a_gap() {
+    fn nan_and_infinity_remain_gaps() {
         let mut envelope = Envelope::default();
         for k in 0..100_000_u32 {
             let value = if (40_000..60_000).contains(&k) { f64::NAN } else { 1.0 };

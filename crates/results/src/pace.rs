@@ -12,8 +12,9 @@ pub(super) struct Pace {
     interval: Duration,
     last_write: Instant,
     last_reading: Instant,
-    /// Rows until the next reading of the clock; then rows between two readings.
+    /// Number of rows until the next reading of the clock.
     left: u32,
+    /// Number of rows between two readings.
     stride: u32,
 }
 

@@ -171,18 +171,18 @@ mod tests {
     }
 
     #[test]
-    fn nothing_stated_chooses_everything_in_its_order() {
+    fn an_empty_selection_selects_everything_in_order() {
         assert_eq!(chosen(&[], &[]).unwrap(), NAMES);
     }
 
     #[test]
-    fn names_come_in_the_order_asked_for_and_once() {
+    fn each_name_is_selected_once_in_the_order_of_the_patterns() {
         let patterns = ["plant.theta", "plant.x_p", "plant.*"];
         assert_eq!(chosen(&patterns, &[]).unwrap(), ["plant.theta", "plant.x_p"]);
     }
 
     #[test]
-    fn brackets_stand_for_themselves_beside_wildcards() {
+    fn brackets_match_themselves_also_with_wildcards() {
         assert_eq!(chosen(&["ctrl.x_hat[1]"], &[]).unwrap(), ["ctrl.x_hat[1]"]);
         assert_eq!(chosen(&["*.x_hat[?]"], &[]).unwrap(), ["ctrl.x_hat[1]", "ctrl.x_hat[2]"]);
         assert_eq!(chosen(&["*[2]"], &[]).unwrap(), ["ctrl.x_hat[2]"]);
@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_excluded_is_left_out() {
+    fn excluded_names_are_left_out() {
         let kept = ["plant.x_p", "ctrl.inner.y", "'a*b'"];
         assert_eq!(chosen(&[], &["*theta*", "*.x_hat[*]"]).unwrap(), kept);
         assert_eq!(chosen(&["plant.*"], &["plant.*"]), Err(SelectionError::Empty));
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn many_stars_cost_no_more_than_the_product_of_the_lengths() {
+    fn matching_many_stars_takes_at_most_the_product_of_the_lengths() {
         let pattern: Vec<char> = "*a".repeat(200).chars().chain(['b']).collect();
         assert!(!matches_pattern(&pattern, &"a".repeat(5000)));
     }

@@ -4,7 +4,8 @@
 //! The connected values u of a loop are a fixed point, `u = G(u)`: G sets the inputs u, steps the
 //! slaves or evaluates their outputs, and returns the resulting values of the connections. A
 //! [`Solver`] receives u and G(u) and returns the next u to evaluate. It never calls G, so that the
-//! caller keeps control of the slaves:
+//! caller keeps control of the slaves. Solvers of other libraries call G themselves; the solvers here also
+//! allocate nothing between steps and can be serialised into a checkpoint:
 //!
 //! ```
 //! use solve::{Anderson, Progress, Scale, Solver};

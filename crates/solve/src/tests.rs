@@ -139,7 +139,7 @@ fn nominals_make_the_solution_independent_of_units() {
 }
 
 #[test]
-fn loops_that_are_not_linear_are_solved() {
+fn nonlinear_loops_are_solved() {
     // u = cos(u), Dottie's number; u1 = 1 - 10 u2^3, u2 = tanh(u1): 1 - u1 = 10 tanh(u1)^3.
     for (name, mut solver) in all(1, 30) {
         let (u, _) = solve(&mut *solver, &[0.0], &|u| vec![u[0].cos()]);
@@ -219,7 +219,7 @@ fn a_loop_without_a_solution_is_no_convergence() {
 }
 
 #[test]
-fn values_that_are_not_finite_end_it() {
+fn values_that_are_not_finite_end_the_iteration() {
     for bad in [f64::NAN, f64::INFINITY] {
         for (name, mut solver) in all(2, 20) {
             let (_, end) = solve(&mut *solver, &[1.0, 1.0], &|_| vec![0.0, bad]);

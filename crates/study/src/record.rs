@@ -15,7 +15,7 @@ use crate::config::Every;
 
 /// All open results files, so that they can be completed when the process ends.
 static FILES: Mutex<Vec<Weak<Mutex<Recording>>>> = Mutex::new(Vec::new());
-/// Number of attempts and pause between them to lock a file when the process ends.
+/// Number of attempts to lock a file when the process ends, and the pause between them.
 const TRIES: u32 = 50;
 const PAUSE: Duration = Duration::from_millis(10);
 

@@ -1,4 +1,4 @@
-//! A ball that bounces: h' = v, v' = g; where it hits the ground, v becomes -e v.
+//! A bouncing ball: h' = v, v' = g; at each impact on the ground, v becomes -e v.
 #![forbid(unsafe_code)]
 
 use fmu::{About, Failure, Model, Step, Variable};

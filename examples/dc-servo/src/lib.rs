@@ -1,5 +1,4 @@
-//! A DC servo whose load has Coulomb and static friction, set-valued at rest; faults of drive and
-//! sensor.
+//! A DC servo whose load has Coulomb and static friction, with faults of drive and sensor.
 #![forbid(unsafe_code)]
 
 mod motion;
@@ -17,10 +16,10 @@ use motion::Motion;
 use motor::{BIAS, COUNT, Motor, ONSET};
 use variables::PARAMETERS;
 
-/// How far the event indicator lies above its margin, so that a margin of zero is no event.
+/// Offset of the event indicator from its margin, so that a margin of zero is no event.
 const SHIFT: f64 = 1e-10;
 
-/// Fields carry the values of the variables.
+/// The model; fields without a comment have the name of their variable.
 #[derive(Clone, serde::Serialize, serde::Deserialize)]
 struct DcServo {
     u: f64,
@@ -30,9 +29,9 @@ struct DcServo {
     parameters: [f64; COUNT],
     friction: bool,
     regime: i32,
-    /// Drive and sensor are past the begin of their faults.
+    /// Whether the faults of drive and sensor have started.
     begun: [bool; 2],
-    /// The time that what follows belongs to.
+    /// The time of the fields below.
     time: f64,
     acceleration: f64,
     measured: f64,
@@ -46,7 +45,7 @@ impl DcServo {
         Motor { parameters, faulty: self.begun[0], friction }
     }
 
-    /// The motion from `time` on, under the input `u` and its derivative then.
+    /// The motion from `time` on, under the input `u` and its derivative at that time.
     fn motion(&self, u: f64, time: f64) -> Motion {
         let motor = self.motor();
         Motion::new(&motor, [motor.voltage(u, time), motor.voltage_rise(self.u_slope)])
@@ -65,7 +64,7 @@ impl DcServo {
         self.begun = self.onsets().map(|onset| time >= onset);
     }
 
-    /// Everything that follows from the state and the input `u` at this time.
+    /// Computes all outputs and derivatives from the state and the input `u` at this time.
     fn show(&mut self, u: f64, time: f64) {
         let motor = self.motor();
         let now = motor.response(self.regime, self.state[1], motor.voltage(u, time));

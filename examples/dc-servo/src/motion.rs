@@ -1,13 +1,13 @@
-//! The motion in closed form: piece by piece a linear equation with a torque linear in time.
+//! The motion in closed form: between events the equation is linear and the torque linear in time.
 
 use crate::motor::Motor;
 
-/// Most pieces of one interval; four are possible.
+/// Maximum number of pieces between events in one interval; four are possible.
 const PIECES: u32 = 16;
-/// Halvings in the search of an event.
+/// Number of bisection steps that locate an event.
 const HALVINGS: u32 = 100;
 
-/// A servo under a voltage linear in time.
+/// A servo under a voltage that is linear in time.
 pub(crate) struct Motion {
     /// Torque at velocity zero, in N m, and its derivative, in N m/s.
     torque: [f64; 2],
@@ -42,7 +42,7 @@ impl Motion {
         }
     }
 
-    /// Angle and velocity after `duration` in s; `None` beyond all numbers.
+    /// Angle and velocity after `duration` in s; `None` if they overflow.
     pub(crate) fn advance(&self, state: [f64; 2], duration: f64) -> Option<[f64; 2]> {
         let (mut state, mut time) = (state, 0.0);
         for _ in 0..PIECES {
@@ -76,7 +76,7 @@ impl Motion {
     }
 }
 
-/// `w' = -a w + b_0 + b_1 t` from a start.
+/// The solution of `w' = -a w + b_0 + b_1 t` for an initial value.
 struct Slide {
     start: [f64; 2],
     /// `a`
@@ -99,10 +99,10 @@ impl Slide {
         phi_0 * (self.push[0] - self.decay * self.start[1]) + t * phi_1 * self.push[1]
     }
 
-    /// The first time until `end` at which the velocity is no longer in its direction.
+    /// The first time until `end` at which the velocity no longer has its sign.
     ///
-    /// The acceleration is monotone, so that the velocity turns once at most, and has at most one zero
-    /// before and one after that.
+    /// The acceleration is monotone, so the velocity has at most one extremum, and at most one zero
+    /// before and one after it.
     fn stop(&self, direction: i32, end: f64) -> Option<f64> {
         let direction = f64::from(direction);
         let speed = |t: f64| direction * self.at(t)[1];
@@ -118,7 +118,7 @@ impl Slide {
 
 /// The functions `phi_0(z) = e^z`, `phi_(k+1)(z) = (phi_k(z) - 1/k!) / z` at `z <= 0`.
 ///
-/// Near zero by the power series of the last one, and the others from it.
+/// Near zero, the last one is computed by its power series, and the others from it.
 fn phi(z: f64) -> [f64; 4] {
     if z < -1.0 {
         let phi_1 = z.exp_m1() / z;
@@ -131,8 +131,9 @@ fn phi(z: f64) -> [f64; 4] {
     [1.0 + z * phi_1, phi_1, phi_2, phi_3]
 }
 
-/// Where a margin, positive or zero at `low` and negative at `high`, has become negative: the upper
-/// end of the interval after bisection down to neighbouring numbers.
+/// Locates the sign change of a margin that is not negative at `low` and negative at `high`.
+///
+/// Returns the upper end of the interval after bisection down to neighbouring numbers.
 fn first_negative(margin: impl Fn(f64) -> f64, low: f64, high: f64) -> f64 {
     let (mut low, mut high) = (low, high);
     for _ in 0..HALVINGS {

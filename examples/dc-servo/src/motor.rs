@@ -1,4 +1,4 @@
-//! The equations of the servo at one instant.
+//! The equations of the servo at one point in time.
 
 use num_dual::DualNum;
 
@@ -6,12 +6,12 @@ use num_dual::DualNum;
 pub(crate) trait Number: DualNum<Primitive = f64> + Copy {}
 impl<D: DualNum<Primitive = f64> + Copy> Number for D {}
 
-/// Number of parameters, and the places of those that more than these equations depend on.
+/// Number of parameters, and the indices of those that are used outside of these equations too.
 pub(crate) const COUNT: usize = 12;
 pub(crate) const ONSET: usize = 9;
 pub(crate) const BIAS: usize = 11;
 
-/// What stays as it is between events.
+/// Conditions that change at events only.
 pub(crate) struct Motor<D> {
     pub(crate) parameters: [D; COUNT],
     pub(crate) faulty: bool,
@@ -19,7 +19,7 @@ pub(crate) struct Motor<D> {
     pub(crate) friction: bool,
 }
 
-/// What follows at once from velocity, voltage and regime.
+/// Acceleration, friction and current for a velocity, a voltage and a regime.
 pub(crate) struct Response<D> {
     /// In rad/s2.
     pub(crate) acceleration: D,
@@ -42,8 +42,10 @@ impl<D: Number> Motor<D> {
         if self.faulty { (D::one() - loss) * u_slope + rate } else { u_slope }
     }
 
-    /// `J w' = k i - F_v w - T_f` with the current `R i = v - k w` and the dry friction `T_f`:
-    /// `T_c sign(w)` while the load slides, at rest what holds it, at most `T_s`.
+    /// Evaluates `J w' = k i - F_v w - T_f` with the current from `R i = v - k w`.
+    ///
+    /// The dry friction `T_f` is `T_c sign(w)` while the load slides. At rest it balances the
+    /// torque, up to `T_s`.
     pub(crate) fn response(&self, regime: i32, omega: D, voltage: D) -> Response<D> {
         let [resistance, k, inertia, viscous, coulomb, holding, ..] = self.parameters;
         let current = (voltage - k * omega) / resistance;

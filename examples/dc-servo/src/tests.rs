@@ -15,7 +15,7 @@ fn parameter(name: &str) -> f64 {
     *place(&mut DcServo::new(Path::new("")).unwrap(), name)
 }
 
-/// The model initialised with these values.
+/// Creates the model and initialises it with these values.
 fn started(friction: bool, values: &[(&str, f64)]) -> DcServo {
     let mut model = DcServo::new(Path::new("")).unwrap();
     model.friction = friction;
@@ -116,7 +116,7 @@ fn input(time: f64) -> f64 {
 }
 
 #[test]
-fn friction_takes_energy_and_all_energy_is_accounted_for() {
+fn friction_dissipates_energy_and_the_energy_balance_holds() {
     let mut model = started(true, &FAULTS);
     let size = 1e-5;
     let power = |model: &DcServo| {
@@ -138,12 +138,12 @@ fn friction_takes_energy_and_all_energy_is_accounted_for() {
     }
     assert_eq!(regimes, [true; 3]);
     let gained = kinetic(&model) - begin;
-    // The quadrature sees the fault begin up to a step late.
+    // The quadrature notices the start of the fault up to a step late.
     assert!((gained - work).abs() < 2e-4 * gained, "{gained} {work}");
 }
 
 #[test]
-fn the_result_does_not_depend_on_how_a_held_input_is_cut() {
+fn the_result_does_not_depend_on_how_an_interval_with_held_input_is_divided_into_steps() {
     let follow = |cuts: u32| {
         let mut model = started(true, &FAULTS);
         for k in 0..60 {
@@ -165,7 +165,7 @@ fn the_result_does_not_depend_on_how_a_held_input_is_cut() {
 }
 
 #[test]
-fn a_fault_of_the_drive_is_the_voltage_that_it_makes() {
+fn a_fault_of_the_drive_acts_like_the_equal_change_of_voltage() {
     let faulty = started(true, &FAULTS);
     let sound = started(true, &[("omega", 30.0)]);
     let [mut faulty, mut sound] = [faulty, sound];
@@ -180,7 +180,7 @@ fn a_fault_of_the_drive_is_the_voltage_that_it_makes() {
 }
 
 #[test]
-fn a_bias_moves_the_measurement_from_its_time_on_and_nothing_else() {
+fn from_its_time_on_a_bias_shifts_the_measurement_and_nothing_else() {
     let mut model = started(true, &[("omega", 9.0), ("b_theta", 0.1), ("t_bias", 0.02)]);
     let mut sound = started(true, &[("omega", 9.0)]);
     for k in 0..4 {
@@ -241,7 +241,7 @@ fn directional_derivatives_are_difference_quotients_in_every_regime() {
 }
 
 #[test]
-fn without_friction_it_is_the_linear_motor_also_at_rest() {
+fn without_friction_the_model_is_the_linear_motor_also_at_rest() {
     let model = started(false, &[]);
     let gain = parameter("k") / (parameter("R") * parameter("J"));
     close(along(&model, "omega", 0.0)[0], -decay(), 1e-14);
@@ -264,7 +264,7 @@ fn a_static_friction_below_the_coulomb_friction_is_refused() {
 }
 
 #[test]
-fn a_voltage_beyond_all_numbers_is_refused_and_leaves_the_state() {
+fn a_voltage_that_overflows_the_motion_is_refused_and_leaves_the_state() {
     let mut model = started(true, &[("omega", 1.0)]);
     model.u = 1e308;
     let refusal = model.step(&Step { start: 0.0, size: 1e9 }).unwrap_err();

@@ -11,7 +11,7 @@ type Row = (&'static str, &'static str, &'static str, f64, [f64; 2]);
 
 const TIME: [f64; 2] = [-1e9, 1e9];
 
-/// The order is the one that the equations take them in.
+/// The parameters, in the order in which the equations take them.
 pub(crate) const PARAMETERS: [Row; COUNT] = [
     ("R", "Armature resistance", "Ohm", 4.0, [1e-6, 1e6]),
     ("k", "Torque per current, back-EMF per velocity", "N.m/A", 0.0274, [1e-6, 1e6]),
@@ -27,7 +27,7 @@ pub(crate) const PARAMETERS: [Row; COUNT] = [
     ("b_theta", "Bias of the sensor of the angle", "rad", 0.0, [-1e6, 1e6]),
 ];
 
-/// What acceleration and friction depend on.
+/// The variables that acceleration and friction depend on.
 const DEPENDS: [&str; 3] = ["u", "omega", "time"];
 
 /// All variables, in the order of the description.

@@ -1,4 +1,5 @@
-//! Linear interpolation in `resources/table.csv`: an input, and outputs as many as it has columns.
+//! Linear interpolation in `resources/table.csv`: the first column is the input, the others are
+//! outputs.
 #![forbid(unsafe_code)]
 
 use fmu::{About, Failure, Model, Step, Variable as V};

@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Every `T_s`: `u = K (e - T_d y') + sum of K e T_s / T_i`, at most `u_max` in size; `e = w - y`.
+/// A PID controller: every `T_s`, `u = K (e - T_d y') + sum of K e T_s / T_i` with `e = w - y`,
+/// limited to `u_max`.
 #[derive(Clone, Default, Serialize, Deserialize)]
 pub(crate) struct Law {
     pub(crate) mode: i32,
@@ -44,16 +45,16 @@ impl Law {
         Self { gain, integral_time, sample_time, limit, hold: true, ..Self::default() }
     }
 
-    /// Before the first sample.
+    /// Resets the controller to the time before its first sample; returns the status.
     pub(crate) fn start(&mut self) -> String {
         (self.u, self.integral, self.last_measurement) = (0.0, 0.0, self.measurement);
         "no sample yet".to_owned()
     }
 
-    /// Takes a sample and says what decided u.
+    /// Takes a sample and returns what determined u.
     ///
-    /// Outside of the automatic mode the integral is the one that would give u, so that a change of
-    /// the mode makes no bump; with anti-windup the same holds at a limit.
+    /// Outside of the automatic mode, and with anti-windup also at a limit, the integral is set to the
+    /// value for which the law gives u, so that u does not jump when the law takes over again.
     pub(crate) fn sample(&mut self) -> String {
         let error = self.setpoint - self.measurement;
         let slope = (self.measurement - self.last_measurement) / self.sample_time;

@@ -1,8 +1,8 @@
-//! The flows of pumps and pipes, and what they do to the levels.
+//! The flows of pumps and pipes, and the derivatives of the levels.
 
 use num_dual::{Dual64, DualNum};
 
-/// Number of parameters, and the places of those that more than the flows depend on.
+/// Number of parameters, and the indices of those that are used outside of the flows too.
 pub(crate) const COUNT: usize = 18;
 pub(crate) const Q_MAX: usize = 6;
 pub(crate) const H_MAX: usize = 7;
@@ -12,7 +12,7 @@ pub(crate) const BIAS: usize = 15;
 /// `f64`, or a dual number `x + x' e` with `e^2 = 0`, which carries a derivative through the same
 /// equations.
 pub(crate) trait Number: DualNum<Primitive = f64> + Copy {
-    /// `sign(x) sqrt(|x|)`; its derivative at zero is infinite, unless the direction leaves x as it is.
+    /// `sign(x) sqrt(|x|)`; its derivative at zero is infinite, unless `x' = 0`.
     fn root(self) -> Self;
 }
 
@@ -32,20 +32,20 @@ impl Number for Dual64 {
 
 /// Flows in m3/s.
 pub(crate) struct Flows<D> {
-    /// `q_01`, `q_02`: what the pumps deliver.
+    /// `q_01`, `q_02`: the flows that the pumps deliver.
     pub(crate) pumps: [D; 2],
     /// `q_13`, `q_32`, `q_20`: through the pipes.
     pub(crate) pipes: [D; 3],
-    /// Inflow less outflow of each tank.
+    /// Inflow minus outflow of each tank.
     pub(crate) net: [D; 3],
 }
 
-/// What stays as it is between events.
+/// Conditions that change at events only.
 pub(crate) struct Tanks<D> {
     /// `Q_1`, `Q_2` in m3/s.
     pub(crate) command: [D; 2],
     pub(crate) parameters: [D; COUNT],
-    /// The pumps that are past the begin of their fault.
+    /// For each pump, whether its fault has started.
     pub(crate) faulty: [bool; 2],
 }
 
@@ -78,7 +78,7 @@ impl<D: Number> Tanks<D> {
         Flows { pumps: [q_1, q_2], pipes: [q_13, q_32, q_20], net }
     }
 
-    /// The derivatives of the levels in m/s; the level of a tank that is full stays.
+    /// The derivatives of the levels in m/s; zero for a full tank.
     pub(crate) fn slope(&self, h: &[D; 3], full: [bool; 3]) -> [D; 3] {
         let [area, ..] = self.parameters;
         let net = self.flows(h).net;

@@ -1,17 +1,17 @@
 //! The levels over time.
 //!
-//! Dormand-Prince steps of order 5(4) and adaptive length, cut where a tank becomes full or stops
+//! Dormand-Prince steps of order 5(4) and adaptive size, which end where a tank becomes full or stops
 //! spilling. Source: J. R. Dormand and P. J. Prince, "A family of embedded Runge-Kutta formulae" (1980).
 
 use std::array::from_fn;
 
 use crate::flows::{H_MAX, Tanks};
 
-/// Largest error of one integration step, in m.
+/// Maximum error of one integration step, in m.
 const TOLERANCE: f64 = 1e-9;
-/// Most integration steps in one call of `advance`.
+/// Maximum number of integration steps in one call of `advance`.
 const STEPS: u32 = 50_000_000;
-/// Halvings in the search of the end of a cut step.
+/// Number of bisection steps that locate the end of a shortened step.
 const HALVINGS: u32 = 60;
 
 const STAGES: [[f64; 6]; 6] = [
@@ -34,8 +34,8 @@ const ERROR: [f64; 7] = [
 ];
 
 impl Tanks<f64> {
-    /// Puts levels above the brim back to it; says which tanks are full and have more inflow than
-    /// outflow, so that they spill.
+    /// Limits levels to the brim, and determines which tanks spill: those that are full and have more
+    /// inflow than outflow.
     pub(crate) fn settle(&self, h: &mut [f64; 3]) -> [bool; 3] {
         let brim = self.parameters[H_MAX];
         *h = h.map(|level| level.min(brim));
@@ -59,8 +59,8 @@ impl Tanks<f64> {
         (end, (0..3).map(|i| moved(&ERROR, &slopes, i).abs()).fold(0.0, f64::max))
     }
 
-    /// Follows the levels for `duration` in s; `trial` is the length of the first integration step
-    /// and becomes that of the next one. Returns how far it came.
+    /// Integrates the levels over `duration` in s and returns the time advanced. `trial` is the size of
+    /// the first integration step, and is replaced by the size of the next one.
     pub(crate) fn advance(&self, h: &mut [f64; 3], trial: &mut f64, duration: f64) -> f64 {
         let mut elapsed = 0.0;
         for _ in 0..STEPS {
@@ -89,8 +89,8 @@ impl Tanks<f64> {
 
     /// The part of a step up to which no tank becomes full or stops spilling; `None` if that is all.
     ///
-    /// A level that may have been above the brim inside the step, because it turns there, cuts the
-    /// step at its highest point.
+    /// If a level has its maximum inside the step and may have been above the brim, the step ends at
+    /// this maximum.
     fn cut(&self, h: &[f64; 3], end: &[f64; 3], full: [bool; 3], length: f64) -> Option<f64> {
         let brim = self.parameters[H_MAX];
         let slope = self.slope(h, full);
@@ -120,7 +120,7 @@ mod tests {
 
     #[test]
     fn a_level_above_the_brim_inside_a_step_only_cuts_the_step() {
-        // Tank 2 rises until tank 3, which empties into tank 1, gives too little.
+        // Tank 2 rises until the flow from tank 3, which also empties into tank 1, is too small.
         let mut tanks = Tanks {
             command: [0.0, 1.2e-4],
             parameters: PARAMETERS.map(|(.., value, _)| value),

@@ -15,16 +15,16 @@ use num_dual::Dual64;
 use flows::{BIAS, COUNT, H_MAX, ONSET, Q_MAX, Tanks};
 use variables::PARAMETERS;
 
-/// How far an event indicator lies above its margin, so that a margin of zero is no event.
+/// Offset of an event indicator from its margin, so that a margin of zero is no event.
 const SHIFT: f64 = 1e-10;
 
-/// Fields carry the values of the variables.
+/// The model; fields without a comment have the name of their variable.
 #[derive(Clone, serde::Serialize, serde::Deserialize)]
 struct ThreeTank {
     h: [f64; 3],
     command: [f64; 2],
     parameters: [f64; COUNT],
-    /// Pump 1, pump 2 and the sensors are past the begin of their faults.
+    /// Whether the faults of pump 1, pump 2 and the sensors have started.
     begun: [bool; 3],
     /// The tanks that spill.
     full: [bool; 3],
@@ -52,7 +52,7 @@ impl ThreeTank {
         self.onsets().into_iter().filter(|onset| *onset > time).reduce(f64::min)
     }
 
-    /// What changes at events only; true if a level was above the brim.
+    /// Updates the conditions that change at events only; true if a level was above the brim.
     fn settle(&mut self, time: f64) -> bool {
         let above = self.h.iter().any(|level| *level > self.parameters[H_MAX]);
         self.begun = self.onsets().map(|onset| time >= onset);

@@ -1,4 +1,4 @@
-//! Laws of the three tanks and their faults.
+//! Physical laws of the three tanks, and their faults.
 
 use std::iter::repeat_n;
 
@@ -9,7 +9,7 @@ fn place<'a>(model: &'a mut ThreeTank, name: &str) -> &'a mut f64 {
     &mut model.parameters[row]
 }
 
-/// The model initialised at these levels, commands and parameters.
+/// Creates the model and initialises it with these levels, commands and parameters.
 fn started(h: [f64; 3], command: [f64; 2], parameters: &[(&str, f64)]) -> ThreeTank {
     let mut model = ThreeTank::new(Path::new("")).unwrap();
     (model.h, model.command) = (h, command);
@@ -20,7 +20,7 @@ fn started(h: [f64; 3], command: [f64; 2], parameters: &[(&str, f64)]) -> ThreeT
     model
 }
 
-/// Follows the model from time zero by steps of these lengths.
+/// Steps the model from time zero by these step sizes.
 fn follow(model: &mut ThreeTank, sizes: impl IntoIterator<Item = f64>) {
     let mut start = 0.0;
     for size in sizes {
@@ -44,7 +44,7 @@ fn the_variables_keep_the_rules_of_the_standard() {
 }
 
 #[test]
-fn the_water_that_comes_in_stays_in_or_goes_out() {
+fn the_volume_balance_of_inflow_outflow_and_content_holds() {
     let faults = [("f_1", 2e-5), ("E_2", 0.4), ("h_max", 0.5)];
     for (h, command) in [
         ([0.4, 0.2, 0.3], [3e-5, 9e-5]),
@@ -85,7 +85,7 @@ fn the_start_values_are_an_equilibrium() {
 }
 
 #[test]
-fn an_outlet_empties_its_tank_along_a_parabola_and_no_further() {
+fn a_tank_empties_through_its_outlet_along_a_parabola_and_stays_empty() {
     for sizes in [vec![1.0; 700], vec![700.0], vec![0.3, 123.0, 70.7, 506.0]] {
         let mut model = started([0.0, 0.3, 0.0], [0.0; 2], &[("mu_13", 0.0), ("mu_32", 0.0)]);
         let rate = 0.675 * 5e-5 * (2.0 * 9.81_f64).sqrt() / (2.0 * 0.0154);
@@ -100,7 +100,7 @@ fn an_outlet_empties_its_tank_along_a_parabola_and_no_further() {
 }
 
 #[test]
-fn joined_levels_become_equal_in_finite_time_and_stay_so() {
+fn levels_of_connected_tanks_become_equal_in_finite_time_and_stay_equal() {
     let mut model = started([0.5, 0.1, 0.3], [0.0; 2], &[("mu_32", 0.0), ("mu_20", 0.0)]);
     let rate = 0.5 * 5e-5 * (2.0 * 9.81_f64).sqrt() / 0.0154;
     for k in 0..100 {
@@ -112,7 +112,7 @@ fn joined_levels_become_equal_in_finite_time_and_stay_so() {
 }
 
 #[test]
-fn a_full_tank_spills_what_comes_in_and_falls_when_less_does() {
+fn a_full_tank_spills_its_surplus_inflow_and_its_level_falls_when_there_is_none() {
     let mut model = started([0.61, 0.1, 0.3], [1e-4, 0.0], &CLOSED);
     let until_full = 0.01 * 0.0154 / 1e-4;
     model.step(&Step { start: 0.0, size: 1.0 }).unwrap();
@@ -131,7 +131,7 @@ fn a_full_tank_spills_what_comes_in_and_falls_when_less_does() {
 }
 
 #[test]
-fn a_fault_begins_at_its_time_whatever_the_steps() {
+fn a_fault_starts_at_its_time_for_every_step_size() {
     let faults = [("f_1", 3e-5), ("t_fault_1", 0.333), ("E_2", 0.25), ("t_fault_2", 1.77)];
     for sizes in [vec![4.0], vec![0.1; 40], vec![0.333, 1.437, 2.23]] {
         let mut model = started([0.1; 3], [2e-5, 6e-5], &[&CLOSED[..], &faults].concat());
@@ -143,7 +143,7 @@ fn a_fault_begins_at_its_time_whatever_the_steps() {
 }
 
 #[test]
-fn a_bias_moves_the_measurement_from_its_time_on_and_nothing_else() {
+fn from_its_time_on_a_bias_shifts_the_measurement_and_nothing_else() {
     let mut biased = started([0.4, 0.2, 0.3], [0.0; 2], &[("b_2", 0.05), ("t_bias", 3.0)]);
     let mut sound = started([0.4, 0.2, 0.3], [0.0; 2], &[]);
     for k in 0..6 {
@@ -178,7 +178,7 @@ fn known<'a>(model: &'a mut ThreeTank, name: &str) -> &'a mut f64 {
 }
 
 #[test]
-fn directional_derivatives_are_difference_quotients_by_every_known() {
+fn directional_derivatives_by_every_known_are_difference_quotients() {
     let faults = [("f_1", 1e-5), ("E_1", 0.3), ("E_2", 0.1), ("b_1", 0.01), ("b_3", -0.02)];
     let names = ["h_1", "h_2", "h_3", "Q_1", "Q_2"];
     for h in [[0.4, 0.2, 0.3], [0.1, 0.5, 0.3], [0.62, 0.1, 0.2]] {
@@ -204,7 +204,7 @@ fn directional_derivatives_are_difference_quotients_by_every_known() {
 }
 
 #[test]
-fn at_equal_levels_there_is_no_derivative_by_a_level_and_one_by_a_command() {
+fn at_equal_levels_derivatives_by_levels_are_refused_and_by_commands_exist() {
     let model = started([0.3, 0.2, 0.3], [7e-5, 5e-5], &[]);
     for name in ["h_1", "h_3"] {
         assert!(matches!(along(&model, name), Err(Failure::Error(_))), "{name}");
@@ -244,7 +244,7 @@ fn held(columns: &[[f64; 6]; 5], start: [f64; 5]) -> [f64; 3] {
 }
 
 #[test]
-fn levels_outside_of_the_tanks_are_refused() {
+fn initial_levels_outside_of_the_tanks_are_refused() {
     for h in [[-1e-3, 0.2, 0.3], [0.4, 0.63, 0.3], [0.4, 0.2, f64::NAN]] {
         let mut model = ThreeTank::new(Path::new("")).unwrap();
         model.h = h;

@@ -11,7 +11,7 @@ type Row = (&'static str, &'static str, &'static str, f64, [f64; 2]);
 
 const TIME: [f64; 2] = [-1e9, 1e9];
 
-/// The order is the one that `flows` takes them in.
+/// The parameters, in the order in which `flows` takes them.
 pub(crate) const PARAMETERS: [Row; COUNT] = [
     ("S", "Cross-section of a tank", "m2", 0.0154, [1e-6, 1e3]),
     ("S_p", "Cross-section of a pipe", "m2", 5e-5, [0.0, 1.0]),
@@ -33,7 +33,7 @@ pub(crate) const PARAMETERS: [Row; COUNT] = [
     ("b_3", "Bias of the sensor of level 3", "m", 0.0, [-1e3, 1e3]),
 ];
 
-/// What the derivative of each level depends on.
+/// The variables that the derivative of each level depends on.
 const DEPENDS: [[&str; 3]; 3] =
     [["Q_1", "h_1", "h_3"], ["Q_2", "h_2", "h_3"], ["h_1", "h_2", "h_3"]];
 

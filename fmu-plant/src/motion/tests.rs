@@ -1,4 +1,5 @@
-//! The laws of the plant, checked on its motion: closed forms, energy, independence of the cut.
+//! Physical laws of the plant's motion: closed forms, energy, independence of the communication
+//! steps.
 
 use super::*;
 
@@ -54,7 +55,7 @@ fn energy(p: &Parameters, [_, angle, v, rate]: State) -> f64 {
     kinetic + moment * p.gravity * angle.cos()
 }
 
-/// Power of the force less what the dampers and the friction take.
+/// Power of the force minus the power of dampers and friction.
 fn power(p: &Parameters, [_, _, v, rate]: State, force: f64) -> f64 {
     let ratio: f64 = v.abs() / p.stribeck_velocity;
     let stribeck = (-ratio.powf(p.stribeck_exponent)).exp();

@@ -1,4 +1,4 @@
-//! Arrays and texts as C passes them.
+//! Arrays and strings as C passes them.
 
 use std::ffi::CString;
 use std::ptr::{null, null_mut};
@@ -11,7 +11,7 @@ pub enum Shape {
     Right,
     Null,
     Misaligned,
-    /// With a count that no memory can hold.
+    /// With a count that exceeds all memory.
     Huge,
 }
 
@@ -43,13 +43,13 @@ impl<T> Array<T> {
         }
     }
 
-    /// The length to state.
+    /// The length to pass.
     pub fn count(&self) -> usize {
         if self.shape == Shape::Huge { usize::MAX } else { self.items.len() }
     }
 }
 
-/// The count of two arrays that share it.
+/// The common count of two arrays.
 pub fn shared<A, B>(one: &Array<A>, other: &Array<B>) -> usize {
     let huge = [one.shape, other.shape].contains(&Shape::Huge);
     assert_eq!(one.items.len(), other.items.len());

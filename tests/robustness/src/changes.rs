@@ -1,5 +1,5 @@
-//! The corpora of the fuzz targets, changed here and there, the same way in every run. Other crates
-//! compile this file into their tests.
+//! Random changes of the corpora of the fuzz targets, the same in every run. Other crates compile
+//! this file into their tests.
 
 use std::time::{Duration, Instant};
 
@@ -10,10 +10,10 @@ use proptest::test_runner::TestRunner;
 
 use crate::corpus;
 
-/// A change: what, where, and two numbers for it.
+/// A change: its kind, its place, and two numbers.
 pub type Change = (u8, u32, u32, u8);
 
-/// What is put in, besides single bytes and the words of a format: numbers at the edge.
+/// Numbers at limits, which are inserted besides single bytes and words of the format.
 const NUMBERS: [&[u8]; 8] = [
     b"\0\0\0\0",
     b"\xff\xff\xff\xff",
@@ -24,7 +24,7 @@ const NUMBERS: [&[u8]; 8] = [
     b"4294967296",
     b"-1",
 ];
-/// Longest that a target may take for one small file: far more than any needs on a busy machine.
+/// Time limit for one small file: far more than any target needs on a busy machine.
 const LONGEST: Duration = Duration::from_secs(20);
 
 pub fn changed(data: &[u8], words: &[&[u8]], changes: &[Change]) -> Vec<u8> {
@@ -51,7 +51,7 @@ pub fn changed(data: &[u8], words: &[&[u8]], changes: &[Change]) -> Vec<u8> {
     bytes
 }
 
-/// Gives `count` changed files of a corpus to a target; `words` are what its format lives on.
+/// Passes `count` changed files of a corpus to a target; `words` are typical words of its format.
 pub fn mutate(name: &str, words: &[&[u8]], target: fn(&[u8]), count: usize) {
     let files: Vec<_> =
         corpus::files(name).iter().map(|file| std::fs::read(file).unwrap()).collect();

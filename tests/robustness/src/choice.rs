@@ -1,13 +1,13 @@
-//! Arguments chosen by bytes: zero is always the harmless choice.
+//! Arguments chosen by bytes; zero always gives a harmless choice.
 
 use std::ffi::CString;
 
 use crate::array::{Array, Shape, Text};
 
-/// The bytes that one call may use.
+/// The bytes that determine one call.
 pub struct Choice<'a> {
     bytes: std::slice::Iter<'a, u8>,
-    /// Whether arguments may be chosen that the standard forbids.
+    /// Whether arguments that the standard forbids may be chosen.
     pub hostile: bool,
 }
 
@@ -24,12 +24,12 @@ impl<'a> Choice<'a> {
         from[usize::from(self.byte()) % from.len()].clone()
     }
 
-    /// One of `fine`, or of `odd` where that may be.
+    /// Chooses one of `fine`, or of `odd` if hostile arguments are allowed.
     pub fn either<T: Clone>(&mut self, fine: &[T], odd: &[T]) -> T {
         if self.rarely() { self.of(odd) } else { self.of(fine) }
     }
 
-    /// True for one byte of eight, where hostile arguments may be chosen.
+    /// True for one byte of eight, if hostile arguments are allowed.
     pub fn rarely(&mut self) -> bool {
         self.byte() >= 224 && self.hostile
     }
@@ -50,7 +50,7 @@ impl<'a> Choice<'a> {
         Array { items: (0..count).map(|_| item(self)).collect(), shape }
     }
 
-    /// One place to write to.
+    /// Chooses an array of one element for a function that writes to it; `before` is its content.
     pub fn place<T: Clone>(&mut self, before: T) -> Array<T> {
         let shape = match self.shape() {
             Shape::Huge => Shape::Right,
@@ -59,12 +59,12 @@ impl<'a> Choice<'a> {
         Array { items: vec![before], shape }
     }
 
-    /// A length of arrays.
+    /// Chooses the length of arrays.
     pub fn count(&mut self) -> usize {
         self.of(&[1, 2, 3, 1, 0])
     }
 
-    /// A value reference below `count` that `fits`, or any other.
+    /// Chooses a value reference below `count` that `fits`, or any other.
     pub fn reference(&mut self, count: u32, fits: impl Fn(u32) -> bool) -> u32 {
         let fine: Vec<_> = (0..count).filter(|own| fits(*own)).collect();
         let odd: Vec<_> = (0..count).chain([count, 1 << 31, u32::MAX]).collect();
@@ -91,7 +91,7 @@ impl<'a> Choice<'a> {
     }
 }
 
-/// The status that an array deserves: an error unless it can be used, or has nothing in it.
+/// The status that an array requires: an error, unless it is usable or empty.
 pub fn usable<T>(array: &Array<T>) -> bool {
     match array.shape {
         Shape::Right => true,

@@ -1,4 +1,4 @@
-//! The corpora of the fuzz targets, given to the targets as they are. Other crates compile this file
+//! Passes the corpora of the fuzz targets unchanged to the targets. Other crates compile this file
 //! into their tests.
 
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ pub fn files(name: &str) -> Vec<PathBuf> {
     files
 }
 
-/// Gives each file of a corpus to its target.
+/// Passes each file of a corpus to its target.
 pub fn replay(name: &str, target: fn(&[u8])) {
     for file in files(name) {
         let outcome = std::panic::catch_unwind(|| target(&std::fs::read(&file).unwrap()));

@@ -1,4 +1,4 @@
-//! What a fuzz target does with its bytes. Each panics where a claim does not hold.
+//! The fuzz targets of the exporter. Each panics if a claim does not hold.
 
 use std::ffi::{CString, c_int};
 use std::sync::OnceLock;
@@ -22,13 +22,13 @@ pub fn guid() -> &'static str {
     })
 }
 
-/// A text up to its first NUL.
+/// The text up to its first NUL.
 pub fn c_text(bytes: &[u8]) -> CString {
     let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
     CString::new(&bytes[..end]).unwrap_or_default()
 }
 
-/// What a well-behaved importer passes to `fmi2Instantiate`.
+/// The arguments that a well-behaved importer passes to `fmi2Instantiate`.
 pub fn order(kind: c_int) -> Order {
     Order {
         name: Some(c"one".to_owned()),
@@ -49,7 +49,8 @@ fn serialized(importer: &Importer, state: &Saved) -> Vec<u8> {
     bytes.items
 }
 
-/// Goes on with an instance whose state nobody knows: statuses only, no crash.
+/// Continues with an instance in an unknown state; only statuses are checked, and that nothing
+/// crashes.
 fn go_on(importer: &Importer) {
     let references = Array::right((0..9).collect());
     for k in 0..3 {
@@ -67,8 +68,8 @@ fn go_on(importer: &Importer) {
     }
 }
 
-/// `fmi2DeSerializeFMUstate`: the bytes as they are, then behind a right header and before a right
-/// checksum, so that they reach what decodes them.
+/// `fmi2DeSerializeFMUstate`: the bytes alone, then between a valid header and a valid checksum, so
+/// that they reach the decoder.
 pub fn serialized_state(data: &[u8]) {
     let Some((kind, data)) = data.split_first() else { return };
     let importer = Importer::new(&order(c_int::from(kind % 2)));
@@ -95,7 +96,7 @@ pub fn serialized_state(data: &[u8]) {
     importer.reset();
 }
 
-/// `fmuResourceLocation`: a path that is read from a URI has a URI that reads back as this path.
+/// `fmuResourceLocation`: if a URI gives a path, the URI of this path gives the same path again.
 pub fn resource_location(data: &[u8]) {
     if let Ok(path) = path_from_uri(&String::from_utf8_lossy(data)) {
         let uri = file_uri(&path).unwrap_or_else(|error| panic!("{error}"));
@@ -108,8 +109,8 @@ pub fn resource_location(data: &[u8]) {
     assert_eq!(importer.exists(), readable);
 }
 
-/// `modelDescription.xml`: what was read and written again reads as the same; without a warning,
-/// where it breaks no rule.
+/// `modelDescription.xml`: a description that was read is written and read again with the same
+/// result, and without a warning if it breaks no rule.
 pub fn model_description(data: &[u8]) {
     let Ok((read, _)) = ModelDescription::read(data) else { return };
     let problems = read.problems();
@@ -123,8 +124,8 @@ pub fn model_description(data: &[u8]) {
     }
 }
 
-/// An FMU archive: nothing is written beside the folder it is unpacked into, no more than the limit,
-/// and nothing stays.
+/// An FMU archive: unpacking writes nothing outside of its folder and no more than the limit, and
+/// leaves no files behind.
 pub fn package(data: &[u8]) {
     use fmu_description::package::{Unpacked, unpack_archive};
     let folder = tempfile::tempdir().unwrap_or_else(|error| panic!("{error}"));
@@ -145,7 +146,7 @@ pub fn package(data: &[u8]) {
     assert_eq!(beside.ok(), Some(1));
 }
 
-/// Bytes in all files of a folder, which holds nothing but files and folders.
+/// Number of bytes in all files of a folder, which may contain only files and folders.
 fn size(folder: &std::path::Path) -> u64 {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let sizes = entries.map(|entry| match entry.file_type() {

@@ -1,7 +1,7 @@
-//! An importer that passes whatever it likes: the C entry points for [`Machine`], called in-process.
+//! An importer with arbitrary arguments: calls the C entry points of [`Machine`] in this process.
 //!
-//! The only contract it keeps is the one that C cannot check: a pointer that is neither null nor
-//! misaligned leads to as many elements as the call says, and a state is one that is not yet freed.
+//! It observes only what C cannot check: a pointer that is neither null nor misaligned points to as
+//! many elements as the call says, and a state has not been freed yet.
 #![expect(unsafe_code, reason = "calls of the C interface")]
 
 use std::cell::{Cell, RefCell};
@@ -25,7 +25,7 @@ pub struct Message {
     pub text: String,
 }
 
-/// What the logger receives, and the instance that it calls meanwhile.
+/// The messages that the logger received, and the instance that it calls from inside.
 #[derive(Debug)]
 struct Ear {
     messages: RefCell<Vec<Message>>,
@@ -33,8 +33,8 @@ struct Ear {
     panics: Cell<bool>,
 }
 
-/// A logger as C has it, but for the dots: where variadic arguments are passed as all others are,
-/// this is the same function.
+/// A logger with C's signature, without variadic arguments. On platforms that pass variadic
+/// arguments like all others, this is the same function.
 unsafe extern "C" fn receive(
     environment: *mut c_void,
     _instance: fmi2String,
@@ -53,7 +53,7 @@ unsafe extern "C" fn receive(
     if ear.panics.get() {
         assert!(std::panic::catch_unwind(|| panic!("the importer's logger")).is_err());
     }
-    // A call from the logger is an error and nothing else: no message, nothing reset, nothing freed.
+    // A call from the logger returns an error and does nothing else: no message, no reset, no free.
     let component = ear.component.get();
     // SAFETY: the component is null or its memory is there until the logger returns.
     unsafe {
@@ -62,10 +62,11 @@ unsafe extern "C" fn receive(
     }
 }
 
-/// Whether messages arrive: not where variadic calls differ from others or cannot be made.
+/// Whether messages can be received: not on platforms whose variadic calls differ or cannot be
+/// made.
 pub const HEARS: bool = cfg!(not(any(miri, target_vendor = "apple")));
 
-/// A state that was got or read, freed once.
+/// A state that was saved or deserialised, and is freed once.
 #[derive(Debug)]
 pub struct Saved(fmi2FMUstate);
 
@@ -81,14 +82,14 @@ impl Saved {
     }
 }
 
-/// An instance, or none.
+/// An instance, or null.
 #[derive(Debug)]
 pub struct Importer {
     component: fmi2Component,
     ear: Box<Ear>,
 }
 
-/// What `fmuDescribe` says of the machine.
+/// The description that `fmuDescribe` returns for the machine.
 pub fn describe() -> Result<String, String> {
     unsafe extern "C" fn sink(context: *mut c_void, text: *const c_char, length: usize) {
         // SAFETY: the context is the vector below, the text has this length.
@@ -159,17 +160,17 @@ impl Importer {
         self.component
     }
 
-    /// From now on the logger panics, and catches it.
+    /// Makes the logger panic, and catch the panic, from now on.
     pub fn let_the_logger_panic(&self) {
         self.ear.panics.set(true);
     }
 
-    /// The messages since the last call of this.
+    /// Returns the messages since the previous call.
     pub fn take_messages(&self) -> Vec<Message> {
         self.ear.messages.take()
     }
 
-    /// `fmi2FreeInstance`; from then on the component is null.
+    /// Calls `fmi2FreeInstance`; afterwards the component is null.
     pub fn free(&mut self) {
         let component = std::mem::replace(&mut self.component, null_mut());
         // SAFETY: the component is null or not yet freed.
@@ -263,7 +264,7 @@ impl Importer {
         ))
     }
 
-    /// Status and, where it is OK, the texts.
+    /// Returns the status and, if it is OK, the texts.
     pub fn get_string(&self, vr: &Array<u32>, shape: Shape) -> (c_int, Vec<String>) {
         let mut values = Array { items: vec![null(); vr.items.len()], shape };
         let count = shared(vr, &values);

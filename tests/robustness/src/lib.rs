@@ -1,8 +1,9 @@
-//! What the fuzz targets do with their bytes, and the corpora changed at random: used by the tests of this
-//! crate, for a fixed count, and by `fuzz`, for as long as one likes.
+//! Fuzz targets, and random changes of their corpora. The tests of this crate run them a fixed
+//! number of times, `fuzz` runs them without end.
 //!
-//! [`exporter`] drives a model through the C functions, [`system_files`] the readers of SSP and of tables of
-//! signals, [`system_toml`] the reader of `system.toml`. Each target panics where a claim does not hold.
+//! [`exporter`] drives a model through the C functions, [`system_files`] the readers of SSP and of
+//! tables of signals, [`system_toml`] the reader of `system.toml`. Each target panics if a claim
+//! does not hold.
 #![expect(missing_docs, reason = "parts of tests")]
 #![expect(
     clippy::float_cmp,

@@ -1,4 +1,4 @@
-//! A model with a variable of every type and role, for both interfaces, that misbehaves on demand.
+//! A model with a variable of every type and role, for both interfaces, that fails on demand.
 //!
 //! x' = q (u - x), y = p x + u.
 
@@ -10,7 +10,7 @@ use fmu::{
 };
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// Where the model's code runs.
+/// The methods of the model in which a failure can be planned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     New,
@@ -52,9 +52,9 @@ impl Place {
     ];
 }
 
-/// What the model does there instead of its work.
+/// The failure that replaces the model's work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mischief {
+pub enum Misbehaviour {
     Panic,
     Discard,
     Incomplete,
@@ -63,25 +63,26 @@ pub enum Mischief {
     Fatal,
 }
 
-impl Mischief {
-    pub const EVERY: [Mischief; 6] = [
-        Mischief::Panic,
-        Mischief::Discard,
-        Mischief::Incomplete,
-        Mischief::Terminated,
-        Mischief::Error,
-        Mischief::Fatal,
+impl Misbehaviour {
+    pub const EVERY: [Misbehaviour; 6] = [
+        Misbehaviour::Panic,
+        Misbehaviour::Discard,
+        Misbehaviour::Incomplete,
+        Misbehaviour::Terminated,
+        Misbehaviour::Error,
+        Misbehaviour::Fatal,
     ];
 }
 
 thread_local! {
-    static PLAN: Cell<Option<(Place, Mischief)>> = const { Cell::new(None) };
+    static PLAN: Cell<Option<(Place, Misbehaviour)>> = const { Cell::new(None) };
     static HAPPENED: Cell<bool> = const { Cell::new(false) };
     static ALIVE: Cell<isize> = const { Cell::new(0) };
 }
 
-/// Runs `work` while the models of this thread follow `plan`; whether they came to it.
-pub fn with_plan<T>(plan: Option<(Place, Mischief)>, work: impl FnOnce() -> T) -> (T, bool) {
+/// Runs `work` while the models of this thread fail by `plan`; returns whether the failure
+/// happened.
+pub fn with_plan<T>(plan: Option<(Place, Misbehaviour)>, work: impl FnOnce() -> T) -> (T, bool) {
     HAPPENED.set(false);
     PLAN.set(plan);
     let done = work();
@@ -89,42 +90,42 @@ pub fn with_plan<T>(plan: Option<(Place, Mischief)>, work: impl FnOnce() -> T) -
     (done, happened())
 }
 
-/// Whether the models of this thread came to what the plan says.
+/// Whether the planned failure has happened in this thread.
 pub fn happened() -> bool {
     HAPPENED.get()
 }
 
-/// How many models exist in this thread.
+/// Number of models that exist in this thread.
 pub fn alive() -> isize {
     ALIVE.get()
 }
 
-/// The model's code reaches `place`.
+/// Reports that the model's code has reached `place`, and fails if this is planned.
 fn reach(place: Place, time: f64) -> Result<(), Failure> {
-    let Some((_, mischief)) = PLAN.get().filter(|(planned, _)| *planned == place) else {
+    let Some((_, misbehaviour)) = PLAN.get().filter(|(planned, _)| *planned == place) else {
         return Ok(());
     };
     HAPPENED.set(true);
-    let message = || "100 % mischief #1".to_owned();
-    Err(match mischief {
-        Mischief::Panic => panic!("100 % mischief #1"),
-        Mischief::Discard => Failure::Discard(message()),
-        Mischief::Incomplete => Failure::Incomplete { time, message: message() },
-        Mischief::Terminated => Failure::Terminated { time, message: message() },
-        Mischief::Error => Failure::Error(message()),
-        Mischief::Fatal => Failure::Fatal(message()),
+    let message = || "100 % misbehaviour #1".to_owned();
+    Err(match misbehaviour {
+        Misbehaviour::Panic => panic!("100 % misbehaviour #1"),
+        Misbehaviour::Discard => Failure::Discard(message()),
+        Misbehaviour::Incomplete => Failure::Incomplete { time, message: message() },
+        Misbehaviour::Terminated => Failure::Terminated { time, message: message() },
+        Misbehaviour::Error => Failure::Error(message()),
+        Misbehaviour::Fatal => Failure::Fatal(message()),
     })
 }
 
-/// The same where the code has no way to fail but a panic.
+/// The same for code that can fail by a panic only.
 fn reach_infallible(place: Place) {
-    if PLAN.get() == Some((place, Mischief::Panic)) {
+    if PLAN.get() == Some((place, Misbehaviour::Panic)) {
         HAPPENED.set(true);
-        panic!("100 % mischief #1");
+        panic!("100 % misbehaviour #1");
     }
 }
 
-/// Sees the model come and go.
+/// Counts the models that exist.
 struct Witness;
 
 impl Witness {

@@ -1,13 +1,13 @@
-//! What the standard says an instance of [`Machine`](crate::machine::Machine) answers: a statement
-//! of its own, from the tables of sections 3.2.3 and 4.2.4 and the text.
+//! Predicts how an instance of [`Machine`](crate::machine::Machine) must answer. This is an
+//! independent statement of the standard: the tables of sections 3.2.3 and 4.2.4 and the text.
 
 use std::sync::OnceLock;
 
 use fmu::call_order::{Function, State};
 
-use crate::machine::Mischief;
+use crate::machine::Misbehaviour;
 
-/// Sets of statuses, as bits.
+/// Sets of statuses, as bit masks.
 pub const OK: u8 = 1;
 pub const DISCARD: u8 = 1 << 2;
 pub const ERROR: u8 = 1 << 3;
@@ -18,7 +18,7 @@ const EXCHANGE: &str =
 const SIMULATION: &str =
     include_str!("../../../crates/fmu-description/src/call_order/section_4_2_4.csv");
 
-/// Entries of a table, by function and state.
+/// The entries of a table, by function and state.
 type Table = Vec<[bool; State::EVERY.len()]>;
 
 fn read(text: &str) -> Table {
@@ -62,7 +62,7 @@ fn may_discard(exchange: bool, function: Function) -> bool {
     }
 }
 
-/// What was set, and so is read back.
+/// Values that were set and must be read back.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Values {
     /// u, p, q, guess.
@@ -75,7 +75,7 @@ pub struct Values {
 }
 
 impl Values {
-    /// Where the Real is kept; x is not, the model changes it.
+    /// The place at which the Real is kept; not x, because the model changes it.
     pub fn place_of_real(reference: u32) -> Option<usize> {
         [1, 5, 6, 7].iter().position(|own| *own == reference)
     }
@@ -90,7 +90,7 @@ impl Values {
     }
 }
 
-/// What an FMU state consists of.
+/// The content of an FMU state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Core {
     pub exchange: bool,
@@ -109,30 +109,35 @@ impl Core {
         Self { exchange, state, start: 0.0, stop: None, time: 0.0, ended: false, values }
     }
 
-    /// The statuses that the call may have: `verdict` is what its arguments deserve.
-    pub fn statuses(&self, function: Function, verdict: u8, mischief: Option<Mischief>) -> u8 {
+    /// The statuses that the call may return; `verdict` is the set that its arguments allow.
+    pub fn statuses(
+        &self,
+        function: Function,
+        verdict: u8,
+        misbehaviour: Option<Misbehaviour>,
+    ) -> u8 {
         if self.state == State::Fatal {
             return FATAL;
         }
         if !in_table(self.exchange, function, self.state) {
             return ERROR;
         }
-        match mischief {
+        match misbehaviour {
             None if verdict & DISCARD != 0 && !may_discard(self.exchange, function) => ERROR,
             None => verdict,
-            Some(Mischief::Panic | Mischief::Fatal) => FATAL,
-            Some(Mischief::Error) => ERROR,
+            Some(Misbehaviour::Panic | Misbehaviour::Fatal) => FATAL,
+            Some(Misbehaviour::Error) => ERROR,
             Some(_) if may_discard(self.exchange, function) => DISCARD,
             Some(_) => ERROR,
         }
     }
 
-    /// The states in which a function has gone wrong, where it did.
-    pub fn after(&mut self, function: Function, status: u8, mischief: Option<Mischief>) {
+    /// Updates the predicted state after a call that returned `status`.
+    pub fn after(&mut self, function: Function, status: u8, misbehaviour: Option<Misbehaviour>) {
         match status {
             DISCARD if function == Function::DoStep => {
                 self.state = State::StepFailed;
-                self.ended = mischief == Some(Mischief::Terminated);
+                self.ended = misbehaviour == Some(Misbehaviour::Terminated);
             }
             ERROR => self.state = State::Error,
             FATAL => self.state = State::Fatal,
@@ -140,7 +145,7 @@ impl Core {
         }
     }
 
-    /// Whether a step may end there: `stopTime`, where it is defined, is not passed (section 2.1.6).
+    /// Whether a step may end there: not beyond `stopTime`, if it is defined (section 2.1.6).
     pub fn is_before_stop(&self, time: f64) -> bool {
         self.stop.is_none_or(|stop| time <= stop + 1e-9 * stop.abs().max(1.0))
     }

@@ -1,4 +1,4 @@
-//! Sequences of calls, legal and illegal, against what the standard says of each.
+//! Runs sequences of legal and illegal calls and compares each with the standard.
 
 use std::ffi::c_int;
 
@@ -8,13 +8,13 @@ use crate::calls::{CALLS, Call, Kept, Outcome, Stores};
 use crate::choice::Choice;
 use crate::exporter::{c_text, guid, order};
 use crate::importer::{HEARS, Importer, Message, Order, Saved};
-use crate::machine::{Mischief, Place, alive, happened, with_plan};
+use crate::machine::{Misbehaviour, Place, alive, happened, with_plan};
 use crate::prediction::{Core, DISCARD, OK, in_table};
 
-/// How many bytes one call may use.
+/// Maximum number of bytes that determine one call.
 pub const LENGTH: usize = 24;
 
-/// First bytes of a call from which on its arguments may be hostile.
+/// First bytes from which on the arguments of a call may be hostile.
 pub const HOSTILE: u8 = 0xd0;
 /// The same for calls that need not be legal.
 pub const ILLEGAL: u8 = 0xf0;
@@ -23,11 +23,11 @@ const NOBODY: u8 = 0xf8;
 /// The second byte of `fmi2FreeInstance`.
 pub const FREE: u8 = 0xff;
 
-/// An instance and what is predicted of it.
+/// An instance and its predicted state.
 struct Life {
     importer: Importer,
     core: Core,
-    /// The categories chosen; all of them when none.
+    /// The chosen log categories; empty means all.
     chosen: Option<Vec<String>>,
     logger: bool,
 }
@@ -35,16 +35,17 @@ struct Life {
 struct World {
     lives: [Option<Life>; 2],
     stores: Stores,
-    /// Frees what others cannot free any more.
-    caretaker: Importer,
-    nobody: Importer,
+    /// Frees FMU states whose own instance no longer can.
+    spare: Importer,
+    /// An importer whose component is null.
+    null: Importer,
     reached: u32,
 }
 
-type Plan = Option<(Place, Mischief)>;
+type Plan = Option<(Place, Misbehaviour)>;
 
-/// Makes the calls that `bytes` say: the places of mischief that were reached, as bits, or what was
-/// not as predicted.
+/// Makes the calls that `bytes` encode. Returns the planned failures that happened, as bits, or the
+/// first difference from the prediction.
 pub fn run(bytes: &[u8]) -> Result<u32, String> {
     let before = alive();
     let mut world = World::new();
@@ -63,8 +64,8 @@ impl World {
         Self {
             lives: [None, None],
             stores: Stores { kept: [kept(), kept(), kept()], records: [None, None] },
-            caretaker: Importer::new(&order(1)),
-            nobody: Importer::new(&Order { guid: None, ..order(1) }),
+            spare: Importer::new(&order(1)),
+            null: Importer::new(&Order { guid: None, ..order(1) }),
             reached: 0,
         }
     }
@@ -72,7 +73,7 @@ impl World {
     fn close(&mut self) {
         self.lives = [None, None];
         for kept in &mut self.stores.kept {
-            self.caretaker.free_fmu_state(Some(&mut kept.saved));
+            self.spare.free_fmu_state(Some(&mut kept.saved));
         }
     }
 
@@ -80,10 +81,10 @@ impl World {
         let mut choice = Choice::new(bytes);
         let (who, which, planned) = (choice.byte(), choice.byte(), choice.byte());
         let plan =
-            (planned >= 224).then(|| (choice.of(&Place::EVERY), choice.of(&Mischief::EVERY)));
+            (planned >= 224).then(|| (choice.of(&Place::EVERY), choice.of(&Misbehaviour::EVERY)));
         choice.hostile = who >= HOSTILE;
         if who >= NOBODY {
-            return self.call_nobody(which, choice);
+            return self.call_null(which, choice);
         }
         let number = usize::from(who % 2);
         let Some(mut life) = self.lives[number].take() else {
@@ -125,12 +126,12 @@ impl World {
         }
     }
 
-    /// A call with a null component is an error and nothing else.
-    fn call_nobody(&mut self, which: u8, choice: Choice) -> Result<(), String> {
+    /// A call with a null component returns an error and does nothing else.
+    fn call_null(&mut self, which: u8, choice: Choice) -> Result<(), String> {
         let (function, caller) = CALLS[usize::from(which) % CALLS.len()];
         let core = Core::new(true);
         let outcome = caller(&mut Call {
-            importer: &self.nobody,
+            importer: &self.null,
             core: &core,
             stores: &mut self.stores,
             choice,
@@ -141,7 +142,7 @@ impl World {
         Err(format!("{} of a null component gives {}", function.name(), outcome.status))
     }
 
-    /// Compares what came with what was predicted, and predicts the state afterwards.
+    /// Compares the outcome with the prediction, and predicts the next state.
     fn settle(
         &mut self,
         life: &mut Life,
@@ -149,8 +150,8 @@ impl World {
         outcome: Outcome,
         plan: Plan,
     ) -> Result<(), String> {
-        let mischief = plan.map(|(_, mischief)| mischief);
-        let predicted = life.core.statuses(function, outcome.verdict, mischief);
+        let misbehaviour = plan.map(|(_, misbehaviour)| misbehaviour);
+        let predicted = life.core.statuses(function, outcome.verdict, misbehaviour);
         let status = 1_u8.checked_shl(outcome.status.unsigned_abs()).unwrap_or(0);
         if status & predicted == 0 {
             return Err(format!("status {}, predicted {predicted:#b}", outcome.status));
@@ -161,19 +162,20 @@ impl World {
         let was_fatal = life.core.state == State::Fatal;
         life.check_messages(function, outcome.status, was_fatal, plan.is_some())?;
         let step = (life.core.time, outcome.half_way);
-        life.core.after(function, status, mischief);
+        life.core.after(function, status, misbehaviour);
         if status == OK {
             (outcome.effect)(&mut life.core, &mut self.stores);
             if let Some(chosen) = outcome.chosen {
                 life.chosen = (!chosen.is_empty()).then_some(chosen);
             }
         }
-        if status == DISCARD && plan.is_some_and(|(place, mischief)| stops(place, mischief)) {
+        if status == DISCARD && plan.is_some_and(|(place, misbehaviour)| stops(place, misbehaviour))
+        {
             life.core.time = step.0.max(step.1);
         }
         for kept in &mut self.stores.kept {
-            if plan == Some((Place::Drop, Mischief::Panic)) {
-                self.caretaker.free_fmu_state(Some(&mut kept.saved));
+            if plan == Some((Place::Drop, Misbehaviour::Panic)) {
+                self.spare.free_fmu_state(Some(&mut kept.saved));
             }
             if kept.saved.is_null() {
                 kept.of = None;
@@ -183,7 +185,7 @@ impl World {
     }
 }
 
-/// How often a legal call is made: those that lead on more often than others.
+/// Frequencies of legal calls: calls that lead to new states are more frequent.
 fn weight(function: Function, core: &Core) -> usize {
     use Function as F;
     match function {
@@ -201,19 +203,21 @@ fn weight(function: Function, core: &Core) -> usize {
     }
 }
 
-/// Whether a step went half way.
-fn stops(place: Place, mischief: Mischief) -> bool {
-    place == Place::Step && [Mischief::Incomplete, Mischief::Terminated].contains(&mischief)
+/// Whether the step stopped half way.
+fn stops(place: Place, misbehaviour: Misbehaviour) -> bool {
+    place == Place::Step
+        && [Misbehaviour::Incomplete, Misbehaviour::Terminated].contains(&misbehaviour)
 }
 
 impl Life {
-    /// One message for each status but `fmi2OK`, naming the function; none from a lost instance.
+    /// Expects one message, naming the function, for each status but `fmi2OK`, and none from an
+    /// instance after `fmi2Fatal`.
     fn check_messages(
         &self,
         function: Function,
         status: c_int,
         was_fatal: bool,
-        by_mischief: bool,
+        by_misbehaviour: bool,
     ) -> Result<(), String> {
         let messages = self.importer.take_messages();
         let category = match status {
@@ -232,7 +236,7 @@ impl Life {
                 if one.status == status
                     && one.category == category
                     && one.text.starts_with(&format!("{}: ", function.name()))
-                    && (!by_mischief || one.text.ends_with("100 % mischief ##1")) =>
+                    && (!by_misbehaviour || one.text.ends_with("100 % misbehaviour ##1")) =>
             {
                 Ok(())
             }
@@ -245,7 +249,7 @@ fn silence<'a>(messages: impl IntoIterator<Item = &'a Message>) -> Result<(), St
     messages.into_iter().next().map_or(Ok(()), |one| Err(format!("nothing happened, but {one:?}")))
 }
 
-/// `fmi2Instantiate`; the instance, where there should be one.
+/// Calls `fmi2Instantiate`; returns the instance if there should be one.
 fn instantiate(choice: &mut Choice, plan: Plan) -> Result<Option<Life>, String> {
     let exchange = choice.byte().is_multiple_of(2);
     let mut order = order(c_int::from(!exchange));
@@ -278,7 +282,7 @@ fn instantiate(choice: &mut Choice, plan: Plan) -> Result<Option<Life>, String> 
     Ok(fine.then_some(Life { importer, core, chosen: None, logger }))
 }
 
-/// `fmi2FreeInstance`, in any state; a panic is heard of.
+/// Calls `fmi2FreeInstance` in any state; a panic must be reported.
 fn free(mut life: Life) -> Result<(), String> {
     life.importer.free();
     let heard = life.importer.take_messages();

@@ -1,4 +1,4 @@
-//! What a fuzz target does with its bytes. Each panics where a claim does not hold.
+//! The fuzz targets of the readers of SSP files and tables. Each panics if a claim does not hold.
 
 use std::fmt::Debug;
 
@@ -6,7 +6,8 @@ use master::signal::{Cursor, Interpolation, Signal, Track};
 use ssp::{self, SspError};
 use study::table::{self, Table, TableError};
 
-/// What was read is written, and reads back as the same; an error says what was expected, and where.
+/// Content that was read is written and reads back the same; an error states what was expected, and
+/// where.
 fn both_ways<T: Debug + PartialEq>(
     data: &[u8],
     read: fn(&[u8]) -> Result<T, SspError>,
@@ -52,8 +53,8 @@ pub fn signal_dictionary(data: &[u8]) {
     both_ways(data, ssp::read_ssb, ssp::render_ssb);
 }
 
-/// A CSV file with signals: what was read is a table in order, and written it reads back as the same;
-/// an error names a line. Its columns, if they are signals, have finite values everywhere.
+/// A CSV file with signals: a file that was read is an ordered table and reads back the same after
+/// writing; an error names a line. Columns that are signals have finite values everywhere.
 pub fn signal_table(data: &[u8]) {
     let table = match table::parse(data) {
         Ok(table) => table,
@@ -71,7 +72,7 @@ pub fn signal_table(data: &[u8]) {
     assert_eq!(again, table, "{text}");
     for column in &table.columns {
         for between in [Interpolation::Line, Interpolation::Hold] {
-            // A time may be beyond what a signal takes.
+            // The time may exceed the range of a signal.
             if let Ok(track) = Track::new(table.times.clone(), column.clone(), between) {
                 follow(&table, column, &Signal::Track(track));
             }
@@ -79,7 +80,7 @@ pub fn signal_table(data: &[u8]) {
     }
 }
 
-/// A line that the file has, where the error has one, and some reason.
+/// Checks that an error has a reason, and that its line, if it states one, exists.
 fn refused(data: &[u8], error: &TableError) {
     let message = error.to_string();
     assert!(message.len() > 20, "{message:?}");
@@ -90,7 +91,7 @@ fn refused(data: &[u8], error: &TableError) {
     assert!(line.is_none_or(|line| (1..=lines(data)).contains(&line)), "{message}");
 }
 
-/// The table as a CSV file, every name in quotes.
+/// Writes the table as a CSV file, every name in quotes.
 fn written(table: &Table) -> String {
     let quoted = |name: &String| format!(",\"{}\"", name.replace('"', "\"\""));
     let mut lines = vec![format!("time{}\n", table.names.iter().map(quoted).collect::<String>())];
@@ -101,11 +102,11 @@ fn written(table: &Table) -> String {
     lines.concat()
 }
 
-/// The values of a signal at its points and between them lie between those of its points.
+/// The values of a signal at and between its points are between the values of the points.
 fn follow(table: &Table, column: &[f64], signal: &Signal) {
     let (least, most) =
         column.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
-    // Two roundings of a mean with weights.
+    // Allows for the two roundings of a weighted mean.
     let slack = 4.0 * f64::EPSILON * least.abs().max(most.abs());
     let mut cursor = Cursor::default();
     for pair in table.times.windows(2).chain([&table.times[table.times.len() - 1..]]) {

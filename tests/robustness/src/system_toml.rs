@@ -1,10 +1,10 @@
-//! What the fuzz target `system_toml` does with its bytes. It panics where a claim does not hold.
+//! The fuzz target `system_toml`. It panics if a claim does not hold.
 
 use std::path::Path;
 
 use study::config::{Config, parse};
 
-/// A `system.toml`: what was read is written, and reads back as the same; an error says where.
+/// A `system.toml`: a file that was read is written and reads back the same; an error says where.
 pub fn system_toml(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let mut config = match parse(text, Path::new("/models/system.toml")) {
@@ -17,14 +17,14 @@ pub fn system_toml(data: &[u8]) {
     let again = parse(&written, Path::new("/elsewhere/system.toml"));
     let again = again.unwrap_or_else(|error| panic!("{error}\n{written}"));
     assert_eq!(again.render().ok().as_ref(), Some(&written));
-    // What is no number is not equal to itself.
+    // NaN is not equal to itself.
     assert!(
         without_places(again) == without_places(config) || written.contains("nan"),
         "{written}"
     );
 }
 
-/// Settings know where they stand.
+/// Settings contain their position in the file.
 fn without_places(mut config: Config) -> Config {
     for (_, _, place) in &mut config.settings.0 {
         *place = 0..0;
@@ -32,7 +32,7 @@ fn without_places(mut config: Config) -> Config {
     config
 }
 
-/// The message begins with a place in the text and a reason, and shows the line with a mark.
+/// The message starts with a position in the text and a reason, and shows the line with a mark.
 fn located(text: &str, message: &str) {
     let mut parts = message.splitn(4, ':');
     assert_eq!(parts.next(), Some("/models/system.toml"));

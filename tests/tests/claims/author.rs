@@ -1,4 +1,4 @@
-//! What the author of a model meets: the examples, `aso-ftc new`, `aso-ftc pack PATH`.
+//! Tests of the author's view: the examples, `aso-ftc new`, `aso-ftc pack PATH`.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::collections::BTreeSet;
@@ -12,8 +12,8 @@ use tests::{command, root};
 
 const EXAMPLES: [&str; 4] = ["van-der-pol", "bouncing-ball", "pid", "lookup-table"];
 
-/// Runs the command in `folder`; the libraries share what they are built of, so that no two tests
-/// may use the same name for a crate.
+/// Runs the command in `folder`. All tests share the folder of built dependencies, so no two tests
+/// may use the same crate name.
 fn run_in(folder: &Path, arguments: &[&str]) -> Output {
     let libraries = root().join("target/author");
     let mut command = Command::new(command());
@@ -35,14 +35,15 @@ fn refuses(folder: &Path, arguments: &[&str], parts: &[&str]) {
     assert!(!message.contains("panicked"), "{message}");
 }
 
-/// Makes the crate `name` in `folder`, with the versions of this workspace: nothing is fetched.
+/// Makes the crate `name` in `folder`, with the dependency versions of this workspace, so that
+/// nothing is downloaded.
 fn new_crate(folder: &Path, name: &str) {
     let output = run_in(folder, &["new", name]);
     assert!(output.status.success(), "{}", message(&output));
     fs::copy(root().join("Cargo.lock"), folder.join(name).join("Cargo.lock")).unwrap();
 }
 
-/// Replaces `old` in the file, where it must be.
+/// Replaces `old` in the file; panics if it is missing.
 fn edit(path: &Path, old: &str, new: &str) {
     let text = fs::read_to_string(path).unwrap();
     assert!(text.contains(old), "{old:?} is not in {}", path.display());
@@ -62,7 +63,7 @@ fn a_model_is_one_file_of_fewer_than_60_lines() {
 }
 
 #[test]
-fn a_new_crate_is_packed_to_the_same_bytes_in_any_folder_and_with_the_files_of_its_author() {
+fn a_new_crate_with_the_files_of_its_author_is_packed_to_the_same_bytes_in_any_folder() {
     let folders = [(); 2].map(|()| tempfile::tempdir().unwrap());
     let [one, other] = folders.each_ref().map(|folder| {
         new_crate(folder.path(), "heat-pump");
@@ -90,7 +91,7 @@ fn a_new_crate_is_packed_to_the_same_bytes_in_any_folder_and_with_the_files_of_i
     packs_the_files_of_the_author(folders[1].path());
 }
 
-/// The files of the author, packed as they are; the library is built already.
+/// Packs files of the author unchanged, with the library that is already built.
 fn packs_the_files_of_the_author(place: &Path) {
     let own = place.join("heat-pump");
     let files =
@@ -138,7 +139,7 @@ fn another_table_gives_the_same_library_other_variables() {
 }
 
 #[test]
-fn broken_rules_of_the_table_are_told_with_the_section_by_the_first_test_and_by_the_packer() {
+fn rules_that_the_table_breaks_are_named_with_their_section_by_the_first_test_and_by_the_packer() {
     let folder = tempfile::tempdir().unwrap();
     new_crate(folder.path(), "broken-table");
     let model = folder.path().join("broken-table/src/lib.rs");
@@ -161,7 +162,7 @@ fn broken_rules_of_the_table_are_told_with_the_section_by_the_first_test_and_by_
 }
 
 #[test]
-fn what_is_no_crate_with_a_model_is_refused() {
+fn folders_without_a_crate_with_a_model_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let refuses = |parts: &[&str]| refuses(folder.path(), &["pack", "own"], parts);
     let own = folder.path().join("own");
@@ -188,7 +189,7 @@ fn what_is_no_crate_with_a_model_is_refused() {
 }
 
 #[test]
-fn bad_names_and_existing_folders_are_refused_and_nothing_is_left() {
+fn bad_names_and_existing_folders_are_refused_and_no_files_are_left() {
     let folder = tempfile::tempdir().unwrap();
     let place = folder.path();
     for name in ["", "2nd", "Heat", "heat pump", "heat--pump", "wärme", "heat/pump", "-", "../up"]
@@ -211,7 +212,7 @@ fn bad_names_and_existing_folders_are_refused_and_nothing_is_left() {
 }
 
 #[test]
-fn a_new_crate_depends_on_the_fmu_that_it_is_told() {
+fn a_new_crate_depends_on_the_stated_version_of_fmu() {
     let folder = tempfile::tempdir().unwrap();
     let own = root().join("crates/fmu").display().to_string();
     let url = "https://example.org/fmu.git";

@@ -1,4 +1,5 @@
-//! `aso-ftc check` on FMUs in C that misbehave: whatever one does to its process is a finding.
+//! `aso-ftc check` on FMUs in C that misbehave: everything that an FMU does to its process is a
+//! finding.
 #![cfg(target_os = "linux")]
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -9,7 +10,7 @@ use serde_json::Value;
 use tests::c_fmu::CFmu;
 use tests::run;
 
-/// With that behaviour, which begins at 0.5 s: within the ten steps of a trial.
+/// An FMU with that behaviour, which starts at 0.5 s: within the ten steps of a trial.
 fn fmu(behaviour: &str) -> CFmu {
     CFmu::that(behaviour).proposing(0.0625)
 }
@@ -28,7 +29,7 @@ fn text<'a>(finding: &'a Value, key: &str) -> &'a str {
     finding[key].as_str().unwrap_or("")
 }
 
-/// The findings on behaviour that a well-behaved FMU does not have.
+/// The findings on behaviour, without those that a well-behaved FMU has too.
 fn new(behaviour: &str, more: &[&str]) -> (Option<i32>, Vec<Value>) {
     let (_, usual) = check(&fmu("as it should"), &[]);
     let (status, mut found) = check(&fmu(behaviour), more);
@@ -88,13 +89,13 @@ fn a_flood_of_messages_is_a_warning_with_their_number() {
     assert_eq!(status, check(&fmu("as it should"), &[]).0);
     let flood = found.iter().find(|own| text(own, "what").starts_with("sends")).unwrap();
     let number = text(flood, "what").split(' ').nth(1).unwrap().parse::<u64>().unwrap();
-    // A million for each instance that is made.
+    // A million for each instance.
     assert!(number >= 1_000_000 && number % 1_000_000 < 1000, "{flood}");
     assert_eq!(text(flood, "severity"), "warning");
 }
 
 #[test]
-fn the_plain_words_name_function_and_reason() {
+fn the_report_in_text_names_function_and_reason() {
     let folder = tempfile::tempdir().unwrap();
     let path = fmu("crash in fmi2DoStep").write(folder.path(), "slave");
     let output = run(&["check", &path.display().to_string()]);
@@ -106,14 +107,14 @@ fn the_plain_words_name_function_and_reason() {
 }
 
 #[test]
-fn an_fmu_for_one_instance_in_a_process_has_no_finding_for_that() {
+fn an_fmu_with_one_instance_per_process_gets_no_finding_for_that() {
     let one = CFmu::that("one instance only").flag("canBeInstantiatedOnlyOncePerProcess", true);
     let (_, found) = check(&one, &[]);
     assert!(!found.iter().any(|own| text(own, "where") == "fmi2Instantiate"), "{found:#?}");
 }
 
 #[test]
-fn what_is_no_fault_of_the_fmu_is_an_error_of_the_command() {
+fn faults_outside_of_the_fmu_are_errors_of_the_command() {
     let folder = tempfile::tempdir().unwrap();
     let path = CFmu::well_behaved().write(folder.path(), "slave").display().to_string();
     assert!(Path::new(&path).exists());

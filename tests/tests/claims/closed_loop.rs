@@ -16,8 +16,8 @@ const SIGNALS: [(&str, &str); 8] = [
     ("controller.x_hat[3]", "x_hat3"),
 ];
 
-/// Largest difference of each signal from the reference up to `end` s, as a part of the signal's
-/// range, at the reference's times.
+/// Returns the largest difference of each signal from the reference up to `end` s, relative to the
+/// signal's range, at the times of the reference.
 fn differences(
     reference: &Table,
     settings: &[(&str, &str)],
@@ -53,12 +53,12 @@ fn largest(differences: &[f64]) -> f64 {
     differences.iter().copied().fold(0.0, f64::max)
 }
 
-/// The reference of scipy for the paper's scenario, compensation still off.
+/// The reference by scipy for the paper's scenario, without compensation.
 fn paper() -> Table {
     Table::read(&root().join("tests/data/closed_loop_paper.csv"))
 }
 
-/// The same with the compensation on from 1 s.
+/// The same with compensation from 1 s on.
 fn compensated() -> Table {
     Table::read(&root().join("tests/data/closed_loop_compensated.csv"))
 }
@@ -78,7 +78,8 @@ fn the_first_5_s_with_compensation_are_those_of_scipy_at_a_communication_step_of
     assert!(largest(&found) < 1e-3, "{found:?}");
 }
 
-/// Differences of the cart's position from the reference over the first 5 s for halved steps.
+/// Differences of the cart's position from the reference over the first 5 s, for steps that are
+/// halved repeatedly.
 fn errors(method: (Method, Extrapolation), steps: &[f64]) -> Vec<f64> {
     let reference = paper();
     let error = |step: &f64| {
@@ -89,7 +90,7 @@ fn errors(method: (Method, Extrapolation), steps: &[f64]) -> Vec<f64> {
     errors
 }
 
-/// The orders seen between neighbouring steps that are halved.
+/// The observed order for each pair of a step and its half.
 fn orders(errors: &[f64]) -> Vec<f64> {
     errors.windows(2).map(|pair| (pair[0] / pair[1]).log2()).collect()
 }
@@ -113,7 +114,8 @@ fn gauss_seidel_with_held_inputs_is_of_first_order() {
     assert!(orders.iter().all(|order| (0.7..1.4).contains(order)), "{orders:?}");
 }
 
-/// Half of peak to peak of `x_p` and theta and rms of `f_fric` - `f_hat` from 60 to 100 s.
+/// Half of the peak-to-peak values of `x_p` and theta, and the rms of `f_fric` - `f_hat`, from 60
+/// to 100 s.
 fn residual(step: f64) -> [f64; 3] {
     let names = ["plant.x_p", "plant.theta", "plant.f_fric", "controller.f_hat"];
     let (mut simulation, mut probe) = simulation(closed_loop(&[]), &Algorithm::new(step), &names);
@@ -138,7 +140,7 @@ fn residual(step: f64) -> [f64; 3] {
 }
 
 #[test]
-fn the_residual_at_1_ms_is_that_at_10_us_to_1_percent() {
+fn the_residual_at_1_ms_equals_that_at_10_us_to_1_percent() {
     let (coarse, fine) = (residual(1e-3), residual(1e-5));
     println!("1 ms {coarse:?}, 10 us {fine:?}");
     for (coarse, fine) in coarse[..2].iter().zip(&fine) {
@@ -161,7 +163,7 @@ fn a_communication_step_allocates_nothing() {
 }
 
 #[test]
-fn the_order_of_stepping_is_plant_then_controller_without_a_loop() {
+fn the_plant_is_stepped_before_the_controller_and_there_is_no_loop() {
     let (simulation, _) = simulation(closed_loop(&[]), &Algorithm::new(1e-3), &[]);
     assert_eq!(simulation.order().sequence, [0, 1]);
     assert!(simulation.order().looped.is_empty());

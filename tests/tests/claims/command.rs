@@ -1,4 +1,4 @@
-//! The command line, driven from outside.
+//! The command line, run as a process.
 #![expect(clippy::unwrap_used, clippy::float_cmp, reason = "tests; numbers as written")]
 
 use std::fs;
@@ -40,7 +40,7 @@ fn refuses(arguments: &[&str], parts: &[&str]) {
 }
 
 #[test]
-fn reproduce_shows_every_claim_of_the_paper_to_hold() {
+fn reproduce_reports_that_every_claim_of_the_paper_holds() {
     let (folder, output) = reproduce(&[]);
     println!("{}", said(&output));
     assert_eq!(output.status.code(), Some(0), "{}", said(&output));
@@ -90,7 +90,7 @@ fn the_papers_initial_state_reaches_the_same_residual_on_the_linearised_plant() 
 }
 
 #[test]
-fn the_printed_gains_lose_the_nonlinear_plant_and_the_report_says_so() {
+fn with_the_printed_gains_the_nonlinear_pendulum_falls_and_the_report_says_so() {
     let (folder, output) = reproduce(&["--scenario", "printed-gains"]);
     println!("{}", said(&output));
     assert_eq!(output.status.code(), Some(1), "{}", said(&output));
@@ -133,7 +133,7 @@ fn settings_reach_the_fmu() {
 }
 
 #[test]
-fn claims_that_a_short_run_cannot_judge_are_not_judged() {
+fn claims_that_a_short_run_cannot_decide_are_left_open() {
     let (folder, output) = reproduce(&["--stop-time", "0.5"]);
     assert_eq!(output.status.code(), Some(0));
     let summary = summary(&folder);

@@ -1,4 +1,5 @@
-//! The engine: initialization, step control, events, steps in part, threads, checkpoints, scenarios.
+//! The engine: initialization, step control, events, incomplete steps, threads, checkpoints,
+//! scenarios.
 #![expect(clippy::unwrap_used, clippy::float_cmp, reason = "tests; exact by construction")]
 
 mod ahead;

@@ -1,4 +1,4 @@
-//! The crate `fmi` as the master's second way in, beside our own loader.
+//! The closed loop through the crate `fmi`, compared with our own loader.
 #![cfg(feature = "fmi")]
 #![expect(clippy::unwrap_used, reason = "a test fails by a panic, in its set-up too")]
 
@@ -23,7 +23,7 @@ fn crate_fmi(path: &Path, name: &str) -> Box<dyn Slave> {
     Box::new(FmiSlave::open(path, name).unwrap())
 }
 
-/// The closed loop with every output and local variable, compensating from 0.5 s on.
+/// The closed loop with every output and local variable, with compensation from 0.5 s on.
 fn closed_loop(
     open: fn(&Path, &str) -> Box<dyn Slave>,
     method: (Method, Extrapolation),
@@ -48,7 +48,7 @@ fn values((simulation, probe): &mut (Simulation, Probe)) -> Vec<f64> {
     values
 }
 
-/// Steps both over 2 s and compares all values bit by bit, from the initial ones on.
+/// Steps both over 2 s and compares all values bit by bit, including the initial ones.
 fn expect_equal_runs(mut own: (Simulation, Probe), mut other: (Simulation, Probe)) {
     let names = own.1.names().to_vec();
     assert_eq!(names, other.1.names());
@@ -79,7 +79,7 @@ fn the_closed_loop_through_the_crate_fmi_is_bit_identical_to_the_one_through_our
 }
 
 #[test]
-fn what_the_crate_fmi_lacks_is_neither_promised_nor_silently_left_out() {
+fn what_the_crate_fmi_lacks_is_neither_declared_nor_silently_omitted() {
     let path = tests::dist().join(PENDULUM);
     let mut slave = FmiSlave::open(&path, "plant").unwrap();
     let promised = slave.description().co_simulation.clone().unwrap();
@@ -93,7 +93,7 @@ fn what_the_crate_fmi_lacks_is_neither_promised_nor_silently_left_out() {
     assert_eq!(error.failure, Failure::Missing);
 }
 
-/// Functions that return a status, of those that a slave through the crate calls.
+/// Functions that return a status, among those that a slave of the crate calls.
 const STATUS_FUNCTIONS: [&str; 14] = [
     "fmi2SetupExperiment",
     "fmi2EnterInitializationMode",
@@ -140,7 +140,7 @@ fn stub(folder: &Path, functions: &[&str], status: i32) -> PathBuf {
 }
 
 #[test]
-fn a_pending_step_is_an_error_although_the_crate_fmi_panics_at_it() {
+fn a_pending_step_is_an_error_although_the_crate_fmi_panics() {
     let folder = tempfile::tempdir().unwrap();
     let path = stub(folder.path(), &STATUS_FUNCTIONS, 5);
     let mut slave = FmiSlave::open(&path, "stub").unwrap();
@@ -150,7 +150,8 @@ fn a_pending_step_is_an_error_although_the_crate_fmi_panics_at_it() {
 }
 
 #[test]
-fn a_function_that_no_instance_can_do_without_is_missed_before_the_crate_fmi_sees_the_library() {
+fn a_library_without_a_function_that_every_instance_needs_is_refused_before_the_crate_fmi_loads_it()
+{
     for missing in ["fmi2SetupExperiment", "fmi2ExitInitializationMode", "fmi2DoStep"] {
         let folder = tempfile::tempdir().unwrap();
         let mut functions = STATUS_FUNCTIONS.to_vec();
@@ -166,7 +167,7 @@ fn a_function_that_no_instance_can_do_without_is_missed_before_the_crate_fmi_see
 }
 
 #[test]
-fn another_missing_function_is_an_error_where_it_is_called_although_the_crate_fmi_panics_at_it() {
+fn a_call_of_a_missing_optional_function_is_an_error_although_the_crate_fmi_panics() {
     let folder = tempfile::tempdir().unwrap();
     let mut functions = STATUS_FUNCTIONS.to_vec();
     functions.retain(|function| !["fmi2GetReal", "fmi2Terminate"].contains(function));

@@ -24,7 +24,7 @@ use master::{Algorithm, Extrapolation, Method, Simulation, Slave, System};
 const FILES: [&str; 2] = ["FrictionPendulum.fmu", "AsoController.fmu"];
 const STEP: f64 = 1e-3;
 
-/// What an FMU reports.
+/// A message reported by an FMU.
 #[derive(Default)]
 struct Messages(Mutex<Vec<String>>);
 
@@ -36,7 +36,7 @@ impl Logger for Messages {
     }
 }
 
-/// An instance in initialization mode, by fmi-rs.
+/// An instance in initialization mode, created by fmi-rs.
 struct Instance {
     unpacked: FMU2Builder,
     fmu: Arc<FMU2<CS>>,
@@ -109,7 +109,7 @@ fn exchange(plant: &Instance, controller: &Instance) {
 }
 
 #[test]
-fn fmi_rs_finds_nothing_to_complain_of_in_the_descriptions() {
+fn fmi_rs_finds_no_fault_in_the_descriptions() {
     for file in FILES {
         let problems = open(file).model_description.validate();
         let texts: Vec<_> = problems.iter().map(|problem| &problem.message).collect();
@@ -118,7 +118,7 @@ fn fmi_rs_finds_nothing_to_complain_of_in_the_descriptions() {
 }
 
 #[test]
-fn fmi_rs_reads_every_variable_and_dependency_as_our_own_parser() {
+fn fmi_rs_reads_the_same_variables_and_dependencies_as_our_parser() {
     for file in FILES {
         let (theirs, own) = (open(file), Fmu::open(&tests::dist().join(file)).unwrap());
         let (theirs, own) = (&theirs.model_description, own.description());
@@ -127,7 +127,8 @@ fn fmi_rs_reads_every_variable_and_dependency_as_our_own_parser() {
             assert_eq!(theirs.name, own.name);
             assert_eq!(theirs.valueReference, own.value_reference, "{}", own.name);
             assert_eq!(theirs.variableType.name(), own.kind.element(), "{}", own.name);
-            // The crate calls inputs exact, where section 2.2.7 has no `initial`.
+            // The crate gives inputs initial = exact, but section 2.2.7 allows no `initial` for
+            // them.
             let input = (own.causality == Causality::Input).then_some(Initial::Exact);
             let initial = own.initial_in_force().or(input);
             let theirs = (theirs.causality, theirs.variability, theirs.initial);
@@ -150,7 +151,7 @@ fn fmi_rs_reads_every_variable_and_dependency_as_our_own_parser() {
 }
 
 #[test]
-fn the_closed_loop_by_fmi_rs_is_bit_identical_to_the_one_by_our_master() {
+fn the_closed_loop_by_fmi_rs_is_bit_identical_to_that_by_our_master() {
     let settings = [("plant.F_s", "60"), ("plant.linearised", "true"), ("controller.t_on", "0.5")];
     let of = |slave: &str| -> Vec<(&str, &str)> {
         let own = |(name, value): &(&'static str, &'static str)| {
@@ -201,7 +202,8 @@ fn the_closed_loop_by_fmi_rs_is_bit_identical_to_the_one_by_our_master() {
     }
 }
 
-/// Values of the Real outputs over time, simulated by fmi-rs alone; nothing may be reported.
+/// Simulates by fmi-rs alone and returns the values of the Real outputs over time; nothing may be
+/// reported.
 #[expect(clippy::arc_with_non_send_sync, reason = "the simulator takes its recorder so")]
 fn simulated(file: &str, settings: &[(&str, &str)], stop: f64) -> Trajectories {
     let unpacked = open(file);
@@ -240,7 +242,7 @@ fn simulated(file: &str, settings: &[(&str, &str)], stop: f64) -> Trajectories {
     Arc::into_inner(recorder).unwrap().into_trajectories()
 }
 
-/// An initialised instance by our own loader.
+/// An initialised instance of our own loader.
 fn own_slave(file: &str, settings: &[(&str, &str)]) -> Box<dyn Slave> {
     let mut system = System::default();
     let fmu = Fmu::open(&tests::dist().join(file)).unwrap();
@@ -255,7 +257,7 @@ fn own_slave(file: &str, settings: &[(&str, &str)]) -> Box<dyn Slave> {
 }
 
 #[test]
-fn the_simulator_of_fmi_rs_runs_each_fmu_as_our_own_loader_steps_it() {
+fn the_simulator_of_fmi_rs_gives_the_values_of_our_loader_for_each_fmu() {
     for (file, settings) in [
         (FILES[0], vec![("x_p_0", "0.5"), ("linearised", "false")]),
         (FILES[1], vec![("x_p", "0.02"), ("theta", "-0.01"), ("t_on", "0.25")]),

@@ -1,4 +1,4 @@
-//! Linearisation of FMUs in each of its ways, against derivatives by hand.
+//! Linearisation of FMUs by each method, compared with derivatives computed by hand.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::fs;
@@ -12,7 +12,7 @@ use linearise::{Linearisation, Linearise, LineariseError, linearise};
 use nalgebra::DMatrix;
 use tests::{dist, root, run};
 
-/// The packed FMUs, with those that are written for this test.
+/// The packed FMUs, including those written for this test.
 fn packed(name: &str) -> PathBuf {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     let folder = FOLDER.get_or_init(|| {
@@ -31,7 +31,8 @@ fn packed(name: &str) -> PathBuf {
     if own.exists() { own } else { dist().join(name) }
 }
 
-/// The FMU with a changed `modelDescription.xml`; the GUID, and so the library, stays.
+/// The FMU with a changed `modelDescription.xml`; the GUID, and therefore the library, stays the
+/// same.
 fn changed(name: &str, change: impl Fn(&str) -> String) -> Fmu {
     let unpacked = Unpacked::open(&packed(name)).unwrap();
     let xml = fs::read_to_string(unpacked.folder().join("modelDescription.xml")).unwrap();
@@ -57,7 +58,7 @@ fn without_derivatives(xml: &str) -> String {
     xml.replace(" providesDirectionalDerivative=\"true\"", "")
 }
 
-/// Without the element of one interface.
+/// The FMU without the element of one interface.
 fn without(element: &str, xml: &str) -> String {
     let start = xml.find(&format!("  <{element} ")).unwrap();
     let end = start + xml[start..].find("/>\n").unwrap() + 3;
@@ -101,8 +102,8 @@ fn expect_within_errors(found: &Linearisation, expected: &DMatrix<f64>) {
     }
 }
 
-/// The pendulum without friction, moving so slowly that it does not stick, and its A, B, F of the
-/// formulas under equation (20) of the paper for the states in their order.
+/// The pendulum without friction, moving so slowly that it does not stick, and its A, B, F by the
+/// formulas below equation (20) of the paper, for the states in their order.
 fn pendulum(linearised: &str) -> (Linearise, DMatrix<f64>) {
     let request = Linearise {
         inputs: names(&["u"]),
@@ -141,7 +142,7 @@ fn pendulum(linearised: &str) -> (Linearise, DMatrix<f64>) {
 }
 
 #[test]
-fn directional_derivatives_of_the_upright_pendulum_are_the_formulas_of_the_paper() {
+fn directional_derivatives_of_the_upright_pendulum_equal_the_formulas_of_the_paper() {
     for linearised in ["true", "false"] {
         let (request, expected) = pendulum(linearised);
         let found = linearise(&open("FrictionPendulum.fmu"), &request).unwrap();
@@ -164,7 +165,7 @@ fn directional_derivatives_of_the_upright_pendulum_are_the_formulas_of_the_paper
 }
 
 #[test]
-fn differences_of_the_upright_pendulum_are_the_formulas_within_their_error() {
+fn differences_of_the_upright_pendulum_equal_the_formulas_within_their_error() {
     let fmu =
         changed("FrictionPendulum.fmu", |xml| without_derivatives(&without("CoSimulation", xml)));
     for linearised in ["true", "false"] {
@@ -188,7 +189,7 @@ fn steps_of_the_upright_pendulum_give_the_formulas_within_their_error() {
     }
 }
 
-/// The tank at level 4 m, where sqrt(level) = 2, and its derivatives by hand.
+/// The tank at level 4 m, where sqrt(level) = 2, and its derivatives computed by hand.
 fn tank() -> (Linearise, DMatrix<f64>) {
     let request = Linearise {
         inputs: names(&["pump", "valve"]),
@@ -206,7 +207,7 @@ fn tank() -> (Linearise, DMatrix<f64>) {
 }
 
 #[test]
-fn a_fault_that_starts_at_its_limit_is_moved_to_one_side_only() {
+fn a_fault_at_the_limit_of_its_range_is_perturbed_to_one_side_only() {
     let (mut request, expected) = tank();
     let found = linearise(&open("DrainedTank.fmu"), &request).unwrap();
     expect_close(&found, &expected, 1e-15);
@@ -243,7 +244,7 @@ fn steps_away_from_an_equilibrium_are_within_their_error_and_the_drift_is_report
 }
 
 #[test]
-fn steps_of_a_falling_pendulum_tell_too_little_and_are_refused() {
+fn steps_of_a_falling_pendulum_are_not_accurate_enough_and_refused() {
     let (mut request, _) = pendulum("false");
     request.at.retain(|(name, _)| name != "theta_0");
     request.at.extend(at(&[("theta_0", "0.3"), ("omega_0", "0.5"), ("u", "3")]));
@@ -253,7 +254,7 @@ fn steps_of_a_falling_pendulum_tell_too_little_and_are_refused() {
 }
 
 #[test]
-fn wrong_directional_derivatives_are_found_out_by_differences() {
+fn wrong_directional_derivatives_are_detected_by_differences() {
     let (mut request, _) = tank();
     request.at = at(&[("lie", "0.25")]);
     let found = linearise(&open("DrainedTank.fmu"), &request).unwrap();
@@ -268,7 +269,7 @@ fn wrong_directional_derivatives_are_found_out_by_differences() {
 }
 
 #[test]
-fn a_point_of_the_van_der_pol_oscillator_has_the_derivatives_by_hand() {
+fn derivatives_of_the_van_der_pol_oscillator_equal_those_by_hand() {
     let request = Linearise {
         outputs: names(&["x0"]),
         at: at(&[("x0", "1.5"), ("x1", "-0.7"), ("mu", "2")]),
@@ -360,7 +361,7 @@ fn names_and_values_that_do_not_fit_are_refused_with_a_reason() {
 }
 
 #[test]
-fn what_is_missing_for_steps_from_an_fmu_state_is_said() {
+fn each_capability_missing_for_linearisation_by_steps_is_named() {
     let fmu = changed("DrainedTank.fmu", steps_only);
     let states = |list: &[&str]| {
         let list = names(list);

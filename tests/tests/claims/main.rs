@@ -1,5 +1,5 @@
-//! What the libraries and the command claim, a module for each subject. Tests that need a process for
-//! themselves are in binaries of their own.
+//! Claims of the libraries and the command, a module for each subject. Tests that need a process
+//! for themselves are in binaries of their own.
 #![forbid(unsafe_code)]
 
 mod author;

@@ -1,4 +1,4 @@
-//! FMUs in C through our own loader: what is unusual is served, what is wrong is said.
+//! FMUs in C through our own loader: unusual behaviour is accepted, wrong behaviour is reported.
 #![expect(clippy::unwrap_used, clippy::float_cmp, reason = "tests; exact by construction")]
 
 use std::path::PathBuf;
@@ -12,7 +12,7 @@ use master::{CallError, Failure, Slave, StepResult};
 use tempfile::TempDir;
 use tests::c_fmu::CFmu;
 
-/// Value references of the slave.
+/// Value references of the FMU's variables.
 const U: u32 = 0;
 const Y: u32 = 1;
 const PARAMETER: u32 = 2;
@@ -28,7 +28,7 @@ fn open(fmu: &CFmu) -> Fmu {
     Fmu::open(&path).unwrap()
 }
 
-/// Why it cannot be opened.
+/// Returns the error of opening it.
 fn refused(fmu: &CFmu) -> FmuError {
     let (_folder, path) = written(fmu);
     Fmu::open(&path).err().unwrap()
@@ -58,7 +58,7 @@ fn output(slave: &mut Instance) -> f64 {
 }
 
 #[test]
-fn the_values_of_all_types_go_through_an_fmu_as_they_are() {
+fn values_of_all_types_pass_through_an_fmu_unchanged() {
     let mut slave = ready("as it should");
     let long = "x".repeat(19_999);
     let texts = ["", "Grüße, \"Ångström\"\n", long.as_str()];
@@ -83,7 +83,7 @@ fn the_values_of_all_types_go_through_an_fmu_as_they_are() {
 }
 
 #[test]
-fn a_string_that_is_null_is_read_as_an_empty_one() {
+fn a_null_string_is_read_as_an_empty_one() {
     let mut values = ["before".to_owned()];
     ready("no text").get_string(&[1], &mut values).unwrap();
     assert_eq!(values, [""]);
@@ -106,7 +106,7 @@ fn instances_of_one_fmu_are_independent() {
 }
 
 #[test]
-fn a_second_instance_of_an_fmu_for_one_only_is_refused_and_the_first_lives_on() {
+fn a_second_instance_of_an_fmu_that_allows_one_is_refused_and_the_first_continues() {
     let one = CFmu::that("one instance only").flag("canBeInstantiatedOnlyOncePerProcess", true);
     let fmu = open(&one);
     let mut first = fmu.instantiate("first").unwrap();
@@ -120,7 +120,7 @@ fn a_second_instance_of_an_fmu_for_one_only_is_refused_and_the_first_lives_on() 
 }
 
 #[test]
-fn an_fmu_for_one_instance_only_that_is_opened_twice_has_two() {
+fn an_fmu_that_allows_one_instance_has_two_if_it_is_opened_twice() {
     let one = CFmu::that("one instance only").flag("canBeInstantiatedOnlyOncePerProcess", true);
     let (_folder, path) = written(&one);
     let opened = [Fmu::open(&path).unwrap(), Fmu::open(&path).unwrap()];
@@ -133,7 +133,7 @@ fn an_fmu_for_one_instance_only_that_is_opened_twice_has_two() {
 }
 
 #[test]
-fn an_fmu_that_needs_a_tool_runs_where_it_can_and_names_the_tool_where_it_cannot() {
+fn an_fmu_that_needs_a_tool_runs_if_it_can_and_otherwise_the_error_names_the_tool() {
     let tool = "Bench 4 & Co".replace('&', "and");
     let mut slave = instance(&CFmu::well_behaved().needing(&tool));
     initialise(&mut slave).unwrap();
@@ -148,7 +148,7 @@ fn an_fmu_that_needs_a_tool_runs_where_it_can_and_names_the_tool_where_it_cannot
 }
 
 #[test]
-fn a_library_of_another_version_is_refused_with_the_version_it_says() {
+fn a_library_of_another_fmi_version_is_refused_with_that_version() {
     let FmuError::Load(LoadError::Version { found, .. }) =
         refused(&CFmu::well_behaved().version("1.0"))
     else {
@@ -159,7 +159,7 @@ fn a_library_of_another_version_is_refused_with_the_version_it_says() {
 }
 
 #[test]
-fn what_no_instance_can_do_without_is_missed_by_name_when_an_fmu_is_opened() {
+fn a_missing_function_that_every_instance_needs_is_named_when_the_fmu_is_opened() {
     for function in [
         "fmi2Instantiate",
         "fmi2FreeInstance",
@@ -178,7 +178,7 @@ fn what_no_instance_can_do_without_is_missed_by_name_when_an_fmu_is_opened() {
 
 type Call = fn(&mut Instance) -> Result<(), CallError>;
 
-/// Functions that an FMU can do without, each with a call that needs it.
+/// Optional functions, each with a call that needs it.
 const OPTIONAL: [(&str, Call); 17] = [
     ("fmi2SetDebugLogging", |slave| slave.set_debug_logging(true)),
     ("fmi2GetReal", |slave| slave.get_real(&[1], &mut [0.0])),
@@ -202,7 +202,7 @@ const OPTIONAL: [(&str, Call); 17] = [
 ];
 
 #[test]
-fn a_missing_optional_function_is_missed_by_name_where_it_is_called_and_nowhere_else() {
+fn a_missing_optional_function_is_named_when_it_is_called_and_harmless_otherwise() {
     for (function, call) in OPTIONAL {
         let mut slave = instance(&CFmu::well_behaved().without(&[function]));
         initialise(&mut slave).unwrap();
@@ -226,7 +226,7 @@ fn an_fmu_without_any_optional_function_still_steps() {
 }
 
 #[test]
-fn a_state_goes_through_its_bytes_into_another_instance() {
+fn a_serialised_state_is_restored_in_another_instance() {
     let mut slave = ready("as it should");
     slave.do_step(0.0, 0.5, true).unwrap();
     let bytes = slave.serialize_state().unwrap();
@@ -240,7 +240,7 @@ fn a_state_goes_through_its_bytes_into_another_instance() {
 }
 
 #[test]
-fn an_fmu_without_a_way_back_says_so_when_it_is_asked() {
+fn an_fmu_without_saved_states_says_so_when_one_is_requested() {
     let fmu = CFmu::that("no way back").without_rollback();
     let mut slave = instance(&fmu);
     let flags = slave.description().co_simulation.clone().unwrap();
@@ -251,7 +251,7 @@ fn an_fmu_without_a_way_back_says_so_when_it_is_asked() {
 }
 
 #[test]
-fn a_state_that_was_never_saved_is_an_error_without_a_call_of_the_fmu() {
+fn restoring_a_state_that_was_never_saved_is_an_error_without_a_call_of_the_fmu() {
     let error = ready("as it should").restore_state(3).unwrap_err();
     assert!(matches!(error.failure, Failure::InvalidAnswer(_)), "{error}");
 }
@@ -265,7 +265,7 @@ fn parameters_choose_the_behaviour_of_a_built_library() {
     assert_eq!(error.to_string(), "fmi2Terminate returned fmi2Error: as it was told");
 }
 
-/// x' = u, of which the library refuses a second instance while there is one.
+/// x' = u; the library refuses a second instance while one exists.
 #[test]
 fn an_fmu_that_allows_one_instance_is_linearised_by_steps() {
     let once = CFmu::that("one instance only").flag("canBeInstantiatedOnlyOncePerProcess", true);

@@ -1,4 +1,4 @@
-//! Calls that FMUs in C refuse, put off or do in part: what the master is told.
+//! Calls that FMUs in C refuse, delay or complete in part: the result that the master gets.
 #![expect(clippy::unwrap_used, clippy::float_cmp, reason = "tests; exact by construction")]
 
 use std::time::Duration;
@@ -35,7 +35,7 @@ fn output(slave: &mut Instance) -> f64 {
     values[0]
 }
 
-/// From the initial values to the end; stops at the first call that fails.
+/// Calls every function from the initial values to the end; stops at the first call that fails.
 fn life(slave: &mut Instance) -> Result<(), CallError> {
     slave.set_real(&[0], &[1.0])?;
     slave.set_integer(&[0], &[1])?;
@@ -69,7 +69,7 @@ const FUNCTIONS: [&str; 13] = [
 ];
 
 #[test]
-fn an_error_is_told_with_the_function_the_status_and_the_words_of_the_fmu() {
+fn an_error_has_the_function_the_status_and_the_message_of_the_fmu() {
     for function in FUNCTIONS {
         let error = life(&mut instance(&format!("fail in {function}"))).unwrap_err();
         assert_eq!(error.to_string(), format!("{function} returned fmi2Error: as it was told"));
@@ -77,7 +77,7 @@ fn an_error_is_told_with_the_function_the_status_and_the_words_of_the_fmu() {
 }
 
 #[test]
-fn a_status_that_the_standard_does_not_know_is_an_error_with_its_number() {
+fn an_undefined_status_is_an_error_with_its_number() {
     for function in FUNCTIONS {
         let error = life(&mut instance(&format!("return 17 in {function}"))).unwrap_err();
         assert_eq!((error.function, error.failure), (function, Failure::UnknownStatus(17)));
@@ -103,7 +103,7 @@ fn a_discarded_call_other_than_a_step_is_an_error() {
 }
 
 #[test]
-fn warnings_stop_nothing() {
+fn warnings_do_not_stop_a_run() {
     life(&mut instance("warn everywhere")).unwrap();
     for function in FUNCTIONS {
         life(&mut instance(&format!("warn in {function}"))).unwrap();
@@ -111,7 +111,7 @@ fn warnings_stop_nothing() {
 }
 
 #[test]
-fn a_discarded_step_tells_how_far_it_came_and_can_be_repeated_to_there() {
+fn a_discarded_step_returns_the_time_reached_and_can_be_repeated_to_it() {
     let mut slave = ready("discard at t1");
     slave.save_state(0).unwrap();
     assert_eq!(slave.do_step(0.0, 0.75, false), Ok(PART));
@@ -123,14 +123,14 @@ fn a_discarded_step_tells_how_far_it_came_and_can_be_repeated_to_there() {
 }
 
 #[test]
-fn a_step_that_was_discarded_without_any_progress_came_to_its_begin() {
+fn a_step_discarded_without_progress_returns_its_start() {
     let mut slave = ready("discard every step");
     let nowhere = StepResult::Part { reached: 0.0, terminated: false };
     assert_eq!(slave.do_step(0.0, 1.0, false), Ok(nowhere));
 }
 
 #[test]
-fn an_fmu_that_wants_the_simulation_to_end_says_where() {
+fn an_fmu_that_requests_the_end_of_the_simulation_returns_the_time() {
     let end = StepResult::Part { reached: 0.5, terminated: true };
     let mut slave = ready("end at t1");
     assert_eq!(slave.do_step(0.0, 1.0, true), Ok(end));
@@ -146,14 +146,14 @@ fn a_discarded_step_without_a_last_successful_time_is_an_error() {
 }
 
 #[test]
-fn a_last_successful_time_outside_the_step_is_nonsense() {
+fn a_last_successful_time_outside_of_the_step_is_an_error() {
     let error = ready("lie about t1").do_step(0.0, 1.0, true).unwrap_err();
     let Failure::InvalidAnswer(what) = &error.failure else { panic!("{error}") };
     assert!(what.contains("-1 s") && what.contains("from 0 to 1 s"), "{what}");
 }
 
 #[test]
-fn a_pending_step_is_asked_for_until_it_is_done() {
+fn a_pending_step_is_polled_until_it_is_done() {
     let mut slave = instance("pend");
     slave.set_integer(&[2], &[25]).unwrap();
     initialise(&mut slave).unwrap();
@@ -171,15 +171,15 @@ fn a_pending_step_that_fails_later_is_an_error_of_the_step() {
 }
 
 #[test]
-fn a_pending_step_that_is_discarded_later_tells_how_far_it_came() {
+fn a_pending_step_that_is_discarded_later_returns_the_time_reached() {
     let mut slave = ready("pend and discard at t1");
     slave.set_time_limit(Some(Duration::from_secs(60)));
     assert_eq!(slave.do_step(0.0, 1.0, true), Ok(PART));
 }
 
-/// Section 4.2.4: the FMU ends the process where an instance is freed that has not stopped.
+/// Section 4.2.4: the FMU ends the process if an instance is freed while its step is pending.
 #[test]
-fn a_step_that_is_pending_for_ever_is_canceled_or_left_alone_after_the_time_limit() {
+fn a_step_that_stays_pending_is_cancelled_or_abandoned_after_the_time_limit() {
     let stubborn = CFmu::that("pend").without(&["fmi2CancelStep"]);
     for fmu in [CFmu::that("pend"), stubborn] {
         let folder = tempfile::tempdir().unwrap();
@@ -193,7 +193,7 @@ fn a_step_that_is_pending_for_ever_is_canceled_or_left_alone_after_the_time_limi
     }
 }
 
-/// Section 2.1.3: the FMU ends the process where a function of any instance is called afterwards.
+/// Section 2.1.3: the FMU ends the process if a function of any instance is called afterwards.
 #[test]
 fn after_a_fatal_error_no_instance_is_freed() {
     let folder = tempfile::tempdir().unwrap();
@@ -209,7 +209,7 @@ fn after_a_fatal_error_no_instance_is_freed() {
 }
 
 #[test]
-fn a_step_of_another_size_is_refused_in_the_words_of_the_fmu() {
+fn a_step_of_another_size_is_refused_with_the_message_of_the_fmu() {
     let mut slave = ready("step of one size");
     assert_eq!(slave.do_step(0.0, 0.25, true), Ok(StepResult::Whole));
     assert_eq!(slave.do_step(0.25, 0.25, true), Ok(StepResult::Whole));
@@ -218,7 +218,7 @@ fn a_step_of_another_size_is_refused_in_the_words_of_the_fmu() {
 }
 
 #[test]
-fn values_that_are_no_numbers_arrive_as_they_are() {
+fn nan_and_infinity_are_passed_on_unchanged() {
     for (behaviour, expected) in [("not a number", f64::NAN), ("infinity", f64::NEG_INFINITY)] {
         let mut slave = ready(behaviour);
         slave.do_step(0.0, 0.5, true).unwrap();
@@ -227,14 +227,14 @@ fn values_that_are_no_numbers_arrive_as_they_are() {
     }
 }
 
-/// What the FMU said until it refused a value that does not exist.
+/// Returns the messages of the FMU until it refuses a value that does not exist.
 fn said(behaviour: &str) -> Vec<String> {
     let mut slave = ready(behaviour);
     slave.get_real(&[99], &mut [0.0]).unwrap_err().messages
 }
 
 #[test]
-fn messages_are_formatted_whatever_stands_in_them() {
+fn messages_are_formatted_whatever_their_content() {
     let messages = said("specifiers in fmi2SetupExperiment");
     assert_eq!(messages[0], "7% of %s%n at 0.125 \u{fffd}\u{fffd}");
     assert_eq!(said("no category in fmi2SetupExperiment")[0], "uncategorised");
@@ -243,14 +243,14 @@ fn messages_are_formatted_whatever_stands_in_them() {
 }
 
 #[test]
-fn of_a_flood_of_messages_the_last_ones_are_kept() {
+fn the_last_of_very_many_messages_are_kept() {
     let messages = said("flood in fmi2SetupExperiment");
     assert!(messages.len() <= 10, "{} messages", messages.len());
     assert_eq!(messages[messages.len() - 2..], ["message 999999", "there is no such Real"]);
 }
 
 #[test]
-fn of_a_message_of_a_million_characters_the_begin_is_kept() {
+fn the_start_of_a_message_of_a_million_characters_is_kept() {
     let messages = said("long message in fmi2SetupExperiment");
     let length = messages[0].len();
     assert!((1000..=4096).contains(&length), "{length} characters");
@@ -258,7 +258,7 @@ fn of_a_message_of_a_million_characters_the_begin_is_kept() {
 }
 
 #[test]
-fn an_fmu_that_cannot_be_instantiated_gives_its_reason_or_is_said_to_give_none() {
+fn an_instantiation_that_fails_reports_the_reason_or_that_the_fmu_gives_none() {
     for (behaviour, reason) in [
         ("fail in fmi2Instantiate", "as it was told"),
         ("return 17 in fmi2Instantiate", "no reason"),

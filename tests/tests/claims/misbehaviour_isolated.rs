@@ -1,16 +1,16 @@
-//! FMUs in C under `aso-ftc run --isolate`: whatever one does to its process, the run ends with
-//! the FMU, the call, the time and the signal, and the results so far are whole.
+//! FMUs in C under `aso-ftc run --isolate`: if one ends its process, the run reports the FMU, the
+//! call, the time and the signal, and the results up to that step are complete.
 
 use tests::c_fmu::CFmu;
 use tests::coupled::{ALL, Run, STEP, TO_T1, UNUSUAL};
 
-/// `a` with that behaviour beside `b`, each in a process of its own.
+/// Runs `a` with that behaviour and `b`, each in a process of its own.
 fn isolated(behaviour: &str, more: &[&str]) -> Run {
     let more: Vec<_> = ["--isolate"].iter().chain(more).copied().collect();
     Run::pair(&CFmu::that(behaviour), &more)
 }
 
-/// What ends the process of an FMU, and how that is told.
+/// Behaviours that end the process of an FMU, and the text that reports each.
 const ENDS: [(&str, &[&str]); 4] = [
     ("crash", &["signal 11", "SIGSEGV"]),
     ("abort", &["signal 6", "SIGABRT"]),
@@ -19,7 +19,7 @@ const ENDS: [(&str, &[&str]); 4] = [
 ];
 
 #[test]
-fn an_fmu_whose_process_ends_in_a_step_is_told_with_call_time_and_reason() {
+fn an_fmu_whose_process_ends_in_a_step_is_reported_with_call_time_and_reason() {
     for (deed, reason) in ENDS {
         let run = isolated(&format!("{deed} in fmi2DoStep"), &[]);
         run.expect(1, TO_T1);
@@ -29,7 +29,7 @@ fn an_fmu_whose_process_ends_in_a_step_is_told_with_call_time_and_reason() {
 }
 
 #[test]
-fn an_fmu_whose_process_ends_when_it_is_read_is_told_with_call_and_reason() {
+fn an_fmu_whose_process_ends_when_it_is_read_is_reported_with_call_and_reason() {
     for (deed, reason) in ENDS {
         let run = isolated(&format!("{deed} in fmi2GetReal"), &[]);
         run.expect(1, TO_T1 - 1);
@@ -39,7 +39,7 @@ fn an_fmu_whose_process_ends_when_it_is_read_is_told_with_call_and_reason() {
 }
 
 #[test]
-fn an_fmu_whose_process_ends_before_the_first_step_is_told_with_call_and_reason() {
+fn an_fmu_whose_process_ends_before_the_first_step_is_reported_with_call_and_reason() {
     for function in ["fmi2Instantiate", "fmi2SetupExperiment", "fmi2EnterInitializationMode"] {
         for (deed, reason) in ENDS {
             let run = isolated(&format!("{deed} in {function}"), &[]);
@@ -52,7 +52,7 @@ fn an_fmu_whose_process_ends_before_the_first_step_is_told_with_call_and_reason(
 }
 
 #[test]
-fn an_fmu_whose_process_ends_at_the_end_takes_no_results() {
+fn no_results_are_lost_if_the_process_of_an_fmu_ends_after_the_last_step() {
     for function in ["fmi2Terminate", "fmi2FreeInstance"] {
         for (deed, reason) in ENDS {
             let run = isolated(&format!("{deed} in {function}"), &[]);
@@ -64,7 +64,7 @@ fn an_fmu_whose_process_ends_at_the_end_takes_no_results() {
 }
 
 #[test]
-fn an_fmu_that_corrupts_its_heap_corrupts_nothing_else() {
+fn an_fmu_that_corrupts_its_heap_affects_nothing_else() {
     let run = isolated("corrupt the heap in fmi2DoStep", &[]);
     run.expect(1, TO_T1);
     run.says(&["a", "signal"]);
@@ -88,7 +88,7 @@ fn a_call_that_never_returns_is_ended_after_the_time_limit() {
 }
 
 #[test]
-fn errors_of_the_interface_are_told_as_without_processes() {
+fn errors_of_the_interface_are_reported_as_without_isolation() {
     for (behaviour, rows, parts) in [
         ("fail in fmi2DoStep", TO_T1, ["fmi2DoStep", "fmi2Error", "as it was told"]),
         ("fail fatally in fmi2DoStep", TO_T1, ["fmi2DoStep", "fmi2Fatal", "as it was told"]),
@@ -105,7 +105,7 @@ fn errors_of_the_interface_are_told_as_without_processes() {
 }
 
 #[test]
-fn unusual_fmus_run_in_processes_as_any_other() {
+fn unusual_fmus_run_in_processes_too() {
     let meddling = [
         "print in fmi2Instantiate",
         "change the locale in fmi2DoStep",
@@ -138,7 +138,7 @@ fn an_fmu_for_one_instance_has_one_in_each_process() {
 }
 
 #[test]
-fn another_rounding_mode_of_one_fmu_reaches_no_other() {
+fn a_changed_rounding_mode_of_one_fmu_does_not_affect_others() {
     let rounds = CFmu::that("round up in fmi2DoStep");
     let more = ["--isolate", "--set", "a.t1=0", "--set", "a.u=0.1", "--set", "b.u=0.1"];
     let run = Run::of(&[("a", &rounds), ("b", &CFmu::well_behaved())], &more);
@@ -152,7 +152,7 @@ fn another_rounding_mode_of_one_fmu_reaches_no_other() {
 }
 
 #[test]
-fn the_values_of_all_types_go_through_connections_between_processes() {
+fn values_of_all_types_pass_through_connections_between_processes() {
     let text = "Grüße, \"Ångström\"\n;";
     let set = format!("a.s_in={text}");
     let links = ["i", "b", "s", "e"].map(|kind| format!("a.{kind}_out=b.{kind}_in"));

@@ -1,6 +1,6 @@
-//! FMUs in C under `aso-ftc run`, in its own process: unusual ones run, and where one fails the
-//! message, the exit status and the results so far are right, even where it takes the process with
-//! it. The same in processes of their own is in `misbehaviour_isolated.rs`.
+//! FMUs in C under `aso-ftc run`, in its own process. Unusual ones run. If one fails, the message,
+//! the exit status and the results up to that step are right, even if the FMU ends the process.
+//! `misbehaviour_isolated.rs` tests the same with isolation.
 
 mod promises;
 mod settings;
@@ -9,7 +9,7 @@ use tests::c_fmu::CFmu;
 use tests::coupled::{ALL, Run, STEP, TO_T1, UNUSUAL};
 
 #[test]
-fn unusual_fmus_run_as_any_other() {
+fn unusual_fmus_run() {
     for behaviour in UNUSUAL {
         Run::pair(&CFmu::that(behaviour), &[]).expect(0, ALL);
     }
@@ -18,7 +18,7 @@ fn unusual_fmus_run_as_any_other() {
 }
 
 #[test]
-fn a_flood_of_messages_does_not_take_the_results_with_it() {
+fn very_many_messages_do_not_affect_the_results() {
     let late = ["--set", "a.t1=0.9375"];
     Run::pair(&CFmu::that("flood in fmi2DoStep"), &late).expect(0, ALL);
 }
@@ -36,7 +36,7 @@ fn another_locale_or_current_folder_of_the_process_changes_no_results() {
 }
 
 #[test]
-fn fmus_without_optional_functions_run_where_nobody_needs_them() {
+fn fmus_without_optional_functions_run_if_these_are_not_needed() {
     for missing in [
         &["fmi2Terminate"][..],
         &["fmi2SetDebugLogging", "fmi2GetTypesPlatform", "fmi2GetVersion", "fmi2Reset"],
@@ -53,7 +53,7 @@ fn fmus_without_optional_functions_run_where_nobody_needs_them() {
 }
 
 #[test]
-fn an_fmu_without_a_function_that_the_run_needs_is_named_with_the_function() {
+fn a_missing_function_that_the_run_needs_is_reported_with_the_fmu() {
     let run = Run::pair(&CFmu::well_behaved().without(&["fmi2DoStep"]), &[]);
     assert_eq!(run.status, Some(2), "{}", run.message);
     run.says(&["fmi2DoStep", "missing"]);
@@ -63,7 +63,7 @@ fn an_fmu_without_a_function_that_the_run_needs_is_named_with_the_function() {
 }
 
 #[test]
-fn the_values_of_all_types_go_through_connections() {
+fn values_of_all_types_pass_through_connections() {
     let text = "Grüße, \"Ångström\"\n;";
     let set = format!("a.s_in={text}");
     let kinds = ["i", "b", "s", "e"];
@@ -78,7 +78,7 @@ fn the_values_of_all_types_go_through_connections() {
         ("i_out", &["0"][..], &["-2147483648"][..]),
         ("b_out", &["0", "false", "False"], &["1", "true", "True"]),
         ("s_out", &[""], &[text]),
-        // An item may be recorded by its number or by its name.
+        // An enumeration item may be recorded by its number or by its name.
         ("e_out", &["1", "off"], &["2", "on"]),
     ] {
         for (slave, delay) in [("a", 1), ("b", 2)] {
@@ -106,14 +106,14 @@ fn an_error_in_a_step_ends_the_run_with_fmu_call_and_time_and_keeps_the_results(
 }
 
 #[test]
-fn an_error_when_outputs_are_read_ends_the_run_with_the_rows_before() {
+fn an_error_when_outputs_are_read_ends_the_run_and_keeps_the_previous_rows() {
     let run = Run::pair(&CFmu::that("fail in fmi2GetReal"), &[]);
     run.expect(1, TO_T1 - 1);
     run.says(&["a", "fmi2GetReal", "fmi2Error", "as it was told"]);
 }
 
 #[test]
-fn an_error_before_the_first_step_is_told_with_fmu_and_call() {
+fn an_error_before_the_first_step_is_reported_with_fmu_and_call() {
     for function in ["fmi2Instantiate", "fmi2SetupExperiment", "fmi2EnterInitializationMode"] {
         let run = Run::pair(&CFmu::that(&format!("fail in {function}")), &[]);
         assert!(matches!(run.status, Some(1 | 2)), "{}", run.message);
@@ -122,14 +122,14 @@ fn an_error_before_the_first_step_is_told_with_fmu_and_call() {
 }
 
 #[test]
-fn an_error_at_the_end_is_told_and_takes_no_results() {
+fn an_error_at_the_end_is_reported_and_no_results_are_lost() {
     let run = Run::pair(&CFmu::that("fail in fmi2Terminate"), &[]);
     run.expect(1, ALL);
     run.says(&["fmi2Terminate", "fmi2Error"]);
 }
 
 #[test]
-fn a_value_that_is_no_number_ends_the_run_with_its_origin_and_time() {
+fn a_nan_ends_the_run_with_its_origin_and_time() {
     for (behaviour, value) in [("not a number", "NaN"), ("infinity", "-inf")] {
         let run = Run::pair(&CFmu::that(behaviour), &[]);
         run.expect(1, TO_T1 - 1);
@@ -138,7 +138,7 @@ fn a_value_that_is_no_number_ends_the_run_with_its_origin_and_time() {
 }
 
 #[test]
-fn values_that_are_no_numbers_go_on_where_they_are_allowed() {
+fn nan_and_infinity_are_passed_on_if_they_are_allowed() {
     let run = Run::pair(&CFmu::that("not a number"), &["--allow-nan"]);
     run.expect(0, TO_T1 - 1);
     let (a, b) = (run.numbers("a.y"), run.numbers("b.y"));
@@ -147,7 +147,7 @@ fn values_that_are_no_numbers_go_on_where_they_are_allowed() {
     assert!(b[TO_T1..].iter().all(|value| value.is_nan()) && b[TO_T1 - 1].is_finite(), "{b:?}");
 }
 
-/// In the middle of the step that begins at 0.5 s.
+/// In the middle of the step that starts at 0.5 s.
 const MIDDLE: [&str; 2] = ["--set", "a.t1=0.53125"];
 
 #[test]
@@ -164,25 +164,25 @@ fn a_step_that_is_discarded_half_way_is_made_in_parts_with_rollback() {
 }
 
 #[test]
-fn a_step_that_is_discarded_half_way_goes_on_from_there_where_the_fmu_allows_it() {
+fn a_step_that_is_discarded_half_way_is_continued_if_the_fmu_allows_it() {
     let run = Run::pair(&CFmu::that("discard at t1 and go on").without_rollback(), &MIDDLE);
     run.expect(0, TO_T1);
     assert_eq!((run.numbers("a.y"), run.numbers("time").last()), (run.numbers("time"), Some(&1.0)));
 }
 
-/// Section 4.2.4: no other step after a discarded one without fmi2SetFMUstate.
+/// Section 4.2.4: after a discarded step no other step is allowed without fmi2SetFMUstate.
 #[test]
-fn a_step_that_is_discarded_half_way_ends_the_run_where_there_is_no_other_way() {
+fn a_step_that_is_discarded_half_way_ends_the_run_if_it_can_be_neither_continued_nor_repeated() {
     let run = Run::pair(&CFmu::that("discard at t1").without_rollback(), &MIDDLE);
     run.expect(1, TO_T1);
     run.says(&["a", "fmi2DoStep", "0.53125"]);
 }
 
 #[test]
-fn an_fmu_that_wants_the_simulation_to_end_ends_it_in_order() {
+fn an_fmu_that_requests_the_end_of_the_simulation_ends_it_normally() {
     let run = Run::pair(&CFmu::that("end at t1"), &MIDDLE);
     run.expect(0, TO_T1);
-    // b is beyond: the last row is that of the last time that both had.
+    // b has already stepped further: the last row has the last time that both have reached.
     run.says(&["a requested the end", "t = 0.53125 s", "the results end at t = 0.5 s"]);
     assert_eq!(run.numbers("time").len(), TO_T1);
     let run = Run::pair(&CFmu::that("end at t1"), &[&MIDDLE[..], &["--rollback"]].concat());
@@ -195,7 +195,7 @@ fn an_fmu_that_wants_the_simulation_to_end_ends_it_in_order() {
 }
 
 #[test]
-fn steps_that_come_to_nothing_end_the_run() {
+fn steps_without_progress_end_the_run() {
     let run = Run::pair(&CFmu::that("discard every step"), &[]);
     run.expect(1, 1);
     run.says(&["a", "fmi2Discard"]);
@@ -205,7 +205,7 @@ fn steps_that_come_to_nothing_end_the_run() {
 }
 
 #[test]
-fn a_step_that_is_pending_for_ever_is_given_up_after_the_time_limit() {
+fn a_step_that_stays_pending_is_given_up_after_the_time_limit() {
     let run = Run::pair(&CFmu::that("pend"), &["--set", "a.n=-1", "--time-limit", "0.2"]);
     run.expect(1, 1);
     run.says(&["a", "t = 0 s", "fmi2DoStep", "did not return within 0.2"]);
@@ -218,9 +218,9 @@ fn a_pending_step_that_fails_ends_the_run() {
     run.says(&["fmi2DoStep", "failed in the background"]);
 }
 
-/// Whole steps end at 20.000000000000004 s, as an FMU that adds them to their begins sees it.
+/// Steps of full size end at 20.000000000000004 s for an FMU that adds the step to its start.
 #[test]
-fn an_fmu_that_refuses_what_is_an_ulp_beyond_its_stop_time_runs_to_it() {
+fn an_fmu_that_refuses_steps_an_ulp_beyond_its_stop_time_runs_to_it() {
     let strict = CFmu::that("refuse what is beyond the stop time");
     let last = 19.990_000_000_000_002;
     assert!(last + 0.01 > 20.0);
@@ -239,7 +239,7 @@ fn an_fmu_that_refuses_what_is_an_ulp_beyond_its_stop_time_runs_to_it() {
 }
 
 #[test]
-fn an_fmu_of_equal_steps_ends_the_run_with_its_last_whole_step_and_the_command_says_so() {
+fn an_fmu_with_equal_steps_ends_the_run_with_its_last_whole_step_and_a_warning() {
     let rigid =
         CFmu::that("step of one size").flag("canHandleVariableCommunicationStepSize", false);
     Run::pair(&rigid, &[]).expect(0, ALL);
@@ -251,7 +251,7 @@ fn an_fmu_of_equal_steps_ends_the_run_with_its_last_whole_step_and_the_command_s
 }
 
 #[test]
-fn two_instances_of_an_fmu_for_one_are_refused_with_the_way_out() {
+fn two_instances_of_an_fmu_that_allows_one_are_refused_and_isolation_is_suggested() {
     let one = CFmu::that("one instance only").flag("canBeInstantiatedOnlyOncePerProcess", true);
     let run = Run::of(&[("a", &one), ("b", &one)], &[]);
     assert_eq!(run.status, Some(2), "{}", run.message);
@@ -259,7 +259,7 @@ fn two_instances_of_an_fmu_for_one_are_refused_with_the_way_out() {
 }
 
 #[test]
-fn several_instances_of_one_fmu_run_side_by_side() {
+fn several_instances_of_one_fmu_run_together() {
     let fmu = CFmu::well_behaved();
     let run = Run::of(&[("a", &fmu), ("b", &fmu), ("c", &fmu)], &["--set", "c.u=-2"]);
     assert_eq!(run.status, Some(0), "{}", run.message);
@@ -270,7 +270,7 @@ fn several_instances_of_one_fmu_run_side_by_side() {
 }
 
 #[test]
-fn messages_with_a_foreign_environment_or_none_are_those_of_the_fmu_that_is_called() {
+fn messages_with_a_foreign_or_null_environment_are_attributed_to_the_fmu_that_is_called() {
     for isolate in [&[][..], &["--isolate"]] {
         let run = Run::pair(&CFmu::that("no environment in fmi2DoStep"), isolate);
         run.expect(0, ALL);
@@ -292,7 +292,7 @@ fn value_references_in_messages_become_the_names_of_the_variables() {
     }
 }
 
-/// What an FMU can do to its process, and the word for it in the report.
+/// Behaviours that end or corrupt the process, and the word for each in the report.
 const ENDS: [(&str, &str); 6] = [
     ("crash", "SIGSEGV"),
     ("abort", "SIGABRT"),
@@ -304,7 +304,7 @@ const ENDS: [(&str, &str); 6] = [
 
 #[test]
 #[cfg(unix)]
-fn an_fmu_that_ends_the_process_is_named_with_call_and_time_and_the_rows_stay() {
+fn an_fmu_that_ends_the_process_is_reported_with_call_and_time_and_the_rows_are_kept() {
     for (deed, word) in ENDS {
         let run = Run::pair(&CFmu::that(&format!("{deed} in fmi2DoStep")), &[]);
         run.expect(1, TO_T1);
@@ -314,7 +314,7 @@ fn an_fmu_that_ends_the_process_is_named_with_call_and_time_and_the_rows_stay() 
 
 #[test]
 #[cfg(unix)]
-fn an_fmu_that_ends_the_process_after_the_last_step_takes_no_row_with_it() {
+fn no_row_is_lost_if_an_fmu_ends_the_process_after_the_last_step() {
     for function in ["fmi2Terminate", "fmi2FreeInstance"] {
         for (deed, word) in ENDS {
             let run = Run::pair(&CFmu::that(&format!("{deed} in {function}")), &[]);
@@ -326,7 +326,7 @@ fn an_fmu_that_ends_the_process_after_the_last_step_takes_no_row_with_it() {
 
 #[test]
 #[cfg(unix)]
-fn an_fmu_that_ends_the_process_before_the_first_step_is_named_with_the_call() {
+fn an_fmu_that_ends_the_process_before_the_first_step_is_reported_with_the_call() {
     for function in ["fmi2Instantiate", "fmi2EnterInitializationMode", "fmi2SetReal"] {
         for (deed, word) in ENDS {
             let fmu = CFmu::that(&format!("{deed} in {function}"));
@@ -339,7 +339,7 @@ fn an_fmu_that_ends_the_process_before_the_first_step_is_named_with_the_call() {
 
 #[test]
 #[cfg(unix)]
-fn an_fmu_that_corrupts_the_heap_of_all_is_named_with_call_and_time() {
+fn an_fmu_that_corrupts_the_common_heap_is_reported_with_call_and_time() {
     for function in ["fmi2DoStep", "fmi2Terminate"] {
         let run = Run::pair(&CFmu::that(&format!("corrupt the heap in {function}")), &[]);
         assert_eq!(run.status, Some(1), "{}", run.message);
@@ -349,7 +349,7 @@ fn an_fmu_that_corrupts_the_heap_of_all_is_named_with_call_and_time() {
 }
 
 #[test]
-fn a_time_limit_without_isolation_says_what_it_cannot_do() {
+fn a_time_limit_without_isolation_gives_a_warning() {
     let run = Run::pair(&CFmu::well_behaved(), &["--time-limit", "5"]);
     run.expect(0, ALL);
     run.says(&["warning: --time-limit without --isolate cannot end a call that hangs"]);

@@ -26,7 +26,8 @@ fn iterated(coupling: Coupling, sweep: Method, extrapolation: Extrapolation) -> 
     }
 }
 
-/// Prints the errors of `algorithm` over the steps; the observed order, by the two smallest steps.
+/// Prints the errors of `algorithm` for all steps; returns the observed order of the two smallest
+/// steps.
 fn observed(label: &str, network: &Network, able: Abilities, algorithm: &Algorithm) -> f64 {
     let errors = STEPS.map(|steps| {
         let step = STOP / f64::from(steps);
@@ -53,7 +54,7 @@ fn both() -> [(&'static str, Network); 2] {
     ]
 }
 
-/// The order of `algorithm`, which is to be `expected`.
+/// Checks that the order of `algorithm` is `expected`.
 fn check(network: &Network, able: Abilities, algorithm: &Algorithm, expected: f64) {
     let mut label = format!("{} {}", algorithm.method.name(), algorithm.extrapolation.name());
     if algorithm.coupling != Coupling::Once {
@@ -63,7 +64,7 @@ fn check(network: &Network, able: Abilities, algorithm: &Algorithm, expected: f6
     assert!((order - expected).abs() < 0.25, "{label}: {order}");
 }
 
-/// Every sweep with every extrapolation and its order, on both problems.
+/// Every order of stepping with every extrapolation, and the expected order, on both problems.
 fn verify(what: &str, able: Abilities, courses: &[(Extrapolation, f64)]) {
     for (problem, network) in both() {
         head(&format!("{problem}; {what}"));
@@ -95,9 +96,9 @@ fn with_first_derivatives_only_parabolas_are_of_order_3() {
     );
 }
 
-/// The first step has no past values and is held, which costs a parabola its order 3.
+/// The first step has no past values and holds its inputs, so a parabola does not reach order 3.
 #[test]
-fn past_values_in_place_of_output_derivatives_give_order_2() {
+fn past_values_instead_of_output_derivatives_give_order_2() {
     let courses = [(Extrapolation::Limited, 2.0), (Extrapolation::Linear, 2.0)];
     verify("input derivatives, no output derivatives", PAST, &courses);
     for (problem, network) in both() {
@@ -111,7 +112,7 @@ fn past_values_in_place_of_output_derivatives_give_order_2() {
 }
 
 #[test]
-fn slaves_that_hold_their_inputs_get_the_mean_of_the_course_which_is_of_order_2() {
+fn slaves_that_hold_their_inputs_get_the_mean_over_the_step_which_is_of_order_2() {
     let courses =
         [(Extrapolation::Hold, 1.0), (Extrapolation::Linear, 2.0), (Extrapolation::Quadratic, 2.0)];
     let network = problems::coupled_oscillators();
@@ -123,7 +124,7 @@ fn slaves_that_hold_their_inputs_get_the_mean_of_the_course_which_is_of_order_2(
     }
 }
 
-/// The force at the end of a step is that of the mean displacement, not of the one at the end.
+/// The force at the end of a step is computed from the mean displacement, not from that at the end.
 #[test]
 fn slaves_that_hold_their_inputs_and_depend_on_them_directly_are_of_order_1() {
     let network = problems::two_masses(20.0, 0.5);
@@ -141,7 +142,7 @@ fn slaves_that_hold_their_inputs_and_depend_on_them_directly_are_of_order_1() {
 }
 
 #[test]
-fn slaves_at_steps_of_their_own_keep_the_order() {
+fn slaves_with_multiples_of_the_step_keep_the_order() {
     for (problem, network) in both() {
         head(&format!("{problem}; the second slave steps every 4 H"));
         for sweep in SWEEPS {
@@ -157,10 +158,10 @@ fn slaves_at_steps_of_their_own_keep_the_order() {
     }
 }
 
-/// Rows between the ends of a slave's own steps have its values on the line between these ends, which
-/// is of order 2; the slave that steps first, too, is read on its way and not at its end.
+/// Rows between the ends of a slave's own steps have values on the line between these ends, which
+/// is of order 2. A slave that steps first is also read within its step and not at its end.
 #[test]
-fn what_is_read_of_a_slave_on_its_way_is_of_its_time() {
+fn a_slave_with_a_multiple_of_the_step_is_read_at_the_time_of_its_reader() {
     for (problem, network) in both() {
         for sweep in SWEEPS {
             for multiples in [vec![1, 4], vec![4, 1]] {
@@ -184,7 +185,7 @@ fn what_is_read_of_a_slave_on_its_way_is_of_its_time() {
 }
 
 #[test]
-fn iterated_coupling_is_of_the_order_of_its_course() {
+fn iterated_coupling_has_the_order_of_its_extrapolation() {
     for (problem, network) in both() {
         head(&format!("{problem}; iterated"));
         for coupling in COUPLINGS {
@@ -201,7 +202,7 @@ fn iterated_coupling_is_of_the_order_of_its_course() {
     }
 }
 
-/// A coupling so stiff that its own frequency w is that of `w H = 2.2`.
+/// A coupling so stiff that its own frequency w gives `w H = 2.2`.
 #[test]
 fn iterated_coupling_is_stable_where_explicit_coupling_is_not() {
     for sweep in SWEEPS {

@@ -1,4 +1,4 @@
-//! Crates outside of the workspace that use one library each, as a user writes them.
+//! Crates outside of the workspace that use one library each, as a user would write them.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::fs;
@@ -8,7 +8,8 @@ use std::sync::OnceLock;
 
 use tests::{dist, root, run};
 
-/// Builds the crates of `tests/outside` with the versions of this workspace; the folder of their programs.
+/// Builds the crates of `tests/outside` with the dependency versions of this workspace; returns the
+/// folder of their programs.
 fn built() -> &'static Path {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     FOLDER.get_or_init(|| {
@@ -18,7 +19,7 @@ fn built() -> &'static Path {
             fs::create_dir_all(crates.join(name).join("src")).unwrap();
             let main = format!("{name}/src/main.rs");
             fs::copy(source.join(&main), crates.join(&main)).unwrap();
-            // Paths from one folder deeper.
+            // The paths of the dependencies start one folder deeper.
             let manifest = fs::read_to_string(source.join(name).join("Cargo.toml")).unwrap();
             let manifest = manifest.replace("\"../../../crates", "\"../../../../crates");
             fs::write(crates.join(name).join("Cargo.toml"), manifest).unwrap();
@@ -77,7 +78,7 @@ fn thirty_lines_couple_two_fmus_as_the_command_does() {
         ["FrictionPendulum.fmu", "AsoController.fmu"].map(|file| dist().join(file));
     let (first, second) = (plant.display().to_string(), controller.display().to_string());
     let paths = ["run", "--plant", &first, "--controller", &second];
-    // What `Algorithm::new` stands for: Gauss-Seidel, limited slopes, fixed steps.
+    // The settings of `Algorithm::new`: Gauss-Seidel, limited slopes, fixed steps.
     let algorithm =
         ["--method", "gauss-seidel", "--extrapolation", "limited", "--coupling", "once"];
     let rest = ["--step", "0.001", "--stop-time", "10", "--out", &out];
@@ -88,7 +89,7 @@ fn thirty_lines_couple_two_fmus_as_the_command_does() {
 }
 
 #[test]
-fn a_system_toml_runs_by_the_library_as_by_the_command() {
+fn a_system_toml_gives_the_same_results_by_the_library_and_by_the_command() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("system.toml");
     let entry = |name: &str, file: &str| format!("{name} = {:?}\n", dist().join(file));

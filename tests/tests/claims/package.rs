@@ -1,4 +1,4 @@
-//! The packed FMUs and what is committed of them.
+//! The packed FMUs and the committed files that describe them.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::collections::BTreeSet;
@@ -57,7 +57,7 @@ fn names(description: &ModelDescription, causality: Causality) -> Vec<&str> {
 }
 
 #[test]
-fn the_interfaces_are_those_of_the_documents() {
+fn the_variables_are_those_of_the_documents() {
     let plant = unpacked("FrictionPendulum").description;
     assert_eq!(names(&plant, Causality::Input), ["u", "f_a"]);
     assert_eq!(names(&plant, Causality::Output), ["x_p", "theta", "v_p", "omega", "f_fric"]);
@@ -84,7 +84,7 @@ fn the_interfaces_are_those_of_the_documents() {
 }
 
 #[test]
-fn the_outputs_of_the_controller_depend_on_no_input_within_a_step() {
+fn no_output_of_the_controller_depends_on_an_input_within_a_step() {
     let controller = unpacked("AsoController").description;
     assert_eq!(controller.structure.outputs.len(), 6);
     for unknown in &controller.structure.outputs {
@@ -129,7 +129,7 @@ fn an_fmu_holds_library_resources_documentation_licences_and_picture() {
 }
 
 #[test]
-fn the_licences_of_exactly_what_is_linked_are_in_the_fmu() {
+fn an_fmu_contains_the_licences_of_exactly_the_linked_crates() {
     for (member, model) in [("fmu-plant", "FrictionPendulum"), ("fmu-controller", "AsoController")]
     {
         let tree = ["tree", "--locked", "--package", member, "--edges", "normal,no-proc-macro"];
@@ -166,7 +166,7 @@ fn the_licences_of_exactly_what_is_linked_are_in_the_fmu() {
 }
 
 #[test]
-fn no_path_of_the_building_machine_is_in_the_libraries() {
+fn the_libraries_contain_no_path_of_the_building_machine() {
     let home = std::env::var("HOME").unwrap_or_default();
     for model in MODELS {
         let library = fs::read(unpacked(model).library(model).unwrap()).unwrap();

@@ -1,4 +1,4 @@
-//! `aso-ftc run`, driven from outside.
+//! `aso-ftc run`, run as a process.
 #![expect(clippy::unwrap_used, clippy::float_cmp, reason = "tests; numbers as written")]
 
 mod configuration;
@@ -39,7 +39,7 @@ impl Bench {
         fs::read_to_string(self.path(name)).unwrap()
     }
 
-    /// Writes a file and gives its path.
+    /// Writes a file and returns its path.
     fn write(&self, name: &str, text: &str) -> String {
         fs::write(self.path(name), text).unwrap();
         self.text(name)
@@ -56,19 +56,19 @@ impl Bench {
         command
     }
 
-    /// Runs plant and controller, the results in `out`.
+    /// Runs plant and controller with the results in `out`.
     fn coupled(&self, more: &[&str]) -> Output {
         let arguments = coupled(more);
         self.run(&arguments.iter().map(String::as_str).collect::<Vec<_>>())
     }
 
-    /// As [`Bench::coupled`], which is to succeed; what was printed.
+    /// As [`Bench::coupled`], but must succeed; returns the output.
     fn coupled_well(&self, more: &[&str]) -> String {
         printed(&self.coupled(more))
     }
 }
 
-/// The arguments for plant and controller, the results in `out`.
+/// The arguments for plant and controller with the results in `out`.
 fn coupled(more: &[&str]) -> Vec<String> {
     let (plant, controller) = (fmu("FrictionPendulum"), fmu("AsoController"));
     let common = ["--plant", &plant, "--controller", &controller, "--out", "out"];
@@ -97,7 +97,7 @@ fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// Checks the exit status, and that standard error has all of `parts`.
+/// Checks the exit status, and that standard error contains all of `parts`.
 fn fails(output: &Output, status: i32, parts: &[&str]) {
     let message = said(output);
     assert_eq!(output.status.code(), Some(status), "{message}");
@@ -113,7 +113,8 @@ fn names(path: &Path) -> Vec<String> {
     reader.headers().unwrap().iter().map(str::to_owned).collect()
 }
 
-/// Checks that every line has as many cells as the first and ends; the number of rows.
+/// Checks that every line is complete and has as many cells as the first; returns the number of
+/// rows.
 fn whole_rows(text: &str) -> usize {
     assert!(text.ends_with('\n'));
     let cells = text.lines().next().unwrap().split(',').count();

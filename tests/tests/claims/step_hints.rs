@@ -1,4 +1,4 @@
-//! Steps that a system structure proposes for its elements: `osp:StepSizeHint`.
+//! Steps that a system structure suggests for its elements: `osp:StepSizeHint`.
 #![expect(clippy::unwrap_used, reason = "tests; numbers are exact by construction")]
 
 use std::path::{Path, PathBuf};
@@ -26,7 +26,7 @@ fn component(name: &str, hint: Option<f64>) -> String {
     )
 }
 
-/// `a`, whose input is 1, before `b` in the system `sub`, with those hints and that base step.
+/// `a`, whose input is 1, before `b` in the system `sub`, with these hints and this base step.
 fn structure(hints: [Option<f64>; 2], base: Option<f64>) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let _ = CFmu::well_behaved().write(folder.path(), "slave");
@@ -57,7 +57,7 @@ fn structure(hints: [Option<f64>; 2], base: Option<f64>) -> (TempDir, PathBuf) {
     (folder, path)
 }
 
-/// Times and outputs of `b` of a run with held inputs, and what `--explain` said.
+/// Runs with held inputs; returns times and outputs of `b`, and the text of `--explain`.
 fn run(structure: &Path, more: &[&str]) -> (Vec<f64>, Vec<f64>, String) {
     let out = structure.with_file_name("out");
     let (path, folder) = (structure.display().to_string(), out.display().to_string());
@@ -71,7 +71,8 @@ fn run(structure: &Path, more: &[&str]) -> (Vec<f64>, Vec<f64>, String) {
     (table.column("time"), table.column("sub.b.y"), said)
 }
 
-/// The output of `b` at the multiples of its step: each step adds `step` times the time before it.
+/// The output of `b` at the multiples of its step: each step adds `step` times the time at its
+/// start.
 fn expected(step: f64, steps: u32) -> Vec<f64> {
     let mut sum = 0.0;
     let mut all = vec![sum];
@@ -83,11 +84,11 @@ fn expected(step: f64, steps: u32) -> Vec<f64> {
 }
 
 #[test]
-fn the_base_step_is_the_step_of_all_and_a_hint_makes_an_element_step_less_often() {
+fn the_base_step_is_the_communication_step_and_a_hint_gives_an_element_a_multiple_of_it() {
     for (hints, base) in [
         ([None, Some(0.125)], Some(0.0625)),
         ([Some(0.0625), Some(0.125)], Some(0.0625)),
-        // Without a base step the least hint is the step.
+        // Without a base step the smallest hint is the step.
         ([Some(0.0625), Some(0.125)], None),
     ] {
         let (_folder, path) = structure(hints, base);
@@ -100,7 +101,7 @@ fn the_base_step_is_the_step_of_all_and_a_hint_makes_an_element_step_less_often(
 }
 
 #[test]
-fn what_the_user_states_goes_before_the_hints() {
+fn settings_of_the_user_override_the_hints() {
     let (_folder, path) = structure([Some(0.0625), Some(0.125)], Some(0.0625));
     let (time, y, said) = run(&path, &["--every", "sub.b=4"]);
     assert_eq!(time.len(), 17);

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use tests::root;
 
-/// All files below `folder` with that extension, without what is built.
+/// All files below `folder` with this extension, without build results.
 fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for item in fs::read_dir(folder).unwrap() {
@@ -42,7 +42,7 @@ fn the_mathematics_depends_on_neither_fmi_nor_files() {
     }
 }
 
-/// The folders of our libraries, each with those that it may use.
+/// The folders of our libraries, each with the libraries that it may use.
 const ARROWS: [(&str, &[&str]); 15] = [
     ("lapack", &[]),
     ("control", &["aso-lapack"]),
@@ -66,7 +66,7 @@ fn manifest(folder: &Path) -> toml::Table {
 }
 
 #[test]
-fn the_libraries_use_each_other_along_the_arrows_only() {
+fn the_libraries_use_only_those_that_architecture_md_allows() {
     let mut folders: Vec<String> = fs::read_dir(root().join("crates"))
         .unwrap()
         .map(|item| item.unwrap().file_name().into_string().unwrap())
@@ -86,7 +86,7 @@ fn the_libraries_use_each_other_along_the_arrows_only() {
 }
 
 #[test]
-fn nothing_but_the_tests_uses_a_model_or_the_command() {
+fn only_tests_use_a_model_or_the_command() {
     let folders = ARROWS.iter().map(|(folder, _)| root().join("crates").join(folder));
     for folder in folders.chain([root().join("cli"), root().join("tests")]) {
         let manifest = manifest(&folder);
@@ -106,17 +106,17 @@ fn nothing_but_the_tests_uses_a_model_or_the_command() {
 }
 
 #[test]
-fn unsafe_code_stands_at_the_boundaries_only() {
+fn unsafe_code_is_at_foreign_boundaries_only() {
     let allowed = [
         "crates/fmu/src/ffi.rs",
         "crates/fmu/src/ffi/entry.rs",
         "crates/fmu/src/ffi/exports.rs",
         "crates/fmu-import/src/library.rs",
-        // Signal handlers, and what they read.
+        // Signal handlers, and the data that they read.
         "crates/fmu-import/src/crash/place.rs",
         "crates/fmu-import/src/crash/signals.rs",
         "crates/fmu-import/src/isolate/memory.rs",
-        // A mapping of shared memory becomes a slice of atomics.
+        // Shared memory viewed as a slice of atomics.
         "crates/fmu-import/src/isolate/region.rs",
         // The C side of BLAS and LAPACK, and its tests.
         "crates/lapack/src/memory.rs",
@@ -133,7 +133,7 @@ fn unsafe_code_stands_at_the_boundaries_only() {
         "crates/fmu-import/src/library/log.rs",
         "crates/fmu-import/src/library/states.rs",
         "crates/fmu-import/src/library/step.rs",
-        // Importers of their own, to call the C functions as no safe one would.
+        // Importers for tests, which call the C functions in ways that safe code cannot.
         "tests/robustness/src/importer.rs",
         "tests/robustness/tests/robustness/uninitialised.rs",
         "fuzz/src/design.rs",
@@ -153,8 +153,8 @@ fn unsafe_code_stands_at_the_boundaries_only() {
     }
 }
 
-/// Whether a licence expression can be met by those that are allowed: each part that AND joins by one
-/// of its alternatives.
+/// Whether the allowed licences satisfy a licence expression: one alternative of each part joined
+/// by AND.
 fn is_allowed(expression: &str, allowed: &[&str]) -> bool {
     let plain = expression.replace(['(', ')'], " ").replace('/', " OR ");
     let known = |own: &str| allowed.contains(&own.trim().split(" WITH ").next().unwrap_or(""));
@@ -162,7 +162,7 @@ fn is_allowed(expression: &str, allowed: &[&str]) -> bool {
 }
 
 #[test]
-fn every_dependency_has_a_licence_that_deny_toml_allows() {
+fn deny_toml_allows_the_licence_of_every_dependency() {
     let deny: toml::Table = fs::read_to_string(root().join("deny.toml")).unwrap().parse().unwrap();
     let allowed = deny["licenses"]["allow"].as_array().unwrap();
     let allowed: Vec<&str> = allowed.iter().map(|own| own.as_str().unwrap()).collect();

@@ -1,4 +1,4 @@
-//! FMUs in processes of their own: the same numbers, and whatever they do, a clear report.
+//! Isolated FMUs give the same results, and every misbehaviour gives a clear report.
 #![cfg(target_os = "linux")]
 #![expect(clippy::unwrap_used, clippy::float_cmp, reason = "tests; numbers as written")]
 
@@ -13,7 +13,7 @@ use master::{Advance, CallError, Failure, Slave, StepResult};
 use tests::isolated::{limited, options, ready};
 use tests::{Trouble, dist, troubles};
 
-/// The error of a step of 0.5 s in which the FMU makes that trouble.
+/// The error of a step of 0.5 s with this misbehaviour of the FMU.
 fn error_of(trouble: Trouble, options: &Options) -> (Isolated, CallError) {
     let mut slave = ready(options);
     slave.set_integer(&[0], &[trouble as i32]).unwrap();
@@ -23,7 +23,7 @@ fn error_of(trouble: Trouble, options: &Options) -> (Isolated, CallError) {
     (slave, error)
 }
 
-/// Sets u = `input`, steps 0.5 s from 0 s; y.
+/// Sets u = `input`, steps 0.5 s from 0 s, and returns y.
 fn advance(slave: &mut dyn Slave, input: f64, size: f64) -> Result<(StepResult, f64), CallError> {
     let mut output = [f64::NAN];
     let input = [input];
@@ -36,7 +36,7 @@ fn is_gone(process: u32) -> bool {
     !std::path::Path::new(&format!("/proc/{process}")).exists()
 }
 
-/// Value references of the Reals, or of those of one causality.
+/// Value references of the Reals, or of those with one causality.
 fn reals(description: &ModelDescription, causality: Option<Causality>) -> Vec<u32> {
     let variables = description.variables.iter();
     variables
@@ -51,7 +51,7 @@ struct Pendulum<'a> {
     plant: &'a mut dyn Slave,
     inputs: Vec<u32>,
     outputs: Vec<u32>,
-    /// The bits of all that was read.
+    /// The bits of all values that were read.
     trajectory: Vec<u64>,
 }
 
@@ -84,8 +84,8 @@ impl Pendulum<'_> {
     }
 }
 
-/// All Reals of the pendulum, by bits, after each of some steps that go back now and then, and at
-/// the end its state as bytes and a derivative.
+/// Steps the pendulum, sometimes going back, and returns the bits of all its Reals after each step,
+/// and at the end its serialised state and a derivative.
 fn trajectory(plant: &mut dyn Slave) -> (Vec<u64>, Vec<u8>) {
     let description = plant.description().clone();
     let of = |causality| reals(&description, causality);
@@ -131,7 +131,7 @@ fn the_isolated_pendulum_gives_the_same_bits() {
 }
 
 #[test]
-fn every_type_of_variable_and_long_data_pass() {
+fn every_type_of_variable_and_large_data_are_transferred() {
     let mut slave = ready(&options());
     slave.set_boolean(&[0], &[1]).unwrap();
     let mut flags = [0, 0];
@@ -156,7 +156,7 @@ fn every_type_of_variable_and_long_data_pass() {
 }
 
 #[test]
-fn errors_and_early_ends_are_those_of_the_fmu_itself() {
+fn errors_and_early_ends_are_reported_as_without_isolation() {
     let mut far = ready(&options());
     let mut near = Fmu::open(troubles()).unwrap().instantiate("one").unwrap();
     near.setup_experiment(&Experiment::default()).unwrap();
@@ -194,7 +194,7 @@ fn a_crash_is_reported_with_its_function_and_signal() {
     ] {
         let (slave, error) = error_of(trouble, &options());
         assert_eq!(error.function, function, "{trouble:?}");
-        // Rust's handler ends an overflow of the stack by abort.
+        // Rust's handler aborts the process after a stack overflow.
         if trouble == Trouble::OverflowStack && error.failure == Failure::Killed(6, "SIGABRT") {
             continue;
         }
@@ -204,7 +204,7 @@ fn a_crash_is_reported_with_its_function_and_signal() {
 }
 
 #[test]
-fn what_the_fmu_said_before_it_crashed_is_in_the_report() {
+fn messages_of_the_fmu_before_its_crash_are_in_the_report() {
     let (_, error) = error_of(Trouble::CrashInStep, &options());
     assert_eq!(error.messages, ["this will not end well"]);
     let text = error.to_string();
@@ -218,7 +218,7 @@ fn an_exit_is_reported_with_its_status() {
 }
 
 #[test]
-fn an_fmu_that_hangs_is_ended_with_the_processes_it_started() {
+fn an_fmu_that_hangs_is_ended_with_the_processes_that_it_started() {
     for trouble in [Trouble::Hang, Trouble::HangWithChild, Trouble::CloseFiles] {
         let begin = Instant::now();
         let (slave, error) = error_of(trouble, &limited(300));
@@ -239,21 +239,21 @@ fn group_exists(group: &str) -> bool {
     let stats =
         processes.filter_map(|entry| std::fs::read_to_string(entry.path().join("stat")).ok());
     stats.into_iter().any(|stat| {
-        // After the name in brackets: state, parent, group.
+        // After the name in parentheses: state, parent, group.
         let fields: Vec<_> = stat.rsplit(") ").next().unwrap_or("").split(' ').collect();
         fields.get(2) == Some(&group) && fields.first() != Some(&"Z")
     })
 }
 
 #[test]
-fn a_turn_that_the_fmu_wrote_over_is_noticed_at_once() {
+fn an_fmu_that_overwrites_the_turn_counter_is_detected_at_once() {
     let (slave, error) = error_of(Trouble::AnswerWrongTurn, &options());
     assert!(error.to_string().contains("wrote over shared memory"), "{error}");
     assert!(is_gone(slave.process_id()));
 }
 
 #[test]
-fn shared_memory_that_a_thread_of_the_fmu_fills_with_anything_is_survived() {
+fn the_master_survives_a_thread_of_the_fmu_that_overwrites_the_shared_memory() {
     for _ in 0..10 {
         let mut slave = ready(&limited(500));
         slave.set_integer(&[0], &[Trouble::OverwriteShared as i32]).unwrap();
@@ -274,7 +274,7 @@ fn shared_memory_that_a_thread_of_the_fmu_fills_with_anything_is_survived() {
 }
 
 #[test]
-fn a_flood_of_messages_neither_stalls_nor_stops_the_run() {
+fn very_many_messages_neither_delay_nor_end_the_run() {
     let mut slave = ready(&options());
     slave.set_integer(&[0], &[Trouble::Flood as i32]).unwrap();
     assert_eq!(advance(&mut slave, 1.0, 0.5).unwrap(), (StepResult::Whole, 0.5));
@@ -283,7 +283,7 @@ fn a_flood_of_messages_neither_stalls_nor_stops_the_run() {
 }
 
 #[test]
-fn an_fmu_that_does_not_free_itself_is_ended() {
+fn an_fmu_that_hangs_while_it_is_freed_is_ended() {
     for trouble in [Trouble::HangInFree, Trouble::CrashInFree] {
         let mut slave = ready(&limited(200));
         slave.set_integer(&[0], &[trouble as i32]).unwrap();
@@ -305,7 +305,7 @@ fn an_fmu_that_fails_at_once_is_reported() {
 }
 
 #[test]
-fn an_instance_is_made_anew_in_the_same_process() {
+fn an_instance_can_be_created_again_in_the_same_process() {
     let mut slave = ready(&options());
     let process = slave.process_id();
     for _ in 0..3 {
@@ -332,7 +332,7 @@ fn an_instance_is_made_anew_in_the_same_process() {
 }
 
 #[test]
-fn what_cannot_be_isolated_is_refused_by_name() {
+fn fmus_that_cannot_be_isolated_are_refused_with_the_reason() {
     let missing = isolate::open("missing.fmu".as_ref(), "one", &options()).err().unwrap();
     assert!(missing.to_string().contains("missing.fmu"), "{missing}");
     let wrong = Options { executable: Some("no/such/program".into()), ..options() };
@@ -354,7 +354,7 @@ fn what_cannot_be_isolated_is_refused_by_name() {
 }
 
 #[test]
-fn a_worker_without_a_master_says_so() {
+fn a_worker_without_a_master_reports_it() {
     let output = tests::run(&[isolate::WORKER]);
     assert_eq!(output.status.code(), Some(2));
     let text = String::from_utf8_lossy(&output.stderr).into_owned();

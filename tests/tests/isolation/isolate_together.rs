@@ -1,4 +1,4 @@
-//! Isolated FMUs step at the same time: the same numbers, and the same reports.
+//! Isolated FMUs step at the same time, with the same results and the same reports.
 #![cfg(target_os = "linux")]
 #![expect(clippy::float_cmp, reason = "tests; exact by construction")]
 
@@ -11,7 +11,7 @@ use tests::coupled::Run;
 use tests::isolated::{limited, options, ready};
 
 #[test]
-fn steps_begun_together_are_finished_together() {
+fn steps_started_together_are_finished_together() {
     let mut slaves = [ready(&options()), ready(&options()), ready(&options())];
     let mut outputs = [[0.0]; 3];
     for _ in 0..100 {
@@ -26,7 +26,7 @@ fn steps_begun_together_are_finished_together() {
 }
 
 #[test]
-fn a_step_begun_and_not_finished_is_waited_for_by_the_next_call() {
+fn the_next_call_waits_for_a_step_that_was_started_and_not_finished() {
     let mut slave = ready(&options());
     let mut output = [0.0];
     for steps in 1..=100 {
@@ -44,7 +44,7 @@ fn a_step_begun_and_not_finished_is_waited_for_by_the_next_call() {
 }
 
 #[test]
-fn the_time_of_a_step_runs_from_its_begin() {
+fn the_time_limit_of_a_step_counts_from_its_start() {
     let mut slaves = [ready(&limited(1000)), ready(&limited(1000)), ready(&limited(1000))];
     for slave in &mut slaves {
         slave.set_integer(&[0], &[Trouble::Hang as i32]).unwrap();
@@ -68,8 +68,8 @@ fn step<'a>(input: &'a [f64], output: &'a mut [f64]) -> Advance<'a> {
 
 const NAMES: [&str; 4] = ["a", "b", "c", "d"];
 
-/// Four FMUs, the output of each the input of the next, with those behaviours. In steps at the same
-/// time each has its input from before the step.
+/// Four FMUs with these behaviours; the output of each is the input of the next. In steps at the
+/// same time each gets the input from before the step.
 fn chain(behaviours: [&str; 4], more: &[&str]) -> Run {
     let fmus = behaviours.map(CFmu::that);
     let named: Vec<_> = NAMES.into_iter().zip(&fmus).collect();
@@ -87,7 +87,7 @@ fn outputs(run: &Run) -> Vec<Vec<String>> {
 const WELL: &str = "as it should";
 
 #[test]
-fn four_fmus_in_processes_give_the_same_bits_also_where_steps_are_discarded() {
+fn four_isolated_fmus_give_the_same_bits_even_if_steps_are_discarded() {
     let late = ["--set", "b.t1=0.53125"];
     for (behaviour, more) in [
         (WELL, &late[..]),
@@ -108,7 +108,7 @@ fn four_fmus_in_processes_give_the_same_bits_also_where_steps_are_discarded() {
 }
 
 #[test]
-fn the_crash_of_one_of_four_is_told_of_that_one_and_the_results_are_whole() {
+fn the_crash_of_one_of_four_is_attributed_to_it_and_the_results_are_complete() {
     for (position, name) in NAMES.into_iter().enumerate() {
         let mut behaviours = [WELL; 4];
         behaviours[position] = "crash in fmi2DoStep";
@@ -125,7 +125,7 @@ fn the_crash_of_one_of_four_is_told_of_that_one_and_the_results_are_whole() {
 }
 
 #[test]
-fn of_several_that_fail_in_a_step_the_first_in_order_is_told() {
+fn of_several_failures_in_a_step_the_first_in_order_is_reported() {
     let limit = ["--isolate", "--time-limit", "0.5"];
     for (behaviours, parts) in [
         ([WELL, "exit 3 in fmi2DoStep", "crash in fmi2DoStep", WELL], ["b at t", "exit status 3"]),

@@ -1,4 +1,4 @@
-//! FMUs in processes of their own, with limits of time that the tests of other subjects would use up.
+//! Isolated FMUs. These tests have time limits, so they do not share a process with other tests.
 #![forbid(unsafe_code)]
 
 mod isolate;

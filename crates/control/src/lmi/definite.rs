@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn badly_scaled_definite_matrices_are_told_from_indefinite_ones() {
+    fn badly_scaled_definite_and_indefinite_matrices_are_distinguished() {
         let d = [1.0, 1e-9, 1e9];
         let matrix = |coupling: f64| {
             DMatrix::from_fn(3, 3, |i, j| d[i] * d[j] * if i == j { 1.0 } else { coupling })

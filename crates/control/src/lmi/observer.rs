@@ -147,9 +147,11 @@ impl<'a> ObserverProgram<'a> {
         self.coordinates.refined(&p.evaluate(&problem.most_interior()?))
     }
 
-    /// A gain for the given bound; without one, a gain as far inside of all inequalities as
-    /// possible at a level slightly above the smallest, or else the gain of the smallest level
-    /// itself.
+    /// Returns a gain that meets the given bound.
+    ///
+    /// Without a bound, the level is minimised. Then the gain with the largest margin of all
+    /// inequalities is computed at a slightly larger level; if that fails, the gain of the smallest
+    /// level is returned.
     fn candidate(&self) -> Result<Outcome<Candidate>, Error> {
         let performance = self.requirements.performance;
         if let Some((performance, gamma)) =

@@ -29,9 +29,13 @@ impl RiccatiEquation {
         }
     }
 
-    /// The left side of the equation. Written as the Lyapunov equation for A + B K, in which an
-    /// error of K has an effect of second order only: (A + B K)' P (A + B K) - P + Q + N K + K' N'
-    /// + K' K, and likewise in continuous time.
+    /// The left side of the equation, written as the Lyapunov equation for A + B K, in which an error
+    /// of K has an effect of second order only.
+    ///
+    /// ```text
+    /// (A + B K)' P (A + B K) - P + Q + N K + K' N' + K' K   in sampled time
+    /// (A + B K)' P + P (A + B K) + Q + N K + K' N' + K' K   in continuous time
+    /// ```
     pub(super) fn left_side(&self, p: &DMatrix<f64>, gain: &DMatrix<f64>) -> DMatrix<f64> {
         let cross = &self.n * gain;
         let cost = &self.q + &cross + cross.transpose() + gain.tr_mul(gain);

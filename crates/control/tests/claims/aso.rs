@@ -13,7 +13,7 @@ fn designed() -> AsoDesign {
 }
 
 #[test]
-fn the_error_dynamics_of_the_pendulum_have_the_wanted_eigenvalues() {
+fn the_error_dynamics_of_the_pendulum_have_the_required_eigenvalues() {
     let (plant, design) = (plant(), designed());
     let mut wanted = OBSERVER_POLES;
     wanted.sort_by(f64::total_cmp);
@@ -35,8 +35,7 @@ fn friction_on_the_cart_is_compensated_one_to_one() {
     assert!(design.cancellation_residual < 1e-15);
 }
 
-/// A force on the pendulum itself is beyond the reach of the cart's actuator, `F_a` = [0, 0, 0,
-/// 1]'.
+/// A force on the pendulum itself, `F_a` = [0, 0, 0, 1]', is not in the range of the actuator.
 #[test]
 fn a_fault_beside_the_actuator_leaves_the_residual_of_the_projection() {
     let plant = FaultyPlant { f_a: matrix(4, 1, &[0., 0., 0., 1.]), ..plant() };
@@ -74,8 +73,8 @@ fn the_printed_observer_with_two_signs_repaired_is_stable_and_without_is_not() {
     }
 }
 
-/// Plant and observer simulated together, uncompensated and with a constant fault: the estimate
-/// settles on the fault, whatever the actuator does.
+/// Plant and observer are simulated together, uncompensated and with a constant fault. The estimate
+/// converges to the fault for every command.
 #[test]
 fn the_estimate_reaches_a_constant_fault_for_any_actuator_command() {
     let (plant, gains) = (plant(), designed().gains);
@@ -112,7 +111,8 @@ fn more_faults_than_measurements_are_refused() {
     assert_eq!(refused, Err(Error::TooManyFaults { faults: 3, measurements: 2 }));
 }
 
-/// A constant error of the rate x' = v + f looks like another velocity when only x is measured.
+/// A constant error f of the rate, x' = v + f, has the same effect as another velocity if only x is
+/// measured.
 #[test]
 fn a_fault_that_looks_like_a_state_is_refused() {
     let plant = FaultyPlant::with_constant_faults(

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 
 const FILE: &str = include_str!("../data/faults.txt");
 
-/// The matrix of that name.
+/// Returns the matrix with that name.
 pub(crate) fn reference(name: &str) -> DMatrix<f64> {
     let mut lines = FILE.lines();
     let head = lines.find(|line| line.split(' ').next() == Some(name));

@@ -15,7 +15,7 @@ fn the_friction_of_the_pendulum_can_be_estimated() {
     assert!(found.distance.lower > 0.0 && found.distance.upper < 1.0, "{:?}", found.distance);
 }
 
-/// A constant force moves the cart for ever; the angle at rest does not depend on it: the
+/// A constant force moves the cart for ever, but the angle at rest does not depend on it: the
 /// transfer functions have s = 0 as a pole and as a zero.
 #[test]
 fn a_constant_force_drives_the_cart_away_and_leaves_the_angle() {
@@ -63,8 +63,8 @@ fn hidden_combinations_are_named_by_their_faults() {
     assert_eq!(pair.at, Complex::new(0.0, 0.0));
 }
 
-/// x1' = -x1 - 2 x2 + f, x2' = -x2 + f, y = x1: f to y is (s - 1) / (s + 1)^2. Only a fault that
-/// grows as e^t is blocked.
+/// x1' = -x1 - 2 x2 + f, x2' = -x2 + f, y = x1: the transfer function from f to y is (s - 1) / (s +
+/// 1)^2. It blocks only a fault that grows as e^t.
 #[test]
 fn a_fault_is_hidden_when_its_model_has_the_eigenvalue_of_a_zero() {
     let constant = FaultyPlant::with_constant_faults(
@@ -84,7 +84,8 @@ fn a_fault_is_hidden_when_its_model_has_the_eigenvalue_of_a_zero() {
     assert!(growing.check_observer_exists().is_err());
 }
 
-/// From f to y: (s^2 + 4) / ((s + 1) (s + 2) (s + 3)) blocks a fault that swings with 2 rad/s only.
+/// The transfer function from f to y is (s^2 + 4) / ((s + 1) (s + 2) (s + 3)): it blocks only a
+/// fault that oscillates with 2 rad/s.
 #[test]
 fn a_swinging_fault_is_examined_at_its_own_frequency() {
     let swing = |frequency: f64| FaultyPlant {
@@ -101,7 +102,8 @@ fn a_swinging_fault_is_examined_at_its_own_frequency() {
     assert!(!found.observer_exists());
 }
 
-/// A sampled integrator x[k+1] = x[k] + f: seen at z = 1, without a bound.
+/// A sampled integrator x[k+1] = x[k] + f: a constant fault appears in the measurement, and grows
+/// without bound.
 #[test]
 fn sampled_faults_are_examined_at_one() {
     let one = matrix(1, 1, &[1.0]);
@@ -121,7 +123,7 @@ fn sampled_faults_are_examined_at_one() {
     assert!((found.visibility[0][0].dc_gain.unwrap() - 2.0).abs() < 1e-15);
 }
 
-/// The rate of a ramp has no column of its own, but it is seen through the fault.
+/// The rate of a ramp has no column of its own; it appears in the measurements through the fault.
 #[test]
 fn the_rate_of_a_ramp_is_seen_through_the_fault() {
     let constant = plant();

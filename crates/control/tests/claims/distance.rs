@@ -4,7 +4,7 @@ use crate::paper::plant;
 use control::distance::{from_uncontrollable, from_unobservable};
 use nalgebra::{DMatrix, DVector};
 
-/// Grid and Nelder-Mead in the script.
+/// The expected values are from a grid and Nelder-Mead in the script.
 #[test]
 fn the_bounds_enclose_the_distance_that_a_search_in_scipy_finds() {
     for case in 0..5 {
@@ -17,10 +17,10 @@ fn the_bounds_enclose_the_distance_that_a_search_in_scipy_finds() {
     }
 }
 
-/// The change that removes the small entry of B takes one mode away, and nothing smaller can be much
-/// smaller: the other entries are one.
+/// Removing the small entry of B makes one mode uncontrollable. No much smaller change can do so,
+/// because the other entries are one.
 #[test]
-fn a_mode_that_is_nearly_lost_is_found_where_it_is() {
+fn a_nearly_uncontrollable_mode_is_found_with_its_eigenvalue() {
     let a = DMatrix::from_diagonal(&DVector::from_vec(vec![-1.0, -0.5, 0.25]));
     for weak in [1e-3, 1e-8] {
         let found = from_uncontrollable(&a, &matrix(3, 1, &[1.0, weak, 1.0])).unwrap();
@@ -37,8 +37,8 @@ fn a_lost_mode_has_the_distance_zero() {
     assert!(found.upper < 1e-15 && (found.at + 1.0).norm() < 1e-12, "{found:?}");
 }
 
-/// States in other units, time in ms, other units of the measurements: balancing leaves a few per
-/// cent.
+/// With other units of states, time (ms) and measurements the result changes by a few per cent,
+/// because of balancing.
 #[test]
 fn units_hardly_change_the_distance() {
     let plant = plant();

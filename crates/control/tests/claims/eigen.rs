@@ -4,7 +4,7 @@ use control::eigen::eigenvalues;
 use control::stability::instability;
 use nalgebra::{Complex, DMatrix};
 
-/// The roots of unity; the unshifted QR algorithm stands still on these.
+/// The roots of unity, for which the unshifted QR algorithm does not converge.
 #[test]
 fn cyclic_permutations_have_the_roots_of_unity() {
     for n in 2..=9_u8 {
@@ -28,7 +28,7 @@ fn complex_pairs_are_exact_conjugates_and_ordered() {
     assert_eq!(found[1], found[2].conj());
 }
 
-/// A companion matrix in units that differ by 1e8 from state to state.
+/// A companion matrix in units that differ by up to 1e8 between states.
 #[test]
 fn bad_units_cost_no_precision() {
     let companion = matrix(3, 3, &[0., 1., 0., 0., 0., 1., -6., -11., -6.]);
@@ -49,10 +49,11 @@ fn the_instability_is_the_largest_real_part_or_the_spectral_radius_less_one() {
     assert!((instability(&turning, Domain::Continuous).unwrap() - 0.25).abs() < 1e-13);
 }
 
-/// Three equal pairs -1.5 +- 2i and four others in many bases: rounding keeps the entries between
-/// equal pairs from vanishing. Their error is rounding times the square of the condition number.
+/// Three equal pairs -1.5 +- 2i and four others in many bases. Because of rounding, entries between
+/// equal pairs do not vanish. The error is the rounding error times the square of the condition
+/// number.
 #[test]
-fn pairs_that_come_several_times_are_found() {
+fn repeated_pairs_are_found() {
     let mut blocks = DMatrix::from_diagonal_element(10, 10, -1.5);
     for first in [0, 2, 4] {
         blocks[(first, first + 1)] = 2.0;

@@ -19,7 +19,7 @@ fn the_example_of_moler_and_van_loan_has_its_closed_form() {
     assert!(entry_error(&e, &matrix(2, 2, &expected)) < 1e-13);
 }
 
-/// Every entry, although they differ by fourteen orders of magnitude.
+/// Every entry is accurate, although they differ by fourteen orders of magnitude.
 #[test]
 fn the_observer_of_the_pendulum_agrees_with_high_precision_in_every_entry() {
     let e = exponential(&(matrix(5, 5, &UNCOMPENSATED) * 1e-3)).unwrap();

@@ -1,5 +1,5 @@
-//! Each fault model in a loop: the user's plant, its filter and the controller as one linear system,
-//! written out here and advanced exactly. The observer sees nothing but u and y.
+//! Each fault model in a closed loop: the user's plant, the filter and the controller as one linear
+//! system, written out here and advanced exactly. The observer uses only u and y.
 
 use crate::data::reference;
 use crate::matrix;
@@ -48,7 +48,7 @@ struct Truth<'a> {
     effect: [f64; 2],
 }
 
-/// A linear system, its inputs [f; r] and the place of the controller's states in it.
+/// A linear system, its inputs [f; r] and the position of the controller's states in it.
 struct Loop {
     dynamics: DMatrix<f64>,
     inputs: DMatrix<f64>,
@@ -89,7 +89,7 @@ impl Truth<'_> {
         Loop { dynamics, inputs, controller, before }
     }
 
-    /// `f_hat` and u at the end, under f = f0 + f1 t and a constant r, in exact steps.
+    /// Returns `f_hat` and u at the end, for f = f0 + f1 t and a constant r, by exact steps.
     fn run(
         &self,
         extended: &ExtendedPlant,
@@ -117,7 +117,8 @@ impl Truth<'_> {
     }
 }
 
-/// What is left after `seconds` of the slowest mode e^(-6 t), at a condition number up to 1e7.
+/// The remaining error after `seconds` of the slowest mode e^(-6 t), at a condition number up to
+/// 1e7.
 fn modal_bound(design: &AsoDesign, seconds: f64, size: f64) -> f64 {
     assert!(design.observer.condition < 1e7, "{:?}", design.observer);
     design.observer.condition * (-6.0 * seconds).exp() * size + 1e-11 * size
@@ -148,7 +149,7 @@ fn two_constant_actuator_faults_at_once_are_estimated() {
     }
 }
 
-/// The observer for constant faults lags behind a ramp, that for ramps does not.
+/// The observer for constant faults lags behind a ramp; the observer for ramps does not.
 #[test]
 fn a_ramp_is_followed_without_a_lag_by_the_model_of_a_ramp_only() {
     let force = || FaultEntry::Actuator(column(&[0., 0., 1., 0.]));
@@ -213,7 +214,7 @@ fn the_loss_of_effectiveness_is_estimated_where_the_command_shows_it() {
     assert!(matches!(estimated_loss(1.0, 1.0, 0.0), Err(Error::OutOfRange { name: "u_e", .. })));
 }
 
-/// Gains by `place_poles`, limits by brentq.
+/// The gains are from `place_poles`, the limits from brentq.
 #[test]
 fn the_loss_that_a_loop_survives_is_that_of_scipy() {
     let Carts { a, b, c } = carts();
@@ -237,7 +238,7 @@ fn the_loss_that_a_loop_survives_is_that_of_scipy() {
     assert!(small.worst_instability < 0.0 && (small.common - 0.3).abs() < 1e-15, "{small:?}");
 }
 
-/// The same, the loop written in Python as one step of the algorithm.
+/// The same with the loop written in Python as one step of the algorithm.
 #[test]
 fn the_loss_that_a_sampled_loop_survives_is_that_of_scipy() {
     let of = |part: &str| reference(&format!("sampled_loss_{part}"));
@@ -263,10 +264,10 @@ fn the_loss_that_a_sampled_loop_survives_is_that_of_scipy() {
     }
 }
 
-/// A position that is measured only once, and the only one: its bias is the same as another
-/// position, because the cart at rest may stand anywhere.
+/// With a single measurement of the position, its bias cannot be distinguished from another
+/// position, because a cart can rest at any position.
 #[test]
-fn the_bias_of_a_position_that_nothing_else_shows_is_refused() {
+fn the_bias_of_a_position_without_another_measurement_of_it_is_refused() {
     let FaultyPlant { a, b, c, .. } = plant();
     let bias = fault(FaultEntry::Sensor(column(&[1.0, 0.0])), FaultKind::Constant);
     let extended = ExtendedPlant::new(&a, &b, &c, &[bias], &[100.0, 100.0]).unwrap();

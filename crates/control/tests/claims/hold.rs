@@ -8,7 +8,7 @@ use control::Error;
 use control::hold::{FirstOrderHold, zero_order_hold};
 use nalgebra::DMatrix;
 
-/// The natural units of the controller's states: its entries follow powers of 1800 / s.
+/// Natural units of the controller's states; its entries are proportional to powers of 1800 / s.
 const UNITS: [f64; 5] = [1.0, 1.0, 1800.0, 1800.0, 3_240_000.0];
 
 fn controller(h: f64) -> FirstOrderHold {
@@ -46,7 +46,7 @@ fn the_controller_agrees_with_high_precision_at_a_tenth_of_a_millisecond() {
     assert_agrees(&controller(1e-4), &matrix(5, 9, &CONTROLLER_TENTH_MILLISECOND), 1e-14);
 }
 
-/// A second is thousands of time constants.
+/// A step of one second is thousands of time constants long.
 #[test]
 fn the_controller_agrees_with_high_precision_at_a_second() {
     assert_agrees(&controller(1.0), &matrix(5, 9, &CONTROLLER_SECOND), 1e-12);
@@ -67,7 +67,7 @@ fn two_half_steps_are_a_whole_one() {
     }
 }
 
-/// x'' = w with w = w0 + w1 t: position and velocity by hand.
+/// x'' = w with w = w0 + w1 t: position and velocity by integration.
 #[test]
 fn a_double_integrator_moves_by_powers_of_the_step() {
     let h = 0.25;
@@ -94,7 +94,8 @@ fn a_straight_solution_is_followed_exactly() {
     assert!(error < 1e-12 * hold.phi.amax().max(1.0), "{error:e}");
 }
 
-/// Sizes below, at and above those that are kept in registers, beside nalgebra's own products.
+/// Sizes below, at and above the largest that is multiplied in registers, compared with nalgebra's
+/// products.
 #[test]
 fn a_step_of_any_order_is_the_sum_of_the_products() {
     for n in 1..=12 {

@@ -67,7 +67,7 @@ fn a_conflict_is_named_without_the_requirements_that_take_no_part() {
     assert_eq!(conflict(problem.solve()), expected);
 }
 
-/// Smallest trace of X with [X, M; M', I] semidefinite: X = M M'.
+/// The smallest trace of X with [X, M; M', I] semidefinite belongs to X = M M'.
 #[test]
 fn the_smallest_matrix_above_a_square_is_the_square() {
     let m = crate::integers(3, 2, |i, j| (3 * i + 5 * j + i * j) % 7 - 3);
@@ -86,7 +86,7 @@ fn the_smallest_matrix_above_a_square_is_the_square() {
     assert!(solution.margins[0].1 >= 0.5e-7);
 }
 
-/// A certificate P of each kind of region, checked by eigenvalues of its inequality.
+/// For each kind of region, the eigenvalues of the inequality with the certificate P.
 #[test]
 fn certificates_of_regions_satisfy_their_inequalities() {
     let a = matrix(3, 3, &[-2., 3., 0., -3., -2., 1., 0., 0., -5.]);
@@ -144,7 +144,7 @@ fn system(case: &Case, domain: Domain) -> StateSpace {
     StateSpace { a: get("A"), b: get("B"), c: get("C"), d: get("D"), domain }
 }
 
-/// A bound is one: it lies above the norm that another method finds, and close to it.
+/// The bound is above the norm that another method finds, and close to it.
 fn assert_bounds(case: &Case, domain: Domain) {
     let names = [
         ("infinity", Norm::HInfinity),
@@ -160,7 +160,7 @@ fn assert_bounds(case: &Case, domain: Domain) {
 }
 
 #[test]
-fn bounds_of_gains_lie_just_above_what_hamiltonians_and_lyapunov_equations_give() {
+fn bounds_of_gains_are_just_above_those_of_hamiltonians_and_lyapunov_equations() {
     for case in cases(DATA, "norms") {
         assert_bounds(&case, Domain::Continuous);
     }
@@ -210,9 +210,9 @@ fn wish(case: &Case, norm: Norm, gamma: Option<f64>) -> Performance {
     }
 }
 
-/// Within the 5 % that the design gives up, and what the reference is inaccurate by.
+/// Tolerance: the 5 % that the design allows, and the error of the reference.
 #[test]
-fn state_feedback_comes_near_the_best_bound_that_other_methods_find() {
+fn state_feedback_is_close_to_the_best_bound_of_other_methods() {
     let nothing = Region::default();
     for case in cases(DATA, "feedback") {
         let (a, b) = (case.get("A"), case.get("B"));
@@ -227,7 +227,7 @@ fn state_feedback_comes_near_the_best_bound_that_other_methods_find() {
                 optimal(state_feedback(a, b, &region, Some(&wish(&case, norm, None)), domain));
             let gamma = found.bound.unwrap().gamma;
             assert!(gamma < 1.06 * case.number(name), "{} {name}: {gamma}", case.name);
-            // One P for region and bound makes the reference of the disc too large.
+            // The reference uses one P for region and bound, which is conservative for the disc.
             let least = if name == "disc" { "infinity" } else { name };
             assert!(gamma > 0.999 * case.number(least), "{} {name}: {gamma}", case.name);
             if let Some(disc) = region.disc {
@@ -263,9 +263,9 @@ fn regions_without_a_common_point_are_a_conflict() {
     assert_eq!(conflict(observer_gain(&a, &c, &region, None, SAMPLED)), ["decay", "disc"]);
 }
 
-/// The second state, at -1, is not seen.
+/// The second state, with the eigenvalue -1, is not measured.
 #[test]
-fn an_eigenvalue_that_no_gain_moves_is_a_conflict_with_the_region_it_lies_outside_of() {
+fn an_uncontrollable_eigenvalue_outside_of_the_region_is_a_conflict() {
     let a = matrix(2, 2, &[1., 0., 0., -1.]);
     let c = matrix(1, 2, &[1., 0.]);
     assert_eq!(conflict(observer_gain(&a, &c, &decay(2.0), None, Domain::Continuous)), ["decay"]);
@@ -290,7 +290,7 @@ fn intersections_of_regions_are_reached_by_feedback_and_by_observer() {
 
 /// Sampled double integrator with a constant disturbance, its position measured.
 #[test]
-fn a_sampled_observer_comes_into_its_disc() {
+fn the_eigenvalues_of_a_sampled_observer_are_in_its_disc() {
     let (t, half) = (0.1, 0.005);
     let a = matrix(3, 3, &[1., t, half, 0., 1., t, 0., 0., 1.]);
     let c = matrix(1, 3, &[1., 0., 0.]);
@@ -307,8 +307,8 @@ fn fault_rate(norm: Norm, gamma: Option<f64>) -> Performance {
     Performance { disturbance, output, feedthrough, norm, gamma }
 }
 
-/// The observer of the paper at its own scale: eigenvalues around -2100, entries from 1 to 1e9. The gain
-/// from the fault rate is smaller than that of the observer with the paper's eigenvalues.
+/// The observer of the paper in its own units: eigenvalues around -2100, entries from 1 to 1e9. The
+/// gain from the fault rate is smaller than with the paper's eigenvalues.
 #[test]
 fn the_observer_of_the_paper_is_designed_by_inequalities() {
     let plant = plant();
@@ -376,7 +376,7 @@ fn bad_arguments_are_refused_by_name() {
 /// One output, five states coupled at random, eigenvalues a thousand times faster than the plant's: the
 /// observer exists, but rounding its gain moves the eigenvalues out of the disc.
 #[test]
-fn what_is_lost_in_rounding_is_no_conflict() {
+fn rounding_errors_do_not_give_a_conflict() {
     let a = crate::integers(5, 5, |i, j| (7 * i * i + 3 * j + 5 * i * j) % 11 - 5);
     let c = crate::integers(1, 5, |_, j| (3 * j) % 5 - 1);
     let found = observer_gain(&a, &c, &disc(-20000.0, 2000.0), None, Domain::Continuous).unwrap();

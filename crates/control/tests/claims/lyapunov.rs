@@ -14,7 +14,7 @@ fn the_observer_of_the_pendulum_agrees_with_high_precision_in_every_entry() {
     assert!(solution.residual < 1e-14 && solution.defect < 1e-2, "{solution:?}");
 }
 
-/// The definition once more, with other roundings: Q is made from a known P.
+/// Computes Q for a known P by the definition, with other rounding errors.
 #[test]
 fn a_known_solution_with_complex_eigenvalues_is_found() {
     let a = integers(6, 6, |i, j| (7 * i * i + 3 * i * j + 5 * j + i * j * j) % 11 - 5)

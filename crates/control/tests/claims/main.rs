@@ -1,4 +1,4 @@
-//! What the crate claims, held against published numbers, other software and the equations
+//! Claims of the crate, compared with published numbers, other software and the equations
 //! themselves.
 
 mod aso;
@@ -41,7 +41,7 @@ fn entry_error(found: &DMatrix<f64>, expected: &DMatrix<f64>) -> f64 {
     found.zip_map(expected, relative).amax()
 }
 
-/// Entries that follow no pattern, in -5 to 5, but are the same for everybody.
+/// Entries in -5 to 5 without a pattern, the same in every run.
 fn integers(rows: usize, cols: usize, rule: impl Fn(i32, i32) -> i32) -> DMatrix<f64> {
     let mut entries = Vec::with_capacity(rows * cols);
     for i in (0..).take(rows) {

@@ -48,7 +48,7 @@ fn the_order_in_which_eigenvalues_are_stated_does_not_change_a_bit() {
     assert_eq!(place_balanced(&a, &b, &poles).unwrap().gain, first.gain);
 }
 
-/// Published as rounded here, from the printed A and B.
+/// Published with these digits, from the printed A and B.
 #[test]
 fn one_input_gives_the_published_gain() {
     let placement = place(&printed().a, &printed().b, &real_poles(&CONTROLLER_POLES)).unwrap();
@@ -65,10 +65,10 @@ fn one_input_gives_the_gain_of_scipy() {
     assert!(entry_error(&placement.gain, &matrix(1, 4, &scipy)) < 1e-9);
 }
 
-/// (s + 1) (s^2 + 6 s + 25) (s^2 + 2 s + 1.0625) by hand; in this form K is the difference of the
+/// (s + 1) (s^2 + 6 s + 25) (s^2 + 2 s + 1.0625) expanded; in this form K is the difference of the
 /// coefficients.
 #[test]
-fn one_input_and_pairs_give_the_coefficients_of_the_wanted_polynomial() {
+fn with_one_input_and_pairs_the_closed_loop_has_the_required_polynomial() {
     let mut a = DMatrix::zeros(5, 5);
     a.view_mut((0, 1), (4, 4)).fill_with_identity();
     a.row_mut(4).copy_from(&matrix(1, 5, &[3.0, -1.0, 4.0, 1.0, -5.0]));
@@ -80,8 +80,8 @@ fn one_input_and_pairs_give_the_coefficients_of_the_wanted_polynomial() {
     assert!(entry_error(&placement.gain, &expected) < 1e-11, "{}", placement.gain);
 }
 
-/// The lowest condition number, 3.198767e7, is where a search over the five free angles
-/// (Nelder-Mead, 60 random starts, scipy) ended.
+/// The lowest condition number, 3.198767e7, is the result of a search over the five free angles
+/// (Nelder-Mead, 60 random starts, scipy).
 #[test]
 fn the_observer_of_the_pendulum_has_the_condition_number_that_a_random_search_finds() {
     let (a, c) = observer();
@@ -91,7 +91,7 @@ fn the_observer_of_the_pendulum_has_the_condition_number_that_a_random_search_fi
     assert_assigned(&a, &c, &placement, &real_poles(&OBSERVER_POLES));
 }
 
-/// Each is best in its own coordinates.
+/// Each gain is the best in its own coordinates.
 #[test]
 fn the_coordinates_decide_which_condition_number_is_low() {
     let (a, c) = observer();
@@ -102,7 +102,7 @@ fn the_coordinates_decide_which_condition_number_is_low() {
     assert!(balanced.balanced_condition < 0.95 * given.balanced_condition);
 }
 
-/// Up to the powers of two at which the balancing stops.
+/// Up to the powers of two that limit the balancing.
 #[test]
 fn the_balanced_placement_does_not_depend_on_the_units_of_the_states() {
     let (a, c) = observer();
@@ -119,7 +119,8 @@ fn the_balanced_placement_does_not_depend_on_the_units_of_the_states() {
     assert_assigned(&scaled_a, &scaled_c, &scaled, &poles);
 }
 
-/// With as many inputs as states every matrix can be made: the best has orthogonal eigenvectors.
+/// With as many inputs as states every closed-loop matrix is possible; the best has orthogonal
+/// eigenvectors.
 #[test]
 fn as_many_inputs_as_states_give_orthogonal_eigenvectors() {
     let a = integers(3, 3, |i, j| (3 * i * i + 2 * i * j + j) % 7 - 3);
@@ -133,7 +134,7 @@ fn as_many_inputs_as_states_give_orthogonal_eigenvectors() {
 }
 
 #[test]
-fn an_eigenvalue_or_a_pair_may_come_as_often_as_there_are_inputs() {
+fn the_multiplicity_of_an_eigenvalue_may_equal_the_number_of_inputs() {
     let a = integers(4, 4, |i, j| (7 * i * i + 3 * i * j + 5 * j + i * j * j) % 11 - 5);
     let b = integers(4, 2, |i, j| (5 * i * i + 3 * j + 2 * i * j + i) % 7 - 3);
     let twice = real_poles(&[-2.0, -1.0, -2.0, -1.0]);
@@ -146,7 +147,7 @@ fn an_eigenvalue_or_a_pair_may_come_as_often_as_there_are_inputs() {
 }
 
 #[test]
-fn an_eigenvalue_or_a_pair_that_comes_more_often_than_there_are_inputs_is_refused() {
+fn a_multiplicity_above_the_number_of_inputs_is_refused() {
     let a = integers(6, 6, |i, j| (7 * i * i + 3 * i * j + 5 * j + i * j * j) % 11 - 5);
     let b = integers(6, 2, |i, j| (5 * i * i + 3 * j + 2 * i * j + i) % 7 - 3);
     let refused = place(&a, &b, &real_poles(&[-2.0, -1.0, -2.0, -2.0, -3.0, -4.0])).unwrap_err();
@@ -224,7 +225,7 @@ fn a_state_out_of_reach_is_refused() {
     assert_eq!(refused, Err(Error::NotControllable { rank: 1, n: 2 }));
 }
 
-/// The eigenvalues -1200 to -3000 sampled: from well apart to all but zero.
+/// The eigenvalues -1200 to -3000 sampled: from well separated to almost zero.
 #[test]
 fn the_sampled_observer_of_the_pendulum_is_placed_at_every_sample_time() {
     let (a, c) = observer();
@@ -242,7 +243,7 @@ fn the_sampled_observer_of_the_pendulum_is_placed_at_every_sample_time() {
     }
 }
 
-/// Zero as often as there are inputs, and nothing else: K = -B^-1 A.
+/// All eigenvalues are zero, as often as there are inputs: K = -B^-1 A.
 #[test]
 fn a_plant_with_as_many_inputs_as_states_comes_to_rest_in_one_sample() {
     let a = matrix(2, 2, &[0.9, 0.1, -0.3, 1.1]);
@@ -254,7 +255,7 @@ fn a_plant_with_as_many_inputs_as_states_comes_to_rest_in_one_sample() {
     }
 }
 
-/// z = 1 in discrete time is what s = 0 is in continuous time.
+/// z = 1 in discrete time corresponds to s = 0 in continuous time.
 #[test]
 fn a_slow_eigenvalue_in_discrete_time_is_judged_by_its_distance_from_one() {
     let a = matrix(2, 2, &[1.0, 1e-3, 0.0, 1.0]);

@@ -20,7 +20,7 @@ fn velocities_alone_do_not_show_the_position() {
     assert_eq!(observability(&plant().a, &velocities).unwrap().rank, 3);
 }
 
-/// Three controllable states and two that nothing reaches, hidden by a change of coordinates with
+/// Three controllable and two uncontrollable states, in other coordinates by a transformation with
 /// determinant one.
 #[test]
 fn the_controllable_part_is_counted_in_any_coordinates() {
@@ -70,7 +70,8 @@ fn the_modes_that_a_rank_lacks_are_those_of_slicot() {
     assert!((modes[0].eigenvalue + 1.0).norm() < 1e-13, "{modes:?}");
 }
 
-/// Two cascades in other coordinates: each vector satisfies A v = s v, C v = 0, in its own residual.
+/// Two cascades in other coordinates: each vector must satisfy A v = s v and C v = 0, by its
+/// residual.
 #[test]
 fn the_vectors_of_unobservable_modes_are_eigenvectors_that_the_measurements_do_not_show() {
     let mut a = integers(6, 6, |i, j| (3 * i * i + 2 * i * j + 5 * j) % 9 - 4);
@@ -92,7 +93,7 @@ fn the_vectors_of_unobservable_modes_are_eigenvectors_that_the_measurements_do_n
 
 /// A double eigenvalue with two eigenvectors gives both.
 #[test]
-fn two_states_at_rest_that_nothing_shows_are_two_modes() {
+fn two_constant_unmeasured_states_are_two_modes() {
     let modes = unobservable_modes(&DMatrix::zeros(3, 3), &matrix(1, 3, &[0., 1., 0.])).unwrap();
     let mut states: Vec<_> = modes.iter().flat_map(|mode| mode.dominant.clone()).collect();
     states.sort_unstable();

@@ -1,4 +1,4 @@
-//! Bad arguments: one matrix at a time, the error names it.
+//! Invalid arguments: one matrix at a time, which the error must name.
 
 use crate::paper::{CONTROLLER_POLES, OBSERVER_POLES, plant, repaired_gains};
 use crate::{integers, matrix};
@@ -57,7 +57,7 @@ fn an_entry_that_is_not_a_number_is_named_in_every_matrix() {
 }
 
 #[test]
-fn a_wrong_shape_is_named_with_what_was_expected() {
+fn a_wrong_shape_is_reported_with_the_expected_one() {
     let (wide, tall, good) = (DMatrix::zeros(2, 3), DMatrix::zeros(3, 1), DMatrix::identity(2, 2));
     assert_eq!(name_of(eigenvalues(&wide)), "A");
     assert_eq!(name_of(exponential(&wide)), "A");

@@ -15,15 +15,16 @@ fn weights(case: &Case) -> Weights {
     Weights { q: get("Q"), r: get("R"), n: Some(get("N")) }
 }
 
-/// Largest distance of the entries relative to sqrt(P[i,i] P[j,j]): no unit of a state matters.
+/// Largest distance of the entries relative to sqrt(P[i,i] P[j,j]), which does not depend on units
+/// of states.
 pub(crate) fn distance(found: &DMatrix<f64>, exact: &DMatrix<f64>) -> f64 {
     let size = exact.diagonal().map(|x| if x == 0.0 { 1.0 } else { x.abs().sqrt() });
     let relative = |i: usize, j: usize| (found[(i, j)] - exact[(i, j)]).abs() / size[i] / size[j];
     DMatrix::from_fn(found.nrows(), found.ncols(), relative).amax()
 }
 
-/// Against 60 digits, entries relative to sqrt(P[i,i] P[j,j]). Where the equation is
-/// ill-conditioned, `SciPy` says how much.
+/// Compared with 60 digits, entries relative to sqrt(P[i,i] P[j,j]). If the equation is
+/// ill-conditioned, the tolerance is the error of `SciPy`.
 fn assert_agrees_with_high_precision(kind: &str, domain: Domain) {
     let recorded = cases(RECORDED, kind);
     assert!(recorded.len() >= 28);
@@ -48,7 +49,7 @@ fn sampled_equations_agree_with_high_precision_as_well_as_scipy() {
     assert_agrees_with_high_precision("sampled", SAMPLED);
 }
 
-/// The equations as printed, with other roundings than those of the solver.
+/// The printed equations, with other rounding errors than in the solver.
 #[test]
 fn solutions_satisfy_the_printed_equation_and_stabilise() {
     for case in cases(RECORDED, "continuous") {
@@ -113,7 +114,7 @@ fn a_mode_on_the_limit_of_stability_that_the_weight_does_not_see_is_named() {
 }
 
 #[test]
-fn weights_that_are_not_definite_enough_are_named() {
+fn weights_that_are_not_definite_are_refused_by_name() {
     let (a, b) = (-DMatrix::identity(2, 2), DMatrix::identity(2, 2));
     let mut weights = identity_weights(2, 2);
     weights.r[(1, 1)] = 0.0;
@@ -161,7 +162,7 @@ fn bad_shapes_entries_and_periods_are_named() {
     assert!(matches!(refused, Err(Error::Unweighted { weight: "W", .. })), "{refused:?}");
 }
 
-/// Noise of the paper's plant with a wandering friction force.
+/// Noise of the paper's plant with a randomly changing friction force.
 fn augmented(plant: &FaultyPlant) -> [DMatrix<f64>; 4] {
     let noise = [1e-8, 1e-8, 1e-2, 1e-2, 1e10];
     let process = DMatrix::from_diagonal(&nalgebra::DVector::from_row_slice(&noise));
@@ -169,7 +170,7 @@ fn augmented(plant: &FaultyPlant) -> [DMatrix<f64>; 4] {
     [plant.augmented_dynamics(), plant.augmented_output(), process, measurement]
 }
 
-/// The covariance equation itself: its right side must not move the covariance found.
+/// The covariance equation itself: its right side must vanish for the computed covariance.
 #[test]
 fn the_filter_of_the_augmented_pendulum_keeps_its_covariance() {
     let [a, c, w, v] = augmented(&plant());
@@ -185,7 +186,7 @@ fn the_filter_of_the_augmented_pendulum_keeps_its_covariance() {
     assert!(filter.current_gain.is_none());
 }
 
-/// Prediction and correction one after the other, 20000 times: the steady state of the recursion.
+/// Prediction and correction alternate 20000 times, up to the steady state of the recursion.
 #[test]
 fn the_sampled_gains_are_the_limit_of_the_filter_recursion() {
     let a = matrix(2, 2, &[1.0, 0.1, 0.0, 1.0]);
@@ -205,7 +206,7 @@ fn the_sampled_gains_are_the_limit_of_the_filter_recursion() {
     assert!((&filter.gain - &a * current).norm() < 1e-12);
 }
 
-/// The cost of a simulated way is x' P x, and any other gain costs more.
+/// The cost of a simulated trajectory is x' P x, and any other gain costs more.
 #[test]
 fn the_cost_is_the_quadratic_form_of_the_solution() {
     let a = matrix(2, 2, &[1.1, 0.3, -0.2, 0.9]);

@@ -12,7 +12,7 @@ use control::sampled::{SampledDesign, design, sample, sampled_poles};
 use control::{Domain, Error};
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// From a tenth of a millisecond to ten.
+/// Sample times from a tenth of a millisecond to ten.
 const PERIODS: [f64; 7] = [1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2];
 
 fn on_real_axis(continuous: &[f64], period: f64) -> Vec<f64> {
@@ -64,7 +64,7 @@ fn a_ramp_moves_inside_of_the_interval_as_in_scipy() {
     assert!((joined(&sampled) - &expected).amax() < 1e-13 * expected.amax());
 }
 
-/// In closed form: A = 0, w = 2, T = 1: `y_f` moves by 1 - e^-2 of y[k] - `y_f`[k].
+/// In closed form, for A = 0, w = 2, T = 1: `y_f` changes by 1 - e^-2 times y[k] - `y_f`[k].
 #[test]
 fn the_filter_runs_on_the_samples() {
     let one = matrix(1, 1, &[1.0]);
@@ -94,7 +94,7 @@ fn the_pendulum_is_stable_at_every_sample_time() {
     }
 }
 
-/// The friction modelled as a ramp, one more pole.
+/// The friction as a ramp, with one more pole.
 fn pendulum_with_ramp(period: f64) -> SampledDesign {
     let FaultyPlant { a, b, c, f_a, .. } = plant();
     let friction =
@@ -105,8 +105,8 @@ fn pendulum_with_ramp(period: f64) -> SampledDesign {
     design(&extended, period, Estimator::Current, &controller, &observer, None).expect("a design")
 }
 
-/// The sum over all samples of `K_f` eps - `K_x` e after a step of the fault, by the response of the
-/// error's own equation.
+/// The sum over all samples of `K_f` eps - `K_x` e after a step of the fault, by the recursion of
+/// the error.
 fn impulse_of_a_step(design: &SampledDesign) -> f64 {
     let (a_0, c_0) = (design.plant.augmented_dynamics(), design.plant.augmented_output());
     let order = a_0.nrows();
@@ -123,7 +123,8 @@ fn impulse_of_a_step(design: &SampledDesign) -> f64 {
     sum
 }
 
-/// In samples of the step: what arrives late with the constant model is made up for with the ramp.
+/// In samples times the step: the constant model lacks force after the step, the ramp model makes
+/// up for it.
 #[test]
 fn a_step_of_the_fault_leaves_an_impulse_unless_the_model_is_a_ramp() {
     for period in PERIODS {
@@ -146,7 +147,7 @@ fn the_pendulum_with_a_ramp_model_is_stable_at_every_sample_time() {
 
 /// e[k+1] = (I - M `C_0`) `A_0` e[k], formed here from the controller's equations for u = 0.
 #[test]
-fn the_estimation_error_has_the_wanted_eigenvalues() {
+fn the_estimation_error_has_the_required_eigenvalues() {
     for period in [1e-4, 1e-3, 1e-2] {
         let found = pendulum(period, Estimator::Current);
         let (a_0, c_0) = (found.plant.augmented_dynamics(), found.plant.augmented_output());
@@ -160,8 +161,8 @@ fn the_estimation_error_has_the_wanted_eigenvalues() {
     }
 }
 
-/// The error of the predicted fault and the largest state after so many samples: the true plant
-/// between samples by its own exact solution, the controller by its equations.
+/// The error of the predicted fault and the largest state after a number of samples: the plant by
+/// its exact solution between samples, the controller by its equations.
 fn run(
     extended: &ExtendedPlant,
     design: &SampledDesign,
@@ -216,7 +217,7 @@ fn constant_and_ramp_faults_are_estimated_in_the_sampled_loop() {
     }
 }
 
-/// Poles that would all be zero in double precision keep a distance that can be placed.
+/// Poles that would all be zero in double precision keep enough distance to be placed.
 #[test]
 fn fast_poles_are_slowed_in_order_and_slow_ones_are_not() {
     let found = on_real_axis(&[-1e6, -1e5, -2e3, -50.0, -1.0], 1e-2);

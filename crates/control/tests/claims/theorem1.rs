@@ -26,7 +26,7 @@ fn the_certificate_of_the_pendulum_satisfies_equation_12() {
     assert!((certificate.controller_abscissa + 4.5).abs() < 1e-9);
 }
 
-/// Other than the paper says: P grows with alpha as fast as 2 / alpha falls.
+/// Contrary to the paper, P grows with alpha as fast as 2 / alpha decreases.
 #[test]
 fn alpha_does_not_shrink_the_region() {
     let (plant, gains) = (printed(), repaired_gains());
@@ -38,7 +38,7 @@ fn alpha_does_not_shrink_the_region() {
     }
 }
 
-/// For one state with `A_0` - L `C_0` = [-a, k; -b, 0]: P from the three equations by hand.
+/// One state with `A_0` - L `C_0` = [-a, k; -b, 0]: P solved from the three equations.
 #[test]
 fn a_plant_of_one_state_gives_the_region_found_by_hand() {
     let one = |value| DMatrix::from_element(1, 1, value);
@@ -61,7 +61,7 @@ fn a_plant_of_one_state_gives_the_region_found_by_hand() {
     assert!((certificate.delta / by_hand - 1.0).abs() < 1e-13);
 }
 
-/// The error system driven by the worst constant fault ends inside of the region.
+/// Under the worst constant fault the errors finally are inside of the region.
 #[test]
 fn the_error_under_a_constant_fault_ends_inside_of_the_region() {
     let (plant, gains) = (printed(), repaired_gains());
@@ -103,7 +103,8 @@ mod free {
         }
     }
 
-    /// On the paper's example the radius shrinks by a factor of 6, with the repaired printed gains by 3.
+    /// For the paper's example the radius decreases by a factor of 6, for the corrected printed
+    /// gains by 3.
     #[test]
     fn the_best_p_shrinks_the_region_of_the_paper() {
         let plant = plant();
@@ -120,7 +121,7 @@ mod free {
         }
     }
 
-    /// Its eigenvalues end at -1200.
+    /// The slowest eigenvalue is -1200.
     #[test]
     fn the_decay_rate_of_the_paper_is_certified_to_a_thousandth() {
         let decay = largest_decay(&gains().error_dynamics(&plant())).unwrap().optimal().unwrap();
@@ -136,8 +137,8 @@ mod free {
         assert!(decay.alpha > 0.99 && decay.alpha < 1.0);
     }
 
-    /// The error under the fault that switches with its own response stays in the ellipsoid; the
-    /// constant fault ends in it.
+    /// Under the fault that switches with the sign of its own response the error stays in the
+    /// ellipsoid; under a constant fault it ends inside.
     #[test]
     fn the_ultimate_bound_holds_for_constant_and_for_switching_faults() {
         let plant = plant();

@@ -23,7 +23,7 @@ fn assert_zeros(found: &[Complex<f64>], expected: &[Complex<f64>], allowed: f64)
     }
 }
 
-/// Finite invariant zeros 2 and -1, the latter a mode that is not seen.
+/// Finite invariant zeros 2 and -1; the latter is an unobservable mode.
 #[test]
 fn the_example_of_slicot_has_its_published_zeros() {
     let (a, b, c) = slicot();
@@ -59,9 +59,10 @@ fn units_do_not_move_the_zeros() {
     assert_zeros(&found.unwrap().finite, &expected, 1e-9);
 }
 
-/// Two copies of one input: every combination that cancels stays unseen, the zeros are those of one.
+/// With two copies of one input, combinations that cancel have no effect; the zeros are those of
+/// one copy.
 #[test]
-fn a_transfer_function_without_full_rank_is_told() {
+fn a_transfer_function_without_full_rank_is_reported() {
     let a = integers(5, 5, |i, j| (7 * i * i + 3 * i * j + 5 * j + i * j * j) % 11 - 5);
     let b = matrix(5, 1, &[1., 0., 2., -1., 1.]);
     let c = matrix(1, 5, &[0., 1., 1., 0., -3.]);

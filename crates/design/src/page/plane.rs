@@ -88,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_eigenvalue_comes_back_from_the_z_plane() {
+    fn the_map_to_the_z_plane_is_inverted() {
         let plane = Plane::Sampled(0.01);
         for pole in [[-3.0, 4.0], [-300.0, -200.0], [0.0, 0.0], [2.0, 1.0]] {
             let back = plane.rate(plane.place(pole));

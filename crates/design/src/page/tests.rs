@@ -11,7 +11,7 @@ use crate::report::Report;
 use hostile::{bare, hostile};
 use pendulum::pendulum;
 
-/// The page as XML: the only elements that HTML leaves open are those of its head.
+/// Converts the page to XML: only the `meta` elements of its head lack an end tag.
 fn xml(html: &str) -> String {
     let body = html.strip_prefix("<!DOCTYPE html>").expect("begins with the document type");
     let mut parts = body.split("<meta");
@@ -90,7 +90,7 @@ fn paragraphs_and_captions_hold_only_text() {
 }
 
 #[test]
-fn the_page_loads_nothing() {
+fn the_page_makes_no_requests() {
     with_pages(|_, document| {
         assert_eq!(elements(document, "script").count(), 1);
         assert_eq!(elements(document, "style").count(), 1);
@@ -114,7 +114,7 @@ fn the_page_loads_nothing() {
 }
 
 #[test]
-fn nothing_is_empty() {
+fn no_section_or_cell_is_empty() {
     with_pages(|_, document| {
         for name in ["section", "h2", "h3", "p", "ul", "li", "dl", "dd", "table", "caption", "pre"]
         {
@@ -133,7 +133,7 @@ fn nothing_is_empty() {
 }
 
 #[test]
-fn sections_stand_in_the_order_of_reading_and_only_where_there_is_something() {
+fn only_sections_with_content_appear_in_reading_order() {
     let titles = |report: &Report| -> Vec<String> {
         let text = xml(&page(report));
         let document = Document::parse(&text).unwrap();
@@ -191,7 +191,7 @@ fn tables_have_captions_and_scoped_heads_and_figures_have_titles_and_description
 }
 
 #[test]
-fn the_verdict_names_what_fails() {
+fn the_verdict_names_the_failed_checks() {
     let verdict = |report: &Report| {
         let page = xml(&page(report));
         let document = Document::parse(&page).unwrap();
@@ -252,7 +252,7 @@ fn maps_show_every_eigenvalue_inside_the_frame_required_around_actual() {
 }
 
 #[test]
-fn the_edge_of_stability_stands_between_stable_and_unstable_eigenvalues() {
+fn the_stability_boundary_is_between_stable_and_unstable_eigenvalues() {
     let text = xml(&page(&pendulum()));
     let document = Document::parse(&text).unwrap();
     let map = map(&document, "map-all");

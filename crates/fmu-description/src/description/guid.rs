@@ -11,7 +11,7 @@ use super::ModelDescription;
 pub struct Guid(pub [u8; 16]);
 
 impl Guid {
-    /// The hash of everything in `description` but its `guid`.
+    /// Hashes everything in `description` except its `guid`.
     ///
     /// # Panics
     ///
@@ -25,7 +25,7 @@ impl Guid {
 }
 
 impl Display for Guid {
-    /// `{xxxxxxxx-xxxx-xxxx-xxxx-xxxxxxxxxxxx}`.
+    /// Formats the GUID as `{xxxxxxxx-xxxx-xxxx-xxxx-xxxxxxxxxxxx}`.
     fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
         formatter.write_str("{")?;
         for (index, byte) in self.0.iter().enumerate() {
@@ -37,11 +37,11 @@ impl Display for Guid {
 }
 
 impl ModelDescription {
-    /// A `guid` that follows from everything else in the description: the first 128 bits of the
-    /// SHA-256 of its serialized form, as `{xxxxxxxx-xxxx-xxxx-xxxx-xxxxxxxxxxxx}`.
+    /// Returns a `guid` derived from everything else in the description: the first 128 bits of the
+    /// SHA-256 of its serialised form, as `{xxxxxxxx-xxxx-xxxx-xxxx-xxxxxxxxxxxx}`.
     ///
-    /// The form is postcard's, which takes a tenth of the time of the XML: each `fmi2Instantiate`
-    /// makes it. Two descriptions that differ in anything but `guid` have different results.
+    /// The form is that of postcard, which takes a tenth of the time of XML; each `fmi2Instantiate`
+    /// computes it. Two descriptions that differ in anything but `guid` have different results.
     #[must_use]
     pub fn content_guid(&self) -> String {
         Guid::of(self).to_string()

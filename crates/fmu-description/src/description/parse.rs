@@ -1,4 +1,4 @@
-//! XML to model description.
+//! Parses XML into a model description.
 
 mod attributes;
 mod encoding;
@@ -16,7 +16,7 @@ use attributes::{Node, WHITE_SPACE};
 pub use warning::Warning;
 use warning::Warnings;
 
-/// The root element of an XML file, with the bounds of a model description.
+/// The root element of an XML file, read with the limits for a model description.
 pub(crate) fn read_xml(bytes: &[u8]) -> Result<crate::xml::Element, ParseError> {
     if bytes.len() > ModelDescription::MOST_BYTES {
         return Err(ParseError::Length { limit: ModelDescription::MOST_BYTES });
@@ -25,12 +25,12 @@ pub(crate) fn read_xml(bytes: &[u8]) -> Result<crate::xml::Element, ParseError> 
     Ok(xml::read_but(&text, |_| false)?.into_owned())
 }
 
-/// A place in an XML file; both numbers count from 1, columns in characters.
+/// A position in an XML file; both numbers count from 1, columns in characters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Position {
-    /// Line.
+    /// The line.
     pub line: u32,
-    /// Column.
+    /// The column.
     pub column: u32,
 }
 
@@ -44,90 +44,91 @@ impl fmt::Display for Position {
     }
 }
 
-/// Why a text is not the model description of an FMI 2.0 FMU.
+/// The error of parsing a text that is not the model description of an FMI 2.0 FMU.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ParseError {
-    /// Not text that the reader can decode.
+    /// The file is not text that the reader can decode.
     #[error("expected XML in UTF-8, or in the encoding that it declares, found {found}")]
     Encoding {
-        /// The encoding, or the place of the first wrong byte.
+        /// The encoding, or the position of the first invalid byte.
         found: String,
     },
-    /// A file that is too long to be read.
+    /// The file is too long.
     #[error("expected at most {limit} bytes, found more")]
     Length {
-        /// How many are accepted.
+        /// The limit in bytes.
         limit: usize,
     },
-    /// Not well-formed.
+    /// The file is not well-formed XML.
     #[error("{at}: expected well-formed XML, found: {found}")]
     Xml {
-        /// Where.
+        /// The position.
         at: Position,
-        /// What is wrong.
+        /// The reason.
         found: String,
     },
-    /// A document type declaration, which FMI does not use and which could define entities.
+    /// The file has a document type declaration, which FMI does not use and which could define
+    /// entities.
     #[error("{at}: expected no document type declaration, found <!DOCTYPE")]
     Doctype {
-        /// Where.
+        /// The position.
         at: Position,
     },
-    /// More nesting or more attributes than any model description has.
+    /// The file has more nesting or more attributes than the limit.
     #[error("{at}: expected at most {limit} {what}, found more")]
     Limit {
-        /// Where.
+        /// The position.
         at: Position,
-        /// What there is too much of.
+        /// The limited quantity.
         what: &'static str,
-        /// How many are accepted.
+        /// The limit.
         limit: usize,
     },
-    /// Another version of the standard.
+    /// The file is of another version of the standard.
     #[error("{at}: expected fmiVersion 2.0, found {found:?}: this is not an FMI 2.0 FMU")]
     Version {
-        /// Where.
+        /// The position.
         at: Position,
-        /// The version of the file.
+        /// The version in the file.
         found: String,
     },
-    /// An element that is missing, or one too many.
+    /// An element is missing, or there is one too many.
     #[error("{at}: in <{element}>: expected {expected}, found {found}")]
     Element {
-        /// Where the element begins.
+        /// The position of the parent element.
         at: Position,
-        /// The element.
+        /// The parent element.
         element: String,
-        /// What it must contain.
+        /// The expected content.
         expected: String,
-        /// What it contains.
+        /// The actual content.
         found: String,
     },
-    /// An attribute that is missing or has a wrong value.
+    /// An attribute is missing or has an invalid value.
     #[error("{at}: <{element}>, attribute {attribute}: expected {expected}, found {found}")]
     Attribute {
-        /// Where the element begins.
+        /// The position of the element.
         at: Position,
         /// The element.
         element: String,
         /// The attribute.
         attribute: &'static str,
-        /// What it must be.
+        /// The expected value.
         expected: String,
-        /// What it is.
+        /// The actual value.
         found: String,
     },
 }
 
 impl ModelDescription {
-    /// Most bytes of a file that is read.
+    /// Maximum size in bytes of a file that is read.
     pub const MOST_BYTES: usize = 128 << 20;
 
     /// Reads `modelDescription.xml` of FMI 2.0 as [`ModelDescription::read`] does, without warnings.
     ///
     /// # Errors
     ///
-    /// Those of [`ModelDescription::read`].
+    /// Same as [`ModelDescription::read`].
     ///
     /// ```
     /// use fmu_description::ModelDescription;
@@ -141,26 +142,27 @@ impl ModelDescription {
         Self::read(xml).map(|(description, _)| description)
     }
 
-    /// Reads `modelDescription.xml` of FMI 2.0, and says what in it the standard does not allow.
+    /// Reads `modelDescription.xml` of FMI 2.0; returns warnings for content that the standard does
+    /// not allow.
     ///
-    /// Defaults of the standard are filled in: `causality` local, `variability` continuous, and
-    /// for a variable with `declaredType` the attributes of that type which it does not state
-    /// itself. Annotations are skipped.
+    /// Fills in the defaults of the standard: `causality` local, `variability` continuous, and for
+    /// a variable with `declaredType` the attributes of that type which it does not state itself.
+    /// Skips annotations.
     ///
-    /// What breaks the standard but leaves no doubt about a simulation, and what other importers
-    /// accept, is read with a [`Warning`] that says what was assumed: other encodings, `fmiVersion`
-    /// 2.0.x, unknown elements and attributes, wrong order, words in another case, unknown words,
-    /// flags, types and dependencies, numbers that are infinite or empty. What would mislead is an
-    /// error: missing required attributes, malformed numbers and such as are too large, value
-    /// references that two inputs or parameters share, names of two outputs, types that refer to types.
-    /// Rules that concern what was read are those of [`ModelDescription::problems`].
+    /// Content that breaks the standard gives a [`Warning`], which states the assumption made, if
+    /// the meaning for a simulation is clear or other importers accept it: other encodings,
+    /// `fmiVersion` 2.0.x, unknown elements and attributes, wrong order, words in another case,
+    /// unknown words, flags, types and dependencies, numbers that are infinite or empty. Content
+    /// that would mislead a simulation is an error: missing required attributes, numbers that are
+    /// malformed or too large, value references that two inputs or parameters share, names of two
+    /// outputs, types that refer to types. [`ModelDescription::problems`] checks further rules.
     ///
-    /// Read are at most 128 MiB, 3,000,000 elements, 12,000,000 attributes, 1,000,000 variables;
-    /// cost: linear in the length of the file. At most 1000 warnings are kept.
+    /// Limits: 128 MiB, 3,000,000 elements, 12,000,000 attributes, 1,000,000 variables. Cost:
+    /// linear in the length of the file. At most 1000 warnings are kept.
     ///
     /// # Errors
     ///
-    /// [`ParseError`] with line and column, what is expected and what was found.
+    /// [`ParseError`] with line and column, expected and actual content.
     pub fn read(xml: impl AsRef<[u8]>) -> Result<(ModelDescription, Vec<Warning>), ParseError> {
         let bytes = xml.as_ref();
         if bytes.len() > Self::MOST_BYTES {
@@ -223,7 +225,8 @@ fn root(root: Node<'_>) -> Result<ModelDescription, ParseError> {
     })
 }
 
-/// `fmiVersion` is 2.0; 2.0.1 to 2.0.5, which are versions of the text, are meant as that.
+/// Checks that `fmiVersion` is 2.0; 2.0.1 to 2.0.5, versions of the standard's text, are read as
+/// 2.0.
 fn version(root: Node<'_>) -> Result<(), ParseError> {
     let found = root.required("fmiVersion")?;
     if found == "2.0" {

@@ -1,4 +1,4 @@
-//! Model description to XML.
+//! Renders a model description as XML.
 
 mod tag;
 
@@ -14,15 +14,15 @@ use tag::Tag;
 pub(super) use tag::is_xml;
 
 impl ModelDescription {
-    /// Renders `modelDescription.xml` as the schema of FMI 2.0.5 orders it.
+    /// Renders `modelDescription.xml` in the order of the schema of FMI 2.0.5.
     ///
     /// UTF-8, two blanks of indentation, numbers in the shortest form that reads back to the same
     /// bits, lists absent when empty, flags absent when false. All text is escaped; characters
     /// that XML 1.0 cannot hold (control characters) become U+FFFD.
     ///
-    /// Numbers must be finite: FMI knows no infinity, and the text for one would not be accepted
-    /// by an importer. [`ModelDescription::problems`] reports such numbers. For a description
-    /// without problems the result validates against `fmi2ModelDescription.xsd`.
+    /// Numbers must be finite: FMI has no infinity, and an importer would not accept its text.
+    /// [`ModelDescription::problems`] reports such numbers. If a description has no problems, the
+    /// result is valid by `fmi2ModelDescription.xsd`.
     ///
     /// ```
     /// use fmu_description::ModelDescription;
@@ -64,7 +64,7 @@ impl Output {
         self.event(Event::End(end));
     }
 
-    /// A list, absent when it is empty.
+    /// Writes a list, which is absent if it is empty.
     fn list<T>(&mut self, name: &str, items: &[T], item: impl Fn(&mut Self, &T)) {
         if !items.is_empty() {
             self.around(Tag::new(name), |output| {
@@ -130,7 +130,7 @@ impl Output {
         );
     }
 
-    /// An interface with its source files.
+    /// Writes an interface with its source files.
     fn interface(&mut self, tag: Tag<'_>, files: &[String]) {
         if files.is_empty() {
             return self.empty(tag);

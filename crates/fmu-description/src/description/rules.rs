@@ -1,4 +1,4 @@
-//! The static rules of FMI 2.0.5 that a model description can break and still be read.
+//! The static rules of FMI 2.0.5 that a readable model description can still break.
 
 mod definitions;
 mod names;
@@ -15,7 +15,7 @@ use super::{DefaultExperiment, ModelDescription};
 pub struct Problem {
     /// Section of FMI 2.0.5 with the rule.
     pub section: &'static str,
-    /// What is wrong, naming the variable or element.
+    /// The violation, with the name of the variable or element.
     pub text: String,
 }
 
@@ -25,7 +25,7 @@ impl fmt::Display for Problem {
     }
 }
 
-/// What has been found so far.
+/// Collects problems.
 #[derive(Default)]
 struct Problems(Vec<Problem>);
 
@@ -41,14 +41,14 @@ impl Problems {
         }
     }
 
-    /// Text that XML can hold.
+    /// Checks that XML allows the text.
     fn text(&mut self, section: &'static str, what: &str, value: &str) {
         self.demand(value.chars().all(super::render::is_xml), section, || {
             format!("{what} {value:?} has characters that XML cannot hold")
         });
     }
 
-    /// Text of one line, the `xs:normalizedString` of the schema.
+    /// Checks that the text has one line: the `xs:normalizedString` of the schema.
     fn line(&mut self, section: &'static str, what: &str, value: &str) {
         self.text(section, what, value);
         self.demand(!value.contains(['\t', '\r', '\n']), section, || {
@@ -62,7 +62,7 @@ impl Problems {
         }
     }
 
-    /// Each of `names` once.
+    /// Checks that each of `names` occurs once.
     fn unique<'a>(
         &mut self,
         section: &'static str,
@@ -77,12 +77,12 @@ impl Problems {
 }
 
 impl ModelDescription {
-    /// Which static rules of FMI 2.0.5 this description breaks; none, if it is in order.
+    /// Returns the static rules of FMI 2.0.5 that this description breaks.
     ///
-    /// Checked are the rules on the file itself: identifiers and flags, units, types, the tables
-    /// of causality, variability and initial, start values and limits, names, aliases, the lists
-    /// of `ModelStructure` with their dependencies, the default experiment. Whether the binary
-    /// behaves accordingly is another question.
+    /// These are the rules on the file itself: identifiers and flags, units, types, the tables of
+    /// causality, variability and initial, start values and limits, names, aliases, the lists of
+    /// `ModelStructure` with their dependencies, the default experiment. The behaviour of the
+    /// binary is not checked.
     ///
     /// Cost: linear in the size of the description.
     #[must_use]
@@ -200,7 +200,7 @@ fn is_c_identifier(text: &str) -> bool {
     starts && text.chars().all(|other| other.is_ascii_alphanumeric() || other == '_')
 }
 
-/// `YYYY-MM-DDThh:mm:ssZ` with every number in its range.
+/// Whether the text is `YYYY-MM-DDThh:mm:ssZ` with every number in its range.
 fn is_date_and_time(text: &str) -> bool {
     let shape = "0000-00-00T00:00:00Z";
     let fits = text.len() == shape.len()

@@ -1,4 +1,4 @@
-//! A ZIP archive whose names and sizes have been looked at before anything is unpacked.
+//! A ZIP archive whose names and sizes are checked before anything is unpacked.
 
 use std::cell::Cell;
 use std::collections::HashSet;
@@ -13,26 +13,27 @@ use zip::{CompressionMethod, ZipArchive};
 
 use super::{PackageError, file_error, paths};
 
-/// Most entries.
+/// Maximum number of entries.
 const ENTRIES: usize = 100_000;
-/// Longest list of entries in bytes.
+/// Maximum size of the list of entries in bytes.
 const DIRECTORY: u64 = 32 << 20;
-/// Most bytes that any archive may unpack to.
+/// Maximum unpacked size of any archive in bytes.
 const CAPACITY: u64 = 4 << 30;
-/// Bytes that even the smallest archive may unpack to ...
+/// Unpacked bytes allowed for even the smallest archive.
 const BASE: u64 = 64 << 20;
-/// ... and how many more for each byte of the archive. FMUs have 2 to 10, deflate up to 1032.
+/// Unpacked bytes allowed in addition for each byte of the archive. FMUs have ratios of 2 to 10;
+/// deflate reaches 1032.
 const RATIO: u64 = 100;
 
-/// Bytes that are unpacked before they are written.
+/// Size of the buffer between unpacking and writing, in bytes.
 const BUFFER: usize = 1 << 20;
 
-/// What is wrong with an archive that has two entries of one name.
+/// The reason for refusing an archive with two entries of the same name.
 const DUPLICATE: &str = "two entries have the same name";
-/// What is wrong with an archive whose entries share their bytes, as those of a bomb do.
+/// The reason for refusing an archive whose entries share bytes, as those of a ZIP bomb do.
 const OVERLAP: &str = "entries overlap";
 
-/// A reader that gives no more than so many bytes, as long as that is limited.
+/// A reader that returns a limited number of bytes.
 pub(super) struct Metered<R> {
     inner: R,
     left: Rc<Cell<u64>>,
@@ -58,16 +59,16 @@ impl<R: Seek> Seek for Metered<R> {
 pub(super) struct Archive {
     zip: ZipArchive<Metered<BufReader<File>>>,
     path: PathBuf,
-    /// All names, those of folders with a slash at their end; in the order of the archive. Empty for
-    /// an entry that is the root folder itself.
+    /// All names in the order of the archive; names of folders end with a slash. Empty for the root
+    /// folder itself.
     names: Vec<String>,
-    /// Names that were read as other ones: how many, and the first with its reading.
+    /// The number of names that were read differently, and the first of them with its reading.
     renamed: Option<(usize, String, String)>,
     capacity: u64,
 }
 
 impl Archive {
-    /// Opens the archive at `path` and looks at its list of entries.
+    /// Opens the archive at `path` and checks its list of entries.
     pub(super) fn open(path: &Path) -> Result<Self, PackageError> {
         let file = File::open(path).map_err(file_error("open", path))?;
         let length = file.metadata().map_err(file_error("read", path))?.len();
@@ -127,7 +128,7 @@ impl Archive {
         &self.names
     }
 
-    /// What breaks the rules for the paths of entries and was read all the same: a sentence each.
+    /// Returns the violations of the rules for paths that were accepted, a sentence each.
     pub(super) fn warnings(&self) -> Vec<String> {
         let sentence = |(count, stated, read): &(usize, String, String)| {
             let entries = if *count == 1 { "entry has" } else { "entries have" };
@@ -141,7 +142,7 @@ impl Archive {
         self.renamed.iter().map(sentence).collect()
     }
 
-    /// Unpacks into `folder` the entries that are `wanted`.
+    /// Unpacks the entries that `wanted` accepts into `folder`.
     pub(super) fn unpack(
         &mut self,
         folder: &Path,
@@ -150,7 +151,7 @@ impl Archive {
         self.unpack_up_to(folder, self.capacity, wanted)
     }
 
-    /// The same, no more than `capacity` bytes.
+    /// The same with a limit of `capacity` bytes.
     pub(super) fn unpack_up_to(
         &mut self,
         folder: &Path,
@@ -177,7 +178,8 @@ impl Archive {
             let wrong = |source| PackageError::Archive { path: self.path.clone(), source };
             let limit =
                 || PackageError::Limit { path: self.path.clone(), limit: capacity, unit: "bytes" };
-            // What the list says is not to be believed: more than is left is not written.
+            // The list of entries may state a wrong size, so the limit applies to the bytes
+            // written.
             let written = write_entry(entry.map_err(wrong)?, &target, left)?;
             left = left.checked_sub(written).ok_or_else(limit)?;
         }
@@ -193,7 +195,7 @@ impl Archive {
     }
 }
 
-/// Whether two names are equal; a folder may be stated twice.
+/// Whether two entries have the same name; a folder may occur twice.
 fn has_duplicates(names: &[String]) -> bool {
     let mut seen = HashSet::new();
     names
@@ -202,7 +204,7 @@ fn has_duplicates(names: &[String]) -> bool {
         .any(|name| !seen.insert(name))
 }
 
-/// A name that is a file's and a folder's.
+/// Returns a name that belongs to a file and a folder.
 fn file_and_folder(names: &[String]) -> Option<String> {
     let files: HashSet<&str> =
         names.iter().filter(|name| !name.ends_with('/')).map(String::as_str).collect();
@@ -225,7 +227,7 @@ fn file_and_folder(names: &[String]) -> Option<String> {
     None
 }
 
-/// Writes one file, stopping after `limit` + 1 bytes whatever the archive says of its size.
+/// Writes one file, and stops after `limit` + 1 bytes whatever size the archive states.
 fn write_entry(
     entry: ZipFile<'_, Metered<BufReader<File>>>,
     target: &Path,

@@ -1,19 +1,19 @@
-//! Which paths an entry of an archive may have.
+//! Allowed paths of the entries of an archive.
 
 /// Characters that Windows does not allow in a file name.
 const RESERVED: [char; 7] = ['<', '>', ':', '"', '|', '?', '*'];
-/// Devices of Windows, which no file may be called, whatever its extension.
+/// Device names of Windows, which no file may have, with any extension.
 const DEVICES: [&str; 4] = ["con", "prn", "aux", "nul"];
 
 const FOLDERS: [&str; 6] =
     ["documentation", "sources", "binaries", "resources", "extra", "terminalsAndIcons"];
 
-/// Longest path in bytes, and deepest.
+/// Maximum length of a path in bytes, and maximum depth.
 const LENGTH: usize = 1024;
 const DEPTH: usize = 64;
 
-/// The path that `path` means: with forward slashes, and without the parts `.` that name a folder
-/// itself. Whatever leads out of the folder stays as it is. Empty for the root folder.
+/// Normalises a path: forward slashes, no parts `.`, which name the folder itself. Parts that lead
+/// out of the folder stay unchanged. Empty for the root folder.
 pub(super) fn normalised(path: &str) -> String {
     let path = path.replace('\\', "/");
     let (inner, end) = path.strip_suffix('/').map_or((path.as_str(), ""), |inner| (inner, "/"));
@@ -24,7 +24,7 @@ pub(super) fn normalised(path: &str) -> String {
     parts.join("/") + end
 }
 
-/// What is wrong with `path` if it could lead out of the folder it is unpacked into: the rule.
+/// Returns the violated rule if `path` could lead out of the folder into which it is unpacked.
 pub(super) fn unsafe_to_unpack(path: &str) -> Option<&'static str> {
     if path.contains('\\') {
         return Some("forward slashes between folders");
@@ -43,7 +43,7 @@ pub(super) fn unsafe_to_unpack(path: &str) -> Option<&'static str> {
     None
 }
 
-/// What is wrong with `path` as an entry of an FMU that is to be written: the rule.
+/// Returns the violated rule if an FMU that is written must not contain `path`.
 pub(super) fn unsuitable(path: &str) -> Option<&'static str> {
     if let Some(rule) = unsafe_to_unpack(path) {
         return Some(rule);

@@ -1,4 +1,4 @@
-//! Unpacking an FMU.
+//! Unpacks an FMU.
 
 use std::fs;
 use std::io::{self, Read as _};
@@ -8,7 +8,7 @@ use super::archive::Archive;
 use super::{DESCRIPTION, PackageError, TemporaryFolder, file_error, platforms};
 use crate::description::{ModelDescription, Warning};
 
-/// The folders of `binaries` that the standard names.
+/// The folders of `binaries` that the standard defines.
 const PLATFORMS: [&str; 15] = [
     "win32",
     "win64",
@@ -27,44 +27,47 @@ const PLATFORMS: [&str; 15] = [
     "aarch64-darwin",
 ];
 
-/// An FMU as a folder, with its model description.
+/// An unpacked FMU with its model description.
 #[derive(Debug)]
 pub struct Unpacked {
     folder: PathBuf,
-    /// Removes the folder at the end, if it was made for this.
+    /// The temporary folder, removed on drop; `None` if the FMU was given as a folder.
     temporary: Option<TemporaryFolder>,
-    /// The entries of the archive, if there was one.
+    /// The names of the archive's entries, if there was an archive.
     names: Vec<String>,
-    /// What `modelDescription.xml` says.
+    /// The content of `modelDescription.xml`.
     pub description: ModelDescription,
-    /// What in it breaks the standard and was read all the same.
+    /// The violations of the standard in it that were accepted.
     pub warnings: Vec<Warning>,
-    /// The same of the archive: a sentence each.
+    /// The same for the archive, a sentence each.
     pub archive_warnings: Vec<String>,
 }
 
 impl Unpacked {
-    /// Unpacks what a simulation can need of the archive at `path` into a new temporary folder, which
-    /// lives as long as the result. A library loaded from it must be closed before. Left out are
-    /// documentation, sources, pictures and the libraries of other platforms. Backslashes in paths are
-    /// read as slashes and parts `.` are skipped, with a sentence in [`Unpacked::archive_warnings`].
+    /// Unpacks the FMU at `path` into a new temporary folder, which is removed when the result is
+    /// dropped.
+    ///
+    /// Only files that a simulation can need are unpacked: no documentation, sources, pictures, and
+    /// no libraries of other platforms. Close a library that was loaded from the folder before you
+    /// drop the result. Backslashes in paths are read as slashes and parts `.` are skipped;
+    /// [`Unpacked::archive_warnings`] reports this.
     ///
     /// # Errors
     ///
     /// [`PackageError`] if the file is no ZIP archive, has entries that lead out of the folder,
     /// links, duplicate names, a file and a folder of one name, overlapping or encrypted entries,
-    /// more than 100,000 entries, more than 4 GiB or more than 64 MiB and 100 times its own size, or
-    /// no readable `modelDescription.xml` at its root. What is refused for its list of entries is so
+    /// more than 100,000 entries, more than 4 GiB or more than 64 MiB and 100 times its own size,
+    /// or no readable `modelDescription.xml` at its root. Faults in the list of entries are found
     /// before anything is written.
     pub fn open(path: &Path) -> Result<Self, PackageError> {
         Self::unpack(path, is_needed)
     }
 
-    /// As [`Unpacked::open`], all of it: to pack it again, or to look at the rest.
+    /// As [`Unpacked::open`], but unpacks all files: to pack them again, or to check them.
     ///
     /// # Errors
     ///
-    /// Those of [`Unpacked::open`].
+    /// Same as [`Unpacked::open`].
     pub fn open_whole(path: &Path) -> Result<Self, PackageError> {
         Self::unpack(path, |_| true)
     }
@@ -95,30 +98,30 @@ impl Unpacked {
         Ok(Unpacked { folder, temporary: None, names, description, warnings, archive_warnings })
     }
 
-    /// The folder with `modelDescription.xml`; an absolute path.
+    /// The folder with `modelDescription.xml`, as an absolute path.
     #[must_use]
     pub fn folder(&self) -> &Path {
         self.temporary.as_ref().map_or(&self.folder, TemporaryFolder::path)
     }
 
-    /// The names of all entries of the archive, those of folders with a slash at their end; none where
-    /// the FMU was given as a folder.
+    /// The names of all entries of the archive, with a slash at the end of folders; `None` if the
+    /// FMU was given as a folder.
     #[must_use]
     pub fn entries(&self) -> &[String] {
         &self.names
     }
 
-    /// The folder `resources`, whether the FMU has one or not.
+    /// The path of the folder `resources`, which may not exist.
     #[must_use]
     pub fn resources(&self) -> PathBuf {
         self.folder().join("resources")
     }
 
-    /// The shared library called `model_identifier` for the platform of this program.
+    /// The path of the shared library `model_identifier` for the platform of this program.
     ///
     /// # Errors
     ///
-    /// [`PackageError::Missing`] with the libraries that the FMU has.
+    /// [`PackageError::Missing`], which lists the libraries of the FMU.
     pub fn library(&self, model_identifier: &str) -> Result<PathBuf, PackageError> {
         let name = format!("{model_identifier}{}", std::env::consts::DLL_SUFFIX);
         let binaries = self.folder().join("binaries");
@@ -134,7 +137,7 @@ impl Unpacked {
         })
     }
 
-    /// The files two levels below `binaries`, whatever its case; at most 20, sorted.
+    /// The files two levels below `binaries`, in any case of that name; at most 20, sorted.
     fn libraries(&self) -> Vec<String> {
         let mut found = if self.temporary.is_some() {
             self.names.clone()
@@ -165,7 +168,7 @@ fn below(folder: &Path) -> impl Iterator<Item = PathBuf> + use<> {
     fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path())
 }
 
-/// Whether a simulation on this platform can need the file: all but what it certainly does not.
+/// Whether a simulation on this platform can need the file; false only if it certainly cannot.
 fn is_needed(name: &str) -> bool {
     let mut parts = name.split('/');
     match (parts.next(), parts.next()) {
@@ -177,12 +180,14 @@ fn is_needed(name: &str) -> bool {
     }
 }
 
-/// Unpacks the ZIP archive at `path` (an FMU, or an SSP) into a new temporary folder: the folder, and
-/// what in the archive breaks the rules for paths and was read all the same, a sentence each.
+/// Unpacks the ZIP archive at `path` (an FMU, or an SSP) into a new temporary folder.
+///
+/// Returns the folder and the violations of the rules for paths that were accepted, a sentence
+/// each.
 ///
 /// # Errors
 ///
-/// [`PackageError`] as for [`Unpacked::open`], whatever is in the archive.
+/// Same as [`Unpacked::open`], except those about the content of the archive.
 pub fn unpack_archive(path: &Path) -> Result<(TemporaryFolder, Vec<String>), PackageError> {
     let mut archive = Archive::open(path)?;
     let folder = folder()?;
@@ -209,7 +214,7 @@ fn describe(folder: &Path, path: &Path) -> Result<(ModelDescription, Vec<Warning
         .map_err(|source| PackageError::Description { path: path.to_owned(), source })
 }
 
-/// A file, or as much of it as is longer than every model description.
+/// Reads a file up to a length that exceeds every valid model description.
 fn start(file: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let most = u64::try_from(ModelDescription::MOST_BYTES).unwrap_or(u64::MAX);
@@ -217,7 +222,7 @@ fn start(file: &Path) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// No model description among `names`: one that is nearly there, or what there is.
+/// The error for an archive without model description: names a similar entry, or lists the entries.
 fn missing(names: &[String]) -> PackageError {
     let near = names.iter().find(|name| {
         let file = name.rsplit_once('/').map_or(name.as_str(), |(_, file)| file);

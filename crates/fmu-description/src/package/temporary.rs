@@ -1,4 +1,4 @@
-//! Temporary folders that do not outlive their process, however it ends.
+//! Temporary folders that are removed even if their process is killed.
 
 use std::fs::File;
 use std::io;
@@ -7,31 +7,32 @@ use std::sync::{Mutex, Once, PoisonError, TryLockError};
 
 use tempfile::TempDir;
 
-/// What the names of all these folders begin with.
+/// Common prefix of the names of these folders.
 const PREFIX: &str = "fmi2-unpacked-";
-/// How often a folder is made that another process removes before it is locked.
+/// Number of attempts to make a folder if another process removes it before it is locked.
 const ATTEMPTS: usize = 10;
 
-/// The folders of this process.
+/// The temporary folders of this process.
 static FOLDERS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// A temporary folder, removed when this is dropped.
+/// A temporary folder, removed on drop.
 ///
-/// On Unix a process that is killed leaves none for long: a lock on the folder ends with its process,
-/// and the first folder of the next process removes those that nobody locks.
+/// On Unix the folders of a killed process are removed too: the lock on a folder ends with its
+/// process, and the next process removes unlocked folders when it makes its first one.
 #[derive(Debug)]
 pub struct TemporaryFolder {
     folder: TempDir,
-    /// Tells other processes that the folder is in use; released after the folder is removed.
+    /// The lock that tells other processes that the folder is in use; released after the folder is
+    /// removed.
     _lock: Option<File>,
 }
 
 impl TemporaryFolder {
-    /// Makes a folder in that of the system for temporary files.
+    /// Makes a folder in the system's folder for temporary files.
     ///
     /// # Errors
     ///
-    /// Where the file system refuses.
+    /// If an operation of the file system fails.
     pub fn new() -> io::Result<Self> {
         static CLEARED: Once = Once::new();
         let parent = std::env::temp_dir();
@@ -47,7 +48,7 @@ impl TemporaryFolder {
         Err(io::Error::other("other processes remove the folders as soon as they are made"))
     }
 
-    /// Its path, absolute.
+    /// The absolute path of the folder.
     #[must_use]
     pub fn path(&self) -> &Path {
         self.folder.path()
@@ -61,22 +62,24 @@ impl Drop for TemporaryFolder {
     }
 }
 
-/// Removes the temporary folders of this process: for one that is about to end without dropping what
-/// it has. Libraries in them may be loaded still.
+/// Removes all temporary folders of this process.
+///
+/// For a process that is about to end without dropping its values. Libraries in the folders may
+/// still be loaded.
 pub fn remove_temporary_folders() {
     let folders = match FOLDERS.try_lock() {
         Ok(folders) => folders,
         Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
-        // Held by a thread that stands still for ever.
+        // A thread that will never continue may hold the lock.
         Err(TryLockError::WouldBlock) => return,
     };
     for folder in folders.iter() {
-        // What cannot be removed now is removed by the next process.
+        // Folders that cannot be removed now are removed by the next process.
         let _ = std::fs::remove_dir_all(folder);
     }
 }
 
-/// Locks the folder at `path`; an error where another process has it, or has removed it.
+/// Locks the folder at `path`; an error if another process has locked or removed it.
 #[cfg(unix)]
 fn lock(path: &Path) -> io::Result<Option<File>> {
     use std::os::unix::fs::MetadataExt as _;
@@ -84,7 +87,7 @@ fn lock(path: &Path) -> io::Result<Option<File>> {
     match file.try_lock() {
         Ok(()) => {}
         Err(std::fs::TryLockError::WouldBlock) => return Err(io::ErrorKind::WouldBlock.into()),
-        // A file system without locks: nobody can have one.
+        // The file system has no locks, so no other process can hold one.
         Err(std::fs::TryLockError::Error(_)) => return Ok(None),
     }
     let same = std::fs::symlink_metadata(path)?.ino() == file.metadata()?.ino();
@@ -103,7 +106,7 @@ fn remove_abandoned(parent: &Path) {
     for entry in entries {
         let is_ours = entry.file_name().to_string_lossy().starts_with(PREFIX)
             && entry.file_type().is_ok_and(|kind| kind.is_dir());
-        // Where there are no locks it cannot be known whether a folder is in use.
+        // Without locks it is unknown whether a folder is in use.
         if is_ours && let Ok(Some(_lock)) = lock(&entry.path()) {
             let _ = std::fs::remove_dir_all(entry.path());
         }

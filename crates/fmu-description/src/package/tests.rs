@@ -46,7 +46,7 @@ fn the_same_content_gives_the_same_bytes() {
 
 /// Offsets of APPNOTE.TXT, sections 4.3.7 and 4.3.12.
 #[test]
-fn every_header_is_as_section_2_3_demands() {
+fn every_header_satisfies_section_2_3() {
     let bytes = written(&package());
     let entries = raw::directory(&bytes);
     let names: Vec<&str> = entries.iter().map(|entry| entry.name.as_str()).collect();
@@ -69,7 +69,7 @@ fn every_header_is_as_section_2_3_demands() {
 }
 
 #[test]
-fn what_was_packed_is_unpacked() {
+fn a_packed_fmu_is_unpacked_with_the_same_content() {
     let folder = folder();
     let target = folder.path().join("M.fmu");
     package().write(&target).unwrap();
@@ -108,7 +108,7 @@ fn an_unpacked_fmu_can_be_used_changed_and_packed_again() {
 }
 
 #[test]
-fn a_missing_library_is_answered_with_those_that_are_there() {
+fn the_error_for_a_missing_library_lists_the_existing_ones() {
     let folder = folder();
     let target = folder.path().join("M.fmu");
     let mut package = Package::new(XML.to_owned());
@@ -187,7 +187,7 @@ fn an_incomplete_fmu_is_not_written() {
 }
 
 #[test]
-fn a_failed_write_leaves_nothing_behind() {
+fn a_failed_write_leaves_no_file() {
     let folder = folder();
     let target = folder.path().join("M.fmu");
     fs::create_dir(&target).unwrap();
@@ -198,7 +198,7 @@ fn a_failed_write_leaves_nothing_behind() {
 
 #[cfg(unix)]
 #[test]
-fn others_may_read_what_was_written() {
+fn a_written_file_can_be_read_by_other_users() {
     use std::os::unix::fs::PermissionsExt as _;
     let folder = folder();
     let target = folder.path().join("M.fmu");
@@ -285,7 +285,7 @@ fn a_plain_archive_is_accepted_and_one_with_duplicates_is_not() {
 }
 
 #[test]
-fn what_is_no_fmu_is_refused_with_the_reason() {
+fn files_that_are_no_fmus_are_refused_with_the_reason() {
     let absent = Unpacked::open(Path::new("/nowhere/M.fmu")).unwrap_err();
     assert!(matches!(absent, PackageError::File { action: "open", .. }), "{absent}");
     let text = opened(b"just text").unwrap_err();
@@ -305,7 +305,7 @@ fn what_is_no_fmu_is_refused_with_the_reason() {
 }
 
 #[test]
-fn a_damaged_file_is_noticed_by_its_checksum() {
+fn a_damaged_file_is_detected_by_its_checksum() {
     let mut bytes = raw::archive(&[(DESCRIPTION, XML, 0o100_644)]);
     let at = bytes.windows(3).position(|part| part == b"\"M\"").unwrap() + 1;
     bytes[at] = b'N';

@@ -1,4 +1,4 @@
-//! Writing an FMU.
+//! Writes an FMU.
 
 use std::collections::HashSet;
 use std::fs;
@@ -10,15 +10,15 @@ use zip::{CompressionMethod, DateTime, System, ZipWriter};
 
 use super::{DESCRIPTION, PackageError, file_error, paths};
 
-/// Bytes that fit into an archive without Zip64, with room for its directory.
+/// Maximum size in bytes of an archive without Zip64, less room for its directory.
 const CAPACITY: u64 = 1 << 31;
-/// Entries that fit into an archive without Zip64.
+/// Maximum number of entries of an archive without Zip64.
 const ENTRIES: u64 = 65_000;
 
 /// An FMU to be written.
 ///
-/// The archive depends on nothing but what is added: entries are sorted, with
-/// `modelDescription.xml` first, all are deflated, dated 1980-01-01 and of mode 0644 (0755 in
+/// The bytes of the archive depend only on the added content: entries are sorted, with
+/// `modelDescription.xml` first; all are deflated, dated 1980-01-01 and have mode 0644 (0755 in
 /// `binaries`). There are no directory entries, data descriptors or Zip64 records.
 ///
 /// ```no_run
@@ -35,7 +35,7 @@ pub struct Package {
 }
 
 impl Package {
-    /// An FMU with `description_xml` as its `modelDescription.xml` and nothing else yet.
+    /// Creates an FMU that contains only `description_xml` as its `modelDescription.xml`.
     #[must_use]
     pub fn new(description_xml: String) -> Self {
         Package { description: description_xml, entries: Vec::new() }
@@ -46,11 +46,11 @@ impl Package {
         self.entries.push((path.into(), bytes.into()));
     }
 
-    /// Adds all files in `folder` and below, under `path`.
+    /// Adds all files in `folder` and its subfolders, under `path`.
     ///
     /// # Errors
     ///
-    /// [`PackageError::File`] if one cannot be read, [`PackageError::Entry`] for a symbolic link
+    /// [`PackageError::File`] if a file cannot be read, [`PackageError::Entry`] for a symbolic link
     /// or a name that is not Unicode.
     pub fn add_folder(&mut self, path: &str, folder: &Path) -> Result<(), PackageError> {
         for entry in fs::read_dir(folder).map_err(file_error("read", folder))? {

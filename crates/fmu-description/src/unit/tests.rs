@@ -9,7 +9,7 @@ fn exponents(expression: &str) -> [i32; 8] {
 }
 
 #[test]
-fn exponents_come_in_the_order_of_their_names() {
+fn exponents_are_in_the_order_of_their_names() {
     for (position, name) in BaseUnit::EXPONENTS.into_iter().enumerate() {
         let mut expected = [0; 8];
         expected[position] = 1;
@@ -119,7 +119,7 @@ fn conversions_have_the_published_factors() {
 }
 
 #[test]
-fn temperatures_have_an_offset_and_stand_alone() {
+fn temperatures_have_an_offset_and_cannot_be_combined() {
     let celsius = base("degC");
     assert_eq!((celsius.k, celsius.factor, celsius.offset), (1, 1.0, 273.15));
     let fahrenheit = base("degF");
@@ -151,7 +151,7 @@ fn the_name_is_kept_as_written() {
 }
 
 #[test]
-fn a_units_own_name_goes_before_prefix_and_unit() {
+fn a_complete_unit_name_has_priority_over_prefix_and_unit() {
     assert_eq!(exponents("min"), [0, 0, 1, 0, 0, 0, 0, 0]);
     assert_eq!(exponents("cd"), [0, 0, 0, 0, 0, 0, 1, 0]);
     assert_eq!(exponents("mol"), [0, 0, 0, 0, 0, 1, 0, 0]);
@@ -160,7 +160,7 @@ fn a_units_own_name_goes_before_prefix_and_unit() {
 }
 
 #[test]
-fn what_is_no_unit_is_refused_with_its_place() {
+fn an_unknown_unit_is_refused_with_its_position() {
     for (expression, column) in
         [("kg.furlong", 4), ("kmin", 1), ("kkg", 1), ("m/Q", 3), ("\u{b5}m.x", 1)]
     {

@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn texts_are_read_up_to_their_end_and_bad_pointers_give_none() {
+    fn texts_are_read_to_their_end_and_invalid_pointers_give_none() {
         assert_eq!(text(c"tank".as_ptr()), Some("tank".to_owned()));
         assert_eq!(text(c"".as_ptr()), Some(String::new()));
         assert_eq!(text(std::ptr::null()), None);

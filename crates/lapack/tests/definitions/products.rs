@@ -3,7 +3,7 @@ use nalgebra::DMatrix;
 
 const TRANSPOSES: [(u8, bool); 3] = [(b'N', false), (b't', true), (b'C', true)];
 
-/// A with op(A) = m.
+/// Returns A with op(A) = m.
 fn stored(m: &DMatrix<f64>, turned: bool) -> DMatrix<f64> {
     if turned { m.transpose() } else { m.clone() }
 }
@@ -66,7 +66,7 @@ fn gemm_with_beta_zero_does_not_read_the_target_and_with_no_terms_scales_it() {
     };
     assert!((DMatrix::from_column_slice(2, 2, &target) - &a * &b).amax() < 1e-14);
     let mut target = vec![1.0, 2.0, 3.0, 4.0];
-    // SAFETY: there are no terms.
+    // SAFETY: the arrays are empty.
     unsafe { blas::dgemm(b'N', b'N', 2, 2, 0, 1.0, &[], 2, &[], 1, 2.0, &mut target, 2) };
     assert_eq!(target, [2.0, 4.0, 6.0, 8.0]);
 }
@@ -137,7 +137,7 @@ fn symv_reads_one_triangle() {
     }
 }
 
-/// The target keeps one triangle and gets the other.
+/// The target keeps one triangle and gets the other one.
 fn assert_triangle(letter: u8, target: &[f64], before: &DMatrix<f64>, expected: &DMatrix<f64>) {
     let n = before.nrows();
     let found = matrix(n, n, 1, target);

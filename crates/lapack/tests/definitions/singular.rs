@@ -8,10 +8,11 @@ struct Factors {
     vt: DMatrix<f64>,
 }
 
-/// The arrays of a decomposition, values, U and V', with two guards below U and one below V'.
+/// The arrays of a decomposition (values, U and V'), with two guards after the columns of U and one
+/// after those of V'.
 type Arrays = (Vec<f64>, Vec<f64>, Vec<f64>);
 
-/// Calls either routine; a workspace of one entry asks for its length. The answer is INFO.
+/// Calls one of the routines and returns INFO; a workspace of one entry requests its size.
 fn call(divide: bool, job: u8, a: &DMatrix<f64>, to: &mut Arrays, work: &mut [f64]) -> i32 {
     let (m, n) = (int(a.nrows()), int(a.ncols()));
     let ldvt = int(to.2.len()) / n;
@@ -72,7 +73,7 @@ fn svd(divide: bool, job: u8, a: &DMatrix<f64>) -> Factors {
     Factors { info, u: matrix(m, cols, 2, &u), values, vt: matrix(rows, n, 1, &vt) }
 }
 
-/// Square, tall, wide; full and deficient rank; graded, huge, tiny, zero.
+/// Matrices that are square, tall and wide; with full and deficient rank; graded, huge, tiny, zero.
 fn general_cases() -> Vec<DMatrix<f64>> {
     let (tall, wide) = (entries(7, 2, 31), entries(2, 5, 32));
     let integers = DMatrix::from_row_slice(4, 3, &[1., 2., 3., 2., 4., 6., 1., 0., 1., 0., 2., 2.]);

@@ -8,7 +8,7 @@ struct Spectrum {
     vectors: Vec<f64>,
 }
 
-/// Asks for the workspace, then for eigenvalues and eigenvectors.
+/// Requests the size of the workspace, then eigenvalues and eigenvectors.
 fn syevr(job: u8, triangle: u8, a: &DMatrix<f64>) -> Spectrum {
     let n = a.nrows();
     let mut found =
@@ -52,7 +52,7 @@ fn syevr(job: u8, triangle: u8, a: &DMatrix<f64>) -> Spectrum {
     found
 }
 
-/// Repeated, zero, tiny and huge eigenvalues, and none of these.
+/// Matrices with repeated, zero, tiny and huge eigenvalues, and ordinary ones.
 fn symmetric_cases() -> Vec<DMatrix<f64>> {
     let graded = symmetric(6, 21);
     let scale = |k: usize| 10.0_f64.powi(-3 * int(k));
@@ -89,7 +89,8 @@ fn syevr_finds_ascending_eigenvalues_and_orthonormal_eigenvectors() {
     }
 }
 
-/// The eigenvalues of the matrix (2, -1 beside it) are 2 - 2 cos(k pi / (n + 1)).
+/// The eigenvalues of the tridiagonal matrix with 2 on and -1 beside the diagonal are 2 - 2 cos(k
+/// pi / (n + 1)).
 #[test]
 fn syevr_finds_the_eigenvalues_of_the_second_difference() {
     let n = 12;

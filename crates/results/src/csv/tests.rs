@@ -25,7 +25,7 @@ fn extremes() -> Vec<f64> {
 }
 
 #[test]
-fn every_double_comes_back_with_the_same_bits() {
+fn every_double_is_read_back_with_the_same_bits() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("extremes.csv");
     let mut sink = Box::new(CsvSink::create(&path, &[column("x", ColumnKind::Real)]).unwrap());
@@ -53,7 +53,7 @@ fn every_double_comes_back_with_the_same_bits() {
 }
 
 #[test]
-fn what_is_no_number_is_spelt_as_numpy_pandas_and_polars_read_it() {
+fn nan_and_infinity_are_spelt_as_numpy_pandas_and_polars_read_them() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.csv");
     let mut sink = Box::new(CsvSink::create(&path, &[column("x", ColumnKind::Real)]).unwrap());
@@ -66,7 +66,7 @@ fn what_is_no_number_is_spelt_as_numpy_pandas_and_polars_read_it() {
 }
 
 #[test]
-fn all_kinds_in_their_order_with_texts_escaped_as_another_reader_wants_them() {
+fn all_kinds_are_written_in_order_and_texts_escaped_for_other_readers() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.csv");
     let mut sink = Box::new(CsvSink::create(&path, &mixed()).unwrap());

@@ -1,4 +1,9 @@
 //! The footer of a Parquet file: schema, units and positions of the row groups.
+//!
+//! The writer of the crate `parquet` writes a footer only when the file is closed, and without a
+//! footer a Parquet file is unreadable: a run that is killed would lose all rows. So this module
+//! keeps the positions of the row groups and writes a footer with every write. (Arrow IPC streams
+//! need no footer, but most tools that read results expect Parquet.)
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -28,7 +28,7 @@ fn groups(path: &Path) -> Vec<i64> {
 }
 
 #[test]
-fn all_kinds_come_back_typed_in_their_order() {
+fn all_kinds_are_read_back_with_type_and_order() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.parquet");
     let mut sink = Box::new(ParquetSink::create(&path, &mixed()).unwrap());
@@ -80,7 +80,7 @@ fn a_file_is_readable_from_the_first_moment_and_after_every_flush_and_drop() {
 }
 
 #[test]
-fn row_groups_are_bounded_and_follow_each_other_whatever_is_flushed_between() {
+fn row_groups_are_bounded_and_contiguous_with_any_flushes_in_between() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.parquet");
     let columns: Vec<Column> =

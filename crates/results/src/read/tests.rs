@@ -68,7 +68,7 @@ fn words_for_truth_are_numbers_and_other_texts_are_named_with_their_place() {
 }
 
 #[test]
-fn what_is_no_results_file_is_refused_by_name() {
+fn a_file_that_has_no_results_is_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     for (name, bytes) in [("a.parquet", &b"no parquet"[..]), ("b.parquet", b""), ("c.csv", b"")] {

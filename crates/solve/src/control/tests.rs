@@ -59,7 +59,7 @@ fn the_step_after_a_rejection_does_not_grow() {
 }
 
 #[test]
-fn the_bounds_hold_and_the_smallest_step_that_fails_says_so() {
+fn the_step_stays_within_its_bounds_and_a_failure_of_the_smallest_is_reported() {
     let bounds = SizeBounds { smallest: 0.1, largest: 1.0 };
     let mut control = ErrorControl::new(bounds, 2.0);
     assert_eq!(control.judge(0.9, 0.0), Verdict::Accepted { next: 1.0 });

@@ -12,7 +12,7 @@ fn a_chain_is_ordered_and_free_nodes_keep_their_order() {
 }
 
 #[test]
-fn loops_are_found_where_tarjan_1972_has_them() {
+fn loops_are_those_of_tarjan_1972() {
     // Figure 3 of the paper, its nodes 1 to 8 numbered 0 to 7 here.
     let edges = [(0, 1), (1, 2), (1, 7), (2, 3), (2, 6), (3, 4), (4, 2), (4, 5), (6, 3), (6, 5)];
     let edges = [&edges[..], &[(7, 0), (7, 6)]].concat();
@@ -27,7 +27,7 @@ fn a_node_that_needs_itself_is_a_loop() {
 }
 
 #[test]
-fn repeated_edges_and_edges_to_nowhere_change_nothing() {
+fn repeated_and_dangling_edges_change_nothing() {
     let found = components(3, &[(1, 0), (1, 0), (9, 0), (0, 9), (2, 1), (2, 1)]);
     assert_eq!(found.sequence(), [2, 1, 0]);
     assert!(components(0, &[(0, 0)]).is_empty());

@@ -81,7 +81,7 @@ fn a_quotation_that_does_not_end_gives_a_short_message() {
 }
 
 #[test]
-fn a_file_that_is_not_there_is_said_so() {
+fn a_missing_file_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let found = read(&folder.path().join("none.csv")).unwrap_err();
     assert!(matches!(found, TableError::Unreadable(_)), "{found}");

@@ -222,7 +222,7 @@ fn a_repeated_step_sets_its_values_again() {
 }
 
 #[test]
-fn steps_can_end_where_signals_and_settings_break() {
+fn steps_can_end_at_breaks_of_signals_and_settings() {
     let text = r#"
         [scenario]
         set = [{ variable = "plant.F_c", at = 1.25, value = 7 }]

@@ -31,7 +31,7 @@ fn series(mut line: FaultChain) -> [f64; 6] {
 }
 
 #[test]
-fn each_kind_does_what_it_says() {
+fn each_kind_of_fault_changes_the_value_by_its_formula() {
     for (body, expected) in [
         ("bias = { value = 0.5, from = 1 }", [1.0, 2.0, 3.5, 4.5, 5.5, 6.5]),
         ("gain = { factor = 2, until = 1 }", [2.0, 4.0, 3.0, 4.0, 5.0, 6.0]),
@@ -157,7 +157,7 @@ fn a_checkpoint_of_another_scenario_is_refused() {
 }
 
 #[test]
-fn a_signal_can_be_disturbed_on_its_way_and_go_on_from_a_checkpoint() {
+fn a_signal_can_have_a_fault_and_continue_from_a_checkpoint() {
     let text = r#"
         [[scenario.signal]]
         variable = "plant.force"
@@ -181,7 +181,7 @@ fn a_signal_can_be_disturbed_on_its_way_and_go_on_from_a_checkpoint() {
 }
 
 #[test]
-fn nothing_allocates_between_the_steps() {
+fn no_memory_is_allocated_between_the_steps() {
     let text = r#"
         [[scenario.signal]]
         variable = "plant.angle"

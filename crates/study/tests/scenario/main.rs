@@ -140,7 +140,7 @@ fn system() -> (System, Calls, Calls) {
     (system, plant_told, ctrl_told)
 }
 
-/// A whole file.
+/// A complete file.
 #[derive(serde::Deserialize, serde::Serialize)]
 struct Document {
     scenario: Scenario,
@@ -150,7 +150,7 @@ fn scenario(text: &str) -> Scenario {
     toml::from_str::<Document>(text).unwrap_or_else(|error| panic!("{error}\n{text}")).scenario
 }
 
-/// Start at 0 s, steps of 0.5 s.
+/// The run starts at 0 s with steps of 0.5 s.
 fn setup(folder: &Path) -> Setup<'_> {
     Setup { folder, start: 0.0, step: 0.5 }
 }

@@ -28,7 +28,7 @@ fn fault(rest: &str) -> String {
 }
 
 #[test]
-fn variables_that_are_not_there_or_cannot_be_set_are_refused() {
+fn variables_that_are_missing_or_cannot_be_set_are_refused() {
     let value = |name: &str| set(&format!("variable = \"{name}\", at = 1, value = 1"));
     for (name, message) in [
         ("plant.forc", "plant.forc: Listener has no variable \"forc\", it has force, F_c"),

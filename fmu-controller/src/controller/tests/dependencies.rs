@@ -1,4 +1,4 @@
-//! The lists of `ModelStructure` against what really changes, by perturbation.
+//! The lists of `ModelStructure`, compared with the effects of perturbations.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -125,7 +125,7 @@ fn factors(of: Shape) -> BTreeMap<(String, String), Vec<f64>> {
     all
 }
 
-/// The kind that factors show; none where they are all zero.
+/// The kind of dependency for these factors; `None` if all are zero.
 fn kind(factors: &[f64], limited: bool) -> Option<DependencyKind> {
     let same = factors.iter().all(|factor| (factor - factors[0]).abs() < 1e-12);
     if factors.iter().all(|factor| factor.abs() < 1e-12) {

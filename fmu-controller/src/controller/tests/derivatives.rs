@@ -1,7 +1,7 @@
 //! Directional derivatives against central differences, mode by mode.
 //!
-//! Every known enters the equations linearly, so its difference quotient has no truncation error;
-//! along a direction in all knowns they are of third order.
+//! The equations are linear in each known, so the difference quotient by one known has no truncation
+//! error. Along a direction in all knowns the equations are of third order.
 
 use super::sized::{
     FREE, LIMITED, Real, SAMPLED, Shape, initial_knowns, inputs, no_direction, number, sized,

@@ -1,4 +1,4 @@
-//! The equations once more, as matrices and vectors: what must come out.
+//! The equations again, as matrices and vectors: the expected values.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -1,4 +1,5 @@
-//! Stop and break-away as an importer finds them: too early, too late, or nearly not at all.
+//! Stop and break-away with the errors of an importer: located too early, too late, or hardly at
+//! all.
 
 use super::*;
 

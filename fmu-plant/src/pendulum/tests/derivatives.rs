@@ -1,4 +1,4 @@
-//! Directional derivatives against difference quotients, and where there is none.
+//! Directional derivatives compared with difference quotients, and points without a derivative.
 
 use super::knowns::{
     AT_A_POINT, UNKNOWNS, at_initialization, field, moved_at_a_point, moved_at_initialization,

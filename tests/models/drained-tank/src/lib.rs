@@ -1,4 +1,4 @@
-//! A tank with a slow pump, a valve and a leak, to be linearised.
+//! A tank with a slow pump, a valve and a leak, as an example for linearisation.
 #![forbid(unsafe_code)]
 
 use std::path::Path;
@@ -25,7 +25,7 @@ struct DrainedTank {
     area: f64,
     size: f64,
     lag: f64,
-    /// Added to the derivative of level' with respect to the level: a wrong one, for tests.
+    /// Error added to the derivative of level' with respect to the level, for tests.
     lie: f64,
 }
 

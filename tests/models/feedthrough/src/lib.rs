@@ -6,7 +6,7 @@ use std::path::Path;
 use fmu::{About, Enumeration, Experiment, Failure, Model, Step, Variable};
 use serde::{Deserialize, Serialize};
 
-/// Outputs that are their inputs. A step does nothing else.
+/// Outputs that equal their inputs. A step does nothing else.
 #[derive(Clone, Serialize, Deserialize)]
 struct Feedthrough {
     fixed: f64,

@@ -1,5 +1,6 @@
-//! A model whose module defines what `fmu::export!` could stumble over: names of the standard library's
-//! prelude, of primitive types, of the crate's own types, functions and macros, and of arguments.
+//! A model whose module defines names that `fmu::export!` could confuse: names of the standard
+//! library's prelude, of primitive types, of the crate's own types, functions and macros, and of
+//! arguments.
 #![forbid(unsafe_code)]
 #![expect(dead_code, unused_macros, reason = "the names alone matter")]
 #![expect(
@@ -11,7 +12,7 @@
 
 mod model;
 
-/// Unit structs: each is the name of a type and of a value.
+/// Unit structs: each defines the name of a type and of a value.
 macro_rules! structs {
     ($($name:ident)*) => { $(struct $name;)* };
 }
@@ -41,7 +42,7 @@ constants! { c n vr on name value values state size start bytes info kind order 
 constants! { resources context sink guid functions visible model argument function result }
 modules! { core std alloc fmi2 ffi abi signature fmi2_entry_points }
 
-// What the name of a macro leads to is no concern of the model's exports.
+// The expansions of these macros do not matter, only their names.
 macro_rules! assert {
     ($($any:tt)*) => {
         compile_error!("the model's own assert")

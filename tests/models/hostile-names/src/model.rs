@@ -51,7 +51,7 @@ impl Model for HostileNames {
     }
 }
 
-/// Functions called like those of the trait and of the C interface, with other arguments.
+/// Functions with the names of the trait's and the C interface's functions, with other arguments.
 impl HostileNames {
     fn step(&mut self) {
         self.y = HostileNames::reset(self.u);

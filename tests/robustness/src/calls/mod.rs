@@ -1,5 +1,5 @@
-//! One call of each function: chosen arguments, the status that came, what they deserve by the
-//! standard, and what changes where it is `fmi2OK`.
+//! One call of each function: chosen arguments, the returned status, the status that the standard
+//! requires, and the changes to expect after `fmi2OK`.
 
 mod exchange;
 mod simulation;
@@ -14,7 +14,7 @@ use crate::choice::{Choice, usable};
 use crate::importer::{Importer, Saved};
 use crate::prediction::{Core, ERROR, OK};
 
-/// A state that the importer holds, and what it is a copy of; nothing where it is null.
+/// A state that the importer holds, and its predicted content; `None` for null.
 pub struct Kept {
     pub saved: Saved,
     pub of: Option<Core>,
@@ -27,13 +27,13 @@ pub struct Record {
     pub of: Core,
 }
 
-/// What belongs to no instance.
+/// The saved and the serialised states that the importer holds.
 pub struct Stores {
     pub kept: [Kept; 3],
     pub records: [Option<Record>; 2],
 }
 
-/// What a call has to work with.
+/// The instance, states and prediction that a call works with.
 pub struct Call<'a> {
     pub importer: &'a Importer,
     pub core: &'a Core,
@@ -43,17 +43,17 @@ pub struct Call<'a> {
 
 type Effect = Box<dyn FnOnce(&mut Core, &mut Stores)>;
 
-/// What came of a call.
+/// The outcome of a call.
 pub struct Outcome {
     pub status: c_int,
-    /// The statuses that the arguments deserve.
+    /// The statuses that the standard allows for the arguments.
     pub verdict: u8,
     pub effect: Effect,
-    /// Where a step ends that stops half way.
+    /// The time at which a step ends that stops half way.
     pub half_way: f64,
     /// The categories that `fmi2SetDebugLogging` chose, if it is `fmi2OK`.
     pub chosen: Option<Vec<String>>,
-    /// What was read and is not as predicted.
+    /// Differences between values read and values predicted.
     pub complaint: Option<String>,
 }
 
@@ -63,7 +63,7 @@ impl Outcome {
         Self { status, verdict, effect, half_way: 0.0, chosen: None, complaint: None }
     }
 
-    /// `fine`: whether the arguments are in order.
+    /// `fine`: whether the arguments are valid.
     fn if_fine(status: c_int, fine: bool) -> Self {
         Self::new(status, if fine { OK } else { ERROR })
     }
@@ -81,7 +81,7 @@ impl Outcome {
     }
 }
 
-/// A verdict on all elements: what any of them deserves but `OK`.
+/// Combines the verdicts on all elements: the union of those that are not `OK`.
 fn together(verdicts: impl IntoIterator<Item = u8>) -> u8 {
     let bad = verdicts.into_iter().filter(|own| *own != OK).fold(0, |all, own| all | own);
     if bad == 0 { OK } else { bad }
@@ -89,7 +89,7 @@ fn together(verdicts: impl IntoIterator<Item = u8>) -> u8 {
 
 type Caller = fn(&mut Call) -> Outcome;
 
-/// Every function that works on an instance, but `fmi2FreeInstance`.
+/// All functions that take an instance, except `fmi2FreeInstance`.
 pub const CALLS: [(Function, Caller); 40] = [
     (Function::EnterInitializationMode, enter_initialization_mode),
     (Function::ExitInitializationMode, exit_initialization_mode),

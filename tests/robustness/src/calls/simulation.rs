@@ -23,7 +23,7 @@ pub(super) fn do_step(call: &mut Call) -> Outcome {
     }
     let status = call.importer.do_step(start, step);
     let end = start + step;
-    // A step that does not lead from one number to a later one would not be one.
+    // A step must lead from one time to a later one.
     let takes_time = step >= start.next_up() - start;
     let fine = start == core.time && takes_time && step.is_finite() && core.is_before_stop(end);
     let half_way = start + 0.5 * step;

@@ -9,7 +9,7 @@ fn slot(choice: &mut Choice) -> usize {
     usize::from(choice.byte() % 3)
 }
 
-/// A place whose state fits, or any other.
+/// Chooses the index of a state that fits, or of any other.
 fn filled(call: &mut Call, fits: impl Fn(&Core) -> bool) -> usize {
     let every: Vec<_> = (0..3).collect();
     let is_fine = |own: &usize| call.stores.kept[*own].of.as_ref().is_some_and(&fits);
@@ -46,8 +46,8 @@ pub(super) fn set(call: &mut Call) -> Outcome {
 pub(super) fn free(call: &mut Call) -> Outcome {
     let (slot, nowhere) = (slot(&mut call.choice), call.choice.rarely());
     if nowhere {
-        // "If a null pointer is provided, the call is ignored" (section 2.1.8), of which pointer
-        // is open.
+        // "If a null pointer is provided, the call is ignored" (section 2.1.8); the standard does
+        // not say which pointer it means.
         return Outcome::new(call.importer.free_fmu_state(None), OK | ERROR);
     }
     let Kept { saved, .. } = &mut call.stores.kept[slot];
@@ -66,7 +66,7 @@ pub(super) fn size(call: &mut Call) -> Outcome {
         .claim(size.items[0] > 0, || "no bytes".to_owned())
 }
 
-/// More bytes than any state of the machine has.
+/// A size larger than any state of the machine.
 const ROOM: usize = 20_000;
 
 pub(super) fn serialize(call: &mut Call) -> Outcome {
@@ -78,7 +78,7 @@ pub(super) fn serialize(call: &mut Call) -> Outcome {
     let fine = of.is_some() && place.shape == Shape::Right && room == ROOM;
     let mut again = Array::right(vec![0x11; room]);
     let same = status == 0 && call.importer.serialize_fmu_state(saved, &mut again) == 0;
-    // What was not written is as it was filled.
+    // Bytes that were not written keep the fill value.
     let unwritten = |(one, other): &(&u8, &u8)| **one == 0xee && **other == 0x11;
     let rest = place.items.iter().zip(&again.items).rev().take_while(unwritten).count();
     place.items.truncate(room - rest);

@@ -7,7 +7,7 @@ use crate::array::Array;
 use crate::choice::{Choice, usable};
 use crate::prediction::{Core, DISCARD, ERROR, OK, Values};
 
-/// References of variables of a type that has `count`, most of them such that `fit`.
+/// Chooses references of variables of a type with `count` variables, most of which satisfy `fit`.
 fn references(choice: &mut Choice, count: u32, fit: impl Fn(u32) -> bool) -> Array<u32> {
     let length = choice.count();
     choice.array(length, |choice| choice.reference(count, &fit))
@@ -17,7 +17,7 @@ fn any(_: u32) -> bool {
     true
 }
 
-/// The verdict on arrays, then on each element.
+/// The verdict on the arrays, then on each element.
 fn verdict(arrays: &[bool], elements: impl IntoIterator<Item = u8>) -> u8 {
     if arrays.iter().all(|fine| *fine) { together(elements) } else { ERROR }
 }
@@ -26,7 +26,7 @@ fn fine(holds: bool) -> u8 {
     if holds { OK } else { ERROR }
 }
 
-/// A value that comes where the variable can be set.
+/// Whether the value is valid and the variable can be set.
 fn set(settable: bool, accepted: bool) -> u8 {
     match (settable, accepted) {
         (false, _) => ERROR,
@@ -42,7 +42,7 @@ fn between(core: &Core) -> bool {
     here.contains(&core.state)
 }
 
-/// Whether a kept value differs from the one that came.
+/// Whether the stored value differs from the one read.
 fn differs<T: PartialEq>(pairs: impl IntoIterator<Item = (Option<T>, T)>) -> bool {
     pairs.into_iter().any(|(kept, got)| kept.is_some_and(|kept| kept != got))
 }

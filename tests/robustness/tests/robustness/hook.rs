@@ -1,4 +1,5 @@
-//! The panic hook: silent inside an instance, as it was outside, and put back when the last one is freed.
+//! The panic hook: replaced while an instance exists, inactive inside its calls only, restored when
+//! the last instance is freed.
 
 use std::panic::{self, PanicHookInfo};
 use std::process::Command;
@@ -10,13 +11,13 @@ use fmu_description::abi::fmi2EventInfo;
 use robustness::array::Array;
 use robustness::exporter::order;
 use robustness::importer::{HEARS, Importer};
-use robustness::machine::{Mischief, Place, with_plan};
+use robustness::machine::{Misbehaviour, Place, with_plan};
 
 const FATAL: i32 = 4;
 
 type Hook = Box<dyn Fn(&PanicHookInfo<'_>) + Send + Sync>;
 
-/// Runs `body`, the test `name` of this module, in a process in which nothing else runs.
+/// Runs `body`, as the test `name` of this module, alone in a process.
 fn alone(name: &str, body: impl FnOnce()) {
     const ALONE: &str = "FMI2_TEST_ALONE";
     if std::env::var_os(ALONE).is_some() {
@@ -37,7 +38,7 @@ fn address(hook: &Hook) -> usize {
     std::ptr::from_ref(&**hook).cast::<()>().addr()
 }
 
-/// A hook that keeps the messages; its address and the messages.
+/// Installs a hook that keeps the messages; returns its address and the messages.
 fn listen() -> (usize, Arc<Mutex<Vec<String>>>) {
     let messages = Arc::<Mutex<Vec<String>>>::default();
     let heard = Arc::clone(&messages);
@@ -47,7 +48,7 @@ fn listen() -> (usize, Arc<Mutex<Vec<String>>>) {
     (address, messages)
 }
 
-/// The address of the hook that is installed now; it stays installed.
+/// Returns the address of the installed hook and leaves it installed.
 fn installed() -> usize {
     let hook = panic::take_hook();
     let address = address(&hook);
@@ -64,7 +65,7 @@ fn started() -> Importer {
 
 /// A step in which the model panics.
 fn panic_in_a_step(importer: &Importer) {
-    let plan = Some((Place::Step, Mischief::Panic));
+    let plan = Some((Place::Step, Misbehaviour::Panic));
     assert_eq!(with_plan(plan, || importer.do_step(0.0, 0.5)), (FATAL, true));
 }
 
@@ -83,19 +84,19 @@ fn the_message_of_a_panic_has_its_file_and_line() {
     let importer = started();
     panic_in_a_step(&importer);
     let text = importer.take_messages().pop().unwrap().text;
-    let place = place_of("Mischief::Panic => panic!");
-    assert!(text.contains(&place) && text.contains("mischief"), "{text}, expected {place}");
-    // In another function: not the place of the panic before.
+    let place = place_of("Misbehaviour::Panic => panic!");
+    assert!(text.contains(&place) && text.contains("misbehaviour"), "{text}, expected {place}");
+    // In another function, so the place differs from that of the previous panic.
     let (other, happened) =
-        with_plan(Some((Place::Variables, Mischief::Panic)), || Importer::new(&order(1)));
+        with_plan(Some((Place::Variables, Misbehaviour::Panic)), || Importer::new(&order(1)));
     assert!(happened && !other.exists());
     let text = other.take_messages().pop().unwrap().text;
     assert!(text.contains("machine.rs:") && !text.contains(&place), "{text}");
 }
 
 #[test]
-fn a_panic_inside_an_instance_is_heard_by_its_importer_alone() {
-    alone("a_panic_inside_an_instance_is_heard_by_its_importer_alone", || {
+fn a_panic_inside_an_instance_reaches_its_importer_only() {
+    alone("a_panic_inside_an_instance_reaches_its_importer_only", || {
         let (_, heard) = listen();
         let [one, other] = [started(), started()];
         panic_in_a_step(&one);
@@ -122,7 +123,7 @@ fn a_panic_outside_goes_to_the_hook_of_the_process() {
             assert_eq!(exchange.enter_continuous_time_mode(), 0);
             assert_eq!([exchange.set_time(60.0), exchange.enter_event_mode()], [0; 2]);
             exchange.let_the_logger_panic();
-            // The message that the simulation ends comes from inside the call.
+            // The message that the simulation ends is logged from inside the call.
             assert_eq!(
                 exchange.new_discrete_states(&mut Array::right(vec![fmi2EventInfo::default()])),
                 0
@@ -137,8 +138,8 @@ fn a_panic_outside_goes_to_the_hook_of_the_process() {
 }
 
 #[test]
-fn the_hook_of_the_process_is_back_when_the_last_instance_is_freed() {
-    alone("the_hook_of_the_process_is_back_when_the_last_instance_is_freed", || {
+fn the_hook_of_the_process_is_restored_when_the_last_instance_is_freed() {
+    alone("the_hook_of_the_process_is_restored_when_the_last_instance_is_freed", || {
         let (own, _) = listen();
         let one = started();
         let other = started();
@@ -148,7 +149,7 @@ fn the_hook_of_the_process_is_back_when_the_last_instance_is_freed() {
         assert_ne!(installed(), own);
         drop(other);
         assert_eq!(installed(), own, "after the last instance");
-        let plan = Some((Place::New, Mischief::Panic));
+        let plan = Some((Place::New, Misbehaviour::Panic));
         assert!(!with_plan(plan, || Importer::new(&order(1))).0.exists());
         assert_eq!(installed(), own, "after an instance that could not be made");
         robustness::importer::describe().unwrap();
@@ -171,8 +172,8 @@ fn a_hook_that_the_importer_installs_meanwhile_stays() {
 }
 
 #[test]
-fn threads_that_make_and_free_instances_leave_the_hook() {
-    alone("threads_that_make_and_free_instances_leave_the_hook", || {
+fn threads_that_make_and_free_instances_restore_the_hook() {
+    alone("threads_that_make_and_free_instances_restore_the_hook", || {
         let (own, heard) = listen();
         thread::scope(|scope| {
             for _ in 0..8 {

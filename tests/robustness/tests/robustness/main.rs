@@ -1,4 +1,4 @@
-//! Nothing from outside can crash an exported model.
+//! No call and no file from outside crashes an exported model.
 #![expect(clippy::float_cmp, reason = "values that are set and read back")]
 #![expect(clippy::unwrap_used, reason = "tests")]
 

@@ -1,10 +1,10 @@
-//! The fuzz targets for a short fixed count. What it finds is found without a nightly toolchain.
+//! Runs the fuzz targets for a short fixed count, without a nightly toolchain.
 #![cfg(not(miri))]
 
 use robustness::changes::{changed, mutate};
 use robustness::exporter as targets;
 
-/// What XML, ZIP and URIs live on.
+/// Typical words of XML, ZIP and URIs.
 const WORDS: [&[u8]; 16] = [
     b"PK\x01\x02",
     b"PK\x03\x04",
@@ -50,7 +50,7 @@ fn changed_call_sequences_are_answered_as_the_standard_says() {
 }
 
 #[test]
-fn a_change_is_made_where_it_says() {
+fn each_change_is_made_at_its_place() {
     assert_eq!(changed(b"abcd", &[], &[(0, 1, 0, b'X')]), b"aXcd");
     assert_eq!(changed(b"abcd", &[], &[(2, 1, 2, 0)]), b"ad");
     assert_eq!(changed(b"abcd", &[], &[(3, 2, 0, 0)]), b"ab");

@@ -1,4 +1,4 @@
-//! The corpora of the fuzz targets, once more.
+//! Replays the corpora of the fuzz targets.
 
 use robustness::corpus::replay;
 use robustness::exporter as targets;

@@ -8,7 +8,7 @@ use proptest::test_runner::{Config, TestRunner};
 use robustness::calls::CALLS;
 use robustness::exporter::order;
 use robustness::importer::{Importer, describe};
-use robustness::machine::{Mischief, Place, with_plan};
+use robustness::machine::{Misbehaviour, Place, with_plan};
 use robustness::sequence::{FREE, HOSTILE, ILLEGAL, LENGTH, run};
 
 /// Bytes for up to `calls` calls; `first` says which instance and whether calls may be illegal.
@@ -22,9 +22,9 @@ fn bytes(first: impl Strategy<Value = u8>, calls: usize) -> impl Strategy<Value 
 }
 
 fn hold(cases: u32, strategy: &impl Strategy<Value = Vec<u8>>) {
-    // What is made once for the whole process is made before memory is counted.
+    // Data that is created once for the process is created before memory is counted.
     run(&[0; 3 * LENGTH]).unwrap();
-    // The panic hook belongs to all instances: with this one it is neither made nor freed meanwhile.
+    // The panic hook is shared by all instances: this instance keeps it in place during the count.
     let _instance = Importer::new(&order(1));
     let cases = if cfg!(miri) { 3 } else { cases };
     let config = Config { cases, failure_persistence: None, ..Config::default() };
@@ -33,7 +33,7 @@ fn hold(cases: u32, strategy: &impl Strategy<Value = Vec<u8>>) {
         let memory = allocation_counter::measure(|| done = run(&bytes));
         let memory = (memory.count_current, memory.bytes_current);
         prop_assert!(done.is_ok(), "{done:?}");
-        // What a function returns is lost to Rust while a destructor of its locals panics.
+        // Rust leaks the return value of a function if a destructor of its locals panics.
         let lossy = done.is_ok_and(|reached| reached & (1 << Place::Drop as u32) != 0);
         prop_assert!(lossy || memory == (0, 0), "{memory:?} blocks and bytes are left");
         Ok(())
@@ -47,11 +47,11 @@ fn every_sequence_of_calls_is_answered_as_the_standard_says_and_leaves_no_memory
 }
 
 #[test]
-fn long_lives_are_answered_as_the_standard_says() {
+fn long_sequences_are_answered_as_the_standard_says() {
     hold(200, &bytes(0..HOSTILE, 600));
 }
 
-/// Whether the model can fail there by anything but a panic.
+/// Whether the model can fail there by other means than a panic.
 fn is_fallible(place: Place) -> bool {
     use Place as P;
     let fallible =
@@ -59,7 +59,7 @@ fn is_fallible(place: Place) -> bool {
     fallible.contains(&place)
 }
 
-/// The bytes of one call: who, which, and the plan of the model.
+/// The bytes of one call: the instance, the function, and the plan of the model.
 fn call(who: u8, which: u8, plan: [u8; 3]) -> [u8; LENGTH] {
     let mut call = [0; LENGTH];
     call[..2].copy_from_slice(&[who, which]);
@@ -80,7 +80,7 @@ fn plain(instance: u8, function: Function, plan: [u8; 3]) -> [u8; LENGTH] {
     call(ILLEGAL | instance, which.map_or(FREE, |which| u8::try_from(which).unwrap()), plan)
 }
 
-/// The calls by which an instance comes to each state, after `fmi2Instantiate`.
+/// The calls after `fmi2Instantiate` that lead to each state.
 fn ways(exchange: bool) -> Vec<Vec<Function>> {
     use Function as F;
     let on = |more: &[F]| [&[F::EnterInitializationMode, F::ExitInitializationMode], more].concat();
@@ -100,13 +100,15 @@ fn ways(exchange: bool) -> Vec<Vec<Function>> {
 }
 
 #[test]
-fn a_model_that_panics_or_fails_anywhere_is_answered_and_heard_of_while_another_one_goes_on() {
+fn failures_and_panics_anywhere_are_answered_and_reported_while_another_instance_continues() {
     let (mut reached, mut number) = (0, 0_u32);
     let every = CALLS.iter().map(|(function, _)| *function).chain([Function::FreeInstance]);
     let plans = (0..Place::EVERY.len()).flat_map(|place| {
-        let mischief =
-            if is_fallible(Place::EVERY[place]) { 0..Mischief::EVERY.len() } else { 0..1 };
-        mischief.map(move |mischief| [0xff, place, mischief].map(|own| u8::try_from(own).unwrap()))
+        let misbehaviour =
+            if is_fallible(Place::EVERY[place]) { 0..Misbehaviour::EVERY.len() } else { 0..1 };
+        misbehaviour.map(move |misbehaviour| {
+            [0xff, place, misbehaviour].map(|own| u8::try_from(own).unwrap())
+        })
     });
     for plan in plans {
         reached |= run(&call(0, 0, plan)).unwrap();
@@ -131,12 +133,14 @@ fn a_model_that_panics_or_fails_anywhere_is_answered_and_heard_of_while_another_
 }
 
 #[test]
-fn a_model_that_panics_while_it_is_described_is_heard_of() {
+fn a_panic_in_the_description_of_a_model_is_reported() {
     for place in Place::EVERY {
-        let (described, happened) = with_plan(Some((place, Mischief::Panic)), describe);
+        let (described, happened) = with_plan(Some((place, Misbehaviour::Panic)), describe);
         match described {
             Ok(xml) => assert!(!happened && xml.contains("<ModelStructure>")),
-            Err(message) => assert!(happened && message.contains("100 % mischief #1"), "{message}"),
+            Err(message) => {
+                assert!(happened && message.contains("100 % misbehaviour #1"), "{message}");
+            }
         }
     }
 }

@@ -1,10 +1,10 @@
-//! No file that the master reads does any harm, whatever is in it.
+//! No file that the master reads does any harm, whatever its content.
 
 use robustness::changes::mutate;
 use robustness::corpus::replay;
 use robustness::system_files as targets;
 
-/// What the XML of SSP lives on.
+/// Typical words of SSP's XML.
 const XML: [&[u8]; 20] = [
     b"<",
     b">",
@@ -27,7 +27,7 @@ const XML: [&[u8]; 20] = [
     b"<ssd:Elements/>",
     b"<ssd:System name=\"x\"/>",
 ];
-/// What CSV lives on.
+/// Typical words of CSV.
 const CSV: [&[u8]; 10] =
     [b",", b"\"", b"\"\"", b"\n", b"\r\n", b"\r", b"time", b"\xef\xbb\xbf", b"1e308", b"-1e-308"];
 

@@ -1,9 +1,9 @@
-//! No `system.toml` does any harm, whatever is in it.
+//! No `system.toml` does any harm, whatever its content.
 
 use robustness::system_toml::system_toml;
 use robustness::{changes, corpus};
 
-/// What TOML and this file live on.
+/// Typical words of TOML and of this file.
 const WORDS: [&[u8]; 22] = [
     b"[",
     b"]",

@@ -1,4 +1,4 @@
-//! Many instances, in many threads.
+//! Many instances in many threads.
 
 use std::thread;
 
@@ -9,7 +9,7 @@ use robustness::importer::Importer;
 const OK: i32 = 0;
 const COUNT: usize = if cfg!(miri) { 2 } else { 40 };
 
-/// Bits of the outputs in each step of a run of its own for each `seed`.
+/// The bits of the outputs in each step of a separate run for each `seed`.
 fn steps(importer: &Importer, seed: usize) -> impl FnMut(u32) -> [u64; 2] {
     #[expect(clippy::cast_precision_loss, reason = "a small number")]
     let drive = seed as f64 * 0.01;
@@ -40,7 +40,7 @@ fn interleaved(from: usize) -> Vec<[u64; 2]> {
 }
 
 #[test]
-fn instances_in_many_threads_have_the_bits_of_each_alone() {
+fn instances_in_many_threads_give_the_bits_of_each_alone() {
     let threads = [0, 7, 0, 100, 7, 0];
     let together = thread::scope(|scope| {
         let running = threads.map(|from| scope.spawn(move || interleaved(from)));
@@ -58,7 +58,7 @@ fn instances_in_many_threads_have_the_bits_of_each_alone() {
 }
 
 #[test]
-fn a_thousand_instances_live_at_once() {
+fn two_thousand_instances_exist_at_once() {
     let count = if cfg!(miri) { 10 } else { 2000 };
     let importers: Vec<_> = (0..count).map(|_| started()).collect();
     assert!(importers.iter().rev().all(|own| own.do_step(0.0, 0.5) == OK));

@@ -1,6 +1,6 @@
-//! Every function that fills memory of the importer, with memory that nobody has initialised.
+//! Passes uninitialised memory to every function that fills memory of the importer.
 //!
-//! Under Miri, `-Zmiri-recursive-validation` refuses a `&mut [f64]` that leads there.
+//! Under Miri, `-Zmiri-recursive-validation` rejects a `&mut [f64]` to such memory.
 #![expect(unsafe_code, reason = "calls of the C interface")]
 
 use std::ffi::{CStr, c_int};
@@ -13,7 +13,7 @@ use robustness::exporter::order;
 use robustness::importer::{Importer, Saved};
 use robustness::machine::Machine;
 
-/// What `fill` makes of `N` places.
+/// Returns the `N` values that `fill` writes.
 fn filled<T: Copy, const N: usize>(fill: impl FnOnce(*mut T) -> c_int) -> [T; N] {
     let mut places = [const { MaybeUninit::<T>::uninit() }; N];
     assert_eq!(fill(places.as_mut_ptr().cast()), 0);
@@ -103,7 +103,7 @@ fn a_state_is_serialised_into_memory_that_was_never_written() {
 }
 
 #[test]
-fn nothing_at_all_may_be_null() {
+fn null_is_allowed_for_arrays_of_length_zero() {
     use std::ptr::{null, null_mut};
     let (importer, c) = started(1);
     // SAFETY: as above; there are no places.

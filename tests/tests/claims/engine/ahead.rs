@@ -1,4 +1,5 @@
-//! A slave in the background: another one, with a record of what is begun and finished.
+//! A slave that steps in the background: it wraps another one and records the starts and ends of
+//! steps.
 
 use std::sync::{Arc, Mutex};
 
@@ -9,10 +10,10 @@ use master::{Advance, Background, CallError, Failure, Slave, StepResult, System}
 
 type Done = Result<(), CallError>;
 
-/// What was begun and finished, in order.
+/// The starts and ends of steps, in order.
 pub(crate) type Record = Arc<Mutex<Vec<String>>>;
 
-/// Where it fails from the time 5 s on.
+/// The slave's failure from the time 5 s on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Fails {
     Nowhere,
@@ -21,18 +22,18 @@ pub(crate) enum Fails {
     InFinish,
 }
 
-/// A slave that makes its step when it is finished.
+/// A slave that makes its step when the step is finished.
 pub(crate) struct Ahead {
     inner: Box<dyn Slave>,
     name: String,
     fails: Fails,
     record: Record,
-    /// Values of the inputs in the step begun.
+    /// The values of the inputs in the current step.
     begun: Option<Vec<f64>>,
     time: f64,
 }
 
-/// Those slaves of the system for which `fails` gives something are in the background.
+/// Puts the slaves of the system for which `fails` returns a value into the background.
 pub(crate) fn ahead(mut system: System, fails: impl Fn(&str) -> Option<Fails>) -> (System, Record) {
     let record = Record::default();
     let slaves = std::mem::take(&mut system.slaves).into_iter();
@@ -59,7 +60,7 @@ impl Ahead {
         self.record.lock().unwrap().push(format!("{what} {}", self.name));
     }
 
-    /// The slave for a call that is no second half of a step.
+    /// The wrapped slave, for a call that does not finish a step.
     fn other(&mut self) -> &mut dyn Slave {
         self.begun = None;
         self.inner.as_mut()

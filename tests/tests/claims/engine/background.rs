@@ -1,4 +1,4 @@
-//! Slaves in the background: their steps overlap, and nothing else is different.
+//! Slaves in the background: their steps overlap; results and errors stay the same.
 
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ fn jacobi(jobs: usize) -> Algorithm {
     Algorithm { jobs, ..Algorithm::fixed(Method::Jacobi, Extrapolation::Hold, 0.25) }
 }
 
-/// A, b and c in a circle by Reals only.
+/// Slaves a, b and c in a circle, connected by Reals only.
 fn reals() -> System {
     let mut system = typed::ring();
     let to_reals = |port: master::Port| port.variable < 2;
@@ -36,13 +36,14 @@ fn reals() -> System {
 }
 
 #[test]
-fn all_slaves_of_a_group_begin_before_the_first_is_finished() {
+fn all_slaves_of_a_group_start_before_the_first_is_finished() {
     for (system, jobs) in
         [(reals as fn() -> System, 1), (typed::ring, 1), (reals, 2), (typed::ring, 2)]
     {
         let (system, record) = ahead(system(), all);
         let mut simulation = Simulation::new(system, &jacobi(jobs), &until(100.0)).unwrap();
-        // The first 32 steps find out whether threads are faster: without them, then with them.
+        // The master uses the first 32 steps to find out whether threads are faster: first without,
+        // then with threads.
         for _ in 0..40 {
             simulation.step().unwrap();
             let found = std::mem::take(&mut *record.lock().unwrap());
@@ -55,7 +56,7 @@ fn all_slaves_of_a_group_begin_before_the_first_is_finished() {
 }
 
 #[test]
-fn slaves_that_are_connected_are_not_begun_together_by_gauss_seidel() {
+fn gauss_seidel_does_not_start_connected_slaves_together() {
     let algorithm = Algorithm { method: Method::GaussSeidel, ..jacobi(1) };
     let (system, record) = ahead(typed::ring(), all);
     Simulation::new(system, &algorithm, &until(1.0)).unwrap().step().unwrap();
@@ -79,7 +80,7 @@ fn trajectory(algorithm: &Algorithm, fails: fn(&str) -> Option<Fails>) -> Vec<u6
 }
 
 #[test]
-fn the_background_changes_no_bit() {
+fn stepping_in_the_background_changes_no_bit() {
     let first: fn(&str) -> Option<Fails> = |name| (name == "a").then_some(Fails::Nowhere);
     assert!(!trajectory(&Algorithm::new(0.05), first).is_empty());
     for sweep in [Method::Jacobi, Method::GaussSeidel] {
@@ -140,7 +141,7 @@ fn stops(begin: f64, end: f64) -> StepResult {
 }
 
 #[test]
-fn a_step_in_part_is_gone_on_with_or_repeated_as_elsewhere() {
+fn an_incomplete_step_is_continued_or_repeated_as_without_background() {
     for algorithm in [
         jacobi(1),
         Algorithm { extrapolation: Extrapolation::Linear, ..jacobi(1) },
@@ -162,8 +163,8 @@ fn a_step_in_part_is_gone_on_with_or_repeated_as_elsewhere() {
     }
 }
 
-/// The error of the step from 5 s, which is one of those in threads where there are any, and what was begun and finished in it. After it every slave still
-/// answers.
+/// Returns the error of the step from 5 s, and the starts and ends of steps in it. If the run has
+/// threads, this step uses them. Afterwards every slave still answers.
 fn failed(jobs: usize, fails: fn(&str) -> Option<Fails>) -> (String, String) {
     let (system, record) = ahead(typed::ring(), fails);
     let mut simulation = Simulation::new(system, &jacobi(jobs), &until(10.0)).unwrap();
@@ -181,7 +182,7 @@ fn failed(jobs: usize, fails: fn(&str) -> Option<Fails>) -> (String, String) {
 }
 
 #[test]
-fn the_error_is_that_of_the_first_slave_in_order_wherever_it_fails() {
+fn the_reported_error_is_that_of_the_first_slave_in_order_wherever_it_fails() {
     use Fails::{InBegin, InFinish, InSet};
     let only_b = |fails: Fails| -> fn(&str) -> Option<Fails> {
         match fails {

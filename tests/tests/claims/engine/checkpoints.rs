@@ -1,4 +1,4 @@
-//! A run that goes on from a checkpoint, bit by bit.
+//! A run resumed from a checkpoint continues with the same bits.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -69,7 +69,7 @@ fn verify(label: &str, able: Abilities, algorithm: &Algorithm, scenario: &str) {
 }
 
 #[test]
-fn fixed_steps_go_on_bit_by_bit() {
+fn fixed_steps_continue_bit_by_bit() {
     let past = Abilities { derivatives: 0, ..ABLE };
     for sweep in [Method::Jacobi, Method::GaussSeidel] {
         for extrapolation in [
@@ -90,7 +90,7 @@ fn fixed_steps_go_on_bit_by_bit() {
 }
 
 #[test]
-fn iterated_steps_go_on_bit_by_bit() {
+fn iterated_steps_continue_bit_by_bit() {
     for coupling in [Coupling::Newton, Coupling::Anderson, Coupling::QuasiNewton] {
         for control in [StepControl::Fixed, StepControl::Doubling] {
             let algorithm = Algorithm { coupling, control, ..Algorithm::new(0.01) };
@@ -101,7 +101,7 @@ fn iterated_steps_go_on_bit_by_bit() {
 }
 
 #[test]
-fn chosen_steps_go_on_bit_by_bit() {
+fn chosen_steps_continue_bit_by_bit() {
     let system = problems::two_masses(20.0, 0.5).system(ABLE, &Arc::default());
     let port = |name: &str| system.port(name).unwrap();
     let bonds = vec![PowerBond { first: port("b.u1"), second: port("a.u0") }];
@@ -149,12 +149,12 @@ fn a_checkpoint_of_another_step_or_algorithm_is_refused_by_name() {
     let later = fmu_description::Experiment { start_time: 0.5, ..until(1.0) };
     let message = resume(&base(), &later).unwrap();
     assert!(message.contains("start-time 0 s; start-time 0.5 s"), "{message}");
-    // What changes no state may be another one.
+    // Settings that do not affect the state may differ.
     assert_eq!(resume(&Algorithm { jobs: 2, ..base() }, &until(2.0)), None);
 }
 
 #[test]
-fn a_run_that_was_ended_by_a_slave_stays_ended() {
+fn a_run_that_a_slave_ended_stays_ended() {
     let (system, _) = crate::engine::puppet::system([f64::sin; 2], crate::engine::parts::ends);
     let algorithm = Algorithm::fixed(Method::Jacobi, Extrapolation::Hold, 0.25);
     let mut run = Simulation::new(system, &algorithm, &until(1.0)).unwrap();

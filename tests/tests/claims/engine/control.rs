@@ -1,4 +1,4 @@
-//! Steps whose size is chosen on the way.
+//! Step sizes chosen by the step control.
 
 use master::algorithm::PowerBond;
 use master::{Algorithm, Extrapolation, Method, StepControl, SystemError};
@@ -23,7 +23,7 @@ fn run(network: &Network, algorithm: &Algorithm) -> Run {
     network.run(ABLE, algorithm, STOP).unwrap()
 }
 
-/// The fixed steps whose error is at most `error`, to within a tenth of their number.
+/// The number of fixed steps that gives an error of at most `error`, to within a tenth.
 fn fixed_of(network: &Network, error: f64) -> Run {
     let mut steps = 16.0;
     loop {
@@ -38,9 +38,12 @@ fn fixed_of(network: &Network, error: f64) -> Run {
     }
 }
 
-/// The error of one step by halves, which is of order 3, is kept at the tolerance, that of the
-/// extrapolation as well: with steps of `tolerance^(1/3)` the error of the run goes as
-/// `tolerance^(2/3)`, with steps of `tolerance^(1/2)` as the tolerance.
+/// Both controls keep the error of one step at the tolerance.
+///
+/// The error that `doubling` estimates is of order 3, so the steps are proportional to
+/// `tolerance^(1/3)` and the error of the run to `tolerance^(2/3)`. The error that `embedded`
+/// estimates is of order 2, so the steps are proportional to `tolerance^(1/2)` and the error of the
+/// run to the tolerance.
 #[test]
 fn repeated_steps_keep_the_error_near_the_tolerance() {
     let network = problems::transient();
@@ -68,7 +71,7 @@ fn repeated_steps_are_fewer_than_fixed_ones_at_the_same_error() {
     }
 }
 
-/// The connected signals move by the tolerance in each step, which is the error of held inputs.
+/// The connected signals change by the tolerance in each step, which is the error of held inputs.
 #[test]
 fn the_increment_makes_steps_small_where_signals_move_fast() {
     let network = problems::transient();
@@ -89,7 +92,7 @@ fn bond(network: &Network) -> PowerBond {
 }
 
 #[test]
-fn the_energy_of_a_bond_makes_steps_small_where_it_is_lost() {
+fn the_energy_control_makes_steps_small_where_a_bond_loses_energy() {
     let network = problems::two_masses(1e3, 20.0);
     let of = |tolerance: f64| {
         let bonds = vec![bond(&network)];
@@ -97,16 +100,16 @@ fn the_energy_of_a_bond_makes_steps_small_where_it_is_lost() {
     };
     let (coarse, fine) = (of(1e-3), of(1e-5));
     assert!(coarse.sizes.1 > 3.0 * coarse.sizes.0, "{coarse:?}");
-    // Of order 2: a hundredth of the tolerance is a tenth of the step.
+    // Order 2: a hundredth of the tolerance gives a tenth of the step.
     let times = 5 * coarse.points..15 * coarse.points;
     assert!(times.contains(&fine.points), "{coarse:?} {fine:?}");
     assert!(fine.error < 0.2 * coarse.error, "{coarse:?} {fine:?}");
     assert_eq!(fine.calls, 2 * fine.points, "nothing is repeated");
 }
 
-/// On a stiff and damped coupling. The first step is not chosen: it has to be small by itself.
+/// On a stiff and damped coupling. The first step is not controlled, so it has to be small.
 #[test]
-fn steps_by_increment_and_by_energy_are_fewer_than_fixed_ones_at_the_same_error() {
+fn increment_and_energy_need_fewer_steps_than_fixed_steps_at_the_same_error() {
     let network = problems::two_masses(1e3, 20.0);
     for (control, tolerance) in [(StepControl::Increment, 0.03), (StepControl::Energy, 1e-5)] {
         let bonds = vec![bond(&network)];
@@ -118,21 +121,22 @@ fn steps_by_increment_and_by_energy_are_fewer_than_fixed_ones_at_the_same_error(
 }
 
 #[test]
-fn the_energy_needs_bonds() {
+fn the_energy_control_needs_power_bonds() {
     let network = problems::two_masses(1e3, 20.0);
     let refused = network.run(ABLE, &chosen(StepControl::Energy, 1e-2), STOP).unwrap_err();
     assert!(matches!(refused, SystemError::Algorithm { .. }), "{refused}");
 }
 
 #[test]
-fn a_tolerance_that_the_smallest_step_does_not_meet_is_an_error() {
+fn a_tolerance_that_the_smallest_step_cannot_meet_is_an_error() {
     let network = problems::transient();
     let algorithm = Algorithm { smallest_step: 1e-3, ..chosen(StepControl::Embedded, 1e-9) };
     let refused = network.run(ABLE, &algorithm, STOP).unwrap_err();
     assert!(matches!(refused, SystemError::Stuck { .. }), "{refused}");
 }
 
-/// The estimate knows that means are of order 2 whatever the extrapolation, and held ends of order 1.
+/// The estimate accounts for order 2 of inputs held at their mean, whatever the extrapolation, and
+/// order 1 of inputs held at their end value.
 #[test]
 fn doubling_keeps_the_tolerance_with_slaves_that_hold_their_inputs() {
     let network = problems::coupled_oscillators();

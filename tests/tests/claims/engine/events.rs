@@ -34,7 +34,7 @@ fn fixed_steps_end_at_the_times_that_an_output_announces_and_on_the_grid() {
     let grid = |k: u32| f64::from(k) * 0.1;
     let mut expected: Vec<f64> = (1..10).map(grid).chain([0.137, 0.3001, 0.7777, 1.0]).collect();
     expected.sort_by(f64::total_cmp);
-    // 3 * 0.1 is the double above 0.3: the event there is the point of the grid.
+    // 3 * 0.1 is the next number above 0.3: the event there is the grid point.
     assert_eq!(times(&mut simulation), expected);
     let ends: Vec<f64> = asked.lock().unwrap().iter().map(|step| step.1).collect();
     for (end, expected) in ends.iter().zip(&expected) {
@@ -57,7 +57,7 @@ fn chosen_steps_end_at_the_times_that_an_output_announces() {
     }
 }
 
-/// Rises through zero at 0.4321 s, falls through it at 0.8 s.
+/// Crosses zero upwards at 0.4321 s and downwards at 0.8 s.
 fn crosses(time: f64) -> f64 {
     let (first, second) = (time - 0.4321, 0.8 - time);
     first * second * (1.0 + time)
@@ -76,7 +76,7 @@ fn a_change_of_sign_ends_a_step_within_1e_9_of_its_size() {
             let near = |time: &&f64| (*time - event).abs() <= 0.15e-9;
             let found: Vec<_> = times.iter().filter(near).collect();
             assert_eq!(found.len(), 1, "{}: {event} in {times:?}", control.name());
-            // At its end the sign has changed.
+            // At the end of the step the sign has changed.
             assert!((crosses(*found[0]) > 0.0) != (crosses(event - 1e-6) > 0.0));
         }
     }
@@ -95,10 +95,12 @@ fn between_events_fixed_steps_stay_on_the_grid() {
     assert_eq!(times.len(), 9);
 }
 
-/// The lag behind a jump to 1 at 0.5 s: `1 - exp(-(t - 0.5))`, whether 0.5 s is a point of the grid or not.
-/// A line through values before and after the jump would go on to 2.
+/// The lag after a jump to 1 at 0.5 s is `1 - exp(-(t - 0.5))`, whether 0.5 s is a grid point or
+/// not.
+///
+/// A line through the values before and after the jump would continue to 2.
 #[test]
-fn after_an_event_inputs_do_not_go_on_as_before() {
+fn after_an_event_inputs_are_not_extrapolated_from_values_before_it() {
     let step = |time: f64| if time > 0.5 - 1e-9 { 1.0 } else { 0.0 };
     let next = |time: f64| if time > 0.5 - 1e-9 { f64::INFINITY } else { 0.5 };
     for extrapolation in [

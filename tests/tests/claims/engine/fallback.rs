@@ -1,4 +1,4 @@
-//! Runs that an iteration or a step control cannot bring to their end.
+//! Runs in which an iteration or a step control fails.
 
 use fmu_description::Experiment;
 use fmu_description::ModelDescription;
@@ -21,7 +21,7 @@ struct Direct {
 }
 
 impl Direct {
-    /// One whose loop shows after the initialization only.
+    /// A slave whose direct dependency appears only after the initialization.
     fn boxed(function: fn(f64) -> f64) -> Box<Self> {
         let xml = r#"<fmiModelDescription fmiVersion="2.0" modelName="Direct" guid="direct">
             <CoSimulation modelIdentifier="D" canGetAndSetFMUstate="true"/><ModelVariables>
@@ -103,7 +103,7 @@ fn outputs(simulation: &mut Simulation) -> Vec<f64> {
 
 /// The oracle is the run without iteration, step by step.
 #[test]
-fn a_loop_without_solution_falls_back_to_steps_made_once_and_counts_them() {
+fn a_loop_without_solution_falls_back_to_single_steps_and_counts_them() {
     for coupling in [Coupling::Newton, Coupling::Anderson, Coupling::QuasiNewton] {
         let once = Algorithm { coupling: Coupling::Once, ..Algorithm::new(STEP) };
         let (mut once, mut iterated) = (
@@ -124,16 +124,18 @@ fn a_loop_without_solution_falls_back_to_steps_made_once_and_counts_them() {
 }
 
 #[test]
-fn a_loop_without_solution_ends_a_run_whose_coupling_the_user_states() {
+fn a_loop_without_solution_ends_a_run_with_stated_coupling() {
     let stated = Algorithm { coupling: Coupling::Newton, ..Algorithm::new(STEP) };
     let error = started(&stated).step().unwrap_err();
     assert!(matches!(error, SystemError::Coupling { .. }), "{error}");
 }
 
-/// A signal that changes by far more than the tolerance in any step that is not smaller still. It is a
-/// function of time alone, so that steps made whole and in halves agree: doubling has nothing to do.
+/// A signal that changes by far more than the tolerance in any step, however small.
+///
+/// It is a function of time alone, so a whole step and two halves agree, and doubling is not
+/// affected.
 #[test]
-fn every_step_control_ends_a_hopeless_run_with_a_reason() {
+fn every_step_control_ends_a_run_that_cannot_advance_with_a_reason() {
     for control in [StepControl::Embedded, StepControl::Increment] {
         let noise = |time: f64| 1e6 * (1e12 * time).sin();
         let (system, _) = puppet::system([noise, noise], puppet::whole);

@@ -1,4 +1,4 @@
-//! Loops in initialization mode.
+//! Algebraic loops in initialization mode.
 
 use std::sync::Arc;
 
@@ -9,9 +9,10 @@ use tests::problems;
 
 use crate::engine::until;
 
-/// `y_a = 1 - 2 y_b`, `y_b = -0.5 + 1.5 y_a`: `y_a = 0.5`, `y_b = 0.25`. Passing values on diverges.
+/// `y_a = 1 - 2 y_b`, `y_b = -0.5 + 1.5 y_a` have the solution `y_a = 0.5`, `y_b = 0.25`.
+/// Fixed-point iteration diverges.
 #[test]
-fn an_algebraic_loop_begins_with_its_solution() {
+fn an_algebraic_loop_starts_at_its_solution() {
     let network = problems::algebraic_loop(-2.0, 1.5);
     let system = network.system(ABLE, &Arc::default());
     let mut simulation = Simulation::new(system, &Algorithm::new(0.1), &until(1.0)).unwrap();
@@ -19,10 +20,10 @@ fn an_algebraic_loop_begins_with_its_solution() {
     assert!((outputs[0] - 0.5).abs() < 1e-9 && (outputs[1] - 0.25).abs() < 1e-9, "{outputs:?}");
 }
 
-/// Two loops, one behind the other: `y_a = 3 - y_b`, `y_b = 2 y_a`: 1, 2; then `y_c = y_b - y_d`,
-/// `y_d = 3 y_c`: 0.5, 1.5.
+/// Two loops in sequence: `y_a = 3 - y_b`, `y_b = 2 y_a` give 1 and 2; then `y_c = y_b - y_d` and
+/// `y_d = 3 y_c` give 0.5 and 1.5.
 #[test]
-fn loops_behind_each_other_are_solved_in_their_order() {
+fn loops_in_sequence_are_solved_in_their_order() {
     let scale = |gain: f64, offset: f64, inputs: usize| {
         let (held, row) = (vec![0.0; inputs], [-gain, 1.0]);
         Block::new(&[&[0.0]], &[&held], &[&[1.0]], &[&row[..inputs]], &[offset])
@@ -42,7 +43,7 @@ fn loops_behind_each_other_are_solved_in_their_order() {
             ((3, 0), (1, 1)),
         ],
     };
-    // With `-gain` in place of the gain: c = 3 - d, d = -2 c; a = -3 b, b = d - a.
+    // With the negative gain: c = 3 - d, d = -2 c; a = -3 b, b = d - a.
     let system = network.system(ABLE, &Arc::default());
     let mut simulation = Simulation::new(system, &Algorithm::new(0.1), &until(1.0)).unwrap();
     let [a, b, c, d] = network.outputs(simulation.system())[..] else { unreachable!() };
@@ -51,7 +52,7 @@ fn loops_behind_each_other_are_solved_in_their_order() {
 }
 
 #[test]
-fn a_singular_loop_is_refused_with_its_outputs() {
+fn a_singular_loop_is_refused_with_the_names_of_its_outputs() {
     let network = problems::algebraic_loop(2.0, 0.5);
     let system = network.system(ABLE, &Arc::default());
     let error = Simulation::new(system, &Algorithm::new(0.1), &until(1.0)).err().unwrap();

@@ -1,4 +1,4 @@
-//! The last step of a run: an FMU may refuse what is an ulp beyond its stop time.
+//! The last step of a run: an FMU may refuse a step that ends an ulp beyond its stop time.
 
 use master::algorithm::EventSource;
 use master::{Algorithm, Coupling, Extrapolation, Method, Simulation, StepControl, System};
@@ -6,8 +6,8 @@ use master::{Algorithm, Coupling, Extrapolation, Method, Simulation, StepControl
 use crate::engine::puppet::{Asked, rigid, system, whole};
 use crate::engine::until;
 
-/// Steps and stop times in s: so many steps end an ulp or more beyond the stop time where each begins
-/// at a multiple and is whole.
+/// Steps and stop times in s. If each step starts at a multiple of the step and has full size, the
+/// last one ends an ulp or more beyond the stop time.
 const BEYOND: [(f64, f64); 4] = [(0.01, 20.0), (0.1, 1.1), (0.7, 4.9), (0.003, 0.3)];
 
 fn algorithms(step: f64, system: &System) -> Vec<(&'static str, Algorithm)> {
@@ -27,7 +27,7 @@ fn algorithms(step: f64, system: &System) -> Vec<(&'static str, Algorithm)> {
     ]
 }
 
-/// Every step that was asked for ends at the stop time or before; the last one at it.
+/// Every requested step ends at the stop time or before; the last one ends at the stop time.
 fn check(label: &str, simulation: &Simulation, asked: &Asked, stop: f64) {
     assert_eq!(simulation.time(), stop, "{label}");
     let asked = asked.lock().unwrap();
@@ -58,7 +58,7 @@ fn no_step_ends_an_ulp_beyond_the_stop_time_with_any_algorithm() {
 }
 
 #[test]
-fn no_step_ends_an_ulp_beyond_the_stop_time_of_a_run_that_was_resumed() {
+fn no_step_of_a_resumed_run_ends_an_ulp_beyond_the_stop_time() {
     for (step, stop) in BEYOND {
         let new = || system([f64::sin, every], whole);
         for (name, algorithm) in algorithms(step, &new().0) {
@@ -94,7 +94,7 @@ fn equal_steps(step: f64, multiples: &[u32], stop: f64) -> (Simulation, Vec<f64>
 }
 
 #[test]
-fn where_an_fmu_takes_equal_steps_only_the_run_ends_with_the_last_whole_one_and_says_so() {
+fn if_an_fmu_takes_equal_steps_only_the_run_ends_with_its_last_whole_step_and_says_so() {
     let (simulation, times, sizes) = equal_steps(0.25, &[], 1.125);
     assert_eq!((times, sizes), (vec![0.25, 0.5, 0.75, 1.0], vec![0.25; 4]));
     let early = simulation.early_end().unwrap().to_string();
@@ -107,16 +107,16 @@ fn where_an_fmu_takes_equal_steps_only_the_run_ends_with_the_last_whole_one_and_
     assert!(times.is_empty() && simulation.time() == 0.0 && simulation.early_end().is_some());
 }
 
-/// 1.25 s is 5 steps of the grid: no whole number of steps of a slave that makes 2 at once.
+/// 1.25 s is 5 steps of the grid, but no whole number of steps of a slave that makes 2 at once.
 #[test]
-fn a_multiple_of_the_step_is_what_equal_steps_are_measured_by() {
+fn equal_steps_of_a_slave_with_a_multiple_are_whole_multiples() {
     let (simulation, times, sizes) = equal_steps(0.25, &[2, 1], 1.25);
     assert_eq!((times.last(), sizes), (Some(&1.0), vec![0.5; 2]));
     assert_eq!(simulation.early_end().unwrap().step, 0.5);
     let (simulation, times, sizes) = equal_steps(0.25, &[2, 1], 1.5);
     assert_eq!((times.last(), sizes), (Some(&1.5), vec![0.5; 3]));
     assert_eq!(simulation.early_end(), None);
-    // The one that can vary its step makes a shorter one.
+    // The slave that can vary its step makes a shorter one.
     let (simulation, times, sizes) = equal_steps(0.25, &[1, 2], 1.25);
     assert_eq!((times.last(), sizes.len()), (Some(&1.25), 5));
     assert_eq!(simulation.early_end(), None);

@@ -1,12 +1,12 @@
-//! Slaves that make several steps at once, as the others see them.
+//! Slaves that make one step for several communication steps, as the others see them.
 
 use master::{Algorithm, Extrapolation, Method, Readout, Simulation};
 
 use crate::engine::puppet::{system, whole};
 use crate::engine::until;
 
-/// The input of a, which makes every step, from p, which makes four at once and whose output is
-/// 1 + 2 t, over 12 steps of 0.25 s.
+/// The input of a, which makes every step, from p, which makes four at once and has the output 1 +
+/// 2 t, over 12 steps of 0.25 s.
 fn seen(sweep: Method) -> Vec<f64> {
     let (system, _) = system([|time| 1.0 + 2.0 * time; 2], whole);
     let multiples = vec![4, 1];
@@ -25,13 +25,13 @@ fn seen(sweep: Method) -> Vec<f64> {
 }
 
 #[test]
-fn a_slave_that_steps_first_is_seen_at_the_time_asked_for_and_not_at_its_own_end() {
+fn a_slave_that_steps_first_is_read_at_the_time_of_the_reader_and_not_at_its_own_end() {
     let ends = (1..=12).map(|count| 1.0 + 2.0 * 0.25 * f64::from(count));
     assert_eq!(seen(Method::GaussSeidel), ends.collect::<Vec<_>>());
 }
 
 #[test]
-fn a_slave_that_steps_at_the_same_time_is_seen_at_the_begin_of_its_step() {
+fn a_slave_that_steps_at_the_same_time_is_read_at_the_start_of_its_step() {
     let begins = (0..12).map(|count| 1.0 + 2.0 * f64::from(count / 4));
     assert_eq!(seen(Method::Jacobi), begins.collect::<Vec<_>>());
 }

@@ -1,4 +1,4 @@
-//! Slaves that stop on the way, and outputs that are no numbers.
+//! Slaves that stop within a step, and outputs that are NaN.
 
 use master::{
     Algorithm, Coupling, Extrapolation, Method, Readout, Simulation, StepControl, StepResult,
@@ -7,7 +7,7 @@ use master::{
 use crate::engine::puppet::{add_clock, system, whole};
 use crate::engine::until;
 
-/// Stops at 0.35 s, to be asked again.
+/// Stops at 0.35 s; the rest of the step must be requested again.
 fn stops(begin: f64, end: f64) -> StepResult {
     if begin < 0.35 && end > 0.35 {
         return StepResult::Part { reached: 0.35, terminated: false };
@@ -39,7 +39,7 @@ fn run(way: fn(f64, f64) -> StepResult, algorithm: &Algorithm) -> (Vec<f64>, Vec
 }
 
 #[test]
-fn without_rollback_a_slave_that_stops_on_the_way_goes_on_from_there() {
+fn without_rollback_a_slave_that_stops_within_a_step_continues_from_there() {
     let algorithm = Algorithm::fixed(Method::Jacobi, Extrapolation::Hold, 0.25);
     let (times, asked) = run(stops, &algorithm);
     assert_eq!(times, [0.25, 0.5, 0.75, 1.0]);
@@ -47,7 +47,7 @@ fn without_rollback_a_slave_that_stops_on_the_way_goes_on_from_there() {
 }
 
 #[test]
-fn with_rollback_all_slaves_step_as_far_as_the_one_that_stopped() {
+fn with_rollback_all_slaves_step_to_the_time_at_which_one_stopped() {
     for (coupling, control) in [
         (Coupling::Newton, StepControl::Fixed),
         (Coupling::Once, StepControl::Doubling),
@@ -57,16 +57,17 @@ fn with_rollback_all_slaves_step_as_far_as_the_one_that_stopped() {
         let (times, asked) = run(stops, &algorithm);
         assert!(times.contains(&0.35), "{times:?}");
         assert_eq!(times.last(), Some(&1.0));
-        // The step that was too far is asked for again from its begin.
+        // The step that was too long is requested again from its start.
         let too_far = asked.iter().find(|step| step.0 < 0.35 && step.1 > 0.35).unwrap();
         let near = |step: &&(f64, f64)| step.0 == too_far.0 && (step.1 - 0.35).abs() < 1e-15;
         assert!(asked.iter().any(|step| near(&step)) || control == StepControl::Doubling);
     }
 }
 
-/// A step in part has no error: what is left of it says nothing about the next one.
+/// An incomplete step gives no error estimate: the size of the rest says nothing about the next
+/// step.
 #[test]
-fn a_step_in_part_does_not_make_the_next_one_longer() {
+fn an_incomplete_step_does_not_make_the_next_one_longer() {
     let algorithm = Algorithm {
         control: StepControl::Embedded,
         relative_tolerance: 1e-2,
@@ -88,7 +89,8 @@ fn a_step_in_part_does_not_make_the_next_one_longer() {
     assert!(longest <= free * 1.000_001, "{longest} {free}");
 }
 
-/// Where a run with a second puppet, whose output is the time, ends; both outputs there.
+/// Returns the end of a run with a second puppet, whose output is the time, and both outputs at
+/// that time.
 fn ended(algorithm: &Algorithm) -> (f64, Vec<f64>) {
     let (mut system, _) = system([|time| time; 2], ends);
     add_clock(&mut system, "q");
@@ -105,7 +107,7 @@ fn ended(algorithm: &Algorithm) -> (f64, Vec<f64>) {
 }
 
 #[test]
-fn a_slave_that_asks_for_the_end_ends_the_run_at_its_time_where_all_can_go_back() {
+fn a_slave_that_requests_the_end_ends_the_run_at_its_time_if_all_can_go_back() {
     for algorithm in [
         Algorithm { rollback: true, ..Algorithm::new(0.25) },
         Algorithm { rollback: true, ..Algorithm::fixed(Method::Jacobi, Extrapolation::Hold, 0.25) },
@@ -117,9 +119,9 @@ fn a_slave_that_asks_for_the_end_ends_the_run_at_its_time_where_all_can_go_back(
     }
 }
 
-/// The time of the run is one that all slaves have had: its row was that of the step before.
+/// The run ends at a time that all slaves have reached: its row is that of the previous step.
 #[test]
-fn a_slave_that_asks_for_the_end_ends_the_run_at_the_last_common_point_where_others_are_beyond() {
+fn a_slave_that_requests_the_end_ends_the_run_at_the_last_common_point_if_others_are_beyond() {
     for sweep in [Method::Jacobi, Method::GaussSeidel] {
         let (time, outputs) = ended(&Algorithm::fixed(sweep, Extrapolation::Hold, 0.25));
         assert_eq!((time, outputs), (0.25, vec![0.35, 0.5]));
@@ -127,7 +129,7 @@ fn a_slave_that_asks_for_the_end_ends_the_run_at_the_last_common_point_where_oth
 }
 
 #[test]
-fn a_slave_that_comes_nowhere_is_an_error() {
+fn a_slave_that_does_not_advance_is_an_error() {
     for algorithm in [
         Algorithm::fixed(Method::Jacobi, Extrapolation::Hold, 0.25),
         Algorithm { coupling: Coupling::Newton, ..Algorithm::new(0.25) },
@@ -146,7 +148,7 @@ fn nearly(_: f64, end: f64) -> StepResult {
 }
 
 #[test]
-fn a_step_that_lacks_the_rounding_of_its_end_is_whole() {
+fn a_step_that_ends_a_rounding_error_early_is_complete() {
     for coupling in [Coupling::Once, Coupling::Newton] {
         let algorithm = Algorithm { coupling, ..Algorithm::new(0.25) };
         assert_eq!(run(nearly, &algorithm).0, [0.25, 0.5, 0.75, 1.0]);
@@ -158,7 +160,7 @@ fn breaks(time: f64) -> f64 {
 }
 
 #[test]
-fn an_output_that_is_no_number_ends_the_run_unless_that_is_allowed() {
+fn an_output_that_is_nan_ends_the_run_unless_that_is_allowed() {
     let algorithm = Algorithm::fixed(Method::GaussSeidel, Extrapolation::Linear, 0.25);
     let (once, _) = system([breaks; 2], whole);
     let mut simulation = Simulation::new(once, &algorithm, &until(1.0)).unwrap();

@@ -1,4 +1,4 @@
-//! A slave that does what a test tells it.
+//! A slave controlled by a test.
 
 use std::sync::{Arc, Mutex};
 
@@ -9,12 +9,12 @@ use tests::linear::{ABLE, Block, Linear};
 
 /// Output over time in s.
 type Output = fn(f64) -> f64;
-/// How far a step between two times comes.
+/// The time that a step between two times reaches.
 type Way = fn(f64, f64) -> StepResult;
-/// The steps asked for: begin and end in s.
+/// The requested steps: start and end in s.
 pub(crate) type Asked = Arc<Mutex<Vec<(f64, f64)>>>;
 
-/// Has the outputs y, which is connected, and z, which is not: functions of time.
+/// A slave with the outputs y, which is connected, and z, which is not: functions of time.
 pub(crate) struct Puppet {
     description: ModelDescription,
     time: f64,
@@ -28,7 +28,7 @@ pub(crate) fn whole(_: f64, _: f64) -> StepResult {
     StepResult::Whole
 }
 
-/// A system of one puppet called p with a lag a behind its y, and the steps that p was asked for.
+/// A system of one puppet p with a lag a behind its y, and the steps requested of p.
 pub(crate) fn system(outputs: [Output; 2], way: Way) -> (System, Asked) {
     let asked = Asked::default();
     let xml = r#"<fmiModelDescription fmiVersion="2.0" modelName="Puppet" guid="puppet">
@@ -51,7 +51,7 @@ pub(crate) fn system(outputs: [Output; 2], way: Way) -> (System, Asked) {
     (system, asked)
 }
 
-/// Adds another puppet, which comes to the end of its steps and whose y is the time.
+/// Adds another puppet, which completes its steps and whose y is the time.
 pub(crate) fn add_clock(system: &mut System, name: &str) {
     let description = system.slaves[0].1.description().clone();
     let clock = Puppet {

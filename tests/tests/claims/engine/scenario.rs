@@ -15,7 +15,8 @@ struct File {
     scenario: Scenario,
 }
 
-/// `x' = u0` from 2 in `a`; `x' = u0 + u1` from 0 in `b`, whose u1 is free. b.u0 is a's x, a.u0 is b's.
+/// `a`: `x' = u0` from 2; `b`: `x' = u0 + u1` from 0, with u1 unconnected. b.u0 is a's x, a.u0 is
+/// b's x.
 fn network() -> Network {
     let first = Block::new(&[&[0.0]], &[&[0.0]], &[&[1.0]], &[&[0.0]], &[2.0]);
     let second = Block::new(&[&[0.0]], &[&[1.0, 1.0]], &[&[1.0]], &[&[0.0, 0.0]], &[0.0]);
@@ -37,9 +38,9 @@ fn result(simulation: &mut Simulation) -> f64 {
     network().outputs(simulation.system())[1]
 }
 
-/// a holds 2, so b integrates 2 (4 at 2 s); 3 more from 0.5 s on gives 4.5 more.
+/// a holds 2, so b integrates 2 and reaches 4 at 2 s; a bias of 3 from 0.5 s on adds 4.5.
 #[test]
-fn a_fault_on_a_connection_reaches_the_input() {
+fn a_fault_on_a_connection_affects_the_input() {
     let text = r#"
         [[scenario.fault]]
         connection = "b.u0"
@@ -50,9 +51,9 @@ fn a_fault_on_a_connection_reaches_the_input() {
     }
 }
 
-/// The line `t` from 0 to 2 s on the free input adds 2; 4 of a.
+/// The signal `t` on the unconnected input adds 2 from 0 to 2 s; a adds 4.
 #[test]
-fn a_signal_on_a_free_input_is_followed() {
+fn an_unconnected_input_follows_its_signal() {
     let text = r#"
         [[scenario.signal]]
         variable = "b.u1"
@@ -65,9 +66,9 @@ fn a_signal_on_a_free_input_is_followed() {
     }
 }
 
-/// Zero until 0.7 s, then 1: exactly 1.3 more, as steps that are chosen end where the signal bends.
+/// Zero until 0.7 s, then 1: adds exactly 1.3, because chosen steps end where the slope changes.
 #[test]
-fn chosen_steps_end_where_a_signal_bends() {
+fn chosen_steps_end_where_the_slope_of_a_signal_changes() {
     let text = r#"
         [[scenario.signal]]
         variable = "b.u1"

@@ -12,7 +12,7 @@ const ALL: [Extrapolation; 4] =
     [Extrapolation::Hold, Extrapolation::Limited, Extrapolation::Linear, Extrapolation::Quadratic];
 
 #[test]
-fn time_is_the_start_and_so_many_steps_to_the_bit() {
+fn time_is_the_start_plus_a_multiple_of_the_step_to_the_bit() {
     for coupling in [Coupling::Once, Coupling::Newton] {
         let network = problems::coupled_oscillators();
         let experiment = fmu_description::Experiment {
@@ -41,7 +41,7 @@ fn stepping_allocates_nothing_with_variables_of_all_types() {
                     Algorithm { multiples, ..Algorithm::fixed(sweep, extrapolation, 0.25) };
                 let mut simulation =
                     Simulation::new(typed::ring(), &algorithm, &until(1e3)).unwrap();
-                // The Strings of the exchange get their room in the first steps.
+                // The Strings of the exchange are allocated in the first steps.
                 for _ in 0..8 {
                     simulation.step().unwrap();
                 }
@@ -57,7 +57,7 @@ fn stepping_allocates_nothing_with_variables_of_all_types() {
     }
 }
 
-/// 50 steps, as the first 32 find out which way is faster: 16 without threads, 16 with them.
+/// 50 steps, because the first 32 find out which way is faster: 16 without threads, 16 with them.
 #[test]
 fn threads_change_no_bit() {
     let network = problems::coupled_oscillators();

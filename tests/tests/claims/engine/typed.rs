@@ -6,8 +6,8 @@ use master::{CallError, Slave, StepResult, System};
 
 type Done = Result<(), CallError>;
 
-/// Each output is the input of its type, one further: the Real 0.5 more in each step, the Integer 1
-/// more, the Boolean the other one, the String the same.
+/// Each output is the changed input of its type: the Real plus 0.5 in each step, the Integer plus
+/// 1, the Boolean inverted, the String unchanged.
 pub(crate) struct Typed {
     description: ModelDescription,
     real: f64,
@@ -40,7 +40,7 @@ fn boxed() -> Box<Typed> {
     Box::new(Typed { description, real: 1.0, integer: 1, boolean: 1, text })
 }
 
-/// Three of them in a circle, each type connected.
+/// Three of these slaves in a circle, with each type connected.
 pub(crate) fn ring() -> System {
     let mut system = System::default();
     for name in ["a", "b", "c"] {

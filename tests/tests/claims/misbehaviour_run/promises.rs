@@ -1,11 +1,11 @@
-//! FMUs that promise more in their descriptions than they keep.
+//! FMUs that do not do what their descriptions declare.
 
 use super::*;
 
-/// Gauss-Seidel's lines from output derivatives, in place of the held inputs of [`Run`].
+/// Gauss-Seidel with lines from output derivatives, instead of the held inputs of [`Run`].
 const LINES: [&str; 4] = ["--method", "jacobi", "--extrapolation", "linear"];
 
-/// `a` behind a connection by lines, which b, without input derivatives, gets as their means.
+/// `a`, connected by lines to b, which has no input derivatives and gets their mean.
 fn by_lines(a: &CFmu, more: &[&str]) -> Vec<String> {
     let folder = tempfile::tempdir().unwrap_or_else(|error| panic!("{error}"));
     let a = a.write(folder.path(), "a").display().to_string();
@@ -26,8 +26,8 @@ fn by_lines(a: &CFmu, more: &[&str]) -> Vec<String> {
     said
 }
 
-/// a.y = t. Where a's derivative of 1 is used, b gets the mean of the line over the step, t + H/2,
-/// so that b.y = t^2/2; where it is not, b gets t.
+/// a.y = t. If the derivative 1 of a.y is used, b gets the mean of the line over the step, t + H/2,
+/// so b.y = t^2/2; otherwise b gets t.
 #[test]
 fn a_connection_is_held_while_its_output_derivative_is_not_finite_and_named_once() {
     for (start, value) in [("NaN", "NaN"), ("infinite", "inf")] {
@@ -48,7 +48,7 @@ fn a_connection_is_held_while_its_output_derivative_is_not_finite_and_named_once
 }
 
 #[test]
-fn derivatives_that_an_fmu_promises_and_refuses_are_done_without() {
+fn a_run_works_without_derivatives_that_an_fmu_declares_and_refuses() {
     let refusing = CFmu::that("derivative refused").promising_output_derivatives();
     let refusing = refusing.flag("canInterpolateInputs", true);
     let lines = by_lines(&refusing, &[]);
@@ -57,7 +57,7 @@ fn derivatives_that_an_fmu_promises_and_refuses_are_done_without() {
         assert!(warning.contains(part), "{part:?} is not in {warning:?}");
     }
     assert_eq!(rows.len(), ALL);
-    // The other way round: a is behind the connection.
+    // The other way round: a receives the connection.
     let folder = tempfile::tempdir().unwrap_or_else(|error| panic!("{error}"));
     let a = refusing.write(folder.path(), "a").display().to_string();
     let b = CFmu::well_behaved().write(folder.path(), "b").display().to_string();
@@ -82,10 +82,11 @@ fn a_variable_that_cannot_be_read_is_named_and_left_out_of_the_results() {
     }
 }
 
-/// A state that the description promises and the FMU refuses: the iteration of the default algorithm
-/// is left out. The FMUs state no dependencies, so none is needed here, and nothing is said.
+/// A state that the description declares and the FMU refuses: the default algorithm then does not
+/// iterate. The FMUs state no dependencies, so no iteration is needed here, and there is no
+/// warning.
 #[test]
-fn fmus_that_refuse_their_state_run_by_default_where_no_state_is_needed() {
+fn fmus_that_refuse_their_state_run_by_default_if_no_state_is_needed() {
     let fmu = CFmu::that("no way back");
     let run = Run::of(&[("a", &fmu), ("b", &fmu)], &["--connect", "a.y=b.u"]);
     assert_eq!((run.status, run.message.as_str()), (Some(0), ""));

@@ -1,14 +1,14 @@
-//! Values that are set before the run, start values, and what the FMUs' solvers are told.
+//! Settings before the run, start values, and the tolerance passed to the FMUs' solvers.
 
 use super::*;
 
-/// The slave ends a step at t1: what it has as t1 shows in the results.
+/// The slave ends a step at t1, so its value of t1 shows in the results.
 fn ending(behaviour: &str) -> CFmu {
     CFmu::that(behaviour)
 }
 
 #[test]
-fn settings_outlive_an_fmu_that_resets_them_before_and_in_the_initialization() {
+fn settings_survive_an_fmu_that_resets_them_before_and_during_the_initialization() {
     for function in ["fmi2SetupExperiment", "fmi2EnterInitializationMode"] {
         let fmu = ending(&format!("forget in {function}"));
         let recorded =
@@ -22,7 +22,7 @@ fn settings_outlive_an_fmu_that_resets_them_before_and_in_the_initialization() {
 }
 
 #[test]
-fn a_setting_that_an_fmu_loses_ends_the_run_before_it_begins_and_is_named() {
+fn a_setting_that_an_fmu_does_not_keep_ends_the_run_before_its_start_and_is_named() {
     let fmu = ending("forget in fmi2ExitInitializationMode");
     for (setting, parts) in
         [("a.t1=2.5", ["a.t1", "2.5", "0.5", "lost"]), ("a.n=4", ["a.n", "4", "3", "lost"])]
@@ -33,13 +33,13 @@ fn a_setting_that_an_fmu_loses_ends_the_run_before_it_begins_and_is_named() {
             run.says(&parts);
         }
     }
-    // What equals the value that it forgets to is not lost.
+    // A setting that equals the value to which the FMU resets it is kept.
     let run = Run::of(&[("a", &fmu)], &["--set", "a.t1=0.5"]);
     assert_eq!((run.status, run.message.as_str()), (Some(0), ""));
 }
 
 #[test]
-fn start_values_that_are_not_those_of_the_description_are_a_warning() {
+fn start_values_that_differ_from_the_description_give_a_warning() {
     let run = Run::of(&[("a", &CFmu::that("other start values"))], &[]);
     assert_eq!(run.status, Some(0), "{}", run.message);
     run.says(&["warning: a: 2 of its start values", "t1 is 7, not 0.5"]);
@@ -48,7 +48,7 @@ fn start_values_that_are_not_those_of_the_description_are_a_warning() {
 }
 
 #[test]
-fn each_fmu_is_told_its_own_tolerance_unless_the_user_states_one() {
+fn each_fmu_gets_its_own_tolerance_unless_the_user_states_one() {
     let told = |tolerance: Option<&str>| {
         let attributes = tolerance.map(|tolerance| format!("tolerance=\"{tolerance}\""));
         let attributes = attributes.unwrap_or_else(|| "stepSize=\"1\"".to_owned());
@@ -69,7 +69,7 @@ fn each_fmu_is_told_its_own_tolerance_unless_the_user_states_one() {
 }
 
 #[test]
-fn a_run_whose_stop_time_nobody_states_takes_one_second_and_says_so() {
+fn a_run_without_a_stop_time_takes_one_second_and_says_so() {
     let folder = tempfile::tempdir().unwrap_or_else(|error| panic!("{error}"));
     for (name, attributes, last) in [
         ("none", "stepSize=\"0.25\"", "1"),

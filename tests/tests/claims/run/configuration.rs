@@ -28,7 +28,7 @@ connection = 'controller.x_p'
 noise = { deviation = 1e-5, seed = 7, from = 0.3 }
 ";
 
-/// A folder with a `system.toml` and what it needs.
+/// A folder with a `system.toml` and the files that it names.
 fn scenario() -> Bench {
     let bench = Bench::new();
     bench.write("friction.csv", "time,F\n0,30\n0.4,30\n0.4,40\n1,40\n");
@@ -36,8 +36,8 @@ fn scenario() -> Bench {
     bench
 }
 
-/// Runs with `arguments`, then what `--print-config` printed of them from another folder, and
-/// compares the results.
+/// Runs with `arguments`, then, in another folder, with the configuration that `--print-config`
+/// prints for them, and compares the results.
 fn round_trip(bench: &Bench, arguments: &[&str]) -> String {
     printed(&bench.run(arguments));
     let first = bench.read("out/results.csv");
@@ -70,12 +70,12 @@ fn a_printed_configuration_gives_the_same_bytes() {
 }
 
 #[test]
-fn a_printed_scenario_gives_the_same_bytes_and_acts() {
+fn a_printed_scenario_gives_the_same_bytes_and_takes_effect() {
     let bench = scenario();
     let with = round_trip(&bench, &["system.toml", "--out", "out", "--record", "plant.*"]);
     let results = Table::read(&bench.path("out/results.csv"));
     let (time, f_a) = (results.column("time"), results.column("plant.f_a"));
-    // A row has the value of the signal at its time.
+    // Each row has the value of the signal at its time.
     for (time, f_a) in time.iter().zip(&f_a) {
         assert_eq!(*f_a, if *time < 0.5 - 1e-9 { 0.0 } else { 2.0 }, "at {time}");
     }
@@ -84,14 +84,14 @@ fn a_printed_scenario_gives_the_same_bytes_and_acts() {
     bench.write("system.toml", &text[..until]);
     printed(&bench.run(&["system.toml", "--out", "out", "--record", "plant.*"]));
     let without = bench.read("out/results.csv");
-    // Up to the fault at 0.3 s, which is row 30 behind the first line.
+    // Compares the rows before the fault at 0.3 s, which is row 30 after the header.
     let lines = |text: &str| text.lines().map(str::to_owned).collect::<Vec<_>>();
     assert_eq!(lines(&with)[..31], lines(&without)[..31]);
     assert_ne!(with, without);
 }
 
 #[test]
-fn the_command_line_goes_before_the_file_and_the_file_before_the_fmus() {
+fn the_command_line_overrides_the_file_and_the_file_overrides_the_fmus() {
     let bench = scenario();
     let more = ["--record", "plant.F_c", "--record", "plant.x_p", "--out", "out"];
     printed(&bench.run(&[&["system.toml"][..], &more].concat()));
@@ -108,7 +108,7 @@ fn the_command_line_goes_before_the_file_and_the_file_before_the_fmus() {
 }
 
 #[test]
-fn errors_point_into_the_file() {
+fn errors_state_line_and_column_of_the_file() {
     let bench = scenario();
     let text = bench.read("system.toml");
     for (old, new, parts) in [
@@ -142,7 +142,7 @@ fn an_explanation_says_what_was_chosen_and_why() {
 }
 
 #[test]
-fn another_fmu_takes_the_place_of_one_of_the_file() {
+fn an_option_replaces_an_fmu_of_the_file() {
     let bench = scenario();
     let text = bench.read("system.toml").replace("AsoController.fmu", "None.fmu");
     bench.write("system.toml", &text);
@@ -152,7 +152,7 @@ fn another_fmu_takes_the_place_of_one_of_the_file() {
 }
 
 #[test]
-fn the_former_name_of_the_extrapolation_is_taken_with_a_warning() {
+fn the_former_name_of_the_extrapolation_is_accepted_with_a_warning() {
     let bench = Bench::new();
     let run = |arguments: &[&str]| {
         let output = bench.run(arguments);

@@ -1,4 +1,4 @@
-//! How runs end, and go on.
+//! How runs end, and how they are resumed.
 
 use std::process::Stdio;
 use std::time::{Duration, Instant};
@@ -7,7 +7,7 @@ use tests::c_fmu::CFmu;
 
 use super::*;
 
-/// Runs plant and controller for `stop` s, sends `signal` when there are some rows.
+/// Runs plant and controller for `stop` s, and sends `signal` when there are some rows.
 fn interrupted(bench: &Bench, signal: &str, stop: &str, more: &[&str]) -> Output {
     let times = ["--stop-time", stop, "--record-every", "0.1"];
     let arguments = coupled(&[&times, more].concat());
@@ -26,7 +26,7 @@ fn interrupted(bench: &Bench, signal: &str, stop: &str, more: &[&str]) -> Output
 }
 
 #[test]
-fn an_interrupted_run_leaves_whole_rows_and_says_where_it_stopped() {
+fn an_interrupted_run_keeps_complete_rows_and_says_where_it_stopped() {
     for signal in ["-INT", "-TERM"] {
         let bench = Bench::new();
         let output = interrupted(&bench, signal, "1e6", &[]);
@@ -43,7 +43,7 @@ fn an_interrupted_run_leaves_whole_rows_and_says_where_it_stopped() {
 }
 
 #[test]
-fn an_interrupted_run_goes_on_as_if_it_had_not_been() {
+fn a_resumed_run_gives_the_results_of_an_uninterrupted_one() {
     let (bench, whole) = (Bench::new(), Bench::new());
     let output = interrupted(&bench, "-INT", "400", &["--checkpoint", "state"]);
     fails(&output, 130, &["interrupted"]);
@@ -62,7 +62,7 @@ fn an_interrupted_run_goes_on_as_if_it_had_not_been() {
 }
 
 #[test]
-fn a_lost_run_keeps_its_rows_and_its_checkpoints() {
+fn a_failed_run_keeps_its_rows_and_its_checkpoints() {
     let bench = Bench::new();
     let write = |fmu: CFmu, name: &str| {
         format!("{name}={}", fmu.write(bench.folder.path(), name).display())
@@ -75,7 +75,7 @@ fn a_lost_run_keeps_its_rows_and_its_checkpoints() {
     fails(&output, 1, &["the run ended early, after t = 0.875 s: a at t = 0.875 s: fmi2DoStep"]);
     let first = bench.read("out/results.csv");
     assert_eq!(whole_rows(&first), 15, "0 to 0.875");
-    // The last checkpoint is that at 0.75 s: the same end again.
+    // The last checkpoint is at 0.75 s: the resumed run ends in the same way.
     fails(&bench.run(&["--resume", "state"]), 1, &["the run ended early, after t = 0.875 s"]);
     let second = bench.read("out/results-from-0.75.csv");
     let (first, second): (Vec<_>, Vec<_>) = (first.lines().collect(), second.lines().collect());
@@ -83,10 +83,10 @@ fn a_lost_run_keeps_its_rows_and_its_checkpoints() {
     assert_eq!((second[0], &second[1..]), (first[0], &first[14..]));
 }
 
-/// The output u of the controller is finite at the start, its derivative is not. A value that is not
-/// finite ends a run: `misbehaviour_run.rs`.
+/// The output u of the controller is finite at the start, its derivative is not.
+/// `misbehaviour_run.rs` tests that a value that is not finite ends a run.
 #[test]
-fn an_output_derivative_that_is_no_number_is_named_and_not_the_value() {
+fn an_infinite_output_derivative_is_named_as_such() {
     let bench = Bench::new();
     let more = ["--set", "plant.linearised=true", "--set", "plant.theta_0=1e300"];
     let output = bench.coupled(&[&more[..], &["--stop-time", "0.01"]].concat());
@@ -95,7 +95,7 @@ fn an_output_derivative_that_is_no_number_is_named_and_not_the_value() {
 }
 
 #[test]
-fn an_fmu_that_cannot_save_its_state_is_told_before_the_run() {
+fn an_fmu_that_cannot_save_its_state_is_named_before_the_run() {
     let bench = Bench::new();
     let fmu = CFmu::well_behaved().without_rollback().write(bench.folder.path(), "a");
     let fmu = format!("a={}", fmu.display());
@@ -109,9 +109,9 @@ fn an_fmu_that_cannot_save_its_state_is_told_before_the_run() {
     fails(&bench.run(&options[..2]), 0, &["stop time 1 s", "--stop-time"]);
 }
 
-/// The FMU refuses steps beyond the stop time that it was told.
+/// The FMU refuses steps beyond the stop time that it got.
 #[test]
-fn a_resumed_run_tells_the_fmus_their_first_stop_time_and_says_where_another_one_is_later() {
+fn a_resumed_run_passes_the_first_stop_time_and_warns_if_the_new_one_is_later() {
     let bench = Bench::new();
     let strict = CFmu::that("refuse what is beyond the stop time");
     let fmu = format!("a={}", strict.write(bench.folder.path(), "a").display());

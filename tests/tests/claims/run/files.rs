@@ -1,4 +1,4 @@
-//! What is recorded and drawn, and where it goes.
+//! Recorded and plotted variables, and the files that are written.
 
 use results::Table as Results;
 use tests::Table;
@@ -7,7 +7,7 @@ use tests::c_fmu::CFmu;
 use super::*;
 
 #[test]
-fn everything_but_parameters_is_recorded_unless_names_or_patterns_say_otherwise() {
+fn everything_but_parameters_is_recorded_unless_names_or_patterns_select_otherwise() {
     let bench = Bench::new();
     let results = bench.path("out/results.csv");
     bench.coupled_well(&["--stop-time", "0.01"]);
@@ -23,7 +23,7 @@ fn everything_but_parameters_is_recorded_unless_names_or_patterns_say_otherwise(
 }
 
 #[test]
-fn rows_come_at_their_interval_at_each_step_or_never() {
+fn rows_are_recorded_at_intervals_at_each_step_or_never() {
     let bench = Bench::new();
     let times = |every: &str| {
         bench.coupled_well(&["--stop-time", "0.1", "--step", "0.002", "--record-every", every]);
@@ -37,7 +37,7 @@ fn rows_come_at_their_interval_at_each_step_or_never() {
 }
 
 #[test]
-fn a_long_run_has_ten_thousand_intervals_and_a_short_one_every_step() {
+fn a_long_run_has_ten_thousand_intervals_and_a_short_one_a_row_for_every_step() {
     let bench = Bench::new();
     bench.coupled_well(&["--stop-time", "25", "--record", "plant.x_p"]);
     let time = Table::read(&bench.path("out/results.csv")).column("time");
@@ -46,10 +46,10 @@ fn a_long_run_has_ten_thousand_intervals_and_a_short_one_every_step() {
     assert_eq!(Table::read(&bench.path("out/results.csv")).column("time").len(), 10_001);
 }
 
-/// The output y of `a`, whose input is 1, is the time; its other outputs take over the inputs with
-/// each of its steps of 0.25 s.
+/// The output y of `a`, whose input is 1, is the time; its other outputs copy the inputs at each of
+/// its steps of 0.25 s.
 #[test]
-fn rows_on_the_way_of_an_fmu_with_a_multiple_of_the_step_have_the_values_of_their_time() {
+fn rows_within_the_step_of_an_fmu_with_a_multiple_have_the_values_of_their_time() {
     let bench = Bench::new();
     let file = CFmu::well_behaved().write(bench.folder.path(), "slave");
     let [a, b] = ["a", "b"].map(|name| format!("{name}={}", file.display()));
@@ -69,7 +69,7 @@ fn rows_on_the_way_of_an_fmu_with_a_multiple_of_the_step_have_the_values_of_thei
         assert_eq!(table.column("a.b_out"), held(4).collect::<Vec<_>>(), "{method}");
         let whole: Vec<_> = held(4).map(|part| 7.0 * part).collect();
         assert_eq!(table.column("a.i_out"), whole, "{method}");
-        // b gets the value of a at the begin of a's step, or at the end of its own.
+        // b gets the value of a at the start of a's step, or at the end of b's own step.
         let mut sum = 0.0;
         for (row, y) in table.column("b.y").into_iter().enumerate() {
             assert_eq!(y, sum, "{method}: row {row}");
@@ -80,7 +80,7 @@ fn rows_on_the_way_of_an_fmu_with_a_multiple_of_the_step_have_the_values_of_thei
 }
 
 #[test]
-fn rows_on_the_way_of_an_fmu_are_the_same_after_a_checkpoint_there() {
+fn rows_within_the_step_of_an_fmu_are_the_same_after_a_checkpoint_there() {
     let bench = Bench::new();
     let write = |fmu: CFmu, name: &str| {
         format!("{name}={}", fmu.write(bench.folder.path(), name).display())
@@ -117,7 +117,7 @@ fn parquet_has_the_numbers_of_csv() {
 }
 
 #[test]
-fn a_plot_shows_its_variables_with_their_units() {
+fn a_plot_shows_the_selected_variables_with_their_units() {
     let bench = Bench::new();
     let printed = bench.coupled_well(&["--stop-time", "0.2", "--plot", "plant.x_p,controller.*u"]);
     assert!(printed.ends_with("out/results.csv\nout/plot.svg\n"), "{printed}");
@@ -128,7 +128,7 @@ fn a_plot_shows_its_variables_with_their_units() {
 }
 
 #[test]
-fn many_connections_are_counted_rather_than_listed() {
+fn many_connections_are_counted_instead_of_listed() {
     let bench = Bench::new();
     let plant = fmu("FrictionPendulum");
     let fmus: Vec<_> = (0..24).map(|k| format!("--fmu=p{k}={plant}")).collect();
@@ -136,7 +136,7 @@ fn many_connections_are_counted_rather_than_listed() {
     let arguments: Vec<_> = fmus.iter().chain(&wires).map(String::as_str).collect();
     let more = ["--stop-time", "0.01", "--record", "p23.f_a", "--record", "p22.f_fric"];
     let printed = printed(&bench.run(&[&arguments[..], &more].concat()));
-    // The connections, how many more, how far the run came, the file.
+    // The connections, the number of further ones, the time reached, the file.
     assert_eq!(printed.lines().count(), 20 + 1 + 1 + 1, "{printed}");
     assert!(
         printed.contains("p0.f_fric -> p1.f_a\n") && printed.contains("and 3 more connections")

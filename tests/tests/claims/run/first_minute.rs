@@ -1,30 +1,30 @@
-//! What a user meets first: FMUs by their files, the summary, the log of calls.
+//! A user's first runs: FMUs by their files, the summary, the log of calls.
 
 use tests::c_fmu::CFmu;
 
 use super::*;
 
-/// Writes an FMU whose input and output have these units, and gives its path.
+/// Writes an FMU whose input and output have these units, and returns its path.
 fn unit_fmu(bench: &Bench, name: &str, input: &str, output: &str) -> String {
     let fmu = CFmu::well_behaved().with_units(input, output);
     fmu.write(bench.folder.path(), name).display().to_string()
 }
 
 #[test]
-fn fmus_given_by_their_files_have_their_names_and_connect_by_name() {
+fn fmus_given_by_their_files_get_their_names_and_are_connected_by_name() {
     let bench = Bench::new();
     let (plant, controller) = (fmu("FrictionPendulum"), fmu("AsoController"));
     let out = printed(&bench.run(&[&plant, &controller, "--stop-time", "0.01", "--out", "a"]));
     assert!(out.contains("FrictionPendulum.x_p -> AsoController.x_p\n"), "{out}");
     assert!(out.contains("AsoController.u -> FrictionPendulum.u\n"), "{out}");
-    // The same run with names for the FMUs.
+    // The same run with names stated for the FMUs.
     printed(&bench.coupled(&["--stop-time", "0.01"]));
     let rows = |name: &str| bench.read(name).lines().skip(1).map(str::to_owned).collect::<Vec<_>>();
     assert_eq!(rows("a/results.csv"), rows("out/results.csv"));
 }
 
 #[test]
-fn an_fmu_given_twice_has_two_names() {
+fn an_fmu_given_twice_gets_two_names() {
     let bench = Bench::new();
     let tank = unit_fmu(&bench, "tank", "m", "m");
     let out = bench.run(&[&tank, &tank, "--connect", "tank.y=tank_2.u", "--stop-time", "0.1"]);
@@ -32,7 +32,7 @@ fn an_fmu_given_twice_has_two_names() {
 }
 
 #[test]
-fn the_only_free_output_and_input_of_a_unit_are_connected_and_named() {
+fn the_only_free_output_and_input_of_a_unit_are_connected_and_reported() {
     let bench = Bench::new();
     let pump = unit_fmu(&bench, "pump", "V", "m3/s");
     let tank = unit_fmu(&bench, "tank", "m3/s", "m");
@@ -40,13 +40,13 @@ fn the_only_free_output_and_input_of_a_unit_are_connected_and_named() {
     assert!(printed(&output).contains("pump.y -> tank.u"), "{}", printed(&output));
     let message = said(&output);
     assert!(message.contains("warning: pump.y and tank.u are connected because"), "{message}");
-    // What is left is listed with what to type.
+    // Inputs that remain are listed with the option that sets each.
     assert!(printed(&output).contains("  pump.u: set it by --set pump.u=VALUE"));
     assert!(printed(&output).contains("  pump.i_in: --connect tank.i_out=pump.i_in"));
 }
 
 #[test]
-fn units_that_fit_more_than_one_way_are_not_connected() {
+fn outputs_and_inputs_whose_units_match_in_several_ways_are_not_connected() {
     let bench = Bench::new();
     let pumps = ["one", "two"].map(|name| unit_fmu(&bench, name, "V", "m3/s"));
     let tank = unit_fmu(&bench, "tank", "m3/s", "m");
@@ -58,7 +58,7 @@ fn units_that_fit_more_than_one_way_are_not_connected() {
 }
 
 #[test]
-fn a_run_ends_with_how_far_it_came_and_where_the_results_are() {
+fn a_run_reports_the_time_reached_and_the_file_of_its_results() {
     let bench = Bench::new();
     let printed = bench.coupled_well(&["--stop-time", "0.25", "--step", "0.125"]);
     let lines: Vec<_> = printed.lines().collect();
@@ -68,7 +68,7 @@ fn a_run_ends_with_how_far_it_came_and_where_the_results_are() {
     assert!(lines[lines.len() - 1].ends_with("results.csv"), "{printed}");
 }
 
-/// The calls of section 4.2.4 in their order, with arguments, results and statuses.
+/// The calls of section 4.2.4 in order, with arguments, results and statuses.
 #[test]
 fn the_log_of_calls_has_every_call_of_a_run() {
     let bench = Bench::new();
@@ -103,7 +103,7 @@ fn the_log_of_calls_has_every_call_of_a_run() {
 }
 
 #[test]
-fn the_log_of_calls_tells_warnings_from_ok() {
+fn the_log_of_calls_distinguishes_warnings_from_ok() {
     let bench = Bench::new();
     let fmu = CFmu::that("warn everywhere").write(bench.folder.path(), "a");
     let path = fmu.display().to_string();
@@ -124,10 +124,10 @@ fn the_log_of_calls_ends_with_the_call_that_failed() {
     assert!(calls.contains("a fmi2DoStep(0.5, 0.25, true) -> fmi2Error\n"), "{calls}");
 }
 
-/// The rows of a driven input are the signal at their times, also at its jump and while the FMU has
-/// the value of the step before.
+/// Each row of a driven input has the signal's value at its time, also at a jump of the signal and
+/// while the FMU still has the value of the previous step.
 #[test]
-fn inputs_that_are_driven_are_recorded_as_driven() {
+fn driven_inputs_are_recorded_with_the_value_of_their_signal() {
     let bench = Bench::new();
     let fmu = CFmu::well_behaved().write(bench.folder.path(), "a");
     let text = format!(

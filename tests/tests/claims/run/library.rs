@@ -1,4 +1,4 @@
-//! What is written is what the library computes.
+//! The written results equal those that the library computes.
 
 use master::Transformation;
 use master::{Algorithm, Coupling, Extrapolation, Method, Probe, Simulation, StepControl, System};
@@ -37,7 +37,7 @@ fn written(path: &Path) -> Vec<[f64; 5]> {
 }
 
 #[test]
-fn each_option_of_the_algorithm_does_what_the_algorithm_of_the_library_does() {
+fn each_option_of_the_algorithm_acts_like_the_setting_of_the_library() {
     let fixed = |sweep, extrapolation| Algorithm::fixed(sweep, extrapolation, 0.001);
     let default = fixed(Method::GaussSeidel, Extrapolation::Limited);
     let cases: [(&[&str], Algorithm); 9] = [
@@ -67,7 +67,7 @@ fn each_option_of_the_algorithm_does_what_the_algorithm_of_the_library_does() {
         bench.coupled_well(&more);
         let written = written(&bench.path("out/results.csv"));
         let settings = [("plant.x_p_0", "0.1")];
-        // Between the points where all FMUs meet, the probe reads one on its way at its own end.
+        // Between the ends of an FMU's step, the probe reads the value at the end of that step.
         let common = algorithm.multiples.iter().max().map_or(1, |&multiple| multiple as usize);
         let computed = computed(closed_loop(&settings), &algorithm, 0.3);
         assert_eq!(written.len(), computed.len(), "{options:?}");
@@ -137,7 +137,7 @@ fn a_connection_of_the_file_has_its_factor_and_offset() {
 }
 
 #[test]
-fn a_run_begins_at_its_start_time() {
+fn a_run_starts_at_its_start_time() {
     let bench = Bench::new();
     let times = ["--start-time", "-1.5", "--stop-time", "0.5", "--record-every", "0.25"];
     bench.coupled_well(&times);
@@ -148,7 +148,7 @@ fn a_run_begins_at_its_start_time() {
 }
 
 #[test]
-fn fmus_in_processes_of_their_own_give_the_same_bytes() {
+fn isolated_fmus_give_the_same_bytes() {
     let (here, apart) = (Bench::new(), Bench::new());
     here.coupled_well(&["--stop-time", "0.5"]);
     apart.coupled_well(&["--stop-time", "0.5", "--isolate", "--time-limit", "60"]);

@@ -1,4 +1,4 @@
-//! What is said on standard error.
+//! Messages on standard error.
 
 use serde_json::Value;
 
@@ -30,7 +30,7 @@ fn as_json_each_line_is_an_object() {
 }
 
 #[test]
-fn a_cause_is_said_once() {
+fn a_cause_is_stated_once() {
     let bench = Bench::new();
     let message = said(&bench.coupled(&UNSOUND));
     let last = message.lines().last().unwrap();
@@ -38,7 +38,7 @@ fn a_cause_is_said_once() {
 }
 
 #[test]
-fn a_run_without_trouble_says_nothing_on_standard_error() {
+fn a_run_without_problems_writes_nothing_to_standard_error() {
     let bench = Bench::new();
     assert_eq!(said(&bench.coupled(&["--stop-time", "0.1"])), "");
 }
@@ -55,7 +55,7 @@ fn fmus_without_common_names_run_unconnected_with_a_warning() {
 }
 
 #[test]
-fn misuse_is_refused_with_what_was_expected() {
+fn misuse_is_refused_with_the_expected_input() {
     let bench = Bench::new();
     for (options, parts) in [
         (

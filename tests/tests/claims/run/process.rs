@@ -1,4 +1,4 @@
-//! The process of a run: signals, what others do beside it, what it leaves behind.
+//! The process of a run: signals, other processes at the same time, files left behind.
 
 use std::path::Path;
 use std::process::{Child, Stdio};
@@ -9,10 +9,10 @@ use tests::c_fmu::CFmu;
 
 use super::*;
 
-/// Longest that something may take that is to happen soon.
+/// Time limit for something that should happen soon.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Writes the FMU and gives the argument by which it is `a`.
+/// Writes the FMU and returns the argument that adds it as `a`.
 fn a(bench: &Bench, behaviour: &str) -> String {
     format!("a={}", CFmu::that(behaviour).write(bench.folder.path(), "a").display())
 }
@@ -25,7 +25,7 @@ fn until(what: &str, mut is_so: impl FnMut() -> bool) {
     }
 }
 
-/// Starts a run of one FMU that hangs in its step from 0.5 s on, and waits until it does.
+/// Starts a run of one FMU that hangs in its step from 0.5 s on, and waits until it hangs.
 fn hanging(bench: &Bench, temporary: &Path, more: &[&str]) -> Child {
     let fmu = a(bench, "hang in fmi2DoStep");
     let arguments = ["--fmu", &fmu, "--stop-time", "1", "--step", "0.25", "--out", "out"];
@@ -34,7 +34,7 @@ fn hanging(bench: &Bench, temporary: &Path, more: &[&str]) -> Child {
     let child = command.spawn().unwrap();
     let results = bench.path("out/results.csv");
     until("there is no file", || fs::metadata(&results).is_ok_and(|file| file.len() > 0));
-    // Into the step that hangs.
+    // Wait until the step hangs.
     std::thread::sleep(Duration::from_millis(300));
     child
 }
@@ -44,7 +44,7 @@ fn signal(child: &Child, signal: &str) {
     assert!(kill.success());
 }
 
-/// Processes whose parent is that one.
+/// Processes whose parent is this one.
 fn children(parent: u32) -> Vec<String> {
     let processes = fs::read_dir("/proc").into_iter().flatten().flatten();
     let is_child = |stat: &String| {
@@ -59,7 +59,7 @@ fn children(parent: u32) -> Vec<String> {
 }
 
 #[test]
-fn one_signal_ends_a_run_whose_fmu_hangs_with_its_call_and_its_rows() {
+fn one_signal_ends_a_run_whose_fmu_hangs_and_keeps_its_rows_and_names_the_call() {
     for (kind, isolate) in [("-INT", &[][..]), ("-TERM", &[]), ("-INT", &["--isolate"])] {
         let (bench, temporary) = (Bench::new(), tempfile::tempdir().unwrap());
         let child = hanging(&bench, temporary.path(), isolate);
@@ -68,7 +68,7 @@ fn one_signal_ends_a_run_whose_fmu_hangs_with_its_call_and_its_rows() {
         let begin = Instant::now();
         signal(&child, kind);
         let output = child.wait_with_output().unwrap();
-        // One second by itself; this machine may be busy.
+        // One second on an idle machine; this machine may be busy.
         assert!(begin.elapsed() < Duration::from_secs(5), "{:?}", begin.elapsed());
         let parts =
             ["interrupted", "a at t = 0.5 s: fmi2DoStep does not return", "out/results.csv"];
@@ -105,7 +105,7 @@ fn a_signal_ends_a_run_whose_fmu_hangs_before_the_first_step() {
 }
 
 #[test]
-fn a_second_run_into_the_same_file_is_refused_and_the_first_goes_on() {
+fn a_second_run_into_the_same_file_is_refused_and_the_first_continues() {
     let (bench, temporary) = (Bench::new(), tempfile::tempdir().unwrap());
     let mut first = hanging(&bench, temporary.path(), &[]);
     let before = bench.read("out/results.csv");
@@ -117,13 +117,13 @@ fn a_second_run_into_the_same_file_is_refused_and_the_first_goes_on() {
     assert!(bench.read("out/results.csv").starts_with(&before));
     first.kill().unwrap();
     first.wait().unwrap();
-    // A run that was killed locks nothing.
+    // A killed run leaves no lock.
     printed(&bench.run(&second));
     assert_eq!(whole_rows(&bench.read("out/results.csv")), 5);
 }
 
 #[test]
-fn what_a_killed_run_leaves_in_the_temporary_folder_is_removed_by_the_next_one() {
+fn temporary_folders_of_a_killed_run_are_removed_by_the_next_run() {
     let (bench, temporary) = (Bench::new(), tempfile::tempdir().unwrap());
     let left = || fs::read_dir(temporary.path()).unwrap().count();
     let mut killed = hanging(&bench, temporary.path(), &[]);
@@ -139,7 +139,7 @@ fn what_a_killed_run_leaves_in_the_temporary_folder_is_removed_by_the_next_one()
 }
 
 #[test]
-fn closed_standard_streams_end_nothing() {
+fn closed_standard_streams_do_not_end_a_run() {
     let bench = Bench::new();
     let fmu = a(&bench, "another environment in fmi2DoStep");
     for close in [">&-", "2>&-", ">&- 2>&-", "| true", "2>&1 | true"] {
@@ -159,7 +159,7 @@ fn closed_standard_streams_end_nothing() {
 }
 
 #[test]
-fn where_there_is_no_more_room_the_results_are_a_readable_prefix() {
+fn on_a_full_disk_the_results_are_a_readable_prefix() {
     let fmu = CFmu::well_behaved();
     for (format, least) in [("csv", 1000), ("parquet", 65_536)] {
         let bench = Bench::new();

@@ -1,4 +1,4 @@
-//! Against what scipy's `place_poles` reaches on many systems: `scripts/reference_placement.py`.
+//! Comparison with scipy's `place_poles` on many systems: `scripts/reference_placement.py`.
 
 use crate::matrix;
 use control::placement::{Quality, place, place_balanced, place_discrete};
@@ -10,13 +10,13 @@ struct System {
     a: DMatrix<f64>,
     b: DMatrix<f64>,
     poles: Vec<Complex<f64>>,
-    /// Of scipy.
+    /// Condition number by scipy.
     condition: f64,
-    /// Of scipy.
+    /// Pole error by scipy.
     pole_error: f64,
 }
 
-/// With what is reached here.
+/// The systems, each with the quality reached by this crate.
 static SYSTEMS: LazyLock<Vec<(System, Quality)>> = LazyLock::new(|| {
     let text = include_str!("../placement_reference.txt");
     let systems = text.lines().filter(|line| !line.starts_with('#')).map(read);
@@ -52,7 +52,8 @@ fn no_system_is_worse_conditioned_than_the_best_that_scipy_finds() {
     }
 }
 
-/// scipy enlarges the determinant of the eigenvectors; here their condition number is lowered.
+/// scipy maximises the determinant of the eigenvectors; this crate minimises their condition
+/// number.
 #[test]
 fn systems_with_a_choice_are_better_conditioned_by_a_tenth_on_average() {
     let with_a_choice = SYSTEMS.iter().filter(|(system, _)| {
@@ -67,8 +68,7 @@ fn systems_with_a_choice_are_better_conditioned_by_a_tenth_on_average() {
     assert!(sum / count < 0.9_f64.ln(), "{}", (sum / count).exp());
 }
 
-/// Rounding errors of either side make up a factor of ten, and those of the eigenvalues computed
-/// here are in ours.
+/// A factor of ten allows for rounding errors of both sides and of the eigenvalues computed here.
 #[test]
 fn the_eigenvalues_are_as_exact_as_those_of_scipy() {
     for (System { kind, b, condition, pole_error, .. }, found) in SYSTEMS.iter() {

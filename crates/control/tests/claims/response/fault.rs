@@ -1,4 +1,4 @@
-//! The loop of the paper under its friction, against other software and against the simulation.
+//! The loop of the paper under its friction, compared with other software and with the simulation.
 
 use super::{CONTINUOUS, RECORDED};
 use crate::paper::CONTROLLER_POLES;
@@ -17,13 +17,12 @@ use nalgebra::{DMatrix, DVector};
 
 /// Static friction of the paper in N.
 const STATIC: f64 = 30.0;
-/// How fast the friction turns round in the simulation, in N/s: its largest rate while the cart
-/// sticks.
+/// Largest rate of the friction in the simulation while the cart sticks, in N/s.
 const RATE: f64 = 521.0;
-/// Half of peak to peak of cart, pendulum and their velocities after compensation, in SI units, and
-/// the largest errors x - `x_hat` and f - `f_hat`. Cart and pendulum as in the README's table; the
-/// rest from `aso-ftc run --step 2e-5 --record-every 2e-5 --stop-time 22 --set controller.t_on=1`,
-/// t > 14 s.
+/// Half of the peak-to-peak values of cart, pendulum and their velocities after compensation, in SI
+/// units, and the largest errors x - `x_hat` and f - `f_hat`. Cart and pendulum are as in the
+/// README's table; the rest is from `aso-ftc run --step 2e-5 --record-every 2e-5 --stop-time 22
+/// --set controller.t_on=1`, t > 14 s.
 const AMPLITUDES: [f64; 4] = [0.9619e-3, 1.754e-3, 9.989e-3, 20.50e-3];
 const STATE_ERRORS: [f64; 4] = [3.437e-8, 7.224e-8, 1.631e-4, 4.603e-4];
 const FAULT_ERROR: f64 = 0.8809;
@@ -69,7 +68,7 @@ fn the_reversal_agrees_with_modal_decomposition_in_high_precision() {
     }
 }
 
-/// Without a rate the fault error is that of the jump, and nothing else is known of it.
+/// Without a rate the error of the fault estimate is that of the jump, and no other bound exists.
 #[test]
 fn a_reversal_of_friction_as_a_jump_predicts_the_residual_within_a_factor_of_three() {
     let (plant, gains, _) = paper();
@@ -96,11 +95,11 @@ fn a_reversal_at_the_rate_of_the_simulation_predicts_every_quantity_within_a_qua
     assert!((0.99..1.01).contains(&ratio), "{ratio}");
 }
 
-/// Upper bounds that are no more than three times what is seen: positions from the magnitude of the
-/// fault alone, errors from its rate. The simulated rate is rounded to 521 N/s, and the friction
-/// jumps by 0.07 N when the cart stops: hence the 1 %.
+/// Upper bounds that exceed the simulated values by at most a factor of three: positions from the
+/// magnitude of the fault alone, errors from its rate. The tolerance of 1 % allows for the rate,
+/// which is rounded to 521 N/s, and for the jump of the friction by 0.07 N when the cart stops.
 #[test]
-fn the_bounds_exceed_what_the_simulation_shows_by_less_than_a_factor_of_three() {
+fn the_bounds_exceed_the_simulated_peaks_by_less_than_a_factor_of_three() {
     let (plant, gains, _) = paper();
     let slow = fault_bounds(&plant, &gains, CONTINUOUS, &[STATIC], &[RATE]).unwrap();
     let any = fault_bounds(&plant, &gains, CONTINUOUS, &[STATIC], &[f64::INFINITY]).unwrap();
@@ -118,7 +117,7 @@ fn the_bounds_exceed_what_the_simulation_shows_by_less_than_a_factor_of_three() 
     assert!((any.fault_errors[0] / (2.0 * STATIC) - 1.0).abs() < 2e-3);
 }
 
-/// A fault that the bound calls the worst one: f = F sign(h(T - t)) reaches the bound at T.
+/// The worst fault by the bound, f = F sign(h(T - t)), reaches the bound at T.
 #[test]
 fn the_bound_of_the_cart_is_reached_by_the_worst_friction() {
     let (plant, gains, _) = paper();
@@ -135,7 +134,8 @@ fn the_bound_of_the_cart_is_reached_by_the_worst_friction() {
     assert!(reached <= bounds.states[0] && reached > 0.998 * bounds.states[0], "{reached:e}");
 }
 
-/// The same loop, sampled fast: constant fault, prediction estimator with the exact error dynamics.
+/// The same loop with a short sample time: constant fault, prediction estimator with the exact
+/// error dynamics.
 #[test]
 fn a_fast_sampled_loop_tends_to_the_continuous_one() {
     let one = |value| DMatrix::from_element(1, 1, value);
@@ -166,7 +166,7 @@ fn a_fast_sampled_loop_tends_to_the_continuous_one() {
     }
 }
 
-/// The loop of errors against the plant and the controller's own equations, sample by sample.
+/// The loop of errors, compared with the plant and the controller's own equations at every sample.
 #[test]
 fn the_sampled_loop_of_either_estimator_is_that_of_plant_and_controller() {
     let extended = ExtendedPlant::without_filter(crate::paper::plant());
@@ -191,7 +191,7 @@ fn the_sampled_loop_of_either_estimator_is_that_of_plant_and_controller() {
             difference = difference.max((both.rows(0, 4) - state.rows(0, 4)).amax());
         }
         assert!(difference < 1e-9 * largest, "{estimator:?}: {difference:e} of {largest:e}");
-        // The estimate ends at the fault.
+        // The estimate converges to the fault.
         assert!((state[8] - 1.0).abs() < 1e-9, "{}", state[8]);
     }
 }

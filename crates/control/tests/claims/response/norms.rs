@@ -20,7 +20,7 @@ fn assert_bracketed(system: &StateSpace, expected: &DMatrix<f64>, slack: f64) {
     }
 }
 
-/// 1e-4: the recorded numbers come from a grid.
+/// The tolerance is 1e-4, because the recorded numbers are from a grid.
 #[test]
 fn peak_gains_agree_with_modal_decomposition_in_high_precision() {
     for case in cases(RECORDED, "peak") {
@@ -28,7 +28,8 @@ fn peak_gains_agree_with_modal_decomposition_in_high_precision() {
     }
 }
 
-/// Half waves that shrink geometrically add up to coth(pi zeta w / (2 v)), v the damped frequency.
+/// Half waves that decrease geometrically add up to coth(pi zeta w / (2 v)), v the damped
+/// frequency.
 #[test]
 fn the_peak_gain_of_an_oscillator_is_a_hyperbolic_cotangent() {
     for zeta in [0.9, 0.3, 0.01, 0.001] {
@@ -49,7 +50,7 @@ fn the_peak_gain_of_a_stiff_system_is_the_closed_form() {
     assert_bracketed(&stiff, &matrix(1, 1, &[exact]), 1e-9);
 }
 
-/// The sum over the samples, one by one.
+/// Computes the sum sample by sample.
 #[test]
 fn sampled_peak_gains_are_the_sums_of_the_absolute_samples() {
     let domain = Domain::Sampled { period: 0.1 };
@@ -125,7 +126,7 @@ fn norms_agree_with_slycot() {
     }
 }
 
-/// The largest singular value over a dense grid comes near the norm and does not exceed it.
+/// The largest singular value on a dense grid is close to the norm and does not exceed it.
 #[test]
 fn no_frequency_exceeds_the_h_infinity_norm() {
     for case in cases(RECORDED, "norms") {

@@ -36,7 +36,7 @@ fn values(report: &Report) -> Vec<Value> {
 }
 
 #[test]
-fn every_text_appears_as_it_is() {
+fn every_text_appears_unchanged() {
     with_pages(|report, document| {
         let page = text(document.root());
         let texts = values(report).into_iter().filter_map(|value| match value {

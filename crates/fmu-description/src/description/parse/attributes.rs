@@ -14,7 +14,7 @@ const UNSIGNED: &str = "an integer from 0 to 4294967295";
 const BOOLEAN: &str = "true, false, 1 or 0";
 const NOTHING: &str = "read as if it were not there";
 
-/// An element that is being read, and where warnings go.
+/// An element that is being read, with the list of warnings.
 #[derive(Clone, Copy)]
 pub(super) struct Node<'a> {
     pub(super) element: &'a Element<'a>,
@@ -22,13 +22,13 @@ pub(super) struct Node<'a> {
 }
 
 impl<'a> Node<'a> {
-    /// The error for a missing or surplus child.
+    /// Returns the error for a missing or surplus child.
     pub(super) fn misses(&self, expected: impl Into<String>, found: String) -> ParseError {
         let (at, element) = (self.element.at, self.element.name.to_owned());
         ParseError::Element { at, element, expected: expected.into(), found }
     }
 
-    /// The error for the value `found` of an attribute.
+    /// Returns the error for the value `found` of an attribute.
     pub(super) fn wrong(&self, attribute: &'static str, expected: &str, found: &str) -> ParseError {
         self.fault(attribute, expected, format!("{found:?}"))
     }
@@ -38,13 +38,14 @@ impl<'a> Node<'a> {
         ParseError::Attribute { at, element, attribute, expected: expected.to_owned(), found }
     }
 
-    /// A warning about the value `found` of an attribute, which the schema does not allow.
+    /// Warns about the value `found` of an attribute that the schema does not allow.
     pub(super) fn warn(&self, attribute: &str, expected: &str, found: &str, assumed: &str) {
         let place = self.place(attribute);
         self.warn_of(true, place, (expected, format!("{found:?}")), assumed);
     }
 
-    /// A warning about the value `found` of an attribute, which only the text does not allow.
+    /// Warns about the value `found` of an attribute that only the text of the standard does not
+    /// allow.
     pub(super) fn warn_text(&self, attribute: &str, expected: &str, found: &str, assumed: &str) {
         let place = self.place(attribute);
         self.warn_of(false, place, (expected, format!("{found:?}")), assumed);
@@ -55,7 +56,7 @@ impl<'a> Node<'a> {
         format!("<{}>, attribute {attribute}", self.element.name)
     }
 
-    /// A warning with what was expected and found.
+    /// Adds a warning with the expected and the actual value.
     pub(super) fn warn_of(
         &self,
         by_schema: bool,
@@ -88,8 +89,8 @@ impl<'a> Node<'a> {
         value.ok_or_else(|| self.fault(name, "a value", "no such attribute".to_owned()))
     }
 
-    /// The text of an attribute without white space around it; an empty one is warned of and
-    /// taken for none.
+    /// Returns an attribute without white space around it; an empty one gives a warning and counts
+    /// as missing.
     fn content(&self, name: &str, expected: &str) -> Option<(&'a str, &'a str)> {
         let text = self.attribute(name)?;
         let trimmed = text.trim_matches(WHITE_SPACE);
@@ -100,12 +101,12 @@ impl<'a> Node<'a> {
         Some((text, trimmed))
     }
 
-    /// An `xs:double`. One that is infinite or no number says as much as none, and is warned of;
-    /// one that is too large for a double is an error.
+    /// Reads an `xs:double`. Infinity and NaN give a warning and count as missing; a number too
+    /// large for a double is an error.
     pub(super) fn number(&self, name: &'static str) -> Result<Option<f64>, ParseError> {
         let Some((text, trimmed)) = self.content(name, NUMBER) else { return Ok(None) };
         if is_not_finite(trimmed) {
-            // The schema's numbers have these, those of FMI have not.
+            // The schema allows these spellings, the text of FMI does not.
             let by_schema = !["INF", "-INF", "NaN"].contains(&trimmed);
             self.warn_of(by_schema, self.place(name), (NUMBER, format!("{text:?}")), NOTHING);
             return Ok(None);
@@ -116,14 +117,14 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// An `xs:double` that a conversion is made with: nothing but a finite number will do.
+    /// Reads an `xs:double` of a conversion, which must be finite.
     pub(super) fn finite(&self, name: &'static str, default: f64) -> Result<f64, ParseError> {
         let Some(text) = self.attribute(name) else { return Ok(default) };
         let value = text.trim_matches(WHITE_SPACE).parse::<f64>().ok();
         value.filter(|value| value.is_finite()).ok_or_else(|| self.wrong(name, NUMBER, text))
     }
 
-    /// `xs:int`. An integer written with a point (`1.0`) is warned of.
+    /// Reads an `xs:int`. An integer written with a point (`1.0`) gives a warning.
     pub(super) fn integer(&self, name: &'static str) -> Result<Option<i32>, ParseError> {
         let Some((text, trimmed)) = self.content(name, INTEGER) else { return Ok(None) };
         if let Ok(value) = trimmed.parse() {
@@ -136,14 +137,14 @@ impl<'a> Node<'a> {
         Ok(Some(value))
     }
 
-    /// `xs:unsignedInt`, or an error.
+    /// Reads an `xs:unsignedInt`; any other value is an error.
     pub(super) fn unsigned(&self, name: &'static str) -> Result<u32, ParseError> {
         let text = self.required(name)?;
         let value = text.trim_matches(WHITE_SPACE).parse();
         value.map_err(|_| self.wrong(name, UNSIGNED, text))
     }
 
-    /// `xs:unsignedInt` of something that a simulation can do without.
+    /// Reads an `xs:unsignedInt` that a simulation does not need.
     pub(super) fn optional_unsigned(&self, name: &'static str) -> Option<u32> {
         let (text, trimmed) = self.content(name, UNSIGNED)?;
         let value = trimmed.parse().ok();
@@ -153,14 +154,14 @@ impl<'a> Node<'a> {
         value
     }
 
-    /// `xs:boolean` in any case.
+    /// Reads an `xs:boolean`, in any case.
     pub(super) fn boolean(&self, name: &'static str) -> Result<Option<bool>, ParseError> {
         let Some((text, trimmed)) = self.content(name, BOOLEAN) else { return Ok(None) };
         let value = self.truth(name, trimmed);
         value.map(Some).ok_or_else(|| self.wrong(name, BOOLEAN, text))
     }
 
-    /// A capability: false where its value is none of `xs:boolean`.
+    /// Reads a capability flag; false if its value is no `xs:boolean`.
     pub(super) fn flag(&self, name: &'static str) -> bool {
         let Some((text, trimmed)) = self.content(name, BOOLEAN) else { return false };
         self.truth(name, trimmed).unwrap_or_else(|| {
@@ -181,7 +182,7 @@ impl<'a> Node<'a> {
         Some(value)
     }
 
-    /// One of `words`, also in another case; another one is taken for none.
+    /// Reads one of `words`, also in another case; any other word counts as missing.
     pub(super) fn word<T: FromStr>(&self, name: &'static str, words: &[&str]) -> Option<T> {
         let text = self.attribute(name)?;
         if let Ok(value) = text.parse() {
@@ -217,7 +218,7 @@ impl<'a> Node<'a> {
         child.ok_or_else(|| self.misses(format!("an element {name}"), "none".to_owned()))
     }
 
-    /// The items called `item` of the list called `name`; none if there is no such list.
+    /// Returns the items called `item` of the list called `name`; empty if there is no such list.
     pub(super) fn list<T>(
         self,
         name: &'a str,
@@ -229,7 +230,7 @@ impl<'a> Node<'a> {
     }
 }
 
-/// Whether a number is spelt as infinite or as none: by XML Schema, C, C#, Java or Windows.
+/// Whether a number is a spelling of infinity or NaN by XML Schema, C, C#, Java or Windows.
 fn is_not_finite(text: &str) -> bool {
     let unsigned = text.trim_start_matches(['+', '-']).to_ascii_lowercase();
     ["inf", "infinity", "nan"].contains(&unsigned.as_str()) || unsigned.starts_with("1.#")

@@ -1,4 +1,4 @@
-//! Bytes to text.
+//! Decodes the bytes of an XML file.
 
 use std::borrow::Cow;
 
@@ -8,10 +8,10 @@ use quick_xml::reader::Reader;
 
 use super::{ParseError, Position, Warning};
 
-/// Longest XML declaration that is looked at.
+/// Length of the part that is searched for an XML declaration.
 const DECLARATION: usize = 256;
 
-/// The text of an XML file, and a warning where it is not UTF-8 as FMI wants it.
+/// Returns the text of an XML file, and a warning if it is not UTF-8, which FMI requires.
 pub(super) fn decode(bytes: &[u8]) -> Result<(Cow<'_, str>, Option<Warning>), ParseError> {
     if let Some((encoding, mark)) = Encoding::for_bom(bytes) {
         let rest = &bytes[mark..];
@@ -20,7 +20,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<(Cow<'_, str>, Option<Warning>), Pa
         }
         return converted(rest, encoding);
     }
-    // Without a mark, the first character "<" tells the two forms of UTF-16 apart.
+    // Without a byte order mark, the first character "<" distinguishes the two forms of UTF-16.
     match bytes {
         [b'<', 0, ..] => return converted(bytes, UTF_16LE),
         [0, b'<', ..] => return converted(bytes, UTF_16BE),
@@ -31,13 +31,13 @@ pub(super) fn decode(bytes: &[u8]) -> Result<(Cow<'_, str>, Option<Warning>), Pa
     };
     match Encoding::for_label(declared.as_bytes()) {
         Some(encoding) if encoding == UTF_8 => Ok((utf8(bytes)?, None)),
-        // Every byte that ASCII has means the same in UTF-8.
+        // In every supported encoding, ASCII bytes have their ASCII meaning.
         _ if declared.eq_ignore_ascii_case("us-ascii")
             || declared.eq_ignore_ascii_case("ascii") =>
         {
             Ok((utf8(bytes)?, Some(other(format!("encoding {declared:?}")))))
         }
-        // What declares UTF-16 in single bytes is not UTF-16.
+        // A file that declares UTF-16 in single bytes is not UTF-16.
         Some(encoding) if encoding != UTF_16LE && encoding != UTF_16BE => {
             converted(bytes, encoding)
         }
@@ -78,7 +78,7 @@ fn utf8(bytes: &[u8]) -> Result<Cow<'_, str>, ParseError> {
     })
 }
 
-/// The encoding in the XML declaration, if there is one.
+/// Returns the encoding in the XML declaration, if there is one.
 fn declared(bytes: &[u8]) -> Option<String> {
     let start = &bytes[..bytes.len().min(DECLARATION)];
     let end = start.windows(2).position(|pair| pair == b"?>")? + 2;

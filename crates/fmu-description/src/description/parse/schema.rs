@@ -1,4 +1,5 @@
-//! Elements and attributes that the schema of FMI 2.0.5 does not have, or has in another order.
+//! Warns of elements and attributes that the schema of FMI 2.0.5 does not have, or has in another
+//! order.
 
 use super::attributes::Node;
 use crate::unit::BaseUnit;
@@ -6,7 +7,7 @@ use crate::unit::BaseUnit;
 /// An element of the schema: its attributes and its children in order.
 struct Shape {
     attributes: &'static [&'static str],
-    /// Attributes that other elements have too.
+    /// Attributes that this element shares with other elements.
     shared: &'static [&'static str],
     children: &'static [&'static str],
     /// The children are one optional list, which must not be empty.
@@ -97,7 +98,7 @@ const REAL: &[&str] =
     &["quantity", "unit", "displayUnit", "relativeQuantity", "min", "max", "nominal", "unbounded"];
 const INTEGER: &[&str] = &["quantity", "min", "max"];
 
-/// The shape of the element `name` in `parent`; none where the schema does not go on.
+/// The shape of the element `name` in `parent`; `None` if the schema does not define its content.
 fn shape(parent: &str, name: &str) -> Option<Shape> {
     Some(match (parent, name) {
         (_, "fmiModelDescription") => ROOT,
@@ -121,7 +122,7 @@ fn shape(parent: &str, name: &str) -> Option<Shape> {
         (_, "LogCategories") => list(&["Category"]),
         (_, "Category") => leaf(&["name", "description"]),
         (_, "DefaultExperiment") => leaf(&["startTime", "stopTime", "tolerance", "stepSize"]),
-        // That it is empty is for the rules to say.
+        // The rules report an empty list, not the schema.
         (_, "ModelVariables") => branch(&[], &["ScalarVariable"]),
         (_, "ScalarVariable") => VARIABLE,
         ("ScalarVariable", "Real") => {
@@ -138,12 +139,12 @@ fn shape(parent: &str, name: &str) -> Option<Shape> {
     })
 }
 
-/// Warns of everything below `node`, which stands in an element called `parent`.
+/// Warns of everything below `node`, a child of the element `parent`.
 pub(super) fn check(node: Node<'_>, parent: &str) {
     let element = node.element;
     let Some(shape) = shape(parent, element.name) else { return };
     for (name, value) in &element.attributes {
-        // Name spaces are not FMI's.
+        // FMI defines no namespaces.
         let own = shape.attributes.contains(name) || shape.shared.contains(name);
         let known = own || *name == "xmlns" || name.contains(':');
         if !known {

@@ -1,4 +1,4 @@
-//! `ModelStructure`.
+//! Reads `ModelStructure`.
 
 use std::collections::HashSet;
 
@@ -10,8 +10,8 @@ const ANYTHING: &str = "read as depending on anything";
 
 /// Reads `ModelStructure` of `root` for `variables`.
 ///
-/// A list with an index that is no variable's is not to be trusted: its rows are read as depending
-/// on anything. So are outputs that are missing from `Outputs`.
+/// If a list has an index that belongs to no variable, all of its rows are read as depending on
+/// anything. Outputs that are missing from `Outputs` are read in the same way.
 pub(super) fn read(
     root: Node<'_>,
     variables: &[ScalarVariable],
@@ -82,7 +82,8 @@ fn list(element: Node<'_>, name: &'static str, count: usize) -> Result<Vec<Unkno
     Ok(rows)
 }
 
-/// `Derivatives`, which say what the states are: an index that is no variable's is an error.
+/// Reads `Derivatives`, which determine the states: an index that belongs to no variable is an
+/// error.
 fn derivatives(element: Node<'_>, count: usize) -> Result<Vec<Unknown>, ParseError> {
     if let Some(list) = element.optional_child("Derivatives")? {
         for row in list.children_named("Unknown") {
@@ -93,7 +94,7 @@ fn derivatives(element: Node<'_>, count: usize) -> Result<Vec<Unknown>, ParseErr
     list(element, "Derivatives", count)
 }
 
-/// The 1-based index of one of `count` variables.
+/// Reads the 1-based index of one of `count` variables.
 pub(super) fn index(text: &str, count: usize) -> Option<u32> {
     let index = text.trim_matches(WHITE_SPACE).parse::<u32>().ok()?;
     (index > 0 && usize::try_from(index).is_ok_and(|own| own <= count)).then_some(index)
@@ -107,10 +108,10 @@ fn words(text: &str) -> impl Iterator<Item = &str> {
     text.split(WHITE_SPACE).filter(|word| !word.is_empty())
 }
 
-/// An index that is no variable's.
+/// The error for an index that belongs to no variable.
 struct Impossible;
 
-/// The attribute `dependencies`, where there is one.
+/// Reads the attribute `dependencies`, if there is one.
 fn dependencies(row: Node<'_>, count: usize) -> Result<Option<Vec<u32>>, Impossible> {
     let Some(text) = row.attribute("dependencies") else { return Ok(None) };
     let mut found = Vec::new();
@@ -124,7 +125,7 @@ fn dependencies(row: Node<'_>, count: usize) -> Result<Option<Vec<u32>>, Impossi
     Ok(Some(found))
 }
 
-/// The attribute `dependenciesKind`, where it fits `dependencies`.
+/// Reads the attribute `dependenciesKind`, if it fits `dependencies`.
 fn kinds(row: Node<'_>, dependencies: Option<&[u32]>) -> Option<Vec<DependencyKind>> {
     const NAME: &str = "dependenciesKind";
     let text = row.attribute(NAME)?;

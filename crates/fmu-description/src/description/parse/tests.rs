@@ -88,7 +88,7 @@ fn each_kind_of_variable_is_read() {
 }
 
 #[test]
-fn a_declared_type_gives_what_the_variable_does_not_state() {
+fn a_variable_gets_the_attributes_of_its_declared_type() {
     let variables = r#"<ScalarVariable name="x" valueReference="0">
         <Real declaredType="Length" min="1"/></ScalarVariable>"#;
     let description = ModelDescription::parse(with(variables, "")).unwrap();
@@ -98,7 +98,7 @@ fn a_declared_type_gives_what_the_variable_does_not_state() {
 }
 
 #[test]
-fn no_dependencies_and_unknown_dependencies_are_told_apart() {
+fn no_dependencies_and_unknown_dependencies_are_distinguished() {
     let structure = r#"<Outputs><Unknown index="1"/><Unknown index="1" dependencies=""/>
         <Unknown index="1" dependencies="1 &#9; 1" dependenciesKind="fixed constant"/></Outputs>"#;
     let description = ModelDescription::parse(with(X, structure)).unwrap();
@@ -174,7 +174,7 @@ fn other_versions_are_named() {
 }
 
 #[test]
-fn numbers_that_are_none_are_refused() {
+fn malformed_numbers_are_refused() {
     let number = |attribute: &str| {
         refused(
             &format!(
@@ -207,14 +207,14 @@ fn numbers_that_are_none_are_refused() {
     }
 }
 
-/// An error of `variables` and `structure` that has a position and says `said`.
+/// Checks that `variables` and `structure` give an error with a position and the text `said`.
 fn assert_refused(variables: &str, structure: &str, said: &str) {
     let error = refused(variables, structure);
     assert!(error.contains(said) && error.starts_with("line "), "{said}: {error}");
 }
 
 #[test]
-fn a_variable_that_would_mislead_is_refused() {
+fn a_variable_that_would_mislead_a_simulation_is_refused() {
     for (attributes, content, said) in [
         ("valueReference='0'", "<Real/>", "attribute name"),
         ("name='x'", "<Real/>", "attribute valueReference"),
@@ -239,7 +239,7 @@ fn variable(name: &str, reference: u32, causality: &str) -> String {
 }
 
 #[test]
-fn a_name_that_stands_for_two_outputs_is_refused() {
+fn a_name_of_two_outputs_is_refused() {
     let twice = variable("y", 1, "output") + &variable("y", 2, "output");
     assert_refused(&twice, "", "a name that is used once");
     let hidden = variable("y", 1, "output") + &variable("y", 2, "local");
@@ -247,7 +247,7 @@ fn a_name_that_stands_for_two_outputs_is_refused() {
 }
 
 #[test]
-fn inputs_and_parameters_that_overwrite_each_other_are_refused() {
+fn inputs_and_parameters_with_the_same_value_reference_are_refused() {
     for (one, other) in [("input", "input"), ("parameter", "parameter"), ("input", "parameter")] {
         let both = variable("a", 7, one) + &variable("b", 7, other);
         assert_refused(
@@ -271,7 +271,7 @@ fn types_that_refer_to_types_are_refused() {
 }
 
 #[test]
-fn conversions_by_what_is_no_number_are_refused() {
+fn conversions_by_numbers_that_are_not_finite_are_refused() {
     for (unit, attribute) in [
         ("<BaseUnit factor='NaN'/>", "factor"),
         ("<BaseUnit offset=''/>", "offset"),
@@ -286,7 +286,7 @@ fn conversions_by_what_is_no_number_are_refused() {
 }
 
 #[test]
-fn a_structure_that_would_mislead_is_refused() {
+fn a_structure_that_would_mislead_a_simulation_is_refused() {
     assert_refused(X, "<Outputs><Unknown/></Outputs>", "attribute index");
     assert_refused(X, "<Outputs/><Outputs/>", "one element Outputs");
     for index in ["0", "2", "x"] {

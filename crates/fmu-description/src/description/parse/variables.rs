@@ -1,4 +1,4 @@
-//! `TypeDefinitions` and `ModelVariables`.
+//! Reads `TypeDefinitions` and `ModelVariables`.
 
 use std::collections::HashMap;
 
@@ -13,7 +13,7 @@ const KINDS: [&str; 5] = ["Real", "Integer", "Boolean", "String", "Enumeration"]
 const CAUSALITIES: [&str; 6] =
     ["parameter", "calculatedParameter", "input", "output", "local", "independent"];
 const VARIABILITIES: [&str; 5] = ["constant", "fixed", "tunable", "discrete", "continuous"];
-/// Most variables.
+/// Maximum number of variables.
 const VARIABLES: usize = 1_000_000;
 
 /// The types of `TypeDefinitions`, by name.
@@ -23,7 +23,7 @@ pub(super) fn types(root: Node<'_>) -> Result<Vec<SimpleType>, ParseError> {
     root.list("TypeDefinitions", "SimpleType", |element| {
         let typed = typed(element)?;
         if let Some(other) = typed.attribute("declaredType") {
-            // Types that refer to types could go round in a circle.
+            // Types that refer to types could form a circle.
             return Err(typed.wrong("declaredType", "no reference to another type", other));
         }
         Ok(SimpleType {
@@ -67,7 +67,7 @@ pub(super) fn variables(
     Ok(variables)
 }
 
-/// A name that two variables have is refused unless it does not matter which one is meant.
+/// Refuses a name that two variables have, unless it does not matter which one is meant.
 fn check_names(elements: &[Node<'_>], variables: &[ScalarVariable]) -> Result<(), ParseError> {
     let mut names: HashMap<&str, &ScalarVariable> = HashMap::with_capacity(variables.len());
     for (element, variable) in elements.iter().zip(variables) {
@@ -88,7 +88,7 @@ fn check_names(elements: &[Node<'_>], variables: &[ScalarVariable]) -> Result<()
     Ok(())
 }
 
-/// What is set from outside must not overwrite each other.
+/// Two variables that are set from outside must not share a value reference.
 fn check_references(elements: &[Node<'_>], variables: &[ScalarVariable]) -> Result<(), ParseError> {
     let mut settable: HashMap<(u8, u32), &str> = HashMap::new();
     for (element, variable) in elements.iter().zip(variables) {
@@ -106,7 +106,7 @@ fn check_references(elements: &[Node<'_>], variables: &[ScalarVariable]) -> Resu
     Ok(())
 }
 
-/// Variables of one base type share the value references.
+/// Variables of the same base type share the space of value references.
 fn base(kind: &Kind) -> u8 {
     match kind {
         Kind::Real(_) => 0,
@@ -136,8 +136,8 @@ fn variable(
     })
 }
 
-/// `variability`: where only a Real can be what the file says, or its default, the least that the
-/// other types can be.
+/// Reads `variability`. If only a Real can have the stated or default value, other types get the
+/// most restrictive value that they can have.
 fn variability(element: Node<'_>, causality: Causality, kind: &Kind) -> Variability {
     let stated = element.word("variability", &VARIABILITIES);
     let variability = stated.unwrap_or(Variability::Continuous);
@@ -156,7 +156,7 @@ fn variability(element: Node<'_>, causality: Causality, kind: &Kind) -> Variabil
     assumed
 }
 
-/// The one child that says which type a variable or a type definition has.
+/// Returns the single child that gives the type of a variable or a type definition.
 fn typed(element: Node<'_>) -> Result<Node<'_>, ParseError> {
     let is_kind = |child: &&super::xml::Element<'_>| KINDS.contains(&child.name);
     let mut found = element.element.children.iter().filter(is_kind);
@@ -211,7 +211,7 @@ fn derivative(element: Node<'_>, count: usize) -> Result<Option<u32>, ParseError
     index.map(Some).ok_or_else(|| element.wrong("derivative", &indices(count), text))
 }
 
-/// The declared type of a variable, if it exists and is of the variable's own kind.
+/// Returns the declared type of a variable, if it exists and has the kind of the variable.
 fn declared<'a>(element: Node<'_>, types: &Types<'a>) -> Option<(String, &'a Kind)> {
     const NAME: &str = "declaredType";
     let kind = element.element.name;

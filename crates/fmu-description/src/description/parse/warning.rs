@@ -1,4 +1,4 @@
-//! What was wrong and could still be read.
+//! Warnings about content that breaks the standard and can still be read.
 
 use std::cell::RefCell;
 use std::fmt;
@@ -6,25 +6,25 @@ use std::fmt;
 use super::Position;
 use super::xml::Element;
 
-/// Most warnings that are kept; one more says that there were others.
+/// Maximum number of warnings that are kept; one more says that there were others.
 const KEPT: usize = 1000;
 
-/// Something that breaks the standard and leaves no doubt, or does no harm, in a simulation.
+/// A violation of the standard that is harmless, or has a clear meaning, in a simulation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Warning {
-    /// Where the element begins.
+    /// The position of the element.
     pub at: Position,
-    /// What it is about: an element, or one of its attributes.
+    /// The subject: an element, or one of its attributes.
     pub place: String,
-    /// What the standard wants.
+    /// The content that the standard requires.
     pub expected: String,
-    /// What the file has.
+    /// The content of the file.
     pub found: String,
-    /// What the reader made of it.
+    /// The assumption that the reader made.
     pub assumed: String,
     /// Section of FMI 2.0.5.
     pub section: &'static str,
-    /// Whether validation against the schema of the standard finds it too.
+    /// Whether validation against the schema of the standard reports it too.
     pub by_schema: bool,
 }
 
@@ -38,7 +38,7 @@ impl fmt::Display for Warning {
     }
 }
 
-/// The warnings so far.
+/// Collects warnings.
 #[derive(Debug, Default)]
 pub(super) struct Warnings {
     kept: RefCell<Vec<Warning>>,
@@ -58,7 +58,7 @@ impl Warnings {
         }
     }
 
-    /// All of them, by their place in the file.
+    /// Returns all warnings in the order of the file.
     pub(super) fn finish(self) -> Vec<Warning> {
         let mut kept = self.kept.into_inner();
         kept.sort_by_key(|warning| (warning.at.line, warning.at.column));
@@ -66,7 +66,7 @@ impl Warnings {
     }
 }
 
-/// Section of FMI 2.0.5 that describes an element.
+/// Returns the section of FMI 2.0.5 that describes an element.
 pub(super) fn section(element: &Element<'_>) -> &'static str {
     match element.name {
         "ModelExchange" => "3.3.1",

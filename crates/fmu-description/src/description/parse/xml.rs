@@ -1,4 +1,4 @@
-//! Text to a tree of elements, with a bound on everything that could grow without sense.
+//! Parses XML into a tree of elements, with limits on everything that could grow.
 
 use std::borrow::Cow;
 
@@ -9,29 +9,29 @@ use quick_xml::reader::Reader;
 
 use super::{ParseError, Position};
 
-/// Deepest nesting; a model description needs 5.
+/// Maximum nesting; a model description needs 5.
 const DEPTH: usize = 64;
-/// Most attributes of one element; the standard has 15 at most.
+/// Maximum number of attributes of one element; the standard has 15 at most.
 const ATTRIBUTES: usize = 256;
-/// Most elements; a variable needs 2.
+/// Maximum number of elements; a variable needs 2.
 const ELEMENTS: usize = 3_000_000;
-/// Most attributes of all elements together.
+/// Maximum number of attributes of all elements together.
 const ALL_ATTRIBUTES: usize = 12_000_000;
 
 /// An element: its attributes, child elements and text, which FMI 2.0 does not use.
 #[derive(Debug)]
 pub(super) struct Element<'a> {
     pub(super) name: &'a str,
-    /// The first text that is more than white space, as it stands in the file.
+    /// The first text that is more than white space, unchanged.
     text: &'a str,
     pub(super) attributes: Vec<(&'a str, Cow<'a, str>)>,
     pub(super) children: Vec<Element<'a>>,
-    /// Where it begins.
+    /// The position at which it starts.
     pub(super) at: Position,
 }
 
 impl Element<'_> {
-    /// The same with text of its own; the reader bounds the depth.
+    /// Compares two elements including their texts; the reader limits the depth of the recursion.
     pub(super) fn into_owned(self) -> crate::xml::Element {
         let attributes = self.attributes.into_iter();
         crate::xml::Element {
@@ -46,7 +46,7 @@ impl Element<'_> {
     }
 }
 
-/// Follows the position in a text that is read once, front to back.
+/// Tracks the position in a text that is read once from start to end.
 struct Place<'a> {
     text: &'a [u8],
     offset: usize,
@@ -59,7 +59,7 @@ impl Place<'_> {
         for byte in self.text.get(self.offset..end).unwrap_or_default() {
             match byte {
                 b'\n' => self.at = Position { line: self.at.line.saturating_add(1), column: 1 },
-                // Continuation bytes of UTF-8 are no characters of their own.
+                // Continuation bytes of UTF-8 are not characters.
                 0x80..=0xbf => {}
                 _ => self.at.column = self.at.column.saturating_add(1),
             }
@@ -69,7 +69,7 @@ impl Place<'_> {
     }
 }
 
-/// The elements that are open, and the root once it is closed.
+/// The open elements, and the root after its end.
 #[derive(Default)]
 struct Tree<'a> {
     open: Vec<Element<'a>>,
@@ -79,7 +79,7 @@ struct Tree<'a> {
 }
 
 impl<'a> Tree<'a> {
-    /// An element at `at`, or `inner` levels below there, is not too deep.
+    /// Checks that an element at `at`, or `inner` levels below, is not too deep.
     fn go_down(&self, at: Position, inner: usize) -> Result<(), ParseError> {
         if self.open.len() + inner >= DEPTH {
             return Err(limit(at, "levels of nested elements", DEPTH));
@@ -88,7 +88,7 @@ impl<'a> Tree<'a> {
     }
 
     fn end(&mut self) -> Result<(), ParseError> {
-        // The reader has checked that there is one.
+        // The reader has checked that there is a parent.
         self.open.pop().map_or(Ok(()), |element| self.add(element))
     }
 
@@ -120,7 +120,7 @@ impl<'a> Tree<'a> {
         self.root.ok_or_else(none)
     }
 
-    /// The element of a tag, whose text begins at `offset` of `text`.
+    /// Creates the element of a tag whose text starts at `offset` of `text`.
     fn element(
         &mut self,
         tag: &BytesStart<'_>,
@@ -161,12 +161,12 @@ fn limit(at: Position, what: &'static str, limit: usize) -> ParseError {
     ParseError::Limit { at, what, limit }
 }
 
-/// Reads the one root element of `text`. Annotations of FMI are skipped.
+/// Reads the root element of `text`. Skips annotations of FMI.
 pub(super) fn read(text: &str) -> Result<Element<'_>, ParseError> {
     read_but(text, is_annotation)
 }
 
-/// Reads the one root element of `text`, without the elements that are `skipped`.
+/// Reads the root element of `text` without the elements in `skipped`.
 pub(super) fn read_but(
     text: &str,
     skipped: impl Fn(&BytesStart<'_>) -> bool,
@@ -205,7 +205,7 @@ pub(super) fn read_but(
     }
 }
 
-/// Skips the content of an element that begins at `at`, up to its end.
+/// Skips the content of an element that starts at `at`, up to its end.
 fn skip(reader: &mut Reader<&[u8]>, tree: &Tree<'_>, at: Position) -> Result<(), ParseError> {
     let mut inner = 1;
     while inner > 0 {

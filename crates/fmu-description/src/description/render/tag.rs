@@ -65,7 +65,7 @@ impl<'a> Tag<'a> {
         }
     }
 
-    /// An attribute that is left out at its default, zero or false.
+    /// Adds an attribute, unless it has its default, zero or false.
     pub(super) fn unless_default<T: Value + Default + PartialEq>(
         self,
         name: &str,
@@ -75,7 +75,7 @@ impl<'a> Tag<'a> {
     }
 }
 
-/// Whether XML 1.0 can hold `character` (its production 2).
+/// Whether XML 1.0 allows `character` (its production 2).
 pub(in crate::description) fn is_xml(character: char) -> bool {
     matches!(character, '\t' | '\n' | '\r' | ' '..='\u{d7ff}' | '\u{e000}'..='\u{fffd}')
         || character >= '\u{10000}'

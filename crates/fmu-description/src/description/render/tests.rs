@@ -39,7 +39,7 @@ fn numbers_read_back_to_the_same_bits() {
 }
 
 #[test]
-fn text_is_escaped_and_what_xml_cannot_hold_is_replaced() {
+fn text_is_escaped_and_characters_that_xml_forbids_are_replaced() {
     let mut description = sample::complete();
     description.model_name = "a\u{0}b\u{1b}c\u{ffff}d".to_owned();
     description.author = Some("<&>\"'\n\r\t".to_owned());
@@ -66,8 +66,8 @@ fn the_content_guid_depends_on_everything_but_the_guid() {
     assert_ne!(changed.content_guid(), guid);
 }
 
-/// Hashed with `hashlib.sha256` of Python: the length of "2.0", the text, and 20 zeros for all that
-/// is absent or empty.
+/// Computed with `hashlib.sha256` of Python: the length of "2.0", the text, and 20 zeros for all
+/// fields that are absent or empty.
 #[test]
 fn the_content_guid_is_the_sha_256_of_the_serialized_form() {
     let description = ModelDescription { fmi_version: "2.0".into(), ..ModelDescription::default() };

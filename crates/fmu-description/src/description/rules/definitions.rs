@@ -56,7 +56,7 @@ fn check_unit(unit: &Unit, problems: &mut Problems) {
     }
 }
 
-/// The unit of a variable or type is defined, its display unit belongs to that unit.
+/// Checks that the unit of a variable or type is defined and has the display unit.
 fn check_use(who: &str, real: &RealType, units: &HashMap<&str, &Unit>, problems: &mut Problems) {
     let unit = real.unit.as_deref();
     let defined = unit.and_then(|name| units.get(name));

@@ -30,8 +30,8 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
     check_arrays(names(), problems);
 }
 
-/// Elements of an array stand together, the last index running fastest. Looked at are arrays of
-/// scalars: names with indices at their end only.
+/// Checks that the elements of each array are adjacent, with the last index running fastest. Only
+/// arrays of scalars are checked: names with indices at their end.
 fn check_arrays<'a>(names: impl Iterator<Item = &'a str>, problems: &mut Problems) {
     let mut seen = HashSet::new();
     let mut last: Option<(&str, Vec<u32>)> = None;
@@ -90,7 +90,7 @@ fn is_identifier(text: &str) -> bool {
     }
 }
 
-/// What follows a `B-name`, which is plain or in apostrophes.
+/// Returns the rest after a `B-name`, which is plain or in apostrophes.
 fn after_name(text: &str) -> Option<&str> {
     let Some(quoted) = text.strip_prefix('\'') else {
         let is_letter = |own: char| own.is_ascii_alphanumeric() || own == '_';
@@ -113,7 +113,7 @@ fn after_name(text: &str) -> Option<&str> {
     None
 }
 
-/// What follows the optional `[ unsignedInteger { "," unsignedInteger } ]`.
+/// Returns the rest after the optional `[ unsignedInteger { "," unsignedInteger } ]`.
 fn after_indices(text: &str) -> Option<&str> {
     let Some(inner) = text.strip_prefix('[') else {
         return Some(text);

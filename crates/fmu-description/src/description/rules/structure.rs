@@ -11,12 +11,12 @@ use crate::description::{
 const SECTION: &str = "2.2.8";
 
 impl ModelDescription {
-    /// The variable with a 1-based index.
+    /// Returns the variable with a 1-based index.
     pub(super) fn at(&self, index: u32) -> Option<&ScalarVariable> {
         self.variables.get(usize::try_from(index).ok()?.checked_sub(1)?)
     }
 
-    /// The 1-based indices of the variables that `chosen` accepts.
+    /// Returns the 1-based indices of the variables that `chosen` accepts.
     fn indices_of(&self, chosen: impl Fn(&ScalarVariable) -> bool) -> BTreeSet<u32> {
         let numbered = (1..).zip(&self.variables);
         numbered.filter(|(_, variable)| chosen(variable)).map(|(index, _)| index).collect()
@@ -55,7 +55,7 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
     }
 }
 
-/// At initialization, a dependency is general or has a constant factor.
+/// Checks that a dependency at initialization is general or has a constant factor.
 fn check_initial_kinds(row: &Unknown, description: &ModelDescription, problems: &mut Problems) {
     let allowed = [DependencyKind::Dependent, DependencyKind::Constant];
     let holds = row.kinds.iter().flatten().all(|kind| allowed.contains(kind));
@@ -65,7 +65,7 @@ fn check_initial_kinds(row: &Unknown, description: &ModelDescription, problems: 
     });
 }
 
-/// The continuous states: what the rows of `Derivatives` are derivatives of.
+/// Returns the continuous states, whose derivatives are the rows of `Derivatives`.
 fn states(description: &ModelDescription, problems: &mut Problems) -> HashSet<u32> {
     let mut states = HashSet::new();
     for row in &description.structure.derivatives {
@@ -93,7 +93,7 @@ fn states(description: &ModelDescription, problems: &mut Problems) -> HashSet<u3
     states
 }
 
-/// The indices that `InitialUnknowns` must have.
+/// Returns the indices that `InitialUnknowns` must have.
 fn initial_unknowns(description: &ModelDescription, states: &HashSet<u32>) -> BTreeSet<u32> {
     let derivatives = description.structure.derivatives.iter().map(|row| row.index);
     let exposed: HashSet<u32> = states.iter().copied().chain(derivatives).collect();
@@ -109,7 +109,7 @@ fn initial_unknowns(description: &ModelDescription, states: &HashSet<u32>) -> BT
     indices
 }
 
-/// A list has exactly the wanted members, each once.
+/// Checks that a list has exactly the required members, each once.
 fn check_members(
     list: &str,
     rows: &[Unknown],
@@ -132,7 +132,7 @@ fn check_members(
     }
 }
 
-/// Dependencies ascend, are known quantities, and have as many kinds, of the allowed sort.
+/// Checks that dependencies ascend, are known quantities, and have one allowed kind each.
 fn check_dependencies(
     list: &str,
     row: &Unknown,

@@ -41,7 +41,7 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
     check_aliases(description, problems);
 }
 
-/// The tables of causality, variability and initial.
+/// Checks the tables of causality, variability and initial.
 fn check_table(variable: &ScalarVariable, problems: &mut Problems) {
     use Causality::{CalculatedParameter, Independent, Input, Local, Output, Parameter};
     use Variability::{Constant, Continuous, Discrete, Fixed, Tunable};
@@ -101,7 +101,7 @@ fn check_start(variable: &ScalarVariable, problems: &mut Problems) {
     }
 }
 
-/// Limits and start of a Real variable or type, called `who`.
+/// Checks limits and start of a Real variable or type, called `who`.
 pub(super) fn check_real(who: &str, real: &RealType, problems: &mut Problems) {
     for (name, value) in
         [("start", real.start), ("min", real.min), ("max", real.max), ("nominal", real.nominal)]
@@ -116,7 +116,7 @@ pub(super) fn check_real(who: &str, real: &RealType, problems: &mut Problems) {
     check_order(who, real.min, real.start, real.max, problems);
 }
 
-/// Limits and start of an Integer or Enumeration variable or type, called `who`.
+/// Checks limits and start of an Integer or Enumeration variable or type, called `who`.
 pub(super) fn check_integer(who: &str, integer: &IntegerType, problems: &mut Problems) {
     check_order(who, integer.min, integer.start, integer.max, problems);
 }
@@ -141,7 +141,8 @@ fn check_order<T: Copy + PartialOrd + std::fmt::Debug>(
     }
 }
 
-/// A declared type exists and is of the variable's kind; the variable keeps to its range.
+/// Checks that a declared type exists and has the variable's kind, and that the variable keeps to
+/// its range.
 fn check_declared_type(
     variable: &ScalarVariable,
     types: &HashMap<&str, &SimpleType>,
@@ -204,7 +205,7 @@ fn within<T: Copy + PartialOrd>(
     !below && !above
 }
 
-/// `derivative` connects two different continuous Reals.
+/// Checks that `derivative` connects two different continuous Reals.
 fn check_derivative(
     variable: &ScalarVariable,
     description: &ModelDescription,
@@ -231,7 +232,7 @@ fn check_derivative(
     });
 }
 
-/// Variables of one base type with the same value reference.
+/// Checks variables of one base type with the same value reference.
 fn check_aliases(description: &ModelDescription, problems: &mut Problems) {
     let mut sets: BTreeMap<(u8, u32), Vec<&ScalarVariable>> = BTreeMap::new();
     for variable in &description.variables {

@@ -1,4 +1,4 @@
-//! Archives that want to do harm, and such as are merely odd.
+//! Malicious and unusual archives.
 
 use std::io::{self, Read as _, Write as _};
 
@@ -14,7 +14,7 @@ fn refused(entries: &[(&str, &str, u32)]) -> PackageError {
     opened(&raw::archive(&all)).unwrap_err()
 }
 
-/// An archive by the crate that reads it: deflated files of that many zeros.
+/// Packs deflated files with this number of zeros, by the crate that also reads archives.
 fn zeros(files: &[(&str, u64)]) -> Vec<u8> {
     let mut archive = zip::ZipWriter::new(io::Cursor::new(Vec::new()));
     let options = SimpleFileOptions::default();
@@ -41,9 +41,9 @@ fn a_bomb_is_refused_by_its_ratio_before_anything_is_written() {
     assert!(opened(&harmless).is_ok());
 }
 
-/// Offsets of APPNOTE.TXT, sections 4.3.7 and 4.3.12: all places where the size is stated.
+/// Offsets of APPNOTE.TXT, sections 4.3.7 and 4.3.12: all fields that state the size.
 #[test]
-fn a_bomb_that_hides_its_size_is_stopped_at_the_limit() {
+fn a_bomb_that_states_a_wrong_size_is_stopped_at_the_limit() {
     let mut bomb = zeros(&[("resources/zeros", 1 << 20)]);
     let size = (1_u32 << 20).to_le_bytes();
     let places: Vec<usize> = (0..bomb.len() - 4).filter(|at| bomb[*at..at + 4] == size).collect();
@@ -144,7 +144,7 @@ fn names_that_differ_in_case_only_are_two_files() {
 }
 
 #[test]
-fn to_run_an_fmu_only_what_can_be_needed_is_unpacked() {
+fn to_run_an_fmu_only_needed_files_are_unpacked() {
     let folder = folder();
     let target = folder.path().join("M.fmu");
     let mut package = package();
@@ -175,7 +175,7 @@ fn to_run_an_fmu_only_what_can_be_needed_is_unpacked() {
 }
 
 #[test]
-fn warnings_about_the_description_come_with_it() {
+fn warnings_about_the_description_are_returned() {
     let xml = XML.replace("fmiVersion=\"2.0\"", "fmiVersion=\"2.0.4\"");
     let unpacked = opened(&raw::archive(&[(DESCRIPTION, &xml, FILE)])).unwrap();
     assert_eq!(unpacked.warnings.len(), 1);

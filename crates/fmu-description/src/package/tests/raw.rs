@@ -1,4 +1,4 @@
-//! ZIP by hand, after APPNOTE.TXT 6.3.10: independent of the crate that the code uses.
+//! A ZIP writer and reader after APPNOTE.TXT 6.3.10, independent of the crate that the code uses.
 
 /// An entry of the central directory (section 4.3.12).
 pub(super) struct Entry {
@@ -53,7 +53,7 @@ pub(super) fn directory(bytes: &[u8]) -> Vec<Entry> {
     entries
 }
 
-/// Whether the local header (section 4.3.7) says the same as the central directory.
+/// Whether the local header (section 4.3.7) agrees with the central directory.
 pub(super) fn local_header_agrees(bytes: &[u8], entry: &Entry) -> bool {
     let header = &bytes[entry.offset as usize..];
     header.starts_with(b"PK\x03\x04")
@@ -68,7 +68,7 @@ pub(super) fn local_header_agrees(bytes: &[u8], entry: &Entry) -> bool {
         && header[30..].starts_with(entry.name.as_bytes())
 }
 
-/// An archive of stored entries: name, content, mode. Any name goes.
+/// Packs stored entries: name, content, mode. Any name is accepted.
 pub(super) fn archive(entries: &[(&str, &str, u32)]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut directory = Vec::new();

@@ -39,7 +39,7 @@ fn cells(table: &str) -> Vec<(Function, State, String)> {
 }
 
 #[test]
-fn a_function_may_be_called_exactly_where_sections_3_2_3_and_4_2_4_say() {
+fn a_function_may_be_called_exactly_in_the_states_of_sections_3_2_3_and_4_2_4() {
     for (interface, table) in TABLES {
         let cells = cells(table);
         for (function, state, cell) in &cells {

@@ -230,7 +230,7 @@ fn directional_derivatives_at_initialization_include_parameters() {
 }
 
 #[test]
-fn a_model_that_wants_to_end_is_discarded_and_says_so() {
+fn a_model_that_requests_the_end_returns_discard_and_terminated() {
     let mut instance = pendulum(InterfaceType::CoSimulation);
     set(&mut instance, ANGLE, 2.0);
     instance.call(Function::EnterInitializationMode, Instance::enter_initialization_mode);

@@ -1,4 +1,4 @@
-//! The file as such: encoding, well-formedness, positions.
+//! Encoding, well-formedness and positions of the file.
 
 use std::fmt::Write as _;
 
@@ -20,7 +20,7 @@ fn errors_point_at_the_line_and_column_of_the_element() {
     }
 }
 
-/// What the file is said to be, with the warning.
+/// Returns the model name, and the content that the only warning states.
 fn named(bytes: &[u8]) -> (String, String) {
     let (description, warnings) = ModelDescription::read(bytes).unwrap();
     let [warning] = warnings.as_slice() else { panic!("{warnings:?}") };
@@ -56,7 +56,7 @@ fn encodings_that_other_importers_read_are_read_with_a_warning() {
 }
 
 #[test]
-fn what_cannot_be_decoded_is_named() {
+fn a_text_that_cannot_be_decoded_is_refused_with_its_encoding() {
     let latin = with(X, "").replace("\"M\"", "\"\u{f6}\"");
     let latin: Vec<u8> = latin.chars().map(|character| character as u8).collect();
     let error = ModelDescription::parse(latin).unwrap_err().to_string();
@@ -103,7 +103,7 @@ fn hostile_files_end_in_an_error() {
     }
 }
 
-/// A description with many of one element, which must be refused.
+/// A description with many copies of one element, which must be refused.
 fn flooded(element: &str, count: usize) -> String {
     let xml = with(&element.repeat(count), "");
     match ModelDescription::parse(xml).unwrap_err() {
@@ -141,7 +141,7 @@ fn every_truncation_of_a_file_is_an_error_and_no_panic() {
 }
 
 #[test]
-fn elements_nest_64_levels_deep_and_no_deeper_in_annotations_too() {
+fn elements_may_nest_64_levels_deep_also_in_annotations() {
     let is_too_deep = |text: String| {
         let error = ModelDescription::parse(text).unwrap_err();
         matches!(error, ParseError::Limit { what: "levels of nested elements", limit: 64, .. })

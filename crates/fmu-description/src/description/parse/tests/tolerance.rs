@@ -1,15 +1,15 @@
-//! What breaks the standard and is read all the same.
+//! Violations of the standard that are read with a warning.
 
 use super::*;
 
-/// The description and its one warning.
+/// Reads a description and returns it with its single warning.
 fn warned(xml: &str) -> (ModelDescription, Warning) {
     let (description, warnings) = ModelDescription::read(xml).unwrap();
     let [warning] = warnings.as_slice() else { panic!("{warnings:#?}") };
     (description, warning.clone())
 }
 
-/// The type of a variable with this element in it, and the one warning.
+/// Returns the type of a variable with this element, and the single warning.
 fn kind(element: &str) -> (Kind, Warning) {
     let variable = format!(
         "<ScalarVariable name='x' valueReference='0'\nvariability='discrete'>{element}</ScalarVariable>"
@@ -19,7 +19,7 @@ fn kind(element: &str) -> (Kind, Warning) {
 }
 
 #[test]
-fn what_is_in_order_gives_no_warning() {
+fn a_correct_description_gives_no_warning() {
     let xml = with(X, "").replace(
         "guid=",
         "xmlns:xsi='http://www.w3.org/2001/XMLSchema-instance' \
@@ -29,7 +29,7 @@ fn what_is_in_order_gives_no_warning() {
 }
 
 #[test]
-fn a_warning_says_where_what_expected_found_assumed_and_by_which_section() {
+fn a_warning_states_position_expectation_content_assumption_and_section() {
     let xml = "<fmiModelDescription fmiVersion='2.0' modelName='M' guid='1'>\n\
                <ModelVariables>\n  <ScalarVariable name='x' valueReference='0'>\n\
                <Real max='INF'/></ScalarVariable></ModelVariables><ModelStructure/></fmiModelDescription>";
@@ -50,7 +50,7 @@ fn versions_of_the_text_are_read_as_2_0() {
 }
 
 #[test]
-fn numbers_that_are_infinite_or_empty_are_read_as_none() {
+fn numbers_that_are_infinite_or_empty_count_as_missing() {
     for text in ["NaN", "INF", "-INF", "+INF", "inf", "Infinity", "1.#INF", "-1.#IND", "", " "] {
         for attribute in ["start", "min", "max", "nominal"] {
             let (kind, warning) = kind(&format!("<Real {attribute}='{text}'/>"));
@@ -72,7 +72,7 @@ fn integers_with_a_point_and_booleans_in_capitals_are_read() {
 }
 
 #[test]
-fn a_flag_that_is_none_is_read_as_false() {
+fn an_invalid_flag_is_read_as_false() {
     let (description, warning) = warned(&CRANE.replace("\"1\" can", "\"yes\" can").replace(
         "<ModelVariables/>",
         "<ModelVariables><ScalarVariable name='x' valueReference='0'><Real/></ScalarVariable></ModelVariables>",
@@ -82,7 +82,7 @@ fn a_flag_that_is_none_is_read_as_false() {
 }
 
 #[test]
-fn words_in_another_case_are_read_and_others_are_taken_for_none() {
+fn words_in_another_case_are_read_and_unknown_words_count_as_missing() {
     let read = |attribute: &str| {
         let variable = format!(
             "<ScalarVariable name='x' valueReference='0' {attribute}><Real/></ScalarVariable>"
@@ -101,7 +101,7 @@ fn words_in_another_case_are_read_and_others_are_taken_for_none() {
 }
 
 #[test]
-fn what_cannot_be_continuous_is_read_as_fixed_or_discrete() {
+fn types_that_cannot_be_continuous_are_read_as_fixed_or_discrete() {
     for (causality, expected) in [
         ("parameter", Variability::Fixed),
         ("calculatedParameter", Variability::Fixed),
@@ -122,7 +122,7 @@ fn what_cannot_be_continuous_is_read_as_fixed_or_discrete() {
 }
 
 #[test]
-fn declared_types_that_do_not_fit_are_left_out() {
+fn declared_types_that_do_not_fit_are_ignored() {
     for element in ["<Real declaredType='Mode'/>", "<Real declaredType='Nothing'/>"] {
         assert_eq!(kind(element).0, Kind::Real(RealType::default()));
     }
@@ -160,14 +160,14 @@ fn elements_in_another_order_and_empty_lists_are_read() {
 const Y: &str =
     "<ScalarVariable name='y' valueReference='1' causality='output'><Real/></ScalarVariable>";
 
-/// The row of the output `y`, with unknown dependencies, and nothing else.
+/// Checks that the only row is that of the output `y`, with unknown dependencies.
 fn assert_unknown(description: &ModelDescription) {
     let row = crate::description::Unknown { index: 2, ..Default::default() };
     assert_eq!(description.structure.outputs, [row]);
 }
 
 #[test]
-fn outputs_that_are_not_listed_may_depend_on_anything() {
+fn unlisted_outputs_may_depend_on_anything() {
     let variables = format!("{X}{Y}");
     let (description, warning) = warned(&with(&variables, ""));
     assert_unknown(&description);
@@ -177,7 +177,7 @@ fn outputs_that_are_not_listed_may_depend_on_anything() {
 }
 
 #[test]
-fn a_list_with_impossible_indices_is_not_trusted() {
+fn a_list_with_invalid_indices_may_depend_on_anything() {
     for rows in [
         "<Unknown index='0' dependencies=''/><Unknown index='2' dependencies=''/>",
         "<Unknown index='2' dependencies='0'/>",
@@ -195,7 +195,7 @@ fn a_list_with_impossible_indices_is_not_trusted() {
 }
 
 #[test]
-fn kinds_of_dependencies_that_do_not_fit_are_left_out() {
+fn kinds_of_dependencies_that_do_not_fit_are_ignored() {
     for attributes in [
         "dependenciesKind='fixed'",
         "dependencies='1' dependenciesKind=''",
@@ -212,7 +212,7 @@ fn kinds_of_dependencies_that_do_not_fit_are_left_out() {
 }
 
 #[test]
-fn a_name_twice_that_leaves_no_doubt_stands_for_the_first() {
+fn a_harmless_duplicate_name_means_the_first_variable() {
     let same = X.to_owned() + X;
     let (description, warning) = warned(&with(&same, ""));
     assert_eq!((description.variables.len(), warning.found.as_str()), (2, "\"x\""));
@@ -221,7 +221,7 @@ fn a_name_twice_that_leaves_no_doubt_stands_for_the_first() {
 }
 
 #[test]
-fn a_missing_model_name_is_the_identifier() {
+fn a_missing_model_name_is_replaced_by_the_identifier() {
     let xml = CRANE.replace("modelName=\"Crane\"", "").replace(
         "<ModelVariables/>",
         "<ModelVariables><ScalarVariable name='x' valueReference='0'><Real/></ScalarVariable></ModelVariables>",
