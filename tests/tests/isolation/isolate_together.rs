@@ -34,7 +34,7 @@ fn a_step_begun_and_not_finished_is_waited_for_by_the_next_call() {
         slave.get_real(&[1], &mut output).unwrap();
         assert_eq!(output, [0.25 * f64::from(steps)]);
         let error = slave.finish_advance(&mut step(&[1.0], &mut output)).unwrap_err();
-        assert!(error.to_string().contains("had not been begun"), "{error}");
+        assert!(error.to_string().contains("was not started before it was finished"), "{error}");
     }
     let process = slave.process_id();
     slave.begin_advance(&step(&[1.0], &mut [0.0])).unwrap();
