@@ -44,6 +44,20 @@ fn a_step_begun_and_not_finished_is_waited_for_by_the_next_call() {
 }
 
 #[test]
+fn a_step_allocates_nothing_in_the_master() {
+    let mut slave = ready(&options());
+    let mut output = [0.0];
+    let mut exchange = || {
+        slave.set_real(&[0], &[1.0]).unwrap();
+        slave.advance(&mut step(&[1.0], &mut output)).unwrap();
+        slave.get_real(&[1], &mut output).unwrap();
+    };
+    exchange();
+    let measured = allocation_counter::measure(|| (0..100).for_each(|_| exchange()));
+    assert_eq!(measured.count_total, 0);
+}
+
+#[test]
 fn the_time_of_a_step_runs_from_its_begin() {
     let mut slaves = [ready(&limited(1000)), ready(&limited(1000)), ready(&limited(1000))];
     for slave in &mut slaves {
