@@ -1,5 +1,7 @@
 //! Reads XML files of FMI and SSP to trees of elements, with limits on size and depth.
 
+use std::borrow::Cow;
+
 use crate::description::{ParseError, Position, read_xml};
 
 /// An element: its attributes, child elements and text, which FMI 2.0 and SSP do not use.
@@ -26,4 +28,21 @@ pub struct Element {
 /// (which could define entities), elements nested too deeply, or too many attributes.
 pub fn read(bytes: &[u8]) -> Result<Element, ParseError> {
     read_xml(bytes)
+}
+
+/// Returns whether XML 1.0 allows `character` (production 2).
+#[must_use]
+pub fn is_character(character: char) -> bool {
+    matches!(character, '\t' | '\n' | '\r' | ' '..='\u{d7ff}' | '\u{e000}'..='\u{fffd}')
+        || character >= '\u{10000}'
+}
+
+/// Returns `text` with U+FFFD for each character that XML 1.0 does not allow.
+#[must_use]
+pub fn writable(text: &str) -> Cow<'_, str> {
+    if text.chars().all(is_character) {
+        return Cow::Borrowed(text);
+    }
+    let replace = |character| if is_character(character) { character } else { '\u{fffd}' };
+    Cow::Owned(text.chars().map(replace).collect())
 }

@@ -12,7 +12,7 @@ mod as_slave;
 #[cfg(target_os = "linux")]
 mod channel;
 #[cfg(target_os = "linux")]
-mod command;
+mod function;
 #[cfg(target_os = "linux")]
 mod isolated;
 #[cfg(target_os = "linux")]
@@ -22,6 +22,8 @@ mod log;
 #[cfg(target_os = "linux")]
 mod memory;
 #[cfg(target_os = "linux")]
+mod message;
+#[cfg(target_os = "linux")]
 mod output;
 #[cfg(target_os = "linux")]
 mod perform;
@@ -30,7 +32,7 @@ mod process;
 #[cfg(target_os = "linux")]
 mod region;
 #[cfg(target_os = "linux")]
-mod strings;
+mod transfer;
 #[cfg(not(target_os = "linux"))]
 mod unsupported;
 #[cfg(target_os = "linux")]

@@ -1,10 +1,14 @@
 //! XML elements of the SSP namespaces, with typed access to attributes and children.
+//!
+//! The tree is that of [`fmu_description::xml`], because roxmltree refuses undeclared prefixes, which some
+//! tools write and which are read with a warning. quick-xml resolves the namespaces.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use std::str::FromStr;
 
 use fmu_description::Position;
-use fmu_description::xml;
+use fmu_description::xml::{self, is_character};
+use quick_xml::name::{Namespace, NamespaceResolver, QName, ResolveResult};
 
 use super::error::SspError;
 use super::schema;
@@ -73,10 +77,10 @@ fn undeclared((prefix, at): (String, Position)) -> String {
     format!("{at}: the prefix {prefix}: is used without xmlns:{prefix}; it is {assumed}")
 }
 
-/// The declared namespaces by prefix; the innermost declaration is last.
+/// The declared namespaces.
 #[derive(Default)]
 struct Scope {
-    spaces: HashMap<String, Vec<String>>,
+    spaces: NamespaceResolver,
     /// Undeclared prefixes with the position of their first use.
     undeclared: Vec<(String, Position)>,
 }
@@ -84,23 +88,27 @@ struct Scope {
 impl Scope {
     /// Adds the declarations of `element`.
     fn open(&mut self, element: &xml::Element) {
-        for (prefix, space) in declarations(&element.attributes) {
-            self.spaces.entry(prefix.to_owned()).or_default().push(space.to_owned());
+        self.spaces.set_level(self.spaces.level().saturating_add(1));
+        for (name, space) in &element.attributes {
+            if let Some(prefix) = QName(name).as_namespace_binding() {
+                // Fails for `xml` and `xmlns`, which no file needs to declare, and for the 129th declaration.
+                let _ = self.spaces.add(prefix, Namespace(space));
+            }
         }
     }
 
-    /// Removes the declarations of an element with these attributes.
-    fn close(&mut self, attributes: &[(String, String)]) {
-        for (prefix, _) in declarations(attributes) {
-            self.spaces.get_mut(prefix).map(Vec::pop);
-        }
+    /// Removes the declarations of the element that was opened last.
+    fn close(&mut self) {
+        self.spaces.pop();
     }
 
     /// Returns the namespace of an element whose declarations were added; `None` without a
     /// declaration.
     fn space(&self, element: &xml::Element) -> Option<&str> {
-        let spaces = self.spaces.get(prefix(element))?;
-        spaces.last().map(String::as_str)
+        match self.spaces.resolve_prefix(QName(&element.name).prefix(), true) {
+            ResolveResult::Bound(space) => Some(space.into_inner()),
+            ResolveResult::Unbound | ResolveResult::Unknown(_) => None,
+        }
     }
 
     /// Returns whether the element has an undeclared prefix that is usual for SSP.
@@ -119,7 +127,7 @@ impl Scope {
         }
         let children = element.children.into_iter().map(|child| self.node(child));
         let children = children.collect::<Result<Vec<Node>, SspError>>()?;
-        self.close(&element.attributes);
+        self.close();
         let name = element.name.rsplit(':').next().unwrap_or_default().to_owned();
         let node = Node { name, own, attributes: element.attributes, children, at: element.at };
         node.characters()?;
@@ -129,21 +137,6 @@ impl Scope {
 
 fn prefix(element: &xml::Element) -> &str {
     element.name.split_once(':').map_or("", |(prefix, _)| prefix)
-}
-
-/// Returns the declared prefixes and namespaces; the prefix is empty for the default namespace.
-fn declarations(attributes: &[(String, String)]) -> impl Iterator<Item = (&str, &str)> {
-    attributes.iter().filter_map(|(name, space)| {
-        let prefix = name.strip_prefix("xmlns")?;
-        let prefix = if prefix.is_empty() { prefix } else { prefix.strip_prefix(':')? };
-        Some((prefix, space.as_str()))
-    })
-}
-
-/// Returns whether XML 1.0 allows `character` (production 2).
-pub(super) fn is_character(character: char) -> bool {
-    matches!(character, '\t' | '\n' | '\r' | ' '..='\u{d7ff}' | '\u{e000}'..='\u{fffd}')
-        || character >= '\u{10000}'
 }
 
 impl Node {

@@ -222,8 +222,18 @@ fn an_fmu_that_hangs_is_ended_with_the_processes_that_it_started() {
     for trouble in [Trouble::Hang, Trouble::HangWithChild, Trouble::CloseFiles] {
         let begin = Instant::now();
         let (slave, error) = error_of(trouble, &limited(300));
-        assert_eq!((error.failure, error.function), (Failure::TimedOut(0.3), "fmi2DoStep"));
-        assert!(begin.elapsed() >= Duration::from_millis(300));
+        assert_eq!(error.function, "fmi2DoStep");
+        match error.failure {
+            Failure::TimedOut(limit) => {
+                assert_eq!(limit, 0.3);
+                assert!(begin.elapsed() >= Duration::from_millis(300));
+            }
+            // An FMU that closes its connection may be noticed before the limit.
+            failure => {
+                assert!(trouble == Trouble::CloseFiles, "{trouble:?}: {failure:?}");
+                assert!(failure.to_string().contains("closed the connection"), "{failure}");
+            }
+        }
         let group = slave.process_id().to_string();
         let begin = Instant::now();
         while group_exists(&group) {

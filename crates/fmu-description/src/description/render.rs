@@ -11,7 +11,6 @@ use super::{
 };
 use crate::unit::{BaseUnit, Unit};
 use tag::Tag;
-pub(super) use tag::is_xml;
 
 impl ModelDescription {
     /// Renders `modelDescription.xml` in the order of the schema of FMI 2.0.5.

@@ -43,7 +43,7 @@ impl Problems {
 
     /// Checks that XML allows the text.
     fn text(&mut self, section: &'static str, what: &str, value: &str) {
-        self.demand(value.chars().all(super::render::is_xml), section, || {
+        self.demand(value.chars().all(crate::xml::is_character), section, || {
             format!("{what} {value:?} has characters that XML cannot hold")
         });
     }

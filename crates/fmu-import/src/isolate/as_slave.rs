@@ -2,44 +2,67 @@
 
 use fmu_description::Experiment;
 use fmu_description::ModelDescription;
+use serde::de::DeserializeOwned;
 
-use super::command::Command;
+use super::function::Function;
 use super::isolated::Isolated;
-use super::strings;
-use super::words::{Reader, Writer};
+use super::message::Request;
+use super::words::{Reader, Word, Writer};
 use slave::{Advance, Background, CallError, Slave, StepResult};
-
-/// Writes the arguments of a command without arguments.
-fn no_arguments(_: &mut Writer<'_>) {}
-
-/// Reads the results of a command without results.
-#[expect(clippy::unnecessary_wraps, reason = "the signature of all readers of answers")]
-fn no_result(_: &mut Reader<'_>) -> Option<()> {
-    Some(())
-}
-
-/// Reads the number of bytes to download.
-fn read_count(reader: &mut Reader<'_>) -> Option<usize> {
-    reader.take()
-}
 
 /// Writes references and one value for each.
 #[inline]
-fn write_pairs<T: super::words::Word>(writer: &mut Writer<'_>, references: &[u32], values: &[T]) {
-    assert_eq!(references.len(), values.len(), "references and values are equally many");
+fn write_pairs<T: Word>(writer: &mut Writer<'_>, references: &[u32], values: &[T]) {
+    assert_equally_many(references, values);
     writer.put_list(references);
     writer.put_all(values);
 }
 
+/// Panics if a caller of [`Slave`] passes another number of values than references.
+#[inline]
+fn assert_equally_many<T>(references: &[u32], values: &[T]) {
+    assert_eq!(references.len(), values.len(), "references and values are equally many");
+}
+
 fn read_step_result(reader: &mut Reader<'_>) -> Option<StepResult> {
-    let whole: bool = reader.take()?;
-    let (reached, terminated) = (reader.take()?, reader.take()?);
-    Some(if whole { StepResult::Whole } else { StepResult::Part { reached, terminated } })
+    let part: u64 = reader.take()?;
+    let (reached, terminated) = (reader.take()?, reader.take::<u64>()? != 0);
+    Some(if part == 0 { StepResult::Whole } else { StepResult::Part { reached, terminated } })
 }
 
 impl Isolated {
-    fn plain(&mut self, command: Command) -> Result<(), CallError> {
-        self.call(command, no_arguments, no_result)
+    fn get<T: Word>(
+        &mut self,
+        function: Function,
+        references: &[u32],
+        values: &mut [T],
+    ) -> Result<(), CallError> {
+        self.call(function, |writer| writer.put_list(references), |reader| reader.take_all(values))
+    }
+
+    fn set<T: Word>(
+        &mut self,
+        function: Function,
+        references: &[u32],
+        values: &[T],
+    ) -> Result<(), CallError> {
+        self.call(function, |writer| write_pairs(writer, references, values), |_| Some(()))
+    }
+
+    /// Requests one value for each element of `values`.
+    fn request_all<T: DeserializeOwned>(
+        &mut self,
+        request: &Request<'_>,
+        values: &mut [T],
+    ) -> Result<(), CallError> {
+        let found: Vec<T> = self.request(request)?;
+        if found.len() != values.len() {
+            return Err(self.invalid_answer(request.function()));
+        }
+        for (value, found) in values.iter_mut().zip(found) {
+            *value = found;
+        }
+        Ok(())
     }
 }
 
@@ -47,10 +70,10 @@ impl Background for Isolated {
     #[inline]
     fn begin_advance(&mut self, step: &Advance<'_>) -> Result<(), CallError> {
         self.place.set_time(step.time);
-        self.post(Command::Advance, |writer| {
+        self.post(Function::DoStep, |writer| {
             writer.put(step.time);
             writer.put(step.size);
-            writer.put(step.never_back);
+            writer.put(u64::from(step.never_back));
             write_pairs(writer, step.inputs, step.input_values);
             write_pairs(writer, step.derived_inputs, step.input_derivatives);
             writer.put_all(step.input_orders);
@@ -64,7 +87,7 @@ impl Background for Isolated {
 
     #[inline]
     fn finish_advance(&mut self, step: &mut Advance<'_>) -> Result<StepResult, CallError> {
-        self.answer(Command::Advance, |reader| {
+        self.answer(Function::DoStep, |reader| {
             let done = read_step_result(reader)?;
             reader.take_all(step.output_values)?;
             reader.take_all(step.output_derivatives)?;
@@ -79,31 +102,24 @@ impl Slave for Isolated {
     }
 
     fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
-        self.call(Command::SetDebugLogging, |writer| writer.put(on), no_result)
+        self.request(&Request::SetDebugLogging(on))
     }
 
     fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError> {
         self.place.set_time(experiment.start_time);
-        let write = |writer: &mut Writer<'_>| {
-            writer.put(experiment.start_time);
-            for optional in [experiment.stop_time, experiment.tolerance] {
-                writer.put(optional.is_some());
-                writer.put(optional.unwrap_or_default());
-            }
-        };
-        self.call(Command::SetupExperiment, write, no_result)
+        self.request(&Request::SetupExperiment(*experiment))
     }
 
     fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
-        self.plain(Command::EnterInitializationMode)
+        self.request(&Request::EnterInitializationMode)
     }
 
     fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
-        self.plain(Command::ExitInitializationMode)
+        self.request(&Request::ExitInitializationMode)
     }
 
     fn terminate(&mut self) -> Result<(), CallError> {
-        self.plain(Command::Terminate)
+        self.request(&Request::Terminate)
     }
 
     fn free(&mut self) -> Result<(), CallError> {
@@ -111,45 +127,37 @@ impl Slave for Isolated {
     }
 
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
-        let write = |writer: &mut Writer<'_>| writer.put_list(references);
-        self.call(Command::GetReal, write, |reader| reader.take_all(values))
+        self.get(Function::GetReal, references, values)
     }
 
     fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), CallError> {
-        self.call(Command::SetReal, |writer| write_pairs(writer, references, values), no_result)
+        self.set(Function::SetReal, references, values)
     }
 
     fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
-        let write = |writer: &mut Writer<'_>| writer.put_list(references);
-        self.call(Command::GetInteger, write, |reader| reader.take_all(values))
+        self.get(Function::GetInteger, references, values)
     }
 
     fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
-        self.call(Command::SetInteger, |writer| write_pairs(writer, references, values), no_result)
+        self.set(Function::SetInteger, references, values)
     }
 
     fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
-        let write = |writer: &mut Writer<'_>| writer.put_list(references);
-        self.call(Command::GetBoolean, write, |reader| reader.take_all(values))
+        self.get(Function::GetBoolean, references, values)
     }
 
     fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
-        self.call(Command::SetBoolean, |writer| write_pairs(writer, references, values), no_result)
+        self.set(Function::SetBoolean, references, values)
     }
 
     fn get_string(&mut self, references: &[u32], values: &mut [String]) -> Result<(), CallError> {
-        let command = Command::GetString;
-        let write = |writer: &mut Writer<'_>| writer.put_list(references);
-        let total = self.call(command, write, read_count)?;
-        let bytes = self.download(command, total)?;
-        strings::read(&bytes, values).ok_or_else(|| self.invalid_answer(command))
+        self.request_all(&Request::GetString(references.into()), values)
     }
 
     fn set_string(&mut self, references: &[u32], values: &[String]) -> Result<(), CallError> {
-        assert_eq!(references.len(), values.len(), "references and values are equally many");
-        self.upload(&strings::write(values))?;
-        let write = |writer: &mut Writer<'_>| writer.put_list(references);
-        self.call(Command::SetString, write, no_result)
+        assert_equally_many(references, values);
+        let values = references.iter().copied().zip(values.iter().map(String::as_str));
+        self.request(&Request::SetString(values.collect()))
     }
 
     fn set_input_derivatives(
@@ -158,11 +166,12 @@ impl Slave for Isolated {
         orders: &[i32],
         values: &[f64],
     ) -> Result<(), CallError> {
-        let write = |writer: &mut Writer<'_>| {
-            write_pairs(writer, references, values);
-            writer.put_all(orders);
-        };
-        self.call(Command::SetInputDerivatives, write, no_result)
+        assert_equally_many(references, orders);
+        assert_equally_many(references, values);
+        let derivatives = references.iter().zip(orders).zip(values);
+        let derivatives =
+            derivatives.map(|((reference, order), value)| (*reference, *order, *value));
+        self.request(&Request::SetInputDerivatives(derivatives.collect()))
     }
 
     fn get_output_derivatives(
@@ -171,21 +180,13 @@ impl Slave for Isolated {
         orders: &[i32],
         values: &mut [f64],
     ) -> Result<(), CallError> {
-        let write = |writer: &mut Writer<'_>| {
-            writer.put_list(references);
-            writer.put_all(orders);
-        };
-        self.call(Command::GetOutputDerivatives, write, |reader| reader.take_all(values))
+        assert_equally_many(references, orders);
+        let outputs = references.iter().copied().zip(orders.iter().copied()).collect();
+        self.request_all(&Request::GetOutputDerivatives(outputs), values)
     }
 
     fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError> {
-        self.place.set_time(time);
-        let write = |writer: &mut Writer<'_>| {
-            writer.put(time);
-            writer.put(size);
-            writer.put(never_back);
-        };
-        self.call(Command::DoStep, write, read_step_result)
+        self.advance(&mut Advance::held((&[], &[]), (time, size), never_back, (&[], &mut [])))
     }
 
     fn directional_derivative(
@@ -195,31 +196,26 @@ impl Slave for Isolated {
         seed: &[f64],
         changes: &mut [f64],
     ) -> Result<(), CallError> {
-        let write = |writer: &mut Writer<'_>| {
-            writer.put_list(unknowns);
-            write_pairs(writer, knowns, seed);
-        };
-        self.call(Command::DirectionalDerivative, write, |reader| reader.take_all(changes))
+        assert_equally_many(knowns, seed);
+        let knowns = knowns.iter().copied().zip(seed.iter().copied()).collect();
+        let unknowns = unknowns.into();
+        self.request_all(&Request::DirectionalDerivative { unknowns, knowns }, changes)
     }
 
     fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
-        self.call(Command::SaveState, |writer| writer.put(slot), no_result)
+        self.request(&Request::SaveState(slot))
     }
 
     fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
-        self.call(Command::RestoreState, |writer| writer.put(slot), no_result)
+        self.request(&Request::RestoreState(slot))
     }
 
     fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
-        let command = Command::SerializeState;
-        let total = self.call(command, no_arguments, read_count)?;
-        self.download(command, total)
+        self.request(&Request::SerializeState)
     }
 
     fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
-        self.upload(bytes)?;
-        let write = |writer: &mut Writer<'_>| writer.put(bytes.len());
-        self.call(Command::DeserializeState, write, no_result)
+        self.request(&Request::DeserializeState(bytes))
     }
 
     fn advance(&mut self, step: &mut Advance<'_>) -> Result<StepResult, CallError> {

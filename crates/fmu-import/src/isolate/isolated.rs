@@ -9,9 +9,11 @@ use std::time::{Duration, Instant};
 use fmu_description::package::Unpacked;
 
 use super::channel::{Channel, Side, WaitResult};
-use super::command::{Command, DONE, FAILED, INSTANTIATED, NOT_PRELOADED, function_at, read_error};
+use super::function::Function;
 use super::layout::Shared;
 use super::log::Inbox;
+use super::message::{Open, Opening, Request};
+use super::perform::VALUES;
 use super::process::Process;
 use super::words::{Reader, Writer};
 use super::worker::refuse_in_worker;
@@ -27,14 +29,12 @@ const END_LIMIT: Duration = Duration::from_secs(2);
 const FREE_LIMIT: Duration = Duration::from_secs(10);
 /// Time limit for a new process to become a worker.
 const START_LIMIT: Duration = Duration::from_secs(20);
-/// Maximum number of bytes of an answer.
-const MAX_ANSWER: usize = u32::MAX as usize;
 
 /// An instance in a process of its own.
 ///
 /// After a call that ended the process every further call returns the same error.
 pub struct Isolated {
-    channel: Channel,
+    pub(super) channel: Channel,
     process: Process,
     inbox: Inbox,
     /// The current function and time of the instance, for a report if this process ends during a call.
@@ -51,6 +51,8 @@ pub struct Isolated {
     memory_limit: Option<u64>,
     slice: Duration,
     started: Instant,
+    /// The bytes of a request or an answer, kept so that small ones need no allocation.
+    pub(super) message: Vec<u8>,
     /// The unpacked FMU, removed with its last instance.
     pub(super) package: Arc<Unpacked>,
 }
@@ -94,6 +96,7 @@ impl Isolated {
             memory_limit: options.memory_limit,
             slice,
             started: Instant::now(),
+            message: Vec::new(),
             package,
         };
         let opened = isolated.open(name, options);
@@ -117,59 +120,51 @@ impl Isolated {
     /// [`IsolateError::Refused`] if the FMU does not instantiate; [`IsolateError::Call`] if the worker
     /// ends or does not answer.
     pub fn renew(&mut self, name: &str, options: &Options) -> Result<(), IsolateError> {
-        let write = |writer: &mut Writer<'_>| {
-            writer.put_bytes(name.as_bytes());
-            writer.put(options.logging);
-        };
-        let done = self.call(Command::Renew, write, read_outcome);
+        let done = self.request(&Request::Renew { name, logging: options.logging });
         self.inbox.rename(name);
         self.place = Place::new(name);
         check_outcome(name, done)
     }
 
-    /// Lets the worker load and instantiate the FMU; returns the outcome and its reason.
-    fn open(&mut self, name: &str, options: &Options) -> Result<(u64, String), CallError> {
+    /// Lets the worker load and instantiate the FMU.
+    fn open(&mut self, name: &str, options: &Options) -> Result<Opening, CallError> {
         let package = self.package.clone();
-        let write = |writer: &mut Writer<'_>| {
-            writer.put_bytes(package.folder().as_os_str().as_bytes());
-            writer.put_bytes(name.as_bytes());
-            writer.put(options.logging);
-            writer.put(options.memory_limit.unwrap_or(0));
-            writer.put(options.preload.len());
-            for library in &options.preload {
-                writer.put_bytes(library.as_bytes());
-            }
-        };
-        self.call(Command::Open, write, read_outcome)
+        self.request(&Request::Open(Open {
+            folder: package.folder().as_os_str().as_bytes(),
+            name,
+            logging: options.logging,
+            memory_limit: options.memory_limit.unwrap_or(0),
+            preload: options.preload.iter().map(|library| library.as_bytes()).collect(),
+        }))
     }
 
-    /// Posts `command` with the arguments that `write` writes; returns the results that `read` reads.
+    /// Posts `function` with the arguments that `write` writes; returns the results that `read` reads.
     #[inline]
     pub(super) fn call<T>(
         &mut self,
-        command: Command,
+        function: Function,
         write: impl FnOnce(&mut Writer<'_>),
         read: impl FnOnce(&mut Reader<'_>) -> Option<T>,
     ) -> Result<T, CallError> {
-        self.post(command, write)?;
-        self.answer(command, read)
+        self.post(function, write)?;
+        self.answer(function, read)
     }
 
-    /// Posts `command` with the arguments that `write` writes. Waits for a pending command first and
+    /// Posts `function` with the arguments that `write` writes. Waits for a pending command first and
     /// discards its answer.
     #[inline]
     pub(super) fn post(
         &mut self,
-        command: Command,
+        function: Function,
         write: impl FnOnce(&mut Writer<'_>),
     ) -> Result<(), CallError> {
         if let Some(failure) = &self.ended {
-            return Err(error(command, failure.clone()));
+            return Err(error(function, failure.clone()));
         }
         if self.is_pending()
             && let Err(failure) = self.wait()
         {
-            return Err(self.abandon(command, failure));
+            return Err(self.abandon(function, failure));
         }
         self.inbox.clear();
         let shared = &self.channel.shared;
@@ -177,13 +172,13 @@ impl Isolated {
         write(&mut writer);
         if !writer.fits() {
             return Err(protocol_error(
-                command,
+                function,
                 "needs more arguments than the shared memory holds",
             ));
         }
-        shared.command().store(command.to_word(), Ordering::Relaxed);
-        shared.place().store(command.to_word(), Ordering::Relaxed);
-        self.place.enter(command.name());
+        shared.command().store(function.to_word(), Ordering::Relaxed);
+        shared.place().store(function.to_word(), Ordering::Relaxed);
+        self.place.enter(function.static_name());
         self.turn = self.turn.wrapping_add(1);
         self.channel.post(self.turn);
         Ok(())
@@ -200,31 +195,42 @@ impl Isolated {
         self.posted_at = self.time_limit.map(|_| Instant::now());
     }
 
-    /// Waits for the answer to `command`; returns the results that `read` reads.
+    /// Waits for the answer to `function`; returns the results that `read` reads.
     #[inline]
     pub(super) fn answer<T>(
         &mut self,
-        command: Command,
+        function: Function,
         read: impl FnOnce(&mut Reader<'_>) -> Option<T>,
     ) -> Result<T, CallError> {
+        self.wait_for_answer(function)?;
+        match self.values(read) {
+            Some(values) => Ok(values),
+            None => Err(self.received_error(function)),
+        }
+    }
+
+    /// Waits until the worker has answered `function`, and logs the messages of the FMU.
+    #[inline]
+    pub(super) fn wait_for_answer(&mut self, function: Function) -> Result<(), CallError> {
         if let Some(failure) = &self.ended {
-            return Err(error(command, failure.clone()));
+            return Err(error(function, failure.clone()));
         }
         if !self.is_pending() {
-            return Err(protocol_error(command, "was not started before it was finished"));
+            return Err(protocol_error(function, "was not started before it was finished"));
         }
         if let Err(failure) = self.wait() {
-            return Err(self.abandon(command, failure));
+            return Err(self.abandon(function, failure));
         }
         self.place.leave();
         self.inbox.drain(&self.channel.shared);
+        Ok(())
+    }
+
+    /// Returns the results that `read` reads from an answer of words; `None` for an encoded answer.
+    #[inline]
+    pub(super) fn values<T>(&self, read: impl FnOnce(&mut Reader<'_>) -> Option<T>) -> Option<T> {
         let mut reader = Reader::new(self.channel.shared.area());
-        let answer = match reader.take() {
-            Some(DONE) => read(&mut reader).map(Ok),
-            Some(FAILED) => read_error(command, &mut reader).map(Err),
-            _ => None,
-        };
-        answer.unwrap_or_else(|| Err(self.invalid_answer(command)))
+        if reader.take::<u64>()? == VALUES { read(&mut reader) } else { None }
     }
 
     /// Waits until the worker has answered.
@@ -276,15 +282,15 @@ impl Isolated {
         }
     }
 
-    /// Kills the worker after a failure; returns the error of `command`.
+    /// Kills the worker after a failure; returns the error of `function`.
     #[cold]
-    fn abandon(&mut self, command: Command, failure: Failure) -> CallError {
+    pub(super) fn abandon(&mut self, function: Function, failure: Failure) -> CallError {
         self.process.kill();
         self.place.leave();
         let shared = &self.channel.shared;
         self.inbox.drain(shared);
-        let place = shared.place().load(Ordering::Relaxed);
-        let function = function_at(place).unwrap_or(command.function());
+        let place = Function::from_word(shared.place().load(Ordering::Relaxed));
+        let function = place.unwrap_or(function).name();
         let failure = match self.memory_limit {
             Some(limit) if shared.no_memory().load(Ordering::Relaxed) != 0 => {
                 Failure::OutOfMemory(limit)
@@ -293,50 +299,6 @@ impl Isolated {
         };
         self.ended = Some(failure.clone());
         CallError { function, failure, messages: self.inbox.take() }
-    }
-
-    /// Sends `bytes` to the worker for the next command.
-    pub(super) fn upload(&mut self, bytes: &[u8]) -> Result<(), CallError> {
-        let most = 8 * self.channel.shared.area().len().saturating_sub(2);
-        let mut first = true;
-        for piece in bytes.chunks(most) {
-            let write = |writer: &mut Writer<'_>| {
-                writer.put(first);
-                writer.put_bytes(piece);
-            };
-            self.call(Command::Upload, write, |_| Some(()))?;
-            first = false;
-        }
-        Ok(())
-    }
-
-    /// Receives the `total` bytes that the worker holds after `command`.
-    pub(super) fn download(
-        &mut self,
-        command: Command,
-        total: usize,
-    ) -> Result<Vec<u8>, CallError> {
-        let mut bytes = Vec::new();
-        let limit = total.min(MAX_ANSWER);
-        while bytes.len() < limit {
-            let (before, offset) = (bytes.len(), bytes.len());
-            let write = |writer: &mut Writer<'_>| writer.put(offset);
-            self.call(Command::Download, write, |reader| reader.take_bytes(&mut bytes))?;
-            if bytes.len() == before {
-                break;
-            }
-        }
-        if bytes.len() != total {
-            let what = format!("announced {total} bytes and sent {}", bytes.len());
-            return Err(self.abandon(command, Failure::InvalidAnswer(what)));
-        }
-        Ok(bytes)
-    }
-
-    /// Kills the worker because its answer to `command` cannot be decoded; returns the error.
-    pub(super) fn invalid_answer(&mut self, command: Command) -> CallError {
-        let what = "returned an invalid answer: its process wrote over shared memory";
-        self.abandon(command, Failure::InvalidAnswer(what.to_owned()))
     }
 
     /// Returns the process identifier of the worker.
@@ -354,7 +316,7 @@ impl Isolated {
         }
         self.freed = true;
         self.time_limit = Some(self.time_limit.unwrap_or(FREE_LIMIT).min(FREE_LIMIT));
-        self.call(Command::Free, |_| (), |_| Some(()))?;
+        self.request::<()>(&Request::Free)?;
         self.process.wait_for_end(END_LIMIT);
         Ok(())
     }
@@ -368,29 +330,22 @@ impl Drop for Isolated {
     }
 }
 
-/// Reads the outcome of an instantiation and its reason.
-fn read_outcome(reader: &mut Reader<'_>) -> Option<(u64, String)> {
-    let outcome: u64 = reader.take()?;
-    let reason = if outcome == INSTANTIATED { String::new() } else { reader.take_text()? };
-    Some((outcome, reason))
-}
-
 /// Converts the outcome of an instantiation to a result.
-fn check_outcome(name: &str, answer: Result<(u64, String), CallError>) -> Result<(), IsolateError> {
+fn check_outcome(name: &str, answer: Result<Opening, CallError>) -> Result<(), IsolateError> {
     let instance = name.to_owned();
     match answer {
-        Ok((INSTANTIATED, _)) => Ok(()),
-        Ok((NOT_PRELOADED, reason)) => Err(IsolateError::Preload { reason }),
-        Ok((_, reason)) => Err(IsolateError::Refused { instance, reason }),
+        Ok(Opening::Instantiated) => Ok(()),
+        Ok(Opening::NotPreloaded(reason)) => Err(IsolateError::Preload { reason }),
+        Ok(Opening::Refused(reason)) => Err(IsolateError::Refused { instance, reason }),
         Err(source) => Err(IsolateError::Call { instance, source }),
     }
 }
 
-fn error(command: Command, failure: Failure) -> CallError {
-    CallError { function: command.function(), failure, messages: Vec::new() }
+fn error(function: Function, failure: Failure) -> CallError {
+    CallError { function: function.name(), failure, messages: Vec::new() }
 }
 
 #[cold]
-fn protocol_error(command: Command, what: &str) -> CallError {
-    error(command, Failure::InvalidAnswer(what.to_owned()))
+fn protocol_error(function: Function, what: &str) -> CallError {
+    error(function, Failure::InvalidAnswer(what.to_owned()))
 }

@@ -1,5 +1,6 @@
 //! Passes the messages of an FMU to the master through a ring buffer in shared memory, which survives
-//! a crash of the worker. Messages that do not fit are counted.
+//! a crash of the worker. Messages that do not fit are counted. A message is a word with the number of
+//! its bytes, then its bytes.
 
 use std::collections::VecDeque;
 use std::fmt::{self, Write as _};
@@ -7,11 +8,14 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
+use serde::{Deserialize, Serialize};
 use tracing::field::{Field, Visit};
 use tracing::span::{Attributes, Id, Record};
 use tracing::{Event, Level, Metadata, Subscriber};
 
 use super::layout::Shared;
+use super::message::decode;
+use super::words::words_of;
 use slave::CallError;
 
 /// The `target` of `tracing` events that carry messages of an FMU.
@@ -28,9 +32,9 @@ const MESSAGES: u32 = 1000;
 const BYTES: usize = 16 << 20;
 /// Interval between two reports of the number of lost messages.
 const WINDOW: Duration = Duration::from_secs(1);
-/// Words of a message before its text: lengths, time.
-const HEAD: usize = 2;
-/// The levels; the ring holds the index into this list.
+/// Maximum number of bytes of a message: category, text, and their lengths, level and time.
+const MESSAGE: usize = CATEGORY + TEXT + 32;
+/// The levels; a message holds the index into this list.
 const LEVELS: [Level; 5] = [Level::ERROR, Level::WARN, Level::INFO, Level::DEBUG, Level::TRACE];
 
 /// Sends the [`tracing`] events of the worker to the master.
@@ -48,31 +52,35 @@ impl Forward {
     fn send(&self, level: Level, message: &Message) {
         let Ok(mut head) = self.head.lock() else { return };
         let ring = self.shared.ring();
-        let (category, text) = (clip(&message.category, CATEGORY), clip(&message.text, TEXT));
-        let needed = HEAD + category.len().div_ceil(8) + text.len().div_ceil(8);
+        let sent = Sent {
+            level: LEVELS.iter().position(|known| *known == level).unwrap_or(0),
+            time: message.time,
+            category: clip(&message.category, CATEGORY),
+            text: clip(&message.text, TEXT),
+        };
+        let mut buffer = [0; MESSAGE];
+        let Ok(bytes) = postcard::to_slice(&sent, &mut buffer) else { return };
         let used = head.wrapping_sub(self.shared.log_tail().load(Ordering::Acquire));
         let free = usize::try_from(used).ok().and_then(|used| ring.len().checked_sub(used));
-        if free.is_none_or(|free| free < needed) {
+        if free.is_none_or(|free| free <= bytes.len().div_ceil(8)) {
             self.shared.log_dropped().fetch_add(1, Ordering::Relaxed);
             return;
         }
-        let level = LEVELS.iter().position(|known| *known == level).unwrap_or(0) as u64;
-        let lengths = level | (category.len() as u64) << 8 | (text.len() as u64) << 32;
-        let mut put = |word: u64| {
+        for word in std::iter::once(bytes.len() as u64).chain(words_of(bytes)) {
             at(ring, *head).store(word, Ordering::Relaxed);
             *head = head.wrapping_add(1);
-        };
-        put(lengths);
-        put(message.time.to_bits());
-        for bytes in [category, text] {
-            for chunk in bytes.chunks(8) {
-                let mut word = [0; 8];
-                word[..chunk.len()].copy_from_slice(chunk);
-                put(u64::from_le_bytes(word));
-            }
         }
         self.shared.log_head().store(*head, Ordering::Release);
     }
+}
+
+/// A message in the ring. Its texts may be cut within a character.
+#[derive(Serialize, Deserialize)]
+struct Sent<'a> {
+    level: usize,
+    time: f64,
+    category: &'a [u8],
+    text: &'a [u8],
 }
 
 /// Returns the word of the ring for the running word number `count`.
@@ -255,29 +263,20 @@ impl Inbox {
     /// Reads the message at the tail and advances the tail; `None` if the ring holds no valid message.
     fn next(&mut self, ring: &[AtomicU64], head: u64) -> Option<(Level, Message)> {
         let available = head.wrapping_sub(self.tail);
-        if available > ring.len() as u64 || available < HEAD as u64 {
+        let word = |offset: u64| at(ring, self.tail.wrapping_add(offset)).load(Ordering::Relaxed);
+        let length = word(0);
+        let words = length.div_ceil(8);
+        if available > ring.len() as u64 || words >= available {
             return None;
         }
-        let word = |offset: u64| at(ring, self.tail.wrapping_add(offset)).load(Ordering::Relaxed);
-        let (lengths, time) = (word(0), f64::from_bits(word(1)));
-        let level = *LEVELS.get(usize::try_from(lengths & 0xff).ok()?)?;
-        let category = (lengths >> 8) & 0xff_ffff;
-        let text = lengths >> 32;
-        let mut next = HEAD as u64;
-        let mut bytes = |length: u64| {
-            let mut bytes = Vec::new();
-            if next + length.div_ceil(8) > available {
-                return None;
-            }
-            for _ in 0..length.div_ceil(8) {
-                bytes.extend_from_slice(&word(next).to_le_bytes());
-                next += 1;
-            }
-            bytes.truncate(usize::try_from(length).ok()?);
-            Some(String::from_utf8_lossy(&bytes).into_owned())
-        };
-        let message = Message { category: bytes(category)?, time, text: bytes(text)? };
-        self.tail = self.tail.wrapping_add(next);
+        let mut bytes: Vec<u8> = (1..=words).flat_map(|next| word(next).to_le_bytes()).collect();
+        bytes.truncate(usize::try_from(length).ok()?);
+        let sent: Sent<'_> = decode(&bytes)?;
+        let level = *LEVELS.get(sent.level)?;
+        let text = |bytes| String::from_utf8_lossy(bytes).into_owned();
+        let message =
+            Message { category: text(sent.category), time: sent.time, text: text(sent.text) };
+        self.tail = self.tail.wrapping_add(words + 1);
         Some((level, message))
     }
 
@@ -347,7 +346,8 @@ mod tests {
             forward.send(Level::INFO, &message(&count.to_string()));
         }
         let dropped = shared.log_dropped().load(Ordering::Relaxed);
-        let words = 2 + 1 + 1;
+        // The number of bytes; level, time, category and text, each with its length.
+        let words = 1 + (1 + 8 + 1 + 6 + 1 + 5_u64).div_ceil(8);
         assert_eq!(100_000 - dropped, shared.ring().len() as u64 / words);
         inbox.drain(&shared);
         assert_eq!(inbox.dropped, dropped);

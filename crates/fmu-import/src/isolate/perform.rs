@@ -1,34 +1,32 @@
-//! Executes the commands of the master: reads the arguments from shared memory, calls the FMU and
-//! writes the results.
+//! Executes the commands of the master: calls the FMU with the arguments in shared memory, and writes
+//! the results.
 
 use std::sync::atomic::Ordering;
 
-use fmu_description::Experiment;
+use serde::Serialize;
 
-use super::command::{Command, DONE};
+use super::function::Function;
 use super::layout::Shared;
-use super::strings;
+use super::message::{RemoteError, Request, encode};
 use super::words::{Reader, Word, Writer};
 use crate::fmu::{Fmu, Instance};
 use slave::{CallError, Slave, StepResult};
 
+/// First word of an answer that consists of words.
+pub(super) const VALUES: u64 = 0;
+/// First word of an encoded answer or error. The number of all its bytes and its first bytes follow.
+pub(super) const MESSAGE: u64 = 1;
+
 /// The result of a command; `None` if its arguments are invalid.
-type CommandResult = Option<Result<(), CallError>>;
+pub(super) type CommandResult = Option<Result<(), CallError>>;
 
 /// An instance and the buffers of its calls, kept so that a step does not allocate.
 pub(super) struct Executor {
     instance: Instance,
     references: Vec<u32>,
-    knowns: Vec<u32>,
-    orders: Vec<i32>,
     reals: Vec<f64>,
-    changes: Vec<f64>,
     integers: Vec<i32>,
     step: Step,
-    /// Bytes received for the next command.
-    uploaded: Vec<u8>,
-    /// Bytes of the last command that the master will download.
-    to_download: Vec<u8>,
 }
 
 /// The arguments and results of [`Slave::advance`].
@@ -54,18 +52,8 @@ impl Executor {
             // An FMU without the function logs by its own rules.
             let _ = instance.set_debug_logging(true);
         }
-        Self {
-            instance,
-            references: Vec::new(),
-            knowns: Vec::new(),
-            orders: Vec::new(),
-            reals: Vec::new(),
-            changes: Vec::new(),
-            integers: Vec::new(),
-            step: Step::default(),
-            uploaded: Vec::new(),
-            to_download: Vec::new(),
-        }
+        let (references, reals, integers) = (Vec::new(), Vec::new(), Vec::new());
+        Self { instance, references, reals, integers, step: Step::default() }
     }
 
     /// Returns the FMU of the instance.
@@ -73,218 +61,122 @@ impl Executor {
         self.instance.fmu().clone()
     }
 
-    /// Executes `command` with the arguments in `reader`; writes the results to `writer`.
+    /// Steps, or gets or sets numbers: reads the arguments from `reader`, writes the results to
+    /// `writer`. Other functions are executed by [`Executor::execute`].
     #[inline]
-    pub(super) fn perform(
+    pub(super) fn exchange(
         &mut self,
-        command: Command,
+        function: Function,
         shared: &Shared,
         reader: &mut Reader<'_>,
         writer: &mut Writer<'_>,
     ) -> CommandResult {
-        if command == Command::Advance {
-            return self.advance(shared, reader, writer);
-        }
-        let done = self
-            .values(command, reader, writer)
-            .or_else(|| self.derivatives_and_steps(command, reader, writer))
-            .or_else(|| self.modes_and_states(command, reader, writer))
-            .or_else(|| self.transfers(command, reader, writer));
-        done?
-    }
-
-    /// Gets and sets Real, Integer and Boolean variables; the outer `None` for other commands.
-    fn values(
-        &mut self,
-        command: Command,
-        reader: &mut Reader<'_>,
-        writer: &mut Writer<'_>,
-    ) -> Option<CommandResult> {
-        let Self { instance, references, reals, integers, .. } = self;
-        Some(match command {
-            Command::GetReal => {
+        let Self { instance, references, reals, integers, step } = self;
+        match function {
+            Function::DoStep => step.advance(instance, shared, reader, writer),
+            Function::GetReal => {
                 get(reader, writer, references, reals, |r, v| instance.get_real(r, v))
             }
-            Command::GetInteger => {
+            Function::GetInteger => {
                 get(reader, writer, references, integers, |r, v| instance.get_integer(r, v))
             }
-            Command::GetBoolean => {
+            Function::GetBoolean => {
                 get(reader, writer, references, integers, |r, v| instance.get_boolean(r, v))
             }
-            Command::SetReal => {
+            Function::SetReal => {
                 set(reader, writer, references, reals, |r, v| instance.set_real(r, v))
             }
-            Command::SetInteger => {
+            Function::SetInteger => {
                 set(reader, writer, references, integers, |r, v| instance.set_integer(r, v))
             }
-            Command::SetBoolean => {
+            Function::SetBoolean => {
                 set(reader, writer, references, integers, |r, v| instance.set_boolean(r, v))
             }
-            _ => return None,
-        })
-    }
-
-    /// Executes steps and the calls for derivatives; the outer `None` for other commands.
-    fn derivatives_and_steps(
-        &mut self,
-        command: Command,
-        reader: &mut Reader<'_>,
-        writer: &mut Writer<'_>,
-    ) -> Option<CommandResult> {
-        match command {
-            Command::SetInputDerivatives
-            | Command::GetOutputDerivatives
-            | Command::DirectionalDerivative
-            | Command::DoStep => {}
-            _ => return None,
+            _ => None,
         }
-        Some((|| {
-            let Self { instance, references, knowns, orders, reals, changes, .. } = self;
-            if command == Command::DoStep {
-                let (time, size) = (reader.take()?, reader.take()?);
-                let done = instance.do_step(time, size, reader.take()?);
-                return Some(done.map(|done| write_step_result(done, writer)));
-            }
-            reader.take_list(references)?;
-            let count = references.len();
-            writer.put(DONE);
-            Some(match command {
-                Command::SetInputDerivatives => {
-                    reader.take_counted(count, reals)?;
-                    reader.take_counted(count, orders)?;
-                    instance.set_input_derivatives(references, orders, reals)
-                }
-                Command::GetOutputDerivatives => {
-                    reader.take_counted(count, orders)?;
-                    reals.resize(count, 0.0);
-                    let done = instance.get_output_derivatives(references, orders, reals);
-                    done.map(|()| writer.put_all(reals))
-                }
-                _ => {
-                    reader.take_list(knowns)?;
-                    reader.take_counted(knowns.len(), reals)?;
-                    changes.resize(count, 0.0);
-                    let done = instance.directional_derivative(references, knowns, reals, changes);
-                    done.map(|()| writer.put_all(changes))
-                }
-            })
-        })())
     }
 
-    /// Changes the mode, saves and restores states; the outer `None` for other commands.
-    fn modes_and_states(
-        &mut self,
-        command: Command,
-        reader: &mut Reader<'_>,
-        writer: &mut Writer<'_>,
-    ) -> Option<CommandResult> {
+    /// Executes a request for the instance and encodes the answer.
+    pub(super) fn execute(&mut self, request: Request<'_>, answer: &mut Vec<u8>) {
         let instance = &mut self.instance;
-        let done = match command {
-            Command::EnterInitializationMode => Some(instance.enter_initialization_mode()),
-            Command::ExitInitializationMode => Some(instance.exit_initialization_mode()),
-            Command::Terminate => Some(instance.terminate()),
-            Command::SetDebugLogging => reader.take().map(|on| instance.set_debug_logging(on)),
-            Command::SetupExperiment => {
-                read_experiment(reader).map(|experiment| instance.setup_experiment(&experiment))
+        let done = match request {
+            Request::SetDebugLogging(on) => instance.set_debug_logging(on),
+            Request::SetupExperiment(experiment) => instance.setup_experiment(&experiment),
+            Request::EnterInitializationMode => instance.enter_initialization_mode(),
+            Request::ExitInitializationMode => instance.exit_initialization_mode(),
+            Request::Terminate => instance.terminate(),
+            Request::SetString(values) => {
+                let (references, values): (Vec<u32>, Vec<String>) = values
+                    .into_iter()
+                    .map(|(reference, value)| (reference, value.to_owned()))
+                    .unzip();
+                instance.set_string(&references, &values)
             }
-            Command::SaveState => reader.take().map(|slot| instance.save_state(slot)),
-            Command::RestoreState => reader.take().map(|slot| instance.restore_state(slot)),
-            _ => return None,
+            Request::SetInputDerivatives(values) => {
+                let (references, orders, values): (Vec<_>, Vec<_>, Vec<_>) =
+                    values.into_iter().collect();
+                instance.set_input_derivatives(&references, &orders, &values)
+            }
+            Request::SaveState(slot) => instance.save_state(slot),
+            Request::RestoreState(slot) => instance.restore_state(slot),
+            Request::DeserializeState(bytes) => instance.deserialize_state(bytes),
+            Request::GetString(references) => {
+                let mut values = vec![String::new(); references.len()];
+                let done = instance.get_string(&references, &mut values);
+                return reply(done.map(|()| values), answer);
+            }
+            Request::GetOutputDerivatives(wanted) => {
+                let (references, orders): (Vec<_>, Vec<_>) = wanted.into_iter().unzip();
+                let mut values = vec![0.0; references.len()];
+                let done = instance.get_output_derivatives(&references, &orders, &mut values);
+                return reply(done.map(|()| values), answer);
+            }
+            Request::DirectionalDerivative { unknowns, knowns } => {
+                let (knowns, seed): (Vec<_>, Vec<_>) = knowns.into_iter().unzip();
+                let mut changes = vec![0.0; unknowns.len()];
+                let done = instance.directional_derivative(&unknowns, &knowns, &seed, &mut changes);
+                return reply(done.map(|()| changes), answer);
+            }
+            Request::SerializeState => return reply(instance.serialize_state(), answer),
+            Request::Open(_) | Request::Renew { .. } | Request::Free => {
+                Err(super::worker::invalid_command(request.function()))
+            }
         };
-        writer.put(DONE);
-        Some(done)
-    }
-
-    /// Executes commands whose data may need several turns; the outer `None` for other commands.
-    fn transfers(
-        &mut self,
-        command: Command,
-        reader: &mut Reader<'_>,
-        writer: &mut Writer<'_>,
-    ) -> Option<CommandResult> {
-        Some(match command {
-            Command::Upload => self.upload(reader, writer),
-            Command::Download => self.download(reader, writer),
-            Command::GetString => self.get_string(reader, writer),
-            Command::SetString => self.set_string(reader, writer),
-            Command::SerializeState => {
-                let done = self.instance.serialize_state();
-                Some(done.map(|bytes| self.offer(bytes, writer)))
-            }
-            Command::DeserializeState => {
-                let bytes = std::mem::take(&mut self.uploaded);
-                let whole = reader.take() == Some(bytes.len());
-                writer.put(DONE);
-                whole.then(|| self.instance.deserialize_state(&bytes))
-            }
-            _ => return None,
-        })
-    }
-
-    /// Receives a piece of the data of the next command.
-    fn upload(&mut self, reader: &mut Reader<'_>, writer: &mut Writer<'_>) -> CommandResult {
-        let first: bool = reader.take()?;
-        if first {
-            self.uploaded.clear();
-        }
-        reader.take_bytes(&mut self.uploaded)?;
-        writer.put(DONE);
-        Some(Ok(()))
-    }
-
-    /// Keeps `bytes` for download and writes their number.
-    fn offer(&mut self, bytes: Vec<u8>, writer: &mut Writer<'_>) {
-        writer.put(DONE);
-        writer.put(bytes.len());
-        self.to_download = bytes;
-    }
-
-    /// Sends a piece of the data of the last command.
-    fn download(&mut self, reader: &mut Reader<'_>, writer: &mut Writer<'_>) -> CommandResult {
-        let offset: usize = reader.take()?;
-        let rest = self.to_download.get(offset..)?;
-        writer.put(DONE);
-        let most = 8 * writer.room().saturating_sub(1);
-        writer.put_bytes(&rest[..rest.len().min(most)]);
-        Some(Ok(()))
-    }
-
-    fn get_string(&mut self, reader: &mut Reader<'_>, writer: &mut Writer<'_>) -> CommandResult {
-        reader.take_list(&mut self.references)?;
-        let mut values = vec![String::new(); self.references.len()];
-        let done = self.instance.get_string(&self.references, &mut values);
-        Some(done.map(|()| self.offer(strings::write(&values), writer)))
-    }
-
-    fn set_string(&mut self, reader: &mut Reader<'_>, writer: &mut Writer<'_>) -> CommandResult {
-        reader.take_list(&mut self.references)?;
-        let bytes = std::mem::take(&mut self.uploaded);
-        let mut values = vec![String::new(); self.references.len()];
-        strings::read(&bytes, &mut values)?;
-        writer.put(DONE);
-        Some(self.instance.set_string(&self.references, &values))
-    }
-
-    fn advance(
-        &mut self,
-        shared: &Shared,
-        reader: &mut Reader<'_>,
-        writer: &mut Writer<'_>,
-    ) -> CommandResult {
-        self.step.read(reader)?;
-        let Self { instance, step, .. } = self;
-        Some(step.run(instance, shared).map(|done| {
-            write_step_result(done, writer);
-            writer.put_all(&step.output_values);
-            writer.put_all(&step.output_derivatives);
-        }))
+        reply(done, answer);
     }
 }
 
+/// Encodes an answer.
+pub(super) fn reply(result: Result<impl Serialize, CallError>, answer: &mut Vec<u8>) {
+    encode(&result.map_err(RemoteError::from), answer);
+}
+
 impl Step {
+    fn advance(
+        &mut self,
+        instance: &mut Instance,
+        shared: &Shared,
+        reader: &mut Reader<'_>,
+        writer: &mut Writer<'_>,
+    ) -> CommandResult {
+        self.read(reader)?;
+        Some(self.run(instance, shared).map(|done| {
+            let (part, reached, terminated) = match done {
+                StepResult::Whole => (false, 0.0, false),
+                StepResult::Part { reached, terminated } => (true, reached, terminated),
+            };
+            writer.put(VALUES);
+            writer.put(u64::from(part));
+            writer.put(reached);
+            writer.put(u64::from(terminated));
+            writer.put_all(&self.output_values);
+            writer.put_all(&self.output_derivatives);
+        }))
+    }
+
     fn read(&mut self, reader: &mut Reader<'_>) -> Option<()> {
         self.span = (reader.take()?, reader.take()?);
-        self.never_back = reader.take()?;
+        self.never_back = reader.take::<u64>()? != 0;
         reader.take_list(&mut self.inputs)?;
         reader.take_counted(self.inputs.len(), &mut self.input_values)?;
         reader.take_list(&mut self.derived_inputs)?;
@@ -301,24 +193,24 @@ impl Step {
     /// Makes the calls of [`Slave::advance`]. Stores each function in shared memory, so that the
     /// master can name the function that crashed.
     fn run(&mut self, instance: &mut Instance, shared: &Shared) -> Result<StepResult, CallError> {
-        let at = |command: Command| shared.place().store(command.to_word(), Ordering::Relaxed);
+        let at = |function: Function| shared.place().store(function.to_word(), Ordering::Relaxed);
         if !self.inputs.is_empty() {
-            at(Command::SetReal);
+            at(Function::SetReal);
             instance.set_real(&self.inputs, &self.input_values)?;
         }
         if !self.derived_inputs.is_empty() {
-            at(Command::SetInputDerivatives);
+            at(Function::SetInputDerivatives);
             let (references, orders) = (&self.derived_inputs, &self.input_orders);
             instance.set_input_derivatives(references, orders, &self.input_derivatives)?;
         }
-        at(Command::DoStep);
+        at(Function::DoStep);
         let done = instance.do_step(self.span.0, self.span.1, self.never_back)?;
         if !self.outputs.is_empty() {
-            at(Command::GetReal);
+            at(Function::GetReal);
             instance.get_real(&self.outputs, &mut self.output_values)?;
         }
         if !self.derived_outputs.is_empty() {
-            at(Command::GetOutputDerivatives);
+            at(Function::GetOutputDerivatives);
             let (references, orders) = (&self.derived_outputs, &self.output_orders);
             instance.get_output_derivatives(references, orders, &mut self.output_derivatives)?;
         }
@@ -335,7 +227,7 @@ fn get<T: Word + Default>(
 ) -> CommandResult {
     reader.take_list(references)?;
     values.resize(references.len(), T::default());
-    writer.put(DONE);
+    writer.put(VALUES);
     Some(call(references, values).map(|()| writer.put_all(values)))
 }
 
@@ -348,26 +240,6 @@ fn set<T: Word>(
 ) -> CommandResult {
     reader.take_list(references)?;
     reader.take_counted(references.len(), values)?;
-    writer.put(DONE);
+    writer.put(VALUES);
     Some(call(references, values))
-}
-
-fn read_experiment(reader: &mut Reader<'_>) -> Option<Experiment> {
-    let start_time = reader.take()?;
-    let mut optional = || {
-        let (defined, value): (bool, f64) = (reader.take()?, reader.take()?);
-        Some(defined.then_some(value))
-    };
-    Some(Experiment { start_time, stop_time: optional()?, tolerance: optional()? })
-}
-
-fn write_step_result(done: StepResult, writer: &mut Writer<'_>) {
-    let (whole, reached, terminated) = match done {
-        StepResult::Whole => (true, 0.0, false),
-        StepResult::Part { reached, terminated } => (false, reached, terminated),
-    };
-    writer.put(DONE);
-    writer.put(whole);
-    writer.put(reached);
-    writer.put(terminated);
 }

@@ -1,5 +1,7 @@
-//! Encodes values as words of the shared memory. The other process may have written anything, so the
-//! reader loads each word once and checks it.
+//! Encodes the values of a step as words of the shared memory, without allocation; `postcard` would
+//! decode them into new vectors in every step. The bytes of all other messages pass here as well.
+//!
+//! The other process may have written anything, so the reader loads each word once and checks it.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -53,24 +55,13 @@ impl Word for i32 {
     }
 }
 
-impl Word for usize {
-    fn to_word(self) -> u64 {
-        self as u64
-    }
-
-    fn from_word(word: u64) -> Option<Self> {
-        word.try_into().ok()
-    }
-}
-
-impl Word for bool {
-    fn to_word(self) -> u64 {
-        self.into()
-    }
-
-    fn from_word(word: u64) -> Option<Self> {
-        (word <= 1).then_some(word == 1)
-    }
+/// Returns the words that hold `bytes`; the last one is filled with zeros.
+pub(super) fn words_of(bytes: &[u8]) -> impl Iterator<Item = u64> {
+    bytes.chunks(BYTES).map(|chunk| {
+        let mut word = [0; BYTES];
+        word[..chunk.len()].copy_from_slice(chunk);
+        u64::from_le_bytes(word)
+    })
 }
 
 /// Writes values to an area from its start. Values that do not fit are not written.
@@ -87,11 +78,6 @@ impl<'a> Writer<'a> {
     /// Returns whether all values fitted.
     pub(super) fn fits(&self) -> bool {
         self.at <= self.words.len()
-    }
-
-    /// Returns the number of free words.
-    pub(super) fn room(&self) -> usize {
-        self.words.len().saturating_sub(self.at)
     }
 
     #[inline]
@@ -117,18 +103,16 @@ impl<'a> Writer<'a> {
     /// Writes the number of values and the values.
     #[inline]
     pub(super) fn put_list<T: Word>(&mut self, values: &[T]) {
-        self.put(values.len());
+        self.put(values.len() as u64);
         self.put_all(values);
     }
 
-    /// Writes the number of bytes and the bytes.
-    pub(super) fn put_bytes(&mut self, bytes: &[u8]) {
-        self.put(bytes.len());
-        for chunk in bytes.chunks(BYTES) {
-            let mut word = [0; BYTES];
-            word[..chunk.len()].copy_from_slice(chunk);
-            self.put(u64::from_le_bytes(word));
-        }
+    /// Writes as many of `bytes` as fit, after their number.
+    pub(super) fn put_part(&mut self, bytes: &[u8]) {
+        let room = self.words.len().saturating_sub(self.at).saturating_sub(1);
+        let part = &bytes[..bytes.len().min(BYTES * room)];
+        self.put(part.len() as u64);
+        words_of(part).for_each(|word| self.put(word));
     }
 }
 
@@ -172,8 +156,8 @@ impl<'a> Reader<'a> {
     /// Reads a number, then that many values, and replaces the content of `values`.
     #[inline]
     pub(super) fn take_list<T: Word>(&mut self, values: &mut Vec<T>) -> Option<()> {
-        let count = self.take()?;
-        self.take_counted(count, values)
+        let count: u64 = self.take()?;
+        self.take_counted(count.try_into().ok()?, values)
     }
 
     /// Reads `count` values and replaces the content of `values`.
@@ -193,21 +177,12 @@ impl<'a> Reader<'a> {
 
     /// Reads a number, then that many bytes, and appends them to `bytes`.
     pub(super) fn take_bytes(&mut self, bytes: &mut Vec<u8>) -> Option<()> {
-        let mut left: usize = self.take()?;
-        for word in self.next(left.div_ceil(BYTES))? {
-            let word = word.load(Ordering::Relaxed).to_le_bytes();
-            let used = left.min(BYTES);
-            bytes.extend_from_slice(&word[..used]);
-            left -= used;
-        }
+        let count = usize::try_from(self.take::<u64>()?).ok()?;
+        let words = self.next(count.div_ceil(BYTES))?;
+        let end = bytes.len() + count;
+        bytes.extend(words.iter().flat_map(|word| word.load(Ordering::Relaxed).to_le_bytes()));
+        bytes.truncate(end);
         Some(())
-    }
-
-    /// Reads a text; invalid UTF-8 is replaced.
-    pub(super) fn take_text(&mut self) -> Option<String> {
-        let mut bytes = Vec::new();
-        self.take_bytes(&mut bytes)?;
-        Some(String::from_utf8_lossy(&bytes).into_owned())
     }
 }
 
@@ -225,8 +200,7 @@ mod tests {
         let mut writer = Writer::new(&area);
         writer.put(-7_i32);
         writer.put_list(&[1.5, -0.0, f64::INFINITY]);
-        writer.put_bytes("grün, nine+".as_bytes());
-        writer.put(true);
+        writer.put_part(b"nine byte");
         assert!(writer.fits());
         let mut reader = Reader::new(&area);
         assert_eq!(reader.take::<i32>(), Some(-7));
@@ -234,19 +208,24 @@ mod tests {
         reader.take_list(&mut values).unwrap();
         assert_eq!(values, [1.5, 0.0, f64::INFINITY]);
         assert!(values[1].is_sign_negative());
-        assert_eq!(reader.take_text().as_deref(), Some("grün, nine+"));
-        assert_eq!(reader.take::<bool>(), Some(true));
+        let mut bytes = b"and ".to_vec();
+        reader.take_bytes(&mut bytes).unwrap();
+        assert_eq!(bytes, b"and nine byte");
     }
 
     #[test]
-    fn what_does_not_fit_is_not_written() {
-        let area = area(3);
-        let mut writer = Writer::new(&area);
+    fn values_that_do_not_fit_are_not_written_and_bytes_are_written_in_part() {
+        let few = area(3);
+        let mut writer = Writer::new(&few);
         writer.put_list(&[1_u32, 2, 3]);
         assert!(!writer.fits());
-        writer.put_bytes(&[255; 100]);
-        assert_eq!(writer.room(), 0);
-        assert!(area[1..].iter().all(|word| word.load(Ordering::Relaxed) == 0));
+        writer.put_part(&[255; 100]);
+        assert!(few[1..].iter().all(|word| word.load(Ordering::Relaxed) == 0));
+        let few = area(3);
+        Writer::new(&few).put_part(&[1; 18]);
+        let mut bytes = Vec::new();
+        Reader::new(&few).take_bytes(&mut bytes).unwrap();
+        assert_eq!(bytes, [1; 16]);
     }
 
     #[test]
@@ -256,7 +235,7 @@ mod tests {
             area[0].store(count, Ordering::Relaxed);
             assert_eq!(Reader::new(&area).take_list(&mut Vec::<f64>::new()), None, "{count}");
             if count > 24 {
-                assert_eq!(Reader::new(&area).take_text(), None, "{count}");
+                assert_eq!(Reader::new(&area).take_bytes(&mut Vec::new()), None, "{count}");
             }
         }
         assert_eq!(Reader::new(&area).take_all(&mut [0.0; 5]), None);
@@ -268,6 +247,5 @@ mod tests {
         area[0].store(1 << 40, Ordering::Relaxed);
         assert_eq!(Reader::new(&area).take::<u32>(), None);
         assert_eq!(Reader::new(&area).take::<i32>(), None);
-        assert_eq!(Reader::new(&area).take::<bool>(), None);
     }
 }

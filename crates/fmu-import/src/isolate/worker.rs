@@ -3,6 +3,7 @@
 use std::ffi::OsStr;
 use std::fs::File;
 use std::io::{self, stderr, stdin, stdout};
+use std::mem::take;
 use std::os::fd::AsFd as _;
 use std::os::unix::ffi::OsStrExt as _;
 use std::os::unix::net::UnixStream;
@@ -16,12 +17,11 @@ use rustix::process::{Pid, Signal, getppid, kill_current_process_group};
 use rustix::stdio::{dup2_stdin, dup2_stdout};
 
 use super::channel::{Channel, Side, WaitResult};
-use super::command::{
-    Command, DONE, INSTANTIATED, LOADING, NOT_PRELOADED, REFUSED, place, write_error,
-};
+use super::function::Function;
 use super::layout::Shared;
 use super::log::Forward;
-use super::perform::Executor;
+use super::message::{Open, Opening, Request, decode};
+use super::perform::{CommandResult, Executor, MESSAGE, VALUES, reply};
 use super::words::{Reader, Writer};
 use super::{IsolateError, STARTED_BY, WorkerError, memory};
 use crate::{Fmu, FmuError, Instance};
@@ -32,6 +32,9 @@ static IS_WORKER: AtomicBool = AtomicBool::new(false);
 
 /// Interval between two checks whether the master lives, if the connection has been closed locally.
 const PARENT_CHECK: Duration = Duration::from_millis(100);
+
+/// Bytes of memory kept for the next request and for its answer.
+const BUFFER: usize = 1 << 16;
 
 /// Runs this process as a worker of the master that started it. Returns when the master frees the
 /// instance or ends. Standard output is redirected to standard error.
@@ -93,134 +96,173 @@ fn end_with_master(socket: &UnixStream) -> io::Result<()> {
 
 /// Executes the commands of the master until it frees the instance.
 fn serve(channel: &mut Channel) -> Result<(), WorkerError> {
-    let (shared, mut executor, mut turn) = (channel.shared.clone(), None, 0_u64);
-    loop {
+    let shared = channel.shared.clone();
+    let mut worker =
+        Worker { shared, executor: None, request: Vec::new(), answer: Vec::new(), freed: false };
+    let mut turn = 0_u64;
+    while !worker.freed {
         match channel.wait(turn) {
             WaitResult::Turn(posted) if posted == turn.wrapping_add(1) => {}
             WaitResult::Turn(found) => return Err(WorkerError::Corrupted { found }),
             WaitResult::TimedOut => continue,
             WaitResult::Closed => return Ok(()),
         }
-        let found = shared.command().load(Ordering::Relaxed);
-        let command = Command::from_word(found).ok_or(WorkerError::Corrupted { found })?;
-        let mut reader = Reader::new(shared.area());
-        let mut writer = Writer::new(shared.area());
-        let done = match (command, &mut executor) {
-            (Command::Open, executor @ None) => open(&shared, executor, &mut reader, &mut writer),
-            (Command::Renew, executor @ Some(_)) => {
-                renew(&shared, executor, &mut reader, &mut writer)
-            }
-            (Command::Free, executor) => {
-                *executor = None;
-                writer.put(DONE);
-                Some(Ok(()))
-            }
-            (_, Some(executor)) => executor.perform(command, &shared, &mut reader, &mut writer),
-            (_, None) => None,
-        };
-        let done = done.unwrap_or_else(|| Err(invalid_command(command)));
-        if let Err(error) = done.and_then(|()| check_fit(command, &writer)) {
-            write_error(&error, &mut Writer::new(shared.area()));
-        }
+        let found = worker.shared.command().load(Ordering::Relaxed);
+        let function = Function::from_word(found).ok_or(WorkerError::Corrupted { found })?;
+        worker.perform(function);
         turn = turn.wrapping_add(2);
         channel.post(turn);
-        if command == Command::Free {
-            return Ok(());
+    }
+    Ok(())
+}
+
+/// The state of a worker between two commands.
+struct Worker {
+    shared: Arc<Shared>,
+    executor: Option<Executor>,
+    /// The bytes of the next request that have arrived.
+    request: Vec<u8>,
+    /// The bytes of the last answer.
+    answer: Vec<u8>,
+    /// Whether the master has freed the instance for good.
+    freed: bool,
+}
+
+impl Worker {
+    /// Executes a command and writes its answer.
+    #[inline]
+    fn perform(&mut self, function: Function) {
+        let mut reader = Reader::new(self.shared.area());
+        let mut writer = Writer::new(self.shared.area());
+        let done = match (function, &mut self.executor) {
+            (Function::Upload, _) => reader.take_bytes(&mut self.request).map(|()| {
+                writer.put(VALUES);
+                Ok(())
+            }),
+            (Function::Download, _) => download(&self.answer, &mut reader, &mut writer),
+            (function, Some(executor)) if function.is_exchange() => {
+                executor.exchange(function, &self.shared, &mut reader, &mut writer)
+            }
+            _ => return self.answer_request(function),
+        };
+        let done = done.unwrap_or_else(|| Err(invalid_command(function)));
+        if let Err(error) = done.and_then(|()| check_fit(function, &writer)) {
+            reply(Err::<(), _>(error), &mut self.answer);
+            self.send_answer();
         }
     }
+
+    /// Reads the last part of a request, executes it and writes its answer.
+    fn answer_request(&mut self, function: Function) {
+        let mut bytes = take(&mut self.request);
+        let whole = Reader::new(self.shared.area()).take_bytes(&mut bytes);
+        self.answer.clear();
+        self.answer.shrink_to(BUFFER);
+        match (whole.and_then(|()| decode(&bytes)), &mut self.executor) {
+            (Some(Request::Open(arguments)), None) => {
+                let opened = self.open(&arguments);
+                reply(opened, &mut self.answer);
+            }
+            (Some(Request::Renew { name, logging }), Some(executor)) => {
+                let fmu = executor.fmu();
+                let renewed = self.renew(&fmu, name, logging);
+                reply(Ok(renewed), &mut self.answer);
+            }
+            (Some(Request::Free), executor) => {
+                *executor = None;
+                self.freed = true;
+                reply(Ok(()), &mut self.answer);
+            }
+            (Some(request), Some(executor)) => executor.execute(request, &mut self.answer),
+            _ => reply(Err::<(), _>(invalid_command(function)), &mut self.answer),
+        }
+        bytes.clear();
+        bytes.shrink_to(BUFFER);
+        self.request = bytes;
+        self.send_answer();
+    }
+
+    /// Loads and instantiates the FMU.
+    fn open(&mut self, arguments: &Open<'_>) -> Result<Opening, CallError> {
+        let Open { folder, name, logging, memory_limit, preload } = arguments;
+        if *memory_limit > 0
+            && let Err(error) = memory::limit(&self.shared, *memory_limit)
+        {
+            let what = format!("cannot limit its memory to {memory_limit} bytes: {error}");
+            return Err(invalid(Function::Load, &what));
+        }
+        self.record(Function::Load);
+        for library in preload {
+            if let Err(error) = crate::preload(OsStr::from_bytes(library)) {
+                return Ok(Opening::NotPreloaded(with_causes(&error)));
+            }
+        }
+        let created = Fmu::open(Path::new(OsStr::from_bytes(folder))).and_then(|fmu| {
+            self.record(Function::Instantiate);
+            fmu.instantiate(name)
+        });
+        Ok(self.accept(created, *logging))
+    }
+
+    /// Frees the instance and creates another one.
+    fn renew(&mut self, fmu: &Fmu, name: &str, logging: bool) -> Opening {
+        self.record(Function::Free);
+        self.executor = None;
+        self.record(Function::Instantiate);
+        self.accept(fmu.instantiate(name), logging)
+    }
+
+    /// Stores the function that runs now, so that the master can name the one that crashed.
+    fn record(&self, function: Function) {
+        self.shared.place().store(function.to_word(), Ordering::Relaxed);
+    }
+
+    /// Takes over the instance if it was created.
+    fn accept(&mut self, created: Result<Instance, FmuError>, logging: bool) -> Opening {
+        match created {
+            Ok(instance) => {
+                self.executor = Some(Executor::new(instance, logging));
+                Opening::Instantiated
+            }
+            Err(error) => Opening::Refused(with_causes(&error)),
+        }
+    }
+
+    /// Writes the start of the encoded answer; the master downloads the rest.
+    fn send_answer(&self) {
+        let mut writer = Writer::new(self.shared.area());
+        writer.put(MESSAGE);
+        writer.put(self.answer.len() as u64);
+        writer.put_part(&self.answer);
+    }
+}
+
+/// Writes the bytes of `answer` from an offset on, as many as fit.
+fn download(answer: &[u8], reader: &mut Reader<'_>, writer: &mut Writer<'_>) -> CommandResult {
+    let offset = usize::try_from(reader.take::<u64>()?).ok()?;
+    let rest = answer.get(offset..)?;
+    writer.put(VALUES);
+    writer.put_part(rest);
+    Some(Ok(()))
 }
 
 /// Returns the error of a command whose arguments are invalid or that comes out of order.
 #[cold]
-fn invalid_command(command: Command) -> CallError {
-    let what = "received an invalid command: the shared memory is corrupted";
+pub(super) fn invalid_command(function: Function) -> CallError {
+    invalid(function, "received an invalid command: the shared memory is corrupted")
+}
+
+fn invalid(function: Function, what: &str) -> CallError {
     let failure = Failure::InvalidAnswer(what.to_owned());
-    CallError { function: command.function(), failure, messages: Vec::new() }
+    CallError { function: function.name(), failure, messages: Vec::new() }
 }
 
 /// Checks that the results fitted into the shared memory.
-fn check_fit(command: Command, writer: &Writer<'_>) -> Result<(), CallError> {
+fn check_fit(function: Function, writer: &Writer<'_>) -> Result<(), CallError> {
     if writer.fits() {
         return Ok(());
     }
-    let failure = Failure::InvalidAnswer("returned more than the shared memory holds".to_owned());
-    Err(CallError { function: command.function(), failure, messages: Vec::new() })
-}
-
-/// Loads and instantiates the FMU.
-fn open(
-    shared: &Arc<Shared>,
-    executor: &mut Option<Executor>,
-    reader: &mut Reader<'_>,
-    writer: &mut Writer<'_>,
-) -> Option<Result<(), CallError>> {
-    let mut folder = Vec::new();
-    reader.take_bytes(&mut folder)?;
-    let name = reader.take_text()?;
-    let logging: bool = reader.take()?;
-    let limit: u64 = reader.take()?;
-    if limit > 0
-        && let Err(error) = memory::limit(shared, limit)
-    {
-        let what = format!("cannot limit its memory to {limit} bytes: {error}");
-        let failure = Failure::InvalidAnswer(what);
-        return Some(Err(CallError { function: LOADING, failure, messages: Vec::new() }));
-    }
-    let mut preload = Vec::new();
-    for _ in 0..reader.take::<usize>()? {
-        let mut library = Vec::new();
-        reader.take_bytes(&mut library)?;
-        preload.push(library);
-    }
-    shared.place().store(place(LOADING), Ordering::Relaxed);
-    for library in &preload {
-        if let Err(error) = crate::preload(OsStr::from_bytes(library)) {
-            writer.put(DONE);
-            writer.put(NOT_PRELOADED);
-            writer.put_bytes(with_causes(&error).as_bytes());
-            return Some(Ok(()));
-        }
-    }
-    let opened = Fmu::open(Path::new(OsStr::from_bytes(&folder))).and_then(|fmu| {
-        shared.place().store(Command::Open.to_word(), Ordering::Relaxed);
-        fmu.instantiate(&name)
-    });
-    *executor = write_outcome(opened, writer).map(|instance| Executor::new(instance, logging));
-    Some(Ok(()))
-}
-
-/// Frees the instance and creates another one.
-fn renew(
-    shared: &Shared,
-    executor: &mut Option<Executor>,
-    reader: &mut Reader<'_>,
-    writer: &mut Writer<'_>,
-) -> Option<Result<(), CallError>> {
-    let name = reader.take_text()?;
-    let logging: bool = reader.take()?;
-    let fmu = executor.as_ref()?.fmu();
-    shared.place().store(Command::Free.to_word(), Ordering::Relaxed);
-    *executor = None;
-    shared.place().store(Command::Open.to_word(), Ordering::Relaxed);
-    let created = fmu.instantiate(&name);
-    *executor = write_outcome(created, writer).map(|instance| Executor::new(instance, logging));
-    Some(Ok(()))
-}
-
-/// Writes whether the instance was created, and the reason if not.
-fn write_outcome(created: Result<Instance, FmuError>, writer: &mut Writer<'_>) -> Option<Instance> {
-    writer.put(DONE);
-    match created {
-        Ok(instance) => {
-            writer.put(INSTANTIATED);
-            Some(instance)
-        }
-        Err(error) => {
-            writer.put(REFUSED);
-            writer.put_bytes(with_causes(&error).as_bytes());
-            None
-        }
-    }
+    Err(invalid(function, "returned more than the shared memory holds"))
 }
 
 /// Returns the text of an error and of its causes.

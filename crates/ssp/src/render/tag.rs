@@ -1,9 +1,9 @@
-//! Elements to be written.
+//! Elements that quick-xml writes once the tree is whole: the root states the version of SSP that its
+//! content needs, so the content is known before the first tag is written.
 
+use fmu_description::xml::writable;
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, Event};
-
-use crate::xml::is_character;
 
 /// What the prefixes mean. Importers compare prefixes: these are the usual ones.
 const PREFIXES: [(&str, &str); 6] = [
@@ -36,8 +36,7 @@ impl Tag {
     }
 
     pub(super) fn with(mut self, name: &str, value: impl AsRef<str>) -> Self {
-        let replace = |character| if is_character(character) { character } else { '\u{fffd}' };
-        self.attributes.push((name.to_owned(), value.as_ref().chars().map(replace).collect()));
+        self.attributes.push((name.to_owned(), writable(value.as_ref()).into_owned()));
         self
     }
 

@@ -1,4 +1,8 @@
-//! Parses XML into a tree of elements, with limits on everything that could grow.
+//! Builds a tree of elements from the events of quick-xml, with limits on depth and size.
+//!
+//! roxmltree builds trees too, but refuses defects that are tolerated here: prefixes without declaration
+//! (such as `xsi:`), control characters, `--` in comments, undefined entities in text. It does not limit
+//! the depth, and does not say where its limit on elements is exceeded.
 
 use std::borrow::Cow;
 

@@ -1,4 +1,5 @@
-//! A start tag and the text of its attributes.
+//! A start tag of quick-xml, with attributes of typed values and optional attributes: `BytesStart`
+//! takes text only, and `Display` of a number is not the text that `modelDescription.xml` has.
 
 use std::borrow::Cow;
 
@@ -11,13 +12,7 @@ pub(super) trait Value {
 
 impl Value for str {
     fn text(&self) -> Cow<'_, str> {
-        if self.chars().all(is_xml) {
-            return Cow::Borrowed(self);
-        }
-        let replace = |character| {
-            if is_xml(character) { character } else { '\u{fffd}' }
-        };
-        Cow::Owned(self.chars().map(replace).collect())
+        crate::xml::writable(self)
     }
 }
 
@@ -73,10 +68,4 @@ impl<'a> Tag<'a> {
     ) -> Self {
         if *value == T::default() { self } else { self.with(name, value) }
     }
-}
-
-/// Whether XML 1.0 allows `character` (its production 2).
-pub(in crate::description) fn is_xml(character: char) -> bool {
-    matches!(character, '\t' | '\n' | '\r' | ' '..='\u{d7ff}' | '\u{e000}'..='\u{fffd}')
-        || character >= '\u{10000}'
 }

@@ -103,6 +103,26 @@ fn hostile_files_end_in_an_error() {
     }
 }
 
+#[test]
+fn xml_that_strict_parsers_refuse_is_read() {
+    for (ordered, found) in [
+        (" guid=", " xsi:noNamespaceSchemaLocation='fmi2ModelDescription.xsd' guid="),
+        (" guid=", " description='a < b'guid="),
+        (" guid=", " description='bell \u{7} &#1;' guid="),
+        ("<ModelVariables>", "<!-- a -- b --><ModelVariables>"),
+        ("<ModelVariables>", "&nbsp; ]]> <ModelVariables>"),
+        (
+            "<ModelVariables>",
+            "<VendorAnnotations><x:y z:a=''/></VendorAnnotations><ModelVariables>",
+        ),
+        ("</fmiModelDescription>", "</fmiModelDescription> end of file"),
+    ] {
+        let xml = with(X, "").replace(ordered, found);
+        let description = ModelDescription::parse(&xml);
+        assert_eq!(description.map(|own| own.variables.len()), Ok(1), "{found}");
+    }
+}
+
 /// A description with many copies of one element, which must be refused.
 fn flooded(element: &str, count: usize) -> String {
     let xml = with(&element.repeat(count), "");

@@ -1,0 +1,270 @@
+//! The requests to a worker and their answers, encoded by `postcard`. The other process may have
+//! written anything: messages are decoded from a copy, and [`decode`] returns `None` for other bytes.
+
+use std::borrow::Cow;
+
+use fmu_description::Experiment;
+use fmu_description::abi::Status;
+use serde::{Deserialize, Serialize};
+
+use super::function::Function;
+use slave::{CallError, Failure};
+
+/// Maximum number of bytes of one text in an error.
+const TEXT: usize = 8192;
+
+/// A request to a worker. Commands of every step are no requests: see `words`.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+pub(super) enum Request<'a> {
+    /// Loads the FMU and creates an instance. The answer is an [`Opening`].
+    #[serde(borrow)]
+    Open(Open<'a>),
+    /// Frees the instance and creates another one. The answer is an [`Opening`].
+    Renew {
+        name: &'a str,
+        logging: bool,
+    },
+    SetDebugLogging(bool),
+    SetupExperiment(Experiment),
+    EnterInitializationMode,
+    ExitInitializationMode,
+    Terminate,
+    GetString(Cow<'a, [u32]>),
+    SetString(#[serde(borrow)] Vec<(u32, &'a str)>),
+    /// References, orders and values.
+    SetInputDerivatives(Vec<(u32, i32, f64)>),
+    /// References and orders.
+    GetOutputDerivatives(Vec<(u32, i32)>),
+    /// The known variables have a seed.
+    DirectionalDerivative {
+        unknowns: Cow<'a, [u32]>,
+        knowns: Vec<(u32, f64)>,
+    },
+    SaveState(usize),
+    RestoreState(usize),
+    SerializeState,
+    DeserializeState(&'a [u8]),
+    Free,
+}
+
+/// The arguments of [`Request::Open`].
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Open<'a> {
+    /// The folder of the unpacked FMU.
+    pub(super) folder: &'a [u8],
+    pub(super) name: &'a str,
+    pub(super) logging: bool,
+    /// Bytes; 0: no limit.
+    pub(super) memory_limit: u64,
+    #[serde(borrow)]
+    pub(super) preload: Vec<&'a [u8]>,
+}
+
+impl Request<'_> {
+    /// Returns the function that the errors of the request name.
+    pub(super) fn function(&self) -> Function {
+        match self {
+            Request::Open(_) | Request::Renew { .. } => Function::Instantiate,
+            Request::SetDebugLogging(_) => Function::SetDebugLogging,
+            Request::SetupExperiment(_) => Function::SetupExperiment,
+            Request::EnterInitializationMode => Function::EnterInitializationMode,
+            Request::ExitInitializationMode => Function::ExitInitializationMode,
+            Request::Terminate => Function::Terminate,
+            Request::GetString(_) => Function::GetString,
+            Request::SetString(_) => Function::SetString,
+            Request::SetInputDerivatives(_) => Function::SetInputDerivatives,
+            Request::GetOutputDerivatives(_) => Function::GetOutputDerivatives,
+            Request::DirectionalDerivative { .. } => Function::DirectionalDerivative,
+            Request::SaveState(_) => Function::SaveState,
+            Request::RestoreState(_) => Function::RestoreState,
+            Request::SerializeState => Function::SerializeState,
+            Request::DeserializeState(_) => Function::DeserializeState,
+            Request::Free => Function::Free,
+        }
+    }
+}
+
+/// The result of an instantiation.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) enum Opening {
+    /// The instance exists.
+    Instantiated,
+    /// The FMU does not load or instantiate, for this reason.
+    Refused(String),
+    /// A library of `preload` does not load, for this reason.
+    NotPreloaded(String),
+}
+
+/// A [`CallError`] as a worker sends it.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct RemoteError {
+    /// `None`: a function without a number.
+    function: Option<Function>,
+    failure: RemoteFailure,
+    messages: Vec<String>,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+enum RemoteFailure {
+    Returned(i32),
+    Missing,
+    TimedOut(f64),
+    Panicked(String),
+    InvalidAnswer(String),
+}
+
+/// Returns the first [`TEXT`] bytes of `text`.
+fn clipped(text: &str) -> String {
+    String::from_utf8_lossy(&text.as_bytes()[..text.len().min(TEXT)]).into_owned()
+}
+
+impl From<CallError> for RemoteError {
+    fn from(error: CallError) -> Self {
+        let failure = match &error.failure {
+            Failure::Status(status) => RemoteFailure::Returned(*status as i32),
+            Failure::UnknownStatus(status) => RemoteFailure::Returned(*status),
+            Failure::Missing => RemoteFailure::Missing,
+            Failure::TimedOut(seconds) => RemoteFailure::TimedOut(*seconds),
+            Failure::Panicked(text) => RemoteFailure::Panicked(clipped(text)),
+            Failure::InvalidAnswer(text) => RemoteFailure::InvalidAnswer(clipped(text)),
+            // A worker cannot report its own end: these failures arise in the master only.
+            Failure::Killed(..) | Failure::Exited(_) | Failure::OutOfMemory(_) => {
+                RemoteFailure::InvalidAnswer("ended a process of its own".to_owned())
+            }
+        };
+        let messages = error.messages.iter().map(|text| clipped(text)).collect();
+        Self { function: Function::named(error.function), failure, messages }
+    }
+}
+
+impl RemoteError {
+    /// Returns the error of a call of `function`.
+    pub(super) fn into_call_error(self, function: Function) -> CallError {
+        let failure = match self.failure {
+            RemoteFailure::Returned(status) => {
+                Status::from_c(status).map_or(Failure::UnknownStatus(status), Failure::Status)
+            }
+            RemoteFailure::Missing => Failure::Missing,
+            RemoteFailure::TimedOut(seconds) => Failure::TimedOut(seconds),
+            RemoteFailure::Panicked(text) => Failure::Panicked(text),
+            RemoteFailure::InvalidAnswer(text) => Failure::InvalidAnswer(text),
+        };
+        let function = self.function.unwrap_or(function).name();
+        CallError { function, failure, messages: self.messages }
+    }
+}
+
+/// Replaces the content of `bytes` by the encoded `value`; allocates only if the capacity is too small.
+pub(super) fn encode(value: &impl Serialize, bytes: &mut Vec<u8>) {
+    let mut buffer = std::mem::take(bytes);
+    buffer.clear();
+    // Fails only for sequences of unknown length, which no message has; nobody decodes an empty one.
+    *bytes = postcard::to_extend(value, buffer).unwrap_or_default();
+}
+
+/// Decodes `bytes`; `None` if they are not exactly one `T`.
+pub(super) fn decode<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Option<T> {
+    match postcard::take_from_bytes(bytes) {
+        Ok((value, [])) => Some(value),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn through(error: &CallError) -> CallError {
+        let mut bytes = Vec::new();
+        encode(&Err::<(), _>(RemoteError::from(error.clone())), &mut bytes);
+        let answer: Result<(), RemoteError> = decode(&bytes).unwrap();
+        answer.unwrap_err().into_call_error(Function::DoStep)
+    }
+
+    #[test]
+    fn errors_pass_unchanged() {
+        let failures = [
+            Failure::Status(Status::Fatal),
+            Failure::UnknownStatus(-77),
+            Failure::Missing,
+            Failure::TimedOut(0.25),
+            Failure::Panicked("index 4".to_owned()),
+            Failure::InvalidAnswer("returned fmi2Discard".to_owned()),
+        ];
+        for failure in failures {
+            let messages = ["first", "", "zweite Äußerung"].map(str::to_owned).to_vec();
+            let error = CallError { function: "fmi2GetRealStatus", failure, messages };
+            assert_eq!(through(&error), error);
+        }
+    }
+
+    #[test]
+    fn long_texts_are_clipped_and_an_unknown_function_is_that_of_the_request() {
+        let failure = Failure::Panicked("é".repeat(TEXT));
+        let error =
+            CallError { function: "another", failure, messages: vec!["x".repeat(TEXT + 1)] };
+        let found = through(&error);
+        assert_eq!(found.function, "fmi2DoStep");
+        assert_eq!(found.failure, Failure::Panicked("é".repeat(TEXT / 2)));
+        assert_eq!(found.messages, ["x".repeat(TEXT)]);
+    }
+
+    fn requests<'a>() -> [Request<'a>; 5] {
+        let (logging, memory_limit) = (true, u64::MAX);
+        let preload = vec![&b"a"[..], &[0xff, 0]];
+        [
+            Request::Open(Open {
+                folder: b"/tmp/\xff",
+                name: "grün",
+                logging,
+                memory_limit,
+                preload,
+            }),
+            Request::SetString(vec![(1, ""), (u32::MAX, "a b"), (3, "Größe\n")]),
+            Request::DirectionalDerivative {
+                unknowns: Cow::Borrowed(&[1, 2]),
+                knowns: vec![(7, -0.5)],
+            },
+            Request::SetInputDerivatives(vec![(1, -2, f64::INFINITY)]),
+            Request::DeserializeState(&[1, 2, 0]),
+        ]
+    }
+
+    #[test]
+    fn requests_pass_and_parts_of_them_are_refused() {
+        for request in requests() {
+            let mut bytes = vec![9; 3];
+            encode(&request, &mut bytes);
+            assert_eq!(decode::<Request<'_>>(&bytes), Some(request));
+            for length in 0..bytes.len() {
+                assert_eq!(decode::<Request<'_>>(&bytes[..length]), None, "{length}");
+            }
+            bytes.push(0);
+            assert_eq!(decode::<Request<'_>>(&bytes), None, "one byte more");
+        }
+    }
+
+    #[test]
+    fn random_bytes_give_a_message_or_none_and_no_panic() {
+        let mut state = 1_u64;
+        let mut bytes = [0; 320];
+        for _ in 0..20_000 {
+            for byte in bytes.as_chunks_mut::<8>().0 {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                *byte = (state >> (state >> 58)).to_le_bytes();
+            }
+            let _ = decode::<Request<'_>>(&bytes);
+            let _ = decode::<Result<Vec<String>, RemoteError>>(&bytes);
+            let _ = decode::<Result<Opening, RemoteError>>(&bytes);
+        }
+    }
+
+    #[test]
+    fn a_reused_buffer_is_not_allocated_again() {
+        let mut bytes = Vec::with_capacity(64);
+        let address = bytes.as_ptr();
+        encode(&Request::SaveState(3), &mut bytes);
+        assert_eq!(bytes.as_ptr(), address);
+        assert!(!bytes.is_empty());
+    }
+}
