@@ -144,10 +144,11 @@ impl<M: Model> Instance<M> {
         if state == State::Fatal {
             return Status::Fatal;
         }
+        // A boxed failure keeps the result of a successful call in one register.
         let done = if allowed(self.core.interface_type, function, state) {
-            guarded(|| body(self))
+            guarded(|| body(self).map_err(Box::new))
         } else {
-            Err(Failure::Error(format!("must not be called in state {state:?}")))
+            Err(Box::new(Failure::Error(format!("must not be called in state {state:?}"))))
         };
         match done {
             Ok(()) => Status::OK,
