@@ -99,13 +99,18 @@ impl<'a, D: Number> Equations<'a, D> {
         signals: &mut D::Out<'_, Signals>,
         z_slopes: &mut D::Out<'_, [f64]>,
     ) {
+        self.set_signals(signals);
+        self.set_slopes(self.knowns(signals), z_slopes);
+    }
+
+    /// Computes e and the free commands from z and y.
+    pub(crate) fn set_signals(self, signals: &mut D::Out<'_, Signals>) {
         for k in 0..D::values(D::read(signals)).e.len() {
             let Knowns { z, y, .. } = self.knowns(signals);
             let e = self.innovation(k, z, y);
             D::write(signals, |signals| &mut signals.e[k], e);
         }
         self.set_free_commands(signals);
-        self.set_slopes(self.knowns(signals), z_slopes);
     }
 
     /// Computes the commands that are not at a limit from z.
