@@ -13,6 +13,7 @@ use crate::loss::Loss;
 use crate::mode::Mode;
 use crate::observer::{Conditions, Observer};
 use crate::sampled::Sampler;
+use crate::shared::Shared;
 use crate::signals::{OperatingPoint, Signals, Values};
 use crate::{names, variables};
 
@@ -25,7 +26,8 @@ const HYSTERESIS: f64 = 1e-9;
 /// Fields without a comment have the name of their FMI variable.
 #[derive(Clone, Serialize, Deserialize)]
 pub(crate) struct AsoController {
-    pub(crate) design: Design,
+    /// Copied where a parameter is changed, not with an FMU state.
+    pub(crate) design: Shared<Design>,
     pub(crate) x_hat_0: Vec<f64>,
     pub(crate) f_hat_0: Vec<f64>,
     /// Estimates, measurements and commands as the importer sees them.
@@ -223,7 +225,7 @@ impl Model for AsoController {
             values,
             operating_point,
             deviations,
-            design,
+            design: Shared::from(design),
         })
     }
 
