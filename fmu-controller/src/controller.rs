@@ -13,6 +13,7 @@ use crate::loss::Loss;
 use crate::mode::Mode;
 use crate::observer::{Conditions, Observer};
 use crate::sampled::Sampler;
+use crate::shared::Shared;
 use crate::signals::{OperatingPoint, Signals, Values};
 use crate::{names, variables};
 
@@ -25,7 +26,8 @@ const HYSTERESIS: f64 = 1e-9;
 /// Fields without a comment have the name of their FMI variable.
 #[derive(Clone, Serialize, Deserialize)]
 pub(crate) struct AsoController {
-    pub(crate) design: Design,
+    /// Copied where a parameter is changed, not with an FMU state.
+    pub(crate) design: Shared<Design>,
     pub(crate) x_hat_0: Vec<f64>,
     pub(crate) f_hat_0: Vec<f64>,
     /// Estimates, measurements and commands as the importer sees them.
@@ -34,9 +36,12 @@ pub(crate) struct AsoController {
     operating_point: OperatingPoint,
     /// The signals as deviations from the operating point.
     pub(crate) deviations: Signals,
-    /// z' and u'.
+    /// z' and u'; see `with_slopes`.
     pub(crate) z_slopes: Vec<f64>,
     pub(crate) u_slopes: Vec<f64>,
+    /// Whether z', u' and E_hat' belong to `deviations` and `mode`.
+    #[serde(skip)]
+    has_slopes: bool,
     pub(crate) compensate: bool,
     /// E_hat with its derivative.
     pub(crate) losses: Vec<Loss>,
@@ -103,35 +108,55 @@ impl AsoController {
         Ok(())
     }
 
-    /// Computes z', u, u' and E_hat at the state and time reached, `offset` s after the measurements
-    /// were set.
+    /// Computes e, u and E_hat at the state and time reached, `offset` s after the measurements were
+    /// set.
     fn evaluate(&mut self, offset: f64) {
         let Self { design, values, operating_point, deviations, mode, .. } = self;
-        let (z_slopes, u_slopes) = (&mut self.z_slopes, &mut self.u_slopes);
         deviations.set(values, operating_point, offset);
         if !self.frozen {
             *mode = mode.limited(design, &deviations.z);
         }
         mode.set_limited(design, &mut deviations.u);
+        Equations::<f64>::new(design, *mode).set_signals(&mut &mut *deviations);
+        values.set_commands(&deviations.u, (design, *mode), operating_point);
+        self.set_losses();
+        self.has_slopes = false;
+    }
+
+    /// The controller with z', u' and E_hat', which are computed when they are read. Those of a
+    /// sampled controller are zero.
+    pub(crate) fn with_slopes(&mut self) -> &mut Self {
+        if !self.has_slopes && self.sampler.is_none() {
+            self.set_slopes();
+            self.has_slopes = true;
+        }
+        self
+    }
+
+    /// Computes z', u' and E_hat'.
+    fn set_slopes(&mut self) {
+        let Self { design, values, deviations, z_slopes, u_slopes, mode, .. } = self;
         let equations = Equations::<f64>::new(design, *mode);
-        equations.evaluate(&mut &mut *deviations, &mut &mut z_slopes[..]);
+        equations.set_slopes(equations.knowns(&deviations), &mut &mut z_slopes[..]);
         for (j, slope) in u_slopes.iter_mut().enumerate() {
             let free = equations.free_command(j, equations.estimate(z_slopes));
             *slope = if mode.is_limited(j) { 0.0 } else { free };
         }
-        values.set_commands(&deviations.u, (design, *mode), operating_point);
-        self.set_losses();
+        for loss in &mut self.losses {
+            let (u, f_hat) = (loss.actuator, design.states.len() + loss.fault);
+            let lost = loss.effectiveness_lost(
+                Dual64::new(values.u[u], u_slopes[u]),
+                Dual64::new(values.z[f_hat], z_slopes[f_hat]),
+            );
+            loss.slope = lost.eps;
+        }
     }
 
-    /// Computes E_hat with its derivative with respect to time.
+    /// Computes E_hat.
     fn set_losses(&mut self) {
         for loss in &mut self.losses {
             let (u, f_hat) = (loss.actuator, self.design.states.len() + loss.fault);
-            let lost = loss.effectiveness_lost(
-                Dual64::new(self.values.u[u], self.u_slopes[u]),
-                Dual64::new(self.values.z[f_hat], self.z_slopes[f_hat]),
-            );
-            (loss.estimate, loss.slope) = (lost.re, lost.eps);
+            loss.estimate = loss.effectiveness_lost(self.values.u[u], self.values.z[f_hat]);
         }
     }
 
@@ -190,6 +215,7 @@ impl Model for AsoController {
             f_hat_0: vec![0.0; design.faults.len()],
             z_slopes: vec![0.0; values.z.len()],
             u_slopes: vec![0.0; values.u.len()],
+            has_slopes: false,
             compensate: true,
             losses: Loss::all(&design),
             mode: Mode::default(),
@@ -199,7 +225,7 @@ impl Model for AsoController {
             values,
             operating_point,
             deviations,
-            design,
+            design: Shared::from(design),
         })
     }
 

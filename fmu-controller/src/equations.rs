@@ -99,13 +99,18 @@ impl<'a, D: Number> Equations<'a, D> {
         signals: &mut D::Out<'_, Signals>,
         z_slopes: &mut D::Out<'_, [f64]>,
     ) {
+        self.set_signals(signals);
+        self.set_slopes(self.knowns(signals), z_slopes);
+    }
+
+    /// Computes e and the free commands from z and y.
+    pub(crate) fn set_signals(self, signals: &mut D::Out<'_, Signals>) {
         for k in 0..D::values(D::read(signals)).e.len() {
             let Knowns { z, y, .. } = self.knowns(signals);
             let e = self.innovation(k, z, y);
             D::write(signals, |signals| &mut signals.e[k], e);
         }
         self.set_free_commands(signals);
-        self.set_slopes(self.knowns(signals), z_slopes);
     }
 
     /// Computes the commands that are not at a limit from z.
@@ -145,23 +150,25 @@ impl<'a, D: Number> Equations<'a, D> {
     /// 0 unless estimating.
     pub(crate) fn set_slopes(self, knowns: Knowns<'_, D>, z_slopes: &mut D::Out<'_, [f64]>) {
         let Knowns { z: Estimate { x_hat, f_hat, y_f }, y, e, u } = knowns;
+        let design = |matrix: fn(&Design) -> &Matrix| D::part(self.design, matrix);
         for i in 0..self.states {
-            let slope = self.product(|design| design.a.row(i), x_hat)
-                + self.product(|design| design.b.row(i), u)
-                + self.product(|design| design.f_a.row(i), f_hat);
-            let slope = self.sum(slope, |design| design.l_x.row(i), e);
-            D::write(z_slopes, |z_slopes| &mut z_slopes[i], slope);
+            // -0 + x has the bits of x.
+            D::write(z_slopes, |z_slopes| &mut z_slopes[i], -D::zero());
         }
+        D::add_product::<true>(z_slopes, 0, design(|design| &design.a), x_hat);
+        D::add_product::<true>(z_slopes, 0, design(|design| &design.b), u);
+        D::add_product::<true>(z_slopes, 0, design(|design| &design.f_a), f_hat);
+        D::add_product::<false>(z_slopes, 0, design(|design| &design.l_x), e);
         for i in 0..self.faults {
             let mut slope = D::zero();
             if self.has_fault_model() {
                 let row = |a_f: &'a Matrix| a_f.row(i);
                 slope = self.product(|design| design.a_f.as_ref().map_or(&[], row), f_hat);
             }
-            if self.mode.estimating {
-                slope = self.sum(slope, |design| design.l_f.row(i), e);
-            }
             D::write(z_slopes, |z_slopes| &mut z_slopes[self.states + i], slope);
+        }
+        if self.mode.estimating {
+            D::add_product::<false>(z_slopes, self.states, design(|design| &design.l_f), e);
         }
         let w = D::part(self.design, |design| design.filter.as_deref().unwrap_or_default());
         for (k, w) in D::list(w).enumerate() {

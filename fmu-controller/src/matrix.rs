@@ -24,11 +24,48 @@ impl Matrix {
         &self.values[i * self.columns..][..self.columns]
     }
 
+    /// Adds each row times `vector` to an element of `sums`: the sum of the products if `WHOLE`, else
+    /// one product after the other.
+    ///
+    /// For short rows a loop costs more than the products, so it is unrolled for them.
+    pub(crate) fn add_product<const WHOLE: bool>(&self, vector: &[f64], sums: &mut [f64]) {
+        match self.columns {
+            1 => add_rows::<1, WHOLE>(self.values.as_chunks().0, vector, sums),
+            2 => add_rows::<2, WHOLE>(self.values.as_chunks().0, vector, sums),
+            3 => add_rows::<3, WHOLE>(self.values.as_chunks().0, vector, sums),
+            4 => add_rows::<4, WHOLE>(self.values.as_chunks().0, vector, sums),
+            columns => {
+                for (sum, row) in sums.iter_mut().zip(self.values.chunks_exact(columns)) {
+                    add_row::<WHOLE>(row, vector, sum);
+                }
+            }
+        }
+    }
+
     /// The matrix for linear algebra.
     #[cfg(test)]
     pub(crate) fn dense(&self) -> DMatrix<f64> {
         DMatrix::from_row_slice(self.rows, self.columns, &self.values)
     }
+}
+
+fn add_rows<const N: usize, const WHOLE: bool>(
+    rows: &[[f64; N]],
+    vector: &[f64],
+    sums: &mut [f64],
+) {
+    if let Some(vector) = vector.first_chunk::<N>() {
+        for (sum, row) in sums.iter_mut().zip(rows) {
+            add_row::<WHOLE>(row, vector, sum);
+        }
+    }
+}
+
+#[inline]
+fn add_row<const WHOLE: bool>(row: &[f64], vector: &[f64], sum: &mut f64) {
+    let start = if WHOLE { -0.0 } else { *sum };
+    let total = row.iter().zip(vector).fold(start, |total, (entry, x)| total + entry * x);
+    *sum = if WHOLE { *sum + total } else { total };
 }
 
 impl TryFrom<Vec<Vec<f64>>> for Matrix {

@@ -2,6 +2,8 @@
 
 use num_dual::{Dual64, DualNum};
 
+use crate::matrix::Matrix;
+
 /// `f64`, or a dual number `x + x' e` with `e² = 0`, which carries the derivative `x'` in a direction
 /// through the same equations (forward differentiation).
 ///
@@ -38,6 +40,15 @@ pub(crate) trait Number: DualNum<Primitive = f64> + Copy {
 
     /// The number at `position` of a list.
     fn at(numbers: Self::In<'_, [f64]>, position: usize) -> Self;
+
+    /// Adds a matrix times a vector to the elements of `sums` from `first` on; see
+    /// [`Matrix::add_product`].
+    fn add_product<const WHOLE: bool>(
+        sums: &mut Self::Out<'_, [f64]>,
+        first: usize,
+        matrix: Self::In<'_, Matrix>,
+        vector: Self::In<'_, [f64]>,
+    );
 }
 
 impl Number for f64 {
@@ -77,6 +88,16 @@ impl Number for f64 {
     fn at(numbers: &[f64], position: usize) -> Self {
         numbers[position]
     }
+
+    #[inline]
+    fn add_product<const WHOLE: bool>(
+        sums: &mut &mut [f64],
+        first: usize,
+        matrix: &Matrix,
+        vector: &[f64],
+    ) {
+        matrix.add_product::<WHOLE>(vector, &mut sums[first..]);
+    }
 }
 
 impl Number for Dual64 {
@@ -113,5 +134,22 @@ impl Number for Dual64 {
 
     fn at([values, derivatives]: [&[f64]; 2], position: usize) -> Self {
         Self::new(values[position], derivatives[position])
+    }
+
+    fn add_product<const WHOLE: bool>(
+        (_, sums): &mut (&[f64], &mut [f64]),
+        first: usize,
+        [values, derivatives]: [&Matrix; 2],
+        vector: [&[f64]; 2],
+    ) {
+        for (i, sum) in sums[first..].iter_mut().take(values.rows).enumerate() {
+            let row = Self::list([values.row(i), derivatives.row(i)]);
+            let products = row.zip(Self::list(vector)).map(|(entry, x)| (entry * x).eps);
+            *sum = if WHOLE {
+                *sum + products.fold(0.0, |sum, product| sum + product)
+            } else {
+                products.fold(*sum, |sum, product| sum + product)
+            };
+        }
     }
 }

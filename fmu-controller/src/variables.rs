@@ -95,7 +95,7 @@ fn commands(design: &Design) -> Vec<Variable<AsoController>> {
                 });
             output(design, with_unit(variable, unit), dependencies::of_command(design, j))
                 .initially(dependencies::of_initial_command(design, j))
-                .derivative(move |model| &mut model.u_slopes[j])
+                .derivative(move |model| &mut model.with_slopes().u_slopes[j])
         })
         .collect()
 }
@@ -137,7 +137,7 @@ fn estimates(design: &Design) -> Vec<Variable<AsoController>> {
                 Variable::real(name, text, move |model: &mut AsoController| &mut model.values.z[k]);
             output(design, with_unit(variable, unit), Vec::new())
                 .initially(dependencies::of_initial_estimate(design, k))
-                .derivative(move |model| &mut model.z_slopes[k])
+                .derivative(move |model| &mut model.with_slopes().z_slopes[k])
         })
         .collect()
 }
@@ -156,7 +156,7 @@ fn losses(controller: &AsoController) -> Vec<Variable<AsoController>> {
             });
             output(design, variable.unit("1"), dependencies::of_loss(design))
                 .initially(dependencies::of_initial_loss(design, loss))
-                .derivative(move |model| &mut model.losses[position].slope)
+                .derivative(move |model| &mut model.with_slopes().losses[position].slope)
         })
         .collect()
 }
@@ -168,7 +168,7 @@ fn slopes(design: &Design) -> Vec<Variable<AsoController>> {
         .map(|State { position: k, name: state, texts: [_, text], unit }| {
             let variable =
                 Variable::real(format!("der({state})"), text, move |model: &mut AsoController| {
-                    &mut model.z_slopes[k]
+                    &mut model.with_slopes().z_slopes[k]
                 });
             let variable = with_unit(variable, per_second(unit).as_ref()).derivative_of(state);
             with_dependencies(variable, dependencies::of_slope(design, k))

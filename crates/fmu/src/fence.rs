@@ -70,12 +70,12 @@ fn text(payload: &dyn Any) -> &str {
 /// Runs `body`, code of the model, and turns a panic into [`Failure::Fatal`].
 ///
 /// The message contains the location of the panic while a [`HookGuard`] exists.
-pub(crate) fn guarded<T>(body: impl FnOnce() -> Result<T, Failure>) -> Result<T, Failure> {
+pub(crate) fn guarded<T, E: From<Failure>>(body: impl FnOnce() -> Result<T, E>) -> Result<T, E> {
     FENCE.with(|fence| {
         fence.depth.set(fence.depth.get() + 1);
         let done = catch_unwind(AssertUnwindSafe(body));
         fence.depth.set(fence.depth.get() - 1);
-        done.unwrap_or_else(|payload| Err(fence.failure(&*payload)))
+        done.unwrap_or_else(|payload| Err(fence.failure(&*payload).into()))
     })
 }
 

@@ -84,11 +84,15 @@ impl<M: Model> Core<M> {
     }
 
     /// Calls [`Model::check`] if a parameter was set since its last success.
+    #[inline]
     fn check(&mut self) -> Result<(), Failure> {
-        if self.unchecked {
-            self.model.check()?;
-            self.unchecked = false;
-        }
+        if self.unchecked { self.check_model() } else { Ok(()) }
+    }
+
+    #[cold]
+    fn check_model(&mut self) -> Result<(), Failure> {
+        self.model.check()?;
+        self.unchecked = false;
         Ok(())
     }
 }
@@ -144,10 +148,11 @@ impl<M: Model> Instance<M> {
         if state == State::Fatal {
             return Status::Fatal;
         }
+        // A boxed failure keeps the result of a successful call in one register.
         let done = if allowed(self.core.interface_type, function, state) {
-            guarded(|| body(self))
+            guarded(|| body(self).map_err(Box::new))
         } else {
-            Err(Failure::Error(format!("must not be called in state {state:?}")))
+            Err(Box::new(Failure::Error(format!("must not be called in state {state:?}"))))
         };
         match done {
             Ok(()) => Status::OK,
@@ -268,21 +273,24 @@ impl<M: Model> Instance<M> {
     }
 
     /// Recomputes the outputs if a value was set since the last computation.
+    #[inline]
     fn refresh(&mut self) -> Result<(), Failure> {
+        if self.core.stale { self.recompute() } else { Ok(()) }
+    }
+
+    fn recompute(&mut self) -> Result<(), Failure> {
         let core = &mut self.core;
-        if core.stale {
-            match core.state {
-                State::InitializationMode => {
-                    core.check()?;
-                    core.model.initialize(&core.experiment)?;
-                }
-                State::StepComplete | State::EventMode | State::ContinuousTimeMode => {
-                    core.model.update(core.time)?;
-                }
-                _ => {}
+        match core.state {
+            State::InitializationMode => {
+                core.check()?;
+                core.model.initialize(&core.experiment)?;
             }
-            core.stale = false;
+            State::StepComplete | State::EventMode | State::ContinuousTimeMode => {
+                core.model.update(core.time)?;
+            }
+            _ => {}
         }
+        core.stale = false;
         Ok(())
     }
 
@@ -353,8 +361,9 @@ fn time_tolerance(time: f64) -> f64 {
 /// Section 4.2.2 requires a step size greater than zero and an end at `start + size`. A step so small
 /// that `start + size` rounds to `start` is an error: importers continue after `fmi2OK`, some (FMPy)
 /// also after `fmi2Discard`, and the time would never advance.
+#[inline]
 fn communication_step(time: f64, start: f64, size: f64) -> Result<Step, Failure> {
-    if !(size > 0.0 && size.is_finite()) {
+    if !(0.0 < size && size < f64::INFINITY) {
         return Err(Failure::Error(format!(
             "communicationStepSize is {size} s, expected more than 0"
         )));
@@ -372,7 +381,9 @@ fn communication_step(time: f64, start: f64, size: f64) -> Result<Step, Failure>
         Step { start: time, size: mismatch + size }
     };
     let ends_later = start + size > time && step.size > 0.0;
-    if size < start.next_up() - start || !ends_later {
+    // A size above `rounding` is above the distance to the next number, too.
+    let is_resolved = size > rounding || size >= start.next_up() - start;
+    if !(ends_later && is_resolved) {
         return Err(step_too_small(time, start, size));
     }
     Ok(step)

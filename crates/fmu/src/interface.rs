@@ -36,6 +36,8 @@ pub(crate) struct Interface<M> {
     /// Number of event indicators; `None` without model exchange.
     pub(crate) event_indicators: Option<usize>,
     pub(crate) max_output_derivative_order: u32,
+    /// Positions of the inputs with derivatives among the Reals.
+    pub(crate) interpolated: Vec<usize>,
     pub(crate) guid: Guid,
 }
 
@@ -57,6 +59,7 @@ impl<M: Model> Interface<M> {
             states: Vec::new(),
             event_indicators: model.model_exchange().map(|own| own.event_indicators),
             max_output_derivative_order: 0,
+            interpolated: Vec::new(),
             guid: Guid([0; 16]),
         };
         description.variables.push(time());
@@ -74,17 +77,15 @@ impl<M: Model> Interface<M> {
         interface.mark(&description);
         if let Some(co_simulation) = &mut description.co_simulation {
             co_simulation.max_output_derivative_order = interface.max_output_derivative_order;
-            co_simulation.can_interpolate_inputs = interface
-                .reals
-                .iter()
-                .any(|slot| slot.causality == Causality::Input && !slot.derivatives.is_empty());
+            co_simulation.can_interpolate_inputs = !interface.interpolated.is_empty();
         }
         interface.guid = Guid::of(&description);
         description.guid = interface.guid.to_string();
         Ok((interface, description))
     }
 
-    /// Marks the slots of the unknowns of `ModelStructure` and lists the continuous states.
+    /// Marks the slots of the states and of the unknowns of `ModelStructure`, and lists the inputs with
+    /// derivatives.
     fn mark(&mut self, description: &ModelDescription) {
         for state in &self.states {
             let slot = &mut self.reals[state.state];
@@ -95,6 +96,11 @@ impl<M: Model> Interface<M> {
             let own = &description.variables[row.index as usize - 1];
             matches!(own.kind, Kind::Real(_)).then(|| own.value_reference as usize - 1)
         };
+        for (position, slot) in self.reals.iter().enumerate() {
+            if slot.causality == Causality::Input && !slot.derivatives.is_empty() {
+                self.interpolated.push(position);
+            }
+        }
         let structure = &description.structure;
         for position in structure.outputs.iter().chain(&structure.derivatives).filter_map(real) {
             self.reals[position].is_unknown = true;

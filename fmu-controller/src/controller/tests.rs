@@ -130,7 +130,8 @@ fn the_slopes_of_the_outputs_are_the_limits_of_their_differences() {
     let mut controller = ready(AsoController::new(&shipped()).unwrap());
     step(&mut controller, 41.0, 1e-3, &[1e-3, -2e-3], &[0.1, 0.2]);
     let (u, f_hat) = (controller.values.u[0], controller.values.z[4]);
-    let (u_slope, f_slope) = (controller.u_slopes[0], controller.z_slopes[4]);
+    let slopes = controller.with_slopes();
+    let (u_slope, f_slope) = (slopes.u_slopes[0], slopes.z_slopes[4]);
     let h = 1e-9;
     step(&mut controller, 41.001, h, &[1e-3 + 1e-4, -2e-3 + 2e-4], &[0.1, 0.2]);
     assert!(((controller.values.u[0] - u) / h / u_slope - 1.0).abs() < 1e-4);

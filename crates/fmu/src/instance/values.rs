@@ -34,8 +34,8 @@ impl<M> Interface<M> {
 
     /// Sets the derivatives of all inputs to zero.
     pub(crate) fn clear_input_derivatives(&self, model: &mut M) {
-        for slot in self.reals.iter().filter(|slot| slot.causality == Causality::Input) {
-            for field in &slot.derivatives {
+        for &position in &self.interpolated {
+            for field in &self.reals[position].derivatives {
                 *field(model) = 0.0;
             }
         }

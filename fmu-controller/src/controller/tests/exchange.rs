@@ -22,7 +22,8 @@ fn rates(controller: &mut AsoController, t: f64, z: [f64; 3]) -> [f64; 3] {
     controller.values.y[0] = 0.4 + 0.5 * t;
     controller.values.z.copy_from_slice(&z);
     controller.update(t).unwrap();
-    std::array::from_fn(|i| controller.z_slopes[i])
+    let slopes = &controller.with_slopes().z_slopes;
+    std::array::from_fn(|i| slopes[i])
 }
 
 /// Integrates to 1 s by classic Runge-Kutta steps of 50 us, with events at t_on and after each

@@ -142,7 +142,9 @@ pub(super) fn unknowns(controller: &AsoController) -> Vec<Real> {
         all.push(real(name, move |own| &mut own.losses[position].estimate));
     }
     for (k, state) in states(controller).into_iter().enumerate() {
-        all.push(real(format!("der({})", state.name), move |own| &mut own.z_slopes[k]));
+        all.push(real(format!("der({})", state.name), move |own| {
+            &mut own.with_slopes().z_slopes[k]
+        }));
     }
     all
 }
