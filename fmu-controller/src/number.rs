@@ -91,7 +91,7 @@ impl Number for f64 {
 
     #[inline]
     fn add_product<const WHOLE: bool>(
-        sums: &mut &mut [f64],
+        sums: &mut Self::Out<'_, [f64]>,
         first: usize,
         matrix: &Matrix,
         vector: &[f64],

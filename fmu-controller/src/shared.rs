@@ -49,7 +49,7 @@ mod tests {
     fn a_change_of_one_copy_leaves_the_others() {
         let original = Shared::from(vec![1, 2]);
         let mut copy = original.clone();
-        assert!(std::ptr::eq(&*original, &*copy));
+        assert!(Arc::ptr_eq(&original.0, &copy.0));
         copy[0] = 3;
         assert_eq!((original.to_vec(), copy.to_vec()), (vec![1, 2], vec![3, 2]));
     }

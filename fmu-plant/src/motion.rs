@@ -174,7 +174,7 @@ impl Motion {
         duration: f64,
         tolerance: &Tolerance,
     ) -> Result<(), Failure> {
-        if !(start.is_finite() && 0.0 <= duration && duration < f64::INFINITY) {
+        if !(start.is_finite() && (0.0..f64::INFINITY).contains(&duration)) {
             return Err(Failure::Interval { start, duration });
         }
         if !force.is_finite() {
