@@ -17,6 +17,7 @@ mod misbehaviour_run;
 mod order;
 mod outside;
 mod package;
+mod preload;
 mod run;
 mod step_hints;
 mod tidy;

@@ -1,7 +1,5 @@
 //! `--preload`: libraries that FMUs expect in their process, without and with isolation.
 #![cfg(target_os = "linux")]
-#![forbid(unsafe_code)]
-#![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::path::Path;
 use std::process::Command;
