@@ -20,6 +20,7 @@ pub const NO_FOLDER: &str = "\0(no fmuResourceLocation)";
 
 /// The error of a conversion between a path and a URI.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum LocationError {
     /// The path is relative.
     #[error("expected an absolute path, found {}", path.display())]

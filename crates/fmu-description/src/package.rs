@@ -7,7 +7,9 @@ mod temporary;
 mod write;
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+use zip::result::ZipError;
 
 use crate::description::ParseError;
 
@@ -20,6 +22,7 @@ pub const DESCRIPTION: &str = "modelDescription.xml";
 
 /// The error of writing or reading an archive.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PackageError {
     /// An operation of the file system failed.
     #[error("cannot {action} {}", path.display())]
@@ -37,7 +40,7 @@ pub enum PackageError {
         /// The archive.
         path: PathBuf,
         /// The reason.
-        source: zip::result::ZipError,
+        source: io::Error,
     },
     /// An entry has a path that an FMU must not have.
     #[error("entry {entry:?}: expected {expected}")]
@@ -82,6 +85,12 @@ fn file_error(
 ) -> impl FnOnce(io::Error) -> PackageError {
     let path = path.into();
     move |source| PackageError::File { action, path, source }
+}
+
+/// Wraps an error of the archive.
+fn archive_error(path: &Path) -> impl FnOnce(ZipError) -> PackageError {
+    let path = path.to_owned();
+    move |error| PackageError::Archive { path, source: error.into() }
 }
 
 /// Folders of `binaries` for libraries of this platform, in order of preference: the names of FMI

@@ -93,6 +93,7 @@ pub struct DisplayUnit {
 
 /// The error of parsing a unit expression. Columns count characters from 1.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum UnitError {
     /// A name is not a known unit.
     #[error(

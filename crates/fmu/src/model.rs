@@ -218,6 +218,7 @@ impl Step {
 
 /// The failure of a call, with a message for the importer's logger.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum Failure {
     /// `fmi2Discard`: the call was rejected; the instance is unchanged. Becomes `fmi2Error` in functions
     /// that must not return `fmi2Discard` (section 2.1.3: initialization, events, directional

@@ -94,6 +94,7 @@ pub trait Sink: Send {
 
 /// The error of writing or reading results.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ResultsError {
     /// The extension of the file is neither `.csv` nor `.parquet`.
     #[error("{}: results are written as .csv or .parquet", path.display())]

@@ -19,6 +19,7 @@ pub struct Selection {
 
 /// The error of a selection.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SelectionError {
     /// A pattern matches no variable.
     #[error("no variable matches {pattern:?}{near}")]

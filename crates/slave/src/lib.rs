@@ -343,6 +343,7 @@ impl CallError {
 
 /// How a call failed.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Failure {
     /// The function returned this status.
     Status(Status),

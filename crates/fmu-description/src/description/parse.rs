@@ -46,6 +46,7 @@ impl fmt::Display for Position {
 
 /// The error of parsing a text that is not the model description of an FMI 2.0 FMU.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ParseError {
     /// The file is not text that the reader can decode.
     #[error("expected XML in UTF-8, or in the encoding that it declares, found {found}")]

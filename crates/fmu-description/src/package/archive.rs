@@ -11,7 +11,7 @@ use zip::read::ZipFile;
 use zip::result::ZipError;
 use zip::{CompressionMethod, ZipArchive};
 
-use super::{PackageError, file_error, paths};
+use super::{PackageError, archive_error, file_error, paths};
 
 /// Maximum number of entries.
 const ENTRIES: usize = 100_000;
@@ -74,8 +74,7 @@ impl Archive {
         let length = file.metadata().map_err(file_error("read", path))?.len();
         let left = Rc::new(Cell::new(DIRECTORY));
         let reader = Metered { inner: BufReader::new(file), left: left.clone() };
-        let wrong = |source| PackageError::Archive { path: path.to_owned(), source };
-        let zip = ZipArchive::new(reader).map_err(wrong)?;
+        let zip = ZipArchive::new(reader).map_err(archive_error(path))?;
         left.set(u64::MAX);
         let capacity = BASE.saturating_add(RATIO.saturating_mul(length)).min(CAPACITY);
         let (path, names) = (path.to_owned(), Vec::new());
@@ -175,19 +174,18 @@ impl Archive {
                 return Err(PackageError::Entry { entry: name.clone(), expected });
             }
             let entry = self.zip.by_index(index);
-            let wrong = |source| PackageError::Archive { path: self.path.clone(), source };
             let limit =
                 || PackageError::Limit { path: self.path.clone(), limit: capacity, unit: "bytes" };
             // The list of entries may state a wrong size, so the limit applies to the bytes
             // written.
-            let written = write_entry(entry.map_err(wrong)?, &target, left)?;
+            let written = write_entry(entry.map_err(archive_error(&self.path))?, &target, left)?;
             left = left.checked_sub(written).ok_or_else(limit)?;
         }
         Ok(())
     }
 
-    fn wrong(&self, source: ZipError) -> PackageError {
-        PackageError::Archive { path: self.path.clone(), source }
+    fn wrong(&self, error: ZipError) -> PackageError {
+        archive_error(&self.path)(error)
     }
 
     fn limit(&self, limit: u64, unit: &'static str) -> PackageError {

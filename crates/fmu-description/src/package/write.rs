@@ -8,7 +8,7 @@ use std::path::Path;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, System, ZipWriter};
 
-use super::{DESCRIPTION, PackageError, file_error, paths};
+use super::{DESCRIPTION, PackageError, archive_error, file_error, paths};
 
 /// Maximum size in bytes of an archive without Zip64, less room for its directory.
 const CAPACITY: u64 = 1 << 31;
@@ -87,9 +87,7 @@ impl Package {
             });
         }
         self.check(target)?;
-        let bytes = self
-            .archive()
-            .map_err(|source| PackageError::Archive { path: target.to_owned(), source })?;
+        let bytes = self.archive().map_err(archive_error(target))?;
         let folder = match target.parent() {
             Some(parent) if parent != Path::new("") => parent,
             _ => Path::new("."),

@@ -127,10 +127,8 @@ impl From<CallError> for RemoteError {
             Failure::TimedOut(seconds) => RemoteFailure::TimedOut(*seconds),
             Failure::Panicked(text) => RemoteFailure::Panicked(clipped(text)),
             Failure::InvalidAnswer(text) => RemoteFailure::InvalidAnswer(clipped(text)),
-            // A worker cannot report its own end: these failures arise in the master only.
-            Failure::Killed(..) | Failure::Exited(_) | Failure::OutOfMemory(_) => {
-                RemoteFailure::InvalidAnswer("ended a process of its own".to_owned())
-            }
+            // The others are ends of a process, which arise in the master only.
+            other => RemoteFailure::InvalidAnswer(other.to_string()),
         };
         let messages = error.messages.iter().map(|text| clipped(text)).collect();
         Self { function: Function::named(error.function), failure, messages }

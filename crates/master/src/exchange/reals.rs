@@ -118,11 +118,14 @@ impl Reals {
         let span = &mut trace.spans[slave];
         (span.earlier_size, span.last_size) = (span.last_size, span.size);
         (span.start, span.size, span.stepped) = (time, size, false);
-        trace.earlier[range.clone()].copy_from_slice(&trace.before[range.clone()]);
-        trace.before[range.clone()].copy_from_slice(&trace.start[range.clone()]);
-        trace.start[range.clone()].copy_from_slice(&trace.latest[range]);
-        let derivatives = &trace.derivatives[derived.clone()];
-        trace.start_derivatives[derived].copy_from_slice(derivatives);
+        for output in range {
+            trace.earlier[output] = trace.before[output];
+            trace.before[output] = trace.start[output];
+            trace.start[output] = trace.latest[output];
+        }
+        for k in derived {
+            trace.start_derivatives[k] = trace.derivatives[k];
+        }
         for &(port, output) in &self.layout.from_integers {
             if port.slave == slave {
                 trace.start[output] = trace.latest[output];

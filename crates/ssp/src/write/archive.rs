@@ -6,6 +6,7 @@ use std::io::{self, Cursor, Write as _};
 use std::path::Path;
 
 use fmu_description::package::{PackageError, Unpacked};
+use zip::result::ZipError;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, System, ZipWriter};
 
@@ -119,7 +120,9 @@ fn zip(target: &Path, entries: &[(&str, &[u8])]) -> Result<Vec<u8>, SspError> {
     if total > CAPACITY {
         return Err(SspError::Limit { limit: CAPACITY, what: "bytes in an archive" });
     }
-    let wrong = |source| SspError::from(PackageError::Archive { path: target.to_owned(), source });
+    let wrong = |error: ZipError| {
+        SspError::from(PackageError::Archive { path: target.to_owned(), source: error.into() })
+    };
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
     for (path, bytes) in entries {
         let is_fmu = Path::new(path).extension().is_some_and(|extension| extension == "fmu");
