@@ -12,7 +12,7 @@ quick:
 test:
     scripts/test
 
-# FMUs for Windows, built and tested under wine.
+# Unit tests with debug assertions and overflow checks; FMUs for Windows under wine.
 test-long:
     scripts/test-long
 
