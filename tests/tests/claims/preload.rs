@@ -1,5 +1,6 @@
 //! `--preload`: libraries that FMUs expect in their process, without and with isolation.
 #![cfg(target_os = "linux")]
+#![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::path::Path;
 use std::process::Command;
