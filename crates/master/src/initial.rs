@@ -1,7 +1,7 @@
 //! Initialisation of the connected system: settings, outputs in the order of their dependencies,
 //! algebraic loops.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use fmu_description::Experiment;
 use fmu_description::{DefaultExperiment, Kind, ModelDescription};
@@ -46,7 +46,8 @@ pub(crate) fn initialise(
     }
     let connections = system.connections.iter().chain(&system.initial);
     let driven = scenario.drives.iter().map(Drive::port);
-    let replaced: Vec<Port> = connections.map(|connection| connection.to).chain(driven).collect();
+    let replaced: HashSet<Port> =
+        connections.map(|connection| connection.to).chain(driven).collect();
     system.confirm_settings(&replaced)?;
     system.confirm_start_values(&replaced);
     Ok(())

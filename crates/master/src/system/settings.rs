@@ -1,6 +1,8 @@
 //! Settings: values of variables that the user states before the run. The FMUs receive them during
 //! initialisation.
 
+use std::collections::HashSet;
+
 use fmu_description::{Causality, Initial, Variability};
 
 use super::{Port, System};
@@ -74,7 +76,7 @@ impl System {
     /// # Errors
     ///
     /// Returns an error if a parameter or an input has another value than the one set.
-    pub(crate) fn confirm_settings(&mut self, replaced: &[Port]) -> Result<(), SystemError> {
+    pub(crate) fn confirm_settings(&mut self, replaced: &HashSet<Port>) -> Result<(), SystemError> {
         for setting in self.settings.clone() {
             if replaced.contains(&setting.port) {
                 continue;
@@ -107,8 +109,8 @@ impl System {
 
     /// Warns after the initialization about parameters and inputs whose value differs from the
     /// start value of the description, except variables that were set or are in `replaced`.
-    pub(crate) fn confirm_start_values(&mut self, replaced: &[Port]) {
-        let set: Vec<Port> = self.settings.iter().map(|setting| setting.port).collect();
+    pub(crate) fn confirm_start_values(&mut self, replaced: &HashSet<Port>) {
+        let set: HashSet<Port> = self.settings.iter().map(|setting| setting.port).collect();
         for slave in 0..self.slaves.len() {
             let ports = (0..self.slaves[slave].1.description().variables.len())
                 .map(|variable| Port { slave, variable })
