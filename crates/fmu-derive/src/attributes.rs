@@ -51,7 +51,7 @@ impl Role {
 pub(crate) struct Items {
     pub(crate) span: Span,
     pub(crate) name: LitStr,
-    pub(crate) items: Vec<(LitStr, Expr)>,
+    pub(crate) values: Vec<(LitStr, Expr)>,
 }
 
 /// The attributes of one field.
@@ -173,7 +173,7 @@ fn items(meta: &ParseNestedMeta<'_>, span: Span) -> Result<Items> {
     let content;
     parenthesized!(content in meta.input);
     let name = content.parse()?;
-    let mut items = Vec::new();
+    let mut values = Vec::new();
     while !content.is_empty() {
         content.parse::<Token![,]>()?;
         if content.is_empty() {
@@ -186,10 +186,10 @@ fn items(meta: &ParseNestedMeta<'_>, span: Span) -> Result<Items> {
             LitStr::new(&item.to_string(), item.span())
         };
         content.parse::<Token![=]>()?;
-        items.push((item, content.parse()?));
+        values.push((item, content.parse()?));
     }
-    if items.is_empty() {
+    if values.is_empty() {
         return Err(Error::new(span, "an enumeration has at least one item: item = 0"));
     }
-    Ok(Items { span, name, items })
+    Ok(Items { span, name, values })
 }

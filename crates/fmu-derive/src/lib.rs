@@ -6,6 +6,8 @@ mod check;
 mod field;
 mod model;
 mod table;
+#[cfg(test)]
+mod tests;
 
 use proc_macro::TokenStream;
 use syn::{DeriveInput, ItemImpl, parse_macro_input};

@@ -151,7 +151,7 @@ fn constructor(variable: &Variable<'_>) -> TokenStream {
 fn enumeration(variable: &Variable<'_>) -> Option<TokenStream> {
     let own = variable.attributes.enumeration.as_ref()?;
     let name = &own.name;
-    let items = own.items.iter().map(|(name, value)| quote!((#name, #value)));
+    let items = own.values.iter().map(|(name, value)| quote!((#name, #value)));
     Some(quote!(::fmu::Enumeration::new(#name, [#(#items),*]),))
 }
 
@@ -218,11 +218,10 @@ fn list<'a>(
     for field in fields {
         let found = variables.iter().find(|variable| variable.field == field);
         let name = found.map_or_else(|| field.to_string(), |found| found.name.clone());
-        names.extend(match found.and_then(|found| found.length) {
-            Some(length) => quote! {
-                names.extend((1..=(#length)).map(|index| ::std::format!("{}[{index}]", #name)));
-            },
-            None => quote!(names.push(#name.into());),
+        names.extend(if let Some(length) = found.and_then(|found| found.length) {
+            quote!(names.extend((1..=(#length)).map(|index| ::std::format!("{}[{index}]", #name)));)
+        } else {
+            quote!(names.push(#name.into());)
         });
     }
     quote!({ #names names })

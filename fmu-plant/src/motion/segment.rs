@@ -25,7 +25,7 @@ impl<'a> Segment<'a> {
 
     pub(super) fn step(&self, length: f64) -> Step<State> {
         let Self { plant, regime, .. } = *self;
-        let mut step = Step::new(self.start, self.slope);
+        let mut step = Step::new(self.start, &self.slope);
         step.take(
             |time, state, slope| *slope = plant.derivative(regime, time, state),
             |time, state, slope| *slope = plant.derivative_at_end(regime, time, state),

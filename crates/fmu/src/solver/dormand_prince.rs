@@ -45,7 +45,7 @@ impl<V: Vector> Step<V> {
     /// Creates a step of length 0 at the state `start`, where the derivative is `slope`.
     #[inline]
     #[must_use]
-    pub fn new(start: V, slope: V) -> Self {
+    pub fn new(start: V, slope: &V) -> Self {
         let (end, stage) = (start.clone(), start.clone());
         let slopes = std::array::from_fn(|_| slope.clone());
         Self { start, end, length: 0.0, slopes, stage }
@@ -243,7 +243,7 @@ mod tests {
     }
 
     fn take(f: impl Fn(f64, &State) -> State, time: f64, start: State, length: f64) -> Step<State> {
-        let mut step = Step::new(start, f(time, &start));
+        let mut step = Step::new(start, &f(time, &start));
         let evaluate = |t: f64, y: &State, slope: &mut State| *slope = f(t, y);
         step.take(evaluate, evaluate, time, length);
         step
@@ -319,7 +319,7 @@ mod tests {
     fn arrays_and_vectors_give_the_same_bits() {
         let array = step(0.1);
         let start = exact(0.3);
-        let mut vector = Step::new(start.to_vec(), oscillators(0.3, &start).to_vec());
+        let mut vector = Step::new(start.to_vec(), &oscillators(0.3, &start).to_vec());
         let evaluate = |t: f64, y: &Vec<f64>, slope: &mut Vec<f64>| {
             slope.copy_from_slice(&oscillators(t, &[y[0], y[1], y[2], y[3]]));
         };

@@ -84,7 +84,7 @@ impl Integrator {
         Self {
             tolerance: TOLERANCE,
             time: 0.0,
-            step: Step::new(zero.clone(), zero.clone()),
+            step: Step::new(zero.clone(), &zero),
             suggested: f64::INFINITY,
             indicators: Indicators::new(indicators),
             slope: zero.clone(),

@@ -34,6 +34,7 @@ where
     Functions { derivative, indicators, evaluations: 0 }
 }
 
+#[expect(clippy::unnecessary_wraps, reason = "the signature of a system")]
 fn oscillator(_: f64, y: &[f64], slope: &mut [f64]) -> Result<(), Failure> {
     slope.copy_from_slice(&[y[1], -y[0]]);
     Ok(())
