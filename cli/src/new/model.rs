@@ -21,10 +21,10 @@ struct NewModel {
     #[fmu(tunable, name = "T_outside", unit = "K", start = 273.15)]
     outside: f64,
     /// Thermal resistance
-    #[fmu(parameter, name = "R", unit = "K/W", min = 1e-9, max = 1e9, start = 0.01)]
+    #[fmu(parameter, name = "R", unit = "K/W", min = 1e-9, start = 0.01)]
     resistance: f64,
     /// Time constant
-    #[fmu(parameter, name = "tau", unit = "s", min = 1e-9, max = 1e9, start = 3600)]
+    #[fmu(parameter, name = "tau", unit = "s", min = 1e-9, start = 3600)]
     time_constant: f64,
 }
 

@@ -13,8 +13,8 @@ fn the_variables_keep_the_rules_of_the_standard() {
 
 #[test]
 fn the_oscillator_reaches_its_limit_cycle() {
-    // The amplitude of the limit cycle for mu = 1 is 2.00862 (Strogatz, Nonlinear Dynamics and Chaos,
-    // and tables since van der Pol's paper).
+    // The amplitude of the limit cycle for mu = 1 is 2.00862: A. Buonomo, "The periodic solution of van
+    // der Pol's equation" (1998).
     let mut simulation = Simulation::<VanDerPol>::new(Path::new("resources")).unwrap();
     let mut largest: f64 = 0.0;
     for k in 0..4000 {
