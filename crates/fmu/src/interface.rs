@@ -311,8 +311,10 @@ fn time() -> ScalarVariable {
 fn define_unit<M>(units: &mut Vec<Unit>, variable: &Variable<M>) -> Result<(), Failure> {
     let Some(name) = &variable.number.unit else { return Ok(()) };
     if units.iter().all(|unit| unit.name != *name) {
-        let unit = Unit::parse(name)
-            .map_err(|error| Failure::Error(format!("variable {}: {error}", variable.name)))?;
+        let unit = Unit::parse(name).map_err(|error| {
+            let name = &variable.name;
+            Failure::Error(format!("variable {name}: {error} (FMI 2.0.5, section 2.2.2)"))
+        })?;
         units.push(unit);
     }
     Ok(())
@@ -324,7 +326,8 @@ fn define_type<M>(types: &mut Vec<SimpleType>, variable: &Variable<M>) -> Result
         Some(known) if known.items == *items => {}
         Some(_) => {
             return Err(Failure::Error(format!(
-                "variable {}: its enumeration {name} has other items elsewhere",
+                "variable {}: its enumeration {name} has other items elsewhere \
+                 (FMI 2.0.5, section 2.2.3)",
                 variable.name
             )));
         }

@@ -1,5 +1,8 @@
 //! The trait [`Variables`], which the derive macro implements.
 
+#[cfg(test)]
+mod tests;
+
 use crate::log::Log;
 use crate::variable::Variable;
 
