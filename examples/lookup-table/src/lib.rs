@@ -2,7 +2,7 @@
 //! outputs.
 #![forbid(unsafe_code)]
 
-use fmu::{About, Failure, Model, Step, Variable as V};
+use fmu::{About, Failure, Model, Variable as V};
 
 #[derive(Clone, serde::Serialize, serde::Deserialize)]
 struct LookupTable {
@@ -34,10 +34,6 @@ impl Model for LookupTable {
         let column = |k| V::real(&self.names[k], "A column", move |m: &mut Self| &mut m.values[k]);
         let outputs = (1..self.names.len()).map(|k| column(k).output(&[&self.names[0]]));
         std::iter::once(column(0).input()).chain(outputs).collect()
-    }
-
-    fn step(&mut self, step: &Step) -> Result<(), Failure> {
-        self.update(step.end())
     }
 
     fn update(&mut self, _time: f64) -> Result<(), Failure> {

@@ -43,11 +43,12 @@ fn the_mathematics_depends_on_neither_fmi_nor_files() {
 }
 
 /// The folders of our libraries, each with the libraries that it may use.
-const ARROWS: [(&str, &[&str]); 15] = [
+const ARROWS: [(&str, &[&str]); 16] = [
     ("lapack", &[]),
     ("control", &["aso-lapack"]),
     ("fmu-description", &[]),
-    ("fmu", &["fmu-description"]),
+    ("fmu-derive", &[]),
+    ("fmu", &["fmu-derive", "fmu-description"]),
     ("slave", &["fmu-description"]),
     ("fmu-import", &["fmu-description", "slave"]),
     ("linearise", &["fmu-description", "fmu-import", "slave"]),

@@ -12,7 +12,9 @@ pub(super) fn index(position: usize) -> u32 {
 /// Returns the position of the variable called `name`, to which `of` refers.
 pub(super) fn find<M>(variables: &[Variable<M>], of: &str, name: &str) -> Result<usize, Failure> {
     let found = variables.iter().position(|variable| variable.name == name);
-    found.ok_or_else(|| Failure::Error(format!("{of} refers to {name}, which is no variable")))
+    found.ok_or_else(|| {
+        Failure::Error(format!("{of} refers to {name}, which is no variable (section 2.2.7)"))
+    })
 }
 
 /// Returns the positions of each continuous state and its derivative, in the order of the derivatives.
