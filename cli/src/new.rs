@@ -11,8 +11,8 @@ const MODEL: &str = include_str!("new/model.rs");
 
 /// Names reserved by Rust, the template, cargo or Windows.
 const TAKEN: &str = "about alloc aux clone con core default deserialize err experiment failure fmu \
-    into model none nul ok option path prn result self send serde serialize some std step string \
-    test variable vec";
+    into model none nul ok option path prn result self send serde serialize simulation some std \
+    step string test variable variables vec";
 
 #[derive(clap::Args)]
 pub(crate) struct Options {

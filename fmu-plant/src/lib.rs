@@ -1,8 +1,6 @@
 //! The friction pendulum: a pendulum on a cart whose rail has set-valued Stribeck friction.
 #![forbid(unsafe_code)]
 
-mod crossing;
-mod dormand_prince;
 pub mod dynamics;
 pub mod friction;
 pub mod functions;

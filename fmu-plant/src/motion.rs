@@ -5,13 +5,13 @@
 //! length. In every step the polynomial of the margin to the next event is searched for its first
 //! sign change, and the step is repeated with the length that ends at the event.
 
-use crate::crossing::locate;
 use crate::dynamics::{Force, State};
 use crate::friction::Regime;
 use crate::functions::Memory;
 use crate::parameters::{Parameters, Refusal, require};
 use crate::plant::{Crossing, NotFinite, Plant};
 use crate::response::Response;
+use fmu::solver::{self, search};
 use segment::Segment;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -30,6 +30,9 @@ const LONGEST_STEP: f64 = 0.1;
 
 /// Shortest length in s to which a rejected integration step is reduced.
 const SHORTEST_STEP: f64 = 1e-13;
+
+/// Width in s to which an event is located.
+const EVENT_WIDTH: f64 = 1e-15;
 
 /// Most integration steps, rejected ones included, in one call of `advance`.
 const STEP_LIMIT: u32 = 200_000;
@@ -245,7 +248,7 @@ impl Motion {
             Err(NotFinite) => Progress::NotFinite,
             Ok(Some(crossing)) => self.step_to_event(&crossing, &segment, length, tolerance),
             Ok(None) => {
-                self.state = step.end;
+                self.state = *step.end();
                 if lasts { Progress::Finished } else { Progress::Advanced(length) }
             }
         }
@@ -275,24 +278,16 @@ impl Motion {
     ) -> Progress {
         let direction = crossing.direction;
         let margin = |length: f64| segment.margin(direction, &segment.step(length));
-        let mut ceiling = crossing.fraction * length;
-        let mut at_ceiling = margin(ceiling);
-        while at_ceiling >= 0.0 && ceiling < length {
-            ceiling = (2.0 * ceiling).min(length);
-            at_ceiling = margin(ceiling);
-        }
-        let happens = at_ceiling < 0.0;
-        let length = if happens {
-            locate(margin(0.0).max(0.0), ceiling, at_ceiling, margin)
-        } else {
-            ceiling
+        let (length, happens) = match search(crossing.fraction, length, EVENT_WIDTH, margin) {
+            solver::Crossing::At(length) => (length, true),
+            solver::Crossing::NoneUpTo(length) => (length, false),
         };
         let step = segment.step(length);
         let error = tolerance.squared_error(&step);
         if error.is_nan() || error > 1.0 {
             return self.reject(length, error);
         }
-        self.state = step.end;
+        self.state = *step.end();
         if !happens {
             return Progress::Advanced(length);
         }

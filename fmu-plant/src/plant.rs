@@ -1,11 +1,10 @@
 //! Body, friction law and force during one communication step.
 
-use crate::crossing::Quartic;
-use crate::dormand_prince::Step;
 use crate::dynamics::{Force, RigidBody, State};
 use crate::friction::{Regime, StribeckLaw};
 use crate::functions::{Direct, Functions, Memory};
 use crate::parameters::Parameters;
+use fmu::solver::{Quartic, Step};
 
 pub(crate) struct Plant<'a> {
     body: RigidBody,
@@ -96,7 +95,7 @@ impl<'a> Plant<'a> {
         &self,
         regime: Regime,
         elapsed: f64,
-        step: &Step,
+        step: &Step<State>,
     ) -> Result<Option<Crossing>, NotFinite> {
         if regime == Regime::Stick {
             self.first_break_away(elapsed, step)
@@ -105,14 +104,19 @@ impl<'a> Plant<'a> {
         }
     }
 
-    fn first_break_away(&self, elapsed: f64, step: &Step) -> Result<Option<Crossing>, NotFinite> {
-        let end = elapsed + step.length;
-        let force = self.force.at(elapsed + 0.5 * step.length);
-        let middle = self.body.balancing_force(&Direct, &step.middle(), force);
+    fn first_break_away(
+        &self,
+        elapsed: f64,
+        step: &Step<State>,
+    ) -> Result<Option<Crossing>, NotFinite> {
+        let (length, end) = (step.length(), elapsed + step.length());
+        let force = self.force.at(elapsed + 0.5 * length);
+        let middle = std::array::from_fn(|i| step.middle(i));
+        let middle = self.body.balancing_force(&Direct, &middle, force);
         let balancing = Quartic::new(
-            self.balancing(elapsed, &step.start, step.length),
+            self.balancing(elapsed, step.start(), length),
             middle,
-            self.balancing(end, &step.end, step.length),
+            self.balancing(end, step.end(), length),
         );
         if !balancing.is_finite() {
             return Err(NotFinite);
@@ -144,12 +148,8 @@ impl<'a> Plant<'a> {
 /// The margin to an event could not be computed.
 pub(crate) struct NotFinite;
 
-fn first_stop(direction: Regime, step: &Step) -> Result<Option<Crossing>, NotFinite> {
-    let velocity = Quartic::new(
-        (step.start[2], step.length * step.first_slope()[2]),
-        step.middle()[2],
-        (step.end[2], step.length * step.last_slope()[2]),
-    );
+fn first_stop(direction: Regime, step: &Step<State>) -> Result<Option<Crossing>, NotFinite> {
+    let velocity = step.extension(2);
     if !velocity.is_finite() {
         return Err(NotFinite);
     }

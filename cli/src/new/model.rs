@@ -1,90 +1,41 @@
 //! A room that is heated: T' = (T_outside + R power - T) / tau.
 #![forbid(unsafe_code)]
 
-use std::path::Path;
-
-use fmu::{About, Experiment, Failure, Model, Step, Variable};
+use fmu::{Failure, Model, Variables};
 use serde::{Deserialize, Serialize};
 
 /// The model. Every quantity that affects the future is a field: the state of the FMU is a copy of
-/// this struct.
-#[derive(Clone, Serialize, Deserialize)]
+/// this struct. Each field is a variable, and its comment is the description of the variable.
+#[derive(Clone, Variables, Serialize, Deserialize)]
 struct NewModel {
+    /// Heating
+    #[fmu(input, unit = "W", start = 0)]
     power: f64,
+    /// Temperature of the room
+    #[fmu(output, name = "T", unit = "K", nominal = 300, start = 293.15)]
     temperature: f64,
+    /// Rise of the temperature
+    #[fmu(derivative_of = temperature, name = "der(T)", unit = "K/s")]
+    rise: f64,
+    /// Temperature outside
+    #[fmu(tunable, name = "T_outside", unit = "K", start = 273.15)]
     outside: f64,
+    /// Thermal resistance
+    #[fmu(parameter, name = "R", unit = "K/W", min = 1e-9, max = 1e9, start = 0.01)]
     resistance: f64,
+    /// Time constant
+    #[fmu(parameter, name = "tau", unit = "s", min = 1e-9, max = 1e9, start = 3600)]
     time_constant: f64,
 }
 
+/// The name of the FMU is that of the struct; `stop_time` is that of the default experiment, in s.
+#[fmu::model(stop_time = 7200)]
 impl Model for NewModel {
-    /// The name of the FMU and of the library in it.
-    const IDENTIFIER: &'static str = "NewModel";
-
-    fn about(&self) -> About {
-        About {
-            description: "A room that is heated".to_owned(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            license: env!("CARGO_PKG_LICENSE").to_owned(),
-            ..About::default()
-        }
-    }
-
-    /// Creates the model; the values here are the start values in the model description.
-    fn new(_resources: &Path) -> Result<Self, Failure> {
-        Ok(Self {
-            power: 0.0,
-            temperature: 293.15,
-            outside: 273.15,
-            resistance: 0.01,
-            time_constant: 3600.0,
-        })
-    }
-
-    /// Lists the variables of the model description, each with its field.
-    fn variables(&self) -> Vec<Variable<Self>> {
-        vec![
-            Variable::real("power", "Heating", |room: &mut Self| &mut room.power)
-                .input()
-                .unit("W"),
-            // An output lists the inputs on which it depends directly, without a step in between:
-            // none here.
-            Variable::real("T", "Temperature of the room", |room: &mut Self| {
-                &mut room.temperature
-            })
-            .output(&[])
-            .exact()
-            .unit("K"),
-            Variable::real("T_outside", "Temperature outside", |room: &mut Self| {
-                &mut room.outside
-            })
-            .tunable()
-            .unit("K"),
-            Variable::real("R", "Thermal resistance", |room: &mut Self| {
-                &mut room.resistance
-            })
-            .parameter()
-            .range(1e-9, 1e9)
-            .unit("K/W"),
-            Variable::real("tau", "Time constant", |room: &mut Self| {
-                &mut room.time_constant
-            })
-            .parameter()
-            .range(1e-9, 1e9)
-            .unit("s"),
-        ]
-    }
-
-    /// Runs after parameters and inputs are set and before the first step.
-    fn initialize(&mut self, _experiment: &Experiment) -> Result<(), Failure> {
-        Ok(())
-    }
-
-    /// Advances the model from `step.start` by `step.size`; this model has an exact solution.
-    fn step(&mut self, step: &Step) -> Result<(), Failure> {
+    /// Computes outputs and derivatives from states, inputs and parameters. The exporter integrates the
+    /// derivatives in co-simulation, the importer in model exchange.
+    fn update(&mut self, _time: f64) -> Result<(), Failure> {
         let rest = self.outside + self.resistance * self.power;
-        let decay = (-step.size / self.time_constant).exp();
-        self.temperature = rest + (self.temperature - rest) * decay;
+        self.rise = (rest - self.temperature) / self.time_constant;
         Ok(())
     }
 }
@@ -93,6 +44,8 @@ fmu::export!(NewModel);
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
 
     #[test]
@@ -105,17 +58,10 @@ mod tests {
 
     #[test]
     fn a_heated_room_ends_at_the_temperature_outside_plus_resistance_times_power() {
-        let mut room = NewModel::new(Path::new("resources")).unwrap();
-        room.power = 2000.0;
-        room.step(&Step {
-            start: 0.0,
-            size: 100.0 * room.time_constant,
-        })
-        .unwrap();
-        assert!(
-            (room.temperature - 293.15).abs() < 1e-9,
-            "{}",
-            room.temperature
-        );
+        let mut room = fmu::Simulation::<NewModel>::new(Path::new("resources")).unwrap();
+        room.model_mut().power = 2000.0;
+        room.step(100.0 * room.model().time_constant).unwrap();
+        let temperature = room.model().temperature;
+        assert!((temperature - 293.15).abs() < 1e-3, "{temperature}");
     }
 }

@@ -214,7 +214,7 @@ pub unsafe fn instantiate<M: Model>(
     resource_location: fmi2String,
     functions: *const fmi2CallbackFunctions,
     _visible: fmi2Boolean,
-    _logging_on: fmi2Boolean,
+    logging_on: fmi2Boolean,
 ) -> fmi2Component {
     // SAFETY: the callbacks are readable during this call; only a copy is kept.
     let Ok([functions]) = (unsafe { read(functions, 1) }) else { return std::ptr::null_mut() };
@@ -239,7 +239,9 @@ pub unsafe fn instantiate<M: Model>(
         Instance::<M>::new(interface_type, &folder, &guid, callbacks.clone())
     });
     match made {
-        Ok(instance) => {
+        Ok(mut instance) => {
+            instance.set_logging_on(logging_on != 0);
+            instance.send_messages();
             let instance = UnsafeCell::new(instance);
             Box::into_raw(Box::new(Component { busy: AtomicBool::new(false), instance })).cast()
         }

@@ -15,8 +15,10 @@ use serde::{Deserialize, Serialize};
 use crate::Experiment;
 use crate::fence::{HookGuard, guarded};
 use crate::ffi::Callbacks;
-use crate::interface::{CATEGORIES, Interface, new_model};
+use crate::interface::{Interface, WARNING, new_model};
+use crate::log::{Log, Message};
 use crate::model::{Failure, Model, Step};
+use crate::stepper::Stepper;
 use fmu_description::Guid;
 use fmu_description::abi::Status;
 use fmu_description::call_order::{Function, InterfaceType, State, allowed, may_discard};
@@ -48,7 +50,13 @@ pub(crate) struct Instance<M: Model> {
     core: Core<M>,
     fresh: M,
     interface: Interface<M>,
+    /// Integrates a model that has no step of its own.
+    stepper: Stepper,
     callbacks: Callbacks,
+    /// Whether debug logging is on: whether messages of the model that are no warnings are sent.
+    debug_logging: bool,
+    /// Messages of the model that are not sent yet.
+    messages: Vec<Message>,
     /// Log categories selected by `fmi2SetDebugLogging`; `None` selects all.
     categories: Option<Vec<String>>,
     /// The strings returned by the last `fmi2GetString`, which must stay valid until the next call.
@@ -106,8 +114,9 @@ impl<M: Model> Instance<M> {
         callbacks: Callbacks,
     ) -> Result<Self, Failure> {
         let hook_guard = HookGuard::new();
-        let (core, fresh, interface) = guarded(|| {
+        let (core, fresh, interface, stepper, messages) = guarded(|| {
             let mut model = new_model::<M>(resources)?;
+            let messages = model.log().map(Log::take).unwrap_or_default();
             let (interface, description) = Interface::new(&mut model)?;
             let offers_exchange = interface.event_indicators.is_some();
             if interface_type == InterfaceType::ModelExchange && !offers_exchange {
@@ -123,13 +132,18 @@ impl<M: Model> Instance<M> {
                     resources.display()
                 )));
             }
-            Ok((Core::new(model.clone(), interface_type), model, interface))
+            let tolerance = description.default_experiment.and_then(|own| own.tolerance);
+            let stepper = Stepper::new(&interface, tolerance);
+            Ok((Core::new(model.clone(), interface_type), model, interface, stepper, messages))
         })?;
         Ok(Self {
             core,
             fresh,
             interface,
+            stepper,
             callbacks,
+            debug_logging: false,
+            messages,
             categories: None,
             strings: Vec::new(),
             direction: None,
@@ -150,14 +164,39 @@ impl<M: Model> Instance<M> {
         }
         // A boxed failure keeps the result of a successful call in one register.
         let done = if allowed(self.core.interface_type, function, state) {
-            guarded(|| body(self).map_err(Box::new))
+            guarded(|| {
+                let done = body(self).map_err(Box::new);
+                if let Some(log) = self.core.model.log().filter(|log| !log.is_empty()) {
+                    self.messages = log.take();
+                }
+                done
+            })
         } else {
             Err(Box::new(Failure::Error(format!("must not be called in state {state:?}"))))
         };
+        let warned = !self.messages.is_empty() && self.send_messages();
         match done {
+            Ok(()) if warned => Status::Warning,
             Ok(()) => Status::OK,
             Err(failure) => self.fail(function, &failure),
         }
+    }
+
+    /// Sends the messages of the model to the importer. Returns whether one is a warning.
+    #[cold]
+    pub(crate) fn send_messages(&mut self) -> bool {
+        let mut warned = false;
+        for Message { category, text } in std::mem::take(&mut self.messages) {
+            match category {
+                Some(category) if self.debug_logging => self.log(Status::OK, category, &text),
+                Some(_) => {}
+                None => {
+                    warned = true;
+                    self.log(Status::Warning, WARNING, &text);
+                }
+            }
+        }
+        warned
     }
 
     #[cold]
@@ -211,11 +250,16 @@ impl<M: Model> Instance<M> {
         log(&self.callbacks, self.categories.as_deref(), status, category, message);
     }
 
+    /// Turns the messages of the model on or off that are no warnings: `loggingOn`.
+    pub(crate) fn set_logging_on(&mut self, on: bool) {
+        self.debug_logging = on;
+    }
+
     /// `fmi2SetDebugLogging`. Messages that explain a status are sent even if debug logging is off
     /// (section 2.1.3). If categories are given, only their messages are sent.
     pub(crate) fn set_debug_logging(&mut self, categories: Vec<String>) -> Result<(), Failure> {
-        let known = CATEGORIES.map(|(name, _)| name);
-        if let Some(unknown) = categories.iter().find(|name| !known.contains(&name.as_str())) {
+        let known = &self.interface.log_categories;
+        if let Some(unknown) = categories.iter().find(|name| !known.contains(name)) {
             return Err(Failure::Error(format!(
                 "{unknown} is not a log category of this FMU, expected one of {}",
                 known.join(", ")
@@ -301,7 +345,14 @@ impl<M: Model> Instance<M> {
         let end = start + size;
         core.before_stop(end)?;
         core.check()?;
-        core.model.step(&step)?;
+        match core.model.step(&step) {
+            Ok(()) => {}
+            Err(Failure::Unsolved) => {
+                let Self { stepper, interface, .. } = self;
+                stepper.run(&mut core.model, interface, &step, core.experiment.tolerance)?;
+            }
+            Err(failure) => return Err(failure),
+        }
         core.time = end;
         core.stale = false;
         if core.sloped {

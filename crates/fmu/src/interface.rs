@@ -2,6 +2,7 @@
 
 mod general;
 mod slot;
+mod states;
 mod structure;
 
 use crate::model::{Failure, Model};
@@ -10,11 +11,11 @@ use fmu_description::call_order::settable;
 use fmu_description::location::NO_FOLDER;
 use fmu_description::unit::Unit;
 use fmu_description::{
-    Causality, Guid, Initial, IntegerType, Kind, ModelDescription, Problem, RealType,
+    Causality, Guid, Initial, IntegerType, Kind, LogCategory, ModelDescription, Problem, RealType,
     ScalarVariable, SimpleType, Unknown, Variability,
 };
 
-pub(crate) use general::CATEGORIES;
+pub(crate) use general::WARNING;
 pub(crate) use slot::Slot;
 use slot::SlotBuilder;
 
@@ -38,6 +39,8 @@ pub(crate) struct Interface<M> {
     pub(crate) max_output_derivative_order: u32,
     /// Positions of the inputs with derivatives among the Reals.
     pub(crate) interpolated: Vec<usize>,
+    /// The names of the log categories.
+    pub(crate) log_categories: Vec<String>,
     pub(crate) guid: Guid,
 }
 
@@ -50,6 +53,7 @@ impl<M: Model> Interface<M> {
     pub(crate) fn new(model: &mut M) -> Result<(Self, ModelDescription), Failure> {
         let variables = model.variables();
         let mut description = general::general::<M>(model);
+        description.log_categories = general::categories::<M>(model.log().is_some());
         description.structure = structure::structure(&variables)?;
         let mut interface = Self {
             reals: Vec::new(),
@@ -60,6 +64,7 @@ impl<M: Model> Interface<M> {
             event_indicators: model.model_exchange().map(|own| own.event_indicators),
             max_output_derivative_order: 0,
             interpolated: Vec::new(),
+            log_categories: names(&description.log_categories),
             guid: Guid([0; 16]),
         };
         description.variables.push(time());
@@ -190,6 +195,10 @@ impl<M: Model> Interface<M> {
     }
 }
 
+fn names(categories: &[LogCategory]) -> Vec<String> {
+    categories.iter().map(|category| category.name.clone()).collect()
+}
+
 fn real(number: Number) -> RealType {
     RealType {
         quantity: number.quantity,
@@ -276,7 +285,7 @@ fn described<M>(
     Ok(ScalarVariable {
         name: variable.name.clone(),
         value_reference: 0,
-        description: Some(variable.description.clone()),
+        description: Some(variable.description.clone()).filter(|text| !text.is_empty()),
         causality: variable.causality,
         variability,
         initial,

@@ -36,20 +36,33 @@
 //! contains more.
 #![deny(unsafe_code)]
 
+#[cfg(test)]
+extern crate self as fmu;
+
+mod about;
 mod fence;
 #[doc(hidden)]
 pub mod ffi;
 mod instance;
 mod interface;
+mod log;
 mod model;
+mod simulation;
+pub mod solver;
+mod stepper;
 mod variable;
+mod variables;
 
+pub use fmu_derive::{Variables, model};
 pub use fmu_description::{self as description, Experiment};
 #[doc(hidden)]
 pub use fmu_description::{abi, call_order};
 pub use interface::{describe, problems};
+pub use log::Log;
 pub use model::{About, At, Event, Failure, Model, ModelExchange, Step};
+pub use simulation::Simulation;
 pub use variable::{Enumeration, Variable};
+pub use variables::Variables;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+use crate::log::Log;
 use crate::variable::Variable;
 use fmu_description::{DefaultExperiment, Experiment};
 
@@ -21,8 +22,8 @@ use fmu_description::{DefaultExperiment, Experiment};
 /// 2. The importer sets parameters and inputs; [`Model::check`] and [`Model::initialize`] then
 ///    compute the initial values (`fmi2EnterInitializationMode`, and again after each change until
 ///    `fmi2ExitInitializationMode`).
-/// 3. Co-simulation: each `fmi2DoStep` calls [`Model::step`]. If a value was set since,
-///    [`Model::update`] runs before the next value is read.
+/// 3. Co-simulation: each `fmi2DoStep` calls [`Model::step`] or, without an implementation, integrates
+///    the equations. If a value was set since, [`Model::update`] runs before the next value is read.
 /// 4. Model exchange, if [`Model::model_exchange`] returns `Some`: the importer integrates. It sets
 ///    time, states and inputs; [`Model::update`] runs before it reads a value, a derivative or
 ///    an event indicator ([`Model::event_indicators`]); `fmi2NewDiscreteStates` calls
@@ -35,6 +36,10 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
 
     /// `providesDirectionalDerivative`: whether the model implements [`Model::differentiate`].
     const PROVIDES_DIRECTIONAL_DERIVATIVE: bool = false;
+
+    /// The log categories of the model's own messages, pairs of name and description, in addition to
+    /// those that every exported FMU has. See [`Log::info`].
+    const LOG_CATEGORIES: &'static [(&'static str, &'static str)] = &[];
 
     /// Returns the general part of the model description.
     fn about(&self) -> About;
@@ -81,11 +86,25 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
 
     /// Advances the model from `step.start` to `step.end()` (co-simulation).
     ///
+    /// The default implementation returns [`Failure::Unsolved`]. The exporter then advances the model by
+    /// its equations, as an importer does in model exchange: it integrates the continuous states
+    /// ([`Variable::derivative_of`]) with the derivatives that [`Model::update`] computes, by the
+    /// [`Integrator`](crate::solver::Integrator) and with the importer's tolerance (default: the one of
+    /// [`About::default_experiment`], or 1e-6). It stops at state events
+    /// ([`Model::event_indicators`]), located to the resolution of time, and at time events
+    /// ([`Event::next_event_time`]). At each of them, and at the start of each communication step, it
+    /// calls [`Model::event`] until no new discrete states are needed. In between, inputs with derivatives
+    /// follow their polynomials. A model without states needs no step either: only its events happen,
+    /// and `update` runs at the end.
+    ///
     /// # Errors
     ///
     /// [`Failure::Incomplete`] or [`Failure::Terminated`] if the model stopped before the end at a known
     /// time, another failure if the time reached is unknown.
-    fn step(&mut self, step: &Step) -> Result<(), Failure>;
+    fn step(&mut self, step: &Step) -> Result<(), Failure> {
+        let _ = step;
+        Err(Failure::Unsolved)
+    }
 
     /// Recomputes the outputs and the derivatives of the states from the present values of inputs,
     /// parameters and, in model exchange, states and `time` (in s). It must not change variables that
@@ -141,12 +160,21 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
     /// `fmi2NewDiscreteStates`: handles an event at `time` (in s), that is, recomputes the variables that
     /// change at events only. Called at least once before the first continuous-time mode.
     ///
+    /// It may be called when nothing has happened, and several times at one time: importers do so, and the
+    /// default [`Model::step`]. So it decides from the values of the fields what to change.
+    ///
     /// # Errors
     ///
     /// [`Failure::Error`] if the model cannot continue.
     fn event(&mut self, time: f64) -> Result<Event, Failure> {
         let _ = time;
         Ok(Event::default())
+    }
+
+    /// Returns the field with the messages of the model; `None` if it has none. The exporter sends them to
+    /// the importer after each call.
+    fn log(&mut self) -> Option<&mut Log> {
+        None
     }
 }
 
@@ -242,6 +270,10 @@ pub enum Failure {
         /// The reason.
         message: String,
     },
+    /// The model has no step of its own, or not for this step, and has not changed: the exporter
+    /// integrates its equations. Only [`Model::step`] returns it.
+    #[error("the model has no step of its own; fmu::Simulation integrates its equations")]
+    Unsolved,
     /// `fmi2Error`: the instance can only be read, reset, restored to a saved state, or freed.
     #[error("{0}")]
     Error(String),

@@ -241,6 +241,20 @@ impl<M> Variable<M> {
         self
     }
 
+    /// Sets the smallest allowed value. See [`Variable::range`].
+    #[must_use]
+    pub fn min(mut self, min: f64) -> Self {
+        self.number.min = Some(min);
+        self
+    }
+
+    /// Sets the largest allowed value. See [`Variable::range`].
+    #[must_use]
+    pub fn max(mut self, max: f64) -> Self {
+        self.number.max = Some(max);
+        self
+    }
+
     /// Sets the nominal value, greater than zero: the typical magnitude. Integrators scale the error of a
     /// state with it.
     #[must_use]

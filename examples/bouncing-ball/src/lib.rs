@@ -1,54 +1,48 @@
-//! A bouncing ball: h' = v, v' = g; at each impact on the ground, v becomes -e v.
+//! A bouncing ball: h' = v, v' = g; an impact on the ground turns v into -e v.
 #![forbid(unsafe_code)]
 
-use fmu::{About, Failure, Model, Step, Variable};
+use fmu::{Event, Failure, Model, Variables};
 
-#[derive(Clone, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Variables, serde::Serialize, serde::Deserialize)]
 struct BouncingBall {
+    /// Height
+    #[fmu(output, reinit, unit = "m", start = 1)]
     h: f64,
+    /// Velocity
+    #[fmu(output, derivative_of = h, reinit, unit = "m/s", start = 0)]
     v: f64,
+    /// Acceleration, zero for a ball that stays down
+    #[fmu(derivative_of = v, depends(h, v), unit = "m/s2")]
+    a: f64,
+    /// Gravity
+    #[fmu(parameter, unit = "m/s2", max = -1e-3, start = -9.81)]
     g: f64,
+    /// Coefficient of restitution
+    #[fmu(tunable, min = 0.5, max = 1, start = 0.7)]
     e: f64,
+    /// A ball stays down if it would rise slower
+    #[fmu(constant, unit = "m/s", start = 0.1)]
     v_min: f64,
 }
 
+#[fmu::model(event_indicators = 1, stop_time = 3, step_size = 0.01)]
 impl Model for BouncingBall {
-    const IDENTIFIER: &'static str = "BouncingBall";
-
-    fn about(&self) -> About {
-        About { description: "A ball that bounces".to_owned(), ..About::default() }
-    }
-
-    fn new(_resources: &std::path::Path) -> Result<Self, Failure> {
-        Ok(Self { h: 1.0, v: 0.0, g: -9.81, e: 0.7, v_min: 0.1 })
-    }
-
-    fn variables(&self) -> Vec<Variable<Self>> {
-        let real = |name, text, field: fn(&mut Self) -> &mut f64| Variable::real(name, text, field);
-        vec![
-            real("h", "Height", |m| &mut m.h).unit("m").range(0.0, 1e6).output(&[]).exact(),
-            real("v", "Velocity", |m| &mut m.v).unit("m/s").output(&[]).exact(),
-            real("g", "Gravity", |m| &mut m.g).unit("m/s2").range(-1e3, -1e-3).parameter(),
-            real("e", "Coefficient of restitution", |m| &mut m.e).range(0.5, 1.0).tunable(),
-            real("v_min", "A slower ball stays down", |m| &mut m.v_min).unit("m/s").constant(),
-        ]
-    }
-
-    fn step(&mut self, step: &Step) -> Result<(), Failure> {
-        let long = || Failure::Discard("expected steps of at most 1e4 s".to_owned());
-        let mut left = (step.size <= 1e4).then_some(step.size).ok_or_else(long)?;
-        while self.h > 0.0 || self.v.abs() > 0.0 {
-            let speed = (self.v * self.v - 2.0 * self.g * self.h).sqrt();
-            let fall = (self.v + speed) / -self.g;
-            if fall > left {
-                self.h = (self.h + left * (self.v + 0.5 * self.g * left)).max(f64::MIN_POSITIVE);
-                self.v += self.g * left;
-                return Ok(());
-            }
-            let up = self.e * speed;
-            (left, self.h, self.v) = (left - fall, 0.0, if up < self.v_min { 0.0 } else { up });
-        }
+    fn update(&mut self, _time: f64) -> Result<(), Failure> {
+        let stays = self.v == 0.0 && self.h <= f64::MIN_POSITIVE;
+        self.a = if stays { 0.0 } else { self.g };
         Ok(())
+    }
+
+    fn event_indicators(&self, _time: f64, z: &mut [f64]) {
+        z[0] = self.h;
+    }
+
+    fn event(&mut self, _time: f64) -> Result<Event, Failure> {
+        let (up, impact) = (-self.e * self.v, self.h <= 0.0 && self.v < 0.0);
+        if impact {
+            (self.h, self.v) = (f64::MIN_POSITIVE, if up < self.v_min { 0.0 } else { up });
+        }
+        Ok(Event { values_of_continuous_states_changed: impact, ..Event::default() })
     }
 }
 

@@ -1,10 +1,10 @@
 //! The motion between two events.
 
 use super::Motion;
-use crate::dormand_prince::Step;
 use crate::dynamics::State;
 use crate::friction::Regime;
 use crate::plant::Plant;
+use fmu::solver::Step;
 
 /// A segment of the motion in one regime, with the state and the slope at its start.
 pub(super) struct Segment<'a> {
@@ -23,15 +23,20 @@ impl<'a> Segment<'a> {
         Self { plant, regime, elapsed, start, slope }
     }
 
-    pub(super) fn step(&self, length: f64) -> Step {
+    pub(super) fn step(&self, length: f64) -> Step<State> {
         let Self { plant, regime, .. } = *self;
-        let derivative = |time: f64, state: &State| plant.derivative(regime, time, state);
-        let at_end = |time: f64, state: &State| plant.derivative_at_end(regime, time, state);
-        Step::take(derivative, at_end, self.elapsed, &self.start, &self.slope, length)
+        let mut step = Step::new(self.start, &self.slope);
+        step.take(
+            |time, state, slope| *slope = plant.derivative(regime, time, state),
+            |time, state, slope| *slope = plant.derivative_at_end(regime, time, state),
+            self.elapsed,
+            length,
+        );
+        step
     }
 
-    pub(super) fn margin(&self, direction: Regime, step: &Step) -> f64 {
-        self.plant.margin(self.regime, direction, self.elapsed + step.length, &step.end)
+    pub(super) fn margin(&self, direction: Regime, step: &Step<State>) -> f64 {
+        self.plant.margin(self.regime, direction, self.elapsed + step.length(), step.end())
     }
 
     /// The longest step in s that cannot miss the fall of the friction near zero velocity.

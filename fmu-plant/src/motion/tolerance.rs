@@ -1,7 +1,8 @@
 //! The tolerance of one integration step.
 
-use crate::dormand_prince::Step;
+use crate::dynamics::State;
 use crate::parameters::{Refusal, require};
+use fmu::solver::Step;
 use serde::{Deserialize, Serialize};
 
 /// The part of the tolerance that the error of one step may reach.
@@ -37,11 +38,11 @@ impl Tolerance {
     }
 
     /// Sum of the squares of the errors of a step, each relative to its bound.
-    pub(super) fn squared_error(&self, step: &Step) -> f64 {
+    pub(super) fn squared_error(&self, step: &Step<State>) -> f64 {
         let mut sum = 0.0;
-        for ((error, start), end) in step.error().iter().zip(&step.start).zip(&step.end) {
+        for (i, (start, end)) in step.start().iter().zip(step.end()).enumerate() {
             let bound = self.absolute + self.relative * start.abs().max(end.abs());
-            let scaled = error / (SAFETY * bound);
+            let scaled = step.error(i) / (SAFETY * bound);
             sum += scaled * scaled;
         }
         sum

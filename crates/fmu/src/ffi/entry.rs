@@ -21,8 +21,12 @@ macro_rules! entry_points {
 }
 
 entry_points! {
-    set_debug_logging = SetDebugLogging(_on: fmi2Boolean, n: usize, categories: *const fmi2String),
-        instance => instance.set_debug_logging(texts(categories, n)?);
+    set_debug_logging = SetDebugLogging(on: fmi2Boolean, n: usize, categories: *const fmi2String),
+        instance => {
+            instance.set_debug_logging(texts(categories, n)?)?;
+            instance.set_logging_on(on != 0);
+            Ok(())
+        };
     setup_experiment = SetupExperiment(
         tolerance_defined: fmi2Boolean, tolerance: fmi2Real, start_time: fmi2Real,
         stop_time_defined: fmi2Boolean, stop_time: fmi2Real

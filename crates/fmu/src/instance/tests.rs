@@ -2,6 +2,7 @@
 #![expect(clippy::float_cmp, reason = "values that are set and read back")]
 
 mod calls;
+mod equations;
 mod exchange;
 mod layout;
 mod pendulum;

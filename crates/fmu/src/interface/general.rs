@@ -5,12 +5,26 @@ use fmu_description::unit::Unit;
 use fmu_description::{CoSimulation, LogCategory, ModelDescription, ModelExchange};
 
 /// Log categories of every exported FMU, with the standardised names of section 2.2.4.
-pub(crate) const CATEGORIES: [(&str, &str); 4] = [
+const CATEGORIES: [(&str, &str); 4] = [
     ("logEvents", "Events at which the model wants the simulation to end"),
     ("logStatusDiscard", "Calls that were refused without harm"),
     ("logStatusError", "Calls that failed; the instance has to be reset or restored"),
     ("logStatusFatal", "Calls after which the instance is lost"),
 ];
+
+/// The category of the warnings of a model.
+pub(crate) const WARNING: &str = "logStatusWarning";
+
+/// Log categories of this FMU; with warnings and the model's own ones if it `logs`.
+pub(super) fn categories<M: Model>(logs: bool) -> Vec<LogCategory> {
+    let warning = logs.then_some((WARNING, "Calls that succeeded, with a warning of the model"));
+    let own = M::LOG_CATEGORIES.iter().copied();
+    let category = |(name, description): (&str, &str)| LogCategory {
+        name: name.to_owned(),
+        description: Some(description.to_owned()),
+    };
+    CATEGORIES.into_iter().chain(warning).chain(own).map(category).collect()
+}
 
 pub(super) fn general<M: Model>(model: &M) -> ModelDescription {
     let about = model.about();
@@ -45,12 +59,6 @@ pub(super) fn general<M: Model>(model: &M) -> ModelDescription {
             provides_directional_derivative: M::PROVIDES_DIRECTIONAL_DERIVATIVE,
             ..CoSimulation::default()
         }),
-        log_categories: CATEGORIES
-            .map(|(name, description)| LogCategory {
-                name: name.to_owned(),
-                description: Some(description.to_owned()),
-            })
-            .to_vec(),
         units: Unit::parse("s").into_iter().collect(),
         default_experiment: Some(about.default_experiment),
         ..ModelDescription::default()

@@ -3,9 +3,6 @@
 /// The most halvings of the unit interval in `Quartic::first_negative`.
 const DEPTH: u32 = 20;
 
-/// Width in s to which `locate` narrows a crossing.
-const WIDTH: f64 = 1e-15;
-
 /// The most evaluations in `locate`; bisection alone would need 50 for a step of 1 s.
 const EVALUATIONS: u32 = 100;
 
@@ -14,28 +11,62 @@ const EVALUATIONS: u32 = 100;
 /// The coefficients bound the polynomial from both sides, so a sign change cannot hide between
 /// samples.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Quartic([f64; 5]);
+pub struct Quartic([f64; 5]);
 
 impl Quartic {
     /// The polynomial with these values and rises (derivative times length) at both ends and this value
     /// at the middle.
-    pub(crate) fn new(start: (f64, f64), middle: f64, end: (f64, f64)) -> Self {
+    #[inline]
+    #[must_use]
+    pub fn new(start: (f64, f64), middle: f64, end: (f64, f64)) -> Self {
         let near_start = start.0 + start.1 / 4.0;
         let near_end = end.0 - end.1 / 4.0;
         let centre = (16.0 * middle - start.0 - 4.0 * (near_start + near_end) - end.0) / 6.0;
         Self([start.0, near_start, centre, near_end, end.0])
     }
 
+    /// The polynomial with these values at 0, 1/4, 1/2, 3/4 and 1.
+    #[must_use]
+    pub fn interpolate(values: [f64; 5]) -> Self {
+        let [first, _, _, _, last] = values;
+        // 256 times the values at 1/4, 1/2 and 3/4, without the terms of the outer coefficients.
+        let early = 256.0 * values[1] - 81.0 * first - last;
+        let centre = 256.0 * values[2] - 16.0 * (first + last);
+        let late = 256.0 * values[3] - first - 81.0 * last;
+        let sum = (96.0 * (early + late) - 108.0 * centre) / 4608.0;
+        let difference = (early - late) / 96.0;
+        let middle = (centre - 64.0 * sum) / 96.0;
+        Self([first, 0.5 * (sum + difference), middle, 0.5 * (sum - difference), last])
+    }
+
     /// `offset + factor * self`.
-    pub(crate) fn affine(&self, offset: f64, factor: f64) -> Self {
+    #[inline]
+    #[must_use]
+    pub fn affine(&self, offset: f64, factor: f64) -> Self {
         Self(self.0.map(|coefficient| offset + factor * coefficient))
     }
 
-    pub(crate) fn is_finite(&self) -> bool {
+    /// The value at `part` of the interval. Method: de Casteljau.
+    #[must_use]
+    pub fn value(&self, part: f64) -> f64 {
+        let mut row = self.0;
+        for level in (1..5).rev() {
+            for i in 0..level {
+                row[i] += part * (row[i + 1] - row[i]);
+            }
+        }
+        row[0]
+    }
+
+    /// Whether no coefficient is infinite or not a number.
+    #[inline]
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
         self.0.iter().all(|coefficient| coefficient.is_finite())
     }
 
     /// Whether no coefficient is negative, which is sufficient for a polynomial without negative values.
+    #[inline]
     fn is_surely_not_negative(&self) -> bool {
         self.0.iter().all(|&coefficient| coefficient >= 0.0)
     }
@@ -44,8 +75,10 @@ impl Quartic {
     ///
     /// `None` where the polynomial is nowhere negative, or only within less than `2^-20`.
     /// Method: subdivision after de Casteljau.
-    pub(crate) fn first_negative(&self) -> Option<f64> {
-        self.search(0.0, 1.0, DEPTH)
+    #[inline]
+    #[must_use]
+    pub fn first_negative(&self) -> Option<f64> {
+        if self.is_surely_not_negative() { None } else { self.search(0.0, 1.0, DEPTH) }
     }
 
     fn search(&self, from: f64, width: f64, depth: u32) -> Option<f64> {
@@ -76,26 +109,62 @@ impl Quartic {
     }
 }
 
-/// Narrows a crossing of `margin` between `0`, where it is `at_start >= 0`, and `ceiling`, where
-/// it is `at_ceiling < 0`; returns the upper end of the last interval, where it is negative.
+/// The result of [`search`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Crossing {
+    /// The margin is negative at this length, and not negative at most `width` before it.
+    At(f64),
+    /// The margin is negative at none of the lengths that were tried; this is the longest one.
+    NoneUpTo(f64),
+}
+
+/// Searches the first crossing of `margin`, a function of the length of a step, from the estimate
+/// `fraction` of the step of `length` on.
 ///
-/// Method: regula falsi with the Illinois rule; the interval ends at `1e-15` s or narrower.
-pub(crate) fn locate(
+/// An estimate may be wrong: a margin may only touch zero, or change its sign by rounding. So the margin
+/// is evaluated at the estimate and at doubled lengths, up to the whole step. If it is negative at one of
+/// them, [`locate`] narrows the crossing to `width`.
+pub fn search(
+    fraction: f64,
+    length: f64,
+    width: f64,
+    mut margin: impl FnMut(f64) -> f64,
+) -> Crossing {
+    let mut ceiling = fraction * length;
+    let mut at_ceiling = margin(ceiling);
+    while at_ceiling >= 0.0 && ceiling < length {
+        ceiling = (2.0 * ceiling).min(length);
+        at_ceiling = margin(ceiling);
+    }
+    if at_ceiling < 0.0 {
+        let at_start = margin(0.0).max(0.0);
+        Crossing::At(locate(at_start, (ceiling, at_ceiling), width, margin))
+    } else {
+        Crossing::NoneUpTo(ceiling)
+    }
+}
+
+/// Narrows a crossing of `margin` between 0, where it is `at_start >= 0`, and `ceiling`, a pair of
+/// length and margin, where it is negative. Returns the upper end of the last interval, where it is
+/// negative.
+///
+/// Method: regula falsi with the Illinois rule; the interval ends at `width` or narrower.
+pub fn locate(
     at_start: f64,
-    ceiling: f64,
-    at_ceiling: f64,
-    margin: impl Fn(f64) -> f64,
+    ceiling: (f64, f64),
+    width: f64,
+    mut margin: impl FnMut(f64) -> f64,
 ) -> f64 {
     let (mut low, mut at_low) = (0.0, at_start);
-    let (mut high, mut at_high) = (ceiling, at_ceiling);
+    let (mut high, mut at_high) = ceiling;
     let mut moved_low = None;
     for _ in 0..EVALUATIONS {
-        let width = high - low;
-        if width <= WIDTH {
+        let distance = high - low;
+        if distance <= width {
             break;
         }
-        let guess = low + width * at_low / (at_low - at_high);
-        let guess = guess.max(low + WIDTH / 2.0).min(high - WIDTH / 2.0);
+        let guess = low + distance * at_low / (at_low - at_high);
+        let guess = guess.max(low + width / 2.0).min(high - width / 2.0);
         let value = margin(guess);
         let moves_low = value >= 0.0;
         let again = moved_low == Some(moves_low);
@@ -115,6 +184,8 @@ pub(crate) fn locate(
 mod tests {
     use super::*;
     use std::cell::Cell;
+
+    const WIDTH: f64 = 1e-15;
 
     /// The quartic `scale * product(s - root)`, built from its values and derivatives.
     fn with_roots(scale: f64, roots: [f64; 4]) -> Quartic {
@@ -155,6 +226,15 @@ mod tests {
     }
 
     #[test]
+    fn five_values_determine_the_polynomial() {
+        let value = |s: f64| 3.0 - s * (2.0 + s * (1.5 - s * (4.0 - 0.7 * s)));
+        let found = Quartic::interpolate([0.0, 0.25, 0.5, 0.75, 1.0].map(value));
+        for part in [0.0, 0.1, 0.33, 0.5, 0.8, 1.0] {
+            assert!((found.value(part) - value(part)).abs() < 1e-13);
+        }
+    }
+
+    #[test]
     fn a_crossing_is_located_to_the_last_digits_from_above() {
         let count = Cell::new(0);
         let margin = |s: f64| {
@@ -162,14 +242,21 @@ mod tests {
             (1.0 - s * s).exp_m1() - 0.9
         };
         let root = (1.0 - 1.9_f64.ln()).sqrt();
-        let found = locate(margin(0.0), 1.0, margin(1.0), margin);
+        let found = locate(margin(0.0), (1.0, margin(1.0)), WIDTH, margin);
         assert!((found - root).abs() < 2e-15 && margin(found) < 0.0);
         assert!(count.get() < 20, "{} evaluations", count.get());
     }
 
     #[test]
     fn a_crossing_at_the_very_start_is_located_there() {
-        let found = locate(0.0, 1e-6, -1e-6, |s| -s);
+        let found = locate(0.0, (1e-6, -1e-6), WIDTH, |s| -s);
         assert!((0.0..=1e-14).contains(&found), "{found}");
+    }
+
+    #[test]
+    fn an_estimate_before_the_crossing_is_extended_up_to_the_end() {
+        assert_eq!(search(0.1, 1.0, WIDTH, |_| 1.0), Crossing::NoneUpTo(1.0));
+        let Crossing::At(found) = search(0.1, 1.0, WIDTH, |s| 0.75 - s) else { panic!("none") };
+        assert!((found - 0.75).abs() < 1e-14);
     }
 }

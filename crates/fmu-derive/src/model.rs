@@ -1,0 +1,127 @@
+//! Generates the items that an implementation of `fmu::Model` does not have.
+
+use proc_macro2::TokenStream;
+use quote::quote;
+use syn::parse::{Parse, ParseStream};
+use syn::punctuated::Punctuated;
+use syn::{Error, Expr, Ident, ImplItem, ItemImpl, Result, Token, parse_quote};
+
+/// Names of the arguments.
+const KNOWN: [&str; 5] = ["event_indicators", "start_time", "stop_time", "step_size", "tolerance"];
+
+/// The arguments of `#[fmu::model(...)]`.
+pub(crate) struct Arguments(Vec<(Ident, Expr)>);
+
+struct Argument(Ident, Expr);
+
+impl Parse for Argument {
+    fn parse(input: ParseStream<'_>) -> Result<Self> {
+        let name: Ident = input.parse()?;
+        input.parse::<Token![=]>()?;
+        Ok(Self(name, input.parse()?))
+    }
+}
+
+impl Parse for Arguments {
+    fn parse(input: ParseStream<'_>) -> Result<Self> {
+        let mut all: Vec<(Ident, Expr)> = Vec::new();
+        for Argument(name, value) in Punctuated::<Argument, Token![,]>::parse_terminated(input)? {
+            if !KNOWN.iter().any(|known| name == known) {
+                let message = format!("unknown argument, expected one of: {}", KNOWN.join(", "));
+                return Err(Error::new(name.span(), message));
+            }
+            if all.iter().any(|(other, _)| *other == name) {
+                return Err(Error::new(name.span(), "this argument is there twice"));
+            }
+            all.push((name, value));
+        }
+        Ok(Self(all))
+    }
+}
+
+pub(crate) fn expand(arguments: &Arguments, mut block: ItemImpl) -> Result<TokenStream> {
+    let is_model = block.trait_.as_ref().and_then(|(_, path, _)| path.segments.last());
+    if is_model.is_none_or(|segment| segment.ident != "Model") {
+        return Err(Error::new_spanned(&block.self_ty, "expected `impl Model for` a struct"));
+    }
+    let present: Vec<String> = block.items.iter().filter_map(name).collect();
+    for (item, given) in items(arguments) {
+        if !name(&item).is_some_and(|name| present.contains(&name)) {
+            block.items.push(item);
+        } else if let Some(argument) = given {
+            let message = "the block has the function that this argument is for";
+            return Err(Error::new(argument.span(), message));
+        }
+    }
+    Ok(quote!(#block))
+}
+
+/// The name of an item.
+fn name(item: &ImplItem) -> Option<String> {
+    match item {
+        ImplItem::Const(item) => Some(item.ident.to_string()),
+        ImplItem::Fn(item) => Some(item.sig.ident.to_string()),
+        _ => None,
+    }
+}
+
+/// The items, each with an argument that it is made from.
+fn items(arguments: &Arguments) -> Vec<(ImplItem, Option<Ident>)> {
+    let is_indicators = |(name, _): &&(Ident, Expr)| name == "event_indicators";
+    let indicators = arguments.0.iter().find(is_indicators);
+    let experiment: Vec<_> = arguments.0.iter().filter(|own| !is_indicators(own)).collect();
+    let fields = experiment.iter().map(|(name, value)| quote!(#name: #value));
+    let exchange: ImplItem = match indicators {
+        Some((_, count)) => parse_quote! {
+            fn model_exchange(&self) -> ::core::option::Option<::fmu::ModelExchange> {
+                ::core::option::Option::Some(::fmu::ModelExchange { event_indicators: #count })
+            }
+        },
+        None => parse_quote! {
+            fn model_exchange(&self) -> ::core::option::Option<::fmu::ModelExchange> {
+                <Self as ::fmu::Variables>::HAS_STATES.then(::core::default::Default::default)
+            }
+        },
+    };
+    vec![
+        (
+            parse_quote! {
+                const IDENTIFIER: &'static str = <Self as ::fmu::Variables>::IDENTIFIER;
+            },
+            None,
+        ),
+        (
+            parse_quote! {
+                fn about(&self) -> ::fmu::About {
+                    ::fmu::about!(#(#fields),*)
+                }
+            },
+            experiment.first().map(|(name, _)| name.clone()),
+        ),
+        (
+            parse_quote! {
+                fn new(_: &::std::path::Path) -> ::core::result::Result<Self, ::fmu::Failure> {
+                    ::core::result::Result::Ok(<Self as ::core::default::Default>::default())
+                }
+            },
+            None,
+        ),
+        (
+            parse_quote! {
+                fn variables(&self) -> ::std::vec::Vec<::fmu::Variable<Self>> {
+                    <Self as ::fmu::Variables>::table()
+                }
+            },
+            None,
+        ),
+        (exchange, indicators.map(|(name, _)| name.clone())),
+        (
+            parse_quote! {
+                fn log(&mut self) -> ::core::option::Option<&mut ::fmu::Log> {
+                    <Self as ::fmu::Variables>::log_field(self)
+                }
+            },
+            None,
+        ),
+    ]
+}

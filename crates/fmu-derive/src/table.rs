@@ -1,0 +1,251 @@
+//! Generates the implementation of `fmu::Variables`.
+
+use proc_macro2::TokenStream;
+use quote::{quote, quote_spanned};
+use syn::{Data, DeriveInput, Error, Expr, Fields, Ident, Result};
+
+use crate::attributes::Role;
+use crate::check::check;
+use crate::field::{Base, Part, Variable, read};
+
+/// The parts of a struct.
+struct Model<'a> {
+    variables: Vec<Variable<'a>>,
+    logs: Vec<&'a Ident>,
+    /// All fields with their start values.
+    starts: Vec<(&'a Ident, Option<Expr>)>,
+}
+
+pub(crate) fn expand(input: &DeriveInput) -> Result<TokenStream> {
+    let Data::Struct(data) = &input.data else {
+        return Err(Error::new(input.ident.span(), "expected a struct: the state of the FMU"));
+    };
+    let Fields::Named(fields) = &data.fields else {
+        return Err(Error::new(input.ident.span(), "expected a struct with named fields"));
+    };
+    if !input.generics.params.is_empty() {
+        let message = "expected a struct without generic parameters: an FMU has one model";
+        return Err(Error::new_spanned(&input.generics, message));
+    }
+    let mut model = read_all(fields)?;
+    check(&mut model.variables)?;
+    let ident = &input.ident;
+    let identifier = ident.to_string();
+    let has_states = model.variables.iter().any(|variable| variable.is_state);
+    let rows = model.variables.iter().map(|variable| row(&model.variables, variable));
+    let log = model.logs.first().map_or(
+        quote!(::core::option::Option::None),
+        |field| quote!(::core::option::Option::Some(&mut self.#field)),
+    );
+    let default = default(ident, &model);
+    Ok(quote! {
+        impl ::fmu::Variables for #ident {
+            const IDENTIFIER: &'static str = #identifier;
+            const HAS_STATES: bool = #has_states;
+
+            fn table() -> ::std::vec::Vec<::fmu::Variable<Self>> {
+                let mut table = ::std::vec::Vec::new();
+                #(#rows)*
+                table
+            }
+
+            fn log_field(&mut self) -> ::core::option::Option<&mut ::fmu::Log> {
+                #log
+            }
+        }
+        #default
+    })
+}
+
+fn read_all(fields: &syn::FieldsNamed) -> Result<Model<'_>> {
+    let mut model = Model { variables: Vec::new(), logs: Vec::new(), starts: Vec::new() };
+    let mut failed: Option<Error> = None;
+    for field in &fields.named {
+        match read(field) {
+            Ok(Part::Variable(variable)) => {
+                let start = variable.attributes.value("start").cloned();
+                model.starts.push((variable.field, start));
+                model.variables.push(*variable);
+            }
+            Ok(Part::Log(field)) => {
+                model.starts.push((field, None));
+                model.logs.push(field);
+            }
+            Ok(Part::Skipped { field, start }) => model.starts.push((field, start)),
+            Err(error) => match &mut failed {
+                Some(all) => all.combine(error),
+                None => failed = Some(error),
+            },
+        }
+    }
+    if let [_, second, ..] = model.logs[..] {
+        return Err(Error::new(second.span(), "a model has one field of the type Log"));
+    }
+    failed.map_or(Ok(model), Err)
+}
+
+/// Generates `Default` if a field has a start value.
+fn default(ident: &Ident, model: &Model<'_>) -> Option<TokenStream> {
+    model.starts.iter().any(|(_, start)| start.is_some()).then_some(())?;
+    let is_array = |field: &Ident| {
+        model.variables.iter().any(|own| own.field == field && own.length.is_some())
+    };
+    let fields = model.starts.iter().map(|(field, start)| match start {
+        Some(value) => quote!(#field: ::core::convert::Into::into(#value)),
+        None if is_array(field) => {
+            quote!(#field: ::core::array::from_fn(|_| ::core::default::Default::default()))
+        }
+        None => quote_spanned!(field.span()=> #field: ::core::default::Default::default()),
+    });
+    Some(quote! {
+        impl ::core::default::Default for #ident {
+            /// The start values.
+            fn default() -> Self {
+                Self { #(#fields),* }
+            }
+        }
+    })
+}
+
+/// Generates the statements that add a variable, or those of an array, to the table.
+fn row(variables: &[Variable<'_>], variable: &Variable<'_>) -> TokenStream {
+    let (field, description) = (variable.field, &variable.description);
+    let constructor = constructor(variable);
+    let attributes = attributes(variables, variable);
+    let name = &variable.name;
+    let span = field.span();
+    let Some(length) = variable.length else {
+        let enumeration = enumeration(variable);
+        return quote_spanned! {span=>
+            let variable = ::fmu::Variable::#constructor(
+                #name, #description, #enumeration |model: &mut Self| &mut model.#field
+            );
+            table.push(variable #attributes);
+        };
+    };
+    let enumeration = enumeration(variable);
+    quote_spanned! {span=>
+        for index in 0..(#length) {
+            let variable = ::fmu::Variable::#constructor(
+                ::std::format!("{}[{}]", #name, index + 1),
+                #description,
+                #enumeration
+                move |model: &mut Self| &mut model.#field[index]
+            );
+            table.push(variable #attributes);
+        }
+    }
+}
+
+fn constructor(variable: &Variable<'_>) -> TokenStream {
+    match variable.base {
+        Base::Real => quote!(real),
+        Base::Integer if variable.attributes.enumeration.is_some() => quote!(enumeration),
+        Base::Integer => quote!(integer),
+        Base::Boolean => quote!(boolean),
+        Base::String => quote!(string),
+    }
+}
+
+/// The argument with the enumeration, with a comma behind it.
+fn enumeration(variable: &Variable<'_>) -> Option<TokenStream> {
+    let own = variable.attributes.enumeration.as_ref()?;
+    let name = &own.name;
+    let items = own.values.iter().map(|(name, value)| quote!((#name, #value)));
+    Some(quote!(::fmu::Enumeration::new(#name, [#(#items),*]),))
+}
+
+/// Calls of the methods of `fmu::Variable`.
+fn attributes(variables: &[Variable<'_>], variable: &Variable<'_>) -> TokenStream {
+    let own = &variable.attributes;
+    let mut calls = role(variable);
+    if own.flag("discrete").is_some() {
+        calls.extend(quote!(.discrete()));
+    }
+    let free = variable.role().is_computed();
+    if own.flag("approximate").is_some() {
+        calls.extend(quote!(.approximate()));
+    } else if free && (variable.is_state || own.value("start").is_some())
+        || own.flag("exact").is_some()
+    {
+        calls.extend(quote!(.exact()));
+    }
+    if own.flag("reinit").is_some() {
+        calls.extend(quote!(.reinit()));
+    }
+    for (name, text) in own.texts.iter().filter(|(name, _)| name != "name") {
+        calls.extend(quote_spanned!(text.span()=> .#name(#text)));
+    }
+    for (name, value) in own.values.iter().filter(|(name, _)| name != "start") {
+        calls.extend(quote!(.#name(::core::convert::Into::into(#value))));
+    }
+    for field in &own.derivatives {
+        calls.extend(quote_spanned!(field.span()=> .derivative(|model| &mut model.#field)));
+    }
+    if let Some(state) = &own.derivative_of {
+        let state = reference(variables, state, variable.length.is_some());
+        calls.extend(quote!(.derivative_of(#state)));
+    }
+    calls.extend(dependencies(variables, variable));
+    calls
+}
+
+fn role(variable: &Variable<'_>) -> TokenStream {
+    match variable.role() {
+        Role::Local | Role::Skip => quote!(),
+        Role::Input => quote!(.input()),
+        Role::Output => quote!(.output(&[])),
+        Role::Parameter => quote!(.parameter()),
+        Role::Tunable => quote!(.tunable()),
+        Role::CalculatedParameter => quote!(.calculated_parameter()),
+        Role::Constant => quote!(.constant()),
+    }
+}
+
+/// The name of the variable of a field; of the element with the same index if `indexed`.
+fn reference(variables: &[Variable<'_>], field: &Ident, indexed: bool) -> TokenStream {
+    let found = variables.iter().find(|variable| variable.field == field);
+    let name = found.map_or_else(|| field.to_string(), |found| found.name.clone());
+    if indexed { quote!(::std::format!("{}[{}]", #name, index + 1)) } else { quote!(#name) }
+}
+
+/// All names of the variables of the fields, for a list.
+fn list<'a>(
+    variables: &[Variable<'_>],
+    fields: impl IntoIterator<Item = &'a Ident>,
+) -> TokenStream {
+    let mut names = quote!(let mut names = ::std::vec::Vec::<::std::string::String>::new(););
+    for field in fields {
+        let found = variables.iter().find(|variable| variable.field == field);
+        let name = found.map_or_else(|| field.to_string(), |found| found.name.clone());
+        names.extend(if let Some(length) = found.and_then(|found| found.length) {
+            quote!(names.extend((1..=(#length)).map(|index| ::std::format!("{}[{index}]", #name)));)
+        } else {
+            quote!(names.push(#name.into());)
+        });
+    }
+    quote!({ #names names })
+}
+
+/// The dependencies of an output or a derivative.
+fn dependencies(variables: &[Variable<'_>], variable: &Variable<'_>) -> TokenStream {
+    let own = &variable.attributes;
+    let mut calls = TokenStream::new();
+    let depends = variable.role() == Role::Output || variable.is_derivative();
+    // A state depends on itself alone, which the exporter knows.
+    if depends && !(variable.is_state && own.depends.is_none()) {
+        let all = || {
+            let known = |other: &&Variable<'_>| other.is_state || other.role() == Role::Input;
+            variables.iter().filter(known).map(|other| other.field.clone()).collect()
+        };
+        let fields: Vec<Ident> = own.depends.clone().unwrap_or_else(all);
+        let names = list(variables, &fields);
+        let kind = quote!(::fmu::description::DependencyKind::Dependent);
+        calls.extend(quote!(.depends(#kind, #names)));
+    }
+    if let Some(fields) = &own.initially {
+        let names = list(variables, fields);
+        calls.extend(quote!(.initially(#names)));
+    }
+    calls
+}

@@ -1,0 +1,63 @@
+//! The continuous states of a model as vectors.
+
+use super::Interface;
+
+impl<M> Interface<M> {
+    /// Copies the continuous states of the model to `to`.
+    pub(crate) fn read_states(&self, model: &mut M, to: &mut [f64]) {
+        for (state, value) in self.states.iter().zip(to) {
+            *value = *(self.reals[state.state].field)(model);
+        }
+    }
+
+    /// Sets the continuous states of the model.
+    pub(crate) fn write_states(&self, model: &mut M, values: &[f64]) {
+        for (state, value) in self.states.iter().zip(values) {
+            *(self.reals[state.state].field)(model) = *value;
+        }
+    }
+
+    /// Copies the derivatives of the continuous states to `to`.
+    pub(crate) fn read_derivatives(&self, model: &mut M, to: &mut [f64]) {
+        for (state, value) in self.states.iter().zip(to) {
+            *value = *(self.reals[state.derivative].field)(model);
+        }
+    }
+
+    /// Returns the nominal values of the continuous states.
+    pub(crate) fn nominals(&self) -> Vec<f64> {
+        self.states.iter().map(|state| state.nominal).collect()
+    }
+}
+
+/// Inputs with derivatives, which `fmi2SetRealInputDerivatives` sets.
+impl<M> Interface<M> {
+    /// Copies the inputs with derivatives to `to`.
+    pub(crate) fn read_interpolated(&self, model: &mut M, to: &mut [f64]) {
+        for (&position, value) in self.interpolated.iter().zip(to) {
+            *value = *(self.reals[position].field)(model);
+        }
+    }
+
+    /// Sets the inputs with derivatives.
+    pub(crate) fn write_interpolated(&self, model: &mut M, values: &[f64]) {
+        for (&position, value) in self.interpolated.iter().zip(values) {
+            *(self.reals[position].field)(model) = *value;
+        }
+    }
+
+    /// Sets the inputs with derivatives to their values `elapsed` s after they were `values`:
+    /// `u + u' t + u'' t^2 / 2 + ...`
+    pub(crate) fn extrapolate(&self, model: &mut M, values: &[f64], elapsed: f64) {
+        for (&position, value) in self.interpolated.iter().zip(values) {
+            let slot = &self.reals[position];
+            let (mut value, mut power, mut order) = (*value, 1.0, 0.0);
+            for derivative in &slot.derivatives {
+                order += 1.0;
+                power *= elapsed / order;
+                value += power * *derivative(model);
+            }
+            *(slot.field)(model) = value;
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! The messages of a model.
+
+use serde::de::IgnoredAny;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+/// Most messages of one call; further ones are counted.
+const LIMIT: usize = 1000;
+
+/// The messages of a model to the importer's logger.
+///
+/// A model that logs has a field of this type, and [`Model::log`](crate::Model::log) returns it
+/// (`#[fmu::model]` does so). After each call the exporter sends the messages and empties the field, so it
+/// is not part of the FMU state: its serialised form is empty.
+///
+/// ```
+/// use fmu::Log;
+///
+/// let mut log = Log::default();
+/// log.info("logEvents", "the valve opens at t = 3 s");
+/// log.warn("the pressure 2.1 bar is above the range of the table, 2 bar");
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Log {
+    messages: Vec<Message>,
+    /// Number of messages that were dropped.
+    dropped: usize,
+}
+
+/// One message of a model.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Message {
+    /// The log category; `None` for a warning.
+    pub(crate) category: Option<&'static str>,
+    pub(crate) text: String,
+}
+
+impl Log {
+    /// Logs a message of a `category`, one of [`Model::LOG_CATEGORIES`](crate::Model::LOG_CATEGORIES) or
+    /// `logEvents`. The importer receives it if debug logging is on for the category.
+    pub fn info(&mut self, category: &'static str, text: impl Into<String>) {
+        self.add(Some(category), text.into());
+    }
+
+    /// Logs a warning. The call that is in progress then returns `fmi2Warning` if it succeeds.
+    pub fn warn(&mut self, text: impl Into<String>) {
+        self.add(None, text.into());
+    }
+
+    fn add(&mut self, category: Option<&'static str>, text: String) {
+        if self.messages.len() < LIMIT {
+            self.messages.push(Message { category, text });
+        } else {
+            self.dropped += 1;
+        }
+    }
+
+    /// Whether there are no messages.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.messages.is_empty()
+    }
+
+    /// The texts of the messages that were not sent yet, for tests of a model.
+    pub fn texts(&self) -> impl Iterator<Item = &str> {
+        self.messages.iter().map(|message| message.text.as_str())
+    }
+
+    /// Removes and returns all messages.
+    pub(crate) fn take(&mut self) -> Vec<Message> {
+        let mut messages = std::mem::take(&mut self.messages);
+        let dropped = std::mem::take(&mut self.dropped);
+        if dropped > 0 {
+            let text = format!("the model logged {dropped} more messages in this call");
+            messages.push(Message { category: None, text });
+        }
+        messages
+    }
+}
+
+impl Serialize for Log {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_unit()
+    }
+}
+
+impl<'de> Deserialize<'de> for Log {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_unit(IgnoredAny).map(|_| Self::default())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_log_has_no_serialised_form() {
+        let mut log = Log::default();
+        log.warn("hot");
+        let bytes = postcard::to_stdvec(&(1_u8, &log, 2_u8)).unwrap();
+        assert_eq!(bytes, [1, 2]);
+        assert_eq!(postcard::from_bytes(&bytes), Ok((1_u8, Log::default(), 2_u8)));
+    }
+
+    #[test]
+    fn messages_above_the_limit_are_counted() {
+        let mut log = Log::default();
+        for _ in 0..LIMIT + 7 {
+            log.info("logEvents", "again");
+        }
+        let messages = log.take();
+        assert_eq!(messages.len(), LIMIT + 1);
+        assert!(messages[LIMIT].text.contains("7 more"));
+        assert!(log.is_empty());
+    }
+}

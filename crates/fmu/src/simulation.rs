@@ -1,0 +1,88 @@
+//! A model run in Rust, without an importer.
+
+use std::path::Path;
+
+use crate::Experiment;
+use crate::interface::{Interface, new_model};
+use crate::model::{Failure, Model, Step};
+use crate::stepper::Stepper;
+
+/// Runs a model step by step, as its FMU does in co-simulation: for the unit tests of the model, and for
+/// programs in Rust that need no FMU.
+///
+/// The fields of the struct are read and set directly. Example: see [`model`](macro@crate::model).
+pub struct Simulation<M: Model> {
+    model: M,
+    interface: Interface<M>,
+    stepper: Stepper,
+    experiment: Experiment,
+    time: f64,
+    is_started: bool,
+}
+
+impl<M: Model> Simulation<M> {
+    /// Creates the model as `fmi2Instantiate` does, with the folder `resources`.
+    ///
+    /// # Errors
+    ///
+    /// The failure of [`Model::new`]; [`Failure::Error`] if the variables cannot be described.
+    pub fn new(resources: &Path) -> Result<Self, Failure> {
+        let mut model = new_model::<M>(resources)?;
+        let (interface, description) = Interface::new(&mut model)?;
+        let tolerance = description.default_experiment.and_then(|own| own.tolerance);
+        let stepper = Stepper::new(&interface, tolerance);
+        let experiment = Experiment::default();
+        Ok(Self { model, interface, stepper, experiment, time: 0.0, is_started: false })
+    }
+
+    /// The model.
+    pub fn model(&self) -> &M {
+        &self.model
+    }
+
+    /// The model, for setting parameters before the start and inputs between steps. Outputs follow with
+    /// the next call of [`Model::update`] or [`Simulation::step`].
+    pub fn model_mut(&mut self) -> &mut M {
+        &mut self.model
+    }
+
+    /// The time reached in s.
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// Initializes the model: checks the parameters and computes the initial values. The first step does
+    /// so with the start time 0 if this function was not called.
+    ///
+    /// # Errors
+    ///
+    /// The failures of [`Model::check`] and [`Model::initialize`].
+    pub fn start(&mut self, experiment: Experiment) -> Result<(), Failure> {
+        self.model.check()?;
+        self.model.initialize(&experiment)?;
+        self.time = experiment.start_time;
+        self.experiment = experiment;
+        self.is_started = true;
+        Ok(())
+    }
+
+    /// Advances the model by a communication step of `size` s.
+    ///
+    /// # Errors
+    ///
+    /// The failures of [`Model::step`] or, if the model has no step of its own, of its equations.
+    pub fn step(&mut self, size: f64) -> Result<(), Failure> {
+        if !self.is_started {
+            self.start(Experiment::default())?;
+        }
+        let step = Step { start: self.time, size };
+        let Self { model, interface, stepper, experiment, .. } = self;
+        match model.step(&step) {
+            Err(Failure::Unsolved) => stepper.run(model, interface, &step, experiment.tolerance)?,
+            done => done?,
+        }
+        self.time = step.end();
+        interface.clear_input_derivatives(model);
+        Ok(())
+    }
+}

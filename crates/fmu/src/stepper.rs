@@ -1,0 +1,171 @@
+//! The default step: integrates the derivatives of a model, with located events.
+
+use crate::interface::Interface;
+use crate::model::{Failure, Model, Step};
+use crate::solver::{Integrator, Reached, System};
+
+/// Most events in one communication step.
+const EVENT_LIMIT: u32 = 10_000;
+
+/// Most calls of [`Model::event`] at one event.
+const ITERATION_LIMIT: u32 = 1000;
+
+/// Integrates the continuous states of a model over communication steps.
+///
+/// It has no memory between steps, so that the struct of the model remains the whole FMU state.
+pub(crate) struct Stepper {
+    integrator: Integrator,
+    /// The relative tolerance if the importer defines none.
+    tolerance: Option<f64>,
+    has_equations: bool,
+    state: Vec<f64>,
+    /// The inputs with derivatives at the start of the step.
+    inputs: Vec<f64>,
+}
+
+impl Stepper {
+    pub(crate) fn new<M>(interface: &Interface<M>, tolerance: Option<f64>) -> Self {
+        let nominals = interface.nominals();
+        let indicators = interface.event_indicators.unwrap_or_default();
+        Self {
+            tolerance,
+            has_equations: !nominals.is_empty() || indicators > 0,
+            state: vec![0.0; nominals.len()],
+            inputs: vec![0.0; interface.interpolated.len()],
+            integrator: Integrator::new(nominals, indicators),
+        }
+    }
+
+    /// Advances the model over the step: handles the event at its start, and then integrates from event
+    /// to event. Inputs with derivatives follow their polynomials; after the step they have their values
+    /// of before.
+    ///
+    /// # Errors
+    ///
+    /// [`Failure::Incomplete`] or [`Failure::Terminated`] with the time reached, at which the model then
+    /// is; other failures of the model.
+    pub(crate) fn run<M: Model>(
+        &mut self,
+        model: &mut M,
+        interface: &Interface<M>,
+        step: &Step,
+        tolerance: Option<f64>,
+    ) -> Result<(), Failure> {
+        if let Some(tolerance) = tolerance.or(self.tolerance) {
+            self.integrator.set_tolerance(tolerance);
+        }
+        let mut inputs = std::mem::take(&mut self.inputs);
+        interface.read_interpolated(model, &mut inputs);
+        let mut equations = Equations { model, interface, start: step.start, inputs: &inputs };
+        let done = self.follow(&mut equations, step);
+        interface.write_interpolated(model, &inputs);
+        self.inputs = inputs;
+        done
+    }
+
+    fn follow<M: Model>(
+        &mut self,
+        equations: &mut Equations<'_, M>,
+        step: &Step,
+    ) -> Result<(), Failure> {
+        let (mut time, end) = (step.start, step.end());
+        for _ in 0..EVENT_LIMIT {
+            let next = equations.settle(time).map_err(|failure| stopped(failure, time))?;
+            let target = next.map_or(end, |next| next.min(end));
+            let reached = self.integrate(equations, time, target)?;
+            time = if reached == Reached::End { target } else { self.integrator.time() };
+            if reached == Reached::End && next.is_none_or(|next| next > end) {
+                return Ok(());
+            }
+            if time >= end {
+                equations.settle(time).map_err(|failure| stopped(failure, time))?;
+                return equations.model.update(time).map_err(|failure| stopped(failure, time));
+            }
+        }
+        let message = format!("more than {EVENT_LIMIT} events in one communication step");
+        Err(Failure::Incomplete { time, message })
+    }
+
+    /// Integrates from `time` to `target` or to the first state event, and sets the model to that point.
+    fn integrate<M: Model>(
+        &mut self,
+        equations: &mut Equations<'_, M>,
+        time: f64,
+        target: f64,
+    ) -> Result<Reached, Failure> {
+        let Self { integrator, state, .. } = self;
+        if !self.has_equations {
+            let shown = equations.show(target, state);
+            return shown.map(|()| Reached::End).map_err(|failure| stopped(failure, time));
+        }
+        equations.interface.read_states(equations.model, state);
+        let reached = integrator
+            .start(equations, time, state, target)
+            .and_then(|()| integrator.advance(equations, target));
+        let time = integrator.time();
+        let shown = equations.show(time, integrator.state());
+        let reached = reached.map_err(|failure| stopped(failure, time))?;
+        shown.map(|()| reached).map_err(|failure| stopped(failure, time))
+    }
+}
+
+/// Returns the failure of a step that reached `time`, which a call that does only a part must name.
+fn stopped(failure: Failure, time: f64) -> Failure {
+    match failure {
+        Failure::Discard(message) => Failure::Incomplete { time, message },
+        other => other,
+    }
+}
+
+/// The equations of a model during one step.
+struct Equations<'a, M> {
+    model: &'a mut M,
+    interface: &'a Interface<M>,
+    start: f64,
+    inputs: &'a [f64],
+}
+
+impl<M: Model> Equations<'_, M> {
+    /// Sets the model to a state at a time and computes its outputs and derivatives.
+    fn show(&mut self, time: f64, state: &[f64]) -> Result<(), Failure> {
+        self.interface.write_states(self.model, state);
+        self.interface.extrapolate(self.model, self.inputs, time - self.start);
+        self.model.update(time)
+    }
+
+    /// Handles an event and returns the time of the next one, if the model knows it.
+    fn settle(&mut self, time: f64) -> Result<Option<f64>, Failure> {
+        for _ in 0..ITERATION_LIMIT {
+            let event = self.model.event(time)?;
+            if let Some(message) = event.terminate_simulation {
+                return Err(Failure::Terminated { time, message });
+            }
+            if event.new_discrete_states_needed {
+                continue;
+            }
+            return match event.next_event_time {
+                Some(next) if next.is_nan() || next <= time => Err(Failure::Error(format!(
+                    "the event at {time} s states the next event time {next} s, expected a later one"
+                ))),
+                next => Ok(next),
+            };
+        }
+        Err(Failure::Error(format!(
+            "the event at {time} s still needs new discrete states after {ITERATION_LIMIT} calls"
+        )))
+    }
+}
+
+impl<M: Model> System for Equations<'_, M> {
+    fn derivative(&mut self, time: f64, state: &[f64], slope: &mut [f64]) -> Result<(), Failure> {
+        self.show(time, state)?;
+        self.interface.read_derivatives(self.model, slope);
+        Ok(())
+    }
+
+    fn indicators(&mut self, time: f64, state: &[f64], z: &mut [f64]) -> Result<(), Failure> {
+        self.show(time, state)?;
+        self.model.event_indicators(time, z);
+        Ok(())
+    }
+}
