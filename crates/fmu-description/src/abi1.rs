@@ -37,6 +37,35 @@ pub const VERSION: &std::ffi::CStr = c"1.0";
 /// The value of `mimeType` for an FMU of the kind stand-alone.
 pub const MIME_TYPE: &std::ffi::CStr = c"application/x-fmu-sharedlibrary";
 
+/// The names of all functions of a library for co-simulation, without the prefix.
+pub const FUNCTIONS: [&str; 25] = [
+    "fmiGetTypesPlatform",
+    "fmiGetVersion",
+    "fmiSetDebugLogging",
+    "fmiInstantiateSlave",
+    "fmiInitializeSlave",
+    "fmiTerminateSlave",
+    "fmiResetSlave",
+    "fmiFreeSlaveInstance",
+    "fmiGetReal",
+    "fmiGetInteger",
+    "fmiGetBoolean",
+    "fmiGetString",
+    "fmiSetReal",
+    "fmiSetInteger",
+    "fmiSetBoolean",
+    "fmiSetString",
+    "fmiSetRealInputDerivatives",
+    "fmiGetRealOutputDerivatives",
+    "fmiDoStep",
+    "fmiCancelStep",
+    "fmiGetStatus",
+    "fmiGetRealStatus",
+    "fmiGetIntegerStatus",
+    "fmiGetBooleanStatus",
+    "fmiGetStringStatus",
+];
+
 /// `fmiCallbackLogger`: component, instance name, status, category, message in the style of `printf`.
 pub type fmiCallbackLogger =
     unsafe extern "C" fn(fmiComponent, fmiString, fmiStatus, fmiString, fmiString, ...);

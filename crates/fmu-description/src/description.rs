@@ -3,7 +3,7 @@
 //! (section 2.4).
 
 mod guid;
-mod hash_form;
+pub(crate) mod hash_form;
 mod interface;
 mod kind;
 mod model_structure;
@@ -90,6 +90,13 @@ impl ModelDescription {
     #[must_use]
     pub fn variable(&self, name: &str) -> Option<&ScalarVariable> {
         self.variables.iter().find(|variable| variable.name == name)
+    }
+
+    /// Returns the variable with a 1-based index, as `structure`, `derivative`, `previous` and `clocks`
+    /// have it.
+    #[must_use]
+    pub fn at(&self, index: u32) -> Option<&ScalarVariable> {
+        self.variables.get(usize::try_from(index).ok()?.checked_sub(1)?)
     }
 }
 

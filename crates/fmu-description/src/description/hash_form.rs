@@ -7,12 +7,12 @@
 use serde::{Serialize, Serializer};
 
 /// Whether the field is absent from the form.
-pub(super) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+pub(crate) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
 
 /// Serialises a field with its number, which is unique within its structure.
-pub(super) fn numbered<const NUMBER: u8, T: Serialize, S: Serializer>(
+pub(crate) fn numbered<const NUMBER: u8, T: Serialize, S: Serializer>(
     value: &T,
     serializer: S,
 ) -> Result<S::Ok, S::Error> {

@@ -157,6 +157,19 @@ impl Kind {
         })
     }
 
+    /// Returns the attribute `declaredType`, which a `Boolean` and a `String` do not keep.
+    #[must_use]
+    pub fn declared_type(&self) -> Option<&str> {
+        match self {
+            Kind::Binary(own) => own.declared_type.as_deref(),
+            Kind::Clock(own) => own.declared_type.as_deref(),
+            other => match (other.as_real(), other.as_integer()) {
+                (Some(own), _) => own.declared_type.as_deref(),
+                (_, own) => own?.declared_type.as_deref(),
+            },
+        }
+    }
+
     /// Whether the variable has a `start` for a scalar, or for all elements of an array.
     #[must_use]
     pub fn has_start(&self) -> bool {

@@ -140,7 +140,7 @@ impl ModelDescription {
     /// let error = ModelDescription::parse(r#"<fmiModelDescription fmiVersion="4.0"/>"#);
     /// assert_eq!(
     ///     error.expect_err("another version").to_string(),
-    ///     "line 1, column 1: expected fmiVersion 2.0, found \"4.0\""
+    ///     "line 1, column 1: expected fmiVersion 1.0, 2.0 or 3.0, found \"4.0\""
     /// );
     /// ```
     pub fn parse(xml: impl AsRef<[u8]>) -> Result<ModelDescription, ParseError> {

@@ -220,3 +220,11 @@ fn structure() -> ModelStructure {
         ..ModelStructure::default()
     }
 }
+
+/// The same for FMI 3.0.
+pub(crate) fn complete_3() -> ModelDescription {
+    let (description, warnings) =
+        ModelDescription::read(include_str!("sample/fmi3.xml")).expect("readable");
+    assert_eq!(warnings, []);
+    description
+}

@@ -2,7 +2,7 @@
 
 use super::ParseError;
 use super::attributes::Node;
-use crate::description::{DefaultExperiment, LogCategory};
+use crate::description::{DefaultExperiment, LogCategory, Version};
 use crate::unit::{BaseUnit, DisplayUnit, Unit};
 
 pub(super) fn structured_names(root: Node<'_>) -> bool {
@@ -23,6 +23,7 @@ pub(super) fn unit(element: Node<'_>) -> Result<Unit, ParseError> {
             name: display.required("name")?.to_owned(),
             factor: display.finite("factor", 1.0)?,
             offset: display.finite("offset", 0.0)?,
+            inverse: element.warnings.version == Version::V3 && display.flag("inverse"),
         })
     });
     Ok(Unit {

@@ -57,6 +57,7 @@ fn unit(element: Node<'_>) -> Result<Unit, ParseError> {
             name: display.required("displayUnit")?.to_owned(),
             factor: display.finite("gain", 1.0)?,
             offset: display.finite("offset", 0.0)?,
+            inverse: false,
         })
     });
     Ok(Unit {

@@ -153,7 +153,7 @@ fn units_categories_and_experiment_are_read() {
     let celsius = BaseUnit { k: 1, offset: 273.15, ..BaseUnit::default() };
     assert_eq!(description.units[1].base, Some(celsius));
     assert_eq!(description.units[2].base, None);
-    let degrees = DisplayUnit { name: "deg".into(), factor: 57.3, offset: 0.0 };
+    let degrees = DisplayUnit { name: "deg".into(), factor: 57.3, offset: 0.0, inverse: false };
     assert_eq!(description.units[0].display_units, [degrees]);
     assert_eq!(description.log_categories[0].description.as_deref(), Some("jumps"));
     let experiment = DefaultExperiment {

@@ -1,4 +1,4 @@
-//! Rules on `ModelVariables` (section 2.2.7).
+//! Rules on `ModelVariables` of FMI 2.0 (section 2.2.7), and on limits in both versions.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -30,8 +30,15 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
                 let start = start.as_deref().unwrap_or_default();
                 problems.text(SECTION, &format!("start of {who}"), start);
             }
-            _ => {}
+            Kind::Boolean(_) => {}
+            other => problems.add(
+                SECTION,
+                format!("{who} is of type {}, which FMI 2.0 does not have", other.element()),
+            ),
         }
+        problems.demand(variable.dimensions.is_empty(), SECTION, || {
+            format!("{who} is an array, which FMI 2.0 does not have")
+        });
     }
     let is_independent = |own: &&ScalarVariable| own.causality == Causality::Independent;
     let independent = description.variables.iter().filter(is_independent).count();
@@ -94,13 +101,14 @@ fn check_start(variable: &ScalarVariable, problems: &mut Problems) {
 
 /// Checks limits and start of a Real variable or type, called `who`.
 pub(super) fn check_real(who: &str, real: &RealType, problems: &mut Problems) {
+    let section = problems.sections.limits;
     for (name, value) in
         [("start", real.start), ("min", real.min), ("max", real.max), ("nominal", real.nominal)]
     {
-        problems.finite(SECTION, &format!("{name} of {who}"), value);
+        problems.finite(section, &format!("{name} of {who}"), value);
     }
     if let Some(nominal) = real.nominal {
-        problems.demand(nominal > 0.0, SECTION, || {
+        problems.demand(nominal > 0.0, section, || {
             format!("{who}: nominal is {nominal:?}, not positive")
         });
     }
@@ -112,20 +120,21 @@ pub(super) fn check_integer(who: &str, integer: &IntegerType, problems: &mut Pro
     check_order(who, integer.min, integer.start, integer.max, problems);
 }
 
-fn check_order<T: Copy + PartialOrd + std::fmt::Debug>(
+pub(super) fn check_order<T: Copy + PartialOrd + std::fmt::Debug>(
     who: &str,
     min: Option<T>,
     start: Option<T>,
     max: Option<T>,
     problems: &mut Problems,
 ) {
+    let section = problems.sections.limits;
     for ((low, lower), (high, upper)) in [
         (("min", &min), ("max", &max)),
         (("min", &min), ("start", &start)),
         (("start", &start), ("max", &max)),
     ] {
         if let (Some(lower), Some(upper)) = (lower, upper) {
-            problems.demand(lower <= upper, SECTION, || {
+            problems.demand(lower <= upper, section, || {
                 format!("{who}: {low} {lower:?} is above {high} {upper:?}")
             });
         }

@@ -94,7 +94,7 @@ fn types_units_and_the_experiment_are_read() {
         (angle.unit.as_deref(), angle.min, angle.start),
         (Some("rad"), Some(-3.5), Some(0.5))
     );
-    let degrees = DisplayUnit { name: "deg".into(), factor: 57.5, offset: 0.0 };
+    let degrees = DisplayUnit { name: "deg".into(), factor: 57.5, offset: 0.0, inverse: false };
     assert_eq!(description.units[0].display_units, [degrees]);
     let items = [("low".to_owned(), 1), ("high".to_owned(), 2)];
     assert_eq!(description.types[1].items, items);
