@@ -7,7 +7,7 @@ use master::{CallError, Slave};
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Value {
     Real(u64),
-    Integer(i32),
+    Integer(i64),
     Boolean(bool),
     String(String),
 }
@@ -100,7 +100,7 @@ pub(super) fn get(slave: &mut dyn Slave, variable: &ScalarVariable) -> Result<Va
 pub(super) fn start(variable: &ScalarVariable) -> Option<Value> {
     match &variable.kind {
         Kind::Real(own) => own.start.map(|value| Value::Real(value.to_bits())),
-        Kind::Integer(own) | Kind::Enumeration(own) => own.start.map(Value::Integer),
+        Kind::Integer(own) | Kind::Enumeration(own) => own.start.map(|start| Value::Integer(start.into())),
         Kind::Boolean(start) => start.map(Value::Boolean),
         Kind::String(start) => start.clone().map(Value::String),
     }

@@ -180,13 +180,13 @@ impl Slave for LoggedSlave {
         self.set("fmi2SetReal", references, values, |slave| slave.set_real(references, values))
     }
 
-    fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
+    fn get_integer(&mut self, references: &[u32], values: &mut [i64]) -> Result<(), CallError> {
         self.get("fmi2GetInteger", references, values, |slave, values| {
             slave.get_integer(references, values)
         })
     }
 
-    fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
+    fn set_integer(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
         self.set("fmi2SetInteger", references, values, |slave| {
             slave.set_integer(references, values)
         })

@@ -13,7 +13,7 @@ use fmu_description::{Kind, ModelDescription};
 
 use crate::error::LoadError;
 use crate::library::{Component, Interface, Library, Names};
-use slave::{CallError, Slave, StepResult};
+use slave::{CallError, Failure, Slave, StepResult};
 
 /// Why an FMU could not be opened or instantiated.
 #[derive(Debug, thiserror::Error)]
@@ -174,7 +174,7 @@ impl Fmu {
             return Err(FmuError::OnlyOnce { instance, model });
         }
         let component = self.component(Interface::CoSimulation, name)?;
-        Ok(Instance { component, fmu: self.clone() })
+        Ok(Instance { component, integers: Vec::new(), fmu: self.clone() })
     }
 
     /// Returns the lookup of variable names for messages. Of several aliases it gives the one declared
@@ -253,7 +253,21 @@ fn with_tool_hint(description: &ModelDescription, error: LoadError) -> FmuError 
 /// A co-simulation instance of an FMU in this process.
 pub struct Instance {
     component: Component,
+    /// Buffer for Integers.
+    integers: Vec<i32>,
     fmu: Fmu,
+}
+
+/// Converts an integer to the type `what` of the FMU.
+pub(crate) fn narrow<T: TryFrom<i64>>(
+    function: &'static str,
+    what: &str,
+    value: i64,
+) -> Result<T, CallError> {
+    T::try_from(value).map_err(|_| {
+        let failure = Failure::InvalidAnswer(format!("cannot take the value {value}, expected {what}"));
+        CallError { function, failure, messages: Vec::new() }
+    })
 }
 
 impl Slave for Instance {
@@ -289,12 +303,22 @@ impl Slave for Instance {
         self.component.set_real(references, values)
     }
 
-    fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
-        self.component.get_integer(references, values)
+    fn get_integer(&mut self, references: &[u32], values: &mut [i64]) -> Result<(), CallError> {
+        self.integers.clear();
+        self.integers.resize(references.len(), 0);
+        self.component.get_integer(references, &mut self.integers)?;
+        for (value, own) in values.iter_mut().zip(&self.integers) {
+            *value = (*own).into();
+        }
+        Ok(())
     }
 
-    fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
-        self.component.set_integer(references, values)
+    fn set_integer(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
+        self.integers.clear();
+        for value in values {
+            self.integers.push(narrow("fmi2SetInteger", "an Integer of 32 bits", *value)?);
+        }
+        self.component.set_integer(references, &self.integers)
     }
 
     fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {

@@ -13,11 +13,13 @@ pub enum Value {
     /// Real.
     Real(f64),
     /// Integer or Enumeration.
-    Integer(i32),
+    Integer(i64),
     /// Boolean.
     Boolean(bool),
     /// String.
     String(String),
+    /// Binary; as text, hexadecimal digits.
+    Binary(Vec<u8>),
 }
 
 impl Value {
@@ -31,9 +33,10 @@ impl Value {
         let trimmed = text.trim();
         match kind {
             Kind::Real(_) => trimmed.parse().map(Value::Real).map_err(|_| "a number".to_owned()),
-            Kind::Integer(_) => {
-                trimmed.parse().map(Value::Integer).map_err(|_| "an integer".to_owned())
-            }
+            Kind::Integer(_) => trimmed
+                .parse::<i32>()
+                .map(|value| Value::Integer(value.into()))
+                .map_err(|_| "an integer".to_owned()),
             Kind::Enumeration(integer) => enumeration(integer, types, trimmed),
             Kind::Boolean(_) => match trimmed {
                 "true" | "1" => Ok(Value::Boolean(true)),
@@ -45,6 +48,69 @@ impl Value {
     }
 }
 
+/// The types between which a master distinguishes: the functions of a slave that access a variable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ValueType {
+    /// `get_real` and `set_real`: Real, `Float64`, `Float32`.
+    Real,
+    /// `get_integer` and `set_integer`: all integers and enumerations.
+    Integer,
+    /// `get_boolean` and `set_boolean`: Boolean, Clock.
+    Boolean,
+    /// `get_string` and `set_string`.
+    String,
+    /// `get_binary` and `set_binary`.
+    Binary,
+}
+
+impl ValueType {
+    /// Returns the type of the values of a variable of that kind.
+    #[must_use]
+    pub fn of(kind: &Kind) -> Self {
+        match kind {
+            Kind::Real(_) => ValueType::Real,
+            Kind::Integer(_) | Kind::Enumeration(_) => ValueType::Integer,
+            Kind::Boolean(_) => ValueType::Boolean,
+            Kind::String(_) => ValueType::String,
+        }
+    }
+}
+
+/// Converts an Integer to a Real, rounded to the nearest `f64` beyond 2^53.
+#[must_use]
+#[expect(clippy::cast_precision_loss, reason = "rounds to the nearest number")]
+pub fn to_real(value: i64) -> f64 {
+    value as f64
+}
+
+/// Applies the pairs of [`crate::Transformation::Integer`] to `value`.
+#[must_use]
+pub fn mapped_integer(pairs: &[(i32, i32)], value: i64) -> i64 {
+    let pair = pairs.iter().find(|(from, _)| i64::from(*from) == value);
+    pair.map_or(value, |(_, to)| (*to).into())
+}
+
+/// Returns the bytes as hexadecimal digits, as a model description writes a Binary (FMI 3.0.2, section
+/// 2.4.7.8).
+#[must_use]
+pub fn to_hex(bytes: &[u8]) -> String {
+    use fmt::Write as _;
+    let mut text = String::with_capacity(2 * bytes.len());
+    for byte in bytes {
+        // Writing to a String does not fail.
+        let _ = write!(text, "{byte:02x}");
+    }
+    text
+}
+
+/// Returns the bytes that `text` writes as hexadecimal digits; `None` if it does not.
+#[must_use]
+pub fn from_hex(text: &str) -> Option<Vec<u8>> {
+    let digits: Option<Vec<u32>> = text.chars().map(|digit| digit.to_digit(16)).collect();
+    let digits = digits.filter(|digits| digits.len() % 2 == 0)?;
+    digits.chunks(2).map(|pair| u8::try_from(16 * pair[0] + pair[1]).ok()).collect()
+}
+
 impl Value {
     /// Returns the start value in a model description; `None` for a String or without start value.
     #[must_use]
@@ -52,7 +118,7 @@ impl Value {
         match kind {
             Kind::Real(real) => real.start.map(Value::Real),
             Kind::Integer(integer) | Kind::Enumeration(integer) => {
-                integer.start.map(Value::Integer)
+                integer.start.map(|start| Value::Integer(start.into()))
             }
             Kind::Boolean(start) => start.map(Value::Boolean),
             Kind::String(_) => None,
@@ -81,18 +147,19 @@ impl fmt::Display for Value {
             Value::Integer(value) => value.fmt(formatter),
             Value::Boolean(value) => value.fmt(formatter),
             Value::String(value) => write!(formatter, "{value:?}"),
+            Value::Binary(value) => formatter.write_str(&to_hex(value)),
         }
     }
 }
 
 fn enumeration(kind: &IntegerType, types: &[SimpleType], text: &str) -> Result<Value, String> {
-    if let Ok(number) = text.parse() {
-        return Ok(Value::Integer(number));
+    if let Ok(number) = text.parse::<i32>() {
+        return Ok(Value::Integer(number.into()));
     }
     let declared = types.iter().find(|known| Some(&known.name) == kind.declared_type.as_ref());
     let items = declared.map(|declared| declared.items.as_slice()).unwrap_or_default();
     if let Some((_, number)) = items.iter().find(|(name, _)| name == text) {
-        return Ok(Value::Integer(*number));
+        return Ok(Value::Integer((*number).into()));
     }
     let names: Vec<_> = items.iter().map(|(name, _)| name.as_str()).collect();
     Err(format!("an integer or one of the items {}", names.join(", ")))

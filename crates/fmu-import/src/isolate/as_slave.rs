@@ -134,11 +134,11 @@ impl Slave for Isolated {
         self.set(Function::SetReal, references, values)
     }
 
-    fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
+    fn get_integer(&mut self, references: &[u32], values: &mut [i64]) -> Result<(), CallError> {
         self.get(Function::GetInteger, references, values)
     }
 
-    fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
+    fn set_integer(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
         self.set(Function::SetInteger, references, values)
     }
 

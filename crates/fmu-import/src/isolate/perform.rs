@@ -25,7 +25,8 @@ pub(super) struct Executor {
     instance: Instance,
     references: Vec<u32>,
     reals: Vec<f64>,
-    integers: Vec<i32>,
+    integers: Vec<i64>,
+    booleans: Vec<i32>,
     step: Step,
 }
 
@@ -53,7 +54,8 @@ impl Executor {
             let _ = instance.set_debug_logging(true);
         }
         let (references, reals, integers) = (Vec::new(), Vec::new(), Vec::new());
-        Self { instance, references, reals, integers, step: Step::default() }
+        let booleans = Vec::new();
+        Self { instance, references, reals, integers, booleans, step: Step::default() }
     }
 
     /// Returns the FMU of the instance.
@@ -71,7 +73,7 @@ impl Executor {
         reader: &mut Reader<'_>,
         writer: &mut Writer<'_>,
     ) -> CommandResult {
-        let Self { instance, references, reals, integers, step } = self;
+        let Self { instance, references, reals, integers, booleans, step } = self;
         match function {
             Function::DoStep => step.advance(instance, shared, reader, writer),
             Function::GetReal => {
@@ -81,7 +83,7 @@ impl Executor {
                 get(reader, writer, references, integers, |r, v| instance.get_integer(r, v))
             }
             Function::GetBoolean => {
-                get(reader, writer, references, integers, |r, v| instance.get_boolean(r, v))
+                get(reader, writer, references, booleans, |r, v| instance.get_boolean(r, v))
             }
             Function::SetReal => {
                 set(reader, writer, references, reals, |r, v| instance.set_real(r, v))
@@ -90,7 +92,7 @@ impl Executor {
                 set(reader, writer, references, integers, |r, v| instance.set_integer(r, v))
             }
             Function::SetBoolean => {
-                set(reader, writer, references, integers, |r, v| instance.set_boolean(r, v))
+                set(reader, writer, references, booleans, |r, v| instance.set_boolean(r, v))
             }
             _ => None,
         }
