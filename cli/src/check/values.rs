@@ -2,6 +2,7 @@
 
 use fmu_description::{Causality, Kind, ModelDescription, ScalarVariable, Variability};
 use master::{CallError, Slave};
+use slave::ValueType;
 
 /// A value of any type; equality compares bits.
 #[derive(Clone, Debug, PartialEq)]
@@ -10,6 +11,7 @@ pub(super) enum Value {
     Integer(i64),
     Boolean(bool),
     String(String),
+    Binary(Vec<u8>),
 }
 
 impl std::fmt::Display for Value {
@@ -19,6 +21,7 @@ impl std::fmt::Display for Value {
             Value::Integer(value) => write!(formatter, "{value}"),
             Value::Boolean(value) => write!(formatter, "{value}"),
             Value::String(value) => write!(formatter, "{value:?}"),
+            Value::Binary(value) => formatter.write_str(&slave::to_hex(value)),
         }
     }
 }
@@ -71,27 +74,33 @@ pub(super) fn distance(one: &[Vec<Value>], other: &[Vec<Value>]) -> f64 {
 /// Reads one variable.
 pub(super) fn get(slave: &mut dyn Slave, variable: &ScalarVariable) -> Result<Value, CallError> {
     let reference = [variable.value_reference];
-    Ok(match variable.kind {
-        Kind::Real(_) => {
+    Ok(match ValueType::of(&variable.kind) {
+        ValueType::Real => {
             let mut value = [0.0];
             slave.get_real(&reference, &mut value)?;
             Value::Real(value[0].to_bits())
         }
-        Kind::Integer(_) | Kind::Enumeration(_) => {
+        ValueType::Integer => {
             let mut value = [0];
             slave.get_integer(&reference, &mut value)?;
             Value::Integer(value[0])
         }
-        Kind::Boolean(_) => {
+        ValueType::Boolean => {
             let mut value = [0];
             slave.get_boolean(&reference, &mut value)?;
             Value::Boolean(value[0] != 0)
         }
-        Kind::String(_) => {
+        ValueType::String => {
             let mut value = [String::new()];
             slave.get_string(&reference, &mut value)?;
             let [value] = value;
             Value::String(value)
+        }
+        ValueType::Binary => {
+            let mut value = [Vec::new()];
+            slave.get_binary(&reference, &mut value)?;
+            let [value] = value;
+            Value::Binary(value)
         }
     })
 }
@@ -99,10 +108,14 @@ pub(super) fn get(slave: &mut dyn Slave, variable: &ScalarVariable) -> Result<Va
 /// Returns the start value in the XML.
 pub(super) fn start(variable: &ScalarVariable) -> Option<Value> {
     match &variable.kind {
-        Kind::Real(own) => own.start.map(|value| Value::Real(value.to_bits())),
-        Kind::Integer(own) | Kind::Enumeration(own) => own.start.map(|start| Value::Integer(start.into())),
-        Kind::Boolean(start) => start.map(Value::Boolean),
         Kind::String(start) => start.clone().map(Value::String),
+        Kind::Binary(own) => own.start.clone().map(Value::Binary),
+        other => match slave::Value::start(other)? {
+            slave::Value::Real(value) => Some(Value::Real(value.to_bits())),
+            slave::Value::Integer(value) => Some(Value::Integer(value)),
+            slave::Value::Boolean(value) => Some(Value::Boolean(value)),
+            slave::Value::String(_) | slave::Value::Binary(_) => None,
+        },
     }
 }
 

@@ -3,8 +3,8 @@
 use std::borrow::Cow;
 
 use crate::description::{
-    CoSimulation, DefaultExperiment, Kind, ModelDescription, ModelExchange, ScalarVariable,
-    SimpleType,
+    CoSimulation, DefaultExperiment, IntegerType, Kind, ModelDescription, ModelExchange,
+    ScalarVariable, SimpleType,
 };
 
 const STYLE: &str = "body { font: 16px/1.5 sans-serif; max-width: 72rem; margin: 2rem auto; \
@@ -148,22 +148,18 @@ fn type_name(kind: &Kind) -> String {
 pub fn texts(kind: &Kind, types: &[SimpleType]) -> (String, [String; 3]) {
     let none = String::new;
     match kind {
-        Kind::Real(own) => {
+        Kind::Real(own) | Kind::Float32(own) => {
             let number = |value: Option<f64>| value.map_or_else(none, |value| format!("{value:?}"));
             let unit = own.unit.clone().unwrap_or_default();
             (unit, [number(own.start), number(own.min), number(own.max)])
-        }
-        Kind::Integer(own) => {
-            let number = |value: Option<i32>| value.map_or_else(none, |value| value.to_string());
-            (none(), [number(own.start), number(own.min), number(own.max)])
         }
         Kind::Enumeration(own) => {
             let declared =
                 types.iter().find(|other| Some(&other.name) == own.declared_type.as_ref());
             let items = declared.map_or(&[][..], |own| &own.items);
-            let item = |value: Option<i32>| {
+            let item = |value: Option<i128>| {
                 let Some(value) = value else { return none() };
-                let item = items.iter().find(|(_, own)| *own == value);
+                let item = items.iter().find(|(_, own)| i128::from(*own) == value);
                 item.map_or_else(|| value.to_string(), |(name, _)| format!("{value} ({name})"))
             };
             (none(), [item(own.start), item(own.min), item(own.max)])
@@ -174,6 +170,23 @@ pub fn texts(kind: &Kind, types: &[SimpleType]) -> (String, [String; 3]) {
         Kind::String(start) => {
             let text = start.as_ref().map_or_else(none, |start| format!("\"{start}\""));
             (none(), [text, none(), none()])
+        }
+        Kind::Binary(own) => {
+            let bytes = own.start.as_ref();
+            let hex = bytes.map_or_else(none, |bytes| {
+                bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().concat()
+            });
+            (none(), [hex, none(), none()])
+        }
+        Kind::Clock(own) => {
+            let interval = own.interval_decimal.map_or_else(none, |value| format!("{value:?}"));
+            ("s".to_owned(), [interval, none(), none()])
+        }
+        other => {
+            let number = |value: Option<i128>| value.map_or_else(none, |value| value.to_string());
+            let own = other.as_integer();
+            let of = |of: fn(&IntegerType) -> Option<i128>| number(own.and_then(of));
+            (none(), [of(|own| own.start), of(|own| own.min), of(|own| own.max)])
         }
     }
 }

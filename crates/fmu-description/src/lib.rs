@@ -13,6 +13,8 @@
 #![forbid(unsafe_code)]
 
 pub mod abi;
+pub mod abi1;
+pub mod abi3;
 pub mod call_order;
 mod description;
 pub mod documentation;

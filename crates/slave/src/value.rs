@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use fmu_description::{IntegerType, Kind, SimpleType};
+use fmu_description::{IntegerType, Kind, SimpleType, Version};
 
 /// Relative tolerance of [`Value::is_near`] for Reals.
 const TOLERANCE: f64 = 1e-9;
@@ -32,20 +32,37 @@ impl Value {
     pub fn parse(kind: &Kind, types: &[SimpleType], text: &str) -> Result<Self, String> {
         let trimmed = text.trim();
         match kind {
-            Kind::Real(_) => trimmed.parse().map(Value::Real).map_err(|_| "a number".to_owned()),
-            Kind::Integer(_) => trimmed
-                .parse::<i32>()
-                .map(|value| Value::Integer(value.into()))
-                .map_err(|_| "an integer".to_owned()),
+            Kind::Real(_) | Kind::Float32(_) => {
+                trimmed.parse().map(Value::Real).map_err(|_| "a number".to_owned())
+            }
             Kind::Enumeration(integer) => enumeration(integer, types, trimmed),
-            Kind::Boolean(_) => match trimmed {
+            Kind::Boolean(_) | Kind::Clock(_) => match trimmed {
                 "true" | "1" => Ok(Value::Boolean(true)),
                 "false" | "0" => Ok(Value::Boolean(false)),
                 _ => Err("true or false".to_owned()),
             },
             Kind::String(_) => Ok(Value::String(text.to_owned())),
+            Kind::Binary(_) => from_hex(trimmed)
+                .map(Value::Binary)
+                .ok_or_else(|| "an even number of hexadecimal digits".to_owned()),
+            Kind::Integer(_) => match trimmed.parse::<i32>() {
+                Ok(value) => Ok(Value::Integer(value.into())),
+                Err(_) => Err("an integer".to_owned()),
+            },
+            _ => parse_integer(kind, trimmed),
         }
     }
+}
+
+/// Reads an integer of a type of FMI 3.0. Integers beyond 63 bits are not supported.
+fn parse_integer(kind: &Kind, text: &str) -> Result<Value, String> {
+    let (least, most) = kind.integer_range(Version::V3).unwrap_or_default();
+    let most = most.min(i64::MAX.into());
+    let value = text.parse::<i128>().ok().filter(|value| (least..=most).contains(value));
+    let value = value.and_then(|value| i64::try_from(value).ok());
+    value.map(Value::Integer).ok_or_else(|| {
+        format!("an integer from {least} to {most}, as its type is {}", kind.element())
+    })
 }
 
 /// The types between which a master distinguishes: the functions of a slave that access a variable.
@@ -68,10 +85,11 @@ impl ValueType {
     #[must_use]
     pub fn of(kind: &Kind) -> Self {
         match kind {
-            Kind::Real(_) => ValueType::Real,
-            Kind::Integer(_) | Kind::Enumeration(_) => ValueType::Integer,
-            Kind::Boolean(_) => ValueType::Boolean,
+            Kind::Real(_) | Kind::Float32(_) => ValueType::Real,
+            Kind::Boolean(_) | Kind::Clock(_) => ValueType::Boolean,
             Kind::String(_) => ValueType::String,
+            Kind::Binary(_) => ValueType::Binary,
+            _ => ValueType::Integer,
         }
     }
 }
@@ -117,11 +135,14 @@ impl Value {
     pub fn start(kind: &Kind) -> Option<Self> {
         match kind {
             Kind::Real(real) => real.start.map(Value::Real),
-            Kind::Integer(integer) | Kind::Enumeration(integer) => {
-                integer.start.map(|start| Value::Integer(start.into()))
-            }
+            // As the FMU holds it.
+            #[expect(clippy::cast_possible_truncation, reason = "the nearest f32")]
+            Kind::Float32(real) => real.start.map(|start| Value::Real((start as f32).into())),
             Kind::Boolean(start) => start.map(Value::Boolean),
-            Kind::String(_) => None,
+            other => {
+                let start = other.as_integer()?.start?;
+                i64::try_from(start).ok().map(Value::Integer)
+            }
         }
     }
 
@@ -153,13 +174,13 @@ impl fmt::Display for Value {
 }
 
 fn enumeration(kind: &IntegerType, types: &[SimpleType], text: &str) -> Result<Value, String> {
-    if let Ok(number) = text.parse::<i32>() {
-        return Ok(Value::Integer(number.into()));
+    if let Ok(number) = text.parse() {
+        return Ok(Value::Integer(number));
     }
     let declared = types.iter().find(|known| Some(&known.name) == kind.declared_type.as_ref());
     let items = declared.map(|declared| declared.items.as_slice()).unwrap_or_default();
     if let Some((_, number)) = items.iter().find(|(name, _)| name == text) {
-        return Ok(Value::Integer((*number).into()));
+        return Ok(Value::Integer(*number));
     }
     let names: Vec<_> = items.iter().map(|(name, _)| name.as_str()).collect();
     Err(format!("an integer or one of the items {}", names.join(", ")))

@@ -190,10 +190,11 @@ fn keep(file: &Mutex<Recording>) -> Option<(PathBuf, Result<(), ResultsError>)> 
 fn column(system: &System, port: Port) -> Column {
     let variable = system.variable(port);
     let kind = match &variable.kind {
-        Kind::Real(_) => ColumnKind::Real,
-        Kind::Integer(_) | Kind::Enumeration(_) => ColumnKind::Integer,
-        Kind::Boolean(_) => ColumnKind::Boolean,
-        Kind::String(_) => ColumnKind::String,
+        Kind::Boolean(_) | Kind::Clock(_) => ColumnKind::Boolean,
+        Kind::String(_) | Kind::Binary(_) => ColumnKind::String,
+        Kind::UInt32(_) | Kind::Int64(_) | Kind::UInt64(_) => ColumnKind::Long,
+        other if other.as_real().is_some() => ColumnKind::Real,
+        _ => ColumnKind::Integer,
     };
     Column { name: system.name(port), kind, unit: unit(system, port) }
 }
@@ -202,7 +203,7 @@ fn column(system: &System, port: Port) -> Column {
 #[must_use]
 pub fn unit(system: &System, port: Port) -> Option<String> {
     match &system.variable(port).kind {
-        Kind::Real(real) => real.unit.clone(),
+        Kind::Real(real) | Kind::Float32(real) => real.unit.clone(),
         _ => None,
     }
 }

@@ -200,7 +200,6 @@ impl Output {
             match &own.kind {
                 Kind::Real(real) => output.empty(real_limits(element, real)),
                 Kind::Integer(integer) => output.empty(integer_limits(element, integer)),
-                Kind::Boolean(_) | Kind::String(_) => output.empty(element),
                 Kind::Enumeration(integer) => {
                     let element = element.maybe("quantity", integer.quantity.as_ref());
                     output.around(element, |output| {
@@ -209,6 +208,7 @@ impl Output {
                         }
                     });
                 }
+                _ => output.empty(element),
             }
         });
     }
@@ -255,6 +255,8 @@ impl Output {
                 }
                 Kind::Boolean(start) => element.maybe("start", start.as_ref()),
                 Kind::String(start) => element.maybe("start", start.as_ref()),
+                // FMI 2.0 has no other types.
+                _ => element,
             });
         });
     }

@@ -71,7 +71,7 @@ impl<'a> Node<'a> {
             expected: expected.to_owned(),
             found,
             assumed: assumed.to_owned(),
-            section: section(self.element),
+            section: section(self.warnings.version, self.element),
         });
     }
 

@@ -1,7 +1,9 @@
 use super::*;
 use crate::description::{
-    Causality, DependencyKind, Initial, IntegerType, Kind, RealType, Variability,
+    Causality, CoSimulation, DefaultExperiment, DependencyKind, Initial, IntegerType, Kind,
+    RealType, Variability,
 };
+use crate::unit::{BaseUnit, DisplayUnit};
 
 mod files;
 mod tolerance;
@@ -66,8 +68,8 @@ fn each_kind_of_variable_is_read() {
     };
     assert_eq!(kind("r"), Kind::Real(real));
     let integer = IntegerType {
-        start: Some(i32::MIN),
-        min: Some(i32::MIN),
+        start: Some(i32::MIN.into()),
+        min: Some(i32::MIN.into()),
         max: Some(7),
         quantity: Some("q".into()),
         declared_type: None,

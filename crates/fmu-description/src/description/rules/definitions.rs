@@ -100,6 +100,6 @@ fn check_type(own: &SimpleType, problems: &mut Problems) {
                 });
             }
         }
-        Kind::Boolean(_) | Kind::String(_) => {}
+        _ => {}
     }
 }

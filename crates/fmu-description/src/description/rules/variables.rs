@@ -30,7 +30,7 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
                 let start = start.as_deref().unwrap_or_default();
                 problems.text(SECTION, &format!("start of {who}"), start);
             }
-            Kind::Boolean(_) => {}
+            _ => {}
         }
     }
     let is_independent = |own: &&ScalarVariable| own.causality == Causality::Independent;
@@ -75,15 +75,6 @@ fn check_table(variable: &ScalarVariable, problems: &mut Problems) {
     });
 }
 
-pub(super) fn has_start(kind: &Kind) -> bool {
-    match kind {
-        Kind::Real(own) => own.start.is_some(),
-        Kind::Integer(own) | Kind::Enumeration(own) => own.start.is_some(),
-        Kind::Boolean(start) => start.is_some(),
-        Kind::String(start) => start.is_some(),
-    }
-}
-
 fn check_start(variable: &ScalarVariable, problems: &mut Problems) {
     let name = &variable.name;
     let needed = match (variable.causality, variable.initial_in_force()) {
@@ -91,7 +82,7 @@ fn check_start(variable: &ScalarVariable, problems: &mut Problems) {
         (Causality::Input, _) => true,
         (_, initial) => initial != Some(Initial::Calculated),
     };
-    match (needed, has_start(&variable.kind)) {
+    match (needed, variable.has_start()) {
         (true, false) => problems.add(SECTION, format!("variable {name} needs a start value")),
         (false, true) => problems.add(
             SECTION,
@@ -152,7 +143,7 @@ fn check_declared_type(
     let declared = match &variable.kind {
         Kind::Real(own) => own.declared_type.as_deref(),
         Kind::Integer(own) | Kind::Enumeration(own) => own.declared_type.as_deref(),
-        Kind::Boolean(_) | Kind::String(_) => None,
+        _ => None,
     };
     let Some(declared) = declared else {
         let needed = matches!(variable.kind, Kind::Enumeration(_));
@@ -171,7 +162,7 @@ fn check_declared_type(
             within((inner.min, inner.max), (outer.min, outer.max))
         }
         (Kind::Enumeration(inner), Kind::Enumeration(_)) => {
-            let is_item = |start| own.items.iter().any(|(_, value)| *value == start);
+            let is_item = |start| own.items.iter().any(|(_, value)| i128::from(*value) == start);
             problems.demand(inner.start.is_none_or(is_item), SECTION, || {
                 format!("variable {name}: the start value is no item of type {declared}")
             });
@@ -240,7 +231,7 @@ fn check_aliases(description: &ModelDescription, problems: &mut Problems) {
             Kind::Real(_) => 0,
             Kind::Integer(_) | Kind::Enumeration(_) => 1,
             Kind::Boolean(_) => 2,
-            Kind::String(_) => 3,
+            _ => 3,
         };
         sets.entry((base, variable.value_reference)).or_default().push(variable);
     }
@@ -262,7 +253,7 @@ fn check_alias_set(set: &[&ScalarVariable], problems: &mut Problems) {
     problems.demand(set.iter().filter(is_free).count() <= 1, SECTION, || {
         format!("aliases {names}: more than one can be set from outside")
     });
-    let starts = set.iter().filter(|own| has_start(&own.kind)).count();
+    let starts = set.iter().filter(|own| own.has_start()).count();
     problems.demand(constants > 0 || starts <= 1, SECTION, || {
         format!("aliases {names}: more than one has a start value")
     });
