@@ -1,8 +1,7 @@
 //! Values of variables: read from a slave, and stated in the XML.
 
 use fmu_description::{Causality, Kind, ModelDescription, ScalarVariable, Variability};
-use master::{CallError, Slave};
-use slave::ValueType;
+use master::{CallError, Slave, ValueType};
 
 /// A value of any type; equality compares bits.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,7 +20,7 @@ impl std::fmt::Display for Value {
             Value::Integer(value) => write!(formatter, "{value}"),
             Value::Boolean(value) => write!(formatter, "{value}"),
             Value::String(value) => write!(formatter, "{value:?}"),
-            Value::Binary(value) => formatter.write_str(&slave::to_hex(value)),
+            Value::Binary(value) => formatter.write_str(&master::to_hex(value)),
         }
     }
 }
@@ -110,11 +109,11 @@ pub(super) fn start(variable: &ScalarVariable) -> Option<Value> {
     match &variable.kind {
         Kind::String(start) => start.clone().map(Value::String),
         Kind::Binary(own) => own.start.clone().map(Value::Binary),
-        other => match slave::Value::start(other)? {
-            slave::Value::Real(value) => Some(Value::Real(value.to_bits())),
-            slave::Value::Integer(value) => Some(Value::Integer(value)),
-            slave::Value::Boolean(value) => Some(Value::Boolean(value)),
-            slave::Value::String(_) | slave::Value::Binary(_) => None,
+        other => match master::Value::start(other)? {
+            master::Value::Real(value) => Some(Value::Real(value.to_bits())),
+            master::Value::Integer(value) => Some(Value::Integer(value)),
+            master::Value::Boolean(value) => Some(Value::Boolean(value)),
+            master::Value::String(_) | master::Value::Binary(_) => None,
         },
     }
 }

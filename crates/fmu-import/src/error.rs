@@ -48,6 +48,14 @@ pub enum LoadError {
         /// The FMU's messages.
         reason: String,
     },
+    /// The FMU needs something that the importer does not offer.
+    #[error("{model}: {reason}")]
+    Unsupported {
+        /// `modelName`.
+        model: String,
+        /// What the importer does not offer.
+        reason: String,
+    },
     /// The library failed to write its model description.
     #[error("{path}: {message}")]
     Describe {

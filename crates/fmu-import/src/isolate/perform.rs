@@ -9,7 +9,7 @@ use super::function::Function;
 use super::layout::Shared;
 use super::message::{RemoteError, Request, encode};
 use super::words::{Reader, Word, Writer};
-use crate::fmu::{Fmu, Instance};
+use crate::{Fmu, Instance};
 use slave::{CallError, Slave, StepResult};
 
 /// First word of an answer that consists of words.

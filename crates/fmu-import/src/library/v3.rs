@@ -25,7 +25,6 @@ use crate::crash::Place;
 use crate::error::LoadError;
 use functions::{Functions, Instance, State};
 use slave::{CallError, Failure};
-pub(crate) use step::{DiscreteStates, StepDone};
 
 /// A loaded library with the functions of FMI 3.0.
 pub(crate) struct Library {

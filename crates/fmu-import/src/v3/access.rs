@@ -49,7 +49,7 @@ impl Instance {
     ) -> Result<(), CallError> {
         self.for_runs(function, list, |own, run| {
             if run.kind == NativeType::Clock {
-                own.clocks.read(run);
+                own.state.clocks.read(run);
             } else {
                 run.buffer.get(&mut own.component, &run.references)?;
             }
@@ -91,9 +91,9 @@ impl Instance {
                 }
             }
             if run.kind == NativeType::Clock {
-                return own.clocks.request(function, run);
+                return own.state.clocks.request(function, run);
             }
-            if !run.clocks.is_empty() && own.mode.is_initialized() {
+            if !run.clocks.is_empty() && own.state.mode.is_initialized() {
                 // Set when one of its clocks ticks.
                 run.deferred = true;
                 return Ok(());
@@ -164,10 +164,10 @@ impl Instance {
         let mut changed = false;
         for (place, shadow) in shadows.iter().enumerate() {
             let value = Some(bits(place));
-            changed |= self.held[*shadow] != value;
-            self.held[*shadow] = value;
+            changed |= self.state.held[*shadow] != value;
+            self.state.held[*shadow] = value;
         }
-        if self.mode != Mode::Step {
+        if self.state.mode != Mode::Step {
             return Ok(true);
         }
         if changed {

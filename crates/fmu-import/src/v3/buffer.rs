@@ -177,14 +177,6 @@ macro_rules! buffer {
                     Buffer::Other => 0,
                 }
             }
-
-            /// Returns the number of values.
-            pub(super) fn len(&self) -> usize {
-                match self {
-                    $(Buffer::$variant(values) => values.len(),)*
-                    Buffer::Other => 0,
-                }
-            }
         }
     };
 }

@@ -93,9 +93,9 @@ pub(super) struct Variable {
 
 /// The scalar variables of an FMU, and where their values are.
 #[derive(Clone, Debug)]
-pub(super) struct ElementView {
+pub(crate) struct ElementView {
     /// The description with a scalar variable for each element.
-    pub(super) description: ModelDescription,
+    pub(crate) description: ModelDescription,
     pub(super) variables: Vec<Variable>,
     by_reference: HashMap<u32, usize>,
     /// The value reference of the first cell.
@@ -111,7 +111,7 @@ pub(super) struct ElementView {
 impl ElementView {
     /// Creates the view of an FMU whose structural parameters have the values `sizes`, by value
     /// reference; others have their start values. On failure returns the reason.
-    pub(super) fn new(own: &ModelDescription, sizes: &HashMap<u32, u64>) -> Result<Self, String> {
+    pub(crate) fn new(own: &ModelDescription, sizes: &HashMap<u32, u64>) -> Result<Self, String> {
         let starts: HashMap<u32, u64> = own
             .variables
             .iter()
@@ -357,7 +357,7 @@ impl Builder {
         }
         for (position, &(start, size)) in self.ranges.iter().enumerate() {
             for element in 0..size {
-                let variable = &mut self.view.description.variables[start + element];
+                let variable = &self.view.description.variables[start + element];
                 let moved = |index: u32| self.moved(index, element);
                 let (mut kind, previous) = (variable.kind.clone(), variable.previous);
                 if let Kind::Real(real) | Kind::Float32(real) = &mut kind {

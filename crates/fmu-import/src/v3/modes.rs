@@ -50,13 +50,14 @@ pub(super) struct State {
 impl Instance {
     /// Ends the initialization and handles the event at the start time.
     pub(super) fn end_initialization(&mut self) -> Result<(), CallError> {
-        self.clocks.start(&mut self.component, self.time)?;
+        let start = self.state.time;
+        self.state.clocks.start(&mut self.component, start)?;
         self.component.exit_initialization_mode()?;
         if self.event_mode {
-            self.mode = Mode::Event;
-            self.handle_event(self.time)
+            self.state.mode = Mode::Event;
+            self.handle_event(self.state.time)
         } else {
-            self.mode = Mode::Step;
+            self.state.mode = Mode::Step;
             Ok(())
         }
     }
@@ -64,17 +65,17 @@ impl Instance {
     /// Enters Event Mode.
     pub(super) fn enter_event(&mut self) -> Result<(), CallError> {
         self.component.enter_event_mode()?;
-        self.mode = Mode::Event;
+        self.state.mode = Mode::Event;
         Ok(())
     }
 
     /// Handles the event at `time`: clocks tick, discrete states are updated until they do not change
     /// any more; then enters Step Mode.
     pub(super) fn handle_event(&mut self, time: f64) -> Result<(), CallError> {
-        if self.mode == Mode::Step {
+        if self.state.mode == Mode::Step {
             self.enter_event()?;
         }
-        let active = if self.clocks.is_due(time) { self.clocks.tick(time) } else { Vec::new() };
+        let active = if self.state.clocks.is_due(time) { self.state.clocks.tick(time) } else { Vec::new() };
         if !active.is_empty() {
             self.component.activate_clocks(&active)?;
             self.set_deferred(&active)?;
@@ -83,8 +84,8 @@ impl Instance {
         loop {
             self.state.clocks.read_outputs(&mut self.component)?;
             let states = self.component.update_discrete_states()?;
-            self.terminate |= states.terminate;
-            self.next_event = states.next_event;
+            self.state.terminate |= states.terminate;
+            self.state.next_event = states.next_event;
             updates += 1;
             if !states.need_update || states.terminate {
                 break;
@@ -98,7 +99,7 @@ impl Instance {
         }
         self.state.clocks.ask_intervals(&mut self.component, time, &active)?;
         self.component.enter_step_mode()?;
-        self.mode = Mode::Step;
+        self.state.mode = Mode::Step;
         Ok(())
     }
 
@@ -121,12 +122,12 @@ impl Instance {
         never_back: bool,
     ) -> Result<StepResult, CallError> {
         if self.event_mode {
-            self.clocks.begin_step();
-            if self.mode == Mode::Event || self.is_event_due(time, size) {
+            self.state.clocks.begin_step();
+            if self.state.mode == Mode::Event || self.is_event_due(time, size) {
                 self.handle_event(time)?;
             }
         }
-        if self.terminate {
+        if self.state.terminate {
             return Ok(StepResult::Part { reached: time, terminated: true });
         }
         let (end, rounding) = (time + size, ROUNDING * size);
@@ -154,13 +155,13 @@ impl Instance {
                 );
                 return Err(refused("fmi3DoStep", what));
             }
-            self.time = reached;
+            self.state.time = reached;
             if done.terminate {
                 return Ok(StepResult::Part { reached, terminated: true });
             }
             if self.event_mode && (done.event || self.is_event_due(reached, size)) {
                 self.handle_event(reached)?;
-                if self.terminate {
+                if self.state.terminate {
                     return Ok(StepResult::Part { reached, terminated: true });
                 }
             }
@@ -181,7 +182,7 @@ impl Instance {
         if !self.event_mode {
             return left;
         }
-        let events = [self.next_event, self.clocks.next()].into_iter().flatten();
+        let events = [self.state.next_event, self.state.clocks.next()].into_iter().flatten();
         let sizes = events.map(|event| event - now).filter(|size| *size > rounding);
         let least = sizes.reduce(f64::min).unwrap_or(f64::INFINITY);
         // A step that ends shortly before its end would leave a rest that is rounding.
@@ -190,7 +191,7 @@ impl Instance {
 
     /// Whether an event is due at `time`, in a step of `size` s.
     fn is_event_due(&self, time: f64, size: f64) -> bool {
-        self.next_event.is_some_and(|next| next <= time + ROUNDING * size)
-            || self.clocks.is_due(time)
+        self.state.next_event.is_some_and(|next| next <= time + ROUNDING * size)
+            || self.state.clocks.is_due(time)
     }
 }

@@ -108,15 +108,6 @@ impl Component {
         Ok(shift)
     }
 
-    /// Calls `fmi3SetIntervalDecimal` for one clock.
-    pub(crate) fn set_interval(&mut self, clock: u32, interval: f64) -> Result<(), CallError> {
-        const NAME: &str = "fmi3SetIntervalDecimal";
-        let function = function!(self.set_interval_decimal, NAME);
-        // SAFETY: the instance is alive; one reference, one value.
-        let status = unsafe { function(self.pointer, &raw const clock, 1, &raw const interval) };
-        self.check(NAME, status)
-    }
-
     /// Calls `fmi3GetDirectionalDerivative`. `seed` and `changes` have as many values as the elements of
     /// the knowns and unknowns together.
     pub(crate) fn directional_derivative(

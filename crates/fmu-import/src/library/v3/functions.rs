@@ -84,8 +84,6 @@ functions! {
         fn(Instance, References, usize, *mut f64, *mut c_int) -> Status;
     get_shift_decimal = "fmi3GetShiftDecimal":
         fn(Instance, References, usize, *mut f64) -> Status;
-    set_interval_decimal = "fmi3SetIntervalDecimal":
-        fn(Instance, References, usize, *const f64) -> Status;
     update_discrete_states = "fmi3UpdateDiscreteStates": fn(Instance, *mut u8, *mut u8, *mut u8,
         *mut u8, *mut u8, *mut f64) -> Status;
     do_step = "fmi3DoStep": fn(Instance, f64, f64, bool, *mut u8, *mut u8, *mut u8, *mut f64)
