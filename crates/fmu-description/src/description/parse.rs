@@ -3,7 +3,9 @@
 mod attributes;
 mod definitions;
 mod encoding;
+mod fmi1;
 mod fmi2;
+mod fmi3;
 mod schema;
 mod structure;
 mod variables;
@@ -88,7 +90,7 @@ pub enum ParseError {
         limit: usize,
     },
     /// The file is of an unknown version of the standard.
-    #[error("{at}: expected fmiVersion 2.0, found {found:?}")]
+    #[error("{at}: expected fmiVersion 1.0, 2.0 or 3.0, found {found:?}")]
     Version {
         /// The position.
         at: Position,
@@ -182,14 +184,15 @@ impl ModelDescription {
         let warnings = Warnings::new(version);
         let root = Node { element: &element, warnings: &warnings };
         let description = match version {
+            Version::V1 => fmi1::root(root)?,
             Version::V2 => fmi2::root(root)?,
-            Version::V1 | Version::V3 => {
-                let found = version.as_str().to_owned();
-                return Err(ParseError::Version { at: element.at, found });
-            }
+            Version::V3 => fmi3::root(root)?,
         };
         let mut warnings = warnings.finish();
-        warnings.splice(0..0, not_utf8);
+        let section = if version == Version::V3 { "2.4" } else { "2.2" };
+        // FMI 1.0 demands no encoding.
+        let not_utf8 = not_utf8.filter(|_| version != Version::V1);
+        warnings.splice(0..0, not_utf8.map(|warning| Warning { section, ..warning }));
         Ok((description, warnings))
     }
 }

@@ -3,24 +3,19 @@
 use super::attributes::Node;
 use super::definitions::{category, experiment, structured_names, unit};
 use super::{ParseError, schema, structure, variables};
-use crate::description::{CoSimulation, ModelDescription, ModelExchange};
+use crate::description::{CoSimulation, ModelDescription, ModelExchange, Version};
 
 pub(super) fn root(root: Node<'_>) -> Result<ModelDescription, ParseError> {
     version(root);
-    schema::check(root, "");
+    schema::check(root, Version::V2);
     let types = variables::types(root)?;
     let variables = variables::variables(root.child("ModelVariables")?, &types)?;
     let structure = structure::read(root, &variables)?;
     let model_exchange = root.optional_child("ModelExchange")?.map(model_exchange).transpose()?;
     let co_simulation = root.optional_child("CoSimulation")?.map(co_simulation).transpose()?;
-    let model_name = root.text("modelName").unwrap_or_else(|| {
-        let own = co_simulation.as_ref().map(|own| &own.model_identifier);
-        let own = own.or(model_exchange.as_ref().map(|own| &own.model_identifier));
-        let own = own.cloned().unwrap_or_default();
-        let said = ("a value", "no such attribute".to_owned());
-        root.warn_of(true, root.place("modelName"), said, &format!("read as {own:?}"));
-        own
-    });
+    let identifier = co_simulation.as_ref().map(|own| &own.model_identifier);
+    let identifier = identifier.or(model_exchange.as_ref().map(|own| &own.model_identifier));
+    let model_name = root.text_or("modelName", identifier.cloned().unwrap_or_default());
     Ok(ModelDescription {
         fmi_version: "2.0".to_owned(),
         model_name,

@@ -6,6 +6,8 @@ use crate::description::{
 use crate::unit::{BaseUnit, DisplayUnit};
 
 mod files;
+mod fmi1;
+mod fmi3;
 mod tolerance;
 
 /// A model description around `variables` and `structure`, with an enumeration and a real type.
@@ -164,7 +166,7 @@ fn units_categories_and_experiment_are_read() {
 
 #[test]
 fn other_versions_are_named() {
-    for version in ["1.0", "3.0", "2.1", "2.0.x", "2.0.1.2", ""] {
+    for version in ["0.9", "1.1", "3.", "4.0", "2.1", "2.0.x", "2.0.1.2", ""] {
         let xml = format!(r#"<fmiModelDescription fmiVersion="{version}"/>"#);
         let error = ModelDescription::parse(xml).unwrap_err();
         assert!(matches!(error, ParseError::Version { ref found, .. } if found == version));

@@ -18,7 +18,7 @@ pub(super) const VARIABILITIES: [&str; 5] =
 pub(super) const VARIABLES: usize = 1_000_000;
 
 /// The types of `TypeDefinitions`, by name.
-type Types<'a> = HashMap<&'a str, &'a SimpleType>;
+pub(super) type Types<'a> = HashMap<&'a str, &'a SimpleType>;
 
 pub(super) fn types(root: Node<'_>) -> Result<Vec<SimpleType>, ParseError> {
     root.list("TypeDefinitions", "SimpleType", |element| {
@@ -116,7 +116,7 @@ pub(super) fn check_references(
 }
 
 /// Variables of the same base type share the space of value references.
-fn base(kind: &Kind) -> u8 {
+pub(super) fn base(kind: &Kind) -> u8 {
     match kind {
         Kind::Real(_) => 0,
         Kind::Integer(_) | Kind::Enumeration(_) => 1,
@@ -177,7 +177,7 @@ fn variability(element: Node<'_>, causality: Causality, kind: &Kind) -> Variabil
 }
 
 /// Returns the single child that gives the type of a variable or a type definition.
-fn typed(element: Node<'_>) -> Result<Node<'_>, ParseError> {
+pub(super) fn typed(element: Node<'_>) -> Result<Node<'_>, ParseError> {
     let is_kind = |child: &&super::xml::Element<'_>| KINDS.contains(&child.name);
     let mut found = element.element.children.iter().filter(is_kind);
     match (found.next(), found.next()) {
@@ -190,7 +190,7 @@ fn typed(element: Node<'_>) -> Result<Node<'_>, ParseError> {
     }
 }
 
-fn kind(element: Node<'_>, types: &Types<'_>, count: usize) -> Result<Kind, ParseError> {
+pub(super) fn kind(element: Node<'_>, types: &Types<'_>, count: usize) -> Result<Kind, ParseError> {
     let declared = declared(element, types);
     Ok(match element.element.name {
         "Real" => {
@@ -252,7 +252,7 @@ fn declared<'a>(element: Node<'_>, types: &Types<'a>) -> Option<(String, &'a Kin
     }
 }
 
-fn real_limits(element: Node<'_>, defaults: &RealType) -> Result<RealType, ParseError> {
+pub(super) fn real_limits(element: Node<'_>, defaults: &RealType) -> Result<RealType, ParseError> {
     Ok(RealType {
         quantity: element.text("quantity").or(defaults.quantity.clone()),
         unit: element.text("unit").or(defaults.unit.clone()),
@@ -264,7 +264,10 @@ fn real_limits(element: Node<'_>, defaults: &RealType) -> Result<RealType, Parse
     })
 }
 
-fn integer_limits(element: Node<'_>, defaults: &IntegerType) -> Result<IntegerType, ParseError> {
+pub(super) fn integer_limits(
+    element: Node<'_>,
+    defaults: &IntegerType,
+) -> Result<IntegerType, ParseError> {
     Ok(IntegerType {
         quantity: element.text("quantity").or(defaults.quantity.clone()),
         min: element.integer("min")?.map(i128::from).or(defaults.min),
