@@ -282,7 +282,9 @@ fn open_library(
     model_identifier: &str,
 ) -> Result<CoSimulation, FmuError> {
     let library = match description.version() {
-        Version::V1 => v1::Library::open(path, model_identifier).map(Arc::new).map(CoSimulation::V1),
+        Version::V1 => {
+            v1::Library::open(path, model_identifier).map(Arc::new).map(CoSimulation::V1)
+        }
         Version::V2 => {
             Library::open(path, Interface::CoSimulation).map(Arc::new).map(CoSimulation::V2)
         }

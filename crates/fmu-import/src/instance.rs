@@ -6,7 +6,7 @@ use fmu_description::{Experiment, ModelDescription};
 
 use crate::fmu::Fmu;
 use crate::{v1, v2, v3};
-use slave::{CallError, Slave, StepResult, absent};
+use slave::{CallError, CallSink, Slave, StepResult, absent};
 
 /// A co-simulation instance of an FMU in this process.
 pub struct Instance {
@@ -286,6 +286,16 @@ impl Slave for Instance {
             self.get_real(outputs, results)?;
         }
         Ok(done)
+    }
+
+    fn log_calls(&mut self, sink: CallSink) -> bool {
+        match &mut self.inner {
+            Inner::V1(_) | Inner::V2(_) => false,
+            Inner::V3(own) => {
+                own.log_calls(sink);
+                true
+            }
+        }
     }
 
     fn take_warning(&mut self) -> bool {

@@ -41,6 +41,13 @@ fn key(kind: ValueType) -> u8 {
     }
 }
 
+/// Returns the description of an instance, in which negated aliases have value references of their own.
+pub(crate) fn scalar_description(own: &ModelDescription) -> ModelDescription {
+    let mut description = own.clone();
+    separate_negated(&mut description);
+    description
+}
+
 /// Gives the negated aliases of `description` value references that no variable has; returns each with
 /// that of the FMU.
 fn separate_negated(description: &mut ModelDescription) -> HashMap<u32, u32> {

@@ -25,7 +25,7 @@ use clocks::Clocks;
 pub(crate) use elements::ElementView;
 use modes::{Mode, State};
 use plan::Plans;
-use slave::{CallError, StepResult};
+use slave::{CallError, CallSink, StepResult};
 
 /// A co-simulation instance of an FMU of FMI 3.0 in this process.
 pub(crate) struct Instance {
@@ -62,11 +62,8 @@ impl Instance {
             event_mode,
             early_return: event_mode || flags.might_return_early_from_do_step,
         })?;
-        let state = State {
-            held: vec![None; view.shadows],
-            clocks: Clocks::new(own),
-            ..State::default()
-        };
+        let state =
+            State { held: vec![None; view.shadows], clocks: Clocks::new(own), ..State::default() };
         let experiment = Experiment { start_time: 0.0, stop_time: None, tolerance: None };
         let (plans, slots) = (Plans::default(), Vec::new());
         Ok(Self { component, view, plans, event_mode, experiment, state, slots, sizes })
@@ -162,9 +159,8 @@ impl Instance {
     }
 
     pub(crate) fn set_boolean(&mut self, list: &[u32], values: &[i32]) -> Result<(), CallError> {
-        let put = |buffer: &mut Buffer, place, value| {
-            buffer.put_integer(place, i64::from(value != 0))
-        };
+        let put =
+            |buffer: &mut Buffer, place, value| buffer.put_integer(place, i64::from(value != 0));
         self.write("fmi3SetBoolean", list, values, put)
     }
 
@@ -216,6 +212,10 @@ impl Instance {
         never_back: bool,
     ) -> Result<StepResult, CallError> {
         self.step(time, size, never_back)
+    }
+
+    pub(crate) fn log_calls(&mut self, sink: CallSink) {
+        self.component.log_calls(sink);
     }
 
     pub(crate) fn take_warning(&mut self) -> bool {

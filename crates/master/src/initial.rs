@@ -165,8 +165,9 @@ impl<'a> Graph<'a> {
         nodes: &[usize],
         time: f64,
     ) -> Result<(), SystemError> {
-        let is_real =
-            |node: &usize| ValueType::of(&system.variable(self.outputs[*node]).kind) == ValueType::Real;
+        let is_real = |node: &usize| {
+            ValueType::of(&system.variable(self.outputs[*node]).kind) == ValueType::Real
+        };
         let (reals, others): (Vec<usize>, Vec<usize>) =
             nodes.iter().partition(|node| is_real(node));
         let mut held = self.read_all(system, &others, time)?;

@@ -54,7 +54,8 @@ pub use probe::Probe;
 pub use readout::{Readout, SlowState, SlowValues};
 pub use simulation::{Checkpoint, Simulation};
 pub use slave::{
-    Advance, Background, CallError, Failure, Slave, StepResult, Transformation, Value, ValueType, to_hex,
+    Advance, Background, CallError, Failure, Slave, StepResult, Transformation, Value, ValueType,
+    to_hex,
 };
 pub use system::{Connection, Port, System};
 

@@ -55,8 +55,7 @@ impl Readout {
             let kind = ValueType::of(&variable.kind);
             let position = readout.add(kind);
             // Only the last group of this kind can be extended, so that its range stays contiguous.
-            let last =
-                readout.reads.iter_mut().rev().find(|read| array(read.kind) == array(kind));
+            let last = readout.reads.iter_mut().rev().find(|read| array(read.kind) == array(kind));
             match last.filter(|read| read.slave == port.slave && read.kind == kind) {
                 Some(read) => {
                     read.references.push(variable.value_reference);

@@ -233,6 +233,14 @@ pub trait Slave: Send {
         self.advance(&mut Advance::held(inputs, (time, size), never_back, outputs))
     }
 
+    /// Logs the C calls of this slave: passes the text of each call to `sink` before it is made, and
+    /// status, results and the end of the line after it. False if the slave cannot do so; the caller
+    /// then logs the functions of this trait.
+    fn log_calls(&mut self, sink: CallSink) -> bool {
+        drop(sink);
+        false
+    }
+
     /// Whether a call has returned `fmi2Warning` since the last call of this function. False if this
     /// is unknown, as for an instance in another process.
     fn take_warning(&mut self) -> bool {
@@ -245,6 +253,9 @@ pub trait Slave: Send {
         None
     }
 }
+
+/// Receives the text of calls, for [`Slave::log_calls`].
+pub type CallSink = Box<dyn FnMut(&str) + Send>;
 
 /// A slave that steps in the background, so that its caller can start the steps of other slaves.
 pub trait Background {

@@ -271,8 +271,7 @@ fn connect(
             Transformation::Linear { factor: factor.unwrap_or(1.0), offset: offset.unwrap_or(0.0) };
         for (from, to) in pairs {
             taken.insert(terminal(to));
-            let transformation =
-                if stated { linear.clone() } else { Transformation::Identity };
+            let transformation = if stated { linear.clone() } else { Transformation::Identity };
             let link = Link {
                 from: terminal(from),
                 to: terminal(to),

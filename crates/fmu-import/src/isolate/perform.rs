@@ -122,6 +122,20 @@ impl Executor {
             Request::SaveState(slot) => instance.save_state(slot),
             Request::RestoreState(slot) => instance.restore_state(slot),
             Request::DeserializeState(bytes) => instance.deserialize_state(bytes),
+            Request::Configure(values) => {
+                let (references, values): (Vec<_>, Vec<_>) = values.into_iter().unzip();
+                instance.configure(&references, &values)
+            }
+            Request::SetBinary(values) => {
+                let values = values.into_iter().map(|(reference, bytes)| (reference, bytes.to_vec()));
+                let (references, values): (Vec<u32>, Vec<Vec<u8>>) = values.unzip();
+                instance.set_binary(&references, &values)
+            }
+            Request::GetBinary(references) => {
+                let mut values = vec![Vec::new(); references.len()];
+                let done = instance.get_binary(&references, &mut values);
+                return reply(done.map(|()| values), answer);
+            }
             Request::GetString(references) => {
                 let mut values = vec![String::new(); references.len()];
                 let done = instance.get_string(&references, &mut values);

@@ -203,9 +203,8 @@ impl Component {
         let function = function!(self.initialize, NAME);
         self.place.set_time(start);
         // SAFETY: the instance is alive.
-        let status = unsafe {
-            function(self.pointer, start, stop.is_some().into(), stop.unwrap_or(0.0))
-        };
+        let status =
+            unsafe { function(self.pointer, start, stop.is_some().into(), stop.unwrap_or(0.0)) };
         self.check(NAME, status)
     }
 
@@ -247,13 +246,7 @@ impl Component {
         let (count, orders) = (same_length(references, values), &orders[..references.len()]);
         // SAFETY: the instance is alive; as many references as orders and values.
         let status = unsafe {
-            function(
-                self.pointer,
-                references.as_ptr(),
-                count,
-                orders.as_ptr(),
-                values.as_mut_ptr(),
-            )
+            function(self.pointer, references.as_ptr(), count, orders.as_ptr(), values.as_mut_ptr())
         };
         self.check(NAME, status)
     }

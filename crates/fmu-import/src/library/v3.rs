@@ -10,7 +10,7 @@ mod states;
 mod step;
 mod values;
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::ffi::CStr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -24,7 +24,7 @@ use super::{c_string, load};
 use crate::crash::Place;
 use crate::error::LoadError;
 use functions::{Functions, Instance, State};
-use slave::{CallError, Failure};
+use slave::{CallError, CallSink, Failure};
 
 /// A loaded library with the functions of FMI 3.0.
 pub(crate) struct Library {
@@ -110,6 +110,7 @@ impl Library {
             sink,
             saved: Vec::new(),
             warned: Cell::new(false),
+            call_sink: RefCell::new(None),
             library: self.clone(),
         };
         if !pointer.is_null() {
@@ -137,6 +138,8 @@ pub(crate) struct Component {
     saved: Vec<State>,
     /// Whether a call has returned `fmi3Warning`.
     warned: Cell<bool>,
+    /// Receives a text for each call, if calls are logged.
+    call_sink: RefCell<Option<CallSink>>,
     library: Arc<Library>,
 }
 
@@ -167,9 +170,45 @@ impl Drop for Component {
 }
 
 impl Component {
+    /// Passes the text of every call from now on to `sink`.
+    pub(crate) fn log_calls(&mut self, sink: CallSink) {
+        self.call_sink = RefCell::new(Some(sink));
+    }
+
+    /// Logs a call before it is made.
+    #[inline]
+    fn log_call(&self, function: &'static str, arguments: impl FnOnce() -> String) {
+        if let Some(sink) = &mut *self.call_sink.borrow_mut() {
+            sink(&format!("{function}({})", arguments()));
+        }
+    }
+
+    /// As [`Component::check`], for a call with results, which are logged.
+    #[inline]
+    fn check_results(
+        &self,
+        function: &'static str,
+        status: i32,
+        results: impl FnOnce() -> String,
+    ) -> Result<(), CallError> {
+        if let Some(sink) = &mut *self.call_sink.borrow_mut() {
+            let name = match Status::from_c(status) {
+                Some(status) => status.name().replace("fmi2", "fmi3"),
+                None => status.to_string(),
+            };
+            sink(&format!(" -> {name}{}\n", results()));
+        }
+        self.check_status(function, status)
+    }
+
     /// Marks the call as returned and converts its status to a result.
     #[inline]
     fn check(&self, function: &'static str, status: i32) -> Result<(), CallError> {
+        self.check_results(function, status, String::new)
+    }
+
+    #[inline]
+    fn check_status(&self, function: &'static str, status: i32) -> Result<(), CallError> {
         self.place.leave();
         if status == Status::OK as i32 {
             return Ok(());

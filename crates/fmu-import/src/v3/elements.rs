@@ -203,7 +203,8 @@ fn count(extents: &[u64]) -> usize {
 
 /// Returns the first of `count` consecutive value references that no variable has.
 fn free_references(own: &ModelDescription, count: usize) -> u32 {
-    let mut used: Vec<u32> = own.variables.iter().map(|variable| variable.value_reference).collect();
+    let mut used: Vec<u32> =
+        own.variables.iter().map(|variable| variable.value_reference).collect();
     used.sort_unstable();
     used.dedup();
     let count = u32::try_from(count).unwrap_or(u32::MAX);

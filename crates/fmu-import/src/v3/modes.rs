@@ -75,7 +75,8 @@ impl Instance {
         if self.state.mode == Mode::Step {
             self.enter_event()?;
         }
-        let active = if self.state.clocks.is_due(time) { self.state.clocks.tick(time) } else { Vec::new() };
+        let active =
+            if self.state.clocks.is_due(time) { self.state.clocks.tick(time) } else { Vec::new() };
         if !active.is_empty() {
             self.component.activate_clocks(&active)?;
             self.set_deferred(&active)?;

@@ -27,9 +27,7 @@ pub(crate) const INTEGERS: Access<i64> = Access {
     set: |slave, references, values| slave.set_integer(references, values),
     map: |value, transformation, target| {
         *target = match transformation {
-            Transformation::Integer(pairs) => {
-                slave::mapped_integer(pairs, *value)
-            }
+            Transformation::Integer(pairs) => slave::mapped_integer(pairs, *value),
             _ => *value,
         }
     },
@@ -107,9 +105,8 @@ impl<T: Clone + Default> Channel<T> {
         kind: ValueType,
         more: impl Iterator<Item = Port>,
     ) -> Self {
-        let belongs = |connection: &&Connection| {
-            ValueType::of(&system.variable(connection.to).kind) == kind
-        };
+        let belongs =
+            |connection: &&Connection| ValueType::of(&system.variable(connection.to).kind) == kind;
         let connections: Vec<_> = system.connections.iter().filter(belongs).collect();
         let mut outputs: Vec<Port> =
             connections.iter().map(|connection| connection.from).chain(more).collect();

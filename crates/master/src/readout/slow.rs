@@ -142,8 +142,8 @@ impl SlowSlave {
             *rows += 1;
             let changes = matches!(variable.causality, Causality::Output | Causality::Local);
             if port.slave == slave && changes {
-                let continuous = kind == ValueType::Real
-                    && variable.variability == Variability::Continuous;
+                let continuous =
+                    kind == ValueType::Real && variable.variability == Variability::Continuous;
                 places.push(ValueIndex { kind, start: *starts, row, continuous });
                 own.push(port);
                 *starts += 1;
@@ -165,7 +165,9 @@ impl SlowSlave {
                 }
                 ValueType::Integer => row.integers[at] = start_values.integers[start],
                 ValueType::Boolean => row.booleans[at] = start_values.booleans[start],
-                ValueType::String | ValueType::Binary => row.strings[at].clone_from(&start_values.strings[start]),
+                ValueType::String | ValueType::Binary => {
+                    row.strings[at].clone_from(&start_values.strings[start])
+                }
             }
         }
     }

@@ -214,9 +214,9 @@ impl System {
                 return Ok(());
             }
             let name = &before[port.variable];
-            port.variable = *variables.get(name).ok_or_else(|| SystemError::Resized {
-                name: format!("{names}.{name}"),
-            })?;
+            port.variable = *variables
+                .get(name)
+                .ok_or_else(|| SystemError::Resized { name: format!("{names}.{name}") })?;
             Ok(())
         };
         for Connection { from, to, .. } in self.connections.iter_mut().chain(&mut self.initial) {

@@ -16,6 +16,7 @@ macro_rules! modes {
             $(#[doc = concat!("Calls `", $name, "`.")]
             pub(crate) fn $method(&mut self) -> Result<(), CallError> {
                 let function = function!(self.$method, $name);
+                self.log_call($name, String::new);
                 // SAFETY: the instance is alive.
                 let status = unsafe { function(self.pointer) };
                 self.check($name, status)
@@ -38,6 +39,7 @@ impl Component {
     pub(crate) fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
         const NAME: &str = "fmi3SetDebugLogging";
         let function = function!(self.set_debug_logging, NAME);
+        self.log_call(NAME, || on.to_string());
         // SAFETY: the instance is alive; no categories.
         let status = unsafe { function(self.pointer, on, 0, std::ptr::null()) };
         self.check(NAME, status)
@@ -49,6 +51,7 @@ impl Component {
         let (tolerance, stop) = (e.tolerance.unwrap_or(0.0), e.stop_time.unwrap_or(0.0));
         let (has_tolerance, has_stop) = (e.tolerance.is_some(), e.stop_time.is_some());
         let function = function!(self.enter_initialization_mode, NAME);
+        self.log_call(NAME, || format!("tolerance {:?}, start time {:?}, stop time {:?}", e.tolerance, e.start_time, e.stop_time));
         self.place.set_time(e.start_time);
         // SAFETY: the instance is alive.
         let status = unsafe {
@@ -65,17 +68,19 @@ impl Component {
     ) -> Result<(), CallError> {
         const NAME: &str = "fmi3GetClock";
         let function = function!(self.get_clock, NAME);
+        self.log_call(NAME, || format!("{references:?}"));
         let count = same_length(references, values);
         // SAFETY: the instance is alive; as many references as values.
         let status =
             unsafe { function(self.pointer, references.as_ptr(), count, values.as_mut_ptr()) };
-        self.check(NAME, status)
+        self.check_results(NAME, status, || format!(" {values:?}"))
     }
 
     /// Calls `fmi3SetClock` to activate clocks.
     pub(crate) fn activate_clocks(&mut self, references: &[u32]) -> Result<(), CallError> {
         const NAME: &str = "fmi3SetClock";
         let function = function!(self.set_clock, NAME);
+        self.log_call(NAME, || format!("{references:?}, active"));
         let values = vec![1_u8; references.len()];
         // SAFETY: the instance is alive; as many references as values.
         let status = unsafe {
@@ -88,12 +93,13 @@ impl Component {
     pub(crate) fn get_interval(&mut self, clock: u32) -> Result<(f64, c_int), CallError> {
         const NAME: &str = "fmi3GetIntervalDecimal";
         let function = function!(self.get_interval_decimal, NAME);
+        self.log_call(NAME, || format!("[{clock}]"));
         let (mut interval, mut qualifier) = (0.0, 0);
         // SAFETY: the instance is alive; one reference, one place for each result.
         let status = unsafe {
             function(self.pointer, &raw const clock, 1, &raw mut interval, &raw mut qualifier)
         };
-        self.check(NAME, status)?;
+        self.check_results(NAME, status, || format!(" {interval:?}, qualifier {qualifier}"))?;
         Ok((interval, qualifier))
     }
 
@@ -101,10 +107,11 @@ impl Component {
     pub(crate) fn get_shift(&mut self, clock: u32) -> Result<f64, CallError> {
         const NAME: &str = "fmi3GetShiftDecimal";
         let function = function!(self.get_shift_decimal, NAME);
+        self.log_call(NAME, || format!("[{clock}]"));
         let mut shift = 0.0;
         // SAFETY: the instance is alive; one reference, one place for the result.
         let status = unsafe { function(self.pointer, &raw const clock, 1, &raw mut shift) };
-        self.check(NAME, status)?;
+        self.check_results(NAME, status, || format!(" {shift:?}"))?;
         Ok(shift)
     }
 
@@ -119,6 +126,7 @@ impl Component {
     ) -> Result<(), CallError> {
         const NAME: &str = "fmi3GetDirectionalDerivative";
         let function = function!(self.get_directional_derivative, NAME);
+        self.log_call(NAME, || format!("{unknowns:?}, {knowns:?}, {seed:?}"));
         // SAFETY: the instance is alive; each pointer comes with its number of values.
         let status = unsafe {
             function(
@@ -133,7 +141,7 @@ impl Component {
                 changes.len(),
             )
         };
-        self.check(NAME, status)
+        self.check_results(NAME, status, || format!(" {changes:?}"))
     }
 
     /// Calls `fmi3GetOutputDerivatives`. `values` has as many values as the elements of the outputs
@@ -146,6 +154,7 @@ impl Component {
     ) -> Result<(), CallError> {
         const NAME: &str = "fmi3GetOutputDerivatives";
         let function = function!(self.get_output_derivatives, NAME);
+        self.log_call(NAME, || format!("{references:?}, orders {orders:?}"));
         let count = same_length(references, orders);
         // SAFETY: the instance is alive; as many references as orders, and `values.len()` values.
         let status = unsafe {
@@ -158,6 +167,6 @@ impl Component {
                 values.len(),
             )
         };
-        self.check(NAME, status)
+        self.check_results(NAME, status, || format!(" {values:?}"))
     }
 }

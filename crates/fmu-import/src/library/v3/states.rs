@@ -12,6 +12,7 @@ impl Component {
     pub(crate) fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
         const NAME: &str = "fmi3GetFMUState";
         let function = function!(self.get_state, NAME);
+        self.log_call(NAME, String::new);
         if self.saved.len() <= slot {
             self.saved.resize(slot + 1, null_mut());
         }
@@ -34,6 +35,7 @@ impl Component {
     fn set_state(&mut self, state: State) -> Result<(), CallError> {
         const NAME: &str = "fmi3SetFMUState";
         let function = function!(self.set_state, NAME);
+        self.log_call(NAME, String::new);
         // SAFETY: the instance is alive; the state is its own.
         let status = unsafe { function(self.pointer, state) };
         self.check(NAME, status)
@@ -54,6 +56,7 @@ impl Component {
     pub(crate) fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
         const NAME: &str = "fmi3GetFMUState";
         let function = function!(self.get_state, NAME);
+        self.log_call(NAME, String::new);
         let mut state = null_mut();
         // SAFETY: the instance is alive; one state to write to.
         let status = unsafe { function(self.pointer, &raw mut state) };
@@ -67,14 +70,15 @@ impl Component {
         const NAME: &str = "fmi3SerializeFMUState";
         let mut size = 0;
         let function = function!(self.serialized_state_size, SIZE);
+        self.log_call(SIZE, String::new);
         // SAFETY: the instance is alive, the state is its own.
         let status = unsafe { function(self.pointer, state, &raw mut size) };
         self.check(SIZE, status)?;
         let function = function!(self.serialize_state, NAME);
+        self.log_call(NAME, String::new);
         let mut bytes = vec![0_u8; size];
         // SAFETY: the instance is alive, the state is its own; `size` bytes to write to.
-        let status =
-            unsafe { function(self.pointer, state, bytes.as_mut_ptr(), bytes.len()) };
+        let status = unsafe { function(self.pointer, state, bytes.as_mut_ptr(), bytes.len()) };
         self.check(NAME, status)?;
         Ok(bytes)
     }
@@ -84,9 +88,9 @@ impl Component {
         const NAME: &str = "fmi3DeserializeFMUState";
         let mut state = null_mut();
         let function = function!(self.deserialize_state, NAME);
+        self.log_call(NAME, String::new);
         // SAFETY: the instance is alive; `bytes.len()` bytes to read, one state to write to.
-        let status =
-            unsafe { function(self.pointer, bytes.as_ptr(), bytes.len(), &raw mut state) };
+        let status = unsafe { function(self.pointer, bytes.as_ptr(), bytes.len(), &raw mut state) };
         let done = self.check(NAME, status).and_then(|()| self.set_state(state));
         self.free_state(&mut state);
         done

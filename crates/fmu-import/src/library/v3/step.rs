@@ -40,6 +40,7 @@ impl Component {
     ) -> Result<StepDone, CallError> {
         const NAME: &str = "fmi3DoStep";
         let function = function!(self.do_step, NAME);
+        self.log_call(NAME, || format!("{time:?}, {size:?}, {never_back}"));
         self.place.set_time(time);
         let (mut event, mut terminate, mut early, mut reached) = (0, 0, 0, time + size);
         // SAFETY: the instance is alive; one place for each result.
@@ -55,7 +56,12 @@ impl Component {
                 &raw mut reached,
             )
         };
-        self.check(NAME, status)?;
+        self.check_results(NAME, status, || {
+            format!(
+                " eventHandlingNeeded {event}, terminateSimulation {terminate}, earlyReturn {early}, \
+                 lastSuccessfulTime {reached:?}"
+            )
+        })?;
         let (event, terminate, early) = (event != 0, terminate != 0, early != 0);
         Ok(StepDone { event, terminate, early, reached })
     }
@@ -64,6 +70,7 @@ impl Component {
     pub(crate) fn update_discrete_states(&mut self) -> Result<DiscreteStates, CallError> {
         const NAME: &str = "fmi3UpdateDiscreteStates";
         let function = function!(self.update_discrete_states, NAME);
+        self.log_call(NAME, String::new);
         let [mut need_update, mut terminate, mut nominals, mut values, mut defined] = [0_u8; 5];
         let mut next = 0.0;
         // SAFETY: the instance is alive; one place for each result.
@@ -78,12 +85,13 @@ impl Component {
                 &raw mut next,
             )
         };
-        self.check(NAME, status)?;
+        self.check_results(NAME, status, || {
+            format!(
+                " discreteStatesNeedUpdate {need_update}, terminateSimulation {terminate}, \
+                 nextEventTimeDefined {defined}, nextEventTime {next:?}"
+            )
+        })?;
         let next_event = (defined != 0).then_some(next);
-        Ok(DiscreteStates {
-            need_update: need_update != 0,
-            terminate: terminate != 0,
-            next_event,
-        })
+        Ok(DiscreteStates { need_update: need_update != 0, terminate: terminate != 0, next_event })
     }
 }

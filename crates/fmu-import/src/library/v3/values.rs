@@ -20,12 +20,13 @@ macro_rules! values {
                 values: &mut [$type],
             ) -> Result<(), CallError> {
                 let function = function!(self.$get, $get_name);
+                self.log_call($get_name, || format!("{references:?}"));
                 let (count, length) = (references.len(), values.len());
                 // SAFETY: the instance is alive; both pointers come with their number of values.
                 let status = unsafe {
                     function(self.pointer, references.as_ptr(), count, values.as_mut_ptr(), length)
                 };
-                self.check($get_name, status)
+                self.check_results($get_name, status, || format!(" {values:?}"))
             }
 
             #[doc = concat!("Calls `", $set_name, "`.")]
@@ -36,6 +37,7 @@ macro_rules! values {
                 values: &[$type],
             ) -> Result<(), CallError> {
                 let function = function!(self.$set, $set_name);
+                self.log_call($set_name, || format!("{references:?}, {values:?}"));
                 let (count, length) = (references.len(), values.len());
                 // SAFETY: the instance is alive; both pointers come with their number of values.
                 let status = unsafe {
@@ -70,12 +72,14 @@ impl Component {
     ) -> Result<(), CallError> {
         const NAME: &str = "fmi3SetString";
         let function = function!(self.set_string, NAME);
+        self.log_call(NAME, || format!("{references:?}, {values:?}"));
         let values: Vec<_> = values.iter().map(|value| c_string(value)).collect();
         let pointers: Vec<_> = values.iter().map(|value| value.as_ptr()).collect();
         let (count, length) = (references.len(), pointers.len());
         // SAFETY: the instance is alive; both pointers come with their number of values.
-        let status =
-            unsafe { function(self.pointer, references.as_ptr(), count, pointers.as_ptr(), length) };
+        let status = unsafe {
+            function(self.pointer, references.as_ptr(), count, pointers.as_ptr(), length)
+        };
         self.check(NAME, status)
     }
 
@@ -87,6 +91,7 @@ impl Component {
     ) -> Result<(), CallError> {
         const NAME: &str = "fmi3GetString";
         let function = function!(self.get_string, NAME);
+        self.log_call(NAME, || format!("{references:?}"));
         let mut pointers = vec![std::ptr::null(); values.len()];
         let (count, length) = (references.len(), pointers.len());
         // SAFETY: the instance is alive; both pointers come with their number of values.
@@ -115,6 +120,7 @@ impl Component {
     ) -> Result<(), CallError> {
         const NAME: &str = "fmi3SetBinary";
         let function = function!(self.set_binary, NAME);
+        self.log_call(NAME, || format!("{references:?}, {values:?}"));
         let sizes: Vec<_> = values.iter().map(Vec::len).collect();
         let pointers: Vec<_> = values.iter().map(|value| value.as_ptr()).collect();
         let (count, length) = (references.len(), pointers.len());
@@ -140,6 +146,7 @@ impl Component {
     ) -> Result<(), CallError> {
         const NAME: &str = "fmi3GetBinary";
         let function = function!(self.get_binary, NAME);
+        self.log_call(NAME, || format!("{references:?}"));
         let mut sizes = vec![0_usize; values.len()];
         let mut pointers = vec![std::ptr::null::<u8>(); values.len()];
         let (count, length) = (references.len(), pointers.len());
