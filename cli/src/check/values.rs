@@ -1,15 +1,16 @@
 //! Values of variables: read from a slave, and stated in the XML.
 
 use fmu_description::{Causality, Kind, ModelDescription, ScalarVariable, Variability};
-use master::{CallError, Slave};
+use master::{CallError, Slave, ValueType};
 
 /// A value of any type; equality compares bits.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Value {
     Real(u64),
-    Integer(i32),
+    Integer(i64),
     Boolean(bool),
     String(String),
+    Binary(Vec<u8>),
 }
 
 impl std::fmt::Display for Value {
@@ -19,6 +20,7 @@ impl std::fmt::Display for Value {
             Value::Integer(value) => write!(formatter, "{value}"),
             Value::Boolean(value) => write!(formatter, "{value}"),
             Value::String(value) => write!(formatter, "{value:?}"),
+            Value::Binary(value) => formatter.write_str(&master::to_hex(value)),
         }
     }
 }
@@ -71,27 +73,33 @@ pub(super) fn distance(one: &[Vec<Value>], other: &[Vec<Value>]) -> f64 {
 /// Reads one variable.
 pub(super) fn get(slave: &mut dyn Slave, variable: &ScalarVariable) -> Result<Value, CallError> {
     let reference = [variable.value_reference];
-    Ok(match &variable.kind {
-        own if own.as_real().is_some() => {
+    Ok(match ValueType::of(&variable.kind) {
+        ValueType::Real => {
             let mut value = [0.0];
             slave.get_real(&reference, &mut value)?;
             Value::Real(value[0].to_bits())
         }
-        own if own.as_integer().is_some() => {
+        ValueType::Integer => {
             let mut value = [0];
             slave.get_integer(&reference, &mut value)?;
             Value::Integer(value[0])
         }
-        Kind::Boolean(_) => {
+        ValueType::Boolean => {
             let mut value = [0];
             slave.get_boolean(&reference, &mut value)?;
             Value::Boolean(value[0] != 0)
         }
-        _ => {
+        ValueType::String => {
             let mut value = [String::new()];
             slave.get_string(&reference, &mut value)?;
             let [value] = value;
             Value::String(value)
+        }
+        ValueType::Binary => {
+            let mut value = [Vec::new()];
+            slave.get_binary(&reference, &mut value)?;
+            let [value] = value;
+            Value::Binary(value)
         }
     })
 }
@@ -99,13 +107,14 @@ pub(super) fn get(slave: &mut dyn Slave, variable: &ScalarVariable) -> Result<Va
 /// Returns the start value in the XML.
 pub(super) fn start(variable: &ScalarVariable) -> Option<Value> {
     match &variable.kind {
-        Kind::Real(own) => own.start.map(|value| Value::Real(value.to_bits())),
-        Kind::Boolean(start) => start.map(Value::Boolean),
         Kind::String(start) => start.clone().map(Value::String),
-        other => {
-            let start = other.as_integer()?.start?;
-            i32::try_from(start).ok().map(Value::Integer)
-        }
+        Kind::Binary(own) => own.start.clone().map(Value::Binary),
+        other => match master::Value::start(other)? {
+            master::Value::Real(value) => Some(Value::Real(value.to_bits())),
+            master::Value::Integer(value) => Some(Value::Integer(value)),
+            master::Value::Boolean(value) => Some(Value::Boolean(value)),
+            master::Value::String(_) | master::Value::Binary(_) => None,
+        },
     }
 }
 

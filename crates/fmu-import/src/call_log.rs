@@ -7,7 +7,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex};
 
 use fmu_description::Experiment;
-use fmu_description::ModelDescription;
+use fmu_description::{ModelDescription, Version};
 
 use slave::{CallError, Slave, StepResult};
 
@@ -33,9 +33,26 @@ impl CallLog {
     /// Wraps `slave` so that its calls are logged under the name `instance`.
     #[must_use]
     pub fn listen(&self, instance: &str, slave: Box<dyn Slave>) -> LoggedSlave {
-        let logged = LoggedSlave { log: self.clone(), instance: instance.to_owned(), slave };
+        let (file, name) = (self.clone(), instance.to_owned());
+        let mut slave = slave;
+        let mut starts_line = true;
+        let direct = slave.log_calls(Box::new(move |text| {
+            if starts_line {
+                file.write(&format!("{name} "));
+            }
+            starts_line = text.ends_with('\n');
+            file.write(text);
+        }));
+        let version = slave.description().version();
+        let (log, instance) = (self.clone(), instance.to_owned());
+        let logged = LoggedSlave { log, instance, slave, direct, version };
         let guid = &logged.slave.description().guid;
-        logged.line(&format!("fmi2Instantiate({instance:?}, fmi2CoSimulation, {guid:?})"));
+        let call = match version {
+            Version::V1 => format!("fmiInstantiateSlave({:?}, {guid:?})", logged.instance),
+            Version::V2 => format!("fmi2Instantiate({:?}, fmi2CoSimulation, {guid:?})", logged.instance),
+            Version::V3 => format!("fmi3InstantiateCoSimulation({:?}, {guid:?})", logged.instance),
+        };
+        logged.log.write(&format!("{} {call} -> {}OK\n", logged.instance, logged.prefix()));
         logged
     }
 
@@ -52,11 +69,49 @@ pub struct LoggedSlave {
     log: CallLog,
     instance: String,
     slave: Box<dyn Slave>,
+    /// Whether the slave logs its C calls itself.
+    direct: bool,
+    version: Version,
 }
 
+/// Functions of FMI 3.0 and 1.0 whose name is not that of FMI 2.0 with another prefix.
+const NAMES: [(&str, &str, &str); 9] = [
+    ("fmi2GetReal", "fmi3GetFloat64", "fmiGetReal"),
+    ("fmi2SetReal", "fmi3SetFloat64", "fmiSetReal"),
+    ("fmi2GetInteger", "fmi3GetInt64", "fmiGetInteger"),
+    ("fmi2SetInteger", "fmi3SetInt64", "fmiSetInteger"),
+    ("fmi2GetFMUstate", "fmi3GetFMUState", "fmi2GetFMUstate"),
+    ("fmi2SetFMUstate", "fmi3SetFMUState", "fmi2SetFMUstate"),
+    ("fmi2Terminate", "fmi3Terminate", "fmiTerminateSlave"),
+    ("fmi2GetRealOutputDerivatives", "fmi3GetOutputDerivatives", "fmiGetRealOutputDerivatives"),
+    ("fmi2EnterInitializationMode", "fmi3EnterInitializationMode", "fmiInitializeSlave"),
+];
+
 impl LoggedSlave {
-    fn line(&self, call: &str) {
-        self.log.write(&format!("{} {call} -> fmi2OK\n", self.instance));
+    /// Returns the prefix of functions and statuses in the version of the FMU.
+    fn prefix(&self) -> &'static str {
+        match self.version {
+            Version::V1 => "fmi",
+            Version::V2 => "fmi2",
+            Version::V3 => "fmi3",
+        }
+    }
+
+    /// Returns the name of a function of FMI 2.0 in the version of the FMU.
+    fn spelt(&self, function: &str) -> String {
+        let known = NAMES.iter().find(|(own, ..)| *own == function);
+        match (self.version, known) {
+            (Version::V3, Some((_, name, _))) | (Version::V1, Some((_, _, name))) => {
+                (*name).to_owned()
+            }
+            _ => function.replacen("fmi2", self.prefix(), 1),
+        }
+    }
+
+    fn write(&self, text: &str) {
+        if !self.direct {
+            self.log.write(text);
+        }
     }
 
     /// Writes `function(arguments)`, performs the call, and writes its status and results.
@@ -74,17 +129,18 @@ impl LoggedSlave {
     }
 
     fn begin(&self, function: &str, arguments: &str) {
-        self.log.write(&format!("{} {function}({arguments})", self.instance));
+        let function = self.spelt(function);
+        self.write(&format!("{} {function}({arguments})", self.instance));
     }
 
     fn end<T>(&mut self, done: &Result<T, CallError>, results: &str) {
         let warned = self.slave.take_warning();
         let status = match done {
-            Ok(_) if warned => "fmi2Warning".to_owned(),
-            Ok(_) => "fmi2OK".to_owned(),
-            Err(error) => error.failure.to_string().replace("returned ", ""),
+            Ok(_) if warned => format!("{}Warning", self.prefix()),
+            Ok(_) => format!("{}OK", self.prefix()),
+            Err(error) => error.failure_text().replace("returned ", ""),
         };
-        self.log.write(&format!(" -> {status}{results}\n"));
+        self.write(&format!(" -> {status}{results}\n"));
     }
 
     fn get<T: Debug>(
@@ -122,7 +178,12 @@ impl LoggedSlave {
 impl Drop for LoggedSlave {
     fn drop(&mut self) {
         // The instance is freed after this.
-        self.log.write(&format!("{} fmi2FreeInstance()\n", self.instance));
+        let function = match self.version {
+            Version::V1 => "fmiFreeSlaveInstance",
+            Version::V2 => "fmi2FreeInstance",
+            Version::V3 => "fmi3FreeInstance",
+        };
+        self.log.write(&format!("{} {function}()\n", self.instance));
     }
 }
 
@@ -135,7 +196,27 @@ impl Slave for LoggedSlave {
         self.plain("fmi2SetDebugLogging", on.to_string(), |slave| slave.set_debug_logging(on))
     }
 
+    fn configure(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
+        let arguments = format!("{references:?}, {values:?}");
+        let call = |slave: &mut dyn Slave| slave.configure(references, values);
+        self.plain("fmi3EnterConfigurationMode", arguments, call)
+    }
+
+    fn get_binary(&mut self, references: &[u32], values: &mut [Vec<u8>]) -> Result<(), CallError> {
+        self.get("fmi3GetBinary", references, values, |slave, values| {
+            slave.get_binary(references, values)
+        })
+    }
+
+    fn set_binary(&mut self, references: &[u32], values: &[Vec<u8>]) -> Result<(), CallError> {
+        self.set("fmi3SetBinary", references, values, |slave| slave.set_binary(references, values))
+    }
+
     fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError> {
+        if self.version != Version::V2 {
+            // No function of the FMU.
+            return self.slave.setup_experiment(experiment);
+        }
         let mut arguments = String::new();
         let Experiment { start_time, stop_time, tolerance } = experiment;
         // Writing to a String cannot fail.
@@ -180,13 +261,13 @@ impl Slave for LoggedSlave {
         self.set("fmi2SetReal", references, values, |slave| slave.set_real(references, values))
     }
 
-    fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
+    fn get_integer(&mut self, references: &[u32], values: &mut [i64]) -> Result<(), CallError> {
         self.get("fmi2GetInteger", references, values, |slave, values| {
             slave.get_integer(references, values)
         })
     }
 
-    fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
+    fn set_integer(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
         self.set("fmi2SetInteger", references, values, |slave| {
             slave.set_integer(references, values)
         })
@@ -244,7 +325,7 @@ impl Slave for LoggedSlave {
         self.begin("fmi2DoStep", &format!("{time:?}, {size:?}, {never_back}"));
         let done = self.slave.do_step(time, size, never_back);
         if let Ok(StepResult::Part { reached, terminated }) = done {
-            self.log.write(&format!(
+            self.write(&format!(
                 " -> fmi2Discard fmi2LastSuccessfulTime {reached:?}, fmi2Terminated {terminated}\n"
             ));
         } else {

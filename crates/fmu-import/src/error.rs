@@ -24,22 +24,36 @@ pub enum LoadError {
         /// The function.
         function: String,
     },
-    /// `fmi2GetVersion` returns another version than 2.0.
-    #[error("{path}: fmi2GetVersion gives {found:?}, expected \"2.0\"")]
+    /// The library has another version of FMI than its model description.
+    #[error("{path}: {function} gives {found:?}, expected {expected:?}")]
     Version {
         /// The library.
         path: PathBuf,
+        /// The function that returned the version, such as `fmi2GetVersion`.
+        function: &'static str,
         /// The version that it returned.
         found: String,
+        /// The version of the model description.
+        expected: &'static str,
     },
-    /// `fmi2Instantiate` returned null.
-    #[error("{path}: fmi2Instantiate failed for the instance {instance}: {reason}")]
+    /// The function that creates an instance returned null.
+    #[error("{path}: {function} failed for the instance {instance}: {reason}")]
     Instantiate {
         /// The library.
         path: PathBuf,
+        /// The function, such as `fmi2Instantiate`.
+        function: &'static str,
         /// Name of the instance.
         instance: String,
         /// The FMU's messages.
+        reason: String,
+    },
+    /// The FMU needs something that the importer does not offer.
+    #[error("{model}: {reason}")]
+    Unsupported {
+        /// `modelName`.
+        model: String,
+        /// What the importer does not offer.
         reason: String,
     },
     /// The library failed to write its model description.

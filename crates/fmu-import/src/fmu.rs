@@ -1,19 +1,17 @@
-//! An opened FMU archive and its instances, which implement [`Slave`].
+//! An opened FMU archive, which creates instances.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
-use std::time::Duration;
 
-use fmu_description::Experiment;
 use fmu_description::location::{LocationError, file_uri};
 use fmu_description::package::{PackageError, Unpacked};
-use fmu_description::{Kind, ModelDescription};
+use fmu_description::{Kind, ModelDescription, Version};
 
 use crate::error::LoadError;
-use crate::library::{Component, Interface, Library, Names};
-use slave::{CallError, Slave, StepResult};
+use crate::instance::{Inner, Instance};
+use crate::library::{Component, Interface, Library, Names, v1, v3};
 
 /// Why an FMU could not be opened or instantiated.
 #[derive(Debug, thiserror::Error)]
@@ -45,6 +43,14 @@ pub enum FmuError {
         instance: String,
         /// `modelName`.
         model: String,
+    },
+    /// An action is available for FMI 2.0 only.
+    #[error("{model} is an FMU of {}; this is available for FMI 2.0 only", version.release())]
+    Version {
+        /// `modelName`.
+        model: String,
+        /// The version of the FMU.
+        version: Version,
     },
     /// The FMU has no interface, or lacks the requested one.
     #[error(
@@ -81,12 +87,20 @@ pub struct Fmu {
 /// Fields are dropped in this order, which unloads the library before its file is removed.
 struct Content {
     /// The library for co-simulation; `None` if the FMU offers model exchange only.
-    library: Option<Arc<Library>>,
+    library: Option<CoSimulation>,
     unpacked: Unpacked,
     /// Whether an instance has been created.
     instantiated: AtomicBool,
     /// Positions of variables by type and value reference; filled at the first message that needs one.
     names: OnceLock<HashMap<(char, u32), usize>>,
+}
+
+/// The library for co-simulation of an FMU, in the version of the FMU.
+#[derive(Clone)]
+enum CoSimulation {
+    V1(Arc<v1::Library>),
+    V2(Arc<Library>),
+    V3(Arc<v3::Library>),
 }
 
 impl Fmu {
@@ -95,8 +109,8 @@ impl Fmu {
     ///
     /// # Errors
     ///
-    /// [`FmuError`] if the FMU is not of version 2.0, has no co-simulation interface or no library
-    /// for this platform, or if the library does not load.
+    /// [`FmuError`] if the FMU is not of version 1.0, 2.0 or 3.0, has no co-simulation interface or no
+    /// library for this platform, or if the library does not load.
     pub fn open(path: &Path) -> Result<Self, FmuError> {
         let fmu = Self::open_any(path)?;
         if fmu.content.library.is_none() {
@@ -125,7 +139,7 @@ impl Fmu {
     ///
     /// # Errors
     ///
-    /// [`FmuError`] if the FMU is not of version 2.0, has neither interface
+    /// [`FmuError`] if the FMU is not of version 1.0, 2.0 or 3.0, has neither interface
     /// ([`FmuError::NoInterface`]) or no library for this platform, or if the library does not load.
     pub fn open_any(path: &Path) -> Result<Self, FmuError> {
         let unpacked =
@@ -146,7 +160,7 @@ impl Fmu {
         }
         let library = description.co_simulation.as_ref().map(|flags| {
             let library = unpacked.library(&flags.model_identifier)?;
-            open_library(description, &library, Interface::CoSimulation)
+            open_library(description, &library, &flags.model_identifier)
         });
         let library = library.transpose()?;
         let (instantiated, names) = (AtomicBool::new(false), OnceLock::new());
@@ -164,7 +178,7 @@ impl Fmu {
     /// # Errors
     ///
     /// [`FmuError::OnlyOnce`] for a forbidden second instance; [`LoadError::Instantiate`] with the
-    /// FMU's messages if `fmi2Instantiate` fails; [`FmuError::NoInterface`] without co-simulation.
+    /// FMU's messages if the FMU does not instantiate; [`FmuError::NoInterface`] without co-simulation.
     pub fn instantiate(&self, name: &str) -> Result<Instance, FmuError> {
         let description = self.description();
         let once = description.co_simulation.as_ref();
@@ -173,8 +187,32 @@ impl Fmu {
             let (instance, model) = (name.to_owned(), description.model_name.clone());
             return Err(FmuError::OnlyOnce { instance, model });
         }
-        let component = self.component(Interface::CoSimulation, name)?;
-        Ok(Instance { component, fmu: self.clone() })
+        let inner = self.instantiate_version(name)?;
+        Ok(Instance::new(inner, self.clone()))
+    }
+
+    /// Creates an instance with the C interface of the FMU's version.
+    fn instantiate_version(&self, name: &str) -> Result<Inner, FmuError> {
+        let (unpacked, description) = (&self.content.unpacked, self.description());
+        let hint = |error| with_tool_hint(description, error);
+        match &self.content.library {
+            Some(CoSimulation::V1(library)) => {
+                let location = file_uri(unpacked.folder())?;
+                let (guid, names) = (&description.guid, self.names());
+                let component = library.instantiate(name, guid, &location, names).map_err(hint)?;
+                Ok(Inner::V1(Box::new(crate::v1::Instance::new(component, description))))
+            }
+            Some(CoSimulation::V3(library)) => {
+                let resources = resource_path(&unpacked.resources());
+                let created =
+                    crate::v3::Instance::new(library, description, name, resources.as_deref());
+                Ok(Inner::V3(Box::new(created.map_err(hint)?)))
+            }
+            _ => {
+                let component = self.component(Interface::CoSimulation, name)?;
+                Ok(Inner::V2(crate::v2::Instance::new(component)))
+            }
+        }
     }
 
     /// Returns the lookup of variable names for messages. Of several aliases it gives the one declared
@@ -195,20 +233,28 @@ impl Fmu {
         })
     }
 
-    /// Creates an instance for `interface`, with access to its C functions.
+    /// Creates an instance of an FMU of FMI 2.0 for `interface`, with access to its C functions.
     ///
     /// # Errors
     ///
-    /// [`FmuError::NoInterface`] if the FMU lacks `interface`; [`LoadError`] if the library does not load
+    /// [`FmuError::Version`] for another version of FMI; [`FmuError::NoInterface`] if the FMU lacks
+    /// `interface`; [`LoadError`] if the library does not load
     /// or `fmi2Instantiate` fails.
     pub fn component(&self, interface: Interface, name: &str) -> Result<Component, FmuError> {
         let unpacked = &self.content.unpacked;
         let description = &unpacked.description;
         let library = match (interface, &self.content.library, &description.model_exchange) {
-            (Interface::CoSimulation, Some(library), _) => library.clone(),
+            _ if description.version() != Version::V2 => {
+                return Err(FmuError::Version {
+                    model: description.model_name.clone(),
+                    version: description.version(),
+                });
+            }
+            (Interface::CoSimulation, Some(CoSimulation::V2(library)), _) => library.clone(),
             (Interface::ModelExchange, _, Some(flags)) => {
                 let library = unpacked.library(&flags.model_identifier)?;
-                open_library(description, &library, interface)?
+                let library = Library::open(&library, interface);
+                Arc::new(library.map_err(|error| with_tool_hint(description, error))?)
             }
             _ => return Err(FmuError::NoInterface { path: unpacked.folder().to_owned() }),
         };
@@ -229,13 +275,29 @@ fn letter(kind: &Kind) -> char {
     }
 }
 
+/// Opens the library for co-simulation in the version of the FMU.
 fn open_library(
     description: &ModelDescription,
     path: &Path,
-    interface: Interface,
-) -> Result<Arc<Library>, FmuError> {
-    let library = Library::open(path, interface);
-    Ok(Arc::new(library.map_err(|error| with_tool_hint(description, error))?))
+    model_identifier: &str,
+) -> Result<CoSimulation, FmuError> {
+    let library = match description.version() {
+        Version::V1 => {
+            v1::Library::open(path, model_identifier).map(Arc::new).map(CoSimulation::V1)
+        }
+        Version::V2 => {
+            Library::open(path, Interface::CoSimulation).map(Arc::new).map(CoSimulation::V2)
+        }
+        Version::V3 => v3::Library::open(path).map(Arc::new).map(CoSimulation::V3),
+    };
+    library.map_err(|error| with_tool_hint(description, error))
+}
+
+/// Returns the `resourcePath` of FMI 3.0: absolute, with a trailing separator (section 2.3.1); `None` if
+/// the FMU has no resources.
+fn resource_path(folder: &Path) -> Option<String> {
+    let folder = std::path::absolute(folder).ok().filter(|folder| folder.is_dir())?;
+    Some(format!("{}{}", folder.display(), std::path::MAIN_SEPARATOR))
 }
 
 /// Adds the tool that the FMU declares to need (`needsExecutionTool`) to `error`.
@@ -248,145 +310,4 @@ fn with_tool_hint(description: &ModelDescription, error: LoadError) -> FmuError 
     let tool = description.generation_tool.clone();
     let tool = tool.unwrap_or_else(|| "the tool that exported it".to_owned());
     FmuError::NeedsTool { tool, source: error }
-}
-
-/// A co-simulation instance of an FMU in this process.
-pub struct Instance {
-    component: Component,
-    fmu: Fmu,
-}
-
-impl Slave for Instance {
-    fn description(&self) -> &ModelDescription {
-        self.fmu.description()
-    }
-
-    fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
-        self.component.set_debug_logging(on)
-    }
-
-    fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError> {
-        self.component.setup_experiment(experiment)
-    }
-
-    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
-        self.component.enter_initialization_mode()
-    }
-
-    fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
-        self.component.exit_initialization_mode()
-    }
-
-    fn terminate(&mut self) -> Result<(), CallError> {
-        self.component.terminate()
-    }
-
-    fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
-        self.component.get_real(references, values)
-    }
-
-    fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), CallError> {
-        self.component.set_real(references, values)
-    }
-
-    fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
-        self.component.get_integer(references, values)
-    }
-
-    fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
-        self.component.set_integer(references, values)
-    }
-
-    fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
-        self.component.get_boolean(references, values)
-    }
-
-    fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
-        self.component.set_boolean(references, values)
-    }
-
-    fn get_string(&mut self, references: &[u32], values: &mut [String]) -> Result<(), CallError> {
-        self.component.get_string(references, values)
-    }
-
-    fn set_string(&mut self, references: &[u32], values: &[String]) -> Result<(), CallError> {
-        self.component.set_string(references, values)
-    }
-
-    fn set_input_derivatives(
-        &mut self,
-        references: &[u32],
-        orders: &[i32],
-        values: &[f64],
-    ) -> Result<(), CallError> {
-        self.component.set_real_input_derivatives(references, orders, values)
-    }
-
-    fn get_output_derivatives(
-        &mut self,
-        references: &[u32],
-        orders: &[i32],
-        values: &mut [f64],
-    ) -> Result<(), CallError> {
-        self.component.get_real_output_derivatives(references, orders, values)
-    }
-
-    fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError> {
-        self.component.do_step(time, size, never_back)
-    }
-
-    fn directional_derivative(
-        &mut self,
-        unknowns: &[u32],
-        knowns: &[u32],
-        seed: &[f64],
-        changes: &mut [f64],
-    ) -> Result<(), CallError> {
-        self.component.directional_derivative(unknowns, knowns, seed, changes)
-    }
-
-    fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
-        self.component.save_state(slot)
-    }
-
-    fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
-        self.component.restore_state(slot)
-    }
-
-    fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
-        self.component.serialize_state()
-    }
-
-    fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
-        self.component.deserialize_state(bytes)
-    }
-
-    fn pass(
-        &mut self,
-        inputs: &[u32],
-        values: &[f64],
-        span: (f64, f64),
-        never_back: bool,
-        outputs: &[u32],
-        results: &mut [f64],
-    ) -> Result<StepResult, CallError> {
-        self.component.pass(inputs, values, span, never_back, outputs, results)
-    }
-
-    fn take_warning(&mut self) -> bool {
-        self.component.take_warning()
-    }
-}
-
-impl Instance {
-    /// Returns the FMU of this instance.
-    #[must_use]
-    pub fn fmu(&self) -> &Fmu {
-        &self.fmu
-    }
-
-    /// Limits how long a step that returned `fmi2Pending` may take; `None`: no limit.
-    pub fn set_time_limit(&mut self, limit: Option<Duration>) {
-        self.component.time_limit = limit;
-    }
 }

@@ -12,13 +12,18 @@ pub mod crash;
 mod described;
 mod error;
 mod fmu;
+mod instance;
 pub mod isolate;
 mod library;
+mod v1;
+mod v2;
+mod v3;
 
 pub use call_log::{CallLog, LoggedSlave};
 pub use described::{DescriptionError, described};
 pub use error::LoadError;
-pub use fmu::{Fmu, FmuError, Instance};
+pub use fmu::{Fmu, FmuError};
+pub use instance::Instance;
 pub use library::{Component, Interface, describe, preload};
 
 #[cfg(doctest)]

@@ -8,6 +8,9 @@ mod functions;
 mod log;
 mod states;
 mod step;
+mod table;
+pub(crate) mod v1;
+pub(crate) mod v3;
 
 use std::cell::Cell;
 use std::ffi::{CStr, CString, OsStr, c_char, c_int, c_void};
@@ -165,15 +168,19 @@ impl Library {
     /// Loads the library and checks that it has the functions of `interface`.
     pub(crate) fn open(path: &Path, interface: Interface) -> Result<Self, LoadError> {
         let handle = load(path)?;
-        let functions = Functions::load(&handle);
+        let functions = Functions::load(&handle, "");
         // SAFETY: takes no argument and returns a static string.
         let version = functions
             .get_version
             .and_then(|function| unsafe { function().as_ref().map(|text| CStr::from_ptr(text)) });
         let found = version.map(CStr::to_string_lossy).unwrap_or_default();
         if functions.get_version.is_some() && !found.starts_with("2.") {
-            let found = found.into_owned();
-            return Err(LoadError::Version { path: path.to_owned(), found });
+            return Err(LoadError::Version {
+                path: path.to_owned(),
+                function: "fmi2GetVersion",
+                found: found.into_owned(),
+                expected: "2.0",
+            });
         }
         functions.require(interface, path)?;
         let corrupted = AtomicBool::new(false);
@@ -190,7 +197,7 @@ impl Library {
         names: Names,
     ) -> Result<Component, LoadError> {
         let place = Place::new(name);
-        let sink = Sink::new(&place, names);
+        let sink = Sink::new(&place, Some(names));
         let callbacks = callbacks(&sink);
         let (c_name, c_guid, c_resources) = (c_string(name), c_string(guid), c_string(resources));
         let kind = interface.to_c();
@@ -239,7 +246,8 @@ impl Library {
         let messages = component.sink.take();
         let reason =
             if messages.is_empty() { "it gave no reason".to_owned() } else { messages.join("; ") };
-        LoadError::Instantiate { path: self.path.clone(), instance: name.to_owned(), reason }
+        let (path, instance) = (self.path.clone(), name.to_owned());
+        LoadError::Instantiate { path, function: "fmi2Instantiate", instance, reason }
     }
 }
 

@@ -42,11 +42,14 @@ fn set(component: &mut Component, setting: &Setting) -> Result<(), LineariseErro
     let to = [setting.reference];
     let done = match &setting.value {
         Value::Real(value) => component.set_real(&to, &[*value]),
-        Value::Integer(value) => component.set_integer(&to, &[*value]),
+        Value::Integer(value) => {
+            component.set_integer(&to, &[i32::try_from(*value).unwrap_or(i32::MAX)])
+        }
         Value::Boolean(value) => component.set_boolean(&to, &[i32::from(*value)]),
         Value::String(value) => {
             component.set_string(&[setting.reference], std::slice::from_ref(value))
         }
+        Value::Binary(_) => Err(slave::absent("fmi3SetBinary")),
     };
     done.map_err(|source| refused(&setting.name, &setting.text, source))
 }

@@ -1,6 +1,5 @@
 //! Driven variables: inputs and tunable parameters that follow a signal during the run.
 
-use fmu_description::Kind;
 use serde::{Deserialize, Serialize};
 
 use crate::error::SystemError;
@@ -8,6 +7,7 @@ use crate::exchange::call;
 use crate::fault::FaultChain;
 use crate::signal::{Cursor, Sample, Signal, earliest, reached};
 use crate::system::{Port, System};
+use slave::ValueType;
 
 /// Signals and faults that act on a system during a run.
 #[derive(Clone, Debug, Default)]
@@ -155,7 +155,8 @@ pub struct Drives {
     groups: Vec<(usize, usize)>,
     references: Vec<u32>,
     reals: Vec<f64>,
-    integers: Vec<i32>,
+    integers: Vec<i64>,
+    booleans: Vec<i32>,
     derived: Vec<u32>,
     orders: Vec<i32>,
     slopes: Vec<f64>,
@@ -181,6 +182,7 @@ impl Drives {
             references: Vec::with_capacity(longest),
             reals: Vec::with_capacity(longest),
             integers: Vec::with_capacity(longest),
+            booleans: Vec::with_capacity(longest),
             derived: Vec::with_capacity(longest),
             orders: Vec::with_capacity(longest),
             slopes: Vec::with_capacity(longest),
@@ -260,7 +262,7 @@ impl Drives {
                     }
                 }
                 DriveKind::Integer => self.integers.push(integer(sample.value)),
-                DriveKind::Boolean => self.integers.push(i32::from(sample.value != 0.0)),
+                DriveKind::Boolean => self.booleans.push(i32::from(sample.value != 0.0)),
                 DriveKind::String => {
                     if let Some(text) = drive.text(sample.value) {
                         slave.set_string(&[drive.reference], std::slice::from_ref(text))?;
@@ -274,7 +276,7 @@ impl Drives {
         match kind {
             DriveKind::Real { .. } => slave.set_real(&self.references, &self.reals)?,
             DriveKind::Integer => slave.set_integer(&self.references, &self.integers)?,
-            DriveKind::Boolean => slave.set_boolean(&self.references, &self.integers)?,
+            DriveKind::Boolean => slave.set_boolean(&self.references, &self.booleans)?,
             DriveKind::String => {}
         }
         if !self.derived.is_empty() {
@@ -287,6 +289,7 @@ impl Drives {
         self.references.clear();
         self.reals.clear();
         self.integers.clear();
+        self.booleans.clear();
         self.derived.clear();
         self.orders.clear();
         self.slopes.clear();
@@ -346,21 +349,21 @@ fn rank(kind: DriveKind) -> u8 {
     }
 }
 
-/// Rounds the value of a signal to an Integer.
+/// Rounds the value of a signal to an Integer of 32 bits.
 #[expect(clippy::cast_possible_truncation, reason = "saturates")]
-pub(crate) fn integer(value: f64) -> i32 {
-    value.round() as i32
+pub(crate) fn integer(value: f64) -> i64 {
+    (value.round() as i32).into()
 }
 
 impl DriveKind {
     /// Returns the type of a variable; `derivatives` applies to Reals only.
     #[must_use]
-    pub fn of(kind: &Kind, derivatives: bool) -> Self {
-        match kind {
-            Kind::Boolean(_) | Kind::Clock(_) => Self::Boolean,
-            Kind::String(_) | Kind::Binary(_) => Self::String,
-            other if other.as_real().is_some() => Self::Real { derivatives },
-            _ => Self::Integer,
+    pub fn of(kind: &fmu_description::Kind, derivatives: bool) -> Self {
+        match ValueType::of(kind) {
+            ValueType::Real => Self::Real { derivatives },
+            ValueType::Integer => Self::Integer,
+            ValueType::Boolean => Self::Boolean,
+            ValueType::String | ValueType::Binary => Self::String,
         }
     }
 }

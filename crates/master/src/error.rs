@@ -74,6 +74,30 @@ pub enum SystemError {
         /// Its unit.
         to_unit: String,
     },
+    /// The two ends of a connection have different sizes.
+    #[error(
+        "{from} is {from_size} and {to} is {to_size}: arrays of different sizes are connected by \
+         element, such as {from}[1]"
+    )]
+    Size {
+        /// The source.
+        from: String,
+        /// Its size.
+        from_size: String,
+        /// The target.
+        to: String,
+        /// Its size.
+        to_size: String,
+    },
+    /// A structural parameter has removed an element of an array that is connected or set.
+    #[error(
+        "{name} is connected or set, but does not exist with the new size of its array; set the \
+         structural parameter first"
+    )]
+    Resized {
+        /// The element.
+        name: String,
+    },
     /// A text cannot be parsed as a value of the variable's type.
     #[error("{name} = {value:?}: expected {expected}")]
     Value {

@@ -17,7 +17,6 @@ mod start;
 mod tasks;
 mod trace;
 
-use fmu_description::Kind;
 use serde::{Deserialize, Serialize};
 
 use crate::algorithm::Algorithm;
@@ -25,17 +24,18 @@ use crate::engine::Task;
 use crate::error::SystemError;
 use crate::fault::FaultChain;
 use crate::system::{Port, System};
-use discrete::{BOOLEANS, Channel, INTEGERS, STRINGS};
+use discrete::{BINARIES, BOOLEANS, Channel, INTEGERS, STRINGS};
 pub(crate) use layout::Refusal;
 pub(crate) use reals::{Reals, Trace};
-use slave::{CallError, Slave, StepResult};
+use slave::{CallError, Slave, StepResult, ValueType};
 
 /// All connections of a system with the current values of their outputs.
 pub(crate) struct Exchange {
     pub(crate) reals: Reals,
-    integers: Channel<i32>,
+    integers: Channel<i64>,
     booleans: Channel<i32>,
     strings: Channel<String>,
+    binaries: Channel<Vec<u8>>,
     /// Whether there are connections of types other than Real.
     discrete: bool,
     allow_nan: bool,
@@ -47,13 +47,15 @@ pub(crate) struct Exchange {
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Values {
     reals: Trace,
-    integers: Vec<i32>,
+    integers: Vec<i64>,
     booleans: Vec<i32>,
     strings: Vec<String>,
+    binaries: Vec<Vec<u8>>,
     /// Values at the start of the last steps.
-    start_integers: Vec<i32>,
+    start_integers: Vec<i64>,
     start_booleans: Vec<i32>,
     start_strings: Vec<String>,
+    start_binaries: Vec<Vec<u8>>,
 }
 
 impl Values {
@@ -63,6 +65,7 @@ impl Values {
             && self.integers.len() == other.integers.len()
             && self.booleans.len() == other.booleans.len()
             && self.strings.len() == other.strings.len()
+            && self.binaries.len() == other.binaries.len()
     }
 }
 
@@ -72,17 +75,17 @@ impl Exchange {
     pub(crate) fn new(system: &System, algorithm: &Algorithm, refusing: &[Refusal]) -> Self {
         let reals = Reals::new(system, algorithm, refusing);
         let to_reals = reals.integer_sources().iter().map(|(port, _)| *port);
-        let is_integer = |kind: &Kind| kind.as_integer().is_some();
-        let integers = Channel::new(system, INTEGERS, is_integer, to_reals);
-        let is_boolean = |kind: &Kind| matches!(kind, Kind::Boolean(_));
-        let booleans = Channel::new(system, BOOLEANS, is_boolean, std::iter::empty());
-        let is_string = |kind: &Kind| matches!(kind, Kind::String(_));
-        let strings = Channel::new(system, STRINGS, is_string, std::iter::empty());
+        let none = std::iter::empty;
+        let integers = Channel::new(system, INTEGERS, ValueType::Integer, to_reals);
+        let booleans = Channel::new(system, BOOLEANS, ValueType::Boolean, none());
+        let strings = Channel::new(system, STRINGS, ValueType::String, none());
+        let binaries = Channel::new(system, BINARIES, ValueType::Binary, none());
         let discrete = !(integers.latest.is_empty()
             && booleans.latest.is_empty()
-            && strings.latest.is_empty());
+            && strings.latest.is_empty()
+            && binaries.latest.is_empty());
         let allow_nan = algorithm.allow_nan;
-        Self { reals, integers, booleans, strings, discrete, allow_nan, faulty: false }
+        Self { reals, integers, booleans, strings, binaries, discrete, allow_nan, faulty: false }
     }
 
     /// Puts faults on connections; each fault is given with the input of its connection.
@@ -149,6 +152,7 @@ impl Exchange {
             self.integers.shift(slave);
             self.booleans.shift(slave);
             self.strings.shift(slave);
+            self.binaries.shift(slave);
         }
     }
 
@@ -162,6 +166,7 @@ impl Exchange {
             self.integers.gather(slave, time, ahead);
             self.booleans.gather(slave, time, ahead);
             self.strings.gather(slave, time, ahead);
+            self.binaries.gather(slave, time, ahead);
         }
     }
 
@@ -261,13 +266,15 @@ impl Exchange {
     fn set_discrete(&self, position: usize, slave: &mut dyn Slave) -> Result<(), CallError> {
         self.integers.set(position, slave)?;
         self.booleans.set(position, slave)?;
-        self.strings.set(position, slave)
+        self.strings.set(position, slave)?;
+        self.binaries.set(position, slave)
     }
 
     fn read_discrete(&mut self, position: usize, slave: &mut dyn Slave) -> Result<(), CallError> {
         self.integers.read(position, slave)?;
         self.booleans.read(position, slave)?;
         self.strings.read(position, slave)?;
+        self.binaries.read(position, slave)?;
         self.copy_integers_to_reals();
         Ok(())
     }
@@ -277,7 +284,7 @@ impl Exchange {
         for k in 0..self.reals.integer_sources().len() {
             let (port, output) = self.reals.integer_sources()[k];
             if let Some(&value) = self.integers.value(port) {
-                self.reals.outputs_mut()[output] = f64::from(value);
+                self.reals.outputs_mut()[output] = slave::to_real(value);
             }
         }
     }
@@ -359,9 +366,11 @@ impl Exchange {
         values.integers.clone_from(&self.integers.latest);
         values.booleans.clone_from(&self.booleans.latest);
         values.strings.clone_from(&self.strings.latest);
+        values.binaries.clone_from(&self.binaries.latest);
         values.start_integers.clone_from(&self.integers.start);
         values.start_booleans.clone_from(&self.booleans.start);
         values.start_strings.clone_from(&self.strings.start);
+        values.start_binaries.clone_from(&self.binaries.start);
     }
 
     /// Restores all values from `values`.
@@ -370,9 +379,11 @@ impl Exchange {
         self.integers.latest.clone_from(&values.integers);
         self.booleans.latest.clone_from(&values.booleans);
         self.strings.latest.clone_from(&values.strings);
+        self.binaries.latest.clone_from(&values.binaries);
         self.integers.start.clone_from(&values.start_integers);
         self.booleans.start.clone_from(&values.start_booleans);
         self.strings.start.clone_from(&values.start_strings);
+        self.binaries.start.clone_from(&values.start_binaries);
     }
 }
 

@@ -175,11 +175,20 @@ impl FaultChain {
         self.stages.iter().fold(derivatives, |derivatives, stage| stage.apply(time, derivatives))
     }
 
-    /// As [`FaultChain::apply`], for Integers; the result is rounded and limited to their range.
+    /// As [`FaultChain::apply`], for Integers; the result is rounded. The result for a value of 32 bits
+    /// is limited to the range of 32 bits, any other to the range of 64 bits.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "saturates")]
-    pub fn apply_integer(&self, time: f64, value: i32) -> i32 {
-        self.apply(time, f64::from(value)).round() as i32
+    pub fn apply_integer(&self, time: f64, value: i64) -> i64 {
+        let given = slave::to_real(value);
+        let faulty = self.apply(time, given);
+        if faulty.total_cmp(&given).is_eq() {
+            value
+        } else if i32::try_from(value).is_ok() {
+            (faulty.round() as i32).into()
+        } else {
+            faulty.round() as i64
+        }
     }
 
     /// As [`FaultChain::apply`], for Booleans: 0 is false, as in the C interface.
@@ -196,7 +205,7 @@ impl FaultChain {
             Value::Boolean(value) => {
                 *value = self.apply_boolean(time, i32::from(*value)) != 0;
             }
-            Value::String(_) => {}
+            Value::String(_) | Value::Binary(_) => {}
         }
     }
 

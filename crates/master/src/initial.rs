@@ -12,7 +12,7 @@ use crate::exchange::call;
 use crate::fault::FaultChain;
 use crate::order::Rows;
 use crate::system::{Port, System};
-use slave::Value;
+use slave::{Value, ValueType};
 use solve::{Components, Newton, Progress, Scale, Solver, components};
 
 /// Tolerance of the values in a loop, relative and as a fraction of nominal values.
@@ -166,8 +166,9 @@ impl<'a> Graph<'a> {
         nodes: &[usize],
         time: f64,
     ) -> Result<(), SystemError> {
-        let is_real =
-            |node: &usize| matches!(system.variable(self.outputs[*node]).kind, Kind::Real(_));
+        let is_real = |node: &usize| {
+            ValueType::of(&system.variable(self.outputs[*node]).kind) == ValueType::Real
+        };
         let (reals, others): (Vec<usize>, Vec<usize>) =
             nodes.iter().partition(|node| is_real(node));
         let mut held = self.read_all(system, &others, time)?;

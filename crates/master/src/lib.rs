@@ -53,7 +53,10 @@ pub use order::{Order, by_direct_dependencies};
 pub use probe::Probe;
 pub use readout::{Readout, SlowState, SlowValues};
 pub use simulation::{Checkpoint, Simulation};
-pub use slave::{Advance, Background, CallError, Failure, Slave, StepResult, Transformation};
+pub use slave::{
+    Advance, Background, CallError, Failure, Slave, StepResult, Transformation, Value, ValueType,
+    to_hex,
+};
 pub use system::{Connection, Port, System};
 
 #[cfg(doctest)]

@@ -1,49 +1,40 @@
 //! Reads chosen variables of a system as numbers.
 
-use fmu_description::Kind;
-
 use crate::error::SystemError;
 use crate::exchange::call;
 use crate::system::{Port, System};
+use slave::ValueType;
 
-/// A list of variables to read together. Booleans are 0 or 1; Strings are left out.
+/// A list of variables to read together. Booleans are 0 or 1; Strings and binaries are left out.
+#[derive(Default)]
 pub struct Probe {
     names: Vec<String>,
     /// One entry for each slave and type: slave, type, value references, positions among the
     /// values.
     reads: Vec<Read>,
     reals: Vec<f64>,
-    integers: Vec<i32>,
+    integers: Vec<i64>,
+    booleans: Vec<i32>,
 }
 
 struct Read {
     slave: usize,
-    kind: ReadKind,
+    kind: ValueType,
     references: Vec<u32>,
     positions: Vec<usize>,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum ReadKind {
-    Real,
-    Integer,
-    Boolean,
 }
 
 impl Probe {
     /// Creates a probe of `ports`, in that order.
     #[must_use]
     pub fn new(system: &System, ports: &[Port]) -> Self {
-        let mut probe =
-            Self { names: Vec::new(), reads: Vec::new(), reals: Vec::new(), integers: Vec::new() };
+        let mut probe = Self::default();
         for &port in ports {
             let variable = system.variable(port);
-            let kind = match &variable.kind {
-                Kind::Boolean(_) => ReadKind::Boolean,
-                other if other.as_real().is_some() => ReadKind::Real,
-                other if other.as_integer().is_some() => ReadKind::Integer,
-                _ => continue,
-            };
+            let kind = ValueType::of(&variable.kind);
+            if matches!(kind, ValueType::String | ValueType::Binary) {
+                continue;
+            }
             let position = probe.names.len();
             probe.names.push(system.name(port));
             let same = |read: &&mut Read| read.slave == port.slave && read.kind == kind;
@@ -63,6 +54,7 @@ impl Probe {
         let longest = probe.reads.iter().map(|read| read.references.len()).max().unwrap_or(0);
         probe.reals.resize(longest, 0.0);
         probe.integers.resize(longest, 0);
+        probe.booleans.resize(longest, 0);
         probe
     }
 
@@ -88,16 +80,22 @@ impl Probe {
             let count = read.references.len();
             let (name, instance) = &mut system.slaves[read.slave];
             let integers = &mut self.integers[..count];
+            let booleans = &mut self.booleans[..count];
             let reals = &mut self.reals[..count];
             match read.kind {
-                ReadKind::Real => instance.get_real(&read.references, reals),
-                ReadKind::Integer => instance.get_integer(&read.references, integers),
-                ReadKind::Boolean => instance.get_boolean(&read.references, integers),
+                ValueType::Real => instance.get_real(&read.references, reals),
+                ValueType::Integer => instance.get_integer(&read.references, integers),
+                ValueType::Boolean => instance.get_boolean(&read.references, booleans),
+                ValueType::String | ValueType::Binary => Ok(()),
             }
             .map_err(|source| call(name, time, source))?;
             for (k, &position) in read.positions.iter().enumerate() {
-                values[position] =
-                    if read.kind == ReadKind::Real { reals[k] } else { f64::from(integers[k]) };
+                values[position] = match read.kind {
+                    ValueType::Real => reals[k],
+                    ValueType::Integer => slave::to_real(integers[k]),
+                    ValueType::Boolean => booleans[k].into(),
+                    ValueType::String | ValueType::Binary => f64::NAN,
+                };
             }
         }
         Ok(())

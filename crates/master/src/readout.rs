@@ -4,13 +4,11 @@ mod slow;
 
 use std::ops::Range;
 
-use fmu_description::Kind;
-
 use crate::drive::{DriveKind, Drives, integer};
 use crate::error::SystemError;
 use crate::exchange::call;
 use crate::system::{Port, System};
-use slave::{CallError, Slave};
+use slave::{CallError, Slave, ValueType, to_hex};
 pub use slow::{SlowState, SlowValues};
 
 /// Values of chosen variables, in one array for each type. Each array keeps the order of the
@@ -22,11 +20,13 @@ pub struct Readout {
     /// Values of Reals.
     pub reals: Vec<f64>,
     /// Values of Integers and Enumerations.
-    pub integers: Vec<i32>,
+    pub integers: Vec<i64>,
     /// Values of Booleans; 0 is false.
     pub booleans: Vec<i32>,
-    /// Values of Strings.
+    /// Values of Strings, and of binaries as hexadecimal digits.
     pub strings: Vec<String>,
+    /// Buffer for binaries.
+    binaries: Vec<Vec<u8>>,
     /// Driven variables: index of the drive, and position of the value.
     driven: Vec<(usize, usize)>,
 }
@@ -35,28 +35,14 @@ pub struct Readout {
 #[derive(Debug)]
 struct Read {
     slave: usize,
-    kind: ReadKind,
+    kind: ValueType,
     references: Vec<u32>,
     range: Range<usize>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum ReadKind {
-    Real,
-    Integer,
-    Boolean,
-    String,
-}
-
-impl ReadKind {
-    fn of(kind: &Kind) -> Self {
-        match kind {
-            Kind::Boolean(_) | Kind::Clock(_) => ReadKind::Boolean,
-            Kind::String(_) | Kind::Binary(_) => ReadKind::String,
-            other if other.as_real().is_some() => ReadKind::Real,
-            _ => ReadKind::Integer,
-        }
-    }
+/// Returns the type of the array that holds values of this type: binaries are with the Strings.
+fn array(kind: ValueType) -> ValueType {
+    if kind == ValueType::Binary { ValueType::String } else { kind }
 }
 
 impl Readout {
@@ -66,11 +52,11 @@ impl Readout {
         let mut readout = Self { ports: ports.to_vec(), ..Self::default() };
         for &port in ports {
             let variable = system.variable(port);
-            let kind = ReadKind::of(&variable.kind);
+            let kind = ValueType::of(&variable.kind);
             let position = readout.add(kind);
             // Only the last group of this kind can be extended, so that its range stays contiguous.
-            let last = readout.reads.iter_mut().rev().find(|read| read.kind == kind);
-            match last.filter(|read| read.slave == port.slave) {
+            let last = readout.reads.iter_mut().rev().find(|read| array(read.kind) == array(kind));
+            match last.filter(|read| read.slave == port.slave && read.kind == kind) {
                 Some(read) => {
                     read.references.push(variable.value_reference);
                     read.range.end = position + 1;
@@ -89,7 +75,7 @@ impl Readout {
     /// Makes driven variables show the value of their signal at the time read, instead of the value
     /// that the FMU received for its last step.
     pub(crate) fn follow(&mut self, drives: &Drives, system: &System, ports: &[Port]) {
-        let kind = |port: Port| ReadKind::of(&system.variable(port).kind);
+        let kind = |port: Port| array(ValueType::of(&system.variable(port).kind));
         for (number, drive) in drives.iter().enumerate() {
             if let Some(at) = ports.iter().position(|port| *port == drive.port()) {
                 let same = |port: &&Port| kind(**port) == kind(drive.port());
@@ -115,18 +101,18 @@ impl Readout {
     }
 
     /// Adds an element for a value and returns its position.
-    fn add(&mut self, kind: ReadKind) -> usize {
+    fn add(&mut self, kind: ValueType) -> usize {
         match kind {
-            ReadKind::Real => self.reals.push(0.0),
-            ReadKind::Integer => self.integers.push(0),
-            ReadKind::Boolean => self.booleans.push(0),
-            ReadKind::String => self.strings.push(String::new()),
+            ValueType::Real => self.reals.push(0.0),
+            ValueType::Integer => self.integers.push(0),
+            ValueType::Boolean => self.booleans.push(0),
+            ValueType::String | ValueType::Binary => self.strings.push(String::new()),
         }
         let length = match kind {
-            ReadKind::Real => self.reals.len(),
-            ReadKind::Integer => self.integers.len(),
-            ReadKind::Boolean => self.booleans.len(),
-            ReadKind::String => self.strings.len(),
+            ValueType::Real => self.reals.len(),
+            ValueType::Integer => self.integers.len(),
+            ValueType::Boolean => self.booleans.len(),
+            ValueType::String | ValueType::Binary => self.strings.len(),
         };
         length - 1
     }
@@ -170,7 +156,7 @@ impl Readout {
             }
             let kind = self.reads[position].kind;
             let members = ports.iter().filter(|port| {
-                port.slave == slave && ReadKind::of(&system.variable(**port).kind) == kind
+                port.slave == slave && ValueType::of(&system.variable(**port).kind) == kind
             });
             for &port in members.collect::<Vec<_>>() {
                 if let Err(error) = system.get_value(port) {
@@ -185,10 +171,18 @@ impl Readout {
         let read = &self.reads[position];
         let (references, range) = (&read.references, read.range.clone());
         match read.kind {
-            ReadKind::Real => slave.get_real(references, &mut self.reals[range]),
-            ReadKind::Integer => slave.get_integer(references, &mut self.integers[range]),
-            ReadKind::Boolean => slave.get_boolean(references, &mut self.booleans[range]),
-            ReadKind::String => slave.get_string(references, &mut self.strings[range]),
+            ValueType::Real => slave.get_real(references, &mut self.reals[range]),
+            ValueType::Integer => slave.get_integer(references, &mut self.integers[range]),
+            ValueType::Boolean => slave.get_boolean(references, &mut self.booleans[range]),
+            ValueType::String => slave.get_string(references, &mut self.strings[range]),
+            ValueType::Binary => {
+                self.binaries.resize(references.len(), Vec::new());
+                slave.get_binary(references, &mut self.binaries)?;
+                for (text, bytes) in self.strings[range].iter_mut().zip(&self.binaries) {
+                    *text = to_hex(bytes);
+                }
+                Ok(())
+            }
         }
     }
 }

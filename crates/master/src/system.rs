@@ -1,6 +1,7 @@
 //! A system: named slaves, connections between their variables, and settings of variables.
 
 mod access;
+mod arrays;
 mod connecting;
 mod settings;
 mod units;
@@ -140,17 +141,6 @@ impl System {
             slave: slave.to_owned(),
             known: known.join(", "),
         }
-    }
-
-    /// Connects an output to an input, both in the form `slave.variable`.
-    ///
-    /// # Errors
-    ///
-    /// Returns an error if a port does not exist, if causality, type or unit do not fit, or if the
-    /// input already has a source.
-    pub fn connect(&mut self, from: &str, to: &str) -> Result<(), SystemError> {
-        let (from, to) = (self.port(from)?, self.port(to)?);
-        self.connect_ports(from, to, Transformation::Identity, false)
     }
 
     /// Connects each output to the inputs of other slaves with the same name and no source; returns

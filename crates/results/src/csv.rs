@@ -97,7 +97,7 @@ impl Sink for CsvSink {
             lines.push(b',');
             match kind {
                 ColumnKind::Real => reals.next().into_iter().for_each(|value| lines.real(*value)),
-                ColumnKind::Integer => {
+                ColumnKind::Integer | ColumnKind::Long => {
                     integers.next().into_iter().for_each(|value| lines.integer(*value));
                 }
                 ColumnKind::Boolean => booleans

@@ -39,13 +39,16 @@ pub struct Column {
     pub unit: Option<String>,
 }
 
-/// The type of a column: a base type of FMI 2.0; an Enumeration is an Integer.
+/// The type of a column: a base type of FMI 2.0, or an integer of 64 bits; an Enumeration is an Integer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ColumnKind {
     /// `fmi2Real`.
     Real,
-    /// `fmi2Integer`.
+    /// `fmi2Integer`, and the integer types of FMI 3.0 with at most 32 bits.
     Integer,
+    /// Integers that need 64 bits: `Int64`, `UInt64`, `UInt32`. Their values are among
+    /// [`Row::integers`].
+    Long,
     /// `fmi2Boolean`.
     Boolean,
     /// `fmi2String`.
@@ -57,8 +60,8 @@ pub enum ColumnKind {
 pub struct Row<'a> {
     /// Values of the Real columns.
     pub reals: &'a [f64],
-    /// Values of the Integer columns.
-    pub integers: &'a [i32],
+    /// Values of the Integer and Long columns. A value beyond the type of its column is limited to it.
+    pub integers: &'a [i64],
     /// Values of the Boolean columns: zero is false.
     pub booleans: &'a [i32],
     /// Values of the String columns.
@@ -232,7 +235,7 @@ impl Widths {
         let count = |kind| columns.iter().filter(|column| column.kind == kind).count();
         Self {
             reals: count(ColumnKind::Real),
-            integers: count(ColumnKind::Integer),
+            integers: count(ColumnKind::Integer) + count(ColumnKind::Long),
             booleans: count(ColumnKind::Boolean),
             strings: count(ColumnKind::String),
         }

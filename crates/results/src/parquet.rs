@@ -157,6 +157,9 @@ impl ParquetSink {
                 ColumnWriter::Int32ColumnWriter(writer) => {
                     writer.write_batch(reader.integers(), None, None)?;
                 }
+                ColumnWriter::Int64ColumnWriter(writer) => {
+                    writer.write_batch(reader.longs(), None, None)?;
+                }
                 ColumnWriter::BoolColumnWriter(writer) => {
                     writer.write_batch(reader.booleans(), None, None)?;
                 }

@@ -26,7 +26,7 @@ pub(super) fn give(sink: &mut dyn Sink, k: i32) {
     let texts = [format!("line\n{k}"), "say \"yes\", then".to_owned()];
     let row = Row {
         reals: &[f64::from(k) * 0.1, -f64::from(k)],
-        integers: &[k, i32::MIN + k],
+        integers: &[k.into(), i64::from(i32::MIN + k)],
         booleans: &[k % 2, 7],
         strings: &texts,
     };

@@ -13,16 +13,30 @@ use fmu_description::Experiment;
 use fmu_description::ModelDescription;
 pub use fmu_description::abi::Status;
 pub use transformation::Transformation;
-pub use value::Value;
+pub use value::{Value, ValueType, from_hex, mapped_integer, to_hex, to_real};
 
-/// An instance of a co-simulation FMU, with the functions of FMI 2.0.5, sections 2.1 and 4.2.
+/// An instance of a co-simulation FMU of FMI 1.0, 2.0 or 3.0.
+///
+/// The functions are named after FMI 2.0.5, sections 2.1 and 4.2. A slave of another version maps them
+/// to its own:
+///
+/// * `get_real` and `set_real` access `Float64` and `Float32`; a value of a `Float32` is rounded to it.
+/// * `get_integer` and `set_integer` access all integer types and enumerations as `i64`. A value that
+///   the type of the variable cannot represent is an error.
+/// * `get_boolean` and `set_boolean` also access clocks: see [`Slave::get_boolean`].
+/// * Each element of an array is a variable of [`Slave::description`] with a value reference of its own,
+///   called `name[1,2]` with indices that start at 1. So there are always as many values as references.
+/// * Events are handled inside of the slave: [`Slave::do_step`] continues after an event until the end
+///   of the communication step.
 ///
 /// Arrays that belong together have the same length. A call succeeds (`fmi2OK`, `fmi2Warning`) or
 /// returns a [`CallError`]. The default implementation of an optional function returns
 /// [`Failure::Missing`].
 #[expect(clippy::missing_errors_doc, reason = "the trait documents the error of every function")]
 pub trait Slave: Send {
-    /// Returns the model description of the FMU.
+    /// Returns the model description of the FMU, in which each element of an array is a scalar variable.
+    ///
+    /// Only [`Slave::configure`] changes it.
     fn description(&self) -> &ModelDescription;
 
     /// Whether the outputs depend on the present inputs only, with no state in between. The Jacobi
@@ -35,6 +49,15 @@ pub trait Slave: Send {
     fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
         let _ = on;
         Err(absent("fmi2SetDebugLogging"))
+    }
+
+    /// Sets structural parameters (FMI 3.0) in configuration mode, before
+    /// [`Slave::enter_initialization_mode`]: value references and values; a Boolean is 0 or 1.
+    ///
+    /// Arrays change their sizes, so [`Slave::description`] has other variables afterwards.
+    fn configure(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
+        let _ = (references, values);
+        Err(absent("fmi3EnterConfigurationMode"))
     }
 
     /// `fmi2SetupExperiment`.
@@ -61,25 +84,26 @@ pub trait Slave: Send {
     /// `fmi2SetReal`.
     fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), CallError>;
 
-    /// `fmi2GetInteger`, also for enumerations.
-    fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
+    /// `fmi2GetInteger`, also for enumerations and for the integer types of FMI 3.0.
+    fn get_integer(&mut self, references: &[u32], values: &mut [i64]) -> Result<(), CallError> {
         let _ = (references, values);
         Err(absent("fmi2GetInteger"))
     }
 
-    /// `fmi2SetInteger`, also for enumerations.
-    fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
+    /// `fmi2SetInteger`, also for enumerations and for the integer types of FMI 3.0.
+    fn set_integer(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
         let _ = (references, values);
         Err(absent("fmi2SetInteger"))
     }
 
-    /// `fmi2GetBoolean`: 0 is false.
+    /// `fmi2GetBoolean`: 0 is false. A clock is true if it has ticked in the last step.
     fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
         let _ = (references, values);
         Err(absent("fmi2GetBoolean"))
     }
 
-    /// `fmi2SetBoolean`: 0 is false.
+    /// `fmi2SetBoolean`: 0 is false. True makes a triggered input clock tick at the start of the next
+    /// step.
     fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
         let _ = (references, values);
         Err(absent("fmi2SetBoolean"))
@@ -95,6 +119,18 @@ pub trait Slave: Send {
     fn set_string(&mut self, references: &[u32], values: &[String]) -> Result<(), CallError> {
         let _ = (references, values);
         Err(absent("fmi2SetString"))
+    }
+
+    /// `fmi3GetBinary`.
+    fn get_binary(&mut self, references: &[u32], values: &mut [Vec<u8>]) -> Result<(), CallError> {
+        let _ = (references, values);
+        Err(absent("fmi3GetBinary"))
+    }
+
+    /// `fmi3SetBinary`.
+    fn set_binary(&mut self, references: &[u32], values: &[Vec<u8>]) -> Result<(), CallError> {
+        let _ = (references, values);
+        Err(absent("fmi3SetBinary"))
     }
 
     /// `fmi2SetRealInputDerivatives`.
@@ -197,6 +233,14 @@ pub trait Slave: Send {
         self.advance(&mut Advance::held(inputs, (time, size), never_back, outputs))
     }
 
+    /// Logs the C calls of this slave: passes the text of each call to `sink` before it is made, and
+    /// status, results and the end of the line after it. False if the slave cannot do so; the caller
+    /// then logs the functions of this trait.
+    fn log_calls(&mut self, sink: CallSink) -> bool {
+        drop(sink);
+        false
+    }
+
     /// Whether a call has returned `fmi2Warning` since the last call of this function. False if this
     /// is unknown, as for an instance in another process.
     fn take_warning(&mut self) -> bool {
@@ -209,6 +253,9 @@ pub trait Slave: Send {
         None
     }
 }
+
+/// Receives the text of calls, for [`Slave::log_calls`].
+pub type CallSink = Box<dyn FnMut(&str) + Send>;
 
 /// A slave that steps in the background, so that its caller can start the steps of other slaves.
 pub trait Background {
@@ -318,7 +365,7 @@ pub enum StepResult {
 
 /// The error of a call of an FMU.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{function} {failure}{}", quoted(.messages))]
+#[error("{function} {}{}", self.failure_text(), quoted(.messages))]
 pub struct CallError {
     /// Name of the FMI function.
     pub function: &'static str,
@@ -329,6 +376,23 @@ pub struct CallError {
 }
 
 impl CallError {
+    /// Returns the text of [`CallError::failure`], with the status in the spelling of the FMI version of
+    /// the function: `fmi3Error` for `fmi3DoStep`, `fmiError` for `fmiDoStep`.
+    #[must_use]
+    pub fn failure_text(&self) -> String {
+        let text = self.failure.to_string();
+        let prefix = match &self.failure {
+            Failure::Status(_) | Failure::InvalidAnswer(_) => {
+                ["fmi2", "fmi3", "fmi"].into_iter().find(|prefix| self.function.starts_with(prefix))
+            }
+            _ => None,
+        };
+        match prefix {
+            None | Some("fmi2") => text,
+            Some(prefix) => text.replace("fmi2", prefix),
+        }
+    }
+
     /// Whether the instance can still be used: the call returned a status other than `fmi2Fatal`, or the
     /// function is missing.
     #[must_use]

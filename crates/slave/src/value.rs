@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use fmu_description::{IntegerType, Kind, SimpleType};
+use fmu_description::{IntegerType, Kind, SimpleType, Version};
 
 /// Relative tolerance of [`Value::is_near`] for Reals.
 const TOLERANCE: f64 = 1e-9;
@@ -13,11 +13,13 @@ pub enum Value {
     /// Real.
     Real(f64),
     /// Integer or Enumeration.
-    Integer(i32),
+    Integer(i64),
     /// Boolean.
     Boolean(bool),
     /// String.
     String(String),
+    /// Binary; as text, hexadecimal digits.
+    Binary(Vec<u8>),
 }
 
 impl Value {
@@ -34,18 +36,97 @@ impl Value {
                 trimmed.parse().map(Value::Real).map_err(|_| "a number".to_owned())
             }
             Kind::Enumeration(integer) => enumeration(integer, types, trimmed),
-            Kind::Boolean(_) => match trimmed {
+            Kind::Boolean(_) | Kind::Clock(_) => match trimmed {
                 "true" | "1" => Ok(Value::Boolean(true)),
                 "false" | "0" => Ok(Value::Boolean(false)),
                 _ => Err("true or false".to_owned()),
             },
             Kind::String(_) => Ok(Value::String(text.to_owned())),
-            Kind::Binary(_) | Kind::Clock(_) => {
-                Err(format!("no value for a variable of type {}", kind.element()))
-            }
-            _ => trimmed.parse().map(Value::Integer).map_err(|_| "an integer".to_owned()),
+            Kind::Binary(_) => from_hex(trimmed)
+                .map(Value::Binary)
+                .ok_or_else(|| "an even number of hexadecimal digits".to_owned()),
+            Kind::Integer(_) => match trimmed.parse::<i32>() {
+                Ok(value) => Ok(Value::Integer(value.into())),
+                Err(_) => Err("an integer".to_owned()),
+            },
+            _ => parse_integer(kind, trimmed),
         }
     }
+}
+
+/// Reads an integer of a type of FMI 3.0. Integers beyond 63 bits are not supported.
+fn parse_integer(kind: &Kind, text: &str) -> Result<Value, String> {
+    let (least, most) = kind.integer_range(Version::V3).unwrap_or_default();
+    let most = most.min(i64::MAX.into());
+    let value = text.parse::<i128>().ok().filter(|value| (least..=most).contains(value));
+    let value = value.and_then(|value| i64::try_from(value).ok());
+    value.map(Value::Integer).ok_or_else(|| {
+        format!("an integer from {least} to {most}, as its type is {}", kind.element())
+    })
+}
+
+/// The types between which a master distinguishes: the functions of a slave that access a variable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ValueType {
+    /// `get_real` and `set_real`: Real, `Float64`, `Float32`.
+    Real,
+    /// `get_integer` and `set_integer`: all integers and enumerations.
+    Integer,
+    /// `get_boolean` and `set_boolean`: Boolean, Clock.
+    Boolean,
+    /// `get_string` and `set_string`.
+    String,
+    /// `get_binary` and `set_binary`.
+    Binary,
+}
+
+impl ValueType {
+    /// Returns the type of the values of a variable of that kind.
+    #[must_use]
+    pub fn of(kind: &Kind) -> Self {
+        match kind {
+            Kind::Real(_) | Kind::Float32(_) => ValueType::Real,
+            Kind::Boolean(_) | Kind::Clock(_) => ValueType::Boolean,
+            Kind::String(_) => ValueType::String,
+            Kind::Binary(_) => ValueType::Binary,
+            _ => ValueType::Integer,
+        }
+    }
+}
+
+/// Converts an Integer to a Real, rounded to the nearest `f64` beyond 2^53.
+#[must_use]
+#[expect(clippy::cast_precision_loss, reason = "rounds to the nearest number")]
+pub fn to_real(value: i64) -> f64 {
+    value as f64
+}
+
+/// Applies the pairs of [`crate::Transformation::Integer`] to `value`.
+#[must_use]
+pub fn mapped_integer(pairs: &[(i32, i32)], value: i64) -> i64 {
+    let pair = pairs.iter().find(|(from, _)| i64::from(*from) == value);
+    pair.map_or(value, |(_, to)| (*to).into())
+}
+
+/// Returns the bytes as hexadecimal digits, as a model description writes a Binary (FMI 3.0.2, section
+/// 2.4.7.8).
+#[must_use]
+pub fn to_hex(bytes: &[u8]) -> String {
+    use fmt::Write as _;
+    let mut text = String::with_capacity(2 * bytes.len());
+    for byte in bytes {
+        // Writing to a String does not fail.
+        let _ = write!(text, "{byte:02x}");
+    }
+    text
+}
+
+/// Returns the bytes that `text` writes as hexadecimal digits; `None` if it does not.
+#[must_use]
+pub fn from_hex(text: &str) -> Option<Vec<u8>> {
+    let digits: Option<Vec<u32>> = text.chars().map(|digit| digit.to_digit(16)).collect();
+    let digits = digits.filter(|digits| digits.len() % 2 == 0)?;
+    digits.chunks(2).map(|pair| u8::try_from(16 * pair[0] + pair[1]).ok()).collect()
 }
 
 impl Value {
@@ -53,11 +134,14 @@ impl Value {
     #[must_use]
     pub fn start(kind: &Kind) -> Option<Self> {
         match kind {
-            Kind::Real(real) | Kind::Float32(real) => real.start.map(Value::Real),
+            Kind::Real(real) => real.start.map(Value::Real),
+            // As the FMU holds it.
+            #[expect(clippy::cast_possible_truncation, reason = "the nearest f32")]
+            Kind::Float32(real) => real.start.map(|start| Value::Real((start as f32).into())),
             Kind::Boolean(start) => start.map(Value::Boolean),
             other => {
                 let start = other.as_integer()?.start?;
-                i32::try_from(start).ok().map(Value::Integer)
+                i64::try_from(start).ok().map(Value::Integer)
             }
         }
     }
@@ -84,6 +168,7 @@ impl fmt::Display for Value {
             Value::Integer(value) => value.fmt(formatter),
             Value::Boolean(value) => value.fmt(formatter),
             Value::String(value) => write!(formatter, "{value:?}"),
+            Value::Binary(value) => formatter.write_str(&to_hex(value)),
         }
     }
 }
@@ -94,9 +179,8 @@ fn enumeration(kind: &IntegerType, types: &[SimpleType], text: &str) -> Result<V
     }
     let declared = types.iter().find(|known| Some(&known.name) == kind.declared_type.as_ref());
     let items = declared.map(|declared| declared.items.as_slice()).unwrap_or_default();
-    let named = items.iter().find(|(name, _)| name == text);
-    if let Some(number) = named.and_then(|(_, number)| i32::try_from(*number).ok()) {
-        return Ok(Value::Integer(number));
+    if let Some((_, number)) = items.iter().find(|(name, _)| name == text) {
+        return Ok(Value::Integer(*number));
     }
     let names: Vec<_> = items.iter().map(|(name, _)| name.as_str()).collect();
     Err(format!("an integer or one of the items {}", names.join(", ")))

@@ -76,18 +76,40 @@ pub fn assemble(
     for (name, function) in &assembly.functions {
         system.add(name, Box::new(function.slave()))?;
     }
+    // Structural parameters come first: they determine the elements of arrays.
+    apply_settings(&mut system, loaded, &assembly.elements, true)?;
     connect(&mut system, loaded, &assembly.links, options.by_unit)?;
-    for element in &assembly.elements {
+    apply_settings(&mut system, loaded, &assembly.elements, false)?;
+    Ok(AssembledSystem { system, experiment, steps, fixed_step, folders })
+}
+
+/// Applies the settings of structural parameters, or those of all other variables.
+fn apply_settings(
+    system: &mut System,
+    loaded: &LoadedConfig,
+    elements: &[Element],
+    structural: bool,
+) -> Result<(), Error> {
+    for element in elements {
         for setting in &element.settings {
-            let port = system.terminal(&element.name, &setting.variable)?;
-            system.set_port(port, &setting.value)?;
+            let name = format!("{}.{}", element.name, setting.variable);
+            if system.is_structural(&name) != structural {
+                continue;
+            }
+            match system.terminal(&element.name, &setting.variable) {
+                Ok(port) => system.set_port(port, &setting.value)?,
+                // A whole array, or an unknown variable.
+                Err(_) => system.set(&name, &setting.value)?,
+            }
         }
     }
-    for (name, value, place) in &config.settings.0 {
-        let set = system.set(name, &value.to_string());
-        set.map_err(|error| loaded.point(place, error))?;
+    for (name, value, place) in &loaded.config.settings.0 {
+        if system.is_structural(name) == structural {
+            let set = system.set(name, &value.to_string());
+            set.map_err(|error| loaded.point(place, error))?;
+        }
     }
-    Ok(AssembledSystem { system, experiment, steps, fixed_step, folders })
+    Ok(())
 }
 
 /// Opens the system on which the configuration builds.
@@ -235,10 +257,11 @@ fn connect(
     let mut own = Vec::new();
     for wire in config.connections.iter().flatten() {
         let ConnectionEntry { from, to, factor, offset } = wire.get_ref();
-        let port = |name: &toml::Spanned<String>| {
-            system.port(name.get_ref()).map_err(|error| loaded.point(&name.span(), error))
-        };
-        let (from, to) = (port(from)?, port(to)?);
+        let pairs = system.pairs(from.get_ref(), to.get_ref()).map_err(|error| {
+            let is_known = system.pairs(from.get_ref(), from.get_ref()).is_ok();
+            let place = if is_known { to.span() } else { from.span() };
+            loaded.point(&place, error)
+        })?;
         let terminal = |port: master::Port| Terminal {
             element: system.slaves[port.slave].0.clone(),
             variable: system.variable(port).name.clone(),
@@ -246,16 +269,17 @@ fn connect(
         let stated = factor.is_some() || offset.is_some();
         let linear =
             Transformation::Linear { factor: factor.unwrap_or(1.0), offset: offset.unwrap_or(0.0) };
-        taken.insert(terminal(to));
-        own.push((
-            wire.span(),
-            Link {
+        for (from, to) in pairs {
+            taken.insert(terminal(to));
+            let transformation = if stated { linear.clone() } else { Transformation::Identity };
+            let link = Link {
                 from: terminal(from),
                 to: terminal(to),
-                transformation: if stated { linear } else { Transformation::Identity },
+                transformation,
                 units_settled: stated,
-            },
-        ));
+            };
+            own.push((wire.span(), link));
+        }
     }
     for link in links.iter().filter(|link| !taken.contains(&link.to)) {
         link_ports(system, link)?;

@@ -3,14 +3,17 @@
 use master::{System, SystemError};
 use ssp::Link;
 
-/// Makes the connection that `link` describes.
+/// Makes the connection that `link` describes; between arrays of equal size one for each element.
 ///
 /// # Errors
 ///
 /// Returns an error if slave or variable do not exist, if causality, type, unit or transformation
-/// do not fit, or if the input already has a source.
+/// do not fit, if arrays have different sizes, or if the input already has a source.
 pub fn link(system: &mut System, link: &Link) -> Result<(), SystemError> {
-    let from = system.terminal(&link.from.element, &link.from.variable)?;
-    let to = system.terminal(&link.to.element, &link.to.variable)?;
-    system.connect_ports(from, to, link.transformation.clone(), link.units_settled)
+    let from = (link.from.element.as_str(), link.from.variable.as_str());
+    let to = (link.to.element.as_str(), link.to.variable.as_str());
+    for (from, to) in system.terminal_pairs(from, to)? {
+        system.connect_ports(from, to, link.transformation.clone(), link.units_settled)?;
+    }
+    Ok(())
 }

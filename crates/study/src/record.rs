@@ -192,6 +192,7 @@ fn column(system: &System, port: Port) -> Column {
     let kind = match &variable.kind {
         Kind::Boolean(_) | Kind::Clock(_) => ColumnKind::Boolean,
         Kind::String(_) | Kind::Binary(_) => ColumnKind::String,
+        Kind::UInt32(_) | Kind::Int64(_) | Kind::UInt64(_) => ColumnKind::Long,
         other if other.as_real().is_some() => ColumnKind::Real,
         _ => ColumnKind::Integer,
     };
@@ -202,7 +203,7 @@ fn column(system: &System, port: Port) -> Column {
 #[must_use]
 pub fn unit(system: &System, port: Port) -> Option<String> {
     match &system.variable(port).kind {
-        Kind::Real(real) => real.unit.clone(),
+        Kind::Real(real) | Kind::Float32(real) => real.unit.clone(),
         _ => None,
     }
 }

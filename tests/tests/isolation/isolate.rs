@@ -16,7 +16,7 @@ use tests::{Trouble, dist, troubles};
 /// The error of a step of 0.5 s with this misbehaviour of the FMU.
 fn error_of(trouble: Trouble, options: &Options) -> (Isolated, CallError) {
     let mut slave = ready(options);
-    slave.set_integer(&[0], &[trouble as i32]).unwrap();
+    slave.set_integer(&[0], &[trouble as i64]).unwrap();
     let error = advance(&mut slave, 1.0, 0.5).expect_err(&format!("{trouble:?}"));
     let again = slave.get_real(&[1], &mut [0.0]).unwrap_err();
     assert_eq!((again.failure, again.function), (error.failure.clone(), "fmi2GetReal"));
@@ -170,9 +170,9 @@ fn errors_and_early_ends_are_reported_as_without_isolation() {
             slave.restore_state(7).unwrap_err(),
             slave.deserialize_state(b"short").unwrap_err(),
         ];
-        slave.set_integer(&[0], &[Trouble::Refuse as i32]).unwrap();
+        slave.set_integer(&[0], &[Trouble::Refuse as i64]).unwrap();
         found.push(advance(slave, 1.0, 0.5).unwrap_err());
-        slave.set_integer(&[0], &[Trouble::StopEarly as i32]).unwrap();
+        slave.set_integer(&[0], &[Trouble::StopEarly as i64]).unwrap();
         (found, advance(slave, 4.0, 1.0).unwrap())
     });
     assert_eq!(near, far);
@@ -266,7 +266,7 @@ fn an_fmu_that_overwrites_the_turn_counter_is_detected_at_once() {
 fn the_master_survives_a_thread_of_the_fmu_that_overwrites_the_shared_memory() {
     for _ in 0..10 {
         let mut slave = ready(&limited(500));
-        slave.set_integer(&[0], &[Trouble::OverwriteShared as i32]).unwrap();
+        slave.set_integer(&[0], &[Trouble::OverwriteShared as i64]).unwrap();
         let (mut errors, mut texts) = (0, vec![String::new(); 4]);
         for _ in 0..20_000 {
             errors += usize::from(advance(&mut slave, 1.0, 0.5).is_err());
@@ -286,9 +286,9 @@ fn the_master_survives_a_thread_of_the_fmu_that_overwrites_the_shared_memory() {
 #[test]
 fn very_many_messages_neither_delay_nor_end_the_run() {
     let mut slave = ready(&options());
-    slave.set_integer(&[0], &[Trouble::Flood as i32]).unwrap();
+    slave.set_integer(&[0], &[Trouble::Flood as i64]).unwrap();
     assert_eq!(advance(&mut slave, 1.0, 0.5).unwrap(), (StepResult::Whole, 0.5));
-    slave.set_integer(&[0], &[Trouble::None as i32]).unwrap();
+    slave.set_integer(&[0], &[Trouble::None as i64]).unwrap();
     assert_eq!(advance(&mut slave, 1.0, 0.5).unwrap(), (StepResult::Whole, 1.0));
 }
 
@@ -296,7 +296,7 @@ fn very_many_messages_neither_delay_nor_end_the_run() {
 fn an_fmu_that_hangs_while_it_is_freed_is_ended() {
     for trouble in [Trouble::HangInFree, Trouble::CrashInFree] {
         let mut slave = ready(&limited(200));
-        slave.set_integer(&[0], &[trouble as i32]).unwrap();
+        slave.set_integer(&[0], &[trouble as i64]).unwrap();
         let process = slave.process_id();
         drop(slave);
         assert!(is_gone(process), "{trouble:?}");

@@ -61,7 +61,7 @@ fn a_step_allocates_nothing_in_the_master() {
 fn the_time_limit_of_a_step_counts_from_its_start() {
     let mut slaves = [ready(&limited(1000)), ready(&limited(1000)), ready(&limited(1000))];
     for slave in &mut slaves {
-        slave.set_integer(&[0], &[Trouble::Hang as i32]).unwrap();
+        slave.set_integer(&[0], &[Trouble::Hang as i64]).unwrap();
     }
     let begin = Instant::now();
     for slave in &mut slaves {

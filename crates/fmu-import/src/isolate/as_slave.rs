@@ -5,7 +5,7 @@ use fmu_description::ModelDescription;
 use serde::de::DeserializeOwned;
 
 use super::function::Function;
-use super::isolated::Isolated;
+use super::isolated::{Isolated, scalar_description};
 use super::message::Request;
 use super::words::{Reader, Word, Writer};
 use slave::{Advance, Background, CallError, Slave, StepResult};
@@ -98,7 +98,23 @@ impl Background for Isolated {
 
 impl Slave for Isolated {
     fn description(&self) -> &ModelDescription {
-        &self.package.description
+        self.description.as_ref().unwrap_or(&self.package.description)
+    }
+
+    fn configure(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
+        assert_equally_many(references, values);
+        let pairs = references.iter().copied().zip(values.iter().copied());
+        self.request::<()>(&Request::Configure(pairs.clone().collect()))?;
+        for (reference, value) in pairs {
+            if let Ok(value) = u64::try_from(value) {
+                self.sizes.insert(reference, value);
+            }
+        }
+        match scalar_description(&self.package.description, &self.sizes) {
+            Ok(description) => self.description = description,
+            Err(_) => return Err(self.invalid_answer(Function::Configure)),
+        }
+        Ok(())
     }
 
     fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
@@ -134,11 +150,11 @@ impl Slave for Isolated {
         self.set(Function::SetReal, references, values)
     }
 
-    fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
+    fn get_integer(&mut self, references: &[u32], values: &mut [i64]) -> Result<(), CallError> {
         self.get(Function::GetInteger, references, values)
     }
 
-    fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
+    fn set_integer(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
         self.set(Function::SetInteger, references, values)
     }
 
@@ -158,6 +174,16 @@ impl Slave for Isolated {
         assert_equally_many(references, values);
         let values = references.iter().copied().zip(values.iter().map(String::as_str));
         self.request(&Request::SetString(values.collect()))
+    }
+
+    fn get_binary(&mut self, references: &[u32], values: &mut [Vec<u8>]) -> Result<(), CallError> {
+        self.request_all(&Request::GetBinary(references.into()), values)
+    }
+
+    fn set_binary(&mut self, references: &[u32], values: &[Vec<u8>]) -> Result<(), CallError> {
+        assert_equally_many(references, values);
+        let values = references.iter().copied().zip(values.iter().map(Vec::as_slice));
+        self.request(&Request::SetBinary(values.collect()))
     }
 
     fn set_input_derivatives(

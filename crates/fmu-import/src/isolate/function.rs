@@ -1,11 +1,49 @@
 //! The functions that a worker executes. The number of a function is the command of the master, and
 //! names the function that crashed.
 
+use fmu_description::Version;
 use serde::{Deserialize, Serialize};
 
-/// Defines the functions, each with the name that its errors have.
+/// Names of functions of FMI 3.0 that are not the name of a [`Function`]: a slave calls them for it.
+const OTHERS: [&str; 24] = [
+    "fmi3EnterEventMode",
+    "fmi3EnterStepMode",
+    "fmi3UpdateDiscreteStates",
+    "fmi3ExitConfigurationMode",
+    "fmi3GetFloat32",
+    "fmi3SetFloat32",
+    "fmi3GetInt8",
+    "fmi3SetInt8",
+    "fmi3GetUInt8",
+    "fmi3SetUInt8",
+    "fmi3GetInt16",
+    "fmi3SetInt16",
+    "fmi3GetUInt16",
+    "fmi3SetUInt16",
+    "fmi3GetInt32",
+    "fmi3SetInt32",
+    "fmi3GetUInt32",
+    "fmi3SetUInt32",
+    "fmi3GetUInt64",
+    "fmi3SetUInt64",
+    "fmi3GetClock",
+    "fmi3SetClock",
+    "fmi3GetIntervalDecimal",
+    "fmi3GetShiftDecimal",
+];
+
+/// Returns the static name of a function of any version.
+pub(super) fn known_name(name: &str) -> Option<&'static str> {
+    let versions = [Version::V2, Version::V3, Version::V1];
+    let names = versions.into_iter().flat_map(|version| {
+        Function::ALL.iter().map(move |function| *function.static_name(version))
+    });
+    names.chain(OTHERS).find(|known| *known == name)
+}
+
+/// Defines the functions, each with the names that its errors have: in FMI 2.0, 3.0 and 1.0.
 macro_rules! functions {
-    ($($function:ident = $name:literal,)*) => {
+    ($($function:ident = $name:literal $name_3:literal $name_1:literal,)*) => {
         /// A function of a worker.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
         pub(super) enum Function {
@@ -17,9 +55,11 @@ macro_rules! functions {
 
             /// Returns a static reference to the name, for the report of a crash of the master.
             #[inline]
-            pub(super) fn static_name(self) -> &'static &'static str {
-                match self {
-                    $(Function::$function => &$name,)*
+            pub(super) fn static_name(self, version: Version) -> &'static &'static str {
+                match (self, version) {
+                    $((Function::$function, Version::V2) => &$name,
+                    (Function::$function, Version::V3) => &$name_3,
+                    (Function::$function, Version::V1) => &$name_1,)*
                 }
             }
         }
@@ -27,48 +67,46 @@ macro_rules! functions {
 }
 
 functions! {
-    Load = "loading the library",
-    Instantiate = "fmi2Instantiate",
-    SetDebugLogging = "fmi2SetDebugLogging",
-    SetupExperiment = "fmi2SetupExperiment",
-    EnterInitializationMode = "fmi2EnterInitializationMode",
-    ExitInitializationMode = "fmi2ExitInitializationMode",
-    Terminate = "fmi2Terminate",
-    GetReal = "fmi2GetReal",
-    SetReal = "fmi2SetReal",
-    GetInteger = "fmi2GetInteger",
-    SetInteger = "fmi2SetInteger",
-    GetBoolean = "fmi2GetBoolean",
-    SetBoolean = "fmi2SetBoolean",
-    GetString = "fmi2GetString",
-    SetString = "fmi2SetString",
-    SetInputDerivatives = "fmi2SetRealInputDerivatives",
-    GetOutputDerivatives = "fmi2GetRealOutputDerivatives",
-    DoStep = "fmi2DoStep",
-    DirectionalDerivative = "fmi2GetDirectionalDerivative",
-    SaveState = "fmi2GetFMUstate",
-    RestoreState = "fmi2SetFMUstate",
-    SerializeState = "fmi2SerializeFMUstate",
-    DeserializeState = "fmi2DeSerializeFMUstate",
-    Free = "fmi2FreeInstance",
-    GetStatus = "fmi2GetStatus",
-    GetRealStatus = "fmi2GetRealStatus",
-    GetBooleanStatus = "fmi2GetBooleanStatus",
-    SerializedSize = "fmi2SerializedFMUstateSize",
+    Load = "loading the library" "loading the library" "loading the library",
+    Instantiate = "fmi2Instantiate" "fmi3InstantiateCoSimulation" "fmiInstantiateSlave",
+    SetDebugLogging = "fmi2SetDebugLogging" "fmi3SetDebugLogging" "fmiSetDebugLogging",
+    SetupExperiment = "fmi2SetupExperiment" "fmi3EnterInitializationMode" "fmiInitializeSlave",
+    EnterInitializationMode = "fmi2EnterInitializationMode" "fmi3EnterInitializationMode" "fmiInitializeSlave",
+    ExitInitializationMode = "fmi2ExitInitializationMode" "fmi3ExitInitializationMode" "fmiInitializeSlave",
+    Terminate = "fmi2Terminate" "fmi3Terminate" "fmiTerminateSlave",
+    GetReal = "fmi2GetReal" "fmi3GetFloat64" "fmiGetReal",
+    SetReal = "fmi2SetReal" "fmi3SetFloat64" "fmiSetReal",
+    GetInteger = "fmi2GetInteger" "fmi3GetInt64" "fmiGetInteger",
+    SetInteger = "fmi2SetInteger" "fmi3SetInt64" "fmiSetInteger",
+    GetBoolean = "fmi2GetBoolean" "fmi3GetBoolean" "fmiGetBoolean",
+    SetBoolean = "fmi2SetBoolean" "fmi3SetBoolean" "fmiSetBoolean",
+    GetString = "fmi2GetString" "fmi3GetString" "fmiGetString",
+    SetString = "fmi2SetString" "fmi3SetString" "fmiSetString",
+    SetInputDerivatives = "fmi2SetRealInputDerivatives" "fmi2SetRealInputDerivatives" "fmiSetRealInputDerivatives",
+    GetOutputDerivatives = "fmi2GetRealOutputDerivatives" "fmi3GetOutputDerivatives" "fmiGetRealOutputDerivatives",
+    DoStep = "fmi2DoStep" "fmi3DoStep" "fmiDoStep",
+    DirectionalDerivative = "fmi2GetDirectionalDerivative" "fmi3GetDirectionalDerivative" "fmi2GetDirectionalDerivative",
+    SaveState = "fmi2GetFMUstate" "fmi3GetFMUState" "fmi2GetFMUstate",
+    RestoreState = "fmi2SetFMUstate" "fmi3SetFMUState" "fmi2SetFMUstate",
+    SerializeState = "fmi2SerializeFMUstate" "fmi3SerializeFMUState" "fmi2SerializeFMUstate",
+    DeserializeState = "fmi2DeSerializeFMUstate" "fmi3DeserializeFMUState" "fmi2DeSerializeFMUstate",
+    Free = "fmi2FreeInstance" "fmi3FreeInstance" "fmiFreeSlaveInstance",
+    GetStatus = "fmi2GetStatus" "fmi2GetStatus" "fmiGetStatus",
+    GetRealStatus = "fmi2GetRealStatus" "fmi2GetRealStatus" "fmiGetRealStatus",
+    GetBooleanStatus = "fmi2GetBooleanStatus" "fmi2GetBooleanStatus" "fmi2GetBooleanStatus",
+    SerializedSize = "fmi2SerializedFMUstateSize" "fmi3SerializedFMUStateSize" "fmi2SerializedFMUstateSize",
+    GetBinary = "fmi3GetBinary" "fmi3GetBinary" "fmi3GetBinary",
+    SetBinary = "fmi3SetBinary" "fmi3SetBinary" "fmi3SetBinary",
+    Configure = "fmi3EnterConfigurationMode" "fmi3EnterConfigurationMode" "fmi3EnterConfigurationMode",
     // Transfer the parts of a request or of an answer that is longer than the shared memory.
-    Upload = "the transfer of data to it",
-    Download = "the transfer of data from it",
+    Upload = "the transfer of data to it" "the transfer of data to it" "the transfer of data to it",
+    Download = "the transfer of data from it" "the transfer of data from it" "the transfer of data from it",
 }
 
 impl Function {
-    /// Returns the name.
-    pub(super) fn name(self) -> &'static str {
-        self.static_name()
-    }
-
-    /// Returns the function with this name.
-    pub(super) fn named(name: &str) -> Option<Self> {
-        Self::ALL.iter().copied().find(|function| function.name() == name)
+    /// Returns the name in a version of FMI.
+    pub(super) fn name(self, version: Version) -> &'static str {
+        self.static_name(version)
     }
 
     /// Whether arguments and results pass as words without allocation, because the function runs in
@@ -101,9 +139,12 @@ mod tests {
     fn every_function_has_its_number_and_name() {
         for function in Function::ALL {
             assert_eq!(Function::from_word(function.to_word()), Some(*function));
-            assert_eq!(Function::named(function.name()), Some(*function));
+            for version in [Version::V1, Version::V2, Version::V3] {
+                let name = function.name(version);
+                assert_eq!(known_name(name), Some(name));
+            }
         }
         assert_eq!(Function::from_word(u64::MAX), None);
-        assert_eq!(Function::named("fmi2Nothing"), None);
+        assert_eq!(known_name("fmi2Nothing"), None);
     }
 }

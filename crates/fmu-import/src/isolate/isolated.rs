@@ -1,5 +1,6 @@
 //! The master's side of an isolated instance.
 
+use std::collections::HashMap;
 use std::os::unix::ffi::OsStrExt as _;
 use std::os::unix::net::UnixStream;
 use std::sync::Arc;
@@ -7,6 +8,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use fmu_description::package::Unpacked;
+use fmu_description::{ModelDescription, Version};
 
 use super::channel::{Channel, Side, WaitResult};
 use super::function::Function;
@@ -55,6 +57,12 @@ pub struct Isolated {
     pub(super) message: Vec<u8>,
     /// The unpacked FMU, removed with its last instance.
     pub(super) package: Arc<Unpacked>,
+    /// The version of the FMU, for the names of functions.
+    pub(super) version: Version,
+    /// The description as the instance has it; `None`: that of the package.
+    pub(super) description: Option<ModelDescription>,
+    /// Values of structural parameters, by value reference.
+    pub(super) sizes: HashMap<u32, u64>,
 }
 
 impl Isolated {
@@ -68,7 +76,12 @@ impl Isolated {
             let instance = name.to_owned();
             move |source| IsolateError::System { what, instance, source }
         };
-        let count = package.description.variables.len();
+        let own = &package.description;
+        let (version, sizes) = (own.version(), HashMap::new());
+        let description = scalar_description(own, &sizes).map_err(|reason| {
+            IsolateError::Refused { instance: name.to_owned(), reason }
+        })?;
+        let count = description.as_ref().unwrap_or(own).variables.len();
         refuse_in_worker()?;
         let (shared, memory) =
             Shared::create(count).map_err(system("cannot create shared memory"))?;
@@ -97,6 +110,9 @@ impl Isolated {
             slice,
             started: Instant::now(),
             message: Vec::new(),
+            version,
+            description,
+            sizes,
             package,
         };
         let opened = isolated.open(name, options);
@@ -159,7 +175,7 @@ impl Isolated {
         write: impl FnOnce(&mut Writer<'_>),
     ) -> Result<(), CallError> {
         if let Some(failure) = &self.ended {
-            return Err(error(function, failure.clone()));
+            return Err(self.error(function, failure.clone()));
         }
         if self.is_pending()
             && let Err(failure) = self.wait()
@@ -171,14 +187,14 @@ impl Isolated {
         let mut writer = Writer::new(shared.area());
         write(&mut writer);
         if !writer.fits() {
-            return Err(protocol_error(
+            return Err(self.protocol_error(
                 function,
                 "needs more arguments than the shared memory holds",
             ));
         }
         shared.command().store(function.to_word(), Ordering::Relaxed);
         shared.place().store(function.to_word(), Ordering::Relaxed);
-        self.place.enter(function.static_name());
+        self.place.enter(function.static_name(self.version));
         self.turn = self.turn.wrapping_add(1);
         self.channel.post(self.turn);
         Ok(())
@@ -213,10 +229,10 @@ impl Isolated {
     #[inline]
     pub(super) fn wait_for_answer(&mut self, function: Function) -> Result<(), CallError> {
         if let Some(failure) = &self.ended {
-            return Err(error(function, failure.clone()));
+            return Err(self.error(function, failure.clone()));
         }
         if !self.is_pending() {
-            return Err(protocol_error(function, "was not started before it was finished"));
+            return Err(self.protocol_error(function, "was not started before it was finished"));
         }
         if let Err(failure) = self.wait() {
             return Err(self.abandon(function, failure));
@@ -290,7 +306,7 @@ impl Isolated {
         let shared = &self.channel.shared;
         self.inbox.drain(shared);
         let place = Function::from_word(shared.place().load(Ordering::Relaxed));
-        let function = place.unwrap_or(function).name();
+        let function = place.unwrap_or(function).name(self.version);
         let failure = match self.memory_limit {
             Some(limit) if shared.no_memory().load(Ordering::Relaxed) != 0 => {
                 Failure::OutOfMemory(limit)
@@ -341,11 +357,26 @@ fn check_outcome(name: &str, answer: Result<Opening, CallError>) -> Result<(), I
     }
 }
 
-fn error(function: Function, failure: Failure) -> CallError {
-    CallError { function: function.name(), failure, messages: Vec::new() }
+impl Isolated {
+    fn error(&self, function: Function, failure: Failure) -> CallError {
+        CallError { function: function.name(self.version), failure, messages: Vec::new() }
+    }
+
+    #[cold]
+    fn protocol_error(&self, function: Function, what: &str) -> CallError {
+        self.error(function, Failure::InvalidAnswer(what.to_owned()))
+    }
 }
 
-#[cold]
-fn protocol_error(function: Function, what: &str) -> CallError {
-    error(function, Failure::InvalidAnswer(what.to_owned()))
+/// Returns the description of an instance if it differs from that of its FMU. On failure returns the
+/// reason.
+pub(super) fn scalar_description(
+    own: &ModelDescription,
+    sizes: &HashMap<u32, u64>,
+) -> Result<Option<ModelDescription>, String> {
+    Ok(match own.version() {
+        Version::V1 => Some(crate::v1::scalar_description(own)),
+        Version::V2 => None,
+        Version::V3 => Some(crate::v3::ElementView::new(own, sizes)?.description),
+    })
 }

@@ -3,11 +3,11 @@
 
 use std::borrow::Cow;
 
-use fmu_description::Experiment;
+use fmu_description::{Experiment, Version};
 use fmu_description::abi::Status;
 use serde::{Deserialize, Serialize};
 
-use super::function::Function;
+use super::function::{Function, known_name};
 use slave::{CallError, Failure};
 
 /// Maximum number of bytes of one text in an error.
@@ -29,6 +29,10 @@ pub(super) enum Request<'a> {
     EnterInitializationMode,
     ExitInitializationMode,
     Terminate,
+    /// Structural parameters: references and values.
+    Configure(Vec<(u32, i64)>),
+    GetBinary(Cow<'a, [u32]>),
+    SetBinary(#[serde(borrow)] Vec<(u32, &'a [u8])>),
     GetString(Cow<'a, [u32]>),
     SetString(#[serde(borrow)] Vec<(u32, &'a str)>),
     /// References, orders and values.
@@ -70,6 +74,9 @@ impl Request<'_> {
             Request::EnterInitializationMode => Function::EnterInitializationMode,
             Request::ExitInitializationMode => Function::ExitInitializationMode,
             Request::Terminate => Function::Terminate,
+            Request::Configure(_) => Function::Configure,
+            Request::GetBinary(_) => Function::GetBinary,
+            Request::SetBinary(_) => Function::SetBinary,
             Request::GetString(_) => Function::GetString,
             Request::SetString(_) => Function::SetString,
             Request::SetInputDerivatives(_) => Function::SetInputDerivatives,
@@ -98,8 +105,7 @@ pub(super) enum Opening {
 /// A [`CallError`] as a worker sends it.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct RemoteError {
-    /// `None`: a function without a number.
-    function: Option<Function>,
+    function: String,
     failure: RemoteFailure,
     messages: Vec<String>,
 }
@@ -131,13 +137,13 @@ impl From<CallError> for RemoteError {
             other => RemoteFailure::InvalidAnswer(other.to_string()),
         };
         let messages = error.messages.iter().map(|text| clipped(text)).collect();
-        Self { function: Function::named(error.function), failure, messages }
+        Self { function: error.function.to_owned(), failure, messages }
     }
 }
 
 impl RemoteError {
-    /// Returns the error of a call of `function`.
-    pub(super) fn into_call_error(self, function: Function) -> CallError {
+    /// Returns the error of a call of `function` of an FMU of that version.
+    pub(super) fn into_call_error(self, function: Function, version: Version) -> CallError {
         let failure = match self.failure {
             RemoteFailure::Returned(status) => {
                 Status::from_c(status).map_or(Failure::UnknownStatus(status), Failure::Status)
@@ -147,7 +153,7 @@ impl RemoteError {
             RemoteFailure::Panicked(text) => Failure::Panicked(text),
             RemoteFailure::InvalidAnswer(text) => Failure::InvalidAnswer(text),
         };
-        let function = self.function.unwrap_or(function).name();
+        let function = known_name(&self.function).unwrap_or(function.name(version));
         CallError { function, failure, messages: self.messages }
     }
 }
@@ -176,7 +182,7 @@ mod tests {
         let mut bytes = Vec::new();
         encode(&Err::<(), _>(RemoteError::from(error.clone())), &mut bytes);
         let answer: Result<(), RemoteError> = decode(&bytes).unwrap();
-        answer.unwrap_err().into_call_error(Function::DoStep)
+        answer.unwrap_err().into_call_error(Function::DoStep, Version::V2)
     }
 
     #[test]

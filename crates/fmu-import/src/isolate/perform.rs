@@ -9,7 +9,7 @@ use super::function::Function;
 use super::layout::Shared;
 use super::message::{RemoteError, Request, encode};
 use super::words::{Reader, Word, Writer};
-use crate::fmu::{Fmu, Instance};
+use crate::{Fmu, Instance};
 use slave::{CallError, Slave, StepResult};
 
 /// First word of an answer that consists of words.
@@ -25,7 +25,8 @@ pub(super) struct Executor {
     instance: Instance,
     references: Vec<u32>,
     reals: Vec<f64>,
-    integers: Vec<i32>,
+    integers: Vec<i64>,
+    booleans: Vec<i32>,
     step: Step,
 }
 
@@ -53,7 +54,8 @@ impl Executor {
             let _ = instance.set_debug_logging(true);
         }
         let (references, reals, integers) = (Vec::new(), Vec::new(), Vec::new());
-        Self { instance, references, reals, integers, step: Step::default() }
+        let booleans = Vec::new();
+        Self { instance, references, reals, integers, booleans, step: Step::default() }
     }
 
     /// Returns the FMU of the instance.
@@ -71,7 +73,7 @@ impl Executor {
         reader: &mut Reader<'_>,
         writer: &mut Writer<'_>,
     ) -> CommandResult {
-        let Self { instance, references, reals, integers, step } = self;
+        let Self { instance, references, reals, integers, booleans, step } = self;
         match function {
             Function::DoStep => step.advance(instance, shared, reader, writer),
             Function::GetReal => {
@@ -81,7 +83,7 @@ impl Executor {
                 get(reader, writer, references, integers, |r, v| instance.get_integer(r, v))
             }
             Function::GetBoolean => {
-                get(reader, writer, references, integers, |r, v| instance.get_boolean(r, v))
+                get(reader, writer, references, booleans, |r, v| instance.get_boolean(r, v))
             }
             Function::SetReal => {
                 set(reader, writer, references, reals, |r, v| instance.set_real(r, v))
@@ -90,7 +92,7 @@ impl Executor {
                 set(reader, writer, references, integers, |r, v| instance.set_integer(r, v))
             }
             Function::SetBoolean => {
-                set(reader, writer, references, integers, |r, v| instance.set_boolean(r, v))
+                set(reader, writer, references, booleans, |r, v| instance.set_boolean(r, v))
             }
             _ => None,
         }
@@ -120,6 +122,20 @@ impl Executor {
             Request::SaveState(slot) => instance.save_state(slot),
             Request::RestoreState(slot) => instance.restore_state(slot),
             Request::DeserializeState(bytes) => instance.deserialize_state(bytes),
+            Request::Configure(values) => {
+                let (references, values): (Vec<_>, Vec<_>) = values.into_iter().unzip();
+                instance.configure(&references, &values)
+            }
+            Request::SetBinary(values) => {
+                let values = values.into_iter().map(|(reference, bytes)| (reference, bytes.to_vec()));
+                let (references, values): (Vec<u32>, Vec<Vec<u8>>) = values.unzip();
+                instance.set_binary(&references, &values)
+            }
+            Request::GetBinary(references) => {
+                let mut values = vec![Vec::new(); references.len()];
+                let done = instance.get_binary(&references, &mut values);
+                return reply(done.map(|()| values), answer);
+            }
             Request::GetString(references) => {
                 let mut values = vec![String::new(); references.len()];
                 let done = instance.get_string(&references, &mut values);

@@ -64,7 +64,7 @@ impl Isolated {
         message.shrink_to(BUFFER);
         self.message = message;
         match answer {
-            Some(answer) => answer.map_err(|error| error.into_call_error(function)),
+            Some(answer) => answer.map_err(|error| error.into_call_error(function, self.version)),
             None => Err(self.invalid_answer(function)),
         }
     }

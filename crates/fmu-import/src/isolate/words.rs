@@ -45,6 +45,16 @@ impl Word for u32 {
     }
 }
 
+impl Word for i64 {
+    fn to_word(self) -> u64 {
+        self.cast_unsigned()
+    }
+
+    fn from_word(word: u64) -> Option<Self> {
+        Some(word.cast_signed())
+    }
+}
+
 impl Word for i32 {
     fn to_word(self) -> u64 {
         i64::from(self).cast_unsigned()

@@ -12,6 +12,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use fmu_description::Version;
 use rustix::event::{PollFd, PollFlags, poll};
 use rustix::process::{Pid, Signal, getppid, kill_current_process_group};
 use rustix::stdio::{dup2_stdin, dup2_stdout};
@@ -254,7 +255,7 @@ pub(super) fn invalid_command(function: Function) -> CallError {
 
 fn invalid(function: Function, what: &str) -> CallError {
     let failure = Failure::InvalidAnswer(what.to_owned());
-    CallError { function: function.name(), failure, messages: Vec::new() }
+    CallError { function: function.name(Version::V2), failure, messages: Vec::new() }
 }
 
 /// Checks that the results fitted into the shared memory.

@@ -7,40 +7,10 @@ use fmu_description::abi::{
     fmi2Boolean, fmi2Byte, fmi2CallbackFunctions, fmi2Component, fmi2EventInfo, fmi2FMUstate,
     fmi2Integer, fmi2Real, fmi2Status, fmi2StatusKind, fmi2String, fmi2Type, fmi2ValueReference,
 };
-use libloading::Library as Handle;
 
 use super::Interface;
+use super::table::functions;
 use crate::error::LoadError;
-
-/// Declares the function table and its loader.
-macro_rules! functions {
-    ($($field:ident = $name:literal: fn($($argument:ty),*) $(-> $result:ty)?;)*) => {
-        /// The functions of a library. The standard requires every function in every library; here a
-        /// missing function fails only when it is called.
-        #[derive(Clone, Copy)]
-        pub(super) struct Functions {
-            $(pub(super) $field: Option<unsafe extern "C" fn($($argument),*) $(-> $result)?>,)*
-        }
-
-        impl Functions {
-            pub(super) fn load(handle: &Handle) -> Self {
-                Self { $($field: {
-                    // SAFETY: the standard gives this name this signature.
-                    let symbol = unsafe { handle.get(concat!($name, "\0").as_bytes()) };
-                    symbol.ok().map(|symbol| *symbol)
-                },)* }
-            }
-
-            /// Returns whether the library exports `function`.
-            fn has(&self, function: &str) -> bool {
-                match function {
-                    $($name => self.$field.is_some(),)*
-                    _ => false,
-                }
-            }
-        }
-    };
-}
 
 type References = *const fmi2ValueReference;
 type Component = fmi2Component;

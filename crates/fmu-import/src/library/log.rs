@@ -29,12 +29,13 @@ pub(crate) type Names = Arc<dyn Fn(char, u32) -> Option<String> + Send + Sync>;
 /// sinks and never dereferenced, because some FMUs pass null or another pointer.
 pub(super) struct Sink {
     place: Arc<Place>,
-    names: Names,
+    /// `None`: messages have no references to variables (FMI 3.0).
+    names: Option<Names>,
     messages: Mutex<VecDeque<String>>,
 }
 
 impl Sink {
-    pub(super) fn new(place: &Arc<Place>, names: Names) -> Arc<Self> {
+    pub(super) fn new(place: &Arc<Place>, names: Option<Names>) -> Arc<Self> {
         let sink = Arc::new(Self { place: place.clone(), names, messages: Mutex::default() });
         let mut sinks = SINKS.write().unwrap_or_else(PoisonError::into_inner);
         sinks.retain(|sink| sink.strong_count() > 0);
@@ -49,8 +50,11 @@ impl Sink {
     }
 
     /// Logs a message and keeps it for the next error.
-    fn receive(&self, status: c_int, category: &str, text: &str) {
-        let text = with_names(text, &*self.names);
+    pub(super) fn receive(&self, status: c_int, category: &str, text: &str) {
+        let text = match &self.names {
+            Some(names) => with_names(text, &**names),
+            None => text.to_owned(),
+        };
         log_message(self.place.instance(), Some(self.place.time()), status, category, &text);
         if let Ok(mut kept) = self.messages.lock() {
             if kept.len() == KEPT {
@@ -142,6 +146,24 @@ unsafe extern "C" fn master_receive(
     // terminated.
     let category = unsafe { category.as_ref().map(|category| CStr::from_ptr(category)) };
     sink.receive(status, &category.map(CStr::to_string_lossy).unwrap_or_default(), &text);
+}
+
+/// Receives a message of an FMU of FMI 3.0.
+pub(super) unsafe extern "C" fn receive_message(
+    environment: *mut c_void,
+    status: c_int,
+    category: *const c_char,
+    message: *const c_char,
+) {
+    let category = foreign::text(category).unwrap_or_default();
+    let Some(sink) = find(|sink| std::ptr::from_ref(sink).addr() == environment.addr()) else {
+        let text = foreign::text(message).unwrap_or_default();
+        return receive_unmatched(None, status, &category, &text);
+    };
+    // SAFETY: the FMU passed the environment that the standard requires; its message is null or
+    // terminated.
+    let text = unsafe { message.as_ref().map(|message| CStr::from_ptr(message)) };
+    sink.receive(status, &category, &text.map(CStr::to_string_lossy).unwrap_or_default());
 }
 
 /// Returns the callback that `logger.c` defines.

@@ -1,14 +1,12 @@
-//! Connections of Integers, Enumerations, Booleans and Strings: inputs are held during a step.
+//! Connections of Integers, Enumerations, Booleans, Strings and binaries: inputs are held during a step.
 
 use std::collections::HashMap;
 use std::ops::Range;
 
-use fmu_description::Kind;
-
 use crate::fault::FaultChain;
 use crate::system::{Connection, Port, System};
 use slave::Transformation;
-use slave::{CallError, Slave};
+use slave::{CallError, Slave, ValueType};
 
 type Get<T> = fn(&mut dyn Slave, &[u32], &mut [T]) -> Result<(), CallError>;
 type Set<T> = fn(&mut dyn Slave, &[u32], &[T]) -> Result<(), CallError>;
@@ -24,19 +22,17 @@ pub(crate) struct Access<T> {
 }
 
 /// Integers and Enumerations.
-pub(crate) const INTEGERS: Access<i32> = Access {
+pub(crate) const INTEGERS: Access<i64> = Access {
     get: |slave, references, values| slave.get_integer(references, values),
     set: |slave, references, values| slave.set_integer(references, values),
     map: |value, transformation, target| {
         *target = match transformation {
-            Transformation::Integer(pairs) => {
-                pairs.iter().find(|(from, _)| from == value).map_or(*value, |(_, to)| *to)
-            }
+            Transformation::Integer(pairs) => slave::mapped_integer(pairs, *value),
             _ => *value,
         }
     },
     disturb: |fault, time, value| fault.apply_integer(time, *value),
-    number: |value| f64::from(*value),
+    number: |value| slave::to_real(*value),
 };
 
 /// Booleans.
@@ -59,6 +55,15 @@ pub(crate) const BOOLEANS: Access<i32> = Access {
 pub(crate) const STRINGS: Access<String> = Access {
     get: |slave, references, values| slave.get_string(references, values),
     set: |slave, references, values| slave.set_string(references, values),
+    map: |value, _, target| target.clone_from(value),
+    disturb: |_, _, value| value.clone(),
+    number: |_| f64::NAN,
+};
+
+/// Binaries.
+pub(crate) const BINARIES: Access<Vec<u8>> = Access {
+    get: |slave, references, values| slave.get_binary(references, values),
+    set: |slave, references, values| slave.set_binary(references, values),
     map: |value, _, target| target.clone_from(value),
     disturb: |_, _, value| value.clone(),
     number: |_| f64::NAN,
@@ -93,15 +98,15 @@ pub(crate) struct Channel<T> {
 }
 
 impl<T: Clone + Default> Channel<T> {
-    /// Collects the connections of variables of the kinds that `is_of` accepts, and the additional
-    /// outputs `more`.
+    /// Collects the connections between variables of type `kind`, and the additional outputs `more`.
     pub(crate) fn new(
         system: &System,
         access: Access<T>,
-        is_of: fn(&Kind) -> bool,
+        kind: ValueType,
         more: impl Iterator<Item = Port>,
     ) -> Self {
-        let belongs = |connection: &&Connection| is_of(&system.variable(connection.to).kind);
+        let belongs =
+            |connection: &&Connection| ValueType::of(&system.variable(connection.to).kind) == kind;
         let connections: Vec<_> = system.connections.iter().filter(belongs).collect();
         let mut outputs: Vec<Port> =
             connections.iter().map(|connection| connection.from).chain(more).collect();

@@ -8,7 +8,7 @@ use fmu_description::Kind;
 use crate::algorithm::{Algorithm, Extrapolation};
 use crate::system::{Port, System};
 use slave::Advance;
-use slave::Transformation;
+use slave::{Transformation, ValueType};
 
 /// Derivatives that a slave refuses although its model description promises them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -129,13 +129,13 @@ impl Layout {
         let mut integers = Vec::new();
         for connection in &system.connections {
             let (from, to) = (connection.from, connection.to);
-            if !matches!(system.variable(to).kind, Kind::Real(_)) {
+            if !is_real(&system.variable(to).kind) {
                 continue;
             }
             if self.indices.insert(from, 0).is_some() {
                 continue;
             }
-            if matches!(system.variable(from).kind, Kind::Real(_)) {
+            if is_real(&system.variable(from).kind) {
                 by_slave[from.slave].push(from);
             } else {
                 integers.push(from);
@@ -166,7 +166,7 @@ impl Layout {
     fn collect_inputs(&mut self, system: &System) {
         let mut by_slave = vec![Vec::new(); self.port_maps.len()];
         for connection in &system.connections {
-            if matches!(system.variable(connection.to).kind, Kind::Real(_)) {
+            if is_real(&system.variable(connection.to).kind) {
                 by_slave[connection.to.slave].push(connection);
             }
         }
@@ -184,7 +184,7 @@ impl Layout {
                 self.plain[slave] &= connection.transformation == Transformation::Identity;
                 self.factors.push(factor);
                 self.offsets.push(offset);
-                let real = matches!(system.variable(connection.from).kind, Kind::Real(_));
+                let real = is_real(&system.variable(connection.from).kind);
                 self.held.push(!real);
             }
             self.port_maps[slave].input_range = start..self.sources.len();
@@ -223,6 +223,11 @@ impl Layout {
     pub(super) fn output(&self, port: Port) -> Option<usize> {
         self.indices.get(&port).map(|&index| index as usize)
     }
+}
+
+/// Whether the values of a variable are Reals.
+fn is_real(kind: &Kind) -> bool {
+    ValueType::of(kind) == ValueType::Real
 }
 
 /// Converts a position to an index; systems have fewer than 2^32 variables.

@@ -139,7 +139,9 @@ fn integers_and_booleans_have_faults_too() {
     assert_eq!(stuck.apply_integer(2.0, -7), 4);
     let bias = single(Fault::Bias(3.0), 0.0, None);
     assert_eq!(bias.apply_integer(0.0, -7), -4);
-    assert_eq!(bias.apply_integer(0.0, i32::MAX), i32::MAX);
+    let largest = i64::from(i32::MAX);
+    assert_eq!(bias.apply_integer(0.0, largest), largest);
+    assert_eq!(bias.apply_integer(0.0, largest + 2), largest + 5);
     let inversion = single(Fault::Inversion, 1.0, Some(2.0));
     let found: Vec<_> = [(0.0, 1), (1.0, 1), (1.5, 0), (1.5, 7), (2.0, 0)]
         .map(|(time, value)| inversion.apply_boolean(time, value))

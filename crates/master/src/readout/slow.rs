@@ -1,12 +1,13 @@
 //! Values of multirate slaves at the communication points within their steps.
 
-use fmu_description::{Causality, Kind, Variability};
+use fmu_description::{Causality, Variability};
 use serde::{Deserialize, Serialize};
 
-use super::{ReadKind, Readout};
+use super::{Readout, array};
 use crate::error::SystemError;
 use crate::simulation::Simulation;
 use crate::system::{Port, System};
+use slave::ValueType;
 
 /// The outputs and local variables of the slaves that step every several communication steps.
 ///
@@ -29,7 +30,7 @@ struct SlowSlave {
 /// The position of a value among the values of its type: at the start of the step, and in a row.
 #[derive(Clone, Copy, Debug)]
 struct ValueIndex {
-    kind: ReadKind,
+    kind: ValueType,
     start: usize,
     row: usize,
     continuous: bool,
@@ -43,7 +44,7 @@ pub struct SlowState {
 }
 
 /// The values of one slave, by type.
-type Begins = (Vec<f64>, Vec<i32>, Vec<i32>, Vec<String>);
+type Begins = (Vec<f64>, Vec<i64>, Vec<i32>, Vec<String>);
 
 impl SlowValues {
     /// Creates the values for a [`Readout`] of `ports`.
@@ -135,14 +136,14 @@ impl SlowSlave {
         let mut counts = [[0; 2]; 4];
         for &port in ports {
             let variable = system.variable(port);
-            let kind = ReadKind::of(&variable.kind);
+            let kind = array(ValueType::of(&variable.kind));
             let [starts, rows] = &mut counts[kind as usize];
             let row = *rows;
             *rows += 1;
             let changes = matches!(variable.causality, Causality::Output | Causality::Local);
             if port.slave == slave && changes {
-                let continuous = matches!(variable.kind, Kind::Real(_))
-                    && variable.variability == Variability::Continuous;
+                let continuous =
+                    kind == ValueType::Real && variable.variability == Variability::Continuous;
                 places.push(ValueIndex { kind, start: *starts, row, continuous });
                 own.push(port);
                 *starts += 1;
@@ -157,14 +158,16 @@ impl SlowSlave {
         for place in &self.places {
             let ValueIndex { start, row: at, .. } = *place;
             match place.kind {
-                ReadKind::Real => {
+                ValueType::Real => {
                     let (start, end) = (start_values.reals[start], row.reals[at]);
                     let part = if place.continuous { part } else { 0.0 };
                     row.reals[at] = start + part * (end - start);
                 }
-                ReadKind::Integer => row.integers[at] = start_values.integers[start],
-                ReadKind::Boolean => row.booleans[at] = start_values.booleans[start],
-                ReadKind::String => row.strings[at].clone_from(&start_values.strings[start]),
+                ValueType::Integer => row.integers[at] = start_values.integers[start],
+                ValueType::Boolean => row.booleans[at] = start_values.booleans[start],
+                ValueType::String | ValueType::Binary => {
+                    row.strings[at].clone_from(&start_values.strings[start])
+                }
             }
         }
     }

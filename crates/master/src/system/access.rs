@@ -1,30 +1,36 @@
 //! Reads and sets single variables of any type.
 
-use fmu_description::Kind;
-
 use super::{Port, System};
 use slave::CallError;
 use slave::Transformation;
-use slave::Value;
+use slave::{Value, ValueType};
 
 impl System {
     /// Reads the variable at `port`.
     pub(crate) fn get_value(&mut self, port: Port) -> Result<Value, CallError> {
         let variable = self.variable(port);
-        let (reference, element) = ([variable.value_reference], variable.kind.element());
+        let (reference, kind) = ([variable.value_reference], ValueType::of(&variable.kind));
         let slave = &mut self.slaves[port.slave].1;
         let (mut real, mut integer, mut text) = ([0.0], [0], [String::new()]);
-        match element {
-            "Real" => slave.get_real(&reference, &mut real).map(|()| Value::Real(real[0])),
-            "Boolean" => {
-                slave.get_boolean(&reference, &mut integer)?;
-                Ok(Value::Boolean(integer[0] != 0))
+        match kind {
+            ValueType::Real => slave.get_real(&reference, &mut real).map(|()| Value::Real(real[0])),
+            ValueType::Boolean => {
+                let mut boolean = [0];
+                slave.get_boolean(&reference, &mut boolean)?;
+                Ok(Value::Boolean(boolean[0] != 0))
             }
-            "String" => {
+            ValueType::Binary => {
+                let mut bytes = [Vec::new()];
+                slave.get_binary(&reference, &mut bytes)?;
+                Ok(Value::Binary(std::mem::take(&mut bytes[0])))
+            }
+            ValueType::String => {
                 slave.get_string(&reference, &mut text)?;
                 Ok(Value::String(std::mem::take(&mut text[0])))
             }
-            _ => slave.get_integer(&reference, &mut integer).map(|()| Value::Integer(integer[0])),
+            ValueType::Integer => {
+                slave.get_integer(&reference, &mut integer).map(|()| Value::Integer(integer[0]))
+            }
         }
     }
 
@@ -37,6 +43,7 @@ impl System {
             Value::Integer(value) => slave.set_integer(&reference, &[*value]),
             Value::Boolean(value) => slave.set_boolean(&reference, &[(*value).into()]),
             Value::String(value) => slave.set_string(&reference, std::slice::from_ref(value)),
+            Value::Binary(value) => slave.set_binary(&reference, std::slice::from_ref(value)),
         }
     }
 
@@ -49,8 +56,7 @@ impl System {
     ) -> Value {
         match (value, transformation) {
             (Value::Integer(value), Transformation::Integer(pairs)) => {
-                let pair = pairs.iter().find(|(from, _)| from == value);
-                Value::Integer(pair.map_or(*value, |(_, to)| *to))
+                Value::Integer(slave::mapped_integer(pairs, *value))
             }
             (Value::Boolean(value), Transformation::Boolean { from_false, from_true }) => {
                 Value::Boolean(if *value { *from_true } else { *from_false })
@@ -58,12 +64,14 @@ impl System {
             (Value::Real(value), Transformation::Linear { factor, offset }) => {
                 Value::Real(factor * value + offset)
             }
-            (Value::Integer(value), _) if matches!(self.variable(to).kind, Kind::Real(_)) => {
+            (Value::Integer(value), _)
+                if ValueType::of(&self.variable(to).kind) == ValueType::Real =>
+            {
                 let (factor, offset) = match transformation {
                     Transformation::Linear { factor, offset } => (*factor, *offset),
                     _ => (1.0, 0.0),
                 };
-                Value::Real(factor * f64::from(*value) + offset)
+                Value::Real(factor * slave::to_real(*value) + offset)
             }
             _ => value.clone(),
         }

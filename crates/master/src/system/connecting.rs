@@ -1,10 +1,10 @@
 //! Checks of a connection: causality, type, unit, transformation.
 
-use fmu_description::{Causality, Kind};
+use fmu_description::Causality;
 
 use super::{Connection, Port, System, units};
 use crate::error::SystemError;
-use slave::Transformation;
+use slave::{Transformation, ValueType};
 
 impl System {
     /// Connects an output to an input, or an output or calculated parameter to a parameter. A
@@ -74,32 +74,34 @@ impl System {
         })
     }
 
-    /// Checks the types: equal types, Integer and Enumeration, or Integer to Real, with a
-    /// transformation for this type.
+    /// Checks the types: both are floating-point types, both are integers or enumerations, both are
+    /// Boolean or clocks, both are Strings, both are binaries; or an integer goes to a floating-point
+    /// type. The transformation must be for this type.
     fn expect_fitting_types(
         &self,
         from: Port,
         to: Port,
         transformation: &Transformation,
     ) -> Result<(), SystemError> {
-        use Kind::{Boolean, Enumeration, Integer, Real, String};
         let (source, target) = (&self.variable(from).kind, &self.variable(to).kind);
-        let fits = match (source, target) {
-            (Real(_) | Integer(_) | Enumeration(_), Real(_)) => {
+        let fits = match (ValueType::of(source), ValueType::of(target)) {
+            (ValueType::Real | ValueType::Integer, ValueType::Real) => {
                 matches!(transformation, Transformation::Identity | Transformation::Linear { .. })
             }
-            (Integer(_) | Enumeration(_), Integer(_) | Enumeration(_)) => {
+            (ValueType::Integer, ValueType::Integer) => {
                 matches!(transformation, Transformation::Identity | Transformation::Integer(_))
             }
-            (Boolean(_), Boolean(_)) => {
+            (ValueType::Boolean, ValueType::Boolean) => {
                 matches!(transformation, Transformation::Identity | Transformation::Boolean { .. })
             }
-            (String(_), String(_)) => *transformation == Transformation::Identity,
+            (ValueType::String, ValueType::String) | (ValueType::Binary, ValueType::Binary) => {
+                *transformation == Transformation::Identity
+            }
             _ => {
                 return Err(SystemError::Role {
                     name: self.name(to),
-                    found: format!("a variable of type {}", target.element()),
-                    expected: format!("{} as {}", source.element(), self.name(from)),
+                    found: format!("a variable of type {}", self.type_name(to)),
+                    expected: format!("{} as {}", self.type_name(from), self.name(from)),
                 });
             }
         };
@@ -108,8 +110,14 @@ impl System {
         }
         Err(SystemError::Role {
             name: self.name(to),
-            found: format!("a variable of type {}", target.element()),
+            found: format!("a variable of type {}", self.type_name(to)),
             expected: format!("the type that its transformation is for: {transformation:?}"),
         })
+    }
+
+    /// Returns the name of the type of a variable in the version of its FMU.
+    fn type_name(&self, port: Port) -> &'static str {
+        let description = self.slaves[port.slave].1.description();
+        self.variable(port).kind.element_in(description.version())
     }
 }

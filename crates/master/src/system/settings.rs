@@ -19,24 +19,18 @@ pub(crate) struct Setting {
 }
 
 impl System {
-    /// Sets the variable called `name` to the value of `text`. The FMU receives it when the
-    /// simulation is initialised. A later setting of the same variable replaces it.
-    ///
-    /// # Errors
-    ///
-    /// Returns an error if the variable does not exist or if `text` is not a value of its type.
-    pub fn set(&mut self, name: &str, text: &str) -> Result<(), SystemError> {
-        let port = self.port(name)?;
-        self.set_port(port, text)
-    }
-
     /// As [`System::set`], for the variable at `port`.
     ///
     /// # Errors
     ///
-    /// Returns an error if `text` is not a value of the variable's type.
+    /// Returns an error if `text` is not a value of the variable's type, or if the FMU refuses the value
+    /// of a structural parameter.
     pub fn set_port(&mut self, port: Port, text: &str) -> Result<(), SystemError> {
-        let setting = Setting { port, value: self.value(port, text)?, text: text.to_owned() };
+        let value = self.value(port, text)?;
+        if self.variable(port).causality == Causality::StructuralParameter {
+            return self.configure(port, &value, text);
+        }
+        let setting = Setting { port, value, text: text.to_owned() };
         match self.settings.iter_mut().find(|known| known.port == port) {
             Some(known) => *known = setting,
             None => self.settings.push(setting),

@@ -1,6 +1,5 @@
 //! Conversion between units of the same base.
 
-use fmu_description::Kind;
 use fmu_description::unit::BaseUnit;
 
 use super::{Port, System};
@@ -10,7 +9,7 @@ use slave::Transformation;
 impl System {
     /// Returns name and base of a variable's unit, if it has one.
     fn unit(&self, port: Port) -> Option<(&String, Option<BaseUnit>)> {
-        let Kind::Real(real) = &self.variable(port).kind else { return None };
+        let real = self.variable(port).kind.as_real()?;
         let name = real.unit.as_ref()?;
         let description = self.slaves[port.slave].1.description();
         let base = description.units.iter().find(|unit| unit.name == *name)?.base;
@@ -19,7 +18,7 @@ impl System {
 
     /// Returns the unit of a variable; `None` if it has none or is dimensionless.
     pub(super) fn dimension(&self, port: Port) -> Option<&str> {
-        let Kind::Real(real) = &self.variable(port).kind else { return None };
+        let real = self.variable(port).kind.as_real()?;
         real.unit.as_deref().filter(|unit| !["", "1", "-"].contains(unit))
     }
 

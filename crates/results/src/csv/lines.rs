@@ -2,9 +2,9 @@
 
 use super::{Column, ColumnKind};
 
-/// Largest length of a Real and of an Integer: -1.7976931348623157e+308, -2147483648.
+/// Largest length of a Real and of an Integer: -1.7976931348623157e+308, -9223372036854775808.
 const REAL: usize = 24;
-const INTEGER: usize = 11;
+const INTEGER: usize = 20;
 
 /// A buffer with room for the next row, so that cells need no check of the capacity.
 ///
@@ -22,7 +22,7 @@ impl Lines {
     pub(super) fn new(columns: &[Column], room: usize) -> Self {
         let width = |column: &Column| match column.kind {
             ColumnKind::Real => REAL,
-            ColumnKind::Integer => INTEGER,
+            ColumnKind::Integer | ColumnKind::Long => INTEGER,
             ColumnKind::Boolean => 1,
             ColumnKind::String => 0,
         };
@@ -64,7 +64,7 @@ impl Lines {
         }
     }
 
-    pub(super) fn integer(&mut self, value: i32) {
+    pub(super) fn integer(&mut self, value: i64) {
         self.cell(itoa::Buffer::new().format(value));
     }
 

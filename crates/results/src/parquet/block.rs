@@ -20,6 +20,9 @@ pub(super) struct Block {
     room: usize,
     reals: Vec<f64>,
     integers: Vec<i32>,
+    longs: Vec<i64>,
+    /// For each value of [`Row::integers`], whether its column is a Long.
+    is_long: Vec<bool>,
     booleans: Vec<bool>,
     texts: Vec<u8>,
     /// End of each text.
@@ -33,7 +36,8 @@ impl Block {
         let count = |kind| columns.iter().filter(|column| column.kind == kind).count();
         let (reals, integers) = (1 + count(ColumnKind::Real), count(ColumnKind::Integer));
         let (booleans, strings) = (count(ColumnKind::Boolean), count(ColumnKind::String));
-        let width = 8 * reals + 4 * integers + booleans + 16 * strings;
+        let longs = count(ColumnKind::Long);
+        let width = 8 * (reals + longs) + 4 * integers + booleans + 16 * strings;
         let room = (BYTES / width).clamp(*ROWS.start(), *ROWS.end());
         let stride = room + PADDING;
         Self {
@@ -41,6 +45,12 @@ impl Block {
             room,
             reals: vec![0.0; reals * stride],
             integers: vec![0; integers * stride],
+            longs: vec![0; longs * stride],
+            is_long: columns
+                .iter()
+                .filter(|own| matches!(own.kind, ColumnKind::Integer | ColumnKind::Long))
+                .map(|own| own.kind == ColumnKind::Long)
+                .collect(),
             booleans: vec![false; booleans * stride],
             texts: Vec::new(),
             ends: Vec::with_capacity(strings * room),
@@ -75,9 +85,14 @@ impl Block {
             *place = *value;
         }
         // A type without columns has no storage, so `skip` yields nothing.
-        let integers = self.integers.iter_mut().skip(self.rows).step_by(stride);
-        for (place, value) in integers.zip(row.integers) {
-            *place = *value;
+        let mut integers = self.integers.iter_mut().skip(self.rows).step_by(stride);
+        let mut longs = self.longs.iter_mut().skip(self.rows).step_by(stride);
+        for (is_long, value) in self.is_long.iter().zip(row.integers) {
+            if *is_long {
+                longs.next().into_iter().for_each(|place| *place = *value);
+            } else {
+                integers.next().into_iter().for_each(|place| *place = limited(*value));
+            }
         }
         let booleans = self.booleans.iter_mut().skip(self.rows).step_by(stride);
         for (place, value) in booleans.zip(row.booleans) {
@@ -93,7 +108,7 @@ impl Block {
     /// Returns a reader of the first `rows` of the columns.
     pub(super) fn reader(&self, rows: usize) -> Reader<'_> {
         let rows = rows.min(self.rows);
-        Reader { block: self, rows, reals: 0, integers: 0, booleans: 0, strings: 0 }
+        Reader { block: self, rows, reals: 0, integers: 0, longs: 0, booleans: 0, strings: 0 }
     }
 }
 
@@ -103,6 +118,7 @@ pub(super) struct Reader<'a> {
     rows: usize,
     reals: usize,
     integers: usize,
+    longs: usize,
     booleans: usize,
     strings: usize,
 }
@@ -114,6 +130,10 @@ impl Reader<'_> {
 
     pub(super) fn integers(&mut self) -> &[i32] {
         column(&self.block.integers, &mut self.integers, self.block, self.rows)
+    }
+
+    pub(super) fn longs(&mut self) -> &[i64] {
+        column(&self.block.longs, &mut self.longs, self.block, self.rows)
     }
 
     pub(super) fn booleans(&mut self) -> &[bool] {
@@ -132,6 +152,11 @@ impl Reader<'_> {
             })
             .collect()
     }
+}
+
+/// Limits a value to 32 bits.
+fn limited(value: i64) -> i32 {
+    i32::try_from(value).unwrap_or(if value < 0 { i32::MIN } else { i32::MAX })
 }
 
 fn column<'a, T>(values: &'a [T], next: &mut usize, block: &Block, rows: usize) -> &'a [T] {

@@ -92,6 +92,7 @@ fn field(name: &str, kind: ColumnKind) -> Result<TypePtr, ParquetError> {
     let (physical, logical) = match kind {
         ColumnKind::Real => (Physical::DOUBLE, None),
         ColumnKind::Integer => (Physical::INT32, None),
+        ColumnKind::Long => (Physical::INT64, None),
         ColumnKind::Boolean => (Physical::BOOLEAN, None),
         ColumnKind::String => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
     };

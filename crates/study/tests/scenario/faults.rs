@@ -134,7 +134,7 @@ fn integers_are_disturbed_as_integers() {
     let mut line = lines(text).remove(0).1;
     let found = [4, 8, 16, 32].map(|value| {
         let time = 0.5 * f64::from(value).log2() - 1.0;
-        let arrived = line.apply_integer(time, value);
+        let arrived = line.apply_integer(time, value.into());
         line.commit(time, f64::from(value));
         arrived
     });

@@ -53,7 +53,7 @@ impl Slave for Listener {
         self.note("real", references, values);
         Ok(())
     }
-    fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
+    fn set_integer(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
         self.note("integer", references, values);
         Ok(())
     }

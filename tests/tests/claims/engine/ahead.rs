@@ -107,10 +107,10 @@ impl Slave for Ahead {
     fn set_real(&mut self, references: &[u32], values: &[f64]) -> Done {
         self.other().set_real(references, values)
     }
-    fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Done {
+    fn get_integer(&mut self, references: &[u32], values: &mut [i64]) -> Done {
         self.other().get_integer(references, values)
     }
-    fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Done {
+    fn set_integer(&mut self, references: &[u32], values: &[i64]) -> Done {
         self.fail(Fails::InSet, "fmi2SetInteger")?;
         self.other().set_integer(references, values)
     }

@@ -11,7 +11,7 @@ type Done = Result<(), CallError>;
 pub(crate) struct Typed {
     description: ModelDescription,
     real: f64,
-    integer: i32,
+    integer: i64,
     boolean: i32,
     text: String,
 }
@@ -78,11 +78,11 @@ impl Slave for Typed {
         self.real = values[0];
         Ok(())
     }
-    fn get_integer(&mut self, _: &[u32], values: &mut [i32]) -> Done {
+    fn get_integer(&mut self, _: &[u32], values: &mut [i64]) -> Done {
         values[0] = self.integer;
         Ok(())
     }
-    fn set_integer(&mut self, _: &[u32], values: &[i32]) -> Done {
+    fn set_integer(&mut self, _: &[u32], values: &[i64]) -> Done {
         self.integer = values[0];
         Ok(())
     }

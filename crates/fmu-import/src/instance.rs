@@ -1,0 +1,308 @@
+//! An instance of an FMU in this process, which implements [`Slave`] for every version of FMI.
+
+use std::time::Duration;
+
+use fmu_description::{Experiment, ModelDescription};
+
+use crate::fmu::Fmu;
+use crate::{v1, v2, v3};
+use slave::{CallError, CallSink, Slave, StepResult, absent};
+
+/// A co-simulation instance of an FMU in this process.
+pub struct Instance {
+    inner: Inner,
+    fmu: Fmu,
+}
+
+/// An instance, by the version of its FMU.
+pub(crate) enum Inner {
+    V1(Box<v1::Instance>),
+    V2(v2::Instance),
+    V3(Box<v3::Instance>),
+}
+
+impl Instance {
+    pub(crate) fn new(inner: Inner, fmu: Fmu) -> Self {
+        Self { inner, fmu }
+    }
+
+    /// Returns the FMU of this instance.
+    #[must_use]
+    pub fn fmu(&self) -> &Fmu {
+        &self.fmu
+    }
+
+    /// Limits how long a step that returned `fmi2Pending` (FMI 1.0: `fmiPending`) may take; `None`: no
+    /// limit. FMI 3.0 has no pending steps.
+    pub fn set_time_limit(&mut self, limit: Option<Duration>) {
+        match &mut self.inner {
+            Inner::V1(own) => own.component.time_limit = limit,
+            Inner::V2(own) => own.component.time_limit = limit,
+            Inner::V3(_) => {}
+        }
+    }
+}
+
+impl Slave for Instance {
+    fn description(&self) -> &ModelDescription {
+        match &self.inner {
+            Inner::V1(own) => own.description(),
+            Inner::V2(_) => self.fmu.description(),
+            Inner::V3(own) => own.description(),
+        }
+    }
+
+    fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
+        match &mut self.inner {
+            Inner::V1(own) => own.component.set_debug_logging(on),
+            Inner::V2(own) => own.component.set_debug_logging(on),
+            Inner::V3(own) => own.set_debug_logging(on),
+        }
+    }
+
+    fn configure(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
+        match &mut self.inner {
+            Inner::V3(own) => own.configure(self.fmu.description(), references, values),
+            _ => Err(absent("fmi3EnterConfigurationMode")),
+        }
+    }
+
+    fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError> {
+        match &mut self.inner {
+            Inner::V1(own) => own.setup_experiment(experiment),
+            Inner::V2(own) => return own.component.setup_experiment(experiment),
+            Inner::V3(own) => own.setup_experiment(experiment),
+        }
+        Ok(())
+    }
+
+    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
+        match &mut self.inner {
+            Inner::V1(own) => own.enter_initialization_mode(),
+            Inner::V2(own) => own.component.enter_initialization_mode(),
+            Inner::V3(own) => own.enter_initialization_mode(),
+        }
+    }
+
+    fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
+        match &mut self.inner {
+            Inner::V1(own) => {
+                own.exit_initialization_mode();
+                Ok(())
+            }
+            Inner::V2(own) => own.component.exit_initialization_mode(),
+            Inner::V3(own) => own.exit_initialization_mode(),
+        }
+    }
+
+    fn terminate(&mut self) -> Result<(), CallError> {
+        match &mut self.inner {
+            Inner::V1(own) => own.component.terminate(),
+            Inner::V2(own) => own.component.terminate(),
+            Inner::V3(own) => own.terminate(),
+        }
+    }
+
+    #[inline]
+    fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
+        match &mut self.inner {
+            Inner::V1(own) => own.get_real(references, values),
+            Inner::V2(own) => own.component.get_real(references, values),
+            Inner::V3(own) => own.get_real(references, values),
+        }
+    }
+
+    #[inline]
+    fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), CallError> {
+        match &mut self.inner {
+            Inner::V1(own) => own.set_real(references, values),
+            Inner::V2(own) => own.component.set_real(references, values),
+            Inner::V3(own) => own.set_real(references, values),
+        }
+    }
+
+    fn get_integer(&mut self, references: &[u32], values: &mut [i64]) -> Result<(), CallError> {
+        match &mut self.inner {
+            Inner::V1(own) => own.get_integer(references, values),
+            Inner::V2(own) => own.get_integer(references, values),
+            Inner::V3(own) => own.get_integer(references, values),
+        }
+    }
+
+    fn set_integer(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
+        match &mut self.inner {
+            Inner::V1(own) => own.set_integer(references, values),
+            Inner::V2(own) => own.set_integer(references, values),
+            Inner::V3(own) => own.set_integer(references, values),
+        }
+    }
+
+    fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
+        match &mut self.inner {
+            Inner::V1(own) => own.get_boolean(references, values),
+            Inner::V2(own) => own.component.get_boolean(references, values),
+            Inner::V3(own) => own.get_boolean(references, values),
+        }
+    }
+
+    fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
+        match &mut self.inner {
+            Inner::V1(own) => own.set_boolean(references, values),
+            Inner::V2(own) => own.component.set_boolean(references, values),
+            Inner::V3(own) => own.set_boolean(references, values),
+        }
+    }
+
+    fn get_string(&mut self, references: &[u32], values: &mut [String]) -> Result<(), CallError> {
+        match &mut self.inner {
+            Inner::V1(own) => own.component.get_string(references, values),
+            Inner::V2(own) => own.component.get_string(references, values),
+            Inner::V3(own) => own.get_string(references, values),
+        }
+    }
+
+    fn set_string(&mut self, references: &[u32], values: &[String]) -> Result<(), CallError> {
+        match &mut self.inner {
+            Inner::V1(own) => own.set_string(references, values),
+            Inner::V2(own) => own.component.set_string(references, values),
+            Inner::V3(own) => own.set_string(references, values),
+        }
+    }
+
+    fn get_binary(&mut self, references: &[u32], values: &mut [Vec<u8>]) -> Result<(), CallError> {
+        match &mut self.inner {
+            Inner::V3(own) => own.get_binary(references, values),
+            _ => Err(absent("fmi3GetBinary")),
+        }
+    }
+
+    fn set_binary(&mut self, references: &[u32], values: &[Vec<u8>]) -> Result<(), CallError> {
+        match &mut self.inner {
+            Inner::V3(own) => own.set_binary(references, values),
+            _ => Err(absent("fmi3SetBinary")),
+        }
+    }
+
+    fn set_input_derivatives(
+        &mut self,
+        references: &[u32],
+        orders: &[i32],
+        values: &[f64],
+    ) -> Result<(), CallError> {
+        match &mut self.inner {
+            Inner::V1(own) => own.component.set_input_derivatives(references, orders, values),
+            Inner::V2(own) => own.component.set_real_input_derivatives(references, orders, values),
+            Inner::V3(_) => Err(absent("fmi2SetRealInputDerivatives")),
+        }
+    }
+
+    fn get_output_derivatives(
+        &mut self,
+        references: &[u32],
+        orders: &[i32],
+        values: &mut [f64],
+    ) -> Result<(), CallError> {
+        match &mut self.inner {
+            Inner::V1(own) => own.component.get_output_derivatives(references, orders, values),
+            Inner::V2(own) => own.component.get_real_output_derivatives(references, orders, values),
+            Inner::V3(own) => own.get_output_derivatives(references, orders, values),
+        }
+    }
+
+    #[inline]
+    fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError> {
+        match &mut self.inner {
+            Inner::V1(own) => own.component.do_step(time, size),
+            Inner::V2(own) => own.component.do_step(time, size, never_back),
+            Inner::V3(own) => own.do_step(time, size, never_back),
+        }
+    }
+
+    fn directional_derivative(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        changes: &mut [f64],
+    ) -> Result<(), CallError> {
+        match &mut self.inner {
+            Inner::V1(_) => Err(absent("fmi2GetDirectionalDerivative")),
+            Inner::V2(own) => own.component.directional_derivative(unknowns, knowns, seed, changes),
+            Inner::V3(own) => own.directional_derivative(unknowns, knowns, seed, changes),
+        }
+    }
+
+    fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
+        match &mut self.inner {
+            Inner::V1(_) => Err(absent("fmi2GetFMUstate")),
+            Inner::V2(own) => own.component.save_state(slot),
+            Inner::V3(own) => own.save_state(slot),
+        }
+    }
+
+    fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
+        match &mut self.inner {
+            Inner::V1(_) => Err(absent("fmi2SetFMUstate")),
+            Inner::V2(own) => own.component.restore_state(slot),
+            Inner::V3(own) => own.restore_state(slot),
+        }
+    }
+
+    fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
+        match &mut self.inner {
+            Inner::V1(_) => Err(absent("fmi2SerializeFMUstate")),
+            Inner::V2(own) => own.component.serialize_state(),
+            Inner::V3(own) => own.serialize_state(),
+        }
+    }
+
+    fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
+        match &mut self.inner {
+            Inner::V1(_) => Err(absent("fmi2DeSerializeFMUstate")),
+            Inner::V2(own) => own.component.deserialize_state(bytes),
+            Inner::V3(own) => own.deserialize_state(bytes),
+        }
+    }
+
+    #[inline]
+    fn pass(
+        &mut self,
+        inputs: &[u32],
+        values: &[f64],
+        (time, size): (f64, f64),
+        never_back: bool,
+        outputs: &[u32],
+        results: &mut [f64],
+    ) -> Result<StepResult, CallError> {
+        if let Inner::V2(own) = &mut self.inner {
+            let span = (time, size);
+            return own.component.pass(inputs, values, span, never_back, outputs, results);
+        }
+        if !inputs.is_empty() {
+            self.set_real(inputs, values)?;
+        }
+        let done = self.do_step(time, size, never_back)?;
+        if !outputs.is_empty() {
+            self.get_real(outputs, results)?;
+        }
+        Ok(done)
+    }
+
+    fn log_calls(&mut self, sink: CallSink) -> bool {
+        match &mut self.inner {
+            Inner::V1(_) | Inner::V2(_) => false,
+            Inner::V3(own) => {
+                own.log_calls(sink);
+                true
+            }
+        }
+    }
+
+    fn take_warning(&mut self) -> bool {
+        match &mut self.inner {
+            Inner::V1(own) => own.component.take_warning(),
+            Inner::V2(own) => own.component.take_warning(),
+            Inner::V3(own) => own.take_warning(),
+        }
+    }
+}

@@ -1,0 +1,33 @@
+//! The macro that declares the function table of a library, for each version of the standard.
+
+/// Declares the function table and its loader.
+macro_rules! functions {
+    ($($field:ident = $name:literal: fn($($argument:ty),*) $(-> $result:ty)?;)*) => {
+        /// The functions of a library. The standard requires every function in every library; here a
+        /// missing function fails only when it is called.
+        #[derive(Clone, Copy)]
+        pub(super) struct Functions {
+            $(pub(super) $field: Option<unsafe extern "C" fn($($argument),*) $(-> $result)?>,)*
+        }
+
+        impl Functions {
+            /// Looks up the functions, whose symbols have the names of the standard after `prefix`.
+            pub(super) fn load(handle: &libloading::Library, prefix: &str) -> Self {
+                Self { $($field: {
+                    // SAFETY: the standard gives this name this signature.
+                    let symbol = unsafe { handle.get(format!("{prefix}{}\0", $name).as_bytes()) };
+                    symbol.ok().map(|symbol| *symbol)
+                },)* }
+            }
+
+            /// Returns whether the library exports `function`.
+            pub(super) fn has(&self, function: &str) -> bool {
+                match function {
+                    $($name => self.$field.is_some(),)*
+                    _ => false,
+                }
+            }
+        }
+    };
+}
+pub(super) use functions;

@@ -1,0 +1,342 @@
+//! The library of an FMU of FMI 1.0 for co-simulation (stand-alone): loading, instantiation, calls.
+//!
+//! The functions have the model identifier as prefix. [`Component`] has one method for each C function.
+#![expect(unsafe_code, reason = "the boundary to C")]
+
+mod functions;
+mod step;
+
+use std::cell::Cell;
+use std::ffi::{CStr, c_char, c_int};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use fmu_description::abi::Status;
+use libloading::Library as Handle;
+
+use super::calls::{function, same_length};
+use super::log::{Names, Sink, logger};
+use super::{c_string, calloc, free, load};
+use crate::crash::Place;
+use crate::error::LoadError;
+use functions::{Callbacks, Functions, Instance};
+use slave::{CallError, Failure, absent};
+
+/// The type of an FMU whose library runs in this process (FMI 1.0 for co-simulation, section 3.4.1).
+const MIME_TYPE: &CStr = c"application/x-fmu-sharedlibrary";
+
+/// A loaded library with the functions of FMI 1.0 for co-simulation.
+pub(crate) struct Library {
+    functions: Functions,
+    path: PathBuf,
+    /// An instance returned `fmiFatal`: no function of any instance may be called.
+    corrupted: AtomicBool,
+    _handle: Handle,
+}
+
+impl Library {
+    /// Loads the library and checks its version and that it can run in co-simulation.
+    pub(crate) fn open(path: &Path, model_identifier: &str) -> Result<Self, LoadError> {
+        let handle = load(path)?;
+        let functions = Functions::load(&handle, &format!("{model_identifier}_"));
+        // SAFETY: takes no argument and returns a static string.
+        let version = functions
+            .get_version
+            .and_then(|function| unsafe { function().as_ref().map(|text| CStr::from_ptr(text)) });
+        let found = version.map(CStr::to_string_lossy).unwrap_or_default();
+        if functions.get_version.is_some() && !found.starts_with("1.") {
+            return Err(LoadError::Version {
+                path: path.to_owned(),
+                function: "fmiGetVersion",
+                found: found.into_owned(),
+                expected: "1.0",
+            });
+        }
+        functions.require(path, model_identifier)?;
+        let corrupted = AtomicBool::new(false);
+        Ok(Self { functions, path: path.to_owned(), corrupted, _handle: handle })
+    }
+
+    /// Calls `fmiInstantiateSlave`. `location` is the URI of the unpacked FMU.
+    pub(crate) fn instantiate(
+        self: &Arc<Self>,
+        name: &str,
+        guid: &str,
+        location: &str,
+        names: Names,
+    ) -> Result<Component, LoadError> {
+        const NAME: &str = "fmiInstantiateSlave";
+        let place = Place::new(name);
+        let sink = Sink::new(&place, Some(names));
+        let callbacks = Callbacks {
+            logger: Some(logger()),
+            allocate_memory: Some(calloc),
+            free_memory: Some(free),
+            step_finished: None,
+        };
+        let (c_name, c_guid, c_location) = (c_string(name), c_string(guid), c_string(location));
+        place.enter(&NAME);
+        // SAFETY: terminated strings, and callbacks by value.
+        let pointer = self.functions.instantiate.map_or(std::ptr::null_mut(), |function| unsafe {
+            function(
+                c_name.as_ptr(),
+                c_guid.as_ptr(),
+                c_location.as_ptr(),
+                MIME_TYPE.as_ptr(),
+                0.0,
+                0,
+                0,
+                callbacks,
+                0,
+            )
+        });
+        place.leave();
+        let component = Component {
+            pointer,
+            functions: self.functions,
+            place,
+            sink,
+            time_limit: None,
+            abandoned: false,
+            warned: Cell::new(false),
+            library: self.clone(),
+        };
+        if !pointer.is_null() {
+            return Ok(component);
+        }
+        let messages = component.sink.take();
+        let reason =
+            if messages.is_empty() { "it gave no reason".to_owned() } else { messages.join("; ") };
+        let (path, instance) = (self.path.clone(), name.to_owned());
+        Err(LoadError::Instantiate { path, function: NAME, instance, reason })
+    }
+}
+
+/// An instance of an FMU of FMI 1.0 and its C functions. Dropping it calls `fmiFreeSlaveInstance`; the
+/// library stays loaded until then.
+pub(crate) struct Component {
+    pointer: Instance,
+    /// A copy of the library's function table.
+    functions: Functions,
+    /// The current function and time of the instance, for crash reports.
+    place: Arc<Place>,
+    /// Receives messages. The logger finds it by the thread or the name of the instance, because FMI 1.0
+    /// has no environment.
+    sink: Arc<Sink>,
+    /// How long a step that returned `fmiPending` may take; `None`: no limit.
+    pub(crate) time_limit: Option<Duration>,
+    /// The instance still computes a step that could not be canceled, and must not be freed.
+    abandoned: bool,
+    /// Whether a call has returned `fmiWarning`.
+    warned: Cell<bool>,
+    library: Arc<Library>,
+}
+
+// SAFETY: any thread may use an instance, one at a time; the pointers lead to the instance and to data
+// shared with it through `Arc`.
+unsafe impl Send for Component {}
+
+impl Drop for Component {
+    fn drop(&mut self) {
+        if self.pointer.is_null() {
+            return;
+        }
+        if self.abandoned || self.library.corrupted.load(Ordering::Relaxed) {
+            // The instance may still use the library and the sink: they are leaked.
+            std::mem::forget((self.library.clone(), self.sink.clone()));
+            return;
+        }
+        if let Some(free_instance) = self.functions.free_instance {
+            self.place.enter(&"fmiFreeSlaveInstance");
+            // SAFETY: the instance is alive and not used again.
+            unsafe { free_instance(self.pointer) };
+            self.place.leave();
+        }
+    }
+}
+
+impl Component {
+    /// Marks the call as returned and converts its status to a result.
+    #[inline]
+    fn check(&self, function: &'static str, status: c_int) -> Result<(), CallError> {
+        self.place.leave();
+        if status == Status::OK as c_int {
+            return Ok(());
+        }
+        if status == Status::Warning as c_int {
+            self.warned.set(true);
+            return Ok(());
+        }
+        if status == Status::Fatal as c_int {
+            self.library.corrupted.store(true, Ordering::Relaxed);
+        }
+        let failure =
+            Status::from_c(status).map_or(Failure::UnknownStatus(status), Failure::Status);
+        Err(self.failed(function, failure))
+    }
+
+    /// Returns whether a call has returned `fmiWarning` since the last call of this function.
+    pub(crate) fn take_warning(&mut self) -> bool {
+        self.warned.take()
+    }
+
+    /// Returns the error of a call, with the instance's recent messages.
+    #[cold]
+    fn failed(&self, function: &'static str, failure: Failure) -> CallError {
+        CallError { function, failure, messages: self.sink.take() }
+    }
+
+    /// Calls `fmiSetDebugLogging`.
+    pub(crate) fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
+        const NAME: &str = "fmiSetDebugLogging";
+        let function = function!(self.set_debug_logging, NAME);
+        // SAFETY: the instance is alive.
+        let status = unsafe { function(self.pointer, on.into()) };
+        self.check(NAME, status)
+    }
+
+    /// Calls `fmiInitializeSlave`.
+    pub(crate) fn initialize(&mut self, start: f64, stop: Option<f64>) -> Result<(), CallError> {
+        const NAME: &str = "fmiInitializeSlave";
+        let function = function!(self.initialize, NAME);
+        self.place.set_time(start);
+        // SAFETY: the instance is alive.
+        let status =
+            unsafe { function(self.pointer, start, stop.is_some().into(), stop.unwrap_or(0.0)) };
+        self.check(NAME, status)
+    }
+
+    /// Calls `fmiTerminateSlave`.
+    pub(crate) fn terminate(&mut self) -> Result<(), CallError> {
+        const NAME: &str = "fmiTerminateSlave";
+        let function = function!(self.terminate, NAME);
+        // SAFETY: the instance is alive.
+        let status = unsafe { function(self.pointer) };
+        self.check(NAME, status)
+    }
+
+    /// Calls `fmiSetRealInputDerivatives`.
+    pub(crate) fn set_input_derivatives(
+        &mut self,
+        references: &[u32],
+        orders: &[c_int],
+        values: &[f64],
+    ) -> Result<(), CallError> {
+        const NAME: &str = "fmiSetRealInputDerivatives";
+        let function = function!(self.set_input_derivatives, NAME);
+        let (count, orders) = (same_length(references, values), &orders[..references.len()]);
+        // SAFETY: the instance is alive; as many references as orders and values.
+        let status = unsafe {
+            function(self.pointer, references.as_ptr(), count, orders.as_ptr(), values.as_ptr())
+        };
+        self.check(NAME, status)
+    }
+
+    /// Calls `fmiGetRealOutputDerivatives`.
+    pub(crate) fn get_output_derivatives(
+        &mut self,
+        references: &[u32],
+        orders: &[c_int],
+        values: &mut [f64],
+    ) -> Result<(), CallError> {
+        const NAME: &str = "fmiGetRealOutputDerivatives";
+        let function = function!(self.get_output_derivatives, NAME);
+        let (count, orders) = (same_length(references, values), &orders[..references.len()]);
+        // SAFETY: the instance is alive; as many references as orders and values.
+        let status = unsafe {
+            function(self.pointer, references.as_ptr(), count, orders.as_ptr(), values.as_mut_ptr())
+        };
+        self.check(NAME, status)
+    }
+
+    /// Calls `fmiSetString`.
+    pub(crate) fn set_string(
+        &mut self,
+        references: &[u32],
+        values: &[String],
+    ) -> Result<(), CallError> {
+        const NAME: &str = "fmiSetString";
+        let function = function!(self.set_string, NAME);
+        let count = same_length(references, values);
+        let values: Vec<_> = values.iter().map(|value| c_string(value)).collect();
+        let pointers: Vec<_> = values.iter().map(|value| value.as_ptr()).collect();
+        // SAFETY: the instance is alive; as many references as terminated strings.
+        let status =
+            unsafe { function(self.pointer, references.as_ptr(), count, pointers.as_ptr()) };
+        self.check(NAME, status)
+    }
+
+    /// Calls `fmiGetString` and copies the strings.
+    pub(crate) fn get_string(
+        &mut self,
+        references: &[u32],
+        values: &mut [String],
+    ) -> Result<(), CallError> {
+        const NAME: &str = "fmiGetString";
+        let function = function!(self.get_string, NAME);
+        let count = same_length(references, values);
+        let mut pointers = vec![std::ptr::null(); count];
+        // SAFETY: the instance is alive; as many references as pointers to write.
+        let status =
+            unsafe { function(self.pointer, references.as_ptr(), count, pointers.as_mut_ptr()) };
+        self.check(NAME, status)?;
+        self.place.enter(&NAME);
+        for (value, pointer) in values.iter_mut().zip(pointers) {
+            value.clear();
+            // SAFETY: the FMU returns null or terminated strings, which live until the next call.
+            let text = unsafe { pointer.as_ref().map(|text| CStr::from_ptr(text)) };
+            if let Some(text) = text {
+                value.push_str(&text.to_string_lossy());
+            }
+        }
+        self.place.leave();
+        Ok(())
+    }
+}
+
+/// Defines the methods of the types whose values are copied.
+macro_rules! values {
+    ($($get:ident $set:ident: $type:ty = $get_name:literal $set_name:literal;)*) => {
+        impl Component {
+            $(#[doc = concat!("Calls `", $get_name, "`.")]
+            #[inline]
+            pub(crate) fn $get(
+                &mut self,
+                references: &[u32],
+                values: &mut [$type],
+            ) -> Result<(), CallError> {
+                let function = function!(self.$get, $get_name);
+                let count = same_length(references, values);
+                // SAFETY: the instance is alive; as many references as values.
+                let status = unsafe {
+                    function(self.pointer, references.as_ptr(), count, values.as_mut_ptr())
+                };
+                self.check($get_name, status)
+            }
+
+            #[doc = concat!("Calls `", $set_name, "`.")]
+            #[inline]
+            pub(crate) fn $set(
+                &mut self,
+                references: &[u32],
+                values: &[$type],
+            ) -> Result<(), CallError> {
+                let function = function!(self.$set, $set_name);
+                let count = same_length(references, values);
+                // SAFETY: the instance is alive; as many references as values.
+                let status = unsafe {
+                    function(self.pointer, references.as_ptr(), count, values.as_ptr())
+                };
+                self.check($set_name, status)
+            })*
+        }
+    };
+}
+
+values! {
+    get_real set_real: f64 = "fmiGetReal" "fmiSetReal";
+    get_integer set_integer: c_int = "fmiGetInteger" "fmiSetInteger";
+    get_boolean set_boolean: c_char = "fmiGetBoolean" "fmiSetBoolean";
+}

@@ -1,0 +1,71 @@
+//! The C functions of FMI 1.0 for co-simulation: names and signatures.
+
+use std::ffi::{c_char, c_int, c_void};
+use std::path::Path;
+
+use fmu_description::abi::{
+    fmi2CallbackAllocateMemory, fmi2CallbackFreeMemory, fmi2CallbackLogger,
+};
+
+use super::super::table::functions;
+use crate::error::LoadError;
+
+/// `fmiComponent`.
+pub(super) type Instance = *mut c_void;
+type Status = c_int;
+type References = *const u32;
+type Text = *const c_char;
+/// `fmiBoolean`: a `char`, 0 is false.
+type Boolean = c_char;
+
+/// `fmiCallbackFunctions`, passed by value. The types of the functions are those of FMI 2.0; the first
+/// argument of the logger is the component.
+#[derive(Clone, Copy)]
+#[repr(C)]
+pub(super) struct Callbacks {
+    pub(super) logger: Option<fmi2CallbackLogger>,
+    pub(super) allocate_memory: Option<fmi2CallbackAllocateMemory>,
+    pub(super) free_memory: Option<fmi2CallbackFreeMemory>,
+    pub(super) step_finished: Option<unsafe extern "C" fn(Instance, Status)>,
+}
+
+functions! {
+    get_version = "fmiGetVersion": fn() -> Text;
+    instantiate = "fmiInstantiateSlave": fn(Text, Text, Text, Text, f64, Boolean, Boolean,
+        Callbacks, Boolean) -> Instance;
+    free_instance = "fmiFreeSlaveInstance": fn(Instance);
+    set_debug_logging = "fmiSetDebugLogging": fn(Instance, Boolean) -> Status;
+    initialize = "fmiInitializeSlave": fn(Instance, f64, Boolean, f64) -> Status;
+    terminate = "fmiTerminateSlave": fn(Instance) -> Status;
+    get_real = "fmiGetReal": fn(Instance, References, usize, *mut f64) -> Status;
+    get_integer = "fmiGetInteger": fn(Instance, References, usize, *mut c_int) -> Status;
+    get_boolean = "fmiGetBoolean": fn(Instance, References, usize, *mut Boolean) -> Status;
+    get_string = "fmiGetString": fn(Instance, References, usize, *mut Text) -> Status;
+    set_real = "fmiSetReal": fn(Instance, References, usize, *const f64) -> Status;
+    set_integer = "fmiSetInteger": fn(Instance, References, usize, *const c_int) -> Status;
+    set_boolean = "fmiSetBoolean": fn(Instance, References, usize, *const Boolean) -> Status;
+    set_string = "fmiSetString": fn(Instance, References, usize, *const Text) -> Status;
+    set_input_derivatives = "fmiSetRealInputDerivatives":
+        fn(Instance, References, usize, *const c_int, *const f64) -> Status;
+    get_output_derivatives = "fmiGetRealOutputDerivatives":
+        fn(Instance, References, usize, *const c_int, *mut f64) -> Status;
+    do_step = "fmiDoStep": fn(Instance, f64, f64, Boolean) -> Status;
+    cancel_step = "fmiCancelStep": fn(Instance) -> Status;
+    get_status = "fmiGetStatus": fn(Instance, c_int, *mut Status) -> Status;
+    get_real_status = "fmiGetRealStatus": fn(Instance, c_int, *mut f64) -> Status;
+}
+
+/// The functions without which no FMU can run in co-simulation.
+const REQUIRED: [&str; 4] =
+    ["fmiInstantiateSlave", "fmiFreeSlaveInstance", "fmiInitializeSlave", "fmiDoStep"];
+
+impl Functions {
+    /// Checks that the library exports the functions that co-simulation cannot do without.
+    pub(super) fn require(&self, path: &Path, prefix: &str) -> Result<(), LoadError> {
+        let missing = REQUIRED.iter().find(|function| !self.has(function));
+        missing.map_or(Ok(()), |function| {
+            let function = format!("{prefix}_{function}");
+            Err(LoadError::Missing { path: path.to_owned(), function })
+        })
+    }
+}

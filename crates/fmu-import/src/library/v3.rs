@@ -1,0 +1,240 @@
+//! The library of an FMU of FMI 3.0 for co-simulation: loading, instantiation, calls.
+//!
+//! [`Component`] has one method for each C function; it knows neither modes nor arrays. The module
+//! `v3` of the crate builds a slave on it.
+#![expect(unsafe_code, reason = "the boundary to C")]
+
+mod calls;
+mod functions;
+mod states;
+mod step;
+mod values;
+
+use std::cell::{Cell, RefCell};
+use std::ffi::CStr;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use fmu_description::abi::Status;
+use libloading::Library as Handle;
+
+use super::log::{Sink, receive_message};
+use super::{c_string, load};
+use crate::crash::Place;
+use crate::error::LoadError;
+use functions::{Functions, Instance, State};
+use slave::{CallError, CallSink, Failure};
+
+/// A loaded library with the functions of FMI 3.0.
+pub(crate) struct Library {
+    functions: Functions,
+    path: PathBuf,
+    /// An instance returned `fmi3Fatal`: no function of any instance may be called.
+    corrupted: AtomicBool,
+    _handle: Handle,
+}
+
+/// The arguments of `fmi3InstantiateCoSimulation` that depend on the FMU.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Instantiation<'a> {
+    /// `instanceName`.
+    pub(crate) name: &'a str,
+    /// `instantiationToken`.
+    pub(crate) token: &'a str,
+    /// `resourcePath`: absolute, with a trailing separator; `None` without resources.
+    pub(crate) resources: Option<&'a str>,
+    /// `eventModeUsed`.
+    pub(crate) event_mode: bool,
+    /// `earlyReturnAllowed`.
+    pub(crate) early_return: bool,
+}
+
+impl Library {
+    /// Loads the library and checks its version and that it can run in co-simulation.
+    pub(crate) fn open(path: &Path) -> Result<Self, LoadError> {
+        let handle = load(path)?;
+        let functions = Functions::load(&handle, "");
+        // SAFETY: takes no argument and returns a static string.
+        let version = functions
+            .get_version
+            .and_then(|function| unsafe { function().as_ref().map(|text| CStr::from_ptr(text)) });
+        let found = version.map(CStr::to_string_lossy).unwrap_or_default();
+        if functions.get_version.is_some() && !found.starts_with("3.") {
+            return Err(LoadError::Version {
+                path: path.to_owned(),
+                function: "fmi3GetVersion",
+                found: found.into_owned(),
+                expected: "3.0",
+            });
+        }
+        functions.require(path)?;
+        let corrupted = AtomicBool::new(false);
+        Ok(Self { functions, path: path.to_owned(), corrupted, _handle: handle })
+    }
+
+    /// Calls `fmi3InstantiateCoSimulation` without intermediate update.
+    pub(crate) fn instantiate(
+        self: &Arc<Self>,
+        with: &Instantiation<'_>,
+    ) -> Result<Component, LoadError> {
+        const NAME: &str = "fmi3InstantiateCoSimulation";
+        let place = Place::new(with.name);
+        let sink = Sink::new(&place, None);
+        let (name, token) = (c_string(with.name), c_string(with.token));
+        let resources = with.resources.map(c_string);
+        let resources = resources.as_ref().map_or(std::ptr::null(), |path| path.as_ptr());
+        place.enter(&NAME);
+        // SAFETY: terminated strings; an environment and a callback that outlive the instance.
+        let pointer = self.functions.instantiate.map_or(std::ptr::null_mut(), |function| unsafe {
+            function(
+                name.as_ptr(),
+                token.as_ptr(),
+                resources,
+                false,
+                false,
+                with.event_mode,
+                with.early_return,
+                std::ptr::null(),
+                0,
+                Arc::as_ptr(&sink).cast_mut().cast(),
+                Some(receive_message),
+                None,
+            )
+        });
+        place.leave();
+        let component = Component {
+            pointer,
+            functions: self.functions,
+            place,
+            sink,
+            saved: Vec::new(),
+            warned: Cell::new(false),
+            call_sink: RefCell::new(None),
+            library: self.clone(),
+        };
+        if !pointer.is_null() {
+            return Ok(component);
+        }
+        let messages = component.sink.take();
+        let reason =
+            if messages.is_empty() { "it gave no reason".to_owned() } else { messages.join("; ") };
+        let (path, instance) = (self.path.clone(), with.name.to_owned());
+        Err(LoadError::Instantiate { path, function: NAME, instance, reason })
+    }
+}
+
+/// An instance of an FMU of FMI 3.0 and its C functions. Dropping it calls `fmi3FreeInstance`; the
+/// library stays loaded until then.
+pub(crate) struct Component {
+    pointer: Instance,
+    /// A copy of the library's function table.
+    functions: Functions,
+    /// The current function and time of the instance, for crash reports.
+    place: Arc<Place>,
+    /// Receives messages; the FMU holds its address.
+    sink: Arc<Sink>,
+    /// FMU states by slot; null in an empty slot.
+    saved: Vec<State>,
+    /// Whether a call has returned `fmi3Warning`.
+    warned: Cell<bool>,
+    /// Receives a text for each call, if calls are logged.
+    call_sink: RefCell<Option<CallSink>>,
+    library: Arc<Library>,
+}
+
+// SAFETY: any thread may use an instance, one at a time (FMI 3.0.2, section 2.2); the pointers lead to
+// the instance, its states, and data shared with it through `Arc`.
+unsafe impl Send for Component {}
+
+impl Drop for Component {
+    fn drop(&mut self) {
+        if self.pointer.is_null() {
+            return;
+        }
+        if self.library.corrupted.load(Ordering::Relaxed) {
+            // The instance may still use the library and the sink: they are leaked.
+            std::mem::forget((self.library.clone(), self.sink.clone()));
+            return;
+        }
+        for mut state in std::mem::take(&mut self.saved) {
+            self.free_state(&mut state);
+        }
+        if let Some(free_instance) = self.functions.free_instance {
+            self.place.enter(&"fmi3FreeInstance");
+            // SAFETY: the instance is alive and not used again.
+            unsafe { free_instance(self.pointer) };
+            self.place.leave();
+        }
+    }
+}
+
+impl Component {
+    /// Passes the text of every call from now on to `sink`.
+    pub(crate) fn log_calls(&mut self, sink: CallSink) {
+        self.call_sink = RefCell::new(Some(sink));
+    }
+
+    /// Logs a call before it is made.
+    #[inline]
+    fn log_call(&self, function: &'static str, arguments: impl FnOnce() -> String) {
+        if let Some(sink) = &mut *self.call_sink.borrow_mut() {
+            sink(&format!("{function}({})", arguments()));
+        }
+    }
+
+    /// As [`Component::check`], for a call with results, which are logged.
+    #[inline]
+    fn check_results(
+        &self,
+        function: &'static str,
+        status: i32,
+        results: impl FnOnce() -> String,
+    ) -> Result<(), CallError> {
+        if let Some(sink) = &mut *self.call_sink.borrow_mut() {
+            let name = match Status::from_c(status) {
+                Some(status) => status.name().replace("fmi2", "fmi3"),
+                None => status.to_string(),
+            };
+            sink(&format!(" -> {name}{}\n", results()));
+        }
+        self.check_status(function, status)
+    }
+
+    /// Marks the call as returned and converts its status to a result.
+    #[inline]
+    fn check(&self, function: &'static str, status: i32) -> Result<(), CallError> {
+        self.check_results(function, status, String::new)
+    }
+
+    #[inline]
+    fn check_status(&self, function: &'static str, status: i32) -> Result<(), CallError> {
+        self.place.leave();
+        if status == Status::OK as i32 {
+            return Ok(());
+        }
+        if status == Status::Warning as i32 {
+            self.warned.set(true);
+            return Ok(());
+        }
+        if status == Status::Fatal as i32 {
+            self.library.corrupted.store(true, Ordering::Relaxed);
+        }
+        let failure = match Status::from_c(status) {
+            Some(Status::Pending) | None => Failure::UnknownStatus(status),
+            Some(status) => Failure::Status(status),
+        };
+        Err(self.failed(function, failure))
+    }
+
+    /// Returns whether a call has returned `fmi3Warning` since the last call of this function.
+    pub(crate) fn take_warning(&mut self) -> bool {
+        self.warned.take()
+    }
+
+    /// Returns the error of a call, with the instance's recent messages.
+    #[cold]
+    pub(crate) fn failed(&self, function: &'static str, failure: Failure) -> CallError {
+        CallError { function, failure, messages: self.sink.take() }
+    }
+}

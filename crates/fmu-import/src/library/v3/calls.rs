@@ -1,0 +1,172 @@
+//! Modes, logging, clocks and derivatives: one method for each function of the standard.
+#![expect(unsafe_code, reason = "the boundary to C")]
+
+use std::ffi::c_int;
+
+use fmu_description::Experiment;
+
+use super::super::calls::{function, same_length};
+use super::Component;
+use slave::{CallError, absent};
+
+/// Defines a method for each function that changes the mode only.
+macro_rules! modes {
+    ($($method:ident = $name:literal;)*) => {
+        impl Component {
+            $(#[doc = concat!("Calls `", $name, "`.")]
+            pub(crate) fn $method(&mut self) -> Result<(), CallError> {
+                let function = function!(self.$method, $name);
+                self.log_call($name, String::new);
+                // SAFETY: the instance is alive.
+                let status = unsafe { function(self.pointer) };
+                self.check($name, status)
+            })*
+        }
+    };
+}
+
+modes! {
+    exit_initialization_mode = "fmi3ExitInitializationMode";
+    enter_event_mode = "fmi3EnterEventMode";
+    enter_step_mode = "fmi3EnterStepMode";
+    enter_configuration_mode = "fmi3EnterConfigurationMode";
+    exit_configuration_mode = "fmi3ExitConfigurationMode";
+    terminate = "fmi3Terminate";
+}
+
+impl Component {
+    /// Calls `fmi3SetDebugLogging` for all categories.
+    pub(crate) fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
+        const NAME: &str = "fmi3SetDebugLogging";
+        let function = function!(self.set_debug_logging, NAME);
+        self.log_call(NAME, || on.to_string());
+        // SAFETY: the instance is alive; no categories.
+        let status = unsafe { function(self.pointer, on, 0, std::ptr::null()) };
+        self.check(NAME, status)
+    }
+
+    /// Calls `fmi3EnterInitializationMode`.
+    pub(crate) fn enter_initialization_mode(&mut self, e: &Experiment) -> Result<(), CallError> {
+        const NAME: &str = "fmi3EnterInitializationMode";
+        let (tolerance, stop) = (e.tolerance.unwrap_or(0.0), e.stop_time.unwrap_or(0.0));
+        let (has_tolerance, has_stop) = (e.tolerance.is_some(), e.stop_time.is_some());
+        let function = function!(self.enter_initialization_mode, NAME);
+        self.log_call(NAME, || format!("tolerance {:?}, start time {:?}, stop time {:?}", e.tolerance, e.start_time, e.stop_time));
+        self.place.set_time(e.start_time);
+        // SAFETY: the instance is alive.
+        let status = unsafe {
+            function(self.pointer, has_tolerance, tolerance, e.start_time, has_stop, stop)
+        };
+        self.check(NAME, status)
+    }
+
+    /// Calls `fmi3GetClock`: 0 is inactive.
+    pub(crate) fn get_clock(
+        &mut self,
+        references: &[u32],
+        values: &mut [u8],
+    ) -> Result<(), CallError> {
+        const NAME: &str = "fmi3GetClock";
+        let function = function!(self.get_clock, NAME);
+        self.log_call(NAME, || format!("{references:?}"));
+        let count = same_length(references, values);
+        // SAFETY: the instance is alive; as many references as values.
+        let status =
+            unsafe { function(self.pointer, references.as_ptr(), count, values.as_mut_ptr()) };
+        self.check_results(NAME, status, || format!(" {values:?}"))
+    }
+
+    /// Calls `fmi3SetClock` to activate clocks.
+    pub(crate) fn activate_clocks(&mut self, references: &[u32]) -> Result<(), CallError> {
+        const NAME: &str = "fmi3SetClock";
+        let function = function!(self.set_clock, NAME);
+        self.log_call(NAME, || format!("{references:?}, active"));
+        let values = vec![1_u8; references.len()];
+        // SAFETY: the instance is alive; as many references as values.
+        let status = unsafe {
+            function(self.pointer, references.as_ptr(), references.len(), values.as_ptr())
+        };
+        self.check(NAME, status)
+    }
+
+    /// Calls `fmi3GetIntervalDecimal` for one clock: interval in s, and `fmi3IntervalQualifier`.
+    pub(crate) fn get_interval(&mut self, clock: u32) -> Result<(f64, c_int), CallError> {
+        const NAME: &str = "fmi3GetIntervalDecimal";
+        let function = function!(self.get_interval_decimal, NAME);
+        self.log_call(NAME, || format!("[{clock}]"));
+        let (mut interval, mut qualifier) = (0.0, 0);
+        // SAFETY: the instance is alive; one reference, one place for each result.
+        let status = unsafe {
+            function(self.pointer, &raw const clock, 1, &raw mut interval, &raw mut qualifier)
+        };
+        self.check_results(NAME, status, || format!(" {interval:?}, qualifier {qualifier}"))?;
+        Ok((interval, qualifier))
+    }
+
+    /// Calls `fmi3GetShiftDecimal` for one clock: shift in s.
+    pub(crate) fn get_shift(&mut self, clock: u32) -> Result<f64, CallError> {
+        const NAME: &str = "fmi3GetShiftDecimal";
+        let function = function!(self.get_shift_decimal, NAME);
+        self.log_call(NAME, || format!("[{clock}]"));
+        let mut shift = 0.0;
+        // SAFETY: the instance is alive; one reference, one place for the result.
+        let status = unsafe { function(self.pointer, &raw const clock, 1, &raw mut shift) };
+        self.check_results(NAME, status, || format!(" {shift:?}"))?;
+        Ok(shift)
+    }
+
+    /// Calls `fmi3GetDirectionalDerivative`. `seed` and `changes` have as many values as the elements of
+    /// the knowns and unknowns together.
+    pub(crate) fn directional_derivative(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        changes: &mut [f64],
+    ) -> Result<(), CallError> {
+        const NAME: &str = "fmi3GetDirectionalDerivative";
+        let function = function!(self.get_directional_derivative, NAME);
+        self.log_call(NAME, || format!("{unknowns:?}, {knowns:?}, {seed:?}"));
+        // SAFETY: the instance is alive; each pointer comes with its number of values.
+        let status = unsafe {
+            function(
+                self.pointer,
+                unknowns.as_ptr(),
+                unknowns.len(),
+                knowns.as_ptr(),
+                knowns.len(),
+                seed.as_ptr(),
+                seed.len(),
+                changes.as_mut_ptr(),
+                changes.len(),
+            )
+        };
+        self.check_results(NAME, status, || format!(" {changes:?}"))
+    }
+
+    /// Calls `fmi3GetOutputDerivatives`. `values` has as many values as the elements of the outputs
+    /// together.
+    pub(crate) fn get_output_derivatives(
+        &mut self,
+        references: &[u32],
+        orders: &[i32],
+        values: &mut [f64],
+    ) -> Result<(), CallError> {
+        const NAME: &str = "fmi3GetOutputDerivatives";
+        let function = function!(self.get_output_derivatives, NAME);
+        self.log_call(NAME, || format!("{references:?}, orders {orders:?}"));
+        let count = same_length(references, orders);
+        // SAFETY: the instance is alive; as many references as orders, and `values.len()` values.
+        let status = unsafe {
+            function(
+                self.pointer,
+                references.as_ptr(),
+                count,
+                orders.as_ptr(),
+                values.as_mut_ptr(),
+                values.len(),
+            )
+        };
+        self.check_results(NAME, status, || format!(" {values:?}"))
+    }
+}

@@ -1,0 +1,224 @@
+//! FMUs of FMI 1.0 for co-simulation (stand-alone) as slaves.
+//!
+//! FMI 1.0 has no initialization mode: `fmiInitializeSlave` is called when the master enters it. Values
+//! set before are start values; afterwards inputs can be set, and parameters are fixed.
+
+use std::collections::{HashMap, HashSet};
+use std::ffi::{c_char, c_int};
+
+use fmu_description::{Causality, Experiment, ModelDescription};
+
+use crate::library::v1::Component;
+use crate::v2::narrow;
+use slave::{CallError, ValueType};
+
+/// A co-simulation instance of an FMU of FMI 1.0 in this process.
+pub(crate) struct Instance {
+    pub(crate) component: Component,
+    experiment: Experiment,
+    /// Whether the FMU has been initialised and no step has been made: then only inputs can be set.
+    settled: bool,
+    /// The inputs: type and value reference.
+    inputs: HashSet<(u8, u32)>,
+    /// Value references of variables whose sign differs from that of their FMU's value reference
+    /// (`negatedAlias`): that of the description, that of the FMU.
+    negated: HashMap<u32, u32>,
+    references: Vec<u32>,
+    reals: Vec<f64>,
+    /// The description, in which negated aliases have value references of their own.
+    description: ModelDescription,
+    integers: Vec<c_int>,
+    booleans: Vec<c_char>,
+}
+
+/// Returns a number for a type, as a key.
+fn key(kind: ValueType) -> u8 {
+    match kind {
+        ValueType::Real => 0,
+        ValueType::Integer => 1,
+        ValueType::Boolean => 2,
+        ValueType::String | ValueType::Binary => 3,
+    }
+}
+
+/// Returns the description of an instance, in which negated aliases have value references of their own.
+pub(crate) fn scalar_description(own: &ModelDescription) -> ModelDescription {
+    let mut description = own.clone();
+    separate_negated(&mut description);
+    description
+}
+
+/// Gives the negated aliases of `description` value references that no variable has; returns each with
+/// that of the FMU.
+fn separate_negated(description: &mut ModelDescription) -> HashMap<u32, u32> {
+    let used: HashSet<u32> = description.variables.iter().map(|own| own.value_reference).collect();
+    let mut free = (0..=u32::MAX).rev().filter(|reference| !used.contains(reference));
+    let mut negated = HashMap::new();
+    for variable in description.variables.iter_mut().filter(|own| own.negated) {
+        if let Some(reference) = free.next() {
+            negated.insert(reference, variable.value_reference);
+            variable.value_reference = reference;
+        }
+    }
+    negated
+}
+
+impl Instance {
+    pub(crate) fn new(component: Component, description: &ModelDescription) -> Self {
+        let mut description = description.clone();
+        let negated = separate_negated(&mut description);
+        let inputs = description.variables.iter().filter(|own| own.causality == Causality::Input);
+        let inputs = inputs.map(|own| (key(ValueType::of(&own.kind)), own.value_reference));
+        Self {
+            component,
+            experiment: Experiment { start_time: 0.0, stop_time: None, tolerance: None },
+            settled: false,
+            inputs: inputs.collect(),
+            negated,
+            references: Vec::new(),
+            reals: Vec::new(),
+            description,
+            integers: Vec::new(),
+            booleans: Vec::new(),
+        }
+    }
+
+    /// Whether the FMU takes the values: between initialization and first step only those of inputs.
+    /// The master repeats settings there; the FMU has them already.
+    fn takes(&self, kind: ValueType, references: &[u32]) -> bool {
+        !self.settled || references.iter().all(|own| self.inputs.contains(&(key(kind), *own)))
+    }
+
+    pub(crate) fn setup_experiment(&mut self, experiment: &Experiment) {
+        self.experiment = *experiment;
+    }
+
+    pub(crate) fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
+        let Experiment { start_time, stop_time, .. } = self.experiment;
+        self.component.initialize(start_time, stop_time)?;
+        self.settled = true;
+        Ok(())
+    }
+
+    pub(crate) fn exit_initialization_mode(&mut self) {
+        self.settled = false;
+    }
+
+    /// Returns the description, in which negated aliases have value references of their own.
+    pub(crate) fn description(&self) -> &ModelDescription {
+        &self.description
+    }
+
+    /// Stores the value references of the FMU for a list, if they differ.
+    fn translate(&mut self, list: &[u32]) -> bool {
+        if self.negated.is_empty() || !list.iter().any(|own| self.negated.contains_key(own)) {
+            return false;
+        }
+        self.references.clear();
+        let negated = &self.negated;
+        self.references.extend(list.iter().map(|own| negated.get(own).unwrap_or(own)));
+        true
+    }
+
+    pub(crate) fn get_real(&mut self, list: &[u32], values: &mut [f64]) -> Result<(), CallError> {
+        if !self.translate(list) {
+            return self.component.get_real(list, values);
+        }
+        self.component.get_real(&self.references, values)?;
+        for (value, _) in values.iter_mut().zip(list).filter(|(_, own)| self.is_negated(own)) {
+            *value = -*value;
+        }
+        Ok(())
+    }
+
+    fn is_negated(&self, reference: &u32) -> bool {
+        self.negated.contains_key(reference)
+    }
+
+    pub(crate) fn set_real(&mut self, list: &[u32], values: &[f64]) -> Result<(), CallError> {
+        if !self.takes(ValueType::Real, list) {
+            return Ok(());
+        }
+        if !self.translate(list) {
+            return self.component.set_real(list, values);
+        }
+        self.reals.clear();
+        for (value, own) in values.iter().zip(list) {
+            self.reals.push(if self.negated.contains_key(own) { -value } else { *value });
+        }
+        self.component.set_real(&self.references, &self.reals)
+    }
+
+    pub(crate) fn get_integer(
+        &mut self,
+        references: &[u32],
+        values: &mut [i64],
+    ) -> Result<(), CallError> {
+        self.integers.clear();
+        self.integers.resize(references.len(), 0);
+        let translated = self.translate(references);
+        let list = if translated { &self.references } else { references };
+        self.component.get_integer(list, &mut self.integers)?;
+        for ((value, own), reference) in values.iter_mut().zip(&self.integers).zip(references) {
+            let own = i64::from(*own);
+            *value = if translated && self.is_negated(reference) { -own } else { own };
+        }
+        Ok(())
+    }
+
+    pub(crate) fn set_integer(
+        &mut self,
+        references: &[u32],
+        values: &[i64],
+    ) -> Result<(), CallError> {
+        if !self.takes(ValueType::Integer, references) {
+            return Ok(());
+        }
+        self.integers.clear();
+        for (value, reference) in values.iter().zip(references) {
+            let value = if self.is_negated(reference) { -*value } else { *value };
+            self.integers.push(narrow("fmiSetInteger", "an Integer of 32 bits", value)?);
+        }
+        let translated = self.translate(references);
+        let list = if translated { &self.references } else { references };
+        self.component.set_integer(list, &self.integers)
+    }
+
+    pub(crate) fn get_boolean(
+        &mut self,
+        references: &[u32],
+        values: &mut [i32],
+    ) -> Result<(), CallError> {
+        self.booleans.clear();
+        self.booleans.resize(references.len(), 0);
+        self.component.get_boolean(references, &mut self.booleans)?;
+        for (value, own) in values.iter_mut().zip(&self.booleans) {
+            *value = i32::from(*own != 0);
+        }
+        Ok(())
+    }
+
+    pub(crate) fn set_boolean(
+        &mut self,
+        references: &[u32],
+        values: &[i32],
+    ) -> Result<(), CallError> {
+        if !self.takes(ValueType::Boolean, references) {
+            return Ok(());
+        }
+        self.booleans.clear();
+        self.booleans.extend(values.iter().map(|value| c_char::from(*value != 0)));
+        self.component.set_boolean(references, &self.booleans)
+    }
+
+    pub(crate) fn set_string(
+        &mut self,
+        references: &[u32],
+        values: &[String],
+    ) -> Result<(), CallError> {
+        if !self.takes(ValueType::String, references) {
+            return Ok(());
+        }
+        self.component.set_string(references, values)
+    }
+}

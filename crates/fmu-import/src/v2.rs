@@ -1,0 +1,55 @@
+//! FMUs of FMI 2.0 for co-simulation as slaves.
+
+use crate::library::Component;
+use slave::{CallError, Failure};
+
+/// A co-simulation instance of an FMU of FMI 2.0 in this process.
+pub(crate) struct Instance {
+    pub(crate) component: Component,
+    /// Buffer for Integers.
+    integers: Vec<i32>,
+}
+
+/// Converts an integer to the type `what` of the FMU.
+pub(crate) fn narrow<T: TryFrom<i64>>(
+    function: &'static str,
+    what: &str,
+    value: i64,
+) -> Result<T, CallError> {
+    T::try_from(value).map_err(|_| {
+        let what = format!("cannot take the value {value}, expected {what}");
+        CallError { function, failure: Failure::InvalidAnswer(what), messages: Vec::new() }
+    })
+}
+
+impl Instance {
+    pub(crate) fn new(component: Component) -> Self {
+        Self { component, integers: Vec::new() }
+    }
+
+    pub(crate) fn get_integer(
+        &mut self,
+        references: &[u32],
+        values: &mut [i64],
+    ) -> Result<(), CallError> {
+        self.integers.clear();
+        self.integers.resize(references.len(), 0);
+        self.component.get_integer(references, &mut self.integers)?;
+        for (value, own) in values.iter_mut().zip(&self.integers) {
+            *value = (*own).into();
+        }
+        Ok(())
+    }
+
+    pub(crate) fn set_integer(
+        &mut self,
+        references: &[u32],
+        values: &[i64],
+    ) -> Result<(), CallError> {
+        self.integers.clear();
+        for value in values {
+            self.integers.push(narrow("fmi2SetInteger", "an Integer of 32 bits", *value)?);
+        }
+        self.component.set_integer(references, &self.integers)
+    }
+}

@@ -1,0 +1,224 @@
+//! FMUs of FMI 3.0 for co-simulation as slaves: types, arrays, events and clocks.
+//!
+//! The slave uses Event Mode if the FMU has it, and lets the FMU return early. It handles the events and
+//! continues the step, so that the master sees one whole communication step (FMI 3.0.2, section 4.2).
+
+mod access;
+mod buffer;
+mod clocks;
+mod derivatives;
+mod elements;
+mod modes;
+mod plan;
+mod states;
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use fmu_description::{Experiment, ModelDescription};
+
+use crate::error::LoadError;
+use crate::library::v3::{Component, Instantiation, Library};
+use access::refused;
+use buffer::Buffer;
+use clocks::Clocks;
+pub(crate) use elements::ElementView;
+use modes::{Mode, State};
+use plan::Plans;
+use slave::{CallError, CallSink, StepResult};
+
+/// A co-simulation instance of an FMU of FMI 3.0 in this process.
+pub(crate) struct Instance {
+    component: Component,
+    view: ElementView,
+    plans: Plans,
+    /// Whether the FMU was instantiated with `eventModeUsed`.
+    event_mode: bool,
+    experiment: Experiment,
+    state: State,
+    /// The states that belong to the FMU states of the slots.
+    slots: Vec<State>,
+    /// Values of structural parameters, by value reference.
+    sizes: HashMap<u32, u64>,
+}
+
+impl Instance {
+    /// Creates the instance `name`. `resources` is the folder of the resources, if the FMU has one.
+    pub(crate) fn new(
+        library: &Arc<Library>,
+        own: &ModelDescription,
+        name: &str,
+        resources: Option<&str>,
+    ) -> Result<Self, LoadError> {
+        let flags = own.co_simulation.clone().unwrap_or_default();
+        let event_mode = flags.has_event_mode;
+        let sizes = HashMap::new();
+        let view = ElementView::new(own, &sizes)
+            .map_err(|reason| LoadError::Unsupported { model: own.model_name.clone(), reason })?;
+        let component = library.instantiate(&Instantiation {
+            name,
+            token: &own.guid,
+            resources,
+            event_mode,
+            early_return: event_mode || flags.might_return_early_from_do_step,
+        })?;
+        let state =
+            State { held: vec![None; view.shadows], clocks: Clocks::new(own), ..State::default() };
+        let experiment = Experiment { start_time: 0.0, stop_time: None, tolerance: None };
+        let (plans, slots) = (Plans::default(), Vec::new());
+        Ok(Self { component, view, plans, event_mode, experiment, state, slots, sizes })
+    }
+
+    /// Returns the description with a scalar variable for each element of an array.
+    pub(crate) fn description(&self) -> &ModelDescription {
+        &self.view.description
+    }
+
+    /// Sets structural parameters in Configuration Mode; arrays of `own` change their sizes.
+    pub(crate) fn configure(
+        &mut self,
+        own: &ModelDescription,
+        references: &[u32],
+        values: &[i64],
+    ) -> Result<(), CallError> {
+        const NAME: &str = "fmi3EnterConfigurationMode";
+        let mut sizes = self.sizes.clone();
+        for (reference, value) in references.iter().zip(values) {
+            if let Ok(value) = u64::try_from(*value) {
+                sizes.insert(*reference, value);
+            }
+        }
+        let view = ElementView::new(own, &sizes).map_err(|reason| refused(NAME, reason))?;
+        self.component.enter_configuration_mode()?;
+        let set = self.write("fmi3SetUInt64", references, values, Buffer::put_integer);
+        set.and_then(|()| self.component.exit_configuration_mode())?;
+        self.state.held = vec![None; view.shadows];
+        (self.view, self.sizes) = (view, sizes);
+        self.plans.clear();
+        Ok(())
+    }
+
+    pub(crate) fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
+        self.component.set_debug_logging(on)
+    }
+
+    pub(crate) fn setup_experiment(&mut self, experiment: &Experiment) {
+        self.experiment = *experiment;
+        self.state.time = experiment.start_time;
+    }
+
+    pub(crate) fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
+        self.component.enter_initialization_mode(&self.experiment)?;
+        self.state.mode = Mode::Initialization;
+        Ok(())
+    }
+
+    pub(crate) fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
+        self.end_initialization()
+    }
+
+    pub(crate) fn terminate(&mut self) -> Result<(), CallError> {
+        self.component.terminate()
+    }
+
+    #[inline]
+    pub(crate) fn get_real(&mut self, list: &[u32], values: &mut [f64]) -> Result<(), CallError> {
+        if self.view.plain {
+            return self.component.get_float64(list, values);
+        }
+        self.read("fmi3GetFloat64", list, values, Buffer::real)
+    }
+
+    #[inline]
+    pub(crate) fn set_real(&mut self, list: &[u32], values: &[f64]) -> Result<(), CallError> {
+        if self.view.plain && !self.event_mode {
+            return self.component.set_float64(list, values);
+        }
+        self.write("fmi3SetFloat64", list, values, Buffer::put_real)
+    }
+
+    pub(crate) fn get_integer(
+        &mut self,
+        list: &[u32],
+        values: &mut [i64],
+    ) -> Result<(), CallError> {
+        self.read("fmi3GetInt64", list, values, Buffer::integer)
+    }
+
+    pub(crate) fn set_integer(&mut self, list: &[u32], values: &[i64]) -> Result<(), CallError> {
+        self.write("fmi3SetInt64", list, values, Buffer::put_integer)
+    }
+
+    pub(crate) fn get_boolean(
+        &mut self,
+        list: &[u32],
+        values: &mut [i32],
+    ) -> Result<(), CallError> {
+        let convert = |buffer: &Buffer, place| Some(i32::from(buffer.integer(place)? != 0));
+        self.read("fmi3GetBoolean", list, values, convert)
+    }
+
+    pub(crate) fn set_boolean(&mut self, list: &[u32], values: &[i32]) -> Result<(), CallError> {
+        let put =
+            |buffer: &mut Buffer, place, value| buffer.put_integer(place, i64::from(value != 0));
+        self.write("fmi3SetBoolean", list, values, put)
+    }
+
+    pub(crate) fn get_string(
+        &mut self,
+        list: &[u32],
+        values: &mut [String],
+    ) -> Result<(), CallError> {
+        self.read_list("fmi3GetString", list, values, |own, references, values| {
+            own.component.get_string(references, values)
+        })
+    }
+
+    pub(crate) fn set_string(&mut self, list: &[u32], values: &[String]) -> Result<(), CallError> {
+        self.write_list(
+            "fmi3SetString",
+            list,
+            values,
+            |own, references, values| own.component.get_string(references, values),
+            |own, references, values| own.component.set_string(references, values),
+        )
+    }
+
+    pub(crate) fn get_binary(
+        &mut self,
+        list: &[u32],
+        values: &mut [Vec<u8>],
+    ) -> Result<(), CallError> {
+        self.read_list("fmi3GetBinary", list, values, |own, references, values| {
+            own.component.get_binary(references, values)
+        })
+    }
+
+    pub(crate) fn set_binary(&mut self, list: &[u32], values: &[Vec<u8>]) -> Result<(), CallError> {
+        self.write_list(
+            "fmi3SetBinary",
+            list,
+            values,
+            |own, references, values| own.component.get_binary(references, values),
+            |own, references, values| own.component.set_binary(references, values),
+        )
+    }
+
+    #[inline]
+    pub(crate) fn do_step(
+        &mut self,
+        time: f64,
+        size: f64,
+        never_back: bool,
+    ) -> Result<StepResult, CallError> {
+        self.step(time, size, never_back)
+    }
+
+    pub(crate) fn log_calls(&mut self, sink: CallSink) {
+        self.component.log_calls(sink);
+    }
+
+    pub(crate) fn take_warning(&mut self) -> bool {
+        self.component.take_warning()
+    }
+}

@@ -1,0 +1,184 @@
+//! Get and set: values of a list of variables through the calls of its plan.
+
+use std::hash::{DefaultHasher, Hash, Hasher};
+
+use super::Instance;
+use super::buffer::Buffer;
+use super::elements::NativeType;
+use super::modes::Mode;
+use super::plan::Run;
+use slave::{CallError, Failure};
+
+/// Returns the error of an access that the FMU cannot be asked for.
+#[cold]
+pub(super) fn refused(function: &'static str, what: String) -> CallError {
+    CallError { function, failure: Failure::InvalidAnswer(what), messages: Vec::new() }
+}
+
+impl Instance {
+    /// Returns the plan of a list, for `function`.
+    fn plan(&mut self, function: &'static str, list: &[u32]) -> Result<usize, CallError> {
+        self.plans.find(&self.view, list).map_err(|reference| {
+            let what =
+                format!("cannot access the value reference {reference}, which no variable has");
+            refused(function, what)
+        })
+    }
+
+    /// Performs `action` for the runs of the plan of a list.
+    fn for_runs(
+        &mut self,
+        function: &'static str,
+        list: &[u32],
+        mut action: impl FnMut(&mut Self, &mut Run) -> Result<(), CallError>,
+    ) -> Result<(), CallError> {
+        let plan = self.plan(function, list)?;
+        let mut runs = self.plans.take(plan);
+        let done = runs.iter_mut().try_for_each(|run| action(self, run));
+        self.plans.put_back(plan, runs);
+        done
+    }
+
+    /// Reads numbers; `convert` takes one out of a buffer.
+    pub(super) fn read<T>(
+        &mut self,
+        function: &'static str,
+        list: &[u32],
+        values: &mut [T],
+        convert: fn(&Buffer, usize) -> Option<T>,
+    ) -> Result<(), CallError> {
+        self.for_runs(function, list, |own, run| {
+            if run.kind == NativeType::Clock {
+                own.state.clocks.read(run);
+            } else {
+                run.buffer.get(&mut own.component, &run.references)?;
+            }
+            for &(position, place) in &run.places {
+                let Some(value) = convert(&run.buffer, place) else {
+                    let (name, kind) = (own.view.name(list[position]), run.kind.name());
+                    let what = format!(
+                        "gives {name} a value of type {kind} that the importer cannot represent: it \
+                         has 64 bits with a sign"
+                    );
+                    return Err(refused(function, what));
+                };
+                values[position] = value;
+            }
+            Ok(())
+        })
+    }
+
+    /// Passes numbers; `put` stores one in a buffer.
+    pub(super) fn write<T: Copy + std::fmt::Debug>(
+        &mut self,
+        function: &'static str,
+        list: &[u32],
+        values: &[T],
+        put: fn(&mut Buffer, usize, T) -> Option<()>,
+    ) -> Result<(), CallError> {
+        self.for_runs(function, list, |own, run| {
+            if run.partial && run.kind != NativeType::Clock {
+                run.buffer.get(&mut own.component, &run.references)?;
+            }
+            for &(position, place) in &run.places {
+                if put(&mut run.buffer, place, values[position]).is_none() {
+                    let (name, kind) = (own.view.name(list[position]), run.kind.name());
+                    let value = values[position];
+                    let what = format!(
+                        "cannot take the value {value:?} for {name}, expected a value of type {kind}"
+                    );
+                    return Err(refused(function, what));
+                }
+            }
+            if run.kind == NativeType::Clock {
+                return own.state.clocks.request(function, run);
+            }
+            if !run.clocks.is_empty() && own.state.mode.is_initialized() {
+                // Set when one of its clocks ticks.
+                run.deferred = true;
+                return Ok(());
+            }
+            if own.may_set(run.event, &run.shadows, |place| run.buffer.bits(place))? {
+                run.buffer.set(&mut own.component, &run.references)?;
+            }
+            Ok(())
+        })
+    }
+
+    /// Reads Strings or binaries by `get`.
+    pub(super) fn read_list<T: Clone + Default>(
+        &mut self,
+        function: &'static str,
+        list: &[u32],
+        values: &mut [T],
+        get: fn(&mut Self, &[u32], &mut [T]) -> Result<(), CallError>,
+    ) -> Result<(), CallError> {
+        self.for_runs(function, list, |own, run| {
+            if run.direct {
+                return get(own, &run.references, values);
+            }
+            let mut found = vec![T::default(); run.shadows.len()];
+            get(own, &run.references, &mut found)?;
+            for &(position, place) in &run.places {
+                values[position].clone_from(&found[place]);
+            }
+            Ok(())
+        })
+    }
+
+    /// Passes Strings or binaries by `set`.
+    pub(super) fn write_list<T: Clone + Default + Hash>(
+        &mut self,
+        function: &'static str,
+        list: &[u32],
+        values: &[T],
+        get: fn(&mut Self, &[u32], &mut [T]) -> Result<(), CallError>,
+        set: fn(&mut Self, &[u32], &[T]) -> Result<(), CallError>,
+    ) -> Result<(), CallError> {
+        self.for_runs(function, list, |own, run| {
+            let mut all = vec![T::default(); run.shadows.len()];
+            if run.partial {
+                get(own, &run.references, &mut all)?;
+            }
+            for &(position, place) in &run.places {
+                all[place].clone_from(&values[position]);
+            }
+            if own.may_set(run.event, &run.shadows, |place| hash(&all[place]))? {
+                set(own, &run.references, &all)?;
+            }
+            Ok(())
+        })
+    }
+
+    /// Prepares to set variables: enters Event Mode if they may change there only and one of them
+    /// changes. Returns whether they must be set.
+    fn may_set(
+        &mut self,
+        event: bool,
+        shadows: &[usize],
+        bits: impl Fn(usize) -> u64,
+    ) -> Result<bool, CallError> {
+        if !(event && self.event_mode) {
+            return Ok(true);
+        }
+        let mut changed = false;
+        for (place, shadow) in shadows.iter().enumerate() {
+            let value = Some(bits(place));
+            changed |= self.state.held[*shadow] != value;
+            self.state.held[*shadow] = value;
+        }
+        if self.state.mode != Mode::Step {
+            return Ok(true);
+        }
+        if changed {
+            self.enter_event()?;
+        }
+        Ok(changed)
+    }
+}
+
+fn hash(value: &impl Hash) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    value.hash(&mut hasher);
+    hasher.finish()
+}

@@ -1,0 +1,92 @@
+//! Directional derivatives and output derivatives of variables that may be elements of arrays.
+
+use std::collections::HashMap;
+
+use super::Instance;
+use super::access::refused;
+use slave::CallError;
+
+/// Variables of the FMU, and where the values of a list are among the values of a call.
+struct Whole {
+    references: Vec<u32>,
+    count: usize,
+    places: Vec<usize>,
+}
+
+impl Instance {
+    /// Returns the whole variables to which the elements of a list belong.
+    fn whole(&self, function: &'static str, list: &[u32]) -> Result<Whole, CallError> {
+        let mut whole = Whole { references: Vec::new(), count: 0, places: Vec::new() };
+        let mut known: HashMap<usize, usize> = HashMap::new();
+        for &reference in list {
+            let Some((number, element)) = self.view.locate(reference) else {
+                let what =
+                    format!("cannot access the value reference {reference}, which no variable has");
+                return Err(refused(function, what));
+            };
+            let variable = &self.view.variables[number];
+            let first = *known.entry(number).or_insert_with(|| {
+                let first = whole.count;
+                whole.references.push(variable.reference);
+                whole.count += variable.size;
+                first
+            });
+            whole.places.push(first + element);
+        }
+        Ok(whole)
+    }
+
+    /// Returns `(dh/dv) seed`; the seed of elements that are not in the list is 0.
+    pub(crate) fn directional_derivative(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        changes: &mut [f64],
+    ) -> Result<(), CallError> {
+        const NAME: &str = "fmi3GetDirectionalDerivative";
+        if self.view.plain {
+            return self.component.directional_derivative(unknowns, knowns, seed, changes);
+        }
+        let (unknowns, knowns) = (self.whole(NAME, unknowns)?, self.whole(NAME, knowns)?);
+        let (mut seeds, mut found) = (vec![0.0; knowns.count], vec![0.0; unknowns.count]);
+        for (place, value) in knowns.places.iter().zip(seed) {
+            seeds[*place] += value;
+        }
+        let (of, by) = (&unknowns.references, &knowns.references);
+        self.component.directional_derivative(of, by, &seeds, &mut found)?;
+        for (change, place) in changes.iter_mut().zip(&unknowns.places) {
+            *change = found[*place];
+        }
+        Ok(())
+    }
+
+    /// Returns derivatives of outputs with respect to time.
+    pub(crate) fn get_output_derivatives(
+        &mut self,
+        list: &[u32],
+        orders: &[i32],
+        values: &mut [f64],
+    ) -> Result<(), CallError> {
+        const NAME: &str = "fmi3GetOutputDerivatives";
+        if self.view.plain {
+            return self.component.get_output_derivatives(list, orders, values);
+        }
+        // One call for each run of equal orders.
+        let mut start = 0;
+        while start < list.len() {
+            let order = orders[start];
+            let same = orders[start..].iter().take_while(|own| **own == order).count();
+            let end = (start + same).min(list.len());
+            let whole = self.whole(NAME, &list[start..end])?;
+            let mut found = vec![0.0; whole.count];
+            let orders = vec![order; whole.references.len()];
+            self.component.get_output_derivatives(&whole.references, &orders, &mut found)?;
+            for (value, place) in values[start..end].iter_mut().zip(&whole.places) {
+                *value = found[*place];
+            }
+            start = end;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,444 @@
+//! The elements of arrays as scalar variables.
+//!
+//! A master knows scalars only. [`ElementView`] replaces each array by its elements: names `A[1,2]` in
+//! row-major order with indices from 1, and value references that no variable of the FMU has. Scalars keep
+//! their value references.
+
+use std::collections::{HashMap, HashSet};
+
+use fmu_description::{
+    Causality, Dimension, Elements, Kind, ModelDescription, ScalarVariable, Unknown, Variability,
+};
+
+/// Largest number of elements of all arrays together.
+const MOST_ELEMENTS: usize = 1 << 24;
+/// Largest number of dependencies between elements; beyond it an unknown depends on all knowns.
+const MOST_DEPENDENCIES: usize = 1 << 22;
+
+/// The C types of FMI 3.0: each has its own functions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum NativeType {
+    Float32,
+    Float64,
+    Int8,
+    UInt8,
+    Int16,
+    UInt16,
+    Int32,
+    UInt32,
+    Int64,
+    UInt64,
+    Boolean,
+    String,
+    Binary,
+    Clock,
+}
+
+impl NativeType {
+    fn of(kind: &Kind) -> Self {
+        match kind {
+            Kind::Float32(_) => Self::Float32,
+            Kind::Real(_) => Self::Float64,
+            Kind::Int8(_) => Self::Int8,
+            Kind::UInt8(_) => Self::UInt8,
+            Kind::Int16(_) => Self::Int16,
+            Kind::UInt16(_) => Self::UInt16,
+            Kind::Integer(_) => Self::Int32,
+            Kind::UInt32(_) => Self::UInt32,
+            Kind::Int64(_) | Kind::Enumeration(_) => Self::Int64,
+            Kind::UInt64(_) => Self::UInt64,
+            Kind::Boolean(_) => Self::Boolean,
+            Kind::String(_) => Self::String,
+            Kind::Binary(_) => Self::Binary,
+            Kind::Clock(_) => Self::Clock,
+        }
+    }
+
+    /// Returns the name of the type in FMI 3.0.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Float32 => "Float32",
+            Self::Float64 => "Float64",
+            Self::Int8 => "Int8",
+            Self::UInt8 => "UInt8",
+            Self::Int16 => "Int16",
+            Self::UInt16 => "UInt16",
+            Self::Int32 => "Int32",
+            Self::UInt32 => "UInt32",
+            Self::Int64 => "Int64",
+            Self::UInt64 => "UInt64",
+            Self::Boolean => "Boolean",
+            Self::String => "String",
+            Self::Binary => "Binary",
+            Self::Clock => "Clock",
+        }
+    }
+}
+
+/// A variable of the FMU: a scalar or an array.
+#[derive(Clone, Debug)]
+pub(super) struct Variable {
+    pub(super) reference: u32,
+    pub(super) kind: NativeType,
+    /// Number of elements; 1 for a scalar.
+    pub(super) size: usize,
+    /// Whether the variable may change in Event Mode only, once the FMU is initialised (FMI 3.0.2,
+    /// section 4.2.1): all but continuous inputs.
+    pub(super) event: bool,
+    /// Value references of the clocks of the variable.
+    pub(super) clocks: Vec<u32>,
+    /// Position of its first element among all elements of variables with `event`.
+    pub(super) shadow: usize,
+}
+
+/// The scalar variables of an FMU, and where their values are.
+#[derive(Clone, Debug)]
+pub(crate) struct ElementView {
+    /// The description with a scalar variable for each element.
+    pub(crate) description: ModelDescription,
+    pub(super) variables: Vec<Variable>,
+    by_reference: HashMap<u32, usize>,
+    /// The value reference of the first cell.
+    base: u32,
+    /// Variable and element of each reference from `base` on.
+    cells: Vec<(usize, usize)>,
+    /// Whether all floating-point variables are scalars of type `Float64`.
+    pub(super) plain: bool,
+    /// Number of elements of all variables with `event`.
+    pub(super) shadows: usize,
+}
+
+impl ElementView {
+    /// Creates the view of an FMU whose structural parameters have the values `sizes`, by value
+    /// reference; others have their start values. On failure returns the reason.
+    pub(crate) fn new(own: &ModelDescription, sizes: &HashMap<u32, u64>) -> Result<Self, String> {
+        let starts: HashMap<u32, u64> = own
+            .variables
+            .iter()
+            .filter_map(|variable| {
+                let start = variable.kind.as_integer()?.start?;
+                Some((variable.value_reference, u64::try_from(start).ok()?))
+            })
+            .collect();
+        let mut builder = Builder {
+            view: Self {
+                description: ModelDescription { variables: Vec::new(), ..own.clone() },
+                variables: Vec::new(),
+                by_reference: HashMap::new(),
+                base: 0,
+                cells: Vec::new(),
+                plain: true,
+                shadows: 0,
+            },
+            first_cell: HashMap::new(),
+            ranges: Vec::new(),
+        };
+        let extents: Vec<Vec<u64>> = own
+            .variables
+            .iter()
+            .map(|variable| extents(variable, &starts, sizes))
+            .collect::<Result<_, _>>()?;
+        let counts: Vec<usize> = extents.iter().map(|extents| count(extents)).collect();
+        let total = counts.iter().fold(0_usize, |sum, count| sum.saturating_add(*count));
+        if total > MOST_ELEMENTS.max(2 * own.variables.len()) {
+            return Err(format!(
+                "its arrays have {total} elements, expected at most {MOST_ELEMENTS}"
+            ));
+        }
+        builder.view.base = free_references(own, total);
+        for (position, variable) in own.variables.iter().enumerate() {
+            let resized = variable.dimensions.iter().any(
+                |dimension| matches!(dimension, Dimension::Variable(by) if sizes.contains_key(by)),
+            );
+            builder.add(own, (position, variable), &extents[position], resized);
+        }
+        builder.finish(own)
+    }
+
+    /// Returns variable and element of a value reference of [`ElementView::description`].
+    pub(super) fn locate(&self, reference: u32) -> Option<(usize, usize)> {
+        let virtual_position = reference.wrapping_sub(self.base) as usize;
+        match self.cells.get(virtual_position) {
+            Some(cell) => Some(*cell),
+            None => self.by_reference.get(&reference).map(|variable| (*variable, 0)),
+        }
+    }
+
+    /// Returns the name of a variable of the FMU.
+    pub(super) fn name(&self, reference: u32) -> String {
+        let known = self.description.variables.iter().find(|own| {
+            self.locate(own.value_reference)
+                .is_some_and(|(variable, _)| self.variables[variable].reference == reference)
+        });
+        known.map_or_else(|| format!("the variable {reference}"), |own| own.name.clone())
+    }
+}
+
+/// Returns the extents of a variable.
+fn extents(
+    variable: &ScalarVariable,
+    starts: &HashMap<u32, u64>,
+    sizes: &HashMap<u32, u64>,
+) -> Result<Vec<u64>, String> {
+    let extent = |dimension: &Dimension| match dimension {
+        Dimension::Fixed(extent) => Ok(*extent),
+        Dimension::Variable(by) => {
+            sizes.get(by).or_else(|| starts.get(by)).copied().ok_or_else(|| {
+                format!(
+                    "the dimension of {} is the variable with value reference {by}, expected a \
+                     constant or structural parameter with a start value",
+                    variable.name
+                )
+            })
+        }
+    };
+    variable.dimensions.iter().map(extent).collect()
+}
+
+/// Returns the number of elements.
+fn count(extents: &[u64]) -> usize {
+    let product = extents.iter().fold(1_u64, |product, extent| product.saturating_mul(*extent));
+    usize::try_from(product).unwrap_or(usize::MAX)
+}
+
+/// Returns the first of `count` consecutive value references that no variable has.
+fn free_references(own: &ModelDescription, count: usize) -> u32 {
+    let mut used: Vec<u32> =
+        own.variables.iter().map(|variable| variable.value_reference).collect();
+    used.sort_unstable();
+    used.dedup();
+    let count = u32::try_from(count).unwrap_or(u32::MAX);
+    // References above the largest one, else the first gap that is wide enough.
+    let largest = used.last().copied().unwrap_or(0);
+    if largest < u32::MAX - count {
+        return largest + 1;
+    }
+    let gap = used.windows(2).find(|pair| pair[1] - pair[0] > count);
+    gap.map_or(0, |pair| pair[0] + 1)
+}
+
+/// Returns the indices of element number `position`: `[1,2]`.
+fn indices(mut position: usize, extents: &[u64]) -> String {
+    let mut text = vec![String::new(); extents.len()];
+    for (index, extent) in text.iter_mut().zip(extents).rev() {
+        let extent = usize::try_from(*extent).unwrap_or(usize::MAX).max(1);
+        *index = (position % extent + 1).to_string();
+        position /= extent;
+    }
+    format!("[{}]", text.join(","))
+}
+
+/// Returns `kind` with the start value of one element.
+fn with_start(kind: &Kind, values: Option<&Elements>, position: usize) -> Kind {
+    let mut kind = kind.clone();
+    let real = || match values {
+        Some(Elements::Real(values)) => values.get(position).copied(),
+        _ => None,
+    };
+    let integer = || match values {
+        Some(Elements::Integer(values)) => values.get(position).copied(),
+        _ => None,
+    };
+    match &mut kind {
+        Kind::Real(own) | Kind::Float32(own) => own.start = real(),
+        Kind::Integer(own)
+        | Kind::Enumeration(own)
+        | Kind::Int8(own)
+        | Kind::UInt8(own)
+        | Kind::Int16(own)
+        | Kind::UInt16(own)
+        | Kind::UInt32(own)
+        | Kind::Int64(own)
+        | Kind::UInt64(own) => own.start = integer(),
+        Kind::Boolean(start) => {
+            *start = match values {
+                Some(Elements::Boolean(values)) => values.get(position).copied(),
+                _ => None,
+            }
+        }
+        Kind::String(start) => {
+            *start = match values {
+                Some(Elements::String(values)) => values.get(position).cloned(),
+                _ => None,
+            }
+        }
+        Kind::Binary(own) => {
+            own.start = match values {
+                Some(Elements::Binary(values)) => values.get(position).cloned(),
+                _ => None,
+            }
+        }
+        Kind::Clock(_) => {}
+    }
+    kind
+}
+
+struct Builder {
+    view: ElementView,
+    /// For each array, by value reference, its first cell.
+    first_cell: HashMap<u32, usize>,
+    /// For each variable of the FMU, the position and number of its elements in the new description.
+    ranges: Vec<(usize, usize)>,
+}
+
+impl Builder {
+    /// Adds the elements of a variable.
+    fn add(
+        &mut self,
+        own: &ModelDescription,
+        (position, variable): (usize, &ScalarVariable),
+        extents: &[u64],
+        resized: bool,
+    ) {
+        let size = count(extents);
+        self.add_native(own, variable, size);
+        let start = self.view.description.variables.len();
+        self.ranges.push((start, size));
+        debug_assert_eq!(self.ranges.len(), position + 1);
+        if variable.dimensions.is_empty() {
+            self.view.description.variables.push(variable.clone());
+            return;
+        }
+        let first = self.first_cell[&variable.value_reference];
+        let starts = if resized { None } else { variable.start_values(own, MOST_ELEMENTS) };
+        for element in 0..size {
+            let indices = indices(element, extents);
+            let reference = u32::try_from(first + element).unwrap_or(u32::MAX);
+            self.view.description.variables.push(ScalarVariable {
+                name: format!("{}{indices}", variable.name),
+                value_reference: self.view.base.wrapping_add(reference),
+                kind: with_start(&variable.kind, starts.as_ref(), element),
+                dimensions: Vec::new(),
+                start_elements: None,
+                alias_of: variable.alias_of.as_ref().map(|name| format!("{name}{indices}")),
+                ..variable.clone()
+            });
+        }
+    }
+
+    /// Adds a variable of the FMU unless it is an alias of a known one.
+    fn add_native(&mut self, own: &ModelDescription, variable: &ScalarVariable, size: usize) {
+        let view = &mut self.view;
+        if view.by_reference.contains_key(&variable.value_reference) {
+            return;
+        }
+        let number = view.variables.len();
+        view.by_reference.insert(variable.value_reference, number);
+        let is_array = !variable.dimensions.is_empty();
+        if is_array {
+            self.first_cell.insert(variable.value_reference, view.cells.len());
+            view.cells.extend((0..size).map(|element| (number, element)));
+        }
+        let kind = NativeType::of(&variable.kind);
+        view.plain &= kind != NativeType::Float32 && !(kind == NativeType::Float64 && is_array);
+        let event = !(variable.causality == Causality::Input
+            && variable.variability == Variability::Continuous);
+        let clocks = variable.clocks.iter().filter_map(|index| {
+            own.variables.get((*index as usize).checked_sub(1)?).map(|own| own.value_reference)
+        });
+        view.variables.push(Variable {
+            reference: variable.value_reference,
+            kind,
+            size,
+            event,
+            clocks: clocks.collect(),
+            shadow: view.shadows,
+        });
+        if event {
+            view.shadows += size;
+        }
+    }
+
+    /// Converts the indices between variables.
+    fn finish(mut self, own: &ModelDescription) -> Result<ElementView, String> {
+        let mut names = HashSet::new();
+        let variables = &self.view.description.variables;
+        if let Some(twice) = variables.iter().find(|variable| !names.insert(&variable.name)) {
+            return Err(format!("the element {} has the name of another variable", twice.name));
+        }
+        for (position, &(start, size)) in self.ranges.iter().enumerate() {
+            for element in 0..size {
+                let variable = &self.view.description.variables[start + element];
+                let moved = |index: u32| self.moved(index, element);
+                let (mut kind, previous) = (variable.kind.clone(), variable.previous);
+                if let Kind::Real(real) | Kind::Float32(real) = &mut kind {
+                    real.derivative = real.derivative.and_then(moved);
+                }
+                let previous = previous.and_then(moved);
+                let clocks = own.variables[position].clocks.iter();
+                let clocks = clocks.filter_map(|index| self.moved(*index, 0)).collect();
+                let variable = &mut self.view.description.variables[start + element];
+                (variable.kind, variable.previous, variable.clocks) = (kind, previous, clocks);
+            }
+        }
+        let structure = &own.structure;
+        let rows = |rows: &[Unknown]| self.rows(rows);
+        let (outputs, derivatives) = (rows(&structure.outputs), rows(&structure.derivatives));
+        let (initial_unknowns, clocked_states, event_indicators) = (
+            rows(&structure.initial_unknowns),
+            rows(&structure.clocked_states),
+            rows(&structure.event_indicators),
+        );
+        let new = &mut self.view.description.structure;
+        (new.outputs, new.derivatives) = (outputs, derivatives);
+        (new.initial_unknowns, new.clocked_states, new.event_indicators) =
+            (initial_unknowns, clocked_states, event_indicators);
+        Ok(self.view)
+    }
+
+    /// Returns the new 1-based index of an element of the variable with the 1-based index `index`.
+    fn moved(&self, index: u32, element: usize) -> Option<u32> {
+        let (start, size) = *self.ranges.get((index as usize).checked_sub(1)?)?;
+        if size == 0 {
+            return None;
+        }
+        // A scalar belongs to every element.
+        u32::try_from(start + element.min(size - 1) + 1).ok()
+    }
+
+    /// Returns the rows of all elements: each depends on all elements of the dependencies.
+    fn rows(&self, rows: &[Unknown]) -> Vec<Unknown> {
+        let mut all = Vec::new();
+        let mut left = MOST_DEPENDENCIES;
+        for row in rows {
+            let Some(&(start, size)) =
+                (row.index as usize).checked_sub(1).and_then(|index| self.ranges.get(index))
+            else {
+                continue;
+            };
+            let (mut dependencies, mut kinds) = (row.dependencies.clone(), row.kinds.clone());
+            if let Some(list) = &row.dependencies {
+                let range = |index: &u32| {
+                    let index = (*index as usize).checked_sub(1)?;
+                    self.ranges.get(index).copied()
+                };
+                let total: usize =
+                    list.iter().filter_map(range).map(|(_, count)| count).sum::<usize>() * size;
+                if total > left {
+                    (dependencies, kinds) = (None, None);
+                } else {
+                    left -= total;
+                    let mut of_all = Vec::new();
+                    let mut kinds_of_all = Vec::new();
+                    for (k, index) in list.iter().enumerate() {
+                        let Some((start, count)) = range(index) else { continue };
+                        for element in start..start + count {
+                            of_all.extend(u32::try_from(element + 1).ok());
+                            kinds_of_all.extend(row.kinds.as_ref().and_then(|kinds| kinds.get(k)));
+                        }
+                    }
+                    dependencies = Some(of_all);
+                    kinds = row.kinds.as_ref().map(|_| kinds_of_all);
+                }
+            }
+            for element in start..start + size {
+                all.extend(u32::try_from(element + 1).ok().map(|index| Unknown {
+                    index,
+                    dependencies: dependencies.clone(),
+                    kinds: kinds.clone(),
+                }));
+            }
+        }
+        all
+    }
+}

@@ -1,0 +1,154 @@
+//! How a list of value references becomes C calls: one for each type.
+
+use std::collections::HashMap;
+
+use super::buffer::Buffer;
+use super::elements::{ElementView, NativeType, Variable};
+
+/// Largest number of lists whose plans are kept.
+const KEPT: usize = 32;
+
+/// The calls for one list of value references.
+#[derive(Debug)]
+pub(super) struct Plan {
+    /// The list.
+    references: Vec<u32>,
+    pub(super) runs: Vec<Run>,
+}
+
+/// One call: variables of one type with the same clocks, all of which may or may not change outside of
+/// events.
+#[derive(Debug)]
+pub(super) struct Run {
+    pub(super) kind: NativeType,
+    /// Whether the variables may change in Event Mode only.
+    pub(super) event: bool,
+    /// Value references of the clocks of the variables.
+    pub(super) clocks: Vec<u32>,
+    /// Whether the buffer has values that wait for a tick of the clocks.
+    pub(super) deferred: bool,
+    /// Value references of whole variables, for the C function.
+    pub(super) references: Vec<u32>,
+    /// For each value: position in the list, position among the values of the call.
+    pub(super) places: Vec<(usize, usize)>,
+    /// For each value of the call, its position among the shadows.
+    pub(super) shadows: Vec<usize>,
+    /// Whether the list lacks elements of an array, which keep their values.
+    pub(super) partial: bool,
+    /// Whether the values of the call are the values of the list, in the same order.
+    pub(super) direct: bool,
+    pub(super) buffer: Buffer,
+}
+
+impl Plan {
+    /// Creates the plan for a list. On failure returns the reference that no variable has.
+    fn new(view: &ElementView, list: &[u32]) -> Result<Self, u32> {
+        let mut runs: Vec<Run> = Vec::new();
+        // For each variable its run and the place of its first element in the call.
+        let mut known: HashMap<usize, (usize, usize)> = HashMap::new();
+        for (position, &reference) in list.iter().enumerate() {
+            let (number, element) = view.locate(reference).ok_or(reference)?;
+            let (run, first) = match known.get(&number) {
+                Some(place) => *place,
+                None => {
+                    let run = run_for(&mut runs, &view.variables[number]);
+                    let first = runs[run].add(&view.variables[number]);
+                    known.insert(number, (run, first));
+                    (run, first)
+                }
+            };
+            runs[run].places.push((position, first + element));
+        }
+        for run in &mut runs {
+            let count = run.shadows.len();
+            run.buffer = Buffer::new(run.kind, count);
+            let mut given = vec![false; count];
+            run.places.iter().for_each(|(_, place)| given[*place] = true);
+            run.partial = given.contains(&false);
+        }
+        let single = runs.len() == 1;
+        for run in &mut runs {
+            run.direct = single
+                && !run.partial
+                && run.places.len() == run.shadows.len()
+                && run.places.iter().all(|(position, place)| position == place);
+        }
+        Ok(Self { references: list.to_vec(), runs })
+    }
+}
+
+/// Returns the position of the run that calls the function for `variable`, which may be a new one.
+fn run_for(runs: &mut Vec<Run>, variable: &Variable) -> usize {
+    let (kind, event, clocks) = (variable.kind, variable.event, &variable.clocks);
+    let same = |run: &Run| (run.kind, run.event, &run.clocks) == (kind, event, clocks);
+    runs.iter().position(same).unwrap_or_else(|| {
+        runs.push(Run {
+            kind,
+            event,
+            clocks: clocks.clone(),
+            deferred: false,
+            references: Vec::new(),
+            places: Vec::new(),
+            shadows: Vec::new(),
+            partial: false,
+            direct: false,
+            buffer: Buffer::Other,
+        });
+        runs.len() - 1
+    })
+}
+
+impl Run {
+    /// Adds a variable and returns the place of its first element.
+    fn add(&mut self, variable: &Variable) -> usize {
+        self.references.push(variable.reference);
+        let first = self.shadows.len();
+        self.shadows.extend(variable.shadow..variable.shadow + variable.size);
+        first
+    }
+}
+
+/// The plans of the lists used last.
+#[derive(Debug, Default)]
+pub(super) struct Plans {
+    kept: Vec<Plan>,
+    next: usize,
+}
+
+impl Plans {
+    /// Returns the position of the plan for a list. On failure returns the reference that no variable
+    /// has.
+    pub(super) fn find(&mut self, view: &ElementView, list: &[u32]) -> Result<usize, u32> {
+        if let Some(found) = self.kept.iter().position(|plan| plan.references == list) {
+            return Ok(found);
+        }
+        let plan = Plan::new(view, list)?;
+        if self.kept.len() < KEPT {
+            self.kept.push(plan);
+            return Ok(self.kept.len() - 1);
+        }
+        let place = self.next;
+        self.next = (self.next + 1) % KEPT;
+        self.kept[place] = plan;
+        Ok(place)
+    }
+
+    /// Returns the runs of a plan; [`Plans::put_back`] returns them.
+    pub(super) fn take(&mut self, plan: usize) -> Vec<Run> {
+        std::mem::take(&mut self.kept[plan].runs)
+    }
+
+    pub(super) fn put_back(&mut self, plan: usize, runs: Vec<Run>) {
+        self.kept[plan].runs = runs;
+    }
+
+    /// Iterates over the runs of all plans.
+    pub(super) fn all_runs(&mut self) -> impl Iterator<Item = &mut Run> {
+        self.kept.iter_mut().flat_map(|plan| &mut plan.runs)
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.kept.clear();
+        self.next = 0;
+    }
+}

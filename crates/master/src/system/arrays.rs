@@ -1,0 +1,233 @@
+//! Arrays: each element is a variable `name[1,2]`; connections and settings may name the whole array.
+
+use super::{Connection, Port, System};
+use crate::error::SystemError;
+use fmu_description::Causality;
+use slave::{Transformation, Value, ValueType};
+
+/// What a name stands for: a variable, or the elements of an array with their indices.
+enum Named {
+    One(Port),
+    Array(Vec<(String, Port)>),
+}
+
+impl Named {
+    /// Returns the size for a message.
+    fn size(&self) -> String {
+        match self {
+            Named::One(_) => "a scalar".to_owned(),
+            Named::Array(elements) => {
+                let last = elements.last().map_or("[0]", |(indices, _)| indices.as_str());
+                format!("an array of size {last}")
+            }
+        }
+    }
+}
+
+/// Whether `text` has the form of indices: `[1,2]`.
+fn is_indices(text: &str) -> bool {
+    text.strip_prefix('[').and_then(|rest| rest.strip_suffix(']')).is_some_and(|inner| {
+        inner.split(',').all(|index| !index.is_empty() && index.bytes().all(|b| b.is_ascii_digit()))
+    })
+}
+
+impl System {
+    /// Returns what a name `slave.variable` stands for.
+    fn named(&self, name: &str) -> Result<Named, SystemError> {
+        let error = match self.port(name) {
+            Ok(port) => return Ok(Named::One(port)),
+            Err(error) => error,
+        };
+        let splits = name.match_indices('.').rev();
+        let elements = splits.filter_map(|(at, _)| {
+            let slave = *self.names.get(&name[..at])?;
+            Some(self.elements(slave, &name[at + 1..])).filter(|elements| !elements.is_empty())
+        });
+        elements.map(Named::Array).next().ok_or(error)
+    }
+
+    /// Returns the elements of the array `variable`, with their indices, in the order of the description.
+    fn elements(&self, slave: usize, variable: &str) -> Vec<(String, Port)> {
+        let variables = self.slaves[slave].1.description().variables.iter().enumerate();
+        let element = |(position, own): (usize, &fmu_description::ScalarVariable)| {
+            let indices = own.name.strip_prefix(variable).filter(|rest| is_indices(rest))?;
+            Some((indices.to_owned(), Port { slave, variable: position }))
+        };
+        variables.filter_map(element).collect()
+    }
+
+    /// Returns the pairs of output and input that a connection from `from` to `to` consists of, both in
+    /// the form `slave.variable`: one pair for two scalars, one for each element of two arrays of equal
+    /// size.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if a variable does not exist or if the sizes differ.
+    pub fn pairs(&self, from: &str, to: &str) -> Result<Vec<(Port, Port)>, SystemError> {
+        let (source, target) = (self.named(from)?, self.named(to)?);
+        let pairs = match (&source, &target) {
+            (Named::One(source), Named::One(target)) => Some(vec![(*source, *target)]),
+            (Named::Array(sources), Named::Array(targets)) if sources.len() == targets.len() => {
+                let partner = |indices: &String| {
+                    let found = targets.iter().find(|(other, _)| other == indices);
+                    found.map(|(_, port)| *port)
+                };
+                let pair = |(position, (indices, port)): (usize, &(String, Port))| {
+                    // Usually both arrays have their elements in the same order.
+                    let same = targets[position].0 == *indices;
+                    Some((*port, if same { targets[position].1 } else { partner(indices)? }))
+                };
+                sources.iter().enumerate().map(pair).collect()
+            }
+            _ => None,
+        };
+        pairs.ok_or_else(|| SystemError::Size {
+            from: from.to_owned(),
+            from_size: source.size(),
+            to: to.to_owned(),
+            to_size: target.size(),
+        })
+    }
+
+    /// As [`System::pairs`], with the names of slaves and variables apart.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if a slave or a variable does not exist or if the sizes differ.
+    pub fn terminal_pairs(
+        &self,
+        from: (&str, &str),
+        to: (&str, &str),
+    ) -> Result<Vec<(Port, Port)>, SystemError> {
+        match (self.terminal(from.0, from.1), self.terminal(to.0, to.1)) {
+            (Ok(from), Ok(to)) => Ok(vec![(from, to)]),
+            (Err(error), _) | (_, Err(error)) => {
+                let name = |(slave, variable): (&str, &str)| format!("{slave}.{variable}");
+                let is_array = |(slave, variable): (&str, &str)| {
+                    let slave = self.names.get(slave);
+                    slave.is_some_and(|slave| !self.elements(*slave, variable).is_empty())
+                };
+                if is_array(from) || is_array(to) {
+                    self.pairs(&name(from), &name(to))
+                } else {
+                    Err(error)
+                }
+            }
+        }
+    }
+
+    /// Connects an output to an input, or the outputs to the inputs of two arrays of equal size; both in
+    /// the form `slave.variable`.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if a variable does not exist, if causality, type, unit or size do not fit, or if
+    /// an input already has a source.
+    pub fn connect(&mut self, from: &str, to: &str) -> Result<(), SystemError> {
+        for (from, to) in self.pairs(from, to)? {
+            self.connect_ports(from, to, Transformation::Identity, false)?;
+        }
+        Ok(())
+    }
+
+    /// Sets the variable called `name` to the value of `text`. The FMU receives it when the
+    /// simulation is initialised. A later setting of the same variable replaces it.
+    ///
+    /// A whole array gets one value for each element in row-major order, separated by blanks or commas,
+    /// or one value for all elements. A structural parameter is set at once, and arrays change their
+    /// sizes; set it before connections and settings of their elements.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the variable does not exist or if `text` is not a value of its type.
+    pub fn set(&mut self, name: &str, text: &str) -> Result<(), SystemError> {
+        let elements = match self.named(name)? {
+            Named::One(port) => return self.set_port(port, text),
+            Named::Array(elements) => elements,
+        };
+        let wrong = |expected: String| SystemError::Value {
+            name: name.to_owned(),
+            value: text.to_owned(),
+            expected,
+        };
+        let kind = ValueType::of(&self.variable(elements[0].1).kind);
+        if kind == ValueType::String {
+            return Err(wrong(format!(
+                "a setting for each element, such as {name}{}, as the elements are Strings",
+                elements[0].0
+            )));
+        }
+        let separator = |letter: char| letter.is_whitespace() || ",;[]".contains(letter);
+        let values: Vec<&str> = text.split(separator).filter(|value| !value.is_empty()).collect();
+        if values.len() != 1 && values.len() != elements.len() {
+            let count = elements.len();
+            return Err(wrong(format!("{count} values or one for all, found {}", values.len())));
+        }
+        for (position, (_, port)) in elements.into_iter().enumerate() {
+            self.set_port(port, values[position % values.len()])?;
+        }
+        Ok(())
+    }
+
+    /// Whether the variable called `name` is a structural parameter, which must be set before others.
+    #[must_use]
+    pub fn is_structural(&self, name: &str) -> bool {
+        let port = self.port(name);
+        port.is_ok_and(|port| self.variable(port).causality == Causality::StructuralParameter)
+    }
+
+    /// Sets a structural parameter now. Arrays of the slave change their sizes; ports move with their
+    /// names.
+    pub(super) fn configure(
+        &mut self,
+        port: Port,
+        value: &Value,
+        text: &str,
+    ) -> Result<(), SystemError> {
+        let number = match value {
+            Value::Integer(value) => *value,
+            Value::Boolean(value) => i64::from(*value),
+            _ => 0,
+        };
+        let name = self.name(port);
+        let description = self.slaves[port.slave].1.description();
+        let before: Vec<String> =
+            description.variables.iter().map(|variable| variable.name.clone()).collect();
+        let reference = self.variable(port).value_reference;
+        let slave = &mut self.slaves[port.slave].1;
+        slave.configure(&[reference], &[number]).map_err(|source| SystemError::Setting {
+            name,
+            value: text.to_owned(),
+            source,
+        })?;
+        let variables = slave.description().variables.iter().enumerate();
+        self.variables[port.slave] =
+            variables.map(|(k, variable)| (variable.name.clone(), k)).collect();
+        self.move_ports(port.slave, &before)
+    }
+
+    /// Replaces the ports of a slave, whose variables had the names `before`.
+    fn move_ports(&mut self, slave: usize, before: &[String]) -> Result<(), SystemError> {
+        let (names, variables) = (&self.slaves[slave].0, &self.variables[slave]);
+        let moved = |port: &mut Port| -> Result<(), SystemError> {
+            if port.slave != slave {
+                return Ok(());
+            }
+            let name = &before[port.variable];
+            port.variable = *variables
+                .get(name)
+                .ok_or_else(|| SystemError::Resized { name: format!("{names}.{name}") })?;
+            Ok(())
+        };
+        for Connection { from, to, .. } in self.connections.iter_mut().chain(&mut self.initial) {
+            moved(from)?;
+            moved(to)?;
+        }
+        for setting in &mut self.settings {
+            moved(&mut setting.port)?;
+        }
+        let connections = self.connections.iter().enumerate();
+        self.sources = connections.map(|(position, own)| (own.to, position)).collect();
+        Ok(())
+    }
+}
