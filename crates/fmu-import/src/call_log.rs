@@ -1,5 +1,7 @@
 //! The log of FMI calls: one line per call with instance, function, arguments, status and results.
 
+mod model_exchange;
+
 use std::fmt::{Debug, Write as _};
 use std::fs::File;
 use std::io::{self, Write as _};
@@ -9,7 +11,7 @@ use std::sync::{Arc, Mutex};
 use fmu_description::Experiment;
 use fmu_description::ModelDescription;
 
-use slave::{CallError, Slave, StepResult};
+use slave::{CallError, ModelExchange, Slave, StepResult};
 
 /// A log file of FMI calls.
 ///
@@ -34,8 +36,19 @@ impl CallLog {
     #[must_use]
     pub fn listen(&self, instance: &str, slave: Box<dyn Slave>) -> LoggedSlave {
         let logged = LoggedSlave { log: self.clone(), instance: instance.to_owned(), slave };
-        let guid = &logged.slave.description().guid;
-        logged.line(&format!("fmi2Instantiate({instance:?}, fmi2CoSimulation, {guid:?})"));
+        logged.created("fmi2CoSimulation");
+        logged
+    }
+
+    /// Wraps a model-exchange instance so that its calls are logged under the name `instance`.
+    #[must_use]
+    pub fn listen_to_equations(
+        &self,
+        instance: &str,
+        slave: Box<dyn ModelExchange>,
+    ) -> LoggedSlave<dyn ModelExchange> {
+        let logged = LoggedSlave { log: self.clone(), instance: instance.to_owned(), slave };
+        logged.created("fmi2ModelExchange");
         logged
     }
 
@@ -48,13 +61,18 @@ impl CallLog {
 }
 
 /// A slave whose calls go to a [`CallLog`].
-pub struct LoggedSlave {
+pub struct LoggedSlave<S: Slave + ?Sized = dyn Slave> {
     log: CallLog,
     instance: String,
-    slave: Box<dyn Slave>,
+    slave: Box<S>,
 }
 
-impl LoggedSlave {
+impl<S: Slave + ?Sized> LoggedSlave<S> {
+    fn created(&self, interface: &str) {
+        let (instance, guid) = (&self.instance, &self.slave.description().guid);
+        self.line(&format!("fmi2Instantiate({instance:?}, {interface}, {guid:?})"));
+    }
+
     fn line(&self, call: &str) {
         self.log.write(&format!("{} {call} -> fmi2OK\n", self.instance));
     }
@@ -63,7 +81,7 @@ impl LoggedSlave {
     fn call<T>(
         &mut self,
         (function, arguments): (&str, String),
-        call: impl FnOnce(&mut dyn Slave) -> Result<T, CallError>,
+        call: impl FnOnce(&mut S) -> Result<T, CallError>,
         results: impl FnOnce(&T) -> String,
     ) -> Result<T, CallError> {
         self.begin(function, &arguments);
@@ -92,10 +110,10 @@ impl LoggedSlave {
         function: &str,
         references: &[u32],
         values: &mut [T],
-        get: impl FnOnce(&mut dyn Slave, &mut [T]) -> Result<(), CallError>,
+        get: impl FnOnce(&mut S, &mut [T]) -> Result<(), CallError>,
     ) -> Result<(), CallError> {
         let arguments = format!("{references:?}");
-        let call = |slave: &mut dyn Slave| get(slave, values).map(|()| format!("{values:?}"));
+        let call = |slave: &mut S| get(slave, values).map(|()| format!("{values:?}"));
         self.call((function, arguments), call, |values| format!(" {values}")).map(|_| ())
     }
 
@@ -104,7 +122,7 @@ impl LoggedSlave {
         function: &str,
         references: &[u32],
         values: &[T],
-        set: impl FnOnce(&mut dyn Slave) -> Result<(), CallError>,
+        set: impl FnOnce(&mut S) -> Result<(), CallError>,
     ) -> Result<(), CallError> {
         self.plain(function, format!("{references:?}, {values:?}"), set)
     }
@@ -113,20 +131,20 @@ impl LoggedSlave {
         &mut self,
         function: &str,
         arguments: String,
-        call: impl FnOnce(&mut dyn Slave) -> Result<(), CallError>,
+        call: impl FnOnce(&mut S) -> Result<(), CallError>,
     ) -> Result<(), CallError> {
         self.call((function, arguments), call, |()| String::new())
     }
 }
 
-impl Drop for LoggedSlave {
+impl<S: Slave + ?Sized> Drop for LoggedSlave<S> {
     fn drop(&mut self) {
         // The instance is freed after this.
         self.log.write(&format!("{} fmi2FreeInstance()\n", self.instance));
     }
 }
 
-impl Slave for LoggedSlave {
+impl<S: Slave + ?Sized> Slave for LoggedSlave<S> {
     fn description(&self) -> &ModelDescription {
         self.slave.description()
     }
@@ -148,17 +166,17 @@ impl Slave for LoggedSlave {
             Some(stop) => write!(arguments, "stop time {stop:?}"),
             None => write!(arguments, "no stop time"),
         };
-        let call = |slave: &mut dyn Slave| slave.setup_experiment(experiment);
+        let call = |slave: &mut S| slave.setup_experiment(experiment);
         self.plain("fmi2SetupExperiment", arguments, call)
     }
 
     fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
-        let call = |slave: &mut dyn Slave| slave.enter_initialization_mode();
+        let call = |slave: &mut S| slave.enter_initialization_mode();
         self.plain("fmi2EnterInitializationMode", String::new(), call)
     }
 
     fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
-        let call = |slave: &mut dyn Slave| slave.exit_initialization_mode();
+        let call = |slave: &mut S| slave.exit_initialization_mode();
         self.plain("fmi2ExitInitializationMode", String::new(), call)
     }
 
@@ -233,7 +251,7 @@ impl Slave for LoggedSlave {
         values: &mut [f64],
     ) -> Result<(), CallError> {
         let arguments = format!("{references:?}, orders {orders:?}");
-        let call = |slave: &mut dyn Slave| {
+        let call = |slave: &mut S| {
             let done = slave.get_output_derivatives(references, orders, values);
             done.map(|()| format!(" {values:?}"))
         };
@@ -261,7 +279,7 @@ impl Slave for LoggedSlave {
         changes: &mut [f64],
     ) -> Result<(), CallError> {
         let arguments = format!("{unknowns:?}, {knowns:?}, {seed:?}");
-        let call = |slave: &mut dyn Slave| {
+        let call = |slave: &mut S| {
             let done = slave.directional_derivative(unknowns, knowns, seed, changes);
             done.map(|()| format!(" {changes:?}"))
         };
@@ -269,24 +287,24 @@ impl Slave for LoggedSlave {
     }
 
     fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
-        let call = |slave: &mut dyn Slave| slave.save_state(slot);
+        let call = |slave: &mut S| slave.save_state(slot);
         self.plain("fmi2GetFMUstate", format!("state {slot}"), call)
     }
 
     fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
-        let call = |slave: &mut dyn Slave| slave.restore_state(slot);
+        let call = |slave: &mut S| slave.restore_state(slot);
         self.plain("fmi2SetFMUstate", format!("state {slot}"), call)
     }
 
     fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
-        let call = |slave: &mut dyn Slave| slave.serialize_state();
+        let call = |slave: &mut S| slave.serialize_state();
         self.call(("fmi2SerializeFMUstate", String::new()), call, |bytes| {
             format!(" {} bytes", bytes.len())
         })
     }
 
     fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
-        let call = |slave: &mut dyn Slave| slave.deserialize_state(bytes);
+        let call = |slave: &mut S| slave.deserialize_state(bytes);
         self.plain("fmi2DeSerializeFMUstate", format!("{} bytes", bytes.len()), call)
     }
 }

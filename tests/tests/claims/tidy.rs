@@ -43,7 +43,7 @@ fn the_mathematics_depends_on_neither_fmi_nor_files() {
 }
 
 /// The folders of our libraries, each with the libraries that it may use.
-const ARROWS: [(&str, &[&str]); 15] = [
+const ARROWS: [(&str, &[&str]); 16] = [
     ("lapack", &[]),
     ("control", &["aso-lapack"]),
     ("fmu-description", &[]),
@@ -54,10 +54,23 @@ const ARROWS: [(&str, &[&str]); 15] = [
     ("ssp", &["fmu-description", "slave"]),
     ("results", &[]),
     ("solve", &[]),
+    ("integrate", &["fmu-description", "slave", "solve"]),
     ("master", &["fmu-description", "slave", "solve"]),
     ("files", &[]),
     ("figure", &["files"]),
-    ("study", &["files", "fmu-description", "fmu-import", "master", "results", "slave", "ssp"]),
+    (
+        "study",
+        &[
+            "files",
+            "fmu-description",
+            "fmu-import",
+            "integrate",
+            "master",
+            "results",
+            "slave",
+            "ssp",
+        ],
+    ),
     ("design", &["control", "figure", "files", "fmu-description", "fmu-import", "linearise"]),
 ];
 
