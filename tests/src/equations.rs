@@ -101,7 +101,8 @@ fn description() -> String {
         variable("bounces", BOUNCES, counter, integer),
     ];
     let unknowns = |indices: &[u32]| -> String {
-        indices.iter().map(|index| format!("<Unknown index=\"{index}\"/>\n")).collect()
+        let rows = indices.iter().map(|index| format!("<Unknown index=\"{index}\"/>\n"));
+        rows.collect::<Vec<_>>().concat()
     };
     let (outputs, derivatives) = (unknowns(&[2, 3, 4, 5, 16, 17, 18, 19]), unknowns(&[6, 7, 8, 9]));
     format!(

@@ -181,7 +181,7 @@ impl<S: Slave + ?Sized> Slave for LoggedSlave<S> {
     }
 
     fn terminate(&mut self) -> Result<(), CallError> {
-        self.plain("fmi2Terminate", String::new(), |slave| slave.terminate())
+        self.plain("fmi2Terminate", String::new(), S::terminate)
     }
 
     fn free(&mut self) -> Result<(), CallError> {

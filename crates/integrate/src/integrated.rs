@@ -201,34 +201,35 @@ impl Integrated {
         )
     }
 
-    fn failed(&self, what: String) -> CallError {
-        let failure = Failure::InvalidAnswer(what);
-        CallError { function: INTEGRATION, failure, messages: Vec::new() }
-    }
-
     /// Returns the error of a step that could not be made.
     fn stopped(&self, error: StepError) -> CallError {
         let (size, state, cause) = match error {
             StepError::Call(error) => return error,
             StepError::Size { size, state, cause } => (size, state, cause),
         };
-        let time = self.point.time;
-        let mut what =
-            format!("stops at t = {time} s: a step of {size:e} s is still too large, because ");
-        match cause {
-            Some(CallError { function, messages, .. }) => {
-                what.push_str(&format!("{function} returned {}", Status::Discard.name()));
-                let mut error = self.failed(what);
-                error.messages = messages;
-                return error;
-            }
-            None => what.push_str(&format!(
+        let (refused, messages) = match cause {
+            Some(CallError { function, messages, .. }) => (Some(function), messages),
+            None => (None, Vec::new()),
+        };
+        let why = match refused {
+            Some(function) => format!("{function} returned {}", Status::Discard.name()),
+            None => format!(
                 "{} is not within the tolerance {:e}; a larger tolerance or the solver `stiff` may \
                  help",
                 self.name_of_state(state),
                 self.tolerance
-            )),
-        }
-        self.failed(what)
+            ),
+        };
+        let time = self.point.time;
+        let what = format!(
+            "stops at t = {time} s: a step of {size:e} s is still too large, because {why}"
+        );
+        CallError { messages, ..failed(what) }
     }
+}
+
+/// Returns an error of the integration.
+fn failed(what: String) -> CallError {
+    let failure = Failure::InvalidAnswer(what);
+    CallError { function: INTEGRATION, failure, messages: Vec::new() }
 }

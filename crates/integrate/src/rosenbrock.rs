@@ -103,16 +103,16 @@ impl Rosenbrock {
     ) -> Result<(), E> {
         let n = start.len();
         self.argument.copy_from_slice(start);
-        for column in 0..n {
-            let change = f64::EPSILON.sqrt() * start[column].abs().max(typical(column));
-            self.argument[column] = start[column] + change;
-            let change = self.argument[column] - start[column];
+        for (column, &value) in start.iter().enumerate() {
+            let change = f64::EPSILON.sqrt() * value.abs().max(typical(column));
+            self.argument[column] = value + change;
+            let change = self.argument[column] - value;
             let quotients = &mut self.jacobian[column * n..(column + 1) * n];
             derivative(time, &self.argument, quotients)?;
             for (quotient, slope) in quotients.iter_mut().zip(slope) {
                 *quotient = (*quotient - slope) / change;
             }
-            self.argument[column] = start[column];
+            self.argument[column] = value;
         }
         // Within the step, because the time may not pass an event.
         let change = (f64::EPSILON * time.abs().max(1e-5)).sqrt().min(1e-3 * size);
@@ -210,6 +210,7 @@ mod tests {
     use std::convert::Infallible;
 
     /// A nonlinear equation that depends on time: y = exp(-1 / (t + 1)), z = y^2 + t.
+    #[expect(clippy::unnecessary_wraps, reason = "the signature of a right-hand side")]
     fn equations(t: f64, y: &[f64], slope: &mut [f64]) -> Result<(), Infallible> {
         let decay = (t + 1.0).powi(2);
         slope[0] = y[0] / decay;

@@ -30,15 +30,15 @@ impl ModelExchange for LoggedSlave<Equations> {
     }
 
     fn get_continuous_states(&mut self, states: &mut [f64]) -> Result<(), CallError> {
-        self.read("fmi2GetContinuousStates", states, |slave, to| slave.get_continuous_states(to))
+        self.read("fmi2GetContinuousStates", states, Equations::get_continuous_states)
     }
 
     fn get_derivatives(&mut self, derivatives: &mut [f64]) -> Result<(), CallError> {
-        self.read("fmi2GetDerivatives", derivatives, |slave, to| slave.get_derivatives(to))
+        self.read("fmi2GetDerivatives", derivatives, Equations::get_derivatives)
     }
 
     fn get_event_indicators(&mut self, indicators: &mut [f64]) -> Result<(), CallError> {
-        self.read("fmi2GetEventIndicators", indicators, |slave, to| slave.get_event_indicators(to))
+        self.read("fmi2GetEventIndicators", indicators, Equations::get_event_indicators)
     }
 
     fn get_nominals_of_continuous_states(&mut self, nominals: &mut [f64]) -> Result<(), CallError> {
@@ -58,7 +58,7 @@ impl ModelExchange for LoggedSlave<Equations> {
     }
 
     fn enter_event_mode(&mut self) -> Result<(), CallError> {
-        self.plain("fmi2EnterEventMode", String::new(), |slave| slave.enter_event_mode())
+        self.plain("fmi2EnterEventMode", String::new(), Equations::enter_event_mode)
     }
 
     fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {

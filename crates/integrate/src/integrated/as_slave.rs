@@ -3,7 +3,7 @@
 use fmu_description::{Experiment, ModelDescription};
 use slave::{CallError, Slave, StepResult};
 
-use super::{Integrated, Mode, TOLERANCE};
+use super::{Integrated, Mode, TOLERANCE, failed};
 
 /// Largest difference between the start of a step and the end of the last one, relative to the step.
 const GAP: f64 = 1e-6;
@@ -135,7 +135,7 @@ impl Slave for Integrated {
     fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError> {
         let at = self.point.time;
         if !(size >= 0.0 && (time - at).abs() <= GAP * size.max(f64::EPSILON * at.abs())) {
-            return Err(self.failed(format!(
+            return Err(failed(format!(
                 "cannot step from {time} s over {size} s: the last step ended at {at} s"
             )));
         }

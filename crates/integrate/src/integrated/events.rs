@@ -2,7 +2,7 @@
 
 use slave::{CallError, EventInfo};
 
-use super::{Integrated, Mode};
+use super::{Integrated, Mode, failed};
 
 /// The most iterations of one event.
 const ITERATIONS: usize = 1000;
@@ -23,7 +23,7 @@ impl Integrated {
         while info.discrete_states_need_update {
             if iterations == ITERATIONS {
                 let time = self.point.time;
-                return Err(self.failed(format!(
+                return Err(failed(format!(
                     "stops at t = {time} s: the discrete states of an event still change after \
                      {ITERATIONS} iterations"
                 )));
@@ -63,17 +63,17 @@ impl Integrated {
             return Ok(());
         }
         self.instance.get_event_indicators(&mut self.indicators)?;
-        self.check_indicators(self.point.time, &self.indicators)
+        check_indicators(self.point.time, &self.indicators)
     }
+}
 
-    /// Returns an error if an indicator has no sign.
-    pub(super) fn check_indicators(&self, time: f64, indicators: &[f64]) -> Result<(), CallError> {
-        match indicators.iter().position(|indicator| indicator.is_nan()) {
-            None => Ok(()),
-            Some(index) => {
-                Err(self
-                    .failed(format!("stops: event indicator {} is NaN at t = {time} s", index + 1)))
-            }
+/// Returns an error if an indicator has no sign.
+pub(super) fn check_indicators(time: f64, indicators: &[f64]) -> Result<(), CallError> {
+    match indicators.iter().position(|indicator| indicator.is_nan()) {
+        None => Ok(()),
+        Some(index) => {
+            let number = index + 1;
+            Err(failed(format!("stops: event indicator {number} is NaN at t = {time} s")))
         }
     }
 }

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use slave::CallError;
 
-use super::{Integrated, Point};
+use super::{Integrated, Point, failed};
 use crate::inputs::Track;
 
 /// The state of the integration.
@@ -49,20 +49,20 @@ impl Integrated {
         };
         let theirs = self.instance.serialize_state()?;
         postcard::to_allocvec(&(own, theirs))
-            .map_err(|error| self.failed(format!("cannot serialise its state: {error}")))
+            .map_err(|error| failed(format!("cannot serialise its state: {error}")))
     }
 
     pub(super) fn deserialize(&mut self, bytes: &[u8]) -> Result<(), CallError> {
         let read: Result<(Saved, Vec<u8>), _> = postcard::from_bytes(bytes);
         let (own, theirs) =
-            read.map_err(|error| self.failed(format!("cannot read a serialised state: {error}")))?;
+            read.map_err(|error| failed(format!("cannot read a serialised state: {error}")))?;
         let fits = own.point.is_some()
             && own.states.len() == self.states.len()
             && own.indicators.len() == self.indicators.len()
             && own.tracks.len() == self.inputs.tracks.len();
         if !fits {
             let what = "cannot read a serialised state: it is one of another FMU";
-            return Err(self.failed(what.to_owned()));
+            return Err(failed(what.to_owned()));
         }
         self.instance.deserialize_state(&theirs)?;
         let slot = self.saved.len();

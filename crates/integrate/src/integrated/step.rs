@@ -3,7 +3,8 @@
 use slave::{CallError, StepResult};
 use solve::Bracket;
 
-use super::{Integrated, Mode};
+use super::events::check_indicators;
+use super::{Integrated, Mode, failed};
 
 /// The most events in one communication step.
 const EVENTS: u32 = 100_000;
@@ -60,7 +61,7 @@ impl Integrated {
                 events += 1;
                 if events > EVENTS {
                     let time = self.point.time;
-                    return Err(self.failed(format!(
+                    return Err(failed(format!(
                         "stops at t = {time} s after {EVENTS} events since t = {start} s"
                     )));
                 }
@@ -92,7 +93,7 @@ impl Integrated {
             return Ok(false);
         }
         self.instance.get_event_indicators(&mut self.search.between)?;
-        self.check_indicators(self.point.time, &self.search.between)?;
+        check_indicators(self.point.time, &self.search.between)?;
         Ok(changed(&self.indicators, &self.search.between).is_some())
     }
 
@@ -148,7 +149,7 @@ impl Integrated {
             self.instance.set_continuous_states(&self.search.states)?;
         }
         self.instance.get_event_indicators(&mut self.search.between)?;
-        self.check_indicators(time, &self.search.between)
+        check_indicators(time, &self.search.between)
     }
 
     /// Returns the time just after the first state event in the step from `start` to `end`, with the
