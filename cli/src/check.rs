@@ -118,7 +118,8 @@ fn without_trial(options: &Options, unpacked: &Unpacked) -> Option<TrialResult> 
         return Some(TrialResult::NotTried { reason: "--no-run".to_owned() });
     }
     let Some(simulation) = &unpacked.description.co_simulation else {
-        return Some(TrialResult::No { reason: "it is for model exchange only".to_owned() });
+        let reason = "it is for model exchange only; `aso-ftc run` integrates it";
+        return Some(TrialResult::NotTried { reason: reason.to_owned() });
     };
     if simulation.needs_execution_tool {
         let tool = unpacked.description.generation_tool.as_deref().unwrap_or("the exporting tool");

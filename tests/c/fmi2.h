@@ -1,4 +1,4 @@
-/* The types of FMI 2.0.5, sections 2.1 and 4.2, that a co-simulation slave needs. */
+/* The types of FMI 2.0.5, sections 2.1, 3.2 and 4.2, that the FMUs of the tests need. */
 #ifndef FMI2_H
 #define FMI2_H
 
@@ -29,5 +29,14 @@ typedef struct {
     void (*stepFinished)(void *environment, fmi2Status status);
     void *componentEnvironment;
 } fmi2CallbackFunctions;
+
+typedef struct {
+    fmi2Boolean newDiscreteStatesNeeded;
+    fmi2Boolean terminateSimulation;
+    fmi2Boolean nominalsOfContinuousStatesChanged;
+    fmi2Boolean valuesOfContinuousStatesChanged;
+    fmi2Boolean nextEventTimeDefined;
+    fmi2Real nextEventTime;
+} fmi2EventInfo;
 
 #endif

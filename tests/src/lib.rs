@@ -4,6 +4,7 @@
 
 pub mod c_fmu;
 pub mod coupled;
+pub mod equations;
 #[cfg(feature = "fmi")]
 pub mod fmi_crate;
 pub mod isolated;

@@ -6,7 +6,7 @@ use anyhow::{Context, bail};
 use master::{AlgorithmRequest, Coupling, Extrapolation, Method, StepControl};
 use toml::Spanned;
 
-use study::{Config, ConnectionEntry, Every, LoadedConfig, Memory, SavedRun};
+use study::{Config, ConnectionEntry, Every, Interface, LoadedConfig, Memory, SavedRun, Solver};
 
 /// Default folder of the results.
 const OUT: &str = "results/run";
@@ -75,6 +75,14 @@ pub(crate) struct Options {
     /// The FMU called controller [default: dist/AsoController.fmu]
     #[arg(long, value_name = "FMU", conflicts_with = "resume")]
     controller: Option<PathBuf>,
+    /// Use this interface of an FMU that offers both, co-simulation [default] or model-exchange; may be
+    /// repeated
+    #[arg(long = "interface", value_name = "FMU=INTERFACE", value_parser = interface)]
+    interfaces: Vec<(String, Interface)>,
+    /// Integrate a model-exchange FMU by this method: automatic [default], explicit or stiff; may be
+    /// repeated
+    #[arg(long = "solver", value_name = "FMU=METHOD", value_parser = solver)]
+    solvers: Vec<(String, Solver)>,
     /// Connect an output to an input, for example `plant.y=controller.y`; may be repeated. Without
     /// this, FMUs given here are connected where names are equal, and those given without `--fmu`
     /// also where one free output and one free input have the same unit
@@ -90,7 +98,8 @@ pub(crate) struct Options {
     /// after the start]
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     stop_time: Option<f64>,
-    /// Relative tolerance for the solvers inside the FMUs [default: from the default experiment of
+    /// Relative tolerance for the solvers inside the FMUs and for the integration of model-exchange
+    /// FMUs [default: from the default experiment of
     /// each FMU]; the tolerance of the coupling is --relative-tolerance
     #[arg(long, value_name = "FRACTION", allow_negative_numbers = true)]
     tolerance: Option<f64>,
@@ -189,6 +198,16 @@ fn multiple(text: &str) -> Result<(String, u32), String> {
         Ok(count) if count > 0 => Ok((name, count)),
         _ => Err(format!("expected a whole number above 0, found {value:?}")),
     }
+}
+
+fn interface(text: &str) -> Result<(String, Interface), String> {
+    let (name, value) = setting(text)?;
+    value.parse().map(|interface| (name, interface))
+}
+
+fn solver(text: &str) -> Result<(String, Solver), String> {
+    let (name, value) = setting(text)?;
+    value.parse().map(|solver| (name, solver))
 }
 
 fn method(text: &str) -> Result<Method, String> {
@@ -297,6 +316,12 @@ impl Options {
     fn put_system(&self, config: &mut Config) -> anyhow::Result<()> {
         for (name, path) in &self.fmus {
             config.fmus.put(name.clone(), path.into());
+        }
+        for (name, interface) in &self.interfaces {
+            config.interface.put(name.clone(), *interface);
+        }
+        for (name, solver) in &self.solvers {
+            config.solver.put(name.clone(), *solver);
         }
         for (position, (from, to)) in self.connections.iter().enumerate() {
             let earlier = &self.connections[..position];

@@ -1,5 +1,7 @@
 //! The log of FMI calls: one line per call with instance, function, arguments, status and results.
 
+mod model_exchange;
+
 use std::fmt::{Debug, Write as _};
 use std::fs::File;
 use std::io::{self, Write as _};
@@ -9,7 +11,7 @@ use std::sync::{Arc, Mutex};
 use fmu_description::Experiment;
 use fmu_description::{ModelDescription, Version};
 
-use slave::{CallError, Slave, StepResult};
+use slave::{CallError, ModelExchange, Slave, StepResult};
 
 /// A log file of FMI calls.
 ///
@@ -46,13 +48,29 @@ impl CallLog {
         let version = slave.description().version();
         let (log, instance) = (self.clone(), instance.to_owned());
         let logged = LoggedSlave { log, instance, slave, direct, version };
-        let guid = &logged.slave.description().guid;
-        let call = match version {
-            Version::V1 => format!("fmiInstantiateSlave({:?}, {guid:?})", logged.instance),
-            Version::V2 => format!("fmi2Instantiate({:?}, fmi2CoSimulation, {guid:?})", logged.instance),
-            Version::V3 => format!("fmi3InstantiateCoSimulation({:?}, {guid:?})", logged.instance),
-        };
-        logged.log.write(&format!("{} {call} -> {}OK\n", logged.instance, logged.prefix()));
+        logged.created(match version {
+            Version::V1 => ("fmiInstantiateSlave", ""),
+            Version::V2 => ("fmi2Instantiate", "fmi2CoSimulation, "),
+            Version::V3 => ("fmi3InstantiateCoSimulation", ""),
+        });
+        logged
+    }
+
+    /// Wraps a model-exchange instance so that its calls are logged under the name `instance`.
+    #[must_use]
+    pub fn listen_to_equations(
+        &self,
+        instance: &str,
+        slave: Box<dyn ModelExchange>,
+    ) -> LoggedSlave<dyn ModelExchange> {
+        let version = slave.description().version();
+        let (log, instance) = (self.clone(), instance.to_owned());
+        let logged = LoggedSlave { log, instance, slave, direct: false, version };
+        logged.created(match version {
+            Version::V1 => ("fmiInstantiateModel", ""),
+            Version::V2 => ("fmi2Instantiate", "fmi2ModelExchange, "),
+            Version::V3 => ("fmi3InstantiateModelExchange", ""),
+        });
         logged
     }
 
@@ -65,10 +83,10 @@ impl CallLog {
 }
 
 /// A slave whose calls go to a [`CallLog`].
-pub struct LoggedSlave {
+pub struct LoggedSlave<S: Slave + ?Sized = dyn Slave> {
     log: CallLog,
     instance: String,
-    slave: Box<dyn Slave>,
+    slave: Box<S>,
     /// Whether the slave logs its C calls itself.
     direct: bool,
     version: Version,
@@ -87,7 +105,14 @@ const NAMES: [(&str, &str, &str); 9] = [
     ("fmi2EnterInitializationMode", "fmi3EnterInitializationMode", "fmiInitializeSlave"),
 ];
 
-impl LoggedSlave {
+impl<S: Slave + ?Sized> LoggedSlave<S> {
+    /// Logs that `function` has created the instance of this `kind`.
+    fn created(&self, (function, kind): (&str, &str)) {
+        let (instance, guid) = (&self.instance, &self.slave.description().guid);
+        let prefix = self.prefix();
+        self.log.write(&format!("{instance} {function}({instance:?}, {kind}{guid:?}) -> {prefix}OK\n"));
+    }
+
     /// Returns the prefix of functions and statuses in the version of the FMU.
     fn prefix(&self) -> &'static str {
         match self.version {
@@ -118,7 +143,7 @@ impl LoggedSlave {
     fn call<T>(
         &mut self,
         (function, arguments): (&str, String),
-        call: impl FnOnce(&mut dyn Slave) -> Result<T, CallError>,
+        call: impl FnOnce(&mut S) -> Result<T, CallError>,
         results: impl FnOnce(&T) -> String,
     ) -> Result<T, CallError> {
         self.begin(function, &arguments);
@@ -148,10 +173,10 @@ impl LoggedSlave {
         function: &str,
         references: &[u32],
         values: &mut [T],
-        get: impl FnOnce(&mut dyn Slave, &mut [T]) -> Result<(), CallError>,
+        get: impl FnOnce(&mut S, &mut [T]) -> Result<(), CallError>,
     ) -> Result<(), CallError> {
         let arguments = format!("{references:?}");
-        let call = |slave: &mut dyn Slave| get(slave, values).map(|()| format!("{values:?}"));
+        let call = |slave: &mut S| get(slave, values).map(|()| format!("{values:?}"));
         self.call((function, arguments), call, |values| format!(" {values}")).map(|_| ())
     }
 
@@ -160,7 +185,7 @@ impl LoggedSlave {
         function: &str,
         references: &[u32],
         values: &[T],
-        set: impl FnOnce(&mut dyn Slave) -> Result<(), CallError>,
+        set: impl FnOnce(&mut S) -> Result<(), CallError>,
     ) -> Result<(), CallError> {
         self.plain(function, format!("{references:?}, {values:?}"), set)
     }
@@ -169,13 +194,13 @@ impl LoggedSlave {
         &mut self,
         function: &str,
         arguments: String,
-        call: impl FnOnce(&mut dyn Slave) -> Result<(), CallError>,
+        call: impl FnOnce(&mut S) -> Result<(), CallError>,
     ) -> Result<(), CallError> {
         self.call((function, arguments), call, |()| String::new())
     }
 }
 
-impl Drop for LoggedSlave {
+impl<S: Slave + ?Sized> Drop for LoggedSlave<S> {
     fn drop(&mut self) {
         // The instance is freed after this.
         let function = match self.version {
@@ -187,7 +212,7 @@ impl Drop for LoggedSlave {
     }
 }
 
-impl Slave for LoggedSlave {
+impl<S: Slave + ?Sized> Slave for LoggedSlave<S> {
     fn description(&self) -> &ModelDescription {
         self.slave.description()
     }
@@ -198,7 +223,7 @@ impl Slave for LoggedSlave {
 
     fn configure(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
         let arguments = format!("{references:?}, {values:?}");
-        let call = |slave: &mut dyn Slave| slave.configure(references, values);
+        let call = |slave: &mut S| slave.configure(references, values);
         self.plain("fmi3EnterConfigurationMode", arguments, call)
     }
 
@@ -229,22 +254,22 @@ impl Slave for LoggedSlave {
             Some(stop) => write!(arguments, "stop time {stop:?}"),
             None => write!(arguments, "no stop time"),
         };
-        let call = |slave: &mut dyn Slave| slave.setup_experiment(experiment);
+        let call = |slave: &mut S| slave.setup_experiment(experiment);
         self.plain("fmi2SetupExperiment", arguments, call)
     }
 
     fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
-        let call = |slave: &mut dyn Slave| slave.enter_initialization_mode();
+        let call = |slave: &mut S| slave.enter_initialization_mode();
         self.plain("fmi2EnterInitializationMode", String::new(), call)
     }
 
     fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
-        let call = |slave: &mut dyn Slave| slave.exit_initialization_mode();
+        let call = |slave: &mut S| slave.exit_initialization_mode();
         self.plain("fmi2ExitInitializationMode", String::new(), call)
     }
 
     fn terminate(&mut self) -> Result<(), CallError> {
-        self.plain("fmi2Terminate", String::new(), |slave| slave.terminate())
+        self.plain("fmi2Terminate", String::new(), S::terminate)
     }
 
     fn free(&mut self) -> Result<(), CallError> {
@@ -314,7 +339,7 @@ impl Slave for LoggedSlave {
         values: &mut [f64],
     ) -> Result<(), CallError> {
         let arguments = format!("{references:?}, orders {orders:?}");
-        let call = |slave: &mut dyn Slave| {
+        let call = |slave: &mut S| {
             let done = slave.get_output_derivatives(references, orders, values);
             done.map(|()| format!(" {values:?}"))
         };
@@ -342,7 +367,7 @@ impl Slave for LoggedSlave {
         changes: &mut [f64],
     ) -> Result<(), CallError> {
         let arguments = format!("{unknowns:?}, {knowns:?}, {seed:?}");
-        let call = |slave: &mut dyn Slave| {
+        let call = |slave: &mut S| {
             let done = slave.directional_derivative(unknowns, knowns, seed, changes);
             done.map(|()| format!(" {changes:?}"))
         };
@@ -350,24 +375,24 @@ impl Slave for LoggedSlave {
     }
 
     fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
-        let call = |slave: &mut dyn Slave| slave.save_state(slot);
+        let call = |slave: &mut S| slave.save_state(slot);
         self.plain("fmi2GetFMUstate", format!("state {slot}"), call)
     }
 
     fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
-        let call = |slave: &mut dyn Slave| slave.restore_state(slot);
+        let call = |slave: &mut S| slave.restore_state(slot);
         self.plain("fmi2SetFMUstate", format!("state {slot}"), call)
     }
 
     fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
-        let call = |slave: &mut dyn Slave| slave.serialize_state();
+        let call = |slave: &mut S| slave.serialize_state();
         self.call(("fmi2SerializeFMUstate", String::new()), call, |bytes| {
             format!(" {} bytes", bytes.len())
         })
     }
 
     fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
-        let call = |slave: &mut dyn Slave| slave.deserialize_state(bytes);
+        let call = |slave: &mut S| slave.deserialize_state(bytes);
         self.plain("fmi2DeSerializeFMUstate", format!("{} bytes", bytes.len()), call)
     }
 }

@@ -1,5 +1,7 @@
 //! An opened FMU archive, which creates instances.
 
+mod model_exchange;
+
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -119,20 +121,16 @@ impl Fmu {
         Ok(fmu)
     }
 
-    /// Opens an FMU like [`Fmu::open`], but does not log warnings about the archive and the
+    /// Opens an FMU like [`Fmu::open_any`], but does not log warnings about the archive and the
     /// description.
     ///
     /// # Errors
     ///
-    /// Same as [`Fmu::open`].
+    /// Same as [`Fmu::open_any`].
     pub fn open_quietly(path: &Path) -> Result<Self, FmuError> {
         let unpacked =
             if path.is_dir() { Unpacked::in_folder(path)? } else { Unpacked::open(path)? };
-        let fmu = Self::load(path, unpacked)?;
-        if fmu.content.library.is_none() {
-            return Err(FmuError::NoCoSimulation { path: path.to_owned() });
-        }
-        Ok(fmu)
+        Self::load(path, unpacked)
     }
 
     /// Opens an FMU like [`Fmu::open`], but also accepts one that offers model exchange only.

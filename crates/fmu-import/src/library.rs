@@ -196,6 +196,10 @@ impl Library {
         resources: &str,
         names: Names,
     ) -> Result<Component, LoadError> {
+        let functions = match interface {
+            Interface::CoSimulation => self.functions,
+            Interface::ModelExchange => self.functions.without_co_simulation(),
+        };
         let place = Place::new(name);
         let sink = Sink::new(&place, Some(names));
         let callbacks = callbacks(&sink);
@@ -218,14 +222,14 @@ impl Library {
         let component = Component {
             hot: Hot {
                 pointer,
-                set_real: self.functions.set_real,
-                do_step: self.functions.do_step,
-                get_real: self.functions.get_real,
+                set_real: functions.set_real,
+                do_step: functions.do_step,
+                get_real: functions.get_real,
                 place: place.slot(),
             },
             place,
             pointer,
-            functions: self.functions,
+            functions,
             sink,
             saved: Vec::new(),
             time_limit: None,

@@ -4,6 +4,7 @@
 //! process, a test double. `fmu-import` implements it for FMUs; `master` couples slaves.
 #![forbid(unsafe_code)]
 
+mod model_exchange;
 mod transformation;
 mod value;
 
@@ -12,6 +13,7 @@ use std::fmt;
 use fmu_description::Experiment;
 use fmu_description::ModelDescription;
 pub use fmu_description::abi::Status;
+pub use model_exchange::{CompletedStep, EventInfo, ModelExchange};
 pub use transformation::Transformation;
 pub use value::{Value, ValueType, from_hex, mapped_integer, to_hex, to_real};
 

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// LU factorisation `P M = L U` of a square matrix, by Gaussian elimination with row pivoting (Golub
 /// and Van Loan 2013, algorithm 3.4.1). `2/3 n^3` operations; no allocation after construction.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub(super) struct Factors {
+pub struct Factors {
     n: usize,
     /// L below the diagonal, U on and above it, column by column.
     entries: Vec<f64>,
@@ -14,18 +14,17 @@ pub(super) struct Factors {
 }
 
 impl Factors {
-    pub(super) fn new(n: usize) -> Self {
+    /// Creates the memory for matrices of `n` rows.
+    #[must_use]
+    pub fn new(n: usize) -> Self {
         Self { n, entries: vec![0.0; n * n], pivots: vec![0; n], unit: vec![0.0; n] }
     }
 
     /// Factorises `matrix` (column by column) and returns `|M^-1|_1`, infinite if a pivot is zero or not
     /// finite.
     pub(super) fn factor(&mut self, matrix: &[f64]) -> f64 {
-        self.entries.copy_from_slice(matrix);
-        for column in 0..self.n {
-            if !self.eliminate(column) {
-                return f64::INFINITY;
-            }
+        if !self.decompose(matrix) {
+            return f64::INFINITY;
         }
         let mut inverse = 0.0_f64;
         let mut unit = std::mem::take(&mut self.unit);
@@ -38,6 +37,12 @@ impl Factors {
         }
         self.unit = unit;
         inverse
+    }
+
+    /// Factorises `matrix` (column by column); returns false if a pivot is zero or not finite.
+    pub fn decompose(&mut self, matrix: &[f64]) -> bool {
+        self.entries.copy_from_slice(matrix);
+        (0..self.n).all(|column| self.eliminate(column))
     }
 
     fn eliminate(&mut self, column: usize) -> bool {
@@ -69,8 +74,8 @@ impl Factors {
         true
     }
 
-    /// Replaces `vector` by `M^-1 vector`.
-    pub(super) fn solve(&self, vector: &mut [f64]) {
+    /// Replaces `vector` by `M^-1 vector`, after [`Factors::decompose`] returned true.
+    pub fn solve(&self, vector: &mut [f64]) {
         let n = self.n;
         for (row, &pivot) in self.pivots.iter().enumerate() {
             vector.swap(row, pivot);

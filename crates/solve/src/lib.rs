@@ -40,6 +40,7 @@ mod tests;
 
 pub use anderson::Anderson;
 pub use control::{Bond, EnergyControl, ErrorControl, ForwardControl, SizeBounds, Verdict};
+pub use dense::Factors;
 pub use graph::{Components, components};
 pub use newton::Newton;
 pub use quasi_newton::QuasiNewton;

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::function::Function;
+use crate::structure::Implementation;
 use slave::Transformation;
 
 /// A coupled system: FMUs with settings, functions, connections, start and stop time.
@@ -33,6 +34,8 @@ pub struct Element {
     pub shown: Option<PathBuf>,
     /// Values set before the initialization, in this order; later values override earlier ones.
     pub settings: Vec<Setting>,
+    /// The interface of the FMU to use, as stated in a system structure.
+    pub implementation: Implementation,
 }
 
 impl Element {

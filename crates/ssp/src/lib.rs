@@ -112,6 +112,7 @@ pub fn open_variant(path: &Path, variant: Option<&str>) -> Result<Opened, SspErr
             fmu: tree.fmus[fmu].folder().to_owned(),
             shown: Some(tree.shown[fmu].clone()),
             settings: settings.remove(&index).unwrap_or_default(),
+            implementation: node.implementation,
         });
         steps.extend(node.step_size.map(|size| (node.path.clone(), size)));
     }

@@ -88,6 +88,7 @@ impl Loader {
             connections: Vec::new(),
             bindings: Vec::new(),
             step_size: None,
+            implementation: Implementation::Any,
             content: Content::System,
         });
         Ok(self.tree.nodes.len() - 1)
@@ -182,18 +183,38 @@ impl Loader {
         let index = self.files.fmu(target)?;
         let fmu = &self.files.fmus[index];
         check_runnable(fmu).map_err(|why| here(&format!("{}: {why}", target.shown.display())))?;
-        let stated = component.implementation;
-        if matches!(stated, Implementation::ModelExchange | Implementation::ScheduledExecution) {
-            let sentence = "the system structure asks for another implementation than \
-                 co-simulation, which is all that can be run: its co-simulation is taken";
-            self.files.warnings.push(here(sentence).to_string());
-        }
+        let (stated, description) = (component.implementation, &fmu.description);
+        let missing = match stated {
+            Implementation::Any => None,
+            Implementation::CoSimulation => {
+                description.co_simulation.is_none().then_some("co-simulation")
+            }
+            Implementation::ModelExchange => {
+                description.model_exchange.is_none().then_some("model exchange")
+            }
+            Implementation::ScheduledExecution => Some("scheduled execution"),
+        };
+        let implementation = if let Some(missing) = missing {
+            let other = if description.co_simulation.is_some() {
+                "its co-simulation is used"
+            } else {
+                "its model exchange is used"
+            };
+            let sentence = format!(
+                "the system structure asks for {missing}, which cannot be run with this FMU: {other}"
+            );
+            self.files.warnings.push(here(&sentence).to_string());
+            Implementation::Any
+        } else {
+            stated
+        };
         let inside = Base::archive(self.files.fmus[index].folder(), &target.shown);
         let node = self.add(&component.base, place, file)?;
         let bindings = self.bindings(&component.base.bindings, file, Some(&inside))?;
         let added = &mut self.tree.nodes[node];
         added.content = Content::Fmu(index);
         (added.bindings, added.step_size) = (bindings, component.step_size);
+        added.implementation = implementation;
         Ok(node)
     }
 
@@ -278,12 +299,16 @@ impl Loader {
 
 /// Returns an error sentence if the FMU cannot run here, before its library is loaded.
 pub(super) fn check_runnable(fmu: &Unpacked) -> Result<(), String> {
-    let Some(flags) = &fmu.description.co_simulation else {
+    let description = &fmu.description;
+    let simulation = description.co_simulation.as_ref().map(|flags| &flags.model_identifier);
+    let exchange = description.model_exchange.as_ref().map(|flags| &flags.model_identifier);
+    let Some(identifier) = simulation.or(exchange) else {
         return Err(
-            "the FMU offers model exchange only, and only co-simulation can be run".to_owned()
+            "the FMU lacks an interface, expected the element CoSimulation or ModelExchange"
+                .to_owned(),
         );
     };
-    fmu.library(&flags.model_identifier).map(|_| ()).map_err(|error| error.to_string())
+    fmu.library(identifier).map(|_| ()).map_err(|error| error.to_string())
 }
 
 /// Returns the system with the identifier `id` at any depth.

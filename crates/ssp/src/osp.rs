@@ -12,7 +12,7 @@ use super::error::{SspError, semantic_error};
 use super::load::check_runnable;
 use super::load::files::{Files, Finished};
 use super::source::{Base, Target};
-use super::structure::DefaultExperiment;
+use super::structure::{DefaultExperiment, Implementation};
 use super::{Folders, Opened};
 use crate::assembly::{Assembly, Element, Link, Terminal};
 use document::{Connection, Document, End, Kind, Simulator};
@@ -110,6 +110,7 @@ impl Loader {
             fmu: fmu.folder().to_owned(),
             shown: Some(shown),
             settings: simulator.settings.clone(),
+            implementation: Implementation::Any,
         });
         let model = fmu.description.model_name.clone();
         let groups = self.groups(&target, &model)?;

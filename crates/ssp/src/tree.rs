@@ -10,7 +10,8 @@ use fmu_description::{ModelDescription, Position, ScalarVariable};
 use super::conversion::Measure;
 use super::source::Base;
 use super::structure::{
-    Connection, Connector, Definitions, ParameterMapping, ParameterSet, SystemStructure,
+    Connection, Connector, Definitions, Implementation, ParameterMapping, ParameterSet,
+    SystemStructure,
 };
 
 /// All elements of all files. The root system is first; every system precedes its elements.
@@ -47,6 +48,8 @@ pub(super) struct Node {
     pub(super) bindings: Vec<Binding>,
     /// Step in s that an annotation proposes.
     pub(super) step_size: Option<f64>,
+    /// `implementation`, if the FMU offers this interface.
+    pub(super) implementation: Implementation,
     pub(super) content: Content,
 }
 

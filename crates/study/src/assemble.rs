@@ -1,18 +1,18 @@
 //! Builds a system of connected FMUs from a configuration.
 
 use crate::error::Error;
-use std::collections::{HashMap, HashSet};
-use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::collections::HashSet;
+use std::path::Path;
 
-use fmu_import::{CallLog, Fmu, Instance, isolate};
+use fmu_import::CallLog;
+use master::System;
 use master::Transformation;
-use master::{CallError, Failure, Slave, System};
 use ssp::structure::DefaultExperiment;
 use ssp::{self, Folders, Opened};
 use ssp::{Element, Link, Terminal};
 
-use crate::config::{Config, ConnectionEntry, LoadedConfig};
+use crate::config::{ConnectionEntry, LoadedConfig, Solver};
+use crate::instances::instantiate;
 use crate::link::link as link_ports;
 
 /// A connected system before initialisation.
@@ -27,6 +27,8 @@ pub struct AssembledSystem {
     pub fixed_step: bool,
     /// The folders to which an SSP was unpacked; keep them as long as the system.
     pub folders: Option<Folders>,
+    /// FMUs by name that are integrated through their model-exchange interface, with the method.
+    pub integrated: Vec<(String, Solver)>,
 }
 
 /// Options of [`assemble`] that are not part of the configuration.
@@ -72,7 +74,7 @@ pub fn assemble(
             "the system has no FMU, expected `system` or an entry of [fmus]".to_owned(),
         ));
     }
-    let mut system = instantiate(&assembly.elements, config, options)?;
+    let (mut system, integrated) = instantiate(&assembly.elements, config, options)?;
     for (name, function) in &assembly.functions {
         system.add(name, Box::new(function.slave()))?;
     }
@@ -80,7 +82,7 @@ pub fn assemble(
     apply_settings(&mut system, loaded, &assembly.elements, true)?;
     connect(&mut system, loaded, &assembly.links, options.by_unit)?;
     apply_settings(&mut system, loaded, &assembly.elements, false)?;
-    Ok(AssembledSystem { system, experiment, steps, fixed_step, folders })
+    Ok(AssembledSystem { system, experiment, steps, fixed_step, folders, integrated })
 }
 
 /// Applies the settings of structural parameters, or those of all other variables.
@@ -129,118 +131,6 @@ fn open(path: &Path) -> Result<Opened, Error> {
 
 fn element(name: &str, path: &Path) -> Element {
     Element { name: name.to_owned(), fmu: path.to_owned(), ..Element::default() }
-}
-
-/// Instantiates the FMUs.
-fn instantiate(
-    elements: &[Element],
-    config: &Config,
-    options: &AssemblyOptions<'_>,
-) -> Result<System, Error> {
-    let logging = options.logging;
-    let limit = config.isolation.time_limit.as_ref().map(|limit| *limit.get_ref());
-    let time_limit = limit.map(Duration::try_from_secs_f64).transpose();
-    let time_limit = time_limit.map_err(|error| Error::Invalid(format!("time-limit: {error}")))?;
-    let preload = config.preload.iter().map(Into::into).collect();
-    let memory_limit = config.isolation.memory_limit.map(|memory| memory.0);
-    if config.isolation.isolate != Some(true) {
-        if memory_limit.is_some() {
-            return Err(Error::Invalid(
-                "--memory-limit applies to FMUs in separate processes, expected --isolate"
-                    .to_owned(),
-            ));
-        }
-        if time_limit.is_some() {
-            tracing::warn!(
-                "--time-limit without --isolate cannot end a call that hangs; it limits pending \
-                 answers only"
-            );
-        }
-    }
-    let isolation =
-        isolate::Options { time_limit, memory_limit, preload, logging, executable: None };
-    let mut opening = Opening { isolation, opened: HashMap::new(), isolated: HashMap::new() };
-    let mut system = System::default();
-    for element in elements {
-        let slave: Box<dyn Slave> = if config.isolation.isolate == Some(true) {
-            Box::new(opening.isolated(element)?)
-        } else {
-            Box::new(opening.in_process(element)?)
-        };
-        let slave = match options.log_calls {
-            Some(log) => Box::new(log.listen(&element.name, slave)),
-            None => slave,
-        };
-        system.add(&element.name, slave)?;
-    }
-    Ok(system)
-}
-
-/// Opens the FMUs; unpacks an FMU only once if several elements use it.
-struct Opening<'a> {
-    isolation: isolate::Options,
-    opened: HashMap<&'a PathBuf, Fmu>,
-    isolated: HashMap<&'a PathBuf, isolate::Package>,
-}
-
-impl<'a> Opening<'a> {
-    /// Creates an instance in a separate process.
-    fn isolated(&mut self, element: &'a Element) -> Result<isolate::Isolated, Error> {
-        let package = if let Some(package) = self.isolated.get(&element.fmu) {
-            package.clone()
-        } else {
-            let opened = isolate::Package::open(&element.fmu);
-            opened.map_err(|error| Error::from(error).within(&element.name))?
-        };
-        let slave = package.instantiate(&element.name, &self.isolation);
-        let slave = slave.map_err(|error| as_shown(error.into(), element))?;
-        self.isolated.insert(&element.fmu, package);
-        Ok(slave)
-    }
-
-    /// Creates an instance in this process.
-    fn in_process(&mut self, element: &'a Element) -> Result<Instance, Error> {
-        let fmu = match self.opened.get(&element.fmu) {
-            Some(fmu) => fmu.clone(),
-            None => open_fmu(element)?,
-        };
-        let slave = fmu.instantiate(&element.name);
-        let mut slave = slave.map_err(|error| as_shown(error.into(), element))?;
-        self.opened.insert(&element.fmu, fmu);
-        slave.set_time_limit(self.isolation.time_limit);
-        if self.isolation.logging {
-            switch_logging_on(&element.name, &mut slave);
-        }
-        Ok(slave)
-    }
-}
-
-/// Opens the FMU of an element. Warnings about an FMU in an SSP were already logged when the SSP
-/// was opened.
-fn open_fmu(element: &Element) -> Result<Fmu, Error> {
-    let opened = match &element.shown {
-        Some(_) => Fmu::open_quietly(&element.fmu),
-        None => Fmu::open(&element.fmu),
-    };
-    opened.map_err(|error| as_shown(Error::from(error).within(&element.name), element))
-}
-
-/// Replaces the unpacked path of an FMU in an error by the path that the user knows.
-fn as_shown(error: Error, element: &Element) -> Error {
-    match &element.shown {
-        Some(shown) => {
-            let unpacked = element.fmu.display().to_string();
-            Error::Invalid(error.sentence().replace(&unpacked, &shown.display().to_string()))
-        }
-        None => error,
-    }
-}
-
-fn switch_logging_on(name: &str, slave: &mut dyn Slave) {
-    match slave.set_debug_logging(true) {
-        Ok(()) | Err(CallError { failure: Failure::Missing, .. }) => {}
-        Err(error) => tracing::warn!("{name}: {error}"),
-    }
 }
 
 /// Makes the connections. A connection of the configuration takes precedence over one of `links` to

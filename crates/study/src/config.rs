@@ -1,6 +1,7 @@
 //! The configuration `system.toml`. Options of the command line take precedence over it.
 
 mod every;
+mod interface;
 mod memory;
 mod ordered;
 mod tables;
@@ -14,6 +15,8 @@ use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 pub use every::Every;
+pub use integrate::Method as Solver;
+pub use interface::Interface;
 pub use memory::Memory;
 pub use ordered::{Ordered, Settings};
 pub use tables::{CheckpointSettings, ConnectionEntry, Experiment, Isolation, Results};
@@ -33,6 +36,12 @@ pub struct Config {
     /// Paths of FMUs by name.
     #[serde(skip_serializing_if = "Ordered::is_empty")]
     pub fmus: Ordered<PathBuf>,
+    /// The interfaces of FMUs that offer both, by name; default: co-simulation.
+    #[serde(skip_serializing_if = "Ordered::is_empty")]
+    pub interface: Ordered<Interface>,
+    /// The integration methods of model-exchange FMUs, by name; default: automatic.
+    #[serde(skip_serializing_if = "Ordered::is_empty")]
+    pub solver: Ordered<Solver>,
     /// Connections. If neither they nor `system` are stated, variables of equal names are
     /// connected.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -10,6 +10,8 @@
 mod assemble;
 pub mod config;
 mod error;
+#[cfg(feature = "load")]
+mod instances;
 mod link;
 #[cfg(feature = "load")]
 mod plan;
@@ -26,7 +28,7 @@ pub mod table;
 
 #[cfg(feature = "load")]
 pub use assemble::{AssembledSystem, AssemblyOptions, assemble};
-pub use config::{Config, ConnectionEntry, Every, LoadedConfig, Memory};
+pub use config::{Config, ConnectionEntry, Every, Interface, LoadedConfig, Memory, Solver};
 pub use error::Error;
 pub use link::link;
 #[cfg(feature = "load")]

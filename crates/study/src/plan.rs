@@ -10,7 +10,7 @@ use master::{
 use toml::Spanned;
 
 use crate::assemble::AssembledSystem;
-use crate::config::{Config, ConnectionEntry, Every};
+use crate::config::{Config, ConnectionEntry, Every, Solver};
 
 /// Largest default number of rows with fixed steps.
 const ROWS: f64 = 1e4;
@@ -50,6 +50,7 @@ pub fn plan(config: &mut Config, assembled: &AssembledSystem) -> Result<Plan, Er
     let algorithm = chosen.algorithm;
     let tolerance = config.experiment.tolerance.as_ref().map(|tolerance| *tolerance.get_ref());
     explain_tolerances(system, tolerance, &mut reasons);
+    explain_interfaces(&assembled.integrated, &mut reasons);
     let experiment = Experiment { start_time: start, stop_time: Some(stop), tolerance };
     let every =
         config.results.every.unwrap_or_else(|| rows(&algorithm, stop - start, &mut reasons));
@@ -77,6 +78,16 @@ fn explain_tolerances(system: &System, stated: Option<f64>, reasons: &mut Vec<St
         if let Some(tolerance) = default.and_then(DefaultExperiment::usable_tolerance) {
             reasons.push(format!("tolerance {tolerance:e} for {name}: from its DefaultExperiment"));
         }
+    }
+}
+
+/// Explains which FMUs the master integrates.
+fn explain_interfaces(integrated: &[(String, Solver)], reasons: &mut Vec<String>) {
+    for (name, method) in integrated {
+        reasons.push(format!(
+            "{name} runs by model exchange: the master integrates it, solver {}",
+            method.name()
+        ));
     }
 }
 

@@ -14,6 +14,7 @@ mod misbehaviour;
 mod misbehaviour_calls;
 mod misbehaviour_isolated;
 mod misbehaviour_run;
+mod model_exchange;
 mod order;
 mod outside;
 mod package;

@@ -55,10 +55,23 @@ const ARROWS: [(&str, &[&str]); 16] = [
     ("ssp", &["fmu-description", "slave"]),
     ("results", &[]),
     ("solve", &[]),
+    ("integrate", &["fmu-description", "slave", "solve"]),
     ("master", &["fmu-description", "slave", "solve"]),
     ("files", &[]),
     ("figure", &["files"]),
-    ("study", &["files", "fmu-description", "fmu-import", "master", "results", "slave", "ssp"]),
+    (
+        "study",
+        &[
+            "files",
+            "fmu-description",
+            "fmu-import",
+            "integrate",
+            "master",
+            "results",
+            "slave",
+            "ssp",
+        ],
+    ),
     ("design", &["control", "figure", "files", "fmu-description", "fmu-import", "linearise"]),
 ];
 

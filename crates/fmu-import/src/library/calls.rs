@@ -6,7 +6,7 @@ use std::ffi::CStr;
 use fmu_description::abi::{fmi2Boolean, fmi2EventInfo};
 
 use super::{Component, c_string};
-use slave::{CallError, absent};
+use slave::{CallError, CompletedStep, absent};
 
 /// Evaluates to the C function in `$field` and marks it as entered; returns an error from the caller
 /// if the library lacks it. [`Component::check`] marks its return.
@@ -76,6 +76,8 @@ calls! {
         "fmi2GetDerivatives"(values.as_mut_ptr(), values.len());
     get_nominals(values: &mut [f64]) =
         "fmi2GetNominalsOfContinuousStates"(values.as_mut_ptr(), values.len());
+    get_event_indicators(values: &mut [f64]) =
+        "fmi2GetEventIndicators"(values.as_mut_ptr(), values.len());
 }
 
 /// Returns the common length of both slices.
@@ -184,6 +186,41 @@ impl Component {
         let status = unsafe { function(self.pointer, &raw mut info) };
         self.check(NAME, status)?;
         Ok(info)
+    }
+
+    /// Calls `fmi2SetTime`; `time` is in s.
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
+    /// `fmi2Warning`.
+    pub fn set_time(&mut self, time: f64) -> Result<(), CallError> {
+        const NAME: &str = "fmi2SetTime";
+        let function = function!(self.set_time, NAME);
+        self.place.set_time(time);
+        // SAFETY: the instance is alive.
+        let status = unsafe { function(self.pointer, time) };
+        self.check(NAME, status)
+    }
+
+    /// Calls `fmi2CompletedIntegratorStep`. `never_back` is `noSetFMUStatePriorToCurrentPoint`.
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
+    /// `fmi2Warning`.
+    pub fn completed_integrator_step(
+        &mut self,
+        never_back: bool,
+    ) -> Result<CompletedStep, CallError> {
+        const NAME: &str = "fmi2CompletedIntegratorStep";
+        let (mut event, mut end): (fmi2Boolean, fmi2Boolean) = (0, 0);
+        let function = function!(self.completed_integrator_step, NAME);
+        // SAFETY: the instance is alive; two Booleans to write to.
+        let status =
+            unsafe { function(self.pointer, never_back.into(), &raw mut event, &raw mut end) };
+        self.check(NAME, status)?;
+        Ok(CompletedStep { enter_event_mode: event != 0, terminate_simulation: end != 0 })
     }
 
     /// Calls `fmi2GetDirectionalDerivative`.

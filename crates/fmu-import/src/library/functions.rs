@@ -73,6 +73,11 @@ functions! {
     get_derivatives = "fmi2GetDerivatives": fn(Component, *mut fmi2Real, usize) -> fmi2Status;
     get_nominals = "fmi2GetNominalsOfContinuousStates":
         fn(Component, *mut fmi2Real, usize) -> fmi2Status;
+    set_time = "fmi2SetTime": fn(Component, fmi2Real) -> fmi2Status;
+    get_event_indicators = "fmi2GetEventIndicators":
+        fn(Component, *mut fmi2Real, usize) -> fmi2Status;
+    completed_integrator_step = "fmi2CompletedIntegratorStep":
+        fn(Component, fmi2Boolean, *mut fmi2Boolean, *mut fmi2Boolean) -> fmi2Status;
 }
 
 /// `fmi2SetReal`.
@@ -95,6 +100,16 @@ const COMMON: [&str; 5] = [
 ];
 
 impl Functions {
+    /// Removes the functions of co-simulation: an instance for model exchange refuses them as missing.
+    pub(super) fn without_co_simulation(self) -> Self {
+        Self {
+            do_step: None,
+            set_real_input_derivatives: None,
+            get_real_output_derivatives: None,
+            ..self
+        }
+    }
+
     /// Checks that the library exports the functions that `interface` cannot do without.
     pub(super) fn require(&self, interface: Interface, path: &Path) -> Result<(), LoadError> {
         let more: &[&str] = match interface {

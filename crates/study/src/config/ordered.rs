@@ -26,6 +26,12 @@ impl<T> Ordered<T> {
         self.0.is_empty()
     }
 
+    /// Returns the value of `name`.
+    #[must_use]
+    pub fn get(&self, name: &str) -> Option<&T> {
+        self.0.iter().find(|(known, _)| known == name).map(|(_, value)| value)
+    }
+
     /// Sets the value of `name`, replacing an earlier one.
     pub fn put(&mut self, name: String, value: T) {
         match self.0.iter_mut().find(|(known, _)| *known == name) {

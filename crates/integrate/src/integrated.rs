@@ -1,0 +1,237 @@
+//! [`Integrated`]: a model-exchange instance as a slave.
+
+mod as_slave;
+mod events;
+mod state;
+mod step;
+
+use std::str::FromStr;
+
+use fmu_description::{CoSimulation, ModelDescription};
+use serde::{Deserialize, Serialize};
+use slave::{CallError, Failure, ModelExchange, Status};
+use solve::Scale;
+
+use crate::inputs::Inputs;
+use crate::stepper::{Memory, StepError, Stepper};
+use state::Saved;
+
+/// Relative tolerance if neither the user nor the FMU states one.
+const TOLERANCE: f64 = 1e-6;
+/// Absolute tolerance of a state, relative to the relative tolerance and the nominal value.
+const ABSOLUTE: f64 = 0.01;
+/// The name of the integration in errors.
+const INTEGRATION: &str = "the integration of the model-exchange FMU";
+
+/// The integration method.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// The explicit method; the stiff one while the steps of the explicit one are limited by its
+    /// stability.
+    #[default]
+    Automatic,
+    /// Dormand and Prince, order 5(4).
+    Explicit,
+    /// RODAS, order 4(3), for stiff equations.
+    Stiff,
+}
+
+impl Method {
+    /// Returns the name in a `system.toml` and on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Method::Automatic => "automatic",
+            Method::Explicit => "explicit",
+            Method::Stiff => "stiff",
+        }
+    }
+}
+
+impl FromStr for Method {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let all = [Method::Automatic, Method::Explicit, Method::Stiff];
+        let found = all.into_iter().find(|method| method.name() == text);
+        found.ok_or_else(|| format!("expected automatic, explicit or stiff, found {text:?}"))
+    }
+}
+
+/// Options of [`Integrated`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Options {
+    /// The method.
+    pub method: Method,
+}
+
+/// The mode of the FMU.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+enum Mode {
+    /// Before the end of initialization mode.
+    Setup,
+    /// Event mode.
+    Event,
+    /// Continuous-time mode.
+    Continuous,
+}
+
+/// The present point, as far as numbers of a fixed count describe it.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+struct Point {
+    /// The time in s.
+    time: f64,
+    mode: Mode,
+    /// The time of the next time event in s.
+    next_event: Option<f64>,
+    /// Whether the FMU requested the end of the simulation.
+    ends: bool,
+    /// Whether inputs may have changed since the event indicators were read.
+    input_changed: bool,
+    memory: Memory,
+}
+
+/// A model-exchange instance that is integrated from one communication point to the next.
+///
+/// The description is that of the FMU, with an element `CoSimulation` that states what this slave offers:
+/// steps of any size, inputs with derivatives up to order 3, and FMU states if the FMU has them.
+///
+/// The relative tolerance is that of `setup_experiment`, otherwise 1e-6; the absolute tolerance of a
+/// state is 0.01 times the relative one and the nominal value. Continuous inputs that the master sets
+/// follow their derivatives within the step. Other variables that it changes after initialization cause
+/// an event, as the standard demands, if the value is a new one.
+///
+/// Where an event coincides with the end of a step, it belongs to this step: the outputs are those after
+/// the event.
+pub struct Integrated {
+    instance: Box<dyn ModelExchange>,
+    description: ModelDescription,
+    options: Options,
+    tolerance: f64,
+    point: Point,
+    stepper: Stepper,
+    inputs: Inputs,
+    /// The continuous states, and the event indicators at the present point.
+    states: Vec<f64>,
+    indicators: Vec<f64>,
+    /// States and event indicators within a step.
+    search: step::Search,
+    saved: Vec<Saved>,
+    integers: Vec<i64>,
+    booleans: Vec<i32>,
+    reals: Vec<f64>,
+}
+
+impl Integrated {
+    /// Wraps a new instance.
+    #[must_use]
+    pub fn new(instance: Box<dyn ModelExchange>, options: Options) -> Self {
+        let mut description = instance.description().clone();
+        let flags = description.model_exchange.clone().unwrap_or_default();
+        description.co_simulation = Some(CoSimulation {
+            model_identifier: flags.model_identifier,
+            needs_execution_tool: flags.needs_execution_tool,
+            can_be_instantiated_only_once_per_process: flags
+                .can_be_instantiated_only_once_per_process,
+            can_get_and_set_fmu_state: flags.can_get_and_set_fmu_state,
+            can_serialize_fmu_state: flags.can_serialize_fmu_state,
+            provides_directional_derivative: flags.provides_directional_derivative,
+            can_handle_variable_communication_step_size: true,
+            can_interpolate_inputs: true,
+            ..CoSimulation::default()
+        });
+        let inputs = Inputs::new(&description);
+        let point = Point {
+            time: 0.0,
+            mode: Mode::Setup,
+            next_event: None,
+            ends: false,
+            input_changed: false,
+            memory: Memory::default(),
+        };
+        Self {
+            instance,
+            description,
+            options,
+            tolerance: TOLERANCE,
+            point,
+            stepper: Stepper::new(options.method, Scale::new(TOLERANCE, TOLERANCE, Vec::new())),
+            inputs,
+            states: Vec::new(),
+            indicators: Vec::new(),
+            search: step::Search::default(),
+            saved: Vec::new(),
+            integers: Vec::new(),
+            booleans: Vec::new(),
+            reals: Vec::new(),
+        }
+    }
+
+    /// Allocates what depends on the numbers of states and event indicators.
+    fn allocate(&mut self) -> Result<(), CallError> {
+        self.states = vec![0.0; self.instance.number_of_continuous_states()?];
+        self.indicators = vec![0.0; self.instance.number_of_event_indicators()?];
+        self.search = step::Search::new(self.states.len(), self.indicators.len());
+        let scale = self.scale()?;
+        self.stepper = Stepper::new(self.options.method, scale);
+        Ok(())
+    }
+
+    /// Returns the tolerances of the states. Nominal values that the FMU does not state are 1.
+    fn scale(&mut self) -> Result<Scale, CallError> {
+        let mut nominals = vec![1.0; self.states.len()];
+        if !nominals.is_empty() {
+            match self.instance.get_nominals_of_continuous_states(&mut nominals) {
+                Ok(()) => {}
+                Err(error) if error.leaves_the_instance_usable() => nominals.fill(1.0),
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(Scale::new(self.tolerance, ABSOLUTE * self.tolerance, nominals))
+    }
+
+    /// Returns the name of a continuous state.
+    fn name_of_state(&self, index: usize) -> String {
+        let variables = &self.description.variables;
+        let at = |index: u32| variables.get((index as usize).checked_sub(1)?);
+        let derivative = self.description.structure.derivatives.get(index);
+        let derivative = derivative.and_then(|unknown| at(unknown.index));
+        derivative.map_or_else(
+            || format!("continuous state {}", index + 1),
+            |own| format!("the continuous state with the derivative {}", own.name),
+        )
+    }
+
+    /// Returns the error of a step that could not be made.
+    fn stopped(&self, error: StepError) -> CallError {
+        let (size, state, cause) = match error {
+            StepError::Call(error) => return error,
+            StepError::Size { size, state, cause } => (size, state, cause),
+        };
+        let (refused, messages) = match cause {
+            Some(CallError { function, messages, .. }) => (Some(function), messages),
+            None => (None, Vec::new()),
+        };
+        let why = match refused {
+            Some(function) => format!("{function} returned {}", Status::Discard.name()),
+            None => format!(
+                "{} is not within the tolerance {:e}; a larger tolerance or the solver `stiff` may \
+                 help",
+                self.name_of_state(state),
+                self.tolerance
+            ),
+        };
+        let time = self.point.time;
+        let what = format!(
+            "stops at t = {time} s: a step of {size:e} s is still too large, because {why}"
+        );
+        CallError { messages, ..failed(what) }
+    }
+}
+
+/// Returns an error of the integration.
+fn failed(what: String) -> CallError {
+    let failure = Failure::InvalidAnswer(what);
+    CallError { function: INTEGRATION, failure, messages: Vec::new() }
+}

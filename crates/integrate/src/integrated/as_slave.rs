@@ -1,0 +1,178 @@
+//! [`Integrated`] as a [`Slave`].
+
+use fmu_description::{Experiment, ModelDescription};
+use slave::{CallError, Slave, StepResult};
+
+use super::{Integrated, Mode, TOLERANCE, failed};
+
+/// Largest difference between the start of a step and the end of the last one, relative to the step.
+const GAP: f64 = 1e-6;
+
+impl Integrated {
+    /// Prepares the change of variables that are not continuous inputs: after initialization, this takes
+    /// event mode.
+    fn prepare_change(&mut self) -> Result<(), CallError> {
+        if self.point.mode == Mode::Continuous { self.enter_event() } else { Ok(()) }
+    }
+}
+
+impl Slave for Integrated {
+    fn description(&self) -> &ModelDescription {
+        &self.description
+    }
+
+    fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
+        self.instance.set_debug_logging(on)
+    }
+
+    fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError> {
+        self.point.time = experiment.start_time;
+        let usable = |tolerance: &f64| *tolerance > 0.0 && tolerance.is_finite();
+        self.tolerance = experiment.tolerance.filter(usable).unwrap_or(TOLERANCE);
+        self.instance.setup_experiment(experiment)
+    }
+
+    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
+        self.instance.enter_initialization_mode()
+    }
+
+    /// Also iterates the first event and enters continuous-time mode.
+    fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
+        self.instance.exit_initialization_mode()?;
+        self.point.mode = Mode::Event;
+        self.allocate()?;
+        self.inputs.read(self.instance.as_mut(), self.point.time)?;
+        self.settle()
+    }
+
+    fn terminate(&mut self) -> Result<(), CallError> {
+        self.instance.terminate()
+    }
+
+    fn free(&mut self) -> Result<(), CallError> {
+        self.instance.free()
+    }
+
+    fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
+        self.instance.get_real(references, values)
+    }
+
+    fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), CallError> {
+        if self.point.mode == Mode::Setup {
+            return self.instance.set_real(references, values);
+        }
+        if !self.inputs.contain(references) {
+            self.reals.resize(references.len(), 0.0);
+            let known = self.instance.get_real(references, &mut self.reals);
+            let bits = |value: &f64| value.to_bits();
+            if known.is_ok() && self.reals.iter().map(bits).eq(values.iter().map(bits)) {
+                return Ok(());
+            }
+            self.prepare_change()?;
+        }
+        self.inputs.record(self.point.time, references, values);
+        self.point.input_changed = true;
+        self.instance.set_real(references, values)
+    }
+
+    fn get_integer(&mut self, references: &[u32], values: &mut [i64]) -> Result<(), CallError> {
+        self.instance.get_integer(references, values)
+    }
+
+    fn set_integer(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
+        if self.point.mode != Mode::Setup {
+            self.integers.resize(references.len(), 0);
+            let known = self.instance.get_integer(references, &mut self.integers);
+            if known.is_ok() && self.integers == values {
+                return Ok(());
+            }
+            self.prepare_change()?;
+        }
+        self.instance.set_integer(references, values)
+    }
+
+    fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
+        self.instance.get_boolean(references, values)
+    }
+
+    fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
+        if self.point.mode != Mode::Setup {
+            self.booleans.resize(references.len(), 0);
+            let known = self.instance.get_boolean(references, &mut self.booleans);
+            let truth = |value: &i32| *value != 0;
+            if known.is_ok() && self.booleans.iter().map(truth).eq(values.iter().map(truth)) {
+                return Ok(());
+            }
+            self.prepare_change()?;
+        }
+        self.instance.set_boolean(references, values)
+    }
+
+    fn get_string(&mut self, references: &[u32], values: &mut [String]) -> Result<(), CallError> {
+        self.instance.get_string(references, values)
+    }
+
+    fn set_string(&mut self, references: &[u32], values: &[String]) -> Result<(), CallError> {
+        if self.point.mode != Mode::Setup {
+            let mut known = vec![String::new(); references.len()];
+            if self.instance.get_string(references, &mut known).is_ok() && known == values {
+                return Ok(());
+            }
+            self.prepare_change()?;
+        }
+        self.instance.set_string(references, values)
+    }
+
+    fn set_input_derivatives(
+        &mut self,
+        references: &[u32],
+        orders: &[i32],
+        values: &[f64],
+    ) -> Result<(), CallError> {
+        self.inputs.derive(self.point.time, references, orders, values)
+    }
+
+    fn do_step(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError> {
+        let at = self.point.time;
+        if !(size >= 0.0 && (time - at).abs() <= GAP * size.max(f64::EPSILON * at.abs())) {
+            return Err(failed(format!(
+                "cannot step from {time} s over {size} s: the last step ended at {at} s"
+            )));
+        }
+        self.integrate(time + size, never_back)
+    }
+
+    fn directional_derivative(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        changes: &mut [f64],
+    ) -> Result<(), CallError> {
+        self.instance.directional_derivative(unknowns, knowns, seed, changes)
+    }
+
+    fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
+        self.instance.save_state(slot)?;
+        self.save_own(slot);
+        Ok(())
+    }
+
+    fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
+        self.instance.restore_state(slot)?;
+        self.restore_own(slot);
+        Ok(())
+    }
+
+    fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
+        self.serialize()
+    }
+
+    fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
+        self.deserialize(bytes)
+    }
+
+    fn take_warning(&mut self) -> bool {
+        self.instance.take_warning()
+    }
+}

@@ -1,0 +1,74 @@
+//! FMU states, together with the state of the integration.
+
+use serde::{Deserialize, Serialize};
+use slave::CallError;
+
+use super::{Integrated, Point, failed};
+use crate::inputs::Track;
+
+/// The state of the integration.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub(super) struct Saved {
+    /// `None` in a slot without a state.
+    point: Option<Point>,
+    states: Vec<f64>,
+    indicators: Vec<f64>,
+    tracks: Vec<Track>,
+}
+
+impl Integrated {
+    pub(super) fn save_own(&mut self, slot: usize) {
+        if self.saved.len() <= slot {
+            self.saved.resize(slot + 1, Saved::default());
+        }
+        let saved = &mut self.saved[slot];
+        saved.point = Some(Point { memory: self.stepper.memory, ..self.point });
+        saved.states.clone_from(&self.states);
+        saved.indicators.clone_from(&self.indicators);
+        saved.tracks.clone_from(&self.inputs.tracks);
+    }
+
+    /// Restores the state of a slot; an empty slot changes nothing.
+    pub(super) fn restore_own(&mut self, slot: usize) {
+        let Some(saved) = self.saved.get(slot) else { return };
+        let Some(point) = saved.point else { return };
+        self.point = point;
+        self.states.clone_from(&saved.states);
+        self.indicators.clone_from(&saved.indicators);
+        self.inputs.tracks.clone_from(&saved.tracks);
+        self.stepper.memory = point.memory;
+        self.stepper.forget_slope();
+    }
+
+    pub(super) fn serialize(&mut self) -> Result<Vec<u8>, CallError> {
+        let own = Saved {
+            point: Some(Point { memory: self.stepper.memory, ..self.point }),
+            states: self.states.clone(),
+            indicators: self.indicators.clone(),
+            tracks: self.inputs.tracks.clone(),
+        };
+        let theirs = self.instance.serialize_state()?;
+        postcard::to_allocvec(&(own, theirs))
+            .map_err(|error| failed(format!("cannot serialise its state: {error}")))
+    }
+
+    pub(super) fn deserialize(&mut self, bytes: &[u8]) -> Result<(), CallError> {
+        let read: Result<(Saved, Vec<u8>), _> = postcard::from_bytes(bytes);
+        let (own, theirs) =
+            read.map_err(|error| failed(format!("cannot read a serialised state: {error}")))?;
+        let fits = own.point.is_some()
+            && own.states.len() == self.states.len()
+            && own.indicators.len() == self.indicators.len()
+            && own.tracks.len() == self.inputs.tracks.len();
+        if !fits {
+            let what = "cannot read a serialised state: it is one of another FMU";
+            return Err(failed(what.to_owned()));
+        }
+        self.instance.deserialize_state(&theirs)?;
+        let slot = self.saved.len();
+        self.saved.push(own);
+        self.restore_own(slot);
+        self.saved.pop();
+        Ok(())
+    }
+}

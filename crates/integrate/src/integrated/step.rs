@@ -1,0 +1,210 @@
+//! A communication step: integration from event to event.
+
+use slave::{CallError, StepResult};
+use solve::Bracket;
+
+use super::events::check_indicators;
+use super::{Integrated, Mode, failed};
+
+/// The most events in one communication step.
+const EVENTS: u32 = 100_000;
+/// Difference of times that counts as rounding, relative to the time and the step.
+const ROUNDING: f64 = 1e-12;
+/// Width to which a state event is located, relative to the step of the integrator.
+const WIDTH: f64 = 1e-12;
+
+/// Memory for the search of a state event: times, event indicators before and after it, and those in
+/// between.
+#[derive(Default)]
+pub(super) struct Search {
+    left: (f64, Vec<f64>),
+    right: (f64, Vec<f64>),
+    between: Vec<f64>,
+    states: Vec<f64>,
+}
+
+impl Search {
+    pub(super) fn new(states: usize, indicators: usize) -> Self {
+        let zeros = || vec![0.0; indicators];
+        Self {
+            left: (0.0, zeros()),
+            right: (0.0, zeros()),
+            between: zeros(),
+            states: vec![0.0; states],
+        }
+    }
+}
+
+/// Returns the first event indicator whose sign differs: z > 0 or z <= 0.
+fn changed(before: &[f64], after: &[f64]) -> Option<usize> {
+    before.iter().zip(after).position(|(before, after)| (*before > 0.0) != (*after > 0.0))
+}
+
+impl Integrated {
+    /// Integrates to `end`, or to the time at which the FMU requests the end of the simulation.
+    pub(super) fn integrate(
+        &mut self,
+        end: f64,
+        never_back: bool,
+    ) -> Result<StepResult, CallError> {
+        let start = self.point.time;
+        let rounding = ROUNDING * (end - start).max(end.abs());
+        self.inputs.prepare();
+        self.stepper.forget_slope();
+        let mut events = 0;
+        loop {
+            if self.point.ends {
+                let reached = self.point.time;
+                return Ok(StepResult::Part { reached, terminated: true });
+            }
+            if self.point.mode == Mode::Event {
+                events += 1;
+                if events > EVENTS {
+                    let time = self.point.time;
+                    return Err(failed(format!(
+                        "stops at t = {time} s after {EVENTS} events since t = {start} s"
+                    )));
+                }
+                self.settle()?;
+            } else if self.event_is_due(rounding)? || self.input_caused_event()? {
+                self.enter_event()?;
+            } else if self.point.time >= end {
+                return Ok(StepResult::Whole);
+            } else {
+                let limit = self.point.next_event.map_or(end, |event| event.min(end));
+                self.step(limit, never_back)?;
+            }
+        }
+    }
+
+    /// Whether a time event is due. Sets the time to that of the event, which may be later by rounding.
+    fn event_is_due(&mut self, rounding: f64) -> Result<bool, CallError> {
+        let due = self.point.next_event.filter(|event| *event <= self.point.time + rounding);
+        if let Some(event) = due.filter(|event| *event > self.point.time) {
+            self.instance.set_time(event)?;
+            self.point.time = event;
+        }
+        Ok(due.is_some())
+    }
+
+    /// Whether new inputs changed the sign of an event indicator.
+    fn input_caused_event(&mut self) -> Result<bool, CallError> {
+        if !std::mem::take(&mut self.point.input_changed) || self.indicators.is_empty() {
+            return Ok(false);
+        }
+        self.instance.get_event_indicators(&mut self.search.between)?;
+        check_indicators(self.point.time, &self.search.between)?;
+        Ok(changed(&self.indicators, &self.search.between).is_some())
+    }
+
+    /// Makes one step of the integrator, to `limit` at most or to the first state event.
+    fn step(&mut self, limit: f64, never_back: bool) -> Result<(), CallError> {
+        let start = self.point.time;
+        let (instance, inputs) = (self.instance.as_mut(), &mut self.inputs);
+        let mut derivative = |time: f64, states: &[f64], slope: &mut [f64]| {
+            instance.set_time(time)?;
+            inputs.apply(instance, time)?;
+            instance.set_continuous_states(states)?;
+            instance.get_derivatives(slope)
+        };
+        let reached = self.stepper.advance(&mut derivative, &self.states, (start, limit));
+        let reached = reached.map_err(|error| self.stopped(error))?;
+        let event = self.locate(start, reached)?;
+        let time = event.unwrap_or(reached);
+        match event {
+            Some(_) => self.states.copy_from_slice(&self.search.states),
+            None if !self.states.is_empty() => self.states.copy_from_slice(self.stepper.end()),
+            None => {}
+        }
+        self.instance.set_time(time)?;
+        self.inputs.apply(self.instance.as_mut(), time)?;
+        if !self.states.is_empty() {
+            self.instance.set_continuous_states(&self.states)?;
+        }
+        self.point.time = time;
+        if self.instance.needs_completed_integrator_step() {
+            let done = self.instance.completed_integrator_step(never_back)?;
+            self.point.ends |= done.terminate_simulation;
+            if done.enter_event_mode && !self.point.ends {
+                return self.enter_event();
+            }
+        }
+        if event.is_some() && !self.point.ends { self.enter_event() } else { Ok(()) }
+    }
+
+    /// Reads the event indicators at `time` within the step from `start` to `end` into
+    /// `search.between`, the states into `search.states`.
+    fn look(&mut self, time: f64, (start, end): (f64, f64)) -> Result<(), CallError> {
+        if !self.states.is_empty() {
+            if time >= end {
+                self.search.states.copy_from_slice(self.stepper.end());
+            } else {
+                let part = (time - start) / (end - start);
+                self.stepper.interpolate(part, &mut self.search.states);
+            }
+        }
+        self.instance.set_time(time)?;
+        self.inputs.apply(self.instance.as_mut(), time)?;
+        if !self.states.is_empty() {
+            self.instance.set_continuous_states(&self.search.states)?;
+        }
+        self.instance.get_event_indicators(&mut self.search.between)?;
+        check_indicators(time, &self.search.between)
+    }
+
+    /// Returns the time just after the first state event in the step from `start` to `end`, with the
+    /// states there in `search.states`. Without one, the event indicators become those of the end.
+    ///
+    /// An indicator that changes its sign twice within half a step is not noticed.
+    fn locate(&mut self, start: f64, end: f64) -> Result<Option<f64>, CallError> {
+        if self.indicators.is_empty() {
+            return Ok(None);
+        }
+        self.search.left.0 = start;
+        self.search.left.1.copy_from_slice(&self.indicators);
+        for time in [start + 0.5 * (end - start), end] {
+            self.look(time, (start, end))?;
+            let search = &mut self.search;
+            if changed(&search.left.1, &search.between).is_some() {
+                search.right.0 = time;
+                search.right.1.copy_from_slice(&search.between);
+                return self.narrow((start, end)).map(Some);
+            }
+            search.left.0 = time;
+            search.left.1.copy_from_slice(&search.between);
+        }
+        self.indicators.copy_from_slice(&self.search.left.1);
+        Ok(None)
+    }
+
+    /// Narrows the interval of `search` around its first change of sign; returns its end.
+    fn narrow(&mut self, span: (f64, f64)) -> Result<f64, CallError> {
+        let width = WIDTH * (span.1 - span.0);
+        while let Some(index) = changed(&self.search.left.1, &self.search.right.1) {
+            let Search { left, right, .. } = &self.search;
+            let ends = ((left.0, left.1[index]), (right.0, right.1[index]));
+            // None if an indicator is infinite: the end of the interval is then as good as it gets.
+            let Some(mut bracket) = Bracket::new(ends.0, ends.1, width) else { break };
+            if bracket.ask().is_none() {
+                break;
+            }
+            while let Some(time) = bracket.ask() {
+                self.look(time, span)?;
+                let search = &mut self.search;
+                bracket.tell(time, search.between[index]);
+                let own = (search.left.1[index] > 0.0) != (search.between[index] > 0.0);
+                let any = changed(&search.left.1, &search.between).is_some();
+                let side = if any { &mut search.right } else { &mut search.left };
+                side.0 = time;
+                side.1.copy_from_slice(&search.between);
+                if any && !own {
+                    // Another indicator changes earlier.
+                    break;
+                }
+            }
+        }
+        let time = self.search.right.0;
+        self.look(time, span)?;
+        Ok(time)
+    }
+}

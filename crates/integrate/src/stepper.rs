@@ -1,0 +1,326 @@
+//! Adaptive steps between events: step size, choice of the method, continuous extension.
+
+use serde::{Deserialize, Serialize};
+use slave::{CallError, Failure, Status};
+use solve::Scale;
+
+use crate::explicit::Explicit;
+use crate::integrated::Method;
+use crate::rosenbrock::Rosenbrock;
+
+/// Ratio of the chosen step to the largest step that meets the tolerance, and the bounds of the ratio of
+/// two steps.
+const SAFETY: f64 = 0.9;
+const SHRINK: f64 = 0.2;
+const GROW: f64 = 5.0;
+/// The step after a trial step that cannot be evaluated, relative to it.
+const RETREAT: f64 = 0.25;
+/// A remaining distance that exceeds the step by less than this factor is made in one step.
+const STRETCH: f64 = 1.01;
+/// The size of a state below which its difference quotients do not depend on it, relative to its nominal
+/// value. Reactions have states far below their nominal value that matter.
+const SMALL: f64 = 1e-3;
+/// `size |lambda|` at the border of stability of the explicit method; so many steps there mean that the
+/// equations are stiff, and so many others in a row that they are not.
+const BORDER: f64 = 3.25;
+const STIFF_STEPS: u32 = 15;
+const OTHER_STEPS: u32 = 6;
+/// `size |lambda|` at which the explicit method is stable with some room, and the number of steps in a
+/// row after which it is used again.
+const STABLE: f64 = 2.0;
+const STABLE_STEPS: u32 = 5;
+
+/// What one step leaves to the next one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Memory {
+    /// The proposed step in s; 0: none.
+    size: f64,
+    /// The error of the last step; 0: none.
+    error: f64,
+    /// Whether the stiff method is in use.
+    is_stiff: bool,
+    suspicious: u32,
+    others: u32,
+    stable: u32,
+}
+
+/// Why no step was made.
+#[derive(Debug)]
+pub(crate) enum StepError {
+    /// The FMU failed.
+    Call(CallError),
+    /// The step would be too small.
+    Size {
+        /// The step in s.
+        size: f64,
+        /// The state with the largest error.
+        state: usize,
+        /// Why the FMU refused the last trial step, if it did.
+        cause: Option<CallError>,
+    },
+}
+
+impl From<CallError> for StepError {
+    fn from(error: CallError) -> Self {
+        StepError::Call(error)
+    }
+}
+
+/// Makes steps; keeps the last one for its continuous extension.
+pub(crate) struct Stepper {
+    pub(crate) memory: Memory,
+    method: Method,
+    scale: Scale,
+    explicit: Explicit,
+    /// The memory of the stiff method, allocated when it is first used.
+    stiff: Option<Rosenbrock>,
+    /// The states, the derivative and the size of the last step.
+    start: Vec<f64>,
+    slope: Vec<f64>,
+    /// Whether `slope` is the derivative at the next start.
+    has_slope: bool,
+    size: f64,
+    last_is_stiff: bool,
+}
+
+impl Stepper {
+    pub(crate) fn new(method: Method, scale: Scale) -> Self {
+        let n = scale.len();
+        let memory = Memory { is_stiff: method == Method::Stiff, ..Memory::default() };
+        Self {
+            memory,
+            method,
+            explicit: Explicit::new(n),
+            stiff: (method == Method::Stiff).then(|| Rosenbrock::new(n)),
+            start: vec![0.0; n],
+            slope: vec![0.0; n],
+            has_slope: false,
+            size: 0.0,
+            last_is_stiff: false,
+            scale,
+        }
+    }
+
+    /// Replaces the tolerances.
+    pub(crate) fn set_scale(&mut self, scale: Scale) {
+        self.scale = scale;
+    }
+
+    /// Forgets the derivative at the present point, because inputs may have changed.
+    pub(crate) fn forget_slope(&mut self) {
+        self.has_slope = false;
+    }
+
+    /// Forgets the step size too, because of an event.
+    pub(crate) fn restart(&mut self) {
+        self.has_slope = false;
+        (self.memory.size, self.memory.error) = (0.0, 0.0);
+    }
+
+    /// Makes one step from `states` at `time` to `limit` at most; returns the time reached.
+    pub(crate) fn advance(
+        &mut self,
+        derivative: &mut impl FnMut(f64, &[f64], &mut [f64]) -> Result<(), CallError>,
+        states: &[f64],
+        (time, limit): (f64, f64),
+    ) -> Result<f64, StepError> {
+        self.start.copy_from_slice(states);
+        if states.is_empty() {
+            self.size = limit - time;
+            return Ok(limit);
+        }
+        if !self.has_slope {
+            derivative(time, &self.start, &mut self.slope)?;
+        }
+        if self.memory.size <= 0.0 {
+            self.memory.size = self.first_size(derivative, time, limit - time)?;
+        }
+        let (mut rejected, mut linearised, mut cause) = (false, false, None);
+        loop {
+            let room = limit - time;
+            let is_last = self.memory.size * STRETCH >= room;
+            let size = if is_last { room } else { self.memory.size };
+            if !is_last
+                && size < 16.0 * f64::EPSILON * time.abs().max(f64::MIN_POSITIVE / f64::EPSILON)
+            {
+                return Err(StepError::Size { size, state: self.worst(), cause });
+            }
+            match self.attempt(derivative, (time, size), &mut linearised) {
+                Ok(error) if error <= 1.0 => {
+                    self.accept(size, error, rejected);
+                    return Ok(if is_last { limit } else { time + size });
+                }
+                Ok(error) if error.is_finite() => {
+                    let ratio = SAFETY * error.powf(-1.0 / self.order());
+                    self.memory.size = size * ratio.max(SHRINK);
+                }
+                Ok(_) => self.memory.size = size * RETREAT,
+                Err(error) if error.failure == Failure::Status(Status::Discard) => {
+                    self.memory.size = size * RETREAT;
+                    cause = Some(error);
+                }
+                Err(error) => return Err(error.into()),
+            }
+            rejected = true;
+        }
+    }
+
+    /// Attempts a step; returns its error relative to the tolerance, not finite if the step has none.
+    fn attempt(
+        &mut self,
+        derivative: &mut impl FnMut(f64, &[f64], &mut [f64]) -> Result<(), CallError>,
+        span: (f64, f64),
+        linearised: &mut bool,
+    ) -> Result<f64, CallError> {
+        let Self { explicit, stiff, start, slope, scale, .. } = self;
+        (self.size, self.last_is_stiff) = (span.1, self.memory.is_stiff);
+        if !self.memory.is_stiff {
+            explicit.attempt(derivative, span, start, slope)?;
+            return Ok(norm(scale, &explicit.error, start, &explicit.end));
+        }
+        let method = stiff.get_or_insert_with(|| Rosenbrock::new(start.len()));
+        if !*linearised {
+            let nominals = scale.nominals();
+            method.linearise(derivative, span, start, slope, |i| SMALL * nominals[i])?;
+            *linearised = true;
+        }
+        if !method.attempt(derivative, span, start, slope)? {
+            return Ok(f64::INFINITY);
+        }
+        Ok(norm(scale, method.error(), start, &method.end))
+    }
+
+    /// The order of the error estimate.
+    fn order(&self) -> f64 {
+        if self.last_is_stiff { 4.0 } else { 5.0 }
+    }
+
+    /// Chooses the next step size (a PI controller, Gustafsson 1991) and method.
+    fn accept(&mut self, size: f64, error: f64, rejected: bool) {
+        let memory = &mut self.memory;
+        let order = if self.last_is_stiff { 4.0 } else { 5.0 };
+        let error = error.max(1e-10);
+        let before = if memory.error > 0.0 { memory.error } else { error };
+        let target = SAFETY.powf(order);
+        let ratio = (error / target).powf(-0.7 / order) * (before / target).powf(0.4 / order);
+        let ratio = ratio.clamp(SHRINK, if rejected { 1.0 } else { GROW });
+        // A step that a limit shortened says nothing against the proposed size.
+        let shortened = size < memory.size && !rejected;
+        memory.size = if shortened { memory.size.max(size * ratio) } else { size * ratio };
+        memory.error = error;
+        self.has_slope = !self.last_is_stiff;
+        if self.last_is_stiff {
+            self.look_for_end_of_stiffness(size);
+        } else {
+            self.look_for_stiffness(size);
+            self.slope.copy_from_slice(self.explicit.last_slope());
+        }
+    }
+
+    fn look_for_stiffness(&mut self, size: f64) {
+        if self.method != Method::Automatic {
+            return;
+        }
+        let (scale, start, end) = (&self.scale, &self.start, &self.explicit.end);
+        let memory = &mut self.memory;
+        if self.explicit.stiffness(size, |i| scale.weight(i, start[i], end[i])) > BORDER {
+            memory.others = 0;
+            memory.suspicious += 1;
+            if memory.suspicious == STIFF_STEPS {
+                (memory.is_stiff, memory.suspicious, memory.stable) = (true, 0, 0);
+            }
+        } else {
+            memory.others += 1;
+            if memory.others == OTHER_STEPS {
+                (memory.suspicious, memory.others) = (0, 0);
+            }
+        }
+    }
+
+    fn look_for_end_of_stiffness(&mut self, size: f64) {
+        let (Method::Automatic, Some(method)) = (self.method, &self.stiff) else { return };
+        let (scale, start) = (&self.scale, &self.start);
+        let bound = method.bound_of_eigenvalues(|i| scale.weight(i, start[i], method.end[i]));
+        let memory = &mut self.memory;
+        memory.stable = if size * bound < STABLE { memory.stable + 1 } else { 0 };
+        if memory.stable == STABLE_STEPS {
+            (memory.is_stiff, memory.stable) = (false, 0);
+        }
+    }
+
+    /// The states at the end of the last step.
+    pub(crate) fn end(&self) -> &[f64] {
+        match &self.stiff {
+            Some(method) if self.last_is_stiff => &method.end,
+            _ => &self.explicit.end,
+        }
+    }
+
+    /// Computes the states at the fraction `part` of the last step.
+    pub(crate) fn interpolate(&self, part: f64, states: &mut [f64]) {
+        match &self.stiff {
+            Some(method) if self.last_is_stiff => method.interpolate(part, &self.start, states),
+            _ => self.explicit.interpolate(part, self.size, &self.start, states),
+        }
+    }
+
+    /// Chooses the first step after an event (Hairer, Norsett and Wanner 1993, section II.4).
+    fn first_size(
+        &mut self,
+        derivative: &mut impl FnMut(f64, &[f64], &mut [f64]) -> Result<(), CallError>,
+        time: f64,
+        room: f64,
+    ) -> Result<f64, CallError> {
+        let Self { explicit, start, slope, scale, .. } = self;
+        let (value, rise) = (norm(scale, start, start, start), norm(scale, slope, start, start));
+        let guess = if value < 1e-5 || rise < 1e-5 { 1e-6 } else { 0.01 * value / rise };
+        let guess = if guess.is_finite() { guess.min(room) } else { 1e-6 * room };
+        for (i, end) in explicit.end.iter_mut().enumerate() {
+            *end = start[i] + guess * slope[i];
+        }
+        // The error estimate of the coming step is overwritten anyway.
+        let bend = match derivative(time + guess, &explicit.end, &mut explicit.error) {
+            Ok(()) => {
+                for (difference, slope) in explicit.error.iter_mut().zip(slope) {
+                    *difference -= *slope;
+                }
+                norm(scale, &explicit.error, start, start) / guess
+            }
+            Err(error) if error.failure == Failure::Status(Status::Discard) => f64::NAN,
+            Err(error) => return Err(error),
+        };
+        if !bend.is_finite() || !rise.is_finite() {
+            return Ok(RETREAT * guess);
+        }
+        let most = rise.max(bend);
+        let size = if most <= 1e-15 { (1e-3 * guess).max(1e-6) } else { (0.01 / most).powf(0.2) };
+        Ok(size.min(100.0 * guess))
+    }
+
+    /// The state with the largest error of the last step, or the first one that is not finite.
+    fn worst(&self) -> usize {
+        let error = match &self.stiff {
+            Some(method) if self.last_is_stiff => method.error(),
+            _ => &self.explicit.error,
+        };
+        let end = self.end();
+        let ratio = |i: usize| error[i].abs() / self.scale.weight(i, self.start[i], end[i]);
+        let broken = (0..error.len()).find(|&i| !ratio(i).is_finite());
+        let most = || (0..error.len()).max_by(|&a, &b| ratio(a).total_cmp(&ratio(b)));
+        broken.or_else(most).unwrap_or(0)
+    }
+}
+
+/// The root mean square of `values`, relative to the tolerances of the states from `a` to `b`.
+fn norm(scale: &Scale, values: &[f64], a: &[f64], b: &[f64]) -> f64 {
+    let part = |(i, value): (usize, &f64)| (value / scale.weight(i, a[i], b[i])).powi(2);
+    let sum: f64 = values.iter().enumerate().map(part).sum();
+    // More states than 2^52 do not fit in memory.
+    #[expect(clippy::cast_precision_loss, reason = "a length")]
+    let count = values.len().max(1) as f64;
+    let mean = (sum / count).sqrt();
+    if b.iter().all(|end| end.is_finite()) { mean } else { f64::NAN }
+}
+
+#[cfg(test)]
+mod tests;

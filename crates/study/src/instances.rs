@@ -1,0 +1,258 @@
+//! Instances of the FMUs of a system: their interface, their process.
+
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use fmu_import::{CallLog, Fmu, isolate};
+use integrate::Integrated;
+use master::{CallError, Failure, Slave, System};
+use ssp::Element;
+use ssp::structure::Implementation;
+
+use crate::assemble::AssemblyOptions;
+use crate::config::{Config, Interface, Solver};
+use crate::error::Error;
+
+/// Instantiates the FMUs; returns the system, and the FMUs that are integrated with their method.
+pub(crate) fn instantiate(
+    elements: &[Element],
+    config: &Config,
+    options: &AssemblyOptions<'_>,
+) -> Result<(System, Vec<(String, Solver)>), Error> {
+    check_names(elements, config)?;
+    let logging = options.logging;
+    let limit = config.isolation.time_limit.as_ref().map(|limit| *limit.get_ref());
+    let time_limit = limit.map(Duration::try_from_secs_f64).transpose();
+    let time_limit = time_limit.map_err(|error| Error::Invalid(format!("time-limit: {error}")))?;
+    let preload = config.preload.iter().map(Into::into).collect();
+    let memory_limit = config.isolation.memory_limit.map(|memory| memory.0);
+    if config.isolation.isolate != Some(true) {
+        if memory_limit.is_some() {
+            return Err(Error::Invalid(
+                "--memory-limit applies to FMUs in separate processes, expected --isolate"
+                    .to_owned(),
+            ));
+        }
+        if time_limit.is_some() {
+            tracing::warn!(
+                "--time-limit without --isolate cannot end a call that hangs; it limits pending \
+                 answers only"
+            );
+        }
+    }
+    let isolation =
+        isolate::Options { time_limit, memory_limit, preload, logging, executable: None };
+    let log = options.log_calls;
+    let (opened, isolated) = (HashMap::new(), HashMap::new());
+    let mut opening = Opening { isolation, log, opened, isolated };
+    let (mut system, mut integrated) = (System::default(), Vec::new());
+    for element in elements {
+        let name = &element.name;
+        let stated = stated_interface(element, config);
+        let slave: Box<dyn Slave> = if config.isolation.isolate == Some(true) {
+            opening.isolated(element, stated)?
+        } else {
+            let fmu = opening.open(element)?;
+            match choose_interface(element, &fmu, config, stated)? {
+                Interface::CoSimulation => opening.co_simulation(element, &fmu)?,
+                Interface::ModelExchange => {
+                    let method = config.solver.get(name).copied().unwrap_or_default();
+                    integrated.push((name.clone(), method));
+                    opening.model_exchange(element, &fmu, method)?
+                }
+            }
+        };
+        system.add(name, slave)?;
+    }
+    let unused = config.solver.0.iter();
+    let unused =
+        unused.map(|(name, _)| name).find(|name| !integrated.iter().any(|own| own.0 == **name));
+    if let Some(name) = unused {
+        return Err(Error::Invalid(format!(
+            "solver.{name}: {name} runs by co-simulation, with a solver of its own; the interface \
+             model-exchange would let the master integrate it"
+        )));
+    }
+    Ok((system, integrated))
+}
+
+/// Checks that the tables `interface` and `solver` name FMUs of the system.
+fn check_names(elements: &[Element], config: &Config) -> Result<(), Error> {
+    let interfaces = config.interface.0.iter().map(|(name, _)| ("interface", name));
+    let solvers = config.solver.0.iter().map(|(name, _)| ("solver", name));
+    let is_known = |name: &str| elements.iter().any(|element| element.name == name);
+    match interfaces.chain(solvers).find(|(_, name)| !is_known(name)) {
+        None => Ok(()),
+        Some((table, name)) => {
+            let known: Vec<_> = elements.iter().map(|element| element.name.as_str()).collect();
+            Err(Error::Invalid(format!(
+                "{table}.{name}: the system has no FMU {name}, expected one of {}",
+                known.join(", ")
+            )))
+        }
+    }
+}
+
+/// Returns the interface that the configuration or the system structure states.
+fn stated_interface(element: &Element, config: &Config) -> Option<Interface> {
+    let stated = config.interface.get(&element.name).copied();
+    stated.or(match element.implementation {
+        Implementation::CoSimulation => Some(Interface::CoSimulation),
+        Implementation::ModelExchange => Some(Interface::ModelExchange),
+        Implementation::Any | Implementation::ScheduledExecution => None,
+    })
+}
+
+/// Returns the interface to use: the stated one, otherwise co-simulation if the FMU offers it.
+fn choose_interface(
+    element: &Element,
+    fmu: &Fmu,
+    config: &Config,
+    stated: Option<Interface>,
+) -> Result<Interface, Error> {
+    let description = fmu.description();
+    let offers = |interface| match interface {
+        Interface::CoSimulation => description.co_simulation.is_some(),
+        Interface::ModelExchange => description.model_exchange.is_some(),
+    };
+    let default = if offers(Interface::CoSimulation) {
+        Interface::CoSimulation
+    } else {
+        Interface::ModelExchange
+    };
+    match stated {
+        Some(interface) if offers(interface) => Ok(interface),
+        // A system structure states the interface of the FMU that the configuration replaced.
+        Some(_) if config.interface.get(&element.name).is_none() => Ok(default),
+        Some(interface) => Err(Error::Invalid(format!(
+            "interface.{}: {} offers {} only, found {}",
+            element.name,
+            element.shown().display(),
+            default.name(),
+            interface.name()
+        ))),
+        None => Ok(default),
+    }
+}
+
+/// Returns the error for a model-exchange FMU that shall run in a separate process.
+fn not_isolated(element: &Element) -> Error {
+    Error::Invalid(format!(
+        "{}: {} runs by model exchange, which --isolate does not support: expected a run without \
+         --isolate, or an FMU that offers co-simulation",
+        element.name,
+        element.shown().display()
+    ))
+}
+
+/// Opens the FMUs; unpacks an FMU only once if several elements use it.
+struct Opening<'a> {
+    isolation: isolate::Options,
+    log: Option<&'a CallLog>,
+    opened: HashMap<&'a PathBuf, Fmu>,
+    isolated: HashMap<&'a PathBuf, isolate::Package>,
+}
+
+impl<'a> Opening<'a> {
+    /// Creates an instance in a separate process.
+    fn isolated(
+        &mut self,
+        element: &'a Element,
+        stated: Option<Interface>,
+    ) -> Result<Box<dyn Slave>, Error> {
+        if stated == Some(Interface::ModelExchange) {
+            return Err(not_isolated(element));
+        }
+        let package = if let Some(package) = self.isolated.get(&element.fmu) {
+            package.clone()
+        } else {
+            match isolate::Package::open(&element.fmu) {
+                Err(isolate::IsolateError::NoCoSimulation { .. }) => {
+                    return Err(not_isolated(element));
+                }
+                opened => opened.map_err(|error| Error::from(error).within(&element.name))?,
+            }
+        };
+        let slave = package.instantiate(&element.name, &self.isolation);
+        let slave = slave.map_err(|error| as_shown(error.into(), element))?;
+        self.isolated.insert(&element.fmu, package);
+        Ok(self.logged(element, Box::new(slave)))
+    }
+
+    /// Returns the FMU of an element, opened for use in this process.
+    fn open(&mut self, element: &'a Element) -> Result<Fmu, Error> {
+        if let Some(fmu) = self.opened.get(&element.fmu) {
+            return Ok(fmu.clone());
+        }
+        let fmu = open_fmu(element)?;
+        self.opened.insert(&element.fmu, fmu.clone());
+        Ok(fmu)
+    }
+
+    /// Creates a co-simulation instance in this process.
+    fn co_simulation(&self, element: &Element, fmu: &Fmu) -> Result<Box<dyn Slave>, Error> {
+        let slave = fmu.instantiate(&element.name);
+        let mut slave = slave.map_err(|error| as_shown(error.into(), element))?;
+        slave.set_time_limit(self.isolation.time_limit);
+        if self.isolation.logging {
+            switch_logging_on(&element.name, &mut slave);
+        }
+        Ok(self.logged(element, Box::new(slave)))
+    }
+
+    /// Creates a model-exchange instance in this process, integrated by `method`.
+    fn model_exchange(
+        &self,
+        element: &Element,
+        fmu: &Fmu,
+        method: Solver,
+    ) -> Result<Box<dyn Slave>, Error> {
+        let name = &element.name;
+        let equations = fmu.instantiate_equations(name);
+        let mut equations = equations.map_err(|error| as_shown(error.into(), element))?;
+        if let Some(log) = self.log {
+            equations = Box::new(log.listen_to_equations(name, equations));
+        }
+        let mut slave = Integrated::new(equations, integrate::Options { method });
+        if self.isolation.logging {
+            switch_logging_on(name, &mut slave);
+        }
+        Ok(Box::new(slave))
+    }
+
+    fn logged(&self, element: &Element, slave: Box<dyn Slave>) -> Box<dyn Slave> {
+        match self.log {
+            Some(log) => Box::new(log.listen(&element.name, slave)),
+            None => slave,
+        }
+    }
+}
+
+/// Opens the FMU of an element. Warnings about an FMU in an SSP were already logged when the SSP
+/// was opened.
+fn open_fmu(element: &Element) -> Result<Fmu, Error> {
+    let opened = match &element.shown {
+        Some(_) => Fmu::open_quietly(&element.fmu),
+        None => Fmu::open_any(&element.fmu),
+    };
+    opened.map_err(|error| as_shown(Error::from(error).within(&element.name), element))
+}
+
+/// Replaces the unpacked path of an FMU in an error by the path that the user knows.
+fn as_shown(error: Error, element: &Element) -> Error {
+    match &element.shown {
+        Some(shown) => {
+            let unpacked = element.fmu.display().to_string();
+            Error::Invalid(error.sentence().replace(&unpacked, &shown.display().to_string()))
+        }
+        None => error,
+    }
+}
+
+fn switch_logging_on(name: &str, slave: &mut dyn Slave) {
+    match slave.set_debug_logging(true) {
+        Ok(()) | Err(CallError { failure: Failure::Missing, .. }) => {}
+        Err(error) => tracing::warn!("{name}: {error}"),
+    }
+}
