@@ -45,7 +45,7 @@ pub struct ScalarVariable {
     #[serde(skip_serializing_if = "is_default", serialize_with = "numbered::<6, _, _>")]
     pub clocks: Vec<u32>,
     /// Name of the variable of which this one is an alias (FMI 3.0 element `Alias`; attribute `alias` of
-    /// FMI 1.0). Both have the same value reference.
+    /// FMI 1.0). Both have the same value reference; an alias of FMI 3.0 has no start value of its own.
     #[serde(skip_serializing_if = "is_default", serialize_with = "numbered::<7, _, _>")]
     pub alias_of: Option<String>,
     /// `alias` is `negatedAlias` (FMI 1.0): the value is that of `alias_of` with its sign changed.
@@ -165,11 +165,17 @@ impl ScalarVariable {
 
     /// Returns the start values of all elements in row-major order, one for a scalar: the stated
     /// list, or the common start value for each element. `None` without start value, and if there
-    /// are more than `most` elements.
+    /// are more than `most` elements. An alias of FMI 3.0 has the start values of its variable.
+    ///
+    /// Cost: see [`ScalarVariable::extents`]; for an alias also linear in the number of variables.
     #[must_use]
     pub fn start_values(&self, description: &ModelDescription, most: usize) -> Option<Elements> {
+        if let (Some(of), false) = (&self.alias_of, self.has_start()) {
+            let variable = description.variable(of).filter(|own| own.alias_of.is_none())?;
+            return variable.start_values(description, most);
+        }
         if let Some(elements) = &self.start_elements {
-            return Some(elements.clone());
+            return Some(elements.clone()).filter(|own| own.len() <= most);
         }
         let count = self.size(description);
         if count > most {
