@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::hash_form::{is_default, numbered};
-use super::{Causality, Initial, Kind, ModelDescription, RealType, Variability};
+use super::{Causality, Initial, Kind, ModelDescription, RealType, Variability, Version};
 
 /// `ScalarVariable`, in FMI 3.0 an element named by the type: a scalar or an array.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -170,7 +170,8 @@ impl ScalarVariable {
     /// Cost: see [`ScalarVariable::extents`]; for an alias also linear in the number of variables.
     #[must_use]
     pub fn start_values(&self, description: &ModelDescription, most: usize) -> Option<Elements> {
-        if let (Some(of), false) = (&self.alias_of, self.has_start()) {
+        let third = description.version() == Version::V3;
+        if let Some(of) = self.alias_of.as_ref().filter(|_| third && !self.has_start()) {
             let variable = description.variable(of).filter(|own| own.alias_of.is_none())?;
             return variable.start_values(description, most);
         }

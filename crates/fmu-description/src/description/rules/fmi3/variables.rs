@@ -176,7 +176,7 @@ fn check_numbers(variable: &ScalarVariable, problems: &mut Problems) {
     }
 }
 
-fn inside<T: PartialOrd>(value: T, min: Option<T>, max: Option<T>) -> bool {
+fn inside<T: Copy + PartialOrd>(value: T, min: Option<T>, max: Option<T>) -> bool {
     min.is_none_or(|min| min <= value) && max.is_none_or(|max| value <= max)
 }
 
