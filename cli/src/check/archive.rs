@@ -162,6 +162,10 @@ fn top_level(names: &[String], version: Version, findings: &mut Findings) {
         let reserved = ["org.modelica", "org.fmi-standard"];
         let inner = name.strip_prefix("extra/").and_then(|rest| rest.split('/').next());
         let Some(inner) = inner.filter(|inner| !inner.is_empty()) else { continue };
+        // Layered standards of FMI 3.0 (section 2.6).
+        if version == Version::V3 && inner.starts_with("org.fmi-standard.fmi-ls-") {
+            continue;
+        }
         if reserved.iter().any(|prefix| inner.starts_with(prefix)) || !inner.contains('.') {
             let what = "expected a folder called by a reverse domain name of its own";
             findings.add(Warning, name, what, ("", "2.3.1"));

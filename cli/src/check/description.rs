@@ -19,7 +19,7 @@ const fn rule(words: &'static str, why: &'static str, stops: &'static [Tool]) ->
     Rule { words, why, stops }
 }
 
-const RULES: [Rule; 19] = {
+const RULES: [Rule; 20] = {
     use Tool::{Fmpy, FmpyValidation};
     let dates = "FMPy's schema refuses some of these dates; others show what is there.";
     let validation = "fmpy.validation.validate_fmu reports it; few importers use the list.";
@@ -50,6 +50,8 @@ const RULES: [Rule; 19] = {
             "FMPy refuses combinations that are not in the table.",
             &[FmpyValidation],
         ),
+        // FMI 3.0.
+        rule("only for a float", "", &[]),
         rule("dependenciesKind", "FMI Library refuses some of these lists.", &[]),
         rule("InitialUnknown", validation, &[]),
         rule("Outputs", order, &[]),

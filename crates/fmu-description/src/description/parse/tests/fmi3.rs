@@ -83,7 +83,7 @@ fn other_types_have_start_values_of_their_own() {
     else {
         panic!("Float32")
     };
-    assert_eq!(real.start, Some(-0.0015));
+    assert_eq!(real.start, Some(f64::from(-0.0015_f32)), "the number that the FMU has");
     let text = r#"<Boolean name="x" valueReference="1" start="1"/>"#;
     assert_eq!(kind(text), Kind::Boolean(Some(true)));
     let text = r#"<String name="x" valueReference="1"><Start value="a &lt; b"/></String>"#;
@@ -311,6 +311,12 @@ fn defects_with_a_clear_meaning_are_warnings_that_name_them() {
             r#"<Float64 name="x" valueReference="0"/>"#,
             "",
             "expected one that no other variable has, variable 1 has it, found \"0\"",
+        ),
+        (
+            r#"<Float64 name="x" valueReference="1" causality="output"/>
+               <Float64 name="y" valueReference="1" causality="output"/>"#,
+            r#"<Output valueReference="1"/>"#,
+            "references to it are read as the first variable",
         ),
         (
             r#"<Float64 name="x" valueReference="1" previous="9"/>"#,
