@@ -53,7 +53,7 @@ impl Measure {
             Kind::Enumeration(kind) => {
                 let declared = kind.declared_type.as_ref();
                 let known = description.types.iter().find(|each| Some(&each.name) == declared);
-                Measure { unit: None, items: known.map(|each| items_of(each)) }
+                Measure { unit: None, items: known.map(items_of) }
             }
             _ => Measure::default(),
         }

@@ -3,8 +3,8 @@
 use std::ffi::{CString, c_int};
 use std::sync::OnceLock;
 
-use fmu_description::ModelDescription;
 use fmu_description::location::{file_uri, path_from_uri};
+use fmu_description::{ModelDescription, Version};
 
 use crate::array::Array;
 use crate::importer::{Importer, Order, Saved, describe};
@@ -113,6 +113,10 @@ pub fn resource_location(data: &[u8]) {
 /// result, and without a warning if it breaks no rule.
 pub fn model_description(data: &[u8]) {
     let Ok((read, _)) = ModelDescription::read(data) else { return };
+    if read.version() == Version::V1 {
+        // FMI 1.0 is only read.
+        return;
+    }
     let problems = read.problems();
     let xml = read.to_xml();
     match ModelDescription::read(&xml) {

@@ -157,6 +157,23 @@ impl Kind {
         })
     }
 
+    /// Removes the start value, and `reinit`.
+    pub(super) fn clear_start(&mut self) {
+        match self {
+            Kind::Boolean(start) => *start = None,
+            Kind::String(start) => *start = None,
+            Kind::Binary(own) => own.start = None,
+            Kind::Clock(_) => {}
+            other => {
+                if let Some(own) = other.as_real_mut() {
+                    (own.start, own.reinit) = (None, false);
+                } else if let Some(own) = other.as_integer_mut() {
+                    own.start = None;
+                }
+            }
+        }
+    }
+
     /// Returns the attribute `declaredType`, which a `Boolean` and a `String` do not keep.
     #[must_use]
     pub fn declared_type(&self) -> Option<&str> {

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::hash_form::{is_default, numbered};
-use super::{Causality, Initial, Kind, ModelDescription, RealType, Variability};
+use super::{Causality, Initial, Kind, ModelDescription, RealType, Variability, Version};
 
 /// `ScalarVariable`, in FMI 3.0 an element named by the type: a scalar or an array.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -45,7 +45,7 @@ pub struct ScalarVariable {
     #[serde(skip_serializing_if = "is_default", serialize_with = "numbered::<6, _, _>")]
     pub clocks: Vec<u32>,
     /// Name of the variable of which this one is an alias (FMI 3.0 element `Alias`; attribute `alias` of
-    /// FMI 1.0). Both have the same value reference.
+    /// FMI 1.0). Both have the same value reference; an alias of FMI 3.0 has no start value of its own.
     #[serde(skip_serializing_if = "is_default", serialize_with = "numbered::<7, _, _>")]
     pub alias_of: Option<String>,
     /// `alias` is `negatedAlias` (FMI 1.0): the value is that of `alias_of` with its sign changed.
@@ -165,11 +165,18 @@ impl ScalarVariable {
 
     /// Returns the start values of all elements in row-major order, one for a scalar: the stated
     /// list, or the common start value for each element. `None` without start value, and if there
-    /// are more than `most` elements.
+    /// are more than `most` elements. An alias of FMI 3.0 has the start values of its variable.
+    ///
+    /// Cost: see [`ScalarVariable::extents`]; for an alias also linear in the number of variables.
     #[must_use]
     pub fn start_values(&self, description: &ModelDescription, most: usize) -> Option<Elements> {
+        let third = description.version() == Version::V3;
+        if let Some(of) = self.alias_of.as_ref().filter(|_| third && !self.has_start()) {
+            let variable = description.variable(of).filter(|own| own.alias_of.is_none())?;
+            return variable.start_values(description, most);
+        }
         if let Some(elements) = &self.start_elements {
-            return Some(elements.clone());
+            return Some(elements.clone()).filter(|own| own.len() <= most);
         }
         let count = self.size(description);
         if count > most {

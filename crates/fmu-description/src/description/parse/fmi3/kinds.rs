@@ -44,11 +44,16 @@ pub(super) fn types(root: Node<'_>) -> Result<Vec<SimpleType>, ParseError> {
         // The check against the schema has warned of other elements.
         let Some(mut kind) = name.and_then(blank) else { continue };
         attributes(element, &mut kind, None)?;
+        let items = if let Kind::Enumeration(_) = kind {
+            element.children_named("Item").map(item).collect::<Result<_, _>>()?
+        } else {
+            Vec::new()
+        };
         types.push(SimpleType {
             name: element.required("name")?.to_owned(),
             description: element.text("description"),
             kind,
-            items: element.children_named("Item").map(item).collect::<Result<_, _>>()?,
+            items,
         });
     }
     Ok(types)
@@ -95,8 +100,9 @@ pub(super) fn attributes(
         *own = integer(element, range, defaults.and_then(Kind::as_integer))?;
         return Ok(());
     }
+    let precision = Precision::of(kind);
     if let Some(own) = kind.as_real_mut() {
-        *own = real(element, defaults.and_then(Kind::as_real))?;
+        *own = real(element, precision, defaults.and_then(Kind::as_real))?;
         return Ok(());
     }
     match (kind, defaults) {
@@ -109,15 +115,42 @@ pub(super) fn attributes(
     Ok(())
 }
 
-fn real(element: Node<'_>, defaults: Option<&RealType>) -> Result<RealType, ParseError> {
+/// The precision of a floating-point type.
+#[derive(Clone, Copy)]
+pub(super) enum Precision {
+    Single,
+    Double,
+}
+
+impl Precision {
+    pub(super) fn of(kind: &Kind) -> Self {
+        if let Kind::Float32(_) = kind { Precision::Single } else { Precision::Double }
+    }
+
+    /// Rounds a number to the precision.
+    #[expect(clippy::cast_possible_truncation, reason = "the FMU has this number")]
+    pub(super) fn round(self, value: f64) -> f64 {
+        match self {
+            Precision::Single => f64::from(value as f32),
+            Precision::Double => value,
+        }
+    }
+}
+
+fn real(
+    element: Node<'_>,
+    precision: Precision,
+    defaults: Option<&RealType>,
+) -> Result<RealType, ParseError> {
     let defaults = defaults.cloned().unwrap_or_default();
+    let round = |value: Option<f64>| value.map(|value| precision.round(value));
     Ok(RealType {
         quantity: element.text("quantity").or(defaults.quantity),
         unit: element.text("unit").or(defaults.unit),
         display_unit: element.text("displayUnit").or(defaults.display_unit),
-        min: element.bound("min")?.or(defaults.min),
-        max: element.bound("max")?.or(defaults.max),
-        nominal: element.number("nominal")?.or(defaults.nominal),
+        min: round(element.bound("min")?).or(defaults.min),
+        max: round(element.bound("max")?).or(defaults.max),
+        nominal: round(element.number("nominal")?).or(defaults.nominal),
         ..RealType::default()
     })
 }

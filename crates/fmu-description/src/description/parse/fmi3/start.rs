@@ -1,5 +1,6 @@
 //! Reads the start values of variables and arrays of FMI 3.0.
 
+use super::kinds::Precision;
 use crate::description::parse::ParseError;
 use crate::description::parse::attributes::{Node, WHITE_SPACE};
 use crate::description::{Elements, Kind, Version};
@@ -16,8 +17,10 @@ pub(super) fn read(element: Node<'_>, kind: &mut Kind) -> Result<Option<Elements
         )?;
         return Ok(single(values, |value| own.start = Some(value)).map(Elements::Integer));
     }
+    let precision = Precision::of(kind);
     if let Some(own) = kind.as_real_mut() {
-        let values = list(element, real, || "numbers".to_owned())?;
+        let values =
+            list(element, |text| Some(precision.round(real(text)?)), || "numbers".to_owned())?;
         return Ok(single(values, |value| own.start = Some(value)).map(Elements::Real));
     }
     Ok(match kind {

@@ -1,5 +1,7 @@
 //! Reads `ModelStructure` of FMI 3.0, which refers to variables by value reference.
 
+use std::collections::HashSet;
+
 use super::variables::References;
 use crate::description::parse::ParseError;
 use crate::description::parse::attributes::Node;
@@ -22,12 +24,12 @@ pub(super) fn read(
         let said = ("an element ModelStructure", "none".to_owned());
         root.warn_of(true, place, said, ANYTHING);
         return Ok(ModelStructure {
-            outputs: missing_outputs(&[], variables).map(|(row, _)| row).collect(),
+            outputs: missing(&[], variables, references).map(|(row, _)| row).collect(),
             ..ModelStructure::default()
         });
     };
     let mut outputs = list(element, "Output", references)?;
-    let missing: Vec<_> = missing_outputs(&outputs, variables).collect();
+    let missing: Vec<_> = missing(&outputs, variables, references).collect();
     if !missing.is_empty() {
         let names: Vec<_> = missing.iter().take(5).map(|(_, name)| *name).collect();
         let more = if missing.len() > 5 { ", and others" } else { "" };
@@ -50,6 +52,17 @@ pub(super) fn read(
         clocked_states: list(element, "ClockedState", references)?,
         event_indicators: list(element, "EventIndicator", references)?,
     })
+}
+
+/// Returns rows for the outputs without a row. A variable whose value reference means another variable
+/// cannot have one.
+fn missing<'a>(
+    rows: &[Unknown],
+    variables: &'a [ScalarVariable],
+    references: &References,
+) -> impl Iterator<Item = (Unknown, &'a str)> {
+    let meant: HashSet<u32> = references.values().copied().collect();
+    missing_outputs(rows, variables).filter(move |(row, _)| meant.contains(&row.index))
 }
 
 fn index(row: Node<'_>, references: &References) -> Result<Option<u32>, ParseError> {

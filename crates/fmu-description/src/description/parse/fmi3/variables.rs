@@ -10,7 +10,7 @@ use crate::description::parse::variables::{
     VARIABILITIES, VARIABLES, check_names, check_references,
 };
 use crate::description::{
-    Causality, Dimension, Elements, Kind, ScalarVariable, SimpleType, Variability,
+    Causality, Dimension, Elements, Kind, ModelDescription, ScalarVariable, SimpleType, Variability,
 };
 
 const CAUSALITIES: [&str; 7] = [
@@ -34,14 +34,21 @@ pub(super) fn read(
 ) -> Result<(Vec<ScalarVariable>, References), ParseError> {
     let types: Types<'_> = types.iter().map(|own| (own.name.as_str(), own)).collect();
     let (mut elements, mut variables) = (Vec::new(), Vec::new());
+    // A few bytes of the file may name an alias of a variable with long texts and lists.
+    let mut inherited = 0;
     for element in list.children() {
         let Some(kind) = blank(element.element.name) else { continue };
         let variable = variable(element, kind, &types)?;
-        let aliases = element.children_named("Alias").map(|own| Ok((own, alias(own, &variable)?)));
-        let aliases = aliases.collect::<Result<Vec<_>, ParseError>>()?;
+        let position = variables.len();
         elements.push(element);
         variables.push(variable);
-        for (element, alias) in aliases {
+        for element in element.children_named("Alias") {
+            let alias = alias(element, &variables[position])?;
+            inherited += weight(&alias);
+            if inherited > ModelDescription::MOST_BYTES {
+                let (at, limit) = (element.element.at, ModelDescription::MOST_BYTES);
+                return Err(ParseError::Limit { at, what: "bytes of aliases", limit });
+            }
             elements.push(element);
             variables.push(alias);
         }
@@ -129,18 +136,45 @@ fn set_declared_type(kind: &mut Kind, name: Option<String>) {
 
 /// Reads an `Alias`: a variable with the value of the one that contains it.
 fn alias(element: Node<'_>, of: &ScalarVariable) -> Result<ScalarVariable, ParseError> {
+    let mut kind = of.kind.clone();
+    kind.clear_start();
     let mut alias = ScalarVariable {
         name: element.required("name")?.to_owned(),
+        value_reference: of.value_reference,
+        description: element.text("description").or_else(|| of.description.clone()),
+        causality: of.causality,
+        variability: of.variability,
+        initial: of.initial,
+        kind,
+        dimensions: of.dimensions.clone(),
+        start_elements: None,
+        can_handle_multiple_set_per_time_instant: of.can_handle_multiple_set_per_time_instant,
+        intermediate_update: of.intermediate_update,
+        previous: of.previous,
+        clocks: of.clocks.clone(),
         alias_of: Some(of.name.clone()),
-        ..of.clone()
+        negated: false,
     };
-    if let Some(text) = element.text("description") {
-        alias.description = Some(text);
-    }
     if let (Some(unit), Some(own)) = (element.text("displayUnit"), alias.kind.as_real_mut()) {
         own.display_unit = Some(unit);
     }
     Ok(alias)
+}
+
+/// Returns the approximate number of bytes that an alias takes from its variable.
+fn weight(alias: &ScalarVariable) -> usize {
+    let text = |own: &Option<String>| own.as_ref().map_or(0, String::len);
+    let kind = match &alias.kind {
+        Kind::Binary(own) => text(&own.mime_type),
+        other => {
+            let real = other.as_real();
+            real.map_or(0, |own| text(&own.quantity) + text(&own.unit) + text(&own.display_unit))
+                + other.as_integer().map_or(0, |own| text(&own.quantity))
+        }
+    };
+    let declared = alias.kind.declared_type().map_or(0, str::len);
+    let lists = 16 * alias.dimensions.len() + 4 * alias.clocks.len();
+    text(&alias.description) + text(&alias.alias_of) + kind + declared + lists
 }
 
 /// Reads `variability`, or returns its default (section 2.4.7.4).
@@ -215,7 +249,7 @@ fn check_dimensions(
         }
         let count = variable.start_elements.as_ref().map(Elements::len);
         let fits = count.is_none_or(|count| u64::try_from(count) == Ok(size));
-        if !fits && variable.alias_of.is_none() {
+        if !fits {
             let found = format!("{} values", count.unwrap_or_default());
             let expected = format!("one value or {size}");
             let place = element.place("start");

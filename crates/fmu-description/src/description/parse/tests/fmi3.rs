@@ -83,7 +83,7 @@ fn other_types_have_start_values_of_their_own() {
     else {
         panic!("Float32")
     };
-    assert_eq!(real.start, Some(-0.0015));
+    assert_eq!(real.start, Some(f64::from(-0.0015_f32)), "the number that the FMU has");
     let text = r#"<Boolean name="x" valueReference="1" start="1"/>"#;
     assert_eq!(kind(text), Kind::Boolean(Some(true)));
     let text = r#"<String name="x" valueReference="1"><Start value="a &lt; b"/></String>"#;
@@ -209,6 +209,34 @@ fn an_alias_is_a_variable_after_the_one_that_contains_it() {
 }
 
 #[test]
+fn an_alias_has_the_start_values_of_its_variable() {
+    let (description, _) = read(
+        r#"<Float64 name="A" valueReference="1" causality="parameter" start="1 2">
+             <Dimension start="2"/><Alias name="B"/></Float64>
+           <String name="s" valueReference="2" causality="parameter"><Start value="a"/>
+             <Alias name="t"/></String>"#,
+        "",
+    );
+    for (alias, expected) in
+        [("B", Elements::Real(vec![1.0, 2.0])), ("t", Elements::String(vec!["a".to_owned()]))]
+    {
+        let alias = description.variable(alias).unwrap();
+        assert!(!alias.has_start(), "it is stated once");
+        assert_eq!(alias.start_values(&description, 2), Some(expected));
+    }
+}
+
+#[test]
+fn aliases_of_a_long_description_have_a_limit() {
+    let aliases = (0..2000).map(|k| format!("<Alias name=\"a{k}\"/>")).collect::<Vec<_>>().concat();
+    let long = "x".repeat(100_000);
+    let text =
+        format!(r#"<Float64 name="x" valueReference="1" description="{long}">{aliases}</Float64>"#);
+    let error = refused(&text, "");
+    assert!(error.contains("bytes of aliases"), "{error}");
+}
+
+#[test]
 fn capabilities_and_versions_are_read() {
     let (description, _) = read("", "");
     let flags = description.co_simulation.as_ref().unwrap();
@@ -283,6 +311,12 @@ fn defects_with_a_clear_meaning_are_warnings_that_name_them() {
             r#"<Float64 name="x" valueReference="0"/>"#,
             "",
             "expected one that no other variable has, variable 1 has it, found \"0\"",
+        ),
+        (
+            r#"<Float64 name="x" valueReference="1" causality="output"/>
+               <Float64 name="y" valueReference="1" causality="output"/>"#,
+            r#"<Output valueReference="1"/>"#,
+            "references to it are read as the first variable",
         ),
         (
             r#"<Float64 name="x" valueReference="1" previous="9"/>"#,

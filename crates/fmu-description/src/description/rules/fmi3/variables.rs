@@ -133,7 +133,8 @@ fn check_numbers(variable: &ScalarVariable, problems: &mut Problems) {
     if let Some(own) = kind.as_real() {
         check_real(&who, own, problems);
         if let Some(Elements::Real(starts)) = &variable.start_elements {
-            for start in starts {
+            let outside = |start: &&f64| !inside(**start, own.min, own.max);
+            if let Some(start) = starts.iter().find(outside) {
                 check_order(&who, own.min, Some(*start), own.max, problems);
             }
         }
@@ -144,14 +145,16 @@ fn check_numbers(variable: &ScalarVariable, problems: &mut Problems) {
             Some(Elements::Integer(starts)) => starts.as_slice(),
             _ => &[],
         };
-        for start in starts {
+        let outside = |start: &&i128| !inside(**start, own.min, own.max);
+        if let Some(start) = starts.iter().find(outside) {
             check_order(&who, own.min, Some(*start), own.max, problems);
         }
-        for value in [own.min, own.max, own.start].iter().flatten().chain(starts) {
-            problems.demand((low..=high).contains(value), TYPED, || {
-                let kind = kind.element_in(Version::V3);
-                format!("{who}: {value} is no number of type {kind}, {low} to {high}")
-            });
+        let mut numbers =
+            [own.min, own.max, own.start].into_iter().flatten().chain(starts.iter().copied());
+        if let Some(value) = numbers.find(|value| !(low..=high).contains(value)) {
+            let kind = kind.element_in(Version::V3);
+            let text = format!("{who}: {value} is no number of type {kind}, {low} to {high}");
+            problems.add(TYPED, text);
         }
     }
     match (kind, &variable.start_elements) {
@@ -171,6 +174,10 @@ fn check_numbers(variable: &ScalarVariable, problems: &mut Problems) {
         }
         _ => {}
     }
+}
+
+fn inside<T: Copy + PartialOrd>(value: T, min: Option<T>, max: Option<T>) -> bool {
+    min.is_none_or(|min| min <= value) && max.is_none_or(|max| value <= max)
 }
 
 /// Checks that a declared type exists and has the variable's kind, and that the start value of an
