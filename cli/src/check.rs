@@ -8,6 +8,7 @@ mod description;
 mod finding;
 mod fold;
 mod messages;
+mod sections;
 #[cfg(test)]
 mod tests;
 mod values;
@@ -91,9 +92,10 @@ pub(crate) fn check(options: &Options) -> anyhow::Result<bool> {
 fn findings(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResult, Vec<Finding>)> {
     let description = &unpacked.description;
     let mut findings = archive::check(&options.fmu, unpacked.entries(), description)?;
-    findings.extend(description::check(description, &unpacked.warnings));
     let read = |path: &str| std::fs::read(unpacked.folder().join(path));
     findings.extend(binaries::check(&read, unpacked.entries(), description));
+    sections::renumber(&mut findings, description.version());
+    findings.extend(description::check(description, &unpacked.warnings));
     let here = if let Some(here) = without_trial(options, unpacked) {
         here
     } else {
@@ -105,6 +107,7 @@ fn findings(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResu
         for finding in &mut found {
             finding.what = finding.what.replace(&folder, "");
         }
+        sections::renumber(&mut found, description.version());
         findings.extend(found);
         here
     };

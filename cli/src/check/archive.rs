@@ -1,11 +1,11 @@
-//! Checks of the archive (section 2.3): packing, file names, required files.
+//! Checks of the archive (FMI 2.0.5, section 2.3; FMI 3.0.2, section 2.5.1): packing, file names, required files.
 
 use std::collections::{HashMap, HashSet};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-use fmu_description::ModelDescription;
+use fmu_description::{ModelDescription, Version};
 use zip::CompressionMethod;
 use zip::read::ZipFile;
 
@@ -54,9 +54,12 @@ pub(super) fn check(
         findings.add(Error, "the archive", error.to_string(), (why, SECTION));
     }
     case(names, &mut findings);
-    top_level(names, &mut findings);
+    top_level(names, description.version(), &mut findings);
     documentation(names, &mut findings);
     sources(names, description, &mut findings);
+    if description.version() == Version::V3 {
+        build_description(names, &mut findings);
+    }
     if let Ok(index) = archive.by_name("model.png") {
         picture(index, &mut findings);
     }
@@ -130,18 +133,21 @@ fn case(names: &[String], findings: &mut Findings) {
     }
 }
 
-fn top_level(names: &[String], findings: &mut Findings) {
+fn top_level(names: &[String], version: Version, findings: &mut Findings) {
     let mut seen = HashSet::new();
+    // FMI 3.0 has its picture in terminalsAndIcons.
+    let allowed = |own: &&&str| version != Version::V3 || **own != "model.png";
+    let tops: Vec<&str> = TOP.iter().filter(allowed).copied().collect();
     for name in names {
         let top = name.split('/').next().unwrap_or(name);
-        if !seen.insert(top) || TOP.contains(&top) {
+        if !seen.insert(top) || tops.contains(&top) {
             continue;
         }
-        let near = TOP.iter().find(|own| own.eq_ignore_ascii_case(top));
+        let near = tops.iter().find(|own| own.eq_ignore_ascii_case(top));
         let what = match near {
             Some(near) => format!("expected {near}, in this case"),
             None if top == "icons" => "expected terminalsAndIcons".to_owned(),
-            None => format!("expected nothing but {} at the top", TOP.join(", ")),
+            None => format!("expected nothing but {} at the top", tops.join(", ")),
         };
         let why =
             near.map_or("", |_| "Importers do not find it where upper and lower case differ.");
@@ -172,6 +178,15 @@ fn documentation(names: &[String], findings: &mut Findings) {
     if !has("documentation/licenses/license.") {
         let what = "expected documentation/licenses/license.txt or .html, found neither";
         findings.add(Note, "documentation", what, ("Users do not know what they may do.", SECTION));
+    }
+}
+
+/// Checks that sources of FMI 3.0 say how they are built.
+fn build_description(names: &[String], findings: &mut Findings) {
+    let has = |path: &str| names.iter().any(|name| name.starts_with(path) && !name.ends_with('/'));
+    if has("sources/") && !has("sources/buildDescription.xml") {
+        let what = "expected buildDescription.xml in it";
+        findings.add(Error, "sources", what, ("It cannot be built.", SECTION));
     }
 }
 

@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 use std::io;
 
-use fmu_description::ModelDescription;
 use fmu_description::call_order::{Function, InterfaceType, State, allowed};
+use fmu_description::{ModelDescription, Version, abi1, abi3};
 use object::{Architecture, BinaryFormat, ImportFlags, NameOrOrdinal, Object as _};
 
 use super::finding::Severity::{Error, Note, Warning};
@@ -65,10 +65,17 @@ pub(crate) fn check(
         .iter()
         .filter_map(|name| name.strip_prefix("binaries/")?.split_once('/').map(|(top, _)| top))
         .collect();
+    let version = description.version();
     for name in found {
-        let Some(platform) = PLATFORMS.iter().find(|own| own.folder == name) else {
-            let what =
-                "expected the name of a platform, as win64, linux64, darwin64, aarch64-linux";
+        // FMI 3.0 has platform tuples only.
+        let named =
+            |own: &&Platform| own.folder == name && (version != Version::V3 || name.contains('-'));
+        let Some(platform) = PLATFORMS.iter().find(named) else {
+            let what = if version == Version::V3 {
+                "expected a platform tuple, as x86_64-windows, x86_64-linux, aarch64-darwin"
+            } else {
+                "expected the name of a platform, as win64, linux64, darwin64, aarch64-linux"
+            };
             let why = "Importers do not look there, unless a library does.";
             findings.add(Note, format!("binaries/{name}"), what, (why, SECTION));
             continue;
@@ -80,13 +87,37 @@ pub(crate) fn check(
                 continue;
             }
             let before = findings.all.len();
-            library(read, &path, platform, (&interfaces, names), &mut findings);
+            let required = required(version, &interfaces, &identifier);
+            library(read, &path, platform, (&required, names), &mut findings);
             for finding in &mut findings.all[before..] {
-                finding.stops = stops(finding, platform, &interfaces);
+                finding.stops = match version {
+                    Version::V2 => stops(finding, platform, &interfaces),
+                    Version::V1 | Version::V3 => loading(finding, platform),
+                };
             }
         }
     }
     findings.all
+}
+
+/// Returns the functions that a library must export: in FMI 1.0 with the model identifier before
+/// them, in FMI 3.0 all of them.
+fn required(version: Version, interfaces: &[InterfaceType], identifier: &str) -> Vec<String> {
+    match version {
+        // Model exchange has other functions.
+        Version::V1 if !interfaces.contains(&InterfaceType::CoSimulation) => Vec::new(),
+        Version::V1 => abi1::FUNCTIONS.map(|name| format!("{identifier}_{name}")).to_vec(),
+        Version::V2 => required_functions(interfaces).map(str::to_owned).collect(),
+        Version::V3 => abi3::FUNCTIONS.map(str::to_owned).to_vec(),
+    }
+}
+
+/// Returns the platform whose importers cannot load the library.
+fn loading(finding: &Finding, platform: &Platform) -> Vec<Tool> {
+    if finding.severity == Error && !finding.what.starts_with("lacks ") {
+        return vec![Tool::Platform(platform.folder)];
+    }
+    Vec::new()
 }
 
 /// Adds a finding for a missing library.
@@ -151,7 +182,7 @@ fn library(
     read: &Read<'_>,
     path: &str,
     platform: &Platform,
-    (interfaces, names): (&[InterfaceType], &[String]),
+    (required, names): (&[String], &[String]),
     findings: &mut Findings,
 ) {
     let bytes = match read(path) {
@@ -177,7 +208,7 @@ fn library(
         );
         return findings.add(Error, path, what, ("The system refuses to load it.", SECTION));
     }
-    functions(&file, path, interfaces, findings);
+    functions(&file, path, required, findings);
     needs(&file, path, names, findings);
     versions(&file, path, findings);
 }
@@ -209,12 +240,7 @@ fn required_functions(interfaces: &[InterfaceType]) -> impl Iterator<Item = &'st
     ALWAYS.into_iter().chain(own)
 }
 
-fn functions(
-    file: &object::File<'_>,
-    path: &str,
-    interfaces: &[InterfaceType],
-    findings: &mut Findings,
-) {
+fn functions(file: &object::File<'_>, path: &str, required: &[String], findings: &mut Findings) {
     let mut exported = BTreeSet::new();
     let Ok(exports) = file.exports() else {
         return findings.add(Error, path, "expected a readable list of exports", ("", "2.1"));
@@ -223,24 +249,32 @@ fn functions(
         if let NameOrOrdinal::Name(name) = export.name() {
             let name = String::from_utf8_lossy(name);
             // On macOS, the export list has C names with a leading underscore.
-            let plain = name.strip_prefix('_').filter(|rest| rest.starts_with("fmi2"));
+            let plain = name
+                .strip_prefix('_')
+                .filter(|rest| rest.starts_with("fmi") || required.iter().any(|own| own == rest));
             exported.insert(plain.unwrap_or(&name).to_owned());
         }
     }
-    let missing: BTreeSet<_> =
-        required_functions(interfaces).filter(|name| !exported.contains(*name)).collect();
+    let missing: BTreeSet<&str> =
+        required.iter().filter(|name| !exported.contains(*name)).map(String::as_str).collect();
     if missing.is_empty() {
         return;
     }
-    let prefixed = exported.iter().find(|name| name.ends_with("_fmi2DoStep"));
-    if let Some(prefixed) = prefixed.filter(|_| missing.contains(&"fmi2DoStep")) {
+    let step = ["fmi2DoStep", "fmi3DoStep"].into_iter().find(|own| missing.contains(own));
+    let prefixed = step.and_then(|step| exported.iter().find(|name| name.ends_with(step)));
+    if let Some(prefixed) = prefixed {
         let what = format!("expected functions without prefix, found {prefixed}");
-        let why = "Importers of FMI 2.0 look for the plain names; prefixes are for source code.";
+        let why = "Importers look for the plain names; prefixes are for source code.";
         return findings.add(Error, path, what, (why, "2.1.1"));
     }
+    let second = missing.iter().any(|own| own.starts_with("fmi2"));
     let missing: Vec<_> = missing.into_iter().collect();
     let what = format!("lacks {}", missing.join(", "));
-    let why = "FMPy needs all functions; FMI Library all but those for states and directional derivatives.";
+    let why = if second {
+        "FMPy needs all functions; FMI Library all but those for states and directional derivatives."
+    } else {
+        "The standard demands all functions; importers may refuse to load it."
+    };
     findings.add(Error, path, what, (why, "2.1.1"));
 }
 

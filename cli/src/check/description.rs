@@ -1,6 +1,6 @@
 //! Checks of `modelDescription.xml`: warnings of the parser, and rules of the standard.
 
-use fmu_description::{ModelDescription, Warning};
+use fmu_description::{ModelDescription, Version, Warning};
 
 use super::finding::Severity::Note;
 use super::finding::{Finding, Findings, Part, Severity, Tool};
@@ -19,13 +19,14 @@ const fn rule(words: &'static str, why: &'static str, stops: &'static [Tool]) ->
     Rule { words, why, stops }
 }
 
-const RULES: [Rule; 15] = {
+const RULES: [Rule; 19] = {
     use Tool::{Fmpy, FmpyValidation};
     let dates = "FMPy's schema refuses some of these dates; others show what is there.";
     let validation = "fmpy.validation.validate_fmu reports it; few importers use the list.";
     let refused = "FMPy's validation refuses it.";
+    let order = "Importers that order FMUs by their dependencies go wrong.";
     [
-        rule("fmiVersion", "FMPy reads 2.0 only.", &[Fmpy]),
+        rule("must be \"2.0\"", "FMPy reads 2.0 only.", &[Fmpy]),
         rule("generationDateAndTime", dates, &[]),
         rule("no C identifier", "Tools that build from the sources make C names of it.", &[]),
         rule("which is not defined", refused, &[FmpyValidation]),
@@ -50,15 +51,19 @@ const RULES: [Rule; 15] = {
             &[FmpyValidation],
         ),
         rule("dependenciesKind", "FMI Library refuses some of these lists.", &[]),
-        rule("InitialUnknowns", validation, &[]),
-        rule("Outputs", "Importers that order FMUs by their dependencies go wrong.", &[]),
+        rule("InitialUnknown", validation, &[]),
+        rule("Outputs", order, &[]),
+        rule("Output lacks", order, &[]),
+        rule("Output has", order, &[]),
+        rule("are independent", refused, &[FmpyValidation]),
+        rule("have the value reference", refused, &[FmpyValidation]),
         rule("is there twice", "Which one is meant, importers decide differently.", &[]),
     ]
 };
 
 /// Returns the tools that a warning of the parser stops, and the reason.
 fn stops(warning: &Warning) -> (&'static [Tool], &'static str) {
-    if warning.place.contains("fmiVersion") {
+    if warning.place.contains("fmiVersion") && warning.expected.starts_with("2.0") {
         return (&[Tool::Fmpy], "FMPy reads 2.0 only.");
     }
     if warning.by_schema {
@@ -98,6 +103,11 @@ pub(super) fn check(description: &ModelDescription, warnings: &[Warning]) -> Vec
 
 /// Adds notes on things that the standard allows and users run into.
 fn notes(description: &ModelDescription, findings: &mut Findings) {
+    let [experiment_section, variables, flags] = match description.version() {
+        Version::V1 => ["", "", ""],
+        Version::V2 => ["2.2.5", "2.2.7", "4.3.1"],
+        Version::V3 => ["2.4.6", "2.4.7.4", "2.4.2"],
+    };
     let experiment = description.default_experiment.unwrap_or_default();
     let stated = [("stopTime", experiment.stop_time), ("stepSize", experiment.step_size)];
     let absent: Vec<_> = stated.iter().filter(|own| own.1.is_none()).map(|own| own.0).collect();
@@ -105,21 +115,21 @@ fn notes(description: &ModelDescription, findings: &mut Findings) {
         let what = format!("no {} in DefaultExperiment", absent.join(" and no "));
         let why =
             "FMPy, OMSimulator and fmusim take them where the user states none; others guess.";
-        findings.add(Note, FILE, what, (why, "2.2.5"));
+        findings.add(Note, FILE, what, (why, experiment_section));
     }
     let unnamed = description.variables.iter().filter(|own| own.description.is_none()).count();
     if unnamed > 0 {
         let what =
             format!("{unnamed} of {} variables without description", description.variables.len());
-        findings.add(Note, FILE, what, ("Importers show it to the user.", "2.2.7"));
+        findings.add(Note, FILE, what, ("Importers show it to the user.", variables));
     }
     let simulation = description.co_simulation.as_ref();
     if simulation.is_some_and(|own| own.needs_execution_tool) {
         let what = "needsExecutionTool is true";
-        findings.add(Note, FILE, what, ("It runs only beside the tool that made it.", "4.3.1"));
+        findings.add(Note, FILE, what, ("It runs only beside the tool that made it.", flags));
     }
     if simulation.is_some_and(|own| own.can_be_instantiated_only_once_per_process) {
         let what = "canBeInstantiatedOnlyOncePerProcess is true";
-        findings.add(Note, FILE, what, ("Two of it need two processes.", "4.3.1"));
+        findings.add(Note, FILE, what, ("Two of it need two processes.", flags));
     }
 }

@@ -71,13 +71,13 @@ pub(super) fn distance(one: &[Vec<Value>], other: &[Vec<Value>]) -> f64 {
 /// Reads one variable.
 pub(super) fn get(slave: &mut dyn Slave, variable: &ScalarVariable) -> Result<Value, CallError> {
     let reference = [variable.value_reference];
-    Ok(match variable.kind {
-        Kind::Real(_) => {
+    Ok(match &variable.kind {
+        own if own.as_real().is_some() => {
             let mut value = [0.0];
             slave.get_real(&reference, &mut value)?;
             Value::Real(value[0].to_bits())
         }
-        Kind::Integer(_) | Kind::Enumeration(_) => {
+        own if own.as_integer().is_some() => {
             let mut value = [0];
             slave.get_integer(&reference, &mut value)?;
             Value::Integer(value[0])
@@ -87,7 +87,7 @@ pub(super) fn get(slave: &mut dyn Slave, variable: &ScalarVariable) -> Result<Va
             slave.get_boolean(&reference, &mut value)?;
             Value::Boolean(value[0] != 0)
         }
-        Kind::String(_) => {
+        _ => {
             let mut value = [String::new()];
             slave.get_string(&reference, &mut value)?;
             let [value] = value;
@@ -100,9 +100,12 @@ pub(super) fn get(slave: &mut dyn Slave, variable: &ScalarVariable) -> Result<Va
 pub(super) fn start(variable: &ScalarVariable) -> Option<Value> {
     match &variable.kind {
         Kind::Real(own) => own.start.map(|value| Value::Real(value.to_bits())),
-        Kind::Integer(own) | Kind::Enumeration(own) => own.start.map(Value::Integer),
         Kind::Boolean(start) => start.map(Value::Boolean),
         Kind::String(start) => start.clone().map(Value::String),
+        other => {
+            let start = other.as_integer()?.start?;
+            i32::try_from(start).ok().map(Value::Integer)
+        }
     }
 }
 

@@ -3,8 +3,8 @@
 use std::borrow::Cow;
 
 use crate::description::{
-    CoSimulation, DefaultExperiment, Kind, ModelDescription, ModelExchange, ScalarVariable,
-    SimpleType,
+    CoSimulation, DefaultExperiment, Dimension, Elements, IntegerType, Kind, ModelDescription,
+    ModelExchange, ScalarVariable, SimpleType, Unknown, Version,
 };
 
 const STYLE: &str = "body { font: 16px/1.5 sans-serif; max-width: 72rem; margin: 2rem auto; \
@@ -32,9 +32,13 @@ pub const FRAGMENT: &str = "model.html";
 pub fn page(description: &ModelDescription, model_html: &str) -> String {
     let title = escaped(&description.model_name);
     let experiment = description.default_experiment.as_ref().map(experiment);
-    let simulation = description.co_simulation.as_ref().map(co_simulation);
-    let exchange = description.model_exchange.as_ref();
-    let exchange = exchange.map(|own| model_exchange(own, description));
+    let third = description.version() == Version::V3;
+    let simulation = description.co_simulation.as_ref();
+    let simulation =
+        simulation.map(|own| if third { co_simulation_3(own) } else { co_simulation(own) });
+    let exchange = description.model_exchange.as_ref().map(|own| {
+        if third { model_exchange_3(own, description) } else { model_exchange(own, description) }
+    });
     let sections = [
         format!("<h1>{title}</h1>\n"),
         paragraph(description.description.as_deref()),
@@ -91,13 +95,14 @@ fn table(header: &[&str], rows: &[Vec<String>]) -> String {
 }
 
 fn facts(description: &ModelDescription) -> String {
+    let token = if description.version() == Version::V3 { "Instantiation token" } else { "GUID" };
     let facts = [
         ("Version", description.version.as_deref()),
         ("Author", description.author.as_deref()),
         ("Copyright", description.copyright.as_deref()),
         ("Made by", description.generation_tool.as_deref()),
         ("Made at", description.generation_date_and_time.as_deref()),
-        ("GUID", Some(description.guid.as_str()).filter(|guid| !guid.is_empty())),
+        (token, Some(description.guid.as_str()).filter(|guid| !guid.is_empty())),
     ];
     let rows: Vec<Vec<String>> = facts
         .iter()
@@ -111,11 +116,12 @@ fn variables(description: &ModelDescription) -> String {
         ["Name", "Causality", "Variability", "Type", "Unit", "Start", "Min", "Max", "Description"];
     let row = |variable: &ScalarVariable| {
         let (unit, [start, min, max]) = texts(&variable.kind, &description.types);
+        let start = variable.start_elements.as_ref().map_or(start, list);
         vec![
             code(&variable.name),
             variable.causality.as_str().to_owned(),
             variable.variability.as_str().to_owned(),
-            type_name(&variable.kind),
+            type_name(variable, description.version()),
             escaped(&unit).into_owned(),
             code(&start),
             code(&min),
@@ -131,14 +137,38 @@ fn code(text: &str) -> String {
     if text.is_empty() { String::new() } else { format!("<code>{}</code>", escaped(text)) }
 }
 
-fn type_name(kind: &Kind) -> String {
-    match kind {
+/// Returns the type, with the dimensions of an array: extents, or the value references of the
+/// structural parameters.
+fn type_name(variable: &ScalarVariable, version: Version) -> String {
+    let name = match &variable.kind {
         Kind::Enumeration(own) => {
             let name = own.declared_type.as_deref().unwrap_or_default();
             format!("Enumeration {}", escaped(name))
         }
-        other => other.element().to_owned(),
-    }
+        other => other.element_in(version).to_owned(),
+    };
+    let extents = variable.dimensions.iter().map(|dimension| match dimension {
+        Dimension::Fixed(extent) => extent.to_string(),
+        Dimension::Variable(reference) => format!("value of {reference}"),
+    });
+    let extents: Vec<String> = extents.collect();
+    if extents.is_empty() { name } else { format!("{name} [{}]", extents.join(", ")) }
+}
+
+/// Returns the start values of an array, the first ones of a long array.
+fn list(elements: &Elements) -> String {
+    const SHOWN: usize = 20;
+    let texts: Vec<String> = match elements {
+        Elements::Real(own) => own.iter().take(SHOWN).map(|own| format!("{own:?}")).collect(),
+        Elements::Integer(own) => own.iter().take(SHOWN).map(ToString::to_string).collect(),
+        Elements::Boolean(own) => own.iter().take(SHOWN).map(ToString::to_string).collect(),
+        Elements::String(own) => own.iter().take(SHOWN).map(|own| format!("{own:?}")).collect(),
+        Elements::Binary(own) => {
+            own.iter().take(SHOWN).map(|own| format!("{} bytes", own.len())).collect()
+        }
+    };
+    let more = if elements.len() > SHOWN { ", ..." } else { "" };
+    format!("{}{more}", texts.join(", "))
 }
 
 /// Returns the unit, and start, min and max as text; an absent value is an empty text.
@@ -148,22 +178,18 @@ fn type_name(kind: &Kind) -> String {
 pub fn texts(kind: &Kind, types: &[SimpleType]) -> (String, [String; 3]) {
     let none = String::new;
     match kind {
-        Kind::Real(own) => {
+        Kind::Real(own) | Kind::Float32(own) => {
             let number = |value: Option<f64>| value.map_or_else(none, |value| format!("{value:?}"));
             let unit = own.unit.clone().unwrap_or_default();
             (unit, [number(own.start), number(own.min), number(own.max)])
-        }
-        Kind::Integer(own) => {
-            let number = |value: Option<i32>| value.map_or_else(none, |value| value.to_string());
-            (none(), [number(own.start), number(own.min), number(own.max)])
         }
         Kind::Enumeration(own) => {
             let declared =
                 types.iter().find(|other| Some(&other.name) == own.declared_type.as_ref());
             let items = declared.map_or(&[][..], |own| &own.items);
-            let item = |value: Option<i32>| {
+            let item = |value: Option<i128>| {
                 let Some(value) = value else { return none() };
-                let item = items.iter().find(|(_, own)| *own == value);
+                let item = items.iter().find(|(_, own)| i128::from(*own) == value);
                 item.map_or_else(|| value.to_string(), |(name, _)| format!("{value} ({name})"))
             };
             (none(), [item(own.start), item(own.min), item(own.max)])
@@ -174,6 +200,23 @@ pub fn texts(kind: &Kind, types: &[SimpleType]) -> (String, [String; 3]) {
         Kind::String(start) => {
             let text = start.as_ref().map_or_else(none, |start| format!("\"{start}\""));
             (none(), [text, none(), none()])
+        }
+        Kind::Binary(own) => {
+            let bytes = own.start.as_ref();
+            let hex = bytes.map_or_else(none, |bytes| {
+                bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().concat()
+            });
+            (none(), [hex, none(), none()])
+        }
+        Kind::Clock(own) => {
+            let interval = own.interval_decimal.map_or_else(none, |value| format!("{value:?}"));
+            ("s".to_owned(), [interval, none(), none()])
+        }
+        other => {
+            let number = |value: Option<i128>| value.map_or_else(none, |value| value.to_string());
+            let own = other.as_integer();
+            let of = |of: fn(&IntegerType) -> Option<i128>| number(own.and_then(of));
+            (none(), [of(|own| own.start), of(|own| own.min), of(|own| own.max)])
         }
     }
 }
@@ -251,6 +294,65 @@ fn model_exchange(own: &ModelExchange, description: &ModelDescription) -> String
     ])
 }
 
+fn co_simulation_3(own: &CoSimulation) -> String {
+    let order = own.max_output_derivative_order.to_string();
+    let step = own.fixed_internal_step_size.map(|step| format!("{step:?} s"));
+    attributes(&[
+        ("modelIdentifier", own.model_identifier.as_str()),
+        ("needsExecutionTool", flag(own.needs_execution_tool)),
+        (
+            "canHandleVariableCommunicationStepSize",
+            flag(own.can_handle_variable_communication_step_size),
+        ),
+        ("fixedInternalStepSize", step.as_deref().unwrap_or("none")),
+        ("maxOutputDerivativeOrder", &order),
+        ("hasEventMode", flag(own.has_event_mode)),
+        ("mightReturnEarlyFromDoStep", flag(own.might_return_early_from_do_step)),
+        (
+            "canReturnEarlyAfterIntermediateUpdate",
+            flag(own.can_return_early_after_intermediate_update),
+        ),
+        ("providesIntermediateUpdate", flag(own.provides_intermediate_update)),
+        (
+            "canBeInstantiatedOnlyOncePerProcess",
+            flag(own.can_be_instantiated_only_once_per_process),
+        ),
+        ("canGetAndSetFMUState", flag(own.can_get_and_set_fmu_state)),
+        ("canSerializeFMUState", flag(own.can_serialize_fmu_state)),
+        ("providesDirectionalDerivatives", flag(own.provides_directional_derivative)),
+        ("providesAdjointDerivatives", flag(own.provides_adjoint_derivatives)),
+        ("providesPerElementDependencies", flag(own.provides_per_element_dependencies)),
+        ("providesEvaluateDiscreteStates", flag(own.provides_evaluate_discrete_states)),
+    ])
+}
+
+fn model_exchange_3(own: &ModelExchange, description: &ModelDescription) -> String {
+    let size = |rows: &[Unknown]| {
+        let variables = rows.iter().filter_map(|row| description.at(row.index));
+        let sizes = variables.map(|variable| variable.size(description));
+        sizes.fold(0, usize::saturating_add).to_string()
+    };
+    let states = size(&description.structure.derivatives);
+    let indicators = size(&description.structure.event_indicators);
+    attributes(&[
+        ("modelIdentifier", own.model_identifier.as_str()),
+        ("continuous states", &states),
+        ("event indicators", &indicators),
+        ("needsExecutionTool", flag(own.needs_execution_tool)),
+        ("needsCompletedIntegratorStep", flag(own.needs_completed_integrator_step)),
+        (
+            "canBeInstantiatedOnlyOncePerProcess",
+            flag(own.can_be_instantiated_only_once_per_process),
+        ),
+        ("canGetAndSetFMUState", flag(own.can_get_and_set_fmu_state)),
+        ("canSerializeFMUState", flag(own.can_serialize_fmu_state)),
+        ("providesDirectionalDerivatives", flag(own.provides_directional_derivative)),
+        ("providesAdjointDerivatives", flag(own.provides_adjoint_derivatives)),
+        ("providesPerElementDependencies", flag(own.provides_per_element_dependencies)),
+        ("providesEvaluateDiscreteStates", flag(own.provides_evaluate_discrete_states)),
+    ])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -318,6 +420,27 @@ mod tests {
             assert!(shows(text), "{text:?}");
         }
         assert!(page.contains("<p id=\"own\">x' = u</p>"));
+    }
+
+    #[test]
+    fn the_page_of_fmi_3_shows_arrays_and_its_own_capabilities() {
+        let page = page(&sample::complete_3(), "");
+        let texts = texts(&page);
+        for text in [
+            "Instantiation token",
+            "Float64 [value of 1, 2]",
+            "0.30000000000000004, -1e-5, 5e-324, 1.7976931348623157e308",
+            "UInt64",
+            "Int32 [2]",
+            "canReturnEarlyAfterIntermediateUpdate",
+            "providesAdjointDerivatives",
+            "needsCompletedIntegratorStep",
+            "00ff1a",
+        ] {
+            assert!(texts.iter().any(|own| own == text), "{text:?}");
+        }
+        // Two states in an array.
+        assert!(page.contains("<td><code>continuous states</code></td><td>2</td>"), "{page}");
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! Model descriptions and archives of FMUs (FMI 2.0): read, check, write, pack, unpack.
+//! Model descriptions and archives of FMUs: FMI 2.0 and 3.0 are read, checked, written, packed and
+//! unpacked; FMI 1.0 (co-simulation) is read.
 //!
 //! Use this crate to look at an FMU, to check it or to make one, without running it:
 //!
@@ -6,6 +7,7 @@
 //!   returns a [`Warning`] for each defect; [`ModelDescription::problems`] lists the rules of the
 //!   standard that a description breaks; [`ModelDescription::to_xml`] writes one.
 //! * `package` (feature `package`) unpacks and writes `.fmu` archives.
+//! * [`abi1`], [`abi`] (FMI 2.0) and [`abi3`] have the C types of each version.
 //! * [`unit`](mod@unit) derives base units from names, [`location`] converts paths to `fmuResourceLocation` and
 //!   back, [`documentation`] writes the documentation page of a model.
 //!
@@ -13,6 +15,8 @@
 #![forbid(unsafe_code)]
 
 pub mod abi;
+pub mod abi1;
+pub mod abi3;
 pub mod call_order;
 mod description;
 pub mod documentation;

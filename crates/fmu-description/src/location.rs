@@ -1,4 +1,5 @@
-//! Conversion between paths and `file:` URIs for `fmuResourceLocation` (FMI 2.0.5, section 2.1.5).
+//! Conversion between paths and `file:` URIs for `fmuResourceLocation` (FMI 2.0.5, section 2.1.5), and
+//! paths for `resourcePath` (FMI 3.0.2, section 2.3.1).
 //!
 //! Written here because the crate `url` ends a path at an unencoded `?` or `#`, which some importers
 //! pass, and would add tables for international host names to every exported FMU.
@@ -71,6 +72,30 @@ pub fn file_uri(path: &Path) -> Result<String, LocationError> {
         return Err(LocationError::Relative { path: path.to_owned() });
     }
     Ok(encode(&bytes_of(path)?, cfg!(windows)))
+}
+
+/// Returns an absolute path as text with a separator at its end, as `resourcePath` of FMI 3.0 needs it.
+///
+/// # Errors
+///
+/// [`LocationError`] for a relative path and for one that is not Unicode.
+///
+/// ```
+/// # #[cfg(unix)] {
+/// let path = fmu_description::location::folder_path("/tmp/a model/50%".as_ref())?;
+/// assert_eq!(path, "/tmp/a model/50%/");
+/// # }
+/// # Ok::<(), fmu_description::location::LocationError>(())
+/// ```
+pub fn folder_path(path: &Path) -> Result<String, LocationError> {
+    if !path.is_absolute() {
+        return Err(LocationError::Relative { path: path.to_owned() });
+    }
+    let text = path.to_str().ok_or_else(|| LocationError::NotUnicode { path: path.to_owned() })?;
+    // `\\?\` only marks a long path, which some FMUs cannot open.
+    let plain = text.strip_prefix(r"\\?\").filter(|_| cfg!(windows)).unwrap_or(text);
+    let separated = plain.ends_with(std::path::is_separator);
+    Ok(if separated { plain.to_owned() } else { format!("{plain}{}", std::path::MAIN_SEPARATOR) })
 }
 
 /// Converts a `file:` URI to a path.

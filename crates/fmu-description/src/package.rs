@@ -1,4 +1,4 @@
-//! Writes `.fmu` archives (FMI 2.0.5, section 2.3), and unpacks them.
+//! Writes `.fmu` archives (FMI 2.0.5, section 2.3; FMI 3.0.2, section 2.5), and unpacks them.
 
 mod archive;
 mod paths;
@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use zip::result::ZipError;
 
-use crate::description::ParseError;
+use crate::description::{ParseError, Version};
 
 pub use read::{Unpacked, unpack_archive};
 pub use temporary::{TemporaryFolder, remove_temporary_folders};
@@ -93,11 +93,36 @@ fn archive_error(path: &Path) -> impl FnOnce(ZipError) -> PackageError {
     move |error| PackageError::Archive { path, source: error.into() }
 }
 
-/// Folders of `binaries` for libraries of this platform, in order of preference: the names of FMI
-/// 2.0 for x86, otherwise the platform tuples of FMI 3.0 (allowed since FMI 2.0.4).
+/// Folders of `binaries` for libraries of this platform in FMI 2.0, in order of preference: the names
+/// of FMI 2.0 for x86, otherwise the platform tuples of FMI 3.0 (allowed since FMI 2.0.4).
 #[must_use]
 pub fn platforms() -> &'static [&'static str] {
     folders(std::env::consts::OS, std::env::consts::ARCH)
+}
+
+/// Folders of `binaries` for libraries of this platform in a version of FMI, in order of preference.
+/// FMI 3.0 has platform tuples only, such as `x86_64-linux` (FMI 3.0.2, section 2.5.1.4.1).
+#[must_use]
+pub fn platforms_of(version: Version) -> &'static [&'static str] {
+    if version == Version::V3 {
+        return tuple(std::env::consts::OS, std::env::consts::ARCH);
+    }
+    platforms()
+}
+
+fn tuple(system: &str, processor: &str) -> &'static [&'static str] {
+    match (system, processor) {
+        ("linux", "x86_64") => &["x86_64-linux"],
+        ("linux", "x86") => &["x86-linux"],
+        ("linux", "aarch64") => &["aarch64-linux"],
+        ("linux", "arm") => &["aarch32-linux"],
+        ("windows", "x86_64") => &["x86_64-windows"],
+        ("windows", "x86") => &["x86-windows"],
+        ("windows", "aarch64") => &["aarch64-windows"],
+        ("macos", "x86_64") => &["x86_64-darwin"],
+        ("macos", "aarch64") => &["aarch64-darwin"],
+        _ => &[],
+    }
 }
 
 fn folders(system: &str, processor: &str) -> &'static [&'static str] {

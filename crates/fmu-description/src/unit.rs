@@ -5,6 +5,8 @@ mod names;
 
 use serde::Serialize;
 
+use crate::description::hash_form::{is_default, numbered};
+
 use expression::Cursor;
 
 /// Degrees in a radian, 180 / pi.
@@ -89,6 +91,9 @@ pub struct DisplayUnit {
     pub factor: f64,
     /// `offset`, in display units.
     pub offset: f64,
+    /// `inverse` (FMI 3.0): `display = factor / unit`.
+    #[serde(skip_serializing_if = "is_default", serialize_with = "numbered::<1, _, _>")]
+    pub inverse: bool,
 }
 
 /// The error of parsing a unit expression. Columns count characters from 1.
@@ -183,7 +188,12 @@ fn displays(base: &BaseUnit) -> Vec<DisplayUnit> {
     } else {
         return Vec::new();
     };
-    vec![DisplayUnit { name: name.to_owned(), factor: DEGREES_PER_RADIAN, offset: 0.0 }]
+    vec![DisplayUnit {
+        name: name.to_owned(),
+        factor: DEGREES_PER_RADIAN,
+        offset: 0.0,
+        inverse: false,
+    }]
 }
 
 #[cfg(test)]

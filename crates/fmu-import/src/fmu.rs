@@ -223,9 +223,9 @@ impl Fmu {
 fn letter(kind: &Kind) -> char {
     match kind {
         Kind::Real(_) => 'r',
-        Kind::Integer(_) | Kind::Enumeration(_) => 'i',
         Kind::Boolean(_) => 'b',
         Kind::String(_) => 's',
+        _ => 'i',
     }
 }
 

@@ -171,7 +171,7 @@ impl<M: Model> Interface<M> {
                 (Kind::Real(real), builder.build(&mut self.reals, field) + 1)
             }
             Access::Integer(field) => {
-                let start = start_given.then(|| *field(model));
+                let start = start_given.then(|| i128::from(*field(model)));
                 let kind = match enumeration {
                     Some(Enumeration { name, .. }) => Kind::Enumeration(IntegerType {
                         declared_type: Some(name),
@@ -216,7 +216,7 @@ fn integer(number: Number) -> Result<IntegerType, String> {
         None => Ok(None),
         #[expect(clippy::cast_possible_truncation, reason = "tested before")]
         Some(value) if value.fract() == 0.0 && value.abs() <= f64::from(i32::MAX) => {
-            Ok(Some(value as i32))
+            Ok(Some(i128::from(value as i32)))
         }
         Some(value) => Err(format!("limit {value}, expected a 32-bit integer")),
     };
@@ -259,6 +259,7 @@ fn without_start(kind: Kind) -> Kind {
         Kind::Enumeration(own) => Kind::Enumeration(IntegerType { start: None, ..own }),
         Kind::Boolean(_) => Kind::Boolean(None),
         Kind::String(_) => Kind::String(None),
+        other => other,
     }
 }
 
@@ -292,6 +293,7 @@ fn described<M>(
             derivative: state.map(structure::index),
             ..RealType::default()
         }),
+        ..ScalarVariable::default()
     })
 }
 
@@ -305,6 +307,7 @@ fn time() -> ScalarVariable {
         variability: Variability::Continuous,
         initial: None,
         kind: Kind::Real(RealType { unit: Some("s".to_owned()), ..RealType::default() }),
+        ..ScalarVariable::default()
     }
 }
 
@@ -323,7 +326,7 @@ fn define_unit<M>(units: &mut Vec<Unit>, variable: &Variable<M>) -> Result<(), F
 fn define_type<M>(types: &mut Vec<SimpleType>, variable: &Variable<M>) -> Result<(), Failure> {
     let Some(Enumeration { name, items }) = &variable.enumeration else { return Ok(()) };
     match types.iter().find(|known| known.name == *name) {
-        Some(known) if known.items == *items => {}
+        Some(known) if known.items == wide(items) => {}
         Some(_) => {
             return Err(Failure::Error(format!(
                 "variable {}: its enumeration {name} has other items elsewhere \
@@ -335,7 +338,7 @@ fn define_type<M>(types: &mut Vec<SimpleType>, variable: &Variable<M>) -> Result
             name: name.clone(),
             description: None,
             kind: Kind::Enumeration(IntegerType::default()),
-            items: items.clone(),
+            items: wide(items),
         }),
     }
     Ok(())
@@ -375,4 +378,8 @@ pub(crate) fn new_model<M: Model>(resources: &std::path::Path) -> Result<M, Fail
 /// Same as [`describe`].
 pub fn problems<M: Model>(resources: &std::path::Path) -> Result<Vec<Problem>, Failure> {
     describe::<M>(resources).map(|description| description.problems())
+}
+
+fn wide(items: &[(String, i32)]) -> Vec<(String, i64)> {
+    items.iter().map(|(name, value)| (name.clone(), (*value).into())).collect()
 }

@@ -357,10 +357,10 @@ impl DriveKind {
     #[must_use]
     pub fn of(kind: &Kind, derivatives: bool) -> Self {
         match kind {
-            Kind::Real(_) => Self::Real { derivatives },
-            Kind::Integer(_) | Kind::Enumeration(_) => Self::Integer,
-            Kind::Boolean(_) => Self::Boolean,
-            Kind::String(_) => Self::String,
+            Kind::Boolean(_) | Kind::Clock(_) => Self::Boolean,
+            Kind::String(_) | Kind::Binary(_) => Self::String,
+            other if other.as_real().is_some() => Self::Real { derivatives },
+            _ => Self::Integer,
         }
     }
 }

@@ -72,7 +72,7 @@ impl Exchange {
     pub(crate) fn new(system: &System, algorithm: &Algorithm, refusing: &[Refusal]) -> Self {
         let reals = Reals::new(system, algorithm, refusing);
         let to_reals = reals.integer_sources().iter().map(|(port, _)| *port);
-        let is_integer = |kind: &Kind| matches!(kind, Kind::Integer(_) | Kind::Enumeration(_));
+        let is_integer = |kind: &Kind| kind.as_integer().is_some();
         let integers = Channel::new(system, INTEGERS, is_integer, to_reals);
         let is_boolean = |kind: &Kind| matches!(kind, Kind::Boolean(_));
         let booleans = Channel::new(system, BOOLEANS, is_boolean, std::iter::empty());

@@ -38,11 +38,11 @@ impl Probe {
             Self { names: Vec::new(), reads: Vec::new(), reals: Vec::new(), integers: Vec::new() };
         for &port in ports {
             let variable = system.variable(port);
-            let kind = match variable.kind {
-                Kind::Real(_) => ReadKind::Real,
-                Kind::Integer(_) | Kind::Enumeration(_) => ReadKind::Integer,
+            let kind = match &variable.kind {
                 Kind::Boolean(_) => ReadKind::Boolean,
-                Kind::String(_) => continue,
+                other if other.as_real().is_some() => ReadKind::Real,
+                other if other.as_integer().is_some() => ReadKind::Integer,
+                _ => continue,
             };
             let position = probe.names.len();
             probe.names.push(system.name(port));

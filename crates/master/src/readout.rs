@@ -51,10 +51,10 @@ enum ReadKind {
 impl ReadKind {
     fn of(kind: &Kind) -> Self {
         match kind {
-            Kind::Real(_) => ReadKind::Real,
-            Kind::Integer(_) | Kind::Enumeration(_) => ReadKind::Integer,
-            Kind::Boolean(_) => ReadKind::Boolean,
-            Kind::String(_) => ReadKind::String,
+            Kind::Boolean(_) | Kind::Clock(_) => ReadKind::Boolean,
+            Kind::String(_) | Kind::Binary(_) => ReadKind::String,
+            other if other.as_real().is_some() => ReadKind::Real,
+            _ => ReadKind::Integer,
         }
     }
 }

@@ -30,9 +30,8 @@ impl Value {
     pub fn parse(kind: &Kind, types: &[SimpleType], text: &str) -> Result<Self, String> {
         let trimmed = text.trim();
         match kind {
-            Kind::Real(_) => trimmed.parse().map(Value::Real).map_err(|_| "a number".to_owned()),
-            Kind::Integer(_) => {
-                trimmed.parse().map(Value::Integer).map_err(|_| "an integer".to_owned())
+            Kind::Real(_) | Kind::Float32(_) => {
+                trimmed.parse().map(Value::Real).map_err(|_| "a number".to_owned())
             }
             Kind::Enumeration(integer) => enumeration(integer, types, trimmed),
             Kind::Boolean(_) => match trimmed {
@@ -41,6 +40,10 @@ impl Value {
                 _ => Err("true or false".to_owned()),
             },
             Kind::String(_) => Ok(Value::String(text.to_owned())),
+            Kind::Binary(_) | Kind::Clock(_) => {
+                Err(format!("no value for a variable of type {}", kind.element()))
+            }
+            _ => trimmed.parse().map(Value::Integer).map_err(|_| "an integer".to_owned()),
         }
     }
 }
@@ -50,12 +53,12 @@ impl Value {
     #[must_use]
     pub fn start(kind: &Kind) -> Option<Self> {
         match kind {
-            Kind::Real(real) => real.start.map(Value::Real),
-            Kind::Integer(integer) | Kind::Enumeration(integer) => {
-                integer.start.map(Value::Integer)
-            }
+            Kind::Real(real) | Kind::Float32(real) => real.start.map(Value::Real),
             Kind::Boolean(start) => start.map(Value::Boolean),
-            Kind::String(_) => None,
+            other => {
+                let start = other.as_integer()?.start?;
+                i32::try_from(start).ok().map(Value::Integer)
+            }
         }
     }
 
@@ -91,8 +94,9 @@ fn enumeration(kind: &IntegerType, types: &[SimpleType], text: &str) -> Result<V
     }
     let declared = types.iter().find(|known| Some(&known.name) == kind.declared_type.as_ref());
     let items = declared.map(|declared| declared.items.as_slice()).unwrap_or_default();
-    if let Some((_, number)) = items.iter().find(|(name, _)| name == text) {
-        return Ok(Value::Integer(*number));
+    let named = items.iter().find(|(name, _)| name == text);
+    if let Some(number) = named.and_then(|(_, number)| i32::try_from(*number).ok()) {
+        return Ok(Value::Integer(number));
     }
     let names: Vec<_> = items.iter().map(|(name, _)| name.as_str()).collect();
     Err(format!("an integer or one of the items {}", names.join(", ")))

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use fmu_description::unit::BaseUnit;
-use fmu_description::{Kind, ModelDescription, ScalarVariable};
+use fmu_description::{Kind, ModelDescription, ScalarVariable, SimpleType};
 
 use super::structure::{Conversion, Definitions, Transformation as Stated, Type};
 use slave::Transformation;
@@ -53,7 +53,7 @@ impl Measure {
             Kind::Enumeration(kind) => {
                 let declared = kind.declared_type.as_ref();
                 let known = description.types.iter().find(|each| Some(&each.name) == declared);
-                Measure { unit: None, items: known.map(|each| each.items.clone()) }
+                Measure { unit: None, items: known.map(|each| items_of(each)) }
             }
             _ => Measure::default(),
         }
@@ -178,6 +178,12 @@ fn resolve(stated: &Stated, here: &Measure, there: &Measure) -> Result<Transform
             Transformation::Integer(pairs.collect::<Result<_, String>>()?)
         }
     })
+}
+
+/// Returns the items of an enumeration with numbers of 32 bits, the integers of SSP.
+pub(super) fn items_of(own: &SimpleType) -> Vec<(String, i32)> {
+    let small = |(name, value): &(String, i64)| Some((name.clone(), i32::try_from(*value).ok()?));
+    own.items.iter().filter_map(small).collect()
 }
 
 fn listed<'a>(items: &[&'a str]) -> Cow<'a, str> {

@@ -288,6 +288,7 @@ pub(super) fn kind_of(causality: Causality) -> Option<ConnectorKind> {
         Causality::Input => Some(ConnectorKind::Input),
         Causality::Output => Some(ConnectorKind::Output),
         Causality::Parameter => Some(ConnectorKind::Parameter),
+        Causality::StructuralParameter => Some(ConnectorKind::StructuralParameter),
         Causality::CalculatedParameter => Some(ConnectorKind::CalculatedParameter),
         Causality::Local | Causality::Independent => None,
     }

@@ -116,8 +116,8 @@ impl Function {
                 .collect(),
             structure: ModelStructure {
                 outputs: rows.clone(),
-                derivatives: Vec::new(),
                 initial_unknowns: rows,
+                ..ModelStructure::default()
             },
             ..ModelDescription::default()
         }
@@ -134,6 +134,7 @@ fn variable(reference: usize, name: String, causality: Causality) -> ScalarVaria
         variability: Variability::Continuous,
         initial: None,
         kind: Kind::Real(RealType { start, ..RealType::default() }),
+        ..ScalarVariable::default()
     }
 }
 

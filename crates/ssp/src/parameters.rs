@@ -5,7 +5,7 @@ mod value;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use fmu_description::{Causality, Initial, Kind, ScalarVariable, Variability};
+use fmu_description::{Causality, Initial, ScalarVariable, Variability};
 
 use super::error::{SspError, semantic_error};
 use super::flatten::Flow;
@@ -278,16 +278,10 @@ fn find(tree: &Tree, node: usize, name: &str, found: &mut Vec<Vertex>) {
 /// Returns whether a variable may be set before the initialization: an input, or a variable with a
 /// start value.
 fn settable(variable: &ScalarVariable) -> bool {
-    let has_start = match &variable.kind {
-        Kind::Real(real) => real.start.is_some(),
-        Kind::Integer(kind) | Kind::Enumeration(kind) => kind.start.is_some(),
-        Kind::Boolean(start) => start.is_some(),
-        Kind::String(start) => start.is_some(),
-    };
     let initial = variable.initial_in_force();
     variable.variability != Variability::Constant
         && variable.causality != Causality::Independent
         && (variable.causality == Causality::Input
-            || has_start
+            || variable.has_start()
             || matches!(initial, Some(Initial::Exact | Initial::Approx)))
 }

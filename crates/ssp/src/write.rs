@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use fmu_description::package::Unpacked;
 use fmu_description::{Causality, Kind, ModelDescription, ScalarVariable};
 
+use super::conversion::items_of;
 use super::error::SspError;
 use super::flatten::kind_of;
 use super::render::{render_ssd, render_ssv};
@@ -159,7 +160,7 @@ impl Exporter {
             Kind::Enumeration(kind) => {
                 let name = kind.declared_type.as_ref()?;
                 let own = description.types.iter().find(|each| each.name == *name)?;
-                let own = Enumeration { name: name.clone(), items: own.items.clone() };
+                let own = Enumeration { name: name.clone(), items: items_of(own) };
                 let known = &mut self.definitions.enumerations;
                 match known.iter().find(|each| each.name == *name) {
                     Some(other) if *other != own => return None,
@@ -168,6 +169,8 @@ impl Exporter {
                 }
                 Some(Type::Enumeration(name.clone()))
             }
+            // SSP 1.0 has no other types.
+            _ => None,
         }
     }
 
@@ -276,10 +279,11 @@ fn value(
                 .iter()
                 .find(|each| Some(&each.name) == kind.declared_type.as_ref());
             let items = own.map(|own| own.items.as_slice()).unwrap_or_default();
-            let number = text.parse::<i32>().ok();
+            let number = text.parse::<i64>().ok();
             let item = items.iter().find(|(name, value)| name == text || Some(*value) == number);
             let (item, _) = item.ok_or_else(|| wrong("an item of its enumeration"))?;
             ParameterValue::Enumeration(item.clone(), None)
         }
+        _ => return Err(wrong("a variable of a type of SSP 1.0")),
     })
 }

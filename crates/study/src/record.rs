@@ -190,10 +190,10 @@ fn keep(file: &Mutex<Recording>) -> Option<(PathBuf, Result<(), ResultsError>)> 
 fn column(system: &System, port: Port) -> Column {
     let variable = system.variable(port);
     let kind = match &variable.kind {
-        Kind::Real(_) => ColumnKind::Real,
-        Kind::Integer(_) | Kind::Enumeration(_) => ColumnKind::Integer,
-        Kind::Boolean(_) => ColumnKind::Boolean,
-        Kind::String(_) => ColumnKind::String,
+        Kind::Boolean(_) | Kind::Clock(_) => ColumnKind::Boolean,
+        Kind::String(_) | Kind::Binary(_) => ColumnKind::String,
+        other if other.as_real().is_some() => ColumnKind::Real,
+        _ => ColumnKind::Integer,
     };
     Column { name: system.name(port), kind, unit: unit(system, port) }
 }

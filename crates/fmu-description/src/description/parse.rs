@@ -1,7 +1,11 @@
 //! Parses XML into a model description.
 
 mod attributes;
+mod definitions;
 mod encoding;
+mod fmi1;
+mod fmi2;
+mod fmi3;
 mod schema;
 mod structure;
 mod variables;
@@ -10,11 +14,11 @@ mod xml;
 
 use std::fmt;
 
-use super::{CoSimulation, DefaultExperiment, LogCategory, ModelDescription, ModelExchange};
-use crate::unit::{BaseUnit, DisplayUnit, Unit};
+use super::{ModelDescription, Version};
 use attributes::{Node, WHITE_SPACE};
 pub use warning::Warning;
 use warning::Warnings;
+use xml::Element;
 
 /// The root element of an XML file, read with the limits for a model description.
 pub(crate) fn read_xml(bytes: &[u8]) -> Result<crate::xml::Element, ParseError> {
@@ -44,7 +48,7 @@ impl fmt::Display for Position {
     }
 }
 
-/// The error of parsing a text that is not the model description of an FMI 2.0 FMU.
+/// The error of parsing a text that is not the model description of an FMU.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ParseError {
@@ -85,8 +89,8 @@ pub enum ParseError {
         /// The limit.
         limit: usize,
     },
-    /// The file is of another version of the standard.
-    #[error("{at}: expected fmiVersion 2.0, found {found:?}: this is not an FMI 2.0 FMU")]
+    /// The file is of an unknown version of the standard.
+    #[error("{at}: expected fmiVersion 1.0, 2.0 or 3.0, found {found:?}")]
     Version {
         /// The position.
         at: Position,
@@ -125,7 +129,7 @@ impl ModelDescription {
     /// Maximum size in bytes of a file that is read.
     pub const MOST_BYTES: usize = 128 << 20;
 
-    /// Reads `modelDescription.xml` of FMI 2.0 as [`ModelDescription::read`] does, without warnings.
+    /// Reads `modelDescription.xml` as [`ModelDescription::read`] does, without warnings.
     ///
     /// # Errors
     ///
@@ -133,22 +137,27 @@ impl ModelDescription {
     ///
     /// ```
     /// use fmu_description::ModelDescription;
-    /// let error = ModelDescription::parse(r#"<fmiModelDescription fmiVersion="3.0"/>"#);
+    /// let error = ModelDescription::parse(r#"<fmiModelDescription fmiVersion="4.0"/>"#);
     /// assert_eq!(
     ///     error.expect_err("another version").to_string(),
-    ///     "line 1, column 1: expected fmiVersion 2.0, found \"3.0\": this is not an FMI 2.0 FMU"
+    ///     "line 1, column 1: expected fmiVersion 1.0, 2.0 or 3.0, found \"4.0\""
     /// );
     /// ```
     pub fn parse(xml: impl AsRef<[u8]>) -> Result<ModelDescription, ParseError> {
         Self::read(xml).map(|(description, _)| description)
     }
 
-    /// Reads `modelDescription.xml` of FMI 2.0; returns warnings for content that the standard does
-    /// not allow.
+    /// Reads `modelDescription.xml` of FMI 1.0, 2.0 or 3.0; returns warnings for content that the
+    /// standard does not allow.
     ///
-    /// Fills in the defaults of the standard: `causality` local, `variability` continuous, and for
-    /// a variable with `declaredType` the attributes of that type which it does not state itself.
-    /// Skips annotations.
+    /// Fills in the defaults of the standard: `causality` local, `variability` by version and type,
+    /// and for a variable with `declaredType` the attributes of that type which it does not state
+    /// itself. Skips annotations.
+    ///
+    /// FMI 3.0: value references in `derivative`, `previous`, `clocks` and `ModelStructure` become
+    /// indices; each `Alias` becomes a variable after the one that contains it. FMI 1.0: `internal`
+    /// becomes local, a `parameter` that is no output becomes a parameter, `fixed` becomes `initial`,
+    /// and `DirectDependency` the dependencies of an output.
     ///
     /// Content that breaks the standard gives a [`Warning`], which states the assumption made, if
     /// the meaning for a simulation is clear or other importers accept it: other encodings,
@@ -171,168 +180,57 @@ impl ModelDescription {
         }
         let (text, not_utf8) = encoding::decode(bytes)?;
         let element = xml::read(&text)?;
-        let warnings = Warnings::default();
-        let description = root(Node { element: &element, warnings: &warnings })?;
+        let version = version(&element)?;
+        let warnings = Warnings::new(version);
+        let root = Node { element: &element, warnings: &warnings };
+        let description = match version {
+            Version::V1 => fmi1::root(root)?,
+            Version::V2 => fmi2::root(root)?,
+            Version::V3 => fmi3::root(root)?,
+        };
         let mut warnings = warnings.finish();
-        warnings.splice(0..0, not_utf8);
+        let section = if version == Version::V3 { "2.4" } else { "2.2" };
+        // FMI 1.0 demands no encoding.
+        let not_utf8 = not_utf8.filter(|_| version != Version::V1);
+        warnings.splice(0..0, not_utf8.map(|warning| Warning { section, ..warning }));
         Ok((description, warnings))
     }
 }
 
-fn root(root: Node<'_>) -> Result<ModelDescription, ParseError> {
-    if root.element.name != "fmiModelDescription" {
-        let found = format!("<{}>", root.element.name);
-        return Err(root.misses("the root element fmiModelDescription", found));
+/// Returns the version of FMI that the root element states. FMI 2.0.1 to 2.0.5 and 3.0.1 to 3.x are
+/// versions of the standard's text: importers of 2.0 and 3.0 run them.
+fn version(root: &Element<'_>) -> Result<Version, ParseError> {
+    if root.name != "fmiModelDescription" {
+        return Err(ParseError::Element {
+            at: root.at,
+            element: root.name.to_owned(),
+            expected: "the root element fmiModelDescription".to_owned(),
+            found: format!("<{}>", root.name),
+        });
     }
-    version(root)?;
-    schema::check(root, "");
-    let types = variables::types(root)?;
-    let variables = variables::variables(root.child("ModelVariables")?, &types)?;
-    let structure = structure::read(root, &variables)?;
-    let model_exchange = root.optional_child("ModelExchange")?.map(model_exchange).transpose()?;
-    let co_simulation = root.optional_child("CoSimulation")?.map(co_simulation).transpose()?;
-    let model_name = root.text("modelName").unwrap_or_else(|| {
-        let own = co_simulation.as_ref().map(|own| &own.model_identifier);
-        let own = own.or(model_exchange.as_ref().map(|own| &own.model_identifier));
-        let own = own.cloned().unwrap_or_default();
-        let said = ("a value", "no such attribute".to_owned());
-        root.warn_of(true, root.place("modelName"), said, &format!("read as {own:?}"));
-        own
-    });
-    Ok(ModelDescription {
-        fmi_version: "2.0".to_owned(),
-        model_name,
-        guid: root.required("guid")?.to_owned(),
-        description: root.text("description"),
-        author: root.text("author"),
-        version: root.text("version"),
-        copyright: root.text("copyright"),
-        license: root.text("license"),
-        generation_tool: root.text("generationTool"),
-        generation_date_and_time: root.text("generationDateAndTime"),
-        structured_names: structured_names(root),
-        number_of_event_indicators: root.optional_unsigned("numberOfEventIndicators"),
-        model_exchange,
-        co_simulation,
-        units: root.list("UnitDefinitions", "Unit", unit)?,
-        types,
-        log_categories: root.list("LogCategories", "Category", category)?,
-        default_experiment: root
-            .optional_child("DefaultExperiment")?
-            .map(experiment)
-            .transpose()?,
-        variables,
-        structure,
-    })
-}
-
-/// Checks that `fmiVersion` is 2.0; 2.0.1 to 2.0.5, versions of the standard's text, are read as
-/// 2.0.
-fn version(root: Node<'_>) -> Result<(), ParseError> {
-    let found = root.required("fmiVersion")?;
-    if found == "2.0" {
-        return Ok(());
-    }
-    let patch = found.trim_matches(WHITE_SPACE).strip_prefix("2.0");
-    let patch = patch.map(|rest| rest.strip_prefix('.').unwrap_or(rest));
-    if patch.is_none_or(|patch| patch.len() > 3 || !patch.bytes().all(|own| own.is_ascii_digit())) {
-        return Err(ParseError::Version { at: root.element.at, found: found.to_owned() });
-    }
-    root.warn("fmiVersion", "2.0 for every 2.0.x", found, "read as 2.0");
-    Ok(())
-}
-
-fn structured_names(root: Node<'_>) -> bool {
-    const NAME: &str = "variableNamingConvention";
-    match root.attribute(NAME) {
-        None | Some("flat") => false,
-        Some("structured") => true,
-        Some(other) => {
-            root.warn(NAME, "flat or structured", other, "read as flat");
-            false
+    let stated = root.attributes.iter().find(|(name, _)| *name == "fmiVersion");
+    let Some((_, found)) = stated else {
+        return Err(ParseError::Attribute {
+            at: root.at,
+            element: root.name.to_owned(),
+            attribute: "fmiVersion",
+            expected: "a value".to_owned(),
+            found: "no such attribute".to_owned(),
+        });
+    };
+    let trimmed = found.trim_matches(WHITE_SPACE);
+    let is_patch = |rest: &str| {
+        let patch = rest.strip_prefix('.').unwrap_or(rest);
+        patch.len() <= 3 && patch.bytes().all(|own| own.is_ascii_digit())
+    };
+    match trimmed.split_at_checked(2) {
+        Some(("1.", "0")) => Ok(Version::V1),
+        Some(("2.", _)) if trimmed.strip_prefix("2.0").is_some_and(is_patch) => Ok(Version::V2),
+        Some(("3.", minor)) if minor.starts_with(|own: char| own.is_ascii_digit()) => {
+            Ok(Version::V3)
         }
+        _ => Err(ParseError::Version { at: root.at, found: found.clone().into_owned() }),
     }
-}
-
-fn identifier(element: Node<'_>) -> Result<String, ParseError> {
-    Ok(element.required("modelIdentifier")?.to_owned())
-}
-
-fn source_files(element: Node<'_>) -> Result<Vec<String>, ParseError> {
-    element.list("SourceFiles", "File", |file| Ok(file.required("name")?.to_owned()))
-}
-
-fn model_exchange(element: Node<'_>) -> Result<ModelExchange, ParseError> {
-    let flag = |name| element.flag(name);
-    Ok(ModelExchange {
-        model_identifier: identifier(element)?,
-        needs_execution_tool: flag("needsExecutionTool"),
-        completed_integrator_step_not_needed: flag("completedIntegratorStepNotNeeded"),
-        can_be_instantiated_only_once_per_process: flag("canBeInstantiatedOnlyOncePerProcess"),
-        can_not_use_memory_management_functions: flag("canNotUseMemoryManagementFunctions"),
-        can_get_and_set_fmu_state: flag("canGetAndSetFMUstate"),
-        can_serialize_fmu_state: flag("canSerializeFMUstate"),
-        provides_directional_derivative: flag("providesDirectionalDerivative"),
-        source_files: source_files(element)?,
-    })
-}
-
-fn co_simulation(element: Node<'_>) -> Result<CoSimulation, ParseError> {
-    let flag = |name| element.flag(name);
-    Ok(CoSimulation {
-        model_identifier: identifier(element)?,
-        needs_execution_tool: flag("needsExecutionTool"),
-        can_handle_variable_communication_step_size: flag("canHandleVariableCommunicationStepSize"),
-        can_interpolate_inputs: flag("canInterpolateInputs"),
-        max_output_derivative_order: element
-            .optional_unsigned("maxOutputDerivativeOrder")
-            .unwrap_or(0),
-        can_run_asynchronuously: flag("canRunAsynchronuously"),
-        can_be_instantiated_only_once_per_process: flag("canBeInstantiatedOnlyOncePerProcess"),
-        can_not_use_memory_management_functions: flag("canNotUseMemoryManagementFunctions"),
-        can_get_and_set_fmu_state: flag("canGetAndSetFMUstate"),
-        can_serialize_fmu_state: flag("canSerializeFMUstate"),
-        provides_directional_derivative: flag("providesDirectionalDerivative"),
-        source_files: source_files(element)?,
-    })
-}
-
-fn unit(element: Node<'_>) -> Result<Unit, ParseError> {
-    let display_units = element.children_named("DisplayUnit").map(|display| {
-        Ok(DisplayUnit {
-            name: display.required("name")?.to_owned(),
-            factor: display.finite("factor", 1.0)?,
-            offset: display.finite("offset", 0.0)?,
-        })
-    });
-    Ok(Unit {
-        name: element.required("name")?.to_owned(),
-        display_units: display_units.collect::<Result<_, ParseError>>()?,
-        base: element.optional_child("BaseUnit")?.map(base_unit).transpose()?,
-    })
-}
-
-fn base_unit(element: Node<'_>) -> Result<BaseUnit, ParseError> {
-    let mut exponents = [0; 8];
-    for (exponent, name) in exponents.iter_mut().zip(BaseUnit::EXPONENTS) {
-        *exponent = element.integer(name)?.unwrap_or(0);
-    }
-    let (factor, offset) = (element.finite("factor", 1.0)?, element.finite("offset", 0.0)?);
-    Ok(BaseUnit::from_exponents(exponents, factor, offset))
-}
-
-fn category(element: Node<'_>) -> Result<LogCategory, ParseError> {
-    let name = element.required("name")?.to_owned();
-    Ok(LogCategory { name, description: element.text("description") })
-}
-
-fn experiment(element: Node<'_>) -> Result<DefaultExperiment, ParseError> {
-    Ok(DefaultExperiment {
-        start_time: element.number("startTime")?,
-        stop_time: element.number("stopTime")?,
-        tolerance: element.number("tolerance")?,
-        step_size: element.number("stepSize")?,
-    })
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! Renders a model description as XML.
 
+mod fmi3;
 mod tag;
 
 use quick_xml::events::{BytesDecl, BytesEnd, Event};
@@ -7,13 +8,14 @@ use quick_xml::writer::Writer;
 
 use super::{
     CoSimulation, DefaultExperiment, IntegerType, Kind, LogCategory, ModelDescription,
-    ModelExchange, ModelStructure, RealType, ScalarVariable, SimpleType, Unknown,
+    ModelExchange, ModelStructure, RealType, ScalarVariable, SimpleType, Unknown, Version,
 };
 use crate::unit::{BaseUnit, Unit};
 use tag::Tag;
 
 impl ModelDescription {
-    /// Renders `modelDescription.xml` in the order of the schema of FMI 2.0.5.
+    /// Renders `modelDescription.xml` in the order of the schema of its version, FMI 2.0.5 or 3.0.2.
+    /// Descriptions of FMI 1.0 are only read: the result is not one of FMI 1.0.
     ///
     /// UTF-8, two blanks of indentation, numbers in the shortest form that reads back to the same
     /// bits, lists absent when empty, flags absent when false. All text is escaped; characters
@@ -21,7 +23,7 @@ impl ModelDescription {
     ///
     /// Numbers must be finite: FMI has no infinity, and an importer would not accept its text.
     /// [`ModelDescription::problems`] reports such numbers. If a description has no problems, the
-    /// result is valid by `fmi2ModelDescription.xsd`.
+    /// result is valid by `fmi2ModelDescription.xsd` or `fmi3ModelDescription.xsd`.
     ///
     /// ```
     /// use fmu_description::ModelDescription;
@@ -36,7 +38,10 @@ impl ModelDescription {
     pub fn to_xml(&self) -> String {
         let mut output = Output { writer: Writer::new_with_indent(Vec::new(), b' ', 2) };
         output.event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)));
-        output.root(self);
+        match self.version() {
+            Version::V3 => output.root_3(self),
+            Version::V1 | Version::V2 => output.root(self),
+        }
         let mut bytes = output.writer.into_inner();
         bytes.push(b'\n');
         String::from_utf8_lossy(&bytes).into_owned()
@@ -178,7 +183,8 @@ impl Output {
             }
             for display in &unit.display_units {
                 let tag = Tag::new("DisplayUnit").with("name", &display.name);
-                output.empty(conversion(tag, display.factor, display.offset));
+                let tag = conversion(tag, display.factor, display.offset);
+                output.empty(tag.unless_default("inverse", &display.inverse));
             }
         });
     }
@@ -200,7 +206,6 @@ impl Output {
             match &own.kind {
                 Kind::Real(real) => output.empty(real_limits(element, real)),
                 Kind::Integer(integer) => output.empty(integer_limits(element, integer)),
-                Kind::Boolean(_) | Kind::String(_) => output.empty(element),
                 Kind::Enumeration(integer) => {
                     let element = element.maybe("quantity", integer.quantity.as_ref());
                     output.around(element, |output| {
@@ -209,6 +214,7 @@ impl Output {
                         }
                     });
                 }
+                _ => output.empty(element),
             }
         });
     }
@@ -255,6 +261,8 @@ impl Output {
                 }
                 Kind::Boolean(start) => element.maybe("start", start.as_ref()),
                 Kind::String(start) => element.maybe("start", start.as_ref()),
+                // FMI 2.0 has no other types.
+                _ => element,
             });
         });
     }

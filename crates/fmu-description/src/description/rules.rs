@@ -1,6 +1,8 @@
-//! The static rules of FMI 2.0.5 that a readable model description can still break.
+//! The static rules of the standard that a readable model description can still break: here what FMI
+//! 2.0.5 and 3.0.2 have in common, and the identity of FMI 2.0.
 
 mod definitions;
+mod fmi3;
 mod names;
 mod structure;
 mod variables;
@@ -8,12 +10,12 @@ mod variables;
 use std::collections::HashSet;
 use std::fmt;
 
-use super::{DefaultExperiment, ModelDescription};
+use super::{DefaultExperiment, ModelDescription, Version};
 
 /// A rule that a model description breaks.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
-    /// Section of FMI 2.0.5 with the rule.
+    /// Section of FMI 2.0.5, or of FMI 3.0.2, with the rule.
     pub section: &'static str,
     /// The violation, with the name of the variable or element.
     pub text: String,
@@ -25,13 +27,49 @@ impl fmt::Display for Problem {
     }
 }
 
+/// The sections of rules that both versions have.
+struct Sections {
+    root: &'static str,
+    units: &'static str,
+    types: &'static str,
+    categories: &'static str,
+    experiment: &'static str,
+    variables: &'static str,
+    /// Limits and start values.
+    limits: &'static str,
+    names: &'static str,
+}
+
+const SECTIONS_OF_2: Sections = Sections {
+    root: "2.2.1",
+    units: "2.2.2",
+    types: "2.2.3",
+    categories: "2.2.4",
+    experiment: "2.2.5",
+    variables: "2.2.7",
+    limits: "2.2.7",
+    names: "2.2.9",
+};
+const SECTIONS_OF_3: Sections = Sections {
+    root: "2.4.1",
+    units: "2.4.3",
+    types: "2.4.4",
+    categories: "2.4.5",
+    experiment: "2.4.6",
+    variables: "2.4.7.4",
+    limits: "2.4.7.5",
+    names: "2.4.7.5.1",
+};
+
 /// Collects problems.
-#[derive(Default)]
-struct Problems(Vec<Problem>);
+struct Problems {
+    sections: &'static Sections,
+    found: Vec<Problem>,
+}
 
 impl Problems {
     fn add(&mut self, section: &'static str, text: String) {
-        self.0.push(Problem { section, text });
+        self.found.push(Problem { section, text });
     }
 
     /// Adds a problem unless the rule `holds`.
@@ -77,7 +115,8 @@ impl Problems {
 }
 
 impl ModelDescription {
-    /// Returns the static rules of FMI 2.0.5 that this description breaks.
+    /// Returns the static rules of FMI 2.0.5, or of FMI 3.0.2, that this description breaks. None are
+    /// known here for FMI 1.0, which is only read.
     ///
     /// These are the rules on the file itself: identifiers and flags, units, types, the tables of
     /// causality, variability and initial, start values and limits, names, aliases, the lists of
@@ -87,19 +126,36 @@ impl ModelDescription {
     /// Cost: linear in the size of the description.
     #[must_use]
     pub fn problems(&self) -> Vec<Problem> {
-        let mut problems = Problems::default();
-        identity(self, &mut problems);
+        let sections = match self.version() {
+            Version::V1 => return Vec::new(),
+            Version::V2 => &SECTIONS_OF_2,
+            Version::V3 => &SECTIONS_OF_3,
+        };
+        let mut problems = Problems { sections, found: Vec::new() };
+        if self.version() == Version::V3 {
+            fmi3::check_identity(self, &mut problems);
+        } else {
+            identity(self, &mut problems);
+        }
         texts(self, &mut problems);
         let categories = self.log_categories.iter().map(|category| category.name.as_str());
-        problems.unique("2.2.4", "log category", categories);
+        problems.unique(sections.categories, "log category", categories);
         if let Some(own) = &self.default_experiment {
-            experiment(own, &mut problems);
+            experiment(own, self.version(), &mut problems);
         }
         definitions::check(self, &mut problems);
-        variables::check(self, &mut problems);
+        if self.version() == Version::V3 {
+            fmi3::check_variables(self, &mut problems);
+        } else {
+            variables::check(self, &mut problems);
+        }
         names::check(self, &mut problems);
-        structure::check(self, &mut problems);
-        problems.0
+        if self.version() == Version::V3 {
+            fmi3::check_structure(self, &mut problems);
+        } else {
+            structure::check(self, &mut problems);
+        }
+        problems.found
     }
 }
 
@@ -109,11 +165,7 @@ fn identity(description: &ModelDescription, problems: &mut Problems) {
         format!("fmiVersion is {version:?}, it must be \"2.0\" for every 2.0.x")
     });
     problems.demand(!description.guid.is_empty(), "2.2.1", || "guid is empty".to_owned());
-    if let Some(date) = &description.generation_date_and_time {
-        problems.demand(is_date_and_time(date), "2.2.1", || {
-            format!("generationDateAndTime is {date:?}, not of the form YYYY-MM-DDThh:mm:ssZ")
-        });
-    }
+    date(description, problems);
     let co_simulation = description.co_simulation.as_ref();
     let identifiers = description
         .model_exchange
@@ -145,51 +197,62 @@ fn identity(description: &ModelDescription, problems: &mut Problems) {
     }
 }
 
+fn date(description: &ModelDescription, problems: &mut Problems) {
+    if let Some(date) = &description.generation_date_and_time {
+        problems.demand(is_date_and_time(date), problems.sections.root, || {
+            format!("generationDateAndTime is {date:?}, not of the form YYYY-MM-DDThh:mm:ssZ")
+        });
+    }
+}
+
 fn texts(description: &ModelDescription, problems: &mut Problems) {
-    problems.text("2.2.1", "modelName", &description.model_name);
-    problems.line("2.2.1", "guid", &description.guid);
+    let Sections { root, categories, .. } = problems.sections;
+    problems.text(root, "modelName", &description.model_name);
+    let token = if description.version() == Version::V3 { "instantiationToken" } else { "guid" };
+    problems.line(root, token, &description.guid);
     for (name, value) in [
         ("description", &description.description),
         ("author", &description.author),
         ("copyright", &description.copyright),
         ("license", &description.license),
     ] {
-        problems.text("2.2.1", name, value.as_deref().unwrap_or_default());
+        problems.text(root, name, value.as_deref().unwrap_or_default());
     }
     for (name, value) in
         [("version", &description.version), ("generationTool", &description.generation_tool)]
     {
-        problems.line("2.2.1", name, value.as_deref().unwrap_or_default());
+        problems.line(root, name, value.as_deref().unwrap_or_default());
     }
     for category in &description.log_categories {
-        problems.line("2.2.4", "log category", &category.name);
+        problems.line(categories, "log category", &category.name);
         let text = category.description.as_deref().unwrap_or_default();
-        problems.text("2.2.4", "description of a log category", text);
+        problems.text(categories, "description of a log category", text);
     }
 }
 
-fn experiment(own: &DefaultExperiment, problems: &mut Problems) {
+fn experiment(own: &DefaultExperiment, version: Version, problems: &mut Problems) {
+    let section = problems.sections.experiment;
     for (name, value) in [
         ("startTime", own.start_time),
         ("stopTime", own.stop_time),
         ("tolerance", own.tolerance),
         ("stepSize", own.step_size),
     ] {
-        problems.finite("2.2.5", name, value);
+        problems.finite(section, name, value);
     }
     for (name, value) in [("tolerance", own.tolerance), ("stepSize", own.step_size)] {
         if let Some(value) = value {
-            problems.demand(value > 0.0, "2.2.5", || format!("{name} is {value:?}, not positive"));
+            problems.demand(value > 0.0, section, || format!("{name} is {value:?}, not positive"));
         }
     }
     let (Some(start), Some(stop)) = (own.start_time, own.stop_time) else {
         return;
     };
-    problems.demand(stop > start, "2.2.5", || {
+    problems.demand(stop > start, section, || {
         format!("stopTime {stop:?} is not after startTime {start:?}")
     });
-    if let Some(step) = own.step_size {
-        problems.demand(step < stop - start, "2.2.5", || {
+    if let Some(step) = own.step_size.filter(|_| version == Version::V2) {
+        problems.demand(step < stop - start, section, || {
             format!("stepSize {step:?} is not shorter than the experiment")
         });
     }

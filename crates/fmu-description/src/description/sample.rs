@@ -40,6 +40,7 @@ pub(crate) fn complete() -> ModelDescription {
         }),
         variables: variables(),
         structure: structure(),
+        ..ModelDescription::default()
     }
 }
 
@@ -54,6 +55,7 @@ fn all_exchange_capabilities() -> ModelExchange {
         can_serialize_fmu_state: true,
         provides_directional_derivative: true,
         source_files: vec!["all.c".to_owned(), "a & b.c".to_owned()],
+        ..ModelExchange::default()
     }
 }
 
@@ -71,6 +73,7 @@ fn all_capabilities() -> CoSimulation {
         can_serialize_fmu_state: true,
         provides_directional_derivative: true,
         source_files: vec!["all.c".to_owned(), "a & b.c".to_owned()],
+        ..CoSimulation::default()
     }
 }
 
@@ -90,7 +93,7 @@ fn types() -> Vec<SimpleType> {
         nominal: Some(0.1),
         ..RealType::default()
     };
-    let count = IntegerType { min: Some(0), max: Some(i32::MAX), ..IntegerType::default() };
+    let count = IntegerType { min: Some(0), max: Some(i32::MAX.into()), ..IntegerType::default() };
     let mode = IntegerType { quantity: Some("Mode".to_owned()), ..IntegerType::default() };
     vec![
         SimpleType {
@@ -124,12 +127,10 @@ pub(crate) fn other(
 ) -> ScalarVariable {
     ScalarVariable {
         name: name.to_owned(),
-        value_reference: 0,
-        description: None,
         causality,
         variability,
-        initial: None,
         kind,
+        ..ScalarVariable::default()
     }
 }
 
@@ -216,5 +217,14 @@ fn structure() -> ModelStructure {
             Unknown { index: 10, dependencies: None, kinds: None },
             row(12, &[11]),
         ],
+        ..ModelStructure::default()
     }
+}
+
+/// The same for FMI 3.0.
+pub(crate) fn complete_3() -> ModelDescription {
+    let (description, warnings) =
+        ModelDescription::read(include_str!("sample/fmi3.xml")).expect("readable");
+    assert_eq!(warnings, []);
+    description
 }

@@ -1,5 +1,7 @@
 //! Allowed paths of the entries of an archive.
 
+use crate::description::Version;
+
 /// Characters that Windows does not allow in a file name.
 const RESERVED: [char; 7] = ['<', '>', ':', '"', '|', '?', '*'];
 /// Device names of Windows, which no file may have, with any extension.
@@ -44,7 +46,7 @@ pub(super) fn unsafe_to_unpack(path: &str) -> Option<&'static str> {
 }
 
 /// Returns the violated rule if an FMU that is written must not contain `path`.
-pub(super) fn unsuitable(path: &str) -> Option<&'static str> {
+pub(super) fn unsuitable(path: &str, version: Version) -> Option<&'static str> {
     if let Some(rule) = unsafe_to_unpack(path) {
         return Some(rule);
     }
@@ -59,6 +61,11 @@ pub(super) fn unsuitable(path: &str) -> Option<&'static str> {
         return Some("names that Windows allows: no trailing dot or blank, no device");
     }
     let inside = path.split_once('/').is_some_and(|(folder, _)| FOLDERS.contains(&folder));
+    if !inside && version == Version::V3 {
+        return Some(
+            "a file in documentation, sources, binaries, resources, extra or terminalsAndIcons",
+        );
+    }
     if !inside && path != "model.png" {
         return Some(
             "model.png, or a file in documentation, sources, binaries, resources, extra or \

@@ -5,11 +5,12 @@ use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
 use super::archive::Archive;
-use super::{DESCRIPTION, PackageError, TemporaryFolder, file_error, platforms};
+use super::{DESCRIPTION, PackageError, TemporaryFolder, file_error, platforms, platforms_of};
 use crate::description::{ModelDescription, Warning};
+use crate::location::{LocationError, folder_path};
 
 /// The folders of `binaries` that the standard defines.
-const PLATFORMS: [&str; 15] = [
+const PLATFORMS: [&str; 18] = [
     "win32",
     "win64",
     "linux32",
@@ -25,6 +26,9 @@ const PLATFORMS: [&str; 15] = [
     "x86-darwin",
     "x86_64-darwin",
     "aarch64-darwin",
+    "aarch32-linux",
+    "aarch32-windows",
+    "aarch32-darwin",
 ];
 
 /// An unpacked FMU with its model description.
@@ -117,7 +121,19 @@ impl Unpacked {
         self.folder().join("resources")
     }
 
-    /// The path of the shared library `model_identifier` for the platform of this program.
+    /// The argument `resourcePath` of FMI 3.0: the absolute path of the folder `resources` with a
+    /// separator at its end; `None` if the FMU has no such folder (FMI 3.0.2, section 2.3.1).
+    ///
+    /// # Errors
+    ///
+    /// [`LocationError`] if the path is not Unicode.
+    pub fn resource_path(&self) -> Result<Option<String>, LocationError> {
+        let resources = self.resources();
+        resources.is_dir().then(|| folder_path(&resources)).transpose()
+    }
+
+    /// The path of the shared library `model_identifier` for the platform of this program, in a folder
+    /// that the version of the FMU has ([`platforms_of`]).
     ///
     /// # Errors
     ///
@@ -125,10 +141,11 @@ impl Unpacked {
     pub fn library(&self, model_identifier: &str) -> Result<PathBuf, PackageError> {
         let name = format!("{model_identifier}{}", std::env::consts::DLL_SUFFIX);
         let binaries = self.folder().join("binaries");
-        let candidates = platforms().iter().map(|platform| binaries.join(platform).join(&name));
+        let platforms = platforms_of(self.description.version());
+        let candidates = platforms.iter().map(|platform| binaries.join(platform).join(&name));
         candidates.into_iter().find(|path| path.is_file()).ok_or_else(|| {
             let wanted: Vec<String> =
-                platforms().iter().map(|platform| format!("binaries/{platform}/{name}")).collect();
+                platforms.iter().map(|platform| format!("binaries/{platform}/{name}")).collect();
             let found = self.libraries();
             PackageError::Missing {
                 expected: format!("the library {}", wanted.join(" or ")),

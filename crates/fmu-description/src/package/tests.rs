@@ -4,6 +4,7 @@ use std::path::Path;
 use super::*;
 use tempfile::TempDir;
 
+mod fmi3;
 mod hostile;
 mod raw;
 

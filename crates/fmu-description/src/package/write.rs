@@ -9,6 +9,7 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, System, ZipWriter};
 
 use super::{DESCRIPTION, PackageError, archive_error, file_error, paths};
+use crate::description::Version;
 
 /// Maximum size in bytes of an archive without Zip64, less room for its directory.
 const CAPACITY: u64 = 1 << 31;
@@ -30,15 +31,22 @@ const ENTRIES: u64 = 65_000;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Package {
+    version: Version,
     description: String,
     entries: Vec<(String, Vec<u8>)>,
 }
 
 impl Package {
-    /// Creates an FMU that contains only `description_xml` as its `modelDescription.xml`.
+    /// Creates an FMU of FMI 2.0 that contains only `description_xml` as its `modelDescription.xml`.
     #[must_use]
     pub fn new(description_xml: String) -> Self {
-        Package { description: description_xml, entries: Vec::new() }
+        Package { version: Version::V2, description: description_xml, entries: Vec::new() }
+    }
+
+    /// Sets the version of FMI whose rules on files the archive must keep.
+    #[must_use]
+    pub fn for_version(self, version: Version) -> Self {
+        Package { version, ..self }
     }
 
     /// Adds a file; `path` is relative to the root, with forward slashes.
@@ -75,9 +83,10 @@ impl Package {
     ///
     /// # Errors
     ///
-    /// [`PackageError`] if the FMU breaks a rule of section 2.3 (paths, duplicates ignoring case,
-    /// neither `binaries` nor `sources`, `documentation` without `index.html`), is too large, or
-    /// the file cannot be written.
+    /// [`PackageError`] if the FMU breaks a rule of section 2.3, in FMI 3.0 of section 2.5 (paths,
+    /// duplicates ignoring case, neither `binaries` nor `sources`, `documentation` without
+    /// `index.html`, in FMI 3.0 `sources` without `buildDescription.xml` and `documentation/licenses`
+    /// without a license), is too large, or the file cannot be written.
     pub fn write(&self, target: &Path) -> Result<(), PackageError> {
         if target.extension().is_none_or(|extension| extension != "fmu") {
             let found = target.display().to_string();
@@ -112,7 +121,7 @@ impl Package {
         let mut seen = HashSet::new();
         for (path, _) in &self.entries {
             let entry = path.clone();
-            if let Some(expected) = paths::unsuitable(path) {
+            if let Some(expected) = paths::unsuitable(path, self.version) {
                 return Err(PackageError::Entry { entry, expected });
             }
             if !seen.insert(path.to_ascii_lowercase()) {
@@ -129,10 +138,10 @@ impl Package {
                 "documentation without it",
             ),
         ] {
-            if !holds {
-                let (expected, found) = (expected.to_owned(), found.to_owned());
-                return Err(PackageError::Missing { expected, found });
-            }
+            demand(holds, expected, found)?;
+        }
+        if self.version == Version::V3 {
+            self.check_folders_of_3()?;
         }
         let bytes = |text: &[u8]| u64::try_from(text.len()).unwrap_or(u64::MAX);
         let sizes = self.entries.iter().map(|(_, content)| bytes(content));
@@ -144,6 +153,22 @@ impl Package {
             }
         }
         Ok(())
+    }
+
+    /// Checks what FMI 3.0 demands of single folders (sections 2.4.10, 2.5.1.1, 2.5.1.2).
+    fn check_folders_of_3(&self) -> Result<(), PackageError> {
+        let has = |name: &str| self.entries.iter().any(|(path, _)| path == name);
+        let has_folder = |name: &str| self.entries.iter().any(|(path, _)| path.starts_with(name));
+        let described = !has_folder("sources/") || has("sources/buildDescription.xml");
+        demand(described, "sources/buildDescription.xml", "sources without it")?;
+        let license = ["txt", "html", "spdx"]
+            .iter()
+            .any(|extension| has(&format!("documentation/licenses/license.{extension}")));
+        let licensed = !has_folder("documentation/licenses/") || license;
+        let expected = "documentation/licenses/license.txt, .html or .spdx";
+        demand(licensed, expected, "documentation/licenses without it")?;
+        let pictured = !has("terminalsAndIcons/icon.svg") || has("terminalsAndIcons/icon.png");
+        demand(pictured, "terminalsAndIcons/icon.png", "icon.svg without it")
     }
 
     fn archive(&self) -> zip::result::ZipResult<Vec<u8>> {
@@ -165,4 +190,12 @@ impl Package {
         }
         Ok(archive.finish()?.into_inner())
     }
+}
+
+fn demand(holds: bool, expected: &str, found: &str) -> Result<(), PackageError> {
+    if holds {
+        return Ok(());
+    }
+    let (expected, found) = (expected.to_owned(), found.to_owned());
+    Err(PackageError::Missing { expected, found })
 }

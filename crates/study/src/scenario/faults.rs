@@ -167,12 +167,14 @@ impl Reader<'_> {
     /// Checks that a kind of fault fits the type of the input.
     fn expect_fit(&self, what: &'static str) -> Result<(), Reason> {
         let anywhere = ["stuck", "dropout", "delay"].contains(&what);
-        let (fits, expected) = match self.target.variable.kind {
-            Kind::Real(_) => (what != "inversion", OF_REALS),
-            Kind::Integer(_) => (anywhere || ["bias", "saturation"].contains(&what), OF_INTEGERS),
+        let (fits, expected) = match &self.target.variable.kind {
+            Kind::Real(_) | Kind::Float32(_) => (what != "inversion", OF_REALS),
             Kind::Boolean(_) => (anywhere || what == "inversion", OF_BOOLEANS),
             Kind::Enumeration(_) => (anywhere, OF_ENUMERATIONS),
-            Kind::String(_) => (false, "an input of another type"),
+            other if other.as_integer().is_some() => {
+                (anywhere || ["bias", "saturation"].contains(&what), OF_INTEGERS)
+            }
+            _ => (false, "an input of another type"),
         };
         if fits {
             return Ok(());

@@ -75,28 +75,33 @@ impl Literal {
         description: &ModelDescription,
     ) -> Result<f64, String> {
         match (&variable.kind, self) {
-            (Kind::Real(_), Literal::Number(number)) if number.is_finite() => Ok(*number),
-            (Kind::Real(_), _) => Err("a finite number".to_owned()),
-            (Kind::Integer(_) | Kind::Enumeration(_), Literal::Number(number))
-                if is_integer(*number) =>
+            (Kind::Real(_) | Kind::Float32(_), Literal::Number(number)) if number.is_finite() => {
+                Ok(*number)
+            }
+            (Kind::Real(_) | Kind::Float32(_), _) => Err("a finite number".to_owned()),
+            (kind, Literal::Number(number))
+                if kind.as_integer().is_some() && is_integer(*number) =>
             {
                 Ok(*number)
             }
-            (Kind::Integer(_), _) => Err("an Integer of 32 bits".to_owned()),
             (Kind::Enumeration(kind), _) => {
                 let named = |name: &String| description.types.iter().find(|one| one.name == *name);
                 let items = kind.declared_type.as_ref().and_then(named);
                 let items = items.map_or(&[][..], |one| &one.items[..]);
                 let item =
                     items.iter().find(|(name, _)| matches!(self, Self::Text(text) if text == name));
-                item.map(|(_, number)| f64::from(*number)).ok_or_else(|| {
+                let number = item.and_then(|(_, number)| i32::try_from(*number).ok());
+                number.map(f64::from).ok_or_else(|| {
                     let names: Vec<_> = items.iter().map(|(name, _)| name.as_str()).collect();
                     format!("a whole number or one of {}", names.join(", "))
                 })
             }
             (Kind::Boolean(_), Literal::Boolean(flag)) => Ok(f64::from(u8::from(*flag))),
             (Kind::Boolean(_), _) => Err("true or false".to_owned()),
-            (Kind::String(_), _) => Err("no number, as it is a String".to_owned()),
+            (Kind::String(_) | Kind::Binary(_) | Kind::Clock(_), _) => {
+                Err(format!("no number, as it is a {}", variable.kind.element()))
+            }
+            _ => Err("an Integer of 32 bits".to_owned()),
         }
     }
 }

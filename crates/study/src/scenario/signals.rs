@@ -270,11 +270,11 @@ fn column_signal(
         let (path, name) = (path.to_owned(), name.to_owned());
         return Err(Reason::Column { path, name, known: some(&table.names) });
     };
-    let (fits, expected): (fn(f64) -> bool, _) = match target.variable.kind {
-        Kind::Real(_) => (f64::is_finite, "a finite number"),
-        Kind::Integer(_) | Kind::Enumeration(_) => (is_integer, "an Integer of 32 bits"),
+    let (fits, expected): (fn(f64) -> bool, _) = match &target.variable.kind {
         Kind::Boolean(_) => (|value| [0.0, 1.0].contains(&value), "0 or 1"),
-        Kind::String(_) => return Err(unfit("csv", target, "constant or steps")),
+        other if other.as_real().is_some() => (f64::is_finite, "a finite number"),
+        other if other.as_integer().is_some() => (is_integer, "an Integer of 32 bits"),
+        _ => return Err(unfit("csv", target, "constant or steps")),
     };
     if let Some(row) = values.iter().position(|&value| !fits(value)) {
         let found = format!("{} in row {} of {}", values[row], row + 1, path.display());

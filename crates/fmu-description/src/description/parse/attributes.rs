@@ -1,5 +1,6 @@
 //! Typed access to attributes and children, with errors and warnings that name them.
 
+use std::borrow::Cow;
 use std::str::FromStr;
 
 use super::ParseError;
@@ -11,6 +12,7 @@ pub(super) const WHITE_SPACE: [char; 4] = [' ', '\t', '\r', '\n'];
 const NUMBER: &str = "a finite number";
 const INTEGER: &str = "an integer from -2147483648 to 2147483647";
 const UNSIGNED: &str = "an integer from 0 to 4294967295";
+const COUNTER: &str = "an integer from 0 to 18446744073709551615";
 const BOOLEAN: &str = "true, false, 1 or 0";
 const NOTHING: &str = "read as if it were not there";
 
@@ -71,13 +73,33 @@ impl<'a> Node<'a> {
             expected: expected.to_owned(),
             found,
             assumed: assumed.to_owned(),
-            section: section(self.element),
+            section: section(self.warnings.version, self.element),
         });
     }
 
     pub(super) fn attribute(&self, name: &str) -> Option<&'a str> {
         let own = self.element.attributes.iter().find(|(own, _)| *own == name);
         own.map(|(_, value)| value.as_ref())
+    }
+
+    /// Returns the text in the element, with its entities resolved.
+    pub(super) fn content_text(&self) -> String {
+        let text = self.element.text;
+        quick_xml::escape::unescape(text).map_or_else(|_| text.to_owned(), Cow::into_owned)
+    }
+
+    pub(super) fn has(&self, name: &str) -> bool {
+        self.attribute(name).is_some()
+    }
+
+    /// Reads a required text that a simulation does not need; if it is absent, warns and returns
+    /// `default`.
+    pub(super) fn text_or(&self, name: &str, default: String) -> String {
+        self.text(name).unwrap_or_else(|| {
+            let said = ("a value", "no such attribute".to_owned());
+            self.warn_of(true, self.place(name), said, &format!("read as {default:?}"));
+            default
+        })
     }
 
     pub(super) fn text(&self, name: &str) -> Option<String> {
@@ -117,6 +139,14 @@ impl<'a> Node<'a> {
         }
     }
 
+    /// Reads the `xs:double` of a limit. An infinite one of FMI 3.0 limits nothing.
+    pub(super) fn bound(&self, name: &'static str) -> Result<Option<f64>, ParseError> {
+        match self.attribute(name).map(|text| text.trim_matches(WHITE_SPACE)) {
+            Some("INF" | "-INF") => Ok(None),
+            _ => self.number(name),
+        }
+    }
+
     /// Reads an `xs:double` of a conversion, which must be finite.
     pub(super) fn finite(&self, name: &'static str, default: f64) -> Result<f64, ParseError> {
         let Some(text) = self.attribute(name) else { return Ok(default) };
@@ -135,6 +165,36 @@ impl<'a> Node<'a> {
         let value = value.ok_or_else(|| self.wrong(name, INTEGER, text))?;
         self.warn(name, INTEGER, text, &format!("read as {value}"));
         Ok(Some(value))
+    }
+
+    /// Reads an integer of a type of FMI 3.0 with its smallest and largest value. An integer written
+    /// with a point (`1.0`) gives a warning.
+    pub(super) fn integer_within(
+        &self,
+        name: &'static str,
+        (low, high): (i128, i128),
+    ) -> Result<Option<i128>, ParseError> {
+        let expected = || format!("an integer from {low} to {high}");
+        let Some((text, trimmed)) = self.content(name, "an integer") else { return Ok(None) };
+        let inside = |value: &i128| (low..=high).contains(value);
+        if let Some(value) = trimmed.parse().ok().filter(inside) {
+            return Ok(Some(value));
+        }
+        let real = trimmed.parse::<f64>().ok().filter(|real| real.fract() == 0.0);
+        let value = real.and_then(|real| format!("{real:.0}").parse().ok()).filter(inside);
+        let value = value.ok_or_else(|| self.wrong(name, &expected(), text))?;
+        self.warn(name, &expected(), text, &format!("read as {value}"));
+        Ok(Some(value))
+    }
+
+    /// Reads an `xs:unsignedLong` that a simulation does not need.
+    pub(super) fn optional_counter(&self, name: &'static str) -> Option<u64> {
+        let (text, trimmed) = self.content(name, COUNTER)?;
+        let value = trimmed.parse().ok();
+        if value.is_none() {
+            self.warn(name, COUNTER, text, NOTHING);
+        }
+        value
     }
 
     /// Reads an `xs:unsignedInt`; any other value is an error.
@@ -194,6 +254,10 @@ impl<'a> Node<'a> {
         let assumed = meant.map_or(NOTHING.to_owned(), |word| format!("read as {word}"));
         self.warn(name, &expected, text, &assumed);
         meant.and_then(|word| word.parse().ok())
+    }
+
+    pub(super) fn children(self) -> impl Iterator<Item = Node<'a>> {
+        self.element.children.iter().map(move |element| Node { element, ..self })
     }
 
     pub(super) fn children_named(self, name: &'a str) -> impl Iterator<Item = Node<'a>> {

@@ -1,8 +1,12 @@
-//! Warns of elements and attributes that the schema of FMI 2.0.5 does not have, or has in another
+//! Warns of elements and attributes that the schema of the standard does not have, or has in another
 //! order.
 
+mod fmi1;
+mod fmi2;
+mod fmi3;
+
 use super::attributes::Node;
-use crate::unit::BaseUnit;
+use crate::description::Version;
 
 /// An element of the schema: its attributes and its children in order.
 struct Shape {
@@ -12,6 +16,8 @@ struct Shape {
     children: &'static [&'static str],
     /// The children are one optional list, which must not be empty.
     list: bool,
+    /// The first children, up to this position, may come in any order.
+    unordered: usize,
 }
 
 impl Shape {
@@ -29,120 +35,22 @@ const fn list(children: &'static [&'static str]) -> Shape {
 }
 
 const fn branch(attributes: &'static [&'static str], children: &'static [&'static str]) -> Shape {
-    Shape { attributes, shared: &[], children, list: false }
+    Shape { attributes, shared: &[], children, list: false, unordered: 0 }
 }
 
-const ROOT: Shape = branch(
-    &[
-        "fmiVersion",
-        "modelName",
-        "guid",
-        "description",
-        "author",
-        "version",
-        "copyright",
-        "license",
-        "generationTool",
-        "generationDateAndTime",
-        "variableNamingConvention",
-        "numberOfEventIndicators",
-    ],
-    &[
-        "ModelExchange",
-        "CoSimulation",
-        "UnitDefinitions",
-        "TypeDefinitions",
-        "LogCategories",
-        "DefaultExperiment",
-        "VendorAnnotations",
-        "ModelVariables",
-        "ModelStructure",
-    ],
-);
-/// Attributes of both interfaces.
-const INTERFACE: &[&str] = &[
-    "modelIdentifier",
-    "needsExecutionTool",
-    "canBeInstantiatedOnlyOncePerProcess",
-    "canNotUseMemoryManagementFunctions",
-    "canGetAndSetFMUstate",
-    "canSerializeFMUstate",
-    "providesDirectionalDerivative",
-];
-const MODEL_EXCHANGE: Shape =
-    branch(&["completedIntegratorStepNotNeeded"], &["SourceFiles"]).with(INTERFACE);
-const CO_SIMULATION: Shape = branch(
-    &[
-        "canHandleVariableCommunicationStepSize",
-        "canInterpolateInputs",
-        "maxOutputDerivativeOrder",
-        "canRunAsynchronuously",
-    ],
-    &["SourceFiles"],
-)
-.with(INTERFACE);
-const VARIABLE: Shape = branch(
-    &[
-        "name",
-        "valueReference",
-        "description",
-        "causality",
-        "variability",
-        "initial",
-        "canHandleMultipleSetPerTimeInstant",
-    ],
-    &["Real", "Integer", "Boolean", "String", "Enumeration", "Annotations"],
-);
-/// Attributes of Real and of Integer, as a type and as a variable.
-const REAL: &[&str] =
-    &["quantity", "unit", "displayUnit", "relativeQuantity", "min", "max", "nominal", "unbounded"];
-const INTEGER: &[&str] = &["quantity", "min", "max"];
-
-/// The shape of the element `name` in `parent`; `None` if the schema does not define its content.
-fn shape(parent: &str, name: &str) -> Option<Shape> {
-    Some(match (parent, name) {
-        (_, "fmiModelDescription") => ROOT,
-        (_, "ModelExchange") => MODEL_EXCHANGE,
-        (_, "CoSimulation") => CO_SIMULATION,
-        (_, "SourceFiles") => list(&["File"]),
-        (_, "File") => leaf(&["name"]),
-        (_, "UnitDefinitions") => list(&["Unit"]),
-        (_, "Unit") => branch(&["name"], &["BaseUnit", "DisplayUnit"]),
-        (_, "BaseUnit") => leaf(&["factor", "offset"]).with(&BaseUnit::EXPONENTS),
-        (_, "DisplayUnit") => leaf(&["name", "factor", "offset"]),
-        (_, "TypeDefinitions") => list(&["SimpleType"]),
-        (_, "SimpleType") => branch(
-            &["name", "description"],
-            &["Real", "Integer", "Boolean", "String", "Enumeration"],
-        ),
-        ("SimpleType", "Real") => leaf(REAL),
-        ("SimpleType", "Integer") => leaf(INTEGER),
-        ("SimpleType", "Enumeration") => branch(&["quantity"], &["Item"]),
-        (_, "Item") => leaf(&["name", "value", "description"]),
-        (_, "LogCategories") => list(&["Category"]),
-        (_, "Category") => leaf(&["name", "description"]),
-        (_, "DefaultExperiment") => leaf(&["startTime", "stopTime", "tolerance", "stepSize"]),
-        // The rules report an empty list, not the schema.
-        (_, "ModelVariables") => branch(&[], &["ScalarVariable"]),
-        (_, "ScalarVariable") => VARIABLE,
-        ("ScalarVariable", "Real") => {
-            leaf(&["declaredType", "start", "derivative", "reinit"]).with(REAL)
-        }
-        ("ScalarVariable", "Integer" | "Enumeration") => {
-            leaf(&["declaredType", "start"]).with(INTEGER)
-        }
-        ("ScalarVariable", "Boolean" | "String") => leaf(&["declaredType", "start"]),
-        (_, "ModelStructure") => branch(&[], &["Outputs", "Derivatives", "InitialUnknowns"]),
-        (_, "Outputs" | "Derivatives" | "InitialUnknowns") => list(&["Unknown"]),
-        (_, "Unknown") => leaf(&["index", "dependencies", "dependenciesKind"]),
-        _ => return None,
-    })
+/// Warns of everything in the file with the root element `root`.
+pub(super) fn check(root: Node<'_>, version: Version) {
+    match version {
+        Version::V1 => check_element(root, "", fmi1::shape),
+        Version::V2 => check_element(root, "", fmi2::shape),
+        Version::V3 => check_element(root, "", fmi3::shape),
+    }
 }
 
 /// Warns of everything below `node`, a child of the element `parent`.
-pub(super) fn check(node: Node<'_>, parent: &str) {
+fn check_element(node: Node<'_>, parent: &str, shapes: fn(&str, &str) -> Option<Shape>) {
     let element = node.element;
-    let Some(shape) = shape(parent, element.name) else { return };
+    let Some(shape) = shapes(parent, element.name) else { return };
     for (name, value) in &element.attributes {
         // FMI defines no namespaces.
         let own = shape.attributes.contains(name) || shape.shared.contains(name);
@@ -166,8 +74,7 @@ pub(super) fn check(node: Node<'_>, parent: &str) {
             inner.warn_of(true, place, said, "it was skipped");
             continue;
         };
-        // The two interfaces may come in either order.
-        let position = if element.name == ROOT_NAME { position.max(1) } else { position };
+        let position = position.max(shape.unordered);
         if position < last {
             let place = format!("<{}>", child.name);
             let expected = format!("the order {}", shape.children.join(", "));
@@ -175,8 +82,6 @@ pub(super) fn check(node: Node<'_>, parent: &str) {
             inner.warn_of(true, place, (&expected, found), "it was read all the same");
         }
         last = last.max(position);
-        check(inner, element.name);
+        check_element(inner, element.name, shapes);
     }
 }
-
-const ROOT_NAME: &str = "fmiModelDescription";

@@ -6,7 +6,7 @@ use super::ParseError;
 use super::attributes::{Node, WHITE_SPACE};
 use crate::description::{Causality, DependencyKind, ModelStructure, ScalarVariable, Unknown};
 
-const ANYTHING: &str = "read as depending on anything";
+pub(super) const ANYTHING: &str = "read as depending on anything";
 
 /// Reads `ModelStructure` of `root` for `variables`.
 ///
@@ -39,16 +39,19 @@ pub(super) fn read(
         outputs,
         derivatives: derivatives(element, variables.len())?,
         initial_unknowns: list(element, "InitialUnknowns", variables.len())?,
+        ..ModelStructure::default()
     })
 }
 
-fn missing_outputs<'a>(
+pub(super) fn missing_outputs<'a>(
     rows: &[Unknown],
     variables: &'a [ScalarVariable],
 ) -> impl Iterator<Item = (Unknown, &'a str)> {
     let listed: HashSet<u32> = rows.iter().map(|row| row.index).collect();
     (1..).zip(variables).filter_map(move |(index, own)| {
-        let missing = own.causality == Causality::Output && !listed.contains(&index);
+        let missing = own.causality == Causality::Output
+            && own.alias_of.is_none()
+            && !listed.contains(&index);
         missing.then(|| (Unknown { index, ..Unknown::default() }, own.name.as_str()))
     })
 }
@@ -104,7 +107,7 @@ pub(super) fn indices(count: usize) -> String {
     format!("the index of a variable, 1 to {count}")
 }
 
-fn words(text: &str) -> impl Iterator<Item = &str> {
+pub(super) fn words(text: &str) -> impl Iterator<Item = &str> {
     text.split(WHITE_SPACE).filter(|word| !word.is_empty())
 }
 
@@ -126,7 +129,7 @@ fn dependencies(row: Node<'_>, count: usize) -> Result<Option<Vec<u32>>, Impossi
 }
 
 /// Reads the attribute `dependenciesKind`, if it fits `dependencies`.
-fn kinds(row: Node<'_>, dependencies: Option<&[u32]>) -> Option<Vec<DependencyKind>> {
+pub(super) fn kinds(row: Node<'_>, dependencies: Option<&[u32]>) -> Option<Vec<DependencyKind>> {
     const NAME: &str = "dependenciesKind";
     let text = row.attribute(NAME)?;
     let expected = match dependencies {

@@ -1,9 +1,13 @@
 use super::*;
 use crate::description::{
-    Causality, DependencyKind, Initial, IntegerType, Kind, RealType, Variability,
+    Causality, CoSimulation, DefaultExperiment, DependencyKind, Initial, IntegerType, Kind,
+    RealType, Variability,
 };
+use crate::unit::{BaseUnit, DisplayUnit};
 
 mod files;
+mod fmi1;
+mod fmi3;
 mod tolerance;
 
 /// A model description around `variables` and `structure`, with an enumeration and a real type.
@@ -66,8 +70,8 @@ fn each_kind_of_variable_is_read() {
     };
     assert_eq!(kind("r"), Kind::Real(real));
     let integer = IntegerType {
-        start: Some(i32::MIN),
-        min: Some(i32::MIN),
+        start: Some(i32::MIN.into()),
+        min: Some(i32::MIN.into()),
         max: Some(7),
         quantity: Some("q".into()),
         declared_type: None,
@@ -149,7 +153,7 @@ fn units_categories_and_experiment_are_read() {
     let celsius = BaseUnit { k: 1, offset: 273.15, ..BaseUnit::default() };
     assert_eq!(description.units[1].base, Some(celsius));
     assert_eq!(description.units[2].base, None);
-    let degrees = DisplayUnit { name: "deg".into(), factor: 57.3, offset: 0.0 };
+    let degrees = DisplayUnit { name: "deg".into(), factor: 57.3, offset: 0.0, inverse: false };
     assert_eq!(description.units[0].display_units, [degrees]);
     assert_eq!(description.log_categories[0].description.as_deref(), Some("jumps"));
     let experiment = DefaultExperiment {
@@ -162,7 +166,7 @@ fn units_categories_and_experiment_are_read() {
 
 #[test]
 fn other_versions_are_named() {
-    for version in ["1.0", "3.0", "2.1", "2.0.x", "2.0.1.2", ""] {
+    for version in ["0.9", "1.1", "3.", "4.0", "2.1", "2.0.x", "2.0.1.2", ""] {
         let xml = format!(r#"<fmiModelDescription fmiVersion="{version}"/>"#);
         let error = ModelDescription::parse(xml).unwrap_err();
         assert!(matches!(error, ParseError::Version { ref found, .. } if found == version));

@@ -12,12 +12,13 @@ use crate::description::{
 const KINDS: [&str; 5] = ["Real", "Integer", "Boolean", "String", "Enumeration"];
 const CAUSALITIES: [&str; 6] =
     ["parameter", "calculatedParameter", "input", "output", "local", "independent"];
-const VARIABILITIES: [&str; 5] = ["constant", "fixed", "tunable", "discrete", "continuous"];
+pub(super) const VARIABILITIES: [&str; 5] =
+    ["constant", "fixed", "tunable", "discrete", "continuous"];
 /// Maximum number of variables.
-const VARIABLES: usize = 1_000_000;
+pub(super) const VARIABLES: usize = 1_000_000;
 
 /// The types of `TypeDefinitions`, by name.
-type Types<'a> = HashMap<&'a str, &'a SimpleType>;
+pub(super) type Types<'a> = HashMap<&'a str, &'a SimpleType>;
 
 pub(super) fn types(root: Node<'_>) -> Result<Vec<SimpleType>, ParseError> {
     root.list("TypeDefinitions", "SimpleType", |element| {
@@ -41,11 +42,11 @@ pub(super) fn types(root: Node<'_>) -> Result<Vec<SimpleType>, ParseError> {
     })
 }
 
-fn item(element: Node<'_>) -> Result<(String, i32), ParseError> {
+fn item(element: Node<'_>) -> Result<(String, i64), ParseError> {
     let text = element.required("value")?;
     let value = element.integer("value")?;
     let value = value.ok_or_else(|| element.wrong("value", "an integer", text))?;
-    Ok((element.required("name")?.to_owned(), value))
+    Ok((element.required("name")?.to_owned(), value.into()))
 }
 
 pub(super) fn variables(
@@ -68,7 +69,10 @@ pub(super) fn variables(
 }
 
 /// Refuses a name that two variables have, unless it does not matter which one is meant.
-fn check_names(elements: &[Node<'_>], variables: &[ScalarVariable]) -> Result<(), ParseError> {
+pub(super) fn check_names(
+    elements: &[Node<'_>],
+    variables: &[ScalarVariable],
+) -> Result<(), ParseError> {
     let mut names: HashMap<&str, &ScalarVariable> = HashMap::with_capacity(variables.len());
     for (element, variable) in elements.iter().zip(variables) {
         let Some(first) = names.get(variable.name.as_str()) else {
@@ -89,10 +93,15 @@ fn check_names(elements: &[Node<'_>], variables: &[ScalarVariable]) -> Result<()
 }
 
 /// Two variables that are set from outside must not share a value reference.
-fn check_references(elements: &[Node<'_>], variables: &[ScalarVariable]) -> Result<(), ParseError> {
+pub(super) fn check_references(
+    elements: &[Node<'_>],
+    variables: &[ScalarVariable],
+) -> Result<(), ParseError> {
     let mut settable: HashMap<(u8, u32), &str> = HashMap::new();
     for (element, variable) in elements.iter().zip(variables) {
-        if !matches!(variable.causality, Causality::Input | Causality::Parameter) {
+        let set_from_outside =
+            matches!(variable.causality, Causality::Input | Causality::Parameter);
+        if !set_from_outside || variable.alias_of.is_some() {
             continue;
         }
         let key = (base(&variable.kind), variable.value_reference);
@@ -107,12 +116,22 @@ fn check_references(elements: &[Node<'_>], variables: &[ScalarVariable]) -> Resu
 }
 
 /// Variables of the same base type share the space of value references.
-fn base(kind: &Kind) -> u8 {
+pub(super) fn base(kind: &Kind) -> u8 {
     match kind {
         Kind::Real(_) => 0,
         Kind::Integer(_) | Kind::Enumeration(_) => 1,
         Kind::Boolean(_) => 2,
         Kind::String(_) => 3,
+        Kind::Float32(_) => 4,
+        Kind::Int8(_) => 5,
+        Kind::UInt8(_) => 6,
+        Kind::Int16(_) => 7,
+        Kind::UInt16(_) => 8,
+        Kind::UInt32(_) => 9,
+        Kind::Int64(_) => 10,
+        Kind::UInt64(_) => 11,
+        Kind::Binary(_) => 12,
+        Kind::Clock(_) => 13,
     }
 }
 
@@ -133,6 +152,7 @@ fn variable(
         variability: variability(element, causality, &kind),
         initial: element.word("initial", &["exact", "approx", "calculated"]),
         kind,
+        ..ScalarVariable::default()
     })
 }
 
@@ -157,7 +177,7 @@ fn variability(element: Node<'_>, causality: Causality, kind: &Kind) -> Variabil
 }
 
 /// Returns the single child that gives the type of a variable or a type definition.
-fn typed(element: Node<'_>) -> Result<Node<'_>, ParseError> {
+pub(super) fn typed(element: Node<'_>) -> Result<Node<'_>, ParseError> {
     let is_kind = |child: &&super::xml::Element<'_>| KINDS.contains(&child.name);
     let mut found = element.element.children.iter().filter(is_kind);
     match (found.next(), found.next()) {
@@ -170,7 +190,7 @@ fn typed(element: Node<'_>) -> Result<Node<'_>, ParseError> {
     }
 }
 
-fn kind(element: Node<'_>, types: &Types<'_>, count: usize) -> Result<Kind, ParseError> {
+pub(super) fn kind(element: Node<'_>, types: &Types<'_>, count: usize) -> Result<Kind, ParseError> {
     let declared = declared(element, types);
     Ok(match element.element.name {
         "Real" => {
@@ -197,7 +217,7 @@ fn kind(element: Node<'_>, types: &Types<'_>, count: usize) -> Result<Kind, Pars
             };
             let own = IntegerType {
                 declared_type: name,
-                start: element.integer("start")?,
+                start: element.integer("start")?.map(i128::from),
                 ..integer_limits(element, &defaults)?
             };
             if other == "Integer" { Kind::Integer(own) } else { Kind::Enumeration(own) }
@@ -232,7 +252,7 @@ fn declared<'a>(element: Node<'_>, types: &Types<'a>) -> Option<(String, &'a Kin
     }
 }
 
-fn real_limits(element: Node<'_>, defaults: &RealType) -> Result<RealType, ParseError> {
+pub(super) fn real_limits(element: Node<'_>, defaults: &RealType) -> Result<RealType, ParseError> {
     Ok(RealType {
         quantity: element.text("quantity").or(defaults.quantity.clone()),
         unit: element.text("unit").or(defaults.unit.clone()),
@@ -244,11 +264,14 @@ fn real_limits(element: Node<'_>, defaults: &RealType) -> Result<RealType, Parse
     })
 }
 
-fn integer_limits(element: Node<'_>, defaults: &IntegerType) -> Result<IntegerType, ParseError> {
+pub(super) fn integer_limits(
+    element: Node<'_>,
+    defaults: &IntegerType,
+) -> Result<IntegerType, ParseError> {
     Ok(IntegerType {
         quantity: element.text("quantity").or(defaults.quantity.clone()),
-        min: element.integer("min")?.or(defaults.min),
-        max: element.integer("max")?.or(defaults.max),
+        min: element.integer("min")?.map(i128::from).or(defaults.min),
+        max: element.integer("max")?.map(i128::from).or(defaults.max),
         ..IntegerType::default()
     })
 }

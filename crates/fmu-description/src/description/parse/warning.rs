@@ -5,6 +5,7 @@ use std::fmt;
 
 use super::Position;
 use super::xml::Element;
+use crate::description::Version;
 
 /// Maximum number of warnings that are kept; one more says that there were others.
 const KEPT: usize = 1000;
@@ -22,7 +23,7 @@ pub struct Warning {
     pub found: String,
     /// The assumption that the reader made.
     pub assumed: String,
-    /// Section of FMI 2.0.5.
+    /// Section of the standard: FMI 2.0.5 or 3.0.2, for FMI 1.0 the document on co-simulation.
     pub section: &'static str,
     /// Whether validation against the schema of the standard reports it too.
     pub by_schema: bool,
@@ -39,12 +40,18 @@ impl fmt::Display for Warning {
 }
 
 /// Collects warnings.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Warnings {
+    /// The version of the file.
+    pub(super) version: Version,
     kept: RefCell<Vec<Warning>>,
 }
 
 impl Warnings {
+    pub(super) fn new(version: Version) -> Self {
+        Self { version, kept: RefCell::new(Vec::new()) }
+    }
+
     pub(super) fn add(&self, warning: Warning) {
         let mut kept = self.kept.borrow_mut();
         if kept.len() < KEPT {
@@ -66,9 +73,30 @@ impl Warnings {
     }
 }
 
-/// Returns the section of FMI 2.0.5 that describes an element.
-pub(super) fn section(element: &Element<'_>) -> &'static str {
-    match element.name {
+/// Returns the section of the standard that describes an element.
+pub(super) fn section(version: Version, element: &Element<'_>) -> &'static str {
+    match version {
+        Version::V1 => section_1(element.name),
+        Version::V2 => section_2(element.name),
+        Version::V3 => section_3(element.name),
+    }
+}
+
+/// FMI 1.0 for co-simulation: section 4.1 has the elements of co-simulation, section 4.2 the others.
+fn section_1(element: &str) -> &'static str {
+    match element {
+        "Implementation"
+        | "CoSimulation_StandAlone"
+        | "CoSimulation_Tool"
+        | "Capabilities"
+        | "Model"
+        | "File" => "4.1",
+        _ => "4.2",
+    }
+}
+
+fn section_2(element: &str) -> &'static str {
+    match element {
         "ModelExchange" => "3.3.1",
         "CoSimulation" | "SourceFiles" | "File" => "4.3.1",
         "UnitDefinitions" | "Unit" | "BaseUnit" | "DisplayUnit" => "2.2.2",
@@ -80,5 +108,28 @@ pub(super) fn section(element: &Element<'_>) -> &'static str {
         | "Enumeration" => "2.2.7",
         "ModelStructure" | "Outputs" | "Derivatives" | "InitialUnknowns" | "Unknown" => "2.2.8",
         _ => "2.2.1",
+    }
+}
+
+fn section_3(element: &str) -> &'static str {
+    match element {
+        "ModelExchange" => "3.4",
+        "CoSimulation" => "4.4",
+        "ScheduledExecution" => "5.4",
+        "UnitDefinitions" | "Unit" | "BaseUnit" | "DisplayUnit" => "2.4.3",
+        "LogCategories" | "Category" => "2.4.5",
+        "DefaultExperiment" => "2.4.6",
+        "Dimension" => "2.4.7.2",
+        "Alias" => "2.4.7.3",
+        "ModelStructure"
+        | "Output"
+        | "ContinuousStateDerivative"
+        | "ClockedState"
+        | "InitialUnknown"
+        | "EventIndicator" => "2.4.8",
+        "fmiModelDescription" => "2.4.1",
+        "TypeDefinitions" | "Item" => "2.4.4",
+        other if other.ends_with("Type") => "2.4.4",
+        _ => "2.4.7",
     }
 }

@@ -22,12 +22,12 @@ const ELEMENTS: usize = 3_000_000;
 /// Maximum number of attributes of all elements together.
 const ALL_ATTRIBUTES: usize = 12_000_000;
 
-/// An element: its attributes, child elements and text, which FMI 2.0 does not use.
+/// An element: its attributes, child elements and text, which only FMI 1.0 uses.
 #[derive(Debug)]
 pub(super) struct Element<'a> {
     pub(super) name: &'a str,
     /// The first text that is more than white space, unchanged.
-    text: &'a str,
+    pub(super) text: &'a str,
     pub(super) attributes: Vec<(&'a str, Cow<'a, str>)>,
     pub(super) children: Vec<Element<'a>>,
     /// The position at which it starts.

@@ -38,7 +38,7 @@ macro_rules! displayed {
     )*};
 }
 
-displayed!(i32, u32, bool);
+displayed!(i32, i64, i128, u32, u64, bool);
 
 /// A start tag under construction.
 pub(super) struct Tag<'a>(pub(super) BytesStart<'a>);

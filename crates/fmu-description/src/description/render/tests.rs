@@ -1,11 +1,46 @@
 use super::tag::Value;
 use super::*;
-use crate::description::sample;
+use crate::description::{Elements, sample};
 
 #[test]
 fn a_description_with_everything_reads_back_equal() {
     let description = sample::complete();
     assert_eq!(ModelDescription::parse(description.to_xml()).unwrap(), description);
+}
+
+#[test]
+fn a_description_of_fmi_3_with_everything_reads_back_equal() {
+    let description = sample::complete_3();
+    let (read, warnings) = ModelDescription::read(description.to_xml()).unwrap();
+    assert_eq!(warnings, []);
+    assert_eq!(read, description);
+}
+
+#[test]
+fn an_alias_is_rendered_in_its_variable() {
+    let mut description = sample::complete_3();
+    let xml = description.to_xml();
+    assert_eq!(xml.matches("<Alias ").count(), 2);
+    assert!(xml.contains("<Alias name=\"phi\"/>"), "{xml}");
+    // The order of the variables does not matter.
+    let position = description.variables.iter().position(|own| own.name == "phi").unwrap();
+    let alias = description.variables.remove(position);
+    description.variables.push(alias);
+    let again = ModelDescription::parse(description.to_xml()).unwrap();
+    assert_eq!(again.variables[position].alias_of.as_deref(), Some("x"));
+}
+
+#[test]
+fn single_precision_has_the_digits_of_its_own() {
+    let mut description = sample::complete_3();
+    let gains = description.variables.iter_mut().find(|own| own.name == "gains").unwrap();
+    gains.kind = Kind::Float32(RealType { start: Some(f64::from(0.1_f32)), ..RealType::default() });
+    let xml = description.to_xml();
+    assert!(xml.contains("name=\"gains\"") && xml.contains(" start=\"0.1\""), "{xml}");
+    let elements = Elements::Real(vec![f64::INFINITY, f64::NEG_INFINITY, 0.5]);
+    description.variables.iter_mut().find(|own| own.name == "gains").unwrap().start_elements =
+        Some(elements);
+    assert!(description.to_xml().contains(" start=\"INF -INF 0.5\""));
 }
 
 #[test]

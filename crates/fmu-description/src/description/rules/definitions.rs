@@ -1,34 +1,33 @@
-//! Rules on `UnitDefinitions` and `TypeDefinitions` (sections 2.2.2 and 2.2.3).
+//! Rules on `UnitDefinitions` and `TypeDefinitions` (FMI 2.0.5, sections 2.2.2 and 2.2.3; FMI 3.0.2,
+//! sections 2.4.3 and 2.4.4).
 
 use std::collections::{HashMap, HashSet};
 
-use super::Problems;
+use super::{Problems, Sections};
 use crate::description::{Kind, ModelDescription, RealType, SimpleType};
 use crate::unit::Unit;
 
-const UNITS: &str = "2.2.2";
-const TYPES: &str = "2.2.3";
-
 pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
-    problems.unique(UNITS, "unit", description.units.iter().map(|unit| unit.name.as_str()));
+    let Sections { units: in_units, types: in_types, .. } = problems.sections;
+    problems.unique(in_units, "unit", description.units.iter().map(|unit| unit.name.as_str()));
     for unit in &description.units {
         check_unit(unit, problems);
     }
     let units = description.units.iter().map(|unit| (unit.name.as_str(), unit)).collect();
     for variable in &description.variables {
-        if let Kind::Real(real) = &variable.kind {
+        if let Some(real) = variable.kind.as_real() {
             check_use(&format!("variable {}", variable.name), real, &units, problems);
         }
     }
     let names = description.types.iter().map(|own| own.name.as_str());
-    problems.unique(TYPES, "type", names);
+    problems.unique(in_types, "type", names);
     let variables: HashSet<_> =
         description.variables.iter().map(|variable| variable.name.as_str()).collect();
     for own in &description.types {
-        problems.demand(!variables.contains(own.name.as_str()), TYPES, || {
+        problems.demand(!variables.contains(own.name.as_str()), in_types, || {
             format!("type {} has the name of a variable", own.name)
         });
-        if let Kind::Real(real) = &own.kind {
+        if let Some(real) = own.kind.as_real() {
             check_use(&format!("type {}", own.name), real, &units, problems);
         }
         check_type(own, problems);
@@ -36,10 +35,11 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
 }
 
 fn check_unit(unit: &Unit, problems: &mut Problems) {
+    let Sections { units: in_units, .. } = problems.sections;
     let name = &unit.name;
-    problems.line(UNITS, "unit", name);
+    problems.line(in_units, "unit", name);
     let displays = unit.display_units.iter().map(|display| display.name.as_str());
-    problems.unique(UNITS, &format!("in unit {name:?}, display unit"), displays);
+    problems.unique(in_units, &format!("in unit {name:?}, display unit"), displays);
     let base = unit.base.iter().map(|base| ("its base unit", base.factor, base.offset));
     let displays = unit
         .display_units
@@ -47,7 +47,7 @@ fn check_unit(unit: &Unit, problems: &mut Problems) {
         .map(|display| (display.name.as_str(), display.factor, display.offset));
     for (other, factor, offset) in base.chain(displays) {
         let sound = factor.is_finite() && factor != 0.0 && offset.is_finite();
-        problems.demand(sound, UNITS, || {
+        problems.demand(sound, in_units, || {
             format!(
                 "unit {name:?} to {other}: factor {factor:?} must be finite and not zero, \
                  offset {offset:?} finite"
@@ -58,48 +58,57 @@ fn check_unit(unit: &Unit, problems: &mut Problems) {
 
 /// Checks that the unit of a variable or type is defined and has the display unit.
 fn check_use(who: &str, real: &RealType, units: &HashMap<&str, &Unit>, problems: &mut Problems) {
+    let Sections { units: in_units, types: in_types, .. } = problems.sections;
     let unit = real.unit.as_deref();
     let defined = unit.and_then(|name| units.get(name));
     if let Some(unit) = unit {
-        problems.demand(defined.is_some(), UNITS, || {
+        problems.demand(defined.is_some(), in_units, || {
             format!("{who} has unit {unit:?}, which is not defined")
         });
     }
     if let Some(display) = &real.display_unit {
-        problems.demand(unit.is_some(), TYPES, || {
+        problems.demand(unit.is_some(), in_types, || {
             format!("{who} has display unit {display:?} and no unit")
         });
         let listed =
             defined.is_none_or(|unit| unit.display_units.iter().any(|own| own.name == *display));
-        problems.demand(listed, TYPES, || {
+        problems.demand(listed, in_types, || {
             format!("{who} has display unit {display:?}, which its unit does not list")
         });
     }
 }
 
 fn check_type(own: &SimpleType, problems: &mut Problems) {
+    let Sections { types: in_types, .. } = problems.sections;
     let name = &own.name;
-    problems.demand(!name.is_empty(), TYPES, || "a type has no name".to_owned());
-    problems.line(TYPES, "type", name);
-    problems.text(TYPES, "description of a type", own.description.as_deref().unwrap_or_default());
+    problems.demand(!name.is_empty(), in_types, || "a type has no name".to_owned());
+    problems.line(in_types, "type", name);
+    problems.text(
+        in_types,
+        "description of a type",
+        own.description.as_deref().unwrap_or_default(),
+    );
     match &own.kind {
-        Kind::Real(real) => super::variables::check_real(&format!("type {name}"), real, problems),
-        Kind::Integer(integer) => {
-            super::variables::check_integer(&format!("type {name}"), integer, problems);
-        }
         Kind::Enumeration(_) => {
-            problems.demand(!own.items.is_empty(), TYPES, || {
+            problems.demand(!own.items.is_empty(), in_types, || {
                 format!("enumeration type {name} has no item")
             });
             let items = own.items.iter().map(|(item, _)| item.as_str());
-            problems.unique(TYPES, &format!("in type {name}, item"), items);
+            problems.unique(in_types, &format!("in type {name}, item"), items);
             let mut values = HashSet::new();
             for (item, value) in &own.items {
-                problems.demand(values.insert(value), TYPES, || {
+                problems.demand(values.insert(value), in_types, || {
                     format!("in type {name}, item {item} has the value {value} of another item")
                 });
             }
         }
-        Kind::Boolean(_) | Kind::String(_) => {}
+        other => {
+            let who = format!("type {name}");
+            if let Some(real) = other.as_real() {
+                super::variables::check_real(&who, real, problems);
+            } else if let Some(integer) = other.as_integer() {
+                super::variables::check_integer(&who, integer, problems);
+            }
+        }
     }
 }

@@ -3,36 +3,39 @@
 use std::collections::HashSet;
 
 use super::Problems;
-use crate::description::{Kind, ModelDescription};
-
-const SECTION: &str = "2.2.9";
+use crate::description::{ModelDescription, Version};
 
 pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
+    let section = problems.sections.names;
     let names = || description.variables.iter().map(|variable| variable.name.as_str());
-    problems.unique("2.2.7", "variable", names());
+    problems.unique(problems.sections.variables, "variable", names());
     for name in names() {
-        problems.demand(!name.is_empty(), SECTION, || "a variable has no name".to_owned());
-        problems.line(SECTION, "variable", name);
+        problems.demand(!name.is_empty(), section, || "a variable has no name".to_owned());
+        problems.line(section, "variable", name);
     }
     if !description.structured_names {
         return;
     }
     for variable in &description.variables {
         let name = &variable.name;
-        problems.demand(is_structured(name), SECTION, || {
+        problems.demand(is_structured(name), section, || {
             format!("variable {name:?} is not a structured name")
         });
-        let real = matches!(variable.kind, Kind::Real(_));
-        problems.demand(real || !name.starts_with("der("), SECTION, || {
+        let real = variable.kind.as_real().is_some();
+        problems.demand(real || !name.starts_with("der("), section, || {
             format!("variable {name} is named as a derivative and is not Real")
         });
     }
-    check_arrays(names(), problems);
+    // Arrays of FMI 3.0 are variables, not names.
+    if description.version() == Version::V2 {
+        check_arrays(names(), problems);
+    }
 }
 
 /// Checks that the elements of each array are adjacent, with the last index running fastest. Only
 /// arrays of scalars are checked: names with indices at their end.
 fn check_arrays<'a>(names: impl Iterator<Item = &'a str>, problems: &mut Problems) {
+    let section = problems.sections.names;
     let mut seen = HashSet::new();
     let mut last: Option<(&str, Vec<u32>)> = None;
     for name in names {
@@ -42,11 +45,11 @@ fn check_arrays<'a>(names: impl Iterator<Item = &'a str>, problems: &mut Problem
         };
         match &last {
             Some((other, before)) if *other == array => {
-                problems.demand(*before < indices, SECTION, || {
+                problems.demand(*before < indices, section, || {
                     format!("variable {name} does not follow in row-major order")
                 });
             }
-            _ => problems.demand(seen.insert(array), SECTION, || {
+            _ => problems.demand(seen.insert(array), section, || {
                 format!("variable {name} stands apart from the other elements of {array}")
             }),
         }

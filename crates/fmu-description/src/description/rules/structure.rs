@@ -1,4 +1,4 @@
-//! Rules on `ModelStructure` (section 2.2.8).
+//! Rules on `ModelStructure` of FMI 2.0 (section 2.2.8).
 
 use std::collections::{BTreeSet, HashSet};
 
@@ -11,18 +11,13 @@ use crate::description::{
 const SECTION: &str = "2.2.8";
 
 impl ModelDescription {
-    /// Returns the variable with a 1-based index.
-    pub(super) fn at(&self, index: u32) -> Option<&ScalarVariable> {
-        self.variables.get(usize::try_from(index).ok()?.checked_sub(1)?)
-    }
-
     /// Returns the 1-based indices of the variables that `chosen` accepts.
-    fn indices_of(&self, chosen: impl Fn(&ScalarVariable) -> bool) -> BTreeSet<u32> {
+    pub(super) fn indices_of(&self, chosen: impl Fn(&ScalarVariable) -> bool) -> BTreeSet<u32> {
         let numbered = (1..).zip(&self.variables);
         numbered.filter(|(_, variable)| chosen(variable)).map(|(index, _)| index).collect()
     }
 
-    fn name_of(&self, index: u32) -> String {
+    pub(super) fn name_of(&self, index: u32) -> String {
         self.at(index).map_or_else(|| format!("number {index}"), |own| own.name.clone())
     }
 }
@@ -31,10 +26,10 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
     let structure = &description.structure;
     let states = states(description, problems);
     let outputs = description.indices_of(|own| own.causality == Causality::Output);
-    check_members("Outputs", &structure.outputs, &outputs, description, problems);
+    check_members(("Outputs", SECTION), &structure.outputs, &outputs, description, problems);
     let unknowns = initial_unknowns(description, &states);
     let rows = &structure.initial_unknowns;
-    check_members("InitialUnknowns", rows, &unknowns, description, problems);
+    check_members(("InitialUnknowns", SECTION), rows, &unknowns, description, problems);
     let ascending = rows.windows(2).all(|pair| pair[0].index <= pair[1].index);
     problems.demand(ascending, SECTION, || "InitialUnknowns are not in ascending order".to_owned());
 
@@ -110,8 +105,8 @@ fn initial_unknowns(description: &ModelDescription, states: &HashSet<u32>) -> BT
 }
 
 /// Checks that a list has exactly the required members, each once.
-fn check_members(
-    list: &str,
+pub(super) fn check_members(
+    (list, section): (&str, &'static str),
     rows: &[Unknown],
     wanted: &BTreeSet<u32>,
     description: &ModelDescription,
@@ -119,16 +114,16 @@ fn check_members(
 ) {
     let mut found = BTreeSet::new();
     for row in rows {
-        problems.demand(found.insert(row.index), SECTION, || {
+        problems.demand(found.insert(row.index), section, || {
             format!("{list} has variable {} twice", description.name_of(row.index))
         });
     }
     for index in wanted.difference(&found) {
-        problems.add(SECTION, format!("{list} lacks variable {}", description.name_of(*index)));
+        problems.add(section, format!("{list} lacks variable {}", description.name_of(*index)));
     }
     for index in found.difference(wanted) {
         let name = description.name_of(*index);
-        problems.add(SECTION, format!("{list} has variable {name}, which does not belong there"));
+        problems.add(section, format!("{list} has variable {name}, which does not belong there"));
     }
 }
 

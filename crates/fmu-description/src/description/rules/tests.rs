@@ -6,6 +6,8 @@ use crate::description::{
 };
 use crate::unit::Unit;
 
+mod fmi3;
+
 /// The problems of the sample after `change`; there must be exactly one, in `section`.
 fn only_problem(section: &str, change: impl FnOnce(&mut ModelDescription)) -> String {
     let mut description = sample::complete();
@@ -141,7 +143,7 @@ fn causality_and_variability_follow_the_table() {
     for causality in [Parameter, CalculatedParameter, Input, Output, Local, Independent] {
         for variability in [Constant, Fixed, Tunable, Discrete, Continuous] {
             let pair = (causality, variability);
-            let mut problems = Problems::default();
+            let mut problems = Problems { sections: &SECTIONS_OF_2, found: Vec::new() };
             let description = ModelDescription {
                 variables: vec![ScalarVariable {
                     initial: None,
@@ -150,7 +152,12 @@ fn causality_and_variability_follow_the_table() {
                 ..ModelDescription::default()
             };
             variables::check(&description, &mut problems);
-            assert_eq!(problems.0.is_empty(), allowed.contains(&pair), "{pair:?} {:?}", problems.0);
+            assert_eq!(
+                problems.found.is_empty(),
+                allowed.contains(&pair),
+                "{pair:?} {:?}",
+                problems.found
+            );
         }
     }
 }

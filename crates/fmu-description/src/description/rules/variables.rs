@@ -1,4 +1,4 @@
-//! Rules on `ModelVariables` (section 2.2.7).
+//! Rules on `ModelVariables` of FMI 2.0 (section 2.2.7), and on limits in both versions.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -31,7 +31,14 @@ pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
                 problems.text(SECTION, &format!("start of {who}"), start);
             }
             Kind::Boolean(_) => {}
+            other => problems.add(
+                SECTION,
+                format!("{who} is of type {}, which FMI 2.0 does not have", other.element()),
+            ),
         }
+        problems.demand(variable.dimensions.is_empty(), SECTION, || {
+            format!("{who} is an array, which FMI 2.0 does not have")
+        });
     }
     let is_independent = |own: &&ScalarVariable| own.causality == Causality::Independent;
     let independent = description.variables.iter().filter(is_independent).count();
@@ -75,15 +82,6 @@ fn check_table(variable: &ScalarVariable, problems: &mut Problems) {
     });
 }
 
-pub(super) fn has_start(kind: &Kind) -> bool {
-    match kind {
-        Kind::Real(own) => own.start.is_some(),
-        Kind::Integer(own) | Kind::Enumeration(own) => own.start.is_some(),
-        Kind::Boolean(start) => start.is_some(),
-        Kind::String(start) => start.is_some(),
-    }
-}
-
 fn check_start(variable: &ScalarVariable, problems: &mut Problems) {
     let name = &variable.name;
     let needed = match (variable.causality, variable.initial_in_force()) {
@@ -91,7 +89,7 @@ fn check_start(variable: &ScalarVariable, problems: &mut Problems) {
         (Causality::Input, _) => true,
         (_, initial) => initial != Some(Initial::Calculated),
     };
-    match (needed, has_start(&variable.kind)) {
+    match (needed, variable.has_start()) {
         (true, false) => problems.add(SECTION, format!("variable {name} needs a start value")),
         (false, true) => problems.add(
             SECTION,
@@ -103,13 +101,14 @@ fn check_start(variable: &ScalarVariable, problems: &mut Problems) {
 
 /// Checks limits and start of a Real variable or type, called `who`.
 pub(super) fn check_real(who: &str, real: &RealType, problems: &mut Problems) {
+    let section = problems.sections.limits;
     for (name, value) in
         [("start", real.start), ("min", real.min), ("max", real.max), ("nominal", real.nominal)]
     {
-        problems.finite(SECTION, &format!("{name} of {who}"), value);
+        problems.finite(section, &format!("{name} of {who}"), value);
     }
     if let Some(nominal) = real.nominal {
-        problems.demand(nominal > 0.0, SECTION, || {
+        problems.demand(nominal > 0.0, section, || {
             format!("{who}: nominal is {nominal:?}, not positive")
         });
     }
@@ -121,20 +120,21 @@ pub(super) fn check_integer(who: &str, integer: &IntegerType, problems: &mut Pro
     check_order(who, integer.min, integer.start, integer.max, problems);
 }
 
-fn check_order<T: Copy + PartialOrd + std::fmt::Debug>(
+pub(super) fn check_order<T: Copy + PartialOrd + std::fmt::Debug>(
     who: &str,
     min: Option<T>,
     start: Option<T>,
     max: Option<T>,
     problems: &mut Problems,
 ) {
+    let section = problems.sections.limits;
     for ((low, lower), (high, upper)) in [
         (("min", &min), ("max", &max)),
         (("min", &min), ("start", &start)),
         (("start", &start), ("max", &max)),
     ] {
         if let (Some(lower), Some(upper)) = (lower, upper) {
-            problems.demand(lower <= upper, SECTION, || {
+            problems.demand(lower <= upper, section, || {
                 format!("{who}: {low} {lower:?} is above {high} {upper:?}")
             });
         }
@@ -152,7 +152,7 @@ fn check_declared_type(
     let declared = match &variable.kind {
         Kind::Real(own) => own.declared_type.as_deref(),
         Kind::Integer(own) | Kind::Enumeration(own) => own.declared_type.as_deref(),
-        Kind::Boolean(_) | Kind::String(_) => None,
+        _ => None,
     };
     let Some(declared) = declared else {
         let needed = matches!(variable.kind, Kind::Enumeration(_));
@@ -171,7 +171,7 @@ fn check_declared_type(
             within((inner.min, inner.max), (outer.min, outer.max))
         }
         (Kind::Enumeration(inner), Kind::Enumeration(_)) => {
-            let is_item = |start| own.items.iter().any(|(_, value)| *value == start);
+            let is_item = |start| own.items.iter().any(|(_, value)| i128::from(*value) == start);
             problems.demand(inner.start.is_none_or(is_item), SECTION, || {
                 format!("variable {name}: the start value is no item of type {declared}")
             });
@@ -240,7 +240,7 @@ fn check_aliases(description: &ModelDescription, problems: &mut Problems) {
             Kind::Real(_) => 0,
             Kind::Integer(_) | Kind::Enumeration(_) => 1,
             Kind::Boolean(_) => 2,
-            Kind::String(_) => 3,
+            _ => 3,
         };
         sets.entry((base, variable.value_reference)).or_default().push(variable);
     }
@@ -262,7 +262,7 @@ fn check_alias_set(set: &[&ScalarVariable], problems: &mut Problems) {
     problems.demand(set.iter().filter(is_free).count() <= 1, SECTION, || {
         format!("aliases {names}: more than one can be set from outside")
     });
-    let starts = set.iter().filter(|own| has_start(&own.kind)).count();
+    let starts = set.iter().filter(|own| own.has_start()).count();
     problems.demand(constants > 0 || starts <= 1, SECTION, || {
         format!("aliases {names}: more than one has a start value")
     });

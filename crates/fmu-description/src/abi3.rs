@@ -1,0 +1,281 @@
+//! The C types of `fmi3PlatformTypes.h` and `fmi3FunctionTypes.h` (FMI 3.0.2).
+//!
+//! `fmi3Boolean` and `fmi3Clock` are `bool` in C and `u8` here: a byte of the other side that is neither
+//! 0 nor 1 would not be a valid `bool`. Both are passed in the same way by the C ABIs of all platforms.
+#![expect(non_camel_case_types, reason = "the names of the C headers")]
+
+mod functions;
+
+use std::ffi::{c_char, c_int, c_void};
+
+pub use functions::*;
+
+/// `fmi3Instance`.
+pub type fmi3Instance = *mut c_void;
+/// `fmi3InstanceEnvironment`.
+pub type fmi3InstanceEnvironment = *mut c_void;
+/// `fmi3FMUState`.
+pub type fmi3FMUState = *mut c_void;
+/// `fmi3ValueReference`.
+pub type fmi3ValueReference = u32;
+/// `fmi3Float32`.
+pub type fmi3Float32 = f32;
+/// `fmi3Float64`.
+pub type fmi3Float64 = f64;
+/// `fmi3Int8`.
+pub type fmi3Int8 = i8;
+/// `fmi3UInt8`.
+pub type fmi3UInt8 = u8;
+/// `fmi3Int16`.
+pub type fmi3Int16 = i16;
+/// `fmi3UInt16`.
+pub type fmi3UInt16 = u16;
+/// `fmi3Int32`.
+pub type fmi3Int32 = i32;
+/// `fmi3UInt32`.
+pub type fmi3UInt32 = u32;
+/// `fmi3Int64`.
+pub type fmi3Int64 = i64;
+/// `fmi3UInt64`.
+pub type fmi3UInt64 = u64;
+/// `fmi3Boolean`: [`FALSE`] or [`TRUE`].
+pub type fmi3Boolean = u8;
+/// `fmi3Char`.
+pub type fmi3Char = c_char;
+/// `fmi3String`: zero-terminated UTF-8.
+pub type fmi3String = *const fmi3Char;
+/// `fmi3Byte`.
+pub type fmi3Byte = u8;
+/// `fmi3Binary`: bytes with a length that is given apart from them.
+pub type fmi3Binary = *const fmi3Byte;
+/// `fmi3Clock`: [`CLOCK_INACTIVE`] or [`CLOCK_ACTIVE`].
+pub type fmi3Clock = u8;
+/// `fmi3Status` as an integer; see [`Status`].
+pub type fmi3Status = c_int;
+/// `fmi3DependencyKind` as an integer; see [`DependencyKind`].
+pub type fmi3DependencyKind = c_int;
+/// `fmi3IntervalQualifier` as an integer; see [`IntervalQualifier`].
+pub type fmi3IntervalQualifier = c_int;
+
+/// `fmi3False`.
+pub const FALSE: fmi3Boolean = 0;
+/// `fmi3True`.
+pub const TRUE: fmi3Boolean = 1;
+/// `fmi3ClockInactive`.
+pub const CLOCK_INACTIVE: fmi3Clock = 0;
+/// `fmi3ClockActive`.
+pub const CLOCK_ACTIVE: fmi3Clock = 1;
+/// The result of `fmi3GetVersion`, for every 3.0.x.
+pub const VERSION: &std::ffi::CStr = c"3.0";
+
+/// The names of all functions of `fmi3Functions.h`; a library exports all of them (section 2.5).
+pub const FUNCTIONS: [&str; 75] = [
+    "fmi3GetVersion",
+    "fmi3SetDebugLogging",
+    "fmi3InstantiateModelExchange",
+    "fmi3InstantiateCoSimulation",
+    "fmi3InstantiateScheduledExecution",
+    "fmi3FreeInstance",
+    "fmi3EnterInitializationMode",
+    "fmi3ExitInitializationMode",
+    "fmi3EnterEventMode",
+    "fmi3Terminate",
+    "fmi3Reset",
+    "fmi3GetFloat32",
+    "fmi3GetFloat64",
+    "fmi3GetInt8",
+    "fmi3GetUInt8",
+    "fmi3GetInt16",
+    "fmi3GetUInt16",
+    "fmi3GetInt32",
+    "fmi3GetUInt32",
+    "fmi3GetInt64",
+    "fmi3GetUInt64",
+    "fmi3GetBoolean",
+    "fmi3GetString",
+    "fmi3GetBinary",
+    "fmi3GetClock",
+    "fmi3SetFloat32",
+    "fmi3SetFloat64",
+    "fmi3SetInt8",
+    "fmi3SetUInt8",
+    "fmi3SetInt16",
+    "fmi3SetUInt16",
+    "fmi3SetInt32",
+    "fmi3SetUInt32",
+    "fmi3SetInt64",
+    "fmi3SetUInt64",
+    "fmi3SetBoolean",
+    "fmi3SetString",
+    "fmi3SetBinary",
+    "fmi3SetClock",
+    "fmi3GetNumberOfVariableDependencies",
+    "fmi3GetVariableDependencies",
+    "fmi3GetFMUState",
+    "fmi3SetFMUState",
+    "fmi3FreeFMUState",
+    "fmi3SerializedFMUStateSize",
+    "fmi3SerializeFMUState",
+    "fmi3DeserializeFMUState",
+    "fmi3GetDirectionalDerivative",
+    "fmi3GetAdjointDerivative",
+    "fmi3EnterConfigurationMode",
+    "fmi3ExitConfigurationMode",
+    "fmi3GetIntervalDecimal",
+    "fmi3GetIntervalFraction",
+    "fmi3GetShiftDecimal",
+    "fmi3GetShiftFraction",
+    "fmi3SetIntervalDecimal",
+    "fmi3SetIntervalFraction",
+    "fmi3SetShiftDecimal",
+    "fmi3SetShiftFraction",
+    "fmi3EvaluateDiscreteStates",
+    "fmi3UpdateDiscreteStates",
+    "fmi3EnterContinuousTimeMode",
+    "fmi3CompletedIntegratorStep",
+    "fmi3SetTime",
+    "fmi3SetContinuousStates",
+    "fmi3GetContinuousStateDerivatives",
+    "fmi3GetEventIndicators",
+    "fmi3GetContinuousStates",
+    "fmi3GetNominalsOfContinuousStates",
+    "fmi3GetNumberOfEventIndicators",
+    "fmi3GetNumberOfContinuousStates",
+    "fmi3EnterStepMode",
+    "fmi3GetOutputDerivatives",
+    "fmi3DoStep",
+    "fmi3ActivateModelPartition",
+];
+
+/// The values of `fmi3Status` (section 2.2.4).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(i32)]
+pub enum Status {
+    /// `fmi3OK`.
+    OK = 0,
+    /// `fmi3Warning`.
+    Warning = 1,
+    /// `fmi3Discard`.
+    Discard = 2,
+    /// `fmi3Error`.
+    Error = 3,
+    /// `fmi3Fatal`.
+    Fatal = 4,
+}
+
+impl Status {
+    /// Converts a C value to a status; `None` if it is no `fmi3Status`.
+    #[must_use]
+    pub fn from_c(status: fmi3Status) -> Option<Self> {
+        use Status::{Discard, Error, Fatal, OK, Warning};
+        [OK, Warning, Discard, Error, Fatal]
+            .into_iter()
+            .find(|known| *known as fmi3Status == status)
+    }
+
+    /// Returns the name in the C header.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Status::OK => "fmi3OK",
+            Status::Warning => "fmi3Warning",
+            Status::Discard => "fmi3Discard",
+            Status::Error => "fmi3Error",
+            Status::Fatal => "fmi3Fatal",
+        }
+    }
+}
+
+/// The values of `fmi3DependencyKind` (section 2.2.9).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(i32)]
+pub enum DependencyKind {
+    /// `fmi3Independent`.
+    Independent = 0,
+    /// `fmi3Constant`.
+    Constant = 1,
+    /// `fmi3Fixed`.
+    Fixed = 2,
+    /// `fmi3Tunable`.
+    Tunable = 3,
+    /// `fmi3Discrete`.
+    Discrete = 4,
+    /// `fmi3Dependent`.
+    Dependent = 5,
+}
+
+impl DependencyKind {
+    /// Converts a C value; `None` if it is no `fmi3DependencyKind`.
+    #[must_use]
+    pub fn from_c(kind: fmi3DependencyKind) -> Option<Self> {
+        use DependencyKind::{Constant, Dependent, Discrete, Fixed, Independent, Tunable};
+        [Independent, Constant, Fixed, Tunable, Discrete, Dependent]
+            .into_iter()
+            .find(|known| *known as fmi3DependencyKind == kind)
+    }
+}
+
+/// The values of `fmi3IntervalQualifier` (section 2.2.8.4).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(i32)]
+pub enum IntervalQualifier {
+    /// `fmi3IntervalNotYetKnown`.
+    NotYetKnown = 0,
+    /// `fmi3IntervalUnchanged`.
+    Unchanged = 1,
+    /// `fmi3IntervalChanged`.
+    Changed = 2,
+}
+
+impl IntervalQualifier {
+    /// Converts a C value; `None` if it is no `fmi3IntervalQualifier`.
+    #[must_use]
+    pub fn from_c(qualifier: fmi3IntervalQualifier) -> Option<Self> {
+        use IntervalQualifier::{Changed, NotYetKnown, Unchanged};
+        [NotYetKnown, Unchanged, Changed]
+            .into_iter()
+            .find(|known| *known as fmi3IntervalQualifier == qualifier)
+    }
+}
+
+/// `fmi3LogMessageCallback`.
+pub type fmi3LogMessageCallback =
+    unsafe extern "C" fn(fmi3InstanceEnvironment, fmi3Status, fmi3String, fmi3String);
+/// `fmi3ClockUpdateCallback`.
+pub type fmi3ClockUpdateCallback = unsafe extern "C" fn(fmi3InstanceEnvironment);
+/// `fmi3IntermediateUpdateCallback`: environment, `intermediateUpdateTime`,
+/// `intermediateVariableSetRequested`, `intermediateVariableGetAllowed`, `intermediateStepFinished`,
+/// `canReturnEarly`, `earlyReturnRequested`, `earlyReturnTime`.
+pub type fmi3IntermediateUpdateCallback = unsafe extern "C" fn(
+    fmi3InstanceEnvironment,
+    fmi3Float64,
+    fmi3Boolean,
+    fmi3Boolean,
+    fmi3Boolean,
+    fmi3Boolean,
+    *mut fmi3Boolean,
+    *mut fmi3Float64,
+);
+/// `fmi3LockPreemptionCallback`.
+pub type fmi3LockPreemptionCallback = unsafe extern "C" fn();
+/// `fmi3UnlockPreemptionCallback`.
+pub type fmi3UnlockPreemptionCallback = unsafe extern "C" fn();
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_of_the_enumerations_are_those_of_the_header() {
+        for (value, name) in
+            (0..).zip(["fmi3OK", "fmi3Warning", "fmi3Discard", "fmi3Error", "fmi3Fatal"])
+        {
+            assert_eq!(Status::from_c(value).map(Status::name), Some(name));
+        }
+        assert_eq!((Status::from_c(5), Status::from_c(-1)), (None, None));
+        assert_eq!(IntervalQualifier::from_c(2), Some(IntervalQualifier::Changed));
+        assert_eq!(IntervalQualifier::from_c(3), None);
+        assert_eq!(DependencyKind::from_c(5), Some(DependencyKind::Dependent));
+        assert_eq!(DependencyKind::from_c(6), None);
+    }
+}

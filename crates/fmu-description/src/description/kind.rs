@@ -1,0 +1,303 @@
+//! The types of variables with the attributes that depend on them.
+
+use serde::Serialize;
+
+use super::Version;
+use super::words::spelt;
+
+/// `SimpleType` of `TypeDefinitions`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SimpleType {
+    /// `name`, unique, also different from the names of all variables.
+    pub name: String,
+    /// `description`.
+    pub description: Option<String>,
+    /// The type itself; `start`, `derivative` and `declared_type` stay empty. The element of FMI 3.0
+    /// has `Type` at its end.
+    pub kind: Kind,
+    /// Items of an enumeration: name and value.
+    pub items: Vec<(String, i64)>,
+}
+
+/// The type of a variable with the attributes that depend on it.
+///
+/// The types of FMI 1.0 and 2.0 are types of FMI 3.0 too: `Real` is `Float64` there and `Integer` is
+/// `Int32`. An `Enumeration` is an `Int32` in FMI 2.0 and an `Int64` in FMI 3.0.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub enum Kind {
+    /// `Real`, in FMI 3.0 `Float64`.
+    Real(RealType),
+    /// `Integer`, in FMI 3.0 `Int32`.
+    Integer(IntegerType),
+    /// `Boolean` with its `start`.
+    Boolean(Option<bool>),
+    /// `String` with its `start`.
+    String(Option<String>),
+    /// `Enumeration` as an integer; the type `declared_type` has the names of its items.
+    Enumeration(IntegerType),
+    /// `Float32`; its numbers are those of an `f32`.
+    Float32(RealType),
+    /// `Int8`.
+    Int8(IntegerType),
+    /// `UInt8`.
+    UInt8(IntegerType),
+    /// `Int16`.
+    Int16(IntegerType),
+    /// `UInt16`.
+    UInt16(IntegerType),
+    /// `UInt32`.
+    UInt32(IntegerType),
+    /// `Int64`.
+    Int64(IntegerType),
+    /// `UInt64`.
+    UInt64(IntegerType),
+    /// `Binary`.
+    Binary(BinaryType),
+    /// `Clock`.
+    Clock(ClockType),
+}
+
+impl Kind {
+    /// Returns the name of the XML element, with the names of FMI 2.0 for the types that it has:
+    /// `Real`, `Integer`.
+    #[must_use]
+    pub fn element(&self) -> &'static str {
+        match self {
+            Kind::Real(_) => "Real",
+            Kind::Integer(_) => "Integer",
+            Kind::Boolean(_) => "Boolean",
+            Kind::String(_) => "String",
+            Kind::Enumeration(_) => "Enumeration",
+            Kind::Float32(_) => "Float32",
+            Kind::Int8(_) => "Int8",
+            Kind::UInt8(_) => "UInt8",
+            Kind::Int16(_) => "Int16",
+            Kind::UInt16(_) => "UInt16",
+            Kind::UInt32(_) => "UInt32",
+            Kind::Int64(_) => "Int64",
+            Kind::UInt64(_) => "UInt64",
+            Kind::Binary(_) => "Binary",
+            Kind::Clock(_) => "Clock",
+        }
+    }
+
+    /// Returns the name of the XML element in a version of FMI: `Float64` and `Int32` in FMI 3.0.
+    #[must_use]
+    pub fn element_in(&self, version: Version) -> &'static str {
+        match (self, version) {
+            (Kind::Real(_), Version::V3) => "Float64",
+            (Kind::Integer(_), Version::V3) => "Int32",
+            _ => self.element(),
+        }
+    }
+
+    /// Returns the attributes of a floating-point type, `Float64` or `Float32`.
+    #[must_use]
+    pub fn as_real(&self) -> Option<&RealType> {
+        match self {
+            Kind::Real(own) | Kind::Float32(own) => Some(own),
+            _ => None,
+        }
+    }
+
+    /// Returns the attributes of an integer type of any width, or of an `Enumeration`.
+    #[must_use]
+    pub fn as_integer(&self) -> Option<&IntegerType> {
+        match self {
+            Kind::Integer(own)
+            | Kind::Enumeration(own)
+            | Kind::Int8(own)
+            | Kind::UInt8(own)
+            | Kind::Int16(own)
+            | Kind::UInt16(own)
+            | Kind::UInt32(own)
+            | Kind::Int64(own)
+            | Kind::UInt64(own) => Some(own),
+            _ => None,
+        }
+    }
+
+    pub(super) fn as_real_mut(&mut self) -> Option<&mut RealType> {
+        match self {
+            Kind::Real(own) | Kind::Float32(own) => Some(own),
+            _ => None,
+        }
+    }
+
+    pub(super) fn as_integer_mut(&mut self) -> Option<&mut IntegerType> {
+        match self {
+            Kind::Integer(own)
+            | Kind::Enumeration(own)
+            | Kind::Int8(own)
+            | Kind::UInt8(own)
+            | Kind::Int16(own)
+            | Kind::UInt16(own)
+            | Kind::UInt32(own)
+            | Kind::Int64(own)
+            | Kind::UInt64(own) => Some(own),
+            _ => None,
+        }
+    }
+
+    /// Returns the smallest and largest integer of the type in a version of FMI; `None` for types
+    /// other than integers and enumerations.
+    #[must_use]
+    pub fn integer_range(&self, version: Version) -> Option<(i128, i128)> {
+        Some(match self {
+            Kind::Enumeration(_) if version == Version::V3 => (i64::MIN.into(), i64::MAX.into()),
+            Kind::Integer(_) | Kind::Enumeration(_) => (i32::MIN.into(), i32::MAX.into()),
+            Kind::Int8(_) => (i8::MIN.into(), i8::MAX.into()),
+            Kind::UInt8(_) => (0, u8::MAX.into()),
+            Kind::Int16(_) => (i16::MIN.into(), i16::MAX.into()),
+            Kind::UInt16(_) => (0, u16::MAX.into()),
+            Kind::UInt32(_) => (0, u32::MAX.into()),
+            Kind::Int64(_) => (i64::MIN.into(), i64::MAX.into()),
+            Kind::UInt64(_) => (0, u64::MAX.into()),
+            _ => return None,
+        })
+    }
+
+    /// Removes the start value, and `reinit`.
+    pub(super) fn clear_start(&mut self) {
+        match self {
+            Kind::Boolean(start) => *start = None,
+            Kind::String(start) => *start = None,
+            Kind::Binary(own) => own.start = None,
+            Kind::Clock(_) => {}
+            other => {
+                if let Some(own) = other.as_real_mut() {
+                    (own.start, own.reinit) = (None, false);
+                } else if let Some(own) = other.as_integer_mut() {
+                    own.start = None;
+                }
+            }
+        }
+    }
+
+    /// Returns the attribute `declaredType`, which a `Boolean` and a `String` do not keep.
+    #[must_use]
+    pub fn declared_type(&self) -> Option<&str> {
+        match self {
+            Kind::Binary(own) => own.declared_type.as_deref(),
+            Kind::Clock(own) => own.declared_type.as_deref(),
+            other => match (other.as_real(), other.as_integer()) {
+                (Some(own), _) => own.declared_type.as_deref(),
+                (_, own) => own?.declared_type.as_deref(),
+            },
+        }
+    }
+
+    /// Whether the variable has a `start` for a scalar, or for all elements of an array.
+    #[must_use]
+    pub fn has_start(&self) -> bool {
+        match self {
+            Kind::Boolean(start) => start.is_some(),
+            Kind::String(start) => start.is_some(),
+            Kind::Binary(own) => own.start.is_some(),
+            Kind::Clock(_) => false,
+            other => {
+                other.as_real().is_some_and(|own| own.start.is_some())
+                    || other.as_integer().is_some_and(|own| own.start.is_some())
+            }
+        }
+    }
+}
+
+/// Attributes of a `Real` (`Float64`) or a `Float32`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct RealType {
+    /// `declaredType`.
+    pub declared_type: Option<String>,
+    /// `quantity`.
+    pub quantity: Option<String>,
+    /// `unit`.
+    pub unit: Option<String>,
+    /// `displayUnit`.
+    pub display_unit: Option<String>,
+    /// `min`.
+    pub min: Option<f64>,
+    /// `max`.
+    pub max: Option<f64>,
+    /// `nominal`.
+    pub nominal: Option<f64>,
+    /// `start`.
+    pub start: Option<f64>,
+    /// `derivative`: 1-based index of the state of which this variable is the derivative.
+    pub derivative: Option<u32>,
+    /// `reinit`: an event may change this continuous state.
+    pub reinit: bool,
+}
+
+/// Attributes of an integer type or an `Enumeration`. The numbers can hold every integer type of
+/// FMI 3.0.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct IntegerType {
+    /// `declaredType`.
+    pub declared_type: Option<String>,
+    /// `quantity`.
+    pub quantity: Option<String>,
+    /// `min`.
+    pub min: Option<i128>,
+    /// `max`.
+    pub max: Option<i128>,
+    /// `start`.
+    pub start: Option<i128>,
+}
+
+/// Attributes of a `Binary` (FMI 3.0.2, section 2.4.7.5).
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct BinaryType {
+    /// `declaredType`.
+    pub declared_type: Option<String>,
+    /// `mimeType`; `None` means `application/octet-stream`.
+    pub mime_type: Option<String>,
+    /// `maxSize` in bytes.
+    pub max_size: Option<u64>,
+    /// The value of the element `Start`.
+    pub start: Option<Vec<u8>>,
+}
+
+spelt! {
+    /// `intervalVariability` of a clock (FMI 3.0.2, section 2.2.8.2).
+    #[derive(Default)]
+    IntervalVariability {
+        /// Periodic: the interval is a number of the description.
+        Constant = "constant",
+        /// Periodic: the interval is known after instantiation and never changes.
+        Fixed = "fixed",
+        /// Periodic: the interval may change in Event Mode.
+        Tunable = "tunable",
+        /// Aperiodic: each tick states the interval to the next.
+        Changing = "changing",
+        /// Aperiodic: an event states the interval to the next tick.
+        Countdown = "countdown",
+        /// Not based on time.
+        #[default]
+        Triggered = "triggered",
+    }
+}
+
+/// Attributes of a `Clock` (FMI 3.0.2, section 2.4.7.5, `fmi3ClockAttributes`).
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct ClockType {
+    /// `declaredType`.
+    pub declared_type: Option<String>,
+    /// `canBeDeactivated`.
+    pub can_be_deactivated: bool,
+    /// `priority` for Scheduled Execution.
+    pub priority: Option<u32>,
+    /// `intervalVariability`.
+    pub interval_variability: IntervalVariability,
+    /// `intervalDecimal` in s.
+    pub interval_decimal: Option<f64>,
+    /// `shiftDecimal` in s; `None` means 0.
+    pub shift_decimal: Option<f64>,
+    /// `supportsFraction`.
+    pub supports_fraction: bool,
+    /// `resolution`: the counters count parts of 1 s, this many.
+    pub resolution: Option<u64>,
+    /// `intervalCounter`.
+    pub interval_counter: Option<u64>,
+    /// `shiftCounter`; `None` means 0.
+    pub shift_counter: Option<u64>,
+}

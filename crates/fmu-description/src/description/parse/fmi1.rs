@@ -1,0 +1,127 @@
+//! Reads a model description of FMI 1.0 with the interface for co-simulation.
+
+mod variables;
+
+use super::ParseError;
+use super::attributes::Node;
+use super::definitions::{experiment, structured_names};
+use super::schema;
+use super::variables::{integer_limits, real_limits};
+use crate::description::{
+    CoSimulation, IntegerType, Kind, ModelDescription, ModelExchange, RealType, SimpleType, Version,
+};
+use crate::unit::{DisplayUnit, Unit};
+
+pub(super) fn root(root: Node<'_>) -> Result<ModelDescription, ParseError> {
+    schema::check(root, Version::V1);
+    let identifier = root.required("modelIdentifier")?.to_owned();
+    let types = root.list("TypeDefinitions", "Type", simple_type)?;
+    let list = root.optional_child("ModelVariables")?;
+    let variables = list.map(|list| variables::read(list, &types)).transpose()?;
+    let (variables, structure) = variables.unwrap_or_default();
+    let implementation = root.optional_child("Implementation")?;
+    let co_simulation =
+        implementation.map(|own| co_simulation(own, identifier.clone())).transpose()?;
+    let model_exchange = co_simulation.is_none().then(|| ModelExchange {
+        model_identifier: identifier.clone(),
+        ..ModelExchange::default()
+    });
+    Ok(ModelDescription {
+        fmi_version: Version::V1.as_str().to_owned(),
+        model_name: root.text_or("modelName", identifier),
+        guid: root.required("guid")?.to_owned(),
+        description: root.text("description"),
+        author: root.text("author"),
+        version: root.text("version"),
+        generation_tool: root.text("generationTool"),
+        generation_date_and_time: root.text("generationDateAndTime"),
+        structured_names: structured_names(root),
+        number_of_event_indicators: root.optional_unsigned("numberOfEventIndicators"),
+        model_exchange,
+        co_simulation,
+        units: root.list("UnitDefinitions", "BaseUnit", unit)?,
+        types,
+        default_experiment: root
+            .optional_child("DefaultExperiment")?
+            .map(experiment)
+            .transpose()?,
+        variables,
+        structure,
+        ..ModelDescription::default()
+    })
+}
+
+fn unit(element: Node<'_>) -> Result<Unit, ParseError> {
+    let display_units = element.children_named("DisplayUnitDefinition").map(|display| {
+        Ok(DisplayUnit {
+            name: display.required("displayUnit")?.to_owned(),
+            factor: display.finite("gain", 1.0)?,
+            offset: display.finite("offset", 0.0)?,
+            inverse: false,
+        })
+    });
+    Ok(Unit {
+        name: element.required("unit")?.to_owned(),
+        display_units: display_units.collect::<Result<_, ParseError>>()?,
+        base: None,
+    })
+}
+
+fn simple_type(element: Node<'_>) -> Result<SimpleType, ParseError> {
+    let mut kinds = element.children().filter(|own| own.element.name.ends_with("Type"));
+    let Some(own) = kinds.next() else {
+        let expected = "RealType, IntegerType, BooleanType, StringType or EnumerationType";
+        return Err(element.misses(expected, "none".to_owned()));
+    };
+    // The items of an enumeration are numbered from 1.
+    let items = (1..).zip(own.children_named("Item"));
+    let items = items.map(|(value, item)| Ok((item.required("name")?.to_owned(), value)));
+    Ok(SimpleType {
+        name: element.required("name")?.to_owned(),
+        description: element.text("description"),
+        kind: match own.element.name {
+            "IntegerType" => Kind::Integer(integer_limits(own, &IntegerType::default())?),
+            "BooleanType" => Kind::Boolean(None),
+            "StringType" => Kind::String(None),
+            "EnumerationType" => Kind::Enumeration(integer_limits(own, &IntegerType::default())?),
+            _ => Kind::Real(real_limits(own, &RealType::default())?),
+        },
+        items: items.collect::<Result<_, ParseError>>()?,
+    })
+}
+
+/// Reads `Implementation`: the kind stand-alone, or the kind that needs a simulation tool.
+fn co_simulation(
+    implementation: Node<'_>,
+    model_identifier: String,
+) -> Result<CoSimulation, ParseError> {
+    let stand_alone = implementation.optional_child("CoSimulation_StandAlone")?;
+    let tool = implementation.optional_child("CoSimulation_Tool")?;
+    let Some(own) = stand_alone.or(tool) else {
+        let expected = "CoSimulation_StandAlone or CoSimulation_Tool";
+        return Err(implementation.misses(expected, "neither".to_owned()));
+    };
+    let mut flags = CoSimulation {
+        model_identifier,
+        needs_execution_tool: stand_alone.is_none(),
+        ..CoSimulation::default()
+    };
+    let Some(capabilities) = own.optional_child("Capabilities")? else {
+        let place = format!("<{}>", own.element.name);
+        let said = ("an element Capabilities", "none".to_owned());
+        own.warn_of(true, place, said, "read without capabilities");
+        return Ok(flags);
+    };
+    let flag = |name| capabilities.flag(name);
+    flags.can_handle_variable_communication_step_size =
+        flag("canHandleVariableCommunicationStepSize");
+    flags.can_interpolate_inputs = flag("canInterpolateInputs");
+    flags.max_output_derivative_order =
+        capabilities.optional_unsigned("maxOutputDerivativeOrder").unwrap_or(0);
+    flags.can_run_asynchronuously = flag("canRunAsynchronuously");
+    flags.can_be_instantiated_only_once_per_process = flag("canBeInstantiatedOnlyOncePerProcess");
+    flags.can_not_use_memory_management_functions = flag("canNotUseMemoryManagementFunctions");
+    flags.can_reject_steps = flag("canRejectSteps");
+    flags.can_handle_events = flag("canHandleEvents");
+    Ok(flags)
+}

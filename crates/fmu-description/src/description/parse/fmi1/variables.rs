@@ -1,0 +1,164 @@
+//! Reads `ModelVariables` of FMI 1.0, and the dependencies of the outputs.
+
+use std::collections::HashMap;
+
+use crate::description::parse::ParseError;
+use crate::description::parse::attributes::{Node, WHITE_SPACE};
+use crate::description::parse::structure::ANYTHING;
+use crate::description::parse::variables::{
+    Types, VARIABLES, base, check_names, check_references, kind, typed,
+};
+use crate::description::{
+    Causality, Initial, ModelStructure, ScalarVariable, SimpleType, Unknown, Variability,
+};
+
+const VARIABILITIES: [&str; 4] = ["constant", "parameter", "discrete", "continuous"];
+const CAUSALITIES: [&str; 4] = ["input", "output", "internal", "none"];
+
+/// Reads the variables, and the outputs with the inputs on which they depend.
+pub(super) fn read(
+    list: Node<'_>,
+    types: &[SimpleType],
+) -> Result<(Vec<ScalarVariable>, ModelStructure), ParseError> {
+    let types: Types<'_> = types.iter().map(|own| (own.name.as_str(), own)).collect();
+    let elements: Vec<Node<'_>> = list.children_named("ScalarVariable").collect();
+    if elements.len() > VARIABLES {
+        let at = list.element.at;
+        return Err(ParseError::Limit { at, what: "variables", limit: VARIABLES });
+    }
+    let mut variables = Vec::with_capacity(elements.len());
+    for element in &elements {
+        variables.push(variable(*element, &types, elements.len())?);
+    }
+    set_aliases(&elements, &mut variables);
+    check_names(&elements, &variables)?;
+    check_references(&elements, &variables)?;
+    let outputs = outputs(&elements, &variables)?;
+    Ok((variables, ModelStructure { outputs, ..ModelStructure::default() }))
+}
+
+fn variable(
+    element: Node<'_>,
+    types: &Types<'_>,
+    count: usize,
+) -> Result<ScalarVariable, ParseError> {
+    let value = typed(element)?;
+    let kind = kind(value, types, count)?;
+    let stated = word(element, "variability", &VARIABILITIES);
+    let continuous = kind.as_real().is_some();
+    let (causality, variability) = match (word(element, "causality", &CAUSALITIES), stated) {
+        (_, Some("parameter")) if kind.has_start() => (Causality::Parameter, Variability::Fixed),
+        (_, Some("parameter")) => (Causality::CalculatedParameter, Variability::Fixed),
+        (causality, variability) => {
+            let causality = match causality {
+                Some("input") => Causality::Input,
+                Some("output") => Causality::Output,
+                _ => Causality::Local,
+            };
+            let variability = match variability {
+                Some("constant") => Variability::Constant,
+                // The default of every type, which only a Real can have.
+                Some("continuous") | None if continuous => Variability::Continuous,
+                _ => Variability::Discrete,
+            };
+            (causality, variability)
+        }
+    };
+    let has_initial = matches!(causality, Causality::Output | Causality::Local) && kind.has_start();
+    let initial = has_initial.then(|| match value.boolean("fixed") {
+        Ok(Some(false)) => Initial::Approx,
+        _ => Initial::Exact,
+    });
+    Ok(ScalarVariable {
+        name: element.required("name")?.to_owned(),
+        value_reference: element.unsigned("valueReference")?,
+        description: element.text("description"),
+        causality,
+        variability,
+        initial,
+        kind,
+        ..ScalarVariable::default()
+    })
+}
+
+/// Reads one of `words`, also in another case; any other word counts as missing.
+fn word(element: Node<'_>, name: &str, words: &[&'static str]) -> Option<&'static str> {
+    let text = element.attribute(name)?;
+    let trimmed = text.trim_matches(WHITE_SPACE);
+    let found = words.iter().find(|word| word.eq_ignore_ascii_case(trimmed)).copied();
+    if found != Some(text) {
+        let assumed = found.map_or_else(
+            || "read as if it were not there".to_owned(),
+            |word| format!("read as {word}"),
+        );
+        element.warn(name, &format!("one of {}", words.join(", ")), text, &assumed);
+    }
+    found
+}
+
+/// Sets `alias_of` and `negated` by the attribute `alias`.
+fn set_aliases(elements: &[Node<'_>], variables: &mut [ScalarVariable]) {
+    const NAME: &str = "alias";
+    let stated: Vec<_> = elements
+        .iter()
+        .map(|element| word(*element, NAME, &["noAlias", "alias", "negatedAlias"]))
+        .collect();
+    let is_alias = |own: Option<&str>| matches!(own, Some("alias" | "negatedAlias"));
+    let mut bases: HashMap<(u8, u32), String> = HashMap::new();
+    for (variable, stated) in variables.iter().zip(&stated) {
+        if !is_alias(*stated) {
+            let key = (base(&variable.kind), variable.value_reference);
+            bases.entry(key).or_insert_with(|| variable.name.clone());
+        }
+    }
+    for ((element, variable), stated) in elements.iter().zip(variables).zip(stated) {
+        if !is_alias(stated) {
+            continue;
+        }
+        let own = bases.get(&(base(&variable.kind), variable.value_reference));
+        if own.is_none() {
+            let expected = "the value reference of a variable with alias=\"noAlias\"";
+            let found = variable.value_reference.to_string();
+            element.warn_text(NAME, expected, &found, "read as if it were not there");
+        }
+        variable.alias_of = own.cloned();
+        variable.negated = own.is_some() && stated == Some("negatedAlias");
+    }
+}
+
+/// Returns the outputs with their `DirectDependency`: without this element an output depends on all
+/// inputs.
+fn outputs(
+    elements: &[Node<'_>],
+    variables: &[ScalarVariable],
+) -> Result<Vec<Unknown>, ParseError> {
+    let inputs = (1..).zip(variables).filter(|(_, own)| own.causality == Causality::Input);
+    let inputs: HashMap<&str, u32> =
+        inputs.map(|(index, own)| (own.name.as_str(), index)).collect();
+    let mut rows = Vec::new();
+    for ((index, variable), element) in (1..).zip(variables).zip(elements) {
+        if variable.causality == Causality::Output {
+            let direct = element.optional_child("DirectDependency")?;
+            let dependencies = direct.and_then(|own| dependencies(own, &inputs));
+            rows.push(Unknown { index, dependencies, kinds: None });
+        }
+    }
+    Ok(rows)
+}
+
+fn dependencies(element: Node<'_>, inputs: &HashMap<&str, u32>) -> Option<Vec<u32>> {
+    let mut found = Vec::new();
+    for name in element.children_named("Name") {
+        let text = name.content_text();
+        let Some(index) = inputs.get(text.as_str()) else {
+            let place = "<Name> in <DirectDependency>".to_owned();
+            let said = ("the name of an input", format!("{text:?}"));
+            name.warn_of(false, place, said, ANYTHING);
+            return None;
+        };
+        found.push(*index);
+    }
+    found.sort_unstable();
+    found.dedup();
+    Some(found)
+}

@@ -1,0 +1,97 @@
+//! Reads a model description of FMI 2.0.
+
+use super::attributes::Node;
+use super::definitions::{category, experiment, structured_names, unit};
+use super::{ParseError, schema, structure, variables};
+use crate::description::{CoSimulation, ModelDescription, ModelExchange, Version};
+
+pub(super) fn root(root: Node<'_>) -> Result<ModelDescription, ParseError> {
+    version(root);
+    schema::check(root, Version::V2);
+    let types = variables::types(root)?;
+    let variables = variables::variables(root.child("ModelVariables")?, &types)?;
+    let structure = structure::read(root, &variables)?;
+    let model_exchange = root.optional_child("ModelExchange")?.map(model_exchange).transpose()?;
+    let co_simulation = root.optional_child("CoSimulation")?.map(co_simulation).transpose()?;
+    let identifier = co_simulation.as_ref().map(|own| &own.model_identifier);
+    let identifier = identifier.or(model_exchange.as_ref().map(|own| &own.model_identifier));
+    let model_name = root.text_or("modelName", identifier.cloned().unwrap_or_default());
+    Ok(ModelDescription {
+        fmi_version: "2.0".to_owned(),
+        model_name,
+        guid: root.required("guid")?.to_owned(),
+        description: root.text("description"),
+        author: root.text("author"),
+        version: root.text("version"),
+        copyright: root.text("copyright"),
+        license: root.text("license"),
+        generation_tool: root.text("generationTool"),
+        generation_date_and_time: root.text("generationDateAndTime"),
+        structured_names: structured_names(root),
+        number_of_event_indicators: root.optional_unsigned("numberOfEventIndicators"),
+        model_exchange,
+        co_simulation,
+        units: root.list("UnitDefinitions", "Unit", unit)?,
+        types,
+        log_categories: root.list("LogCategories", "Category", category)?,
+        default_experiment: root
+            .optional_child("DefaultExperiment")?
+            .map(experiment)
+            .transpose()?,
+        variables,
+        structure,
+        ..ModelDescription::default()
+    })
+}
+
+/// Warns of 2.0.1 to 2.0.5, versions of the standard's text, which are read as 2.0.
+fn version(root: Node<'_>) {
+    if let Some(found) = root.attribute("fmiVersion").filter(|found| *found != "2.0") {
+        root.warn("fmiVersion", "2.0 for every 2.0.x", found, "read as 2.0");
+    }
+}
+
+fn identifier(element: Node<'_>) -> Result<String, ParseError> {
+    Ok(element.required("modelIdentifier")?.to_owned())
+}
+
+fn source_files(element: Node<'_>) -> Result<Vec<String>, ParseError> {
+    element.list("SourceFiles", "File", |file| Ok(file.required("name")?.to_owned()))
+}
+
+fn model_exchange(element: Node<'_>) -> Result<ModelExchange, ParseError> {
+    let flag = |name| element.flag(name);
+    Ok(ModelExchange {
+        model_identifier: identifier(element)?,
+        needs_execution_tool: flag("needsExecutionTool"),
+        completed_integrator_step_not_needed: flag("completedIntegratorStepNotNeeded"),
+        can_be_instantiated_only_once_per_process: flag("canBeInstantiatedOnlyOncePerProcess"),
+        can_not_use_memory_management_functions: flag("canNotUseMemoryManagementFunctions"),
+        can_get_and_set_fmu_state: flag("canGetAndSetFMUstate"),
+        can_serialize_fmu_state: flag("canSerializeFMUstate"),
+        provides_directional_derivative: flag("providesDirectionalDerivative"),
+        source_files: source_files(element)?,
+        ..ModelExchange::default()
+    })
+}
+
+fn co_simulation(element: Node<'_>) -> Result<CoSimulation, ParseError> {
+    let flag = |name| element.flag(name);
+    Ok(CoSimulation {
+        model_identifier: identifier(element)?,
+        needs_execution_tool: flag("needsExecutionTool"),
+        can_handle_variable_communication_step_size: flag("canHandleVariableCommunicationStepSize"),
+        can_interpolate_inputs: flag("canInterpolateInputs"),
+        max_output_derivative_order: element
+            .optional_unsigned("maxOutputDerivativeOrder")
+            .unwrap_or(0),
+        can_run_asynchronuously: flag("canRunAsynchronuously"),
+        can_be_instantiated_only_once_per_process: flag("canBeInstantiatedOnlyOncePerProcess"),
+        can_not_use_memory_management_functions: flag("canNotUseMemoryManagementFunctions"),
+        can_get_and_set_fmu_state: flag("canGetAndSetFMUstate"),
+        can_serialize_fmu_state: flag("canSerializeFMUstate"),
+        provides_directional_derivative: flag("providesDirectionalDerivative"),
+        source_files: source_files(element)?,
+        ..CoSimulation::default()
+    })
+}

@@ -1,0 +1,185 @@
+//! Reads the types of FMI 3.0 with their attributes: definitions, and defaults of variables.
+
+use std::collections::HashMap;
+
+use crate::description::parse::ParseError;
+use crate::description::parse::attributes::Node;
+use crate::description::{
+    BinaryType, ClockType, IntegerType, IntervalVariability, Kind, RealType, SimpleType, Version,
+};
+
+/// The types of `TypeDefinitions`, by name.
+pub(super) type Types<'a> = HashMap<&'a str, &'a SimpleType>;
+
+const INTERVALS: [&str; 6] = ["constant", "fixed", "tunable", "changing", "countdown", "triggered"];
+
+/// Returns the kind of an element without attributes; `None` if `name` is no type of FMI 3.0.
+pub(super) fn blank(name: &str) -> Option<Kind> {
+    let (real, integer) = (RealType::default(), IntegerType::default());
+    Some(match name {
+        "Float32" => Kind::Float32(real),
+        "Float64" => Kind::Real(real),
+        "Int8" => Kind::Int8(integer),
+        "UInt8" => Kind::UInt8(integer),
+        "Int16" => Kind::Int16(integer),
+        "UInt16" => Kind::UInt16(integer),
+        "Int32" => Kind::Integer(integer),
+        "UInt32" => Kind::UInt32(integer),
+        "Int64" => Kind::Int64(integer),
+        "UInt64" => Kind::UInt64(integer),
+        "Boolean" => Kind::Boolean(None),
+        "String" => Kind::String(None),
+        "Binary" => Kind::Binary(BinaryType::default()),
+        "Enumeration" => Kind::Enumeration(integer),
+        "Clock" => Kind::Clock(ClockType::default()),
+        _ => return None,
+    })
+}
+
+pub(super) fn types(root: Node<'_>) -> Result<Vec<SimpleType>, ParseError> {
+    let Some(list) = root.optional_child("TypeDefinitions")? else { return Ok(Vec::new()) };
+    let mut types = Vec::new();
+    for element in list.children() {
+        let name = element.element.name.strip_suffix("Type");
+        // The check against the schema has warned of other elements.
+        let Some(mut kind) = name.and_then(blank) else { continue };
+        attributes(element, &mut kind, None)?;
+        types.push(SimpleType {
+            name: element.required("name")?.to_owned(),
+            description: element.text("description"),
+            kind,
+            items: element.children_named("Item").map(item).collect::<Result<_, _>>()?,
+        });
+    }
+    Ok(types)
+}
+
+fn item(element: Node<'_>) -> Result<(String, i64), ParseError> {
+    let text = element.required("value")?;
+    let value = element.integer_within("value", (i64::MIN.into(), i64::MAX.into()))?;
+    let value = value.and_then(|value| i64::try_from(value).ok());
+    let value = value.ok_or_else(|| element.wrong("value", "an integer", text))?;
+    Ok((element.required("name")?.to_owned(), value))
+}
+
+/// Returns the declared type of a variable, if it exists and has the kind of the variable.
+pub(super) fn declared<'a>(element: Node<'_>, types: &Types<'a>) -> Option<(String, &'a Kind)> {
+    const NAME: &str = "declaredType";
+    let kind = element.element.name;
+    let Some(name) = element.attribute(NAME) else {
+        if kind == "Enumeration" {
+            let said = ("the name of an enumeration", "no such attribute".to_owned());
+            element.warn_of(true, element.place(NAME), said, "read without names of its items");
+        }
+        return None;
+    };
+    match types.get(name) {
+        Some(own) if own.kind.element_in(Version::V3) == kind => Some((name.to_owned(), &own.kind)),
+        _ => {
+            let expected = format!("the name of a {kind}Type");
+            element.warn_text(NAME, &expected, name, "read without declared type");
+            None
+        }
+    }
+}
+
+/// Reads the attributes that a type and a variable have in common; `defaults` has those of the
+/// declared type.
+pub(super) fn attributes(
+    element: Node<'_>,
+    kind: &mut Kind,
+    defaults: Option<&Kind>,
+) -> Result<(), ParseError> {
+    let range = kind.integer_range(Version::V3);
+    if let (Some(own), Some(range)) = (kind.as_integer_mut(), range) {
+        *own = integer(element, range, defaults.and_then(Kind::as_integer))?;
+        return Ok(());
+    }
+    if let Some(own) = kind.as_real_mut() {
+        *own = real(element, defaults.and_then(Kind::as_real))?;
+        return Ok(());
+    }
+    match (kind, defaults) {
+        (Kind::Binary(own), Some(Kind::Binary(defaults))) => *own = binary(element, defaults),
+        (Kind::Binary(own), _) => *own = binary(element, &BinaryType::default()),
+        (Kind::Clock(own), Some(Kind::Clock(defaults))) => *own = clock(element, Some(defaults))?,
+        (Kind::Clock(own), _) => *own = clock(element, None)?,
+        _ => {}
+    }
+    Ok(())
+}
+
+fn real(element: Node<'_>, defaults: Option<&RealType>) -> Result<RealType, ParseError> {
+    let defaults = defaults.cloned().unwrap_or_default();
+    Ok(RealType {
+        quantity: element.text("quantity").or(defaults.quantity),
+        unit: element.text("unit").or(defaults.unit),
+        display_unit: element.text("displayUnit").or(defaults.display_unit),
+        min: element.bound("min")?.or(defaults.min),
+        max: element.bound("max")?.or(defaults.max),
+        nominal: element.number("nominal")?.or(defaults.nominal),
+        ..RealType::default()
+    })
+}
+
+fn integer(
+    element: Node<'_>,
+    range: (i128, i128),
+    defaults: Option<&IntegerType>,
+) -> Result<IntegerType, ParseError> {
+    let defaults = defaults.cloned().unwrap_or_default();
+    Ok(IntegerType {
+        quantity: element.text("quantity").or(defaults.quantity),
+        min: element.integer_within("min", range)?.or(defaults.min),
+        max: element.integer_within("max", range)?.or(defaults.max),
+        ..IntegerType::default()
+    })
+}
+
+fn binary(element: Node<'_>, defaults: &BinaryType) -> BinaryType {
+    BinaryType {
+        mime_type: element.text("mimeType").or(defaults.mime_type.clone()),
+        max_size: element.optional_counter("maxSize").or(defaults.max_size),
+        ..BinaryType::default()
+    }
+}
+
+fn clock(element: Node<'_>, defaults: Option<&ClockType>) -> Result<ClockType, ParseError> {
+    let given = defaults.is_some();
+    let defaults = defaults.cloned().unwrap_or_default();
+    let flag = |name, default| if element.has(name) { element.flag(name) } else { default };
+    let interval_decimal = element.number("intervalDecimal")?.or(defaults.interval_decimal);
+    let stated = element.word("intervalVariability", &INTERVALS);
+    let interval_variability = match stated {
+        Some(stated) => stated,
+        None if given => defaults.interval_variability,
+        None => assumed_interval(element, interval_decimal),
+    };
+    Ok(ClockType {
+        declared_type: None,
+        can_be_deactivated: flag("canBeDeactivated", defaults.can_be_deactivated),
+        priority: element.optional_unsigned("priority").or(defaults.priority),
+        interval_variability,
+        interval_decimal,
+        shift_decimal: element.number("shiftDecimal")?.or(defaults.shift_decimal),
+        supports_fraction: flag("supportsFraction", defaults.supports_fraction),
+        resolution: element.optional_counter("resolution").or(defaults.resolution),
+        interval_counter: element.optional_counter("intervalCounter").or(defaults.interval_counter),
+        shift_counter: element.optional_counter("shiftCounter").or(defaults.shift_counter),
+    })
+}
+
+/// Returns the interval variability of a clock that does not state it.
+fn assumed_interval(element: Node<'_>, interval: Option<f64>) -> IntervalVariability {
+    let assumed = if interval.is_some() {
+        IntervalVariability::Constant
+    } else {
+        IntervalVariability::Triggered
+    };
+    if !element.has("intervalVariability") {
+        let said = (&*format!("one of {}", INTERVALS.join(", ")), "no such attribute".to_owned());
+        let place = element.place("intervalVariability");
+        element.warn_of(true, place, said, &format!("read as {}", assumed.as_str()));
+    }
+    assumed
+}

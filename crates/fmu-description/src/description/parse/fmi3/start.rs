@@ -1,0 +1,107 @@
+//! Reads the start values of variables and arrays of FMI 3.0.
+
+use crate::description::parse::ParseError;
+use crate::description::parse::attributes::{Node, WHITE_SPACE};
+use crate::description::{Elements, Kind, Version};
+
+/// Reads `start`, or the elements `Start` of a String or Binary. A single value becomes the start of
+/// `kind`; a list is returned.
+pub(super) fn read(element: Node<'_>, kind: &mut Kind) -> Result<Option<Elements>, ParseError> {
+    let range = kind.integer_range(Version::V3);
+    if let (Some(own), Some(range)) = (kind.as_integer_mut(), range) {
+        let values = list(
+            element,
+            |text| integer(text, range),
+            || format!("integers from {} to {}", range.0, range.1),
+        )?;
+        return Ok(single(values, |value| own.start = Some(value)).map(Elements::Integer));
+    }
+    if let Some(own) = kind.as_real_mut() {
+        let values = list(element, real, || "numbers".to_owned())?;
+        return Ok(single(values, |value| own.start = Some(value)).map(Elements::Real));
+    }
+    Ok(match kind {
+        Kind::Boolean(start) => {
+            let values = list(element, boolean, || "true, false, 1 or 0".to_owned())?;
+            single(values, |value| *start = Some(value)).map(Elements::Boolean)
+        }
+        Kind::String(start) => {
+            let values = texts(element).map(str::to_owned).collect();
+            single(values, |value| *start = Some(value)).map(Elements::String)
+        }
+        Kind::Binary(own) => {
+            let wrong = |text| element.wrong("value", "pairs of hexadecimal digits", text);
+            let bytes = texts(element).map(|text| hexadecimal(text).ok_or_else(|| wrong(text)));
+            let values = bytes.collect::<Result<_, ParseError>>()?;
+            single(values, |value| own.start = Some(value)).map(Elements::Binary)
+        }
+        _ => None,
+    })
+}
+
+/// Passes on a single value, and returns any other number of values but none.
+fn single<T>(mut values: Vec<T>, set: impl FnOnce(T)) -> Option<Vec<T>> {
+    if values.len() > 1 {
+        return Some(values);
+    }
+    values.pop().map(set);
+    None
+}
+
+/// Reads the attribute `start` as a list of values between white space.
+fn list<T>(
+    element: Node<'_>,
+    value: impl Fn(&str) -> Option<T>,
+    expected: impl Fn() -> String,
+) -> Result<Vec<T>, ParseError> {
+    let Some(text) = element.attribute("start") else { return Ok(Vec::new()) };
+    let words = text.split(WHITE_SPACE).filter(|word| !word.is_empty());
+    let mut values = Vec::new();
+    for word in words {
+        values.push(value(word).ok_or_else(|| element.wrong("start", &expected(), word))?);
+    }
+    if values.is_empty() {
+        element.warn("start", &expected(), text, "read as if it were not there");
+    }
+    Ok(values)
+}
+
+fn integer(text: &str, (low, high): (i128, i128)) -> Option<i128> {
+    let plain = text.parse().ok();
+    let whole = || {
+        let real = text.parse::<f64>().ok().filter(|real| real.fract() == 0.0)?;
+        format!("{real:.0}").parse().ok()
+    };
+    plain.or_else(whole).filter(|value| (low..=high).contains(value))
+}
+
+/// A number of XML Schema, which has `INF`, `-INF` and `NaN`.
+fn real(text: &str) -> Option<f64> {
+    text.parse().ok()
+}
+
+fn boolean(text: &str) -> Option<bool> {
+    match text.to_ascii_lowercase().as_str() {
+        "true" | "1" => Some(true),
+        "false" | "0" => Some(false),
+        _ => None,
+    }
+}
+
+/// The values of the elements `Start`; empty where the attribute is absent.
+fn texts(element: Node<'_>) -> impl Iterator<Item = &str> {
+    element.children_named("Start").map(|start| start.attribute("value").unwrap_or_default())
+}
+
+/// Decodes hexadecimal digits; white space between bytes is skipped.
+fn hexadecimal(text: &str) -> Option<Vec<u8>> {
+    let digits: Vec<u8> = text.bytes().filter(|byte| !byte.is_ascii_whitespace()).collect();
+    let digit = |byte: u8| char::from(byte).to_digit(16).and_then(|own| u8::try_from(own).ok());
+    digits
+        .chunks(2)
+        .map(|pair| match pair {
+            [high, low] => Some(digit(*high)? << 4 | digit(*low)?),
+            _ => None,
+        })
+        .collect()
+}

@@ -1,0 +1,92 @@
+//! Reads `ModelStructure` of FMI 3.0, which refers to variables by value reference.
+
+use super::variables::References;
+use crate::description::parse::ParseError;
+use crate::description::parse::attributes::Node;
+use crate::description::parse::structure::{ANYTHING, kinds, missing_outputs, words};
+use crate::description::{ModelStructure, ScalarVariable, Unknown};
+
+const A_REFERENCE: &str = "the value reference of a variable";
+
+/// Reads `ModelStructure` of `root` for `variables`.
+///
+/// A dependency on a value reference that belongs to no variable is read as a dependency on anything.
+/// Outputs that are missing are read in the same way.
+pub(super) fn read(
+    root: Node<'_>,
+    variables: &[ScalarVariable],
+    references: &References,
+) -> Result<ModelStructure, ParseError> {
+    let Some(element) = root.optional_child("ModelStructure")? else {
+        let place = "<fmiModelDescription>".to_owned();
+        let said = ("an element ModelStructure", "none".to_owned());
+        root.warn_of(true, place, said, ANYTHING);
+        return Ok(ModelStructure {
+            outputs: missing_outputs(&[], variables).map(|(row, _)| row).collect(),
+            ..ModelStructure::default()
+        });
+    };
+    let mut outputs = list(element, "Output", references)?;
+    let missing: Vec<_> = missing_outputs(&outputs, variables).collect();
+    if !missing.is_empty() {
+        let names: Vec<_> = missing.iter().take(5).map(|(_, name)| *name).collect();
+        let more = if missing.len() > 5 { ", and others" } else { "" };
+        let found = format!("none for {}{more}", names.join(", "));
+        let place = "<ModelStructure>".to_owned();
+        element.warn_of(false, place, ("an Output for every output", found), ANYTHING);
+        outputs.extend(missing.into_iter().map(|(row, _)| row));
+    }
+    for row in element.children_named("ContinuousStateDerivative") {
+        if index(row, references)?.is_none() {
+            // The rows determine the states.
+            let found = row.attribute("valueReference").unwrap_or_default();
+            return Err(row.wrong("valueReference", A_REFERENCE, found));
+        }
+    }
+    Ok(ModelStructure {
+        outputs,
+        derivatives: list(element, "ContinuousStateDerivative", references)?,
+        initial_unknowns: list(element, "InitialUnknown", references)?,
+        clocked_states: list(element, "ClockedState", references)?,
+        event_indicators: list(element, "EventIndicator", references)?,
+    })
+}
+
+fn index(row: Node<'_>, references: &References) -> Result<Option<u32>, ParseError> {
+    Ok(references.get(&row.unsigned("valueReference")?).copied())
+}
+
+fn list(
+    element: Node<'_>,
+    name: &'static str,
+    references: &References,
+) -> Result<Vec<Unknown>, ParseError> {
+    let mut rows = Vec::new();
+    for row in element.children_named(name) {
+        let Some(index) = index(row, references)? else {
+            let found = row.attribute("valueReference").unwrap_or_default();
+            row.warn_text("valueReference", A_REFERENCE, found, "the row was skipped");
+            continue;
+        };
+        let dependencies = dependencies(row, references);
+        let kinds = kinds(row, dependencies.as_deref());
+        rows.push(Unknown { index, dependencies, kinds });
+    }
+    Ok(rows)
+}
+
+/// Reads the attribute `dependencies` as indices; `None` if it is absent or has a reference that
+/// belongs to no variable.
+fn dependencies(row: Node<'_>, references: &References) -> Option<Vec<u32>> {
+    let text = row.attribute("dependencies")?;
+    let mut found = Vec::new();
+    for word in words(text) {
+        let index = word.parse().ok().and_then(|reference: u32| references.get(&reference));
+        let Some(index) = index else {
+            row.warn_text("dependencies", A_REFERENCE, word, ANYTHING);
+            return None;
+        };
+        found.push(*index);
+    }
+    Some(found)
+}

@@ -1,0 +1,289 @@
+//! Reads `ModelVariables` of FMI 3.0: variables, arrays and aliases.
+
+use std::collections::HashMap;
+
+use super::kinds::{Types, attributes, blank, declared};
+use super::start;
+use crate::description::parse::ParseError;
+use crate::description::parse::attributes::{Node, WHITE_SPACE};
+use crate::description::parse::variables::{
+    VARIABILITIES, VARIABLES, check_names, check_references,
+};
+use crate::description::{
+    Causality, Dimension, Elements, Kind, ModelDescription, ScalarVariable, SimpleType, Variability,
+};
+
+const CAUSALITIES: [&str; 7] = [
+    "parameter",
+    "calculatedParameter",
+    "input",
+    "output",
+    "local",
+    "independent",
+    "structuralParameter",
+];
+const A_REFERENCE: &str = "the value reference of a variable";
+
+/// The 1-based index of the variable with a value reference, without aliases.
+pub(super) type References = HashMap<u32, u32>;
+
+/// Returns the variables, each followed by its aliases, and the indices of value references.
+pub(super) fn read(
+    list: Node<'_>,
+    types: &[SimpleType],
+) -> Result<(Vec<ScalarVariable>, References), ParseError> {
+    let types: Types<'_> = types.iter().map(|own| (own.name.as_str(), own)).collect();
+    let (mut elements, mut variables) = (Vec::new(), Vec::new());
+    // A few bytes of the file may name an alias of a variable with long texts and lists.
+    let mut inherited = 0;
+    for element in list.children() {
+        let Some(kind) = blank(element.element.name) else { continue };
+        let variable = variable(element, kind, &types)?;
+        let position = variables.len();
+        elements.push(element);
+        variables.push(variable);
+        for element in element.children_named("Alias") {
+            let alias = alias(element, &variables[position])?;
+            inherited += weight(&alias);
+            if inherited > ModelDescription::MOST_BYTES {
+                let (at, limit) = (element.element.at, ModelDescription::MOST_BYTES);
+                return Err(ParseError::Limit { at, what: "bytes of aliases", limit });
+            }
+            elements.push(element);
+            variables.push(alias);
+        }
+        if variables.len() > VARIABLES {
+            let at = list.element.at;
+            return Err(ParseError::Limit { at, what: "variables", limit: VARIABLES });
+        }
+    }
+    check_names(&elements, &variables)?;
+    check_references(&elements, &variables)?;
+    let references = references(&elements, &variables);
+    check_dimensions(&elements, &mut variables, &references)?;
+    for (element, variable) in elements.iter().zip(&mut variables) {
+        resolve(*element, variable, &references)?;
+    }
+    Ok((variables, references))
+}
+
+/// Maps value references to indices; the first of several variables counts.
+fn references(elements: &[Node<'_>], variables: &[ScalarVariable]) -> References {
+    let mut references = HashMap::with_capacity(variables.len());
+    for ((index, variable), element) in (1..).zip(variables).zip(elements) {
+        if variable.alias_of.is_some() {
+            continue;
+        }
+        if let Some(first) = references.get(&variable.value_reference) {
+            let expected = format!("one that no other variable has, variable {first} has it");
+            let found = variable.value_reference.to_string();
+            let assumed = "references to it are read as the first variable";
+            element.warn_text("valueReference", &expected, &found, assumed);
+        } else {
+            references.insert(variable.value_reference, index);
+        }
+    }
+    references
+}
+
+fn variable(
+    element: Node<'_>,
+    mut kind: Kind,
+    types: &Types<'_>,
+) -> Result<ScalarVariable, ParseError> {
+    let causality = element.word("causality", &CAUSALITIES).unwrap_or(Causality::Local);
+    let (declared_type, defaults) = declared(element, types).unzip();
+    attributes(element, &mut kind, defaults)?;
+    set_declared_type(&mut kind, declared_type);
+    if let Some(own) = kind.as_real_mut() {
+        own.derivative = reference(element, "derivative")?;
+        own.reinit = element.flag("reinit");
+    }
+    let start_elements = start::read(element, &mut kind)?;
+    Ok(ScalarVariable {
+        name: element.required("name")?.to_owned(),
+        value_reference: element.unsigned("valueReference")?,
+        description: element.text("description"),
+        causality,
+        variability: variability(element, causality, &kind),
+        initial: element.word("initial", &["exact", "approx", "calculated"]),
+        kind,
+        dimensions: element.children_named("Dimension").map(dimension).collect::<Result<_, _>>()?,
+        start_elements,
+        can_handle_multiple_set_per_time_instant: element
+            .has("canHandleMultipleSetPerTimeInstant")
+            .then(|| element.flag("canHandleMultipleSetPerTimeInstant")),
+        intermediate_update: element.flag("intermediateUpdate"),
+        previous: reference(element, "previous")?,
+        clocks: clocks(element)?,
+        ..ScalarVariable::default()
+    })
+}
+
+fn set_declared_type(kind: &mut Kind, name: Option<String>) {
+    if let Some(own) = kind.as_real_mut() {
+        own.declared_type = name;
+    } else if let Some(own) = kind.as_integer_mut() {
+        own.declared_type = name;
+    } else {
+        match kind {
+            Kind::Binary(own) => own.declared_type = name,
+            Kind::Clock(own) => own.declared_type = name,
+            _ => {}
+        }
+    }
+}
+
+/// Reads an `Alias`: a variable with the value of the one that contains it.
+fn alias(element: Node<'_>, of: &ScalarVariable) -> Result<ScalarVariable, ParseError> {
+    let mut kind = of.kind.clone();
+    kind.clear_start();
+    let mut alias = ScalarVariable {
+        name: element.required("name")?.to_owned(),
+        value_reference: of.value_reference,
+        description: element.text("description").or_else(|| of.description.clone()),
+        causality: of.causality,
+        variability: of.variability,
+        initial: of.initial,
+        kind,
+        dimensions: of.dimensions.clone(),
+        start_elements: None,
+        can_handle_multiple_set_per_time_instant: of.can_handle_multiple_set_per_time_instant,
+        intermediate_update: of.intermediate_update,
+        previous: of.previous,
+        clocks: of.clocks.clone(),
+        alias_of: Some(of.name.clone()),
+        negated: false,
+    };
+    if let (Some(unit), Some(own)) = (element.text("displayUnit"), alias.kind.as_real_mut()) {
+        own.display_unit = Some(unit);
+    }
+    Ok(alias)
+}
+
+/// Returns the approximate number of bytes that an alias takes from its variable.
+fn weight(alias: &ScalarVariable) -> usize {
+    let text = |own: &Option<String>| own.as_ref().map_or(0, String::len);
+    let kind = match &alias.kind {
+        Kind::Binary(own) => text(&own.mime_type),
+        other => {
+            let real = other.as_real();
+            real.map_or(0, |own| text(&own.quantity) + text(&own.unit) + text(&own.display_unit))
+                + other.as_integer().map_or(0, |own| text(&own.quantity))
+        }
+    };
+    let declared = alias.kind.declared_type().map_or(0, str::len);
+    let lists = 16 * alias.dimensions.len() + 4 * alias.clocks.len();
+    text(&alias.description) + text(&alias.alias_of) + kind + declared + lists
+}
+
+/// Reads `variability`, or returns its default (section 2.4.7.4).
+fn variability(element: Node<'_>, causality: Causality, kind: &Kind) -> Variability {
+    use Causality::{CalculatedParameter, Parameter, StructuralParameter};
+    let continuous = kind.as_real().is_some();
+    let default = match causality {
+        Parameter | CalculatedParameter | StructuralParameter => Variability::Fixed,
+        _ if continuous => Variability::Continuous,
+        _ => Variability::Discrete,
+    };
+    let stated = element.word("variability", &VARIABILITIES).unwrap_or(default);
+    if stated == Variability::Continuous && !continuous {
+        let expected = format!("another one than continuous for {}", element.element.name);
+        let assumed = format!("read as {}", default.as_str());
+        element.warn_text("variability", &expected, stated.as_str(), &assumed);
+        return default;
+    }
+    stated
+}
+
+fn dimension(element: Node<'_>) -> Result<Dimension, ParseError> {
+    let start = element.optional_counter("start").map(Dimension::Fixed);
+    let reference = reference(element, "valueReference")?.map(Dimension::Variable);
+    if start.is_some() && reference.is_some() {
+        let place = "<Dimension>".to_owned();
+        let said = ("start or valueReference", "both".to_owned());
+        element.warn_of(false, place, said, "read with its start");
+    }
+    let missing = || element.misses("start or valueReference", "neither".to_owned());
+    start.or(reference).ok_or_else(missing)
+}
+
+fn reference(element: Node<'_>, name: &'static str) -> Result<Option<u32>, ParseError> {
+    if element.has(name) { element.unsigned(name).map(Some) } else { Ok(None) }
+}
+
+/// Reads the attribute `clocks` as value references.
+fn clocks(element: Node<'_>) -> Result<Vec<u32>, ParseError> {
+    let text = element.attribute("clocks").unwrap_or_default();
+    let words = text.split(WHITE_SPACE).filter(|word| !word.is_empty());
+    let wrong = |word| element.wrong("clocks", "value references of clocks", word);
+    words.map(|word| word.parse().map_err(|_| wrong(word))).collect()
+}
+
+/// Checks that each dimension has an extent, and drops start values that are not as many as the
+/// elements.
+fn check_dimensions(
+    elements: &[Node<'_>],
+    variables: &mut [ScalarVariable],
+    references: &References,
+) -> Result<(), ParseError> {
+    let extent = |reference: u32, variables: &[ScalarVariable]| {
+        let index = usize::try_from(*references.get(&reference)?).ok()?;
+        let start = variables.get(index.checked_sub(1)?)?.kind.as_integer()?.start?;
+        u64::try_from(start).ok()
+    };
+    for position in 0..variables.len() {
+        let (element, variable) = (elements[position], &variables[position]);
+        let mut size = 1_u64;
+        for own in &variable.dimensions {
+            let found = match *own {
+                Dimension::Fixed(extent) => extent,
+                Dimension::Variable(reference) => {
+                    extent(reference, variables).ok_or_else(|| {
+                        let expected = "the value reference of an integer with a start value";
+                        element.wrong("valueReference", expected, &reference.to_string())
+                    })?
+                }
+            };
+            size = size.saturating_mul(found);
+        }
+        let count = variable.start_elements.as_ref().map(Elements::len);
+        let fits = count.is_none_or(|count| u64::try_from(count) == Ok(size));
+        if !fits {
+            let found = format!("{} values", count.unwrap_or_default());
+            let expected = format!("one value or {size}");
+            let place = element.place("start");
+            element.warn_of(false, place, (&expected, found), "read without start values");
+        }
+        if !fits {
+            variables[position].start_elements = None;
+        }
+    }
+    Ok(())
+}
+
+/// Replaces value references by indices.
+fn resolve(
+    element: Node<'_>,
+    variable: &mut ScalarVariable,
+    references: &References,
+) -> Result<(), ParseError> {
+    let index = |name, reference: u32| {
+        let found = references.get(&reference).copied();
+        found.ok_or_else(|| element.wrong(name, A_REFERENCE, &reference.to_string()))
+    };
+    if let Some(own) = variable.kind.as_real_mut() {
+        own.derivative = own.derivative.map(|own| index("derivative", own)).transpose()?;
+    }
+    if let Some(reference) = variable.previous {
+        variable.previous = references.get(&reference).copied();
+        if variable.previous.is_none() {
+            let assumed = "read as if it were not there";
+            element.warn_text("previous", A_REFERENCE, &reference.to_string(), assumed);
+        }
+    }
+    for clock in &mut variable.clocks {
+        *clock = index("clocks", *clock)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,129 @@
+//! Renders `ModelVariables`: variables, arrays with their start values, aliases.
+
+use super::{attributes, reference, references, single};
+use crate::description::render::Output;
+use crate::description::render::tag::Tag;
+use crate::description::{
+    Dimension, Elements, Initial, Kind, ModelDescription, ScalarVariable, Version,
+};
+
+impl Output {
+    /// Writes the variables with their aliases, the variables with the same value reference that name
+    /// it as `alias_of`. Neither needs to follow the other.
+    pub(super) fn variables_3(&mut self, description: &ModelDescription) {
+        let mut aliases = std::collections::HashMap::<&str, Vec<&ScalarVariable>>::new();
+        for alias in &description.variables {
+            if let Some(of) = &alias.alias_of {
+                aliases.entry(of).or_default().push(alias);
+            }
+        }
+        for variable in description.variables.iter().filter(|own| own.alias_of.is_none()) {
+            let own = aliases.get(variable.name.as_str()).map_or(&[][..], Vec::as_slice);
+            self.variable_3(variable, own, description);
+        }
+    }
+
+    fn variable_3(
+        &mut self,
+        variable: &ScalarVariable,
+        aliases: &[&ScalarVariable],
+        description: &ModelDescription,
+    ) {
+        let tag = tag(variable, description);
+        let starts = start_elements(variable);
+        if variable.dimensions.is_empty() && starts.is_empty() && aliases.is_empty() {
+            return self.empty(tag);
+        }
+        self.around(tag, |output| {
+            for dimension in &variable.dimensions {
+                let tag = Tag::new("Dimension");
+                output.empty(match dimension {
+                    Dimension::Fixed(extent) => tag.with("start", extent),
+                    Dimension::Variable(reference) => tag.with("valueReference", reference),
+                });
+            }
+            for start in &starts {
+                output.empty(Tag::new("Start").with("value", start));
+            }
+            for own in aliases {
+                output.empty(alias(own, variable));
+            }
+        });
+    }
+}
+
+fn tag<'a>(variable: &'a ScalarVariable, description: &ModelDescription) -> Tag<'a> {
+    let kind = &variable.kind;
+    let clocks = Some(references(description, &variable.clocks)).filter(|own| !own.is_empty());
+    let previous = variable.previous.map(|index| reference(description, index));
+    let once = variable.can_handle_multiple_set_per_time_instant.as_ref();
+    let tag = Tag::new(kind.element_in(Version::V3))
+        .with("name", &variable.name)
+        .with("valueReference", &variable.value_reference)
+        .maybe("description", variable.description.as_ref())
+        .with("causality", variable.causality.as_str())
+        .with("variability", variable.variability.as_str())
+        .maybe("canHandleMultipleSetPerTimeInstant", once)
+        .maybe("clocks", clocks.as_ref())
+        .unless_default("intermediateUpdate", &variable.intermediate_update)
+        .maybe("previous", previous.as_ref())
+        .maybe("declaredType", kind.declared_type())
+        .maybe("initial", variable.initial.map(Initial::as_str));
+    let tag = attributes(tag, kind).maybe("start", start_list(variable).as_ref());
+    let Some(real) = kind.as_real() else { return tag };
+    let derivative = real.derivative.map(|index| reference(description, index));
+    tag.maybe("derivative", derivative.as_ref()).unless_default("reinit", &real.reinit)
+}
+
+/// Returns what an alias states itself.
+fn alias<'a>(own: &'a ScalarVariable, of: &ScalarVariable) -> Tag<'a> {
+    let description = own.description.as_ref().filter(|_| own.description != of.description);
+    let display = |own: &'a ScalarVariable| own.kind.as_real()?.display_unit.as_ref();
+    let unit = of.kind.as_real().and_then(|own| own.display_unit.as_ref());
+    Tag::new("Alias")
+        .with("name", &own.name)
+        .maybe("description", description)
+        .maybe("displayUnit", display(own).filter(|own| Some(*own) != unit))
+}
+
+/// Returns the attribute `start`: one value, or a list.
+fn start_list(variable: &ScalarVariable) -> Option<String> {
+    let number = |value: f64| match &variable.kind {
+        _ if value.is_nan() => "NaN".to_owned(),
+        _ if value.is_infinite() => if value > 0.0 { "INF" } else { "-INF" }.to_owned(),
+        Kind::Float32(_) => single(value),
+        _ => format!("{value:?}"),
+    };
+    match &variable.start_elements {
+        Some(Elements::Real(own)) => return Some(joined(own, |value| number(*value))),
+        Some(Elements::Integer(own)) => return Some(joined(own, i128::to_string)),
+        Some(Elements::Boolean(own)) => return Some(joined(own, bool::to_string)),
+        _ => {}
+    }
+    match &variable.kind {
+        Kind::Boolean(start) => start.map(|own| own.to_string()),
+        kind => match (kind.as_real(), kind.as_integer()) {
+            (Some(own), _) => own.start.map(number),
+            (_, own) => own?.start.map(|own| own.to_string()),
+        },
+    }
+}
+
+fn joined<T>(values: &[T], text: impl Fn(&T) -> String) -> String {
+    values.iter().map(text).collect::<Vec<_>>().join(" ")
+}
+
+/// Returns the values of the elements `Start`, which a String and a Binary have.
+fn start_elements(variable: &ScalarVariable) -> Vec<String> {
+    let hexadecimal = |own: &Vec<u8>| {
+        let digits: Vec<String> = own.iter().map(|byte| format!("{byte:02x}")).collect();
+        digits.concat()
+    };
+    match (&variable.start_elements, &variable.kind) {
+        (Some(Elements::String(own)), _) => own.clone(),
+        (Some(Elements::Binary(own)), _) => own.iter().map(hexadecimal).collect(),
+        (_, Kind::String(start)) => start.iter().cloned().collect(),
+        (_, Kind::Binary(own)) => own.start.iter().map(hexadecimal).collect(),
+        _ => Vec::new(),
+    }
+}

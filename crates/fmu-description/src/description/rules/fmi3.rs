@@ -1,0 +1,90 @@
+//! The rules of FMI 3.0.2.
+
+mod arrays;
+mod clocks;
+mod structure;
+mod variables;
+
+use super::{Problems, date, is_c_identifier};
+use crate::description::{CoSimulation, Kind, ModelDescription};
+
+pub(super) use structure::check as check_structure;
+pub(super) use variables::check as check_variables;
+
+pub(super) fn check_identity(description: &ModelDescription, problems: &mut Problems) {
+    const ROOT: &str = "2.4.1";
+    let version = &description.fmi_version;
+    problems.demand(version == "3.0", ROOT, || {
+        format!("fmiVersion is {version:?}, it must be \"3.0\" for every 3.0.x")
+    });
+    let token = &description.guid;
+    problems.demand(!token.is_empty(), ROOT, || "instantiationToken is empty".to_owned());
+    date(description, problems);
+    let interfaces = interfaces(description);
+    problems.demand(!interfaces.is_empty(), ROOT, || {
+        "none of ModelExchange, CoSimulation and ScheduledExecution is there".to_owned()
+    });
+    for Interface { name, identifier, keeps, serializes } in interfaces {
+        problems.demand(is_c_identifier(identifier), "2.4.2", || {
+            format!("{name}: modelIdentifier {identifier:?} is no C identifier")
+        });
+        problems.demand(keeps || !serializes, "2.4.2", || {
+            format!("{name}: canSerializeFMUState is true without canGetAndSetFMUState")
+        });
+    }
+    if let Some(own) = &description.co_simulation {
+        check_co_simulation(own, description, problems);
+    }
+}
+
+/// What the rules on each interface need.
+struct Interface<'a> {
+    name: &'static str,
+    identifier: &'a str,
+    keeps: bool,
+    serializes: bool,
+}
+
+fn interfaces(description: &ModelDescription) -> Vec<Interface<'_>> {
+    let exchange = description.model_exchange.as_ref().map(|own| Interface {
+        name: "ModelExchange",
+        identifier: &own.model_identifier,
+        keeps: own.can_get_and_set_fmu_state,
+        serializes: own.can_serialize_fmu_state,
+    });
+    let simulation = description.co_simulation.as_ref().map(|own| Interface {
+        name: "CoSimulation",
+        identifier: &own.model_identifier,
+        keeps: own.can_get_and_set_fmu_state,
+        serializes: own.can_serialize_fmu_state,
+    });
+    let scheduled = description.scheduled_execution.as_ref().map(|own| Interface {
+        name: "ScheduledExecution",
+        identifier: &own.model_identifier,
+        keeps: own.can_get_and_set_fmu_state,
+        serializes: own.can_serialize_fmu_state,
+    });
+    [exchange, simulation, scheduled].into_iter().flatten().collect()
+}
+
+fn check_co_simulation(
+    own: &CoSimulation,
+    description: &ModelDescription,
+    problems: &mut Problems,
+) {
+    const SECTION: &str = "4.4";
+    let returns = own.can_return_early_after_intermediate_update;
+    problems.demand(own.provides_intermediate_update || !returns, SECTION, || {
+        "canReturnEarlyAfterIntermediateUpdate is true without providesIntermediateUpdate"
+            .to_owned()
+    });
+    let clocked = description.variables.iter().any(|own| matches!(own.kind, Kind::Clock(_)));
+    problems.demand(own.has_event_mode || !clocked, SECTION, || {
+        "there are clocks, and hasEventMode is false".to_owned()
+    });
+    if let Some(step) = own.fixed_internal_step_size {
+        problems.demand(step > 0.0 && step.is_finite(), SECTION, || {
+            format!("fixedInternalStepSize is {step:?}, not positive and finite")
+        });
+    }
+}

@@ -1,0 +1,72 @@
+//! Rules on arrays and structural parameters (section 2.4.7.2).
+
+use std::collections::HashMap;
+
+use crate::description::rules::Problems;
+use crate::description::{
+    Causality, Dimension, Kind, ModelDescription, ScalarVariable, Variability,
+};
+
+const SECTION: &str = "2.4.7.2";
+
+pub(super) fn check(description: &ModelDescription, problems: &mut Problems) {
+    let variables = description.variables.iter().filter(|own| own.alias_of.is_none());
+    let references: HashMap<u32, &ScalarVariable> =
+        variables.clone().map(|own| (own.value_reference, own)).collect();
+    for variable in variables {
+        let name = &variable.name;
+        let scalar = match variable.kind {
+            Kind::Clock(_) => Some("a Clock"),
+            _ if variable.causality == Causality::StructuralParameter => {
+                Some("a structural parameter")
+            }
+            _ => None,
+        };
+        if let Some(what) = scalar.filter(|_| !variable.dimensions.is_empty()) {
+            problems.add(SECTION, format!("variable {name}: {what} cannot be an array"));
+        }
+        let mut size = Some(1_u64);
+        for dimension in &variable.dimensions {
+            let extent = extent(name, dimension, &references, problems);
+            size = size.zip(extent).and_then(|(size, extent)| size.checked_mul(extent));
+        }
+        let Some(starts) = &variable.start_elements else { continue };
+        let count = u64::try_from(starts.len()).unwrap_or(u64::MAX);
+        problems.demand(size.is_none_or(|size| size == count), SECTION, || {
+            let size = size.unwrap_or_default();
+            format!("variable {name} has {count} start values for {size} elements")
+        });
+    }
+}
+
+/// Returns the extent of a dimension, or adds the problem that there is none.
+fn extent(
+    name: &str,
+    dimension: &Dimension,
+    references: &HashMap<u32, &ScalarVariable>,
+    problems: &mut Problems,
+) -> Option<u64> {
+    let found = match *dimension {
+        Dimension::Fixed(extent) => extent,
+        Dimension::Variable(reference) => {
+            let size = references.get(&reference).filter(|own| {
+                matches!(own.kind, Kind::UInt64(_))
+                    && (own.causality == Causality::StructuralParameter
+                        || own.variability == Variability::Constant)
+            });
+            let start = size.and_then(|own| own.kind.as_integer()?.start);
+            let Some(start) = start.and_then(|start| u64::try_from(start).ok()) else {
+                let text = format!(
+                    "variable {name}: a dimension refers to {reference}, which is no constant or \
+                     structural parameter of type UInt64 with a start value"
+                );
+                problems.add(SECTION, text);
+                return None;
+            };
+            start
+        }
+    };
+    problems
+        .demand(found > 0, SECTION, || format!("variable {name}: a dimension starts with size 0"));
+    Some(found)
+}

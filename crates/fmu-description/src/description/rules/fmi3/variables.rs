@@ -1,0 +1,260 @@
+//! Rules on `ModelVariables` (sections 2.4.7.3 to 2.4.7.5).
+
+use std::collections::HashMap;
+
+use super::{arrays, clocks};
+use crate::description::rules::Problems;
+use crate::description::rules::variables::{check_integer, check_order, check_real};
+use crate::description::{
+    Causality, Elements, Initial, Kind, ModelDescription, ScalarVariable, SimpleType, Variability,
+    Version,
+};
+
+const ALIASES: &str = "2.4.7.3";
+const ATTRIBUTES: &str = "2.4.7.4";
+const TYPED: &str = "2.4.7.5";
+
+pub(in crate::description::rules) fn check(
+    description: &ModelDescription,
+    problems: &mut Problems,
+) {
+    problems.demand(!description.variables.is_empty(), "2.4.7.1", || {
+        "ModelVariables has no variable".to_owned()
+    });
+    let types = description.types.iter().map(|own| (own.name.as_str(), own)).collect();
+    for variable in &description.variables {
+        let text = variable.description.as_deref().unwrap_or_default();
+        problems.text(ATTRIBUTES, &format!("description of variable {}", variable.name), text);
+        if variable.alias_of.is_none() {
+            check_table(variable, problems);
+            check_flags(variable, problems);
+            check_start(variable, problems);
+            check_numbers(variable, problems);
+            check_declared_type(variable, &types, problems);
+            check_derivative(variable, description, problems);
+        }
+    }
+    let independent: Vec<&ScalarVariable> = description
+        .variables
+        .iter()
+        .filter(|own| own.causality == Causality::Independent && own.alias_of.is_none())
+        .collect();
+    problems.demand(independent.len() == 1, ATTRIBUTES, || {
+        format!("{} variables are independent, exactly one must be", independent.len())
+    });
+    for own in independent {
+        let float = own.kind.as_real().is_some() && own.dimensions.is_empty();
+        problems.demand(float, ATTRIBUTES, || {
+            format!("variable {}: the independent variable must be a scalar Float", own.name)
+        });
+    }
+    check_references(description, problems);
+    arrays::check(description, problems);
+    clocks::check(description, problems);
+}
+
+/// Checks the tables of causality, variability and initial.
+fn check_table(variable: &ScalarVariable, problems: &mut Problems) {
+    use Causality::{
+        CalculatedParameter, Independent, Input, Local, Output, Parameter, StructuralParameter,
+    };
+    use Variability::{Constant, Continuous, Discrete, Fixed, Tunable};
+    let name = &variable.name;
+    let (causality, variability) = (variable.causality, variable.variability);
+    let allowed: &[Initial] = match (causality, variability) {
+        (StructuralParameter | Parameter, Fixed | Tunable)
+        | (Output | Local, Constant)
+        | (Input, Discrete | Continuous) => &[Initial::Exact],
+        (CalculatedParameter | Local, Fixed | Tunable) => &[Initial::Calculated, Initial::Approx],
+        (Output | Local, Discrete | Continuous) => {
+            &[Initial::Calculated, Initial::Exact, Initial::Approx]
+        }
+        (Independent, Continuous) => &[],
+        _ => {
+            let (causality, variability) = (causality.as_str(), variability.as_str());
+            let text = format!("variable {name}: a {causality} cannot be {variability}");
+            return problems.add(ATTRIBUTES, text);
+        }
+    };
+    let allowed = if matches!(variable.kind, Kind::Clock(_)) { &[] } else { allowed };
+    if let Some(initial) = variable.initial {
+        problems.demand(allowed.contains(&initial), TYPED, || {
+            let kind = variable.kind.element_in(Version::V3);
+            let (causality, variability) = (causality.as_str(), variability.as_str());
+            let initial = initial.as_str();
+            format!(
+                "variable {name}: initial {initial} is not allowed for {variability} {causality} \
+                 of type {kind}"
+            )
+        });
+    }
+    let float = variable.kind.as_real().is_some();
+    problems.demand(float || variability != Continuous, ATTRIBUTES, || {
+        format!("variable {name}: only a Float32 or Float64 can be continuous")
+    });
+}
+
+/// Checks attributes that only some variables may have.
+fn check_flags(variable: &ScalarVariable, problems: &mut Problems) {
+    let name = &variable.name;
+    let input = variable.causality == Causality::Input;
+    let once = variable.can_handle_multiple_set_per_time_instant.is_some();
+    problems.demand(input || !once, ATTRIBUTES, || {
+        format!("variable {name}: only inputs have canHandleMultipleSetPerTimeInstant")
+    });
+    let continuous = variable.variability == Variability::Continuous;
+    problems.demand(continuous || !variable.intermediate_update, ATTRIBUTES, || {
+        format!("variable {name}: only continuous variables can have intermediateUpdate")
+    });
+}
+
+fn check_start(variable: &ScalarVariable, problems: &mut Problems) {
+    let name = &variable.name;
+    let needed = match (variable.causality, variable.initial_in_force()) {
+        _ if matches!(variable.kind, Kind::Clock(_)) => false,
+        (Causality::Independent, _) => false,
+        (Causality::Input, _) => true,
+        (_, initial) => initial != Some(Initial::Calculated),
+    };
+    match (needed, variable.has_start()) {
+        (true, false) => problems.add(TYPED, format!("variable {name} needs a start value")),
+        (false, true) => problems.add(
+            TYPED,
+            format!("variable {name} has a start value, which calculated and independent forbid"),
+        ),
+        _ => {}
+    }
+}
+
+/// Checks limits and start values, which must be numbers of the type.
+fn check_numbers(variable: &ScalarVariable, problems: &mut Problems) {
+    let who = format!("variable {}", variable.name);
+    let kind = &variable.kind;
+    if let Some(own) = kind.as_real() {
+        check_real(&who, own, problems);
+        if let Some(Elements::Real(starts)) = &variable.start_elements {
+            let outside = |start: &&f64| !inside(**start, own.min, own.max);
+            if let Some(start) = starts.iter().find(outside) {
+                check_order(&who, own.min, Some(*start), own.max, problems);
+            }
+        }
+    }
+    if let (Some(own), Some((low, high))) = (kind.as_integer(), kind.integer_range(Version::V3)) {
+        check_integer(&who, own, problems);
+        let starts = match &variable.start_elements {
+            Some(Elements::Integer(starts)) => starts.as_slice(),
+            _ => &[],
+        };
+        let outside = |start: &&i128| !inside(**start, own.min, own.max);
+        if let Some(start) = starts.iter().find(outside) {
+            check_order(&who, own.min, Some(*start), own.max, problems);
+        }
+        let mut numbers =
+            [own.min, own.max, own.start].into_iter().flatten().chain(starts.iter().copied());
+        if let Some(value) = numbers.find(|value| !(low..=high).contains(value)) {
+            let kind = kind.element_in(Version::V3);
+            let text = format!("{who}: {value} is no number of type {kind}, {low} to {high}");
+            problems.add(TYPED, text);
+        }
+    }
+    match (kind, &variable.start_elements) {
+        (Kind::String(Some(start)), None) => {
+            problems.text(TYPED, &format!("start of {who}"), start);
+        }
+        (Kind::String(_), Some(Elements::String(starts))) => {
+            for start in starts {
+                problems.text(TYPED, &format!("start of {who}"), start);
+            }
+        }
+        (Kind::Binary(own), None) => {
+            let length = own.start.as_ref().and_then(|start| u64::try_from(start.len()).ok());
+            let fits = length.zip(own.max_size).is_none_or(|(length, most)| length <= most);
+            problems
+                .demand(fits, TYPED, || format!("{who}: the start value is longer than maxSize"));
+        }
+        _ => {}
+    }
+}
+
+fn inside<T: PartialOrd>(value: T, min: Option<T>, max: Option<T>) -> bool {
+    min.is_none_or(|min| min <= value) && max.is_none_or(|max| value <= max)
+}
+
+/// Checks that a declared type exists and has the variable's kind, and that the start value of an
+/// enumeration is an item.
+fn check_declared_type(
+    variable: &ScalarVariable,
+    types: &HashMap<&str, &SimpleType>,
+    problems: &mut Problems,
+) {
+    let name = &variable.name;
+    let Some(declared) = variable.kind.declared_type() else {
+        let needed = matches!(variable.kind, Kind::Enumeration(_));
+        return problems.demand(!needed, TYPED, || {
+            format!("variable {name} is an Enumeration and has no declared type")
+        });
+    };
+    let Some(own) = types.get(declared) else {
+        return problems.add(TYPED, format!("variable {name}: there is no type {declared:?}"));
+    };
+    let (kind, other) = (variable.kind.element_in(Version::V3), own.kind.element_in(Version::V3));
+    problems.demand(kind == other, TYPED, || {
+        format!("variable {name} is {kind}, its declared type {declared} is {other}")
+    });
+    if let Kind::Enumeration(integer) = &variable.kind {
+        let is_item = |start| own.items.iter().any(|(_, value)| i128::from(*value) == start);
+        problems.demand(integer.start.is_none_or(is_item), TYPED, || {
+            format!("variable {name}: the start value is no item of type {declared}")
+        });
+    }
+}
+
+/// Checks that `derivative` connects two different continuous floats of one size.
+fn check_derivative(
+    variable: &ScalarVariable,
+    description: &ModelDescription,
+    problems: &mut Problems,
+) {
+    let Some(index) = variable.kind.as_real().and_then(|own| own.derivative) else { return };
+    let name = &variable.name;
+    let Some(state) = description.at(index) else {
+        let text = format!("variable {name}: derivative is the reference of no variable");
+        return problems.add(TYPED, text);
+    };
+    let is_continuous = |own: &ScalarVariable| {
+        own.kind.as_real().is_some() && own.variability == Variability::Continuous
+    };
+    let sound = !std::ptr::eq(state, variable) && is_continuous(state) && is_continuous(variable);
+    problems.demand(sound && state.dimensions == variable.dimensions, TYPED, || {
+        format!(
+            "variable {name}: derivative must connect two different continuous floats of equal \
+             dimensions, it points at {}",
+            state.name
+        )
+    });
+}
+
+/// Checks that only aliases share a value reference, and that they name their variable.
+fn check_references(description: &ModelDescription, problems: &mut Problems) {
+    let mut variables: HashMap<u32, &ScalarVariable> = HashMap::new();
+    for variable in description.variables.iter().filter(|own| own.alias_of.is_none()) {
+        if let Some(first) = variables.insert(variable.value_reference, variable) {
+            let text = format!(
+                "variables {} and {} have the value reference {}",
+                first.name, variable.name, variable.value_reference
+            );
+            problems.add(ATTRIBUTES, text);
+        }
+    }
+    for alias in &description.variables {
+        let Some(of) = &alias.alias_of else { continue };
+        let variable = variables.get(&alias.value_reference).filter(|own| own.name == *of);
+        let kind = alias.kind.element();
+        problems.demand(variable.is_some_and(|own| own.kind.element() == kind), ALIASES, || {
+            format!(
+                "alias {}: there is no variable {of} of its type and value reference",
+                alias.name
+            )
+        });
+    }
+}
