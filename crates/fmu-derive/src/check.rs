@@ -45,8 +45,9 @@ fn mark_states(variables: &mut [Variable<'_>]) -> Vec<Error> {
                 errors
                     .push(refuse("a state and its derivative are f64 or arrays of f64".to_owned()));
             }
-            Some(found) if found.length.is_some() != variable.length.is_some() => {
-                errors.push(refuse("a state and its derivative have the same length".to_owned()));
+            Some(found) if found.extents.len() != variable.extents.len() => {
+                let message = "a state and its derivative have the same dimensions";
+                errors.push(refuse(message.to_owned()));
             }
             Some(_) if states.contains(state) => {
                 errors.push(refuse(format!("`{state}` has two derivatives")));
@@ -178,7 +179,7 @@ fn references(variables: &[Variable<'_>], variable: &Variable<'_>) -> Vec<Error>
     }
     if let Some(first) = attributes.derivatives.first() {
         let fits = matches!(variable.role(), Role::Input | Role::Output);
-        if !fits || variable.base != Base::Real || variable.length.is_some() {
+        if !fits || variable.base != Base::Real || !variable.extents.is_empty() {
             let message = "only an input or output of type f64 has `derivatives`";
             errors.push(Error::new(first.span(), message));
         }

@@ -20,8 +20,8 @@ pub(crate) struct Variable<'a> {
     pub(crate) name: String,
     pub(crate) description: String,
     pub(crate) base: Base,
-    /// The number of elements of an array.
-    pub(crate) length: Option<&'a Expr>,
+    /// The extents of the dimensions of an array; empty for a scalar.
+    pub(crate) extents: Vec<&'a Expr>,
     pub(crate) attributes: Attributes,
     /// Whether another field is the derivative of this one.
     pub(crate) is_state: bool,
@@ -69,14 +69,14 @@ pub(crate) fn read(field: &Field) -> Result<Part<'_>> {
         let start = attributes.value("start").cloned();
         return Ok(Part::Skipped { field: ident, start });
     }
-    let (base, length) = base(&field.ty)?;
+    let (base, extents) = base(&field.ty)?;
     let name = attributes.text("name").map_or_else(|| plain(ident), syn::LitStr::value);
     Ok(Part::Variable(Box::new(Variable {
         field: ident,
         name,
         description: description(field),
         base,
-        length,
+        extents,
         attributes,
         is_state: false,
     })))
@@ -100,13 +100,12 @@ fn is_log(path: &Type) -> bool {
     last_segment(path).is_some_and(|name| name == "Log")
 }
 
-/// The base type of a field, and the number of elements of an array.
-fn base(of: &Type) -> Result<(Base, Option<&Expr>)> {
+/// The base type of a field, and the extents of an array.
+fn base(of: &Type) -> Result<(Base, Vec<&Expr>)> {
     if let Type::Array(TypeArray { elem, len, .. }) = of {
-        return match base(elem)? {
-            (base, None) => Ok((base, Some(len))),
-            (_, Some(_)) => Err(Error::new(of.span(), "an array of arrays is no variable")),
-        };
+        let (base, mut extents) = base(elem)?;
+        extents.insert(0, len);
+        return Ok((base, extents));
     }
     let base = match last_segment(of).as_deref() {
         Some("f64") => Base::Real,
@@ -119,7 +118,7 @@ fn base(of: &Type) -> Result<(Base, Option<&Expr>)> {
             return Err(Error::new(of.span(), message));
         }
     };
-    Ok((base, None))
+    Ok((base, Vec::new()))
 }
 
 /// The first paragraph of the doc comment, in one line.

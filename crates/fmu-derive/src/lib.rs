@@ -1,6 +1,7 @@
 //! The macros of the crate `fmu`, which documents and exports them.
 #![forbid(unsafe_code)]
 
+mod array;
 mod attributes;
 mod check;
 mod field;
@@ -23,7 +24,7 @@ use syn::{DeriveInput, ItemImpl, parse_macro_input};
 /// | `i32` | Integer, or Enumeration with `enumeration(...)` |
 /// | `bool` | Boolean |
 /// | `String` | String |
-/// | `[f64; N]`, `[i32; N]`, `[bool; N]`, `[String; N]` | N scalar variables `name[1]` to `name[N]` |
+/// | `[f64; N]`, `[[f64; M]; N]` and other arrays of these | one variable for each element, `x[1]` or `A[1,2]`, row by row; of an array called `der(x)` they are `der(x[1])` and so on |
 /// | `fmu::Log` | none: the messages of the model, without the attribute |
 ///
 /// # The role

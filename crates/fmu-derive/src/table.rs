@@ -4,6 +4,7 @@ use proc_macro2::TokenStream;
 use quote::{quote, quote_spanned};
 use syn::{Data, DeriveInput, Error, Expr, Fields, Ident, Result};
 
+use crate::array;
 use crate::attributes::Role;
 use crate::check::check;
 use crate::field::{Base, Part, Variable, read};
@@ -87,15 +88,16 @@ fn read_all(fields: &syn::FieldsNamed) -> Result<Model<'_>> {
 /// Generates `Default` if a field has a start value.
 fn default(ident: &Ident, model: &Model<'_>) -> Option<TokenStream> {
     model.starts.iter().any(|(_, start)| start.is_some()).then_some(())?;
-    let is_array = |field: &Ident| {
-        model.variables.iter().any(|own| own.field == field && own.length.is_some())
+    let dimensions = |field: &Ident| {
+        let variable = model.variables.iter().find(|own| own.field == field);
+        variable.map_or(0, |own| own.extents.len())
     };
     let fields = model.starts.iter().map(|(field, start)| match start {
         Some(value) => quote!(#field: ::core::convert::Into::into(#value)),
-        None if is_array(field) => {
-            quote!(#field: ::core::array::from_fn(|_| ::core::default::Default::default()))
+        None => {
+            let value = array::default_value(dimensions(field));
+            quote_spanned!(field.span()=> #field: #value)
         }
-        None => quote_spanned!(field.span()=> #field: ::core::default::Default::default()),
     });
     Some(quote! {
         impl ::core::default::Default for #ident {
@@ -112,29 +114,17 @@ fn row(variables: &[Variable<'_>], variable: &Variable<'_>) -> TokenStream {
     let (field, description) = (variable.field, &variable.description);
     let constructor = constructor(variable);
     let attributes = attributes(variables, variable);
-    let name = &variable.name;
-    let span = field.span();
-    let Some(length) = variable.length else {
-        let enumeration = enumeration(variable);
-        return quote_spanned! {span=>
-            let variable = ::fmu::Variable::#constructor(
-                #name, #description, #enumeration |model: &mut Self| &mut model.#field
-            );
-            table.push(variable #attributes);
-        };
-    };
+    let dimensions = variable.extents.len();
+    let name = array::element_name(&variable.name, dimensions);
+    let element = array::element(dimensions);
     let enumeration = enumeration(variable);
-    quote_spanned! {span=>
-        for index in 0..(#length) {
-            let variable = ::fmu::Variable::#constructor(
-                ::std::format!("{}[{}]", #name, index + 1),
-                #description,
-                #enumeration
-                move |model: &mut Self| &mut model.#field[index]
-            );
-            table.push(variable #attributes);
-        }
-    }
+    let add = quote_spanned! {field.span()=>
+        let variable = ::fmu::Variable::#constructor(
+            #name, #description, #enumeration move |model: &mut Self| &mut model.#field #element
+        );
+        table.push(variable #attributes);
+    };
+    array::for_each(&variable.extents, add)
 }
 
 fn constructor(variable: &Variable<'_>) -> TokenStream {
@@ -183,8 +173,11 @@ fn attributes(variables: &[Variable<'_>], variable: &Variable<'_>) -> TokenStrea
         calls.extend(quote_spanned!(field.span()=> .derivative(|model| &mut model.#field)));
     }
     if let Some(state) = &own.derivative_of {
-        let state = reference(variables, state, variable.length.is_some());
-        calls.extend(quote!(.derivative_of(#state)));
+        let name = state.to_string();
+        let found = variables.iter().find(|variable| variable.field == state);
+        let name = found.map_or(&name, |found| &found.name);
+        let name = array::element_name(name, variable.extents.len());
+        calls.extend(quote!(.derivative_of(#name)));
     }
     calls.extend(dependencies(variables, variable));
     calls
@@ -202,13 +195,6 @@ fn role(variable: &Variable<'_>) -> TokenStream {
     }
 }
 
-/// The name of the variable of a field; of the element with the same index if `indexed`.
-fn reference(variables: &[Variable<'_>], field: &Ident, indexed: bool) -> TokenStream {
-    let found = variables.iter().find(|variable| variable.field == field);
-    let name = found.map_or_else(|| field.to_string(), |found| found.name.clone());
-    if indexed { quote!(::std::format!("{}[{}]", #name, index + 1)) } else { quote!(#name) }
-}
-
 /// All names of the variables of the fields, for a list.
 fn list<'a>(
     variables: &[Variable<'_>],
@@ -216,13 +202,12 @@ fn list<'a>(
 ) -> TokenStream {
     let mut names = quote!(let mut names = ::std::vec::Vec::<::std::string::String>::new(););
     for field in fields {
+        let name = field.to_string();
         let found = variables.iter().find(|variable| variable.field == field);
-        let name = found.map_or_else(|| field.to_string(), |found| found.name.clone());
-        names.extend(if let Some(length) = found.and_then(|found| found.length) {
-            quote!(names.extend((1..=(#length)).map(|index| ::std::format!("{}[{index}]", #name)));)
-        } else {
-            quote!(names.push(#name.into());)
-        });
+        let (name, extents) =
+            found.map_or((&name, &[][..]), |found| (&found.name, &found.extents[..]));
+        let name = array::element_name(name, extents.len());
+        names.extend(array::for_each(extents, quote!(names.push(#name.into());)));
     }
     quote!({ #names names })
 }

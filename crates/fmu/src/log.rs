@@ -10,7 +10,11 @@ const LIMIT: usize = 1000;
 ///
 /// A model that logs has a field of this type, and [`Model::log`](crate::Model::log) returns it
 /// (`#[fmu::model]` does so). After each call the exporter sends the messages and empties the field, so it
-/// is not part of the FMU state: its serialised form is empty.
+/// is not part of the FMU state: its serialised form is empty. A message that is repeated within a call is
+/// sent once.
+///
+/// [`Model::update`](crate::Model::update) also runs at states that an integrator only tries; messages about
+/// what has happened belong to the other functions.
 ///
 /// ```
 /// use fmu::Log;
@@ -47,8 +51,12 @@ impl Log {
     }
 
     fn add(&mut self, category: Option<&'static str>, text: String) {
+        let message = Message { category, text };
+        if self.messages.contains(&message) {
+            return;
+        }
         if self.messages.len() < LIMIT {
-            self.messages.push(Message { category, text });
+            self.messages.push(message);
         } else {
             self.dropped += 1;
         }
@@ -105,8 +113,9 @@ mod tests {
     #[test]
     fn messages_above_the_limit_are_counted() {
         let mut log = Log::default();
-        for _ in 0..LIMIT + 7 {
-            log.info("logEvents", "again");
+        for k in 0..LIMIT + 7 {
+            log.info("logEvents", format!("sample {k}"));
+            log.info("logEvents", "sample 0");
         }
         let messages = log.take();
         assert_eq!(messages.len(), LIMIT + 1);

@@ -181,6 +181,23 @@ fn mistakes_in_the_variables_are_errors_of_the_compiler_at_their_lines() {
 }
 
 #[test]
+fn warnings_of_a_model_reach_the_user_of_its_fmu() {
+    let folder = tempfile::tempdir().unwrap();
+    new_crate(folder.path(), "talking-room");
+    let model = folder.path().join("talking-room/src/lib.rs");
+    edit(&model, "    time_constant: f64,\n}", "    time_constant: f64,\n    log: fmu::Log,\n}");
+    let check = "if self.power < 0.0 {\n            self.log.warn(format!(\"{} W, 100 %\", self.power));\n        }\n        let rest =";
+    edit(&model, "let rest =", check);
+    let output = run_in(folder.path(), &["pack", "talking-room", "--out", "."]);
+    assert!(output.status.success(), "{}", message(&output));
+    let run = ["run", "TalkingRoom.fmu", "--stop-time", "1", "--step", "0.5"];
+    let quiet = run_in(folder.path(), &run);
+    assert!(quiet.status.success() && !message(&quiet).contains(" W, 100 %"));
+    let loud = run_in(folder.path(), &[&run[..], &["--set", "TalkingRoom.power=-5"]].concat());
+    assert!(loud.status.success() && message(&loud).contains("logStatusWarning: -5 W, 100 %"));
+}
+
+#[test]
 fn folders_without_a_crate_with_a_model_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let refuses = |parts: &[&str]| refuses(folder.path(), &["pack", "own"], parts);

@@ -162,7 +162,7 @@ impl Integrator {
             }
             let lasts = remaining <= 1.01 * self.suggested;
             let length = if lasts { remaining } else { self.suggested };
-            if !self.try_step(system, length)? {
+            if !self.try_step(system, length, !lasts)? {
                 continue;
             }
             if let Some(fraction) = self.find_crossing(system)?
@@ -178,8 +178,13 @@ impl Integrator {
     }
 
     /// Takes a step of `length` from the state reached; false if its error is too large, and a shorter
-    /// step is suggested.
-    fn try_step(&mut self, system: &mut impl System, length: f64) -> Result<bool, Failure> {
+    /// step is suggested. A longer one is suggested after it if `grows`.
+    fn try_step(
+        &mut self,
+        system: &mut impl System,
+        length: f64,
+        grows: bool,
+    ) -> Result<bool, Failure> {
         let outcome = self.take(system, length);
         if let Err(failure) = &outcome
             && !matches!(failure, Failure::Discard(_))
@@ -188,7 +193,7 @@ impl Integrator {
         }
         let error = if outcome.is_ok() { self.error() } else { f64::NAN };
         if error <= 1.0 {
-            if length >= self.suggested {
+            if grows {
                 self.suggested = length * growth(error);
             }
             return Ok(true);

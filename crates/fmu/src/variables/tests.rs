@@ -20,8 +20,13 @@ struct Everything {
     #[fmu(output, state, reinit, unit = "m", nominal = 0.5)]
     position: [f64; 2],
     /// Velocities
-    #[fmu(derivative_of = position, depends(force), initially(mass))]
+    #[fmu(derivative_of = position, name = "der(position)", depends(force), initially(mass))]
     velocity: [f64; 2],
+    /// Gains
+    #[fmu(parameter, start = [[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]])]
+    gain: [[f64; 2]; 3],
+    #[fmu(output, depends())]
+    table: [[i32; 1]; 2],
     /// Mass
     #[fmu(parameter, unit = "kg", quantity = "Mass", min = 1e-3, start = 1)]
     mass: f64,
@@ -75,8 +80,9 @@ fn dependencies(description: &ModelDescription, name: &str) -> Vec<String> {
 fn the_fields_are_the_variables_in_their_order() {
     let description = description();
     let names: Vec<_> = description.variables.iter().map(|own| own.name.as_str()).collect();
-    let expected = "time force[1] force[2] position[1] position[2] velocity[1] velocity[2] mass mode \
-                    count power enabled label inverse guess limit type";
+    let expected = "time force[1] force[2] position[1] position[2] der(position[1]) \
+                    der(position[2]) gain[1,1] gain[1,2] gain[2,1] gain[2,2] gain[3,1] gain[3,2] \
+                    table[1,1] table[2,1] mass mode count power enabled label inverse guess limit type";
     assert_eq!(names, expected.split_whitespace().collect::<Vec<_>>());
     assert_eq!(description.problems(), []);
     assert_eq!(description.model_name, "Everything");
@@ -99,9 +105,10 @@ fn roles_types_and_attributes_are_described() {
         Some("Positions of the masses, from left to right")
     );
     assert_eq!((position.causality, position.initial), (Causality::Output, Some(Initial::Exact)));
+    assert_eq!((real("gain[1,2]").start, real("gain[3,1]").start), (Some(2.0), Some(5.0)));
     assert!(real("position[2]").reinit);
     assert_eq!(real("position[2]").nominal, Some(0.5));
-    assert_eq!(real("velocity[2]").derivative, Some(5));
+    assert_eq!(real("der(position[2])").derivative, Some(5));
     assert_eq!(real("mass").quantity.as_deref(), Some("Mass"));
     assert_eq!((real("mass").min, real("mass").max), (Some(1e-3), None));
     assert!(matches!(&find("mode").kind, Kind::Enumeration(own) if own.start == Some(1)));
@@ -124,7 +131,7 @@ fn an_output_depends_on_all_inputs_and_states_unless_it_says_otherwise() {
     );
     assert_eq!(dependencies(&description, "position[2]"), ["position[2]"]);
     assert_eq!(dependencies(&description, "count"), <[String; 0]>::default());
-    assert_eq!(dependencies(&description, "velocity[1]"), ["force[1]", "force[2]"]);
+    assert_eq!(dependencies(&description, "der(position[1])"), ["force[1]", "force[2]"]);
     let kinds = description.structure.derivatives.iter().map(|row| row.kinds.clone());
     assert!(kinds.flatten().flatten().all(|kind| kind == DependencyKind::Dependent));
 }
