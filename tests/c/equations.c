@@ -9,6 +9,8 @@
  * The FMU requests the end of the simulation at the time `end`. It discards states with h < `floor`.
  * Events take two iterations.
  *
+ * With UNREADABLE_INPUTS it refuses to read u.
+ *
  * It is strict: a call that section 3.2.3 forbids in its state, and a time before the last event or
  * after the next one, end the process by SIGABRT. */
 #include "fmi2.h"
@@ -232,6 +234,11 @@ EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference referenc
     derive(now);
     for (size_t i = 0; i < count; i++) {
         demand(references[i] < REALS);
+#ifdef UNREADABLE_INPUTS
+        if (references[i] == U) {
+            return fmi2Error;
+        }
+#endif
         values[i] = now->real[references[i]];
     }
     return fmi2OK;

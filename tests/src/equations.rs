@@ -3,7 +3,6 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::OnceLock;
 
 use fmu_description::package::{Package, platforms};
 
@@ -41,28 +40,34 @@ pub const GRAVITY: f64 = 9.81;
 /// If it cannot be built or written.
 #[must_use]
 pub fn write(folder: &Path) -> PathBuf {
+    write_with(folder, &[])
+}
+
+/// Writes the FMU, built with these definitions.
+///
+/// # Panics
+///
+/// If it cannot be built or written.
+#[must_use]
+pub fn write_with(folder: &Path, definitions: &[&str]) -> PathBuf {
     let mut package = Package::new(description());
     let suffix = std::env::consts::DLL_SUFFIX;
-    let library = library().to_owned();
-    package.add(format!("binaries/{}/equations{suffix}", platforms()[0]), library);
+    package.add(format!("binaries/{}/equations{suffix}", platforms()[0]), library(definitions));
     let path = folder.join("equations.fmu");
     package.write(&path).unwrap_or_else(|error| panic!("{error}"));
     path
 }
 
-/// Builds the shared library once.
-fn library() -> &'static [u8] {
-    static LIBRARY: OnceLock<Vec<u8>> = OnceLock::new();
-    LIBRARY.get_or_init(|| {
-        let folder = tempfile::tempdir().unwrap_or_else(|error| panic!("{error}"));
-        let target = folder.path().join("equations");
-        let mut compiler = Command::new("cc");
-        compiler.current_dir(root().join("tests/c"));
-        compiler.args(["-std=c11", "-shared", "-fPIC", "-fvisibility=hidden", "-Wall"]);
-        compiler.args(["-Wextra", "-Werror", "-o"]).arg(&target).args(["equations.c", "-lm"]);
-        assert!(compiler.status().is_ok_and(|status| status.success()), "{compiler:?} fails");
-        fs::read(&target).unwrap_or_else(|error| panic!("{error}"))
-    })
+/// Builds the shared library.
+fn library(definitions: &[&str]) -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap_or_else(|error| panic!("{error}"));
+    let target = folder.path().join("equations");
+    let mut compiler = Command::new("cc");
+    compiler.current_dir(root().join("tests/c")).args(definitions);
+    compiler.args(["-std=c11", "-shared", "-fPIC", "-fvisibility=hidden", "-Wall"]);
+    compiler.args(["-Wextra", "-Werror", "-o"]).arg(&target).args(["equations.c", "-lm"]);
+    assert!(compiler.status().is_ok_and(|status| status.success()), "{compiler:?} fails");
+    fs::read(&target).unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn description() -> String {

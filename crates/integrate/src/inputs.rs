@@ -12,6 +12,8 @@ pub(crate) const ORDERS: usize = 3;
 pub(crate) struct Inputs {
     /// Value references, ascending.
     references: Vec<u32>,
+    /// Their start values in the description, 0 if there is none.
+    starts: Vec<f64>,
     pub(crate) tracks: Vec<Track>,
     /// The inputs with a derivative other than zero, their value references and present values.
     moving: Vec<usize>,
@@ -46,12 +48,19 @@ impl Inputs {
                 && variable.variability == Variability::Continuous
                 && matches!(variable.kind, Kind::Real(_))
         });
-        let mut references: Vec<u32> = continuous.map(|own| own.value_reference).collect();
-        references.sort_unstable();
-        references.dedup();
+        let start = |kind: &Kind| match kind {
+            Kind::Real(real) => real.start.unwrap_or(0.0),
+            _ => 0.0,
+        };
+        let mut all: Vec<_> =
+            continuous.map(|own| (own.value_reference, start(&own.kind))).collect();
+        all.sort_by_key(|(reference, _)| *reference);
+        all.dedup_by_key(|(reference, _)| *reference);
+        let (references, starts): (Vec<u32>, Vec<f64>) = all.into_iter().unzip();
         let count = references.len();
         Self {
             references,
+            starts,
             tracks: vec![Track::default(); count],
             moving: Vec::with_capacity(count),
             moving_references: Vec::with_capacity(count),
@@ -59,18 +68,21 @@ impl Inputs {
         }
     }
 
-    /// Reads the start values.
+    /// Reads the values at the start. An input that the FMU does not let read has its start value.
     pub(crate) fn read(
         &mut self,
         instance: &mut dyn ModelExchange,
         time: f64,
     ) -> Result<(), CallError> {
-        let mut values = vec![0.0; self.references.len()];
-        if !values.is_empty() {
-            instance.get_real(&self.references, &mut values)?;
-        }
-        for (track, value) in self.tracks.iter_mut().zip(values) {
-            *track = Track { origin: time, value, derivatives: [0.0; ORDERS] };
+        let inputs = self.references.iter().zip(&self.starts).zip(&mut self.tracks);
+        for ((reference, start), track) in inputs {
+            let mut value = [*start];
+            match instance.get_real(&[*reference], &mut value) {
+                Ok(()) => {}
+                Err(error) if error.leaves_the_instance_usable() => value = [*start],
+                Err(error) => return Err(error),
+            }
+            *track = Track { origin: time, value: value[0], derivatives: [0.0; ORDERS] };
         }
         Ok(())
     }

@@ -205,9 +205,9 @@ impl Integrated {
 
     /// Returns the error of a step that could not be made.
     fn stopped(&self, error: StepError) -> CallError {
-        let (size, state, cause) = match error {
+        let (size, state, is_finite, cause) = match error {
             StepError::Call(error) => return error,
-            StepError::Size { size, state, cause } => (size, state, cause),
+            StepError::Size { size, state, is_finite, cause } => (size, state, is_finite, cause),
         };
         let (refused, messages) = match cause {
             Some(CallError { function, messages, .. }) => (Some(function), messages),
@@ -215,6 +215,9 @@ impl Integrated {
         };
         let why = match refused {
             Some(function) => format!("{function} returned {}", Status::Discard.name()),
+            None if !is_finite => {
+                format!("{} is NaN or infinite, or its derivative", self.name_of_state(state))
+            }
             None => format!(
                 "{} is not within the tolerance {:e}; a larger tolerance or the solver `stiff` may \
                  help",

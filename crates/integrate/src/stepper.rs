@@ -53,8 +53,10 @@ pub(crate) enum StepError {
     Size {
         /// The step in s.
         size: f64,
-        /// The state with the largest error.
+        /// The state with the largest error, or the first one without a finite value or derivative.
         state: usize,
+        /// Whether the error of this state is finite.
+        is_finite: bool,
         /// Why the FMU refused the last trial step, if it did.
         cause: Option<CallError>,
     },
@@ -143,7 +145,8 @@ impl Stepper {
             if !is_last
                 && size < 16.0 * f64::EPSILON * time.abs().max(f64::MIN_POSITIVE / f64::EPSILON)
             {
-                return Err(StepError::Size { size, state: self.worst(), cause });
+                let (state, is_finite) = self.worst();
+                return Err(StepError::Size { size, state, is_finite, cause });
             }
             match self.attempt(derivative, (time, size), &mut linearised) {
                 Ok(error) if error <= 1.0 => {
@@ -297,17 +300,20 @@ impl Stepper {
         Ok(size.min(100.0 * guess))
     }
 
-    /// The state with the largest error of the last step, or the first one that is not finite.
-    fn worst(&self) -> usize {
+    /// The first state of the last step without a finite error, otherwise the one with the largest error;
+    /// and whether its error is finite.
+    fn worst(&self) -> (usize, bool) {
         let error = match &self.stiff {
             Some(method) if self.last_is_stiff => method.error(),
             _ => &self.explicit.error,
         };
         let end = self.end();
         let ratio = |i: usize| error[i].abs() / self.scale.weight(i, self.start[i], end[i]);
-        let broken = (0..error.len()).find(|&i| !ratio(i).is_finite());
-        let most = || (0..error.len()).max_by(|&a, &b| ratio(a).total_cmp(&ratio(b)));
-        broken.or_else(most).unwrap_or(0)
+        if let Some(broken) = (0..error.len()).find(|&i| !ratio(i).is_finite()) {
+            return (broken, false);
+        }
+        let most = (0..error.len()).max_by(|&a, &b| ratio(a).total_cmp(&ratio(b)));
+        (most.unwrap_or(0), true)
     }
 }
 

@@ -26,10 +26,16 @@ struct Instance {
 }
 
 impl Instance {
-    /// An instance with these parameters, initialised with these inputs, at 0 s.
+    /// An instance with these parameters, initialised, at 0 s.
     fn new(method: Method, parameters: &[(u32, f64)]) -> Self {
+        Self::built(&[], method, parameters)
+    }
+
+    /// The same, of an FMU built with these definitions.
+    fn built(definitions: &[&str], method: Method, parameters: &[(u32, f64)]) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let fmu = Fmu::open_any(&equations::write(folder.path())).unwrap();
+        let path = equations::write_with(folder.path(), definitions);
+        let fmu = Fmu::open_any(&path).unwrap();
         let equations = fmu.instantiate_equations("equations").unwrap();
         let mut slave = Integrated::new(equations, Options { method });
         let experiment = Experiment { tolerance: Some(TOLERANCE), ..Experiment::default() };
@@ -242,4 +248,42 @@ fn a_step_from_another_time_is_refused() {
     let mut instance = Instance::new(Method::Automatic, &[]);
     let error = instance.slave.do_step(0.5, 0.1, true).unwrap_err();
     assert!(error.to_string().contains("the last step ended at 0 s"), "{error}");
+}
+
+#[test]
+fn a_parameter_that_keeps_its_value_is_not_set_beside_an_input() {
+    let mut instance = Instance::new(Method::Automatic, &[(E, 0.8)]);
+    instance.steps(0, 1, 0.1);
+    // The FMU would end the process if `e` were set now.
+    instance.slave.set_real(&[E, U], &[0.8, 2.0]).unwrap();
+    instance.steps(1, 1, 0.1);
+    assert!((instance.real(U) - 2.0).abs() < 1e-15);
+    let exact = 2.0 - (2.0 - (-0.1_f64).exp()) * (-0.1_f64).exp();
+    assert!((instance.real(X) - exact).abs() < 1e-7);
+}
+
+#[test]
+fn a_communication_step_allocates_nothing() {
+    let mut instance = Instance::new(Method::Stiff, &[]);
+    instance.steps(0, 2, 0.1);
+    instance.slave.save_state(0).unwrap();
+    let counted = allocation_counter::measure(|| {
+        instance.slave.save_state(0).unwrap();
+        for k in 2..20 {
+            let time = 0.1 * f64::from(k);
+            instance.slave.set_real(&[U], &[time]).unwrap();
+            instance.slave.set_input_derivatives(&[U], &[1], &[1.0]).unwrap();
+            instance.slave.do_step(time, 0.1, true).unwrap();
+        }
+    });
+    assert_eq!(counted.count_total, 0);
+}
+
+#[test]
+fn an_fmu_whose_inputs_cannot_be_read_is_integrated() {
+    let mut instance = Instance::built(&["-DUNREADABLE_INPUTS"], Method::Automatic, &[]);
+    instance.slave.set_input_derivatives(&[U], &[1], &[1.0]).unwrap();
+    instance.steps(0, 1, 1.0);
+    // u = t, x = t - 1 + 2 e^-t
+    assert!((instance.real(X) - 2.0 * (-1.0_f64).exp()).abs() < 1e-7);
 }

@@ -16,6 +16,32 @@ impl Integrated {
     }
 }
 
+impl Integrated {
+    /// Whether a variable that is no continuous input would get a new value.
+    fn changes_discrete(&mut self, references: &[u32], values: &[f64]) -> bool {
+        self.reals.resize(references.len(), 0.0);
+        if self.instance.get_real(references, &mut self.reals).is_err() {
+            return true;
+        }
+        let mut all = references.iter().zip(values).zip(&self.reals);
+        all.any(|((&reference, value), known)| {
+            value.to_bits() != known.to_bits() && !self.inputs.contain(&[reference])
+        })
+    }
+
+    /// Sets the continuous inputs among `references`.
+    fn set_continuous(&mut self, references: &[u32], values: &[f64]) -> Result<(), CallError> {
+        for (&reference, &value) in references.iter().zip(values) {
+            if self.inputs.contain(&[reference]) {
+                self.inputs.record(self.point.time, &[reference], &[value]);
+                self.instance.set_real(&[reference], &[value])?;
+                self.point.input_changed = true;
+            }
+        }
+        Ok(())
+    }
+}
+
 impl Slave for Integrated {
     fn description(&self) -> &ModelDescription {
         &self.description
@@ -61,12 +87,9 @@ impl Slave for Integrated {
         if self.point.mode == Mode::Setup {
             return self.instance.set_real(references, values);
         }
-        if !self.inputs.contain(references) {
-            self.reals.resize(references.len(), 0.0);
-            let known = self.instance.get_real(references, &mut self.reals);
-            let bits = |value: &f64| value.to_bits();
-            if known.is_ok() && self.reals.iter().map(bits).eq(values.iter().map(bits)) {
-                return Ok(());
+        if self.point.mode == Mode::Continuous && !self.inputs.contain(references) {
+            if !self.changes_discrete(references, values) {
+                return self.set_continuous(references, values);
             }
             self.prepare_change()?;
         }

@@ -1,6 +1,6 @@
 //! A communication step: integration from event to event.
 
-use slave::{CallError, StepResult};
+use slave::{CallError, CompletedStep, Failure, StepResult};
 use solve::Bracket;
 
 use super::events::check_indicators;
@@ -123,7 +123,11 @@ impl Integrated {
         }
         self.point.time = time;
         if self.instance.needs_completed_integrator_step() {
-            let done = self.instance.completed_integrator_step(never_back)?;
+            let done = match self.instance.completed_integrator_step(never_back) {
+                // An FMU that lacks the function does not need it.
+                Err(CallError { failure: Failure::Missing, .. }) => CompletedStep::default(),
+                done => done?,
+            };
             self.point.ends |= done.terminate_simulation;
             if done.enter_event_mode && !self.point.ends {
                 return self.enter_event();

@@ -32,7 +32,10 @@ fn an_fmu_without_co_simulation_runs_and_the_explanation_says_how() {
     let results = fs::read_to_string(folder.path().join("results.csv")).unwrap();
     let names: Vec<&str> = results.lines().next().unwrap().split(',').collect();
     let last: Vec<&str> = results.lines().last().unwrap().split(',').collect();
-    let at = |name: &str| last[names.iter().position(|own| *own == name).unwrap()];
+    let at = |name: &str| {
+        let column = names.iter().position(|own| own.trim_matches('"') == name);
+        last[column.unwrap_or_else(|| panic!("{name} in {names:?}"))]
+    };
     let decay: f64 = at("equations.x").parse().unwrap();
     assert!((decay - (-1.0_f64).exp()).abs() < 1e-6, "{decay}");
     assert_eq!(at("equations.ticks"), "4");
@@ -103,4 +106,29 @@ fn check_says_that_the_master_integrates_it() {
     let (_folder, path) = fmu();
     let (_, said, _) = output(&["check", &path]);
     assert!(said.contains("model exchange only; `aso-ftc run` integrates it"), "{said}");
+}
+
+#[test]
+fn a_system_structure_selects_model_exchange() {
+    let (folder, _) = fmu();
+    let structure = r#"<?xml version="1.0" encoding="UTF-8"?>
+<ssd:SystemStructureDescription name="one" version="1.0"
+  xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription">
+<ssd:System name="system"><ssd:Elements>
+<ssd:Component name="m" source="equations.fmu" implementation="IMPLEMENTATION"/>
+</ssd:Elements></ssd:System>
+</ssd:SystemStructureDescription>
+"#;
+    let out = folder.path().display().to_string();
+    for (implementation, warned) in [("ModelExchange", false), ("CoSimulation", true)] {
+        let path = folder.path().join("system.ssd");
+        fs::write(&path, structure.replace("IMPLEMENTATION", implementation)).unwrap();
+        let path = path.display().to_string();
+        let (status, said, errors) = output(&["run", &path, "--out", &out, "--explain"]);
+        assert_eq!(status, Some(0), "{errors}");
+        assert!(said.contains("m runs by model exchange"), "{said}");
+        let warning =
+            "asks for co-simulation, which cannot be run with this FMU: its model exchange";
+        assert_eq!(errors.contains(warning), warned, "{errors}");
+    }
 }
