@@ -16,10 +16,10 @@ pub mod isolate;
 mod library;
 
 pub use call_log::{CallLog, LoggedSlave};
-pub use described::{DescriptionError, described};
+pub use described::{DescriptionError, described, described_as};
 pub use error::LoadError;
 pub use fmu::{Fmu, FmuError, Instance};
-pub use library::{Component, Interface, describe, preload};
+pub use library::{Component, Interface, describe, describe_as, preload};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
