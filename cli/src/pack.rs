@@ -11,9 +11,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use fmu_description::ModelDescription;
 use fmu_description::documentation::page;
 use fmu_description::package::Package;
+use fmu_description::{ModelDescription, Version};
 
 use figure::rasterise;
 
@@ -39,7 +39,12 @@ pub(crate) struct Options {
     /// Folder for the FMUs
     #[arg(long, value_name = "FOLDER", default_value = "dist")]
     out: PathBuf,
-    /// Also write the model descriptions into the folder modelDescription of the workspace
+    /// Versions of FMI: `2` writes MODEL.fmu of FMI 2.0, `3` writes MODEL.fmi3.fmu of FMI 3.0, `both`
+    /// writes both. All have the same library
+    #[arg(long, value_name = "VERSION", default_value = "2")]
+    fmi: Versions,
+    /// Also write the model descriptions of FMI 2.0 and 3.0 into the folder modelDescription of the
+    /// workspace
     #[arg(long, conflicts_with = "crates")]
     update_descriptions: bool,
     /// Also write InvertedPendulum.ssp: both FMUs of this workspace, connected, with a stop time of
@@ -52,6 +57,29 @@ pub(crate) struct Options {
     /// Also write a bill of materials for each FMU; needs a command built with the feature `sbom`
     #[arg(long)]
     sbom: bool,
+}
+
+/// The versions of FMI to pack.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Versions {
+    /// FMI 2.0.
+    #[value(name = "2")]
+    Two,
+    /// FMI 3.0.
+    #[value(name = "3")]
+    Three,
+    /// Both, in two archives.
+    Both,
+}
+
+impl Versions {
+    fn list(self) -> &'static [Version] {
+        match self {
+            Versions::Two => &[Version::V2],
+            Versions::Three => &[Version::V3],
+            Versions::Both => &[Version::V2, Version::V3],
+        }
+    }
 }
 
 /// Builds and packs the given crates or all models of the workspace.
@@ -67,11 +95,14 @@ pub(crate) fn pack(options: &Options) -> anyhow::Result<bool> {
         binaries: options.binaries.as_deref(),
         sbom: options.sbom,
         locked: options.crates.is_empty(),
+        versions: options.fmi,
     };
     for folder in &options.crates {
-        let fmu = pack_crate(folder, &packing)
+        let fmus = pack_crate(folder, &packing)
             .with_context(|| format!("cannot pack {}", folder.display()))?;
-        println!("{}", fmu.path.display());
+        for fmu in fmus {
+            println!("{}", fmu.path.display());
+        }
     }
     if !options.crates.is_empty() {
         return Ok(true);
@@ -79,15 +110,15 @@ pub(crate) fn pack(options: &Options) -> anyhow::Result<bool> {
     let root = workspace()?;
     let fmus = pack_models(&root, &packing)?;
     for fmu in &fmus {
-        if options.update_descriptions {
-            let name = format!("{}.xml", fmu.description.model_name);
-            let target = root.join("modelDescription").join(name);
-            fs::write(&target, &fmu.xml)
-                .with_context(|| format!("cannot write {}", target.display()))?;
-        }
         println!("{}", fmu.path.display());
     }
+    if options.update_descriptions {
+        update_descriptions(&root)?;
+    }
     if options.ssp {
+        let version = packing.versions.list()[0];
+        let of_version = |fmu: &PackedFmu| fmu.description.version() == version;
+        let fmus: Vec<_> = fmus.into_iter().filter(of_version).collect();
         println!("{}", ssp::write(&fmus, &options.out)?.display());
     }
     Ok(true)
@@ -103,22 +134,51 @@ struct PackOptions<'a> {
     sbom: bool,
     /// `--locked` of cargo.
     locked: bool,
+    versions: Versions,
 }
 
 /// A packed FMU.
 pub(crate) struct PackedFmu {
     pub(crate) path: PathBuf,
-    xml: String,
     description: ModelDescription,
 }
 
 /// Builds all models of the workspace `root` and packs each into the folder `out`.
 pub(crate) fn pack_into(root: &Path, out: &Path) -> anyhow::Result<Vec<PackedFmu>> {
-    pack_models(root, &PackOptions { out, binaries: None, sbom: false, locked: true })
+    let versions = Versions::Two;
+    pack_models(root, &PackOptions { out, binaries: None, sbom: false, locked: true, versions })
 }
 
 fn pack_models(root: &Path, packing: &PackOptions<'_>) -> anyhow::Result<Vec<PackedFmu>> {
-    MODELS.iter().map(|model| pack_crate(&root.join(model), packing)).collect()
+    let packed: Vec<_> = MODELS
+        .iter()
+        .map(|model| pack_crate(&root.join(model), packing))
+        .collect::<anyhow::Result<_>>()?;
+    Ok(packed.into_iter().flatten().collect())
+}
+
+/// Writes the model descriptions of both versions of FMI to the folder modelDescription.
+fn update_descriptions(root: &Path) -> anyhow::Result<()> {
+    for model in MODELS {
+        let folder = root.join(model);
+        let library = library::build(&folder, true, &[])?;
+        for &version in Versions::Both.list() {
+            let resources = folder.join("resources");
+            let (xml, description) =
+                fmu_import::described_as(&library.file, &resources, model, version)?;
+            let name = format!("{}.xml", file_stem(&description));
+            let target = root.join("modelDescription").join(name);
+            fs::write(&target, &xml)
+                .with_context(|| format!("cannot write {}", target.display()))?;
+        }
+    }
+    Ok(())
+}
+
+/// Name of the archive and of the committed description, without extension: `MODEL`, `MODEL.fmi3`.
+fn file_stem(description: &ModelDescription) -> String {
+    let name = &description.model_name;
+    if description.version() == Version::V3 { format!("{name}.fmi3") } else { name.clone() }
 }
 
 /// Returns the folder of this workspace: the nearest folder upwards with the models.
@@ -137,35 +197,45 @@ pub(crate) fn workspace() -> anyhow::Result<PathBuf> {
         })
 }
 
-fn pack_crate(folder: &Path, packing: &PackOptions<'_>) -> anyhow::Result<PackedFmu> {
+/// Builds the library of a crate and packs it, once for each version of FMI.
+fn pack_crate(folder: &Path, packing: &PackOptions<'_>) -> anyhow::Result<Vec<PackedFmu>> {
     let others = packing.binaries.map_or(Ok(Vec::new()), binaries::targets)?;
     let library = library::build(folder, packing.locked, &others)?;
+    let versions = packing.versions.list().iter();
+    versions.map(|&version| pack_version(folder, packing, &library, version)).collect()
+}
+
+fn pack_version(
+    folder: &Path,
+    packing: &PackOptions<'_>,
+    library: &library::Library,
+    version: Version,
+) -> anyhow::Result<PackedFmu> {
     let resources = folder.join("resources");
     let (xml, description) =
-        fmu_import::described(&library.file, &resources, &library.package.name)?;
-    let mut package = Package::new(xml.clone());
-    let identifier = &description.model_name;
+        fmu_import::described_as(&library.file, &resources, &library.package.name, version)?;
+    let mut package = Package::new(xml).for_version(version);
     let libraries = match packing.binaries {
         Some(folder) => binaries::collect(folder, &description)?,
-        None => vec![own_library(&library, &description)?],
+        None => vec![own_library(library, &description)?],
     };
     for (path, bytes) in libraries {
-        package.add(path, bytes);
+        package.add(binaries::path_in(version, path), bytes);
     }
     add_resources(&mut package, folder)?;
     add_documentation(&mut package, folder, &description)?;
-    add_picture(&mut package, folder)?;
-    licenses::add(&mut package, &library)?;
-    let path = packing.out.join(format!("{identifier}.fmu"));
+    add_picture(&mut package, folder, version)?;
+    licenses::add(&mut package, library)?;
+    let path = packing.out.join(format!("{}.fmu", file_stem(&description)));
     package.write(&path)?;
     #[cfg(feature = "sbom")]
     if packing.sbom {
-        let bill = sbom::bill(&description, &library, packing.binaries.is_some())?;
+        let bill = sbom::bill(&description, library, packing.binaries.is_some())?;
         let target = path.with_extension("cdx.json");
         files::whole::write(&target, &bill)
             .with_context(|| format!("cannot write {}", target.display()))?;
     }
-    Ok(PackedFmu { path, xml, description })
+    Ok(PackedFmu { path, description })
 }
 
 /// Returns path and bytes of the library that was built here, for the FMU.
@@ -173,7 +243,8 @@ fn own_library(
     library: &library::Library,
     description: &ModelDescription,
 ) -> anyhow::Result<(String, Vec<u8>)> {
-    let (platform, suffix) = (fmu_description::package::platforms(), std::env::consts::DLL_SUFFIX);
+    let platform = fmu_description::package::platforms_of(description.version());
+    let suffix = std::env::consts::DLL_SUFFIX;
     let platform = platform.first().context("FMI has no name for this platform")?;
     let path = format!("binaries/{platform}/{}{suffix}", description.model_name);
     Ok((path, read(&library.file)?))
@@ -227,8 +298,9 @@ fn add_documentation(
     Ok(())
 }
 
-/// Adds `model.png`, or a picture made from the drawing.
-fn add_picture(package: &mut Package, folder: &Path) -> anyhow::Result<()> {
+/// Adds `model.png`, or a picture made from the drawing; in FMI 3.0 it is the icon (section 2.5.1.5).
+fn add_picture(package: &mut Package, folder: &Path, version: Version) -> anyhow::Result<()> {
+    let target = if version == Version::V3 { "terminalsAndIcons/icon.png" } else { "model.png" };
     let picture = folder.join("model.png");
     let drawing = folder.join("documentation").join(DRAWING);
     if picture.is_file() {
@@ -236,12 +308,12 @@ fn add_picture(package: &mut Package, folder: &Path) -> anyhow::Result<()> {
         if !bytes.starts_with(b"\x89PNG\r\n\x1a\n") {
             bail!("{}: expected a PNG file", picture.display());
         }
-        package.add("model.png", bytes);
+        package.add(target, bytes);
     } else if drawing.is_file() {
         let svg = read(&drawing)?;
         let bytes = rasterise(&String::from_utf8_lossy(&svg))
             .with_context(|| format!("{}", drawing.display()))?;
-        package.add("model.png", bytes);
+        package.add(target, bytes);
     }
     Ok(())
 }

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use fmu_description::ModelDescription;
+use fmu_description::{ModelDescription, Version};
 
 use super::read;
 use crate::check::{Severity, binaries};
@@ -19,6 +19,15 @@ const TARGETS: [(&str, &[&str]); 8] = [
     ("aarch64-linux", &["aarch64-unknown-linux-gnu"]),
     ("aarch64-windows", &["aarch64-pc-windows-gnullvm"]),
     ("aarch64-darwin", &["aarch64-apple-darwin"]),
+];
+
+/// Platforms of FMI 2.0 and the tuples of FMI 3.0.
+const TUPLES: [(&str, &str); 5] = [
+    ("linux64", "x86_64-linux"),
+    ("linux32", "x86-linux"),
+    ("win64", "x86_64-windows"),
+    ("win32", "x86-windows"),
+    ("darwin64", "x86_64-darwin"),
 ];
 
 /// Returns the targets of the platforms in `folder`.
@@ -67,6 +76,18 @@ pub(super) fn collect(
     refuse_broken(&found, description)
         .with_context(|| format!("the libraries of {model} in {}", folder.display()))?;
     Ok(found)
+}
+
+/// Returns the path of a library in an FMU of `version`: FMI 3.0 has platform tuples only (section
+/// 2.5.1.4.1).
+pub(super) fn path_in(version: Version, path: String) -> String {
+    let folder = path.split('/').nth(1).unwrap_or_default();
+    match TUPLES.iter().find(|(name, _)| *name == folder) {
+        Some((name, tuple)) if version == Version::V3 => {
+            path.replacen(&format!("/{name}/"), &format!("/{tuple}/"), 1)
+        }
+        _ => path,
+    }
 }
 
 fn refuse_broken(

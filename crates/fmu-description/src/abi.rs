@@ -146,10 +146,14 @@ pub struct fmi2CallbackFunctions {
 /// Callback that receives text from `fmuDescribe`: context, bytes (not terminated), length.
 pub type DescribeSink = unsafe extern "C" fn(*mut c_void, *const c_char, usize);
 
-/// Name of the function that renders the model description of a library, the only one beyond the
-/// standard.
+/// Name of the function that renders the model description of FMI 2.0 of a library. It and
+/// [`DESCRIBE_3`] are the only ones beyond the standard.
 ///
 /// `int fmuDescribe(const char *resources, void *context, void (*sink)(void *context, const char
 /// *text, size_t length))` passes the XML to `sink` and returns 0, or passes an error message and
 /// returns 1.
 pub const DESCRIBE: &str = "fmuDescribe";
+
+/// Name of the function that renders the model description of FMI 3.0; the signature is the one of
+/// [`DESCRIBE`].
+pub const DESCRIBE_3: &str = "fmuDescribe3";

@@ -55,6 +55,12 @@ states! {
     Error,
     /// After a function returned `fmi2Fatal`.
     Fatal,
+    /// FMI 3.0: after `fmi3EnterConfigurationMode` in state `Instantiated`.
+    ConfigurationMode,
+    /// FMI 3.0: after `fmi3EnterConfigurationMode` in event mode or step mode.
+    ReconfigurationMode,
+    /// FMI 3.0: during `fmi3IntermediateUpdateCallback`.
+    IntermediateUpdateMode,
 }
 
 const I: u16 = State::Instantiated.bit();

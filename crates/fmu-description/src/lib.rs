@@ -18,6 +18,7 @@ pub mod abi;
 pub mod abi1;
 pub mod abi3;
 pub mod call_order;
+pub mod call_order3;
 mod description;
 pub mod documentation;
 mod experiment;

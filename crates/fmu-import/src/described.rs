@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use fmu_description::{ModelDescription, ParseError};
+use fmu_description::{ModelDescription, ParseError, Version};
 
 use crate::error::LoadError;
-use crate::library::describe;
+use crate::library::describe_as;
 
 /// Why the model description that a library generates cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -28,8 +28,10 @@ pub enum DescriptionError {
         source: ParseError,
     },
     /// The description breaks rules of the standard.
-    #[error("the variables of {name} break rules of FMI 2.0.5:\n{}", problems.join("\n"))]
+    #[error("the variables of {name} break rules of {}:\n{}", version.release(), problems.join("\n"))]
     Rules {
+        /// The version of FMI.
+        version: Version,
         /// Name of the model for the user.
         name: String,
         /// The rules, each with its section.
@@ -49,7 +51,21 @@ pub fn described(
     resources: &Path,
     name: &str,
 ) -> Result<(String, ModelDescription), DescriptionError> {
-    let xml = describe(file, resources)
+    described_as(file, resources, name, Version::V2)
+}
+
+/// Returns the model description of FMI 2.0 or 3.0 of the library at `file`; see [`described`].
+///
+/// # Errors
+///
+/// Same as [`described`].
+pub fn described_as(
+    file: &Path,
+    resources: &Path,
+    name: &str,
+    version: Version,
+) -> Result<(String, ModelDescription), DescriptionError> {
+    let xml = describe_as(file, resources, version)
         .map_err(|source| DescriptionError::None { name: name.to_owned(), source })?;
     let (description, warnings) = ModelDescription::read(xml.as_bytes())
         .map_err(|source| DescriptionError::Unreadable { name: name.to_owned(), source })?;
@@ -59,6 +75,6 @@ pub fn described(
     if problems.is_empty() {
         Ok((xml, description))
     } else {
-        Err(DescriptionError::Rules { name: name.to_owned(), problems })
+        Err(DescriptionError::Rules { version, name: name.to_owned(), problems })
     }
 }

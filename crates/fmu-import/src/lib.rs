@@ -20,11 +20,11 @@ mod v2;
 mod v3;
 
 pub use call_log::{CallLog, LoggedSlave};
-pub use described::{DescriptionError, described};
+pub use described::{DescriptionError, described, described_as};
 pub use error::LoadError;
 pub use fmu::{Fmu, FmuError};
 pub use instance::Instance;
-pub use library::{Component, Interface, describe, preload};
+pub use library::{Component, Interface, describe, describe_as, preload};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -19,9 +19,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use fmu_description::Version;
 use fmu_description::abi::{
-    CO_SIMULATION, DESCRIBE, DescribeSink, MODEL_EXCHANGE, Status, fmi2CallbackFunctions,
-    fmi2Component, fmi2FMUstate, fmi2Status,
+    CO_SIMULATION, DESCRIBE, DESCRIBE_3, DescribeSink, MODEL_EXCHANGE, Status,
+    fmi2CallbackFunctions, fmi2Component, fmi2FMUstate, fmi2Status,
 };
 use libloading::Library as Handle;
 
@@ -109,6 +110,15 @@ pub fn preload(library: &OsStr) -> Result<(), LoadError> {
 /// [`LoadError`] if the library does not load, was not exported by the crate `fmu`
 /// ([`LoadError::Missing`]), or rejects `resources` ([`LoadError::Describe`]).
 pub fn describe(path: &Path, resources: &Path) -> Result<String, LoadError> {
+    describe_as(path, resources, Version::V2)
+}
+
+/// Returns the model description of FMI 2.0 or 3.0 that a library exported by `fmu::export!` generates.
+///
+/// # Errors
+///
+/// Same as [`describe`].
+pub fn describe_as(path: &Path, resources: &Path, version: Version) -> Result<String, LoadError> {
     unsafe extern "C" fn sink(context: *mut c_void, text: *const c_char, length: usize) {
         // SAFETY: `context` is the buffer below; the library gives `length` bytes.
         unsafe {
@@ -118,9 +128,10 @@ pub fn describe(path: &Path, resources: &Path) -> Result<String, LoadError> {
     }
     type Describe = unsafe extern "C" fn(*const c_char, *mut c_void, DescribeSink) -> c_int;
     let handle = load(path)?;
+    let name = if version == Version::V3 { DESCRIBE_3 } else { DESCRIBE };
     // SAFETY: `fmu::export!` gives this name this signature.
-    let describe = unsafe { handle.get::<Describe>(DESCRIBE.as_bytes()) }
-        .map_err(|_| LoadError::Missing { path: path.to_owned(), function: DESCRIBE.to_owned() })?;
+    let describe = unsafe { handle.get::<Describe>(name.as_bytes()) }
+        .map_err(|_| LoadError::Missing { path: path.to_owned(), function: name.to_owned() })?;
     let folder = c_string(&resources.display().to_string());
     let mut text = Vec::<u8>::new();
     // SAFETY: a terminated path, and a sink that fits its context.

@@ -5,6 +5,7 @@
 
 mod entry;
 mod exports;
+pub mod fmi3;
 
 use std::cell::UnsafeCell;
 use std::ffi::{CStr, CString, c_char, c_void};
@@ -21,16 +22,20 @@ pub use entry::*;
 pub use exports::signature;
 
 use crate::fence::{HookGuard, guarded, outside};
-use crate::instance::Instance;
+use crate::instance::{Function, Instance, Snapshot};
 use crate::model::{Failure, Model};
-use fmu_description::call_order::{Function, InterfaceType};
+use fmu_description::ModelDescription;
+use fmu_description::abi3::{fmi3InstanceEnvironment, fmi3LogMessageCallback, fmi3Status};
+use fmu_description::call_order::InterfaceType;
 use fmu_description::location::{NO_FOLDER, path_from_uri};
 
-/// The importer's callbacks and the name of the instance.
+/// The importer's logger, with what it takes besides a message.
 #[derive(Clone)]
-pub(crate) struct Callbacks {
-    functions: fmi2CallbackFunctions,
-    instance_name: CString,
+pub(crate) enum Callbacks {
+    /// FMI 2.0.
+    Version2 { functions: fmi2CallbackFunctions, instance_name: CString },
+    /// FMI 3.0.
+    Version3 { environment: fmi3InstanceEnvironment, log: Option<fmi3LogMessageCallback> },
 }
 
 // SAFETY: by the standard the importer's callbacks may be called from any thread that calls the FMU;
@@ -41,37 +46,35 @@ impl Callbacks {
     /// Callbacks that do nothing.
     #[cfg(test)]
     pub(crate) fn silent() -> Self {
-        let functions = fmi2CallbackFunctions {
-            logger: None,
-            allocate_memory: None,
-            free_memory: None,
-            step_finished: None,
-            component_environment: std::ptr::null_mut(),
-        };
-        Self { functions, instance_name: CString::default() }
+        Self::Version3 { environment: std::ptr::null_mut(), log: None }
     }
 
-    /// Sends a message to the importer's logger. The format string is `%s`; `#`, by which the standard
-    /// marks value references, is doubled.
+    /// Sends a message to the importer's logger. The format string of FMI 2.0 is `%s`; `#`, by which the
+    /// standard marks value references, is doubled.
     pub(crate) fn log(&self, status: Status, category: &str, message: &str) {
-        let Some(logger) = self.functions.logger else { return };
         let c_string = |text: &str| CString::new(text.replace('\0', "")).unwrap_or_default();
         let (category, message) = (c_string(category), c_string(&message.replace('#', "##")));
-        // SAFETY: the logger has this signature by the standard; all strings outlive the call.
-        outside(|| unsafe {
-            logger(
-                self.functions.component_environment,
-                self.instance_name.as_ptr(),
-                status as fmi2Status,
-                category.as_ptr(),
-                c"%s".as_ptr(),
-                message.as_ptr(),
-            );
-        });
+        let (category, message) = (category.as_ptr(), message.as_ptr());
+        match self {
+            Self::Version2 { functions, instance_name } => {
+                let Some(logger) = functions.logger else { return };
+                let (environment, name) = (functions.component_environment, instance_name.as_ptr());
+                let status = status as fmi2Status;
+                // SAFETY: the logger has this signature by the standard; all strings outlive the call.
+                outside(|| unsafe {
+                    logger(environment, name, status, category, c"%s".as_ptr(), message);
+                });
+            }
+            Self::Version3 { environment, log } => {
+                let Some(log) = log else { return };
+                // SAFETY: the logger has this signature by the standard; all strings outlive the call.
+                outside(|| unsafe { log(*environment, status as fmi3Status, category, message) });
+            }
+        }
     }
 }
 
-/// The target of `fmi2Component`: an instance that allows one call at a time.
+/// The target of `fmi2Component` and `fmi3Instance`: an instance that allows one call at a time.
 struct Component<M: Model> {
     busy: AtomicBool,
     instance: UnsafeCell<Instance<M>>,
@@ -80,13 +83,13 @@ struct Component<M: Model> {
 /// Runs a call of an instance: checks for null and for a call in progress, then calls
 /// [`Instance::call`] (call order, panic fence, message and status).
 ///
-/// A call from a callback during another call of the same instance returns `fmi2Error` without effect
+/// A call from a callback during another call of the same instance returns an error without effect
 /// (for a synchronous slave this is the state stepInProgress). Simultaneous calls from several threads,
 /// which section 2.1 forbids, are detected in most cases only: an atomic exchange would double the
 /// cost of reading one value.
-unsafe fn dispatch<M: Model>(
+unsafe fn dispatch<M: Model, F: Function>(
     component: fmi2Component,
-    function: Function,
+    function: F,
     body: impl FnOnce(&mut Instance<M>) -> Result<(), Failure>,
 ) -> fmi2Status {
     // SAFETY: a component that is not null is one that `instantiate` made for this `M`.
@@ -162,6 +165,31 @@ unsafe fn borrow_state<'a>(pointer: *mut fmi2FMUstate) -> Result<&'a mut fmi2FMU
     unsafe { pointer.as_mut() }.ok_or_else(|| null_pointer("FMUstate"))
 }
 
+/// Returns the snapshot to which an FMU state points.
+unsafe fn snapshot<'a, M: Model>(state: fmi2FMUstate) -> Result<&'a Snapshot<M>, Failure> {
+    // SAFETY: a state that is not null is a snapshot that this library made.
+    unsafe { state.cast::<Snapshot<M>>().as_ref() }.ok_or_else(|| null_pointer("FMUstate"))
+}
+
+/// Writes a snapshot to the FMU state in `place`, or makes one if it is null.
+unsafe fn store<M: Model>(place: &mut fmi2FMUstate, snapshot: Snapshot<M>) {
+    // SAFETY: a state that is not null is a snapshot that this library made.
+    if let Some(old) = unsafe { place.cast::<Snapshot<M>>().as_mut() } {
+        *old = snapshot;
+    } else {
+        *place = Box::into_raw(Box::new(snapshot)).cast();
+    }
+}
+
+/// Frees the snapshot in `place` and sets the FMU state to null.
+unsafe fn free_state<M: Model>(place: &mut fmi2FMUstate) {
+    if !place.is_null() {
+        let state = std::mem::replace(place, std::ptr::null_mut());
+        // SAFETY: a state that is not null is a snapshot that this library made.
+        drop(unsafe { Box::from_raw(state.cast::<Snapshot<M>>()) });
+    }
+}
+
 unsafe fn text(pointer: fmi2String, what: &str) -> Result<String, Failure> {
     if pointer.is_null() {
         return Err(null_pointer(what));
@@ -218,13 +246,15 @@ pub unsafe fn instantiate<M: Model>(
 ) -> fmi2Component {
     // SAFETY: the callbacks are readable during this call; only a copy is kept.
     let Ok([functions]) = (unsafe { read(functions, 1) }) else { return std::ptr::null_mut() };
-    let mut callbacks = Callbacks { functions: *functions, instance_name: CString::default() };
+    let functions = *functions;
+    let mut callbacks = Callbacks::Version2 { functions, instance_name: CString::default() };
     // SAFETY: strings as the standard demands them.
     let made = unsafe { text(instance_name, "instanceName") }.and_then(|name| {
-        callbacks.instance_name = CString::new(name).unwrap_or_default();
-        if callbacks.instance_name.is_empty() {
+        if name.is_empty() {
             return Err(Failure::Error("instanceName is empty".to_owned()));
         }
+        let instance_name = CString::new(name).unwrap_or_default();
+        callbacks = Callbacks::Version2 { functions, instance_name };
         let interface_type = match fmu_type {
             abi::MODEL_EXCHANGE => InterfaceType::ModelExchange,
             abi::CO_SIMULATION => InterfaceType::CoSimulation,
@@ -242,8 +272,7 @@ pub unsafe fn instantiate<M: Model>(
         Ok(mut instance) => {
             instance.set_logging_on(logging_on != 0);
             instance.send_messages();
-            let instance = UnsafeCell::new(instance);
-            Box::into_raw(Box::new(Component { busy: AtomicBool::new(false), instance })).cast()
+            into_component(instance)
         }
         Err(failure) => {
             let message = format!("fmi2Instantiate: {failure}");
@@ -251,6 +280,11 @@ pub unsafe fn instantiate<M: Model>(
             std::ptr::null_mut()
         }
     }
+}
+
+fn into_component<M: Model>(instance: Instance<M>) -> fmi2Component {
+    let instance = UnsafeCell::new(instance);
+    Box::into_raw(Box::new(Component { busy: AtomicBool::new(false), instance })).cast()
 }
 
 /// Frees the instance. Does nothing during another call of the instance (stepInProgress).
@@ -269,14 +303,12 @@ pub unsafe fn free_instance<M: Model>(component: fmi2Component) {
     }
 }
 
-/// Renders the description of `M`.
+/// Renders a description.
 ///
 /// # Errors
 ///
-/// [`Failure::Error`] if the description breaks rules of the standard; the failures of
-/// [`describe`](crate::describe).
-fn description_of<M: Model>(resources: &Path) -> Result<String, Failure> {
-    let description = crate::interface::describe::<M>(resources)?;
+/// [`Failure::Error`] if the description breaks rules of the standard.
+fn render(description: &ModelDescription) -> Result<String, Failure> {
     let problems = description.problems();
     if problems.is_empty() {
         return Ok(description.to_xml());
@@ -285,17 +317,17 @@ fn description_of<M: Model>(resources: &Path) -> Result<String, Failure> {
     Err(Failure::Error(format!("the model's variables break rules: {}", list.join("; "))))
 }
 
-/// [`abi::DESCRIBE`]: passes the model description, or an error message, to `sink`.
-pub unsafe fn describe<M: Model>(
+/// Passes the model description that `make` makes, or an error message, to `sink`.
+unsafe fn pass_description(
     resources: *const c_char,
-    context: *mut c_void,
-    sink: DescribeSink,
+    (context, sink): (*mut c_void, DescribeSink),
+    make: impl FnOnce(&Path) -> Result<ModelDescription, Failure>,
 ) -> fmi2Integer {
     let hook_guard = HookGuard::new();
     // SAFETY: the caller gives a zero-terminated path.
     let described = unsafe { text(resources, "resources") }.and_then(|folder| {
         let folder = if folder.is_empty() { NO_FOLDER } else { &folder };
-        guarded(|| description_of::<M>(Path::new(folder)))
+        guarded(|| make(Path::new(folder)).and_then(|description| render(&description)))
     });
     drop(hook_guard);
     let (status, answer) = match described {
@@ -305,4 +337,14 @@ pub unsafe fn describe<M: Model>(
     // SAFETY: the caller gives a sink that reads the text during the call.
     unsafe { sink(context, answer.as_ptr().cast(), answer.len()) };
     status
+}
+
+/// [`abi::DESCRIBE`]: passes the model description of FMI 2.0, or an error message, to `sink`.
+pub unsafe fn describe<M: Model>(
+    resources: *const c_char,
+    context: *mut c_void,
+    sink: DescribeSink,
+) -> fmi2Integer {
+    // SAFETY: the arguments are passed on unchanged.
+    unsafe { pass_description(resources, (context, sink), crate::interface::describe::<M>) }
 }

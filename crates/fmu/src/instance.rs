@@ -1,7 +1,9 @@
 //! An instance of a model: the state machine of FMI in safe Rust, called by the C ABI.
 
 mod derivatives;
+mod door;
 mod exchange;
+mod fmi3;
 mod layout;
 mod snapshot;
 #[cfg(test)]
@@ -19,10 +21,12 @@ use crate::interface::{Interface, WARNING, new_model};
 use crate::log::{Log, Message};
 use crate::model::{Failure, Model, Step};
 use crate::stepper::Stepper;
-use fmu_description::Guid;
 use fmu_description::abi::Status;
-use fmu_description::call_order::{Function, InterfaceType, State, allowed, may_discard};
+use fmu_description::call_order::{InterfaceType, State};
+use fmu_description::{Guid, ModelDescription};
 
+pub(crate) use door::Function;
+pub(crate) use fmi3::{Instantiation, Jacobian, Session};
 pub(crate) use snapshot::Snapshot;
 
 /// The content of an FMU state: everything that determines the further simulation.
@@ -43,6 +47,8 @@ pub(crate) struct Core<M: Model> {
     unchecked: bool,
     /// Whether an input derivative is set for the next step.
     sloped: bool,
+    /// FMI 3.0: the time of the next event in s, as the last event stated it.
+    next_event: Option<f64>,
 }
 
 /// An instance: the FMU state and the data that is not part of it.
@@ -63,6 +69,8 @@ pub(crate) struct Instance<M: Model> {
     strings: Vec<std::ffi::CString>,
     /// Buffer for `fmi2GetDirectionalDerivative`, created by its first call.
     direction: Option<M>,
+    /// What an instance of FMI 3.0 has in addition.
+    session: Option<Box<Session>>,
     hook_guard: HookGuard,
 }
 
@@ -78,6 +86,7 @@ impl<M: Model> Core<M> {
             stale: true,
             unchecked: true,
             sloped: false,
+            next_event: None,
         }
     }
 }
@@ -113,49 +122,72 @@ impl<M: Model> Instance<M> {
         guid: &str,
         callbacks: Callbacks,
     ) -> Result<Self, Failure> {
+        let instance = Self::build(resources, callbacks, |_, _| None)?;
+        if interface_type == InterfaceType::ModelExchange && !instance.offers_exchange() {
+            let message = "fmuType is fmi2ModelExchange, and this FMU offers co-simulation only";
+            return Err(Failure::Error(message.to_owned()));
+        }
+        instance.check_guid("GUID", guid, resources)?;
+        Ok(instance.into_type(interface_type))
+    }
+
+    /// Makes the model and its interface; `session` makes the part of FMI 3.0.
+    fn build(
+        resources: &Path,
+        callbacks: Callbacks,
+        session: impl FnOnce(&mut Interface<M>, &ModelDescription) -> Option<Box<Session>>,
+    ) -> Result<Self, Failure> {
         let hook_guard = HookGuard::new();
-        let (core, fresh, interface, stepper, messages) = guarded(|| {
-            let mut model = new_model::<M>(resources)?;
-            let messages = model.log().map(Log::take).unwrap_or_default();
-            let (interface, description) = Interface::new(&mut model)?;
-            let offers_exchange = interface.event_indicators.is_some();
-            if interface_type == InterfaceType::ModelExchange && !offers_exchange {
-                let message =
-                    "fmuType is fmi2ModelExchange, and this FMU offers co-simulation only";
-                return Err(Failure::Error(message.to_owned()));
-            }
-            if guid != description.guid {
-                let (name, own) = (M::IDENTIFIER, description.guid);
-                return Err(Failure::Error(format!(
-                    "the GUID is {guid}, but this library of {name} with the resources in {} \
-                     describes itself with {own}",
-                    resources.display()
-                )));
-            }
+        guarded(|| {
+            let mut fresh = new_model::<M>(resources)?;
+            let messages = fresh.log().map(Log::take).unwrap_or_default();
+            let (mut interface, description) = Interface::new(&mut fresh)?;
+            let session = session(&mut interface, &description);
             let tolerance = description.default_experiment.and_then(|own| own.tolerance);
             let stepper = Stepper::new(&interface, tolerance);
-            Ok((Core::new(model.clone(), interface_type), model, interface, stepper, messages))
-        })?;
-        Ok(Self {
-            core,
-            fresh,
-            interface,
-            stepper,
-            callbacks,
-            debug_logging: false,
-            messages,
-            categories: None,
-            strings: Vec::new(),
-            direction: None,
-            hook_guard,
+            Ok(Self {
+                core: Core::new(fresh.clone(), InterfaceType::CoSimulation),
+                fresh,
+                interface,
+                stepper,
+                callbacks,
+                debug_logging: false,
+                messages,
+                categories: None,
+                strings: Vec::new(),
+                direction: None,
+                session,
+                hook_guard,
+            })
         })
+    }
+
+    fn into_type(mut self, interface_type: InterfaceType) -> Self {
+        self.core.interface_type = interface_type;
+        self
+    }
+
+    fn offers_exchange(&self) -> bool {
+        self.interface.event_indicators.is_some()
+    }
+
+    fn check_guid(&self, what: &str, guid: &str, resources: &Path) -> Result<(), Failure> {
+        let (name, own) = (M::IDENTIFIER, self.guid().to_string());
+        if guid == own {
+            return Ok(());
+        }
+        Err(Failure::Error(format!(
+            "the {what} is {guid}, but this library of {name} with the resources in {} describes itself \
+             with {own}",
+            resources.display()
+        )))
     }
 
     /// Runs one FMI call: checks the call order, runs `body` inside the panic fence, and converts a
     /// failure to state, log message and status.
-    pub(crate) fn call(
+    pub(crate) fn call<F: Function>(
         &mut self,
-        function: Function,
+        function: F,
         body: impl FnOnce(&mut Self) -> Result<(), Failure>,
     ) -> Status {
         let state = self.core.state;
@@ -163,7 +195,7 @@ impl<M: Model> Instance<M> {
             return Status::Fatal;
         }
         // A boxed failure keeps the result of a successful call in one register.
-        let done = if allowed(self.core.interface_type, function, state) {
+        let done = if function.is_allowed(self.core.interface_type, state) {
             guarded(|| {
                 let done = body(self).map_err(Box::new);
                 if let Some(log) = self.core.model.log().filter(|log| !log.is_empty()) {
@@ -200,19 +232,17 @@ impl<M: Model> Instance<M> {
     }
 
     #[cold]
-    fn fail(&mut self, function: Function, failure: &Failure) -> Status {
+    fn fail<F: Function>(&mut self, function: F, failure: &Failure) -> Status {
         let (status, category) = match failure {
             Failure::Fatal(_) => (Status::Fatal, "logStatusFatal"),
-            Failure::Discard(_) | Failure::Incomplete { .. } | Failure::Terminated { .. }
-                if may_discard(self.core.interface_type, function) =>
-            {
+            failure if function.discards(self.core.interface_type, failure) => {
                 (Status::Discard, "logStatusDiscard")
             }
             _ => (Status::Error, "logStatusError"),
         };
         match status {
-            Status::Discard if function == Function::DoStep => self.record_partial_step(failure),
-            Status::Error => self.core.state = State::Error,
+            Status::Discard if function.keeps_partial_step() => self.record_partial_step(failure),
+            Status::Error => self.core.state = F::STATE_AFTER_ERROR,
             Status::Fatal => self.core.state = State::Fatal,
             _ => {}
         }
@@ -235,11 +265,12 @@ impl<M: Model> Instance<M> {
     /// Frees the instance. Drops its models one after another, so that a panic in one destructor does
     /// not abort the process in another.
     pub(crate) fn free(self) {
-        let Self { core, fresh, direction, callbacks, categories, hook_guard, .. } = self;
+        let Self { core, fresh, direction, callbacks, categories, session, hook_guard, .. } = self;
         let dropped =
             [drop_inside_fence(core), drop_inside_fence(fresh), drop_inside_fence(direction)];
         if let Some(failure) = dropped.into_iter().find_map(Result::err) {
-            let message = format!("fmi2FreeInstance: {failure}");
+            let version = if session.is_some() { 3 } else { 2 };
+            let message = format!("fmi{version}FreeInstance: {failure}");
             log(&callbacks, categories.as_deref(), Status::Fatal, "logStatusFatal", &message);
         }
         drop(hook_guard);

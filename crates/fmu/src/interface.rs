@@ -1,5 +1,6 @@
 //! The variables of a model by value reference, and the model description made from them.
 
+pub(crate) mod fmi3;
 mod general;
 mod slot;
 mod states;
@@ -8,6 +9,7 @@ mod structure;
 use crate::model::{Failure, Model};
 use crate::variable::{Access, Enumeration, Number, Variable};
 use fmu_description::call_order::settable;
+use fmu_description::call_order3;
 use fmu_description::location::NO_FOLDER;
 use fmu_description::unit::Unit;
 use fmu_description::{
@@ -353,6 +355,44 @@ fn define_type<M>(types: &mut Vec<SimpleType>, variable: &Variable<M>) -> Result
 /// that cannot be described; the failure of [`Model::new`].
 pub fn describe<M: Model>(resources: &std::path::Path) -> Result<ModelDescription, Failure> {
     Interface::new(&mut new_model::<M>(resources)?).map(|(_, description)| description)
+}
+
+/// Makes the model description of FMI 3.0 of `M`; its `guid` is the `instantiationToken`.
+///
+/// Scalars named `A[1,1]`, `A[1,2]` and so on ([`Variable::real_array`] declares such) are one array if
+/// their attributes agree. Event indicators are local variables.
+///
+/// # Errors
+///
+/// Same as [`describe`].
+pub fn describe_3<M: Model>(resources: &std::path::Path) -> Result<ModelDescription, Failure> {
+    let (mut interface, description) = Interface::new(&mut new_model::<M>(resources)?)?;
+    Ok(interface.convert(&description).1)
+}
+
+impl<M> Interface<M> {
+    /// Converts to FMI 3.0: the GUID becomes the `instantiationToken`, and continuous states may be set
+    /// in event mode unless an event changes them (section 2.3.5).
+    pub(crate) fn convert(
+        &mut self,
+        description: &ModelDescription,
+    ) -> (fmi3::Table, ModelDescription) {
+        let indicators = self.event_indicators.unwrap_or_default();
+        let (table, mut converted) = fmi3::describe(description, indicators);
+        self.guid = Guid::of(&converted);
+        converted.guid = self.guid.to_string();
+        for variable in &description.variables {
+            if let Kind::Real(RealType { reinit: true, .. }) = variable.kind {
+                self.reals[variable.value_reference as usize - 1].is_reinitialised = true;
+            }
+        }
+        for slot in &mut self.reals {
+            let is_state = slot.is_state.then_some(slot.is_reinitialised);
+            let role = (slot.causality, slot.variability);
+            slot.settable = call_order3::settable(role, slot.initial, is_state);
+        }
+        (table, converted)
+    }
 }
 
 /// Calls [`Model::new`]. If it fails and the importer named no folder, the message says so.

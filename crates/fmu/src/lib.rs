@@ -112,8 +112,8 @@ mod variables;
 pub use fmu_derive::{Variables, model};
 pub use fmu_description::{self as description, Experiment};
 #[doc(hidden)]
-pub use fmu_description::{abi, call_order};
-pub use interface::{describe, problems};
+pub use fmu_description::{abi, abi3, call_order, call_order3};
+pub use interface::{describe, describe_3, problems};
 pub use log::Log;
 pub use model::{About, At, Event, Failure, Model, ModelExchange, Step};
 pub use simulation::Simulation;

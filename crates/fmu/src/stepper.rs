@@ -10,6 +10,15 @@ const EVENT_LIMIT: u32 = 10_000;
 /// Most calls of [`Model::event`] at one event.
 const ITERATION_LIMIT: u32 = 1000;
 
+/// Where a step that stops at events ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Stop {
+    /// The time in s.
+    pub(crate) time: f64,
+    /// Whether an event is to be handled there.
+    pub(crate) is_event: bool,
+}
+
 /// Integrates the continuous states of a model over communication steps.
 ///
 /// It has no memory between steps, so that the struct of the model remains the whole FMU state.
@@ -51,13 +60,55 @@ impl Stepper {
         step: &Step,
         tolerance: Option<f64>,
     ) -> Result<(), Failure> {
+        self.with_equations((model, interface), step, tolerance, |stepper, equations| {
+            stepper.follow(equations, step)
+        })
+    }
+
+    /// Advances the model to the end of the step, or to the first state event or to the event at `next`
+    /// (in s). It handles no event.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`Stepper::run`].
+    pub(crate) fn run_to_event<M: Model>(
+        &mut self,
+        model: &mut M,
+        interface: &Interface<M>,
+        step: &Step,
+        tolerance: Option<f64>,
+        next: Option<f64>,
+    ) -> Result<Stop, Failure> {
+        let (start, end) = (step.start, step.end());
+        let target = next.map_or(end, |next| next.min(end));
+        if target <= start {
+            return Ok(Stop { time: start, is_event: true });
+        }
+        self.with_equations((model, interface), step, tolerance, |stepper, equations| {
+            Ok(match stepper.integrate(equations, start, target)? {
+                Reached::End => {
+                    Stop { time: target, is_event: next.is_some_and(|next| next <= end) }
+                }
+                _ => Stop { time: stepper.integrator.time(), is_event: true },
+            })
+        })
+    }
+
+    /// Runs `body` with the equations of the model during a step.
+    fn with_equations<M: Model, T>(
+        &mut self,
+        (model, interface): (&mut M, &Interface<M>),
+        step: &Step,
+        tolerance: Option<f64>,
+        body: impl FnOnce(&mut Self, &mut Equations<'_, M>) -> Result<T, Failure>,
+    ) -> Result<T, Failure> {
         if let Some(tolerance) = tolerance.or(self.tolerance) {
             self.integrator.set_tolerance(tolerance);
         }
         let mut inputs = std::mem::take(&mut self.inputs);
         interface.read_interpolated(model, &mut inputs);
         let mut equations = Equations { model, interface, start: step.start, inputs: &inputs };
-        let done = self.follow(&mut equations, step);
+        let done = body(self, &mut equations);
         interface.write_interpolated(model, &inputs);
         self.inputs = inputs;
         done

@@ -76,6 +76,39 @@ impl<M> Variable<M> {
         Self::local(name, description, Variability::Continuous, Access::Real(Box::new(field)))
     }
 
+    /// Creates the elements of a vector or matrix as Real variables, in row-major order: `name[1,1]`,
+    /// `name[1,2]` and so on; `der(x)` as `name` gives `der(x[1])`. `extents` are the extents of the
+    /// dimensions, `field` borrows all elements.
+    ///
+    /// FMI 2.0 has no arrays: each element is a variable there. In FMI 3.0 they are one array if the author
+    /// gives all of them the same attributes.
+    ///
+    /// ```
+    /// # use fmu::Variable;
+    /// struct Filter { gains: [f64; 6] }
+    /// let gains = Variable::real_array("K", "Gain", &[2, 3], |filter: &mut Filter| &mut filter.gains[..]);
+    /// let variables: Vec<_> = gains.map(Variable::parameter).collect();
+    /// assert_eq!(variables.len(), 6);
+    /// ```
+    pub fn real_array<F>(
+        name: &str,
+        description: &str,
+        extents: &[usize],
+        field: F,
+    ) -> impl Iterator<Item = Self>
+    where
+        F: for<'a> Fn(&'a mut M) -> &'a mut [f64] + Send + Sync + 'static,
+    {
+        let field = std::sync::Arc::new(field);
+        let (name, description) = (name.to_owned(), description.to_owned());
+        let extents = extents.to_vec();
+        (0..extents.iter().product()).map(move |position| {
+            let field = std::sync::Arc::clone(&field);
+            let name = element_name(&name, &extents, position);
+            Self::real(name, description.clone(), move |model: &mut M| &mut field(model)[position])
+        })
+    }
+
     /// Creates an `Integer` variable.
     pub fn integer<F>(name: impl Into<String>, description: impl Into<String>, field: F) -> Self
     where
@@ -309,5 +342,25 @@ impl<M> Variable<M> {
     {
         self.derivatives.push(Box::new(field));
         self
+    }
+}
+
+/// Returns the name of the element at a position in row-major order.
+fn element_name(name: &str, extents: &[usize], position: usize) -> String {
+    let mut left = position;
+    let mut indices: Vec<_> = extents
+        .iter()
+        .rev()
+        .map(|extent| {
+            let index = left % extent + 1;
+            left /= extent;
+            index.to_string()
+        })
+        .collect();
+    indices.reverse();
+    let indices = indices.join(",");
+    match name.strip_prefix("der(").and_then(|state| state.strip_suffix(')')) {
+        Some(state) => format!("der({state}[{indices}])"),
+        None => format!("{name}[{indices}]"),
     }
 }

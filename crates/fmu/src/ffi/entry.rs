@@ -1,6 +1,8 @@
 //! The C functions with an instance, one entry each.
 
-use super::{borrow_output, borrow_state, dispatch, null_pointer, read, texts, write_one};
+use super::{
+    borrow_output, borrow_state, dispatch, free_state, read, snapshot, store, texts, write_one,
+};
 use crate::Experiment;
 use crate::instance::Snapshot;
 use crate::model::{Failure, Model};
@@ -15,7 +17,7 @@ macro_rules! entry_points {
     ($($name:ident = $function:ident($($argument:ident: $type:ty),*), $instance:ident => $body:expr;)*) => {
         $(pub unsafe fn $name<M: Model>(component: fmi2Component, $($argument: $type),*) -> fmi2Status {
             // SAFETY: pointers and lengths are as the standard requires; null is handled.
-            unsafe { dispatch::<M>(component, Function::$function, |$instance| $body) }
+            unsafe { dispatch::<M, _>(component, Function::$function, |$instance| $body) }
         })*
     };
 }
@@ -106,43 +108,24 @@ entry_points! {
         instance => instance.get_nominals(borrow_output(nominals, n)?);
     get_fmu_state = GetFMUstate(state: *mut fmi2FMUstate), instance => {
         let place = borrow_state(state)?;
-        if let Some(snapshot) = place.cast::<Snapshot<M>>().as_mut() {
-            *snapshot = instance.snapshot();
-        } else {
-            *place = Box::into_raw(Box::new(instance.snapshot())).cast();
-        }
+        store(place, instance.snapshot());
         Ok(())
     };
     set_fmu_state = SetFMUstate(state: fmi2FMUstate), instance =>
-        instance.restore(state.cast::<Snapshot<M>>().as_ref().ok_or_else(|| null_pointer("FMUstate"))?);
+        instance.restore(snapshot(state)?);
     free_fmu_state = FreeFMUstate(state: *mut fmi2FMUstate), _instance => {
-        let place = borrow_state(state)?;
-        if !place.is_null() {
-            let state = std::mem::replace(place, std::ptr::null_mut());
-            drop(Box::from_raw(state.cast::<Snapshot<M>>()));
-        }
+        free_state::<M>(borrow_state(state)?);
         Ok(())
     };
     serialized_fmu_state_size = SerializedFMUstateSize(state: fmi2FMUstate, size: *mut usize),
-        _instance => {
-            let state = state.cast::<Snapshot<M>>().as_ref().ok_or_else(|| null_pointer("FMUstate"))?;
-            write_one(size, state.size()?)
-        };
+        _instance => write_one(size, snapshot::<M>(state)?.size()?);
     serialize_fmu_state = SerializeFMUstate(state: fmi2FMUstate, bytes: *mut fmi2Byte, size: usize),
-        _instance => {
-            let state = state.cast::<Snapshot<M>>().as_ref().ok_or_else(|| null_pointer("FMUstate"))?;
-            state.write(borrow_output(bytes.cast::<u8>(), size)?)
-        };
+        _instance => snapshot::<M>(state)?.write(borrow_output(bytes.cast::<u8>(), size)?);
     de_serialize_fmu_state = DeSerializeFMUstate(
         bytes: *const fmi2Byte, size: usize, state: *mut fmi2FMUstate
     ), instance => {
         let snapshot = Snapshot::<M>::from_bytes(read(bytes.cast::<u8>(), size)?, instance.guid())?;
-        let place = borrow_state(state)?;
-        if let Some(old) = place.cast::<Snapshot<M>>().as_mut() {
-            *old = snapshot;
-        } else {
-            *place = Box::into_raw(Box::new(snapshot)).cast();
-        }
+        store(borrow_state(state)?, snapshot);
         Ok(())
     };
     get_status = GetStatus(kind: fmi2StatusKind, _value: *mut fmi2Status),

@@ -1,6 +1,6 @@
 //! The macro [`export!`](crate::export) and the C signatures that it defines.
 
-/// Exports a [`Model`](crate::Model) with all C functions of FMI 2.0. Write it as the last line of the
+/// Exports a [`Model`](crate::Model) with all C functions of FMI 2.0 and FMI 3.0. Write it as the last line of the
 /// model's library, which must be a `cdylib`.
 ///
 /// The library also has the functions of model exchange if the model has no such interface;
@@ -61,8 +61,9 @@
 /// # fn main() {}
 /// ```
 ///
-/// The library also exports [`fmuDescribe`](fmu_description::abi::DESCRIBE), from which `aso-ftc pack`
-/// gets the model description.
+/// The library also exports [`fmuDescribe`](fmu_description::abi::DESCRIBE) and
+/// [`fmuDescribe3`](fmu_description::abi::DESCRIBE_3), from which `aso-ftc pack` gets the model
+/// descriptions.
 #[macro_export]
 macro_rules! export {
     ($model:ty) => {
@@ -168,6 +169,7 @@ macro_rules! export {
                 fmi2GetStringStatus = get_string_status(fmi2_c: fmi2Component,
                     fmi2_kind: fmi2StatusKind, fmi2_value: *mut fmi2String) -> fmi2Status;
             }
+            $crate::entry_points_of_fmi3! { $model }
         };
     };
 }
@@ -180,14 +182,15 @@ macro_rules! export {
 #[macro_export]
 macro_rules! entry_points {
     ($model:ty; $($name:ident =
-        $function:ident($($argument:ident: $(*$access:tt)? $type:ident),*) -> $result:ident;)*) => {
+        $($function:ident)::+ ($($argument:ident: $(*$access:tt)? $type:ident),*)
+            -> $result:ident;)*) => {
         $(
             #[unsafe(no_mangle)]
             unsafe extern "C" fn $name(
                 $($argument: $(*$access)? $crate::ffi::signature::$type),*
             ) -> $crate::ffi::signature::$result {
                 // SAFETY: the arguments are passed on unchanged from the importer.
-                unsafe { $crate::ffi::$function::<$model>($($argument),*) }
+                unsafe { $crate::ffi::$($function)::+::<$model>($($argument),*) }
             }
         )*
     };
@@ -198,6 +201,27 @@ pub mod signature {
     #![expect(non_camel_case_types, reason = "the names of C")]
 
     pub use fmu_description::abi::*;
+    pub use fmu_description::abi3::{
+        fmi3Binary, fmi3Boolean, fmi3Byte, fmi3Clock, fmi3DependencyKind, fmi3FMUState,
+        fmi3Float32, fmi3Float64, fmi3Instance, fmi3InstanceEnvironment, fmi3Int8, fmi3Int16,
+        fmi3Int32, fmi3Int64, fmi3IntervalQualifier, fmi3Status, fmi3String, fmi3UInt8, fmi3UInt16,
+        fmi3UInt32, fmi3UInt64, fmi3ValueReference,
+    };
+    use fmu_description::abi3::{
+        fmi3ClockUpdateCallback, fmi3IntermediateUpdateCallback, fmi3LockPreemptionCallback,
+        fmi3LogMessageCallback, fmi3UnlockPreemptionCallback,
+    };
+
+    /// `fmi3LogMessageCallback`, which may be null; likewise the other callbacks.
+    pub type fmi3LogMessage = Option<fmi3LogMessageCallback>;
+    /// `fmi3IntermediateUpdateCallback`.
+    pub type fmi3IntermediateUpdate = Option<fmi3IntermediateUpdateCallback>;
+    /// `fmi3ClockUpdateCallback`.
+    pub type fmi3ClockUpdate = Option<fmi3ClockUpdateCallback>;
+    /// `fmi3LockPreemptionCallback`.
+    pub type fmi3LockPreemption = Option<fmi3LockPreemptionCallback>;
+    /// `fmi3UnlockPreemptionCallback`.
+    pub type fmi3UnlockPreemption = Option<fmi3UnlockPreemptionCallback>;
 
     /// `size_t`.
     pub type size_t = usize;

@@ -26,6 +26,21 @@ impl<M: Model> Instance<M> {
         (knowns, delta): (&[u32], &[f64]),
         to: &mut [MaybeUninit<f64>],
     ) -> Result<(), Failure> {
+        let mut places = to.iter_mut();
+        self.directional_derivative(unknowns, (knowns, delta), |value| {
+            if let Some(place) = places.next() {
+                place.write(value);
+            }
+        })
+    }
+
+    /// Computes `(dh/dv) delta` and passes the components to `write`, in the order of the unknowns.
+    pub(super) fn directional_derivative(
+        &mut self,
+        unknowns: &[u32],
+        (knowns, delta): (&[u32], &[f64]),
+        mut write: impl FnMut(f64),
+    ) -> Result<(), Failure> {
         if !M::PROVIDES_DIRECTIONAL_DERIVATIVE {
             let message = "not available: providesDirectionalDerivative is false";
             return Err(Failure::Error(message.to_owned()));
@@ -60,9 +75,9 @@ impl<M: Model> Instance<M> {
             At::Point { time: self.core.time, delta_time }
         };
         model.differentiate(&at, direction)?;
-        for (&reference, value) in unknowns.iter().zip(to) {
+        for &reference in unknowns {
             if let Some(slot) = self.interface.real(reference)? {
-                value.write(*(slot.field)(direction));
+                write(*(slot.field)(direction));
             }
         }
         Ok(())

@@ -4,7 +4,7 @@ use std::mem::MaybeUninit;
 
 use super::{Instance, time_tolerance};
 use crate::ffi::filled;
-use crate::model::{Failure, Model};
+use crate::model::{Event, Failure, Model};
 use fmu_description::abi::{Status, fmi2EventInfo};
 use fmu_description::call_order::State;
 
@@ -30,8 +30,8 @@ impl<M: Model> Instance<M> {
         self.core.before_stop(self.core.time)
     }
 
-    /// `fmi2NewDiscreteStates`.
-    pub(crate) fn new_discrete_states(&mut self) -> Result<fmi2EventInfo, Failure> {
+    /// Handles an event: `fmi2NewDiscreteStates`, `fmi3UpdateDiscreteStates`.
+    pub(crate) fn update_discrete_states(&mut self) -> Result<Event, Failure> {
         let core = &mut self.core;
         core.check()?;
         let event = core.model.event(core.time)?;
@@ -40,6 +40,12 @@ impl<M: Model> Instance<M> {
             let message = format!("the simulation ends at t = {} s: {reason}", self.core.time);
             self.log(Status::OK, "logEvents", &message);
         }
+        Ok(event)
+    }
+
+    /// `fmi2NewDiscreteStates`.
+    pub(crate) fn new_discrete_states(&mut self) -> Result<fmi2EventInfo, Failure> {
+        let event = self.update_discrete_states()?;
         Ok(fmi2EventInfo {
             new_discrete_states_needed: event.new_discrete_states_needed.into(),
             terminate_simulation: event.terminate_simulation.is_some().into(),

@@ -9,7 +9,7 @@ use fmu_description::Guid;
 use fmu_description::call_order::{InterfaceType, State};
 
 /// First bytes of a serialised state; the last two digits are the version of the layout.
-const MAGIC: &[u8; 8] = b"FMI2ST03";
+const MAGIC: &[u8; 8] = b"FMI2ST04";
 /// Length of magic, GUID and layout.
 const HEAD: usize = MAGIC.len() + size_of::<Guid>() + size_of::<Layout>();
 /// Length of the checksum at the end.
@@ -45,6 +45,13 @@ impl<M: Model> Instance<M> {
             return Err(Failure::Error(format!(
                 "the state belongs to an instance for {of:?}, this instance is for {own:?}"
             )));
+        }
+        if snapshot.core.state == State::EventMode
+            && own == InterfaceType::CoSimulation
+            && !self.uses_event_mode()
+        {
+            let message = "the state is in event mode, which this instance does not use";
+            return Err(Failure::Error(message.to_owned()));
         }
         self.core.clone_from(&snapshot.core);
         Ok(())
@@ -131,16 +138,21 @@ impl<M: Model> Core<M> {
     /// Checks that an instance can reach this state.
     fn is_reachable(&self) -> bool {
         let reached = match self.state {
-            State::Instantiated | State::InitializationMode | State::Terminated | State::Error => {
-                true
-            }
-            State::EventMode | State::ContinuousTimeMode => {
-                self.interface_type == InterfaceType::ModelExchange
-            }
+            State::Instantiated
+            | State::InitializationMode
+            | State::EventMode
+            | State::Terminated
+            | State::Error => true,
+            State::ContinuousTimeMode => self.interface_type == InterfaceType::ModelExchange,
             State::StepComplete | State::StepFailed => {
                 self.interface_type == InterfaceType::CoSimulation
             }
-            State::StepInProgress | State::StepCanceled | State::Fatal => false,
+            State::StepInProgress
+            | State::StepCanceled
+            | State::Fatal
+            | State::ConfigurationMode
+            | State::ReconfigurationMode
+            | State::IntermediateUpdateMode => false,
         };
         reached && self.time.is_finite() && self.experiment.start_time.is_finite()
     }

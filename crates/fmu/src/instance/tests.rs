@@ -4,6 +4,7 @@
 mod calls;
 mod equations;
 mod exchange;
+mod fmi3;
 mod layout;
 mod pendulum;
 mod steps;

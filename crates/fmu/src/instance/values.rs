@@ -88,7 +88,7 @@ impl<M: Model> Core<M> {
     }
 
     /// Sets all `values`, or none if one of them cannot be set.
-    fn set<T, V>(
+    pub(super) fn set<T, V>(
         &mut self,
         slots: &[Slot<M, T>],
         references: &[u32],

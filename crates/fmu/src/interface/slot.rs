@@ -11,6 +11,8 @@ pub(crate) struct Slot<M, T> {
     pub(crate) variability: Variability,
     pub(crate) initial: Option<Initial>,
     pub(crate) is_state: bool,
+    /// Whether an event may change the state.
+    pub(crate) is_reinitialised: bool,
     /// Whether `Outputs` or `Derivatives` lists the variable or an alias of it.
     pub(crate) is_unknown: bool,
     /// Whether `InitialUnknowns` lists the variable or an alias of it.
@@ -63,6 +65,7 @@ impl<M> SlotBuilder<M> {
             variability: self.variability,
             initial: self.initial,
             is_state: false,
+            is_reinitialised: false,
             is_unknown: false,
             is_initial_unknown: false,
             range: self.range,

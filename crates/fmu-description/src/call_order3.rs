@@ -1,0 +1,282 @@
+//! Call order of FMI 3.0.2: the functions allowed in each state, as sections 2.3, 3.2.1 and 4.2.1 state
+//! them.
+//!
+//! The states are those of [`call_order`](crate::call_order): [`State::StepComplete`] is Step Mode. After
+//! `fmi3Error` an instance is in state [`State::Terminated`] (section 2.3.1), so no state `Error` exists.
+
+use crate::call_order::{InterfaceType, State};
+use crate::{Causality, Initial, Variability};
+
+const I: u16 = State::Instantiated.bit();
+const G: u16 = State::ConfigurationMode.bit();
+const M: u16 = State::InitializationMode.bit();
+const V: u16 = State::EventMode.bit();
+const N: u16 = State::ContinuousTimeMode.bit();
+const C: u16 = State::StepComplete.bit();
+const U: u16 = State::IntermediateUpdateMode.bit();
+const R: u16 = State::ReconfigurationMode.bit();
+const T: u16 = State::Terminated.bit();
+/// The super state "FMU State Settable" in model exchange and in co-simulation.
+const ME: u16 = I | G | M | V | N | R | T;
+const CS: u16 = I | G | M | V | C | R | T;
+/// The states in which values of every type may be set in model exchange and in co-simulation, and
+/// continuous ones.
+const SET_ME: u16 = I | G | M | V | R;
+const SET_CS: u16 = I | G | M | V | C | R;
+/// The states in which values may be read in model exchange and in co-simulation.
+const GET_ME: u16 = I | M | V | N | T;
+const GET_CS: u16 = I | M | V | C | U | T;
+/// The states in which the number of states or event indicators may be read. Section 2.3 names
+/// `Instantiated` and Event Mode only; the others do no harm.
+const COUNT: u16 = I | M | V | N | T;
+
+macro_rules! functions {
+    ($($name:ident: $exchange:expr, $simulation:expr;)*) => {
+        /// A function of FMI 3.0 that takes an instance.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum Function { $(#[doc = concat!("`fmi3", stringify!($name), "`")] $name,)* }
+
+        impl Function {
+            /// Every function, in the order of `fmi3Functions.h`.
+            pub const EVERY: &[Function] = &[$(Function::$name,)*];
+
+            /// Returns the name in the C ABI.
+            #[must_use]
+            pub fn name(self) -> &'static str {
+                match self { $(Function::$name => concat!("fmi3", stringify!($name)),)* }
+            }
+
+            /// Returns the states in which the function may be called for an interface.
+            fn states(self, interface: InterfaceType) -> u16 {
+                match (self, interface) {
+                    $((Function::$name, InterfaceType::ModelExchange) => $exchange,
+                    (Function::$name, InterfaceType::CoSimulation) => $simulation,)*
+                }
+            }
+        }
+    };
+}
+
+// A row: function: states in model exchange, states in co-simulation.
+functions! {
+    SetDebugLogging: ME, CS;
+    FreeInstance: ME, CS;
+    EnterInitializationMode: I, I;
+    ExitInitializationMode: M, M;
+    EnterEventMode: N, C;
+    Terminate: V | N | R, V | C | R;
+    Reset: ME, CS;
+    GetFloat32: GET_ME, GET_CS;
+    GetFloat64: GET_ME, GET_CS;
+    GetInt8: GET_ME, GET_CS;
+    GetUInt8: GET_ME, GET_CS;
+    GetInt16: GET_ME, GET_CS;
+    GetUInt16: GET_ME, GET_CS;
+    GetInt32: GET_ME, GET_CS;
+    GetUInt32: GET_ME, GET_CS;
+    GetInt64: GET_ME, GET_CS;
+    GetUInt64: GET_ME, GET_CS;
+    GetBoolean: GET_ME, GET_CS;
+    GetString: GET_ME, GET_CS;
+    GetBinary: GET_ME, GET_CS;
+    GetClock: V, V;
+    SetFloat32: SET_ME | N, SET_CS | U;
+    SetFloat64: SET_ME | N, SET_CS | U;
+    SetInt8: SET_ME, SET_CS;
+    SetUInt8: SET_ME, SET_CS;
+    SetInt16: SET_ME, SET_CS;
+    SetUInt16: SET_ME, SET_CS;
+    SetInt32: SET_ME, SET_CS;
+    SetUInt32: SET_ME, SET_CS;
+    SetInt64: SET_ME, SET_CS;
+    SetUInt64: SET_ME, SET_CS;
+    SetBoolean: SET_ME, SET_CS;
+    SetString: SET_ME, SET_CS;
+    SetBinary: SET_ME, SET_CS;
+    SetClock: V, V;
+    GetNumberOfVariableDependencies: ME, CS;
+    GetVariableDependencies: ME, CS;
+    GetFMUState: ME, CS;
+    SetFMUState: ME, CS;
+    FreeFMUState: ME, CS;
+    SerializedFMUStateSize: ME, CS;
+    SerializeFMUState: ME, CS;
+    DeserializeFMUState: ME, CS;
+    GetDirectionalDerivative: M | V | N | T, M | V | C | T;
+    GetAdjointDerivative: M | V | N | T, M | V | C | T;
+    EnterConfigurationMode: I | V, I | C;
+    ExitConfigurationMode: G | R, G | R;
+    GetIntervalDecimal: M | V, M | V;
+    GetIntervalFraction: M | V, M | V;
+    GetShiftDecimal: M, M;
+    GetShiftFraction: M, M;
+    SetIntervalDecimal: M | V, M | V;
+    SetIntervalFraction: M | V, M | V;
+    SetShiftDecimal: M, M;
+    SetShiftFraction: M, M;
+    EvaluateDiscreteStates: V, V;
+    UpdateDiscreteStates: V, V;
+    EnterContinuousTimeMode: V, 0;
+    CompletedIntegratorStep: N, 0;
+    SetTime: N, 0;
+    SetContinuousStates: N, 0;
+    GetContinuousStateDerivatives: M | V | N | T, 0;
+    GetEventIndicators: M | V | N | T, 0;
+    GetContinuousStates: M | V | N | T, 0;
+    GetNominalsOfContinuousStates: M | V | N | R | T, 0;
+    GetNumberOfEventIndicators: COUNT, 0;
+    GetNumberOfContinuousStates: COUNT, 0;
+    EnterStepMode: 0, V;
+    GetOutputDerivatives: 0, C | U | T;
+    DoStep: 0, C;
+    ActivateModelPartition: 0, 0;
+}
+
+/// Whether `function` may be called in `state` of an instance for `interface`.
+///
+/// Conditions on single variables are covered by [`settable`].
+#[must_use]
+pub fn allowed(interface: InterfaceType, function: Function, state: State) -> bool {
+    function.states(interface) & state.bit() != 0
+}
+
+/// Whether a call of `function` that fails may leave the instance unchanged: whether it may return
+/// `fmi3Discard` (section 2.2.4), "handling of min/max violation" and "numerical problems during model
+/// evaluation".
+#[must_use]
+pub fn may_discard(interface: InterfaceType, function: Function) -> bool {
+    use Function as F;
+    match function {
+        F::SetFloat64 | F::SetInt32 | F::SetInt64 | F::SetBoolean | F::SetString => true,
+        F::SetContinuousStates
+        | F::GetFloat64
+        | F::GetContinuousStateDerivatives
+        | F::GetContinuousStates
+        | F::GetEventIndicators => interface == InterfaceType::ModelExchange,
+        F::DoStep => interface == InterfaceType::CoSimulation,
+        _ => false,
+    }
+}
+
+/// Returns the set of states in which a variable may be set (sections 2.3.2 to 2.3.5, 3.2.1, 4.2.1).
+/// `is_state`: `Some(reinit)` for a continuous state.
+#[must_use]
+pub fn settable(
+    (causality, variability): (Causality, Variability),
+    initial: Option<Initial>,
+    is_state: Option<bool>,
+) -> u16 {
+    if causality == Causality::StructuralParameter {
+        return if variability == Variability::Tunable { G | R } else { G };
+    }
+    let at_the_start = match initial {
+        Some(Initial::Exact) if variability != Variability::Constant => I | M,
+        Some(Initial::Approx) => I,
+        _ => 0,
+    };
+    let at_points = match (causality, variability) {
+        (Causality::Input, Variability::Continuous) => I | M | V | N | C | U,
+        (Causality::Input, _) => I | M | V | C,
+        (Causality::Parameter, Variability::Tunable) => V | C,
+        _ => 0,
+    };
+    let as_state = match is_state {
+        Some(true) => N,
+        Some(false) => N | V,
+        None => 0,
+    };
+    at_the_start | at_points | as_state
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LISTS: &str = include_str!("call_order3/allowed_function_calls.csv");
+    const TYPES: &str =
+        "Float32 Float64 Int8 UInt8 Int16 UInt16 Int32 UInt32 Int64 UInt64 Boolean String Binary";
+
+    /// The functions that an entry of the lists names.
+    fn named(entry: &str) -> Vec<String> {
+        let entry = format!("fmi3{}", entry.trim_start_matches('~'));
+        let parts = |mark: &str, parts: &str| {
+            let parts = parts.split(' ');
+            parts.map(|part| entry.replace(mark, part)).collect()
+        };
+        match &entry {
+            entry if entry.contains("{T}") => parts("{T}", TYPES),
+            entry if entry.contains("{R}") => parts("{R}", "Float32 Float64"),
+            entry if entry.contains("{D}") => parts("{D}", "Decimal Fraction"),
+            _ => vec![entry],
+        }
+    }
+
+    /// The states that a name of the standard means, for an interface.
+    fn states(name: &str, interface: InterfaceType) -> Vec<State> {
+        use State as S;
+        let own = match interface {
+            InterfaceType::ModelExchange => S::ContinuousTimeMode,
+            InterfaceType::CoSimulation => S::StepComplete,
+        };
+        let initialized = [S::EventMode, own, S::ReconfigurationMode];
+        match name {
+            "FMUStateSettable" => {
+                let others =
+                    [S::Instantiated, S::ConfigurationMode, S::InitializationMode, S::Terminated];
+                initialized.into_iter().chain(others).collect()
+            }
+            "Initialized" => initialized.to_vec(),
+            "StepMode" => vec![S::StepComplete],
+            name => State::EVERY.into_iter().filter(|state| format!("{state:?}") == name).collect(),
+        }
+    }
+
+    #[test]
+    fn a_function_may_be_called_exactly_in_the_states_that_the_standard_lists() {
+        for interface in [InterfaceType::ModelExchange, InterfaceType::CoSimulation] {
+            let mut listed = Vec::new();
+            for line in LISTS.lines().filter(|line| !line.starts_with('#')) {
+                let [_, state, of, functions] =
+                    line.split(',').collect::<Vec<_>>().try_into().unwrap();
+                if of != "both" && of != format!("{interface:?}") {
+                    continue;
+                }
+                let states = states(state, interface);
+                assert!(!states.is_empty(), "{line}");
+                for name in functions.split(' ').flat_map(named) {
+                    assert!(Function::EVERY.iter().any(|own| own.name() == name), "{name}");
+                    listed.extend(states.iter().map(|state| (name.clone(), *state)));
+                }
+            }
+            for &function in Function::EVERY {
+                for state in State::EVERY {
+                    let expected = listed.contains(&(function.name().to_owned(), state));
+                    let found = allowed(interface, function, state);
+                    assert_eq!(found, expected, "{function:?} in {state:?}, {interface:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn variables_are_set_in_the_states_that_the_standard_names() {
+        use Causality::{Input, Local, Output, Parameter, StructuralParameter};
+        use Variability::{Constant, Continuous, Discrete, Fixed, Tunable};
+        let exact = Some(Initial::Exact);
+        for (role, initial, state, expected) in [
+            ((Input, Continuous), None, None, I | M | V | N | C | U),
+            ((Input, Discrete), None, None, I | M | V | C),
+            ((Parameter, Fixed), exact, None, I | M),
+            ((Parameter, Tunable), exact, None, I | M | V | C),
+            ((Output, Constant), exact, None, 0),
+            ((Local, Continuous), Some(Initial::Approx), None, I),
+            ((Local, Continuous), exact, Some(false), I | M | N | V),
+            ((Local, Continuous), exact, Some(true), I | M | N),
+            ((Output, Continuous), Some(Initial::Calculated), None, 0),
+            ((StructuralParameter, Fixed), exact, None, G),
+            ((StructuralParameter, Tunable), exact, None, G | R),
+        ] {
+            assert_eq!(settable(role, initial, state), expected, "{role:?}");
+        }
+    }
+}

@@ -1,0 +1,194 @@
+//! The functions with an instance, except those for values and clocks.
+
+use super::super::{
+    borrow_output, borrow_state, free_state, read, snapshot, store, texts, write_one,
+};
+use super::{entry_points_3, unavailable};
+use crate::Experiment;
+use crate::instance::{Jacobian, Snapshot};
+use crate::model::Failure;
+use fmu_description::abi3::{
+    DependencyKind, fmi3Boolean, fmi3Byte, fmi3DependencyKind, fmi3FMUState, fmi3Float64,
+    fmi3Int32, fmi3String, fmi3ValueReference,
+};
+
+entry_points_3! {
+    set_debug_logging = SetDebugLogging(on: fmi3Boolean, n: usize, categories: *const fmi3String),
+        instance => instance.set_debug_logging_3(on != 0, &texts(categories, n)?);
+    enter_initialization_mode = EnterInitializationMode(
+        tolerance_defined: fmi3Boolean, tolerance: fmi3Float64, start_time: fmi3Float64,
+        stop_time_defined: fmi3Boolean, stop_time: fmi3Float64
+    ), instance => {
+        instance.setup_experiment(Experiment {
+            start_time,
+            stop_time: (stop_time_defined != 0).then_some(stop_time),
+            tolerance: (tolerance_defined != 0).then_some(tolerance),
+        })?;
+        instance.enter_initialization_mode()
+    };
+    exit_initialization_mode = ExitInitializationMode(),
+        instance => instance.exit_initialization_mode_3();
+    enter_event_mode = EnterEventMode(), instance => instance.enter_event_mode_3();
+    terminate = Terminate(), instance => { instance.terminate(); Ok(()) };
+    reset = Reset(), instance => { instance.reset(); Ok(()) };
+    get_number_of_variable_dependencies = GetNumberOfVariableDependencies(
+        reference: fmi3ValueReference, n: *mut usize
+    ), instance => write_one(n, instance.dependencies(reference)?.len());
+    get_variable_dependencies = GetVariableDependencies(
+        dependent: fmi3ValueReference, elements: *mut usize,
+        independents: *mut fmi3ValueReference, elements_of_independents: *mut usize,
+        kinds: *mut fmi3DependencyKind, n: usize
+    ), instance => {
+        let found = instance.dependencies(dependent)?;
+        if found.len() != n {
+            let expected = found.len();
+            return Err(Failure::Error(format!("nDependencies is {n}, expected {expected}")));
+        }
+        let (elements, independents) = (borrow_output(elements, n)?, borrow_output(independents, n)?);
+        let of_independents = borrow_output(elements_of_independents, n)?;
+        let kinds = borrow_output(kinds, n)?;
+        for (k, (element, known, element_of_known, kind)) in found.into_iter().enumerate() {
+            elements[k].write(element);
+            independents[k].write(known);
+            of_independents[k].write(element_of_known);
+            kinds[k].write(to_c(kind) as fmi3DependencyKind);
+        }
+        Ok(())
+    };
+    get_fmu_state = GetFMUState(state: *mut fmi3FMUState), instance => {
+        let place = borrow_state(state)?;
+        store(place, instance.snapshot());
+        Ok(())
+    };
+    set_fmu_state = SetFMUState(state: fmi3FMUState),
+        instance => instance.restore(snapshot(state)?);
+    free_fmu_state = FreeFMUState(state: *mut fmi3FMUState), _instance => {
+        free_state::<M>(borrow_state(state)?);
+        Ok(())
+    };
+    serialized_fmu_state_size = SerializedFMUStateSize(state: fmi3FMUState, size: *mut usize),
+        _instance => write_one(size, snapshot::<M>(state)?.size()?);
+    serialize_fmu_state = SerializeFMUState(state: fmi3FMUState, bytes: *mut fmi3Byte, size: usize),
+        _instance => snapshot::<M>(state)?.write(borrow_output(bytes, size)?);
+    deserialize_fmu_state = DeserializeFMUState(
+        bytes: *const fmi3Byte, size: usize, state: *mut fmi3FMUState
+    ), instance => {
+        let snapshot = Snapshot::<M>::from_bytes(read(bytes, size)?, instance.guid())?;
+        store(borrow_state(state)?, snapshot);
+        Ok(())
+    };
+    get_directional_derivative = GetDirectionalDerivative(
+        unknowns: *const fmi3ValueReference, n_unknowns: usize,
+        knowns: *const fmi3ValueReference, n_knowns: usize,
+        seed: *const fmi3Float64, n_seed: usize,
+        sensitivity: *mut fmi3Float64, n_sensitivity: usize
+    ), instance => {
+        let (unknowns, knowns) = (read(unknowns, n_unknowns)?, read(knowns, n_knowns)?);
+        let own = Jacobian { unknowns, knowns, unknown_count: n_sensitivity, known_count: n_seed };
+        instance.jacobian(&own, |instance, unknowns, knowns| instance.get_directional_derivative(
+            unknowns,
+            (knowns, read(seed, n_seed)?),
+            borrow_output(sensitivity, n_sensitivity)?,
+        ))
+    };
+    get_adjoint_derivative = GetAdjointDerivative(
+        unknowns: *const fmi3ValueReference, n_unknowns: usize,
+        knowns: *const fmi3ValueReference, n_knowns: usize,
+        seed: *const fmi3Float64, n_seed: usize,
+        sensitivity: *mut fmi3Float64, n_sensitivity: usize
+    ), instance => {
+        let (unknowns, knowns) = (read(unknowns, n_unknowns)?, read(knowns, n_knowns)?);
+        let own = Jacobian { unknowns, knowns, unknown_count: n_seed, known_count: n_sensitivity };
+        instance.jacobian(&own, |instance, unknowns, knowns| instance.get_adjoint_derivative(
+            unknowns,
+            read(seed, n_seed)?,
+            knowns,
+            borrow_output(sensitivity, n_sensitivity)?,
+        ))
+    };
+    enter_configuration_mode = EnterConfigurationMode(),
+        instance => instance.enter_configuration_mode();
+    exit_configuration_mode = ExitConfigurationMode(),
+        instance => { instance.exit_configuration_mode(); Ok(()) };
+    // Ignored, because providesEvaluateDiscreteStates is false (section 2.3.5).
+    evaluate_discrete_states = EvaluateDiscreteStates(), _instance => Ok(());
+    update_discrete_states = UpdateDiscreteStates(
+        need_update: *mut fmi3Boolean, terminate: *mut fmi3Boolean,
+        nominals_changed: *mut fmi3Boolean, values_changed: *mut fmi3Boolean,
+        next_defined: *mut fmi3Boolean, next: *mut fmi3Float64
+    ), instance => {
+        let event = instance.update_discrete_states_3()?;
+        write_one(need_update, event.new_discrete_states_needed.into())?;
+        write_one(terminate, event.terminate_simulation.is_some().into())?;
+        write_one(nominals_changed, 0)?;
+        write_one(values_changed, event.values_of_continuous_states_changed.into())?;
+        write_one(next_defined, event.next_event_time.is_some().into())?;
+        write_one(next, event.next_event_time.unwrap_or_default())
+    };
+    enter_continuous_time_mode = EnterContinuousTimeMode(), instance => {
+        instance.enter_continuous_time_mode();
+        Ok(())
+    };
+    completed_integrator_step = CompletedIntegratorStep(
+        _no_set_fmu_state: fmi3Boolean, enter: *mut fmi3Boolean, terminate: *mut fmi3Boolean
+    ), instance => {
+        instance.completed_integrator_step()?;
+        write_one(enter, 0)?;
+        write_one(terminate, 0)
+    };
+    set_time = SetTime(time: fmi3Float64), instance => instance.set_time(time);
+    set_continuous_states = SetContinuousStates(x: *const fmi3Float64, n: usize),
+        instance => instance.set_continuous_states(read(x, n)?);
+    get_continuous_state_derivatives = GetContinuousStateDerivatives(x: *mut fmi3Float64, n: usize),
+        instance => instance.get_derivatives(borrow_output(x, n)?);
+    get_event_indicators = GetEventIndicators(z: *mut fmi3Float64, n: usize),
+        instance => instance.get_event_indicators(borrow_output(z, n)?);
+    get_continuous_states = GetContinuousStates(x: *mut fmi3Float64, n: usize),
+        instance => instance.get_continuous_states(borrow_output(x, n)?);
+    get_nominals_of_continuous_states = GetNominalsOfContinuousStates(x: *mut fmi3Float64, n: usize),
+        instance => instance.get_nominals(borrow_output(x, n)?);
+    get_number_of_event_indicators = GetNumberOfEventIndicators(n: *mut usize),
+        instance => write_one(n, instance.indicator_count());
+    get_number_of_continuous_states = GetNumberOfContinuousStates(n: *mut usize),
+        instance => write_one(n, instance.state_count());
+    enter_step_mode = EnterStepMode(), instance => instance.enter_step_mode();
+    get_output_derivatives = GetOutputDerivatives(
+        references: *const fmi3ValueReference, n: usize, orders: *const fmi3Int32,
+        values: *mut fmi3Float64, n_values: usize
+    ), instance => instance.get_output_derivatives(
+        read(references, n)?,
+        read(orders, n)?,
+        borrow_output(values, n_values)?,
+    );
+    do_step = DoStep(
+        start: fmi3Float64, size: fmi3Float64, _no_set_fmu_state: fmi3Boolean,
+        event: *mut fmi3Boolean, terminate: *mut fmi3Boolean, early: *mut fmi3Boolean,
+        last: *mut fmi3Float64
+    ), instance => {
+        for place in [event, terminate, early] {
+            write_one(place, 0)?;
+        }
+        let reached = borrow_output(last, 1)?;
+        let step = instance.do_step_3(start, size);
+        reached[0].write(instance.last_successful_time());
+        let step = step?;
+        write_one(event, step.event_handling_needed.into())?;
+        write_one(terminate, step.terminate_simulation.into())?;
+        write_one(early, step.early_return.into())?;
+        write_one(last, step.last_successful_time)
+    };
+    activate_model_partition = ActivateModelPartition(
+        _clock: fmi3ValueReference, _time: fmi3Float64
+    ), _instance => Err(unavailable("this FMU offers no scheduled execution"));
+}
+
+fn to_c(kind: fmu_description::DependencyKind) -> DependencyKind {
+    use fmu_description::DependencyKind as Kind;
+    match kind {
+        Kind::Dependent => DependencyKind::Dependent,
+        Kind::Constant => DependencyKind::Constant,
+        Kind::Fixed => DependencyKind::Fixed,
+        Kind::Tunable => DependencyKind::Tunable,
+        Kind::Discrete => DependencyKind::Discrete,
+    }
+}

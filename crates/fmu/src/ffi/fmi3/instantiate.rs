@@ -1,0 +1,154 @@
+//! `fmi3InstantiateXXX` and `fmi3FreeInstance`.
+
+use std::path::{Path, PathBuf};
+
+use super::super::{Callbacks, into_component, text};
+use crate::instance::{Instance, Instantiation};
+use crate::model::{Failure, Model};
+use fmu_description::abi::Status;
+use fmu_description::abi3::{
+    fmi3Boolean, fmi3ClockUpdateCallback, fmi3Instance, fmi3InstanceEnvironment,
+    fmi3IntermediateUpdateCallback, fmi3LockPreemptionCallback, fmi3LogMessageCallback, fmi3String,
+    fmi3UnlockPreemptionCallback, fmi3ValueReference,
+};
+use fmu_description::call_order::InterfaceType;
+use fmu_description::location::NO_FOLDER;
+
+/// The strings of `fmi3InstantiateXXX`.
+struct Strings {
+    name: fmi3String,
+    token: fmi3String,
+    resources: fmi3String,
+}
+
+/// Returns token and folder of resources; a null or empty path means that the importer has none.
+unsafe fn read_strings(strings: &Strings) -> Result<(String, PathBuf), Failure> {
+    // SAFETY: null or zero-terminated by the standard.
+    unsafe {
+        let name = text(strings.name, "instanceName")?;
+        if name.trim().is_empty() {
+            return Err(Failure::Error("instanceName is empty".to_owned()));
+        }
+        let token = text(strings.token, "instantiationToken")?;
+        let folder = if strings.resources.is_null() {
+            String::new()
+        } else {
+            text(strings.resources, "resourcePath")?
+        };
+        let folder = if folder.is_empty() { NO_FOLDER } else { &folder };
+        Ok((token, Path::new(folder).to_owned()))
+    }
+}
+
+/// Makes an instance, or logs why there is none.
+unsafe fn instantiate<M: Model>(
+    function: &str,
+    strings: &Strings,
+    callbacks: Callbacks,
+    made: &Instantiation<'_>,
+) -> fmi3Instance {
+    // SAFETY: strings as the standard demands them.
+    let instance = unsafe { read_strings(strings) }.and_then(|(token, resources)| {
+        let made = Instantiation { token: &token, resources: &resources, ..*made };
+        Instance::<M>::new_3(&made, callbacks.clone())
+    });
+    match instance {
+        Ok(mut instance) => {
+            instance.send_messages();
+            into_component(instance)
+        }
+        Err(failure) => {
+            if made.logging_on {
+                callbacks.log(Status::Error, "logStatusError", &format!("{function}: {failure}"));
+            }
+            std::ptr::null_mut()
+        }
+    }
+}
+
+fn instantiation(interface_type: InterfaceType, logging_on: fmi3Boolean) -> Instantiation<'static> {
+    Instantiation {
+        interface_type,
+        token: "",
+        resources: Path::new(NO_FOLDER),
+        logging_on: logging_on != 0,
+        event_mode_used: false,
+        early_return_allowed: false,
+    }
+}
+
+#[must_use]
+pub unsafe fn instantiate_model_exchange<M: Model>(
+    name: fmi3String,
+    token: fmi3String,
+    resources: fmi3String,
+    _visible: fmi3Boolean,
+    logging_on: fmi3Boolean,
+    environment: fmi3InstanceEnvironment,
+    log: Option<fmi3LogMessageCallback>,
+) -> fmi3Instance {
+    let callbacks = Callbacks::Version3 { environment, log };
+    let strings = Strings { name, token, resources };
+    let made = instantiation(InterfaceType::ModelExchange, logging_on);
+    // SAFETY: strings as the standard demands them.
+    unsafe { instantiate::<M>("fmi3InstantiateModelExchange", &strings, callbacks, &made) }
+}
+
+/// No exported model offers intermediate update: `requiredIntermediateVariables` has no effect.
+#[must_use]
+#[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
+pub unsafe fn instantiate_co_simulation<M: Model>(
+    name: fmi3String,
+    token: fmi3String,
+    resources: fmi3String,
+    _visible: fmi3Boolean,
+    logging_on: fmi3Boolean,
+    event_mode_used: fmi3Boolean,
+    early_return_allowed: fmi3Boolean,
+    _required: *const fmi3ValueReference,
+    _n_required: usize,
+    environment: fmi3InstanceEnvironment,
+    log: Option<fmi3LogMessageCallback>,
+    _intermediate_update: Option<fmi3IntermediateUpdateCallback>,
+) -> fmi3Instance {
+    let callbacks = Callbacks::Version3 { environment, log };
+    let strings = Strings { name, token, resources };
+    let made = Instantiation {
+        event_mode_used: event_mode_used != 0,
+        early_return_allowed: early_return_allowed != 0,
+        ..instantiation(InterfaceType::CoSimulation, logging_on)
+    };
+    // SAFETY: strings as the standard demands them.
+    unsafe { instantiate::<M>("fmi3InstantiateCoSimulation", &strings, callbacks, &made) }
+}
+
+/// Scheduled execution is refused.
+#[must_use]
+#[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
+pub unsafe fn instantiate_scheduled_execution<M: Model>(
+    _name: fmi3String,
+    _token: fmi3String,
+    _resources: fmi3String,
+    _visible: fmi3Boolean,
+    logging_on: fmi3Boolean,
+    environment: fmi3InstanceEnvironment,
+    log: Option<fmi3LogMessageCallback>,
+    _clock_update: Option<fmi3ClockUpdateCallback>,
+    _lock_preemption: Option<fmi3LockPreemptionCallback>,
+    _unlock_preemption: Option<fmi3UnlockPreemptionCallback>,
+) -> fmi3Instance {
+    if logging_on != 0 {
+        let message = format!(
+            "fmi3InstantiateScheduledExecution: {} offers no scheduled execution",
+            M::IDENTIFIER
+        );
+        Callbacks::Version3 { environment, log }.log(Status::Error, "logStatusError", &message);
+    }
+    std::ptr::null_mut()
+}
+
+/// Frees the instance. Does nothing for null and during another call of the instance.
+pub unsafe fn free_instance<M: Model>(instance: fmi3Instance) {
+    // SAFETY: an instance that is not null is one that this library made.
+    unsafe { super::super::free_instance::<M>(instance) }
+}

@@ -1,0 +1,209 @@
+//! The functions of FMI 3.0 that differ from those of FMI 2.0.
+
+mod derivatives;
+mod step;
+mod values;
+
+use std::path::Path;
+
+use super::Instance;
+use crate::ffi::Callbacks;
+use crate::interface::fmi3::{Dependency, Table, Type};
+use crate::model::{Event, Failure, Model};
+use fmu_description::call_order::{InterfaceType, State};
+
+pub(crate) use derivatives::Jacobian;
+
+/// What an instance of FMI 3.0 has besides the parts of every instance.
+pub(crate) struct Session {
+    table: Table,
+    event_mode_used: bool,
+    early_return_allowed: bool,
+    /// Places of the variables of the present call.
+    places: Vec<u32>,
+    /// Orders of the output derivatives, or values of enumerations, of the present call.
+    integers: Vec<i32>,
+    /// The event indicators.
+    indicators: Vec<f64>,
+}
+
+/// The arguments of `fmi3InstantiateXXX` that the model needs.
+pub(crate) struct Instantiation<'a> {
+    pub(crate) interface_type: InterfaceType,
+    pub(crate) token: &'a str,
+    pub(crate) resources: &'a Path,
+    pub(crate) logging_on: bool,
+    pub(crate) event_mode_used: bool,
+    pub(crate) early_return_allowed: bool,
+}
+
+impl<M: Model> Instance<M> {
+    /// `fmi3InstantiateModelExchange`, `fmi3InstantiateCoSimulation`.
+    pub(crate) fn new_3(made: &Instantiation<'_>, callbacks: Callbacks) -> Result<Self, Failure> {
+        let mut instance = Self::build(made.resources, callbacks, |interface, description| {
+            let (table, _) = interface.convert(description);
+            let indicators = vec![0.0; interface.event_indicators.unwrap_or_default()];
+            Some(Box::new(Session {
+                table,
+                event_mode_used: made.event_mode_used,
+                early_return_allowed: made.early_return_allowed,
+                places: Vec::new(),
+                integers: Vec::new(),
+                indicators,
+            }))
+        })?;
+        if !instance.offers_exchange() {
+            if made.interface_type == InterfaceType::ModelExchange {
+                return Err(Failure::Error("this FMU offers co-simulation only".to_owned()));
+            }
+            if made.event_mode_used {
+                let message = "eventModeUsed is true, but hasEventMode of this FMU is false";
+                return Err(Failure::Error(message.to_owned()));
+            }
+        }
+        instance.check_guid("instantiationToken", made.token, made.resources)?;
+        instance.debug_logging = true;
+        instance.categories = (!made.logging_on).then(Vec::new);
+        Ok(instance.into_type(made.interface_type))
+    }
+
+    /// Returns the part of FMI 3.0.
+    fn session(&self) -> Result<&Session, Failure> {
+        self.session.as_deref().ok_or_else(other_version)
+    }
+
+    fn session_mut(&mut self) -> Result<&mut Session, Failure> {
+        self.session.as_deref_mut().ok_or_else(other_version)
+    }
+
+    /// Whether this is co-simulation with event mode.
+    pub(super) fn uses_event_mode(&self) -> bool {
+        self.session.as_ref().is_some_and(|own| own.event_mode_used)
+    }
+
+    /// `fmi3SetDebugLogging`: turns categories on or off, all of them if none is given.
+    pub(crate) fn set_debug_logging_3(
+        &mut self,
+        on: bool,
+        categories: &[String],
+    ) -> Result<(), Failure> {
+        let known = self.interface.log_categories.clone();
+        if let Some(unknown) = categories.iter().find(|name| !known.contains(name)) {
+            return Err(Failure::Error(format!(
+                "{unknown} is not a log category of this FMU, expected one of {}",
+                known.join(", ")
+            )));
+        }
+        let mut selected = self.categories.take().unwrap_or(known);
+        if categories.is_empty() {
+            self.categories = (!on).then(Vec::new);
+            return Ok(());
+        }
+        selected.retain(|name| !categories.contains(name));
+        if on {
+            selected.extend_from_slice(categories);
+        }
+        self.categories = Some(selected);
+        Ok(())
+    }
+
+    /// `fmi3ExitInitializationMode`: leads to event mode if the importer handles events.
+    pub(crate) fn exit_initialization_mode_3(&mut self) -> Result<(), Failure> {
+        self.exit_initialization_mode()?;
+        if self.uses_event_mode() {
+            self.core.state = State::EventMode;
+        }
+        Ok(())
+    }
+
+    /// `fmi3EnterEventMode`.
+    pub(crate) fn enter_event_mode_3(&mut self) -> Result<(), Failure> {
+        if self.core.interface_type == InterfaceType::CoSimulation && !self.uses_event_mode() {
+            return Err(Failure::Error("eventModeUsed is false".to_owned()));
+        }
+        self.core.next_event = None;
+        self.enter_event_mode()
+    }
+
+    /// `fmi3UpdateDiscreteStates`.
+    pub(crate) fn update_discrete_states_3(&mut self) -> Result<Event, Failure> {
+        let event = self.update_discrete_states()?;
+        self.core.next_event = event.next_event_time;
+        Ok(event)
+    }
+
+    /// `fmi3EnterStepMode`.
+    pub(crate) fn enter_step_mode(&mut self) -> Result<(), Failure> {
+        self.refresh()?;
+        self.core.state = State::StepComplete;
+        Ok(())
+    }
+
+    /// `fmi3EnterConfigurationMode`: refused, because no exported model has structural parameters
+    /// (sections 2.3.6, 2.3.7).
+    #[expect(clippy::unused_self, reason = "an entry point like the others")]
+    pub(crate) fn enter_configuration_mode(&self) -> Result<(), Failure> {
+        Err(Failure::Error("this FMU has no structural parameters".to_owned()))
+    }
+
+    /// `fmi3ExitConfigurationMode`.
+    pub(crate) fn exit_configuration_mode(&mut self) {
+        self.core.state = match (self.core.state, self.core.interface_type) {
+            (State::ConfigurationMode, _) => State::Instantiated,
+            (_, InterfaceType::ModelExchange) => State::EventMode,
+            (_, InterfaceType::CoSimulation) => State::StepComplete,
+        };
+    }
+
+    /// `fmi3GetNumberOfContinuousStates`.
+    pub(crate) fn state_count(&self) -> usize {
+        self.interface.states.len()
+    }
+
+    /// `fmi3GetNumberOfEventIndicators`.
+    pub(crate) fn indicator_count(&self) -> usize {
+        self.interface.event_indicators.unwrap_or_default()
+    }
+
+    /// `fmi3GetVariableDependencies`: those of the initial values until initialization mode has ended.
+    pub(crate) fn dependencies(&self, reference: u32) -> Result<Vec<Dependency>, Failure> {
+        let initial = matches!(
+            self.core.state,
+            State::Instantiated | State::ConfigurationMode | State::InitializationMode
+        );
+        self.session()?.table.dependencies(reference, initial)
+    }
+
+    /// Finds the places of variables of one type, in row-major order, and runs `body` with them.
+    pub(crate) fn located(
+        &mut self,
+        kind: Type,
+        references: &[u32],
+        count: usize,
+        body: impl FnOnce(&mut Self, &[u32]) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let session = self.session_mut()?;
+        let mut places = std::mem::take(&mut session.places);
+        let found = session.table.locate(kind, references, count, &mut places);
+        let done = found.and_then(|()| body(self, &places));
+        self.session_mut()?.places = places;
+        done
+    }
+
+    /// The answer of the functions for types that no exported model has.
+    pub(crate) fn without_variables(
+        &self,
+        function_type: &str,
+        references: &[u32],
+    ) -> Result<(), Failure> {
+        match references.first() {
+            None => Ok(()),
+            Some(&first) => Err(self.session()?.table.wrong_type(first, function_type)),
+        }
+    }
+}
+
+#[cold]
+fn other_version() -> Failure {
+    Failure::Error("the instance was made by fmi2Instantiate".to_owned())
+}

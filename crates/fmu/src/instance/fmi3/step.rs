@@ -1,0 +1,81 @@
+//! `fmi3DoStep`.
+
+use super::super::{Instance, communication_step};
+use crate::model::{Failure, Model};
+use crate::stepper::Stop;
+use fmu_description::abi::Status;
+
+/// The results of `fmi3DoStep` (section 4.2.1).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct StepResult {
+    pub(crate) event_handling_needed: bool,
+    pub(crate) terminate_simulation: bool,
+    pub(crate) early_return: bool,
+    pub(crate) last_successful_time: f64,
+}
+
+impl<M: Model> Instance<M> {
+    /// `fmi3DoStep`.
+    ///
+    /// A model whose equations the exporter integrates stops at its events if the importer handles them
+    /// (`eventModeUsed`) and allows early return. A model that wants the simulation to end returns at that
+    /// time.
+    ///
+    /// # Errors
+    ///
+    /// The failures of the model. [`Failure::Incomplete`] is an error, because `earlyReturn` must not
+    /// signal one.
+    pub(crate) fn do_step_3(&mut self, start: f64, size: f64) -> Result<StepResult, Failure> {
+        let (events, may_return) = {
+            let session = self.session()?;
+            (session.event_mode_used, session.early_return_allowed)
+        };
+        let end = start + size;
+        let mut stop = Stop { time: end, is_event: false };
+        let done = if events && may_return {
+            self.step_to_event(start, size).map(|reached| stop = reached)
+        } else {
+            self.do_step(start, size)
+        };
+        let terminated = match done {
+            Ok(()) => false,
+            Err(Failure::Terminated { time, message }) => {
+                stop.time = time.clamp(start, end);
+                self.core.time = stop.time;
+                self.core.terminated = true;
+                self.log(Status::OK, "logEvents", &format!("the simulation ends: {message}"));
+                true
+            }
+            Err(failure) => return Err(failure),
+        };
+        Ok(StepResult {
+            event_handling_needed: stop.is_event,
+            terminate_simulation: terminated,
+            early_return: may_return && stop.time < end,
+            last_successful_time: stop.time,
+        })
+    }
+
+    /// Advances to the end of the step or to the first event, which event mode will handle.
+    fn step_to_event(&mut self, start: f64, size: f64) -> Result<Stop, Failure> {
+        let core = &mut self.core;
+        let step = communication_step(core.time, start, size)?;
+        let end = start + size;
+        core.before_stop(end)?;
+        core.check()?;
+        let stop = match core.model.step(&step) {
+            Ok(()) => Stop { time: end, is_event: false },
+            Err(Failure::Unsolved) => {
+                let Self { stepper, interface, .. } = self;
+                let tolerance = core.experiment.tolerance;
+                let next = core.next_event;
+                stepper.run_to_event(&mut core.model, interface, &step, tolerance, next)?
+            }
+            Err(failure) => return Err(failure),
+        };
+        let stop = if stop.time < step.end() { stop } else { Stop { time: end, ..stop } };
+        core.time = stop.time;
+        core.stale = false;
+        Ok(stop)
+    }
+}

@@ -1,0 +1,184 @@
+//! The variables of FMI 3.0, derived from those of FMI 2.0: value references that are unique over all
+//! types, arrays, and event indicators as variables.
+
+mod arrays;
+mod describe;
+
+use crate::model::Failure;
+use fmu_description::{DependencyKind, ModelStructure};
+
+pub(crate) use describe::describe;
+
+/// Marks a place that is an event indicator and no value reference of FMI 2.0.
+pub(crate) const INDICATOR: u32 = 1 << 31;
+
+/// The types of FMI 3.0 that an exported model can have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Type {
+    Float64,
+    Int32,
+    /// An `Enumeration`, which `fmi3GetInt64` reads.
+    Int64,
+    Boolean,
+    String,
+}
+
+impl Type {
+    /// Returns the name in the functions `fmi3Get{VariableType}`.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Type::Float64 => "Float64",
+            Type::Int32 => "Int32",
+            Type::Int64 => "Int64",
+            Type::Boolean => "Boolean",
+            Type::String => "String",
+        }
+    }
+}
+
+/// A variable of FMI 3.0: a scalar or an array.
+#[derive(Debug)]
+pub(crate) struct Entry {
+    pub(crate) name: String,
+    pub(crate) kind: Type,
+    /// The value reference of FMI 2.0 of the first element; the others follow.
+    first: u32,
+    /// Number of elements.
+    count: u32,
+}
+
+/// The variables by value reference of FMI 3.0, and what they depend on.
+pub(crate) struct Table {
+    entries: Vec<Entry>,
+    /// `ModelStructure` of FMI 2.0, in which each element of an array is a variable.
+    scalars: ModelStructure,
+    /// Value reference and element (from 1; 0 for a scalar) of each variable of FMI 2.0, in their order.
+    elements: Vec<(u32, usize)>,
+    /// 1-based indices in FMI 2.0 of the parameters, on which outputs and derivatives may depend.
+    parameters: Vec<u32>,
+    /// 1-based indices in FMI 2.0 of the continuous states and of their aliases, which depend on no
+    /// parameter.
+    states: Vec<u32>,
+    /// 1-based indices in FMI 2.0 of the knowns in initialization mode and after it.
+    knowns: [Vec<u32>; 2],
+}
+
+/// One dependency: element of the unknown, value reference and element of the known, kind.
+pub(crate) type Dependency = (usize, u32, usize, DependencyKind);
+
+impl Table {
+    /// Returns the variable with a value reference.
+    fn entry(&self, reference: u32, function_type: &str) -> Result<&Entry, Failure> {
+        self.entries.get(reference as usize).ok_or_else(|| {
+            Failure::Error(format!(
+                "no {function_type} variable has the value reference {reference}"
+            ))
+        })
+    }
+
+    /// Appends the value references of FMI 2.0 of all elements of the variables to `places`, in
+    /// row-major order.
+    ///
+    /// # Errors
+    ///
+    /// [`Failure::Error`] for an unknown value reference, a variable of another type, and if the
+    /// variables have not `count` elements together (section 2.2.7.1).
+    pub(crate) fn locate(
+        &self,
+        kind: Type,
+        references: &[u32],
+        count: usize,
+        places: &mut Vec<u32>,
+    ) -> Result<(), Failure> {
+        places.clear();
+        for &reference in references {
+            match self.entries.get(reference as usize) {
+                Some(entry) if entry.kind == kind => {
+                    if entry.count == 1 {
+                        places.push(entry.first);
+                    } else {
+                        places.extend(entry.first..entry.first + entry.count);
+                    }
+                }
+                _ => return Err(self.wrong_type(reference, kind.name())),
+            }
+        }
+        if places.len() != count {
+            return Err(self.wrong_count(references, places.len(), count));
+        }
+        Ok(())
+    }
+
+    /// Returns the error for a function that does not access the variable's type.
+    #[cold]
+    pub(crate) fn wrong_type(&self, reference: u32, function_type: &str) -> Failure {
+        match self.entry(reference, function_type) {
+            Ok(Entry { name, kind, .. }) => Failure::Error(format!(
+                "value reference {reference} is {name} of type {}, expected a {function_type}",
+                kind.name()
+            )),
+            Err(failure) => failure,
+        }
+    }
+
+    #[cold]
+    fn wrong_count(&self, references: &[u32], expected: usize, found: usize) -> Failure {
+        let names = references.iter().filter_map(|&reference| self.entries.get(reference as usize));
+        let names: Vec<_> = names.take(5).map(|entry| entry.name.as_str()).collect();
+        let more = if references.len() > names.len() { ", ..." } else { "" };
+        Failure::Error(format!(
+            "nValues is {found}, expected {expected} for the elements of {}{more}",
+            names.join(", ")
+        ))
+    }
+
+    /// Returns the number of elements of each of the variables.
+    pub(crate) fn sizes(&self, references: &[u32]) -> impl Iterator<Item = u32> {
+        references
+            .iter()
+            .map(|&reference| self.entries.get(reference as usize).map_or(0, |entry| entry.count))
+    }
+
+    /// Returns the dependencies of a variable, those of the initial values if `initial`; none for a
+    /// variable that is no unknown.
+    ///
+    /// # Errors
+    ///
+    /// [`Failure::Error`] for an unknown value reference.
+    pub(crate) fn dependencies(
+        &self,
+        reference: u32,
+        initial: bool,
+    ) -> Result<Vec<Dependency>, Failure> {
+        self.entry(reference, "exported")?;
+        let own = &self.scalars;
+        let later = || own.outputs.iter().chain(&own.derivatives);
+        let rows: Vec<_> =
+            if initial { own.initial_unknowns.iter().collect() } else { later().collect() };
+        let mut found = Vec::new();
+        let mut seen = Vec::new();
+        for row in rows {
+            let (owner, element) = self.elements[row.index as usize - 1];
+            if owner != reference || seen.contains(&row.index) {
+                continue;
+            }
+            seen.push(row.index);
+            let all = &self.knowns[usize::from(!initial)];
+            let listed = row.dependencies.as_ref().unwrap_or(all);
+            for (position, &known) in listed.iter().enumerate() {
+                let kinds = row.kinds.as_ref();
+                let kind = kinds.and_then(|kinds| kinds.get(position).copied());
+                found.push(self.dependency(element, known, kind));
+            }
+            if !initial && row.dependencies.is_some() && !self.states.contains(&row.index) {
+                found.extend(self.parameters.iter().map(|&k| self.dependency(element, k, None)));
+            }
+        }
+        Ok(found)
+    }
+
+    fn dependency(&self, element: usize, known: u32, kind: Option<DependencyKind>) -> Dependency {
+        let (reference, of_known) = self.elements[known as usize - 1];
+        (element, reference, of_known, kind.unwrap_or(DependencyKind::Dependent))
+    }
+}

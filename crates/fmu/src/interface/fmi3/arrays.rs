@@ -1,0 +1,209 @@
+//! Arrays: scalars of FMI 2.0 that are one array in FMI 3.0.
+
+use fmu_description::{Elements, Kind, RealType, ScalarVariable};
+
+/// Scalars that are an array, or one scalar.
+pub(super) struct Block {
+    pub(super) name: String,
+    /// Position of the first scalar and their number.
+    pub(super) start: usize,
+    pub(super) count: usize,
+    /// Extents; empty for a scalar.
+    pub(super) extents: Vec<u64>,
+}
+
+/// Splits variables into arrays and scalars.
+///
+/// Scalars are an array if they follow one another, are named `name[1,1]`, `name[1,2]` and so on (or
+/// `der(name[1,1])`), with every index in row-major order, and differ in nothing but start value. A
+/// variable that is an alias, or has one, stays a scalar: FMI 3.0 knows no alias of an element.
+/// `is_single` says which ones those are.
+pub(super) fn blocks(
+    variables: &[ScalarVariable],
+    is_single: impl Fn(&ScalarVariable) -> bool,
+) -> Vec<Block> {
+    let mut singles: Vec<String> = Vec::new();
+    loop {
+        let found = split_up(variables, &|own| is_single(own) || singles.contains(&own.name));
+        let unmatched = unmatched(variables, &found);
+        if unmatched.is_empty() {
+            return found;
+        }
+        singles.extend(unmatched);
+    }
+}
+
+/// Returns the first scalars of arrays of states without an array of derivatives, and the reverse.
+fn unmatched(variables: &[ScalarVariable], blocks: &[Block]) -> Vec<String> {
+    let state = |position: usize| variables[position].kind.as_real().and_then(|own| own.derivative);
+    let pairs = blocks.iter().filter_map(|block| {
+        let state = state(block.start)? as usize - 1;
+        let of = blocks.iter().find(|of| (of.start..of.start + of.count).contains(&state))?;
+        Some((block, of, state))
+    });
+    let mut names = Vec::new();
+    for (block, of, state) in pairs {
+        if of.start != state || of.extents != block.extents {
+            for block in [block, of].into_iter().filter(|block| !block.extents.is_empty()) {
+                names.push(variables[block.start].name.clone());
+            }
+        }
+    }
+    names
+}
+
+fn split_up(
+    variables: &[ScalarVariable],
+    is_single: &impl Fn(&ScalarVariable) -> bool,
+) -> Vec<Block> {
+    let mut blocks = Vec::new();
+    let mut start = 0;
+    while start < variables.len() {
+        let block = array(variables, start, is_single).unwrap_or_else(|| Block {
+            name: variables[start].name.clone(),
+            start,
+            count: 1,
+            extents: Vec::new(),
+        });
+        start += block.count;
+        blocks.push(block);
+    }
+    blocks
+}
+
+/// Returns the array that begins at `start` and has all elements of its name.
+fn array(
+    variables: &[ScalarVariable],
+    start: usize,
+    is_single: &impl Fn(&ScalarVariable) -> bool,
+) -> Option<Block> {
+    let rest = &variables[start..];
+    let (name, first) = split(&rest[0].name).filter(|_| !is_single(&rest[0]))?;
+    let like_first = |(position, other): (usize, &ScalarVariable)| {
+        let (of, indices) = split(&other.name)?;
+        let fits = of == name && indices.len() == first.len() && !is_single(other);
+        (fits && is_element(&rest[0], other, position)).then_some(indices)
+    };
+    let found: Vec<_> = rest.iter().enumerate().map_while(like_first).collect();
+    let extents = found.last()?.clone();
+    let all = variables.iter().filter(|own| split(&own.name).is_some_and(|(of, _)| of == name));
+    let complete = all.count() == found.len()
+        && found.iter().enumerate().all(|(position, indices)| {
+            let mut left = position as u64;
+            extents.iter().zip(indices).rev().all(|(extent, index)| {
+                let fits = left % extent == index - 1;
+                left /= extent;
+                fits
+            })
+        });
+    let count = extents.iter().try_fold(1_u64, |product, &extent| product.checked_mul(extent))?;
+    let count = usize::try_from(count).ok()?;
+    (complete && count == found.len()).then_some(Block { name, start, count, extents })
+}
+
+/// Splits `name[1,2]` into `name` and its indices, `der(name[1,2])` into `der(name)` and its indices.
+fn split(name: &str) -> Option<(String, Vec<u64>)> {
+    let (inner, closing) = match name.strip_suffix("])") {
+        Some(inner) if name.starts_with("der(") => (inner, ")"),
+        _ => (name.strip_suffix(']')?, ""),
+    };
+    let (base, indices) = inner.rsplit_once('[')?;
+    let indices: Option<Vec<u64>> =
+        indices.split(',').map(|index| index.parse().ok().filter(|index| *index > 0)).collect();
+    Some((format!("{base}{closing}"), indices?))
+}
+
+/// Whether `other` can be the element at `position` of the array whose first element is `first`.
+fn is_element(first: &ScalarVariable, other: &ScalarVariable, position: usize) -> bool {
+    let Ok(offset) = u32::try_from(position) else { return false };
+    let kind = match (&first.kind, &other.kind) {
+        (Kind::Real(one), Kind::Real(two)) => {
+            let shifted = one.derivative.map(|derivative| derivative + offset);
+            let alike = RealType { start: two.start, derivative: two.derivative, ..one.clone() };
+            alike == *two && shifted == two.derivative && one.start.is_some() == two.start.is_some()
+        }
+        (Kind::Integer(one), Kind::Integer(two)) => {
+            let alike = fmu_description::IntegerType { start: two.start, ..one.clone() };
+            alike == *two && one.start.is_some() == two.start.is_some()
+        }
+        (Kind::Boolean(one), Kind::Boolean(two)) => one.is_some() == two.is_some(),
+        _ => false,
+    };
+    let alike = ScalarVariable {
+        name: other.name.clone(),
+        value_reference: first.value_reference + offset,
+        kind: other.kind.clone(),
+        ..first.clone()
+    };
+    kind && alike == *other
+}
+
+/// Returns the start values of the elements, if they have any.
+pub(super) fn starts(elements: &[ScalarVariable]) -> Option<Elements> {
+    let real = |own: &ScalarVariable| own.kind.as_real().and_then(|real| real.start);
+    let integer = |own: &ScalarVariable| own.kind.as_integer().and_then(|integer| integer.start);
+    let boolean = |own: &ScalarVariable| match own.kind {
+        Kind::Boolean(start) => start,
+        _ => None,
+    };
+    match elements.first()?.kind {
+        Kind::Real(_) => elements.iter().map(real).collect::<Option<_>>().map(Elements::Real),
+        Kind::Integer(_) => {
+            elements.iter().map(integer).collect::<Option<_>>().map(Elements::Integer)
+        }
+        Kind::Boolean(_) => {
+            elements.iter().map(boolean).collect::<Option<_>>().map(Elements::Boolean)
+        }
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn variables(names: &[&str]) -> Vec<ScalarVariable> {
+        (1..)
+            .zip(names)
+            .map(|(value_reference, name)| ScalarVariable {
+                name: (*name).to_owned(),
+                value_reference,
+                ..ScalarVariable::default()
+            })
+            .collect()
+    }
+
+    fn found(names: &[&str]) -> Vec<(String, usize, Vec<u64>)> {
+        let blocks = blocks(&variables(names), |_| false);
+        blocks.into_iter().map(|own| (own.name, own.count, own.extents)).collect()
+    }
+
+    #[test]
+    fn scalars_with_every_index_in_row_major_order_are_an_array() {
+        let names = ["x", "A[1,1]", "A[1,2]", "A[2,1]", "A[2,2]", "b[1]", "b[2]", "der(b[1])"];
+        let expected =
+            [("x", 1, vec![]), ("A", 4, vec![2, 2]), ("b", 2, vec![2]), ("der(b)", 1, vec![1])];
+        assert_eq!(found(&names), expected.map(|(name, n, e)| (name.to_owned(), n, e)));
+    }
+
+    #[test]
+    fn incomplete_or_disordered_indices_are_scalars() {
+        for names in [
+            &["A[1,1]", "A[2,2]"][..],
+            &["A[1,2]", "A[1,1]"],
+            &["A[2]", "A[3]"],
+            &["A[1,1]", "A[1,2]", "A[2,1]"],
+            &["A[0]"],
+            &["A[x]"],
+        ] {
+            assert!(found(names).iter().all(|own| own.2.is_empty()), "{names:?}");
+        }
+    }
+
+    #[test]
+    fn elements_with_other_attributes_are_scalars() {
+        let mut all = variables(&["x[1]", "x[2]"]);
+        all[1].kind = Kind::Real(RealType { unit: Some("m".to_owned()), ..RealType::default() });
+        assert!(blocks(&all, |_| false).iter().all(|own| own.extents.is_empty()));
+    }
+}

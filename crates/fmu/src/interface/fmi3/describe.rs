@@ -1,0 +1,381 @@
+//! The description of FMI 3.0, made from the description of FMI 2.0.
+
+use std::collections::HashMap;
+
+use super::arrays::{Block, blocks, starts};
+use super::{Entry, INDICATOR, Table, Type};
+use fmu_description::{
+    Causality, CoSimulation, DependencyKind, Dimension, Initial, IntegerType, Kind,
+    ModelDescription, ModelExchange, ModelStructure, RealType, ScalarVariable, Unknown,
+    Variability,
+};
+
+/// The new variables with the places of the old ones.
+#[derive(Default)]
+struct Builder {
+    variables: Vec<ScalarVariable>,
+    entries: Vec<Entry>,
+    /// For each old variable: 1-based index of the new one and its element (from 1; 0 for a scalar).
+    places: Vec<(u32, usize)>,
+}
+
+/// Returns table and description of FMI 3.0 for a description of FMI 2.0 and a number of event
+/// indicators.
+///
+/// * Scalars named `A[1,1]`, `A[1,2]`, ... are one array if their attributes agree.
+/// * An alias with the same attributes becomes an `Alias`; another one becomes a variable.
+/// * The parameters are knowns of outputs and derivatives (section 2.4.8): each of these depends on all
+///   of them, except a state.
+/// * The event indicators are local variables.
+pub(crate) fn describe(old: &ModelDescription, indicators: usize) -> (Table, ModelDescription) {
+    let mut builder = Builder::default();
+    builder.add_variables(&old.variables);
+    let structure = builder.structure(old);
+    builder.set_derivatives();
+    let table = builder.table(old);
+    let (table, variables, event_indicators) = add_indicators(table, builder.variables, indicators);
+    let description = ModelDescription {
+        fmi_version: "3.0".to_owned(),
+        guid: String::new(),
+        number_of_event_indicators: None,
+        model_exchange: old.model_exchange.as_ref().map(exchange),
+        co_simulation: old.co_simulation.as_ref().map(|own| simulation(own, old)),
+        variables,
+        structure: ModelStructure { event_indicators, ..structure },
+        ..old.clone()
+    };
+    (table, description)
+}
+
+fn exchange(own: &ModelExchange) -> ModelExchange {
+    ModelExchange {
+        can_not_use_memory_management_functions: false,
+        provides_adjoint_derivatives: own.provides_directional_derivative,
+        provides_per_element_dependencies: true,
+        ..own.clone()
+    }
+}
+
+fn simulation(own: &CoSimulation, old: &ModelDescription) -> CoSimulation {
+    CoSimulation {
+        can_not_use_memory_management_functions: false,
+        can_interpolate_inputs: false,
+        has_event_mode: old.model_exchange.is_some(),
+        might_return_early_from_do_step: true,
+        provides_adjoint_derivatives: own.provides_directional_derivative,
+        provides_per_element_dependencies: true,
+        ..own.clone()
+    }
+}
+
+/// Returns the type of FMI 3.0 and the start value's absence for an alias.
+fn kind_of(kind: &Kind) -> Type {
+    match kind {
+        Kind::Integer(_) => Type::Int32,
+        Kind::Enumeration(_) => Type::Int64,
+        Kind::Boolean(_) => Type::Boolean,
+        Kind::String(_) => Type::String,
+        _ => Type::Float64,
+    }
+}
+
+/// Key of the variables with the same value: base type and value reference of FMI 2.0.
+fn value_of(own: &ScalarVariable) -> (bool, &'static str, u32) {
+    let element = match own.kind {
+        Kind::Enumeration(_) => "Integer",
+        ref kind => kind.element(),
+    };
+    (own.causality == Causality::Independent, element, own.value_reference)
+}
+
+fn same_attributes(alias: &ScalarVariable, of: &ScalarVariable) -> bool {
+    let kind = |own: &ScalarVariable| match without_start(&own.kind) {
+        Kind::Real(real) => Kind::Real(RealType { reinit: false, ..real }),
+        other => other,
+    };
+    alias.causality == of.causality
+        && alias.variability == of.variability
+        && kind(alias) == kind(of)
+}
+
+fn without_start(kind: &Kind) -> Kind {
+    match kind {
+        Kind::Real(own) => Kind::Real(RealType { start: None, ..own.clone() }),
+        Kind::Integer(own) => Kind::Integer(IntegerType { start: None, ..own.clone() }),
+        Kind::Enumeration(own) => Kind::Enumeration(IntegerType { start: None, ..own.clone() }),
+        Kind::Boolean(_) => Kind::Boolean(None),
+        Kind::String(_) => Kind::String(None),
+        other => other.clone(),
+    }
+}
+
+impl Builder {
+    fn add_variables(&mut self, old: &[ScalarVariable]) {
+        let mut same: HashMap<_, Vec<usize>> = HashMap::new();
+        for (position, variable) in old.iter().enumerate() {
+            same.entry(value_of(variable)).or_default().push(position);
+        }
+        let group = |own: &ScalarVariable| same.get(&value_of(own)).map_or(&[][..], Vec::as_slice);
+        // The variable that an alias repeats is the one with a start value, otherwise the first one.
+        let main = |own: &ScalarVariable| {
+            let with_start = group(own).iter().copied().find(|&other| old[other].has_start());
+            with_start.unwrap_or_else(|| group(own)[0])
+        };
+        let is_alias = |position: usize| {
+            let main = main(&old[position]);
+            main != position && same_attributes(&old[position], &old[main])
+        };
+        self.places = vec![(0, 0); old.len()];
+        for block in blocks(old, |own| group(own).len() > 1) {
+            if block.count == 1 && block.extents.is_empty() && is_alias(block.start) {
+                continue;
+            }
+            let elements = &old[block.start..block.start + block.count];
+            let aliases = group(&elements[0]).iter().copied();
+            let aliases: Vec<_> = aliases
+                .filter(|&other| is_alias(other) && main(&old[other]) == block.start)
+                .collect();
+            self.add_block(&block, elements);
+            for position in aliases {
+                self.add_alias(&old[position], position, &block.name);
+            }
+        }
+    }
+
+    fn add_block(&mut self, block: &Block, elements: &[ScalarVariable]) {
+        let reference = u32::try_from(self.entries.len()).unwrap_or(u32::MAX);
+        let first = &elements[0];
+        let index = self.next_index();
+        let is_array = !block.extents.is_empty();
+        for element in 0..block.count {
+            self.places[block.start + element] = (index, if is_array { element + 1 } else { 0 });
+        }
+        self.entries.push(Entry {
+            name: block.name.clone(),
+            kind: kind_of(&first.kind),
+            first: first.value_reference,
+            count: u32::try_from(block.count).unwrap_or(u32::MAX),
+        });
+        let start_elements = starts(elements).filter(|_| block.count > 1);
+        let stated = start_elements.is_some();
+        let kind = if stated { without_start(&first.kind) } else { first.kind.clone() };
+        self.variables.push(ScalarVariable {
+            name: block.name.clone(),
+            value_reference: reference,
+            dimensions: block.extents.iter().map(|&extent| Dimension::Fixed(extent)).collect(),
+            start_elements,
+            kind,
+            ..first.clone()
+        });
+    }
+
+    fn add_alias(&mut self, alias: &ScalarVariable, position: usize, of: &str) {
+        self.places[position] = (self.next_index(), 0);
+        let target = self.variables.iter().rfind(|own| own.name == of).cloned().unwrap_or_default();
+        self.variables.push(ScalarVariable {
+            name: alias.name.clone(),
+            description: alias.description.clone(),
+            alias_of: Some(of.to_owned()),
+            initial: alias.initial,
+            kind: alias.kind.clone(),
+            ..target
+        });
+    }
+
+    fn next_index(&self) -> u32 {
+        u32::try_from(self.variables.len() + 1).unwrap_or(u32::MAX)
+    }
+
+    fn index(&self, old: u32) -> u32 {
+        self.places[old as usize - 1].0
+    }
+
+    /// Replaces the indices of the states in derivatives.
+    fn set_derivatives(&mut self) {
+        let places = std::mem::take(&mut self.places);
+        for variable in &mut self.variables {
+            if let Kind::Real(RealType { derivative: Some(state), .. }) = &mut variable.kind {
+                *state = places[*state as usize - 1].0;
+            }
+        }
+        self.places = places;
+    }
+
+    fn structure(&self, old: &ModelDescription) -> ModelStructure {
+        let own = &old.structure;
+        let parameters: Vec<_> =
+            parameters(old).into_iter().map(|parameter| self.index(parameter)).collect();
+        let states = states(old);
+        let later = |rows: &[Unknown]| {
+            self.rows(rows, |row| if states.contains(&row) { &[] } else { parameters.as_slice() })
+        };
+        ModelStructure {
+            outputs: later(&own.outputs),
+            derivatives: later(&own.derivatives),
+            initial_unknowns: self.rows(&own.initial_unknowns, |_| &[]),
+            ..ModelStructure::default()
+        }
+    }
+
+    /// Returns the rows of the new variables: the row of an array has the dependencies of all its
+    /// elements, and `more` for each of the old rows.
+    fn rows<'a>(&self, old: &[Unknown], more: impl Fn(u32) -> &'a [u32]) -> Vec<Unknown> {
+        let mut rows: Vec<Unknown> = Vec::new();
+        let mut by_reference: HashMap<u32, (usize, u32)> = HashMap::new();
+        for row in old {
+            let index = self.index(row.index);
+            let reference = self.variables[index as usize - 1].value_reference;
+            let new = self.row(row, index, more(row.index));
+            match by_reference.get(&reference) {
+                None => {
+                    by_reference.insert(reference, (rows.len(), index));
+                    rows.push(new);
+                }
+                // Another element of an array; the row of an alias is the row of its variable.
+                Some(&(position, same)) if same == index => merge(&mut rows[position], new),
+                Some(_) => {}
+            }
+        }
+        rows
+    }
+
+    fn row(&self, old: &Unknown, index: u32, more: &[u32]) -> Unknown {
+        let Some(known) = &old.dependencies else {
+            return Unknown { index, dependencies: None, kinds: None };
+        };
+        let kind = |position: usize| {
+            let kinds = old.kinds.as_ref().and_then(|kinds| kinds.get(position).copied());
+            kinds.unwrap_or(DependencyKind::Dependent)
+        };
+        let listed = known.iter().enumerate().map(|(at, &known)| (self.index(known), kind(at)));
+        let more = more.iter().map(|&known| (known, DependencyKind::Dependent));
+        from_pairs(index, listed.chain(more).collect())
+    }
+
+    fn table(&self, old: &ModelDescription) -> Table {
+        let reference = |&(index, element): &(u32, usize)| {
+            (self.variables[index as usize - 1].value_reference, element)
+        };
+        let knowns = |is_known: &dyn Fn(&ScalarVariable) -> bool| {
+            let all = (1_u32..).zip(&old.variables);
+            all.filter(|(_, own)| is_known(own)).map(|(index, _)| index).collect::<Vec<_>>()
+        };
+        let states = states(old);
+        let initial = |own: &ScalarVariable| match own.causality {
+            Causality::Input | Causality::Independent => true,
+            _ => {
+                own.initial_in_force() == Some(Initial::Exact)
+                    && own.variability != Variability::Constant
+            }
+        };
+        let mut later = knowns(&|own| {
+            matches!(
+                own.causality,
+                Causality::Input | Causality::Independent | Causality::Parameter
+            )
+        });
+        later.extend(derivative_states(old));
+        later.sort_unstable();
+        Table {
+            elements: self.places.iter().map(reference).collect(),
+            entries: self
+                .entries
+                .iter()
+                .map(|own| Entry { name: own.name.clone(), ..*own })
+                .collect(),
+            scalars: old.structure.clone(),
+            parameters: parameters(old),
+            states,
+            knowns: [knowns(&initial), later],
+        }
+    }
+}
+
+/// Returns the indices of the parameters.
+fn parameters(old: &ModelDescription) -> Vec<u32> {
+    let all = (1..).zip(&old.variables);
+    all.filter(|(_, own)| own.causality == Causality::Parameter).map(|(index, _)| index).collect()
+}
+
+/// Returns the indices of the continuous states.
+fn derivative_states(old: &ModelDescription) -> Vec<u32> {
+    let rows = old.structure.derivatives.iter();
+    let derivative = rows.map(|row| &old.variables[row.index as usize - 1]);
+    derivative.filter_map(|own| own.kind.as_real().and_then(|real| real.derivative)).collect()
+}
+
+/// Returns the indices of the continuous states and of the other variables with their values.
+fn states(old: &ModelDescription) -> Vec<u32> {
+    let values: Vec<_> = derivative_states(old)
+        .into_iter()
+        .map(|index| value_of(&old.variables[index as usize - 1]))
+        .collect();
+    let all = (1..).zip(&old.variables);
+    all.filter(|(_, own)| values.contains(&value_of(own))).map(|(index, _)| index).collect()
+}
+
+/// Returns the row with these dependencies. A known that occurs twice with different kinds has no
+/// particular structure.
+fn from_pairs(index: u32, mut pairs: Vec<(u32, DependencyKind)>) -> Unknown {
+    pairs.sort_by_key(|(known, _)| *known);
+    let mut merged: Vec<(u32, DependencyKind)> = Vec::new();
+    for (known, kind) in pairs {
+        match merged.last_mut().filter(|last| last.0 == known) {
+            Some(last) if last.1 == kind => {}
+            Some(last) => last.1 = DependencyKind::Dependent,
+            None => merged.push((known, kind)),
+        }
+    }
+    let (dependencies, kinds): (Vec<_>, Vec<_>) = merged.into_iter().unzip();
+    let plain = kinds.iter().all(|kind| *kind == DependencyKind::Dependent);
+    Unknown { index, dependencies: Some(dependencies), kinds: (!plain).then_some(kinds) }
+}
+
+fn merge(row: &mut Unknown, other: Unknown) {
+    let pairs = |row: &Unknown| {
+        let kinds = row.kinds.clone();
+        row.dependencies.clone().map(|known| {
+            let none = vec![DependencyKind::Dependent; known.len()];
+            known.into_iter().zip(kinds.unwrap_or(none)).collect::<Vec<_>>()
+        })
+    };
+    *row = match (pairs(row), pairs(&other)) {
+        (Some(mut one), Some(two)) => {
+            one.extend(two);
+            from_pairs(row.index, one)
+        }
+        _ => Unknown { index: row.index, dependencies: None, kinds: None },
+    };
+}
+
+/// Adds the event indicators as local variables. Returns their rows as well.
+fn add_indicators(
+    mut table: Table,
+    mut variables: Vec<ScalarVariable>,
+    count: usize,
+) -> (Table, Vec<ScalarVariable>, Vec<Unknown>) {
+    let mut rows = Vec::new();
+    for k in 0..count {
+        let name = format!("event_indicator[{}]", k + 1);
+        let place = INDICATOR | u32::try_from(k).unwrap_or(u32::MAX);
+        let reference = u32::try_from(table.entries.len()).unwrap_or(u32::MAX);
+        table.entries.push(Entry {
+            name: name.clone(),
+            kind: Type::Float64,
+            first: place,
+            count: 1,
+        });
+        variables.push(ScalarVariable {
+            name,
+            value_reference: reference,
+            description: Some("A state event occurs where it changes its sign".to_owned()),
+            causality: Causality::Local,
+            variability: Variability::Continuous,
+            initial: Some(Initial::Calculated),
+            ..ScalarVariable::default()
+        });
+        let index = u32::try_from(variables.len()).unwrap_or(u32::MAX);
+        rows.push(Unknown { index, dependencies: None, kinds: None });
+    }
+    (table, variables, rows)
+}
