@@ -110,7 +110,8 @@ impl<S: Slave + ?Sized> LoggedSlave<S> {
     fn created(&self, (function, kind): (&str, &str)) {
         let (instance, guid) = (&self.instance, &self.slave.description().guid);
         let prefix = self.prefix();
-        self.log.write(&format!("{instance} {function}({instance:?}, {kind}{guid:?}) -> {prefix}OK\n"));
+        self.log
+            .write(&format!("{instance} {function}({instance:?}, {kind}{guid:?}) -> {prefix}OK\n"));
     }
 
     /// Returns the prefix of functions and statuses in the version of the FMU.

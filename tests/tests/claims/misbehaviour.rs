@@ -63,7 +63,7 @@ fn values_of_all_types_pass_through_an_fmu_unchanged() {
     let long = "x".repeat(19_999);
     let texts = ["", "Grüße, \"Ångström\"\n", long.as_str()];
     for (step, text) in texts.into_iter().enumerate() {
-        let number = [i32::MIN, i32::MAX, 0][step];
+        let number = [i64::from(i32::MIN), i32::MAX.into(), 0][step];
         let (item, boolean) = ([1, 2, 1][step], [1, 0, 1][step]);
         slave.set_real(&[U], &[f64::MIN_POSITIVE]).unwrap();
         slave.set_integer(&[0, 10], &[number, item]).unwrap();

@@ -57,7 +57,7 @@ impl Instance {
     fn integer(&mut self, reference: u32) -> i32 {
         let mut value = [0];
         self.slave.get_integer(&[reference], &mut value).unwrap();
-        value[0]
+        i32::try_from(value[0]).unwrap()
     }
 
     /// Makes `count` steps of `size` s from the step `from` on.

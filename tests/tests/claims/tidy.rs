@@ -43,7 +43,7 @@ fn the_mathematics_depends_on_neither_fmi_nor_files() {
 }
 
 /// The folders of our libraries, each with the libraries that it may use.
-const ARROWS: [(&str, &[&str]); 16] = [
+const ARROWS: [(&str, &[&str]); 17] = [
     ("lapack", &[]),
     ("control", &["aso-lapack"]),
     ("fmu-description", &[]),
