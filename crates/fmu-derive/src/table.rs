@@ -92,12 +92,12 @@ fn default(ident: &Ident, model: &Model<'_>) -> Option<TokenStream> {
         let variable = model.variables.iter().find(|own| own.field == field);
         variable.map_or(0, |own| own.extents.len())
     };
-    let fields = model.starts.iter().map(|(field, start)| match start {
-        Some(value) => quote!(#field: ::core::convert::Into::into(#value)),
-        None => {
-            let value = array::default_value(dimensions(field));
-            quote_spanned!(field.span()=> #field: #value)
+    let fields = model.starts.iter().map(|(field, start)| {
+        if let Some(value) = start {
+            return quote!(#field: ::core::convert::Into::into(#value));
         }
+        let value = array::default_value(dimensions(field));
+        quote_spanned!(field.span()=> #field: #value)
     });
     Some(quote! {
         impl ::core::default::Default for #ident {
