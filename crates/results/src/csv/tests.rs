@@ -130,10 +130,10 @@ fn a_row_of_any_kind_allocates_nothing() {
     let mut sink = CsvSink::create(&folder.path().join("a.csv"), &mixed()).unwrap();
     let texts = ["a \"b\"".to_owned(), String::new()];
     let measured = allocation_counter::measure(|| {
-        for k in 0..50_000 {
+        for k in 0..50_000_i32 {
             let row = Row {
                 reals: &[f64::from(k) / 3.0, f64::NAN],
-                integers: &[k, -k],
+                integers: &[k.into(), (-k).into()],
                 booleans: &[0, 1],
                 strings: &texts,
             };
