@@ -1,4 +1,4 @@
-//! Exports a Rust model as an FMU for co-simulation and model exchange (FMI 2.0).
+//! Exports a Rust model as an FMU for co-simulation and model exchange (FMI 2.0 and 3.0).
 //!
 //! The author of a model implements [`Model`] for a struct, declares its variables as
 //! [`Variable`]s, and ends the library with [`export!`]. The crate derives the C functions,
