@@ -1,4 +1,4 @@
-//! Exports a Rust model as an FMU for co-simulation and model exchange (FMI 2.0).
+//! Exports a Rust model as an FMU for co-simulation and model exchange (FMI 2.0 and 3.0).
 //!
 //! A struct is the model: its fields are the variables, `update` has the equations, and [`export!`] makes
 //! the library. The crate derives the C functions, `modelDescription.xml` and the value references.

@@ -89,7 +89,7 @@ impl Stepper {
                 Reached::End => {
                     Stop { time: target, is_event: next.is_some_and(|next| next <= end) }
                 }
-                _ => Stop { time: stepper.integrator.time(), is_event: true },
+                Reached::Event => Stop { time: stepper.integrator.time(), is_event: true },
             })
         })
     }

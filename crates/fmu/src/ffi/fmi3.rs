@@ -20,8 +20,8 @@ use fmu_description::abi3::{self, fmi3String};
 
 /// Defines C functions that call `dispatch`: their arguments, then the safe code.
 macro_rules! entry_points_3 {
-    ($($name:ident = $function:ident($($argument:ident: $type:ty),* $(,)?), $instance:ident => $body:expr;)*) => {
-        $(pub unsafe fn $name<M: crate::model::Model>(
+    ($($(#[$attribute:meta])* $name:ident = $function:ident($($argument:ident: $type:ty),* $(,)?), $instance:ident => $body:expr;)*) => {
+        $($(#[$attribute])* pub unsafe fn $name<M: crate::model::Model>(
             instance: fmu_description::abi3::fmi3Instance,
             $($argument: $type),*
         ) -> fmu_description::abi3::fmi3Status {

@@ -5,6 +5,7 @@ use fmu_description::call_order::settable;
 use fmu_description::{Causality, Initial, Variability};
 
 /// A variable of base type `T`; its position in [`Interface`] follows from its value reference.
+#[expect(clippy::struct_excessive_bools, reason = "facts that are independent")]
 pub(crate) struct Slot<M, T> {
     pub(crate) name: String,
     pub(crate) causality: Causality,

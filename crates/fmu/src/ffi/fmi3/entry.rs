@@ -77,6 +77,7 @@ entry_points_3! {
         store(borrow_state(state)?, snapshot);
         Ok(())
     };
+    #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
     get_directional_derivative = GetDirectionalDerivative(
         unknowns: *const fmi3ValueReference, n_unknowns: usize,
         knowns: *const fmi3ValueReference, n_knowns: usize,
@@ -91,6 +92,7 @@ entry_points_3! {
             borrow_output(sensitivity, n_sensitivity)?,
         ))
     };
+    #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
     get_adjoint_derivative = GetAdjointDerivative(
         unknowns: *const fmi3ValueReference, n_unknowns: usize,
         knowns: *const fmi3ValueReference, n_knowns: usize,
@@ -160,6 +162,7 @@ entry_points_3! {
         read(orders, n)?,
         borrow_output(values, n_values)?,
     );
+    #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
     do_step = DoStep(
         start: fmi3Float64, size: fmi3Float64, _no_set_fmu_state: fmi3Boolean,
         event: *mut fmi3Boolean, terminate: *mut fmi3Boolean, early: *mut fmi3Boolean,

@@ -44,7 +44,7 @@ unsafe fn read_strings(strings: &Strings) -> Result<(String, PathBuf), Failure> 
 unsafe fn instantiate<M: Model>(
     function: &str,
     strings: &Strings,
-    callbacks: Callbacks,
+    callbacks: &Callbacks,
     made: &Instantiation<'_>,
 ) -> fmi3Instance {
     // SAFETY: strings as the standard demands them.
@@ -91,7 +91,7 @@ pub unsafe fn instantiate_model_exchange<M: Model>(
     let strings = Strings { name, token, resources };
     let made = instantiation(InterfaceType::ModelExchange, logging_on);
     // SAFETY: strings as the standard demands them.
-    unsafe { instantiate::<M>("fmi3InstantiateModelExchange", &strings, callbacks, &made) }
+    unsafe { instantiate::<M>("fmi3InstantiateModelExchange", &strings, &callbacks, &made) }
 }
 
 /// No exported model offers intermediate update: `requiredIntermediateVariables` has no effect.
@@ -119,7 +119,7 @@ pub unsafe fn instantiate_co_simulation<M: Model>(
         ..instantiation(InterfaceType::CoSimulation, logging_on)
     };
     // SAFETY: strings as the standard demands them.
-    unsafe { instantiate::<M>("fmi3InstantiateCoSimulation", &strings, callbacks, &made) }
+    unsafe { instantiate::<M>("fmi3InstantiateCoSimulation", &strings, &callbacks, &made) }
 }
 
 /// Scheduled execution is refused.

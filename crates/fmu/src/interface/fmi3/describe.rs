@@ -232,7 +232,7 @@ impl Builder {
                     rows.push(new);
                 }
                 // Another element of an array; the row of an alias is the row of its variable.
-                Some(&(position, same)) if same == index => merge(&mut rows[position], new),
+                Some(&(position, same)) if same == index => merge(&mut rows[position], &new),
                 Some(_) => {}
             }
         }
@@ -331,7 +331,7 @@ fn from_pairs(index: u32, mut pairs: Vec<(u32, DependencyKind)>) -> Unknown {
     Unknown { index, dependencies: Some(dependencies), kinds: (!plain).then_some(kinds) }
 }
 
-fn merge(row: &mut Unknown, other: Unknown) {
+fn merge(row: &mut Unknown, other: &Unknown) {
     let pairs = |row: &Unknown| {
         let kinds = row.kinds.clone();
         row.dependencies.clone().map(|known| {
@@ -339,7 +339,7 @@ fn merge(row: &mut Unknown, other: Unknown) {
             known.into_iter().zip(kinds.unwrap_or(none)).collect::<Vec<_>>()
         })
     };
-    *row = match (pairs(row), pairs(&other)) {
+    *row = match (pairs(row), pairs(other)) {
         (Some(mut one), Some(two)) => {
             one.extend(two);
             from_pairs(row.index, one)
