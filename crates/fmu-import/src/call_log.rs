@@ -49,7 +49,9 @@ impl CallLog {
         let guid = &logged.slave.description().guid;
         let call = match version {
             Version::V1 => format!("fmiInstantiateSlave({:?}, {guid:?})", logged.instance),
-            Version::V2 => format!("fmi2Instantiate({:?}, fmi2CoSimulation, {guid:?})", logged.instance),
+            Version::V2 => {
+                format!("fmi2Instantiate({:?}, fmi2CoSimulation, {guid:?})", logged.instance)
+            }
             Version::V3 => format!("fmi3InstantiateCoSimulation({:?}, {guid:?})", logged.instance),
         };
         logged.log.write(&format!("{} {call} -> {}OK\n", logged.instance, logged.prefix()));

@@ -78,9 +78,8 @@ impl Isolated {
         };
         let own = &package.description;
         let (version, sizes) = (own.version(), HashMap::new());
-        let description = scalar_description(own, &sizes).map_err(|reason| {
-            IsolateError::Refused { instance: name.to_owned(), reason }
-        })?;
+        let description = scalar_description(own, &sizes)
+            .map_err(|reason| IsolateError::Refused { instance: name.to_owned(), reason })?;
         let count = description.as_ref().unwrap_or(own).variables.len();
         refuse_in_worker()?;
         let (shared, memory) =
@@ -187,10 +186,9 @@ impl Isolated {
         let mut writer = Writer::new(shared.area());
         write(&mut writer);
         if !writer.fits() {
-            return Err(self.protocol_error(
-                function,
-                "needs more arguments than the shared memory holds",
-            ));
+            return Err(
+                self.protocol_error(function, "needs more arguments than the shared memory holds")
+            );
         }
         shared.command().store(function.to_word(), Ordering::Relaxed);
         shared.place().store(function.to_word(), Ordering::Relaxed);

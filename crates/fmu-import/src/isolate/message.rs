@@ -3,8 +3,8 @@
 
 use std::borrow::Cow;
 
-use fmu_description::{Experiment, Version};
 use fmu_description::abi::Status;
+use fmu_description::{Experiment, Version};
 use serde::{Deserialize, Serialize};
 
 use super::function::{Function, known_name};

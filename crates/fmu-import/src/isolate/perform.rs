@@ -127,7 +127,8 @@ impl Executor {
                 instance.configure(&references, &values)
             }
             Request::SetBinary(values) => {
-                let values = values.into_iter().map(|(reference, bytes)| (reference, bytes.to_vec()));
+                let values =
+                    values.into_iter().map(|(reference, bytes)| (reference, bytes.to_vec()));
                 let (references, values): (Vec<u32>, Vec<Vec<u8>>) = values.unzip();
                 instance.set_binary(&references, &values)
             }

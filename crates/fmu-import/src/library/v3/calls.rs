@@ -51,7 +51,12 @@ impl Component {
         let (tolerance, stop) = (e.tolerance.unwrap_or(0.0), e.stop_time.unwrap_or(0.0));
         let (has_tolerance, has_stop) = (e.tolerance.is_some(), e.stop_time.is_some());
         let function = function!(self.enter_initialization_mode, NAME);
-        self.log_call(NAME, || format!("tolerance {:?}, start time {:?}, stop time {:?}", e.tolerance, e.start_time, e.stop_time));
+        self.log_call(NAME, || {
+            format!(
+                "tolerance {:?}, start time {:?}, stop time {:?}",
+                e.tolerance, e.start_time, e.stop_time
+            )
+        });
         self.place.set_time(e.start_time);
         // SAFETY: the instance is alive.
         let status = unsafe {
