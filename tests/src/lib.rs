@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 
 pub mod c_fmu;
+pub mod c_versions;
 pub mod coupled;
 pub mod equations;
 #[cfg(feature = "fmi")]

@@ -54,6 +54,15 @@ pub enum FmuError {
         /// The version of the FMU.
         version: Version,
     },
+    /// The FMU offers scheduled execution only.
+    #[error(
+        "{path}: the FMU offers scheduled execution only, which is not supported, expected the element \
+         CoSimulation or ModelExchange"
+    )]
+    ScheduledExecution {
+        /// The FMU.
+        path: PathBuf,
+    },
     /// The FMU has no interface, or lacks the requested one.
     #[error(
         "{path}: the FMU lacks an interface, expected the element CoSimulation or ModelExchange"
@@ -154,6 +163,9 @@ impl Fmu {
     fn load(path: &Path, unpacked: Unpacked) -> Result<Self, FmuError> {
         let description = &unpacked.description;
         if description.co_simulation.is_none() && description.model_exchange.is_none() {
+            if description.scheduled_execution.is_some() {
+                return Err(FmuError::ScheduledExecution { path: path.to_owned() });
+            }
             return Err(FmuError::NoInterface { path: path.to_owned() });
         }
         let library = description.co_simulation.as_ref().map(|flags| {

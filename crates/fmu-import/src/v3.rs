@@ -51,17 +51,31 @@ impl Instance {
         resources: Option<&str>,
     ) -> Result<Self, LoadError> {
         let flags = own.co_simulation.clone().unwrap_or_default();
-        let event_mode = flags.has_event_mode;
         let sizes = HashMap::new();
         let view = ElementView::new(own, &sizes)
             .map_err(|reason| LoadError::Unsupported { model: own.model_name.clone(), reason })?;
-        let component = library.instantiate(&Instantiation {
+        let with = Instantiation {
             name,
             token: &own.guid,
             resources,
-            event_mode,
-            early_return: event_mode || flags.might_return_early_from_do_step,
-        })?;
+            event_mode: flags.has_event_mode,
+            early_return: flags.has_event_mode || flags.might_return_early_from_do_step,
+        };
+        let (component, event_mode) = match library.instantiate(&with) {
+            Ok(component) => (component, with.event_mode),
+            // Some FMUs promise Event Mode and lack it.
+            Err(error) if with.event_mode => {
+                let early_return = flags.might_return_early_from_do_step;
+                let without = Instantiation { event_mode: false, early_return, ..with };
+                let component = library.instantiate(&without).map_err(|_| error)?;
+                tracing::warn!(
+                    "{name}: the FMU runs without Event Mode, although its hasEventMode is true: it \
+                     instantiates only without eventModeUsed"
+                );
+                (component, false)
+            }
+            Err(error) => return Err(error),
+        };
         let state =
             State { held: vec![None; view.shadows], clocks: Clocks::new(own), ..State::default() };
         let experiment = Experiment { start_time: 0.0, stop_time: None, tolerance: None };

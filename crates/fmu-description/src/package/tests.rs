@@ -283,6 +283,16 @@ fn a_plain_archive_is_accepted_and_one_with_duplicates_is_not() {
     let twice = [(DESCRIPTION, XML, 0o100_644), (DESCRIPTION, XML, 0o100_644)];
     let error = opened(&raw::archive(&twice)).unwrap_err();
     assert!(matches!(error, PackageError::Archive { .. }), "{error}");
+    let with = |first, second| {
+        let file = |content| ("extra/a.txt", content, 0o100_644);
+        opened(&raw::archive(&[(DESCRIPTION, XML, 0o100_644), file(first), file(second)]))
+    };
+    assert!(matches!(with("a", "b"), Err(PackageError::Archive { .. })));
+    let same = with("a", "a").unwrap();
+    assert_eq!(
+        same.archive_warnings,
+        ["1 file is in the archive twice with the same content, for example \"extra/a.txt\""]
+    );
 }
 
 #[test]
