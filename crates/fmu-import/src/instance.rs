@@ -16,6 +16,7 @@ pub struct Instance {
 }
 
 /// An instance, by the version of its FMU.
+#[expect(clippy::large_enum_variant, reason = "there are few, and FMI 2.0 is the usual one")]
 pub(crate) enum Inner {
     V1(Box<v1::Instance>),
     V2(v2::Instance),

@@ -125,14 +125,14 @@ impl Instance {
             return self.component.get_real(list, values);
         }
         self.component.get_real(&self.references, values)?;
-        for (value, _) in values.iter_mut().zip(list).filter(|(_, own)| self.is_negated(own)) {
+        for (value, _) in values.iter_mut().zip(list).filter(|(_, own)| self.is_negated(**own)) {
             *value = -*value;
         }
         Ok(())
     }
 
-    fn is_negated(&self, reference: &u32) -> bool {
-        self.negated.contains_key(reference)
+    fn is_negated(&self, reference: u32) -> bool {
+        self.negated.contains_key(&reference)
     }
 
     pub(crate) fn set_real(&mut self, list: &[u32], values: &[f64]) -> Result<(), CallError> {
@@ -161,7 +161,7 @@ impl Instance {
         self.component.get_integer(list, &mut self.integers)?;
         for ((value, own), reference) in values.iter_mut().zip(&self.integers).zip(references) {
             let own = i64::from(*own);
-            *value = if translated && self.is_negated(reference) { -own } else { own };
+            *value = if translated && self.is_negated(*reference) { -own } else { own };
         }
         Ok(())
     }
@@ -176,7 +176,7 @@ impl Instance {
         }
         self.integers.clear();
         for (value, reference) in values.iter().zip(references) {
-            let value = if self.is_negated(reference) { -*value } else { *value };
+            let value = if self.is_negated(*reference) { -*value } else { *value };
             self.integers.push(narrow("fmiSetInteger", "an Integer of 32 bits", value)?);
         }
         let translated = self.translate(references);

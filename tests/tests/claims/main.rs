@@ -22,3 +22,4 @@ mod preload;
 mod run;
 mod step_hints;
 mod tidy;
+mod versions;

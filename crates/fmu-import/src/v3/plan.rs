@@ -19,6 +19,7 @@ pub(super) struct Plan {
 /// One call: variables of one type with the same clocks, all of which may or may not change outside of
 /// events.
 #[derive(Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "four independent properties")]
 pub(super) struct Run {
     pub(super) kind: NativeType,
     /// Whether the variables may change in Event Mode only.
@@ -48,15 +49,10 @@ impl Plan {
         let mut known: HashMap<usize, (usize, usize)> = HashMap::new();
         for (position, &reference) in list.iter().enumerate() {
             let (number, element) = view.locate(reference).ok_or(reference)?;
-            let (run, first) = match known.get(&number) {
-                Some(place) => *place,
-                None => {
-                    let run = run_for(&mut runs, &view.variables[number]);
-                    let first = runs[run].add(&view.variables[number]);
-                    known.insert(number, (run, first));
-                    (run, first)
-                }
-            };
+            let (run, first) = *known.entry(number).or_insert_with(|| {
+                let run = run_for(&mut runs, &view.variables[number]);
+                (run, runs[run].add(&view.variables[number]))
+            });
             runs[run].places.push((position, first + element));
         }
         for run in &mut runs {

@@ -166,7 +166,7 @@ impl SlowSlave {
                 ValueType::Integer => row.integers[at] = start_values.integers[start],
                 ValueType::Boolean => row.booleans[at] = start_values.booleans[start],
                 ValueType::String | ValueType::Binary => {
-                    row.strings[at].clone_from(&start_values.strings[start])
+                    row.strings[at].clone_from(&start_values.strings[start]);
                 }
             }
         }

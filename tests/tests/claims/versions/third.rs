@@ -1,0 +1,199 @@
+//! FMI 3.0.
+
+use master::{Failure, Slave, StepResult};
+
+use super::Loaded;
+
+fn ready(token: &str) -> Loaded {
+    Loaded::third(token).initialised()
+}
+
+#[test]
+fn an_array_is_set_and_read_whole_or_by_element() {
+    let mut loaded = ready("plain");
+    let whole = ["a[1]", "a[2]"].map(|name| loaded.reference(name));
+    loaded.slave.set_real(&whole, &[3.0, 4.0]).unwrap();
+    loaded.set_real("a[2]", 5.0);
+    assert_eq!(loaded.step(0.0, 0.1), Ok(StepResult::Whole));
+    let list = ["b[2]", "u", "a[1]", "b[1]"].map(|name| loaded.reference(name));
+    let mut values = [0.0; 4];
+    loaded.slave.get_real(&list, &mut values).unwrap();
+    assert_eq!(values, [10.0, 1.0, 3.0, 6.0]);
+}
+
+#[test]
+fn the_elements_of_a_matrix_are_in_row_major_order() {
+    let mut loaded = Loaded::third("plain");
+    loaded.set_real("M[1,3]", 30.0);
+    loaded.set_real("M[2,1]", 40.0);
+    let mut loaded = loaded.initialised();
+    assert_eq!(loaded.real("M[1,2]"), 2.0);
+    assert_eq!(loaded.real("M[1,3]"), 30.0);
+    assert_eq!(loaded.real("M[2,1]"), 40.0);
+    assert_eq!(loaded.real("sum"), 1.0 + 2.0 + 30.0 + 40.0 + 5.0 + 6.0);
+}
+
+#[test]
+fn a_structural_parameter_changes_the_size_of_arrays() {
+    let mut loaded = Loaded::third("plain");
+    let size = loaded.reference("n");
+    loaded.slave.configure(&[size], &[4]).unwrap();
+    let mut loaded = loaded.initialised();
+    loaded.set_real("a[4]", 1.5);
+    assert_eq!(loaded.step(0.0, 0.1), Ok(StepResult::Whole));
+    assert_eq!(loaded.real("b[4]"), 3.0);
+    let names = loaded.slave.description().variables.iter().map(|own| own.name.as_str());
+    assert_eq!(names.filter(|name| name.starts_with("b[")).count(), 4);
+}
+
+#[test]
+fn events_within_a_step_are_handled_and_the_step_is_finished() {
+    let mut loaded = Loaded::third("plain");
+    loaded.set_real("level", 0.45);
+    let mut loaded = loaded.initialised();
+    assert_eq!(loaded.step(0.0, 1.0), Ok(StepResult::Whole));
+    // 10 ticks after 0 s, 0.25 s and 0.75 s, and the state event.
+    assert_eq!(loaded.integer("events"), 13);
+    assert!((loaded.real("y") - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn a_periodic_clock_ticks_from_the_start_and_sets_clocked_inputs_at_its_ticks() {
+    let mut loaded = ready("plain");
+    assert_eq!(loaded.integer("ticks"), 1);
+    loaded.set_integer("weight", 10);
+    assert_eq!(loaded.step(0.0, 0.35), Ok(StepResult::Whole));
+    assert_eq!(loaded.integer("ticks"), 31);
+    assert!(loaded.boolean("tick"));
+    assert_eq!(loaded.step(0.35, 0.01), Ok(StepResult::Whole));
+    assert!(!loaded.boolean("tick"));
+    assert!(!loaded.boolean("third"));
+    // 41 and 51 are the next ones; the latter is divisible by 3.
+    assert_eq!(loaded.step(0.36, 0.1), Ok(StepResult::Whole));
+    assert!(loaded.boolean("tick") && !loaded.boolean("third"));
+    assert_eq!(loaded.step(0.46, 0.1), Ok(StepResult::Whole));
+    assert!(loaded.boolean("third"));
+}
+
+#[test]
+fn a_clock_that_ticks_at_times_cannot_be_triggered() {
+    let mut loaded = ready("plain");
+    let tick = loaded.reference("tick");
+    let error = loaded.slave.set_boolean(&[tick], &[1]).unwrap_err();
+    assert!(error.to_string().contains("expected a triggered input clock"), "{error}");
+}
+
+#[test]
+fn discrete_inputs_are_set_in_event_mode_and_only_if_they_change() {
+    let mut loaded = Loaded::third("plain");
+    loaded.set_real("level", 9.0);
+    let mut loaded = loaded.initialised();
+    for (time, value) in [(0.01, 5), (0.02, 5), (0.03, 6)] {
+        loaded.set_integer("k_in", value);
+        assert_eq!(loaded.step(time - 0.01, 0.01), Ok(StepResult::Whole));
+        assert_eq!(loaded.integer("k_out"), value);
+    }
+    assert_eq!(loaded.integer("events"), 2);
+}
+
+#[test]
+fn binaries_and_arrays_of_strings_pass_unchanged() {
+    let mut loaded = ready("plain");
+    let (from, to) = (loaded.reference("bytes_in"), loaded.reference("bytes_out"));
+    let mut bytes = [Vec::new()];
+    loaded.slave.get_binary(&[to], &mut bytes).unwrap();
+    assert_eq!(bytes[0], b"foo");
+    loaded.slave.set_binary(&[from], &[vec![0, 255, 7]]).unwrap();
+    let text = loaded.reference("texts[1]");
+    loaded.slave.set_string(&[text], &["Grüße".to_owned()]).unwrap();
+    assert_eq!(loaded.step(0.0, 0.01), Ok(StepResult::Whole));
+    loaded.slave.get_binary(&[to], &mut bytes).unwrap();
+    assert_eq!(bytes[0], [0, 255, 7]);
+    let (copy, mut texts) = (loaded.reference("texts[2]"), [String::new()]);
+    loaded.slave.get_string(&[copy], &mut texts).unwrap();
+    assert_eq!(texts[0], "Grüße");
+}
+
+#[test]
+fn a_float32_has_its_own_precision() {
+    let mut loaded = ready("plain");
+    loaded.set_real("f", 0.1);
+    assert_eq!(loaded.step(0.0, 0.01), Ok(StepResult::Whole));
+    assert_eq!(loaded.real("g"), f64::from(0.1_f32));
+}
+
+#[test]
+fn a_number_beyond_63_bits_is_an_error_that_names_its_variable() {
+    assert_eq!(ready("plain").integer("big"), 42);
+    let mut loaded = ready("huge");
+    let error = loaded.slave.get_integer(&[loaded.reference("big")], &mut [0]).unwrap_err();
+    assert!(error.to_string().contains("big"), "{error}");
+}
+
+#[test]
+fn a_state_brings_back_time_events_and_clocks() {
+    let mut loaded = ready("plain");
+    assert_eq!(loaded.step(0.0, 0.32), Ok(StepResult::Whole));
+    loaded.slave.save_state(0).unwrap();
+    let bytes = loaded.slave.serialize_state().unwrap();
+    let mut ends = Vec::new();
+    for again in 0..3 {
+        match again {
+            0 => {}
+            1 => loaded.slave.restore_state(0).unwrap(),
+            _ => loaded.slave.deserialize_state(&bytes).unwrap(),
+        }
+        assert_eq!(loaded.step(0.32, 0.5), Ok(StepResult::Whole));
+        let end = (loaded.real("y"), loaded.integer("ticks"), loaded.integer("events"));
+        ends.push(end);
+    }
+    // Ticks at 0 s to 0.8 s.
+    assert_eq!(ends[0].1, 9);
+    assert!(ends.iter().all(|end| *end == ends[0]), "{ends:?}");
+}
+
+#[test]
+fn directional_derivatives_of_elements_are_those_of_their_arrays() {
+    let mut loaded = ready("plain");
+    let (outputs, inputs) = (["b[1]", "b[2]"], ["a[2]"]);
+    let unknowns = outputs.map(|name| loaded.reference(name));
+    let knowns = inputs.map(|name| loaded.reference(name));
+    let mut changes = [f64::NAN; 2];
+    loaded.slave.directional_derivative(&unknowns, &knowns, &[3.0], &mut changes).unwrap();
+    assert_eq!(changes, [0.0, 6.0]);
+}
+
+#[test]
+fn a_discarded_step_is_made_in_smaller_parts() {
+    let mut loaded = ready("discard");
+    assert_eq!(loaded.step(0.0, 0.2), Ok(StepResult::Whole));
+    assert!((loaded.real("y") - 0.2).abs() < 1e-12);
+}
+
+#[test]
+fn an_fmu_that_requests_the_end_ends_there() {
+    let mut loaded = ready("terminate");
+    let Ok(StepResult::Part { reached, terminated: true }) = loaded.step(0.0, 1.0) else {
+        panic!("the FMU is not stopped");
+    };
+    assert!((reached - 0.5).abs() < 1e-9, "{reached}");
+}
+
+#[test]
+fn impossible_answers_to_a_step_are_errors_that_say_what_was_expected() {
+    let error = ready("lie").step(2.0, 0.1).unwrap_err();
+    assert!(matches!(error.failure, Failure::InvalidAnswer(_)));
+    assert!(error.to_string().contains("last successful time"), "{error}");
+    let error = ready("stay").step(0.0, 0.1).unwrap_err();
+    assert!(error.to_string().contains("returned early 1000 times at t = 0 s"), "{error}");
+}
+
+#[test]
+fn an_fmu_that_lacks_the_event_mode_it_promises_runs_without() {
+    let mut loaded = ready("no event mode");
+    loaded.set_integer("k_in", 5);
+    assert_eq!(loaded.step(0.0, 1.0), Ok(StepResult::Whole));
+    assert_eq!(loaded.integer("events"), 0);
+    assert_eq!(loaded.integer("k_out"), 5);
+    assert!((loaded.real("y") - 1.0).abs() < 1e-12);
+}
