@@ -9,7 +9,7 @@ pub(crate) fn worker() -> Option<ExitCode> {
     if std::env::args_os().nth(1)? != WORKER {
         return None;
     }
-    Some(match fmu_import::isolate::worker() {
+    Some(match fmu_import::isolate::worker_with(integrate::Integrated::boxed) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             let cause = std::error::Error::source(&error);

@@ -1,10 +1,11 @@
-/* A co-simulation slave of FMI 3.0.2 with arrays, events, clocks and binaries.
+/* An FMU of FMI 3.0.2 for co-simulation and model exchange, with arrays, events, clocks and binaries.
  *
  * der(y) = u, held over a step; b = 2 a for arrays of n elements; sum is the sum of the matrix M.
  * When y passes `level`, the slave returns early from the step and needs an event. Every 0.25 s there
  * is a time event, which it announces. At an event k_out = k_in and bytes_out = bytes_in; `events`
  * counts the events. The clock `tick` is periodic; each tick increments `ticks` by `weight`, and every
- * third one makes the clock `third` tick.
+ * third one makes the clock `third` tick. In model exchange y is the state, and y - level the event
+ * indicator.
  *
  * The instantiation token selects a misbehaviour: "lie" returns early with a time before the step,
  * "stay" returns early for ever, "discard" discards steps above 0.03 s, "huge" gives `big` a value
@@ -22,7 +23,7 @@
 
 enum { MOST = 8, MATRIX = 6, BYTES = 64 };
 enum { TIME, U, Y, N, A, B, M, SUM, K_IN, K_OUT, EVENTS, BYTES_IN, BYTES_OUT, F, G, BIG, LEVEL,
-       TICK, TICKS, THIRD, WEIGHT, TEXTS };
+       TICK, TICKS, THIRD, WEIGHT, TEXTS, DER_Y };
 typedef enum { INSTANTIATED, CONFIGURATION, INITIALIZATION, EVENT, STEP, TERMINATED } Mode;
 
 /* The content of an FMU state. */
@@ -40,7 +41,7 @@ typedef struct {
 
 typedef struct {
     Values now;
-    bool event_mode, early_return;
+    bool event_mode, early_return, exchange;
     char token[40];
     void *environment;
     fmi3LogMessageCallback log;
@@ -62,22 +63,9 @@ static fmi3Status refuse(Slave *slave, const char *text) {
 
 EXPORT const char *fmi3GetVersion(void) { return "3.0"; }
 
-EXPORT fmi3Instance fmi3InstantiateCoSimulation(
-    fmi3String name, fmi3String token, fmi3String resources, bool visible, bool logging,
-    bool event_mode, bool early_return, const fmi3ValueReference *intermediate, size_t count,
-    void *environment, fmi3LogMessageCallback log, fmi3IntermediateUpdateCallback update) {
-    demand(name != NULL && token != NULL && !visible && !logging, "fmi3InstantiateCoSimulation");
-    demand(intermediate == NULL && count == 0 && update == NULL, "no intermediate update");
-    demand(resources == NULL || resources[strlen(resources) - 1] == '/', "resourcePath");
-    if (strcmp(token, "no event mode") == 0 && event_mode) {
-        return NULL;
-    }
+static Slave *create(fmi3String token) {
     Slave *slave = calloc(1, sizeof *slave);
     strncpy(slave->token, token, sizeof slave->token - 1);
-    slave->event_mode = event_mode;
-    slave->early_return = early_return;
-    slave->environment = environment;
-    slave->log = log;
     Values *now = &slave->now;
     now->u = 1;
     now->n = 2;
@@ -89,6 +77,36 @@ EXPORT fmi3Instance fmi3InstantiateCoSimulation(
         now->m[k] = k + 1;
     }
     memcpy(now->bytes_in, "foo", now->size_in = 3);
+    return slave;
+}
+
+EXPORT fmi3Instance fmi3InstantiateCoSimulation(
+    fmi3String name, fmi3String token, fmi3String resources, bool visible, bool logging,
+    bool event_mode, bool early_return, const fmi3ValueReference *intermediate, size_t count,
+    void *environment, fmi3LogMessageCallback log, fmi3IntermediateUpdateCallback update) {
+    demand(name != NULL && token != NULL && !visible && !logging, "fmi3InstantiateCoSimulation");
+    demand(intermediate == NULL && count == 0 && update == NULL, "no intermediate update");
+    demand(resources == NULL || resources[strlen(resources) - 1] == '/', "resourcePath");
+    if (strcmp(token, "no event mode") == 0 && event_mode) {
+        return NULL;
+    }
+    Slave *slave = create(token);
+    slave->event_mode = event_mode;
+    slave->early_return = early_return;
+    slave->environment = environment;
+    slave->log = log;
+    return slave;
+}
+
+EXPORT fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token,
+                                                 fmi3String resources, bool visible, bool logging,
+                                                 void *environment, fmi3LogMessageCallback log) {
+    demand(name != NULL && token != NULL && !visible && !logging, "fmi3InstantiateModelExchange");
+    demand(resources == NULL || resources[strlen(resources) - 1] == '/', "resourcePath");
+    Slave *slave = create(token);
+    slave->event_mode = slave->exchange = true;
+    slave->environment = environment;
+    slave->log = log;
     return slave;
 }
 
@@ -164,7 +182,15 @@ EXPORT fmi3Status fmi3EnterEventMode(fmi3Instance c) {
 
 EXPORT fmi3Status fmi3EnterStepMode(fmi3Instance c) {
     Slave *slave = c;
-    demand(slave->event_mode && slave->now.mode == EVENT, "fmi3EnterStepMode");
+    demand(slave->event_mode && !slave->exchange && slave->now.mode == EVENT, "fmi3EnterStepMode");
+    demand(!slave->now.tick && !slave->now.third, "clocks are inactive after the update");
+    slave->now.mode = STEP;
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance c) {
+    Slave *slave = c;
+    demand(slave->exchange && slave->now.mode == EVENT, "fmi3EnterContinuousTimeMode");
     demand(!slave->now.tick && !slave->now.third, "clocks are inactive after the update");
     slave->now.mode = STEP;
     return fmi3OK;
@@ -201,7 +227,7 @@ EXPORT fmi3Status fmi3DoStep(fmi3Instance c, double time, double size, bool neve
     Slave *slave = c;
     Values *now = &slave->now;
     (void)never_back;
-    demand(now->mode == STEP, "fmi3DoStep");
+    demand(!slave->exchange && now->mode == STEP, "fmi3DoStep");
     demand(size > 0 && fabs(time - now->time) < 1e-9, "the step continues the last one");
     if (strcmp(slave->token, "discard") == 0 && size > 0.03) {
         return fmi3Discard;
@@ -239,6 +265,71 @@ EXPORT fmi3Status fmi3DoStep(fmi3Instance c, double time, double size, bool neve
     if (strcmp(slave->token, "terminate") == 0 && end >= 0.5 - 1e-9) {
         *terminate = true;
     }
+    return fmi3OK;
+}
+
+/* Whether the instance is in Continuous-Time Mode. */
+static Values *continuous(fmi3Instance c, const char *function) {
+    Slave *slave = c;
+    demand(slave->exchange && slave->now.mode == STEP, function);
+    return &slave->now;
+}
+
+EXPORT fmi3Status fmi3SetTime(fmi3Instance c, double time) {
+    Values *now = continuous(c, "fmi3SetTime");
+    demand(time <= now->next_event + 1e-9, "the time is not after the announced event");
+    now->time = time;
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3SetContinuousStates(fmi3Instance c, const double *states, size_t n) {
+    Values *now = continuous(c, "fmi3SetContinuousStates");
+    demand(n == 1, "one state");
+    now->y = states[0];
+    return fmi3OK;
+}
+
+/* Values of the continuous states and event indicators, which event mode also allows to read. */
+static fmi3Status one(fmi3Instance c, double value, double *values, size_t n) {
+    demand(((Slave *)c)->exchange && ((Slave *)c)->now.mode >= INITIALIZATION, "model exchange");
+    demand(n == 1, "one value");
+    values[0] = value;
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3GetContinuousStates(fmi3Instance c, double *states, size_t n) {
+    return one(c, ((Slave *)c)->now.y, states, n);
+}
+
+EXPORT fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance c, double *values, size_t n) {
+    return one(c, ((Slave *)c)->now.u, values, n);
+}
+
+EXPORT fmi3Status fmi3GetEventIndicators(fmi3Instance c, double *values, size_t n) {
+    return one(c, ((Slave *)c)->now.y - ((Slave *)c)->now.level, values, n);
+}
+
+EXPORT fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance c, double *nominals, size_t n) {
+    return one(c, 1, nominals, n);
+}
+
+EXPORT fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance c, size_t *count) {
+    demand(((Slave *)c)->exchange, "model exchange");
+    *count = 1;
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance c, size_t *count) {
+    return fmi3GetNumberOfContinuousStates(c, count);
+}
+
+EXPORT fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, bool never_back, bool *event,
+                                              bool *terminate) {
+    Values *now = continuous(c, "fmi3CompletedIntegratorStep");
+    (void)never_back;
+    follow(now);
+    *event = false;
+    *terminate = strcmp(((Slave *)c)->token, "terminate") == 0 && now->time >= 0.5 - 1e-9;
     return fmi3OK;
 }
 
@@ -287,6 +378,10 @@ static fmi3Status float64(Slave *slave, const fmi3ValueReference *vr, size_t n, 
             break;
         case SUM: COPY(double, sum, 1); break;
         case LEVEL: COPY(double, now->level, 1); break;
+        case DER_Y:
+            demand(!set, "a derivative is not set");
+            COPY(double, now->u, 1);
+            break;
         default: return refuse(slave, "no Float64");
         }
     }

@@ -30,24 +30,35 @@ fn library(source: &'static str) -> Vec<u8> {
     known.entry(source).or_insert_with(build).clone()
 }
 
-/// Writes `slave3.c` as an FMU of FMI 3.0 to `folder`; `token` selects a misbehaviour.
+/// Writes `slave3.c` as an FMU of FMI 3.0 for co-simulation to `folder`; `token` selects a misbehaviour.
 ///
 /// # Panics
 ///
 /// If it cannot be built or written.
 #[must_use]
 pub fn slave_3(folder: &Path, token: &str, has_event_mode: bool) -> PathBuf {
-    let xml = DESCRIPTION_3
-        .replace("TOKEN", token)
-        .replace("EVENT_MODE", if has_event_mode { "true" } else { "false" });
+    let event_mode = if has_event_mode { "true" } else { "false" };
+    version_3(folder, token, &CO_SIMULATION_3.replace("EVENT_MODE", event_mode), "slave3")
+}
+
+/// Writes `slave3.c` as an FMU of FMI 3.0 for model exchange to `folder`; `token` selects a
+/// misbehaviour.
+///
+/// # Panics
+///
+/// If it cannot be built or written.
+#[must_use]
+pub fn equations_3(folder: &Path, token: &str) -> PathBuf {
+    version_3(folder, token, MODEL_EXCHANGE_3, "equations3")
+}
+
+fn version_3(folder: &Path, token: &str, interface: &str, file: &str) -> PathBuf {
+    let xml = DESCRIPTION_3.replace("TOKEN", token).replace("<INTERFACE/>", interface);
     let mut package = Package::new(xml).for_version(Version::V3);
     let name = format!("slave3{}", std::env::consts::DLL_SUFFIX);
-    package.add(
-        format!("binaries/{}/{name}", platforms_of(Version::V3)[0]),
-        library("slave3.c"),
-    );
+    package.add(format!("binaries/{}/{name}", platforms_of(Version::V3)[0]), library("slave3.c"));
     package.add("resources/text.txt", "text");
-    written(&package, folder, "slave3")
+    written(&package, folder, file)
 }
 
 /// Writes `slave1.c` as an FMU of FMI 1.0 to `folder`; `guid` selects a misbehaviour.
@@ -69,11 +80,16 @@ fn written(package: &Package, folder: &Path, name: &str) -> PathBuf {
     path
 }
 
+const CO_SIMULATION_3: &str = r#"<CoSimulation modelIdentifier="slave3"
+ canHandleVariableCommunicationStepSize="true" canGetAndSetFMUState="true" canSerializeFMUState="true"
+ providesDirectionalDerivatives="true" hasEventMode="EVENT_MODE" mightReturnEarlyFromDoStep="true"/>"#;
+
+const MODEL_EXCHANGE_3: &str = r#"<ModelExchange modelIdentifier="slave3" canGetAndSetFMUState="true"
+ canSerializeFMUState="true" providesDirectionalDerivatives="true"/>"#;
+
 const DESCRIPTION_3: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="3.0" modelName="Slave" instantiationToken="TOKEN">
-<CoSimulation modelIdentifier="slave3" canHandleVariableCommunicationStepSize="true"
- canGetAndSetFMUState="true" canSerializeFMUState="true" providesDirectionalDerivatives="true"
- hasEventMode="EVENT_MODE" mightReturnEarlyFromDoStep="true"/>
+<INTERFACE/>
 <ModelVariables>
 <Float64 name="time" valueReference="0" causality="independent" variability="continuous"/>
 <Float64 name="u" valueReference="1" causality="input" start="1"/>
@@ -102,6 +118,7 @@ const DESCRIPTION_3: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <Int32 name="weight" valueReference="20" causality="input" start="1" clocks="17"/>
 <String name="texts" valueReference="21" causality="input"><Dimension start="2"/>
  <Start value=""/><Start value=""/></String>
+<Float64 name="der(y)" valueReference="22" causality="local" derivative="2"/>
 </ModelVariables>
 <ModelStructure>
 <Output valueReference="2" dependencies=""/>
@@ -113,6 +130,7 @@ const DESCRIPTION_3: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <Output valueReference="15" dependencies=""/>
 <Output valueReference="18" dependencies=""/>
 <Output valueReference="19" dependencies="17"/>
+<ContinuousStateDerivative valueReference="22" dependencies="1"/>
 </ModelStructure>
 </fmiModelDescription>
 "#;

@@ -35,20 +35,8 @@ impl CallLog {
     /// Wraps `slave` so that its calls are logged under the name `instance`.
     #[must_use]
     pub fn listen(&self, instance: &str, slave: Box<dyn Slave>) -> LoggedSlave {
-        let (file, name) = (self.clone(), instance.to_owned());
-        let mut slave = slave;
-        let mut starts_line = true;
-        let direct = slave.log_calls(Box::new(move |text| {
-            if starts_line {
-                file.write(&format!("{name} "));
-            }
-            starts_line = text.ends_with('\n');
-            file.write(text);
-        }));
-        let version = slave.description().version();
-        let (log, instance) = (self.clone(), instance.to_owned());
-        let logged = LoggedSlave { log, instance, slave, direct, version };
-        logged.created(match version {
+        let logged = self.wrap(instance, slave);
+        logged.created(match logged.version {
             Version::V1 => ("fmiInstantiateSlave", ""),
             Version::V2 => ("fmi2Instantiate", "fmi2CoSimulation, "),
             Version::V3 => ("fmi3InstantiateCoSimulation", ""),
@@ -63,15 +51,27 @@ impl CallLog {
         instance: &str,
         slave: Box<dyn ModelExchange>,
     ) -> LoggedSlave<dyn ModelExchange> {
-        let version = slave.description().version();
-        let (log, instance) = (self.clone(), instance.to_owned());
-        let logged = LoggedSlave { log, instance, slave, direct: false, version };
-        logged.created(match version {
+        let logged = self.wrap(instance, slave);
+        logged.created(match logged.version {
             Version::V1 => ("fmiInstantiateModel", ""),
             Version::V2 => ("fmi2Instantiate", "fmi2ModelExchange, "),
             Version::V3 => ("fmi3InstantiateModelExchange", ""),
         });
         logged
+    }
+
+    /// Wraps an instance, which logs its C calls itself if it can.
+    fn wrap<S: Slave + ?Sized>(&self, instance: &str, mut slave: Box<S>) -> LoggedSlave<S> {
+        let (file, name, mut starts_line) = (self.clone(), instance.to_owned(), true);
+        let direct = slave.log_calls(Box::new(move |text| {
+            if starts_line {
+                file.write(&format!("{name} "));
+            }
+            starts_line = text.ends_with('\n');
+            file.write(text);
+        }));
+        let version = slave.description().version();
+        LoggedSlave { log: self.clone(), instance: instance.to_owned(), slave, direct, version }
     }
 
     /// Appends `text`. A write error is ignored: a debugging aid does not end a run.

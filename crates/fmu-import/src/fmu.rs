@@ -214,8 +214,9 @@ impl Fmu {
             }
             Some(CoSimulation::V3(library)) => {
                 let resources = resource_path(&unpacked.resources());
+                let (interface, resources) = (Interface::CoSimulation, resources.as_deref());
                 let created =
-                    crate::v3::Instance::new(library, description, name, resources.as_deref());
+                    crate::v3::Instance::new(library, description, interface, name, resources);
                 Ok(Inner::V3(Box::new(created.map_err(hint)?)))
             }
             _ => {
@@ -298,7 +299,9 @@ fn open_library(
         Version::V2 => {
             Library::open(path, Interface::CoSimulation).map(Arc::new).map(CoSimulation::V2)
         }
-        Version::V3 => v3::Library::open(path).map(Arc::new).map(CoSimulation::V3),
+        Version::V3 => {
+            v3::Library::open(path, Interface::CoSimulation).map(Arc::new).map(CoSimulation::V3)
+        }
     };
     library.map_err(|error| with_tool_hint(description, error))
 }

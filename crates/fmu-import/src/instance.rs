@@ -5,13 +5,12 @@ use std::time::Duration;
 use fmu_description::{Experiment, ModelDescription};
 
 use crate::fmu::Fmu;
-use crate::library::Component;
 use crate::{v1, v2, v3};
 use slave::{CallError, CallSink, Slave, StepResult, absent};
 
 /// An instance of an FMU in this process, for either interface.
 pub struct Instance {
-    inner: Inner,
+    pub(crate) inner: Inner,
     fmu: Fmu,
 }
 
@@ -26,18 +25,6 @@ pub(crate) enum Inner {
 impl Instance {
     pub(crate) fn new(inner: Inner, fmu: Fmu) -> Self {
         Self { inner, fmu }
-    }
-
-    /// Returns the instance for the functions of model exchange.
-    ///
-    /// # Errors
-    ///
-    /// [`CallError`] for another version than FMI 2.0.
-    pub(crate) fn equations(&mut self) -> Result<&mut Component, CallError> {
-        match &mut self.inner {
-            Inner::V2(own) => Ok(&mut own.component),
-            Inner::V1(_) | Inner::V3(_) => Err(absent("fmi2SetTime")),
-        }
     }
 
     /// Returns the FMU of this instance.

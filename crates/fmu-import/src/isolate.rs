@@ -46,16 +46,17 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
+use fmu_description::ModelDescription;
 use fmu_description::package::{PackageError, Unpacked};
 
-use slave::{CallError, Failure};
+use slave::{CallError, Failure, ModelExchange, Slave};
 
 #[cfg(target_os = "linux")]
 pub use isolated::Isolated;
 #[cfg(not(target_os = "linux"))]
-pub use unsupported::{Isolated, worker};
+pub use unsupported::{Isolated, worker, worker_with};
 #[cfg(target_os = "linux")]
-pub use worker::worker;
+pub use worker::{worker, worker_with};
 
 /// The first argument of a program that shall become a worker.
 pub const WORKER: &str = "--fmu-worker";
@@ -79,7 +80,22 @@ pub struct Options {
     pub logging: bool,
     /// The program that becomes the worker; `None`: this program.
     pub executable: Option<PathBuf>,
+    /// How the worker integrates the instance, which is then one for model exchange; `None`: the instance
+    /// is one for co-simulation.
+    pub integration: Option<Integration>,
 }
+
+/// How a worker integrates an instance for model exchange. The worker must have called [`worker_with`].
+#[derive(Clone, Debug)]
+pub struct Integration {
+    /// The options, as the [`Integrator`] of the worker reads them.
+    pub options: String,
+    /// Returns the description of the slave that the integrator makes, from that of the instance.
+    pub describe: fn(&ModelDescription) -> ModelDescription,
+}
+
+/// Makes a slave that integrates an instance for model exchange, with options as text.
+pub type Integrator = fn(Box<dyn ModelExchange>, &str) -> Box<dyn Slave>;
 
 /// Why an FMU cannot run in a process of its own.
 #[derive(Debug, thiserror::Error)]
@@ -88,9 +104,15 @@ pub enum IsolateError {
     /// The archive or its model description cannot be read.
     #[error(transparent)]
     Package(Box<PackageError>),
-    /// The FMU has no co-simulation interface.
+    /// The FMU has no co-simulation interface, and [`Options::integration`] is not stated.
     #[error("{path}: the FMU offers no co-simulation, expected the element CoSimulation")]
     NoCoSimulation {
+        /// The FMU.
+        path: PathBuf,
+    },
+    /// The FMU has no model-exchange interface, although [`Options::integration`] is stated.
+    #[error("{path}: the FMU offers no model exchange, expected the element ModelExchange")]
+    NoModelExchange {
         /// The FMU.
         path: PathBuf,
     },
@@ -188,6 +210,7 @@ impl IsolateError {
 /// An unpacked FMU, shared by all its isolated instances.
 #[derive(Clone, Debug)]
 pub struct Package {
+    path: PathBuf,
     unpacked: Arc<Unpacked>,
 }
 
@@ -197,24 +220,36 @@ impl Package {
     ///
     /// # Errors
     ///
-    /// [`IsolateError::Package`] if the FMU cannot be read; [`IsolateError::NoCoSimulation`] if it has
-    /// no co-simulation interface.
+    /// [`IsolateError::Package`] if the FMU cannot be read.
     pub fn open(path: &Path) -> Result<Self, IsolateError> {
         let unpacked =
             if path.is_dir() { Unpacked::in_folder(path)? } else { Unpacked::open(path)? };
-        if unpacked.description.co_simulation.is_none() {
-            return Err(IsolateError::NoCoSimulation { path: path.to_owned() });
-        }
-        Ok(Self { unpacked: Arc::new(unpacked) })
+        Ok(Self { path: path.to_owned(), unpacked: Arc::new(unpacked) })
+    }
+
+    /// Returns the model description.
+    #[must_use]
+    pub fn description(&self) -> &ModelDescription {
+        &self.unpacked.description
     }
 
     /// Starts a worker process and creates the instance `name` in it.
     ///
     /// # Errors
     ///
-    /// [`IsolateError`] if no worker can be started, or if the FMU does not load, does not instantiate
-    /// or ends its process.
+    /// [`IsolateError`] if the FMU lacks the interface, if no worker can be started, or if the FMU does
+    /// not load, does not instantiate or ends its process.
     pub fn instantiate(&self, name: &str, options: &Options) -> Result<Isolated, IsolateError> {
+        let (own, path) = (self.description(), self.path.clone());
+        match options.integration {
+            None if own.co_simulation.is_none() => {
+                return Err(IsolateError::NoCoSimulation { path });
+            }
+            Some(_) if own.model_exchange.is_none() => {
+                return Err(IsolateError::NoModelExchange { path });
+            }
+            _ => {}
+        }
         Isolated::start(self.unpacked.clone(), name, options)
     }
 }
@@ -223,8 +258,7 @@ impl Package {
 ///
 /// # Errors
 ///
-/// [`IsolateError`] if the FMU cannot be read or has no co-simulation interface, if no worker can be
-/// started, or if the FMU does not load, does not instantiate or ends its process.
+/// [`IsolateError`] if the FMU cannot be read or lacks the interface, if no worker can be started, or if the FMU does not load, does not instantiate or ends its process.
 pub fn open(path: &Path, name: &str, options: &Options) -> Result<Isolated, IsolateError> {
     Package::open(path)?.instantiate(name, options)
 }

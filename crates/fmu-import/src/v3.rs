@@ -1,13 +1,15 @@
-//! FMUs of FMI 3.0 for co-simulation as slaves: types, arrays, events and clocks.
+//! FMUs of FMI 3.0 as slaves: types, arrays, events and clocks.
 //!
-//! The slave uses Event Mode if the FMU has it, and lets the FMU return early. It handles the events and
-//! continues the step, so that the master sees one whole communication step (FMI 3.0.2, section 4.2).
+//! In co-simulation the slave uses Event Mode if the FMU has it, and lets the FMU return early. It handles
+//! the events and continues the step, so that the master sees one whole communication step (FMI 3.0.2,
+//! section 4.2). In model exchange its caller handles the events, and the slave ticks its clocks in them.
 
 mod access;
 mod buffer;
 mod clocks;
 mod derivatives;
 mod elements;
+mod equations;
 mod modes;
 mod plan;
 mod states;
@@ -15,9 +17,10 @@ mod states;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use fmu_description::{Experiment, ModelDescription};
+use fmu_description::{CoSimulation, Experiment, ModelDescription};
 
 use crate::error::LoadError;
+use crate::library::Interface;
 use crate::library::v3::{Component, Instantiation, Library};
 use access::refused;
 use buffer::Buffer;
@@ -27,15 +30,18 @@ use modes::{Mode, State};
 use plan::Plans;
 use slave::{CallError, CallSink, StepResult};
 
-/// A co-simulation instance of an FMU of FMI 3.0 in this process.
+/// An instance of an FMU of FMI 3.0 in this process.
 pub(crate) struct Instance {
     component: Component,
     view: ElementView,
     plans: Plans,
+    interface: Interface,
     /// Whether the FMU was instantiated with `eventModeUsed`.
     event_mode: bool,
     experiment: Experiment,
     state: State,
+    /// The clocks that have ticked in the present event of model exchange.
+    active: Vec<u32>,
     /// The states that belong to the FMU states of the slots.
     slots: Vec<State>,
     /// Values of structural parameters, by value reference.
@@ -43,18 +49,24 @@ pub(crate) struct Instance {
 }
 
 impl Instance {
-    /// Creates the instance `name`. `resources` is the folder of the resources, if the FMU has one.
+    /// Creates the instance `name` for `interface`. `resources` is the folder of the resources, if the FMU
+    /// has one.
     pub(crate) fn new(
         library: &Arc<Library>,
         own: &ModelDescription,
+        interface: Interface,
         name: &str,
         resources: Option<&str>,
     ) -> Result<Self, LoadError> {
-        let flags = own.co_simulation.clone().unwrap_or_default();
+        let flags = match interface {
+            Interface::CoSimulation => own.co_simulation.clone().unwrap_or_default(),
+            Interface::ModelExchange => CoSimulation::default(),
+        };
         let sizes = HashMap::new();
         let view = ElementView::new(own, &sizes)
             .map_err(|reason| LoadError::Unsupported { model: own.model_name.clone(), reason })?;
         let with = Instantiation {
+            interface,
             name,
             token: &own.guid,
             resources,
@@ -79,8 +91,19 @@ impl Instance {
         let state =
             State { held: vec![None; view.shadows], clocks: Clocks::new(own), ..State::default() };
         let experiment = Experiment { start_time: 0.0, stop_time: None, tolerance: None };
-        let (plans, slots) = (Plans::default(), Vec::new());
-        Ok(Self { component, view, plans, event_mode, experiment, state, slots, sizes })
+        let (plans, active, slots) = (Plans::default(), Vec::new(), Vec::new());
+        Ok(Self {
+            component,
+            view,
+            plans,
+            interface,
+            event_mode,
+            experiment,
+            state,
+            active,
+            slots,
+            sizes,
+        })
     }
 
     /// Returns the description with a scalar variable for each element of an array.

@@ -1,4 +1,4 @@
-//! Continuous Real inputs that follow polynomials of time within a step.
+//! Continuous floating-point inputs that follow polynomials of time within a step.
 
 use fmu_description::{Causality, Kind, ModelDescription, Variability};
 use serde::{Deserialize, Serialize};
@@ -7,7 +7,7 @@ use slave::{CallError, Failure, ModelExchange};
 /// The largest order of a derivative.
 pub(crate) const ORDERS: usize = 3;
 
-/// The continuous Real inputs of an instance.
+/// The continuous floating-point inputs of an instance.
 #[derive(Default)]
 pub(crate) struct Inputs {
     /// Value references, ascending.
@@ -46,10 +46,10 @@ impl Inputs {
         let continuous = description.variables.iter().filter(|variable| {
             variable.causality == Causality::Input
                 && variable.variability == Variability::Continuous
-                && matches!(variable.kind, Kind::Real(_))
+                && matches!(variable.kind, Kind::Real(_) | Kind::Float32(_))
         });
         let start = |kind: &Kind| match kind {
-            Kind::Real(real) => real.start.unwrap_or(0.0),
+            Kind::Real(real) | Kind::Float32(real) => real.start.unwrap_or(0.0),
             _ => 0.0,
         };
         let mut all: Vec<_> =

@@ -7,9 +7,9 @@ mod step;
 
 use std::str::FromStr;
 
-use fmu_description::{CoSimulation, ModelDescription};
+use fmu_description::{CoSimulation, Kind, ModelDescription};
 use serde::{Deserialize, Serialize};
-use slave::{CallError, Failure, ModelExchange, Status};
+use slave::{CallError, Failure, ModelExchange, Slave, Status};
 use solve::Scale;
 
 use crate::inputs::Inputs;
@@ -92,6 +92,32 @@ struct Point {
     memory: Memory,
 }
 
+/// Returns the description of a model-exchange FMU with an element `CoSimulation` that states what
+/// [`Integrated`] offers.
+#[must_use]
+pub fn description_of(own: &ModelDescription) -> ModelDescription {
+    let mut description = own.clone();
+    let flags = own.model_exchange.clone().unwrap_or_default();
+    description.co_simulation = Some(CoSimulation {
+        model_identifier: flags.model_identifier,
+        needs_execution_tool: flags.needs_execution_tool,
+        can_be_instantiated_only_once_per_process: flags.can_be_instantiated_only_once_per_process,
+        can_get_and_set_fmu_state: flags.can_get_and_set_fmu_state,
+        can_serialize_fmu_state: flags.can_serialize_fmu_state,
+        provides_directional_derivative: flags.provides_directional_derivative,
+        can_handle_variable_communication_step_size: true,
+        can_interpolate_inputs: true,
+        ..CoSimulation::default()
+    });
+    description
+}
+
+/// Returns the value references of the clocks.
+fn clocks_of(description: &ModelDescription) -> Vec<u32> {
+    let clocks = description.variables.iter().filter(|own| matches!(own.kind, Kind::Clock(_)));
+    clocks.map(|own| own.value_reference).collect()
+}
+
 /// A model-exchange instance that is integrated from one communication point to the next.
 ///
 /// The description is that of the FMU, with an element `CoSimulation` that states what this slave offers:
@@ -112,6 +138,8 @@ pub struct Integrated {
     point: Point,
     stepper: Stepper,
     inputs: Inputs,
+    /// Value references of clocks.
+    clocks: Vec<u32>,
     /// The continuous states, and the event indicators at the present point.
     states: Vec<f64>,
     indicators: Vec<f64>,
@@ -127,21 +155,8 @@ impl Integrated {
     /// Wraps a new instance.
     #[must_use]
     pub fn new(instance: Box<dyn ModelExchange>, options: Options) -> Self {
-        let mut description = instance.description().clone();
-        let flags = description.model_exchange.clone().unwrap_or_default();
-        description.co_simulation = Some(CoSimulation {
-            model_identifier: flags.model_identifier,
-            needs_execution_tool: flags.needs_execution_tool,
-            can_be_instantiated_only_once_per_process: flags
-                .can_be_instantiated_only_once_per_process,
-            can_get_and_set_fmu_state: flags.can_get_and_set_fmu_state,
-            can_serialize_fmu_state: flags.can_serialize_fmu_state,
-            provides_directional_derivative: flags.provides_directional_derivative,
-            can_handle_variable_communication_step_size: true,
-            can_interpolate_inputs: true,
-            ..CoSimulation::default()
-        });
-        let inputs = Inputs::new(&description);
+        let description = description_of(instance.description());
+        let (inputs, clocks) = (Inputs::new(&description), clocks_of(&description));
         let point = Point {
             time: 0.0,
             mode: Mode::Setup,
@@ -158,6 +173,7 @@ impl Integrated {
             point,
             stepper: Stepper::new(options.method, Scale::new(TOLERANCE, TOLERANCE, Vec::new())),
             inputs,
+            clocks,
             states: Vec::new(),
             indicators: Vec::new(),
             search: step::Search::default(),
@@ -166,6 +182,21 @@ impl Integrated {
             booleans: Vec::new(),
             reals: Vec::new(),
         }
+    }
+
+    /// Wraps a new instance as a slave, with the method called `method`; an unknown one is the default.
+    ///
+    /// The form in which a worker of `fmu-import` calls an integrator.
+    #[must_use]
+    pub fn boxed(instance: Box<dyn ModelExchange>, method: &str) -> Box<dyn Slave> {
+        let method = method.parse().unwrap_or_default();
+        Box::new(Self::new(instance, Options { method }))
+    }
+
+    /// Reads the description again, after the sizes of arrays have changed.
+    fn describe(&mut self) {
+        self.description = description_of(self.instance.description());
+        self.inputs = Inputs::new(&self.description);
     }
 
     /// Allocates what depends on the numbers of states and event indicators.

@@ -20,7 +20,7 @@ mod integrated;
 mod rosenbrock;
 mod stepper;
 
-pub use integrated::{Integrated, Method, Options};
+pub use integrated::{Integrated, Method, Options, description_of};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

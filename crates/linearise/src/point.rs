@@ -241,11 +241,11 @@ fn set_states(
 /// Iterates the event and enters continuous-time mode.
 fn settle(component: &mut Component) -> Result<(), LineariseError> {
     for _ in 0..EVENT_ITERATIONS {
-        let info = component.new_discrete_states()?;
-        if info.terminate_simulation != 0 {
+        let info = component.update_discrete_states()?;
+        if info.terminate_simulation {
             return Err(LineariseError::Ended);
         }
-        if info.new_discrete_states_needed == 0 {
+        if !info.discrete_states_need_update {
             component.enter_continuous_time_mode()?;
             return Ok(());
         }

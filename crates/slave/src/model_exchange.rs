@@ -27,6 +27,10 @@ pub trait ModelExchange: Slave {
         true
     }
 
+    /// Tells that a communication step begins: a clock is true until the next one
+    /// ([`Slave::get_boolean`]).
+    fn begin_communication_step(&mut self) {}
+
     /// `fmi2SetTime`: sets the time in s.
     fn set_time(&mut self, time: f64) -> Result<(), CallError>;
 

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::time::Duration;
 
+use fmu_description::ModelDescription;
 use fmu_import::{CallLog, Fmu, isolate};
 use integrate::Integrated;
 use master::{CallError, Failure, Slave, System};
@@ -42,26 +43,21 @@ pub(crate) fn instantiate(
         }
     }
     let isolation =
-        isolate::Options { time_limit, memory_limit, preload, logging, executable: None };
-    let log = options.log_calls;
-    let (opened, isolated) = (HashMap::new(), HashMap::new());
-    let mut opening = Opening { isolation, log, opened, isolated };
+        isolate::Options { time_limit, memory_limit, preload, logging, ..Default::default() };
+    let mut opening = Opening { isolation, log: options.log_calls, opened: HashMap::new() };
     let (mut system, mut integrated) = (System::default(), Vec::new());
     for element in elements {
         let name = &element.name;
         let stated = stated_interface(element, config);
-        let slave: Box<dyn Slave> = if config.isolation.isolate == Some(true) {
-            opening.isolated(element, stated)?
-        } else {
-            let fmu = opening.open(element)?;
-            match choose_interface(element, &fmu, config, stated)? {
-                Interface::CoSimulation => opening.co_simulation(element, &fmu)?,
-                Interface::ModelExchange => {
-                    let method = config.solver.get(name).copied().unwrap_or_default();
-                    integrated.push((name.clone(), method));
-                    opening.model_exchange(element, &fmu, method)?
-                }
-            }
+        let content = opening.open(element, config.isolation.isolate == Some(true))?;
+        let interface = choose_interface(element, content.description(), config, stated)?;
+        let method = (interface == Interface::ModelExchange)
+            .then(|| config.solver.get(name).copied().unwrap_or_default());
+        integrated.extend(method.map(|method| (name.clone(), method)));
+        let slave: Box<dyn Slave> = match (&content, method) {
+            (Content::Isolated(package), method) => opening.isolated(element, package, method)?,
+            (Content::Loaded(fmu), None) => opening.co_simulation(element, fmu)?,
+            (Content::Loaded(fmu), Some(method)) => opening.model_exchange(element, fmu, method)?,
         };
         system.add(name, slave)?;
     }
@@ -107,11 +103,10 @@ fn stated_interface(element: &Element, config: &Config) -> Option<Interface> {
 /// Returns the interface to use: the stated one, otherwise co-simulation if the FMU offers it.
 fn choose_interface(
     element: &Element,
-    fmu: &Fmu,
+    description: &ModelDescription,
     config: &Config,
     stated: Option<Interface>,
 ) -> Result<Interface, Error> {
-    let description = fmu.description();
     let offers = |interface| match interface {
         Interface::CoSimulation => description.co_simulation.is_some(),
         Interface::ModelExchange => description.model_exchange.is_some(),
@@ -136,58 +131,71 @@ fn choose_interface(
     }
 }
 
-/// Returns the error for a model-exchange FMU that shall run in a separate process.
-fn not_isolated(element: &Element) -> Error {
-    Error::Invalid(format!(
-        "{}: {} runs by model exchange, which --isolate does not support: expected a run without \
-         --isolate, or an FMU that offers co-simulation",
-        element.name,
-        element.shown().display()
-    ))
+/// An opened FMU.
+#[derive(Clone)]
+enum Content {
+    /// Its library is loaded into this process.
+    Loaded(Fmu),
+    /// Its instances run in processes of their own.
+    Isolated(isolate::Package),
+}
+
+impl Content {
+    fn description(&self) -> &ModelDescription {
+        match self {
+            Content::Loaded(fmu) => fmu.description(),
+            Content::Isolated(package) => package.description(),
+        }
+    }
 }
 
 /// Opens the FMUs; unpacks an FMU only once if several elements use it.
 struct Opening<'a> {
     isolation: isolate::Options,
     log: Option<&'a CallLog>,
-    opened: HashMap<&'a PathBuf, Fmu>,
-    isolated: HashMap<&'a PathBuf, isolate::Package>,
+    opened: HashMap<&'a PathBuf, Content>,
 }
 
 impl<'a> Opening<'a> {
-    /// Creates an instance in a separate process.
-    fn isolated(
-        &mut self,
-        element: &'a Element,
-        stated: Option<Interface>,
-    ) -> Result<Box<dyn Slave>, Error> {
-        if stated == Some(Interface::ModelExchange) {
-            return Err(not_isolated(element));
+    /// Returns the FMU of an element.
+    fn open(&mut self, element: &'a Element, isolate: bool) -> Result<Content, Error> {
+        if let Some(content) = self.opened.get(&element.fmu) {
+            return Ok(content.clone());
         }
-        let package = if let Some(package) = self.isolated.get(&element.fmu) {
-            package.clone()
+        let content = if isolate {
+            let opened = isolate::Package::open(&element.fmu);
+            Content::Isolated(opened.map_err(|error| Error::from(error).within(&element.name))?)
         } else {
-            match isolate::Package::open(&element.fmu) {
-                Err(isolate::IsolateError::NoCoSimulation { .. }) => {
-                    return Err(not_isolated(element));
-                }
-                opened => opened.map_err(|error| Error::from(error).within(&element.name))?,
-            }
+            Content::Loaded(open_fmu(element)?)
         };
-        let slave = package.instantiate(&element.name, &self.isolation);
-        let slave = slave.map_err(|error| as_shown(error.into(), element))?;
-        self.isolated.insert(&element.fmu, package);
-        Ok(self.logged(element, Box::new(slave)))
+        self.opened.insert(&element.fmu, content.clone());
+        Ok(content)
     }
 
-    /// Returns the FMU of an element, opened for use in this process.
-    fn open(&mut self, element: &'a Element) -> Result<Fmu, Error> {
-        if let Some(fmu) = self.opened.get(&element.fmu) {
-            return Ok(fmu.clone());
+    /// Creates an instance in a separate process, integrated there by `method` if it is one for model
+    /// exchange.
+    fn isolated(
+        &self,
+        element: &Element,
+        package: &isolate::Package,
+        method: Option<Solver>,
+    ) -> Result<Box<dyn Slave>, Error> {
+        if let (Some(_), Some(_)) = (method, self.log) {
+            return Err(Error::Invalid(format!(
+                "{}: {} runs by model exchange in a separate process, where --log-calls does not see \
+                 its calls: expected a run without --log-calls or without --isolate",
+                element.name,
+                element.shown().display()
+            )));
         }
-        let fmu = open_fmu(element)?;
-        self.opened.insert(&element.fmu, fmu.clone());
-        Ok(fmu)
+        let mut options = self.isolation.clone();
+        options.integration = method.map(|method| isolate::Integration {
+            options: method.name().to_owned(),
+            describe: integrate::description_of,
+        });
+        let slave = package.instantiate(&element.name, &options);
+        let slave = slave.map_err(|error| as_shown(error.into(), element))?;
+        Ok(self.logged(element, Box::new(slave)))
     }
 
     /// Creates a co-simulation instance in this process.

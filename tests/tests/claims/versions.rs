@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, clippy::float_cmp, reason = "tests; exact by construction")]
 
 mod coupled;
+mod exchange;
 mod first;
 mod third;
 

@@ -20,6 +20,10 @@ impl ModelExchange for LoggedSlave<Equations> {
         self.slave.needs_completed_integrator_step()
     }
 
+    fn begin_communication_step(&mut self) {
+        self.slave.begin_communication_step();
+    }
+
     fn set_time(&mut self, time: f64) -> Result<(), CallError> {
         self.plain("fmi2SetTime", format!("{time:?}"), |slave| slave.set_time(time))
     }

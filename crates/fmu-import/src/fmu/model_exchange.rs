@@ -1,12 +1,14 @@
 //! Instances for model exchange.
 
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use slave::{CallError, CompletedStep, EventInfo, ModelExchange};
+use fmu_description::Version;
+use slave::{CallError, CompletedStep, EventInfo, ModelExchange, absent};
 
-use super::{Fmu, FmuError};
+use super::{Fmu, FmuError, resource_path, with_tool_hint};
 use crate::instance::{Inner, Instance};
-use crate::library::Interface;
+use crate::library::{Interface, v3};
 
 impl Fmu {
     /// Creates a model-exchange instance called `name`.
@@ -14,7 +16,8 @@ impl Fmu {
     /// # Errors
     ///
     /// [`FmuError::OnlyOnce`] for a forbidden second instance; [`LoadError::Instantiate`] with the
-    /// FMU's messages if `fmi2Instantiate` fails; [`FmuError::NoInterface`] without model exchange.
+    /// FMU's messages if the FMU does not instantiate; [`FmuError::NoInterface`] without model exchange;
+    /// [`FmuError::Version`] for FMI 1.0.
     pub fn instantiate_equations(&self, name: &str) -> Result<Box<dyn ModelExchange>, FmuError> {
         let description = self.description();
         let once = description.model_exchange.as_ref();
@@ -23,61 +26,104 @@ impl Fmu {
             let (instance, model) = (name.to_owned(), description.model_name.clone());
             return Err(FmuError::OnlyOnce { instance, model });
         }
-        let component = self.component(Interface::ModelExchange, name)?;
-        Ok(Box::new(Instance::new(Inner::V2(crate::v2::Instance::new(component)), self.clone())))
+        let inner = if description.version() == Version::V3 {
+            Inner::V3(Box::new(self.equations_of_version_3(name)?))
+        } else {
+            let component = self.component(Interface::ModelExchange, name)?;
+            Inner::V2(crate::v2::Instance::new(component))
+        };
+        Ok(Box::new(Instance::new(inner, self.clone())))
+    }
+
+    fn equations_of_version_3(&self, name: &str) -> Result<crate::v3::Instance, FmuError> {
+        let (unpacked, description) = (&self.content.unpacked, self.description());
+        let Some(flags) = &description.model_exchange else {
+            return Err(FmuError::NoInterface { path: unpacked.folder().to_owned() });
+        };
+        let hint = |error| with_tool_hint(description, error);
+        let interface = Interface::ModelExchange;
+        let library = unpacked.library(&flags.model_identifier)?;
+        let library = Arc::new(v3::Library::open(&library, interface).map_err(hint)?);
+        let resources = resource_path(&unpacked.resources());
+        let resources = resources.as_deref();
+        crate::v3::Instance::new(&library, description, interface, name, resources).map_err(hint)
     }
 }
 
+/// Calls a method of the instance in the version of its FMU.
+macro_rules! equations {
+    ($own:ident.$method:ident($($argument:expr),*)) => {
+        match &mut $own.inner {
+            Inner::V2(own) => own.component.$method($($argument),*),
+            Inner::V3(own) => own.$method($($argument),*),
+            Inner::V1(_) => Err(absent("model exchange of FMI 1.0")),
+        }
+    };
+}
+
 impl ModelExchange for Instance {
+    fn number_of_continuous_states(&mut self) -> Result<usize, CallError> {
+        match &mut self.inner {
+            Inner::V3(own) => own.number_of_continuous_states(),
+            _ => Ok(self.fmu().description().structure.derivatives.len()),
+        }
+    }
+
+    fn number_of_event_indicators(&mut self) -> Result<usize, CallError> {
+        match &mut self.inner {
+            Inner::V3(own) => own.number_of_event_indicators(),
+            _ => Ok(self.fmu().description().number_of_event_indicators.unwrap_or(0) as usize),
+        }
+    }
+
+    fn begin_communication_step(&mut self) {
+        if let Inner::V3(own) = &mut self.inner {
+            own.begin_communication_step();
+        }
+    }
+
     fn needs_completed_integrator_step(&self) -> bool {
         let flags = self.fmu().description().model_exchange.as_ref();
         flags.is_none_or(|flags| !flags.completed_integrator_step_not_needed)
     }
 
     fn set_time(&mut self, time: f64) -> Result<(), CallError> {
-        self.equations()?.set_time(time)
+        equations!(self.set_time(time))
     }
 
     fn set_continuous_states(&mut self, states: &[f64]) -> Result<(), CallError> {
-        self.equations()?.set_continuous_states(states)
+        equations!(self.set_continuous_states(states))
     }
 
     fn get_continuous_states(&mut self, states: &mut [f64]) -> Result<(), CallError> {
-        self.equations()?.get_continuous_states(states)
+        equations!(self.get_continuous_states(states))
     }
 
     fn get_derivatives(&mut self, derivatives: &mut [f64]) -> Result<(), CallError> {
-        self.equations()?.get_derivatives(derivatives)
+        equations!(self.get_derivatives(derivatives))
     }
 
     fn get_event_indicators(&mut self, indicators: &mut [f64]) -> Result<(), CallError> {
-        self.equations()?.get_event_indicators(indicators)
+        equations!(self.get_event_indicators(indicators))
     }
 
     fn get_nominals_of_continuous_states(&mut self, nominals: &mut [f64]) -> Result<(), CallError> {
-        self.equations()?.get_nominals(nominals)
+        equations!(self.get_nominals(nominals))
     }
 
     fn completed_integrator_step(&mut self, never_back: bool) -> Result<CompletedStep, CallError> {
-        self.equations()?.completed_integrator_step(never_back)
+        equations!(self.completed_integrator_step(never_back))
     }
 
     fn enter_event_mode(&mut self) -> Result<(), CallError> {
-        self.equations()?.enter_event_mode()
+        equations!(self.enter_event_mode())
     }
 
     fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
-        let info = self.equations()?.new_discrete_states()?;
-        Ok(EventInfo {
-            discrete_states_need_update: info.new_discrete_states_needed != 0,
-            terminate_simulation: info.terminate_simulation != 0,
-            nominals_changed: info.nominals_of_continuous_states_changed != 0,
-            values_changed: info.values_of_continuous_states_changed != 0,
-            next_event_time: (info.next_event_time_defined != 0).then_some(info.next_event_time),
-        })
+        equations!(self.update_discrete_states())
     }
 
     fn enter_continuous_time_mode(&mut self) -> Result<(), CallError> {
-        self.equations()?.enter_continuous_time_mode()
+        equations!(self.enter_continuous_time_mode())
     }
 }

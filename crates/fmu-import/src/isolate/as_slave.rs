@@ -5,7 +5,7 @@ use fmu_description::ModelDescription;
 use serde::de::DeserializeOwned;
 
 use super::function::Function;
-use super::isolated::{Isolated, scalar_description};
+use super::isolated::{Isolated, description_of_instance};
 use super::message::Request;
 use super::words::{Reader, Word, Writer};
 use slave::{Advance, Background, CallError, Slave, StepResult};
@@ -110,7 +110,7 @@ impl Slave for Isolated {
                 self.sizes.insert(reference, value);
             }
         }
-        match scalar_description(&self.package.description, &self.sizes) {
+        match description_of_instance(&self.package.description, &self.sizes, self.describe) {
             Ok(description) => self.description = description,
             Err(_) => return Err(self.invalid_answer(Function::Configure)),
         }

@@ -61,6 +61,8 @@ pub struct Isolated {
     pub(super) version: Version,
     /// The description as the instance has it; `None`: that of the package.
     pub(super) description: Option<ModelDescription>,
+    /// [`Integration::describe`](super::Integration::describe) of an instance for model exchange.
+    pub(super) describe: Option<Describe>,
     /// Values of structural parameters, by value reference.
     pub(super) sizes: HashMap<u32, u64>,
 }
@@ -78,7 +80,8 @@ impl Isolated {
         };
         let own = &package.description;
         let (version, sizes) = (own.version(), HashMap::new());
-        let description = scalar_description(own, &sizes)
+        let describe = options.integration.as_ref().map(|own| own.describe);
+        let description = description_of_instance(own, &sizes, describe)
             .map_err(|reason| IsolateError::Refused { instance: name.to_owned(), reason })?;
         let count = description.as_ref().unwrap_or(own).variables.len();
         refuse_in_worker()?;
@@ -111,6 +114,7 @@ impl Isolated {
             message: Vec::new(),
             version,
             description,
+            describe,
             sizes,
             package,
         };
@@ -150,6 +154,7 @@ impl Isolated {
             logging: options.logging,
             memory_limit: options.memory_limit.unwrap_or(0),
             preload: options.preload.iter().map(|library| library.as_bytes()).collect(),
+            integration: options.integration.as_ref().map(|own| own.options.as_str()),
         }))
     }
 
@@ -366,15 +371,23 @@ impl Isolated {
     }
 }
 
+/// Returns the description of an integrated instance from that of the instance.
+pub(super) type Describe = fn(&ModelDescription) -> ModelDescription;
+
 /// Returns the description of an instance if it differs from that of its FMU. On failure returns the
 /// reason.
-pub(super) fn scalar_description(
+pub(super) fn description_of_instance(
     own: &ModelDescription,
     sizes: &HashMap<u32, u64>,
+    describe: Option<Describe>,
 ) -> Result<Option<ModelDescription>, String> {
-    Ok(match own.version() {
+    let scalar = match own.version() {
         Version::V1 => Some(crate::v1::scalar_description(own)),
         Version::V2 => None,
         Version::V3 => Some(crate::v3::ElementView::new(own, sizes)?.description),
+    };
+    Ok(match describe {
+        Some(describe) => Some(describe(scalar.as_ref().unwrap_or(own))),
+        None => scalar,
     })
 }

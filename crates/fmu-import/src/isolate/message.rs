@@ -62,6 +62,8 @@ pub(super) struct Open<'a> {
     pub(super) memory_limit: u64,
     #[serde(borrow)]
     pub(super) preload: Vec<&'a [u8]>,
+    /// The options of the integrator, for an instance for model exchange.
+    pub(super) integration: Option<&'a str>,
 }
 
 impl Request<'_> {
@@ -223,6 +225,7 @@ mod tests {
                 logging,
                 memory_limit,
                 preload,
+                integration: Some("stiff"),
             }),
             Request::SetString(vec![(1, ""), (u32::MAX, "a b"), (3, "Größe\n")]),
             Request::DirectionalDerivative {

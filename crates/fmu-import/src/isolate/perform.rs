@@ -5,11 +5,12 @@ use std::sync::atomic::Ordering;
 
 use serde::Serialize;
 
+use super::Integrator;
 use super::function::Function;
 use super::layout::Shared;
 use super::message::{RemoteError, Request, encode};
 use super::words::{Reader, Word, Writer};
-use crate::{Fmu, Instance};
+use crate::{Fmu, FmuError};
 use slave::{CallError, Slave, StepResult};
 
 /// First word of an answer that consists of words.
@@ -22,12 +23,32 @@ pub(super) type CommandResult = Option<Result<(), CallError>>;
 
 /// An instance and the buffers of its calls, kept so that a step does not allocate.
 pub(super) struct Executor {
-    instance: Instance,
+    instance: Box<dyn Slave>,
+    maker: Maker,
     references: Vec<u32>,
     reals: Vec<f64>,
     integers: Vec<i64>,
     booleans: Vec<i32>,
     step: Step,
+}
+
+/// Creates instances of an FMU.
+#[derive(Clone)]
+pub(super) struct Maker {
+    pub(super) fmu: Fmu,
+    /// The integrator and its options, for model exchange.
+    pub(super) integration: Option<(Integrator, String)>,
+}
+
+impl Maker {
+    pub(super) fn make(&self, name: &str) -> Result<Box<dyn Slave>, FmuError> {
+        match &self.integration {
+            None => Ok(Box::new(self.fmu.instantiate(name)?)),
+            Some((integrator, options)) => {
+                Ok(integrator(self.fmu.instantiate_equations(name)?, options))
+            }
+        }
+    }
 }
 
 /// The arguments and results of [`Slave::advance`].
@@ -48,19 +69,19 @@ struct Step {
 }
 
 impl Executor {
-    pub(super) fn new(mut instance: Instance, logging: bool) -> Self {
+    pub(super) fn new(mut instance: Box<dyn Slave>, maker: Maker, logging: bool) -> Self {
         if logging {
             // An FMU without the function logs by its own rules.
             let _ = instance.set_debug_logging(true);
         }
         let (references, reals, integers) = (Vec::new(), Vec::new(), Vec::new());
         let booleans = Vec::new();
-        Self { instance, references, reals, integers, booleans, step: Step::default() }
+        Self { instance, maker, references, reals, integers, booleans, step: Step::default() }
     }
 
-    /// Returns the FMU of the instance.
-    pub(super) fn fmu(&self) -> Fmu {
-        self.instance.fmu().clone()
+    /// Returns what creates another instance like this one.
+    pub(super) fn maker(&self) -> Maker {
+        self.maker.clone()
     }
 
     /// Steps, or gets or sets numbers: reads the arguments from `reader`, writes the results to
@@ -73,9 +94,9 @@ impl Executor {
         reader: &mut Reader<'_>,
         writer: &mut Writer<'_>,
     ) -> CommandResult {
-        let Self { instance, references, reals, integers, booleans, step } = self;
+        let Self { instance, references, reals, integers, booleans, step, .. } = self;
         match function {
-            Function::DoStep => step.advance(instance, shared, reader, writer),
+            Function::DoStep => step.advance(instance.as_mut(), shared, reader, writer),
             Function::GetReal => {
                 get(reader, writer, references, reals, |r, v| instance.get_real(r, v))
             }
@@ -171,7 +192,7 @@ pub(super) fn reply(result: Result<impl Serialize, CallError>, answer: &mut Vec<
 impl Step {
     fn advance(
         &mut self,
-        instance: &mut Instance,
+        instance: &mut dyn Slave,
         shared: &Shared,
         reader: &mut Reader<'_>,
         writer: &mut Writer<'_>,
@@ -209,7 +230,7 @@ impl Step {
 
     /// Makes the calls of [`Slave::advance`]. Stores each function in shared memory, so that the
     /// master can name the function that crashed.
-    fn run(&mut self, instance: &mut Instance, shared: &Shared) -> Result<StepResult, CallError> {
+    fn run(&mut self, instance: &mut dyn Slave, shared: &Shared) -> Result<StepResult, CallError> {
         let at = |function: Function| shared.place().store(function.to_word(), Ordering::Relaxed);
         if !self.inputs.is_empty() {
             at(Function::SetReal);

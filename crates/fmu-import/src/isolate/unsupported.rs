@@ -7,7 +7,7 @@ use fmu_description::Experiment;
 use fmu_description::ModelDescription;
 use fmu_description::package::Unpacked;
 
-use super::{IsolateError, Options, WorkerError};
+use super::{Integrator, IsolateError, Options, WorkerError};
 use slave::{CallError, Slave, StepResult};
 
 /// An instance in a process of its own. It cannot be created on this operating system.
@@ -37,6 +37,15 @@ impl Isolated {
 ///
 /// Always [`WorkerError::Platform`].
 pub fn worker() -> Result<(), WorkerError> {
+    Err(WorkerError::Platform)
+}
+
+/// Returns the error that this operating system does not support workers.
+///
+/// # Errors
+///
+/// Always [`WorkerError::Platform`].
+pub fn worker_with(_: Integrator) -> Result<(), WorkerError> {
     Err(WorkerError::Platform)
 }
 

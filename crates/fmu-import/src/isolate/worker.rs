@@ -22,10 +22,10 @@ use super::function::Function;
 use super::layout::Shared;
 use super::log::Forward;
 use super::message::{Open, Opening, Request, decode};
-use super::perform::{CommandResult, Executor, MESSAGE, VALUES, reply};
+use super::perform::{CommandResult, Executor, MESSAGE, Maker, VALUES, reply};
 use super::words::{Reader, Writer};
-use super::{IsolateError, STARTED_BY, WorkerError, memory};
-use crate::{Fmu, FmuError, Instance};
+use super::{Integrator, IsolateError, STARTED_BY, WorkerError, memory};
+use crate::Fmu;
 use slave::{CallError, Failure};
 
 /// Whether this process has become a worker.
@@ -33,6 +33,9 @@ static IS_WORKER: AtomicBool = AtomicBool::new(false);
 
 /// Interval between two checks whether the master lives, if the connection has been closed locally.
 const PARENT_CHECK: Duration = Duration::from_millis(100);
+
+const NO_INTEGRATOR: &str = "this program cannot integrate model-exchange FMUs in separate processes: \
+    its `main` must call `fmu_import::isolate::worker_with` where it calls `worker`";
 
 /// Bytes of memory kept for the next request and for its answer.
 const BUFFER: usize = 1 << 16;
@@ -45,6 +48,19 @@ const BUFFER: usize = 1 << 16;
 /// [`WorkerError::Alone`] if no master started this process; [`WorkerError::Corrupted`] if the FMU
 /// overwrote the shared memory.
 pub fn worker() -> Result<(), WorkerError> {
+    run(None)
+}
+
+/// Like [`worker`], but also runs instances for model exchange, which `integrator` integrates.
+///
+/// # Errors
+///
+/// Same as [`worker`].
+pub fn worker_with(integrator: Integrator) -> Result<(), WorkerError> {
+    run(Some(integrator))
+}
+
+fn run(integrator: Option<Integrator>) -> Result<(), WorkerError> {
     IS_WORKER.store(true, Ordering::Relaxed);
     let alone = |what| move |source| WorkerError::Alone { what, source };
     let memory = stdout().as_fd().try_clone_to_owned().map_err(alone("no shared memory"))?;
@@ -58,7 +74,7 @@ pub fn worker() -> Result<(), WorkerError> {
     // Fails only if the program has set a subscriber, which then receives the messages.
     let _ = tracing::subscriber::set_global_default(Forward::new(shared.clone()));
     shared.attached().store(1, Ordering::Relaxed);
-    serve(&mut Channel::new(shared, socket, Side::Worker))
+    serve(&mut Channel::new(shared, socket, Side::Worker), integrator)
 }
 
 /// Returns an error if this process was started as a worker but did not become one. Without this check
@@ -96,10 +112,15 @@ fn end_with_master(socket: &UnixStream) -> io::Result<()> {
 }
 
 /// Executes the commands of the master until it frees the instance.
-fn serve(channel: &mut Channel) -> Result<(), WorkerError> {
-    let shared = channel.shared.clone();
-    let mut worker =
-        Worker { shared, executor: None, request: Vec::new(), answer: Vec::new(), freed: false };
+fn serve(channel: &mut Channel, integrator: Option<Integrator>) -> Result<(), WorkerError> {
+    let mut worker = Worker {
+        shared: channel.shared.clone(),
+        integrator,
+        executor: None,
+        request: Vec::new(),
+        answer: Vec::new(),
+        freed: false,
+    };
     let mut turn = 0_u64;
     while !worker.freed {
         match channel.wait(turn) {
@@ -120,6 +141,7 @@ fn serve(channel: &mut Channel) -> Result<(), WorkerError> {
 /// The state of a worker between two commands.
 struct Worker {
     shared: Arc<Shared>,
+    integrator: Option<Integrator>,
     executor: Option<Executor>,
     /// The bytes of the next request that have arrived.
     request: Vec<u8>,
@@ -165,8 +187,8 @@ impl Worker {
                 reply(opened, &mut self.answer);
             }
             (Some(Request::Renew { name, logging }), Some(executor)) => {
-                let fmu = executor.fmu();
-                let renewed = self.renew(&fmu, name, logging);
+                let maker = executor.maker();
+                let renewed = self.renew(maker, name, logging);
                 reply(Ok(renewed), &mut self.answer);
             }
             (Some(Request::Free), executor) => {
@@ -185,7 +207,7 @@ impl Worker {
 
     /// Loads and instantiates the FMU.
     fn open(&mut self, arguments: &Open<'_>) -> Result<Opening, CallError> {
-        let Open { folder, name, logging, memory_limit, preload } = arguments;
+        let Open { folder, name, logging, memory_limit, preload, integration } = arguments;
         if *memory_limit > 0
             && let Err(error) = memory::limit(&self.shared, *memory_limit)
         {
@@ -198,19 +220,23 @@ impl Worker {
                 return Ok(Opening::NotPreloaded(with_causes(&error)));
             }
         }
-        let created = Fmu::open(Path::new(OsStr::from_bytes(folder))).and_then(|fmu| {
-            self.record(Function::Instantiate);
-            fmu.instantiate(name)
-        });
-        Ok(self.accept(created, *logging))
+        let integration = match (integration, self.integrator) {
+            (None, _) => None,
+            (Some(options), Some(integrator)) => Some((integrator, (*options).to_owned())),
+            (Some(_), None) => return Ok(Opening::Refused(NO_INTEGRATOR.to_owned())),
+        };
+        let opened = Fmu::open_any(Path::new(OsStr::from_bytes(folder)));
+        Ok(match opened {
+            Ok(fmu) => self.create(Maker { fmu, integration }, name, *logging),
+            Err(error) => Opening::Refused(with_causes(&error)),
+        })
     }
 
     /// Frees the instance and creates another one.
-    fn renew(&mut self, fmu: &Fmu, name: &str, logging: bool) -> Opening {
+    fn renew(&mut self, maker: Maker, name: &str, logging: bool) -> Opening {
         self.record(Function::Free);
         self.executor = None;
-        self.record(Function::Instantiate);
-        self.accept(fmu.instantiate(name), logging)
+        self.create(maker, name, logging)
     }
 
     /// Stores the function that runs now, so that the master can name the one that crashed.
@@ -218,11 +244,12 @@ impl Worker {
         self.shared.place().store(function.to_word(), Ordering::Relaxed);
     }
 
-    /// Takes over the instance if it was created.
-    fn accept(&mut self, created: Result<Instance, FmuError>, logging: bool) -> Opening {
-        match created {
+    /// Creates an instance and takes it over.
+    fn create(&mut self, maker: Maker, name: &str, logging: bool) -> Opening {
+        self.record(Function::Instantiate);
+        match maker.make(name) {
             Ok(instance) => {
-                self.executor = Some(Executor::new(instance, logging));
+                self.executor = Some(Executor::new(instance, maker, logging));
                 Opening::Instantiated
             }
             Err(error) => Opening::Refused(with_causes(&error)),

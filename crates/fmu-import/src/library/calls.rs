@@ -6,7 +6,7 @@ use std::ffi::CStr;
 use fmu_description::abi::{fmi2Boolean, fmi2EventInfo};
 
 use super::{Component, c_string};
-use slave::{CallError, CompletedStep, absent};
+use slave::{CallError, CompletedStep, EventInfo, absent};
 
 /// Evaluates to the C function in `$field` and marks it as entered; returns an error from the caller
 /// if the library lacks it. [`Component::check`] marks its return.
@@ -178,14 +178,20 @@ impl Component {
     ///
     /// [`CallError`] if the library lacks the function, or if its status is neither `fmi2OK` nor
     /// `fmi2Warning`.
-    pub fn new_discrete_states(&mut self) -> Result<fmi2EventInfo, CallError> {
+    pub fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
         const NAME: &str = "fmi2NewDiscreteStates";
         let mut info = fmi2EventInfo::default();
         let function = function!(self.new_discrete_states, NAME);
         // SAFETY: the instance is alive; one structure to write to.
         let status = unsafe { function(self.pointer, &raw mut info) };
         self.check(NAME, status)?;
-        Ok(info)
+        Ok(EventInfo {
+            discrete_states_need_update: info.new_discrete_states_needed != 0,
+            terminate_simulation: info.terminate_simulation != 0,
+            nominals_changed: info.nominals_of_continuous_states_changed != 0,
+            values_changed: info.values_of_continuous_states_changed != 0,
+            next_event_time: (info.next_event_time_defined != 0).then_some(info.next_event_time),
+        })
     }
 
     /// Calls `fmi2SetTime`; `time` is in s.

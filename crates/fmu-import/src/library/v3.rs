@@ -1,10 +1,11 @@
-//! The library of an FMU of FMI 3.0 for co-simulation: loading, instantiation, calls.
+//! The library of an FMU of FMI 3.0: loading, instantiation, calls.
 //!
 //! [`Component`] has one method for each C function; it knows neither modes nor arrays. The module
 //! `v3` of the crate builds a slave on it.
 #![expect(unsafe_code, reason = "the boundary to C")]
 
 mod calls;
+mod equations;
 mod functions;
 mod states;
 mod step;
@@ -20,7 +21,7 @@ use fmu_description::abi::Status;
 use libloading::Library as Handle;
 
 use super::log::{Sink, receive_message};
-use super::{c_string, load};
+use super::{Interface, c_string, load};
 use crate::crash::Place;
 use crate::error::LoadError;
 use functions::{Functions, Instance, State};
@@ -35,9 +36,12 @@ pub(crate) struct Library {
     _handle: Handle,
 }
 
-/// The arguments of `fmi3InstantiateCoSimulation` that depend on the FMU.
+/// The arguments of `fmi3InstantiateCoSimulation` or `fmi3InstantiateModelExchange` that depend on the
+/// FMU.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Instantiation<'a> {
+    /// Which of the functions is called.
+    pub(crate) interface: Interface,
     /// `instanceName`.
     pub(crate) name: &'a str,
     /// `instantiationToken`.
@@ -51,8 +55,8 @@ pub(crate) struct Instantiation<'a> {
 }
 
 impl Library {
-    /// Loads the library and checks its version and that it can run in co-simulation.
-    pub(crate) fn open(path: &Path) -> Result<Self, LoadError> {
+    /// Loads the library and checks its version and that it has the functions of `interface`.
+    pub(crate) fn open(path: &Path, interface: Interface) -> Result<Self, LoadError> {
         let handle = load(path)?;
         let functions = Functions::load(&handle, "");
         // SAFETY: takes no argument and returns a static string.
@@ -68,40 +72,64 @@ impl Library {
                 expected: "3.0",
             });
         }
-        functions.require(path)?;
+        functions.require(interface, path)?;
         let corrupted = AtomicBool::new(false);
         Ok(Self { functions, path: path.to_owned(), corrupted, _handle: handle })
     }
 
-    /// Calls `fmi3InstantiateCoSimulation` without intermediate update.
+    /// Calls the C function of `with.interface` without intermediate update; null if it fails.
+    fn create(&self, with: &Instantiation<'_>, sink: &Sink) -> Instance {
+        let (name, token) = (c_string(with.name), c_string(with.token));
+        let resources = with.resources.map(c_string);
+        let resources = resources.as_ref().map_or(std::ptr::null(), |path| path.as_ptr());
+        let (name, token) = (name.as_ptr(), token.as_ptr());
+        let environment = std::ptr::from_ref(sink).cast_mut().cast();
+        let log = Some(receive_message as functions::LogMessage);
+        let created = match with.interface {
+            Interface::CoSimulation => self.functions.instantiate.map(|function| {
+                let (event_mode, early_return) = (with.event_mode, with.early_return);
+                let (none, count) = (std::ptr::null(), 0);
+                // SAFETY: terminated strings; an environment and a callback that outlive the instance.
+                unsafe {
+                    function(
+                        name,
+                        token,
+                        resources,
+                        false,
+                        false,
+                        event_mode,
+                        early_return,
+                        none,
+                        count,
+                        environment,
+                        log,
+                        None,
+                    )
+                }
+            }),
+            Interface::ModelExchange => self.functions.instantiate_equations.map(|function| {
+                // SAFETY: as above.
+                unsafe { function(name, token, resources, false, false, environment, log) }
+            }),
+        };
+        created.unwrap_or(std::ptr::null_mut())
+    }
+
+    /// Creates an instance.
     pub(crate) fn instantiate(
         self: &Arc<Self>,
         with: &Instantiation<'_>,
     ) -> Result<Component, LoadError> {
-        const NAME: &str = "fmi3InstantiateCoSimulation";
+        const CO_SIMULATION: &str = "fmi3InstantiateCoSimulation";
+        const MODEL_EXCHANGE: &str = "fmi3InstantiateModelExchange";
+        let function = match with.interface {
+            Interface::CoSimulation => &CO_SIMULATION,
+            Interface::ModelExchange => &MODEL_EXCHANGE,
+        };
         let place = Place::new(with.name);
         let sink = Sink::new(&place, None);
-        let (name, token) = (c_string(with.name), c_string(with.token));
-        let resources = with.resources.map(c_string);
-        let resources = resources.as_ref().map_or(std::ptr::null(), |path| path.as_ptr());
-        place.enter(&NAME);
-        // SAFETY: terminated strings; an environment and a callback that outlive the instance.
-        let pointer = self.functions.instantiate.map_or(std::ptr::null_mut(), |function| unsafe {
-            function(
-                name.as_ptr(),
-                token.as_ptr(),
-                resources,
-                false,
-                false,
-                with.event_mode,
-                with.early_return,
-                std::ptr::null(),
-                0,
-                Arc::as_ptr(&sink).cast_mut().cast(),
-                Some(receive_message),
-                None,
-            )
-        });
+        place.enter(function);
+        let pointer = self.create(with, &sink);
         place.leave();
         let component = Component {
             pointer,
@@ -120,7 +148,7 @@ impl Library {
         let reason =
             if messages.is_empty() { "it gave no reason".to_owned() } else { messages.join("; ") };
         let (path, instance) = (self.path.clone(), with.name.to_owned());
-        Err(LoadError::Instantiate { path, function: NAME, instance, reason })
+        Err(LoadError::Instantiate { path, function, instance, reason })
     }
 }
 

@@ -15,6 +15,11 @@ pub(super) fn refused(function: &'static str, what: String) -> CallError {
     CallError { function, failure: Failure::InvalidAnswer(what), messages: Vec::new() }
 }
 
+/// A function that reads the values of whole variables.
+type Get<T> = fn(&mut Instance, &[u32], &mut [T]) -> Result<(), CallError>;
+/// A function that passes the values of whole variables.
+type Set<T> = fn(&mut Instance, &[u32], &[T]) -> Result<(), CallError>;
+
 impl Instance {
     /// Returns the plan of a list, for `function`.
     fn plan(&mut self, function: &'static str, list: &[u32]) -> Result<usize, CallError> {
@@ -111,7 +116,7 @@ impl Instance {
         function: &'static str,
         list: &[u32],
         values: &mut [T],
-        get: fn(&mut Self, &[u32], &mut [T]) -> Result<(), CallError>,
+        get: Get<T>,
     ) -> Result<(), CallError> {
         self.for_runs(function, list, |own, run| {
             if run.direct {
@@ -132,8 +137,8 @@ impl Instance {
         function: &'static str,
         list: &[u32],
         values: &[T],
-        get: fn(&mut Self, &[u32], &mut [T]) -> Result<(), CallError>,
-        set: fn(&mut Self, &[u32], &[T]) -> Result<(), CallError>,
+        get: Get<T>,
+        set: Set<T>,
     ) -> Result<(), CallError> {
         self.for_runs(function, list, |own, run| {
             let mut all = vec![T::default(); run.shadows.len()];

@@ -2,6 +2,7 @@
 
 use super::Instance;
 use super::access::refused;
+use crate::library::Interface;
 use slave::{CallError, Failure, StepResult};
 
 use fmu_description::abi::Status;
@@ -53,7 +54,10 @@ impl Instance {
         let start = self.state.time;
         self.state.clocks.start(&mut self.component, start)?;
         self.component.exit_initialization_mode()?;
-        if self.event_mode {
+        if self.interface == Interface::ModelExchange {
+            self.state.mode = Mode::Event;
+            Ok(())
+        } else if self.event_mode {
             self.state.mode = Mode::Event;
             self.handle_event(self.state.time)
         } else {
@@ -75,20 +79,15 @@ impl Instance {
         if self.state.mode == Mode::Step {
             self.enter_event()?;
         }
-        let active =
-            if self.state.clocks.is_due(time) { self.state.clocks.tick(time) } else { Vec::new() };
-        if !active.is_empty() {
-            self.component.activate_clocks(&active)?;
-            self.set_deferred(&active)?;
-        }
+        let active = self.tick(time)?;
         let mut updates = 0;
         loop {
             self.state.clocks.read_outputs(&mut self.component)?;
-            let states = self.component.update_discrete_states()?;
-            self.state.terminate |= states.terminate;
-            self.state.next_event = states.next_event;
+            let info = self.component.update_discrete_states()?;
+            self.state.terminate |= info.terminate_simulation;
+            self.state.next_event = info.next_event_time;
             updates += 1;
-            if !states.need_update || states.terminate {
+            if !info.discrete_states_need_update || info.terminate_simulation {
                 break;
             }
             if updates == UPDATES {
@@ -102,6 +101,17 @@ impl Instance {
         self.component.enter_step_mode()?;
         self.state.mode = Mode::Step;
         Ok(())
+    }
+
+    /// Makes the clocks tick that are due at `time`, and returns them.
+    pub(super) fn tick(&mut self, time: f64) -> Result<Vec<u32>, CallError> {
+        if !self.state.clocks.is_due(time) {
+            return Ok(Vec::new());
+        }
+        let active = self.state.clocks.tick(time);
+        self.component.activate_clocks(&active)?;
+        self.set_deferred(&active)?;
+        Ok(active)
     }
 
     /// Sets the values that waited for a tick of one of the `active` clocks.

@@ -1,7 +1,7 @@
 //! [`Integrated`] as a [`Slave`].
 
 use fmu_description::{Experiment, ModelDescription};
-use slave::{CallError, Slave, StepResult};
+use slave::{CallError, CallSink, Slave, StepResult};
 
 use super::{Integrated, Mode, TOLERANCE, failed};
 
@@ -49,6 +49,12 @@ impl Slave for Integrated {
 
     fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
         self.instance.set_debug_logging(on)
+    }
+
+    fn configure(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
+        self.instance.configure(references, values)?;
+        self.describe();
+        Ok(())
     }
 
     fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError> {
@@ -121,9 +127,14 @@ impl Slave for Integrated {
     fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
         if self.point.mode != Mode::Setup {
             self.booleans.resize(references.len(), 0);
-            let known = self.instance.get_boolean(references, &mut self.booleans);
-            let truth = |value: &i32| *value != 0;
-            if known.is_ok() && self.booleans.iter().map(truth).eq(values.iter().map(truth)) {
+            let known = self.instance.get_boolean(references, &mut self.booleans).is_ok();
+            let mut all = references.iter().zip(values).zip(&self.booleans);
+            let changes = all.any(|((reference, value), known)| {
+                // A clock that has ticked may tick again.
+                let before = *known != 0 && !self.clocks.contains(reference);
+                (*value != 0) != before
+            });
+            if known && !changes {
                 return Ok(());
             }
             self.prepare_change()?;
@@ -146,6 +157,21 @@ impl Slave for Integrated {
         self.instance.set_string(references, values)
     }
 
+    fn get_binary(&mut self, references: &[u32], values: &mut [Vec<u8>]) -> Result<(), CallError> {
+        self.instance.get_binary(references, values)
+    }
+
+    fn set_binary(&mut self, references: &[u32], values: &[Vec<u8>]) -> Result<(), CallError> {
+        if self.point.mode != Mode::Setup {
+            let mut known = vec![Vec::new(); references.len()];
+            if self.instance.get_binary(references, &mut known).is_ok() && known == values {
+                return Ok(());
+            }
+            self.prepare_change()?;
+        }
+        self.instance.set_binary(references, values)
+    }
+
     fn set_input_derivatives(
         &mut self,
         references: &[u32],
@@ -162,6 +188,7 @@ impl Slave for Integrated {
                 "cannot step from {time} s over {size} s: the last step ended at {at} s"
             )));
         }
+        self.instance.begin_communication_step();
         self.integrate(time + size, never_back)
     }
 
@@ -193,6 +220,10 @@ impl Slave for Integrated {
 
     fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
         self.deserialize(bytes)
+    }
+
+    fn log_calls(&mut self, sink: CallSink) -> bool {
+        self.instance.log_calls(sink)
     }
 
     fn take_warning(&mut self) -> bool {

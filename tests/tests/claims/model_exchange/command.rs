@@ -46,7 +46,21 @@ fn an_fmu_without_co_simulation_runs_and_the_explanation_says_how() {
 }
 
 #[test]
-fn isolation_and_wrong_interfaces_are_refused_with_the_reason() {
+fn an_isolated_fmu_is_integrated_in_its_process_to_the_same_results() {
+    let (folder, path) = fmu();
+    let results = ["plain", "isolated"].map(|name| {
+        let out = folder.path().join(name).display().to_string();
+        let mut arguments = vec!["run", &path, "--out", &out, "--set", "equations.k=2"];
+        arguments.extend((name == "isolated").then_some("--isolate"));
+        let (status, _, errors) = output(&arguments);
+        assert_eq!(status, Some(0), "{errors}");
+        fs::read(folder.path().join(name).join("results.csv")).unwrap()
+    });
+    assert_eq!(results[0], results[1]);
+}
+
+#[test]
+fn wrong_interfaces_are_refused_with_the_reason() {
     let (folder, path) = fmu();
     let out = folder.path().display().to_string();
     let with = |more: &[&str]| {
@@ -55,8 +69,9 @@ fn isolation_and_wrong_interfaces_are_refused_with_the_reason() {
         assert_eq!(status, Some(2), "{errors}");
         errors
     };
-    let said = with(&["--isolate"]);
-    assert!(said.contains("runs by model exchange, which --isolate does not support"), "{said}");
+    let log = folder.path().join("calls.log").display().to_string();
+    let said = with(&["--isolate", "--log-calls", &log]);
+    assert!(said.contains("where --log-calls does not see its calls"), "{said}");
     let said = with(&["--interface", "equations=co-simulation"]);
     assert!(said.contains("offers model-exchange only, found co-simulation"), "{said}");
     let said = with(&["--interface", "other=model-exchange"]);

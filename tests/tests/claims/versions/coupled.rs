@@ -23,9 +23,10 @@ fn write(folder: &Path, connections: &[(&str, &str)]) -> String {
     c_versions::slave_1(folder, "plain");
     CFmu::well_behaved().write(folder, "slave2");
     c_versions::slave_3(folder, "plain", true);
-    let mut text = "[fmus]\none = \"slave1.fmu\"\ntwo = \"slave2.fmu\"\nthree = \"slave3.fmu\"\nfour = \
+    let mut text =
+        "[fmus]\none = \"slave1.fmu\"\ntwo = \"slave2.fmu\"\nthree = \"slave3.fmu\"\nfour = \
                     \"slave3.fmu\"\n"
-        .to_owned();
+            .to_owned();
     for (from, to) in connections {
         text += &format!("[[connections]]\nfrom = \"{from}\"\nto = \"{to}\"\n");
     }

@@ -29,6 +29,7 @@ modes! {
     exit_initialization_mode = "fmi3ExitInitializationMode";
     enter_event_mode = "fmi3EnterEventMode";
     enter_step_mode = "fmi3EnterStepMode";
+    enter_continuous_time_mode = "fmi3EnterContinuousTimeMode";
     enter_configuration_mode = "fmi3EnterConfigurationMode";
     exit_configuration_mode = "fmi3ExitConfigurationMode";
     terminate = "fmi3Terminate";

@@ -1,4 +1,4 @@
-//! The C functions of FMI 3.0 for co-simulation: names and signatures.
+//! The C functions of FMI 3.0: names and signatures.
 //!
 //! `fmi3Boolean` and `fmi3Clock` are read as bytes: an FMU may write other values than 0 and 1, which a
 //! Rust `bool` does not allow.
@@ -6,6 +6,7 @@
 use std::ffi::{c_char, c_int, c_void};
 use std::path::Path;
 
+use super::super::Interface;
 use super::super::table::functions;
 use crate::error::LoadError;
 
@@ -28,6 +29,8 @@ functions! {
         fn(Instance, bool, usize, *const Text) -> Status;
     instantiate = "fmi3InstantiateCoSimulation": fn(Text, Text, Text, bool, bool, bool, bool,
         References, usize, *mut c_void, Option<LogMessage>, Option<IntermediateUpdate>) -> Instance;
+    instantiate_equations = "fmi3InstantiateModelExchange":
+        fn(Text, Text, Text, bool, bool, *mut c_void, Option<LogMessage>) -> Instance;
     free_instance = "fmi3FreeInstance": fn(Instance);
     enter_initialization_mode = "fmi3EnterInitializationMode":
         fn(Instance, bool, f64, f64, bool, f64) -> Status;
@@ -88,21 +91,42 @@ functions! {
         *mut u8, *mut u8, *mut f64) -> Status;
     do_step = "fmi3DoStep": fn(Instance, f64, f64, bool, *mut u8, *mut u8, *mut u8, *mut f64)
         -> Status;
+    enter_continuous_time_mode = "fmi3EnterContinuousTimeMode": fn(Instance) -> Status;
+    completed_integrator_step = "fmi3CompletedIntegratorStep":
+        fn(Instance, bool, *mut u8, *mut u8) -> Status;
+    set_time = "fmi3SetTime": fn(Instance, f64) -> Status;
+    set_continuous_states = "fmi3SetContinuousStates": fn(Instance, *const f64, usize) -> Status;
+    get_continuous_states = "fmi3GetContinuousStates": fn(Instance, *mut f64, usize) -> Status;
+    get_derivatives = "fmi3GetContinuousStateDerivatives":
+        fn(Instance, *mut f64, usize) -> Status;
+    get_event_indicators = "fmi3GetEventIndicators": fn(Instance, *mut f64, usize) -> Status;
+    get_nominals = "fmi3GetNominalsOfContinuousStates": fn(Instance, *mut f64, usize) -> Status;
+    get_number_of_states = "fmi3GetNumberOfContinuousStates": fn(Instance, *mut usize) -> Status;
+    get_number_of_indicators = "fmi3GetNumberOfEventIndicators":
+        fn(Instance, *mut usize) -> Status;
 }
 
-/// The functions without which no FMU can run in co-simulation.
-const REQUIRED: [&str; 5] = [
-    "fmi3InstantiateCoSimulation",
-    "fmi3FreeInstance",
-    "fmi3EnterInitializationMode",
-    "fmi3ExitInitializationMode",
-    "fmi3DoStep",
+/// The functions without which no FMU can run.
+const REQUIRED: [&str; 3] =
+    ["fmi3FreeInstance", "fmi3EnterInitializationMode", "fmi3ExitInitializationMode"];
+/// Those that co-simulation cannot do without either.
+const CO_SIMULATION: [&str; 2] = ["fmi3InstantiateCoSimulation", "fmi3DoStep"];
+/// Those that model exchange cannot do without either.
+const MODEL_EXCHANGE: [&str; 4] = [
+    "fmi3InstantiateModelExchange",
+    "fmi3SetTime",
+    "fmi3UpdateDiscreteStates",
+    "fmi3EnterContinuousTimeMode",
 ];
 
 impl Functions {
-    /// Checks that the library exports the functions that co-simulation cannot do without.
-    pub(super) fn require(&self, path: &Path) -> Result<(), LoadError> {
-        let missing = REQUIRED.iter().find(|function| !self.has(function));
+    /// Checks that the library exports the functions that `interface` cannot do without.
+    pub(super) fn require(&self, interface: Interface, path: &Path) -> Result<(), LoadError> {
+        let own: &[&str] = match interface {
+            Interface::CoSimulation => &CO_SIMULATION,
+            Interface::ModelExchange => &MODEL_EXCHANGE,
+        };
+        let missing = REQUIRED.iter().chain(own).find(|function| !self.has(function));
         missing.map_or(Ok(()), |function| {
             Err(LoadError::Missing { path: path.to_owned(), function: (*function).to_owned() })
         })

@@ -3,7 +3,7 @@
 
 use super::super::calls::function;
 use super::Component;
-use slave::{CallError, absent};
+use slave::{CallError, EventInfo, absent};
 
 /// The results of `fmi3DoStep`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,17 +16,6 @@ pub(crate) struct StepDone {
     pub(crate) early: bool,
     /// `lastSuccessfulTime` in s.
     pub(crate) reached: f64,
-}
-
-/// The results of `fmi3UpdateDiscreteStates`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct DiscreteStates {
-    /// `discreteStatesNeedUpdate`.
-    pub(crate) need_update: bool,
-    /// `terminateSimulation`.
-    pub(crate) terminate: bool,
-    /// `nextEventTime` in s, if it is defined.
-    pub(crate) next_event: Option<f64>,
 }
 
 impl Component {
@@ -67,7 +56,7 @@ impl Component {
     }
 
     /// Calls `fmi3UpdateDiscreteStates`.
-    pub(crate) fn update_discrete_states(&mut self) -> Result<DiscreteStates, CallError> {
+    pub(crate) fn update_discrete_states(&mut self) -> Result<EventInfo, CallError> {
         const NAME: &str = "fmi3UpdateDiscreteStates";
         let function = function!(self.update_discrete_states, NAME);
         self.log_call(NAME, String::new);
@@ -91,7 +80,12 @@ impl Component {
                  nextEventTimeDefined {defined}, nextEventTime {next:?}"
             )
         })?;
-        let next_event = (defined != 0).then_some(next);
-        Ok(DiscreteStates { need_update: need_update != 0, terminate: terminate != 0, next_event })
+        Ok(EventInfo {
+            discrete_states_need_update: need_update != 0,
+            terminate_simulation: terminate != 0,
+            nominals_changed: nominals != 0,
+            values_changed: values != 0,
+            next_event_time: (defined != 0).then_some(next),
+        })
     }
 }

@@ -74,7 +74,7 @@ impl Component {
         let function = function!(self.set_string, NAME);
         self.log_call(NAME, || format!("{references:?}, {values:?}"));
         let values: Vec<_> = values.iter().map(|value| c_string(value)).collect();
-        let pointers: Vec<_> = values.iter().map(|value| value.as_ptr()).collect();
+        let pointers: Vec<_> = values.iter().map(|text| text.as_ptr()).collect();
         let (count, length) = (references.len(), pointers.len());
         // SAFETY: the instance is alive; both pointers come with their number of values.
         let status = unsafe {
@@ -122,7 +122,7 @@ impl Component {
         let function = function!(self.set_binary, NAME);
         self.log_call(NAME, || format!("{references:?}, {values:?}"));
         let sizes: Vec<_> = values.iter().map(Vec::len).collect();
-        let pointers: Vec<_> = values.iter().map(|value| value.as_ptr()).collect();
+        let pointers: Vec<_> = values.iter().map(Vec::as_ptr).collect();
         let (count, length) = (references.len(), pointers.len());
         // SAFETY: the instance is alive; as many sizes as pointers, each to as many bytes.
         let status = unsafe {
