@@ -85,7 +85,8 @@ const CO_SIMULATION_3: &str = r#"<CoSimulation modelIdentifier="slave3"
  providesDirectionalDerivatives="true" hasEventMode="EVENT_MODE" mightReturnEarlyFromDoStep="true"/>"#;
 
 const MODEL_EXCHANGE_3: &str = r#"<ModelExchange modelIdentifier="slave3" canGetAndSetFMUState="true"
- canSerializeFMUState="true" providesDirectionalDerivatives="true"/>"#;
+ canSerializeFMUState="true" providesDirectionalDerivatives="true"
+ needsCompletedIntegratorStep="true"/>"#;
 
 const DESCRIPTION_3: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="3.0" modelName="Slave" instantiationToken="TOKEN">

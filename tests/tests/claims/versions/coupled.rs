@@ -20,15 +20,15 @@ const CONNECTIONS: [(&str, &str); 9] = [
 
 /// Writes one FMU of FMI 1.0, one of 2.0 and two of 3.0, and a system of them.
 fn write(folder: &Path, connections: &[(&str, &str)]) -> String {
-    c_versions::slave_1(folder, "plain");
-    CFmu::well_behaved().write(folder, "slave2");
-    c_versions::slave_3(folder, "plain", true);
+    let one = c_versions::slave_1(folder, "plain");
+    let two = CFmu::well_behaved().write(folder, "slave2");
+    let three = c_versions::slave_3(folder, "plain", true);
     let mut text =
-        "[fmus]\none = \"slave1.fmu\"\ntwo = \"slave2.fmu\"\nthree = \"slave3.fmu\"\nfour = \
-                    \"slave3.fmu\"\n"
-            .to_owned();
+        format!("[fmus]\none = {one:?}\ntwo = {two:?}\nthree = {three:?}\nfour = {three:?}\n");
     for (from, to) in connections {
-        text += &format!("[[connections]]\nfrom = \"{from}\"\nto = \"{to}\"\n");
+        for part in ["[[connections]]\nfrom = \"", from, "\"\nto = \"", to, "\"\n"] {
+            text += part;
+        }
     }
     text += "[settings]\nthree.level = 9\nfour.level = 9\nthree.a = \"3 4\"\n[algorithm]\nmethod = \
              \"jacobi\"\ncourse = \"hold\"\ncoupling = \"once\"\nstep = 0.125\n[experiment]\nstop-time \
@@ -79,7 +79,8 @@ fn fmus_of_three_versions_exchange_values_of_all_types() {
         assert_eq!(at("one.i_out"), 9.0);
         assert_eq!(at("two.i_out"), 8.0);
         assert_eq!(at("four.k_out"), 7.0);
-        assert_eq!(at("four.g"), f64::from((21.0_f64 / 64.0) as f32));
+        // Exact as a Float32.
+        assert_eq!(at("four.g"), 21.0 / 64.0);
     }
 }
 

@@ -98,8 +98,9 @@ fn a_state_of_model_exchange_brings_back_clocks_and_events() {
 #[test]
 fn an_fmu_of_fmi_3_ends_its_integration() {
     let mut slave = ready("terminate", &[]);
-    let Ok(StepResult::Part { reached, terminated: true }) = slave.do_step(0.0, 1.0, true) else {
-        panic!("the FMU is not stopped");
+    let done = slave.do_step(0.0, 1.0, true);
+    let Ok(StepResult::Part { reached, terminated: true }) = done else {
+        panic!("the FMU is not stopped: {done:?}");
     };
     assert!((reached - 0.5).abs() < 1e-9, "{reached}");
 }

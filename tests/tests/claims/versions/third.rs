@@ -181,7 +181,7 @@ fn an_fmu_that_requests_the_end_ends_there() {
 
 #[test]
 fn impossible_answers_to_a_step_are_errors_that_say_what_was_expected() {
-    let error = ready("lie").step(2.0, 0.1).unwrap_err();
+    let error = ready("lie").step(0.0, 0.1).unwrap_err();
     assert!(matches!(error.failure, Failure::InvalidAnswer(_)));
     assert!(error.to_string().contains("last successful time"), "{error}");
     let error = ready("stay").step(0.0, 0.1).unwrap_err();
