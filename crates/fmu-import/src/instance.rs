@@ -193,7 +193,7 @@ impl Slave for Instance {
         match &mut self.inner {
             Inner::V1(own) => own.component.set_input_derivatives(references, orders, values),
             Inner::V2(own) => own.component.set_real_input_derivatives(references, orders, values),
-            Inner::V3(_) => Err(absent("fmi2SetRealInputDerivatives")),
+            Inner::V3(own) => own.set_input_derivatives(references, orders, values),
         }
     }
 

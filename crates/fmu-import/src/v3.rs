@@ -65,6 +65,8 @@ impl Instance {
         let sizes = HashMap::new();
         let view = ElementView::new(own, &sizes)
             .map_err(|reason| LoadError::Unsupported { model: own.model_name.clone(), reason })?;
+        let followed = view.variables.iter().filter(|own| own.intermediate);
+        let intermediate: Vec<u32> = followed.map(|own| own.reference).collect();
         let with = Instantiation {
             interface,
             name,
@@ -72,6 +74,7 @@ impl Instance {
             resources,
             event_mode: flags.has_event_mode,
             early_return: flags.has_event_mode || flags.might_return_early_from_do_step,
+            intermediate: &intermediate,
         };
         let (component, event_mode) = match library.instantiate(&with) {
             Ok(component) => (component, with.event_mode),

@@ -25,7 +25,9 @@ use crate::fence::{HookGuard, guarded, outside};
 use crate::instance::{Function, Instance, Snapshot};
 use crate::model::{Failure, Model};
 use fmu_description::ModelDescription;
-use fmu_description::abi3::{fmi3InstanceEnvironment, fmi3LogMessageCallback, fmi3Status};
+use fmu_description::abi3::{
+    fmi3InstanceEnvironment, fmi3IntermediateUpdateCallback, fmi3LogMessageCallback, fmi3Status,
+};
 use fmu_description::call_order::InterfaceType;
 use fmu_description::location::{NO_FOLDER, path_from_uri};
 
@@ -74,9 +76,55 @@ impl Callbacks {
     }
 }
 
+/// `fmi3IntermediateUpdateCallback` of an importer.
+#[derive(Clone, Copy)]
+pub(crate) struct IntermediateUpdate {
+    environment: fmi3InstanceEnvironment,
+    function: fmi3IntermediateUpdateCallback,
+}
+
+// SAFETY: as for `Callbacks`.
+unsafe impl Send for IntermediateUpdate {}
+
+impl IntermediateUpdate {
+    /// Asks for the inputs at `time`; the importer can neither read outputs nor return early.
+    fn ask(self, time: f64) {
+        let (mut return_requested, mut return_time) = (0, time);
+        let (request, result) = (&raw mut return_requested, &raw mut return_time);
+        // SAFETY: the callback has this signature by the standard; both places outlive the call.
+        outside(|| unsafe { (self.function)(self.environment, time, 1, 0, 0, 0, request, result) });
+    }
+}
+
+/// Lets the importer set the inputs within the step that `fmi3DoStep` will make, if it has asked for that
+/// ([`Instance::begin_intermediate`]). During the callbacks no call is in progress, so that the importer
+/// can set inputs.
+unsafe fn ask_for_inputs<M: Model>(component: fmi2Component, start: f64, size: f64) {
+    // SAFETY: a component that is not null is one that `instantiate` made for this `M`.
+    let Some(component) = (unsafe { component.cast::<Component<M>>().as_ref() }) else { return };
+    if component.busy.load(Ordering::Relaxed) || component.asking.load(Ordering::Relaxed) {
+        return;
+    }
+    // SAFETY: `busy` is false, and the reference does not outlive the statement.
+    let Some(update) = (unsafe { &mut *component.instance.get() }).begin_intermediate(size) else {
+        return;
+    };
+    component.asking.store(true, Ordering::Relaxed);
+    for (place, time) in [(1, start + 0.5 * size), (2, start + size)] {
+        update.ask(time);
+        // SAFETY: as above.
+        unsafe { &mut *component.instance.get() }.record_intermediate(place);
+    }
+    component.asking.store(false, Ordering::Relaxed);
+    // SAFETY: as above.
+    unsafe { &mut *component.instance.get() }.end_intermediate(size);
+}
+
 /// The target of `fmi2Component` and `fmi3Instance`: an instance that allows one call at a time.
 struct Component<M: Model> {
     busy: AtomicBool,
+    /// Whether the importer sets inputs within a step; the instance must not be freed.
+    asking: AtomicBool,
     instance: UnsafeCell<Instance<M>>,
 }
 
@@ -284,7 +332,12 @@ pub unsafe fn instantiate<M: Model>(
 
 fn into_component<M: Model>(instance: Instance<M>) -> fmi2Component {
     let instance = UnsafeCell::new(instance);
-    Box::into_raw(Box::new(Component { busy: AtomicBool::new(false), instance })).cast()
+    Box::into_raw(Box::new(Component {
+        busy: AtomicBool::new(false),
+        asking: AtomicBool::new(false),
+        instance,
+    }))
+    .cast()
 }
 
 /// Frees the instance. Does nothing during another call of the instance (stepInProgress).
@@ -292,7 +345,7 @@ pub unsafe fn free_instance<M: Model>(component: fmi2Component) {
     let component = component.cast::<Component<M>>();
     // SAFETY: a component that is not null is one that `instantiate` made for this `M`.
     let Some(shared) = (unsafe { component.as_ref() }) else { return };
-    if !shared.busy.load(Ordering::Relaxed) {
+    if !shared.busy.load(Ordering::Relaxed) && !shared.asking.load(Ordering::Relaxed) {
         shared.busy.store(true, Ordering::Relaxed);
         // SAFETY: not in use and, by the standard, freed once. `busy` stays set while `free` logs a
         // panic of a destructor, because the logger may call the instance.

@@ -379,6 +379,13 @@ impl<M> Interface<M> {
     ) -> (fmi3::Table, ModelDescription) {
         let indicators = self.event_indicators.unwrap_or_default();
         let (table, mut converted) = fmi3::describe(description, indicators);
+        for own in &mut converted.variables {
+            own.intermediate_update = self.interpolates(&own.name);
+        }
+        let intermediate = converted.variables.iter().any(|own| own.intermediate_update);
+        if let Some(co_simulation) = &mut converted.co_simulation {
+            co_simulation.provides_intermediate_update = intermediate;
+        }
         self.guid = Guid::of(&converted);
         converted.guid = self.guid.to_string();
         for variable in &description.variables {

@@ -7,6 +7,7 @@
 mod calls;
 mod equations;
 mod functions;
+mod intermediate;
 mod states;
 mod step;
 mod values;
@@ -24,7 +25,9 @@ use super::log::{Sink, receive_message};
 use super::{Interface, c_string, load};
 use crate::crash::Place;
 use crate::error::LoadError;
-use functions::{Functions, Instance, State};
+use functions::{Functions, Instance, IntermediateUpdate, State};
+use intermediate::Inputs;
+pub(crate) use intermediate::ORDERS;
 use slave::{CallError, CallSink, Failure};
 
 /// A loaded library with the functions of FMI 3.0.
@@ -52,6 +55,8 @@ pub(crate) struct Instantiation<'a> {
     pub(crate) event_mode: bool,
     /// `earlyReturnAllowed`.
     pub(crate) early_return: bool,
+    /// The inputs that follow polynomials within a step, if the FMU asks for them.
+    pub(crate) intermediate: &'a [u32],
 }
 
 impl Library {
@@ -77,7 +82,7 @@ impl Library {
         Ok(Self { functions, path: path.to_owned(), corrupted, _handle: handle })
     }
 
-    /// Calls the C function of `with.interface` without intermediate update; null if it fails.
+    /// Calls the C function of `with.interface`; null if it fails.
     fn create(&self, with: &Instantiation<'_>, sink: &Sink) -> Instance {
         let (name, token) = (c_string(with.name), c_string(with.token));
         let resources = with.resources.map(c_string);
@@ -88,7 +93,9 @@ impl Library {
         let created = match with.interface {
             Interface::CoSimulation => self.functions.instantiate.map(|function| {
                 let (event_mode, early_return) = (with.event_mode, with.early_return);
-                let (none, count) = (std::ptr::null(), 0);
+                let (count, list) = (with.intermediate.len(), with.intermediate.as_ptr());
+                let list = if count == 0 { std::ptr::null() } else { list };
+                let update = (count > 0).then_some(intermediate::update as IntermediateUpdate);
                 // SAFETY: terminated strings; an environment and a callback that outlive the instance.
                 unsafe {
                     function(
@@ -99,11 +106,11 @@ impl Library {
                         false,
                         event_mode,
                         early_return,
-                        none,
+                        list,
                         count,
                         environment,
                         log,
-                        None,
+                        update,
                     )
                 }
             }),
@@ -139,6 +146,7 @@ impl Library {
             saved: Vec::new(),
             warned: Cell::new(false),
             call_sink: RefCell::new(None),
+            inputs: Box::default(),
             library: self.clone(),
         };
         if !pointer.is_null() {
@@ -168,6 +176,8 @@ pub(crate) struct Component {
     warned: Cell<bool>,
     /// Receives a text for each call, if calls are logged.
     call_sink: RefCell<Option<CallSink>>,
+    /// The courses of the inputs within the present step.
+    inputs: Box<Inputs>,
     library: Arc<Library>,
 }
 

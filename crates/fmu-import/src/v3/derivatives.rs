@@ -61,6 +61,22 @@ impl Instance {
         Ok(())
     }
 
+    /// Sets the derivatives of inputs for the next step, at whose start they have their present values. An
+    /// input for which the FMU does not ask within a step is held.
+    pub(crate) fn set_input_derivatives(
+        &mut self,
+        list: &[u32],
+        orders: &[i32],
+        values: &[f64],
+    ) -> Result<(), CallError> {
+        let (view, time) = (&self.view, self.state.time);
+        let is_followed = |reference| {
+            let found = view.locate(reference);
+            found.is_some_and(|(variable, _)| view.variables[variable].intermediate)
+        };
+        self.component.set_input_derivatives(list, orders, values, time, is_followed)
+    }
+
     /// Returns derivatives of outputs with respect to time.
     pub(crate) fn get_output_derivatives(
         &mut self,

@@ -85,6 +85,8 @@ pub(super) struct Variable {
     /// Whether the variable may change in Event Mode only, once the FMU is initialised (FMI 3.0.2,
     /// section 4.2.1): all but continuous inputs.
     pub(super) event: bool,
+    /// Whether the FMU asks for this input within a step: a scalar with `intermediateUpdate`.
+    pub(super) intermediate: bool,
     /// Value references of the clocks of the variable.
     pub(super) clocks: Vec<u32>,
     /// Position of its first element among all elements of variables with `event`.
@@ -341,6 +343,11 @@ impl Builder {
             kind,
             size,
             event,
+            intermediate: !event
+                && kind == NativeType::Float64
+                && !is_array
+                && variable.intermediate_update
+                && own.co_simulation.as_ref().is_some_and(|own| own.provides_intermediate_update),
             clocks: clocks.collect(),
             shadow: view.shadows,
         });
@@ -370,6 +377,10 @@ impl Builder {
                 let variable = &mut self.view.description.variables[start + element];
                 (variable.kind, variable.previous, variable.clocks) = (kind, previous, clocks);
             }
+        }
+        if let Some(flags) = &mut self.view.description.co_simulation {
+            // Replaces the input derivatives of FMI 2.0.
+            flags.can_interpolate_inputs = self.view.variables.iter().any(|own| own.intermediate);
         }
         let structure = &own.structure;
         let rows = |rows: &[Unknown]| self.rows(rows);

@@ -132,6 +132,12 @@ impl Instance {
         size: f64,
         never_back: bool,
     ) -> Result<StepResult, CallError> {
+        let done = self.parts(time, size, never_back);
+        self.component.forget_input_derivatives();
+        done
+    }
+
+    fn parts(&mut self, time: f64, size: f64, never_back: bool) -> Result<StepResult, CallError> {
         if self.event_mode {
             self.state.clocks.begin_step();
             if self.state.mode == Mode::Event || self.is_event_due(time, size) {
@@ -167,6 +173,7 @@ impl Instance {
                 return Err(refused("fmi3DoStep", what));
             }
             self.state.time = reached;
+            self.component.settle_inputs(reached)?;
             if done.terminate {
                 return Ok(StepResult::Part { reached, terminated: true });
             }

@@ -1,24 +1,27 @@
 //! The functions of FMI 3.0 that differ from those of FMI 2.0.
 
 mod derivatives;
+mod intermediate;
 mod step;
 mod values;
 
 use std::path::Path;
 
 use super::Instance;
-use crate::ffi::Callbacks;
+use crate::ffi::{Callbacks, IntermediateUpdate};
 use crate::interface::fmi3::{Dependency, Table, Type};
 use crate::model::{Event, Failure, Model};
 use fmu_description::call_order::{InterfaceType, State};
 
 pub(crate) use derivatives::Jacobian;
+use intermediate::Intermediate;
 
 /// What an instance of FMI 3.0 has besides the parts of every instance.
 pub(crate) struct Session {
     table: Table,
     event_mode_used: bool,
     early_return_allowed: bool,
+    intermediate: Option<Box<Intermediate>>,
     /// Places of the variables of the present call.
     places: Vec<u32>,
     /// Orders of the output derivatives, or values of enumerations, of the present call.
@@ -35,6 +38,8 @@ pub(crate) struct Instantiation<'a> {
     pub(crate) logging_on: bool,
     pub(crate) event_mode_used: bool,
     pub(crate) early_return_allowed: bool,
+    /// The importer's callback, and the variables that it intends to set.
+    pub(crate) intermediate: Option<(IntermediateUpdate, &'a [u32])>,
 }
 
 impl<M: Model> Instance<M> {
@@ -43,10 +48,17 @@ impl<M: Model> Instance<M> {
         let mut instance = Self::build(made.resources, callbacks, |interface, description| {
             let (table, _) = interface.convert(description);
             let indicators = vec![0.0; interface.event_indicators.unwrap_or_default()];
+            let wanted = |(update, required): (IntermediateUpdate, &[u32])| {
+                let sets = |name: &str| interface.interpolates(name);
+                let is_set = required.iter().any(|own| table.name(*own).is_some_and(sets));
+                is_set.then(|| Box::new(Intermediate::new(update, interface.interpolated.len())))
+            };
+            let intermediate = made.intermediate.and_then(wanted);
             Some(Box::new(Session {
                 table,
                 event_mode_used: made.event_mode_used,
                 early_return_allowed: made.early_return_allowed,
+                intermediate,
                 places: Vec::new(),
                 integers: Vec::new(),
                 indicators,

@@ -76,6 +76,11 @@ impl Table {
         })
     }
 
+    /// Returns the name of a variable.
+    pub(crate) fn name(&self, reference: u32) -> Option<&str> {
+        self.entries.get(reference as usize).map(|entry| entry.name.as_str())
+    }
+
     /// Appends the value references of FMI 2.0 of all elements of the variables to `places`, in
     /// row-major order.
     ///

@@ -32,6 +32,11 @@ impl<M> Interface<M> {
 
 /// Inputs with derivatives, which `fmi2SetRealInputDerivatives` sets.
 impl<M> Interface<M> {
+    /// Whether the variable called `name` is an input with derivatives.
+    pub(crate) fn interpolates(&self, name: &str) -> bool {
+        self.interpolated.iter().any(|&position| self.reals[position].name == name)
+    }
+
     /// Copies the inputs with derivatives to `to`.
     pub(crate) fn read_interpolated(&self, model: &mut M, to: &mut [f64]) {
         for (&position, value) in self.interpolated.iter().zip(to) {
@@ -44,6 +49,33 @@ impl<M> Interface<M> {
         for (&position, value) in self.interpolated.iter().zip(values) {
             *(self.reals[position].field)(model) = *value;
         }
+    }
+
+    /// Sets the derivatives of the inputs for a step of `size` s by their values at its start, its middle
+    /// and its end. Returns whether one is not zero.
+    pub(crate) fn interpolate(
+        &self,
+        model: &mut M,
+        [starts, middles, ends]: [&[f64]; 3],
+        size: f64,
+    ) -> bool {
+        let mut moves = false;
+        for (k, &position) in self.interpolated.iter().enumerate() {
+            let (start, middle, end) = (starts[k], middles[k], ends[k]);
+            let parabola = [
+                (4.0 * (middle - start) - (end - start)) / size,
+                4.0 * ((end - middle) - (middle - start)) / (size * size),
+            ];
+            let line = [(end - start) / size, 0.0];
+            let fields = &self.reals[position].derivatives;
+            let found = if fields.len() == 1 { line } else { parabola };
+            for (order, field) in fields.iter().enumerate() {
+                let value = found.get(order).copied().unwrap_or(0.0);
+                *field(model) = value;
+                moves |= value != 0.0;
+            }
+        }
+        moves
     }
 
     /// Sets the inputs with derivatives to their values `elapsed` s after they were `values`:

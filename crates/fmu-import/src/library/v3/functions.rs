@@ -21,7 +21,7 @@ type Text = *const c_char;
 pub(super) type LogMessage = unsafe extern "C" fn(*mut c_void, Status, Text, Text);
 /// `fmi3IntermediateUpdateCallback`.
 pub(super) type IntermediateUpdate =
-    unsafe extern "C" fn(*mut c_void, f64, bool, bool, bool, bool, *mut bool, *mut f64);
+    unsafe extern "C" fn(*mut c_void, f64, u8, u8, u8, u8, *mut u8, *mut f64);
 
 functions! {
     get_version = "fmi3GetVersion": fn() -> Text;

@@ -3,7 +3,10 @@
 
 use super::super::calls::function;
 use super::Component;
-use slave::{CallError, EventInfo, absent};
+use super::ORDERS;
+use slave::{CallError, EventInfo, Failure, absent};
+
+const SET: &str = "fmi3SetFloat64";
 
 /// The results of `fmi3DoStep`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,18 +35,16 @@ impl Component {
         self.log_call(NAME, || format!("{time:?}, {size:?}, {never_back}"));
         self.place.set_time(time);
         let (mut event, mut terminate, mut early, mut reached) = (0, 0, 0, time + size);
-        // SAFETY: the instance is alive; one place for each result.
-        let status = unsafe {
-            function(
-                self.pointer,
-                time,
-                size,
-                never_back,
-                &raw mut event,
-                &raw mut terminate,
-                &raw mut early,
-                &raw mut reached,
-            )
+        let pointer = self.pointer;
+        let results = (&raw mut event, &raw mut terminate, &raw mut early, &raw mut reached);
+        let (first, second, third, fourth) = results;
+        let step = || {
+            // SAFETY: the instance is alive; one place for each result.
+            unsafe { function(pointer, time, size, never_back, first, second, third, fourth) }
+        };
+        let status = match self.functions.set_float64.filter(|_| self.inputs.is_set) {
+            Some(set) => self.inputs.during((pointer, set), step),
+            None => step(),
         };
         self.check_results(NAME, status, || {
             format!(
@@ -53,6 +54,47 @@ impl Component {
         })?;
         let (event, terminate, early) = (event != 0, terminate != 0, early != 0);
         Ok(StepDone { event, terminate, early, reached })
+    }
+
+    /// Sets the derivatives of the inputs that `is_followed` accepts, for the step from `start` s, at which
+    /// they have their present values.
+    pub(crate) fn set_input_derivatives(
+        &mut self,
+        list: &[u32],
+        orders: &[i32],
+        values: &[f64],
+        start: f64,
+        is_followed: impl Fn(u32) -> bool,
+    ) -> Result<(), CallError> {
+        self.inputs.is_set = false;
+        self.inputs.derive(list, orders, values, is_followed).map_err(|order| {
+            let what =
+                format!("cannot follow a derivative of order {order}, expected 1 to {ORDERS}");
+            self.failed(SET, Failure::InvalidAnswer(what))
+        })?;
+        let references = std::mem::take(&mut self.inputs.references);
+        let mut present = std::mem::take(&mut self.inputs.values);
+        let read = self.get_float64(&references, &mut present);
+        let is_set = read.is_ok() && !references.is_empty();
+        let inputs = &mut *self.inputs;
+        (inputs.references, inputs.values) = (references, present);
+        (inputs.start, inputs.is_set) = (start, is_set);
+        read
+    }
+
+    /// Sets the inputs whose derivatives are set to their values at `time` in s.
+    pub(crate) fn settle_inputs(&mut self, time: f64) -> Result<(), CallError> {
+        if !self.inputs.is_set {
+            return Ok(());
+        }
+        self.place.enter(&SET);
+        let status = self.inputs.settle(time);
+        self.check_status(SET, status)
+    }
+
+    /// Forgets the derivatives of the inputs, which are for one step.
+    pub(crate) fn forget_input_derivatives(&mut self) {
+        self.inputs.is_set = false;
     }
 
     /// Calls `fmi3UpdateDiscreteStates`.

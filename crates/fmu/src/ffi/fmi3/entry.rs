@@ -1,16 +1,18 @@
 //! The functions with an instance, except those for values and clocks.
 
 use super::super::{
-    borrow_output, borrow_state, free_state, read, snapshot, store, texts, write_one,
+    ask_for_inputs, borrow_output, borrow_state, dispatch, free_state, read, snapshot, store,
+    texts, write_one,
 };
 use super::{entry_points_3, unavailable};
 use crate::Experiment;
 use crate::instance::{Jacobian, Snapshot};
-use crate::model::Failure;
+use crate::model::{Failure, Model};
 use fmu_description::abi3::{
     DependencyKind, fmi3Boolean, fmi3Byte, fmi3DependencyKind, fmi3FMUState, fmi3Float64,
-    fmi3Int32, fmi3String, fmi3ValueReference,
+    fmi3Instance, fmi3Int32, fmi3Status, fmi3String, fmi3ValueReference,
 };
+use fmu_description::call_order3::Function;
 
 entry_points_3! {
     set_debug_logging = SetDebugLogging(on: fmi3Boolean, n: usize, categories: *const fmi3String),
@@ -162,27 +164,40 @@ entry_points_3! {
         read(orders, n)?,
         borrow_output(values, n_values)?,
     );
-    #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
-    do_step = DoStep(
-        start: fmi3Float64, size: fmi3Float64, _no_set_fmu_state: fmi3Boolean,
-        event: *mut fmi3Boolean, terminate: *mut fmi3Boolean, early: *mut fmi3Boolean,
-        last: *mut fmi3Float64
-    ), instance => {
-        for place in [event, terminate, early] {
-            write_one(place, 0)?;
-        }
-        let reached = borrow_output(last, 1)?;
-        let step = instance.do_step_3(start, size);
-        reached[0].write(instance.last_successful_time());
-        let step = step?;
-        write_one(event, step.event_handling_needed.into())?;
-        write_one(terminate, step.terminate_simulation.into())?;
-        write_one(early, step.early_return.into())?;
-        write_one(last, step.last_successful_time)
-    };
     activate_model_partition = ActivateModelPartition(
         _clock: fmi3ValueReference, _time: fmi3Float64
     ), _instance => Err(unavailable("this FMU offers no scheduled execution"));
+}
+
+/// `fmi3DoStep`, after the importer has set its inputs within the step.
+#[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
+pub unsafe fn do_step<M: Model>(
+    instance: fmi3Instance,
+    start: fmi3Float64,
+    size: fmi3Float64,
+    _no_set_fmu_state: fmi3Boolean,
+    event: *mut fmi3Boolean,
+    terminate: *mut fmi3Boolean,
+    early: *mut fmi3Boolean,
+    last: *mut fmi3Float64,
+) -> fmi3Status {
+    // SAFETY: pointers are as the standard requires; null is handled.
+    unsafe {
+        ask_for_inputs::<M>(instance, start, size);
+        dispatch::<M, _>(instance, Function::DoStep, |instance| {
+            for place in [event, terminate, early] {
+                write_one(place, 0)?;
+            }
+            let reached = borrow_output(last, 1)?;
+            let step = instance.do_step_3(start, size);
+            reached[0].write(instance.last_successful_time());
+            let step = step?;
+            write_one(event, step.event_handling_needed.into())?;
+            write_one(terminate, step.terminate_simulation.into())?;
+            write_one(early, step.early_return.into())?;
+            write_one(last, step.last_successful_time)
+        })
+    }
 }
 
 fn to_c(kind: fmu_description::DependencyKind) -> DependencyKind {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::super::{Callbacks, into_component, text};
+use super::super::{Callbacks, IntermediateUpdate, into_component, read, text};
 use crate::instance::{Instance, Instantiation};
 use crate::model::{Failure, Model};
 use fmu_description::abi::Status;
@@ -74,6 +74,7 @@ fn instantiation(interface_type: InterfaceType, logging_on: fmi3Boolean) -> Inst
         logging_on: logging_on != 0,
         event_mode_used: false,
         early_return_allowed: false,
+        intermediate: None,
     }
 }
 
@@ -94,7 +95,7 @@ pub unsafe fn instantiate_model_exchange<M: Model>(
     unsafe { instantiate::<M>("fmi3InstantiateModelExchange", &strings, &callbacks, &made) }
 }
 
-/// No exported model offers intermediate update: `requiredIntermediateVariables` has no effect.
+/// The importer may set inputs within a step; `requiredIntermediateVariables` names those inputs.
 #[must_use]
 #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
 pub unsafe fn instantiate_co_simulation<M: Model>(
@@ -105,15 +106,19 @@ pub unsafe fn instantiate_co_simulation<M: Model>(
     logging_on: fmi3Boolean,
     event_mode_used: fmi3Boolean,
     early_return_allowed: fmi3Boolean,
-    _required: *const fmi3ValueReference,
-    _n_required: usize,
+    required: *const fmi3ValueReference,
+    n_required: usize,
     environment: fmi3InstanceEnvironment,
     log: Option<fmi3LogMessageCallback>,
-    _intermediate_update: Option<fmi3IntermediateUpdateCallback>,
+    intermediate_update: Option<fmi3IntermediateUpdateCallback>,
 ) -> fmi3Instance {
     let callbacks = Callbacks::Version3 { environment, log };
     let strings = Strings { name, token, resources };
+    // SAFETY: an array of the stated length by the standard.
+    let required = unsafe { read(required, n_required) }.unwrap_or_default();
+    let update = |function| (IntermediateUpdate { environment, function }, required);
     let made = Instantiation {
+        intermediate: intermediate_update.map(update),
         event_mode_used: event_mode_used != 0,
         early_return_allowed: early_return_allowed != 0,
         ..instantiation(InterfaceType::CoSimulation, logging_on)

@@ -48,6 +48,7 @@ impl<M: Model> Instance<M> {
             }
             Err(failure) => return Err(failure),
         };
+        self.leave_inputs(stop.time - start, stop.time >= end);
         Ok(StepResult {
             event_handling_needed: stop.is_event,
             terminate_simulation: terminated,

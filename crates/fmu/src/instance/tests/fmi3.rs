@@ -115,6 +115,7 @@ fn made<M: Model>(kind: InterfaceType, events: bool, early: bool) -> Result<Inst
         logging_on: true,
         event_mode_used: events,
         early_return_allowed: early,
+        intermediate: None,
     };
     Instance::new_3(&made, Callbacks::silent())
 }

@@ -1,0 +1,142 @@
+//! Intermediate update: the FMU asks for its inputs within a step, and they follow polynomials (FMI 3.0.2,
+//! section 4.2.2). This replaces the input derivatives of FMI 2.0.
+#![expect(unsafe_code, reason = "the boundary to C")]
+
+use std::cell::Cell;
+use std::collections::HashMap;
+use std::ffi::{c_int, c_void};
+use std::ptr;
+
+use super::functions::Instance;
+
+/// The largest order of a derivative.
+pub(crate) const ORDERS: usize = 3;
+
+type SetFloat64 = unsafe extern "C" fn(Instance, *const u32, usize, *const f64, usize) -> c_int;
+
+thread_local! {
+    /// The inputs of the instance that steps on this thread. The callback does not use
+    /// `instanceEnvironment`, which some FMUs pass back changed.
+    static CURRENT: Cell<*mut Inputs> = const { Cell::new(ptr::null_mut()) };
+}
+
+/// The inputs of the present step.
+#[derive(Debug, Default)]
+pub(super) struct Inputs {
+    /// Whether derivatives are set for the step.
+    pub(super) is_set: bool,
+    /// Start of the step in s.
+    pub(super) start: f64,
+    /// The last time for which the FMU asked, in s.
+    asked: Option<f64>,
+    pub(super) references: Vec<u32>,
+    /// The values at the start of the step.
+    pub(super) values: Vec<f64>,
+    derivatives: Vec<[f64; ORDERS]>,
+    index: HashMap<u32, usize>,
+    present: Vec<f64>,
+    target: Option<(Instance, SetFloat64)>,
+}
+
+impl Inputs {
+    /// Stores derivatives of the inputs that `is_followed` accepts; on failure returns an order that is not
+    /// supported.
+    pub(super) fn derive(
+        &mut self,
+        list: &[u32],
+        orders: &[i32],
+        values: &[f64],
+        is_followed: impl Fn(u32) -> bool,
+    ) -> Result<(), i32> {
+        self.derivatives.fill([0.0; ORDERS]);
+        let all = list.iter().zip(orders).zip(values);
+        for ((&reference, &order), &value) in all.filter(|((own, _), _)| is_followed(**own)) {
+            let place = usize::try_from(order).ok().and_then(|order| order.checked_sub(1));
+            let place = place.filter(|place| *place < ORDERS).ok_or(order)?;
+            let index = *self.index.entry(reference).or_insert_with(|| {
+                self.references.push(reference);
+                self.values.push(0.0);
+                self.derivatives.push([0.0; ORDERS]);
+                self.present.push(0.0);
+                self.references.len() - 1
+            });
+            self.derivatives[index][place] = value;
+        }
+        Ok(())
+    }
+
+    /// Runs a part of the step of an instance, during which the FMU may ask for the inputs.
+    pub(super) fn during(
+        &mut self,
+        target: (Instance, SetFloat64),
+        step: impl FnOnce() -> c_int,
+    ) -> c_int {
+        (self.asked, self.target) = (None, Some(target));
+        let before = CURRENT.replace(self);
+        let status = step();
+        CURRENT.set(before);
+        status
+    }
+
+    /// Sets the inputs to their values at `time` unless the FMU has asked for these; returns its status.
+    pub(super) fn settle(&mut self, time: f64) -> c_int {
+        if self.asked == Some(time) { 0 } else { self.apply(time) }
+    }
+
+    /// Sets the inputs to their values at `time`; returns the status of the FMU.
+    fn apply(&mut self, time: f64) -> c_int {
+        let elapsed = time - self.start;
+        let all = self.present.iter_mut().zip(&self.values).zip(&self.derivatives);
+        for ((present, value), derivatives) in all {
+            *present = at(*value, derivatives, elapsed);
+        }
+        let Some((instance, set)) = self.target else { return 0 };
+        let count = self.references.len();
+        let (references, values) = (self.references.as_ptr(), self.present.as_ptr());
+        // SAFETY: the instance is alive, as it asks or has just stepped; as many values as references.
+        unsafe { set(instance, references, count, values, count) }
+    }
+}
+
+/// Returns `value + sum(derivatives[k] s^(k + 1) / (k + 1)!)`.
+fn at(value: f64, [first, second, third]: &[f64; ORDERS], s: f64) -> f64 {
+    value + s * (first + s / 2.0 * (second + s / 3.0 * third))
+}
+
+/// `fmi3IntermediateUpdateCallback`: sets the inputs if the FMU asks for them; no early return.
+///
+/// A failure of the FMU shows in the status of its step.
+pub(super) unsafe extern "C" fn update(
+    _environment: *mut c_void,
+    time: f64,
+    set_requested: u8,
+    _get_allowed: u8,
+    _finished: u8,
+    _can_return_early: u8,
+    return_requested: *mut u8,
+    _return_time: *mut f64,
+) {
+    if !return_requested.is_null() {
+        // SAFETY: a place for the answer by the standard.
+        unsafe { return_requested.write(0) };
+    }
+    // SAFETY: null, or the inputs of the step that runs on this thread and waits for this callback.
+    let inputs = unsafe { CURRENT.get().as_mut() };
+    if let Some(inputs) = inputs.filter(|_| set_requested != 0) {
+        inputs.asked = Some(time);
+        inputs.apply(time);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::at;
+
+    #[test]
+    fn a_polynomial_of_order_3_is_that_of_taylor() {
+        let taylor = |s: f64| 2.0 + 0.5 * s - 3.0 * s * s / 2.0 + 7.0 * s * s * s / 6.0;
+        for s in [0.0, 0.25, 1.0, 3.0] {
+            assert!((at(2.0, &[0.5, -3.0, 7.0], s) - taylor(s)).abs() < 1e-12);
+        }
+    }
+}

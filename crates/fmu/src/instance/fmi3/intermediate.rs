@@ -1,0 +1,87 @@
+//! Intermediate update: the importer sets the inputs within a communication step (section 4.2.2).
+//!
+//! At the start of a step the instance asks for the inputs in the middle and at the end of the step. The
+//! model then follows the parabola through start, middle and end, as with the derivatives of FMI 2.0.
+
+use super::super::Instance;
+use crate::ffi::IntermediateUpdate;
+use crate::model::Model;
+use fmu_description::call_order::{InterfaceType, State};
+
+/// The importer's callback, and the inputs with derivatives at start, middle and end of the step.
+pub(super) struct Intermediate {
+    update: IntermediateUpdate,
+    values: [Vec<f64>; 3],
+    /// Whether a value had been set since the outputs were computed, when the step began.
+    stale: bool,
+    /// Whether the importer has been asked for the present step.
+    asked: bool,
+}
+
+impl Intermediate {
+    pub(super) fn new(update: IntermediateUpdate, inputs: usize) -> Self {
+        let values = || vec![0.0; inputs];
+        Self { update, values: [values(), values(), values()], stale: false, asked: false }
+    }
+}
+
+impl<M: Model> Instance<M> {
+    /// Enters intermediate update mode for a step of `size` s. Returns the callback to call, if the
+    /// importer has one and may step.
+    pub(crate) fn begin_intermediate(&mut self, size: f64) -> Option<IntermediateUpdate> {
+        let core = &mut self.core;
+        let own = self.session.as_mut()?.intermediate.as_mut()?;
+        own.asked = false;
+        if core.state != State::StepComplete
+            || core.interface_type != InterfaceType::CoSimulation
+            || !(size > 0.0 && size.is_finite())
+        {
+            return None;
+        }
+        (own.asked, own.stale) = (true, core.stale);
+        core.state = State::IntermediateUpdateMode;
+        self.interface.read_interpolated(&mut core.model, &mut own.values[0]);
+        Some(own.update)
+    }
+
+    /// Records the inputs in the middle (1) or at the end (2) of the step.
+    pub(crate) fn record_intermediate(&mut self, place: usize) {
+        let own = self.session.as_mut().and_then(|own| own.intermediate.as_mut());
+        if let Some(own) = own {
+            self.interface.read_interpolated(&mut self.core.model, &mut own.values[place]);
+        }
+    }
+
+    /// Leaves intermediate update mode, unless a call in it failed, with the inputs at the start.
+    pub(crate) fn end_intermediate(&mut self, size: f64) {
+        let Some(own) = self.session.as_mut().and_then(|own| own.intermediate.as_mut()) else {
+            return;
+        };
+        let core = &mut self.core;
+        let [start, middle, end] = &own.values;
+        self.interface.write_interpolated(&mut core.model, start);
+        core.stale = own.stale;
+        if core.state == State::IntermediateUpdateMode {
+            core.state = State::StepComplete;
+            core.sloped = self.interface.interpolate(&mut core.model, [start, middle, end], size);
+        }
+    }
+
+    /// Sets the inputs to their values at the end of the step, `elapsed` s after its start, if the
+    /// importer has been asked for them.
+    pub(super) fn leave_inputs(&mut self, elapsed: f64, is_whole: bool) {
+        let Self { core, interface, session, .. } = self;
+        let Some(own) = session.as_mut().and_then(|own| own.intermediate.as_mut()) else { return };
+        if !std::mem::take(&mut own.asked) {
+            return;
+        }
+        if is_whole {
+            interface.write_interpolated(&mut core.model, &own.values[2]);
+        } else {
+            interface.extrapolate(&mut core.model, &own.values[0], elapsed);
+        }
+        if std::mem::take(&mut core.sloped) {
+            interface.clear_input_derivatives(&mut core.model);
+        }
+    }
+}
