@@ -9,7 +9,8 @@
  *
  * The instantiation token selects a misbehaviour: "lie" returns early with a time before the step,
  * "stay" returns early for ever, "discard" discards steps above 0.03 s, "huge" gives `big` a value
- * beyond 63 bits, "no event mode" does not instantiate with eventModeUsed, "terminate" ends at 0.5 s.
+ * beyond 63 bits, "no event mode" does not instantiate with eventModeUsed, "terminate" ends at 0.5 s. With
+ * "intermediate" it asks for u in the middle and at the end of a step, and y follows by Simpson's rule.
  *
  * It is strict: a call that section 4.2 forbids in its mode ends the process by SIGABRT. */
 #include "fmi3.h"
@@ -45,6 +46,9 @@ typedef struct {
     char token[40];
     void *environment;
     fmi3LogMessageCallback log;
+    fmi3IntermediateUpdateCallback update;
+    /* Whether the slave asks for u. */
+    bool asks;
 } Slave;
 
 static void demand(int allowed, const char *what) {
@@ -85,7 +89,11 @@ EXPORT fmi3Instance fmi3InstantiateCoSimulation(
     bool event_mode, bool early_return, const fmi3ValueReference *intermediate, size_t count,
     void *environment, fmi3LogMessageCallback log, fmi3IntermediateUpdateCallback update) {
     demand(name != NULL && token != NULL && !visible && !logging, "fmi3InstantiateCoSimulation");
-    demand(intermediate == NULL && count == 0 && update == NULL, "no intermediate update");
+    if (strcmp(token, "intermediate") == 0) {
+        demand(count == 1 && intermediate[0] == U && update != NULL, "intermediate update of u");
+    } else {
+        demand(intermediate == NULL && count == 0 && update == NULL, "no intermediate update");
+    }
     demand(resources == NULL || resources[strlen(resources) - 1] == '/', "resourcePath");
     if (strcmp(token, "no event mode") == 0 && event_mode) {
         return NULL;
@@ -95,6 +103,7 @@ EXPORT fmi3Instance fmi3InstantiateCoSimulation(
     slave->early_return = early_return;
     slave->environment = environment;
     slave->log = log;
+    slave->update = update;
     return slave;
 }
 
@@ -222,6 +231,22 @@ EXPORT fmi3Status fmi3Terminate(fmi3Instance c) {
     return fmi3OK;
 }
 
+/* The mean of u in a step, by Simpson's rule if the importer gives u within the step. */
+static double mean(Slave *slave, double time, double end) {
+    double u[3] = {slave->now.u, slave->now.u, slave->now.u};
+    for (int k = 1; k < 3 && slave->update != NULL; k++) {
+        bool early = true;
+        double when = 0, middle = 0.5 * (time + end);
+        slave->asks = true;
+        slave->update(slave->environment, k == 1 ? middle : end, true, false, false, false, &early,
+                      &when);
+        slave->asks = false;
+        demand(!early, "no early return");
+        u[k] = slave->now.u;
+    }
+    return (u[0] + 4 * u[1] + u[2]) / 6;
+}
+
 EXPORT fmi3Status fmi3DoStep(fmi3Instance c, double time, double size, bool never_back,
                              bool *event, bool *terminate, bool *early, double *reached) {
     Slave *slave = c;
@@ -256,7 +281,7 @@ EXPORT fmi3Status fmi3DoStep(fmi3Instance c, double time, double size, bool neve
     if (slave->event_mode && now->next_event <= end + 1e-9) {
         demand(now->next_event > end - 1e-9, "the step crosses the announced event");
     }
-    now->y += (end - now->time) * now->u;
+    now->y += (end - now->time) * mean(slave, time, end);
     now->time = *reached = end;
     follow(now);
     if (!slave->event_mode) {
@@ -361,6 +386,7 @@ static fmi3Status float64(Slave *slave, const fmi3ValueReference *vr, size_t n, 
                           size_t count, bool set) {
     Values *now = &slave->now;
     size_t at = 0;
+    demand(!slave->asks || (set && n == 1 && vr[0] == U), "only u is set within a step");
     for (size_t k = 0; k < n; k++) {
         double sum = 0;
         for (int i = 0; i < MATRIX; i++) {

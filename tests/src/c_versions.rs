@@ -53,7 +53,9 @@ pub fn equations_3(folder: &Path, token: &str) -> PathBuf {
 }
 
 fn version_3(folder: &Path, token: &str, interface: &str, file: &str) -> PathBuf {
+    let intermediate = if token == "intermediate" { "true" } else { "false" };
     let xml = DESCRIPTION_3.replace("TOKEN", token).replace("<INTERFACE/>", interface);
+    let xml = xml.replace("INTERMEDIATE", intermediate);
     let mut package = Package::new(xml).for_version(Version::V3);
     let name = format!("slave3{}", std::env::consts::DLL_SUFFIX);
     package.add(format!("binaries/{}/{name}", platforms_of(Version::V3)[0]), library("slave3.c"));
@@ -82,7 +84,8 @@ fn written(package: &Package, folder: &Path, name: &str) -> PathBuf {
 
 const CO_SIMULATION_3: &str = r#"<CoSimulation modelIdentifier="slave3"
  canHandleVariableCommunicationStepSize="true" canGetAndSetFMUState="true" canSerializeFMUState="true"
- providesDirectionalDerivatives="true" hasEventMode="EVENT_MODE" mightReturnEarlyFromDoStep="true"/>"#;
+ providesDirectionalDerivatives="true" hasEventMode="EVENT_MODE" mightReturnEarlyFromDoStep="true"
+ providesIntermediateUpdate="INTERMEDIATE"/>"#;
 
 const MODEL_EXCHANGE_3: &str = r#"<ModelExchange modelIdentifier="slave3" canGetAndSetFMUState="true"
  canSerializeFMUState="true" providesDirectionalDerivatives="true"
@@ -93,7 +96,7 @@ const DESCRIPTION_3: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <INTERFACE/>
 <ModelVariables>
 <Float64 name="time" valueReference="0" causality="independent" variability="continuous"/>
-<Float64 name="u" valueReference="1" causality="input" start="1"/>
+<Float64 name="u" valueReference="1" causality="input" start="1" intermediateUpdate="INTERMEDIATE"/>
 <Float64 name="y" valueReference="2" causality="output"><Alias name="y_again"/></Float64>
 <UInt64 name="n" valueReference="3" causality="structuralParameter" variability="fixed" start="2"/>
 <Float64 name="a" valueReference="4" causality="input" start="1 2">

@@ -72,7 +72,7 @@ pub fn dist() -> &'static Path {
     static DIST: OnceLock<PathBuf> = OnceLock::new();
     DIST.get_or_init(|| {
         let folder = root().join("target/test-fmus").join(std::process::id().to_string());
-        let output = run(&["pack", "--out", &folder.display().to_string()]);
+        let output = run(&["pack", "--fmi", "both", "--out", &folder.display().to_string()]);
         let message = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "aso-ftc pack failed: {message}");
         folder
@@ -86,8 +86,18 @@ pub fn dist() -> &'static Path {
 /// If the FMUs refuse.
 #[must_use]
 pub fn closed_loop(settings: &[(&str, &str)]) -> System {
+    closed_loop_of("FrictionPendulum.fmu", "AsoController.fmu", settings)
+}
+
+/// The same of these files in [`dist`].
+///
+/// # Panics
+///
+/// If the FMUs refuse.
+#[must_use]
+pub fn closed_loop_of(plant: &str, controller: &str, settings: &[(&str, &str)]) -> System {
     let mut system = System::default();
-    for (name, file) in [("plant", "FrictionPendulum.fmu"), ("controller", "AsoController.fmu")] {
+    for (name, file) in [("plant", plant), ("controller", controller)] {
         let instance = Fmu::open(&dist().join(file)).and_then(|fmu| fmu.instantiate(name));
         let slave = Box::new(instance.unwrap_or_else(|error| panic!("{error}")));
         system.add(name, slave).unwrap_or_else(|error| panic!("{error}"));

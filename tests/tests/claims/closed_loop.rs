@@ -1,8 +1,8 @@
 //! The closed loop of plant and controller, one test for each claim.
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-use master::{Algorithm, Extrapolation, Method};
-use tests::{Table, closed_loop, root, simulation};
+use master::{Algorithm, Extrapolation, Method, System};
+use tests::{Table, closed_loop, closed_loop_of, root, simulation};
 
 /// The signals that are compared, with the columns of the reference files.
 const SIGNALS: [(&str, &str); 8] = [
@@ -116,9 +116,9 @@ fn gauss_seidel_with_held_inputs_is_of_first_order() {
 
 /// Half of the peak-to-peak values of `x_p` and theta, and the rms of `f_fric` - `f_hat`, from 60
 /// to 100 s.
-fn residual(step: f64) -> [f64; 3] {
+fn residual(system: System, step: f64) -> [f64; 3] {
     let names = ["plant.x_p", "plant.theta", "plant.f_fric", "controller.f_hat"];
-    let (mut simulation, mut probe) = simulation(closed_loop(&[]), &Algorithm::new(step), &names);
+    let (mut simulation, mut probe) = simulation(system, &Algorithm::new(step), &names);
     let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     let (mut squares, mut count) = (0.0, 0.0);
     let mut values = [0.0; 4];
@@ -141,25 +141,63 @@ fn residual(step: f64) -> [f64; 3] {
 
 #[test]
 fn the_residual_at_1_ms_equals_that_at_10_us_to_1_percent() {
-    let (coarse, fine) = (residual(1e-3), residual(1e-5));
+    let (coarse, fine) = (residual(closed_loop(&[]), 1e-3), residual(closed_loop(&[]), 1e-5));
     println!("1 ms {coarse:?}, 10 us {fine:?}");
     for (coarse, fine) in coarse[..2].iter().zip(&fine) {
         assert!((coarse / fine - 1.0).abs() < 0.01, "{coarse} {fine}");
     }
 }
 
+/// The loop of these versions of FMI.
+fn mixed(plant: &str, controller: &str) -> System {
+    let plant = format!("FrictionPendulum{plant}.fmu");
+    closed_loop_of(&plant, &format!("AsoController{controller}.fmu"), &[])
+}
+
 #[test]
-fn a_communication_step_allocates_nothing() {
-    let (mut simulation, _) = simulation(closed_loop(&[]), &Algorithm::new(1e-3), &[]);
-    for _ in 0..10 {
-        simulation.step().unwrap();
+fn the_residual_at_1_ms_is_the_same_with_fmi_3_where_intermediate_update_replaces_derivatives() {
+    let known = residual(closed_loop(&[]), 1e-3);
+    for (plant, controller) in [(".fmi3", ".fmi3"), ("", ".fmi3"), (".fmi3", "")] {
+        let found = residual(mixed(plant, controller), 1e-3);
+        println!("plant {plant}, controller {controller}: {found:?}, FMI 2.0 {known:?}");
+        // Cart, pendulum, error of the estimate.
+        for ((found, known), bound) in found.iter().zip(&known).zip([1e-4, 1e-4, 0.02]) {
+            assert!((found / known - 1.0).abs() < bound, "{found} {known}");
+        }
     }
-    let allocations = allocation_counter::measure(|| {
-        for _ in 0..100 {
+}
+
+#[test]
+fn held_inputs_give_the_same_bits_with_fmi_2_and_fmi_3() {
+    let names: Vec<_> = SIGNALS.iter().map(|(name, _)| *name).collect();
+    let algorithm = Algorithm::fixed(Method::Jacobi, Extrapolation::Hold, 1e-3);
+    let end = |system| {
+        let (mut simulation, mut probe) = simulation(system, &algorithm, &names);
+        while simulation.time() < 5.0 {
             simulation.step().unwrap();
         }
-    });
-    assert_eq!(allocations.count_total, 0);
+        let mut values = vec![0.0; names.len()];
+        let time = simulation.time();
+        probe.read(simulation.system(), time, &mut values).unwrap();
+        values.iter().map(|value| value.to_bits()).collect::<Vec<_>>()
+    };
+    assert_eq!(end(mixed(".fmi3", ".fmi3")), end(mixed("", "")));
+}
+
+#[test]
+fn a_communication_step_allocates_nothing_in_fmi_2_and_fmi_3() {
+    for version in ["", ".fmi3"] {
+        let (mut simulation, _) = simulation(mixed(version, version), &Algorithm::new(1e-3), &[]);
+        for _ in 0..10 {
+            simulation.step().unwrap();
+        }
+        let allocations = allocation_counter::measure(|| {
+            for _ in 0..100 {
+                simulation.step().unwrap();
+            }
+        });
+        assert_eq!(allocations.count_total, 0, "{version}");
+    }
 }
 
 #[test]

@@ -14,6 +14,17 @@ struct Whole {
 }
 
 impl Instance {
+    /// Whether the references are those of scalars of the FMU.
+    fn are_scalars(&self, list: &[u32]) -> bool {
+        list.iter().all(|reference| {
+            let found = self.view.locate(*reference);
+            found.is_some_and(|(variable, _)| {
+                let own = &self.view.variables[variable];
+                own.reference == *reference && own.size == 1
+            })
+        })
+    }
+
     /// Returns the whole variables to which the elements of a list belong.
     fn whole(&self, function: &'static str, list: &[u32]) -> Result<Whole, CallError> {
         let mut whole = Whole { references: Vec::new(), count: 0, places: Vec::new() };
@@ -45,7 +56,7 @@ impl Instance {
         changes: &mut [f64],
     ) -> Result<(), CallError> {
         const NAME: &str = "fmi3GetDirectionalDerivative";
-        if self.view.plain {
+        if self.are_scalars(unknowns) && self.are_scalars(knowns) {
             return self.component.directional_derivative(unknowns, knowns, seed, changes);
         }
         let (unknowns, knowns) = (self.whole(NAME, unknowns)?, self.whole(NAME, knowns)?);
@@ -85,7 +96,7 @@ impl Instance {
         values: &mut [f64],
     ) -> Result<(), CallError> {
         const NAME: &str = "fmi3GetOutputDerivatives";
-        if self.view.plain {
+        if self.are_scalars(list) {
             return self.component.get_output_derivatives(list, orders, values);
         }
         // One call for each run of equal orders.

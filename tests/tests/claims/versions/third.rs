@@ -1,6 +1,8 @@
 //! FMI 3.0.
 
+use fmu_import::Fmu;
 use master::{Failure, Slave, StepResult};
+use tests::c_versions;
 
 use super::Loaded;
 
@@ -196,4 +198,32 @@ fn an_fmu_that_lacks_the_event_mode_it_promises_runs_without() {
     assert_eq!(loaded.integer("events"), 0);
     assert_eq!(loaded.integer("k_out"), 5);
     assert!((loaded.real("y") - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn inputs_follow_their_derivatives_where_the_fmu_asks_for_them_within_a_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = c_versions::slave_3(folder.path(), "intermediate", false);
+    let slave = Fmu::open(&path).unwrap().instantiate("slave").unwrap();
+    let mut loaded = Loaded { slave, _folder: folder }.initialised();
+    let flags = loaded.slave.description().co_simulation.clone().unwrap();
+    assert!(flags.can_interpolate_inputs);
+    let u = loaded.reference("u");
+    loaded.slave.set_input_derivatives(&[u, u], &[1, 2], &[2.0, 6.0]).unwrap();
+    assert_eq!(loaded.step(0.0, 1.0), Ok(StepResult::Whole));
+    // u = 1 + 2 t + 3 t^2.
+    assert!((loaded.real("y") - 3.0).abs() < 1e-12);
+    assert_eq!(loaded.real("u"), 6.0);
+    // The derivatives are for one step.
+    assert_eq!(loaded.step(1.0, 1.0), Ok(StepResult::Whole));
+    assert!((loaded.real("y") - 9.0).abs() < 1e-12);
+    let error = loaded.slave.set_input_derivatives(&[u], &[4], &[1.0]).unwrap_err();
+    assert!(error.to_string().contains("order 4, expected 1 to 3"), "{error}");
+}
+
+#[test]
+fn inputs_of_an_fmu_that_does_not_ask_for_them_are_held() {
+    let loaded = ready("plain");
+    let flags = loaded.slave.description().co_simulation.clone().unwrap();
+    assert!(!flags.can_interpolate_inputs);
 }
