@@ -20,9 +20,9 @@ const CONNECTIONS: [(&str, &str); 9] = [
 
 /// Writes one FMU of FMI 1.0, one of 2.0 and two of 3.0, and a system of them.
 fn write(folder: &Path, connections: &[(&str, &str)]) -> String {
-    let one = c_versions::slave_1(folder, "plain");
-    let two = CFmu::well_behaved().write(folder, "slave2");
-    let three = c_versions::slave_3(folder, "plain", true);
+    let one = c_versions::slave_1(folder, "plain").display().to_string();
+    let two = CFmu::well_behaved().write(folder, "slave2").display().to_string();
+    let three = c_versions::slave_3(folder, "plain", true).display().to_string();
     let mut text =
         format!("[fmus]\none = {one:?}\ntwo = {two:?}\nthree = {three:?}\nfour = {three:?}\n");
     for (from, to) in connections {
