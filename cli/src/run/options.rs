@@ -75,11 +75,11 @@ pub(crate) struct Options {
     /// The FMU called controller [default: dist/AsoController.fmu]
     #[arg(long, value_name = "FMU", conflicts_with = "resume")]
     controller: Option<PathBuf>,
-    /// Use this interface of an FMU that offers both, co-simulation [default] or model-exchange; may be
+    /// Use this interface of an FMU that offers both, co-simulation (the default) or model-exchange; may be
     /// repeated
     #[arg(long = "interface", value_name = "FMU=INTERFACE", value_parser = interface)]
     interfaces: Vec<(String, Interface)>,
-    /// Integrate a model-exchange FMU by this method: automatic [default], explicit or stiff; may be
+    /// Integrate a model-exchange FMU by this method: automatic (the default), explicit or stiff; may be
     /// repeated
     #[arg(long = "solver", value_name = "FMU=METHOD", value_parser = solver)]
     solvers: Vec<(String, Solver)>,
