@@ -15,8 +15,8 @@ impl Fmu {
     ///
     /// # Errors
     ///
-    /// [`FmuError::OnlyOnce`] for a forbidden second instance; [`LoadError::Instantiate`](crate::LoadError::Instantiate) with the
-    /// FMU's messages if the FMU does not instantiate; [`FmuError::NoInterface`] without model exchange;
+    /// [`FmuError::OnlyOnce`] for a forbidden second instance; [`FmuError::Load`] with the FMU's messages
+    /// if the FMU does not instantiate; [`FmuError::NoInterface`] without model exchange;
     /// [`FmuError::Version`] for FMI 1.0.
     pub fn instantiate_equations(&self, name: &str) -> Result<Box<dyn ModelExchange>, FmuError> {
         let description = self.description();
