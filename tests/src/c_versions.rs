@@ -149,6 +149,8 @@ const DESCRIPTION_1: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 </ScalarVariable>
 <ScalarVariable name="gain" valueReference="2" causality="input" variability="parameter">
 <Real start="1"/></ScalarVariable>
+<ScalarVariable name="twice" valueReference="1" causality="internal"><Real/></ScalarVariable>
+<ScalarVariable name="twice" valueReference="2" causality="internal"><Real/></ScalarVariable>
 <ScalarVariable name="i_in" valueReference="0" causality="input" variability="discrete">
 <Integer start="0"/></ScalarVariable>
 <ScalarVariable name="i_out" valueReference="1" causality="output" variability="discrete">

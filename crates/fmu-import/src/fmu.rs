@@ -46,13 +46,15 @@ pub enum FmuError {
         /// `modelName`.
         model: String,
     },
-    /// An action is available for FMI 2.0 only.
-    #[error("{model} is an FMU of {}; this is available for FMI 2.0 only", version.release())]
+    /// An action is not available for the version of the FMU.
+    #[error("{model} is an FMU of {}; expected {expected}", version.release())]
     Version {
         /// `modelName`.
         model: String,
         /// The version of the FMU.
         version: Version,
+        /// What is expected.
+        expected: &'static str,
     },
     /// The FMU offers scheduled execution only.
     #[error(
@@ -259,6 +261,10 @@ impl Fmu {
                 return Err(FmuError::Version {
                     model: description.model_name.clone(),
                     version: description.version(),
+                    expected: match interface {
+                        Interface::ModelExchange => "FMI 2.0 or 3.0 for model exchange",
+                        Interface::CoSimulation => "FMI 2.0",
+                    },
                 });
             }
             (Interface::CoSimulation, Some(CoSimulation::V2(library)), _) => library.clone(),

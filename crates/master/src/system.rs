@@ -65,7 +65,8 @@ impl System {
         if self.names.insert(name.to_owned(), self.slaves.len()).is_some() {
             return Err(SystemError::SameName { name: name.to_owned() });
         }
-        let variables = slave.description().variables.iter().enumerate();
+        // A name that two variables have stands for the first one.
+        let variables = slave.description().variables.iter().enumerate().rev();
         self.variables.push(variables.map(|(k, variable)| (variable.name.clone(), k)).collect());
         self.slaves.push((name.to_owned(), slave));
         Ok(())

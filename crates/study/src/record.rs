@@ -1,6 +1,7 @@
 //! Records rows of results during the run.
 
 use crate::error::Error;
+use std::collections::HashSet;
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -219,6 +220,9 @@ pub fn select(system: &System, record: &[String], exclude: &[String]) -> Result<
     let mut ports: Vec<Port> =
         shown.into_iter().flat_map(|causality| system.ports(causality)).collect();
     ports.sort_by_key(|port| (port.slave, port.variable));
+    // A name that two variables have stands for the first one.
+    let mut known = HashSet::new();
+    ports.retain(|port| known.insert(system.name(*port)));
     for name in record {
         if let Ok(port) = system.port(name)
             && !shown.contains(&system.variable(port).causality)

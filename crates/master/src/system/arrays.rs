@@ -200,7 +200,7 @@ impl System {
             value: text.to_owned(),
             source,
         })?;
-        let variables = slave.description().variables.iter().enumerate();
+        let variables = slave.description().variables.iter().enumerate().rev();
         self.variables[port.slave] =
             variables.map(|(k, variable)| (variable.name.clone(), k)).collect();
         self.move_ports(port.slave, &before)

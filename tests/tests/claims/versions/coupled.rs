@@ -70,6 +70,9 @@ fn fmus_of_three_versions_exchange_values_of_all_types() {
         assert_eq!(status, Some(0), "{errors}");
         // y' = u, held over steps of H: sums of H, H^2 k, H^3 k (k - 1) / 2.
         assert_eq!(at("one.y"), 1.0);
+        // Two local variables have this name; it stands for the first one, y.
+        assert_eq!(at("one.twice"), 1.0);
+        assert!(errors.contains("a name that is used once"), "{errors}");
         assert_eq!(at("two.y"), 28.0 / 64.0);
         assert_eq!(at("three.y"), 56.0 / 512.0);
         assert_eq!((at("three.b[1]"), at("three.b[2]")), (6.0, 8.0));
