@@ -19,6 +19,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context as _, anyhow};
+use fmu_description::Version;
 use fmu_description::package::Unpacked;
 use fmu_import::isolate::{self, IsolateError, Isolated, Package};
 use fmu_import::{Fmu, Instance};
@@ -108,6 +109,7 @@ fn findings(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResu
             finding.what = finding.what.replace(&folder, "");
         }
         sections::renumber(&mut found, description.version());
+        sections::rename(&mut found, description.version());
         findings.extend(found);
         here
     };
@@ -120,16 +122,24 @@ fn without_trial(options: &Options, unpacked: &Unpacked) -> Option<TrialResult> 
     if options.no_run {
         return Some(TrialResult::NotTried { reason: "--no-run".to_owned() });
     }
-    let Some(simulation) = &unpacked.description.co_simulation else {
-        let reason = "it is for model exchange only; `aso-ftc run` integrates it";
-        return Some(TrialResult::NotTried { reason: reason.to_owned() });
+    let not_tried = |reason: &str| Some(TrialResult::NotTried { reason: reason.to_owned() });
+    let own = &unpacked.description;
+    let simulation = own.co_simulation.as_ref();
+    let exchange = own.model_exchange.as_ref().filter(|_| own.version() != Version::V1);
+    let simulation = simulation.map(|own| (&own.model_identifier, own.needs_execution_tool));
+    let exchange = exchange.map(|own| (&own.model_identifier, own.needs_execution_tool));
+    let Some((identifier, needs_tool)) = simulation.or(exchange) else {
+        return not_tried("it offers neither co-simulation nor model exchange of FMI 2.0 or 3.0");
     };
-    if simulation.needs_execution_tool {
+    if simulation.is_none() && cfg!(not(target_os = "linux")) {
+        return not_tried("it is for model exchange only, which is tried on Linux only");
+    }
+    if needs_tool {
         let tool = unpacked.description.generation_tool.as_deref().unwrap_or("the exporting tool");
         let reason = format!("it needs {tool} beside it (needsExecutionTool)");
         return Some(TrialResult::NotTried { reason });
     }
-    let refused = unpacked.library(&simulation.model_identifier).err()?;
+    let refused = unpacked.library(identifier).err()?;
     Some(TrialResult::No { reason: refused.to_string() })
 }
 
@@ -171,8 +181,16 @@ fn isolated(
 ) -> anyhow::Result<(TrialResult, Vec<Finding>)> {
     let package = Package::open(unpacked.folder())?;
     let preload = options.preload.clone();
-    let options = isolate::Options { time_limit: Some(limit), preload, ..Default::default() };
-    let flags = unpacked.description.co_simulation.as_ref();
+    let exchange = unpacked.description.co_simulation.is_none();
+    let integration = exchange.then(|| isolate::Integration {
+        options: integrate::Method::default().name().to_owned(),
+        describe: integrate::description_of,
+    });
+    let options =
+        isolate::Options { time_limit: Some(limit), preload, integration, ..Default::default() };
+    let integrated = exchange.then(|| integrate::description_of(&unpacked.description));
+    let description = integrated.as_ref().unwrap_or(&unpacked.description);
+    let flags = description.co_simulation.as_ref();
     let once = flags.is_some_and(|flags| flags.can_be_instantiated_only_once_per_process);
     let mut broken = None;
     let mut make = |name: &str, before: Option<Isolated>| -> anyhow::Result<Isolated> {
@@ -190,6 +208,10 @@ fn isolated(
             }
         })
     };
-    let found = behaviour::check(&unpacked.description, &mut make);
-    broken.map_or(Ok(found), |error| Err(error.into()))
+    let (here, mut found) = behaviour::check(description, &mut make);
+    if exchange {
+        // The rules are those of co-simulation.
+        found.clear();
+    }
+    broken.map_or(Ok((here, found)), |error| Err(error.into()))
 }

@@ -1,4 +1,4 @@
-//! Sections of the standard in findings about archive, libraries and behaviour.
+//! Sections and functions of the standard in findings about archive, libraries and behaviour.
 
 use fmu_description::Version;
 
@@ -32,5 +32,31 @@ pub(super) fn renumber(findings: &mut [Finding], version: Version) {
             Version::V2 => finding.section,
             Version::V3 => own.map(|(_, third)| *third),
         };
+    }
+}
+
+/// Functions of FMI 2.0 whose name in FMI 3.0 or 1.0 is not that with another prefix.
+const FUNCTIONS: [(&str, &str, &str); 6] = [
+    ("fmi2GetReal", "fmi3GetFloat64", "fmiGetReal"),
+    ("fmi2GetFMUstate", "fmi3GetFMUState", "fmi2GetFMUstate"),
+    ("fmi2SetFMUstate", "fmi3SetFMUState", "fmi2SetFMUstate"),
+    ("fmi2DeSerializeFMUstate", "fmi3DeserializeFMUState", "fmi2DeSerializeFMUstate"),
+    ("fmi2Terminate", "fmi3Terminate", "fmiTerminateSlave"),
+    ("fmi2Instantiate", "fmi3InstantiateCoSimulation", "fmiInstantiateSlave"),
+];
+
+/// Replaces the names of functions and statuses of FMI 2.0 in findings about the behaviour by those of
+/// `version`.
+pub(super) fn rename(findings: &mut [Finding], version: Version) {
+    let prefix = match version {
+        Version::V1 => "fmi",
+        Version::V2 => return,
+        Version::V3 => "fmi3",
+    };
+    for text in findings.iter_mut().flat_map(|own| [&mut own.place, &mut own.what]) {
+        for (second, third, first) in FUNCTIONS {
+            *text = text.replace(second, if version == Version::V3 { third } else { first });
+        }
+        *text = text.replace("fmi2", prefix);
     }
 }

@@ -30,6 +30,11 @@ use modes::{Mode, State};
 use plan::Plans;
 use slave::{CallError, CallSink, StepResult};
 
+/// The categories of messages that explain a status (FMI 3.0.2, section 2.4.5). They are switched on:
+/// with `loggingOn = false` alone an FMU is silent about its errors.
+const STATUS_CATEGORIES: [&str; 4] =
+    ["logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal"];
+
 /// An instance of an FMU of FMI 3.0 in this process.
 pub(crate) struct Instance {
     component: Component,
@@ -91,6 +96,13 @@ impl Instance {
             }
             Err(error) => return Err(error),
         };
+        let known = |name: &&str| own.log_categories.iter().any(|own| own.name == *name);
+        let categories: Vec<&str> = STATUS_CATEGORIES.into_iter().filter(known).collect();
+        let mut component = component;
+        if !categories.is_empty() {
+            // An FMU that refuses this is one without messages.
+            let _ = component.set_debug_logging(true, &categories);
+        }
         let state =
             State { held: vec![None; view.shadows], clocks: Clocks::new(own), ..State::default() };
         let experiment = Experiment { start_time: 0.0, stop_time: None, tolerance: None };
@@ -139,7 +151,7 @@ impl Instance {
     }
 
     pub(crate) fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
-        self.component.set_debug_logging(on)
+        self.component.set_debug_logging(on, &[])
     }
 
     pub(crate) fn setup_experiment(&mut self, experiment: &Experiment) {
@@ -164,6 +176,10 @@ impl Instance {
     #[inline]
     pub(crate) fn get_real(&mut self, list: &[u32], values: &mut [f64]) -> Result<(), CallError> {
         if self.view.plain {
+            return self.component.get_float64(list, values);
+        }
+        if self.plans.find(&self.view, list).is_err() {
+            // A value reference that no variable has: the FMU says so.
             return self.component.get_float64(list, values);
         }
         self.read("fmi3GetFloat64", list, values, Buffer::real)

@@ -1,5 +1,6 @@
 //! FMI 3.0.
 
+use fmu_description::Experiment;
 use fmu_import::Fmu;
 use master::{Failure, Slave, StepResult};
 use tests::c_versions;
@@ -226,4 +227,15 @@ fn inputs_of_an_fmu_that_does_not_ask_for_them_are_held() {
     let loaded = ready("plain");
     let flags = loaded.slave.description().co_simulation.clone().unwrap();
     assert!(!flags.can_interpolate_inputs);
+}
+
+#[test]
+fn an_fmu_of_fmi_3_explains_its_errors_although_logging_is_off() {
+    let fmu = Fmu::open(&tests::dist().join("AsoController.fmi3.fmu")).unwrap();
+    let mut slave = fmu.instantiate("controller").unwrap();
+    slave.setup_experiment(&Experiment::default()).unwrap();
+    slave.enter_initialization_mode().unwrap();
+    let error = slave.get_real(&[1 << 30], &mut [0.0]).unwrap_err();
+    assert_eq!(error.function, "fmi3GetFloat64");
+    assert!(error.messages.iter().any(|own| own.contains("value reference 1073741824")), "{error}");
 }

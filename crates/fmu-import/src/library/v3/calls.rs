@@ -5,6 +5,7 @@ use std::ffi::c_int;
 
 use fmu_description::Experiment;
 
+use super::super::c_string;
 use super::super::calls::{function, same_length};
 use super::Component;
 use slave::{CallError, absent};
@@ -36,13 +37,19 @@ modes! {
 }
 
 impl Component {
-    /// Calls `fmi3SetDebugLogging` for all categories.
-    pub(crate) fn set_debug_logging(&mut self, on: bool) -> Result<(), CallError> {
+    /// Calls `fmi3SetDebugLogging` for these categories; none means all.
+    pub(crate) fn set_debug_logging(
+        &mut self,
+        on: bool,
+        categories: &[&str],
+    ) -> Result<(), CallError> {
         const NAME: &str = "fmi3SetDebugLogging";
         let function = function!(self.set_debug_logging, NAME);
-        self.log_call(NAME, || on.to_string());
-        // SAFETY: the instance is alive; no categories.
-        let status = unsafe { function(self.pointer, on, 0, std::ptr::null()) };
+        self.log_call(NAME, || format!("{on}, {categories:?}"));
+        let texts: Vec<_> = categories.iter().map(|category| c_string(category)).collect();
+        let pointers: Vec<_> = texts.iter().map(|text| text.as_ptr()).collect();
+        // SAFETY: the instance is alive; terminated strings, as many as stated.
+        let status = unsafe { function(self.pointer, on, pointers.len(), pointers.as_ptr()) };
         self.check(NAME, status)
     }
 
