@@ -25,5 +25,6 @@ pub mod importer;
 pub mod machine;
 pub mod prediction;
 pub mod sequence;
+pub mod sequence3;
 pub mod system_files;
 pub mod system_toml;

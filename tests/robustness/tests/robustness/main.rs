@@ -7,6 +7,7 @@ mod hook;
 mod mutations;
 mod replay;
 mod sequences;
+mod sequences3;
 #[cfg(not(miri))]
 mod system_files;
 #[cfg(not(miri))]
