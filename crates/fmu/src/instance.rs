@@ -137,16 +137,18 @@ impl<M: Model> Instance<M> {
         callbacks: Callbacks,
         session: impl FnOnce(&mut Interface<M>, &ModelDescription) -> Option<Box<Session>>,
     ) -> Result<Self, Failure> {
+        // The guard outlives a panic of the model, during which it could not restore the hook.
         let hook_guard = HookGuard::new();
-        guarded(|| {
+        let made = guarded(|| {
             let mut fresh = new_model::<M>(resources)?;
             let messages = fresh.log().map(Log::take).unwrap_or_default();
             let (mut interface, description) = Interface::new(&mut fresh)?;
             let session = session(&mut interface, &description);
             let tolerance = description.default_experiment.and_then(|own| own.tolerance);
             let stepper = Stepper::new(&interface, tolerance);
-            Ok(Self {
-                core: Core::new(fresh.clone(), InterfaceType::CoSimulation),
+            let core = Core::new(fresh.clone(), InterfaceType::CoSimulation);
+            Ok(move |hook_guard| Self {
+                core,
                 fresh,
                 interface,
                 stepper,
@@ -159,7 +161,8 @@ impl<M: Model> Instance<M> {
                 session,
                 hook_guard,
             })
-        })
+        })?;
+        Ok(made(hook_guard))
     }
 
     fn into_type(mut self, interface_type: InterfaceType) -> Self {

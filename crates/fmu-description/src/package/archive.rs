@@ -1,7 +1,7 @@
 //! A ZIP archive whose names and sizes are checked before anything is unpacked.
 
 use std::cell::Cell;
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use zip::read::ZipFile;
 use zip::result::ZipError;
 use zip::{CompressionMethod, ZipArchive};
 
-use super::{DESCRIPTION, PackageError, archive_error, file_error, paths};
+use super::{PackageError, archive_error, file_error, paths};
 
 /// Maximum number of entries.
 const ENTRIES: usize = 100_000;
@@ -64,8 +64,6 @@ pub(super) struct Archive {
     names: Vec<String>,
     /// The number of names that were read differently, and the first of them with its reading.
     renamed: Option<(usize, String, String)>,
-    /// The number of files that occur again with the same content, and the first of them.
-    repeated: Option<(usize, String)>,
     capacity: u64,
 }
 
@@ -80,7 +78,7 @@ impl Archive {
         left.set(u64::MAX);
         let capacity = BASE.saturating_add(RATIO.saturating_mul(length)).min(CAPACITY);
         let (path, names) = (path.to_owned(), Vec::new());
-        let mut archive = Self { zip, path, names, renamed: None, repeated: None, capacity };
+        let mut archive = Self { zip, path, names, renamed: None, capacity };
         archive.look()?;
         Ok(archive)
     }
@@ -90,7 +88,6 @@ impl Archive {
             return Err(self.limit(ENTRIES as u64, "entries"));
         }
         let mut total = 0_u64;
-        let mut contents: HashMap<String, (u32, u64)> = HashMap::new();
         for index in 0..self.zip.len() {
             let entry = self.zip.by_index_data(index).map_err(|error| self.wrong(error))?;
             let stated = entry.name().map_err(|error| self.wrong(error))?.into_owned();
@@ -105,21 +102,12 @@ impl Archive {
                 let (count, ..) = self.renamed.get_or_insert((0, stated, name.clone()));
                 *count += 1;
             }
-            let content = (entry.crc32(), entry.size());
-            let first = contents.insert(name.clone(), content);
-            let is_file = !name.ends_with('/') && !name.is_empty() && name != DESCRIPTION;
-            if is_file && first == Some(content) {
-                // The same file again: it is unpacked once.
-                self.repeated.get_or_insert((0, name)).0 += 1;
-                self.names.push(String::new());
-            } else {
-                self.names.push(name);
-            }
+            self.names.push(name);
         }
         if total > self.capacity {
             return Err(self.limit(self.capacity, "bytes"));
         }
-        if has_duplicates(&self.names) {
+        if self.renamed.is_some() && has_duplicates(&self.names) {
             return Err(self.wrong(ZipError::InvalidArchive(DUPLICATE.into())));
         }
         if let Some(name) = file_and_folder(&self.names) {
@@ -147,13 +135,10 @@ impl Archive {
                  {stated:?}: {example}"
             )
         };
-        let repeated = |(count, name): &(usize, String)| {
-            let files = if *count == 1 { "file is" } else { "files are" };
-            format!(
-                "{count} {files} in the archive twice with the same content, for example {name:?}"
-            )
-        };
-        self.renamed.iter().map(sentence).chain(self.repeated.iter().map(repeated)).collect()
+        let repeated =
+            "several entries of the archive have the same name; the last one of each is used";
+        let repeated = self.zip.has_duplicate_names().then(|| repeated.to_owned());
+        self.renamed.iter().map(sentence).chain(repeated).collect()
     }
 
     /// Unpacks the entries that `wanted` accepts into `folder`.
