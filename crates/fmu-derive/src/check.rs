@@ -97,11 +97,13 @@ fn alone(variable: &Variable<'_>) -> Vec<Error> {
             errors.push(Error::new(span, message));
         }
     };
-    let is_real = variable.base == Base::Real;
-    let is_number = is_real || variable.base == Base::Integer && attributes.enumeration.is_none();
+    let is_real = variable.base.is_float();
+    let is_number = is_real
+        || variable.base.is_narrow()
+        || variable.base == Base::Integer && attributes.enumeration.is_none();
     for name in ["unit", "display_unit"] {
         if let Some(text) = attributes.text(name) {
-            require(is_real, text.span(), "only a variable of type f64 has a unit");
+            require(is_real, text.span(), "only a variable of type f64 or f32 has a unit");
         }
     }
     for (name, value) in attributes.values.iter().filter(|(name, _)| name != "start") {
@@ -120,7 +122,7 @@ fn alone(variable: &Variable<'_>) -> Vec<Error> {
         require(variable.base == Base::Integer, enumeration.span, message);
     }
     if let Some(span) = attributes.flag("discrete") {
-        require(is_real, span, "only a variable of type f64 can be discrete or not");
+        require(is_real, span, "only a variable of type f64 or f32 can be discrete or not");
     }
     if let Some(span) = attributes.flag("state") {
         let message =

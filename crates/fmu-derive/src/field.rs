@@ -1,7 +1,10 @@
 //! A field of the struct that is a variable.
 
 use syn::spanned::Spanned;
-use syn::{Error, Expr, ExprLit, Field, Ident, Lit, Meta, Result, Type, TypeArray};
+use syn::{
+    Error, Expr, ExprLit, Field, GenericArgument, Ident, Lit, Meta, PathArguments, Result, Type,
+    TypeArray,
+};
 
 use crate::attributes::{Attributes, Role};
 
@@ -12,6 +15,20 @@ pub(crate) enum Base {
     Integer,
     Boolean,
     String,
+    /// A type that FMI 2.0 does not have; the name is the constructor of `fmu::Variable`.
+    Typed(&'static str),
+}
+
+impl Base {
+    /// Whether it is `f64` or `f32`.
+    pub(crate) fn is_float(self) -> bool {
+        matches!(self, Base::Real | Base::Typed("float32"))
+    }
+
+    /// Whether it is a number of a type that FMI 2.0 does not have.
+    pub(crate) fn is_narrow(self) -> bool {
+        matches!(self, Base::Typed(name) if name != "binary")
+    }
 }
 
 /// A field with the attribute `#[fmu(...)]`.
@@ -112,13 +129,41 @@ fn base(of: &Type) -> Result<(Base, Vec<&Expr>)> {
         Some("i32") => Base::Integer,
         Some("bool") => Base::Boolean,
         Some("String") => Base::String,
+        Some("Vec") if is_bytes(of) => Base::Typed("binary"),
+        Some(name) if of_fmi_3(name).is_some() => Base::Typed(of_fmi_3(name).unwrap_or_default()),
         _ => {
-            let message = "no variable has this type: expected f64, i32, bool, String or an array of \
-                           them, or #[fmu(skip)] for a field that is no variable";
+            let message = "no variable has this type: expected f64, i32, bool, String; for FMI 3.0 only \
+                           f32, i8, u8, i16, u16, u32, i64, u64, Vec<u8>; an array of them, or #[fmu(skip)] for a field that is no variable";
             return Err(Error::new(of.span(), message));
         }
     };
     Ok((base, Vec::new()))
+}
+
+/// The constructor of variables with a type that FMI 2.0 does not have.
+fn of_fmi_3(name: &str) -> Option<&'static str> {
+    const TYPES: [(&str, &str); 8] = [
+        ("f32", "float32"),
+        ("i8", "int8"),
+        ("u8", "uint8"),
+        ("i16", "int16"),
+        ("u16", "uint16"),
+        ("u32", "uint32"),
+        ("i64", "int64"),
+        ("u64", "uint64"),
+    ];
+    TYPES.iter().find(|(native, _)| *native == name).map(|(_, constructor)| *constructor)
+}
+
+/// Whether the type, a `Vec`, is `Vec<u8>`.
+fn is_bytes(of: &Type) -> bool {
+    let Type::Path(path) = of else { return false };
+    let last = path.path.segments.last().map(|segment| &segment.arguments);
+    let Some(PathArguments::AngleBracketed(list)) = last else { return false };
+    match list.args.first() {
+        Some(GenericArgument::Type(item)) => last_segment(item).is_some_and(|name| name == "u8"),
+        _ => false,
+    }
 }
 
 /// The first paragraph of the doc comment, in one line.

@@ -92,8 +92,16 @@ fn default(ident: &Ident, model: &Model<'_>) -> Option<TokenStream> {
         let variable = model.variables.iter().find(|own| own.field == field);
         variable.map_or(0, |own| own.extents.len())
     };
+    let base = |field: &Ident| {
+        let variable = model.variables.iter().find(|own| own.field == field);
+        variable.map(|own| own.base)
+    };
     let fields = model.starts.iter().map(|(field, start)| {
         if let Some(value) = start {
+            // A literal takes the type of such a field; it would be an i32 or f64 for `into`.
+            if base(field).is_some_and(Base::is_narrow) {
+                return quote!(#field: #value);
+            }
             return quote!(#field: ::core::convert::Into::into(#value));
         }
         let value = array::default_value(dimensions(field));
@@ -134,6 +142,10 @@ fn constructor(variable: &Variable<'_>) -> TokenStream {
         Base::Integer => quote!(integer),
         Base::Boolean => quote!(boolean),
         Base::String => quote!(string),
+        Base::Typed(name) => {
+            let name = Ident::new(name, variable.field.span());
+            quote!(#name)
+        }
     }
 }
 

@@ -147,8 +147,21 @@ pub fn allowed(interface: InterfaceType, function: Function, state: State) -> bo
 pub fn may_discard(interface: InterfaceType, function: Function) -> bool {
     use Function as F;
     match function {
-        F::SetFloat64 | F::SetInt32 | F::SetInt64 | F::SetBoolean | F::SetString => true,
+        F::SetFloat32
+        | F::SetFloat64
+        | F::SetInt8
+        | F::SetUInt8
+        | F::SetInt16
+        | F::SetUInt16
+        | F::SetInt32
+        | F::SetUInt32
+        | F::SetInt64
+        | F::SetUInt64
+        | F::SetBoolean
+        | F::SetString
+        | F::SetBinary => true,
         F::SetContinuousStates
+        | F::GetFloat32
         | F::GetFloat64
         | F::GetContinuousStateDerivatives
         | F::GetContinuousStates

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use crate::Experiment;
 use crate::fence::{HookGuard, guarded};
 use crate::ffi::Callbacks;
-use crate::interface::{Interface, WARNING, new_model};
+use crate::interface::{Interface, WARNING, expressible_in_2, new_model};
 use crate::log::{Log, Message};
 use crate::model::{Failure, Model, Step};
 use crate::stepper::Stepper;
@@ -122,7 +122,12 @@ impl<M: Model> Instance<M> {
         guid: &str,
         callbacks: Callbacks,
     ) -> Result<Self, Failure> {
-        let instance = Self::build(resources, callbacks, |_, _| None)?;
+        let mut expressible = Ok(());
+        let instance = Self::build(resources, callbacks, |_, description| {
+            expressible = expressible_in_2(description);
+            None
+        })?;
+        expressible?;
         if interface_type == InterfaceType::ModelExchange && !instance.offers_exchange() {
             let message = "fmuType is fmi2ModelExchange, and this FMU offers co-simulation only";
             return Err(Failure::Error(message.to_owned()));

@@ -7,6 +7,7 @@ mod states;
 mod structure;
 
 use crate::model::{Failure, Model};
+use crate::typed::Slots;
 use crate::variable::{Access, Enumeration, Number, Variable};
 use fmu_description::call_order::settable;
 use fmu_description::call_order3;
@@ -19,7 +20,7 @@ use fmu_description::{
 
 pub(crate) use general::WARNING;
 pub(crate) use slot::Slot;
-use slot::SlotBuilder;
+pub(crate) use slot::SlotBuilder;
 
 /// A continuous state: positions of state and derivative among the Reals, and the nominal value.
 pub(crate) struct ContinuousState {
@@ -35,6 +36,8 @@ pub(crate) struct Interface<M> {
     pub(crate) integers: Vec<Slot<M, i32>>,
     pub(crate) booleans: Vec<Slot<M, bool>>,
     pub(crate) strings: Vec<Slot<M, String>>,
+    /// The variables of types that FMI 2.0 does not have.
+    pub(crate) typed: Slots<M>,
     pub(crate) states: Vec<ContinuousState>,
     /// Number of event indicators; `None` without model exchange.
     pub(crate) event_indicators: Option<usize>,
@@ -62,6 +65,7 @@ impl<M: Model> Interface<M> {
             integers: Vec::new(),
             booleans: Vec::new(),
             strings: Vec::new(),
+            typed: Slots::default(),
             states: Vec::new(),
             event_indicators: model.model_exchange().map(|own| own.event_indicators),
             max_output_derivative_order: 0,
@@ -192,6 +196,7 @@ impl<M: Model> Interface<M> {
                 let start = start_given.then(|| field(model).clone());
                 (Kind::String(start), builder.build(&mut self.strings, field))
             }
+            Access::Typed(field) => self.typed.add(model, (field, number), start_given, builder)?,
             Access::Alias(of) => return Err(format!("it is an alias of {of}")),
         })
     }
@@ -201,7 +206,7 @@ fn names(categories: &[LogCategory]) -> Vec<String> {
     categories.iter().map(|category| category.name.clone()).collect()
 }
 
-fn real(number: Number) -> RealType {
+pub(crate) fn real(number: Number) -> RealType {
     RealType {
         quantity: number.quantity,
         unit: number.unit,
@@ -261,7 +266,10 @@ fn without_start(kind: Kind) -> Kind {
         Kind::Enumeration(own) => Kind::Enumeration(IntegerType { start: None, ..own }),
         Kind::Boolean(_) => Kind::Boolean(None),
         Kind::String(_) => Kind::String(None),
-        other => other,
+        mut other => {
+            other.clear_start();
+            other
+        }
     }
 }
 
@@ -352,9 +360,36 @@ fn define_type<M>(types: &mut Vec<SimpleType>, variable: &Variable<M>) -> Result
 /// # Errors
 ///
 /// [`Failure::Error`] for an unknown unit, a reference to an unknown variable or another declaration
-/// that cannot be described; the failure of [`Model::new`].
+/// that cannot be described, such as a type that FMI 2.0 does not have; the failure of [`Model::new`].
 pub fn describe<M: Model>(resources: &std::path::Path) -> Result<ModelDescription, Failure> {
-    Interface::new(&mut new_model::<M>(resources)?).map(|(_, description)| description)
+    let (_, description) = Interface::new(&mut new_model::<M>(resources)?)?;
+    expressible_in_2(&description)?;
+    Ok(description)
+}
+
+/// Checks that every variable has a type of FMI 2.0.
+pub(crate) fn expressible_in_2(description: &ModelDescription) -> Result<(), Failure> {
+    match description.variables.iter().find(|own| is_of_3(own)) {
+        None => Ok(()),
+        Some(own) => Err(Failure::Error(format!(
+            "variable {} is a {}, a type that FMI 2.0 does not have: this model is for FMI 3.0 only \
+             (aso-ftc pack --fmi 3)",
+            own.name,
+            own.kind.element()
+        ))),
+    }
+}
+
+/// Whether the variable has a type that FMI 2.0 does not have.
+fn is_of_3(variable: &ScalarVariable) -> bool {
+    !matches!(
+        variable.kind,
+        Kind::Real(_)
+            | Kind::Integer(_)
+            | Kind::Enumeration(_)
+            | Kind::Boolean(_)
+            | Kind::String(_)
+    )
 }
 
 /// Makes the model description of FMI 3.0 of `M`; its `guid` is the `instantiationToken`.
@@ -416,7 +451,8 @@ pub(crate) fn new_model<M: Model>(resources: &std::path::Path) -> Result<M, Fail
     })
 }
 
-/// Returns the static rules of FMI 2.0.5 that the description of `M` breaks.
+/// Returns the static rules of FMI 2.0.5 that the description of `M` breaks; those of FMI 3.0.2 if a
+/// variable has a type that FMI 2.0 does not have.
 ///
 /// Use it as the first test of a model: `aso-ftc pack` rejects a model with problems.
 ///
@@ -424,7 +460,11 @@ pub(crate) fn new_model<M: Model>(resources: &std::path::Path) -> Result<M, Fail
 ///
 /// Same as [`describe`].
 pub fn problems<M: Model>(resources: &std::path::Path) -> Result<Vec<Problem>, Failure> {
-    describe::<M>(resources).map(|description| description.problems())
+    let (mut interface, description) = Interface::new(&mut new_model::<M>(resources)?)?;
+    if description.variables.iter().any(is_of_3) {
+        return Ok(interface.convert(&description).1.problems());
+    }
+    Ok(description.problems())
 }
 
 fn wide(items: &[(String, i32)]) -> Vec<(String, i64)> {

@@ -106,6 +106,7 @@ mod model;
 mod simulation;
 pub mod solver;
 mod stepper;
+mod typed;
 mod variable;
 mod variables;
 

@@ -1,5 +1,6 @@
 //! Declaration of a variable: the source of its description, value reference and field access.
 
+use crate::typed::TypedField;
 use fmu_description::{Causality, DependencyKind, Initial, Variability};
 
 /// A function that borrows one field of a model.
@@ -11,6 +12,8 @@ pub(crate) enum Access<M> {
     Integer(Field<M, i32>),
     Boolean(Field<M, bool>),
     String(Field<M, String>),
+    /// A type that FMI 2.0 does not have.
+    Typed(TypedField<M>),
     /// An alias of the variable with this name.
     Alias(String),
 }
@@ -154,6 +157,15 @@ impl<M> Variable<M> {
         of: impl Into<String>,
     ) -> Self {
         Self::local(name, description, Variability::Continuous, Access::Alias(of.into()))
+    }
+
+    pub(crate) fn typed(
+        name: impl Into<String>,
+        description: impl Into<String>,
+        variability: Variability,
+        field: TypedField<M>,
+    ) -> Self {
+        Self::local(name, description, variability, Access::Typed(field))
     }
 
     fn local(

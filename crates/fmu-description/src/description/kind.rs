@@ -158,7 +158,7 @@ impl Kind {
     }
 
     /// Removes the start value, and `reinit`.
-    pub(super) fn clear_start(&mut self) {
+    pub fn clear_start(&mut self) {
         match self {
             Kind::Boolean(start) => *start = None,
             Kind::String(start) => *start = None,

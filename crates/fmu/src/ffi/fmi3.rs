@@ -4,6 +4,8 @@ mod clocks;
 mod entry;
 mod exports;
 mod instantiate;
+#[cfg(test)]
+mod tests;
 mod values;
 
 pub use clocks::*;

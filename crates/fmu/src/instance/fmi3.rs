@@ -28,6 +28,8 @@ pub(crate) struct Session {
     integers: Vec<i32>,
     /// The event indicators.
     indicators: Vec<f64>,
+    /// The values returned by the last `fmi3GetBinary`, which must stay valid until the next call.
+    binaries: Vec<Vec<u8>>,
 }
 
 /// The arguments of `fmi3InstantiateXXX` that the model needs.
@@ -62,6 +64,7 @@ impl<M: Model> Instance<M> {
                 places: Vec::new(),
                 integers: Vec::new(),
                 indicators,
+                binaries: Vec::new(),
             }))
         })?;
         if !instance.offers_exchange() {

@@ -87,6 +87,23 @@ impl<M: Model> Core<M> {
         self.unchecked |= slot.causality == Causality::Parameter;
     }
 
+    /// Checks that all `values` can be set.
+    pub(super) fn check_all<T, V>(
+        &self,
+        slots: &[Slot<M, T>],
+        references: &[u32],
+        values: &[V],
+        accept: impl Fn(&Slot<M, T>, &V) -> Result<(), Failure>,
+        kind: &str,
+    ) -> Result<(), Failure> {
+        for (&reference, value) in references.iter().zip(values) {
+            let slot = slot(slots, reference, kind)?;
+            settable(slot, self.state)?;
+            accept(slot, value)?;
+        }
+        Ok(())
+    }
+
     /// Sets all `values`, or none if one of them cannot be set.
     pub(super) fn set<T, V>(
         &mut self,
@@ -97,11 +114,7 @@ impl<M: Model> Core<M> {
         accept: impl Fn(&Slot<M, T>, &V) -> Result<(), Failure>,
         kind: &str,
     ) -> Result<(), Failure> {
-        for (&reference, value) in references.iter().zip(values) {
-            let slot = slot(slots, reference, kind)?;
-            settable(slot, self.state)?;
-            accept(slot, value)?;
-        }
+        self.check_all(slots, references, values, accept, kind)?;
         for (&reference, value) in references.iter().zip(values) {
             let slot = slot(slots, reference, kind)?;
             assign((slot.field)(&mut self.model), value);

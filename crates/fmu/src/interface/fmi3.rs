@@ -12,26 +12,45 @@ pub(crate) use describe::describe;
 /// Marks a place that is an event indicator and no value reference of FMI 2.0.
 pub(crate) const INDICATOR: u32 = 1 << 31;
 
+/// Marks the place of an `Int64`, to tell it from that of an enumeration.
+pub(crate) const INT64: u32 = 1 << 31;
+
 /// The types of FMI 3.0 that an exported model can have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Type {
+    Float32,
     Float64,
+    Int8,
+    UInt8,
+    Int16,
+    UInt16,
     Int32,
-    /// An `Enumeration`, which `fmi3GetInt64` reads.
+    UInt32,
+    /// An `Int64`, or an `Enumeration`, which `fmi3GetInt64` reads as well.
     Int64,
+    UInt64,
     Boolean,
     String,
+    Binary,
 }
 
 impl Type {
     /// Returns the name in the functions `fmi3Get{VariableType}`.
     pub(crate) fn name(self) -> &'static str {
         match self {
+            Type::Float32 => "Float32",
             Type::Float64 => "Float64",
+            Type::Int8 => "Int8",
+            Type::UInt8 => "UInt8",
+            Type::Int16 => "Int16",
+            Type::UInt16 => "UInt16",
             Type::Int32 => "Int32",
+            Type::UInt32 => "UInt32",
             Type::Int64 => "Int64",
+            Type::UInt64 => "UInt64",
             Type::Boolean => "Boolean",
             Type::String => "String",
+            Type::Binary => "Binary",
         }
     }
 }

@@ -1,8 +1,8 @@
 //! Run-time data of a variable, indexed by value reference.
 
 use crate::variable::{Access, Field, Variable};
-use fmu_description::call_order::settable;
 use fmu_description::{Causality, Initial, Variability};
+use fmu_description::{call_order::settable, call_order3};
 
 /// A variable of base type `T`; its position in [`Interface`] follows from its value reference.
 #[expect(clippy::struct_excessive_bools, reason = "facts that are independent")]
@@ -30,7 +30,7 @@ pub(crate) struct Slot<M, T> {
 }
 
 /// A slot without its field, which determines the base type.
-pub(super) struct SlotBuilder<M> {
+pub(crate) struct SlotBuilder<M> {
     name: String,
     causality: Causality,
     variability: Variability,
@@ -56,6 +56,16 @@ impl<M> SlotBuilder<M> {
             derivatives: variable.derivatives,
         };
         (builder, variable.access)
+    }
+
+    /// Same as [`SlotBuilder::build`] for a type that FMI 2.0 does not have: the rules of FMI 3.0 say when
+    /// the variable may be set.
+    pub(crate) fn build_3<T>(self, slots: &mut Vec<Slot<M, T>>, field: Field<M, T>) -> u32 {
+        let role = (self.causality, self.variability);
+        let settable = call_order3::settable(role, self.initial, None);
+        let position = self.build(slots, field);
+        slots[position as usize].settable = settable;
+        position
     }
 
     /// Adds the field, appends the slot and returns its position.

@@ -4,8 +4,9 @@ use std::mem::MaybeUninit;
 
 use super::super::Instance;
 use crate::interface::Slot;
-use crate::interface::fmi3::INDICATOR;
+use crate::interface::fmi3::{INDICATOR, INT64};
 use crate::model::{Failure, Model};
+use crate::typed::Native;
 
 /// Reads the values of located variables.
 fn copy<M, T, V>(
@@ -19,6 +20,18 @@ fn copy<M, T, V>(
         if let Some(slot) = slots.get(place as usize) {
             value.write(read((slot.field)(model)));
         }
+    }
+}
+
+/// Checks that a number is in the range of its variable, which is finite.
+fn accept_number<M, T: Native>(slot: &Slot<M, T>, value: &T) -> Result<(), Failure> {
+    let (min, max) = slot.range;
+    match value.number() {
+        Some(number) if number.is_nan() || number < min || number > max => {
+            let name = &slot.name;
+            Err(Failure::Discard(format!("{name} = {number}, expected {min} to {max}")))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -57,15 +70,87 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// `fmi3GetInt64` of enumerations.
-    pub(crate) fn get_enumerations(
+    /// `fmi3GetInt64`: of `Int64` variables and enumerations.
+    pub(crate) fn get_int64(
         &mut self,
         places: &[u32],
         to: &mut [MaybeUninit<i64>],
     ) -> Result<(), Failure> {
         self.refresh()?;
-        let read = |value: &i32| i64::from(*value);
-        copy(&self.interface.integers, &mut self.core.model, places, to, read);
+        let model = &mut self.core.model;
+        for (&place, value) in places.iter().zip(to) {
+            let (one, value) = (&[place & !INT64], std::slice::from_mut(value));
+            if place & INT64 == 0 {
+                copy(&self.interface.integers, model, one, value, |value| i64::from(*value));
+            } else {
+                copy(i64::slots(&self.interface.typed), model, one, value, |value| *value);
+            }
+        }
+        Ok(())
+    }
+
+    /// `fmi3SetInt64`: sets all values or, after a failure, none.
+    pub(crate) fn set_int64(&mut self, places: &[u32], values: &[i64]) -> Result<(), Failure> {
+        if places.iter().all(|place| place & INT64 == 0) {
+            return self.set_enumerations(places, values);
+        }
+        let (mut enumerations, mut integers) = ((Vec::new(), Vec::new()), (Vec::new(), Vec::new()));
+        for (&place, &value) in places.iter().zip(values) {
+            let (places, values) =
+                if place & INT64 == 0 { &mut enumerations } else { &mut integers };
+            places.push(place & !INT64);
+            values.push(value);
+        }
+        self.core.check_all(
+            i64::slots(&self.interface.typed),
+            &integers.0,
+            &integers.1,
+            accept_number,
+            "Int64",
+        )?;
+        self.set_enumerations(&enumerations.0, &enumerations.1)?;
+        self.set_typed(&integers.0, &integers.1)
+    }
+
+    /// `fmi3Get{VariableType}` of a number that FMI 2.0 does not have.
+    pub(crate) fn get_typed<T: Native + Copy>(
+        &mut self,
+        places: &[u32],
+        to: &mut [MaybeUninit<T>],
+    ) -> Result<(), Failure> {
+        self.refresh()?;
+        copy(T::slots(&self.interface.typed), &mut self.core.model, places, to, |value| *value);
+        Ok(())
+    }
+
+    /// `fmi3Set{VariableType}` of a type that FMI 2.0 does not have: sets all values or, after a
+    /// failure, none.
+    pub(crate) fn set_typed<T: Native>(
+        &mut self,
+        places: &[u32],
+        values: &[T],
+    ) -> Result<(), Failure> {
+        let slots = T::slots(&self.interface.typed);
+        self.core.set(slots, places, values, T::clone_from, accept_number, T::TYPE.name())
+    }
+
+    /// `fmi3GetBinary`: passes each value to `write` with its position. The bytes stay valid until the
+    /// next call.
+    pub(crate) fn get_binary(
+        &mut self,
+        places: &[u32],
+        mut write: impl FnMut(usize, &[u8]),
+    ) -> Result<(), Failure> {
+        self.refresh()?;
+        let slots = <Vec<u8>>::slots(&self.interface.typed);
+        let found = places.iter().filter_map(|&place| slots.get(place as usize));
+        let model = &mut self.core.model;
+        let values: Vec<_> = found.map(|slot| (slot.field)(model).clone()).collect();
+        let kept = &mut self.session_mut()?.binaries;
+        *kept = values;
+        for (position, value) in kept.iter().enumerate() {
+            write(position, value);
+        }
         Ok(())
     }
 
@@ -81,12 +166,8 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// `fmi3SetInt64` of enumerations: sets all values or, after a failure, none.
-    pub(crate) fn set_enumerations(
-        &mut self,
-        places: &[u32],
-        values: &[i64],
-    ) -> Result<(), Failure> {
+    /// Sets enumerations: sets all values or, after a failure, none.
+    fn set_enumerations(&mut self, places: &[u32], values: &[i64]) -> Result<(), Failure> {
         let mut narrow = std::mem::take(&mut self.session_mut()?.integers);
         narrow.clear();
         // A value beyond 32 bits is no item of any enumeration; neither is the one that replaces it.

@@ -127,7 +127,15 @@ fn is_element(first: &ScalarVariable, other: &ScalarVariable, position: usize) -
             alike == *two && one.start.is_some() == two.start.is_some()
         }
         (Kind::Boolean(one), Kind::Boolean(two)) => one.is_some() == two.is_some(),
-        _ => false,
+        (Kind::String(_) | Kind::Binary(_), _) => false,
+        (one, two) => {
+            let bare = |kind: &Kind| {
+                let mut kind = kind.clone();
+                kind.clear_start();
+                kind
+            };
+            bare(one) == bare(two) && one.has_start() == two.has_start()
+        }
     };
     let alike = ScalarVariable {
         name: other.name.clone(),
@@ -147,8 +155,17 @@ pub(super) fn starts(elements: &[ScalarVariable]) -> Option<Elements> {
         _ => None,
     };
     match elements.first()?.kind {
-        Kind::Real(_) => elements.iter().map(real).collect::<Option<_>>().map(Elements::Real),
-        Kind::Integer(_) => {
+        Kind::Real(_) | Kind::Float32(_) => {
+            elements.iter().map(real).collect::<Option<_>>().map(Elements::Real)
+        }
+        Kind::Integer(_)
+        | Kind::Int8(_)
+        | Kind::UInt8(_)
+        | Kind::Int16(_)
+        | Kind::UInt16(_)
+        | Kind::UInt32(_)
+        | Kind::Int64(_)
+        | Kind::UInt64(_) => {
             elements.iter().map(integer).collect::<Option<_>>().map(Elements::Integer)
         }
         Kind::Boolean(_) => {

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::arrays::{Block, blocks, starts};
-use super::{Entry, INDICATOR, Table, Type};
+use super::{Entry, INDICATOR, INT64, Table, Type};
 use fmu_description::{
     Causality, CoSimulation, DependencyKind, Dimension, Initial, IntegerType, Kind,
     ModelDescription, ModelExchange, ModelStructure, RealType, ScalarVariable, Unknown,
@@ -68,11 +68,19 @@ fn simulation(own: &CoSimulation, old: &ModelDescription) -> CoSimulation {
     }
 }
 
-/// Returns the type of FMI 3.0 and the start value's absence for an alias.
+/// Returns the type of FMI 3.0 in the names of functions.
 fn kind_of(kind: &Kind) -> Type {
     match kind {
         Kind::Integer(_) => Type::Int32,
-        Kind::Enumeration(_) => Type::Int64,
+        Kind::Enumeration(_) | Kind::Int64(_) => Type::Int64,
+        Kind::Float32(_) => Type::Float32,
+        Kind::Int8(_) => Type::Int8,
+        Kind::UInt8(_) => Type::UInt8,
+        Kind::Int16(_) => Type::Int16,
+        Kind::UInt16(_) => Type::UInt16,
+        Kind::UInt32(_) => Type::UInt32,
+        Kind::UInt64(_) => Type::UInt64,
+        Kind::Binary(_) => Type::Binary,
         Kind::Boolean(_) => Type::Boolean,
         Kind::String(_) => Type::String,
         _ => Type::Float64,
@@ -105,7 +113,19 @@ fn without_start(kind: &Kind) -> Kind {
         Kind::Enumeration(own) => Kind::Enumeration(IntegerType { start: None, ..own.clone() }),
         Kind::Boolean(_) => Kind::Boolean(None),
         Kind::String(_) => Kind::String(None),
-        other => other.clone(),
+        other => {
+            let mut kind = other.clone();
+            kind.clear_start();
+            kind
+        }
+    }
+}
+
+/// Returns the place of the first element of a variable.
+fn place(first: &ScalarVariable) -> u32 {
+    match first.kind {
+        Kind::Int64(_) => INT64 | first.value_reference,
+        _ => first.value_reference,
     }
 }
 
@@ -153,7 +173,7 @@ impl Builder {
         self.entries.push(Entry {
             name: block.name.clone(),
             kind: kind_of(&first.kind),
-            first: first.value_reference,
+            first: place(first),
             count: u32::try_from(block.count).unwrap_or(u32::MAX),
         });
         let start_elements = starts(elements).filter(|_| block.count > 1);
