@@ -102,12 +102,14 @@ fn findings(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResu
         let (mut here, mut found) = run(options, unpacked)?;
         let folder = format!("{}/", unpacked.folder().display());
         if let TrialResult::No { reason } = &mut here {
-            *reason = reason.replace(&folder, "");
+            *reason = sections::renamed(&reason.replace(&folder, ""), description.version());
         }
+        let version = description.version();
         for finding in &mut found {
-            finding.what = finding.what.replace(&folder, "");
+            finding.what = sections::renamed(&finding.what.replace(&folder, ""), version);
+            finding.place = sections::renamed(&finding.place, version);
         }
-        sections::renumber(&mut found, description.version());
+        sections::renumber(&mut found, version);
         findings.extend(found);
         here
     };
@@ -121,7 +123,11 @@ fn without_trial(options: &Options, unpacked: &Unpacked) -> Option<TrialResult> 
         return Some(TrialResult::NotTried { reason: "--no-run".to_owned() });
     }
     let Some(simulation) = &unpacked.description.co_simulation else {
-        let reason = "it is for model exchange only; `aso-ftc run` integrates it";
+        let reason = if unpacked.description.model_exchange.is_some() {
+            "it is for model exchange only; `aso-ftc run` integrates it"
+        } else {
+            "it is for scheduled execution only, which `aso-ftc run` does not offer"
+        };
         return Some(TrialResult::NotTried { reason: reason.to_owned() });
     };
     if simulation.needs_execution_tool {
