@@ -103,13 +103,14 @@ fn findings(options: &Options, unpacked: &Unpacked) -> anyhow::Result<(TrialResu
         let (mut here, mut found) = run(options, unpacked)?;
         let folder = format!("{}/", unpacked.folder().display());
         if let TrialResult::No { reason } = &mut here {
-            *reason = reason.replace(&folder, "");
+            *reason = sections::renamed(&reason.replace(&folder, ""), description.version());
         }
+        let version = description.version();
         for finding in &mut found {
-            finding.what = finding.what.replace(&folder, "");
+            finding.what = sections::renamed(&finding.what.replace(&folder, ""), version);
+            finding.place = sections::renamed(&finding.place, version);
         }
-        sections::renumber(&mut found, description.version());
-        sections::rename(&mut found, description.version());
+        sections::renumber(&mut found, version);
         findings.extend(found);
         here
     };
@@ -129,7 +130,11 @@ fn without_trial(options: &Options, unpacked: &Unpacked) -> Option<TrialResult> 
     let simulation = simulation.map(|own| (&own.model_identifier, own.needs_execution_tool));
     let exchange = exchange.map(|own| (&own.model_identifier, own.needs_execution_tool));
     let Some((identifier, needs_tool)) = simulation.or(exchange) else {
-        return not_tried("it offers neither co-simulation nor model exchange of FMI 2.0 or 3.0");
+        return not_tried(if own.model_exchange.is_some() {
+            "it is for model exchange of FMI 1.0, which `aso-ftc run` does not offer"
+        } else {
+            "it is for scheduled execution only, which `aso-ftc run` does not offer"
+        });
     };
     if simulation.is_none() && cfg!(not(target_os = "linux")) {
         return not_tried("it is for model exchange only, which is tried on Linux only");

@@ -55,7 +55,9 @@ pub(super) fn check(
     }
     case(names, &mut findings);
     top_level(names, description.version(), &mut findings);
-    documentation(names, &mut findings);
+    if description.version() != Version::V1 {
+        documentation(names, &mut findings);
+    }
     sources(names, description, &mut findings);
     if description.version() == Version::V3 {
         build_description(names, &mut findings);

@@ -2,8 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use fmu_description::Experiment;
-use fmu_description::ModelDescription;
+use fmu_description::{Experiment, ModelDescription, Version};
 use master::{CallError, Failure, Slave, StepResult};
 
 use super::answer::TrialResult;
@@ -289,8 +288,12 @@ impl<S: Slave> Trial<'_, S> {
         }
     }
 
-    /// Checks that an unknown value reference is an error.
+    /// Checks that an unknown value reference is an error. In FMI 3.0 our importer itself refuses
+    /// it, as it gives references to the elements of arrays.
     fn unknown_reference(&mut self) {
+        if self.description.version() == Version::V3 {
+            return;
+        }
         let Some(mut slave) = self.initialized("unknown", None, None) else { return };
         match slave.get_real(&[unknown_reference(self.description)], &mut [0.0]) {
             Ok(()) => {
@@ -383,6 +386,10 @@ impl<S: Slave> Trial<'_, S> {
     }
 
     fn categories(&mut self, used: &BTreeSet<String>) {
+        // Descriptions of FMI 1.0 do not list categories.
+        if self.description.version() == Version::V1 {
+            return;
+        }
         for category in used.iter().filter(|own| !own.is_empty()) {
             let declared = self.description.log_categories.iter().any(|own| own.name == *category);
             if !declared {

@@ -1,4 +1,4 @@
-//! Sections and functions of the standard in findings about archive, libraries and behaviour.
+//! Sections and names of the standard in findings about archive, libraries and behaviour.
 
 use fmu_description::Version;
 
@@ -23,6 +23,28 @@ const PAIRS: [(&str, &str); 15] = [
     ("4.2.4", "4.2"),
 ];
 
+/// Names of FMI 2.0 in findings about behaviour, and those of FMI 1.0 and 3.0.
+const NAMES: [(&str, &str, &str); 9] = [
+    ("fmi2DeSerializeFMUstate", "fmi2DeSerializeFMUstate", "fmi3DeserializeFMUState"),
+    ("fmi2SetFMUstate", "fmi2SetFMUstate", "fmi3SetFMUState"),
+    ("fmi2Instantiate", "fmiInstantiateSlave", "fmi3InstantiateCoSimulation"),
+    ("fmi2Terminate", "fmiTerminateSlave", "fmi3Terminate"),
+    ("fmi2GetReal", "fmiGetReal", "fmi3GetFloat64"),
+    ("fmi2DoStep", "fmiDoStep", "fmi3DoStep"),
+    ("fmi2Error", "fmiError", "fmi3Error"),
+    ("canGetAndSetFMUstate", "canGetAndSetFMUstate", "canGetAndSetFMUState"),
+    ("canSerializeFMUstate", "canSerializeFMUstate", "canSerializeFMUState"),
+];
+
+/// Replaces names of FMI 2.0 in a text by those of `version`.
+pub(super) fn renamed(text: &str, version: Version) -> String {
+    NAMES.iter().fold(text.to_owned(), |text, (second, first, third)| match version {
+        Version::V1 => text.replace(second, first),
+        Version::V2 => text,
+        Version::V3 => text.replace(second, third),
+    })
+}
+
 /// Replaces sections of FMI 2.0.5 by those of `version`; a section that has no counterpart is left out.
 pub(super) fn renumber(findings: &mut [Finding], version: Version) {
     for finding in findings {
@@ -35,28 +57,21 @@ pub(super) fn renumber(findings: &mut [Finding], version: Version) {
     }
 }
 
-/// Functions of FMI 2.0 whose name in FMI 3.0 or 1.0 is not that with another prefix.
-const FUNCTIONS: [(&str, &str, &str); 6] = [
-    ("fmi2GetReal", "fmi3GetFloat64", "fmiGetReal"),
-    ("fmi2GetFMUstate", "fmi3GetFMUState", "fmi2GetFMUstate"),
-    ("fmi2SetFMUstate", "fmi3SetFMUState", "fmi2SetFMUstate"),
-    ("fmi2DeSerializeFMUstate", "fmi3DeserializeFMUState", "fmi2DeSerializeFMUstate"),
-    ("fmi2Terminate", "fmi3Terminate", "fmiTerminateSlave"),
-    ("fmi2Instantiate", "fmi3InstantiateCoSimulation", "fmiInstantiateSlave"),
-];
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// Replaces the names of functions and statuses of FMI 2.0 in findings about the behaviour by those of
-/// `version`.
-pub(super) fn rename(findings: &mut [Finding], version: Version) {
-    let prefix = match version {
-        Version::V1 => "fmi",
-        Version::V2 => return,
-        Version::V3 => "fmi3",
-    };
-    for text in findings.iter_mut().flat_map(|own| [&mut own.place, &mut own.what]) {
-        for (second, third, first) in FUNCTIONS {
-            *text = text.replace(second, if version == Version::V3 { third } else { first });
-        }
-        *text = text.replace("fmi2", prefix);
+    #[test]
+    fn messages_name_the_functions_of_the_version_of_the_fmu() {
+        let text =
+            "fmi2SetFMUstate: differs, expected fmi2Error, though canGetAndSetFMUstate is true";
+        let third =
+            "fmi3SetFMUState: differs, expected fmi3Error, though canGetAndSetFMUState is true";
+        assert_eq!(renamed(text, Version::V2), text);
+        assert_eq!(renamed(text, Version::V3), third);
+        assert_eq!(
+            renamed("fmi2DoStep after fmi2Terminate", Version::V1),
+            "fmiDoStep after fmiTerminateSlave"
+        );
     }
 }

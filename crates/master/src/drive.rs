@@ -7,6 +7,7 @@ use crate::exchange::call;
 use crate::fault::FaultChain;
 use crate::signal::{Cursor, Sample, Signal, earliest, reached};
 use crate::system::{Port, System};
+use fmu_description::Version;
 use slave::ValueType;
 
 /// Signals and faults that act on a system during a run.
@@ -27,8 +28,13 @@ pub enum DriveKind {
         /// Whether the variable is a continuous input of an FMU that takes input derivatives.
         derivatives: bool,
     },
-    /// Integer or Enumeration.
-    Integer,
+    /// Integer of any width, or Enumeration.
+    Integer {
+        /// Smallest value of the type.
+        least: i64,
+        /// Largest value of the type, or that of 64 bits with a sign.
+        largest: i64,
+    },
     /// Boolean: 0 is false.
     Boolean,
     /// String: the value of the signal is an index into the texts of the drive.
@@ -261,7 +267,9 @@ impl Drives {
                         self.slopes.push(sample.slope);
                     }
                 }
-                DriveKind::Integer => self.integers.push(integer(sample.value)),
+                DriveKind::Integer { least, largest } => {
+                    self.integers.push(integer(sample.value, least, largest));
+                }
                 DriveKind::Boolean => self.booleans.push(i32::from(sample.value != 0.0)),
                 DriveKind::String => {
                     if let Some(text) = drive.text(sample.value) {
@@ -275,7 +283,7 @@ impl Drives {
         }
         match kind {
             DriveKind::Real { .. } => slave.set_real(&self.references, &self.reals)?,
-            DriveKind::Integer => slave.set_integer(&self.references, &self.integers)?,
+            DriveKind::Integer { .. } => slave.set_integer(&self.references, &self.integers)?,
             DriveKind::Boolean => slave.set_boolean(&self.references, &self.booleans)?,
             DriveKind::String => {}
         }
@@ -343,25 +351,29 @@ impl Drives {
 fn rank(kind: DriveKind) -> u8 {
     match kind {
         DriveKind::Real { .. } => 0,
-        DriveKind::Integer => 1,
+        DriveKind::Integer { .. } => 1,
         DriveKind::Boolean => 2,
         DriveKind::String => 3,
     }
 }
 
-/// Rounds the value of a signal to an Integer of 32 bits.
+/// Rounds the value of a signal to an integer from `least` to `largest`.
 #[expect(clippy::cast_possible_truncation, reason = "saturates")]
-pub(crate) fn integer(value: f64) -> i64 {
-    (value.round() as i32).into()
+pub(crate) fn integer(value: f64, least: i64, largest: i64) -> i64 {
+    (value.round() as i64).clamp(least, largest)
 }
 
 impl DriveKind {
-    /// Returns the type of a variable; `derivatives` applies to Reals only.
+    /// Returns the type of a variable of an FMU of this version of FMI; `derivatives` applies to
+    /// Reals only.
     #[must_use]
-    pub fn of(kind: &fmu_description::Kind, derivatives: bool) -> Self {
+    pub fn of(kind: &fmu_description::Kind, version: Version, derivatives: bool) -> Self {
+        let (least, largest) = kind.integer_range(version).unwrap_or_default();
+        let least = i64::try_from(least).unwrap_or(i64::MIN);
+        let largest = i64::try_from(largest).unwrap_or(i64::MAX);
         match ValueType::of(kind) {
             ValueType::Real => Self::Real { derivatives },
-            ValueType::Integer => Self::Integer,
+            ValueType::Integer => Self::Integer { least, largest },
             ValueType::Boolean => Self::Boolean,
             ValueType::String | ValueType::Binary => Self::String,
         }

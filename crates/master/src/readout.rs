@@ -89,7 +89,9 @@ impl Readout {
         for &(number, position) in &self.driven {
             drives.show(number, time, |kind, value, text| match kind {
                 DriveKind::Real { .. } => self.reals[position] = value,
-                DriveKind::Integer => self.integers[position] = integer(value),
+                DriveKind::Integer { least, largest } => {
+                    self.integers[position] = integer(value, least, largest);
+                }
                 DriveKind::Boolean => self.booleans[position] = i32::from(value != 0.0),
                 DriveKind::String => {
                     if let Some(text) = text {

@@ -4,7 +4,7 @@ use fmu_description::{Causality, Kind};
 use serde_spanned::Spanned;
 
 use super::convert::Conversion;
-use super::literal::is_integer;
+use super::literal::fits_integer;
 use super::resolve::{Resolver, Target, at, finite, only, positive, require};
 use super::signals::conversion;
 use super::{
@@ -185,7 +185,8 @@ impl Reader<'_> {
 
     /// Checks that a number is an integer if the input is not a Real.
     fn whole(&self, what: &'static str, number: f64) -> Result<f64, Reason> {
-        let fits = self.target.is_real() || is_integer(number);
+        let fits = self.target.is_real()
+            || fits_integer(number, &self.target.variable.kind, self.target.description);
         require(what, number, fits, "a whole number, as the input is an Integer")
     }
 

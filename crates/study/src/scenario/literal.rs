@@ -79,9 +79,7 @@ impl Literal {
                 Ok(*number)
             }
             (Kind::Real(_) | Kind::Float32(_), _) => Err("a finite number".to_owned()),
-            (kind, Literal::Number(number))
-                if kind.as_integer().is_some() && is_integer(*number) =>
-            {
+            (kind, Literal::Number(number)) if fits_integer(*number, kind, description) => {
                 Ok(*number)
             }
             (Kind::Enumeration(kind), _) => {
@@ -101,12 +99,34 @@ impl Literal {
             (Kind::String(_) | Kind::Binary(_) | Kind::Clock(_), _) => {
                 Err(format!("no number, as it is a {}", variable.kind.element()))
             }
-            _ => Err("an Integer of 32 bits".to_owned()),
+            (kind, _) => Err(integers(kind, description)),
         }
     }
 }
 
-/// Whether a number is a 32-bit Integer of the standard.
-pub(super) fn is_integer(number: f64) -> bool {
-    number.fract() == 0.0 && (f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&number)
+/// The largest magnitude up to which each integer is a double, 2^53.
+const EXACT: i128 = 1 << f64::MANTISSA_DIGITS;
+
+/// Returns the smallest and largest integer that a signal can give to a variable of this type.
+fn range(kind: &Kind, description: &ModelDescription) -> Option<(i128, i128)> {
+    let (least, largest) = kind.integer_range(description.version())?;
+    Some((least.max(-EXACT), largest.min(EXACT)))
+}
+
+/// Whether a number is an integer that a signal can give to a variable of this type.
+#[expect(clippy::cast_precision_loss, reason = "up to 2^53")]
+pub(super) fn fits_integer(number: f64, kind: &Kind, description: &ModelDescription) -> bool {
+    range(kind, description).is_some_and(|(least, largest)| {
+        number.fract() == 0.0 && (least as f64..=largest as f64).contains(&number)
+    })
+}
+
+/// Describes the integers that a signal can give to a variable of this type.
+pub(super) fn integers(kind: &Kind, description: &ModelDescription) -> String {
+    match range(kind, description) {
+        Some((least, largest)) if (least, largest) != (i32::MIN.into(), i32::MAX.into()) => {
+            format!("a whole number from {least} to {largest}")
+        }
+        _ => "an Integer of 32 bits".to_owned(),
+    }
 }

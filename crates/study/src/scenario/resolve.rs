@@ -139,7 +139,7 @@ impl Target<'_> {
     }
 
     pub(super) fn is_real(&self) -> bool {
-        matches!(self.variable.kind, Kind::Real(_))
+        self.variable.kind.as_real().is_some()
     }
 }
 
@@ -180,9 +180,10 @@ impl<'a> Resolver<'a> {
             return Err(Reason::Twice { name: target.name.clone(), first: first.clone() });
         }
         let takes = target.description.co_simulation.as_ref();
-        let derivatives =
-            target.is_continuous() && takes.is_some_and(|takes| takes.can_interpolate_inputs);
-        let kind = DriveKind::of(&target.variable.kind, derivatives);
+        let derivatives = target.is_continuous()
+            && matches!(target.variable.kind, Kind::Real(_))
+            && takes.is_some_and(|takes| takes.can_interpolate_inputs);
+        let kind = DriveKind::of(&target.variable.kind, target.description.version(), derivatives);
         let drive = Drive::new(target.port, target.variable.value_reference, kind, following);
         self.drives.push((drive, path.to_owned()));
         Ok(())

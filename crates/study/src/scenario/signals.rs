@@ -7,7 +7,7 @@ use fmu_description::Kind;
 use serde_spanned::Spanned;
 
 use super::convert::Conversion;
-use super::literal::{Literal, is_integer};
+use super::literal::{Literal, fits_integer, integers};
 use super::resolve::{Resolver, Target, at, finite, only, positive, require};
 use super::{Csv, Ramp, Reason, ScenarioError, SetEntry, SignalEntry, Sine, TableEntry};
 use crate::table::Table;
@@ -270,15 +270,22 @@ fn column_signal(
         let (path, name) = (path.to_owned(), name.to_owned());
         return Err(Reason::Column { path, name, known: some(&table.names) });
     };
-    let (fits, expected): (fn(f64) -> bool, _) = match &target.variable.kind {
-        Kind::Boolean(_) => (|value| [0.0, 1.0].contains(&value), "0 or 1"),
-        other if other.as_real().is_some() => (f64::is_finite, "a finite number"),
-        other if other.as_integer().is_some() => (is_integer, "an Integer of 32 bits"),
+    let (kind, description) = (&target.variable.kind, target.description);
+    let wrong = match kind {
+        Kind::Boolean(_) => values.iter().position(|value| ![0.0, 1.0].contains(value)),
+        _ if target.is_real() => values.iter().position(|value| !value.is_finite()),
+        _ if kind.as_integer().is_some() => {
+            values.iter().position(|&value| !fits_integer(value, kind, description))
+        }
         _ => return Err(unfit("csv", target, "constant or steps")),
     };
-    if let Some(row) = values.iter().position(|&value| !fits(value)) {
+    if let Some(row) = wrong {
         let found = format!("{} in row {} of {}", values[row], row + 1, path.display());
-        let expected = expected.to_owned();
+        let expected = match kind {
+            Kind::Boolean(_) => "0 or 1".to_owned(),
+            _ if target.is_real() => "a finite number".to_owned(),
+            _ => integers(kind, description),
+        };
         return Err(Reason::Value { name: target.name.clone(), found, expected });
     }
     let between =

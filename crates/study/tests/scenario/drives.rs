@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Calls, scenario, setup, system};
+use super::{Calls, of_fmi_3, scenario, setup, system};
 
 /// Returns the calls that `plant` receives at the communication points `times`; leaves out points
 /// without calls.
@@ -196,6 +196,29 @@ fn an_entry_of_its_own_goes_before_a_table_and_a_column_may_be_held_or_chosen() 
         (2.0, &["real [1, 2, 3] [3.0, 7.0, 3.0]", "derivative [1, 2] [0.0, 0.0]"]),
     ];
     expect(&calls(text, folder.path(), &[0.0, 1.0, 2.0]), &expected);
+}
+
+#[test]
+fn integers_of_every_width_follow_a_file_within_their_range() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |text: &str| std::fs::write(folder.path().join("in.csv"), text).unwrap();
+    let text = "[[scenario.table]]\ncsv = \"in.csv\"\nelement = \"fmu\"\n";
+    let resolve = |system: &master::System| scenario(text).resolve(system, &setup(folder.path()));
+    let (mut system, calls) = of_fmi_3();
+    write("time,small,large,wide,single\n0,-128,4294967295,-9007199254740992,0\n1,127,0,5,1\n");
+    let mut prepared = resolve(&system).unwrap();
+    prepared.scenario.drives.write(&mut system, 0.5).unwrap();
+    let set = ["real [4] [0.5]", "integer [1, 2, 3] [-128, 4294967295, -9007199254740992]"];
+    assert_eq!(take(&calls), set);
+    for (name, value, expected) in [
+        ("small", "128", "a whole number from -128 to 127"),
+        ("large", "4294967296", "a whole number from 0 to 4294967295"),
+        ("wide", "9007199254740994", "a whole number from -9007199254740992 to 9007199254740992"),
+    ] {
+        write(&format!("time,{name}\n0,{value}\n"));
+        let refused = resolve(&system).unwrap_err().to_string();
+        assert!(refused.contains(&format!("expected {expected}")), "{refused}");
+    }
 }
 
 #[test]

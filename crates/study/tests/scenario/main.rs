@@ -140,6 +140,23 @@ fn system() -> (System, Calls, Calls) {
     (system, plant_told, ctrl_told)
 }
 
+/// An FMU of FMI 3.0, called fmu, with inputs of several widths.
+fn of_fmi_3() -> (System, Calls) {
+    let xml = r#"<fmiModelDescription fmiVersion="3.0" modelName="Listener" instantiationToken="t">
+        <CoSimulation modelIdentifier="L"/>
+        <ModelVariables>
+        <Float64 name="time" valueReference="0" causality="independent"/>
+        <Int8 name="small" valueReference="1" causality="input" start="0"/>
+        <UInt32 name="large" valueReference="2" causality="input" start="0"/>
+        <Int64 name="wide" valueReference="3" causality="input" start="0"/>
+        <Float32 name="single" valueReference="4" causality="input" start="0"/>
+        </ModelVariables><ModelStructure/></fmiModelDescription>"#;
+    let (description, calls) = (ModelDescription::parse(xml).unwrap(), Calls::default());
+    let mut system = System::default();
+    system.add("fmu", Box::new(Listener { description, calls: calls.clone() })).unwrap();
+    (system, calls)
+}
+
 /// A complete file.
 #[derive(serde::Deserialize, serde::Serialize)]
 struct Document {
