@@ -233,6 +233,12 @@ impl Package {
         &self.unpacked.description
     }
 
+    /// Returns what was accepted with a warning in the archive and the description.
+    pub fn warnings(&self) -> impl Iterator<Item = String> {
+        let description = self.unpacked.warnings.iter().map(ToString::to_string);
+        self.unpacked.archive_warnings.iter().cloned().chain(description)
+    }
+
     /// Starts a worker process and creates the instance `name` in it.
     ///
     /// # Errors

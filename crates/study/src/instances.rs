@@ -164,7 +164,12 @@ impl<'a> Opening<'a> {
         }
         let content = if isolate {
             let opened = isolate::Package::open(&element.fmu);
-            Content::Isolated(opened.map_err(|error| Error::from(error).within(&element.name))?)
+            let package = opened.map_err(|error| Error::from(error).within(&element.name))?;
+            // Those of an FMU in an SSP were logged when the SSP was opened.
+            for warning in package.warnings().filter(|_| element.shown.is_none()) {
+                tracing::warn!("{}: {warning}", element.fmu.display());
+            }
+            Content::Isolated(package)
         } else {
             Content::Loaded(open_fmu(element)?)
         };

@@ -225,7 +225,7 @@ impl Worker {
             (Some(options), Some(integrator)) => Some((integrator, (*options).to_owned())),
             (Some(_), None) => return Ok(Opening::Refused(NO_INTEGRATOR.to_owned())),
         };
-        let opened = Fmu::open_any(Path::new(OsStr::from_bytes(folder)));
+        let opened = Fmu::open_quietly(Path::new(OsStr::from_bytes(folder)));
         Ok(match opened {
             Ok(fmu) => self.create(Maker { fmu, integration }, name, *logging),
             Err(error) => Opening::Refused(with_causes(&error)),

@@ -117,10 +117,10 @@ fn a_resumed_run_gives_the_same_results() {
 }
 
 #[test]
-fn check_says_that_the_master_integrates_it() {
+fn check_tries_an_fmu_for_model_exchange() {
     let (_folder, path) = fmu();
     let (_, said, _) = output(&["check", &path]);
-    assert!(said.contains("model exchange only; `aso-ftc run` integrates it"), "{said}");
+    assert!(said.contains("runs in this master: yes, 10 steps of 0.1 s"), "{said}");
 }
 
 #[test]

@@ -31,7 +31,7 @@ fn write(folder: &Path, connections: &[(&str, &str)]) -> String {
         }
     }
     text += "[settings]\nthree.level = 9\nfour.level = 9\nthree.a = \"3 4\"\n[algorithm]\nmethod = \
-             \"jacobi\"\ncourse = \"hold\"\ncoupling = \"once\"\nstep = 0.125\n[experiment]\nstop-time \
+             \"jacobi\"\nextrapolation = \"hold\"\ncoupling = \"once\"\nstep = 0.125\n[experiment]\nstop-time \
              = 1\n";
     let path = folder.join("system.toml");
     fs::write(&path, text).unwrap();
