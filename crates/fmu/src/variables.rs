@@ -81,7 +81,7 @@ use crate::variable::Variable;
 /// #[derive(Clone, fmu::Variables)]
 /// struct Tank {
 ///     #[fmu(output)]
-///     level: u8,
+///     level: u128,
 /// }
 /// ```
 ///
