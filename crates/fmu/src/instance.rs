@@ -122,25 +122,28 @@ impl<M: Model> Instance<M> {
         guid: &str,
         callbacks: Callbacks,
     ) -> Result<Self, Failure> {
-        let mut expressible = Ok(());
-        let instance = Self::build(resources, callbacks, |_, description| {
-            expressible = expressible_in_2(description);
-            None
+        let instance = Self::build(resources, callbacks, |interface, description| {
+            expressible_in_2(description)?;
+            if interface_type == InterfaceType::ModelExchange && !interface.offers_exchange() {
+                let message =
+                    "fmuType is fmi2ModelExchange, and this FMU offers co-simulation only";
+                return Err(Failure::Error(message.to_owned()));
+            }
+            check_guid::<M>(interface.guid, "GUID", guid, resources)?;
+            Ok(None)
         })?;
-        expressible?;
-        if interface_type == InterfaceType::ModelExchange && !instance.offers_exchange() {
-            let message = "fmuType is fmi2ModelExchange, and this FMU offers co-simulation only";
-            return Err(Failure::Error(message.to_owned()));
-        }
-        instance.check_guid("GUID", guid, resources)?;
         Ok(instance.into_type(interface_type))
     }
 
-    /// Makes the model and its interface; `session` makes the part of FMI 3.0.
+    /// Makes the model and its interface. `session` makes the part of FMI 3.0, and refuses what the
+    /// importer may not ask for: inside of the fence, because the model is dropped then.
     fn build(
         resources: &Path,
         callbacks: Callbacks,
-        session: impl FnOnce(&mut Interface<M>, &ModelDescription) -> Option<Box<Session>>,
+        session: impl FnOnce(
+            &mut Interface<M>,
+            &ModelDescription,
+        ) -> Result<Option<Box<Session>>, Failure>,
     ) -> Result<Self, Failure> {
         // The guard outlives a panic of the model, during which it could not restore the hook.
         let hook_guard = HookGuard::new();
@@ -148,7 +151,7 @@ impl<M: Model> Instance<M> {
             let mut fresh = new_model::<M>(resources)?;
             let messages = fresh.log().map(Log::take).unwrap_or_default();
             let (mut interface, description) = Interface::new(&mut fresh)?;
-            let session = session(&mut interface, &description);
+            let session = session(&mut interface, &description)?;
             let tolerance = description.default_experiment.and_then(|own| own.tolerance);
             let stepper = Stepper::new(&interface, tolerance);
             let core = Core::new(fresh.clone(), InterfaceType::CoSimulation);
@@ -173,22 +176,6 @@ impl<M: Model> Instance<M> {
     fn into_type(mut self, interface_type: InterfaceType) -> Self {
         self.core.interface_type = interface_type;
         self
-    }
-
-    fn offers_exchange(&self) -> bool {
-        self.interface.event_indicators.is_some()
-    }
-
-    fn check_guid(&self, what: &str, guid: &str, resources: &Path) -> Result<(), Failure> {
-        let (name, own) = (M::IDENTIFIER, self.guid().to_string());
-        if guid == own {
-            return Ok(());
-        }
-        Err(Failure::Error(format!(
-            "the {what} is {guid}, but this library of {name} with the resources in {} describes itself \
-             with {own}",
-            resources.display()
-        )))
     }
 
     /// Runs one FMI call: checks the call order, runs `body` inside the panic fence, and converts a
@@ -415,6 +402,24 @@ impl<M: Model> Instance<M> {
     pub(crate) fn guid(&self) -> Guid {
         self.interface.guid
     }
+}
+
+/// Checks the GUID or the token that the importer read in the description.
+fn check_guid<M: Model>(
+    own: Guid,
+    what: &str,
+    guid: &str,
+    resources: &Path,
+) -> Result<(), Failure> {
+    let (name, own) = (M::IDENTIFIER, own.to_string());
+    if guid == own {
+        return Ok(());
+    }
+    Err(Failure::Error(format!(
+        "the {what} is {guid}, but this library of {name} with the resources in {} describes itself \
+         with {own}",
+        resources.display()
+    )))
 }
 
 /// Drops `value` inside the panic fence.

@@ -7,7 +7,7 @@ mod values;
 
 use std::path::Path;
 
-use super::Instance;
+use super::{Instance, check_guid};
 use crate::ffi::{Callbacks, IntermediateUpdate};
 use crate::interface::fmi3::{Dependency, Table, Type};
 use crate::model::{Event, Failure, Model};
@@ -49,6 +49,16 @@ impl<M: Model> Instance<M> {
     pub(crate) fn new_3(made: &Instantiation<'_>, callbacks: Callbacks) -> Result<Self, Failure> {
         let mut instance = Self::build(made.resources, callbacks, |interface, description| {
             let (table, _) = interface.convert(description);
+            if !interface.offers_exchange() {
+                if made.interface_type == InterfaceType::ModelExchange {
+                    return Err(Failure::Error("this FMU offers co-simulation only".to_owned()));
+                }
+                if made.event_mode_used {
+                    let message = "eventModeUsed is true, but hasEventMode of this FMU is false";
+                    return Err(Failure::Error(message.to_owned()));
+                }
+            }
+            check_guid::<M>(interface.guid, "instantiationToken", made.token, made.resources)?;
             let indicators = vec![0.0; interface.event_indicators.unwrap_or_default()];
             let wanted = |(update, required): (IntermediateUpdate, &[u32])| {
                 let sets = |name: &str| interface.interpolates(name);
@@ -56,7 +66,7 @@ impl<M: Model> Instance<M> {
                 is_set.then(|| Box::new(Intermediate::new(update, interface.interpolated.len())))
             };
             let intermediate = made.intermediate.and_then(wanted);
-            Some(Box::new(Session {
+            Ok(Some(Box::new(Session {
                 table,
                 event_mode_used: made.event_mode_used,
                 early_return_allowed: made.early_return_allowed,
@@ -65,18 +75,8 @@ impl<M: Model> Instance<M> {
                 integers: Vec::new(),
                 indicators,
                 binaries: Vec::new(),
-            }))
+            })))
         })?;
-        if !instance.offers_exchange() {
-            if made.interface_type == InterfaceType::ModelExchange {
-                return Err(Failure::Error("this FMU offers co-simulation only".to_owned()));
-            }
-            if made.event_mode_used {
-                let message = "eventModeUsed is true, but hasEventMode of this FMU is false";
-                return Err(Failure::Error(message.to_owned()));
-            }
-        }
-        instance.check_guid("instantiationToken", made.token, made.resources)?;
         instance.debug_logging = true;
         instance.categories = (!made.logging_on).then(Vec::new);
         Ok(instance.into_type(made.interface_type))

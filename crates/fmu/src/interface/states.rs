@@ -32,6 +32,11 @@ impl<M> Interface<M> {
 
 /// Inputs with derivatives, which `fmi2SetRealInputDerivatives` sets.
 impl<M> Interface<M> {
+    /// Whether the model offers model exchange.
+    pub(crate) fn offers_exchange(&self) -> bool {
+        self.event_indicators.is_some()
+    }
+
     /// Whether the variable called `name` is an input with derivatives.
     pub(crate) fn interpolates(&self, name: &str) -> bool {
         self.interpolated.iter().any(|&position| self.reals[position].name == name)
