@@ -6,6 +6,7 @@ mod licenses;
 #[cfg(feature = "sbom")]
 mod sbom;
 mod ssp;
+mod symbols;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -40,7 +41,8 @@ pub(crate) struct Options {
     #[arg(long, value_name = "FOLDER", default_value = "dist")]
     out: PathBuf,
     /// Versions of FMI: `2` writes MODEL.fmu of FMI 2.0, `3` writes MODEL.fmi3.fmu of FMI 3.0, `both`
-    /// writes both. All have the same library
+    /// writes both. The library is the same; on Linux the functions of the other version are
+    /// hidden in it, because some importers choose the version by the functions that they find
     #[arg(long, value_name = "VERSION", default_value = "2")]
     fmi: Versions,
     /// Also write the model descriptions of FMI 2.0 and 3.0 into the folder modelDescription of the
@@ -219,7 +221,8 @@ fn pack_version(
         Some(folder) => binaries::collect(folder, &description)?,
         None => vec![own_library(library, &description)?],
     };
-    for (path, bytes) in libraries {
+    for (path, mut bytes) in libraries {
+        symbols::hide_other_version(&mut bytes, version);
         package.add(binaries::path_in(version, path), bytes);
     }
     add_resources(&mut package, folder)?;
