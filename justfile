@@ -34,3 +34,7 @@ book:
 # FMUs and commands for every platform.
 cross:
     scripts/cross --test
+
+# The wheel of the Python package, tested in an environment of its own.
+wheel:
+    scripts/wheel --test

@@ -1,21 +1,25 @@
 //! `aso-ftc design`: designs a controller from a plant file; writes its report and its FMU.
 
+mod outputs;
+mod terminal;
+
+use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use design::Report;
-use files::whole::Pending;
+use outputs::{Outputs, check_distinct, check_own};
 
 #[derive(clap::Args)]
 pub(crate) struct Options {
     /// The plant file: plant, faults and requirements on the controller
     /// (docs/reference/plant-file.md)
     plant: PathBuf,
-    /// The design file to write; the report goes into the same folder
-    #[arg(long, value_name = "FILE", default_value = "design.toml")]
-    out: PathBuf,
-    /// The report to write [default: report.html in the folder of the design file]
+    /// The design file to write; the report goes into the same folder [default: NAME-design.toml for
+    /// the plant file NAME.toml]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// The report to write [default: NAME-report.html in the folder of the design file]
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
     /// Also make the controller FMU
@@ -24,58 +28,76 @@ pub(crate) struct Options {
     /// The packed controller FMU from which it is made
     #[arg(long, value_name = "FMU", default_value = "dist/AsoController.fmu", requires = "fmu")]
     from: PathBuf,
+    /// Also write the worst plant within the tolerances, as a plant file
+    #[arg(long, value_name = "FILE")]
+    worst_case: Option<PathBuf>,
+    /// Overwrite files that another design, or another program, has written
+    #[arg(long)]
+    force: bool,
     /// Print the numbers of the report as JSON
     #[arg(long)]
     json: bool,
 }
 
-/// Designs the controller and writes the requested files; returns whether all checks hold.
+/// Designs the controller and writes the requested files, all or none; returns whether all checks
+/// hold and the verdict is not red.
 pub(crate) fn design(options: &Options) -> anyhow::Result<bool> {
+    let (out, report) = names(options);
+    let mut outputs: Vec<(&str, &Path)> = vec![("--out", &out), ("--report", &report)];
+    outputs.extend(options.fmu.as_deref().map(|path| ("--fmu", path)));
+    outputs.extend(options.worst_case.as_deref().map(|path| ("--worst-case", path)));
+    check_distinct(&inputs(options, None), &outputs)?;
     let mut made = design::design(&options.plant)?;
+    check_distinct(&inputs(options, made.model.as_deref()), &outputs)?;
+    if !options.force {
+        outputs.iter().try_for_each(|(_, path)| check_own(path, &made.identity))?;
+    }
     let fmu = options.fmu.is_some().then(|| made.fmu(&options.from)).transpose()?;
     let page = made.page();
-    let beside = options.out.parent().unwrap_or(Path::new("")).join("report.html");
-    let page_path = options.report.clone().unwrap_or(beside);
-    let mut written = vec![&options.out, &page_path];
-    let files = [(&options.out, &made.file), (&page_path, &page)];
-    let pending = files
-        .into_iter()
-        .map(|(path, text)| Pending::new(path, text.as_bytes()).with_context(|| unwritten(path)))
-        .collect::<anyhow::Result<Vec<_>>>()?;
+    let mut staged = Outputs::default();
+    staged.stage(&out, |path| fs::write(path, &made.file))?;
+    staged.stage(&report, |path| fs::write(path, &page))?;
     if let (Some(fmu), Some(path)) = (fmu, &options.fmu) {
-        fmu.write(path, &page)?;
-        written.push(path);
+        staged.stage(path, |path| fmu.write(path, &page))?;
     }
-    for (file, (path, _)) in pending.into_iter().zip(files) {
-        file.commit().with_context(|| unwritten(path))?;
+    if let Some(path) = &options.worst_case {
+        let text = made.worst_case.as_ref();
+        let text = text.context(
+            "no worst case can be written: the loop is not stable, or a fault enters measurements by \
+             an input of the plant's FMU",
+        )?;
+        staged.stage(path, |path| fs::write(path, text))?;
     }
+    staged.commit()?;
     if options.json {
         let mut output = std::io::stdout().lock();
         serde_json::to_writer_pretty(&mut output, &made.report)
             .context("cannot print the report")?;
         writeln!(output)?;
     } else {
-        summarise(&made.report);
-        for path in written {
+        terminal::summarise(&made.report);
+        for (_, path) in outputs {
             println!("{}", path.display());
         }
     }
     Ok(made.holds())
 }
 
-fn unwritten(path: &Path) -> String {
-    format!("cannot write {}", path.display())
+/// The paths of design and report.
+fn names(options: &Options) -> (PathBuf, PathBuf) {
+    let stem = options.plant.file_stem().unwrap_or_default().to_string_lossy();
+    let out = options.out.clone().unwrap_or_else(|| format!("{stem}-design.toml").into());
+    let beside = || out.parent().unwrap_or(Path::new("")).join(format!("{stem}-report.html"));
+    let report = options.report.clone().unwrap_or_else(beside);
+    (out, report)
 }
 
-/// Prints the main results.
-fn summarise(report: &Report) {
-    for own in [&report.feedback, &report.observer] {
-        println!("{}: {}", own.matrix, own.method);
-        if let Some(condition) = own.condition {
-            println!("    condition of the eigenvectors {condition:.3e}");
-        }
+/// The files that the command reads.
+fn inputs<'a>(options: &'a Options, model: Option<&'a Path>) -> Vec<(&'a str, &'a Path)> {
+    let mut all: Vec<(&str, &Path)> = vec![("the plant file", &options.plant)];
+    if options.fmu.is_some() {
+        all.push(("--from", &options.from));
     }
-    for check in report.checks.iter().filter(|check| !check.holds) {
-        println!("does not hold: {} ({})", check.condition, check.explanation);
-    }
+    all.extend(model.map(|path| ("the plant's FMU", path)));
+    all
 }

@@ -48,7 +48,7 @@ enum Command {
     Run(Box<run::Options>),
     /// Design observer and feedback for the plant of a plant file
     Design(design::Options),
-    /// Check the model description of an FMU against the rules of FMI 2.0.5
+    /// Check an FMU against the rules of its version of FMI, and try it
     Check(check::Options),
 }
 

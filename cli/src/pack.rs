@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use fmu_description::documentation::page;
 use fmu_description::package::Package;
-use fmu_description::{ModelDescription, Version};
+use fmu_description::{ModelDescription, Version, terminals};
 
 use figure::rasterise;
 
@@ -228,6 +228,9 @@ fn pack_version(
     add_resources(&mut package, folder)?;
     add_documentation(&mut package, folder, &description)?;
     add_picture(&mut package, folder, version)?;
+    if version == Version::V3 {
+        package.add(terminals::PATH, terminals::render(&description));
+    }
     licenses::add(&mut package, library)?;
     let path = packing.out.join(format!("{}.fmu", file_stem(&description)));
     package.write(&path)?;

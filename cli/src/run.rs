@@ -60,6 +60,7 @@ fn prepare(options: &Options) -> anyhow::Result<Option<Started>> {
         logging: options.verbose > 0,
         by_unit: options.names_fmus_by_file(),
         log_calls: log_calls.as_ref(),
+        ..Default::default()
     };
     let by_name = loaded.config.connections.is_none() && loaded.config.system.is_none();
     let prepared = PreparedRun::new(loaded, &making)?;

@@ -25,6 +25,7 @@ const HYSTERESIS: f64 = 1e-9;
 ///
 /// Fields without a comment have the name of their FMI variable.
 #[derive(Clone, Serialize, Deserialize)]
+#[expect(clippy::struct_excessive_bools, reason = "facts that are independent")]
 pub(crate) struct AsoController {
     /// Copied where a parameter is changed, not with an FMU state.
     pub(crate) design: Shared<Design>,
@@ -52,6 +53,8 @@ pub(crate) struct AsoController {
     frozen: bool,
     /// `None` for a continuous controller.
     sampler: Option<Sampler>,
+    /// Whether the clock of the samples ticks. The samples follow from time, and so does the clock.
+    pub(crate) sample_clock: bool,
     /// Derived from `design` in the first step, also after a state was read from bytes.
     #[serde(skip)]
     observer: Option<Observer>,
@@ -221,6 +224,7 @@ impl Model for AsoController {
             mode: Mode::default(),
             frozen: false,
             sampler: Sampler::new(&design),
+            sample_clock: false,
             observer: None,
             values,
             operating_point,
@@ -271,6 +275,16 @@ impl Model for AsoController {
             return self.sample(step.start, step.end());
         }
         self.integrate(step)
+    }
+
+    /// The samples of a sampled controller are events. Those that no event has taken are taken at the start
+    /// of the next step.
+    fn step_to_event(&mut self, step: &Step) -> Result<Option<f64>, Failure> {
+        if self.sampler.is_none() {
+            return self.integrate(step).map(|()| None);
+        }
+        self.sample(step.start, step.start)?;
+        Ok(self.sampler.as_ref().and_then(|sampler| sampler.next_until(step.end())))
     }
 
     fn update(&mut self, _time: f64) -> Result<(), Failure> {

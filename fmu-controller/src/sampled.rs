@@ -73,6 +73,12 @@ impl Sampler {
         self.start + self.next * self.period
     }
 
+    /// The instant in s of the next sample, if it is due until `end`; at most `end`.
+    pub(crate) fn next_until(&self, end: f64) -> Option<f64> {
+        let next = self.next_instant();
+        (next <= end + TOLERANCE * self.period).then_some(next.min(end))
+    }
+
     /// The time in s from `start` to the next sample, if it is due until `end`.
     pub(crate) fn time_to_sample(&self, start: f64, end: f64) -> Option<f64> {
         let elapsed = self.next * self.period;

@@ -22,7 +22,19 @@ pub(crate) fn list(controller: &AsoController) -> Vec<Variable<AsoController>> {
         all.extend(slopes(design));
     }
     all.extend(parameters::of(design));
+    all.extend(sample_clock(design));
     all
+}
+
+/// The clock of a sampled controller, which FMI 2.0 does not have.
+fn sample_clock(design: &Design) -> Option<Variable<AsoController>> {
+    let text = "Clock of the samples";
+    let clock = |period| {
+        Variable::periodic_clock("sample_clock", text, period, |model: &mut AsoController| {
+            &mut model.sample_clock
+        })
+    };
+    design.sample_time.map(clock)
 }
 
 fn with_unit(variable: Variable<AsoController>, unit: Option<&String>) -> Variable<AsoController> {

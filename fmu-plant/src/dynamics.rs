@@ -41,6 +41,11 @@ impl Force {
         self.slope + (time - self.start) * self.curvature
     }
 
+    /// Whether the force does not change.
+    pub(crate) fn is_constant(&self) -> bool {
+        self.slope == 0.0 && self.curvature == 0.0
+    }
+
     /// No coefficient is infinite or not a number.
     #[must_use]
     pub fn is_finite(&self) -> bool {

@@ -99,8 +99,43 @@ pub struct Motion {
     state: State,
     regime: Regime,
     suggested_step: f64,
+    /// Whether [`Motion::advance`] integrates the motion, and no importer does.
+    advances: bool,
+    /// The interval that an event has interrupted.
+    interrupted: Option<Interrupted>,
     #[serde(skip)]
     memory: Memory,
+}
+
+/// An interval of the motion; times in s.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Interval {
+    start: f64,
+    duration: f64,
+    /// The part that is done.
+    elapsed: f64,
+}
+
+impl Interval {
+    /// The time reached.
+    fn time(&self) -> f64 {
+        self.start + self.elapsed
+    }
+
+    /// Whether `rest` is the rest of this interval. Its end may differ by rounding.
+    fn ends_with(&self, rest: &Self) -> bool {
+        let (end, other) = (self.start + self.duration, rest.start + rest.duration);
+        self.time().to_bits() == rest.start.to_bits()
+            && (end - other).abs() <= 4.0 * f64::EPSILON * end.abs()
+    }
+}
+
+/// An interval that ended at an event, under a constant force in N.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Interrupted {
+    interval: Interval,
+    force: f64,
+    parameters: Parameters,
 }
 
 impl Default for Motion {
@@ -110,6 +145,8 @@ impl Default for Motion {
             state: [0.0; 4],
             regime: Regime::Stick,
             suggested_step: FIRST_STEP,
+            advances: false,
+            interrupted: None,
             memory: Memory::default(),
         }
     }
@@ -177,33 +214,81 @@ impl Motion {
         duration: f64,
         tolerance: &Tolerance,
     ) -> Result<(), Failure> {
+        self.advance_until(parameters, force, start, duration, tolerance, false).map(|_| ())
+    }
+
+    /// Same as [`Motion::advance`], but stops at the first stop or break-away. Returns its time in s; `None`
+    /// at the end of the interval.
+    ///
+    /// If the next interval is the rest of this one under the same constant force, the motion has the same
+    /// bits as without the stop.
+    ///
+    /// # Errors
+    /// Same as [`Motion::advance`].
+    pub fn advance_to_event(
+        &mut self,
+        parameters: &Parameters,
+        force: &Force,
+        start: f64,
+        duration: f64,
+        tolerance: &Tolerance,
+    ) -> Result<Option<f64>, Failure> {
+        self.advance_until(parameters, force, start, duration, tolerance, true)
+    }
+
+    fn advance_until(
+        &mut self,
+        parameters: &Parameters,
+        force: &Force,
+        start: f64,
+        duration: f64,
+        tolerance: &Tolerance,
+        stops: bool,
+    ) -> Result<Option<f64>, Failure> {
         if !(start.is_finite() && (0.0..f64::INFINITY).contains(&duration)) {
             return Err(Failure::Interval { start, duration });
         }
         if !force.is_finite() {
             return Err(Failure::NotFinite { time: start });
         }
+        let whole = Interval { start, duration, elapsed: 0.0 };
+        let continued = self.interrupted.take().filter(|own| {
+            let alike = force.is_constant() && own.force.to_bits() == force.value.to_bits();
+            alike && own.parameters == *parameters && own.interval.ends_with(&whole)
+        });
+        let mut interval = continued.as_ref().map_or(whole, |own| own.interval);
         let memory = std::mem::take(&mut self.memory);
-        let plant = Plant::new(parameters, force.seen_from(start), &memory);
-        let done = self.integrate(&plant, start, duration, tolerance);
+        let plant = Plant::new(parameters, force.seen_from(interval.start), &memory);
+        if continued.is_none() {
+            self.regime = plant.regime(0.0, &self.state);
+        }
+        self.advances = true;
+        let done = self.integrate(&plant, &mut interval, tolerance, stops);
         self.memory = memory;
-        done
+        if !done? {
+            return Ok(None);
+        }
+        let (force, constant) = (force.value, force.is_constant());
+        self.interrupted =
+            constant.then(|| Interrupted { interval, force, parameters: parameters.clone() });
+        Ok(Some(interval.time()))
     }
 
-    /// Integrates the motion of `plant` for `duration` s. Failures state times from `start` on.
+    /// Integrates the motion of `plant` to the end of the interval or, if it `stops` there, to the first
+    /// event at a later time. Returns whether it has stopped at an event.
     fn integrate(
         &mut self,
         plant: &Plant<'_>,
-        start: f64,
-        duration: f64,
+        interval: &mut Interval,
         tolerance: &Tolerance,
-    ) -> Result<(), Failure> {
-        let mut elapsed = 0.0;
+        stops: bool,
+    ) -> Result<bool, Failure> {
+        let Interval { start, duration, mut elapsed } = *interval;
+        let from = interval.time();
         let mut events = 0;
-        self.regime = plant.regime(elapsed, &self.state);
         for _ in 0..STEP_LIMIT {
             if elapsed >= duration {
-                return Ok(());
+                return Ok(false);
             }
             let time = start + elapsed;
             match self.take_step(plant, elapsed, duration - elapsed, tolerance) {
@@ -211,6 +296,10 @@ impl Motion {
                 Progress::Advanced(length) => elapsed += length,
                 Progress::Event(length) => {
                     elapsed += length;
+                    if stops && start + elapsed > from {
+                        interval.elapsed = elapsed;
+                        return Ok(true);
+                    }
                     events += 1;
                     if events > EVENT_LIMIT {
                         return Err(Failure::TooManyEvents { time: start + elapsed });

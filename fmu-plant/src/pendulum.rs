@@ -147,6 +147,23 @@ impl Model for FrictionPendulum {
         done.map_err(|failure| Failure::Incomplete { time: reached, message: failure.to_string() })
     }
 
+    fn step_to_event(&mut self, step: &Step) -> Result<Option<f64>, Failure> {
+        let force = force(self, step.start);
+        let Self { motion, parameters, tolerance, .. } = self;
+        let done = motion.advance_to_event(parameters, &force, step.start, step.size, tolerance);
+        let event = done.map_err(|failure| {
+            let (time, message) = (failure.time(), failure.to_string());
+            Failure::Incomplete { time, message }
+        });
+        let reached = match &event {
+            Ok(event) => event.unwrap_or(step.end()).min(step.end()),
+            Err(Failure::Incomplete { time, .. }) => *time,
+            Err(_) => step.start,
+        };
+        self.update_outputs(&force, reached);
+        Ok(event?.map(|_| reached))
+    }
+
     fn update(&mut self, time: f64) -> Result<(), Failure> {
         self.update_outputs(&force(self, time), time);
         Ok(())

@@ -24,6 +24,7 @@ targets! {
     model_description: exporter::model_description;
     package: exporter::package;
     call_sequence: exporter::call_sequence;
+    call_sequence_3: robustness::sequence3::run;
     design_file: design::design_file;
     system_structure: system_files::system_structure;
     parameter_values: system_files::parameter_values;

@@ -39,10 +39,11 @@ class Designed:
     def __init__(self, aso_ftc, plant_file, folder):
         self.folder, self.fmu = Path(folder), Path(folder) / "Designed.fmu"
         file = self.folder / "design.toml"
-        wanted = ("--out", file, "--fmu", self.fmu, "--json")
+        wanted = ("--out", file, "--report", self.folder / "report.html", "--fmu", self.fmu, "--json")
         done = aso_ftc("design", ROOT / plant_file, *wanted)
-        assert done.returncode == 0, done.stderr
+        assert done.returncode in (0, 1), done.stderr
         self.report = json.loads(done.stdout)
+        assert done.returncode == (self.report["verdict"]["level"] == "red")
         self.design = tomllib.loads(file.read_text(encoding="utf-8"))
         self.page = (self.folder / "report.html").read_text(encoding="utf-8")
 

@@ -1,6 +1,7 @@
 """Bad input of `aso-ftc design`: exit status 2, one message with a position in the file."""
 
 import re
+import subprocess
 import tomllib
 import zipfile
 
@@ -223,7 +224,7 @@ def test_an_old_output_survives_a_refusal(aso_ftc, tmp_path):
     arguments = (tmp_path / "plant.toml", *outputs)
     (tmp_path / "plant.toml").write_text(MASS, encoding="utf-8")
     assert aso_ftc("design", *arguments).returncode == 0
-    files = ["design.toml", "report.html", "M.fmu"]
+    files = ["design.toml", "plant-report.html", "M.fmu"]
     before = [(tmp_path / name).read_bytes() for name in files]
     (tmp_path / "plant.toml").write_text(MASS.replace("[[1, 0]]", "[[0, 1]]"), encoding="utf-8")
     assert aso_ftc("design", *arguments).returncode == 2
@@ -236,6 +237,61 @@ def test_the_files_are_the_same_every_time(aso_ftc, tmp_path):
     for folder in (tmp_path / "first", tmp_path / "second"):
         arguments = ("--out", folder / "design.toml", "--fmu", folder / "Mine.fmu")
         done = aso_ftc("design", ROOT / "fmu-controller" / "pendulum.toml", *arguments)
-        assert done.returncode == 0, done.stderr
+        assert done.returncode == 1 and "verdict: red" in done.stdout, done.stderr
         made.append([path.read_bytes() for path in sorted(folder.iterdir())])
     assert len(made[0]) == 3 and made[0] == made[1]
+
+
+def test_no_output_is_an_input_by_path_link_or_case(aso_ftc, tmp_path):
+    file, packed, linked = (tmp_path / name for name in ("plant.toml", "Packed.fmu", "link.toml"))
+    file.write_text(MASS, encoding="utf-8")
+    packed.write_bytes((ROOT / "dist" / "AsoController.fmu").read_bytes())
+    linked.symlink_to(file)
+    (tmp_path / "hard.toml").hardlink_to(file)
+    (tmp_path / "inner").mkdir()
+    before = {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
+    for name in ("plant.toml", "inner/../plant.toml", "link.toml", "hard.toml", "PLANT.toml"):
+        for option in ("--out", "--report", "--fmu", "--worst-case"):
+            done = aso_ftc("design", file, "--force", option, tmp_path / name)
+            assert done.returncode == 2 and "would overwrite the plant file" in done.stderr, done
+    done = aso_ftc("design", file, "--fmu", packed, "--from", packed, "--force")
+    assert done.returncode == 2 and "would overwrite --from" in done.stderr
+    done = aso_ftc("design", file, "--out", tmp_path / "one", "--report", tmp_path / "inner" / ".." / "one")
+    assert done.returncode == 2 and "--out and --report name the same file" in done.stderr
+    assert {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == before
+
+
+def test_files_of_another_design_are_overwritten_by_force_only(aso_ftc, tmp_path):
+    (tmp_path / "plant.toml").write_text(MASS, encoding="utf-8")
+    (tmp_path / "other.toml").write_text(MASS, encoding="utf-8")
+    outputs = ("--out", tmp_path / "d.toml", "--report", tmp_path / "r.html", "--fmu", tmp_path / "M.fmu")
+    outputs += ("--worst-case", tmp_path / "w.toml")
+    written = lambda: {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert aso_ftc("design", tmp_path / "plant.toml", *outputs).returncode == 0
+    first = written()
+    assert aso_ftc("design", tmp_path / "plant.toml", *outputs).returncode == 0
+    assert written() == first
+    for name, option in (("d.toml", "--out"), ("r.html", "--report"), ("M.fmu", "--fmu"), ("w.toml", "--worst-case")):
+        done = aso_ftc("design", tmp_path / "other.toml", option, tmp_path / name)
+        assert done.returncode == 2 and f"{name} exists and was not written by" in done.stderr, done
+        assert written() == first
+    assert aso_ftc("design", tmp_path / "other.toml", *outputs, "--force").returncode == 0
+    assert written() != first and set(written()) == set(first)
+
+
+def test_outputs_are_named_after_the_plant_file(aso_ftc, tmp_path):
+    (tmp_path / "mass.toml").write_text(MASS, encoding="utf-8")
+    assert aso_ftc("design", tmp_path / "mass.toml", "--out", tmp_path / "d.toml").returncode == 0
+    assert {path.name for path in tmp_path.iterdir()} == {"mass.toml", "d.toml", "mass-report.html"}
+    command = [ROOT / "target" / "release" / "aso-ftc", "design", "mass.toml"]
+    assert subprocess.run(command, cwd=tmp_path, capture_output=True, check=False).returncode == 0
+    assert (tmp_path / "mass-design.toml").read_bytes() == (tmp_path / "d.toml").read_bytes()
+
+
+def test_the_worst_case_is_a_plant_file(aso_ftc, tmp_path):
+    (tmp_path / "plant.toml").write_text(MASS.replace("[0], [1]", "[0], [2]"), encoding="utf-8")
+    done = aso_ftc("design", tmp_path / "plant.toml", "--worst-case", tmp_path / "w.toml", "--out", tmp_path / "d.toml")
+    assert done.returncode == 0, done.stderr
+    worst = tomllib.loads((tmp_path / "w.toml").read_text(encoding="utf-8"))
+    assert worst["A"] == [[0, 1], [0, 0]] and abs(worst["B"][1][0] - 2) == pytest.approx(0.2)
+    assert aso_ftc("design", tmp_path / "w.toml", "--out", tmp_path / "again.toml").returncode == 0

@@ -1,10 +1,12 @@
 """The FMUs of FMI 3.0, run by FMPy, beside those of FMI 2.0 from the same library."""
 
 import re
+import zipfile
 from pathlib import Path
 
 import fmpy
 import pytest
+from lxml import etree
 from fmpy.validation import validate_fmu
 
 from c_abi import STANDARD_FUNCTIONS
@@ -66,6 +68,34 @@ def test_the_ball_returns_early_at_its_bounces_and_rises_as_high(archives):
     whole = simulate(path, "CoSimulation")
     height = whole.dtype.names[1]
     assert abs(stops[height][-1] - whole[height][-1]) < 1e-6
+
+
+def test_the_plant_returns_early_where_the_cart_stops_or_breaks_away_and_moves_as_without_events(archives):
+    path = archives["FrictionPendulum"][1]
+    start = {"v_p_0": 0.8, "theta_0": 0.02}
+    output = ["x_p", "v_p", "omega", "regime"]
+    whole = simulate(path, "CoSimulation", start_values=start, output=output)
+    stops = simulate(
+        path, "CoSimulation", start_values=start, output=output, use_event_mode=True, early_return_allowed=True
+    )
+    grid = {float(time) for time in whole["time"]}
+    events = [row for row in stops if float(row["time"]) not in grid]
+    assert len(events) >= 2
+    assert all(row["v_p"] == 0.0 for row in events)
+    last = {float(row["time"]): row for row in stops}
+    assert all(last[float(row["time"])].tobytes() == row.tobytes() for row in whole)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_terminal_is_valid_and_has_all_inputs_and_outputs(archives, model):
+    path = archives[model][1]
+    schema = Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3TerminalsAndIcons.xsd"
+    with zipfile.ZipFile(path) as archive:
+        file = etree.fromstring(archive.read("terminalsAndIcons/terminalsAndIcons.xml"))
+    etree.XMLSchema(etree.parse(schema)).assertValid(file)
+    members = {own.get("variableName") for own in file.iter("TerminalMemberVariable")}
+    variables = fmpy.read_model_description(str(path)).modelVariables
+    assert members == {own.name for own in variables if own.causality in ("input", "output")}
 
 
 def test_the_library_defines_every_function_of_the_header(archives):

@@ -46,6 +46,8 @@ RUN = {
 }
 SUFFIX = {"linux64": "so", "win64": "dll", "darwin64": "dylib", "aarch64-linux": "so"}
 SUFFIX["aarch64-darwin"] = "dylib"
+# The names of platforms in FMI 3.0.
+TUPLES = {"linux64": "x86_64-linux", "win64": "x86_64-windows", "darwin64": "x86_64-darwin"}
 # Libraries that every Windows 10 has.
 WINDOWS = {"kernel32.dll", "ntdll.dll", "msvcrt.dll", "bcryptprimitives.dll"}
 WINDOWS |= {"api-ms-win-core-synch-l1-2-0.dll"}
@@ -103,7 +105,24 @@ def words(fmu, library, folder, windows):
     reference = {v.name: str(v.valueReference) for v in description.modelVariables}
     drive = "Z:" if windows else ""
     uri = f"file:///{drive}{folder / 'resources'}".replace("////", "///")
+    if description.fmiVersion == "3.0":
+        uri = f"{drive}{folder / 'resources'}/"
     return [f"{drive}{library}", description.guid, uri, *(reference[name] for name in CONNECTED)]
+
+
+def of_fmi_3(fmu):
+    """The FMU of FMI 3.0 beside one of FMI 2.0."""
+    return fmu.with_suffix(".fmi3.fmu")
+
+
+def compiled(where, source, folder):
+    """A program in C for a platform."""
+    platform, compiler, _ = RUN[where]
+    windows = platform == "win64"
+    program = folder / f"{source.stem}{'.exe' if windows else ''}"
+    options = ["-std=c11", "-O2", "-Wall", "-Wextra", "-Werror", "-o", program, source]
+    subprocess.run([*compiler, *options, *([] if windows else ["-ldl"])], check=True)
+    return program
 
 
 @pytest.fixture(scope="session")
@@ -113,14 +132,10 @@ def hosted(fmus, root, tmp_path_factory, request):
 
     def run(where):
         if where not in printed:
-            platform, compiler, runner = RUN[where]
+            platform, _, runner = RUN[where]
             folder = tmp_path_factory.mktemp(platform)
             windows = platform == "win64"
-            program = folder / ("host.exe" if windows else "host")
-            source = root / "tests" / "platforms" / "host.c"
-            options = ["-std=c11", "-O2", "-Wall", "-Wextra", "-Werror", "-o", program, source]
-            libraries = [] if windows else ["-ldl"]
-            subprocess.run([*compiler, *options, *libraries], check=True)
+            program = compiled(where, root / "tests" / "platforms" / "host.c", folder)
             arguments = [str(STEPS)]
             for role, fmu in fmus.items():
                 name = binary(fmus, role, platform)
@@ -158,6 +173,35 @@ def test_the_closed_loop_has_the_bits_of_the_fmus_for_this_machine(
     lines = lambda text: [line for line in text.splitlines() if line.startswith("step ")]
     assert len(lines(hosted(where))) == 10
     assert lines(hosted(where)) == lines(native(packed, unpacked, root))
+
+
+@pytest.mark.parametrize("where", RUN)
+def test_the_closed_loop_of_fmi_3_has_the_bits_of_fmi_2(fmus, hosted, where, root, tmp_path, request):
+    skip_unless_built(fmus, where)
+    platform, _, runner = RUN[where]
+    windows = platform == "win64"
+    arguments = [str(STEPS)]
+    for role, fmu in fmus.items():
+        folder = tmp_path / role
+        zipfile.ZipFile(of_fmi_3(fmu)).extractall(folder)
+        library = folder / "binaries" / TUPLES.get(platform, platform) / f"{MODELS[role]}.{SUFFIX[platform]}"
+        arguments += words(of_fmi_3(fmu), library, folder, windows)
+    environment = request.getfixturevalue("wine") if windows else None
+    command = [*runner, compiled(where, root / "tests" / "platforms" / "loop3.c", tmp_path), *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment)
+    lines = done.stdout.replace("\r\n", "\n").splitlines()
+    assert done.returncode == 0 and lines[-1] == "done", f"{where}: {done.stdout}\n{done.stderr}"
+    assert lines[:-1] == [line for line in hosted(where).splitlines() if line.startswith("step ")]
+
+
+@pytest.mark.parametrize("role", MODELS)
+def test_the_archives_of_both_versions_have_the_same_platforms(fmus, role):
+    """Their names differ, and darwin64 of FMI 2.0 has both machines."""
+    platforms = [
+        {name.split("/")[1] for name in zipfile.ZipFile(fmu).namelist() if name.startswith("binaries/")}
+        for fmu in (fmus[role], of_fmi_3(fmus[role]))
+    ]
+    assert {TUPLES.get(name, name) for name in platforms[0]} == platforms[1]
 
 
 def native(packed, unpacked, root):
@@ -328,7 +372,7 @@ def test_the_signature_for_arm_macs_has_the_hash_of_each_page(fmus, role, platfo
 def test_checksums_and_bills_of_materials_match_the_fmus(fmus):
     folder = fmus["plant"].parent
     done = subprocess.run(["sha256sum", "--check", "SHA256SUMS"], cwd=folder, capture_output=True)
-    assert done.returncode == 0 and done.stdout.count(b": OK") == 5
+    assert done.returncode == 0 and done.stdout.count(b": OK") == 9
     for fmu in fmus.values():
         text = fmu.with_suffix(".cdx.json").read_text(encoding="utf-8")
         assert JsonStrictValidator(SchemaVersion.V1_5).validate_str(text) is None

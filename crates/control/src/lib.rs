@@ -10,6 +10,7 @@
 //! | test which faults can be estimated | [`detectability`] |
 //! | controllability, observability, distance from losing them, zeros | [`rank`], [`distance`], [`zeros`] |
 //! | norms, step and frequency responses, the effect of faults | [`response`] |
+//! | margins of a loop: sensitivity, disk, gain, phase, delay, hold time, parameter tolerances | [`robustness`] |
 //! | bound of the estimation error with a proof | [`theorem1`] |
 //! | linear matrix inequalities (feature `lmi`) | `lmi` |
 //! | the controller as one system, the closed loop, its stability | [`controller`], [`stability`] |
@@ -45,6 +46,7 @@ mod product;
 pub mod rank;
 pub mod response;
 pub mod riccati;
+pub mod robustness;
 pub mod sampled;
 pub mod stability;
 mod state_space;

@@ -29,6 +29,7 @@ mod transient;
 pub use energy::{Energy, energy};
 pub use fault::{FaultBounds, Reversal, fault_bounds, reversal};
 pub use fault_loop::{fault_rate_system, fault_system};
+pub(crate) use frequency::Transfer;
 pub use frequency::{FrequencyPoint, frequency_grid, frequency_response};
 pub use h_infinity::{HInfinity, h_infinity};
 pub use peak_gain::{Bracket, peak_gain};

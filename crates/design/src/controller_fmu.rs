@@ -7,7 +7,8 @@ use std::path::Path;
 use fmu_description::ModelDescription;
 use fmu_description::documentation::{FRAGMENT, page};
 use fmu_description::package::{Package, Unpacked};
-use fmu_import::described;
+use fmu_description::terminals;
+use fmu_import::described_as;
 
 use crate::Error;
 
@@ -44,8 +45,8 @@ impl ControllerFmu {
         let identifier = unpacked.description.co_simulation.as_ref();
         let identifier = identifier.map(|interface| interface.model_identifier.clone());
         let library = unpacked.library(&identifier.unwrap_or_default())?;
-        let (xml, description) =
-            described(&library, &unpacked.resources(), &base.display().to_string())?;
+        let (name, version) = (base.display().to_string(), unpacked.description.version());
+        let (xml, description) = described_as(&library, &unpacked.resources(), &name, version)?;
         let mut package = Package::new(xml);
         let documentation = unpacked.folder().join("documentation");
         let fragment = fs::read_to_string(documentation.join(FRAGMENT)).unwrap_or_default();
@@ -54,6 +55,11 @@ impl ControllerFmu {
         let plant = documentation.join("plant.toml");
         fs::write(&plant, content.plant).map_err(Error::file("write", &plant))?;
         let folder = unpacked.folder();
+        let described = folder.join(terminals::PATH);
+        if described.is_file() {
+            fs::write(&described, terminals::render(&description))
+                .map_err(Error::file("write", &described))?;
+        }
         for entry in fs::read_dir(folder).map_err(Error::file("read", folder))? {
             let path = entry.map_err(Error::file("read", folder))?.path();
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();

@@ -177,7 +177,7 @@ impl DesignFile<'_> {
         };
         let (tables, scalars): (toml::Table, toml::Table) =
             all.into_iter().partition(|(_, value)| is_table(value));
-        let mut text = "# Written by aso-ftc design.\n\n".to_owned();
+        let mut text = String::new();
         text += &toml::to_string(&scalars).map_err(unwritable)?;
         for (name, matrix) in matrices {
             text.extend(["\n", name, " = [\n"]);

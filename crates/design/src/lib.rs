@@ -16,6 +16,7 @@ mod design_file;
 mod designed;
 mod error;
 mod gains;
+mod identity;
 mod linear_plant;
 mod matrix;
 mod page;
@@ -23,17 +24,22 @@ mod plant_file;
 pub mod report;
 mod reporting;
 mod requirements;
+pub mod robust_report;
+mod robustness;
+mod robustness_limits;
 mod signals;
 #[cfg(test)]
 mod tests;
+mod worst_case;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use files::{Source, Table};
 
 pub use controller_fmu::ControllerFmu;
 pub use error::Error;
 pub use report::Report;
+pub use robust_report::Level;
 
 use controller_fmu::Content;
 use designed::ControllerDesign;
@@ -45,6 +51,14 @@ pub struct Design {
     pub file: String,
     /// The numbers of the report.
     pub report: Report,
+    /// The text that every file of this design contains: the plant file's name and a number from
+    /// the names of its signals.
+    pub identity: String,
+    /// A plant file with the worst plant that was found within the tolerances; none if the loop is
+    /// not stable, or if a plant file cannot state the faults of the plant's FMU.
+    pub worst_case: Option<String>,
+    /// The FMU of the plant, if the plant file names one.
+    pub model: Option<PathBuf>,
     /// The plant file.
     plant: String,
 }
@@ -57,8 +71,22 @@ pub struct Design {
 /// cannot be told apart, or no gain meets the requirements.
 pub fn design(path: &Path) -> Result<Design, Error> {
     let source = Source::read(path).map_err(Error::file("read", path))?;
+    design_source(&source)
+}
+
+/// Designs the controller that `text`, the content of a plant file, asks for. `path` appears in errors;
+/// relative paths of the text start in its folder.
+///
+/// # Errors
+///
+/// Same as [`design()`].
+pub fn design_text(path: &Path, text: String) -> Result<Design, Error> {
+    design_source(&Source::new(path, text))
+}
+
+fn design_source(source: &Source) -> Result<Design, Error> {
     let parsed = source.parse()?;
-    let file = PlantFile::read(&source, &Table::whole(&source, &parsed))?;
+    let file = PlantFile::read(source, &Table::whole(source, &parsed))?;
     let designed = designed::design(&file)?;
     let description = description(&file, &designed);
     let text = designed.file(&file, &description)?;
@@ -66,7 +94,17 @@ pub fn design(path: &Path) -> Result<Design, Error> {
         let what = format!("the design for {} cannot be examined", file.name());
         Error::from(error).within(what)
     })?;
-    Ok(Design { file: text, report, plant: source.text().to_owned() })
+    let identity = identity::identity(&report);
+    let worst_case = worst_case::plant_file(&file, &designed, &report)?;
+    let text = format!("{}\n{text}", identity::heading(&identity, &report.verdict));
+    Ok(Design {
+        file: text,
+        report,
+        identity,
+        worst_case,
+        plant: source.text().to_owned(),
+        model: file.fmu().map(Path::to_owned),
+    })
 }
 
 impl Design {
@@ -85,13 +123,13 @@ impl Design {
     /// The report as an HTML page that needs no other file.
     #[must_use]
     pub fn page(&self) -> String {
-        page::page(&self.report)
+        page::page(&self.report, &self.identity)
     }
 
-    /// Whether all checks hold.
+    /// Whether all checks hold and the verdict is not red.
     #[must_use]
     pub fn holds(&self) -> bool {
-        self.report.checks.iter().all(|check| check.holds)
+        self.report.verdict.level != Level::Red
     }
 }
 

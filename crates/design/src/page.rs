@@ -10,6 +10,7 @@ mod plane;
 mod plant;
 mod pole_map;
 mod region;
+mod robustness;
 mod table;
 mod verdict;
 
@@ -25,15 +26,15 @@ const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 
 /// Returns the page of a design, a complete HTML document. Equal reports give equal bytes.
 ///
 /// `plant.eigenvalues` are eigenvalues of the continuous plant in 1/s; the eigenvalues of the loops
-/// are in the z-plane if the design is sampled.
-pub(crate) fn page(report: &Report) -> String {
+/// are in the z-plane if the design is sampled. `identity` names the design in the head of the page.
+pub(crate) fn page(report: &Report, identity: &str) -> String {
     let title =
         if report.description.is_empty() { &report.plant_file } else { &report.description };
     let sections = sections(report);
     let document = html! {
         (DOCTYPE)
         html lang="en" {
-            (head(title))
+            (head(title, identity))
             body {
                 header {
                     p.kind { "Design report" }
@@ -66,13 +67,14 @@ pub(crate) fn page(report: &Report) -> String {
     document.into_string().replace(|sign: char| sign.is_control() && sign != '\n', " ")
 }
 
-fn head(title: &str) -> Markup {
+fn head(title: &str, identity: &str) -> Markup {
     html! {
         head {
             meta charset="utf-8";
             meta name="viewport" content="width=device-width, initial-scale=1";
             meta name="color-scheme" content="light dark";
             meta http-equiv="Content-Security-Policy" content=(POLICY);
+            meta name="generator" content=(identity);
             title { (title) ", design report" }
             style { (PreEscaped(STYLE)) }
         }
@@ -93,6 +95,7 @@ fn sections(report: &Report) -> Vec<Section> {
         (!report.gains.is_empty(), "gains", "Gains", plant::gains(report)),
         (true, "poles", "Eigenvalues", loops::poles(report)),
         (true, "conditioning", "Condition and pole errors", loops::conditioning(report)),
+        (report.robustness.is_some(), "robustness", "Robustness", robustness::robustness(report)),
         (!report.frequency.is_empty(), "frequency", "Singular values", curves::frequencies(report)),
         (!report.steps.is_empty(), "steps", "Sudden faults", curves::responses(report)),
         (!report.bounds.is_empty(), "bounds", "Bounds of the errors", certificate::bounds(report)),

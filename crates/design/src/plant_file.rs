@@ -2,11 +2,12 @@
 
 use crate::matrix::MatrixEntry as _;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use nalgebra::DMatrix;
 
 use super::requirements::{Request, request};
+use super::robustness_limits::RobustnessLimits;
 use super::signals::{EntryPoint, Fault, Signal, all_actuator_faults, faults, signals};
 use files::{Entry, Place, PlaceError, Source, Table};
 
@@ -31,6 +32,7 @@ pub(crate) struct PlantFile<'a> {
     pub(crate) observer: Request,
     pub(crate) stop_time: Option<f64>,
     pub(crate) step_size: Option<f64>,
+    pub(crate) robustness: RobustnessLimits,
 }
 
 /// The source of the plant's matrices.
@@ -65,7 +67,7 @@ pub(crate) struct Sampling {
     pub(crate) current: bool,
 }
 
-const KEYS: [&str; 21] = [
+const KEYS: [&str; 22] = [
     "description",
     "t_on",
     "monitor",
@@ -86,6 +88,7 @@ const KEYS: [&str; 21] = [
     "feedback",
     "observer",
     "experiment",
+    "robustness",
     "D",
 ];
 /// Entries that errors of later steps point at.
@@ -144,6 +147,7 @@ impl<'a> PlantFile<'a> {
             observer: read("observer", ["W", "V"], "the requirement on A_0 - L C_0")?,
             stop_time: time("stop_time")?,
             step_size: time("step_size")?,
+            robustness: RobustnessLimits::read(file, measurements.len())?,
             model,
             actuators,
             measurements,
@@ -157,6 +161,19 @@ impl<'a> PlantFile<'a> {
     /// Returns the file name without its folder.
     pub(crate) fn name(&self) -> String {
         self.source.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+    }
+
+    /// Returns the path of the plant's FMU, if the plant is one.
+    pub(crate) fn fmu(&self) -> Option<&Path> {
+        match &self.model {
+            Model::Fmu(fmu) => Some(&fmu.path),
+            Model::Matrices { .. } => None,
+        }
+    }
+
+    /// Returns the text of the file.
+    pub(crate) fn text(&self) -> &str {
+        self.source.text()
     }
 
     /// Returns an error at the first of `keys` that the file has, otherwise at its first line.

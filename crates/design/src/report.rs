@@ -3,6 +3,8 @@
 use nalgebra::{Complex, DMatrix};
 use serde::{Serialize, Serializer};
 
+use super::robust_report::{Robustness, Verdict};
+
 /// The data of a design report.
 #[derive(Serialize)]
 pub struct Report {
@@ -12,6 +14,8 @@ pub struct Report {
     pub plant_file: String,
     /// The plant.
     pub plant: Plant,
+    /// The verdict on the design.
+    pub verdict: Verdict,
     /// The conditions that were checked.
     pub checks: Vec<Check>,
     /// K_x, K_f, L_x, L_f and the other matrices of the controller.
@@ -22,6 +26,8 @@ pub struct Report {
     pub observer: Loop,
     /// The sampling of the controller; none in continuous time.
     pub sampling: Option<Sampled>,
+    /// Margins, noise, tolerances; none if the loop is not stable.
+    pub robustness: Option<Robustness>,
     /// Theorem 1 and related certificates.
     pub certificate: Certificate,
     /// Bounds of the errors, one entry for each pair of a fault and an error.

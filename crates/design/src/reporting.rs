@@ -19,6 +19,7 @@ use super::report::{
     Effectiveness, Loop, Matrix, Plant, Region, Report, Sampled, Signal, pairs, rows,
 };
 use super::requirements::{self, Requirement};
+use super::robustness::{robustness, verdict};
 use super::signals::{self, EntryPoint, Fault, FaultDynamics};
 
 /// Returns the report on `designed`.
@@ -30,11 +31,15 @@ pub(crate) fn report(
     let loops = Loops::of(designed)?;
     let ControllerDesign { plant, gains, linear, .. } = designed;
     let names = Names::of(designed);
+    let checks = checks(designed);
+    let robustness = robustness(designed, &file.robustness)?;
     Ok(Report {
         description,
         plant_file: file.name(),
         plant: self::plant(designed, &names)?,
-        checks: checks(designed),
+        verdict: verdict(&checks, robustness.as_ref(), &file.robustness),
+        checks,
+        robustness,
         gains: names.gains(designed),
         feedback: closed(
             "A + B K_x",

@@ -8,6 +8,8 @@ use super::checks::checks;
 use super::designed::design;
 use super::plant_file::{Model, PlantFile};
 use super::requirements::{Region, Requirement};
+use super::robust_report::Level;
+use super::robustness::{robustness, verdict};
 use super::signals::{EntryPoint, FaultDynamics};
 use files::{Source, Table};
 
@@ -20,7 +22,7 @@ observer.eigenvalues = [-5, { re = -6, im = 2.5 }]
 "#;
 
 /// What is replaced in `MASS`, by what, and a part of the error.
-const REFUSALS: [(&str, &str, &str); 34] = [
+const REFUSALS: [(&str, &str, &str); 42] = [
     (
         "A = [[0, 1], [0, 0]]",
         "A = [[0, 1], [0]]",
@@ -115,6 +117,46 @@ const REFUSALS: [(&str, &str, &str); 34] = [
     ("C = ", "actuators = [{ name = \"u\", unit = \"N m!\" }]\nC = ", "actuators[1].unit: "),
     ("C = ", "operating_point = { x = 1 }\nC = ", "3:19: operating_point: it belongs to `plant`"),
     ("C = ", "plant = \"P.fmu\"\nC = ", "1:5: A: an FMU is the plant; its matrices are not stated"),
+    (
+        "C = ",
+        "robustness.limit = 3\nC = ",
+        "3:12: unknown entry `robustness.limit`; expected one of",
+    ),
+    (
+        "C = ",
+        "robustness.tolerance = 1\nC = ",
+        "3:24: robustness.tolerance: expected a number from 0 to below 1, found 1",
+    ),
+    (
+        "C = ",
+        "robustness.tolerance = { A = 0.1, D = 0.1 }\nC = ",
+        "3:35: unknown entry `robustness.tolerance.D`; did you mean `A`?",
+    ),
+    (
+        "C = ",
+        "robustness.red = 0.5\nC = ",
+        "3:18: robustness.red: the peak of S is never below 1: expected more, found 0.5",
+    ),
+    (
+        "C = ",
+        "robustness = { red = 3, amber = 3.5 }\nC = ",
+        "3:22: robustness.red: expected amber <= red, found 3.5 and 3",
+    ),
+    (
+        "C = ",
+        "robustness.cases = 10.5\nC = ",
+        "3:20: robustness.cases: expected a whole number from 0 to 100000, found 10.5",
+    ),
+    (
+        "C = ",
+        "robustness.noise = [1, 2]\nC = ",
+        "3:20: robustness.noise: expected 1 numbers, one per measurement, found 2",
+    ),
+    (
+        "C = ",
+        "robustness.noise = [-1]\nC = ",
+        "robustness.noise[1]: expected no less than 0, found -1",
+    ),
 ];
 
 fn read<T>(text: &str, look: impl Fn(&PlantFile<'_>) -> T) -> Result<T, String> {
@@ -252,4 +294,61 @@ fn an_observer_that_is_unstable_before_t_on_fails_a_check_unless_it_estimates_fr
     assert!(condition.contains("before t_on"), "{condition}");
     assert!((value - 0.082).abs() < 5e-4, "{value}");
     assert!(failed(&pendulum.replace("monitor = false", "monitor = true")).is_empty());
+}
+
+/// The level and the reasons of a plant file.
+fn judged(text: &str) -> (Level, String) {
+    read(text, |file| {
+        let designed = design(file).unwrap();
+        let found = robustness(&designed, &file.robustness).unwrap();
+        let verdict = verdict(&checks(&designed), found.as_ref(), &file.robustness);
+        (verdict.level, verdict.reasons.join("; "))
+    })
+    .unwrap()
+}
+
+/// The peak of S is 1.6992 (python-control 0.10.2, linfnorm).
+#[test]
+fn the_limits_of_the_peak_of_s_decide_the_level() {
+    let (level, reasons) =
+        judged(&format!("{MASS}robustness.amber = 1.6\nrobustness.red = 1.69\n"));
+    assert_eq!(level, Level::Red, "{reasons}");
+    assert!(reasons.contains("above 1.69 (red)"), "{reasons}");
+    let (level, reasons) =
+        judged(&format!("{MASS}robustness.amber = 1.69\nrobustness.red = 1.71\n"));
+    assert_eq!(level, Level::Amber, "{reasons}");
+    let (level, reasons) = judged(&format!("{MASS}robustness.amber = 30\nrobustness.red = 30\n"));
+    assert_eq!((level, reasons.as_str()), (Level::Green, ""));
+}
+
+/// A fast unstable plant with a slow observer.
+#[test]
+fn parameters_within_their_tolerances_that_destabilise_make_a_design_red() {
+    let lag = "A = [[10]]\nB = [[1]]\nC = [[1]]\nactuator_faults = \"all\"\n\
+               feedback.eigenvalues = [-1]\nobserver.eigenvalues = [-1.5, -2]\n\
+               robustness.amber = 100\nrobustness.red = 100\n";
+    let (level, reasons) = judged(&format!("{lag}robustness.tolerance = {{ A = 0.5 }}\n"));
+    assert_eq!(level, Level::Red, "{reasons}");
+    assert!(reasons.contains("±50 % of A, ±0 % of B"), "{reasons}");
+    let (level, reasons) = judged(&format!("{lag}robustness.tolerance = 0.001\n"));
+    assert_eq!(level, Level::Green, "{reasons}");
+}
+
+/// The worst plant, as a plant file, has the matrices of the report and is a plant file.
+#[test]
+fn the_worst_plant_is_a_plant_file() {
+    let text = format!("{MASS}robustness.tolerance = 0.2\n").replace("[0, 0]]", "[-2.0, -0.5]]");
+    let (worst, a) = read(&text, |file| {
+        let designed = design(file).unwrap();
+        let report = super::reporting::report(file, &designed, String::new()).unwrap();
+        let a = report.robustness.as_ref().unwrap().tolerance.worst[0].values.clone();
+        (super::worst_case::plant_file(file, &designed, &report).unwrap().unwrap(), a)
+    })
+    .unwrap();
+    assert!((a[1][0].abs() - 2.0).abs() > 0.39 && a[0] == [0.0, 1.0], "{a:?}");
+    let stated = read(&worst, |file| {
+        let Model::Matrices { a, .. } = &file.model else { panic!("matrices") };
+        [a[(1, 0)], a[(1, 1)]]
+    });
+    assert_eq!(stated.unwrap().map(f64::to_bits), [a[1][0], a[1][1]].map(f64::to_bits));
 }

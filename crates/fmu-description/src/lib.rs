@@ -26,6 +26,7 @@ pub mod location;
 #[cfg(feature = "package")]
 pub mod package;
 pub mod similar;
+pub mod terminals;
 pub mod unit;
 pub mod xml;
 

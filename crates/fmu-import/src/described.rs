@@ -39,26 +39,13 @@ pub enum DescriptionError {
     },
 }
 
-/// Returns the model description of the library at `file`, as XML and as data. The crate `fmu`
-/// exported the library; `resources` is the folder of its resources; messages use `name`.
+/// Returns the model description of FMI 2.0 or 3.0 of the library at `file`, as XML and as data. The
+/// crate `fmu` exported the library; `resources` is the folder of its resources; messages use `name`.
 ///
 /// # Errors
 ///
 /// [`DescriptionError`] if the library generates no description, an unreadable one, or one that
 /// breaks rules of the standard.
-pub fn described(
-    file: &Path,
-    resources: &Path,
-    name: &str,
-) -> Result<(String, ModelDescription), DescriptionError> {
-    described_as(file, resources, name, Version::V2)
-}
-
-/// Returns the model description of FMI 2.0 or 3.0 of the library at `file`; see [`described`].
-///
-/// # Errors
-///
-/// Same as [`described`].
 pub fn described_as(
     file: &Path,
     resources: &Path,

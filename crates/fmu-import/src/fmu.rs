@@ -97,12 +97,22 @@ pub struct Fmu {
 
 /// The library and the unpacked files of an FMU.
 ///
+/// The only instance of an FMU that allows no other (`canBeInstantiatedOnlyOncePerProcess`). When it is
+/// freed, another one may follow.
+pub(crate) struct OnlyInstance(Arc<Content>);
+
+impl Drop for OnlyInstance {
+    fn drop(&mut self) {
+        self.0.instantiated.store(false, Ordering::Relaxed);
+    }
+}
+
 /// Fields are dropped in this order, which unloads the library before its file is removed.
 struct Content {
     /// The library for co-simulation; `None` if the FMU offers model exchange only.
     library: Option<CoSimulation>,
     unpacked: Unpacked,
-    /// Whether an instance has been created.
+    /// Whether an FMU that allows one instance only has it.
     instantiated: AtomicBool,
     /// Positions of variables by type and value reference; filled at the first message that needs one.
     names: OnceLock<HashMap<(char, u32), usize>>,
@@ -185,6 +195,22 @@ impl Fmu {
         &self.content.unpacked.description
     }
 
+    /// Returns the description whose variables the instances have: as [`Fmu::description`], with a
+    /// variable for each element of an array at the start values of its structural parameters.
+    ///
+    /// # Errors
+    ///
+    /// [`LoadError::Unsupported`] if the arrays have too many elements.
+    pub fn elements(&self) -> Result<ModelDescription, FmuError> {
+        let own = self.description();
+        if own.version() != Version::V3 {
+            return Ok(own.clone());
+        }
+        let view = crate::v3::ElementView::new(own, &HashMap::new())
+            .map_err(|reason| LoadError::Unsupported { model: own.model_name.clone(), reason })?;
+        Ok(view.description)
+    }
+
     /// Creates a co-simulation instance called `name`.
     ///
     /// # Errors
@@ -192,15 +218,20 @@ impl Fmu {
     /// [`FmuError::OnlyOnce`] for a forbidden second instance; [`LoadError::Instantiate`] with the
     /// FMU's messages if the FMU does not instantiate; [`FmuError::NoInterface`] without co-simulation.
     pub fn instantiate(&self, name: &str) -> Result<Instance, FmuError> {
-        let description = self.description();
-        let once = description.co_simulation.as_ref();
-        let once = once.is_some_and(|flags| flags.can_be_instantiated_only_once_per_process);
-        if once && self.content.instantiated.swap(true, Ordering::Relaxed) {
-            let (instance, model) = (name.to_owned(), description.model_name.clone());
+        let flags = self.description().co_simulation.as_ref();
+        let once = flags.is_some_and(|flags| flags.can_be_instantiated_only_once_per_process);
+        let only = once.then(|| self.occupy(name)).transpose()?;
+        let inner = self.instantiate_version(name)?;
+        Ok(Instance::new(inner, only, self.clone()))
+    }
+
+    /// Reserves an FMU that allows one instance only.
+    fn occupy(&self, name: &str) -> Result<OnlyInstance, FmuError> {
+        if self.content.instantiated.swap(true, Ordering::Relaxed) {
+            let (instance, model) = (name.to_owned(), self.description().model_name.clone());
             return Err(FmuError::OnlyOnce { instance, model });
         }
-        let inner = self.instantiate_version(name)?;
-        Ok(Instance::new(inner, self.clone()))
+        Ok(OnlyInstance(self.content.clone()))
     }
 
     /// Creates an instance with the C interface of the FMU's version.
@@ -261,9 +292,11 @@ impl Fmu {
                 return Err(FmuError::Version {
                     model: description.model_name.clone(),
                     version: description.version(),
-                    expected: match interface {
-                        Interface::ModelExchange => "FMI 2.0 or 3.0 for model exchange",
-                        Interface::CoSimulation => "FMI 2.0",
+                    expected: match (interface, description.version()) {
+                        (Interface::ModelExchange, Version::V1) => {
+                            "FMI 2.0 or 3.0 for model exchange"
+                        }
+                        _ => "FMI 2.0 for access to its C functions",
                     },
                 });
             }

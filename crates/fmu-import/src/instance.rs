@@ -4,13 +4,15 @@ use std::time::Duration;
 
 use fmu_description::{Experiment, ModelDescription};
 
-use crate::fmu::Fmu;
+use crate::fmu::{Fmu, OnlyInstance};
 use crate::{v1, v2, v3};
 use slave::{CallError, CallSink, Slave, StepResult, absent};
 
 /// An instance of an FMU in this process, for either interface.
 pub struct Instance {
     pub(crate) inner: Inner,
+    /// Dropped after `inner`.
+    _only: Option<OnlyInstance>,
     fmu: Fmu,
 }
 
@@ -23,8 +25,8 @@ pub(crate) enum Inner {
 }
 
 impl Instance {
-    pub(crate) fn new(inner: Inner, fmu: Fmu) -> Self {
-        Self { inner, fmu }
+    pub(crate) fn new(inner: Inner, only: Option<OnlyInstance>, fmu: Fmu) -> Self {
+        Self { inner, _only: only, fmu }
     }
 
     /// Returns the FMU of this instance.

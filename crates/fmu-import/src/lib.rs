@@ -20,7 +20,7 @@ mod v2;
 mod v3;
 
 pub use call_log::{CallLog, LoggedSlave};
-pub use described::{DescriptionError, described, described_as};
+pub use described::{DescriptionError, described_as};
 pub use error::LoadError;
 pub use fmu::{Fmu, FmuError};
 pub use instance::Instance;

@@ -140,7 +140,8 @@ impl Instance {
                 sizes.insert(*reference, value);
             }
         }
-        let view = ElementView::new(own, &sizes).map_err(|reason| refused(NAME, reason))?;
+        let view = ElementView::new(own, &sizes)
+            .map_err(|reason| refused(NAME, format!("was not called: {reason}")))?;
         self.component.enter_configuration_mode()?;
         let set = self.write("fmi3SetUInt64", references, values, Buffer::put_integer);
         set.and_then(|()| self.component.exit_configuration_mode())?;

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use crate::Experiment;
 use crate::fence::{HookGuard, guarded};
 use crate::ffi::Callbacks;
-use crate::interface::{Interface, WARNING, expressible_in_2, new_model};
+use crate::interface::{Interface, WARNING, new_model};
 use crate::log::{Log, Message};
 use crate::model::{Failure, Model, Step};
 use crate::stepper::Stepper;
@@ -123,7 +123,7 @@ impl<M: Model> Instance<M> {
         callbacks: Callbacks,
     ) -> Result<Self, Failure> {
         let instance = Self::build(resources, callbacks, |interface, description| {
-            expressible_in_2(description)?;
+            interface.restrict(description)?;
             if interface_type == InterfaceType::ModelExchange && !interface.offers_exchange() {
                 let message =
                     "fmuType is fmi2ModelExchange, and this FMU offers co-simulation only";
@@ -142,7 +142,7 @@ impl<M: Model> Instance<M> {
         callbacks: Callbacks,
         session: impl FnOnce(
             &mut Interface<M>,
-            &ModelDescription,
+            &mut ModelDescription,
         ) -> Result<Option<Box<Session>>, Failure>,
     ) -> Result<Self, Failure> {
         // The guard outlives a panic of the model, during which it could not restore the hook.
@@ -150,8 +150,8 @@ impl<M: Model> Instance<M> {
         let made = guarded(|| {
             let mut fresh = new_model::<M>(resources)?;
             let messages = fresh.log().map(Log::take).unwrap_or_default();
-            let (mut interface, description) = Interface::new(&mut fresh)?;
-            let session = session(&mut interface, &description)?;
+            let (mut interface, mut description) = Interface::new(&mut fresh)?;
+            let session = session(&mut interface, &mut description)?;
             let tolerance = description.default_experiment.and_then(|own| own.tolerance);
             let stepper = Stepper::new(&interface, tolerance);
             let core = Core::new(fresh.clone(), InterfaceType::CoSimulation);
@@ -337,9 +337,10 @@ impl<M: Model> Instance<M> {
     }
 
     /// `fmi2Reset`: restores the state after `fmi2Instantiate`.
-    pub(crate) fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) -> Result<(), Failure> {
         self.core = Core::new(self.fresh.clone(), self.core.interface_type);
         self.strings.clear();
+        self.fit_layout()
     }
 
     /// Recomputes the outputs if a value was set since the last computation.

@@ -1,7 +1,9 @@
 //! The variables of a model by value reference, and the model description made from them.
 
+mod clocks;
 pub(crate) mod fmi3;
 mod general;
+mod sizes;
 mod slot;
 mod states;
 mod structure;
@@ -47,6 +49,9 @@ pub(crate) struct Interface<M> {
     /// The names of the log categories.
     pub(crate) log_categories: Vec<String>,
     pub(crate) guid: Guid,
+    /// The structural parameters that are the extents of arrays.
+    sizes: sizes::Sizes,
+    clocks: clocks::Clocks,
 }
 
 /// Type and value reference of a variable.
@@ -56,7 +61,9 @@ impl<M: Model> Interface<M> {
     /// Assigns slots and value references to the variables of `model` and makes their description with
     /// start values.
     pub(crate) fn new(model: &mut M) -> Result<(Self, ModelDescription), Failure> {
-        let variables = model.variables();
+        let mut variables = model.variables();
+        // FMI 2.0 leaves them out, and the indices of the others must not change.
+        variables.sort_by_key(Variable::is_left_out_of_2);
         let mut description = general::general::<M>(model);
         description.log_categories = general::categories::<M>(model.log().is_some());
         description.structure = structure::structure(&variables)?;
@@ -72,6 +79,8 @@ impl<M: Model> Interface<M> {
             interpolated: Vec::new(),
             log_categories: names(&description.log_categories),
             guid: Guid([0; 16]),
+            sizes: sizes::Sizes::of(&variables),
+            clocks: clocks::Clocks::of(&variables),
         };
         description.variables.push(time());
         for variable in &variables {
@@ -362,13 +371,13 @@ fn define_type<M>(types: &mut Vec<SimpleType>, variable: &Variable<M>) -> Result
 /// [`Failure::Error`] for an unknown unit, a reference to an unknown variable or another declaration
 /// that cannot be described, such as a type that FMI 2.0 does not have; the failure of [`Model::new`].
 pub fn describe<M: Model>(resources: &std::path::Path) -> Result<ModelDescription, Failure> {
-    let (_, description) = Interface::new(&mut new_model::<M>(resources)?)?;
-    expressible_in_2(&description)?;
+    let (mut interface, mut description) = Interface::new(&mut new_model::<M>(resources)?)?;
+    interface.restrict(&mut description)?;
     Ok(description)
 }
 
 /// Checks that every variable has a type of FMI 2.0.
-pub(crate) fn expressible_in_2(description: &ModelDescription) -> Result<(), Failure> {
+fn expressible_in_2(description: &ModelDescription) -> Result<(), Failure> {
     match description.variables.iter().find(|own| is_of_3(own)) {
         None => Ok(()),
         Some(own) => Err(Failure::Error(format!(
@@ -402,18 +411,50 @@ fn is_of_3(variable: &ScalarVariable) -> bool {
 /// Same as [`describe`].
 pub fn describe_3<M: Model>(resources: &std::path::Path) -> Result<ModelDescription, Failure> {
     let (mut interface, description) = Interface::new(&mut new_model::<M>(resources)?)?;
-    Ok(interface.convert(&description).1)
+    Ok(interface.convert(&description)?.1)
 }
 
 impl<M> Interface<M> {
+    /// Restricts to FMI 2.0, which has neither clocks nor structural parameters, whose arrays have the
+    /// present extents.
+    ///
+    /// # Errors
+    ///
+    /// [`Failure::Error`] for a variable of another type that FMI 2.0 does not have.
+    pub(crate) fn restrict(&mut self, description: &mut ModelDescription) -> Result<(), Failure> {
+        let left_out = |own: &ScalarVariable| {
+            own.causality == Causality::StructuralParameter || matches!(own.kind, Kind::Clock(_))
+        };
+        if description.variables.iter().any(left_out) {
+            description.variables.retain(|own| !left_out(own));
+            // The variables that are left out are the last ones.
+            let count = description.variables.len();
+            let structure = &mut description.structure;
+            for rows in [&mut structure.outputs, &mut structure.initial_unknowns] {
+                rows.retain(|row| row.index as usize <= count);
+            }
+            description.guid = String::new();
+            self.guid = Guid::of(description);
+            description.guid = self.guid.to_string();
+        }
+        expressible_in_2(description)
+    }
+
     /// Converts to FMI 3.0: the GUID becomes the `instantiationToken`, and continuous states may be set
     /// in event mode unless an event changes them (section 2.3.5).
+    ///
+    /// # Errors
+    ///
+    /// [`Failure::Error`] if the extents of an array are not the values of its structural parameters, or a
+    /// clock of a variable is none.
     pub(crate) fn convert(
         &mut self,
         description: &ModelDescription,
-    ) -> (fmi3::Table, ModelDescription) {
+    ) -> Result<(fmi3::Table, ModelDescription), Failure> {
         let indicators = self.event_indicators.unwrap_or_default();
         let (table, mut converted) = fmi3::describe(description, indicators);
+        self.sizes.enter(&mut converted)?;
+        self.clocks.enter(&mut converted)?;
         for own in &mut converted.variables {
             own.intermediate_update = self.interpolates(&own.name);
         }
@@ -433,7 +474,7 @@ impl<M> Interface<M> {
             let role = (slot.causality, slot.variability);
             slot.settable = call_order3::settable(role, slot.initial, is_state);
         }
-        (table, converted)
+        Ok((table, converted))
     }
 }
 
@@ -452,7 +493,7 @@ pub(crate) fn new_model<M: Model>(resources: &std::path::Path) -> Result<M, Fail
 }
 
 /// Returns the static rules of FMI 2.0.5 that the description of `M` breaks; those of FMI 3.0.2 if a
-/// variable has a type that FMI 2.0 does not have.
+/// variable has a type that FMI 2.0 does not have, or is a clock or a structural parameter.
 ///
 /// Use it as the first test of a model: `aso-ftc pack` rejects a model with problems.
 ///
@@ -462,7 +503,7 @@ pub(crate) fn new_model<M: Model>(resources: &std::path::Path) -> Result<M, Fail
 pub fn problems<M: Model>(resources: &std::path::Path) -> Result<Vec<Problem>, Failure> {
     let (mut interface, description) = Interface::new(&mut new_model::<M>(resources)?)?;
     if description.variables.iter().any(is_of_3) {
-        return Ok(interface.convert(&description).1.problems());
+        return Ok(interface.convert(&description)?.1.problems());
     }
     Ok(description.problems())
 }

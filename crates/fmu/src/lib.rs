@@ -80,10 +80,12 @@
 //!    value was set; [`Model::check`] before it.
 //! 9. **Directional derivatives** (optional): implement [`Model::differentiate`].
 //! 10. **Messages** (optional): a field of the type [`Log`] takes messages and warnings.
-//! 11. **The first test** calls [`problems`], which returns the rules of the standard that the
+//! 11. **Structural parameters** (optional, FMI 3.0): extents of arrays that the importer chooses; see
+//!     [`Variable::structural`] and [`Model::resize`].
+//! 12. **The first test** calls [`problems`], which returns the rules of the standard that the
 //!     variables break, each with its section. `aso-ftc pack` rejects such a model with the same
 //!     messages. Further tests run the model by [`Simulation`].
-//! 12. **`aso-ftc pack PATH`** builds the crate and writes the `.fmu`.
+//! 13. **`aso-ftc pack PATH`** builds the crate and writes the `.fmu`.
 //!
 //! The crate checks pointers, call order, value references, limits and NaN before it calls the
 //! model. A panic in the model becomes `fmi2Fatal` of that one instance, with a message that names

@@ -70,6 +70,20 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
         Ok(())
     }
 
+    /// Gives the arrays the extents that the structural parameters state ([`Variable::structural`]).
+    ///
+    /// Called when the importer leaves configuration mode or reconfiguration mode (FMI 3.0.2, sections
+    /// 2.3.6 and 2.3.7). Afterwards [`Model::variables`] runs again; it must return the same arrays and
+    /// scalars in the same order, with the new number of elements. The values of the elements are those
+    /// that this function assigns, until the importer sets others. The default implementation does nothing.
+    ///
+    /// # Errors
+    ///
+    /// [`Failure::Error`] if the extents do not fit together.
+    fn resize(&mut self) -> Result<(), Failure> {
+        Ok(())
+    }
+
     /// Computes states and outputs at the start time from parameters and inputs.
     ///
     /// In initialization mode the importer may set and read values alternately, so this function may be
@@ -104,6 +118,20 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
     fn step(&mut self, step: &Step) -> Result<(), Failure> {
         let _ = step;
         Err(Failure::Unsolved)
+    }
+
+    /// Advances the model from `step.start` to `step.end()` or to its first event, whose time in s it
+    /// returns (co-simulation of FMI 3.0 with event mode and early return, section 4.2.1). An event at the
+    /// start of the step is not reported again.
+    ///
+    /// The importer then handles the event ([`Model::event`]) and asks for the next step from there. The
+    /// default implementation calls [`Model::step`], and reports no event.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`Model::step`].
+    fn step_to_event(&mut self, step: &Step) -> Result<Option<f64>, Failure> {
+        self.step(step).map(|()| None)
     }
 
     /// Recomputes the outputs and the derivatives of the states from the present values of inputs,
@@ -169,6 +197,15 @@ pub trait Model: Clone + Send + Serialize + DeserializeOwned + 'static {
     fn event(&mut self, time: f64) -> Result<Event, Failure> {
         let _ = time;
         Ok(Event::default())
+    }
+
+    /// Sets the fields of the triggered clocks that tick in the event at `time` (in s), and that are no
+    /// inputs ([`Variable::triggered_clock`]). The fields are false before, and after the event.
+    ///
+    /// Called where event mode begins, when the importer has set its clocks, and where discrete states are
+    /// updated again, each time before [`Model::event`]. The default implementation does nothing.
+    fn tick(&mut self, time: f64) {
+        let _ = time;
     }
 
     /// Returns the field with the messages of the model; `None` if it has none. The exporter sends them to

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use crate::interface::Slot;
 use crate::interface::fmi3::Type;
 use crate::variable::{Field, Number, Variable};
-use fmu_description::{BinaryType, IntegerType, Kind, RealType};
+use fmu_description::{BinaryType, ClockType, IntegerType, IntervalVariability, Kind, RealType};
 
 /// The Rust type of the field of such a variable.
 pub(crate) trait Native: Clone + Sized + 'static {
@@ -83,6 +83,28 @@ types! {
     Int64(i64) int64;
     UInt64(u64) uint64;
     Binary(Vec<u8>) binary;
+    Clock(bool) clock;
+}
+
+/// A clock: true where it ticks.
+impl Native for bool {
+    const TYPE: Type = Type::Clock;
+
+    fn slots<M>(all: &Slots<M>) -> &[Slot<M, Self>] {
+        &all.clock
+    }
+
+    fn kind(_: Option<Self>, number: Number) -> Result<Kind, String> {
+        let Some(interval) = number.interval else { return Ok(Kind::Clock(ClockType::default())) };
+        if !(interval > 0.0 && interval.is_finite()) {
+            return Err(format!("interval {interval} s, expected more than 0"));
+        }
+        Ok(Kind::Clock(ClockType {
+            interval_variability: IntervalVariability::Constant,
+            interval_decimal: Some(interval),
+            ..ClockType::default()
+        }))
+    }
 }
 
 impl Native for f32 {

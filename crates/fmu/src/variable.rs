@@ -45,6 +45,8 @@ pub(crate) struct Number {
     pub(crate) min: Option<f64>,
     pub(crate) max: Option<f64>,
     pub(crate) nominal: Option<f64>,
+    /// Interval of a periodic clock in s.
+    pub(crate) interval: Option<f64>,
 }
 
 /// A variable of a model: name, role, attributes and the field that holds its value.
@@ -67,6 +69,10 @@ pub struct Variable<M> {
     pub(crate) direct: Vec<(String, DependencyKind)>,
     pub(crate) initially: Option<Vec<String>>,
     pub(crate) derivatives: Vec<Field<M, f64>>,
+    /// The structural parameters that are the extents of the array with this element.
+    pub(crate) sized_by: Vec<String>,
+    /// The clocks of a clocked variable.
+    pub(crate) clocks: Vec<String>,
     pub(crate) access: Access<M>,
 }
 
@@ -98,7 +104,7 @@ impl<M> Variable<M> {
         description: &str,
         extents: &[usize],
         field: F,
-    ) -> impl Iterator<Item = Self>
+    ) -> impl Iterator<Item = Self> + use<F, M>
     where
         F: for<'a> Fn(&'a mut M) -> &'a mut [f64] + Send + Sync + 'static,
     {
@@ -149,6 +155,61 @@ impl<M> Variable<M> {
         Self { enumeration: Some(enumeration), ..Self::integer(name, description, field) }
     }
 
+    /// Creates a structural parameter: an extent of arrays ([`Variable::sized_by`]), at least 1, which the
+    /// importer may change in configuration mode (FMI 3.0.2, sections 2.3.6 and 2.4.4); if it is
+    /// [`tunable`](Variable::tunable), in reconfiguration mode as well. After that
+    /// [`Model::resize`](crate::Model::resize) runs. State the largest value with [`Variable::max`].
+    ///
+    /// FMI 2.0 has no structural parameters: there it is no variable, and the arrays have the extents of
+    /// [`Model::new`](crate::Model::new).
+    pub fn structural<F>(name: impl Into<String>, description: impl Into<String>, field: F) -> Self
+    where
+        F: for<'a> Fn(&'a mut M) -> &'a mut u64 + Send + Sync + 'static,
+    {
+        let variable = Self::uint64(name, description, field).any_parameter(Variability::Fixed);
+        Self { causality: Causality::StructuralParameter, ..variable }.min(1.0)
+    }
+
+    /// Creates an input clock that ticks every `interval` s from the start time on (FMI 3.0.2, section
+    /// 2.2.8; `intervalVariability = constant`). The importer ticks it in event mode: the field is true in the
+    /// next call of [`Model::event`](crate::Model::event), and false afterwards.
+    ///
+    /// FMI 2.0 has no clocks: there it is no variable. Nor does an importer without event mode tick it. A
+    /// model that also runs there states its ticks by
+    /// [`Event::next_event_time`](crate::Event::next_event_time) as well.
+    pub fn periodic_clock<F>(
+        name: impl Into<String>,
+        description: impl Into<String>,
+        interval: f64,
+        field: F,
+    ) -> Self
+    where
+        F: for<'a> Fn(&'a mut M) -> &'a mut bool + Send + Sync + 'static,
+    {
+        let mut clock = Self::triggered_clock(name, description, field).input();
+        clock.number.interval = Some(interval);
+        clock
+    }
+
+    /// Creates a triggered clock (FMI 3.0.2, section 2.2.8), local unless it becomes an
+    /// [`input`](Variable::input) or an [`output`](Variable::output).
+    ///
+    /// The importer ticks an input clock in event mode: the field is true in the next call of
+    /// [`Model::event`](crate::Model::event), and false afterwards. [`Model::tick`](crate::Model::tick) sets the
+    /// field of another clock when it ticks. FMI 2.0 has no clocks: there it is no variable.
+    pub fn triggered_clock<F>(
+        name: impl Into<String>,
+        description: impl Into<String>,
+        field: F,
+    ) -> Self
+    where
+        F: for<'a> Fn(&'a mut M) -> &'a mut bool + Send + Sync + 'static,
+    {
+        let field = TypedField::Clock(Box::new(field));
+        let clock = Self::typed(name, description, Variability::Discrete, field);
+        Self { initial: None, ..clock }
+    }
+
     /// Creates an alias of the variable `of`, with the same type, unit and value reference. An alias has
     /// no start value and cannot be set.
     pub fn alias(
@@ -157,6 +218,12 @@ impl<M> Variable<M> {
         of: impl Into<String>,
     ) -> Self {
         Self::local(name, description, Variability::Continuous, Access::Alias(of.into()))
+    }
+
+    /// Whether descriptions of FMI 2.0 leave the variable out.
+    pub(crate) fn is_left_out_of_2(&self) -> bool {
+        self.causality == Causality::StructuralParameter
+            || matches!(self.access, Access::Typed(TypedField::Clock(_)))
     }
 
     pub(crate) fn typed(
@@ -187,6 +254,8 @@ impl<M> Variable<M> {
             direct: Vec::new(),
             initially: None,
             derivatives: Vec::new(),
+            sized_by: Vec::new(),
+            clocks: Vec::new(),
             access,
         }
     }
@@ -220,7 +289,40 @@ impl<M> Variable<M> {
 
     fn any_parameter(self, variability: Variability) -> Self {
         let initial = Some(Initial::Exact);
-        Self { causality: Causality::Parameter, variability, initial, ..self }
+        let causality = match self.causality {
+            Causality::StructuralParameter => Causality::StructuralParameter,
+            _ => Causality::Parameter,
+        };
+        Self { causality, variability, initial, ..self }
+    }
+
+    /// States the clocks of a discrete variable: it changes when one of them ticks (FMI 3.0.2, section
+    /// 2.2.8.3).
+    #[must_use]
+    pub fn clocked_by(self, clocks: &[&str]) -> Self {
+        Self { clocks: clocks.iter().map(|&name| name.to_owned()).collect(), ..self }
+    }
+
+    /// States for an element of an array which structural parameters are the extents of the array, one
+    /// name for each dimension. All elements of the array state the same names.
+    ///
+    /// ```
+    /// # use fmu::Variable;
+    /// struct Filter { n: u64, gains: Vec<f64> }
+    /// # impl Filter {
+    /// fn variables(&self) -> Vec<Variable<Self>> {
+    ///     let mut all = vec![Variable::structural("n", "Order", |own: &mut Self| &mut own.n).max(9.0)];
+    ///     let gains = Variable::real_array("K", "Gain", &[self.gains.len()], |own: &mut Self| &mut own.gains[..]);
+    ///     all.extend(gains.map(|element| element.parameter().sized_by(&["n"])));
+    ///     all
+    /// }
+    /// # }
+    /// # let count = Filter { n: 2, gains: vec![0.0; 2] }.variables().len();
+    /// # assert_eq!(count, 3);
+    /// ```
+    #[must_use]
+    pub fn sized_by(self, structural: &[&str]) -> Self {
+        Self { sized_by: structural.iter().map(|&name| name.to_owned()).collect(), ..self }
     }
 
     /// Makes the variable a parameter that [`Model::initialize`](crate::Model::initialize) computes from

@@ -256,12 +256,17 @@ impl Integrated {
                 self.tolerance
             ),
         };
-        let time = self.point.time;
+        let time = seconds(self.point.time);
         let what = format!(
             "stops at t = {time} s: a step of {size:e} s is still too large, because {why}"
         );
         CallError { messages, ..failed(what) }
     }
+}
+
+/// Returns a time with an exponent if it is close to zero.
+fn seconds(time: f64) -> String {
+    if time != 0.0 && time.abs() < 1e-6 { format!("{time:e}") } else { time.to_string() }
 }
 
 /// Returns an error of the integration.

@@ -7,10 +7,11 @@ use nalgebra::DMatrix;
 
 use super::differences::{Side, extrapolate, reach};
 use super::parts::{Part, Parts};
-use super::point::{initialised, read};
+use super::point::{NAME, initialise, read};
 use super::{Linearise, LineariseError};
 use fmu_import::Fmu;
-use fmu_import::{Component, Interface};
+use fmu_import::Instance;
+use slave::Slave as _;
 
 /// Target for the response of a state to a pulse, relative to the state's typical size.
 const RESPONSE: f64 = 1e-2;
@@ -26,7 +27,7 @@ const HEIGHTS: usize = 3;
 /// The instance, its saved state at the operating point, and the variables to set and read.
 pub(super) struct Bench<'p> {
     /// Shared by the benches of all step sizes, because an FMU may allow only one instance.
-    component: Rc<RefCell<Component>>,
+    component: Rc<RefCell<Instance>>,
     parts: &'p Parts<'p>,
     states: &'p [Part],
     inputs: Vec<u32>,
@@ -52,7 +53,8 @@ impl<'p> Bench<'p> {
         request: &Linearise,
         step: f64,
     ) -> Result<Self, LineariseError> {
-        let mut component = initialised(fmu, Interface::CoSimulation, parts, request)?;
+        let mut component = fmu.instantiate(NAME)?;
+        initialise(&mut component, parts, request)?;
         component.save_state(0)?;
         let x = read(&mut component, states.iter())?;
         let u = read(&mut component, parts.inputs.iter())?;

@@ -5,13 +5,13 @@ use nalgebra::DMatrix;
 use super::LineariseError;
 use super::parts::{Parts, State};
 use super::point::row_name;
-use fmu_import::Component;
+use slave::Slave;
 
 /// Returns the Jacobian of state derivatives and outputs with respect to states and inputs.
 ///
 /// A row whose variable is itself a state or an input is a unit vector and needs no call.
 pub(super) fn jacobian(
-    component: &mut Component,
+    component: &mut (impl Slave + ?Sized),
     parts: &Parts,
     states: &[State],
 ) -> Result<DMatrix<f64>, LineariseError> {

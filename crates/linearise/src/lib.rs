@@ -31,7 +31,7 @@ pub use result::{Differences, Disagreement, Linearisation, Matrices, Method, Sig
 use fmu_import::Fmu;
 use fmu_import::Interface;
 use parts::{Part, Parts, State};
-use point::{Equations, all_settable, initialised, read};
+use point::{Equations, NAME, all_settable, initialise, read};
 use result::{MethodResult, RawResult, assemble};
 
 /// A request: the FMU variables of the linear plant, and its operating point.
@@ -106,7 +106,7 @@ pub struct Linearise {
 /// [`LineariseError`] if a name or value is invalid, if a function of the FMU fails, if the FMU offers
 /// none of the three methods, or if the result is not accurate enough.
 pub fn linearise(fmu: &Fmu, request: &Linearise) -> Result<Linearisation, LineariseError> {
-    let description = fmu.description();
+    let description = &fmu.elements()?;
     let parts = Parts::of(description, request)?;
     if !request.start_time.is_finite() {
         let (what, value) = ("the start time".to_owned(), request.start_time);
@@ -153,7 +153,7 @@ fn by_equations(
     }
     let scales = scales(&with_nominals, &equations.x, &parts.inputs, &equations.u);
     let derivatives = if differentiates {
-        Some(directional::jacobian(&mut equations.component, parts, states)?)
+        Some(directional::jacobian(&mut *equations.component, parts, states)?)
     } else {
         None
     };
@@ -191,7 +191,8 @@ fn by_derivatives(
     request: &Linearise,
 ) -> Result<Linearisation, LineariseError> {
     all_settable(parts, &[])?;
-    let mut component = initialised(fmu, Interface::CoSimulation, parts, request)?;
+    let mut component = fmu.instantiate(NAME)?;
+    initialise(&mut component, parts, request)?;
     let rates: Vec<Part> = states
         .iter()
         .map(|state| Part { reference: state.derivative, ..state.part.clone() })

@@ -6,45 +6,42 @@ use fmu_description::{Causality, DefaultExperiment};
 use super::parts::{Part, Parts, Setting, State};
 use super::{Linearise, LineariseError};
 use fmu_import::Fmu;
-use fmu_import::{Component, Interface};
-use slave::CallError;
-use slave::Value;
+use slave::{CallError, ModelExchange, Slave, Value};
 
 /// Maximum number of calls of `fmi2NewDiscreteStates` per event.
 const EVENT_ITERATIONS: usize = 1000;
 
-/// Creates an instance and initialises it with the values of the operating point. States without a
-/// start value are not set yet.
-pub(super) fn initialised(
-    fmu: &Fmu,
-    interface: Interface,
+/// Name of the instances.
+pub(super) const NAME: &str = "linearise";
+
+/// Initialises an instance with the values of the operating point. States without a start value are
+/// not set yet.
+pub(super) fn initialise(
+    component: &mut (impl Slave + ?Sized),
     parts: &Parts,
     request: &Linearise,
-) -> Result<Component, LineariseError> {
-    let mut component = fmu.component(interface, "linearise")?;
-    let default = fmu.description().default_experiment.as_ref();
+) -> Result<(), LineariseError> {
+    let default = parts.description.default_experiment.as_ref();
     let tolerance = default.and_then(DefaultExperiment::usable_tolerance);
     let experiment = Experiment { start_time: request.start_time, stop_time: None, tolerance };
     component.setup_experiment(&experiment)?;
     let settable = parts.settings.iter().filter(|setting| setting.settable);
     for setting in settable.clone().filter(|setting| !setting.is_input) {
-        set(&mut component, setting)?;
+        set(component, setting)?;
     }
     component.enter_initialization_mode()?;
     for setting in settable.filter(|setting| setting.is_input) {
-        set(&mut component, setting)?;
+        set(component, setting)?;
     }
     component.exit_initialization_mode()?;
-    Ok(component)
+    Ok(())
 }
 
-fn set(component: &mut Component, setting: &Setting) -> Result<(), LineariseError> {
+fn set(component: &mut (impl Slave + ?Sized), setting: &Setting) -> Result<(), LineariseError> {
     let to = [setting.reference];
     let done = match &setting.value {
         Value::Real(value) => component.set_real(&to, &[*value]),
-        Value::Integer(value) => {
-            component.set_integer(&to, &[i32::try_from(*value).unwrap_or(i32::MAX)])
-        }
+        Value::Integer(value) => component.set_integer(&to, &[*value]),
         Value::Boolean(value) => component.set_boolean(&to, &[i32::from(*value)]),
         Value::String(value) => {
             component.set_string(&[setting.reference], std::slice::from_ref(value))
@@ -78,7 +75,7 @@ pub(super) fn all_settable(parts: &Parts, states: &[State]) -> Result<(), Linear
 
 /// Reads Reals and checks that they are finite.
 pub(super) fn read<'p>(
-    component: &mut Component,
+    component: &mut (impl Slave + ?Sized),
     parts: impl Iterator<Item = &'p Part> + Clone,
 ) -> Result<Vec<f64>, LineariseError> {
     let references: Vec<u32> = parts.clone().map(|part| part.reference).collect();
@@ -108,7 +105,7 @@ pub(super) enum Known {
 
 /// A model exchange instance in continuous-time mode at the operating point.
 pub(super) struct Equations<'p> {
-    pub(super) component: Component,
+    pub(super) component: Box<dyn ModelExchange>,
     pub(super) parts: &'p Parts<'p>,
     pub(super) states: &'p [State],
     pub(super) x: Vec<f64>,
@@ -126,14 +123,15 @@ impl<'p> Equations<'p> {
         states: &'p [State],
         request: &Linearise,
     ) -> Result<Self, LineariseError> {
-        let mut component = initialised(fmu, Interface::ModelExchange, parts, request)?;
-        settle(&mut component)?;
+        let mut component = fmu.instantiate_equations(NAME)?;
+        initialise(&mut *component, parts, request)?;
+        settle(&mut *component)?;
         let mut x = vec![0.0; states.len()];
         component.get_continuous_states(&mut x)?;
         if place(parts, states, &mut x) {
-            set_states(&mut component, states, &x)?;
+            set_states(&mut *component, states, &x)?;
             component.enter_event_mode()?;
-            settle(&mut component)?;
+            settle(&mut *component)?;
             let mut reached = x.clone();
             component.get_continuous_states(&mut reached)?;
             for (state, (&required, &found)) in states.iter().zip(x.iter().zip(&reached)) {
@@ -143,7 +141,7 @@ impl<'p> Equations<'p> {
                 }
             }
         }
-        let u = read(&mut component, parts.inputs.iter())?;
+        let u = read(&mut *component, parts.inputs.iter())?;
         let flags = fmu.description().model_exchange.as_ref();
         let returns = flags.is_some_and(|flags| flags.can_get_and_set_fmu_state);
         if returns {
@@ -157,7 +155,7 @@ impl<'p> Equations<'p> {
     /// Returns the current nominal value of each state; 1 if the FMU does not state it.
     pub(super) fn nominals(&mut self) -> Vec<f64> {
         let mut nominals = vec![1.0; self.states.len()];
-        let told = self.component.get_nominals(&mut nominals);
+        let told = self.component.get_nominals_of_continuous_states(&mut nominals);
         if told.is_err() { vec![1.0; self.states.len()] } else { nominals }
     }
 
@@ -227,7 +225,7 @@ fn place(parts: &Parts, states: &[State], x: &mut [f64]) -> bool {
 }
 
 fn set_states(
-    component: &mut Component,
+    component: &mut dyn ModelExchange,
     states: &[State],
     x: &[f64],
 ) -> Result<(), LineariseError> {
@@ -239,7 +237,7 @@ fn set_states(
 }
 
 /// Iterates the event and enters continuous-time mode.
-fn settle(component: &mut Component) -> Result<(), LineariseError> {
+fn settle(component: &mut dyn ModelExchange) -> Result<(), LineariseError> {
     for _ in 0..EVENT_ITERATIONS {
         let info = component.update_discrete_states()?;
         if info.terminate_simulation {

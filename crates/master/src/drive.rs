@@ -341,6 +341,7 @@ impl Drives {
         }
         for (drive, DriveState { faults, accepted }) in self.all.iter_mut().zip(state) {
             drive.faults = faults;
+            drive.cursor = Cursor::default();
             (drive.written, drive.accepted) = (accepted, accepted);
         }
         Ok(())

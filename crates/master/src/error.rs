@@ -77,7 +77,7 @@ pub enum SystemError {
     /// The two ends of a connection have different sizes.
     #[error(
         "{from} is {from_size} and {to} is {to_size}: arrays of different sizes are connected by \
-         element, such as {from}[1]"
+         element, such as {element}"
     )]
     Size {
         /// The source.
@@ -88,6 +88,8 @@ pub enum SystemError {
         to: String,
         /// Its size.
         to_size: String,
+        /// The first element of one that is an array.
+        element: Box<str>,
     },
     /// A structural parameter has removed an element of an array that is connected or set.
     #[error(

@@ -1,6 +1,7 @@
 //! Result files of simulations: writes CSV and Parquet row by row during a run, and reads them.
 //!
 //! [`create`] opens a [`Sink`] by the extension of the file: [`CsvSink`] or [`ParquetSink`].
+//! [`MemorySink`] keeps the rows in memory instead.
 //! [`Selection`] selects variables, [`Decimation`] selects communication points; [`Table`] reads a
 //! file.
 #![forbid(unsafe_code)]
@@ -8,6 +9,7 @@
 mod csv;
 mod decimation;
 mod envelope;
+mod memory;
 mod pace;
 mod parquet;
 mod read;
@@ -18,9 +20,12 @@ use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
+use serde::{Deserialize, Serialize};
+
 pub use csv::CsvSink;
 pub use decimation::{Decimation, Due};
 pub use envelope::Envelope;
+pub use memory::{Columns, MemorySink, Recorded, Texts, Values};
 pub use parquet::ParquetSink;
 pub use read::Table;
 pub use select::{Selection, SelectionError};
@@ -29,7 +34,7 @@ pub use select::{Selection, SelectionError};
 pub const TIME: &str = "time";
 
 /// A recorded variable.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Column {
     /// Name, such as `plant.x_p`.
     pub name: String,
@@ -40,7 +45,7 @@ pub struct Column {
 }
 
 /// The type of a column: a base type of FMI 2.0, or an integer of 64 bits; an Enumeration is an Integer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ColumnKind {
     /// `fmi2Real`.
     Real,

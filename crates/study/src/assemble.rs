@@ -3,17 +3,20 @@
 use crate::error::Error;
 use std::collections::HashSet;
 use std::path::Path;
+use std::sync::Arc;
 
 use fmu_import::CallLog;
+use master::Slave;
 use master::System;
 use master::Transformation;
 use ssp::structure::DefaultExperiment;
-use ssp::{self, Folders, Opened};
+use ssp::{self, Opened};
 use ssp::{Element, Link, Terminal};
 
 use crate::config::{ConnectionEntry, LoadedConfig, Solver};
 use crate::instances::instantiate;
 use crate::link::link as link_ports;
+use crate::store::Store;
 
 /// A connected system before initialisation.
 pub struct AssembledSystem {
@@ -25,8 +28,8 @@ pub struct AssembledSystem {
     pub steps: Vec<(String, f64)>,
     /// Whether the SSP requests libcosim's fixed-step algorithm.
     pub fixed_step: bool,
-    /// The folders to which an SSP was unpacked; keep them as long as the system.
-    pub folders: Option<Folders>,
+    /// The SSP with the folders to which it was unpacked; keep it as long as the system.
+    pub opened: Option<Arc<Opened>>,
     /// FMUs by name that are integrated through their model-exchange interface, with the method.
     pub integrated: Vec<(String, Solver)>,
 }
@@ -40,6 +43,10 @@ pub struct AssemblyOptions<'a> {
     pub by_unit: bool,
     /// The log of FMI calls, if any.
     pub log_calls: Option<&'a CallLog>,
+    /// FMUs that are already open, which further runs may use too.
+    pub store: Option<&'a Store>,
+    /// The program that becomes the separate process of an FMU; default: this program.
+    pub worker: Option<&'a Path>,
 }
 
 /// Loads the FMUs of the configuration, connects them and applies the settings.
@@ -52,15 +59,32 @@ pub fn assemble(
     loaded: &LoadedConfig,
     options: &AssemblyOptions<'_>,
 ) -> Result<AssembledSystem, Error> {
+    assemble_with(loaded, options, Vec::new())
+}
+
+/// Like [`assemble`], with further `slaves`, by name, that are no FMUs.
+///
+/// # Errors
+///
+/// Same as [`assemble`]; also if a slave has the name of an FMU.
+pub fn assemble_with(
+    loaded: &LoadedConfig,
+    options: &AssemblyOptions<'_>,
+    slaves: Vec<(String, Box<dyn Slave>)>,
+) -> Result<AssembledSystem, Error> {
     let config = &loaded.config;
     if config.isolation.isolate != Some(true) {
         for library in &config.preload {
             fmu_import::preload(library.as_ref())?;
         }
     }
-    let opened = config.system.as_deref().map(open).transpose()?;
-    let (mut assembly, experiment, steps, fixed_step, folders) = match opened {
-        Some(own) => (own.assembly, own.experiment, own.steps, own.fixed_step, Some(own.folders)),
+    let shared = |path: &Path| match options.store {
+        Some(store) => store.system(path, || open(path)),
+        None => open(path).map(Arc::new),
+    };
+    let opened = config.system.as_deref().map(shared).transpose()?;
+    let (mut assembly, experiment, steps, fixed_step) = match opened.as_deref() {
+        Some(own) => (own.assembly.clone(), own.experiment, own.steps.clone(), own.fixed_step),
         None => Default::default(),
     };
     for (name, path) in &config.fmus.0 {
@@ -69,7 +93,7 @@ pub fn assemble(
             None => assembly.elements.push(element(name, path)),
         }
     }
-    if assembly.elements.is_empty() {
+    if assembly.elements.is_empty() && slaves.is_empty() {
         return Err(Error::Invalid(
             "the system has no FMU, expected `system` or an entry of [fmus]".to_owned(),
         ));
@@ -78,11 +102,14 @@ pub fn assemble(
     for (name, function) in &assembly.functions {
         system.add(name, Box::new(function.slave()))?;
     }
+    for (name, slave) in slaves {
+        system.add(&name, slave)?;
+    }
     // Structural parameters come first: they determine the elements of arrays.
     apply_settings(&mut system, loaded, &assembly.elements, true)?;
     connect(&mut system, loaded, &assembly.links, options.by_unit)?;
     apply_settings(&mut system, loaded, &assembly.elements, false)?;
-    Ok(AssembledSystem { system, experiment, steps, fixed_step, folders, integrated })
+    Ok(AssembledSystem { system, experiment, steps, fixed_step, opened, integrated })
 }
 
 /// Applies the settings of structural parameters, or those of all other variables.

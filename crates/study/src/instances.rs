@@ -14,6 +14,7 @@ use ssp::structure::Implementation;
 use crate::assemble::AssemblyOptions;
 use crate::config::{Config, Interface, Solver};
 use crate::error::Error;
+use crate::store::Store;
 
 /// Instantiates the FMUs; returns the system, and the FMUs that are integrated with their method.
 pub(crate) fn instantiate(
@@ -42,9 +43,17 @@ pub(crate) fn instantiate(
             );
         }
     }
-    let isolation =
-        isolate::Options { time_limit, memory_limit, preload, logging, ..Default::default() };
-    let mut opening = Opening { isolation, log: options.log_calls, opened: HashMap::new() };
+    let executable = options.worker.map(Into::into);
+    let isolation = isolate::Options {
+        time_limit,
+        memory_limit,
+        preload,
+        logging,
+        executable,
+        ..Default::default()
+    };
+    let (log, store, opened) = (options.log_calls, options.store, HashMap::new());
+    let mut opening = Opening { isolation, log, store, opened };
     let (mut system, mut integrated) = (System::default(), Vec::new());
     for element in elements {
         let name = &element.name;
@@ -133,7 +142,7 @@ fn choose_interface(
 
 /// An opened FMU.
 #[derive(Clone)]
-enum Content {
+pub(crate) enum Content {
     /// Its library is loaded into this process.
     Loaded(Fmu),
     /// Its instances run in processes of their own.
@@ -147,12 +156,23 @@ impl Content {
             Content::Isolated(package) => package.description(),
         }
     }
+
+    /// Whether several runs of a process can use it.
+    pub(crate) fn is_reusable(&self) -> bool {
+        let own = self.description();
+        let simulation = own.co_simulation.as_ref();
+        let exchange = own.model_exchange.as_ref();
+        let once = simulation.is_some_and(|own| own.can_be_instantiated_only_once_per_process)
+            || exchange.is_some_and(|own| own.can_be_instantiated_only_once_per_process);
+        !once || matches!(self, Content::Isolated(_))
+    }
 }
 
 /// Opens the FMUs; unpacks an FMU only once if several elements use it.
 struct Opening<'a> {
     isolation: isolate::Options,
     log: Option<&'a CallLog>,
+    store: Option<&'a Store>,
     opened: HashMap<&'a PathBuf, Content>,
 }
 
@@ -162,16 +182,10 @@ impl<'a> Opening<'a> {
         if let Some(content) = self.opened.get(&element.fmu) {
             return Ok(content.clone());
         }
-        let content = if isolate {
-            let opened = isolate::Package::open(&element.fmu);
-            let package = opened.map_err(|error| Error::from(error).within(&element.name))?;
-            // Those of an FMU in an SSP were logged when the SSP was opened.
-            for warning in package.warnings().filter(|_| element.shown.is_none()) {
-                tracing::warn!("{}: {warning}", element.fmu.display());
-            }
-            Content::Isolated(package)
-        } else {
-            Content::Loaded(open_fmu(element)?)
+        let opening = || if isolate { open_package(element) } else { open_fmu(element) };
+        let content = match self.store {
+            Some(store) => store.fmu(&element.fmu, isolate, opening)?,
+            None => opening()?,
         };
         self.opened.insert(&element.fmu, content.clone());
         Ok(content)
@@ -242,13 +256,24 @@ impl<'a> Opening<'a> {
     }
 }
 
-/// Opens the FMU of an element. Warnings about an FMU in an SSP were already logged when the SSP
-/// was opened.
-fn open_fmu(element: &Element) -> Result<Fmu, Error> {
+/// Opens the FMU of an element for separate processes. Warnings about an FMU in an SSP were already
+/// logged when the SSP was opened.
+fn open_package(element: &Element) -> Result<Content, Error> {
+    let opened = isolate::Package::open(&element.fmu);
+    let package = opened.map_err(|error| Error::from(error).within(&element.name))?;
+    for warning in package.warnings().filter(|_| element.shown.is_none()) {
+        tracing::warn!("{}: {warning}", element.fmu.display());
+    }
+    Ok(Content::Isolated(package))
+}
+
+/// Opens the FMU of an element in this process, with warnings as [`open_package`].
+fn open_fmu(element: &Element) -> Result<Content, Error> {
     let opened = match &element.shown {
         Some(_) => Fmu::open_quietly(&element.fmu),
         None => Fmu::open_any(&element.fmu),
     };
+    let opened = opened.map(Content::Loaded);
     opened.map_err(|error| as_shown(Error::from(error).within(&element.name), element))
 }
 

@@ -24,10 +24,12 @@ mod run;
 #[cfg(feature = "load")]
 mod saved;
 pub mod scenario;
+#[cfg(feature = "load")]
+mod store;
 pub mod table;
 
 #[cfg(feature = "load")]
-pub use assemble::{AssembledSystem, AssemblyOptions, assemble};
+pub use assemble::{AssembledSystem, AssemblyOptions, assemble, assemble_with};
 pub use config::{Config, ConnectionEntry, Every, Interface, LoadedConfig, Memory, Solver};
 pub use error::Error;
 pub use link::link;
@@ -39,6 +41,8 @@ pub use record::{Recorder, keep_results, select, unit};
 pub use run::{PreparedRun, Run, RunEnd, RunStatistics};
 #[cfg(feature = "load")]
 pub use saved::SavedRun;
+#[cfg(feature = "load")]
+pub use store::Store;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

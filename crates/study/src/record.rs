@@ -48,6 +48,30 @@ impl Recorder {
         every: Every,
         start: f64,
     ) -> Result<Option<Self>, Error> {
+        let make = |columns: &[Column]| results::create(path, columns);
+        let recorder = Self::with_sink(simulation, ports, every, start, make)?;
+        let Some(recorder) = recorder else { return Ok(None) };
+        path.clone_into(&mut lock(&recorder.recording).path);
+        let mut files = FILES.lock().unwrap_or_else(PoisonError::into_inner);
+        files.retain(|file| file.strong_count() > 0);
+        files.push(Arc::downgrade(&recorder.recording));
+        drop(files);
+        Ok(Some(recorder))
+    }
+
+    /// Creates a recorder of `ports` to the sink that `make` returns for their columns; `None` if
+    /// nothing is recorded.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`] with the reason.
+    pub fn with_sink(
+        simulation: &mut Simulation,
+        ports: &[Port],
+        every: Every,
+        start: f64,
+        make: impl FnOnce(&[Column]) -> Result<Box<dyn Sink>, ResultsError>,
+    ) -> Result<Option<Self>, Error> {
         let decimation = match every {
             Every::Never => return Ok(None),
             Every::Step => Decimation::All,
@@ -58,11 +82,8 @@ impl Recorder {
         let system = simulation.system();
         let columns: Vec<_> = ports.iter().map(|&port| column(system, port)).collect();
         let (due, readout) = (Due::new(decimation, start), simulation.readout(&ports));
-        let sink = Some(results::create(path, &columns)?);
-        let recording = Arc::new(Mutex::new(Recording { path: path.to_owned(), sink }));
-        let mut files = FILES.lock().unwrap_or_else(PoisonError::into_inner);
-        files.retain(|file| file.strong_count() > 0);
-        files.push(Arc::downgrade(&recording));
+        let sink = Some(make(&columns)?);
+        let recording = Arc::new(Mutex::new(Recording { path: PathBuf::new(), sink }));
         Ok(Some(Self { recording, due, readout, slow }))
     }
 

@@ -26,7 +26,8 @@ pub(crate) fn resume(
     if let Some(fmu_stop) = checkpoint.fmu_stop_time().filter(|fmu_stop| fmu_stop < stop) {
         tracing::warn!(
             "resume: the stop time {stop} s is later than {fmu_stop} s, the stop time that the FMUs \
-             received at their start; an FMU may refuse to step beyond it"
+             received at their start; an FMU may refuse to step beyond it, or keep its values \
+             without a message; a run whose checkpoint is to be resumed needs the later --stop-time"
         );
     }
     if simulation.is_finished() && simulation.ended_by().is_none() {

@@ -2,12 +2,15 @@
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
-use master::{Port, Scenario, Simulation, SlowState, System, SystemError};
-use ssp::Folders;
+use fmu_description::Version;
+use master::{Port, Scenario, Simulation, Slave, SlowState, System, SystemError};
+use results::{Column, ResultsError, Sink};
+use ssp::Opened;
 
-use crate::assemble::{AssembledSystem, AssemblyOptions, assemble};
+use crate::assemble::{AssembledSystem, AssemblyOptions, assemble_with};
 use crate::config::{Config, Every, LoadedConfig};
 use crate::error::Error;
 use crate::plan::{Plan, plan};
@@ -27,8 +30,8 @@ pub struct PreparedRun {
     /// The variables to record.
     pub ports: Vec<Port>,
     scenario: Scenario,
-    /// The folders to which an SSP was unpacked; they outlive the system.
-    folders: Option<Folders>,
+    /// The unpacked SSP, which outlives the system.
+    opened: Option<Arc<Opened>>,
 }
 
 impl PreparedRun {
@@ -39,21 +42,34 @@ impl PreparedRun {
     /// # Errors
     ///
     /// Returns the first error found, with its line if it is in a file.
-    pub fn new(mut loaded: LoadedConfig, options: &AssemblyOptions<'_>) -> Result<Self, Error> {
+    pub fn new(loaded: LoadedConfig, options: &AssemblyOptions<'_>) -> Result<Self, Error> {
+        Self::with_slaves(loaded, options, Vec::new())
+    }
+
+    /// Like [`PreparedRun::new`], with further `slaves`, by name, that are no FMUs.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`PreparedRun::new`]; also if a slave has the name of an FMU.
+    pub fn with_slaves(
+        mut loaded: LoadedConfig,
+        options: &AssemblyOptions<'_>,
+        slaves: Vec<(String, Box<dyn Slave>)>,
+    ) -> Result<Self, Error> {
         loaded.config.make_absolute().map_err(Error::file("find", Path::new(".")))?;
         if options.log_calls.is_some() {
             // With threads, the order of the logged calls would be random.
             loaded.config.algorithm.jobs = Some(1);
         }
-        let mut assembled = assemble(&loaded, options)?;
+        let mut assembled = assemble_with(&loaded, options, slaves)?;
         let plan = plan(&mut loaded.config, &assembled)?;
-        let AssembledSystem { system, folders, .. } = &mut assembled;
-        let (system, folders) = (std::mem::take(system), folders.take());
+        let AssembledSystem { system, opened, .. } = &mut assembled;
+        let (system, opened) = (std::mem::take(system), opened.take());
         let scenario = scenario(&loaded, &system, &plan)?;
         let config = loaded.config;
         let ports = select(&system, &config.results.record, &config.results.exclude)?;
         check_saving(&config, &system)?;
-        Ok(Self { config, system, plan, ports, scenario, folders })
+        Ok(Self { config, system, plan, ports, scenario, opened })
     }
 
     /// Initialises the FMUs, or restores them from the checkpoint `saved`, and creates the results
@@ -64,7 +80,35 @@ impl PreparedRun {
     /// Returns [`Error`] if an FMU fails, if the checkpoint does not match the run, or if the file
     /// cannot be written.
     pub fn start(self, saved: Option<&SavedRun>) -> Result<Run, Error> {
-        let Self { config, system, plan, ports, scenario, folders } = self;
+        let file = self.config.results.file.clone();
+        self.start_recording(saved, |simulation, ports, every, start| match file {
+            Some(file) => Recorder::create(&file, simulation, ports, every, start),
+            None => Ok(None),
+        })
+    }
+
+    /// Like [`PreparedRun::start`], but writes the results to the sink that `make` returns for their
+    /// columns, instead of the file of the configuration.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`PreparedRun::start`].
+    pub fn start_into(
+        self,
+        saved: Option<&SavedRun>,
+        make: impl FnOnce(&[Column]) -> Result<Box<dyn Sink>, ResultsError>,
+    ) -> Result<Run, Error> {
+        self.start_recording(saved, |simulation, ports, every, start| {
+            Recorder::with_sink(simulation, ports, every, start, make)
+        })
+    }
+
+    fn start_recording(
+        self,
+        saved: Option<&SavedRun>,
+        record: impl FnOnce(&mut Simulation, &[Port], Every, f64) -> Result<Option<Recorder>, Error>,
+    ) -> Result<Run, Error> {
+        let Self { config, system, plan, ports, scenario, opened } = self;
         let text = config.render()?;
         let Plan { algorithm, experiment, .. } = &plan;
         let mut simulation = match saved {
@@ -75,10 +119,7 @@ impl PreparedRun {
             tracing::warn!("{early}");
         }
         let start = experiment.start_time;
-        let mut recorder = match &config.results.file {
-            Some(file) => Recorder::create(file, &mut simulation, &ports, plan.every, start)?,
-            None => None,
-        };
+        let mut recorder = record(&mut simulation, &ports, plan.every, start)?;
         let due = saved.and_then(|saved| saved.due(plan.every));
         if let (Some(recorder), Some(saved)) = (&mut recorder, saved) {
             recorder.restore(&mut simulation, saved.slow())?;
@@ -94,7 +135,7 @@ impl PreparedRun {
             tally: RunStatistics::default(),
             config,
             plan,
-            _folders: folders,
+            _opened: opened,
         })
     }
 }
@@ -128,8 +169,13 @@ fn check_saving(config: &Config, system: &System) -> Result<(), Error> {
         !flags.is_some_and(|flags| flags.can_serialize_fmu_state)
     });
     match unable {
-        Some((name, _)) => Err(Error::Invalid(format!(
-            "{name} cannot take part in a checkpoint: its canSerializeFMUstate is false"
+        Some((name, slave)) => Err(Error::Invalid(format!(
+            "{name} cannot take part in a checkpoint: {}",
+            match slave.description().version() {
+                Version::V1 => "FMI 1.0 has no functions that save the state of an FMU",
+                Version::V2 => "its canSerializeFMUstate is false",
+                Version::V3 => "its canSerializeFMUState is false",
+            }
         ))),
         None => Ok(()),
     }
@@ -187,8 +233,8 @@ pub struct Run {
     /// recorded.
     resumed: bool,
     tally: RunStatistics,
-    /// Unpacked folders, removed after the simulation.
-    _folders: Option<Folders>,
+    /// The unpacked SSP, whose folders are removed after the simulation.
+    _opened: Option<Arc<Opened>>,
 }
 
 impl Run {

@@ -121,11 +121,15 @@ impl Motion {
         [stop, 1.0, 1.0]
     }
 
-    /// Decides the regime at an event; true if that changed the state.
+    /// Decides the regime at an event; true if that changed the state. Does nothing if
+    /// [`Motion::advance`] integrates the motion, because it decides the regime itself.
     ///
     /// A sliding cart that has stopped gets the velocity zero; there, the balancing force decides whether
     /// it is held, continues or reverses. A held cart with a velocity got it from the importer.
     pub fn settle(&mut self, parameters: &Parameters, force: f64) -> bool {
+        if self.advances {
+            return false;
+        }
         let now = Instant::new(self, parameters, force);
         let velocity = self.state[2];
         if self.regime == Regime::Stick {

@@ -183,6 +183,8 @@ pub struct Machine {
     label: String,
     word: String,
     said: String,
+    size: u64,
+    v: Vec<f64>,
     witness: Witness,
 }
 
@@ -230,6 +232,8 @@ impl Model for Machine {
             label: "100 %".to_owned(),
             word: String::new(),
             said: String::new(),
+            size: 2,
+            v: vec![0.0; 2],
             witness: Witness::new(),
         })
     }
@@ -237,7 +241,10 @@ impl Model for Machine {
     fn variables(&self) -> Vec<Variable<Self>> {
         reach_infallible(Place::Variables);
         let sides = Enumeration::new("Side", [("left", 1), ("right", 2)]);
-        vec![
+        let v =
+            Variable::real_array("v", "", &[self.v.len()], |machine: &mut Self| &mut machine.v[..]);
+        let v = v.map(|element| element.tunable().sized_by(&["size"]));
+        let mut all = vec![
             Variable::real("u", "", field!(u)).input().derivative(field!(u_slope)),
             Variable::real("x", "", field!(x)).output(&["x"]).exact(),
             Variable::real("der(x)", "", field!(x_slope)).derivative_of("x"),
@@ -254,7 +261,15 @@ impl Model for Machine {
             Variable::string("label", "", field!(label)).tunable(),
             Variable::string("word", "", field!(word)).input(),
             Variable::string("said", "", field!(said)).output(&["x"]),
-        ]
+            Variable::structural("size", "", field!(size)).tunable().max(5.0),
+        ];
+        all.extend(v);
+        all
+    }
+
+    fn resize(&mut self) -> Result<(), Failure> {
+        self.v.resize(usize::try_from(self.size).unwrap_or(usize::MAX), 0.0);
+        Ok(())
     }
 
     fn check(&self) -> Result<(), Failure> {

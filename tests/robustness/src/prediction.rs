@@ -161,7 +161,7 @@ impl Core {
             1 => true,
             2 => early || continuous,
             5 => early,
-            6 => early || event,
+            6 | 9 | 10 => early || event,
             7 => self.state == S::Instantiated,
             _ => false,
         }
@@ -178,7 +178,7 @@ impl Core {
     /// Whether the Real is a known of the equations solved in this state.
     pub fn is_known(&self, reference: u32) -> bool {
         match self.state {
-            State::InitializationMode => [0, 1, 2, 5, 6].contains(&reference),
+            State::InitializationMode => [0, 1, 2, 5, 6, 9, 10].contains(&reference),
             _ => [0, 1, 2].contains(&reference),
         }
     }

@@ -25,7 +25,7 @@ pub const LENGTH: usize = 8;
 
 /// The functions that are called; the others differ from these in the type of their values only, or refuse
 /// always.
-pub const FUNCTIONS: [Function; 33] = [
+pub const FUNCTIONS: [Function; 35] = [
     Function::EnterInitializationMode,
     Function::ExitInitializationMode,
     Function::EnterEventMode,
@@ -57,6 +57,8 @@ pub const FUNCTIONS: [Function; 33] = [
     Function::SetFMUState,
     Function::FreeFMUState,
     Function::EnterConfigurationMode,
+    Function::ExitConfigurationMode,
+    Function::SetUInt64,
     Function::Terminate,
     Function::Reset,
 ];
@@ -131,10 +133,15 @@ struct Sequence {
     event_mode: bool,
     state: State,
     time: f64,
+    /// The structural parameter.
+    size: u64,
     saved: *mut c_void,
-    /// The state and time of `saved`.
-    known: (State, f64),
+    /// State, time and structural parameter of `saved`.
+    known: (State, f64, u64),
 }
+
+/// The structural parameter at the start.
+const SIZE: u64 = 2;
 
 /// The token, and the value references of a Float64, an Int32 and a Boolean that are inputs.
 fn known() -> &'static (CString, u32, u32, u32) {
@@ -143,6 +150,16 @@ fn known() -> &'static (CString, u32, u32, u32) {
         let description = fmu::describe_3::<Machine>(Path::new("")).unwrap();
         let of = |name: &str| description.variable(name).unwrap().value_reference;
         (CString::new(description.guid.as_str()).unwrap(), of("u"), of("n"), of("on"))
+    })
+}
+
+/// The value references of the structural parameter and of its array.
+fn sized() -> (u32, u32) {
+    static SIZED: OnceLock<(u32, u32)> = OnceLock::new();
+    *SIZED.get_or_init(|| {
+        let description = fmu::describe_3::<Machine>(Path::new("")).unwrap();
+        let of = |name: &str| description.variable(name).unwrap().value_reference;
+        (of("size"), of("v"))
     })
 }
 
@@ -189,8 +206,9 @@ impl Sequence {
         assert!(!instance.is_null());
         environment.instance.set(instance);
         let (state, saved) = (State::Instantiated, null_mut());
-        let known = (state, 0.0);
-        Self { instance, environment, interface, event_mode, state, time: 0.0, saved, known }
+        let known = (state, 0.0, SIZE);
+        let (time, size) = (0.0, SIZE);
+        Self { instance, environment, interface, event_mode, state, time, size, saved, known }
     }
 
     /// Makes one call; panics if its status is none that the standard allows.
@@ -228,6 +246,15 @@ impl Sequence {
             Function::Terminate => State::Terminated,
             Function::Reset => State::Instantiated,
             Function::SetFMUState => self.known.0,
+            Function::EnterConfigurationMode if self.state == State::Instantiated => {
+                State::ConfigurationMode
+            }
+            Function::EnterConfigurationMode => State::ReconfigurationMode,
+            Function::ExitConfigurationMode => match self.state {
+                State::ConfigurationMode => State::Instantiated,
+                _ if exchange => State::EventMode,
+                _ => State::StepComplete,
+            },
             _ => self.state,
         }
     }
@@ -366,27 +393,65 @@ impl Sequence {
                 Function::GetFMUState => {
                     let status = fmi3::get_fmu_state::<Machine>(own, &raw mut self.saved);
                     if status == 0 {
-                        self.known = (self.state, self.time);
+                        self.known = (self.state, self.time, self.size);
                     }
                     status
                 }
                 Function::SetFMUState => {
                     let status = fmi3::set_fmu_state::<Machine>(own, self.saved);
                     if status == 0 {
-                        self.time = self.known.1;
+                        (_, self.time, self.size) = self.known;
                     }
                     status
                 }
                 Function::FreeFMUState => fmi3::free_fmu_state::<Machine>(own, &raw mut self.saved),
                 Function::EnterConfigurationMode => fmi3::enter_configuration_mode::<Machine>(own),
+                Function::ExitConfigurationMode => {
+                    let status = fmi3::exit_configuration_mode::<Machine>(own);
+                    self.assert_size(status);
+                    status
+                }
+                Function::SetUInt64 => {
+                    let (reference, value) =
+                        (sized().0, choice.either(&[1, 2, 3, 5], &[0, 6, u64::MAX]));
+                    let status = fmi3::set_uint64::<Machine>(
+                        own,
+                        &raw const reference,
+                        1,
+                        &raw const value,
+                        1,
+                    );
+                    if status == 0 {
+                        assert!((1..=5).contains(&value), "{value}");
+                        self.size = value;
+                    }
+                    status
+                }
                 Function::Terminate => fmi3::terminate::<Machine>(own),
                 Function::Reset => {
-                    self.time = 0.0;
+                    (self.time, self.size) = (0.0, SIZE);
                     fmi3::reset::<Machine>(own)
                 }
                 _ => ERROR,
             }
         }
+    }
+}
+
+impl Sequence {
+    /// Asserts after a successful `fmi3ExitConfigurationMode` that the array has the new size.
+    fn assert_size(&self, status: c_int) {
+        if status != 0 {
+            return;
+        }
+        let (reference, size) = (sized().1, usize::try_from(self.size).unwrap());
+        let mut values = [0.0; 8];
+        let values = values.as_mut_ptr();
+        // SAFETY: the array is larger than any size.
+        let status = unsafe {
+            fmi3::get_float64::<Machine>(self.instance, &raw const reference, 1, values, size)
+        };
+        assert_eq!(status, 0, "{size} values");
     }
 }
 

@@ -38,7 +38,7 @@ fn changed(name: &str, change: impl Fn(&str) -> String) -> Fmu {
     let xml = fs::read_to_string(unpacked.folder().join("modelDescription.xml")).unwrap();
     let new = change(&xml);
     assert_ne!(new, xml, "the change changes something");
-    let mut package = Package::new(new);
+    let mut package = Package::new(new).for_version(unpacked.description.version());
     package.add_folder("binaries", &unpacked.folder().join("binaries")).unwrap();
     let resources = unpacked.resources();
     if resources.exists() {
@@ -56,6 +56,7 @@ fn open(name: &str) -> Fmu {
 
 fn without_derivatives(xml: &str) -> String {
     xml.replace(" providesDirectionalDerivative=\"true\"", "")
+        .replace(" providesDirectionalDerivatives=\"true\"", "")
 }
 
 /// The FMU without the element of one interface.
@@ -186,6 +187,22 @@ fn steps_of_the_upright_pendulum_give_the_formulas_within_their_error() {
         let found = linearise(&fmu, &request).unwrap();
         expect_close(&found, &expected, 1e-5);
         expect_within_errors(&found, &expected);
+    }
+}
+
+#[test]
+fn an_fmu_of_fmi_3_has_the_matrices_of_the_same_model_in_fmi_2_by_each_method() {
+    let simulation: fn(&str) -> String = |xml| without("ModelExchange", xml);
+    let exchange: fn(&str) -> String = |xml| without("CoSimulation", xml);
+    let differences: fn(&str) -> String = |xml| without_derivatives(&without("CoSimulation", xml));
+    for change in [simulation, exchange, differences, steps_only] {
+        let (mut request, _) = pendulum("false");
+        request.states = names(&["x_p", "theta", "v_p", "omega"]);
+        let [two, three] = ["FrictionPendulum.fmu", "FrictionPendulum.fmi3.fmu"]
+            .map(|name| linearise(&changed(name, change), &request).unwrap());
+        let matrices = |found: &Linearisation| format!("{:?} {:?}", found.matrices, found.states);
+        assert_eq!(matrices(&three), matrices(&two));
+        assert_eq!(three.method, two.method);
     }
 }
 

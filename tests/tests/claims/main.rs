@@ -8,6 +8,7 @@ mod closed_loop;
 mod command;
 mod engine;
 mod fmi_crate;
+mod fmi_crate3;
 mod fmi_rs;
 mod linearise;
 mod misbehaviour;

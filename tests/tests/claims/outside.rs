@@ -112,6 +112,8 @@ fn a_design_is_the_same_by_the_library_and_by_the_command() {
     let plant = root().join("fmu-controller/pendulum.toml");
     let text = printed("make-design", &[&plant]);
     let file = folder.path().join("design.toml");
-    command(&["design", &plant.display().to_string(), "--out", &file.display().to_string()]);
+    let (plant, out) = (plant.display().to_string(), file.display().to_string());
+    let output = run(&["design", &plant, "--out", &out]);
+    assert_eq!(output.status.code(), Some(1), "the verdict on the pendulum is red");
     assert_eq!(text, fs::read_to_string(file).unwrap().trim());
 }

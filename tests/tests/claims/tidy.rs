@@ -102,13 +102,13 @@ fn the_libraries_use_only_those_that_architecture_md_allows() {
 #[test]
 fn only_tests_use_a_model_or_the_command() {
     let folders = ARROWS.iter().map(|(folder, _)| root().join("crates").join(folder));
-    for folder in folders.chain([root().join("cli"), root().join("tests")]) {
+    for folder in folders.chain([root().join("cli"), root().join("python"), root().join("tests")]) {
         let manifest = manifest(&folder);
         for section in ["dependencies", "dev-dependencies", "build-dependencies"] {
             let Some(dependencies) = manifest.get(section).and_then(toml::Value::as_table) else {
                 continue;
             };
-            for forbidden in ["fmu-plant", "fmu-controller", "aso-ftc"] {
+            for forbidden in ["fmu-plant", "fmu-controller", "aso-ftc", "aso-ftc-python"] {
                 assert!(
                     !dependencies.contains_key(forbidden),
                     "{} uses {forbidden}",
@@ -202,6 +202,7 @@ fn the_models_forbid_unsafe_code() {
         "examples/lookup-table",
         "examples/three-tank",
         "examples/dc-servo",
+        "examples/state-space",
     ] {
         let entry = if model == "cli" { "src/main.rs" } else { "src/lib.rs" };
         let text = fs::read_to_string(root().join(model).join(entry)).unwrap();

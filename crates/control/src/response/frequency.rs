@@ -93,7 +93,7 @@ pub fn frequency_grid(system: &StateSpace, per_decade: u32) -> Result<Vec<f64>, 
 }
 
 /// A system in balanced coordinates.
-pub(super) struct Transfer<'a> {
+pub(crate) struct Transfer<'a> {
     a: DMatrix<f64>,
     b: DMatrix<Complex<f64>>,
     c: DMatrix<Complex<f64>>,
@@ -102,7 +102,7 @@ pub(super) struct Transfer<'a> {
 }
 
 impl<'a> Transfer<'a> {
-    pub(super) fn new(system: &'a StateSpace) -> Self {
+    pub(crate) fn new(system: &'a StateSpace) -> Self {
         let Balance { matrix, scale } = Balance::new(&system.a);
         let b = to_complex(&divide_rows(&system.b, &scale));
         let c = to_complex(&multiply_columns(&system.c, &scale));
@@ -110,6 +110,14 @@ impl<'a> Transfer<'a> {
     }
 
     pub(super) fn point(&self, frequency: f64) -> Result<FrequencyPoint, Error> {
+        let gain = self.gain(frequency)?;
+        let tall = if gain.nrows() < gain.ncols() { gain.transpose() } else { gain.clone() };
+        let singular_values = ComplexSvd::new(&tall)?.values();
+        Ok(FrequencyPoint { frequency, gain, singular_values })
+    }
+
+    /// G at one frequency.
+    pub(crate) fn gain(&self, frequency: f64) -> Result<DMatrix<Complex<f64>>, Error> {
         if !(frequency.is_finite() && frequency >= 0.0) {
             let rule = "a finite number, not negative";
             return Err(Error::OutOfRange { name: "frequency", value: frequency, rule });
@@ -126,9 +134,7 @@ impl<'a> Transfer<'a> {
         if gain.iter().any(|entry| !(entry.re.is_finite() && entry.im.is_finite())) {
             return Err(overflow);
         }
-        let tall = if gain.nrows() < gain.ncols() { gain.transpose() } else { gain.clone() };
-        let singular_values = ComplexSvd::new(&tall)?.values();
-        Ok(FrequencyPoint { frequency, gain, singular_values })
+        Ok(gain)
     }
 
     /// The largest singular value.

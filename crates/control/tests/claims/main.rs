@@ -21,6 +21,7 @@ mod reference;
 mod refusals;
 mod response;
 mod riccati;
+mod robustness;
 mod sampled;
 mod theorem1;
 mod zeros;

@@ -35,7 +35,7 @@ pub(super) fn frequencies(report: &Report) -> Markup {
     }
 }
 
-fn frequency(id: &str, response: &Frequency, limit: Option<f64>) -> Markup {
+pub(super) fn frequency(id: &str, response: &Frequency, limit: Option<f64>) -> Markup {
     let xs = &response.frequencies;
     let values = || response.singular_values.iter().flatten().copied();
     let largest = values().fold(0.0, f64::max);

@@ -6,10 +6,14 @@ mod pendulum;
 
 use resvg::usvg::roxmltree::{Document, Node};
 
-use super::page;
 use crate::report::Report;
+use crate::robust_report::Level;
 use hostile::{bare, hostile};
 use pendulum::pendulum;
+
+fn page(report: &Report) -> String {
+    super::page(report, hostile::QUOTES)
+}
 
 /// Converts the page to XML: only the `meta` elements of its head lack an end tag.
 fn xml(html: &str) -> String {
@@ -147,13 +151,14 @@ fn only_sections_with_content_appear_in_reading_order() {
             "3. Gains",
             "4. Eigenvalues",
             "5. Condition and pole errors",
-            "6. Singular values",
-            "7. Sudden faults",
-            "8. Bounds of the errors",
-            "9. Certificate",
-            "10. Assumptions",
-            "11. Loss of effectiveness",
-            "12. Interface of the FMU",
+            "6. Robustness",
+            "7. Singular values",
+            "8. Sudden faults",
+            "9. Bounds of the errors",
+            "10. Certificate",
+            "11. Assumptions",
+            "12. Loss of effectiveness",
+            "13. Interface of the FMU",
         ]
     );
     assert_eq!(
@@ -199,6 +204,11 @@ fn the_verdict_names_the_failed_checks() {
         text(all.find(|node| node.attribute("class").unwrap().starts_with("verdict")).unwrap())
     };
     assert!(verdict(&pendulum()).starts_with("✓ All 4 checks hold; both loops are stable."));
+    let mut amber = pendulum();
+    amber.verdict.level = Level::Amber;
+    amber.verdict.reasons = vec!["the peak of S".to_owned()];
+    let said = verdict(&amber);
+    assert!(said.starts_with("! All 4") && said.contains("amberthe peak of S"), "{said}");
     let failed = verdict(&hostile());
     assert!(failed.starts_with("✗") && failed.contains("detectable"), "{failed}");
     assert!(!failed.contains("observable"), "{failed}");

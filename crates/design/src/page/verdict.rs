@@ -5,15 +5,22 @@ use maud::{Markup, html};
 use super::number::number;
 use super::plane::Plane;
 use crate::report::{Loop, Report};
+use crate::robust_report::Level;
 
 pub(super) fn verdict(report: &Report) -> Markup {
     let failures = failures(report);
     let count = report.checks.len();
+    let limits = &report.verdict.limits;
+    let level = if failures.is_empty() { report.verdict.level } else { Level::Red };
+    // The checks are shown above with their explanations.
+    let checked = |reason: &&String| !reason.starts_with("does not hold: ");
+    let warnings: Vec<_> = report.verdict.reasons.iter().filter(checked).collect();
     html! {
-        div.verdict .passed[failures.is_empty()] .failed[!failures.is_empty()] {
+        div.verdict .passed[level == Level::Green] .warned[level == Level::Amber]
+            .failed[level == Level::Red] {
             @if failures.is_empty() {
                 p.outcome {
-                    "✓ "
+                    (sign(level)) " "
                     @match count {
                         0 => "Both loops are stable; nothing else was checked.",
                         1 => "The check holds; both loops are stable.",
@@ -31,6 +38,20 @@ pub(super) fn verdict(report: &Report) -> Markup {
                     }
                 }
             }
+            @if !warnings.is_empty() {
+                p.outcome { "Robustness: " (level.word()) }
+                ul { @for warning in &warnings { li { (warning) } } }
+            }
+            p {
+                "Verdict: " (report.verdict.level.word()) ". A peak of S above " (number(limits.amber))
+                " is amber, above " (number(limits.red)) " red, as are parameters within their \
+                 tolerances that make the loop unstable: "
+                @for (index, (name, tolerance)) in ["A", "B", "C"].iter().zip(limits.tolerance).enumerate() {
+                    @if index > 0 { ", " }
+                    (number(tolerance)) " of each entry of " (name)
+                }
+                "."
+            }
             @if let Err(reason) = &report.certificate.printed {
                 p { "Theorem 1 as printed does not apply: " (reason) }
             }
@@ -39,6 +60,14 @@ pub(super) fn verdict(report: &Report) -> Markup {
             }
         }
         (key_numbers(report))
+    }
+}
+
+fn sign(level: Level) -> &'static str {
+    match level {
+        Level::Green => "✓",
+        Level::Amber => "!",
+        Level::Red => "✗",
     }
 }
 
@@ -84,6 +113,14 @@ fn key_numbers(report: &Report) -> Markup {
                 @if let Some(condition) = condition {
                     (key(name, &number(condition)))
                 }
+            }
+            @if let Some(robustness) = &report.robustness {
+                @for point in &robustness.points {
+                    (key(&format!("Peak of S at the {}", point.point), &number(point.judged)))
+                }
+                (key("Random cases that stay stable", &html! {
+                    (number(100.0 * robustness.tolerance.stable)) " %"
+                }))
             }
             (settling(report))
             @if let Ok(theorem) = &report.certificate.printed {

@@ -1,7 +1,6 @@
 //! Instances for model exchange.
 
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
 use fmu_description::Version;
 use slave::{CallError, CompletedStep, EventInfo, ModelExchange, absent};
@@ -20,19 +19,16 @@ impl Fmu {
     /// [`FmuError::Version`] for FMI 1.0.
     pub fn instantiate_equations(&self, name: &str) -> Result<Box<dyn ModelExchange>, FmuError> {
         let description = self.description();
-        let once = description.model_exchange.as_ref();
-        let once = once.is_some_and(|flags| flags.can_be_instantiated_only_once_per_process);
-        if once && self.content.instantiated.swap(true, Ordering::Relaxed) {
-            let (instance, model) = (name.to_owned(), description.model_name.clone());
-            return Err(FmuError::OnlyOnce { instance, model });
-        }
+        let flags = description.model_exchange.as_ref();
+        let once = flags.is_some_and(|flags| flags.can_be_instantiated_only_once_per_process);
+        let only = once.then(|| self.occupy(name)).transpose()?;
         let inner = if description.version() == Version::V3 {
             Inner::V3(Box::new(self.equations_of_version_3(name)?))
         } else {
             let component = self.component(Interface::ModelExchange, name)?;
             Inner::V2(crate::v2::Instance::new(component))
         };
-        Ok(Box::new(Instance::new(inner, self.clone())))
+        Ok(Box::new(Instance::new(inner, only, self.clone())))
     }
 
     fn equations_of_version_3(&self, name: &str) -> Result<crate::v3::Instance, FmuError> {

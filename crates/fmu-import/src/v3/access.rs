@@ -92,7 +92,7 @@ impl Instance {
                     let what = format!(
                         "cannot take the value {value:?} for {name}, expected a value of type {kind}"
                     );
-                    return Err(refused(function, what));
+                    return Err(refused(run.kind.setter(), what));
                 }
             }
             if run.kind == NativeType::Clock {

@@ -54,6 +54,26 @@ impl NativeType {
         }
     }
 
+    /// Returns the name of the function that sets variables of the type.
+    pub(super) fn setter(self) -> &'static str {
+        match self {
+            Self::Float32 => "fmi3SetFloat32",
+            Self::Float64 => "fmi3SetFloat64",
+            Self::Int8 => "fmi3SetInt8",
+            Self::UInt8 => "fmi3SetUInt8",
+            Self::Int16 => "fmi3SetInt16",
+            Self::UInt16 => "fmi3SetUInt16",
+            Self::Int32 => "fmi3SetInt32",
+            Self::UInt32 => "fmi3SetUInt32",
+            Self::Int64 => "fmi3SetInt64",
+            Self::UInt64 => "fmi3SetUInt64",
+            Self::Boolean => "fmi3SetBoolean",
+            Self::String => "fmi3SetString",
+            Self::Binary => "fmi3SetBinary",
+            Self::Clock => "fmi3SetClock",
+        }
+    }
+
     /// Returns the name of the type in FMI 3.0.
     pub(super) fn name(self) -> &'static str {
         match self {

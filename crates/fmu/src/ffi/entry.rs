@@ -42,7 +42,7 @@ entry_points! {
     exit_initialization_mode = ExitInitializationMode(),
         instance => instance.exit_initialization_mode();
     terminate = Terminate(), instance => { instance.terminate(); Ok(()) };
-    reset = Reset(), instance => { instance.reset(); Ok(()) };
+    reset = Reset(), instance => instance.reset();
     get_real = GetReal(vr: *const fmi2ValueReference, n: usize, value: *mut fmi2Real),
         instance => instance.get_real(read(vr, n)?, borrow_output(value, n)?);
     get_integer = GetInteger(vr: *const fmi2ValueReference, n: usize, value: *mut fmi2Integer),

@@ -1,5 +1,7 @@
 //! The functions of FMI 3.0 that differ from those of FMI 2.0.
 
+mod clocks;
+mod configuration;
 mod derivatives;
 mod intermediate;
 mod step;
@@ -16,6 +18,9 @@ use fmu_description::call_order::{InterfaceType, State};
 pub(crate) use derivatives::Jacobian;
 use intermediate::Intermediate;
 
+/// The most scalars of one call whose places need no buffer.
+const FEW: usize = 8;
+
 /// What an instance of FMI 3.0 has besides the parts of every instance.
 pub(crate) struct Session {
     table: Table,
@@ -28,6 +33,8 @@ pub(crate) struct Session {
     integers: Vec<i32>,
     /// The event indicators.
     indicators: Vec<f64>,
+    /// The structural parameters with which the variables were laid out.
+    structural: Vec<u64>,
     /// The values returned by the last `fmi3GetBinary`, which must stay valid until the next call.
     binaries: Vec<Vec<u8>>,
 }
@@ -48,7 +55,7 @@ impl<M: Model> Instance<M> {
     /// `fmi3InstantiateModelExchange`, `fmi3InstantiateCoSimulation`.
     pub(crate) fn new_3(made: &Instantiation<'_>, callbacks: Callbacks) -> Result<Self, Failure> {
         let mut instance = Self::build(made.resources, callbacks, |interface, description| {
-            let (table, _) = interface.convert(description);
+            let (table, _) = interface.convert(description)?;
             if !interface.offers_exchange() {
                 if made.interface_type == InterfaceType::ModelExchange {
                     return Err(Failure::Error("this FMU offers co-simulation only".to_owned()));
@@ -74,11 +81,13 @@ impl<M: Model> Instance<M> {
                 places: Vec::new(),
                 integers: Vec::new(),
                 indicators,
+                structural: Vec::new(),
                 binaries: Vec::new(),
             })))
         })?;
         instance.debug_logging = true;
         instance.categories = (!made.logging_on).then(Vec::new);
+        instance.session_mut()?.structural = instance.structural_parameters();
         Ok(instance.into_type(made.interface_type))
     }
 
@@ -128,6 +137,9 @@ impl<M: Model> Instance<M> {
         if self.uses_event_mode() {
             self.core.state = State::EventMode;
         }
+        if self.core.state == State::EventMode {
+            self.tick();
+        }
         Ok(())
     }
 
@@ -137,37 +149,34 @@ impl<M: Model> Instance<M> {
             return Err(Failure::Error("eventModeUsed is false".to_owned()));
         }
         self.core.next_event = None;
-        self.enter_event_mode()
+        self.enter_event_mode()?;
+        self.tick();
+        Ok(())
     }
 
     /// `fmi3UpdateDiscreteStates`.
     pub(crate) fn update_discrete_states_3(&mut self) -> Result<Event, Failure> {
         let event = self.update_discrete_states()?;
         self.core.next_event = event.next_event_time;
+        self.clear_clocks();
+        if event.new_discrete_states_needed {
+            self.tick();
+        }
         Ok(event)
     }
 
     /// `fmi3EnterStepMode`.
     pub(crate) fn enter_step_mode(&mut self) -> Result<(), Failure> {
+        self.clear_clocks();
         self.refresh()?;
         self.core.state = State::StepComplete;
         Ok(())
     }
 
-    /// `fmi3EnterConfigurationMode`: refused, because no exported model has structural parameters
-    /// (sections 2.3.6, 2.3.7).
-    #[expect(clippy::unused_self, reason = "an entry point like the others")]
-    pub(crate) fn enter_configuration_mode(&self) -> Result<(), Failure> {
-        Err(Failure::Error("this FMU has no structural parameters".to_owned()))
-    }
-
-    /// `fmi3ExitConfigurationMode`.
-    pub(crate) fn exit_configuration_mode(&mut self) {
-        self.core.state = match (self.core.state, self.core.interface_type) {
-            (State::ConfigurationMode, _) => State::Instantiated,
-            (_, InterfaceType::ModelExchange) => State::EventMode,
-            (_, InterfaceType::CoSimulation) => State::StepComplete,
-        };
+    /// `fmi3EnterContinuousTimeMode`.
+    pub(crate) fn enter_continuous_time_mode_3(&mut self) {
+        self.clear_clocks();
+        self.enter_continuous_time_mode();
     }
 
     /// `fmi3GetNumberOfContinuousStates`.
@@ -197,24 +206,30 @@ impl<M: Model> Instance<M> {
         count: usize,
         body: impl FnOnce(&mut Self, &[u32]) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
+        let mut few = [0; FEW];
+        if let Some(places) = few.get_mut(..count)
+            && self.session()?.table.locate_scalars(kind, references, places)
+        {
+            return body(self, places);
+        }
+        self.located_in_arrays(kind, references, count, body)
+    }
+
+    /// [`Instance::located`] of arrays or of many variables.
+    #[inline(never)]
+    fn located_in_arrays(
+        &mut self,
+        kind: Type,
+        references: &[u32],
+        count: usize,
+        body: impl FnOnce(&mut Self, &[u32]) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
         let session = self.session_mut()?;
         let mut places = std::mem::take(&mut session.places);
         let found = session.table.locate(kind, references, count, &mut places);
         let done = found.and_then(|()| body(self, &places));
         self.session_mut()?.places = places;
         done
-    }
-
-    /// The answer of the functions for types that no exported model has.
-    pub(crate) fn without_variables(
-        &self,
-        function_type: &str,
-        references: &[u32],
-    ) -> Result<(), Failure> {
-        match references.first() {
-            None => Ok(()),
-            Some(&first) => Err(self.session()?.table.wrong_type(first, function_type)),
-        }
     }
 }
 

@@ -54,7 +54,7 @@ impl<M: Model> Instance<M> {
             return Err(Failure::Error(message.to_owned()));
         }
         self.core.clone_from(&snapshot.core);
-        Ok(())
+        self.fit_layout()
     }
 }
 
@@ -141,6 +141,8 @@ impl<M: Model> Core<M> {
             State::Instantiated
             | State::InitializationMode
             | State::EventMode
+            | State::ConfigurationMode
+            | State::ReconfigurationMode
             | State::Terminated
             | State::Error => true,
             State::ContinuousTimeMode => self.interface_type == InterfaceType::ModelExchange,
@@ -150,8 +152,6 @@ impl<M: Model> Core<M> {
             State::StepInProgress
             | State::StepCanceled
             | State::Fatal
-            | State::ConfigurationMode
-            | State::ReconfigurationMode
             | State::IntermediateUpdateMode => false,
         };
         reached && self.time.is_finite() && self.experiment.start_time.is_finite()

@@ -228,7 +228,7 @@ fn a_damaged_or_foreign_serialized_state_is_refused() {
 fn reset_is_as_after_instantiation() {
     let mut instance = initialized();
     step(&mut instance, 0.0, 0.1);
-    instance.reset();
+    instance.reset().unwrap();
     let start = fresh();
     assert_eq!(bytes_of(&instance.snapshot()), bytes_of(&start.snapshot()));
 }

@@ -32,6 +32,7 @@ pub(crate) enum Type {
     Boolean,
     String,
     Binary,
+    Clock,
 }
 
 impl Type {
@@ -51,6 +52,7 @@ impl Type {
             Type::Boolean => "Boolean",
             Type::String => "String",
             Type::Binary => "Binary",
+            Type::Clock => "Clock",
         }
     }
 }
@@ -95,6 +97,14 @@ impl Table {
         })
     }
 
+    /// Whether the variables have the same names and types as those of `other`, in the same order.
+    pub(crate) fn has_variables_of(&self, other: &Self) -> bool {
+        let variables = |table: &Self| -> Vec<(String, Type)> {
+            table.entries.iter().map(|entry| (entry.name.clone(), entry.kind)).collect()
+        };
+        variables(self) == variables(other)
+    }
+
     /// Returns the name of a variable.
     pub(crate) fn name(&self, reference: u32) -> Option<&str> {
         self.entries.get(reference as usize).map(|entry| entry.name.as_str())
@@ -131,6 +141,26 @@ impl Table {
             return Err(self.wrong_count(references, places.len(), count));
         }
         Ok(())
+    }
+
+    /// Writes the places of scalars of one type; returns false if a reference is no such scalar, or if
+    /// there are not as many references as places.
+    pub(crate) fn locate_scalars(
+        &self,
+        kind: Type,
+        references: &[u32],
+        places: &mut [u32],
+    ) -> bool {
+        references.len() == places.len()
+            && references.iter().zip(places).all(|(&reference, place)| {
+                match self.entries.get(reference as usize) {
+                    Some(entry) if entry.kind == kind && entry.count == 1 => {
+                        *place = entry.first;
+                        true
+                    }
+                    _ => false,
+                }
+            })
     }
 
     /// Returns the error for a function that does not access the variable's type.

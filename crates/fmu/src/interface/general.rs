@@ -38,7 +38,7 @@ pub(super) fn general<M: Model>(model: &M) -> ModelDescription {
         author: text(about.author),
         version: text(about.version),
         license: text(about.license),
-        generation_tool: Some(concat!("fmi2 ", env!("CARGO_PKG_VERSION")).to_owned()),
+        generation_tool: Some(concat!("aso-ftc ", env!("CARGO_PKG_VERSION")).to_owned()),
         structured_names: true,
         number_of_event_indicators: indicators,
         model_exchange: exchange.map(|_| ModelExchange {

@@ -25,6 +25,8 @@ pub(crate) struct Slot<M, T> {
     pub(crate) settable: u16,
     /// The values of an enumeration; empty for all other types.
     pub(crate) items: Vec<i32>,
+    /// The interval of a periodic clock in s.
+    pub(crate) interval: Option<f64>,
     pub(crate) field: Field<M, T>,
     pub(crate) derivatives: Vec<Field<M, f64>>,
 }
@@ -37,6 +39,7 @@ pub(crate) struct SlotBuilder<M> {
     initial: Option<Initial>,
     range: (f64, f64),
     items: Vec<i32>,
+    interval: Option<f64>,
     derivatives: Vec<Field<M, f64>>,
 }
 
@@ -53,6 +56,7 @@ impl<M> SlotBuilder<M> {
                 .enumeration
                 .map(|own| own.items.iter().map(|(_, value)| *value).collect())
                 .unwrap_or_default(),
+            interval: variable.number.interval,
             derivatives: variable.derivatives,
         };
         (builder, variable.access)
@@ -82,6 +86,7 @@ impl<M> SlotBuilder<M> {
             range: self.range,
             settable: settable((self.causality, self.variability), self.initial, false),
             items: self.items,
+            interval: self.interval,
             field,
             derivatives: self.derivatives,
         });

@@ -1,6 +1,7 @@
 //! `ModelStructure` of a model, from the declared dependencies of its variables.
 
 use crate::model::Failure;
+use crate::typed::TypedField;
 use crate::variable::{Access, Variable};
 use fmu_description::{Causality, DependencyKind, Initial, ModelStructure, Unknown};
 
@@ -51,7 +52,10 @@ pub(super) fn structure<M>(variables: &[Variable<M>]) -> Result<ModelStructure, 
             || is_derivative
             || is_state(position)
             || variable.causality == Causality::CalculatedParameter;
-        if exposed && matches!(variable.initial, Some(Initial::Calculated | Initial::Approx)) {
+        // An output clock may be listed (section 2.4.8); FMPy demands it.
+        let is_clock = matches!(variable.access, Access::Typed(TypedField::Clock(_)));
+        let computed = matches!(variable.initial, Some(Initial::Calculated | Initial::Approx));
+        if exposed && (computed || is_clock) {
             structure.initial_unknowns.push(initial_row(variables, position)?);
         }
     }

@@ -107,30 +107,40 @@ impl Simulation {
         let first_experiment = Experiment { stop_time: origin.stop_time, ..*experiment };
         let stop = experiment.stop_time;
         let mut simulation = Self::start(system, algorithm, &first_experiment, stop, scenario)?;
-        simulation.expect_origin_of(checkpoint)?;
+        simulation.restore(checkpoint)?;
+        Ok(simulation)
+    }
+
+    /// Returns to the state of `checkpoint`, which this simulation or another one of the same system has
+    /// given.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if slaves, connections or faults differ from the checkpoint, or if an FMU
+    /// refuses its state.
+    pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), SystemError> {
+        self.expect_origin_of(checkpoint)?;
         let states = checkpoint.slaves.iter();
-        for ((name, slave), (_, _, bytes)) in simulation.engine.system.slaves.iter_mut().zip(states)
-        {
+        for ((name, slave), (_, _, bytes)) in self.engine.system.slaves.iter_mut().zip(states) {
             slave.deserialize_state(bytes).map_err(|source| call(name, checkpoint.time, source))?;
         }
-        simulation.engine.exchange.restore(&checkpoint.values);
-        for (fault, kept) in simulation.engine.exchange.faults().zip(&checkpoint.faults) {
+        self.engine.exchange.restore(&checkpoint.values);
+        for (fault, kept) in self.engine.exchange.faults().zip(&checkpoint.faults) {
             fault.clone_from(kept);
         }
-        simulation
-            .engine
+        self.engine
             .drives
             .restore(checkpoint.drives.clone())
             .map_err(|error| SystemError::Algorithm { what: error.to_string() })?;
-        simulation.engine.grid.resume(checkpoint.time, checkpoint.count);
-        simulation.ended = checkpoint.ended;
-        simulation.control.size = checkpoint.size;
-        simulation.control.controller = checkpoint.controller.clone();
-        let iterated = &mut simulation.coupler.iterated;
+        self.engine.grid.resume(checkpoint.time, checkpoint.count);
+        self.ended = checkpoint.ended;
+        self.control.size = checkpoint.size;
+        self.control.controller = checkpoint.controller.clone();
+        let iterated = &mut self.coupler.iterated;
         if let (Some(iterated), Some(iteration)) = (iterated, &checkpoint.iteration) {
             iterated.iteration = iteration.clone();
         }
-        Ok(simulation)
+        Ok(())
     }
 
     fn expect_origin_of(&mut self, checkpoint: &Checkpoint) -> Result<(), SystemError> {

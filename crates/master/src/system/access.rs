@@ -7,7 +7,11 @@ use slave::{Value, ValueType};
 
 impl System {
     /// Reads the variable at `port`.
-    pub(crate) fn get_value(&mut self, port: Port) -> Result<Value, CallError> {
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`] if the FMU refuses the read.
+    pub fn get_value(&mut self, port: Port) -> Result<Value, CallError> {
         let variable = self.variable(port);
         let (reference, kind) = ([variable.value_reference], ValueType::of(&variable.kind));
         let slave = &mut self.slaves[port.slave].1;
@@ -34,8 +38,13 @@ impl System {
         }
     }
 
-    /// Sets the variable at `port`; `value` has its type.
-    pub(crate) fn set_value(&mut self, port: Port, value: &Value) -> Result<(), CallError> {
+    /// Sets the variable at `port`; `value` has its type. Between two steps of a simulation, only an
+    /// input without a connection or a tunable parameter keeps it.
+    ///
+    /// # Errors
+    ///
+    /// [`CallError`] if the FMU refuses the value.
+    pub fn set_value(&mut self, port: Port, value: &Value) -> Result<(), CallError> {
         let reference = [self.variable(port).value_reference];
         let slave = &mut self.slaves[port.slave].1;
         match value {

@@ -24,6 +24,12 @@ impl Named {
     }
 }
 
+/// Returns the name of the first element of `named`, which is called `name`, if it is an array.
+fn first_element(name: &str, named: &Named) -> Option<String> {
+    let Named::Array(elements) = named else { return None };
+    elements.first().map(|(indices, _)| format!("{name}{indices}"))
+}
+
 /// Whether `text` has the form of indices: `[1,2]`.
 fn is_indices(text: &str) -> bool {
     text.strip_prefix('[').and_then(|rest| rest.strip_suffix(']')).is_some_and(|inner| {
@@ -86,6 +92,10 @@ impl System {
             from_size: source.size(),
             to: to.to_owned(),
             to_size: target.size(),
+            element: first_element(from, &source)
+                .or_else(|| first_element(to, &target))
+                .unwrap_or_default()
+                .into_boxed_str(),
         })
     }
 

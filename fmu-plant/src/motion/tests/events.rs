@@ -211,3 +211,59 @@ fn a_force_that_equals_the_static_friction_to_rounding_does_not_stall_the_integr
         angle = 1e-18 + (angle * 1.37) % 9e-17;
     }
 }
+
+/// Follows the motion in `steps` steps of `size` under a force that is constant in each of them, and that
+/// pushes the cart to and fro. Returns the motion and the times of the events at which it `stops`.
+fn follow_pushed(
+    p: &Parameters,
+    initial: State,
+    size: f64,
+    steps: u32,
+    stops: bool,
+) -> (Motion, Vec<f64>) {
+    let tolerance = Tolerance::default();
+    let mut motion = start(p, initial, &Force::constant(0.0));
+    let mut events = Vec::new();
+    for k in 0..steps {
+        let (mut time, end) = (f64::from(k) * size, f64::from(k + 1) * size);
+        let force = Force::constant(40.0 * (time * 9.0).sin());
+        if !stops {
+            motion.advance(p, &force, time, size, &tolerance).unwrap();
+            continue;
+        }
+        while let Some(event) =
+            motion.advance_to_event(p, &force, time, end - time, &tolerance).unwrap()
+        {
+            assert!(event > time && event <= end);
+            events.push(event);
+            time = event;
+        }
+    }
+    (motion, events)
+}
+
+#[test]
+fn a_step_to_an_event_ends_where_a_block_stops() {
+    let (mass, level, velocity) = (2.0, 5.0, 0.7);
+    let p = sliding_block(mass, level);
+    let force = Force::constant(0.0);
+    let mut motion = start(&p, [0.0, 0.0, velocity, 0.0], &force);
+    let mut to = |from: f64, to: f64| {
+        motion.advance_to_event(&p, &force, from, to - from, &Tolerance::default()).unwrap()
+    };
+    let stop = to(0.0, 0.25).or_else(|| to(0.25, 0.5)).unwrap();
+    close(stop, velocity * mass / level);
+    assert_eq!(to(stop, 0.5), None);
+    assert_eq!((motion.regime(), motion.state()[2].to_bits()), (Regime::Stick, 0));
+}
+
+#[test]
+fn a_motion_that_stops_at_its_events_has_the_bits_of_one_that_does_not() {
+    let p = Parameters::default();
+    let initial = [0.0, 0.02, 0.3, 0.0];
+    let (stopping, events) = follow_pushed(&p, initial, 1.0 / 128.0, 400, true);
+    assert!(events.len() > 5, "{events:?}");
+    let (whole, _) = follow_pushed(&p, initial, 1.0 / 128.0, 400, false);
+    assert_eq!(stopping.state().map(f64::to_bits), whole.state().map(f64::to_bits));
+    assert_eq!(stopping.regime(), whole.regime());
+}

@@ -48,10 +48,10 @@ fn differs<T: PartialEq>(pairs: impl IntoIterator<Item = (Option<T>, T)>) -> boo
 }
 
 pub(super) fn get_real(call: &mut Call) -> Outcome {
-    let vr = references(&mut call.choice, 9, any);
+    let vr = references(&mut call.choice, 11, any);
     let mut values = call.choice.array(vr.items.len(), |_| 77.0);
     let status = call.importer.get_real(&vr, &mut values);
-    let elements = vr.items.iter().map(|own| fine(*own < 9));
+    let elements = vr.items.iter().map(|own| fine(*own < 11));
     let kept = |own: &u32| match Values::place_of_real(*own) {
         None => (*own == 0).then_some(call.core.time),
         Some(place) => Some(call.core.values.reals[place]),
@@ -62,7 +62,7 @@ pub(super) fn get_real(call: &mut Call) -> Outcome {
 }
 
 pub(super) fn set_real(call: &mut Call) -> Outcome {
-    let vr = references(&mut call.choice, 9, |own| call.core.settable_real(own));
+    let vr = references(&mut call.choice, 11, |own| call.core.settable_real(own));
     let values = call.choice.array(vr.items.len(), Choice::real);
     let status = call.importer.set_real(&vr, &values);
     let (core, mut set_values) = (call.core, Vec::new());
@@ -163,9 +163,9 @@ pub(super) fn set_string(call: &mut Call) -> Outcome {
 
 pub(super) fn get_directional_derivative(call: &mut Call) -> Outcome {
     let choice = &mut call.choice;
-    let unknowns = references(choice, 9, |own| call.core.is_unknown(own));
+    let unknowns = references(choice, 11, |own| call.core.is_unknown(own));
     let mut to = choice.array(unknowns.items.len(), |_| 77.0);
-    let knowns = references(choice, 9, |own| call.core.is_known(own));
+    let knowns = references(choice, 11, |own| call.core.is_known(own));
     let delta = choice.array(knowns.items.len(), Choice::real);
     let status = call.importer.get_directional_derivative((&unknowns, &mut to), (&knowns, &delta));
     let elements = unknowns.items.iter().map(|own| fine(call.core.is_unknown(*own)));

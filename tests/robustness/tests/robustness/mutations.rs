@@ -24,9 +24,30 @@ const WORDS: [&[u8]; 16] = [
     b"<ScalarVariable name=\"x\" valueReference=\"0\"><Real/></ScalarVariable>",
 ];
 
+/// Words of the descriptions of FMI 3.0.
+const WORDS_3: [&[u8]; 12] = [
+    b"<Dimension start=\"3\"/>",
+    b"<Dimension valueReference=\"1\"/>",
+    b"<Dimension start=\"18446744073709551615\"/>",
+    b"<Float32 name=\"f\" valueReference=\"1\" start=\"1 2 3\"/>",
+    b"<UInt64 name=\"n\" valueReference=\"1\" causality=\"structuralParameter\" start=\"2\"/>",
+    b"<Clock name=\"c\" valueReference=\"1\" intervalVariability=\"constant\" intervalDecimal=\"0.1\"/>",
+    b"<Binary name=\"b\" valueReference=\"1\"><Start value=\"0f\"/></Binary>",
+    b"<Alias name=\"a\" displayUnit=\"deg\"/>",
+    b" clocks=\"1 2\"",
+    b" start=\"1 2 3\"",
+    b" derivative=\"1\"",
+    b" fmiVersion=\"3.0\"",
+];
+
 #[test]
 fn changed_model_descriptions_do_no_harm() {
     mutate("model_description", &WORDS, targets::model_description, 5000);
+}
+
+#[test]
+fn changed_model_descriptions_of_fmi_3_do_no_harm() {
+    mutate("model_description", &WORDS_3, targets::model_description, 5000);
 }
 
 #[test]

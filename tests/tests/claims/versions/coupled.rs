@@ -93,6 +93,7 @@ fn connections_that_types_or_sizes_forbid_are_refused_by_name() {
         (("one.y", "three.k_in"), "Int32"),
         (("three.k_out", "one.b_in"), "Boolean"),
         (("three.b", "four.u"), "an array of size [2]"),
+        (("one.y", "four.a"), "are connected by element, such as four.a[1]"),
         (("three.bytes_out", "one.s_in"), "String"),
     ] {
         let folder = tempfile::tempdir().unwrap();
@@ -115,4 +116,17 @@ fn a_structural_parameter_of_one_fmu_fits_its_arrays_to_those_of_another() {
     let (status, errors, at) = outcome(&system, folder.path(), &both);
     assert_eq!(status, Some(0), "{errors}");
     assert_eq!(at("four.b[4]"), 16.0);
+}
+
+#[test]
+fn an_fmu_of_fmi_1_cannot_take_part_in_a_checkpoint_and_the_message_says_why() {
+    let folder = tempfile::tempdir().unwrap();
+    let system = write(folder.path(), &CONNECTIONS);
+    let checkpoint = folder.path().join("checkpoint").display().to_string();
+    let (status, errors, _) = outcome(&system, folder.path(), &["--checkpoint", &checkpoint]);
+    assert_eq!(status, Some(2), "{errors}");
+    assert!(
+        errors.contains("one cannot take part in a checkpoint: FMI 1.0 has no functions"),
+        "{errors}"
+    );
 }

@@ -239,3 +239,25 @@ fn an_fmu_of_fmi_3_explains_its_errors_although_logging_is_off() {
     assert_eq!(error.function, "fmi3GetFloat64");
     assert!(error.messages.iter().any(|own| own.contains("value reference 1073741824")), "{error}");
 }
+
+#[test]
+fn a_value_beyond_the_range_of_a_type_names_the_function_of_that_type() {
+    let mut loaded = ready("plain");
+    let error = loaded.slave.set_real(&[loaded.reference("f")], &[1e300]).unwrap_err();
+    assert_eq!(error.function, "fmi3SetFloat32");
+    assert!(error.to_string().contains("1e300 for f, expected a value of type Float32"), "{error}");
+}
+
+#[test]
+fn a_structural_parameter_that_would_need_too_much_memory_is_refused_and_may_be_set_again() {
+    let mut loaded = Loaded::third("plain");
+    let size = loaded.reference("n");
+    let error = loaded.slave.configure(&[size], &[1 << 40]).unwrap_err().to_string();
+    assert!(
+        error.contains("fmi3EnterConfigurationMode was not called: its arrays have"),
+        "{error}"
+    );
+    loaded.slave.configure(&[size], &[3]).unwrap();
+    let mut loaded = loaded.initialised();
+    loaded.set_real("a[3]", 1.5);
+}

@@ -24,6 +24,10 @@ fn values(report: &Report) -> Vec<Value> {
         response["frequencies"].take();
         response["singular_values"].take();
     }
+    for curve in all["robustness"]["curves"].as_array_mut().into_iter().flatten() {
+        curve["frequencies"].take();
+        curve["singular_values"].take();
+    }
     for response in all["steps"].as_array_mut().unwrap() {
         for curve in response["curves"].as_array_mut().unwrap() {
             curve["times"].take();

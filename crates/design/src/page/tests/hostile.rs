@@ -7,6 +7,10 @@ use crate::report::{
     Region, Report, Sampled, Signal, StepResponse, Theorem1, Ultimate, Variable,
 };
 
+use crate::robust_report::{
+    Channel, Compared, Disk, Level, Limits, LoopPoint, Number, Robustness, ToleranceResult, Verdict,
+};
+
 pub(super) const MARKUP: &str = "</code></pre><script>alert(1)</script>";
 pub(super) const QUOTES: &str = "a\" onload=\"x' & <b>";
 const PERIOD: f64 = 1e-3;
@@ -176,6 +180,58 @@ fn bare_plant() -> Plant {
     }
 }
 
+/// Margins without limits, and names that no page must trip over.
+fn robustness(numbers: &mut Numbers) -> Robustness {
+    let disk = || Disk {
+        alpha: 2.5,
+        certified: 2.25,
+        frequency: f64::INFINITY,
+        gain: [0.0, f64::INFINITY],
+        phase: 102.6,
+    };
+    let channel = |name: &str| Channel {
+        name: name.to_owned(),
+        gain: [0.0, f64::INFINITY],
+        phase: f64::INFINITY,
+        delay: 1e-9,
+        disk: disk(),
+    };
+    let point = |point: &str| LoopPoint {
+        point: point.to_owned(),
+        s_peak: 1.5e5,
+        s_frequency: 12.0,
+        t_peak: 1.5e5,
+        t_frequency: 12.0,
+        s_peak_scaled: 3.0,
+        judged: 3.0,
+        together: disk(),
+        channels: vec![channel(MARKUP), channel(QUOTES)],
+    };
+    Robustness {
+        points: vec![point("input"), point("output")],
+        delay_margin: f64::INFINITY,
+        longest_hold: 0.0,
+        noise_of_measurements: vec![1.0; 8],
+        noise: numbers.matrix("noise", 3, 8),
+        noise_together: vec![Number { name: QUOTES.to_owned(), unit: None, value: 3.25 }],
+        comparison: vec![Compared {
+            name: MARKUP.to_owned(),
+            design: 12.5,
+            linear_quadratic: None,
+        }],
+        tolerance: ToleranceResult {
+            entries: 12,
+            cases: 200,
+            seed: 1,
+            stable: 0.125,
+            worst_instability: 0.5,
+            first_unstable: 0.75,
+            worst: vec![numbers.matrix("A", 10, 10)],
+        },
+        curves: vec![frequency(2)],
+    }
+}
+
 /// A sampled design with everything in it.
 pub(super) fn hostile() -> Report {
     let mut numbers = Numbers(7);
@@ -190,6 +246,12 @@ pub(super) fn hostile() -> Report {
         description: format!("Tanks «Überlauf» {MARKUP}"),
         plant_file: format!("C:\\plants\\{QUOTES}.toml"),
         plant: plant(&mut numbers),
+        verdict: Verdict {
+            level: Level::Red,
+            reasons: vec![format!("the peak of S {MARKUP}")],
+            limits: Limits { amber: 2.0, red: 4.0, tolerance: [0.1; 3] },
+        },
+        robustness: Some(robustness(&mut numbers)),
         checks: vec![check("observable", true, None), check("detectable", false, Some(2.75e-13))],
         gains: vec![numbers.matrix("L_x", 10, 8), numbers.matrix("L_f", 3, 8)],
         feedback: sampled_loop("Φ + Γ K_x", &rates, Some(region())),
@@ -241,7 +303,13 @@ pub(super) fn bare() -> Report {
         description: String::new(),
         plant_file: "plant.toml".to_owned(),
         plant: bare_plant(),
+        verdict: Verdict {
+            level: Level::Green,
+            reasons: Vec::new(),
+            limits: Limits { amber: 2.0, red: 4.0, tolerance: [0.1; 3] },
+        },
         checks: Vec::new(),
+        robustness: None,
         gains: Vec::new(),
         feedback: system(-1.5),
         observer: system(-20.25),

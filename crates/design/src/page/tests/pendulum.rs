@@ -9,6 +9,8 @@ use crate::report::{
     StepResponse, pairs, rows,
 };
 
+use crate::robust_report::{Level, Limits, Verdict};
+
 const DESIGN: &str = include_str!("../../../../../fmu-controller/resources/design.toml");
 const STATES: [(&str, &str, &str); 4] = [
     ("x_p", "m", "cart position"),
@@ -256,7 +258,13 @@ pub(super) fn pendulum() -> Report {
         description: "Fault-tolerant controller of the inverted pendulum".to_owned(),
         plant_file: "pendulum.toml".to_owned(),
         plant: plant(&design, matrices),
+        verdict: Verdict {
+            level: Level::Green,
+            reasons: Vec::new(),
+            limits: Limits { amber: 2.0, red: 4.0, tolerance: [0.1; 3] },
+        },
         checks: checks(),
+        robustness: None,
         gains,
         feedback: system(
             "A + B K_x",

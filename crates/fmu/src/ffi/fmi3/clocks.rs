@@ -1,40 +1,77 @@
-//! The functions for clocks, which no exported model has: each call that names a variable is an error.
+//! The functions for clocks. Intervals are in seconds and constant: functions that set an interval or
+//! count parts of a second are errors for every clock.
 
-use super::super::read;
+use super::super::{borrow_output, read};
 use super::entry_points_3;
+use crate::interface::fmi3::Type;
+use crate::model::Failure;
 use fmu_description::abi3::{
     fmi3Clock, fmi3Float64, fmi3IntervalQualifier, fmi3UInt64, fmi3ValueReference,
 };
 
-/// Defines functions whose first arguments are value references of clocks.
-macro_rules! clock_functions {
-    ($($name:ident = $function:ident($($argument:ident: $type:ty),*);)*) => {
+entry_points_3! {
+    get_clock = GetClock(vr: *const fmi3ValueReference, n: usize, values: *mut fmi3Clock),
+        instance => {
+            let to = borrow_output(values, n)?;
+            instance.located(Type::Clock, read(vr, n)?, n, |own, places| {
+                own.get_clock(places, to);
+                Ok(())
+            })
+        };
+    set_clock = SetClock(vr: *const fmi3ValueReference, n: usize, values: *const fmi3Clock),
+        instance => {
+            let values = read(values, n)?;
+            instance
+                .located(Type::Clock, read(vr, n)?, n, |own, places| own.set_clock(places, values))
+        };
+    get_interval_decimal = GetIntervalDecimal(
+        vr: *const fmi3ValueReference, n: usize, intervals: *mut fmi3Float64,
+        qualifiers: *mut fmi3IntervalQualifier
+    ), instance => {
+        let (intervals, qualifiers) = (borrow_output(intervals, n)?, borrow_output(qualifiers, n)?);
+        instance.located(Type::Clock, read(vr, n)?, n, |own, places| {
+            own.get_intervals(places, intervals, qualifiers)
+        })
+    };
+    get_shift_decimal = GetShiftDecimal(
+        vr: *const fmi3ValueReference, n: usize, shifts: *mut fmi3Float64
+    ), instance => {
+        let shifts = borrow_output(shifts, n)?;
+        instance.located(Type::Clock, read(vr, n)?, n, |own, places| own.get_shifts(places, shifts))
+    };
+}
+
+/// Defines functions that every clock refuses.
+macro_rules! refused {
+    ($($name:ident = $function:ident($($argument:ident: $type:ty),*), $reason:literal;)*) => {
         entry_points_3! {
             $($name = $function(
                 vr: *const fmi3ValueReference, n: usize, $($argument: $type),*
-            ), instance => instance.without_variables("Clock", read(vr, n)?);)*
+            ), instance => {
+                instance.located(Type::Clock, read(vr, n)?, n, |_, places| match places {
+                    [] => Ok(()),
+                    _ => Err(Failure::Error($reason.to_owned())),
+                })
+            };)*
         }
     };
 }
 
-clock_functions! {
-    get_clock = GetClock(_values: *mut fmi3Clock);
-    set_clock = SetClock(_values: *const fmi3Clock);
-    get_interval_decimal = GetIntervalDecimal(
-        _intervals: *mut fmi3Float64, _qualifiers: *mut fmi3IntervalQualifier
-    );
+refused! {
     get_interval_fraction = GetIntervalFraction(
         _counters: *mut fmi3UInt64, _resolutions: *mut fmi3UInt64,
         _qualifiers: *mut fmi3IntervalQualifier
-    );
-    get_shift_decimal = GetShiftDecimal(_shifts: *mut fmi3Float64);
-    get_shift_fraction = GetShiftFraction(_counters: *mut fmi3UInt64, _resolutions: *mut fmi3UInt64);
-    set_interval_decimal = SetIntervalDecimal(_intervals: *const fmi3Float64);
+    ), "supportsFraction of the clock is false";
+    get_shift_fraction = GetShiftFraction(_counters: *mut fmi3UInt64, _resolutions: *mut fmi3UInt64),
+        "supportsFraction of the clock is false";
+    set_interval_decimal = SetIntervalDecimal(_intervals: *const fmi3Float64),
+        "the interval of the clock is constant";
     set_interval_fraction = SetIntervalFraction(
         _counters: *const fmi3UInt64, _resolutions: *const fmi3UInt64
-    );
-    set_shift_decimal = SetShiftDecimal(_shifts: *const fmi3Float64);
+    ), "the interval of the clock is constant";
+    set_shift_decimal = SetShiftDecimal(_shifts: *const fmi3Float64),
+        "the interval of the clock is constant";
     set_shift_fraction = SetShiftFraction(
         _counters: *const fmi3UInt64, _resolutions: *const fmi3UInt64
-    );
+    ), "the interval of the clock is constant";
 }

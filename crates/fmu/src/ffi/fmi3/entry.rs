@@ -32,7 +32,7 @@ entry_points_3! {
         instance => instance.exit_initialization_mode_3();
     enter_event_mode = EnterEventMode(), instance => instance.enter_event_mode_3();
     terminate = Terminate(), instance => { instance.terminate(); Ok(()) };
-    reset = Reset(), instance => { instance.reset(); Ok(()) };
+    reset = Reset(), instance => instance.reset();
     get_number_of_variable_dependencies = GetNumberOfVariableDependencies(
         reference: fmi3ValueReference, n: *mut usize
     ), instance => write_one(n, instance.dependencies(reference)?.len());
@@ -113,7 +113,7 @@ entry_points_3! {
     enter_configuration_mode = EnterConfigurationMode(),
         instance => instance.enter_configuration_mode();
     exit_configuration_mode = ExitConfigurationMode(),
-        instance => { instance.exit_configuration_mode(); Ok(()) };
+        instance => instance.exit_configuration_mode();
     // Ignored, because providesEvaluateDiscreteStates is false (section 2.3.5).
     evaluate_discrete_states = EvaluateDiscreteStates(), _instance => Ok(());
     update_discrete_states = UpdateDiscreteStates(
@@ -130,7 +130,7 @@ entry_points_3! {
         write_one(next, event.next_event_time.unwrap_or_default())
     };
     enter_continuous_time_mode = EnterContinuousTimeMode(), instance => {
-        instance.enter_continuous_time_mode();
+        instance.enter_continuous_time_mode_3();
         Ok(())
     };
     completed_integrator_step = CompletedIntegratorStep(

@@ -23,6 +23,13 @@ impl Intermediate {
         let values = || vec![0.0; inputs];
         Self { update, values: [values(), values(), values()], stale: false, asked: false }
     }
+
+    /// Makes room for another number of inputs.
+    pub(super) fn resize(&mut self, inputs: usize) {
+        for values in &mut self.values {
+            values.resize(inputs, 0.0);
+        }
+    }
 }
 
 impl<M: Model> Instance<M> {

@@ -17,8 +17,8 @@ pub(crate) struct StepResult {
 impl<M: Model> Instance<M> {
     /// `fmi3DoStep`.
     ///
-    /// A model whose equations the exporter integrates stops at its events if the importer handles them
-    /// (`eventModeUsed`) and allows early return. A model that wants the simulation to end returns at that
+    /// A model stops at its events ([`Model::step_to_event`]; the exporter's integration, if it has no step)
+    /// if the importer handles them (`eventModeUsed`) and allows early return. A model that wants the simulation to end returns at that
     /// time.
     ///
     /// # Errors
@@ -64,8 +64,18 @@ impl<M: Model> Instance<M> {
         let end = start + size;
         core.before_stop(end)?;
         core.check()?;
-        let stop = match core.model.step(&step) {
-            Ok(()) => Stop { time: end, is_event: false },
+        let stop = match core.model.step_to_event(&step) {
+            Ok(None) => Stop { time: end, is_event: false },
+            Ok(Some(time)) if time > step.start && time <= step.end() => {
+                Stop { time, is_event: true }
+            }
+            Ok(Some(time)) => {
+                return Err(Failure::Error(format!(
+                    "the model reports an event at {time} s in the step from {} s to {} s",
+                    step.start,
+                    step.end()
+                )));
+            }
             Err(Failure::Unsolved) => {
                 let Self { stepper, interface, .. } = self;
                 let tolerance = core.experiment.tolerance;

@@ -195,7 +195,8 @@ fn a_variable_of_another_type_is_an_error() {
         .call(Function::GetInt32, |i| i.located(Type::Int32, &[reference("u")], 1, |_, _| Ok(())));
     assert_eq!(status, Status::Error);
     let mut instance = made::<Linear>(InterfaceType::CoSimulation, false, false).unwrap();
-    let status = instance.call(Function::GetClock, |i| i.without_variables("Clock", &[0]));
+    let status =
+        instance.call(Function::GetClock, |i| i.located(Type::Clock, &[0], 1, |_, _| Ok(())));
     assert_eq!(status, Status::Error);
 }
 

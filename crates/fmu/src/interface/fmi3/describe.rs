@@ -81,9 +81,10 @@ fn kind_of(kind: &Kind) -> Type {
         Kind::UInt32(_) => Type::UInt32,
         Kind::UInt64(_) => Type::UInt64,
         Kind::Binary(_) => Type::Binary,
+        Kind::Clock(_) => Type::Clock,
         Kind::Boolean(_) => Type::Boolean,
         Kind::String(_) => Type::String,
-        _ => Type::Float64,
+        Kind::Real(_) => Type::Float64,
     }
 }
 

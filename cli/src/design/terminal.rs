@@ -1,0 +1,86 @@
+//! The summary of a design on the terminal.
+
+use design::Report;
+use design::report::{Loop, Matrix};
+
+/// Prints gains, eigenvalues, the three figures that matter, and the verdict.
+pub(crate) fn summarise(report: &Report) {
+    for matrix in &report.gains {
+        print_gain(matrix);
+    }
+    for own in [&report.feedback, &report.observer] {
+        print_loop(own);
+    }
+    if let Some(found) = &report.robustness {
+        let peaks: Vec<_> = found
+            .points
+            .iter()
+            .map(|point| format!("{} at the {}", number(point.judged), point.point))
+            .collect();
+        println!("peak of S: {}", peaks.join(", "));
+        let hold = if report.sampling.is_some() { "longest sample time" } else { "longest hold" };
+        println!(
+            "delay margin: {} s; {hold}: {} s",
+            number(found.delay_margin),
+            number(found.longest_hold)
+        );
+        let tolerance = &found.tolerance;
+        let worst = match tolerance.first_unstable {
+            limit if limit.is_infinite() => "no unstable case found".to_owned(),
+            limit => format!("an unstable case from {} of them on", number(limit)),
+        };
+        println!(
+            "parameter tolerances: {} % of {} random cases are stable, {worst}",
+            number(100.0 * tolerance.stable),
+            tolerance.cases,
+        );
+    }
+    for check in report.checks.iter().filter(|check| !check.holds) {
+        println!("does not hold: {} ({})", check.condition, check.explanation);
+    }
+    println!("verdict: {}", report.verdict.level.word());
+    let checked = |reason: &&String| !reason.starts_with("does not hold: ");
+    for reason in report.verdict.reasons.iter().filter(checked) {
+        println!("    {reason}");
+    }
+}
+
+fn print_gain(matrix: &Matrix) {
+    println!("{} ({}):", matrix.name, matrix.meaning);
+    for row in &matrix.values {
+        let entries: Vec<_> = row.iter().map(|entry| format!("{:>12}", number(*entry))).collect();
+        println!("  {}", entries.join(" "));
+    }
+}
+
+fn print_loop(own: &Loop) {
+    println!("{}: {}", own.matrix, own.method);
+    let shown = own.eigenvalues.iter().filter(|[_, im]| *im >= 0.0).map(|[re, im]| {
+        if *im == 0.0 { number(*re) } else { format!("{} ± {}i", number(*re), number(*im)) }
+    });
+    println!("    eigenvalues {}", shown.collect::<Vec<_>>().join(", "));
+    if let Some(condition) = own.condition {
+        println!("    condition of the eigenvectors {condition:.3e}");
+    }
+}
+
+/// Five digits.
+fn number(value: f64) -> String {
+    if value.is_infinite() {
+        return if value > 0.0 { "no limit".to_owned() } else { "-infinite".to_owned() };
+    }
+    let size = value.abs();
+    if size == 0.0 || (1e-3..1e5).contains(&size) {
+        let decimals = if size >= 1e3 {
+            1
+        } else if size >= 10.0 {
+            3
+        } else {
+            5
+        };
+        let text = format!("{value:.decimals$}");
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        format!("{value:.4e}")
+    }
+}

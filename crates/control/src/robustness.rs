@@ -1,0 +1,155 @@
+//! Robustness of a feedback loop: sensitivity, margins, hold time, noise, parameter tolerances.
+//!
+//! The loop is y = G u, u = K y, with the sign of the feedback inside the controller K. With the
+//! loop transfers L = -K G at the plant's input and L = -G K at its output,
+//!
+//! ```text
+//! S = (I + L)^-1,  T = L (I + L)^-1 = I - S
+//! ```
+//!
+//! | question | answer |
+//! |---|---|
+//! | S and T as systems, their peaks | [`Loop::sensitivity`], [`Loop::complementary`], [`crate::response::h_infinity`] |
+//! | changes of gain and phase in all channels at once | [`disk_margin`] |
+//! | changes of gain, phase and delay in one channel | [`channel_margins`] |
+//! | a delay in all channels | [`delay_margin`], [`sampled_delay_margin`] |
+//! | the longest time over which signals may be held | [`longest_hold`], [`longest_period`] |
+//! | effect of measurement noise | [`noise_gains`] |
+//! | errors of the plant's parameters | [`Tolerances`], [`tolerance_test`] |
+//! | gains for comparison | [`regulator_of_same_speed`] |
+
+mod channel;
+mod delay;
+mod disk;
+mod hold_time;
+mod noise;
+mod scaling;
+mod speed;
+mod sweep;
+mod tolerance;
+mod worst_case;
+
+pub use channel::{ChannelMargins, channel_margins};
+pub use delay::{delay_margin, sampled_delay_margin};
+pub use disk::{DiskMargin, disk_margin, scaled_peak};
+pub use hold_time::{longest_hold, longest_period};
+pub use noise::noise_gains;
+pub use scaling::ScaledPeak;
+pub use speed::regulator_of_same_speed;
+pub use tolerance::{ToleranceTest, Tolerances, tolerance_test};
+
+use crate::blocks::{block_2x2, stacked};
+use crate::{Error, StateSpace, check};
+use nalgebra::DMatrix;
+
+/// Where the loop is opened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Point {
+    /// At the commands.
+    Input,
+    /// At the measurements.
+    Output,
+}
+
+/// The loop y = G u, u = K y of a strictly proper plant G and a controller K.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Loop {
+    plant: StateSpace,
+    controller: StateSpace,
+}
+
+impl Loop {
+    /// Closes the loop of `plant`, from m commands to p measurements with D = 0, and `controller`,
+    /// from p measurements to m commands, both in the same domain.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`StateSpace::check`]; [`Error::Shape`] for a controller that does not fit the plant;
+    /// [`Error::OutOfRange`] for a plant with D other than zero, or for different domains.
+    pub fn new(plant: StateSpace, controller: StateSpace) -> Result<Self, Error> {
+        plant.check()?;
+        controller.check()?;
+        check::shape("the controller's D", &controller.d, (plant.b.ncols(), plant.c.nrows()))?;
+        let direct = plant.d.amax();
+        if direct > 0.0 {
+            return Err(Error::OutOfRange { name: "the plant's D", value: direct, rule: "zero" });
+        }
+        if plant.domain != controller.domain {
+            let rule = "the same for plant and controller";
+            return Err(Error::OutOfRange { name: "the domain", value: f64::NAN, rule });
+        }
+        Ok(Self { plant, controller })
+    }
+
+    /// The plant G.
+    #[must_use]
+    pub fn plant(&self) -> &StateSpace {
+        &self.plant
+    }
+
+    /// The controller K.
+    #[must_use]
+    pub fn controller(&self) -> &StateSpace {
+        &self.controller
+    }
+
+    /// The dynamics of the states of plant and controller together.
+    #[must_use]
+    pub fn dynamics(&self) -> DMatrix<f64> {
+        let (plant, own) = (&self.plant, &self.controller);
+        block_2x2(
+            [&(&plant.a + &plant.b * &own.d * &plant.c), &(&plant.b * &own.c)],
+            [&(&own.b * &plant.c), &own.a],
+        )
+    }
+
+    /// S as a system: from a signal that is added at `at` to the sum.
+    #[must_use]
+    pub fn sensitivity(&self, at: Point) -> StateSpace {
+        let mut system = self.response(at);
+        system.d.fill_with_identity();
+        system
+    }
+
+    /// T as a system: from a signal that is added at `at` to the negative of what comes back.
+    #[must_use]
+    pub fn complementary(&self, at: Point) -> StateSpace {
+        let mut system = self.response(at);
+        system.c.neg_mut();
+        system
+    }
+
+    /// S - I = -T.
+    fn response(&self, at: Point) -> StateSpace {
+        let (plant, own) = (&self.plant, &self.controller);
+        let (n, k) = (plant.a.nrows(), own.a.nrows());
+        let (b, c) = match at {
+            Point::Input => {
+                let c = stacked(&(&own.d * &plant.c).transpose(), &own.c.transpose()).transpose();
+                (plant.b.clone().resize_vertically(n + k, 0.0), c)
+            }
+            Point::Output => {
+                let c = plant.c.clone().resize_horizontally(n + k, 0.0);
+                (stacked(&(&plant.b * &own.d), &own.b), c)
+            }
+        };
+        let d = DMatrix::zeros(c.nrows(), b.ncols());
+        StateSpace { a: self.dynamics(), b, c, d, domain: plant.domain }
+    }
+
+    /// From noise that is added to the measurements to `output` of the controller, which has the
+    /// controller's A and B and its own C and D.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Shape`] when `output` does not fit the controller.
+    pub fn from_noise(&self, output: &StateSpace) -> Result<StateSpace, Error> {
+        let own = &self.controller;
+        check::shape("C of the output", &output.c, (output.c.nrows(), own.a.nrows()))?;
+        check::shape("D of the output", &output.d, (output.c.nrows(), own.b.ncols()))?;
+        let StateSpace { a, b, domain, .. } = self.response(Point::Output);
+        let seen = (&output.d * &self.plant.c).transpose();
+        let c = stacked(&seen, &output.c.transpose()).transpose();
+        Ok(StateSpace { a, b, c, d: output.d.clone(), domain })
+    }
+}

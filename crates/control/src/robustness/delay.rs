@@ -1,0 +1,136 @@
+//! The delay margin for a common delay in all channels.
+
+use super::sweep::Sweep;
+use super::{Loop, Point};
+use crate::blocks::block_2x2;
+use crate::eigen::schur;
+use crate::hold::zero_order_hold;
+use crate::stability::instability;
+use crate::{Domain, Error, StateSpace};
+use nalgebra::{Complex, DMatrix};
+use std::f64::consts::TAU;
+
+const BISECTIONS: usize = 40;
+/// Number of whole samples up to which the delay of a sampled loop is refined.
+const REFINED_SAMPLES: f64 = 20.0;
+
+/// Computes the delay margin: the smallest delay, common to all commands (or to all measurements),
+/// at which the loop is on the limit of stability; infinite if there is none.
+///
+/// ```text
+/// det(I + L(j w) e^(-j w tau)) = 0
+/// ```
+///
+/// has a solution where an eigenvalue of L(j w) has the modulus 1. Method: the moduli of the
+/// eigenvalues on 60 frequencies for each decade and at the resonances, located by bisection. In
+/// sampled time the result is exact for whole samples; [`sampled_delay_margin`] is exact for the
+/// others.
+///
+/// # Errors
+///
+/// [`Error::NotHurwitz`], [`Error::NotSchur`] for a loop that is not stable;
+/// [`Error::NotConverged`], [`Error::Overflow`].
+pub fn delay_margin(closed: &Loop) -> Result<f64, Error> {
+    let system = closed.complementary(Point::Input);
+    let sweep = Sweep::new(&system)?;
+    let mut delay = f64::INFINITY;
+    for rank in 0..system.d.nrows() {
+        let modulus =
+            |t: &DMatrix<Complex<f64>>| loci(t).map_or(f64::NAN, |loci| loci[rank].norm() - 1.0);
+        for frequency in sweep.crossings(modulus)? {
+            let at = loci(&sweep.at(frequency)?)?[rank];
+            delay = delay.min((-at).arg().rem_euclid(TAU) / frequency);
+        }
+    }
+    Ok(delay)
+}
+
+/// The eigenvalues of L = T (I - T)^-1, those of T divided by one less themselves, by modulus.
+fn loci(t: &DMatrix<Complex<f64>>) -> Result<Vec<Complex<f64>>, Error> {
+    let triangular = schur(t)?.unpack().1;
+    let one = Complex::new(1.0, 0.0);
+    let mut found: Vec<_> = triangular.diagonal().iter().map(|t| t / (one - t)).collect();
+    found.sort_by(|x, y| x.norm().total_cmp(&y.norm()));
+    Ok(found)
+}
+
+/// Computes the delay margin of a sampled controller: the smallest delay of its held commands at
+/// which the loop with the continuous plant becomes unstable.
+///
+/// `plant`: continuous; `controller`: sampled. Over an interval the plant receives first the command
+/// of the sample before, then the new one, so that every delay gives a sampled loop whose
+/// eigenvalues decide. Method: the whole samples by [`delay_margin`], the rest by bisection; above
+/// 20 samples without the rest.
+///
+/// # Errors
+///
+/// Same as [`Loop::new`], [`zero_order_hold`] and [`delay_margin`]; [`Error::OutOfRange`] when the
+/// controller is continuous.
+pub fn sampled_delay_margin(plant: &StateSpace, controller: &StateSpace) -> Result<f64, Error> {
+    let Domain::Sampled { period } = controller.domain else {
+        let rule = "that of a sampled controller";
+        return Err(Error::OutOfRange { name: "the domain", value: f64::NAN, rule });
+    };
+    let (a, b) = zero_order_hold(&plant.a, &plant.b, period)?;
+    let sampled = StateSpace { a, b, domain: controller.domain, ..plant.clone() };
+    let estimate = delay_margin(&Loop::new(sampled, controller.clone())?)?;
+    let whole = (estimate / period).floor();
+    if whole.is_nan() || whole > REFINED_SAMPLES {
+        return Ok(estimate);
+    }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most twenty")]
+    let samples = whole as usize;
+    let stable = |part: f64| {
+        let dynamics = delayed(plant, controller, period, (samples, part))?;
+        Ok::<_, Error>(instability(&dynamics, controller.domain)? < 0.0)
+    };
+    let (mut good, mut bad) = (0.0, 1.0);
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (good + bad);
+        *(if stable(middle)? { &mut good } else { &mut bad }) = middle;
+    }
+    Ok(period * (whole + good))
+}
+
+/// The loop with commands delayed by `samples` samples and the part `part` of one: its states are
+/// those of plant and controller and the last `samples` + 1 commands, the newest first.
+fn delayed(
+    plant: &StateSpace,
+    controller: &StateSpace,
+    period: f64,
+    (samples, part): (usize, f64),
+) -> Result<DMatrix<f64>, Error> {
+    let (n, m) = plant.b.shape();
+    let k = controller.a.nrows();
+    let mut a = DMatrix::identity(n, n);
+    let (mut old, mut new) = (DMatrix::zeros(n, m), DMatrix::zeros(n, m));
+    if part > 0.0 {
+        (a, old) = zero_order_hold(&plant.a, &plant.b, part * period)?;
+    }
+    if part < 1.0 {
+        let (rest, held) = zero_order_hold(&plant.a, &plant.b, (1.0 - part) * period)?;
+        (a, old, new) = (&rest * a, rest * old, held);
+    }
+    let own = controller;
+    let now = block_2x2([&a, &DMatrix::zeros(n, k)], [&(&own.b * &plant.c), &own.a]);
+    let order = n + k + m * (samples + 1);
+    let mut dynamics = now.resize(order, order, 0.0);
+    let mut command = DMatrix::zeros(m, order);
+    command.columns_mut(0, n).copy_from(&(&own.d * &plant.c));
+    command.columns_mut(n, k).copy_from(&own.c);
+    let at = |age: usize| n + k + (age - 1) * m;
+    let mut older = DMatrix::zeros(m, order);
+    older.view_mut((0, at(samples + 1)), (m, m)).fill_with_identity();
+    let mut newer = command.clone();
+    if samples > 0 {
+        newer = DMatrix::zeros(m, order);
+        newer.view_mut((0, at(samples)), (m, m)).fill_with_identity();
+    }
+    let plant_rows = dynamics.rows(0, n) + old * older + new * newer;
+    dynamics.rows_mut(0, n).copy_from(&plant_rows);
+    dynamics.rows_mut(at(1), m).copy_from(&command);
+    for age in 2..=samples + 1 {
+        dynamics.view_mut((at(age), at(age - 1)), (m, m)).fill_with_identity();
+    }
+    Ok(dynamics)
+}

@@ -1,0 +1,209 @@
+//! Errors of the plant's parameters: random cases and a search for the worst one.
+
+use super::Loop;
+use super::worst_case::worst_case;
+use crate::hold::zero_order_hold;
+use crate::stability::instability;
+use crate::{Domain, Error, StateSpace, check};
+use nalgebra::DMatrix;
+
+/// Entries this near to 0 (relative to the largest of the matrix) or to +-1 are structural.
+const STRUCTURAL: f64 = 1e-9;
+/// The worst direction is followed up to this multiple of the tolerances.
+const REACH: f64 = 16.0;
+const FACTOR: f64 = 1.1;
+const FIRST: f64 = 1e-6;
+const BISECTIONS: usize = 40;
+
+/// The relative tolerances of the entries of A, B and C of a plant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tolerances {
+    /// Of A, B, C, in this order: each matrix as large as the plant's; zero for an exact entry.
+    pub of: [DMatrix<f64>; 3],
+}
+
+impl Tolerances {
+    /// The tolerances `relative` of A, B and C for all entries that are not structural: 0, 1 and -1
+    /// are exact.
+    #[must_use]
+    pub fn of_values(plant: &StateSpace, relative: [f64; 3]) -> Self {
+        let of = |(m, relative): (&DMatrix<f64>, f64)| {
+            let negligible = STRUCTURAL * m.amax();
+            m.map(|entry| {
+                let fixed = entry.abs() <= negligible || (entry.abs() - 1.0).abs() <= STRUCTURAL;
+                if fixed { 0.0 } else { relative }
+            })
+        };
+        let [a, b, c] = relative;
+        Self { of: [of((&plant.a, a)), of((&plant.b, b)), of((&plant.c, c))] }
+    }
+
+    /// The number of entries that are not exact.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.of.iter().flat_map(DMatrix::iter).filter(|entry| **entry > 0.0).count()
+    }
+}
+
+/// What a loop does while the parameters of its plant are within their tolerances.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct ToleranceTest {
+    /// Number of random cases.
+    pub cases: u32,
+    /// How many of them are stable.
+    pub stable: u32,
+    /// [`instability`] of the worst plant.
+    pub worst_instability: f64,
+    /// The worst plant that was found.
+    pub worst: StateSpace,
+    /// The multiple of the tolerances, in the direction of the worst plant, below which the loop is
+    /// stable; None if it is stable up to 16.
+    pub first_unstable: Option<f64>,
+}
+
+/// Tests the stability of the loop of `plant` and `controller` while the parameters of the plant
+/// vary and the controller does not.
+///
+/// `plant`: continuous; for a sampled controller each case is discretised with its period. Each
+/// entry is multiplied by 1 + t d, t its tolerance, d uniform in -1 to 1 and independent of the
+/// others, drawn by the generator `SplitMix64` from `seed`. The worst case is searched among the
+/// vertices of the tolerances: from the nominal plant and from the worst random cases, in the
+/// directions that the derivatives of the eigenvalues state. It is a lower bound of what the
+/// tolerances can do: a loop that is found stable may be unstable in a case that was not tried.
+///
+/// # Errors
+///
+/// Same as [`Loop::new`], [`zero_order_hold`] and [`instability`]; [`Error::Shape`] for tolerances
+/// that do not fit; [`Error::OutOfRange`] for a negative one.
+pub fn tolerance_test(
+    plant: &StateSpace,
+    controller: &StateSpace,
+    tolerances: &Tolerances,
+    (cases, seed): (u32, u64),
+) -> Result<ToleranceTest, Error> {
+    let family = Family::new(plant, controller, tolerances)?;
+    let mut random = seed;
+    let mut all = Vec::new();
+    let mut stable = 0;
+    for _ in 0..cases {
+        let deviations: Vec<f64> =
+            (0..family.entries.len()).map(|_| 2.0 * uniform(&mut random) - 1.0).collect();
+        let value = family.instability(&deviations)?;
+        stable += u32::from(value < 0.0);
+        all.push((value, deviations));
+    }
+    all.sort_by(|x, y| y.0.total_cmp(&x.0));
+    all.truncate(2);
+    let (worst_instability, deviations) = worst_case(&family, all)?;
+    Ok(ToleranceTest {
+        cases,
+        stable,
+        worst_instability,
+        worst: family.plant(&deviations),
+        first_unstable: family.first_unstable(&deviations)?,
+    })
+}
+
+/// The next number of `SplitMix64` (G. L. Steele, D. Lea and C. H. Flood, OOPSLA 2014), in 0 to 1.
+fn uniform(state: &mut u64) -> f64 {
+    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let mut z = *state;
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^= z >> 31;
+    #[expect(clippy::cast_precision_loss, reason = "53 bits")]
+    let fraction = (z >> 11) as f64;
+    fraction / 9_007_199_254_740_992.0
+}
+
+/// A plant entry that varies: matrix (A, B, C), row, column, and the product of value and tolerance.
+pub(super) struct Entry {
+    pub(super) matrix: usize,
+    pub(super) row: usize,
+    pub(super) column: usize,
+    pub(super) size: f64,
+}
+
+/// The loops of all plants within the tolerances.
+pub(super) struct Family<'a> {
+    pub(super) plant: &'a StateSpace,
+    pub(super) controller: &'a StateSpace,
+    pub(super) entries: Vec<Entry>,
+}
+
+impl<'a> Family<'a> {
+    fn new(
+        plant: &'a StateSpace,
+        controller: &'a StateSpace,
+        tolerances: &Tolerances,
+    ) -> Result<Self, Error> {
+        let mut entries = Vec::new();
+        let named = [("A", &plant.a), ("B", &plant.b), ("C", &plant.c)];
+        for (matrix, ((name, values), of)) in named.into_iter().zip(&tolerances.of).enumerate() {
+            check::shape(name, of, values.shape())?;
+            for (row, column) in
+                (0..of.ncols()).flat_map(|column| (0..of.nrows()).map(move |row| (row, column)))
+            {
+                let relative = of[(row, column)];
+                if relative < 0.0 {
+                    let rule = "not negative";
+                    return Err(Error::OutOfRange { name: "the tolerance", value: relative, rule });
+                }
+                let size = relative * values[(row, column)];
+                if size.abs() > 0.0 {
+                    entries.push(Entry { matrix, row, column, size });
+                }
+            }
+        }
+        Ok(Self { plant, controller, entries })
+    }
+
+    /// The plant whose entries deviate by these parts of their tolerances.
+    pub(super) fn plant(&self, deviations: &[f64]) -> StateSpace {
+        let mut plant = self.plant.clone();
+        for (entry, deviation) in self.entries.iter().zip(deviations) {
+            let own = match entry.matrix {
+                0 => &mut plant.a,
+                1 => &mut plant.b,
+                _ => &mut plant.c,
+            };
+            own[(entry.row, entry.column)] += entry.size * deviation;
+        }
+        plant
+    }
+
+    /// The dynamics of the loop with a plant, which is discretised for a sampled controller.
+    pub(super) fn dynamics(&self, mut plant: StateSpace) -> Result<DMatrix<f64>, Error> {
+        if let Domain::Sampled { period } = self.controller.domain {
+            (plant.a, plant.b) = zero_order_hold(&plant.a, &plant.b, period)?;
+            plant.domain = self.controller.domain;
+        }
+        Ok(Loop::new(plant, self.controller.clone())?.dynamics())
+    }
+
+    pub(super) fn instability(&self, deviations: &[f64]) -> Result<f64, Error> {
+        instability(&self.dynamics(self.plant(deviations))?, self.controller.domain)
+    }
+
+    fn first_unstable(&self, deviations: &[f64]) -> Result<Option<f64>, Error> {
+        let stable = |multiple: f64| {
+            let scaled: Vec<f64> = deviations.iter().map(|part| multiple * part).collect();
+            Ok::<_, Error>(self.instability(&scaled)? < 0.0)
+        };
+        let (mut good, mut multiple) = (0.0, FIRST);
+        while multiple <= REACH {
+            if stable(multiple)? {
+                (good, multiple) = (multiple, multiple * FACTOR);
+                continue;
+            }
+            let mut bad = multiple;
+            for _ in 0..BISECTIONS {
+                let middle = 0.5 * (good + bad);
+                *(if stable(middle)? { &mut good } else { &mut bad }) = middle;
+            }
+            return Ok(Some(good));
+        }
+        Ok(None)
+    }
+}

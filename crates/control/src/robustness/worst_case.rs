@@ -1,0 +1,160 @@
+//! The search for the worst plant within tolerances.
+
+use super::tolerance::Family;
+use crate::blocks::to_complex;
+use crate::eigen::eigenvalues;
+use crate::exponential::exponential;
+use crate::{Domain, Error};
+use nalgebra::{Complex, DMatrix, DVector};
+
+type Vector = DVector<Complex<f64>>;
+
+const ROUNDS: usize = 12;
+/// Number of eigenvalues whose directions are tried from each start.
+const MODES: usize = 6;
+/// Relative shift of the eigenvalue in the inverse iteration.
+const SHIFT: f64 = 1e-9;
+
+/// Returns the largest instability that was found, with its deviations; `starts` are cases to begin
+/// with beside the nominal one.
+pub(super) fn worst_case(
+    family: &Family<'_>,
+    mut starts: Vec<(f64, Vec<f64>)>,
+) -> Result<(f64, Vec<f64>), Error> {
+    let nominal = vec![0.0; family.entries.len()];
+    starts.push((family.instability(&nominal)?, nominal));
+    let mut best: Option<(f64, Vec<f64>)> = None;
+    for start in starts {
+        let found = ascend(family, start)?;
+        if best.as_ref().is_none_or(|(value, _)| found.0 > *value) {
+            best = Some(found);
+        }
+    }
+    best.ok_or(Error::NotConverged { what: "the worst case", iterations: 0 })
+}
+
+fn ascend(
+    family: &Family<'_>,
+    (mut value, mut deviations): (f64, Vec<f64>),
+) -> Result<(f64, Vec<f64>), Error> {
+    for round in 0..ROUNDS {
+        let count = if round == 0 { MODES } else { 1 };
+        let mut improved = false;
+        for gradient in gradients(family, &deviations, count)? {
+            let mut order: Vec<usize> = (0..gradient.len()).collect();
+            order.sort_by(|i, j| gradient[*j].abs().total_cmp(&gradient[*i].abs()));
+            let mut moved = gradient.len();
+            while moved > 0 {
+                let mut candidate = deviations.clone();
+                for &at in &order[..moved] {
+                    if gradient[at].abs() > 0.0 {
+                        candidate[at] = gradient[at].signum();
+                    }
+                }
+                let reached = family.instability(&candidate)?;
+                if reached > value {
+                    (value, deviations, improved) = (reached, candidate, true);
+                    break;
+                }
+                moved /= 2;
+            }
+        }
+        if !improved {
+            break;
+        }
+    }
+    Ok((value, deviations))
+}
+
+/// The derivatives of [`Domain::excess`] of the eigenvalues nearest to instability with respect to
+/// the deviations.
+fn gradients(
+    family: &Family<'_>,
+    deviations: &[f64],
+    count: usize,
+) -> Result<Vec<Vec<f64>>, Error> {
+    let plant = family.plant(deviations);
+    let (n, m) = plant.b.shape();
+    let domain = family.controller.domain;
+    let dynamics = family.dynamics(plant.clone())?;
+    let mut modes: Vec<_> =
+        eigenvalues(&dynamics)?.into_iter().filter(|mode| mode.im >= 0.0).collect();
+    modes.sort_by(|x, y| domain.excess(*y).total_cmp(&domain.excess(*x)));
+    let half = match domain {
+        Domain::Continuous => None,
+        Domain::Sampled { period } => {
+            let mut block = DMatrix::zeros(n + m, n + m);
+            block.view_mut((0, 0), (n, n)).copy_from(&(&plant.a * (0.5 * period)));
+            block.view_mut((0, n), (n, m)).copy_from(&(&plant.b * (0.5 * period)));
+            Some((to_complex(&exponential(&block)?), period))
+        }
+    };
+    let own = family.controller;
+    let command = to_complex(&own.c);
+    let direct = to_complex(&own.d);
+    let mut found = Vec::new();
+    for mode in modes.into_iter().take(count) {
+        let Some((left, right)) = eigenvectors(&dynamics, mode) else {
+            continue;
+        };
+        let x: Vector = right.rows(0, n).into();
+        let y = to_complex(&plant.c) * &x;
+        let u = &command * right.rows(n, own.a.nrows()) + &direct * &y;
+        // d lambda = of_plant [dA, dB] [x; u] + of_output dC x
+        let mut of_plant: Vector = left.rows(0, n).into();
+        let sensed = to_complex(&plant.b);
+        let mut input: Vector = DVector::zeros(n + m);
+        input.rows_mut(0, n).copy_from(&x);
+        input.rows_mut(n, m).copy_from(&u);
+        let mut through = sensed.tr_mul(&of_plant);
+        if let Some((half, period)) = &half {
+            let whole = half * half;
+            through = whole.view((0, n), (n, m)).tr_mul(&of_plant);
+            input = half * input;
+            let before = half.view((0, 0), (n, n)).tr_mul(&of_plant);
+            of_plant = before * Complex::new(*period, 0.0);
+        }
+        let of_output =
+            direct.tr_mul(&through) + to_complex(&own.b).tr_mul(&left.rows(n, own.a.nrows()));
+        let turn = match domain {
+            Domain::Continuous => Complex::new(1.0, 0.0),
+            Domain::Sampled { .. } => mode.conj() / mode.norm().max(f64::MIN_POSITIVE),
+        };
+        let derivative = family.entries.iter().map(|entry| {
+            let (row, column) = (entry.row, entry.column);
+            let change = match entry.matrix {
+                0 => of_plant[row] * input[column],
+                1 => of_plant[row] * input[n + column],
+                _ => of_output[row] * x[column],
+            };
+            (turn * change).re * entry.size
+        });
+        found.push(derivative.collect());
+    }
+    Ok(found)
+}
+
+/// Left and right eigenvector (row and column) with the product one, by inverse iteration; None if
+/// the eigenvalue is defective or the iteration fails.
+fn eigenvectors(m: &DMatrix<f64>, mode: Complex<f64>) -> Option<(Vector, Vector)> {
+    let n = m.nrows();
+    let shift = mode + Complex::new(SHIFT, SHIFT) * mode.norm().max(m.amax() * f64::EPSILON);
+    let shifted = to_complex(m) - DMatrix::from_diagonal_element(n, n, shift);
+    let iterate = |matrix: DMatrix<Complex<f64>>| {
+        let lu = matrix.lu();
+        let mut v = DVector::from_element(n, Complex::new(1.0, 0.3));
+        for _ in 0..3 {
+            v = lu.solve(&v)?;
+            let size = v.norm();
+            if !size.is_finite() || size <= 0.0 {
+                return None;
+            }
+            v.unscale_mut(size);
+        }
+        Some(v)
+    };
+    let left = iterate(shifted.transpose())?;
+    let right = iterate(shifted)?;
+    let product = left.dot(&right);
+    (product.norm() > 0.0).then(|| (left / product, right))
+}

@@ -1,0 +1,252 @@
+//! Margins against python-control, SLICOT and scipy, and against closed forms.
+
+use crate::recorded::{Case, cases};
+use crate::{entry_error, matrix};
+use control::hold::zero_order_hold;
+use control::response::h_infinity;
+use control::robustness::{
+    Loop, Point, Tolerances, channel_margins, delay_margin, disk_margin, longest_hold,
+    longest_period, noise_gains, regulator_of_same_speed, sampled_delay_margin, scaled_peak,
+    tolerance_test,
+};
+use control::stability::instability;
+use control::{Domain, Error, StateSpace};
+use nalgebra::DMatrix;
+use std::f64::consts::PI;
+
+const RECORDED: &str = include_str!("../data/robustness.txt");
+const POINTS: [(&str, Point); 2] = [("in", Point::Input), ("out", Point::Output)];
+
+/// The continuous plant and the controller of a case.
+fn parts(case: &Case) -> (StateSpace, StateSpace) {
+    let get = |name: &str| case.get(name).clone();
+    let (b, c) = (get("B"), get("C"));
+    let d = DMatrix::zeros(c.nrows(), b.ncols());
+    let plant = StateSpace { a: get("A"), b, c, d, domain: Domain::Continuous };
+    let period = case.number("period");
+    let domain = if period > 0.0 { Domain::Sampled { period } } else { Domain::Continuous };
+    (plant, StateSpace { a: get("a"), b: get("b"), c: get("c"), d: get("d"), domain })
+}
+
+fn closed(case: &Case) -> Loop {
+    let (mut plant, controller) = parts(case);
+    if let Domain::Sampled { period } = controller.domain {
+        (plant.a, plant.b) = zero_order_hold(&plant.a, &plant.b, period).expect("a plant");
+        plant.domain = controller.domain;
+    }
+    Loop::new(plant, controller).expect("a loop")
+}
+
+#[track_caller]
+fn assert_near(found: f64, expected: f64, tolerance: f64, what: &str) {
+    let same = found.to_bits() == expected.to_bits() || (found / expected - 1.0).abs() <= tolerance;
+    assert!(same, "{what}: found {found}, expected {expected}");
+}
+
+/// 1 / (s (s + 1)) with u = -k y.
+fn servo(k: f64) -> Loop {
+    let domain = Domain::Continuous;
+    let plant = StateSpace {
+        a: matrix(2, 2, &[0.0, 1.0, 0.0, -1.0]),
+        b: matrix(2, 1, &[0.0, 1.0]),
+        c: matrix(1, 2, &[1.0, 0.0]),
+        d: matrix(1, 1, &[0.0]),
+        domain,
+    };
+    Loop::new(plant, gain(&matrix(1, 1, &[-k]), domain)).expect("a loop")
+}
+
+/// A controller without dynamics; it has one idle state.
+fn gain(k: &DMatrix<f64>, domain: Domain) -> StateSpace {
+    let idle = if domain == Domain::Continuous { -1.0 } else { 0.0 };
+    StateSpace {
+        a: matrix(1, 1, &[idle]),
+        b: DMatrix::zeros(1, k.ncols()),
+        c: DMatrix::zeros(k.nrows(), 1),
+        d: k.clone(),
+        domain,
+    }
+}
+
+#[test]
+fn peaks_of_sensitivities_agree_with_slicot() {
+    for case in cases(RECORDED, "loop") {
+        let closed = closed(&case);
+        for (name, point) in POINTS {
+            let norm = |system: &StateSpace| h_infinity(system, 1e-7).expect("a norm").lower;
+            let what = format!("{} {name}", case.name);
+            let expected = case.number(&format!("s_{name}"));
+            assert_near(norm(&closed.sensitivity(point)), expected, 1e-6, &what);
+            let expected = case.number(&format!("t_{name}"));
+            assert_near(norm(&closed.complementary(point)), expected, 1e-6, &what);
+        }
+    }
+}
+
+#[test]
+fn disk_margins_agree_with_slicot_and_are_certified() {
+    for case in cases(RECORDED, "loop") {
+        let closed = closed(&case);
+        for (name, point) in POINTS {
+            let found = disk_margin(&closed, point, None).expect("a margin");
+            let expected = case.number(&format!("disk_{name}"));
+            assert_near(found.alpha, expected, 1e-3, case.name);
+            assert!(found.certified <= found.alpha && found.certified > 0.9 * found.alpha);
+            let whole = h_infinity(&closed.sensitivity(point), 1e-6).expect("a norm").upper;
+            let scaled = scaled_peak(&closed.sensitivity(point)).expect("a peak");
+            assert!(scaled.value <= whole * 1.0001, "{} {scaled:?} {whole}", case.name);
+        }
+    }
+}
+
+#[test]
+fn margins_of_single_channels_agree_with_python_control() {
+    for case in cases(RECORDED, "loop") {
+        let closed = closed(&case);
+        for (name, point) in POINTS {
+            for (channel, row) in case.get(&format!("channels_{name}")).row_iter().enumerate() {
+                let found = channel_margins(&closed, point, channel).expect("margins");
+                let disk = disk_margin(&closed, point, Some(channel)).expect("a margin").alpha;
+                let what = format!("{} {name} {channel} {found:?}", case.name);
+                assert_near(found.gain[0], row[0], 1e-4, &what);
+                assert_near(found.gain[1], row[1], 1e-4, &what);
+                assert_near(found.phase, row[2], 1e-4, &what);
+                assert_near(found.delay, row[3], 1e-4, &what);
+                assert_near(disk, row[4], 1e-3, &what);
+            }
+        }
+    }
+}
+
+#[test]
+fn noise_hold_and_delay_agree_with_python_control_and_scipy() {
+    for case in cases(RECORDED, "loop") {
+        let closed = closed(&case);
+        let of_noise = closed.from_noise(closed.controller()).expect("a system");
+        let noise = noise_gains(&of_noise).expect("gains");
+        assert!(entry_error(&noise, case.get("noise")) < 1e-6, "{} {noise}", case.name);
+        let (plant, controller) = parts(&case);
+        let (hold, delay) = if controller.domain == Domain::Continuous {
+            (longest_hold(&closed), delay_margin(&closed))
+        } else {
+            (longest_period(&plant, &controller), sampled_delay_margin(&plant, &controller))
+        };
+        assert_near(hold.expect("a time"), case.number("hold"), 1e-6, case.name);
+        assert_near(delay.expect("a delay"), case.number("delay"), 1e-6, case.name);
+    }
+}
+
+/// |L| = 1 at w with k^2 = w^2 (w^2 + 1); the phase margin is pi / 2 - atan w.
+#[test]
+fn the_margins_of_a_servo_are_the_closed_form() {
+    for k in [0.2, 1.0, 30.0] {
+        let found = channel_margins(&servo(k), Point::Output, 0).expect("margins");
+        let frequency = (0.5 * ((1.0 + 4.0 * k * k).sqrt() - 1.0)).sqrt();
+        let phase = 0.5 * PI - frequency.atan();
+        assert_near(found.phase, phase, 1e-9, "phase");
+        assert_near(found.phase_frequency, frequency, 1e-9, "frequency");
+        assert_near(found.delay, phase / frequency, 1e-9, "delay");
+        assert_near(delay_margin(&servo(k)).expect("a delay"), phase / frequency, 1e-9, "delay");
+        assert!(found.gain[0] <= 0.0 && found.gain[1] == f64::INFINITY, "{found:?}");
+    }
+}
+
+/// An integrator with u = -k y, held over h, has the eigenvalue 1 - k h.
+#[test]
+fn an_integrator_may_be_held_for_two_time_constants() {
+    let one = |value| matrix(1, 1, &[value]);
+    let domain = Domain::Continuous;
+    let plant = StateSpace { a: one(0.0), b: one(1.0), c: one(1.0), d: one(0.0), domain };
+    let k = 4.0;
+    let closed = Loop::new(plant, gain(&one(-k), domain)).expect("a loop");
+    assert_near(longest_hold(&closed).expect("a time"), 2.0 / k, 1e-9, "hold");
+}
+
+/// The vertices of two intervals: a scalar plant x' = a x + b u with u = -k y, a = 1, b = 2: the
+/// worst eigenvalue is 1.1 a - 0.9 b k, and it is zero at the tolerance (b k - a) / (b k + a).
+#[test]
+fn the_worst_plant_of_two_parameters_is_a_vertex() {
+    let one = |value| matrix(1, 1, &[value]);
+    let domain = Domain::Continuous;
+    let plant = StateSpace { a: one(3.0), b: one(2.0), c: one(1.0), d: one(0.0), domain };
+    let tolerances = Tolerances::of_values(&plant, [0.1, 0.1, 0.1]);
+    assert_eq!(tolerances.count(), 2, "C is one");
+    let test = |k: f64| tolerance_test(&plant, &gain(&one(-k), domain), &tolerances, (200, 1));
+    let found = test(3.0).expect("a test");
+    assert_eq!((found.cases, found.stable), (200, 200));
+    // The idle state of the controller has -1.
+    assert_near(found.worst_instability, -1.0, 1e-12, "worst");
+    let found = test(1.7).expect("a test");
+    assert_near(found.worst_instability, 3.3 - 1.8 * 1.7, 1e-12, "worst");
+    assert_near(found.worst.a[(0, 0)], 3.3, 1e-12, "a");
+    assert_near(found.worst.b[(0, 0)], 1.8, 1e-12, "b");
+    assert_near(found.first_unstable.expect("unstable"), 0.4 / 6.4 / 0.1, 1e-9, "limit");
+    // P(a + b k > 0) for independent uniform deviations: 0.3 x + 0.34 y > 0.4.
+    let corner = 0.5 * (0.24 / 0.3) * (0.24 / 0.34) / 4.0;
+    let part = f64::from(found.cases - found.stable) / 200.0;
+    assert!((part - corner).abs() < 0.06, "{part} {corner}");
+}
+
+/// No random vertex is worse than the one that the search found, and the worst plant has the
+/// instability that is stated.
+#[test]
+fn the_worst_case_is_at_least_as_bad_as_random_vertices() {
+    for case in cases(RECORDED, "loop") {
+        let (plant, controller) = parts(&case);
+        let tolerances = Tolerances::of_values(&plant, [0.03; 3]);
+        let found = tolerance_test(&plant, &controller, &tolerances, (40, 7)).expect("a test");
+        let value = |plant: &StateSpace| {
+            let mut plant = plant.clone();
+            if let Domain::Sampled { period } = controller.domain {
+                (plant.a, plant.b) = zero_order_hold(&plant.a, &plant.b, period).expect("a plant");
+                plant.domain = controller.domain;
+            }
+            let closed = Loop::new(plant, controller.clone()).expect("a loop");
+            instability(&closed.dynamics(), controller.domain).expect("a number")
+        };
+        assert_near(value(&found.worst), found.worst_instability, 1e-9, case.name);
+        let mut bits = 12345_u64;
+        for _ in 0..100 {
+            let mut vertex = plant.clone();
+            for (values, of) in
+                [&mut vertex.a, &mut vertex.b, &mut vertex.c].into_iter().zip(&tolerances.of)
+            {
+                for (entry, relative) in values.iter_mut().zip(of) {
+                    bits = bits.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                    *entry *= 1.0 + if bits >> 63 == 0 { *relative } else { -relative };
+                }
+            }
+            assert!(value(&vertex) <= found.worst_instability + 1e-9, "{}", case.name);
+        }
+    }
+}
+
+#[test]
+fn the_regulator_of_the_same_speed_has_the_same_sum_of_eigenvalues() {
+    let a = matrix(3, 3, &[0.2, 1.0, 0.0, -2.0, 0.1, 0.5, 0.0, 0.3, -1.0]);
+    let b = matrix(3, 2, &[0.0, 1.0, 1.0, 0.0, 0.2, 0.3]);
+    let k = matrix(2, 3, &[-1.0, -5.0, 0.0, -4.0, 0.0, -1.0]);
+    let found = regulator_of_same_speed(&a, &b, &k, Domain::Continuous).expect("no error");
+    let found = found.expect("a regulator");
+    assert_near((&a + &b * &found).trace(), (&a + &b * &k).trace(), 1e-3, "trace");
+    let (phi, gamma) = zero_order_hold(&a, &b, 0.1).expect("a plant");
+    let domain = Domain::Sampled { period: 0.1 };
+    let found = regulator_of_same_speed(&phi, &gamma, &k, domain).expect("no error");
+    let found = found.expect("a regulator");
+    let log = |k: &DMatrix<f64>| (&phi + &gamma * k).determinant().abs().ln();
+    assert_near(log(&found), log(&k), 1e-3, "determinant");
+}
+
+#[test]
+fn loops_that_are_not_stable_or_do_not_fit_are_refused() {
+    let unstable = servo(-1.0);
+    let refused = disk_margin(&unstable, Point::Input, None);
+    assert!(matches!(refused, Err(Error::NotHurwitz { .. })), "{refused:?}");
+    assert!(matches!(longest_hold(&unstable), Err(Error::NotHurwitz { .. })));
+    let plant = servo(1.0).plant().clone();
+    let sampled = gain(&matrix(1, 1, &[1.0]), Domain::Sampled { period: 1.0 });
+    let refused = Loop::new(plant.clone(), sampled);
+    assert!(matches!(refused, Err(Error::OutOfRange { name: "the domain", .. })), "{refused:?}");
+    let refused = Loop::new(plant, gain(&matrix(2, 1, &[1.0, 1.0]), Domain::Continuous));
+    assert!(matches!(refused, Err(Error::Shape { .. })), "{refused:?}");
+}

@@ -1,0 +1,180 @@
+//! The section on robustness: margins, noise, comparison, tolerances, S and T.
+
+use maud::{Markup, html};
+
+use super::curves::frequency;
+use super::matrix::matrices;
+use super::number::number;
+use super::table::{Cell, table};
+use crate::report::Report;
+use crate::robust_report::{Disk, Robustness, ToleranceResult};
+
+pub(super) fn robustness(report: &Report) -> Markup {
+    html! { @if let Some(found) = &report.robustness { (section(report, found)) } }
+}
+
+fn section(report: &Report, found: &Robustness) -> Markup {
+    let limit = report.sampling.as_ref();
+    let limit = limit.map(|sampled| std::f64::consts::PI / sampled.sample_time);
+    html! {
+        p {
+            "S is the sensitivity of the loop, T = I − S. Where the channels have different units, \
+             the peak of S in the units that make it least is judged. The table "
+            code { "[robustness]" } " of the plant file changes tolerances, noise and limits."
+        }
+        (peaks(found))
+        (channels(found))
+        (disks(found))
+        p {
+            "All commands may be delayed by up to " (number(found.delay_margin)) " s. "
+            @if report.sampling.is_some() {
+                "With the same matrices of the controller the loop is stable up to a sample time of "
+                (number(found.longest_hold)) " s."
+            } @else {
+                "Plant and controller may hold the signals that they exchange for up to "
+                (number(found.longest_hold)) " s: a longer communication step without extrapolation, \
+                 or a longer sample time of the discretised controller, makes the loop unstable."
+            }
+        }
+        h3 id="s-and-t" { "S and T" }
+        div.figures {
+            @for (index, curve) in found.curves.iter().enumerate() {
+                (frequency(&format!("sensitivity-{}", index + 1), curve, limit))
+            }
+        }
+        h3 id="noise" { "Measurement noise" }
+        (noise(report, found))
+        h3 id="comparison" { "Comparison" }
+        (comparison(found))
+        h3 id="tolerances" { "Tolerances of the parameters" }
+        (tolerances(report, &found.tolerance))
+    }
+}
+
+const DISK: [&str; 6] =
+    ["disk margin α", "certified α", "at rad/s", "gain from", "gain to", "phase (degrees)"];
+
+fn disk_cells(name: &str, disk: &Disk) -> Vec<Cell> {
+    let Disk { alpha, certified, frequency, gain: [low, high], phase } = *disk;
+    let numbers = [alpha, certified, frequency, low, high, phase];
+    std::iter::once(name.into()).chain(numbers.map(Cell::from)).collect()
+}
+
+fn disks(found: &Robustness) -> Markup {
+    let mut rows = Vec::new();
+    for point in &found.points {
+        rows.push(disk_cells(&format!("all at the {}", point.point), &point.together));
+        rows.extend(point.channels.iter().map(|channel| disk_cells(&channel.name, &channel.disk)));
+    }
+    let heads: Vec<&str> = std::iter::once("channel").chain(DISK).collect();
+    html! {
+        p {
+            "Each factor of the disk (1 + δα/2) / (1 − δα/2), |δ| < 1, may multiply a channel: gain \
+             and phase change together. For all channels the factors are independent of each other."
+        }
+        (table("Disk margins", &heads, &rows))
+    }
+}
+
+fn peaks(found: &Robustness) -> Markup {
+    let row = |point: &crate::robust_report::LoopPoint| {
+        vec![
+            format!("at the {}", point.point).as_str().into(),
+            point.s_peak.into(),
+            point.s_frequency.into(),
+            point.s_peak_scaled.into(),
+            point.t_peak.into(),
+            point.t_frequency.into(),
+            point.judged.into(),
+        ]
+    };
+    let rows: Vec<Vec<Cell>> = found.points.iter().map(row).collect();
+    let heads = [
+        "loop opened",
+        "peak of S",
+        "at rad/s",
+        "peak of S in the best units",
+        "peak of T",
+        "at rad/s",
+        "judged",
+    ];
+    table("Peaks of the largest singular value", &heads, &rows)
+}
+
+fn channels(found: &Robustness) -> Markup {
+    let rows: Vec<Vec<Cell>> = found
+        .points
+        .iter()
+        .flat_map(|point| &point.channels)
+        .map(|channel| {
+            vec![
+                channel.name.as_str().into(),
+                channel.gain[0].into(),
+                channel.gain[1].into(),
+                channel.phase.into(),
+                channel.delay.into(),
+            ]
+        })
+        .collect();
+    let heads = ["channel", "gain from", "gain to", "phase margin (degrees)", "delay margin (s)"];
+    table("One channel changes, the others are exact", &heads, &rows)
+}
+
+fn noise(report: &Report, found: &Robustness) -> Markup {
+    let rows: Vec<Vec<Cell>> = found
+        .noise_together
+        .iter()
+        .map(|one| vec![one.name.as_str().into(), (&one.unit).into(), one.value.into()])
+        .collect();
+    let assumed = found.noise.columns.iter().zip(&found.noise_of_measurements);
+    let assumed: Vec<Vec<Cell>> =
+        assumed.map(|(name, noise)| vec![name.as_str().into(), (*noise).into()]).collect();
+    html! {
+        p {
+            "Root-mean-square values under independent white noise of the measurements. "
+            @if report.sampling.is_some() {
+                "The noise of a measurement is stated as the standard deviation of a sample."
+            } @else {
+                "The noise of a measurement is stated as the root of its spectral density: its unit \
+                 times √s."
+            }
+        }
+        (table("Assumed noise", &["measurement", "noise"], &assumed))
+        (table("Under all noises", &["signal", "unit", "root mean square"], &rows))
+        (matrices("noise-each", std::slice::from_ref(&found.noise)))
+    }
+}
+
+fn comparison(found: &Robustness) -> Markup {
+    let rows: Vec<Vec<Cell>> = found
+        .comparison
+        .iter()
+        .map(|one| vec![one.name.as_str().into(), one.design.into(), one.linear_quadratic.into()])
+        .collect();
+    html! {
+        p {
+            "The linear-quadratic regulator and the Kalman filter whose eigenvalues have the same sum \
+             of decay rates show what the required speed costs at least: a design that is many times \
+             larger has eigenvalues that the plant resists."
+        }
+        (table("Norms and peaks", &["quantity", "this design", "linear-quadratic"], &rows))
+    }
+}
+
+fn tolerances(report: &Report, found: &ToleranceResult) -> Markup {
+    let [a, b, c] = report.verdict.limits.tolerance;
+    html! {
+        p {
+            "Each of " (number(f64::from(found.entries))) " entries of A (±" (number(a)) ", relative), B (±" (number(b))
+            ") and C (±" (number(c)) ") that is not 0, 1 or −1 varies by itself; the controller \
+             does not. Of " (number(f64::from(found.cases))) " random cases (seed "
+            (number(f64::from(found.seed))) ") the \
+             fraction " (number(found.stable)) " is stable. The worst plant found has the stability \
+             figure " (number(found.worst_instability)) " (negative: stable; "
+            @if report.sampling.is_some() { "largest modulus less 1" } @else { "largest real part, 1/s" }
+            "). In its direction the loop is stable up to " (number(found.first_unstable))
+            " of the tolerances. A case that was not tried may be worse."
+        }
+        (matrices("worst", &found.worst))
+    }
+}

@@ -1,0 +1,385 @@
+//! Analyses the robustness of a design and judges it.
+
+use control::aso::{Estimator, Gains};
+use control::controller::controller;
+use control::hold::zero_order_hold;
+use control::response::{frequency_grid, frequency_response, h_infinity};
+use control::robustness::{
+    DiskMargin, Loop, Point, Tolerances, channel_margins, delay_margin, disk_margin, longest_hold,
+    longest_period, noise_gains, regulator_of_same_speed, sampled_delay_margin, scaled_peak,
+    tolerance_test,
+};
+use control::{Domain, Error, StateSpace};
+use nalgebra::DMatrix;
+
+use super::designed::ControllerDesign;
+use super::report::{Check, Frequency, Matrix, rows};
+use super::robust_report::{
+    Channel, Compared, Disk, Level, Limits, LoopPoint, Number, Robustness, ToleranceResult, Verdict,
+};
+use super::robustness_limits::RobustnessLimits;
+use super::signals::Signal;
+
+const WIDTH: f64 = 1e-4;
+const POINTS_PER_DECADE: u32 = 20;
+const POINTS: [(Point, &str); 2] = [(Point::Input, "input"), (Point::Output, "output")];
+
+/// Returns the robustness of a design; None if the loop is not stable.
+pub(crate) fn robustness(
+    designed: &ControllerDesign,
+    limits: &RobustnessLimits,
+) -> Result<Option<Robustness>, Error> {
+    if designed.instability >= 0.0 {
+        return Ok(None);
+    }
+    let physical = Physical::of(designed);
+    let own = physical.closed(&physical.controller)?;
+    let point = |(point, name): (Point, &str)| {
+        let signals = match point {
+            Point::Input => &designed.linear.actuators,
+            Point::Output => &designed.linear.measurements,
+        };
+        self::point(&own, point, name, signals)
+    };
+    let points = POINTS.into_iter().map(point).collect::<Result<Vec<_>, _>>()?;
+    let (delay, hold) = match designed.domain {
+        Domain::Continuous => (delay_margin(&own)?, longest_hold(&own)?),
+        Domain::Sampled { .. } => (
+            sampled_delay_margin(&physical.plant, &physical.controller)?,
+            longest_period(&physical.plant, &physical.controller)?,
+        ),
+    };
+    let (noise, noise_together) = noise(designed, &own, &physical.estimates(designed), limits)?;
+    Ok(Some(Robustness {
+        comparison: comparison(designed, &physical, &points)?,
+        tolerance: tolerance(designed, &physical, limits)?,
+        curves: curves(&own)?,
+        points,
+        delay_margin: delay,
+        longest_hold: hold,
+        noise_of_measurements: limits.noise.clone(),
+        noise,
+        noise_together,
+    }))
+}
+
+/// The plant without filters, and the controller with its filters.
+struct Physical {
+    plant: StateSpace,
+    controller: StateSpace,
+    filter: Option<Vec<f64>>,
+}
+
+impl Physical {
+    fn of(designed: &ControllerDesign) -> Self {
+        let linear = &designed.linear;
+        let plant = StateSpace {
+            a: linear.a.clone(),
+            b: linear.b.clone(),
+            c: linear.c.clone(),
+            d: DMatrix::zeros(linear.c.nrows(), linear.b.ncols()),
+            domain: Domain::Continuous,
+        };
+        let mut physical = Self {
+            plant,
+            controller: designed.controller.clone(),
+            filter: designed.filter.clone(),
+        };
+        physical.controller = physical.filtered(&designed.controller);
+        physical
+    }
+
+    /// Puts the measurement filter before a controller: its states are y_f, then the controller's.
+    fn filtered(&self, own: &StateSpace) -> StateSpace {
+        let Some(filter) = &self.filter else {
+            return own.clone();
+        };
+        let (p, k, m) = (filter.len(), own.a.nrows(), own.c.nrows());
+        let w = DMatrix::from_diagonal(&filter.clone().into());
+        let kept = match own.domain {
+            Domain::Continuous => -&w,
+            Domain::Sampled { .. } => DMatrix::identity(p, p) - &w,
+        };
+        let mut a = DMatrix::zeros(p + k, p + k);
+        a.view_mut((0, 0), (p, p)).copy_from(&kept);
+        a.view_mut((p, 0), (k, p)).copy_from(&own.b);
+        a.view_mut((p, p), (k, k)).copy_from(&own.a);
+        let mut c = DMatrix::zeros(m, p + k);
+        c.columns_mut(0, p).copy_from(&own.d);
+        c.columns_mut(p, k).copy_from(&own.c);
+        let (b, d) = (w.resize_vertically(p + k, 0.0), DMatrix::zeros(m, p));
+        StateSpace { a, b, c, d, domain: own.domain }
+    }
+
+    fn closed(&self, controller: &StateSpace) -> Result<Loop, Error> {
+        let mut plant = self.plant.clone();
+        if let Domain::Sampled { period } = controller.domain {
+            (plant.a, plant.b) = zero_order_hold(&plant.a, &plant.b, period)?;
+            plant.domain = controller.domain;
+        }
+        Loop::new(plant, controller.clone())
+    }
+
+    /// The controller with the estimated faults as its output.
+    fn estimates(&self, designed: &ControllerDesign) -> StateSpace {
+        let (n, q) = designed.plant.f_a.shape();
+        let mut c = DMatrix::zeros(q, n + q);
+        c.columns_mut(n, q).fill_with_identity();
+        let mut d = DMatrix::zeros(q, designed.plant.c.nrows());
+        if designed.gains.estimator == Estimator::Current {
+            // f_hat after the correction by L_f (y - C x_hat).
+            c.columns_mut(0, n).copy_from(&-(&designed.gains.l_f * &designed.plant.c));
+            d.copy_from(&designed.gains.l_f);
+        }
+        let channels: Vec<_> =
+            designed.extended.channels.iter().map(|channel| channel.estimate).collect();
+        let own = StateSpace {
+            c: c.select_rows(&channels),
+            d: d.select_rows(&channels),
+            ..designed.controller.clone()
+        };
+        self.filtered(&own)
+    }
+}
+
+fn point(own: &Loop, at: Point, name: &str, signals: &[Signal]) -> Result<LoopPoint, Error> {
+    let sensitivity = own.sensitivity(at);
+    let s = h_infinity(&sensitivity, WIDTH)?;
+    let t = h_infinity(&own.complementary(at), WIDTH)?;
+    let scaled = scaled_peak(&sensitivity)?.value;
+    let same_unit = signals.iter().all(|signal| signal.unit == signals[0].unit);
+    let channel = |(index, signal): (usize, &Signal)| {
+        let found = channel_margins(own, at, index)?;
+        Ok(Channel {
+            name: signal.name.clone(),
+            gain: found.gain,
+            phase: found.phase.to_degrees(),
+            delay: found.delay,
+            disk: disk(&disk_margin(own, at, Some(index))?),
+        })
+    };
+    Ok(LoopPoint {
+        point: name.to_owned(),
+        s_peak: s.lower,
+        s_frequency: s.frequency,
+        t_peak: t.lower,
+        t_frequency: t.frequency,
+        s_peak_scaled: scaled,
+        judged: if same_unit { s.lower } else { scaled },
+        together: disk(&disk_margin(own, at, None)?),
+        channels: signals.iter().enumerate().map(channel).collect::<Result<_, Error>>()?,
+    })
+}
+
+fn disk(found: &DiskMargin) -> Disk {
+    Disk {
+        alpha: found.alpha,
+        certified: found.certified,
+        frequency: found.frequency,
+        gain: found.gains(),
+        phase: found.phase().to_degrees(),
+    }
+}
+
+/// Returns the effect of each measurement noise on commands and estimated faults, and of all
+/// together.
+fn noise(
+    designed: &ControllerDesign,
+    own: &Loop,
+    estimates: &StateSpace,
+    limits: &RobustnessLimits,
+) -> Result<(Matrix, Vec<Number>), Error> {
+    let of = |output: &StateSpace| {
+        let mut gains = noise_gains(&own.from_noise(output)?)?;
+        for (mut column, noise) in gains.column_iter_mut().zip(&limits.noise) {
+            column *= *noise;
+        }
+        Ok::<_, Error>(gains)
+    };
+    let (commands, faults) = (of(own.controller())?, of(estimates)?);
+    let linear = &designed.linear;
+    let named = linear.actuators.iter().map(|signal| (signal.name.clone(), signal.unit.clone()));
+    let estimated = linear.faults.iter();
+    let estimated =
+        estimated.map(|fault| (format!("estimate of {}", fault.name), fault.unit.clone()));
+    let names: Vec<_> = named.chain(estimated).collect();
+    let all = commands.row_iter().chain(faults.row_iter());
+    let together = names.iter().zip(all).map(|((name, unit), row)| Number {
+        name: name.clone(),
+        unit: unit.clone(),
+        value: row.norm(),
+    });
+    let together: Vec<_> = together.collect();
+    let mut values = rows(&commands);
+    values.extend(rows(&faults));
+    let matrix = Matrix {
+        name: "noise".to_owned(),
+        meaning: "root-mean-square values under the noise of each measurement".to_owned(),
+        rows: names.into_iter().map(|(name, _)| name).collect(),
+        columns: linear.measurements.iter().map(|signal| signal.name.clone()).collect(),
+        values,
+    };
+    Ok((matrix, together))
+}
+
+/// Returns the gains, and the peaks of S, beside those of the linear-quadratic design.
+fn comparison(
+    designed: &ControllerDesign,
+    physical: &Physical,
+    points: &[LoopPoint],
+) -> Result<Vec<Compared>, Error> {
+    let ControllerDesign { plant, gains, domain, extended, .. } = designed;
+    let n = extended.states;
+    let (a, b) = (plant.a.view((0, 0), (n, n)).into(), plant.b.rows(0, n).into());
+    let k = gains.k_x.columns(0, n).into_owned();
+    let feedback = regulator_of_same_speed(&a, &b, &k, *domain)?;
+    let a_0 = plant.augmented_dynamics();
+    let seen = gains.estimator.output_matrix(&a_0, &plant.augmented_output());
+    let l = gains.observer_gain();
+    let dual = (-&l).transpose();
+    let observer = regulator_of_same_speed(&a_0.transpose(), &seen.transpose(), &dual, *domain)?;
+    let observer = observer.map(|gain| -gain.transpose());
+    let mut found = vec![
+        Compared {
+            name: "norm of K_x".to_owned(),
+            design: norm(&k),
+            linear_quadratic: feedback.as_ref().map(norm),
+        },
+        Compared {
+            name: "norm of L".to_owned(),
+            design: norm(&l),
+            linear_quadratic: observer.as_ref().map(norm),
+        },
+    ];
+    let other = match (feedback, observer) {
+        (Some(feedback), Some(observer)) => {
+            let all = plant.a.nrows();
+            let other = Gains {
+                k_x: feedback.resize_horizontally(all, 0.0),
+                l_x: observer.rows(0, all).into(),
+                l_f: -observer.rows(all, plant.f_a.ncols()),
+                ..gains.clone()
+            };
+            Some(physical.closed(&physical.filtered(&controller(plant, &other, *domain)?))?)
+        }
+        _ => None,
+    };
+    for (point, (at, name)) in points.iter().zip(POINTS) {
+        let peak = |other: &Loop| h_infinity(&other.sensitivity(at), WIDTH).ok();
+        found.push(Compared {
+            name: format!("peak of S at the {name}"),
+            design: point.s_peak,
+            linear_quadratic: other.as_ref().and_then(peak).map(|found| found.lower),
+        });
+    }
+    Ok(found)
+}
+
+/// Returns the 2-norm.
+fn norm(m: &DMatrix<f64>) -> f64 {
+    (m * m.transpose()).symmetric_eigenvalues().max().max(0.0).sqrt()
+}
+
+fn tolerance(
+    designed: &ControllerDesign,
+    physical: &Physical,
+    limits: &RobustnessLimits,
+) -> Result<ToleranceResult, Error> {
+    let tolerances = Tolerances::of_values(&physical.plant, limits.tolerance);
+    let request = (limits.cases, u64::from(limits.seed));
+    let found = tolerance_test(&physical.plant, &physical.controller, &tolerances, request)?;
+    let names = |signals: &[Signal]| -> Vec<String> {
+        signals.iter().map(|signal| signal.name.clone()).collect()
+    };
+    let linear = &designed.linear;
+    let (states, actuators) = (names(&linear.states), names(&linear.actuators));
+    let matrix = |name: &str, values: &DMatrix<f64>, of: &[String], by: &[String]| Matrix {
+        name: name.to_owned(),
+        meaning: "worst plant within the tolerances".to_owned(),
+        rows: of.to_vec(),
+        columns: by.to_vec(),
+        values: rows(values),
+    };
+    Ok(ToleranceResult {
+        entries: u32::try_from(tolerances.count()).unwrap_or(u32::MAX),
+        cases: found.cases,
+        seed: limits.seed,
+        stable: if found.cases == 0 {
+            1.0
+        } else {
+            f64::from(found.stable) / f64::from(found.cases)
+        },
+        worst_instability: found.worst_instability,
+        first_unstable: found.first_unstable.unwrap_or(f64::INFINITY),
+        worst: vec![
+            matrix("A", &found.worst.a, &states, &states),
+            matrix("B", &found.worst.b, &states, &actuators),
+            matrix("C", &found.worst.c, &names(&linear.measurements), &states),
+        ],
+    })
+}
+
+/// Returns the singular values of S and T at both points.
+fn curves(own: &Loop) -> Result<Vec<Frequency>, Error> {
+    let mut found = Vec::new();
+    for (at, name) in POINTS {
+        let (s, t) = (own.sensitivity(at), own.complementary(at));
+        for (symbol, system) in [("S", s), ("T", t)] {
+            let grid = frequency_grid(&system, POINTS_PER_DECADE)?;
+            let points = frequency_response(&system, &grid)?;
+            let values = |k: usize| points.iter().map(|point| point.singular_values[k]).collect();
+            found.push(Frequency {
+                name: format!("{symbol} at the {name}"),
+                singular_values: (0..system.d.nrows()).map(values).collect(),
+                frequencies: grid,
+            });
+        }
+    }
+    Ok(found)
+}
+
+/// Judges a design.
+pub(crate) fn verdict(
+    checks: &[Check],
+    robustness: Option<&Robustness>,
+    limits: &RobustnessLimits,
+) -> Verdict {
+    let mut level = Level::Green;
+    let mut reasons = Vec::new();
+    for check in checks.iter().filter(|check| !check.holds) {
+        level = Level::Red;
+        reasons.push(format!("does not hold: {}", check.condition));
+    }
+    for point in robustness.iter().flat_map(|found| &found.points) {
+        let peak = point.judged;
+        let (limit, reached) = match peak {
+            peak if peak > limits.red => (limits.red, Level::Red),
+            peak if peak > limits.amber => (limits.amber, Level::Amber),
+            _ => continue,
+        };
+        if level != Level::Red {
+            level = reached;
+        }
+        reasons.push(format!(
+            "the peak of S at the {} is {peak:.3}, above {limit} ({})",
+            point.point,
+            reached.word()
+        ));
+    }
+    if let Some(found) = robustness.map(|found| &found.tolerance) {
+        let unstable = found.stable < 1.0 || found.worst_instability >= 0.0;
+        if unstable {
+            level = Level::Red;
+            let [a, b, c] = limits.tolerance.map(|tolerance| 100.0 * tolerance);
+            reasons.push(format!(
+                "parameters within ±{a} % of A, ±{b} % of B, ±{c} % of C make the loop unstable: \
+                 {:.1} % of {} random cases, the worst case from {:.3} of the tolerances on",
+                100.0 * (1.0 - found.stable),
+                found.cases,
+                found.first_unstable
+            ));
+        }
+    }
+    let RobustnessLimits { amber, red, tolerance, .. } = *limits;
+    Verdict { level, reasons, limits: Limits { amber, red, tolerance } }
+}

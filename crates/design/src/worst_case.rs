@@ -1,0 +1,69 @@
+//! A plant file with the worst plant within the tolerances.
+
+use control::faults::FaultEntry;
+use toml::{Table, Value};
+
+use super::designed::ControllerDesign;
+use super::identity::identity;
+use super::plant_file::PlantFile;
+use super::report::Report;
+
+/// Returns the plant file with A, B and C of the worst plant; a plant that is an FMU becomes one
+/// that matrices describe.
+pub(crate) fn plant_file(
+    file: &PlantFile<'_>,
+    designed: &ControllerDesign,
+    report: &Report,
+) -> Result<Option<String>, crate::Error> {
+    let Some(robustness) = &report.robustness else {
+        return Ok(None);
+    };
+    let unwritable = |error: &dyn std::fmt::Display| crate::Error::Invalid(error.to_string());
+    let mut table: Table = file.text().parse().map_err(|error| unwritable(&error))?;
+    for matrix in &robustness.tolerance.worst {
+        let row = |row: &Vec<f64>| Value::Array(row.iter().map(|x| Value::Float(*x)).collect());
+        let rows = matrix.values.iter().map(row).collect();
+        table.insert(matrix.name.clone(), Value::Array(rows));
+    }
+    if file.fmu().is_some() && !without_fmu(&mut table, designed) {
+        return Ok(None);
+    }
+    let text = toml::to_string(&table).map_err(|error| unwritable(&error))?;
+    let tolerance = report.verdict.limits.tolerance.map(|tolerance| 100.0 * tolerance);
+    Ok(Some(format!(
+        "# Written by {}: the worst plant found within ±{} % of A, ±{} % of B, ±{} % of C.\n\n{text}",
+        identity(report),
+        tolerance[0],
+        tolerance[1],
+        tolerance[2]
+    )))
+}
+
+/// Replaces what refers to the plant's FMU; false if a fault cannot be stated without it.
+fn without_fmu(table: &mut Table, designed: &ControllerDesign) -> bool {
+    table.remove("plant");
+    table.remove("operating_point");
+    let linear = &designed.linear;
+    let names = linear.states.iter().map(|signal| Value::String(signal.name.clone()));
+    table.insert("states".to_owned(), Value::Array(names.collect()));
+    let mut columns = Vec::new();
+    if let Some(Value::Array(faults)) = table.get_mut("faults") {
+        let own = linear.models.len() - faults.len();
+        for (fault, model) in faults.iter_mut().zip(&linear.models[own..]) {
+            let input = fault.as_table_mut().and_then(|fault| fault.remove("input"));
+            match (input, &model.entry) {
+                (None, _) => {}
+                (Some(_), FaultEntry::Actuator(column)) => columns.push(column.clone()),
+                (Some(_), _) => return false,
+            }
+        }
+    }
+    if !columns.is_empty() {
+        let row = |at: usize| {
+            Value::Array(columns.iter().map(|column| Value::Float(column[at])).collect())
+        };
+        let rows = (0..linear.a.nrows()).map(row).collect();
+        table.insert("F_a".to_owned(), Value::Array(rows));
+    }
+    true
+}

@@ -1,0 +1,94 @@
+//! Clocks: which of them tick in an event, and their intervals (section 2.2.8).
+
+use std::mem::MaybeUninit;
+
+use super::super::Instance;
+use crate::model::{Failure, Model};
+use crate::typed::Native;
+use fmu_description::Causality;
+use fmu_description::abi3::{IntervalQualifier, fmi3Clock};
+
+impl<M: Model> Instance<M> {
+    /// Lets the model tick its clocks, where event mode begins and after a clock was set.
+    pub(super) fn tick(&mut self) {
+        if !bool::slots(&self.interface.typed).is_empty() {
+            self.core.model.tick(self.core.time);
+        }
+    }
+
+    /// Ends the ticks of all clocks.
+    pub(super) fn clear_clocks(&mut self) {
+        for clock in bool::slots(&self.interface.typed) {
+            *(clock.field)(&mut self.core.model) = false;
+        }
+    }
+
+    /// `fmi3GetClock`.
+    pub(crate) fn get_clock(&mut self, places: &[u32], to: &mut [MaybeUninit<fmi3Clock>]) {
+        let clocks = bool::slots(&self.interface.typed);
+        for (&place, value) in places.iter().zip(to) {
+            let ticks = clocks.get(place as usize).map(|own| *(own.field)(&mut self.core.model));
+            value.write(ticks.unwrap_or(false).into());
+        }
+    }
+
+    /// `fmi3SetClock`: sets all input clocks or, after a failure, none.
+    pub(crate) fn set_clock(
+        &mut self,
+        places: &[u32],
+        values: &[fmi3Clock],
+    ) -> Result<(), Failure> {
+        let clocks = bool::slots(&self.interface.typed);
+        let named = places.iter().filter_map(|place| clocks.get(*place as usize));
+        if let Some(other) = named.into_iter().find(|own| own.causality != Causality::Input) {
+            let (name, causality) = (&other.name, other.causality.as_str());
+            return Err(Failure::Error(format!(
+                "{name} is a clock with causality {causality}: only an input clock can be set"
+            )));
+        }
+        for (&place, &value) in places.iter().zip(values) {
+            if let Some(clock) = clocks.get(place as usize) {
+                *(clock.field)(&mut self.core.model) = value != 0;
+            }
+        }
+        self.tick();
+        Ok(())
+    }
+
+    /// `fmi3GetIntervalDecimal`: intervals in s, which are constant.
+    pub(crate) fn get_intervals(
+        &self,
+        places: &[u32],
+        intervals: &mut [MaybeUninit<f64>],
+        qualifiers: &mut [MaybeUninit<i32>],
+    ) -> Result<(), Failure> {
+        for ((&place, interval), qualifier) in places.iter().zip(intervals).zip(qualifiers) {
+            interval.write(self.interval(place)?);
+            qualifier.write(IntervalQualifier::Changed as i32);
+        }
+        Ok(())
+    }
+
+    /// `fmi3GetShiftDecimal`: the first tick of every periodic clock is at the start time.
+    pub(crate) fn get_shifts(
+        &self,
+        places: &[u32],
+        shifts: &mut [MaybeUninit<f64>],
+    ) -> Result<(), Failure> {
+        for (&place, shift) in places.iter().zip(shifts) {
+            self.interval(place)?;
+            shift.write(0.0);
+        }
+        Ok(())
+    }
+
+    /// Returns the interval in s of a periodic clock.
+    fn interval(&self, place: u32) -> Result<f64, Failure> {
+        let clock = bool::slots(&self.interface.typed).get(place as usize);
+        let interval = clock.and_then(|own| own.interval);
+        interval.ok_or_else(|| {
+            let name = clock.map(|own| own.name.as_str()).unwrap_or_default();
+            Failure::Error(format!("{name} is a triggered clock: it has no interval"))
+        })
+    }
+}

@@ -1,0 +1,89 @@
+//! Configuration mode and reconfiguration mode: the importer changes the extents of arrays (sections
+//! 2.3.6 and 2.3.7).
+
+use super::super::Instance;
+use crate::interface::{Interface, Slot};
+use crate::model::{Failure, Model};
+use crate::stepper::Stepper;
+use crate::typed::Native;
+use fmu_description::call_order::{InterfaceType, State};
+use fmu_description::{Causality, Variability};
+
+impl<M: Model> Instance<M> {
+    fn structural_slots(&self) -> impl Iterator<Item = &Slot<M, u64>> {
+        let all = u64::slots(&self.interface.typed).iter();
+        all.filter(|slot| slot.causality == Causality::StructuralParameter)
+    }
+
+    /// Returns the values of the structural parameters.
+    pub(super) fn structural_parameters(&mut self) -> Vec<u64> {
+        let all = u64::slots(&self.interface.typed).iter();
+        let own = all.filter(|slot| slot.causality == Causality::StructuralParameter);
+        let model = &mut self.core.model;
+        own.map(|slot| *(slot.field)(model)).collect()
+    }
+
+    /// `fmi3EnterConfigurationMode`.
+    pub(crate) fn enter_configuration_mode(&mut self) -> Result<(), Failure> {
+        if self.structural_slots().next().is_none() {
+            return Err(Failure::Error("this FMU has no structural parameters".to_owned()));
+        }
+        if self.core.state == State::Instantiated {
+            self.core.state = State::ConfigurationMode;
+            return Ok(());
+        }
+        if self.structural_slots().all(|slot| slot.variability != Variability::Tunable) {
+            let message = "no structural parameter of this FMU is tunable: set them before \
+                           fmi3EnterInitializationMode";
+            return Err(Failure::Error(message.to_owned()));
+        }
+        self.core.state = State::ReconfigurationMode;
+        Ok(())
+    }
+
+    /// `fmi3ExitConfigurationMode`: resizes the arrays.
+    pub(crate) fn exit_configuration_mode(&mut self) -> Result<(), Failure> {
+        self.core.model.resize()?;
+        self.core.state = match (self.core.state, self.core.interface_type) {
+            (State::ConfigurationMode, _) => State::Instantiated,
+            (_, InterfaceType::ModelExchange) => State::EventMode,
+            (_, InterfaceType::CoSimulation) => State::StepComplete,
+        };
+        (self.core.stale, self.core.unchecked) = (true, true);
+        self.fit_layout()
+    }
+
+    /// Lays the variables out again if the structural parameters have other values than before.
+    pub(in super::super) fn fit_layout(&mut self) -> Result<(), Failure> {
+        // In these modes arrays still have the extents of before, and no function accesses them.
+        let is_open =
+            matches!(self.core.state, State::ConfigurationMode | State::ReconfigurationMode);
+        if is_open || self.session.as_ref().is_none_or(|own| own.structural.is_empty()) {
+            return Ok(());
+        }
+        let structural = self.structural_parameters();
+        if self.session()?.structural == structural {
+            return Ok(());
+        }
+        let (mut interface, description) = Interface::new(&mut self.core.model)?;
+        let (table, _) = interface.convert(&description)?;
+        interface.guid = self.interface.guid;
+        let inputs = interface.interpolated.len();
+        let session = self.session_mut()?;
+        if !table.has_variables_of(&session.table) {
+            let message = "after the structural parameters were set, the model has other variables than \
+                           in its description";
+            return Err(Failure::Error(message.to_owned()));
+        }
+        session.table = table;
+        session.structural = structural;
+        if let Some(intermediate) = &mut session.intermediate {
+            intermediate.resize(inputs);
+        }
+        let tolerance = description.default_experiment.and_then(|own| own.tolerance);
+        self.stepper = Stepper::new(&interface, tolerance);
+        self.interface = interface;
+        self.direction = None;
+        Ok(())
+    }
+}

@@ -1,0 +1,39 @@
+//! The clocks of clocked variables.
+
+use crate::model::Failure;
+use crate::variable::Variable;
+use fmu_description::{Kind, ModelDescription};
+
+/// The clocked variables of a model, by name, with the names of their clocks.
+pub(super) struct Clocks(Vec<(String, Vec<String>)>);
+
+impl Clocks {
+    pub(super) fn of<M>(variables: &[Variable<M>]) -> Self {
+        let clocked = variables.iter().filter(|own| !own.clocks.is_empty());
+        Self(clocked.map(|own| (own.name.clone(), own.clocks.clone())).collect())
+    }
+
+    /// Sets `clocks` of the variables of a description of FMI 3.0.
+    ///
+    /// # Errors
+    ///
+    /// [`Failure::Error`] for a clock that is none.
+    pub(super) fn enter(&self, description: &mut ModelDescription) -> Result<(), Failure> {
+        for (name, clocks) in &self.0 {
+            let index = |clock: &String| {
+                let is_clock = |(_, own): &(u32, &fmu_description::ScalarVariable)| {
+                    own.name == *clock && matches!(own.kind, Kind::Clock(_))
+                };
+                let found = (1..).zip(&description.variables).find(is_clock);
+                found
+                    .map(|(index, _)| index)
+                    .ok_or_else(|| Failure::Error(format!("variable {name}: {clock} is no clock")))
+            };
+            let clocks = clocks.iter().map(index).collect::<Result<Vec<_>, _>>()?;
+            if let Some(own) = description.variables.iter_mut().find(|own| own.name == *name) {
+                own.clocks = clocks;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,171 @@
+//! Structural parameters as extents of arrays.
+
+use std::collections::HashMap;
+
+use crate::model::Failure;
+use crate::variable::Variable;
+use fmu_description::{Causality, Dimension, Kind, ModelDescription, ScalarVariable};
+
+/// The structural parameters of a model.
+#[derive(Default)]
+pub(super) struct Sizes {
+    /// For each element of an array, by its name: the structural parameters that are the extents.
+    by_element: HashMap<String, Vec<String>>,
+}
+
+impl Sizes {
+    pub(super) fn of<M>(variables: &[Variable<M>]) -> Self {
+        let sized = variables.iter().filter(|own| !own.sized_by.is_empty());
+        let by_element = sized.map(|own| (own.name.clone(), own.sized_by.clone())).collect();
+        Self { by_element }
+    }
+
+    /// Replaces the extents in a description of FMI 3.0 by references to the structural parameters.
+    ///
+    /// # Errors
+    ///
+    /// [`Failure::Error`] if an extent is not the value of its structural parameter, or if elements that
+    /// state one are no array of that many dimensions.
+    pub(super) fn enter(&self, description: &mut ModelDescription) -> Result<(), Failure> {
+        if self.by_element.is_empty() {
+            return Ok(());
+        }
+        let parameters: HashMap<String, (u32, i128)> =
+            description.variables.iter().filter_map(parameter).collect();
+        let mut used = 0;
+        for variable in &mut description.variables {
+            let extents: Vec<u64> = variable.dimensions.iter().map(extent).collect();
+            let Some(names) = self.by_element.get(&first_element(&variable.name, extents.len()))
+            else {
+                continue;
+            };
+            variable.dimensions = references(&variable.name, &extents, names, &parameters)?;
+            used += usize::try_from(extents.iter().product::<u64>()).unwrap_or(usize::MAX);
+        }
+        if used == self.by_element.len() {
+            return Ok(());
+        }
+        let arrays = "every element of an array states the same structural parameters, and its elements \
+                      follow one another in row-major order with the same attributes";
+        Err(Failure::Error(format!(
+            "{} elements of arrays state structural parameters, {used} of them belong to an array of \
+             FMI 3.0: {arrays} (FMI 3.0.2, section 2.2.6.1)",
+            self.by_element.len()
+        )))
+    }
+}
+
+/// Returns name, value reference and value of a structural parameter.
+fn parameter(own: &ScalarVariable) -> Option<(String, (u32, i128))> {
+    match &own.kind {
+        Kind::UInt64(kind) if own.causality == Causality::StructuralParameter => {
+            Some((own.name.clone(), (own.value_reference, kind.start.unwrap_or_default())))
+        }
+        _ => None,
+    }
+}
+
+fn extent(dimension: &Dimension) -> u64 {
+    match dimension {
+        Dimension::Fixed(extent) => *extent,
+        Dimension::Variable(_) => 0,
+    }
+}
+
+/// Returns the name of the first element of an array: `A[1,1]`, `der(x[1])`.
+fn first_element(array: &str, dimensions: usize) -> String {
+    let ones = vec!["1"; dimensions].join(",");
+    match array.strip_prefix("der(").and_then(|state| state.strip_suffix(')')) {
+        Some(state) => format!("der({state}[{ones}])"),
+        None => format!("{array}[{ones}]"),
+    }
+}
+
+/// Returns the dimensions of an array whose extents are the values of the structural parameters `names`.
+fn references(
+    array: &str,
+    extents: &[u64],
+    names: &[String],
+    parameters: &HashMap<String, (u32, i128)>,
+) -> Result<Vec<Dimension>, Failure> {
+    let wrong = |reason: String| Failure::Error(format!("array {array}: {reason}"));
+    if extents.len() != names.len() {
+        let (found, expected) = (extents.len(), names.len());
+        return Err(wrong(format!(
+            "it has {found} dimensions and {expected} structural parameters"
+        )));
+    }
+    let reference = |(&extent, name): (&u64, &String)| match parameters.get(name) {
+        Some(&(reference, value)) if value == i128::from(extent) => {
+            Ok(Dimension::Variable(reference))
+        }
+        Some((_, value)) => {
+            Err(wrong(format!("the extent is {extent}, expected {name} = {value}")))
+        }
+        None => Err(wrong(format!("{name} is no structural parameter"))),
+    };
+    extents.iter().zip(names).map(reference).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use serde::{Deserialize, Serialize};
+
+    use super::*;
+    use crate::{About, Model, describe_3, problems};
+
+    /// A vector of `LENGTH` elements whose extent is said to be n = 2; the last element states `OTHER`.
+    #[derive(Clone, Serialize, Deserialize)]
+    struct Vector<const LENGTH: usize, const OTHER: bool> {
+        n: u64,
+        v: Vec<f64>,
+    }
+
+    impl<const LENGTH: usize, const OTHER: bool> Model for Vector<LENGTH, OTHER> {
+        const IDENTIFIER: &'static str = "Vector";
+
+        fn about(&self) -> About {
+            About::default()
+        }
+
+        fn new(_: &Path) -> Result<Self, Failure> {
+            Ok(Self { n: 2, v: vec![0.0; LENGTH] })
+        }
+
+        fn variables(&self) -> Vec<Variable<Self>> {
+            let v = Variable::real_array("v", "", &[LENGTH], |own: &mut Self| &mut own.v[..]);
+            let by = |k| if OTHER && k + 1 == LENGTH { "m" } else { "n" };
+            let v = v.enumerate().map(|(k, element)| element.parameter().sized_by(&[by(k)]));
+            let n = Variable::structural("n", "", |own: &mut Self| &mut own.n);
+            std::iter::once(n).chain(v).collect()
+        }
+    }
+
+    fn refusal<M: Model>() -> String {
+        let problem = problems::<M>(Path::new("")).unwrap_err().to_string();
+        assert_eq!(describe_3::<M>(Path::new("")).unwrap_err().to_string(), problem);
+        problem
+    }
+
+    #[test]
+    fn an_array_has_the_extents_of_its_structural_parameters() {
+        let description = describe_3::<Vector<2, false>>(Path::new("")).unwrap();
+        let n = description.variable("n").unwrap().value_reference;
+        assert_eq!(description.variable("v").unwrap().dimensions, [Dimension::Variable(n)]);
+        assert_eq!(problems::<Vector<2, false>>(Path::new("")), Ok(vec![]));
+    }
+
+    #[test]
+    fn an_extent_that_is_not_the_value_of_its_parameter_is_refused_by_name() {
+        let refusal = refusal::<Vector<3, false>>();
+        assert!(refusal.contains("array v") && refusal.contains("n = 2"), "{refusal}");
+    }
+
+    #[test]
+    fn a_name_that_is_no_structural_parameter_is_refused() {
+        let refusal = refusal::<Vector<1, true>>();
+        assert!(refusal.contains("m is no structural parameter"), "{refusal}");
+    }
+}

@@ -1,0 +1,124 @@
+//! FMUs and system structures that several runs of one process share.
+
+use std::collections::HashMap;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::SystemTime;
+
+use ssp::Opened;
+
+use crate::error::Error;
+use crate::instances::Content;
+
+/// FMUs and system structures that are unpacked, described and loaded once for several runs.
+///
+/// A file is opened again if its size or its time of modification has changed. An FMU that can be
+/// instantiated only once per process is not kept, so that every run loads it anew.
+#[derive(Default)]
+pub struct Store {
+    fmus: Mutex<HashMap<FmuKey, Content>>,
+    systems: Mutex<HashMap<Stamp, Arc<Opened>>>,
+}
+
+/// A file at a state of its content.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+struct Stamp {
+    path: PathBuf,
+    size: u64,
+    modified: Option<SystemTime>,
+}
+
+impl Stamp {
+    /// Returns the stamp of the archive at `path`, or of the description in the folder at `path`; `None`
+    /// if there is none.
+    fn of(path: &Path) -> Option<Self> {
+        let path = std::path::absolute(path).ok()?;
+        let mut data = path.metadata().ok()?;
+        if data.is_dir() {
+            let names = ["modelDescription.xml", "SystemStructure.ssd", "OspSystemStructure.xml"];
+            data = names.iter().find_map(|name| path.join(name).metadata().ok())?;
+        }
+        Some(Self { path, size: data.len(), modified: data.modified().ok() })
+    }
+}
+
+/// An FMU at a state of its file, for instances in this process or in separate ones.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+struct FmuKey {
+    stamp: Stamp,
+    isolated: bool,
+}
+
+impl Store {
+    /// Returns the FMU at `path`; opens it with `open` if the store does not have it.
+    pub(crate) fn fmu(
+        &self,
+        path: &Path,
+        isolated: bool,
+        open: impl FnOnce() -> Result<Content, Error>,
+    ) -> Result<Content, Error> {
+        let Some(stamp) = Stamp::of(path) else { return open() };
+        let mut fmus = lock(&self.fmus);
+        let key = FmuKey { stamp, isolated };
+        if let Some(content) = fmus.get(&key) {
+            return Ok(content.clone());
+        }
+        let content = open()?;
+        if content.is_reusable() {
+            let stale = |own: &FmuKey| own.isolated == isolated && own.stamp.path == key.stamp.path;
+            fmus.retain(|own, _| !stale(own));
+            fmus.insert(key, content.clone());
+        }
+        Ok(content)
+    }
+
+    /// Returns the system structure at `path`; opens it with `open` if the store does not have it.
+    pub(crate) fn system(
+        &self,
+        path: &Path,
+        open: impl FnOnce() -> Result<Opened, Error>,
+    ) -> Result<Arc<Opened>, Error> {
+        // A folder has further files, whose changes its stamp would not show.
+        let stamp = Stamp::of(path).filter(|_| path.is_file());
+        let is_archive = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("ssp"));
+        let Some(stamp) = stamp.filter(|_| is_archive) else { return open().map(Arc::new) };
+        let mut systems = lock(&self.systems);
+        if let Some(opened) = systems.get(&stamp) {
+            return Ok(opened.clone());
+        }
+        let opened = Arc::new(open()?);
+        systems.retain(|own, _| own.path != stamp.path);
+        systems.insert(stamp, opened.clone());
+        Ok(opened)
+    }
+
+    /// Forgets all FMUs and system structures. Their unpacked files are removed when no run uses them
+    /// any more.
+    pub fn clear(&self) {
+        lock(&self.fmus).clear();
+        lock(&self.systems).clear();
+    }
+
+    /// Returns the number of FMUs in the store.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        lock(&self.fmus).len()
+    }
+
+    /// Whether there is no FMU in the store.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+impl fmt::Debug for Store {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.debug_struct("Store").field("fmus", &self.len()).finish_non_exhaustive()
+    }
+}
+
+fn lock<T>(own: &Mutex<T>) -> MutexGuard<'_, T> {
+    own.lock().unwrap_or_else(PoisonError::into_inner)
+}

@@ -1,0 +1,92 @@
+"""Fault-tolerant control and co-simulation of FMUs.
+
+>>> import aso_ftc as af
+>>> results = af.reproduce(stop_time=1.0)
+>>> len(results)
+101
+
+* :func:`simulate` runs one FMU, :class:`System` connects several.
+* :class:`Results` holds the rows of a run for NumPy, Arrow, pandas, polars and xarray.
+* :func:`design` designs a fault-tolerant controller.
+* :func:`check` and :func:`read_model_description` look at an FMU.
+"""
+
+from __future__ import annotations
+
+import atexit as _atexit
+import importlib as _importlib
+from typing import Any as _Any
+
+from . import _core
+from ._command import _path as _command_path
+from ._command import command
+from ._description import DefaultExperiment, ModelDescription, Variable, read_model_description
+from ._design import Controller, Design, design
+from ._errors import (
+    CancelledError,
+    ConfigurationError,
+    DesignError,
+    Error,
+    FmuError,
+    MissingPackageError,
+    ResultsError,
+    RunError,
+    TimeLimitError,
+)
+from ._paper import fmus, paper, reproduce
+from ._results import Results
+from ._simulate import CheckReport, check, simulate
+from ._slave import Slave
+from ._system import Cancel, Simulation, System, fault
+
+__version__ = _core.__version__
+
+__all__ = [
+    "Cancel",
+    "CancelledError",
+    "CheckReport",
+    "ConfigurationError",
+    "Controller",
+    "DefaultExperiment",
+    "Design",
+    "DesignError",
+    "Error",
+    "FmuError",
+    "MissingPackageError",
+    "ModelDescription",
+    "Results",
+    "ResultsError",
+    "RunError",
+    "Simulation",
+    "Slave",
+    "System",
+    "TimeLimitError",
+    "Variable",
+    "__version__",
+    "check",
+    "clear",
+    "command",
+    "design",
+    "fault",
+    "fmus",
+    "paper",
+    "read_model_description",
+    "reproduce",
+    "simulate",
+]
+
+
+def clear() -> None:
+    """Close the FMUs that no run uses and remove their unpacked files; done at the end of Python."""
+    _core.clear()
+
+
+def __getattr__(name: str) -> _Any:
+    # Campaigns import large packages, so they are imported when they are used.
+    if name == "campaign":
+        return _importlib.import_module(f"{__name__}.campaign")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+_core.set_worker(str(_command_path()))
+_atexit.register(_core.clear)

@@ -1,0 +1,638 @@
+"""Systems of connected FMUs, and their runs."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, Literal, Union
+
+from . import _core
+from ._description import Variable
+from ._results import Results
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+    from ._slave import Slave
+
+__all__ = ["Cancel", "Simulation", "System", "fault"]
+
+PathLike = Union[str, "os.PathLike[str]"]
+Value = Union[bool, int, float, str]
+Cancel = _core.Cancel
+
+# Tables of a system.toml that a System shows as attributes.
+_TABLES = ("algorithm", "experiment", "results", "isolation", "scenario")
+
+
+def fault(
+    connection: str,
+    kind: str,
+    *,
+    start: float | None = None,
+    until: float | None = None,
+    unit: str | None = None,
+    **parameters: object,
+) -> dict[str, Any]:
+    """Return a fault on a connection, for :meth:`System.run` and :meth:`System.add_fault`.
+
+    Args:
+        connection: the input, ``"fmu.variable"``, or both ends, ``"fmu.output=fmu.input"``.
+        kind: ``"bias"``, ``"gain"``, ``"drift"``, ``"stuck"``, ``"dropout"``, ``"delay"``,
+            ``"quantisation"``, ``"saturation"``, ``"noise"`` or ``"inversion"``.
+        start: simulated time in s at which the fault begins; default: the start of the run.
+        until: simulated time in s at which it ends; default: never.
+        unit: unit of the values; default: the unit of the input.
+        parameters: the parameters of the kind, such as ``value=0.01`` of a bias.
+
+    >>> fault("controller.x_p", "bias", value=0.01, start=2.0)
+    {'connection': 'controller.x_p', 'bias': {'value': 0.01, 'from': 2.0}}
+    """
+    body = dict(parameters)
+    if start is not None:
+        body["from"] = start
+    if until is not None:
+        body["until"] = until
+    entry: dict[str, Any] = {"connection": connection, kind: body}
+    if unit is not None:
+        entry["unit"] = unit
+    return entry
+
+
+class System:
+    """FMUs, their connections and everything else that a ``system.toml`` states.
+
+    Args:
+        description: the text of a ``system.toml``, or the same structure as nested dicts.
+        folder: the folder where relative paths start; default: the current one.
+
+    Raises:
+        ConfigurationError: an entry is unknown, has the wrong type or is out of range.
+    """
+
+    start_values: dict[str, Value]
+    """Values of variables before the run, by ``"fmu.variable"``."""
+    algorithm: dict[str, Any]
+    """The table ``[algorithm]``."""
+    experiment: dict[str, Any]
+    """The table ``[experiment]``: ``start-time``, ``stop-time`` in s, ``tolerance``."""
+    results: dict[str, Any]
+    """The table ``[results]``."""
+    isolation: dict[str, Any]
+    """The table ``[isolation]``."""
+    scenario: dict[str, Any]
+    """The tables ``[[scenario.set]]``, ``signal``, ``table`` and ``fault``, each a list."""
+
+    def __init__(
+        self,
+        description: str | Mapping[str, Any] | None = None,
+        *,
+        folder: PathLike | None = None,
+    ) -> None:
+        self._folder = os.path.abspath(os.fspath(folder) if folder is not None else os.getcwd())
+        own = {} if description is None else description
+        if not isinstance(own, (str, Mapping)):
+            kind = type(own).__name__
+            raise TypeError(f"expected the text of a system.toml or a dict, found {kind}")
+        self._adopt(_core.check_configuration(own, self._folder))
+        self._slaves: dict[str, Slave] = {}
+        self._cache: tuple[dict[str, Any], dict[str, Slave], _core.Study] | None = None
+
+    def _adopt(self, config: dict[str, Any]) -> None:
+        self.start_values = config.pop("settings", {})
+        for name in _TABLES:
+            setattr(self, name, config.pop(name, {}))
+        self._rest = config
+
+    @classmethod
+    def from_toml(cls, path: PathLike) -> System:
+        """Read a ``system.toml``.
+
+        Raises:
+            ConfigurationError: with ``path``, ``line`` and ``column``.
+        """
+        config = _core.read_configuration(os.fspath(path))
+        own = cls(folder=os.path.dirname(os.path.abspath(os.fspath(path))))
+        own._adopt(config)
+        return own
+
+    @classmethod
+    def from_ssp(cls, path: PathLike) -> System:
+        """Build on a system structure: an SSP, an SSD, or a folder with one."""
+        return cls({"system": os.fspath(path)})
+
+    def _path(self, path: PathLike) -> str:
+        return os.path.abspath(os.path.join(self._folder, os.fspath(path)))
+
+    def add(
+        self,
+        name: str,
+        fmu: PathLike | Slave,
+        *,
+        interface: Literal["co-simulation", "model-exchange"] | None = None,
+        solver: Literal["automatic", "explicit", "stiff"] | None = None,
+        every: int | None = None,
+    ) -> System:
+        """Add an FMU, or a Python object with a function ``step`` (see :class:`Slave`).
+
+        Args:
+            name: its name in the system.
+            fmu: path of the archive or of a folder with the unpacked FMU, or the object.
+            interface: the interface of an FMU that offers both; default: co-simulation.
+            solver: the integration method of a model-exchange FMU.
+            every: the FMU makes one step for this many communication steps.
+
+        Returns:
+            the system itself.
+        """
+        if isinstance(fmu, (str, os.PathLike)):
+            self._slaves.pop(name, None)
+            self._rest.setdefault("fmus", {})[name] = self._path(fmu)
+        elif callable(getattr(fmu, "step", None)):
+            self._rest.get("fmus", {}).pop(name, None)
+            self._slaves[name] = fmu
+        else:
+            kind = type(fmu).__name__
+            raise TypeError(f"{name}: expected a path or an object with a function step, found {kind}")
+        for table, value in (("interface", interface), ("solver", solver)):
+            if value is not None:
+                self._rest.setdefault(table, {})[name] = value
+        if every is not None:
+            self.algorithm.setdefault("every", {})[name] = every
+        return self
+
+    def connect(
+        self, source: str, target: str, *, factor: float | None = None, offset: float | None = None
+    ) -> System:
+        """Connect an output to an input: ``target = factor source + offset``.
+
+        Without a factor and an offset, units that differ are converted. As soon as a system has one
+        stated connection, variables of equal names are no longer connected by themselves.
+
+        Args:
+            source: ``"fmu.output"``.
+            target: ``"fmu.input"``.
+        """
+        entry: dict[str, Any] = {"from": source, "to": target}
+        if factor is not None:
+            entry["factor"] = factor
+        if offset is not None:
+            entry["offset"] = offset
+        self._rest.setdefault("connections", []).append(entry)
+        return self
+
+    def add_fault(
+        self,
+        connection: str,
+        kind: str,
+        *,
+        start: float | None = None,
+        until: float | None = None,
+        unit: str | None = None,
+        **parameters: object,
+    ) -> System:
+        """Disturb the values on a connection; see :func:`fault`."""
+        entry = fault(connection, kind, start=start, until=until, unit=unit, **parameters)
+        self.scenario.setdefault("fault", []).append(entry)
+        return self
+
+    def add_signal(self, variable: str, *, unit: str | None = None, **kind: object) -> System:
+        """Let an unconnected input or a tunable parameter follow a signal.
+
+        Args:
+            variable: ``"fmu.variable"``.
+            unit: unit of the values; default: the unit of the variable.
+            kind: exactly one of ``constant``, ``steps``, ``points``, ``ramp``, ``sine``, ``csv``, as in
+                ``[[scenario.signal]]``.
+        """
+        entry: dict[str, Any] = {"variable": variable, **kind}
+        if unit is not None:
+            entry["unit"] = unit
+        self.scenario.setdefault("signal", []).append(entry)
+        return self
+
+    def add_setting(self, variable: str, at: float, value: Value, unit: str | None = None) -> System:
+        """Set an unconnected input or a tunable parameter at a simulated time in s."""
+        entry: dict[str, Any] = {"variable": variable, "at": at, "value": value}
+        if unit is not None:
+            entry["unit"] = unit
+        self.scenario.setdefault("set", []).append(entry)
+        return self
+
+    @property
+    def fmus(self) -> dict[str, str]:
+        """Paths of the FMUs by name, without those of a system structure."""
+        return dict(self._rest.get("fmus", {}))
+
+    @property
+    def connections(self) -> list[dict[str, Any]]:
+        """The stated connections, each with ``from`` and ``to``."""
+        return copy.deepcopy(self._rest.get("connections", []))
+
+    def _config(self) -> dict[str, Any]:
+        config = {name: value for name, value in self._rest.items()}
+        config["settings"] = _flat(self.start_values)
+        for name in _TABLES:
+            table = getattr(self, name)
+            if table:
+                config[name] = table
+        return config
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the structure of the ``system.toml`` with absolute paths, without Python slaves."""
+        return _core.check_configuration(self._config(), self._folder)
+
+    def to_toml(self) -> str:
+        """Return the text of the ``system.toml`` with absolute paths, without Python slaves."""
+        return _core.render_toml(self.to_dict())
+
+    def copy(self) -> System:
+        """Return an independent copy. Python slaves are copied by ``copy.deepcopy``."""
+        return copy.deepcopy(self)
+
+    def __getstate__(self) -> dict[str, Any]:
+        state = dict(self.__dict__)
+        state["_cache"] = None
+        return state
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> System:
+        own = type(self).__new__(type(self))
+        memo[id(self)] = own
+        own.__dict__.update(copy.deepcopy(self.__getstate__(), memo))
+        return own
+
+    def __repr__(self) -> str:
+        names = [*self._rest.get("fmus", {}), *self._slaves]
+        based = [repr(os.path.basename(self._rest["system"]))] if "system" in self._rest else []
+        return f"System({', '.join([*based, *names])})"
+
+    def _named_files(self) -> Iterator[str]:
+        config = self.to_dict()
+        if "system" in config:
+            yield config["system"]
+        yield from config.get("fmus", {}).values()
+        scenario = config.get("scenario", {})
+        for entry in scenario.get("table", []):
+            yield entry["csv"]
+        for entry in scenario.get("signal", []):
+            if "csv" in entry:
+                yield entry["csv"]["file"]
+
+    def files(self) -> dict[str, str]:
+        """Return the SHA-256 of every file that the system reads, by absolute path.
+
+        A folder has the hash of the names and hashes of its files.
+        """
+        return {path: _hash(path) for path in sorted(set(self._named_files()))}
+
+    def with_files(self, paths: Mapping[str, PathLike]) -> System:
+        """Return a copy that reads other files: absolute path to new path, as for :meth:`files`."""
+        replaced = {os.path.abspath(old): os.path.abspath(os.fspath(new)) for old, new in paths.items()}
+        own = self.copy()
+        config = own.to_dict()
+
+        def swap(path: str) -> str:
+            return replaced.get(path, path)
+
+        if "system" in config:
+            config["system"] = swap(config["system"])
+        for name, path in config.get("fmus", {}).items():
+            config["fmus"][name] = swap(path)
+        scenario = config.get("scenario", {})
+        for entry in scenario.get("table", []):
+            entry["csv"] = swap(entry["csv"])
+        for entry in scenario.get("signal", []):
+            if "csv" in entry:
+                entry["csv"]["file"] = swap(entry["csv"]["file"])
+        own._adopt(config)
+        return own
+
+    def _study(self) -> _core.Study:
+        config = self._config()
+        if self._cache is not None:
+            known, slaves, study = self._cache
+            if known == config and slaves == self._slaves:
+                return study
+        study = _core.Study(config, self._folder, list(self._slaves.items()))
+        self._cache = copy.deepcopy(config), dict(self._slaves), study
+        return study
+
+    def check(self, **changes: Any) -> None:
+        """Find every error that is known before a run: loads and connects the FMUs, resolves all names.
+
+        Args:
+            changes: as for :meth:`run`, as far as they change the configuration.
+
+        Raises:
+            ConfigurationError, FmuError: the first error.
+        """
+        self._study().check(_changes(**changes))
+
+    def variables(self) -> list[Variable]:
+        """Return the variables of all FMUs, with names ``"fmu.variable"``."""
+        return [Variable(**own) for own in self._study().check({})]
+
+    def run(
+        self,
+        *,
+        start_values: Mapping[str, Any] | None = None,
+        faults: Iterable[Mapping[str, Any]] | None = None,
+        settings: Iterable[Mapping[str, Any]] | None = None,
+        signals: Iterable[Mapping[str, Any]] | None = None,
+        record: Iterable[str] | None = None,
+        exclude: Iterable[str] | None = None,
+        record_every: float | Literal["step", "never"] | None = None,
+        start_time: float | None = None,
+        stop_time: float | None = None,
+        step: float | None = None,
+        tolerance: float | None = None,
+        algorithm: Mapping[str, Any] | None = None,
+        isolate: bool | None = None,
+        call_time_limit: float | None = None,
+        memory_limit: int | str | None = None,
+        time_limit: float | None = None,
+        cancel: Cancel | None = None,
+        progress: bool | Callable[[float], object] | None = None,
+        file: PathLike | None = None,
+    ) -> Results:
+        """Run the system to its stop time and return the results.
+
+        The arguments take precedence over the system, which they do not change. The interpreter is
+        released while the FMUs step. Ctrl-C raises ``KeyboardInterrupt`` after the present step.
+
+        Args:
+            start_values: values of variables before the run, by ``"fmu.variable"``.
+            faults: further faults; see :func:`fault`.
+            settings: further settings during the run, as ``[[scenario.set]]``.
+            signals: further signals, as ``[[scenario.signal]]``.
+            record: variables to record, by name or pattern; default: inputs, outputs, local variables.
+            exclude: variables not to record, by name or pattern.
+            record_every: interval between rows in s, ``"step"`` or ``"never"``; default: every step, with
+                more than 10,000 steps 10,000 intervals.
+            start_time, stop_time: simulated time in s.
+            step: communication step in s.
+            tolerance: relative tolerance of solvers inside the FMUs.
+            algorithm: entries of ``[algorithm]``, such as ``{"method": "jacobi"}``.
+            isolate: run each FMU in a process of its own (Linux).
+            call_time_limit: limit of each call of an isolated FMU, in s of wall-clock time.
+            memory_limit: limit of the memory of an isolated FMU, in bytes or as ``"2GiB"``.
+            time_limit: limit of the steps of the run, in s of wall-clock time, checked between steps.
+            cancel: ends the run from another thread.
+            progress: ``True`` for a bar on a terminal, or a function of the fraction done, 0 to 1.
+            file: also write the results to this ``.csv`` or ``.parquet`` file.
+
+        Raises:
+            ConfigurationError: a name, a value or a setting is wrong.
+            FmuError: an FMU cannot be loaded or instantiated.
+            RunError: the run failed after its start; its ``results`` has the rows up to then.
+        """
+        changes = _changes(
+            start_values=start_values,
+            faults=faults,
+            settings=settings,
+            signals=signals,
+            record=record,
+            exclude=exclude,
+            record_every=record_every,
+            start_time=start_time,
+            stop_time=stop_time,
+            step=step,
+            tolerance=tolerance,
+            algorithm=algorithm,
+            isolate=isolate,
+            call_time_limit=call_time_limit,
+            memory_limit=memory_limit,
+            file=None if file is None else os.path.abspath(os.fspath(file)),
+        )
+        return self._run(changes, time_limit=time_limit, cancel=cancel, progress=progress)
+
+    def _run(self, changes: dict[str, Any], **options: Any) -> Results:
+        outcome, error = self._study().run(changes, **options)
+        results = Results(outcome)
+        if error is None:
+            return results
+        try:
+            error.results = results
+            raise error
+        finally:
+            # The traceback would otherwise keep this frame, and with it the results, in a cycle.
+            del error, results
+
+    def simulation(
+        self,
+        *,
+        start_values: Mapping[str, Any] | None = None,
+        faults: Iterable[Mapping[str, Any]] | None = None,
+        settings: Iterable[Mapping[str, Any]] | None = None,
+        signals: Iterable[Mapping[str, Any]] | None = None,
+        start_time: float | None = None,
+        stop_time: float | None = None,
+        step: float | None = None,
+        tolerance: float | None = None,
+        algorithm: Mapping[str, Any] | None = None,
+        isolate: bool | None = None,
+        call_time_limit: float | None = None,
+        memory_limit: int | str | None = None,
+    ) -> Simulation:
+        """Initialise the FMUs and return a simulation to advance step by step.
+
+        The arguments are those of :meth:`run`. Use the simulation in a ``with`` statement, which frees
+        the FMUs at its end.
+        """
+        changes = _changes(
+            start_values=start_values,
+            faults=faults,
+            settings=settings,
+            signals=signals,
+            start_time=start_time,
+            stop_time=stop_time,
+            step=step,
+            tolerance=tolerance,
+            algorithm=algorithm,
+            isolate=isolate,
+            call_time_limit=call_time_limit,
+            memory_limit=memory_limit,
+        )
+        return Simulation(self._study().simulation(changes))
+
+
+class Simulation:
+    """A simulation that Python advances; :meth:`System.simulation` creates it.
+
+    ``simulation["fmu.variable"]`` is the value of a variable at the time reached.
+    """
+
+    def __init__(self, stepper: _core.Stepper) -> None:
+        self._stepper = stepper
+
+    def __enter__(self) -> Simulation:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        try:
+            self.close()
+        except Exception:
+            # The exception of the block is the one that matters.
+            if kind is None:
+                raise
+
+    @property
+    def time(self) -> float:
+        """Simulated time in s that is reached."""
+        return self._stepper.time
+
+    @property
+    def finished(self) -> bool:
+        """Whether the stop time is reached or an FMU requested the end."""
+        return self._stepper.finished
+
+    def names(self) -> list[str]:
+        """Return the names of all variables, ``"fmu.variable"``."""
+        return self._stepper.names()
+
+    def step(self, count: int = 1) -> int:
+        """Make up to ``count`` communication steps; return how many were made before the end."""
+        return self._stepper.step(count)
+
+    def run_until(self, time: float) -> int:
+        """Step until a simulated time in s is reached; return the number of steps."""
+        return self._stepper.run_until(time)
+
+    def __getitem__(self, name: str) -> Any:
+        return self._stepper[name]
+
+    def get(self, names: Iterable[str]) -> list[Any]:
+        """Return the values of several variables."""
+        return self._stepper.get(list(names))
+
+    def set(self, name: str, value: object) -> None:
+        """Set an input without a connection or a tunable parameter, from the next step on."""
+        self._stepper.set(name, value)
+
+    def save(self) -> bytes:
+        """Return the state of all FMUs and connections.
+
+        Raises:
+            ConfigurationError: an FMU cannot serialise its state (``canSerializeFMUstate``).
+        """
+        return self._stepper.save()
+
+    def restore(self, state: bytes) -> None:
+        """Return to a state that :meth:`save` of this or an equal simulation has returned."""
+        self._stepper.restore(state)
+
+    def close(self) -> None:
+        """Terminate and free the FMUs. A second call does nothing."""
+        self._stepper.close()
+
+
+def _flat(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values of variables, those of arrays as text."""
+    return {name: _setting(value) for name, value in values.items()}
+
+
+def _setting(value: Any) -> Any:
+    if isinstance(value, (bool, int, float, str)):
+        return value
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, (bytes, bytearray)):
+        return value.hex()
+    if isinstance(value, (list, tuple)):
+        return ", ".join(_element(item) for item in _leaves(value))
+    return value
+
+
+def _leaves(values: Iterable[Any]) -> Iterator[Any]:
+    for value in values:
+        if isinstance(value, (list, tuple)):
+            yield from _leaves(value)
+        elif hasattr(value, "tolist"):
+            yield from _leaves([value.tolist()])
+        else:
+            yield value
+
+
+def _element(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else repr(value)
+
+
+def _changes(
+    *,
+    start_values: Mapping[str, Any] | None = None,
+    faults: Iterable[Mapping[str, Any]] | None = None,
+    settings: Iterable[Mapping[str, Any]] | None = None,
+    signals: Iterable[Mapping[str, Any]] | None = None,
+    tables: Iterable[Mapping[str, Any]] | None = None,
+    record: Iterable[str] | None = None,
+    exclude: Iterable[str] | None = None,
+    record_every: float | str | None = None,
+    start_time: float | None = None,
+    stop_time: float | None = None,
+    step: float | None = None,
+    tolerance: float | None = None,
+    algorithm: Mapping[str, Any] | None = None,
+    isolate: bool | None = None,
+    call_time_limit: float | None = None,
+    memory_limit: int | str | None = None,
+    file: str | None = None,
+) -> dict[str, Any]:
+    """Return the entries of a ``system.toml`` that the arguments of a run state."""
+    if isinstance(record, str) or isinstance(exclude, str):
+        raise TypeError("record and exclude are lists of names, found a str")
+    recorded = None if record is None else list(record)
+    if recorded is not None and not recorded:
+        record_every = "never"
+    changed = {} if algorithm is None else dict(algorithm)
+    changed = {name.replace("_", "-"): value for name, value in changed.items()}
+    tables_of = {
+        "settings": None if start_values is None else _flat(start_values),
+        "scenario": {
+            "set": None if settings is None else list(settings),
+            "signal": None if signals is None else list(signals),
+            "table": None if tables is None else list(tables),
+            "fault": None if faults is None else list(faults),
+        },
+        "results": {
+            "record": recorded,
+            "exclude": None if exclude is None else list(exclude),
+            "every": record_every,
+            "file": file,
+        },
+        "experiment": {"start-time": start_time, "stop-time": stop_time, "tolerance": tolerance},
+        "algorithm": {**changed, **({} if step is None else {"step": step})},
+        "isolation": {
+            "isolate": isolate,
+            "time-limit": call_time_limit,
+            "memory-limit": memory_limit,
+        },
+    }
+    changes: dict[str, Any] = {}
+    for name, table in tables_of.items():
+        stated = {} if table is None else {key: own for key, own in table.items() if own is not None}
+        if stated:
+            changes[name] = stated
+    return changes
+
+
+def _hash(path: str) -> str:
+    """Return the SHA-256 of a file, or of a folder."""
+    digest = hashlib.sha256()
+    if os.path.isdir(path):
+        for folder, folders, names in os.walk(path):
+            folders.sort()
+            for name in sorted(names):
+                inner = os.path.join(folder, name)
+                digest.update(os.path.relpath(inner, path).encode() + b"\0" + _hash(inner).encode())
+        return digest.hexdigest()
+    with open(path, "rb") as file:
+        while block := file.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()

@@ -1,0 +1,124 @@
+//! Configurations: a `system.toml` as text or as nested dicts, and the entries that a run replaces.
+
+use std::path::{Path, PathBuf};
+
+use pyo3::prelude::*;
+use pyo3::types::PyAny;
+use study::config::parse;
+use study::{Config, LoadedConfig};
+
+use crate::error;
+use crate::node::Node;
+
+/// Name of the file from which a configuration without a file seems to come, for its folder.
+const NAME: &str = "system.toml";
+
+/// Reads the `system.toml` at `path`; returns its content with absolute paths.
+#[pyfunction]
+pub(crate) fn read_configuration(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyAny>> {
+    let loaded = py.detach(|| LoadedConfig::read(&path));
+    let loaded = loaded.map_err(|error| error::study(&error).raise(py))?;
+    plain(py, loaded.config)
+}
+
+/// Checks a configuration given as text or as nested dicts; returns it with absolute paths. Relative
+/// paths start in `folder`.
+#[pyfunction]
+pub(crate) fn check_configuration<'py>(
+    description: &Bound<'py, PyAny>,
+    folder: PathBuf,
+) -> PyResult<Bound<'py, PyAny>> {
+    plain(description.py(), read(description, &folder)?)
+}
+
+/// Writes nested dicts as the text of a TOML file.
+#[pyfunction]
+pub(crate) fn render_toml(description: &Bound<'_, PyAny>) -> PyResult<String> {
+    Node::from_python(description)?.render()
+}
+
+/// Reads the text of a TOML file as nested dicts, in the order of the text.
+#[pyfunction]
+pub(crate) fn parse_toml<'py>(py: Python<'py>, text: &str) -> PyResult<Bound<'py, PyAny>> {
+    let node = Node::parse(text);
+    node.map_err(|error| invalid(error.message()).raise(py))?.to_python(py)
+}
+
+/// Reads a configuration given as text or as nested dicts.
+pub(crate) fn read(description: &Bound<'_, PyAny>, folder: &Path) -> PyResult<Config> {
+    let py = description.py();
+    let text = match description.extract::<String>() {
+        Ok(text) => text,
+        Err(_) => Node::from_python(description)?.render()?,
+    };
+    parse(&text, &folder.join(NAME)).map_err(|place| {
+        let shown = place.shown().trim();
+        let shown = if shown.is_empty() { String::new() } else { format!(", in: {shown}") };
+        invalid(&format!("{}{shown}", place.message())).raise(py)
+    })
+}
+
+fn invalid(sentence: &str) -> error::Exception {
+    error::Exception::new("ConfigurationError", "Entry", sentence)
+}
+
+/// Returns the configuration as nested dicts with absolute paths.
+fn plain(py: Python<'_>, mut config: Config) -> PyResult<Bound<'_, PyAny>> {
+    config.make_absolute()?;
+    let text = config.render().map_err(|error| error::study(&error).raise(py))?;
+    let node = Node::parse(&text).map_err(|error| invalid(error.message()).raise(py))?;
+    node.to_python(py)
+}
+
+/// Replaces the entries of `base` that `changes` states; adds settings and scenario entries.
+pub(crate) fn merge(base: &mut Config, changes: Config) {
+    for (name, value, place) in changes.settings.0 {
+        base.settings.0.retain(|(known, _, _)| *known != name);
+        base.settings.0.push((name, value, place));
+    }
+    base.scenario.set.extend(changes.scenario.set);
+    base.scenario.signal.extend(changes.scenario.signal);
+    base.scenario.table.extend(changes.scenario.table);
+    base.scenario.fault.extend(changes.scenario.fault);
+    replace(&mut base.results.record, changes.results.record);
+    replace(&mut base.results.exclude, changes.results.exclude);
+    set(&mut base.results.every, changes.results.every);
+    set(&mut base.results.file, changes.results.file);
+    set(&mut base.experiment.start_time, changes.experiment.start_time);
+    set(&mut base.experiment.stop_time, changes.experiment.stop_time);
+    set(&mut base.experiment.tolerance, changes.experiment.tolerance);
+    set(&mut base.isolation.isolate, changes.isolation.isolate);
+    set(&mut base.isolation.time_limit, changes.isolation.time_limit);
+    set(&mut base.isolation.memory_limit, changes.isolation.memory_limit);
+    let (own, new) = (&mut base.algorithm, changes.algorithm);
+    set(&mut own.method, new.method);
+    set(&mut own.extrapolation, new.extrapolation);
+    set(&mut own.coupling, new.coupling);
+    set(&mut own.step_control, new.step_control);
+    set(&mut own.step, new.step);
+    set(&mut own.relative_tolerance, new.relative_tolerance);
+    set(&mut own.absolute_tolerance, new.absolute_tolerance);
+    set(&mut own.smallest_step, new.smallest_step);
+    set(&mut own.largest_step, new.largest_step);
+    set(&mut own.iterations, new.iterations);
+    set(&mut own.fallback, new.fallback);
+    own.every.extend(new.every);
+    replace(&mut own.next_event, new.next_event);
+    replace(&mut own.crossing, new.crossing);
+    replace(&mut own.power_bonds, new.power_bonds);
+    set(&mut own.jobs, new.jobs);
+    set(&mut own.rollback, new.rollback);
+    set(&mut own.allow_nan, new.allow_nan);
+}
+
+fn set<T>(own: &mut Option<T>, new: Option<T>) {
+    if new.is_some() {
+        *own = new;
+    }
+}
+
+fn replace<T>(own: &mut Vec<T>, new: Vec<T>) {
+    if !new.is_empty() {
+        *own = new;
+    }
+}

@@ -1,0 +1,145 @@
+//! Model descriptions as dicts, which `aso_ftc` turns into dataclasses.
+
+use std::path::PathBuf;
+
+use fmu_description::package::Unpacked;
+use fmu_description::{Elements, Kind, ModelDescription, ScalarVariable};
+use pyo3::IntoPyObjectExt as _;
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict, PyList};
+
+use crate::error;
+use crate::run::guarded;
+
+/// Most elements of an array whose start values are listed.
+const ELEMENTS: usize = 1_000_000;
+
+/// Reads the model description of an FMU, an archive or a folder.
+#[pyfunction]
+pub(crate) fn read_model_description(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyDict>> {
+    let unpacked = guarded(py, || {
+        if path.is_dir() { Unpacked::in_folder(&path) } else { Unpacked::open(&path) }
+    })?;
+    let unpacked = unpacked.map_err(|error| error::package(&error).raise(py))?;
+    let described = describe(py, &unpacked.description)?;
+    let warnings = unpacked.warnings.iter().map(ToString::to_string);
+    let warnings: Vec<_> = unpacked.archive_warnings.iter().cloned().chain(warnings).collect();
+    described.set_item("warnings", warnings)?;
+    Ok(described)
+}
+
+fn describe<'py>(py: Python<'py>, own: &ModelDescription) -> PyResult<Bound<'py, PyDict>> {
+    let description = PyDict::new(py);
+    description.set_item("fmi_version", &own.fmi_version)?;
+    description.set_item("model_name", &own.model_name)?;
+    description.set_item("guid", &own.guid)?;
+    description.set_item("description", &own.description)?;
+    description.set_item("author", &own.author)?;
+    description.set_item("version", &own.version)?;
+    description.set_item("copyright", &own.copyright)?;
+    description.set_item("license", &own.license)?;
+    description.set_item("generation_tool", &own.generation_tool)?;
+    description.set_item("generation_date_and_time", &own.generation_date_and_time)?;
+    let mut interfaces = Vec::new();
+    interfaces.extend(own.co_simulation.as_ref().map(|_| "co-simulation"));
+    interfaces.extend(own.model_exchange.as_ref().map(|_| "model-exchange"));
+    interfaces.extend(own.scheduled_execution.as_ref().map(|_| "scheduled-execution"));
+    description.set_item("interfaces", interfaces)?;
+    let identifier = own.co_simulation.as_ref().map(|flags| &flags.model_identifier);
+    let identifier =
+        identifier.or(own.model_exchange.as_ref().map(|flags| &flags.model_identifier));
+    description.set_item("model_identifier", identifier)?;
+    description.set_item("capabilities", capabilities(py, own)?)?;
+    let experiment = own.default_experiment.unwrap_or_default();
+    let default = PyDict::new(py);
+    default.set_item("start_time", experiment.start_time)?;
+    default.set_item("stop_time", experiment.stop_time)?;
+    default.set_item("tolerance", experiment.tolerance)?;
+    default.set_item("step_size", experiment.step_size)?;
+    description.set_item("default_experiment", default)?;
+    let variables = PyList::empty(py);
+    for own_variable in &own.variables {
+        variables.append(variable(py, own_variable, own)?)?;
+    }
+    description.set_item("variables", variables)?;
+    Ok(description)
+}
+
+/// Returns the capability flags of co-simulation, by the names of FMI 2.0.
+fn capabilities<'py>(py: Python<'py>, own: &ModelDescription) -> PyResult<Bound<'py, PyDict>> {
+    let capabilities = PyDict::new(py);
+    if let Some(flags) = &own.co_simulation {
+        for (name, flag) in [
+            ("needsExecutionTool", flags.needs_execution_tool),
+            (
+                "canHandleVariableCommunicationStepSize",
+                flags.can_handle_variable_communication_step_size,
+            ),
+            ("canInterpolateInputs", flags.can_interpolate_inputs),
+            (
+                "canBeInstantiatedOnlyOncePerProcess",
+                flags.can_be_instantiated_only_once_per_process,
+            ),
+            ("canGetAndSetFMUstate", flags.can_get_and_set_fmu_state),
+            ("canSerializeFMUstate", flags.can_serialize_fmu_state),
+            ("providesDirectionalDerivative", flags.provides_directional_derivative),
+        ] {
+            capabilities.set_item(name, flag)?;
+        }
+    }
+    Ok(capabilities)
+}
+
+/// Returns a variable as a dict.
+pub(crate) fn variable(
+    py: Python<'_>,
+    own: &ScalarVariable,
+    of: &ModelDescription,
+) -> PyResult<Py<PyDict>> {
+    let variable = PyDict::new(py);
+    variable.set_item("name", &own.name)?;
+    variable.set_item("value_reference", own.value_reference)?;
+    variable.set_item("type", own.kind.element_in(of.version()))?;
+    variable.set_item("causality", own.causality.as_str())?;
+    variable.set_item("variability", own.variability.as_str())?;
+    variable.set_item("initial", own.initial_in_force().map(fmu_description::Initial::as_str))?;
+    variable.set_item("description", &own.description)?;
+    variable.set_item("declared_type", own.kind.declared_type())?;
+    variable.set_item("shape", own.extents(of))?;
+    variable.set_item("start", start(py, own, of)?)?;
+    let real = own.kind.as_real();
+    variable.set_item("unit", real.and_then(|real| real.unit.as_ref()))?;
+    variable.set_item("nominal", real.and_then(|real| real.nominal))?;
+    match (real, own.kind.as_integer()) {
+        (Some(real), _) => {
+            variable.set_item("min", real.min)?;
+            variable.set_item("max", real.max)?;
+        }
+        (_, integer) => {
+            variable.set_item("min", integer.and_then(|integer| integer.min))?;
+            variable.set_item("max", integer.and_then(|integer| integer.max))?;
+        }
+    }
+    Ok(variable.unbind())
+}
+
+/// Returns the start value, for an array the list of its elements in row-major order.
+fn start<'py>(
+    py: Python<'py>,
+    own: &ScalarVariable,
+    of: &ModelDescription,
+) -> PyResult<Option<Bound<'py, PyAny>>> {
+    let Some(elements) = own.start_values(of, ELEMENTS) else { return Ok(None) };
+    let list = match elements {
+        Elements::Real(own) => PyList::new(py, own)?,
+        Elements::Integer(own) => PyList::new(py, own)?,
+        Elements::Boolean(own) => PyList::new(py, own)?,
+        Elements::String(own) => PyList::new(py, own)?,
+        Elements::Binary(own) => PyList::new(py, own.iter().map(|own| PyBytes::new(py, own)))?,
+    };
+    let is_scalar = own.dimensions.is_empty() || matches!(own.kind, Kind::Clock(_));
+    match list.len() {
+        1 if is_scalar => Ok(Some(list.get_item(0)?)),
+        _ => list.into_bound_py_any(py).map(Some),
+    }
+}

@@ -1,0 +1,82 @@
+//! Designs of controllers.
+
+use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
+
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::error;
+use crate::node::Node;
+use crate::run::guarded;
+
+/// A designed controller.
+#[pyclass(frozen, module = "aso_ftc._core")]
+pub(crate) struct Designed {
+    design: Mutex<design::Design>,
+}
+
+/// Designs the controller of the plant file at `path`.
+#[pyfunction]
+pub(crate) fn design_file(py: Python<'_>, path: PathBuf) -> PyResult<Designed> {
+    let made = guarded(py, || design::design(&path))?;
+    let design = made.map_err(|error| error::design(&error).raise(py))?;
+    Ok(Designed { design: Mutex::new(design) })
+}
+
+/// Designs the controller of a plant given as the text of a plant file or as nested dicts. `path`
+/// appears in errors; relative paths start in its folder.
+#[pyfunction]
+pub(crate) fn design_plant(plant: &Bound<'_, PyAny>, path: PathBuf) -> PyResult<Designed> {
+    let py = plant.py();
+    let text = match plant.extract::<String>() {
+        Ok(text) => text,
+        Err(_) => Node::from_python(plant)?.render()?,
+    };
+    let made = guarded(py, || design::design_text(&path, text))?;
+    let design = made.map_err(|error| error::design(&error).raise(py))?;
+    Ok(Designed { design: Mutex::new(design) })
+}
+
+impl Designed {
+    fn with<T>(&self, work: impl FnOnce(&mut design::Design) -> T) -> T {
+        work(&mut self.design.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+#[pymethods]
+impl Designed {
+    /// The content of the controller's `design.toml`.
+    #[getter]
+    fn file(&self) -> String {
+        self.with(|design| design.file.clone())
+    }
+
+    /// Whether all checks hold.
+    #[getter]
+    fn holds(&self) -> bool {
+        self.with(|design| design.holds())
+    }
+
+    /// The numbers of the report as JSON.
+    fn report(&self) -> PyResult<String> {
+        let text = self.with(|design| serde_json::to_string(&design.report));
+        text.map_err(|error| PyValueError::new_err(error.to_string()))
+    }
+
+    /// The report as an HTML page.
+    fn page(&self, py: Python<'_>) -> PyResult<String> {
+        guarded(py, || self.with(|design| design.page()))
+    }
+
+    /// Makes the controller FMU from the packed controller at `base`.
+    fn fmu(&self, py: Python<'_>, base: PathBuf, path: PathBuf) -> PyResult<()> {
+        let made = guarded(py, || {
+            self.with(|design| {
+                let fmu = design.fmu(&base)?;
+                fmu.write(&path, &design.page())
+            })
+        })?;
+        made.map_err(|error| error::design(&error).raise(py))
+    }
+}

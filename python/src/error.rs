@@ -1,0 +1,256 @@
+//! Errors of the libraries as exceptions of `aso_ftc`.
+
+use master::SystemError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use slave::{CallError, Failure};
+
+/// Name of the module with the exceptions.
+const MODULE: &str = "aso_ftc._errors";
+
+/// An exception before it is raised: class, kind, sentence and fields.
+pub(crate) struct Exception {
+    class: &'static str,
+    kind: &'static str,
+    sentence: String,
+    fields: Vec<(&'static str, Field)>,
+}
+
+/// The value of a field of an exception.
+enum Field {
+    Text(String),
+    Texts(Vec<String>),
+    Number(f64),
+    Count(usize),
+}
+
+impl Exception {
+    pub(crate) fn new(
+        class: &'static str,
+        kind: &'static str,
+        sentence: impl Into<String>,
+    ) -> Self {
+        Self { class, kind, sentence: sentence.into(), fields: Vec::new() }
+    }
+
+    fn text(mut self, name: &'static str, value: impl Into<String>) -> Self {
+        self.fields.push((name, Field::Text(value.into())));
+        self
+    }
+
+    pub(crate) fn number(mut self, name: &'static str, value: f64) -> Self {
+        self.fields.push((name, Field::Number(value)));
+        self
+    }
+
+    /// Adds the time reached in s, if the error has no time of its own.
+    pub(crate) fn reached(self, time: f64) -> Self {
+        if self.fields.iter().any(|(name, _)| *name == "time") {
+            self
+        } else {
+            self.number("time", time)
+        }
+    }
+
+    /// Raises the exception.
+    pub(crate) fn raise(self, py: Python<'_>) -> PyErr {
+        self.object(py).map_or_else(|error| error, PyErr::from_value)
+    }
+
+    fn object(self, py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
+        let fields = PyDict::new(py);
+        for (name, value) in self.fields {
+            match value {
+                Field::Text(value) => fields.set_item(name, value)?,
+                Field::Texts(value) => fields.set_item(name, value)?,
+                Field::Number(value) => fields.set_item(name, value)?,
+                Field::Count(value) => fields.set_item(name, value)?,
+            }
+        }
+        py.import(MODULE)?.getattr(self.class)?.call1((self.sentence, self.kind, fields))
+    }
+}
+
+const CONFIGURATION: &str = "ConfigurationError";
+const FMU: &str = "FmuError";
+const RUN: &str = "RunError";
+const RESULTS: &str = "ResultsError";
+const DESIGN: &str = "DesignError";
+
+/// Returns the exception of a study.
+pub(crate) fn study(error: &study::Error) -> Exception {
+    use study::Error as E;
+    let sentence = error.sentence();
+    match error {
+        E::Entry(place) => entry(CONFIGURATION, place, sentence),
+        E::System(system) => Exception { sentence, ..self::system(system) },
+        E::Structure(_) => Exception::new(CONFIGURATION, "Structure", sentence),
+        E::Fmu(source) => Exception::new(FMU, fmu_kind(source), sentence),
+        E::Isolated(_) => Exception::new(FMU, "Isolated", sentence),
+        E::Library(_) => Exception::new(FMU, "Library", sentence),
+        E::Results(_) => Exception::new(RESULTS, "Results", sentence),
+        E::File { action, path, .. } => Exception::new(CONFIGURATION, "File", sentence)
+            .text("action", *action)
+            .text("path", path.display().to_string()),
+        E::Scenario(_) => Exception::new(CONFIGURATION, "Scenario", sentence),
+        E::Selection(_) => Exception::new(CONFIGURATION, "Selection", sentence),
+        E::Within { what, source } => Exception { sentence, ..study(source) }.text("within", what),
+        E::Invalid(_) => Exception::new(CONFIGURATION, "Invalid", sentence),
+        _ => Exception::new("Error", "Other", sentence),
+    }
+}
+
+fn entry(class: &'static str, place: &files::PlaceError, sentence: String) -> Exception {
+    let mut error = Exception::new(class, "Entry", sentence)
+        .text("path", place.path().display().to_string())
+        .text("message", place.message());
+    error.fields.push(("line", Field::Count(place.line())));
+    error.fields.push(("column", Field::Count(place.column())));
+    error
+}
+
+fn fmu_kind(error: &fmu_import::FmuError) -> &'static str {
+    use fmu_import::FmuError as E;
+    match error {
+        E::Package(_) => "Package",
+        E::Location(_) => "Location",
+        E::Load(_) => "Load",
+        E::NoCoSimulation { .. } => "NoCoSimulation",
+        E::OnlyOnce { .. } => "OnlyOnce",
+        E::Version { .. } => "Version",
+        E::ScheduledExecution { .. } => "ScheduledExecution",
+        E::NoInterface { .. } => "NoInterface",
+        E::NeedsTool { .. } => "NeedsTool",
+        _ => "Other",
+    }
+}
+
+/// Returns the exception of an error of the master.
+pub(crate) fn system(error: &SystemError) -> Exception {
+    use SystemError as E;
+    let named = |kind, name: &str| {
+        Exception::new(CONFIGURATION, kind, error.to_string()).text("name", name)
+    };
+    let failed = |kind| Exception::new(RUN, kind, error.to_string());
+    match error {
+        E::Syntax { text, .. } => named("Syntax", text),
+        E::SameName { name } => named("SameName", name),
+        E::UnknownSlave { name, slave, known } => {
+            named("UnknownSlave", name).text("fmu", slave).text("known", known)
+        }
+        E::UnknownVariable { name, model, variable, .. } => {
+            named("UnknownVariable", name).text("model", model).text("variable", variable)
+        }
+        E::Role { name, found, expected } => {
+            named("Role", name).text("found", found).text("expected", expected)
+        }
+        E::Twice { input, first, second } => {
+            named("Twice", input).text("first", first).text("second", second)
+        }
+        E::Unit { from, from_unit, to, to_unit } => {
+            let own = named("Unit", to).text("unit", to_unit);
+            own.text("source", from).text("source_unit", from_unit)
+        }
+        E::Size { from, from_size, to, to_size, element } => {
+            let own = named("Size", to).text("size", to_size).text("element", &**element);
+            own.text("source", from).text("source_size", from_size)
+        }
+        E::Resized { name } => named("Resized", name),
+        E::Value { name, value, expected } => {
+            named("Value", name).text("value", value).text("expected", expected)
+        }
+        E::Setting { name, value, source } => {
+            called(named("Setting", name).text("value", value), source)
+        }
+        E::LostSetting { name, value, found } => {
+            named("LostSetting", name).text("value", value).text("found", found)
+        }
+        E::Capability { slave, lacks, required_by } => {
+            Exception::new(CONFIGURATION, "Capability", error.to_string())
+                .text("fmu", slave)
+                .text("lacks", *lacks)
+                .text("required_by", required_by)
+        }
+        E::Algorithm { .. } => Exception::new(CONFIGURATION, "Algorithm", error.to_string()),
+        E::Time { what, value, .. } => {
+            let own = Exception::new(CONFIGURATION, "Time", error.to_string());
+            own.text("what", *what).number("value", *value)
+        }
+        E::Resume { name, taken, given } => {
+            named("Resume", name).text("taken", taken).text("given", given)
+        }
+        E::Call { slave, time, source } => {
+            called(failed("Call").text("fmu", slave).number("time", *time), source)
+        }
+        E::NotFinite { name, value, time } => {
+            failed("NotFinite").text("name", name).number("value", *value).number("time", *time)
+        }
+        E::Loop { names, time, .. } => failed("Loop").text("names", names).number("time", *time),
+        E::Coupling { time, size, .. } => {
+            failed("Coupling").number("time", *time).number("size", *size)
+        }
+        E::Stuck { time, size, error } => {
+            failed("Stuck").number("time", *time).number("size", *size).number("error", *error)
+        }
+        E::TooManySteps { time, .. } => failed("TooManySteps").number("time", *time),
+        _ => failed("Other"),
+    }
+}
+
+/// Adds function, status and messages of a failed call.
+fn called(error: Exception, call: &CallError) -> Exception {
+    let status = match &call.failure {
+        Failure::Status(status) => status.name(),
+        Failure::UnknownStatus(_) => "unknown status",
+        Failure::Missing => "missing",
+        Failure::Panicked(_) => "panicked",
+        Failure::Killed(..) => "killed",
+        Failure::Exited(_) => "exited",
+        Failure::TimedOut(_) => "timed out",
+        Failure::OutOfMemory(_) => "out of memory",
+        _ => "invalid answer",
+    };
+    let mut error = error.text("function", call.function).text("status", status);
+    error.fields.push(("messages", Field::Texts(call.messages.clone())));
+    error
+}
+
+/// Returns the exception of a design.
+pub(crate) fn design(error: &design::Error) -> Exception {
+    let sentence = sentence(error);
+    match error {
+        design::Error::Entry(place) => entry(DESIGN, place, sentence),
+        design::Error::Control(_) => Exception::new(DESIGN, "Control", sentence),
+        design::Error::Within { source, .. } => Exception { sentence, ..design(source) },
+        design::Error::File { path, .. } => {
+            Exception::new(DESIGN, "File", sentence).text("path", path.display().to_string())
+        }
+        design::Error::Invalid(_) => Exception::new(DESIGN, "Invalid", sentence),
+        _ => Exception::new(DESIGN, "Other", sentence),
+    }
+}
+
+/// Returns the exception of a result file.
+pub(crate) fn results(error: &results::ResultsError) -> Exception {
+    Exception::new(RESULTS, "Results", sentence(error))
+}
+
+/// Returns the exception of an FMU that cannot be read.
+pub(crate) fn package(error: &fmu_description::package::PackageError) -> Exception {
+    Exception::new(FMU, "Package", sentence(error))
+}
+
+/// Joins an error and its causes to one sentence. Leaves out a cause that the error above it already
+/// quotes.
+fn sentence(error: &dyn std::error::Error) -> String {
+    let mut said = error.to_string();
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        let text = error.to_string();
+        if !said.contains(&text) {
+            said = format!("{said}: {text}");
+        }
+        cause = error.source();
+    }
+    said
+}

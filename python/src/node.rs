@@ -1,0 +1,191 @@
+//! Structured values between Python and TOML, which keep the order of their entries.
+
+use std::fmt;
+
+use pyo3::IntoPyObjectExt as _;
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyMapping, PyString};
+use serde::de::{MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use toml::Spanned;
+
+/// Greatest depth of nested values.
+const DEPTH: usize = 32;
+
+/// A value of TOML.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Node {
+    Boolean(bool),
+    Integer(i64),
+    Real(f64),
+    Text(String),
+    List(Vec<Node>),
+    Table(Vec<(String, Node)>),
+}
+
+impl Serialize for Node {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Boolean(value) => serializer.serialize_bool(*value),
+            Self::Integer(value) => serializer.serialize_i64(*value),
+            Self::Real(value) => serializer.serialize_f64(*value),
+            Self::Text(value) => serializer.serialize_str(value),
+            Self::List(values) => serializer.collect_seq(values),
+            Self::Table(entries) => serializer.collect_map(entries.iter().map(|(k, v)| (k, v))),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Node {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(NodeVisitor)
+    }
+}
+
+struct NodeVisitor;
+
+impl<'de> Visitor<'de> for NodeVisitor {
+    type Value = Node;
+
+    fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("a value of TOML")
+    }
+
+    fn visit_bool<E>(self, value: bool) -> Result<Node, E> {
+        Ok(Node::Boolean(value))
+    }
+
+    fn visit_i64<E>(self, value: i64) -> Result<Node, E> {
+        Ok(Node::Integer(value))
+    }
+
+    fn visit_u64<E: serde::de::Error>(self, value: u64) -> Result<Node, E> {
+        i64::try_from(value).map(Node::Integer).map_err(|_| E::custom("the integer is too large"))
+    }
+
+    fn visit_f64<E>(self, value: f64) -> Result<Node, E> {
+        Ok(Node::Real(value))
+    }
+
+    fn visit_str<E>(self, value: &str) -> Result<Node, E> {
+        Ok(Node::Text(value.to_owned()))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Node, A::Error> {
+        let mut values = Vec::new();
+        while let Some(value) = list.next_element()? {
+            values.push(value);
+        }
+        Ok(Node::List(values))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Node, A::Error> {
+        // The parser gives the entries in the order of their names.
+        let mut entries: Vec<(String, Spanned<Node>)> = Vec::new();
+        while let Some(entry) = map.next_entry()? {
+            entries.push(entry);
+        }
+        entries.sort_by_key(|(_, value)| value.span().start);
+        Ok(Node::Table(
+            entries.into_iter().map(|(name, value)| (name, value.into_inner())).collect(),
+        ))
+    }
+}
+
+impl Node {
+    /// Reads the text of a TOML file.
+    pub(crate) fn parse(text: &str) -> Result<Self, toml::de::Error> {
+        toml::from_str(text)
+    }
+
+    /// Writes the text of a TOML file.
+    pub(crate) fn render(&self) -> PyResult<String> {
+        toml::to_string(self).map_err(|error| PyValueError::new_err(error.to_string()))
+    }
+
+    /// Converts a Python object: dict, list, tuple, number, bool, str, path, and objects of `NumPy`. An
+    /// entry of a dict that is `None` counts as absent.
+    pub(crate) fn from_python(value: &Bound<'_, PyAny>) -> PyResult<Self> {
+        convert(value, "", 0)
+    }
+
+    pub(crate) fn to_python<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        match self {
+            Self::Boolean(value) => value.into_bound_py_any(py),
+            Self::Integer(value) => value.into_bound_py_any(py),
+            Self::Real(value) => value.into_bound_py_any(py),
+            Self::Text(value) => value.into_bound_py_any(py),
+            Self::List(values) => {
+                let values: PyResult<Vec<_>> = values.iter().map(|own| own.to_python(py)).collect();
+                Ok(PyList::new(py, values?)?.into_any())
+            }
+            Self::Table(entries) => {
+                let table = PyDict::new(py);
+                for (name, value) in entries {
+                    table.set_item(name, value.to_python(py)?)?;
+                }
+                Ok(table.into_any())
+            }
+        }
+    }
+}
+
+fn convert(value: &Bound<'_, PyAny>, place: &str, depth: usize) -> PyResult<Node> {
+    if depth > DEPTH {
+        return Err(PyValueError::new_err(format!("{place}: more than {DEPTH} nested values")));
+    }
+    // A bool is an int in Python.
+    if let Ok(own) = value.cast::<PyBool>() {
+        return Ok(Node::Boolean(own.is_true()));
+    }
+    if value.is_instance_of::<PyInt>() {
+        let integer = value.extract().map_err(|_| {
+            PyValueError::new_err(format!("{place}: expected an integer of 64 bits, found {value}"))
+        })?;
+        return Ok(Node::Integer(integer));
+    }
+    if value.is_instance_of::<PyFloat>() {
+        return Ok(Node::Real(value.extract()?));
+    }
+    if value.is_instance_of::<PyString>() {
+        return Ok(Node::Text(value.extract()?));
+    }
+    if let Ok(mapping) = value.cast::<PyMapping>() {
+        return table(mapping, place, depth);
+    }
+    if value.hasattr("__fspath__")? {
+        return Ok(Node::Text(
+            value.extract::<std::path::PathBuf>()?.to_string_lossy().into_owned(),
+        ));
+    }
+    if value.hasattr("tolist")? {
+        return convert(&value.call_method0("tolist")?, place, depth + 1);
+    }
+    let Ok(items) = value.try_iter() else {
+        let kind = value.get_type().name()?;
+        let place = if place.is_empty() { String::new() } else { format!("{place}: ") };
+        return Err(PyTypeError::new_err(format!(
+            "{place}expected a bool, a number, a text, a list or a dict, found {kind}"
+        )));
+    };
+    let items = items.enumerate();
+    let list = items.map(|(k, item)| convert(&item?, &format!("{place}[{k}]"), depth + 1));
+    Ok(Node::List(list.collect::<PyResult<_>>()?))
+}
+
+fn table(mapping: &Bound<'_, PyMapping>, place: &str, depth: usize) -> PyResult<Node> {
+    let mut entries = Vec::new();
+    for item in mapping.items()?.iter() {
+        let (key, value): (Bound<'_, PyAny>, Bound<'_, PyAny>) = item.extract()?;
+        if value.is_none() {
+            continue;
+        }
+        let Ok(key) = key.extract::<String>() else {
+            return Err(PyTypeError::new_err(format!("{place}: the key {key} is not a text")));
+        };
+        let inner = if place.is_empty() { key.clone() } else { format!("{place}.{key}") };
+        entries.push((key, convert(&value, &inner, depth + 1)?));
+    }
+    Ok(Node::Table(entries))
+}

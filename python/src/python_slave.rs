@@ -1,0 +1,362 @@
+//! Python objects as slaves.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use fmu_description::abi::Status;
+use fmu_description::{
+    Causality, CoSimulation, Experiment, IntegerType, Kind, ModelDescription, ModelStructure,
+    RealType, ScalarVariable, Unknown, Variability,
+};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyMapping};
+use slave::{CallError, Failure, Slave, StepResult};
+
+/// The exception that a Python object raised last, so that the run can raise it as the cause.
+pub(crate) type Raised = Arc<Mutex<Option<PyErr>>>;
+
+/// A Python object that steps together with FMUs.
+pub(crate) struct PythonSlave {
+    object: Py<PyAny>,
+    description: ModelDescription,
+    /// Positions of the inputs and outputs among the variables.
+    inputs: Vec<usize>,
+    outputs: Vec<usize>,
+    /// Values of all variables; a Boolean is 0 or 1.
+    values: Vec<f64>,
+    start: f64,
+    raised: Raised,
+    saved: Vec<Option<(Vec<f64>, Py<PyAny>)>>,
+}
+
+impl PythonSlave {
+    /// Describes `object` by its attributes `inputs` and `outputs`: names, or a mapping of names to start
+    /// values (`float`, `int` or `bool`). The attribute `direct` (default true) says whether outputs
+    /// depend on the inputs of the same time.
+    pub(crate) fn new(name: &str, object: &Bound<'_, PyAny>, raised: Raised) -> PyResult<Self> {
+        if !object.hasattr("step")? {
+            let kind = object.get_type().name()?;
+            let what =
+                format!("{name}: a slave needs a function step(t, dt, inputs), {kind} has none");
+            return Err(PyTypeError::new_err(what));
+        }
+        let mut variables = Vec::new();
+        let mut values = Vec::new();
+        for (attribute, causality) in [("inputs", Causality::Input), ("outputs", Causality::Output)]
+        {
+            for (name, start) in declared(object, attribute)? {
+                let reference = u32::try_from(variables.len()).unwrap_or(u32::MAX);
+                values.push(start.number());
+                variables.push(variable(name, reference, causality, start));
+            }
+        }
+        let all = |causality| {
+            let own = variables.iter().enumerate();
+            own.filter(|(_, variable): &(_, &ScalarVariable)| variable.causality == causality)
+                .map(|(k, _)| k)
+                .collect::<Vec<_>>()
+        };
+        let (inputs, outputs) = (all(Causality::Input), all(Causality::Output));
+        let direct = match object.getattr_opt("direct")? {
+            Some(direct) => direct.is_truthy()?,
+            None => true,
+        };
+        let state = object.hasattr("save")? && object.hasattr("restore")?;
+        let structure = structure(&inputs, &outputs, direct);
+        let description = describe(name, variables, structure, state);
+        let object = object.clone().unbind();
+        let (start, saved) = (0.0, Vec::new());
+        Ok(Self { object, description, inputs, outputs, values, start, raised, saved })
+    }
+
+    /// Calls the function `name` of the object with `call`, keeps an exception for the run.
+    fn call<T>(
+        &self,
+        function: &'static str,
+        call: impl FnOnce(&Bound<'_, PyAny>) -> PyResult<T>,
+    ) -> Result<T, CallError> {
+        Python::attach(|py| {
+            call(self.object.bind(py)).map_err(|error| {
+                let text = error.to_string();
+                *self.raised.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+                let failure = Failure::InvalidAnswer(format!("raised {text}"));
+                CallError { function, failure, messages: Vec::new() }
+            })
+        })
+    }
+
+    fn given<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let given = PyDict::new(py);
+        for &position in &self.inputs {
+            let variable = &self.description.variables[position];
+            set(&given, variable, self.values[position])?;
+        }
+        Ok(given)
+    }
+
+    /// Takes over the outputs that a call returned; `None` keeps all of them.
+    fn take(&self, answer: &Bound<'_, PyAny>) -> PyResult<Vec<(usize, f64)>> {
+        if answer.is_none() {
+            return Ok(Vec::new());
+        }
+        let Ok(answer) = answer.cast::<PyMapping>() else {
+            let kind = answer.get_type().name()?;
+            let what = format!("expected a dict of outputs or None, found {kind}");
+            return Err(PyTypeError::new_err(what));
+        };
+        let mut taken = Vec::new();
+        for item in answer.items()?.iter() {
+            let (name, value): (String, Bound<'_, PyAny>) = item.extract()?;
+            let named = |position: &&usize| self.description.variables[**position].name == name;
+            let Some(&position) = self.outputs.iter().find(named) else {
+                let name_of = |own: &usize| self.description.variables[*own].name.as_str();
+                let known: Vec<_> = self.outputs.iter().map(name_of).collect();
+                let what = format!("no output {name}, expected one of {}", known.join(", "));
+                return Err(PyValueError::new_err(what));
+            };
+            taken.push((position, value.extract()?));
+        }
+        Ok(taken)
+    }
+
+    fn store(&mut self, taken: Vec<(usize, f64)>) {
+        for (position, value) in taken {
+            self.values[position] = value;
+        }
+    }
+
+    fn read<T>(&self, references: &[u32], values: &mut [T], convert: impl Fn(f64) -> T) {
+        for (reference, value) in references.iter().zip(values) {
+            let found = usize::try_from(*reference).ok().and_then(|k| self.values.get(k));
+            *value = convert(found.copied().unwrap_or(f64::NAN));
+        }
+    }
+
+    fn write(&mut self, references: &[u32], values: impl Iterator<Item = f64>) {
+        for (reference, value) in references.iter().zip(values) {
+            let own = usize::try_from(*reference).ok().and_then(|k| self.values.get_mut(k));
+            if let Some(own) = own {
+                *own = value;
+            }
+        }
+    }
+}
+
+impl Slave for PythonSlave {
+    fn description(&self) -> &ModelDescription {
+        &self.description
+    }
+
+    fn setup_experiment(&mut self, experiment: &Experiment) -> Result<(), CallError> {
+        self.start = experiment.start_time;
+        Ok(())
+    }
+
+    fn enter_initialization_mode(&mut self) -> Result<(), CallError> {
+        Ok(())
+    }
+
+    fn exit_initialization_mode(&mut self) -> Result<(), CallError> {
+        let start = self.start;
+        let taken = self.call("start", |object| match object.getattr_opt("start")? {
+            Some(function) => {
+                let given = self.given(object.py())?;
+                self.take(&function.call1((start, given))?)
+            }
+            None => Ok(Vec::new()),
+        })?;
+        self.store(taken);
+        Ok(())
+    }
+
+    fn terminate(&mut self) -> Result<(), CallError> {
+        self.call("stop", |object| match object.getattr_opt("stop")? {
+            Some(function) => function.call0().map(|_| ()),
+            None => Ok(()),
+        })
+    }
+
+    fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), CallError> {
+        self.read(references, values, |value| value);
+        Ok(())
+    }
+
+    fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), CallError> {
+        self.write(references, values.iter().copied());
+        Ok(())
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "an integer")]
+    fn get_integer(&mut self, references: &[u32], values: &mut [i64]) -> Result<(), CallError> {
+        self.read(references, values, |value| value as i64);
+        Ok(())
+    }
+
+    fn set_integer(&mut self, references: &[u32], values: &[i64]) -> Result<(), CallError> {
+        self.write(references, values.iter().map(|value| slave::to_real(*value)));
+        Ok(())
+    }
+
+    fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), CallError> {
+        self.read(references, values, |value| i32::from(value != 0.0));
+        Ok(())
+    }
+
+    fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Result<(), CallError> {
+        self.write(references, values.iter().map(|value| f64::from(*value != 0)));
+        Ok(())
+    }
+
+    fn do_step(&mut self, time: f64, size: f64, _: bool) -> Result<StepResult, CallError> {
+        let taken = self.call("step", |object| {
+            let given = self.given(object.py())?;
+            self.take(&object.call_method1("step", (time, size, given))?)
+        })?;
+        self.store(taken);
+        Ok(StepResult::Whole)
+    }
+
+    fn save_state(&mut self, slot: usize) -> Result<(), CallError> {
+        let state = self.call("save", |object| Ok(object.call_method0("save")?.unbind()))?;
+        if self.saved.len() <= slot {
+            self.saved.resize_with(slot + 1, || None);
+        }
+        self.saved[slot] = Some((self.values.clone(), state));
+        Ok(())
+    }
+
+    fn restore_state(&mut self, slot: usize) -> Result<(), CallError> {
+        let Some(Some((values, state))) = self.saved.get(slot) else {
+            let (function, failure) = ("restore", Failure::Status(Status::Error));
+            return Err(CallError { function, failure, messages: Vec::new() });
+        };
+        self.call("restore", |object| object.call_method1("restore", (state,)).map(|_| ()))?;
+        self.values = values.clone();
+        Ok(())
+    }
+
+    fn serialize_state(&mut self) -> Result<Vec<u8>, CallError> {
+        self.call("save", |object| {
+            let state = (object.call_method0("save")?, self.values.clone());
+            object.py().import("pickle")?.call_method1("dumps", (state,))?.extract()
+        })
+    }
+
+    fn deserialize_state(&mut self, bytes: &[u8]) -> Result<(), CallError> {
+        self.values = self.call("restore", |object| {
+            let state = object.py().import("pickle")?.call_method1("loads", (bytes,))?;
+            let (state, values): (Bound<'_, PyAny>, Vec<f64>) = state.extract()?;
+            object.call_method1("restore", (state,))?;
+            Ok(values)
+        })?;
+        Ok(())
+    }
+}
+
+/// The start value of a declared variable.
+#[derive(Clone, Copy)]
+enum Start {
+    Real(f64),
+    Integer(i64),
+    Boolean(bool),
+}
+
+impl Start {
+    fn number(&self) -> f64 {
+        match self {
+            Self::Real(value) => *value,
+            Self::Integer(value) => slave::to_real(*value),
+            Self::Boolean(value) => f64::from(u8::from(*value)),
+        }
+    }
+}
+
+/// Returns the variables that an attribute of the object declares.
+fn declared(object: &Bound<'_, PyAny>, attribute: &str) -> PyResult<Vec<(String, Start)>> {
+    let Some(own) = object.getattr_opt(attribute)? else { return Ok(Vec::new()) };
+    if let Ok(mapping) = own.cast::<PyMapping>() {
+        let items = mapping.items()?;
+        let item = |item: Bound<'_, PyAny>| {
+            let (name, value): (String, Bound<'_, PyAny>) = item.extract()?;
+            Ok((name, start(&value)?))
+        };
+        return items.iter().map(item).collect();
+    }
+    own.try_iter()?.map(|name| Ok((name?.extract()?, Start::Real(0.0)))).collect()
+}
+
+fn start(value: &Bound<'_, PyAny>) -> PyResult<Start> {
+    use pyo3::types::{PyBool, PyInt};
+    if let Ok(value) = value.cast::<PyBool>() {
+        return Ok(Start::Boolean(value.is_true()));
+    }
+    if value.is_instance_of::<PyInt>() {
+        return value.extract().map(Start::Integer);
+    }
+    value.extract().map(Start::Real)
+}
+
+fn variable(name: String, reference: u32, causality: Causality, start: Start) -> ScalarVariable {
+    let is_input = causality == Causality::Input;
+    let (kind, variability) = match start {
+        Start::Real(value) => {
+            let start = is_input.then_some(value);
+            (Kind::Real(RealType { start, ..RealType::default() }), Variability::Continuous)
+        }
+        Start::Integer(value) => {
+            let start = is_input.then_some(value.into());
+            (Kind::Integer(IntegerType { start, ..IntegerType::default() }), Variability::Discrete)
+        }
+        Start::Boolean(value) => (Kind::Boolean(is_input.then_some(value)), Variability::Discrete),
+    };
+    ScalarVariable {
+        name,
+        value_reference: reference,
+        causality,
+        variability,
+        kind,
+        ..ScalarVariable::default()
+    }
+}
+
+fn structure(inputs: &[usize], outputs: &[usize], direct: bool) -> ModelStructure {
+    let index = |position: &usize| u32::try_from(position + 1).unwrap_or(u32::MAX);
+    let on: Vec<_> = if direct { inputs.iter().map(index).collect() } else { Vec::new() };
+    let unknown =
+        |output| Unknown { index: index(output), dependencies: Some(on.clone()), kinds: None };
+    let outputs = outputs.iter().map(unknown).collect();
+    ModelStructure { outputs, ..ModelStructure::default() }
+}
+
+fn describe(
+    name: &str,
+    variables: Vec<ScalarVariable>,
+    structure: ModelStructure,
+    state: bool,
+) -> ModelDescription {
+    ModelDescription {
+        fmi_version: "2.0".to_owned(),
+        model_name: name.to_owned(),
+        guid: format!("python {name}"),
+        co_simulation: Some(CoSimulation {
+            model_identifier: name.to_owned(),
+            can_handle_variable_communication_step_size: true,
+            can_get_and_set_fmu_state: state,
+            can_serialize_fmu_state: state,
+            ..CoSimulation::default()
+        }),
+        variables,
+        structure,
+        ..ModelDescription::default()
+    }
+}
+
+/// Sets an entry of `given` in the type of the variable.
+#[expect(clippy::cast_possible_truncation, reason = "an integer")]
+fn set(given: &Bound<'_, PyDict>, variable: &ScalarVariable, value: f64) -> PyResult<()> {
+    match &variable.kind {
+        Kind::Boolean(_) => given.set_item(&variable.name, value != 0.0),
+        Kind::Integer(_) => given.set_item(&variable.name, value as i64),
+        _ => given.set_item(&variable.name, value),
+    }
+}

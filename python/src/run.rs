@@ -1,0 +1,359 @@
+//! Runs: a configuration, its changes, Python slaves.
+
+use std::collections::HashMap;
+use std::ops::ControlFlow;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::sync::{LazyLock, OnceLock, PoisonError};
+
+use master::{Port, Simulation, Slave};
+use pyo3::exceptions::PyException;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyMapping};
+use results::{MemorySink, Recorded, Sink};
+use study::config::CheckpointSettings;
+use study::{AssemblyOptions, Config, LoadedConfig, PreparedRun, Run, RunEnd, Store};
+
+use crate::configuration::{merge, read};
+use crate::error::{self, Exception};
+use crate::logging;
+use crate::python_slave::{PythonSlave, Raised};
+use crate::stepper::Stepper;
+use crate::table::Table;
+use crate::value;
+use crate::watch::{Cancel, Progress, Stop, Watch};
+
+/// The FMUs of this process, and the process that opened them.
+static STORE: LazyLock<(Store, u32)> = LazyLock::new(|| (Store::default(), std::process::id()));
+/// The program that becomes the separate process of an FMU.
+static WORKER: OnceLock<PathBuf> = OnceLock::new();
+
+/// Sets the program that becomes the separate process of an FMU.
+#[pyfunction]
+pub(crate) fn set_worker(path: PathBuf) {
+    // The first call counts: the program does not change while the package is imported.
+    let _ = WORKER.set(path);
+}
+
+/// Closes the FMUs that no run uses, and removes their unpacked files.
+#[pyfunction]
+pub(crate) fn clear(py: Python<'_>) {
+    // A forked process must not remove the files of its parent.
+    if STORE.1 == std::process::id() {
+        py.detach(|| STORE.0.clear());
+    }
+}
+
+/// The number of FMUs that are open.
+#[pyfunction]
+pub(crate) fn open_fmus(py: Python<'_>) -> usize {
+    py.detach(|| STORE.0.len())
+}
+
+/// A configuration, ready for many runs.
+#[pyclass(frozen, module = "aso_ftc._core")]
+pub(crate) struct Study {
+    config: Config,
+    folder: PathBuf,
+    slaves: Vec<(String, Py<PyAny>)>,
+}
+
+/// Slaves with the exceptions that they raise.
+type Slaves = (Vec<(String, Box<dyn Slave>)>, Raised);
+
+#[pymethods]
+impl Study {
+    /// Reads a configuration, as text or as nested dicts. Relative paths start in `folder`.
+    #[new]
+    fn new(
+        description: &Bound<'_, PyAny>,
+        folder: PathBuf,
+        slaves: Vec<(String, Py<PyAny>)>,
+    ) -> PyResult<Self> {
+        let mut config = read(description, &folder)?;
+        config.make_absolute()?;
+        Ok(Self { config, folder, slaves })
+    }
+
+    /// Loads and connects the FMUs, and resolves all names; starts nothing. Returns the variables.
+    fn check(&self, py: Python<'_>, changes: &Bound<'_, PyAny>) -> PyResult<Vec<Py<PyDict>>> {
+        logging::adopt_level(py);
+        let (loaded, (slaves, _)) = (self.loaded(changes)?, self.slaves(py)?);
+        let prepared = guarded(py, || prepare(loaded, slaves));
+        logging::pass_on(py)?;
+        let prepared = prepared?.map_err(|error| error::study(&error).raise(py))?;
+        let mut variables = Vec::new();
+        for (name, slave) in &prepared.system.slaves {
+            for variable in &slave.description().variables {
+                let own = crate::description::variable(py, variable, slave.description())?;
+                own.bind(py).set_item("name", format!("{name}.{}", variable.name))?;
+                variables.push(own);
+            }
+        }
+        Ok(variables)
+    }
+
+    /// Runs to the end. Returns the outcome, and the exception of a run that failed after its start.
+    #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
+    #[pyo3(signature = (changes, *, time_limit = None, cancel = None, progress = None, input = None, prefix = None))]
+    fn run(
+        &self,
+        py: Python<'_>,
+        changes: &Bound<'_, PyAny>,
+        time_limit: Option<f64>,
+        cancel: Option<&Bound<'_, Cancel>>,
+        progress: Option<&Bound<'_, PyAny>>,
+        input: Option<Py<PyAny>>,
+        prefix: Option<&str>,
+    ) -> PyResult<(Outcome, Option<Py<PyAny>>)> {
+        logging::adopt_level(py);
+        let (loaded, (slaves, raised)) = (self.loaded(changes)?, self.slaves(py)?);
+        let cancel = cancel.map(|cancel| cancel.get().flag.clone());
+        let watch = Watch::new(py, time_limit, cancel, Progress::new(progress)?)?;
+        let input = input.map(Input::new);
+        let ran = guarded(py, || run(loaded, slaves, watch, input));
+        logging::pass_on(py)?;
+        let ran = ran?.map_err(|error| caused(py, error::study(&error), &raised))?;
+        let Ran { ended, time, steps, seconds, recorded, settings, reasons, mut watch } = ran;
+        if let (None, RunEnd::AtStop | RunEnd::ByFmu(_)) = (&watch.stop, &ended) {
+            watch.finish(py)?;
+        }
+        let (end, exception) = match (watch.stop.take(), ended) {
+            (Some(Stop::Raised(error)), _) => return Err(error),
+            (Some(Stop::TimeLimit(limit)), _) => {
+                let sentence =
+                    format!("the run reached its time limit of {limit} s at t = {time} s");
+                let own = Exception::new("TimeLimitError", "TimeLimit", sentence);
+                ("time limit".to_owned(), Some(own.number("time", time).raise(py)))
+            }
+            (Some(Stop::Cancelled), _) => {
+                let sentence = format!("the run was cancelled at t = {time} s");
+                let own = Exception::new("CancelledError", "Cancelled", sentence);
+                ("cancelled".to_owned(), Some(own.number("time", time).raise(py)))
+            }
+            (None, RunEnd::ByFmu(name)) => (name, None),
+            (None, RunEnd::Failed(error)) => {
+                let error = caused(py, error::study(&error).reached(time), &raised);
+                if !error.is_instance_of::<PyException>(py) {
+                    return Err(error);
+                }
+                ("failed".to_owned(), Some(error))
+            }
+            (None, RunEnd::AtStop | RunEnd::Interrupted) => ("stop time".to_owned(), None),
+        };
+        let table = Py::new(py, Table::new(recorded, prefix)?)?;
+        let outcome = Outcome { table, end, time, steps, seconds, settings, reasons };
+        Ok((outcome, exception.map(|error| error.into_value(py).into_any())))
+    }
+
+    /// Initialises the FMUs for steps one by one.
+    fn simulation(&self, py: Python<'_>, changes: &Bound<'_, PyAny>) -> PyResult<Stepper> {
+        logging::adopt_level(py);
+        let (mut loaded, (slaves, raised)) = (self.loaded(changes)?, self.slaves(py)?);
+        (loaded.config.results.file, loaded.config.checkpoint) =
+            (None, CheckpointSettings::default());
+        let started = guarded(py, || prepare(loaded, slaves)?.start(None));
+        logging::pass_on(py)?;
+        let run = started?.map_err(|error| caused(py, error::study(&error), &raised))?;
+        Ok(Stepper::new(run, raised))
+    }
+}
+
+impl Study {
+    /// Returns the configuration of a run with these changes.
+    fn loaded(&self, changes: &Bound<'_, PyAny>) -> PyResult<LoadedConfig> {
+        let mut config = self.config.clone();
+        if changes.len()? > 0 {
+            merge(&mut config, read(changes, &self.folder)?);
+        }
+        Ok(LoadedConfig { config, source: None })
+    }
+
+    fn slaves(&self, py: Python<'_>) -> PyResult<Slaves> {
+        let raised = Raised::default();
+        let mut slaves: Vec<(String, Box<dyn Slave>)> = Vec::new();
+        for (name, object) in &self.slaves {
+            let slave = PythonSlave::new(name, object.bind(py), raised.clone())?;
+            slaves.push((name.clone(), Box::new(slave)));
+        }
+        Ok((slaves, raised))
+    }
+}
+
+/// Calls `work` without the interpreter. A panic becomes an exception.
+pub(crate) fn guarded<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    let done = py.detach(|| catch_unwind(AssertUnwindSafe(work)));
+    done.map_err(|panic| {
+        let text = panic.downcast_ref::<String>().map(String::as_str);
+        let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("unknown");
+        let sentence = format!("aso_ftc failed by an internal error, please report it: {text}");
+        Exception::new("Error", "Panic", sentence).raise(py)
+    })
+}
+
+/// Raises the exception with that of a Python slave as its cause. What is no `Exception`, such as
+/// `KeyboardInterrupt`, is raised itself.
+pub(crate) fn caused(py: Python<'_>, exception: Exception, raised: &Raised) -> PyErr {
+    let cause = raised.lock().unwrap_or_else(PoisonError::into_inner).take();
+    let Some(cause) = cause else { return exception.raise(py) };
+    if !cause.is_instance_of::<PyException>(py) {
+        return cause;
+    }
+    let error = exception.raise(py);
+    error.set_cause(py, Some(cause));
+    error
+}
+
+fn prepare(
+    loaded: LoadedConfig,
+    slaves: Vec<(String, Box<dyn Slave>)>,
+) -> Result<PreparedRun, study::Error> {
+    let worker = WORKER.get().map(PathBuf::as_path);
+    let options = AssemblyOptions { store: Some(&STORE.0), worker, ..AssemblyOptions::default() };
+    PreparedRun::with_slaves(loaded, &options, slaves)
+}
+
+/// A run that has ended.
+struct Ran {
+    ended: RunEnd,
+    time: f64,
+    steps: u64,
+    seconds: f64,
+    recorded: results::Columns,
+    settings: String,
+    reasons: Vec<String>,
+    watch: Watch,
+}
+
+/// Runs to the end, without the interpreter.
+fn run(
+    loaded: LoadedConfig,
+    slaves: Vec<(String, Box<dyn Slave>)>,
+    mut watch: Watch,
+    mut input: Option<Input>,
+) -> Result<Ran, study::Error> {
+    let prepared = prepare(loaded, slaves)?;
+    let file = prepared.config.results.file.clone();
+    let recorded = Recorded::default();
+    let mut run = prepared.start_into(None, |columns| {
+        let second = file.map(|file| results::create(&file, columns)).transpose()?;
+        Ok(Box::new(MemorySink::new(columns, recorded.clone(), second)?) as Box<dyn Sink>)
+    })?;
+    watch.set_span(run.simulation.time(), run.plan.stop);
+    let ended = run.advance(|simulation| {
+        if let Some(input) = &mut input
+            && let Err(error) = input.set(simulation)
+        {
+            watch.stop = Some(Stop::Raised(error));
+            return Ok(ControlFlow::Break(()));
+        }
+        Ok(watch.after_step(simulation.time()))
+    });
+    let settings = run.config.render()?;
+    let Run { simulation, .. } = &run;
+    let (time, tally) = (simulation.time(), run.tally());
+    let finished = run.finish().map(|_| ());
+    let reasons = std::mem::take(&mut run.plan.reasons);
+    drop(run);
+    finished?;
+    let recorded = recorded.take();
+    let (steps, seconds) = (tally.steps, tally.seconds);
+    Ok(Ran { ended, time, steps, seconds, recorded, settings, reasons, watch })
+}
+
+/// A function of time that returns values of inputs.
+struct Input {
+    function: Py<PyAny>,
+    ports: HashMap<String, Port>,
+}
+
+impl Input {
+    fn new(function: Py<PyAny>) -> Self {
+        Self { function, ports: HashMap::new() }
+    }
+
+    /// Sets the inputs to the values at the time reached.
+    fn set(&mut self, simulation: &mut Simulation) -> PyResult<()> {
+        let time = simulation.time();
+        Python::attach(|py| {
+            let values = self.function.bind(py).call1((time,))?;
+            let system = simulation.system();
+            for item in values.cast::<PyMapping>()?.items()?.iter() {
+                let (name, value): (String, Bound<'_, PyAny>) = item.extract()?;
+                let port = if let Some(port) = self.ports.get(&name) {
+                    *port
+                } else {
+                    let port = value::settable(system, &name);
+                    let port = port.map_err(|error| error.raise(py))?;
+                    self.ports.insert(name.clone(), port);
+                    port
+                };
+                value::set(system, port, &value, time)?;
+            }
+            Ok(())
+        })
+    }
+}
+
+/// The outcome of a run.
+#[pyclass(frozen, module = "aso_ftc._core")]
+pub(crate) struct Outcome {
+    /// The recorded columns.
+    #[pyo3(get)]
+    table: Py<Table>,
+    /// `stop time`, `time limit`, `cancelled`, `failed`, or the FMU that requested the end.
+    #[pyo3(get)]
+    end: String,
+    /// Time reached in s.
+    #[pyo3(get)]
+    time: f64,
+    /// Number of communication steps.
+    #[pyo3(get)]
+    steps: u64,
+    /// Wall-clock time of the steps in s.
+    #[pyo3(get)]
+    seconds: f64,
+    /// The complete configuration as a `system.toml`.
+    #[pyo3(get)]
+    settings: String,
+    /// One sentence for each setting that was chosen.
+    #[pyo3(get)]
+    reasons: Vec<String>,
+}
+
+/// The arguments of [`Outcome::new`].
+type OutcomeArguments = (Py<Table>, String, f64, u64, f64, String, Vec<String>);
+
+#[pymethods]
+impl Outcome {
+    #[new]
+    fn new(
+        table: Py<Table>,
+        end: String,
+        time: f64,
+        steps: u64,
+        seconds: f64,
+        settings: String,
+        reasons: Vec<String>,
+    ) -> Self {
+        Self { table, end, time, steps, seconds, settings, reasons }
+    }
+
+    /// For pickle.
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> (Bound<'py, pyo3::types::PyType>, OutcomeArguments) {
+        let Self { table, end, time, steps, seconds, settings, reasons } = self;
+        let arguments = (
+            table.clone_ref(py),
+            end.clone(),
+            *time,
+            *steps,
+            *seconds,
+            settings.clone(),
+            reasons.clone(),
+        );
+        (py.get_type::<Self>(), arguments)
+    }
+}

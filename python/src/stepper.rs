@@ -1,0 +1,197 @@
+//! A simulation that Python advances step by step.
+
+use std::ops::ControlFlow;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use master::Checkpoint;
+use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::sync::MutexExt as _;
+use pyo3::types::{PyBytes, PyList};
+use study::Run;
+
+use crate::error;
+use crate::logging;
+use crate::python_slave::Raised;
+use crate::run::{caused, guarded};
+use crate::value;
+use crate::watch::{Progress, Stop, Watch};
+
+/// A running simulation.
+#[pyclass(frozen, module = "aso_ftc._core")]
+pub(crate) struct Stepper {
+    run: Mutex<Option<Run>>,
+    raised: Raised,
+}
+
+impl Stepper {
+    pub(crate) fn new(run: Run, raised: Raised) -> Self {
+        Self { run: Mutex::new(Some(run)), raised }
+    }
+
+    fn lock<'a>(&'a self, py: Python<'_>) -> MutexGuard<'a, Option<Run>> {
+        // Another thread may make a step, and need the interpreter for it.
+        self.run.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Calls `work` with the run.
+    fn with<T>(&self, py: Python<'_>, work: impl FnOnce(&mut Run) -> PyResult<T>) -> PyResult<T> {
+        work(self.lock(py).as_mut().ok_or_else(closed)?)
+    }
+
+    /// Steps until `ended` holds for the number of steps so far and the time, or the run is finished;
+    /// returns the number of steps.
+    fn advance(
+        &self,
+        py: Python<'_>,
+        ended: impl Fn(u64, f64) -> bool + Send + Sync,
+    ) -> PyResult<u64> {
+        let mut watch = Watch::new(py, None, None, Progress::None)?;
+        let stepped = guarded(py, || {
+            let mut guard = self.run.lock().unwrap_or_else(PoisonError::into_inner);
+            let Some(run) = guard.as_mut() else { return Ok(None) };
+            let simulation = &mut run.simulation;
+            let mut steps = 0;
+            while !simulation.is_finished() && !ended(steps, simulation.time()) {
+                simulation.step()?;
+                steps += 1;
+                if let ControlFlow::Break(()) = watch.after_step(simulation.time()) {
+                    break;
+                }
+            }
+            Ok(Some(steps))
+        });
+        logging::pass_on(py)?;
+        let stepped = stepped?.map_err(|error| caused(py, error::system(&error), &self.raised))?;
+        match watch.stop {
+            Some(Stop::Raised(error)) => Err(error),
+            _ => stepped.ok_or_else(closed),
+        }
+    }
+}
+
+fn closed() -> PyErr {
+    PyRuntimeError::new_err("the simulation is closed; start another one")
+}
+
+#[pymethods]
+impl Stepper {
+    /// Time reached in s.
+    #[getter]
+    fn time(&self, py: Python<'_>) -> PyResult<f64> {
+        self.with(py, |run| Ok(run.simulation.time()))
+    }
+
+    /// Whether the stop time is reached or an FMU requested the end.
+    #[getter]
+    fn finished(&self, py: Python<'_>) -> PyResult<bool> {
+        self.with(py, |run| Ok(run.simulation.is_finished()))
+    }
+
+    /// The complete configuration as a `system.toml`.
+    #[getter]
+    fn settings(&self, py: Python<'_>) -> PyResult<String> {
+        self.with(py, |run| run.config.render().map_err(|error| error::study(&error).raise(py)))
+    }
+
+    /// Names of all variables.
+    fn names(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        self.with(py, |run| {
+            let slaves = run.simulation.system().slaves.iter();
+            let names = slaves.flat_map(|(slave, own)| {
+                let variables = own.description().variables.iter();
+                variables.map(move |variable| format!("{slave}.{}", variable.name))
+            });
+            Ok(names.collect())
+        })
+    }
+
+    /// Makes up to `count` communication steps; returns their number.
+    #[pyo3(signature = (count = 1))]
+    fn step(&self, py: Python<'_>, count: u64) -> PyResult<u64> {
+        self.advance(py, |steps, _| steps >= count)
+    }
+
+    /// Steps until `time` (in s) is reached; returns the number of steps.
+    fn run_until(&self, py: Python<'_>, time: f64) -> PyResult<u64> {
+        if time.is_nan() {
+            return Err(PyValueError::new_err("time is nan, expected a number"));
+        }
+        // A time counts as reached when it differs by rounding only.
+        let end = time - 1e-9 * time.abs().max(1e-9);
+        self.advance(py, |_, reached| reached >= end)
+    }
+
+    /// Reads variables by name.
+    fn get<'py>(&self, py: Python<'py>, names: Vec<String>) -> PyResult<Bound<'py, PyList>> {
+        self.with(py, |run| {
+            let time = run.simulation.time();
+            let system = run.simulation.system();
+            let values = PyList::empty(py);
+            for name in names {
+                let port = system.port(&name);
+                let port = port.map_err(|error| error::system(&error).raise(py))?;
+                values.append(value::get(py, system, port, time)?)?;
+            }
+            Ok(values)
+        })
+    }
+
+    /// Reads a variable.
+    fn __getitem__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        self.with(py, |run| {
+            let time = run.simulation.time();
+            let system = run.simulation.system();
+            let port = system.port(name);
+            let port = port.map_err(|error| PyKeyError::new_err(error.to_string()))?;
+            value::get(py, system, port, time)
+        })
+    }
+
+    /// Sets an input without a connection, or a tunable parameter, from the next step on.
+    fn set(&self, py: Python<'_>, name: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
+        self.with(py, |run| {
+            let time = run.simulation.time();
+            let system = run.simulation.system();
+            let port = value::settable(system, name).map_err(|error| error.raise(py))?;
+            value::set(system, port, value, time)
+        })
+    }
+
+    /// The state of all FMUs and connections as bytes.
+    fn save<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let saved = guarded(py, || {
+            let mut guard = self.run.lock().unwrap_or_else(PoisonError::into_inner);
+            guard.as_mut().map(|run| run.simulation.checkpoint()).transpose()
+        })?;
+        let saved = saved.map_err(|error| caused(py, error::system(&error), &self.raised))?;
+        let bytes = postcard::to_stdvec(&saved.ok_or_else(closed)?);
+        let bytes = bytes.map_err(|error| PyValueError::new_err(error.to_string()))?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
+    /// Returns to a state of [`Stepper::save`].
+    fn restore(&self, py: Python<'_>, state: &[u8]) -> PyResult<()> {
+        let checkpoint: Checkpoint = postcard::from_bytes(state).map_err(|_| {
+            PyValueError::new_err("the bytes are no state that save() of this version has returned")
+        })?;
+        let restored = guarded(py, || {
+            let mut guard = self.run.lock().unwrap_or_else(PoisonError::into_inner);
+            guard.as_mut().map(|run| run.simulation.restore(&checkpoint)).transpose()
+        })?;
+        let restored = restored.map_err(|error| caused(py, error::system(&error), &self.raised))?;
+        restored.ok_or_else(closed)
+    }
+
+    /// Terminates and frees the FMUs. A second call does nothing.
+    fn close(&self, py: Python<'_>) -> PyResult<()> {
+        let ended = guarded(py, || {
+            let run = self.run.lock().unwrap_or_else(PoisonError::into_inner).take();
+            let Some(mut run) = run else { return Ok(()) };
+            let terminated = run.simulation.terminate();
+            terminated.and(run.simulation.free())
+        })?;
+        logging::pass_on(py)?;
+        ended.map_err(|error| caused(py, error::system(&error), &self.raised))
+    }
+}

@@ -1,0 +1,271 @@
+//! Results in memory, shared with Python without copies.
+
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use arrow_array::ffi_stream::FFI_ArrowArrayStream;
+use arrow_array::{
+    Array as _, ArrayRef, BooleanArray, Float64Array, Int32Array, Int64Array, LargeStringArray,
+    RecordBatch, RecordBatchIterator, cast::AsArray as _,
+};
+use arrow_buffer::{Buffer, OffsetBuffer, ScalarBuffer};
+use arrow_schema::ffi::FFI_ArrowSchema;
+use arrow_schema::{ArrowError, DataType, Field, Schema};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyCapsule, PyDict, PyList, PyTuple};
+use pyo3::{IntoPyObjectExt as _, pyclass};
+use results::{Column, ColumnKind, Columns, TIME, Values};
+
+use crate::error;
+
+/// The columns of a run.
+#[pyclass(frozen, module = "aso_ftc._core")]
+pub(crate) struct Table {
+    batch: RecordBatch,
+    columns: Vec<Column>,
+}
+
+impl Table {
+    /// Takes over the memory of the columns. Their names lose `prefix`.
+    pub(crate) fn new(recorded: Columns, prefix: Option<&str>) -> PyResult<Self> {
+        let rows = recorded.time.len();
+        let time =
+            Column { name: TIME.to_owned(), kind: ColumnKind::Real, unit: Some("s".to_owned()) };
+        let (mut fields, mut arrays) = (vec![field(&time)], vec![reals(recorded.time)]);
+        let mut columns = vec![time];
+        for (mut column, values) in recorded.columns {
+            let own = prefix.and_then(|prefix| column.name.strip_prefix(prefix));
+            let own = own.filter(|name| *name != TIME).map(str::to_owned);
+            if let Some(name) = own {
+                column.name = name;
+            }
+            fields.push(field(&column));
+            arrays.push(array(values).map_err(failed)?);
+            columns.push(column);
+        }
+        debug_assert!(
+            arrays.iter().all(|array| array.len() == rows),
+            "columns of different lengths"
+        );
+        let batch = RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays).map_err(failed)?;
+        Ok(Self { batch, columns })
+    }
+
+    fn position(&self, name: &str) -> Option<usize> {
+        self.columns.iter().position(|column| column.name == name)
+    }
+
+    /// Returns the columns as they were recorded.
+    fn recorded(&self) -> Columns {
+        let arrays = self.batch.columns().iter().skip(1);
+        let columns = self.columns.iter().skip(1).cloned();
+        Columns {
+            time: self
+                .batch
+                .column(0)
+                .as_primitive::<arrow_array::types::Float64Type>()
+                .values()
+                .to_vec(),
+            columns: columns.zip(arrays.map(values)).collect(),
+        }
+    }
+}
+
+fn failed(error: ArrowError) -> PyErr {
+    PyValueError::new_err(error.to_string())
+}
+
+fn field(column: &Column) -> Field {
+    let kind = match column.kind {
+        ColumnKind::Real => DataType::Float64,
+        ColumnKind::Integer => DataType::Int32,
+        ColumnKind::Long => DataType::Int64,
+        ColumnKind::Boolean => DataType::Boolean,
+        ColumnKind::String => DataType::LargeUtf8,
+    };
+    let unit = column.unit.clone().map(|unit| ("unit".to_owned(), unit));
+    Field::new(&column.name, kind, false).with_metadata(unit.into_iter().collect::<HashMap<_, _>>())
+}
+
+fn reals(values: Vec<f64>) -> ArrayRef {
+    Arc::new(Float64Array::new(ScalarBuffer::from(values), None))
+}
+
+/// Returns an array with the memory of `values`; Booleans become bits.
+fn array(values: Values) -> Result<ArrayRef, ArrowError> {
+    Ok(match values {
+        Values::Real(own) => reals(own),
+        Values::Integer(own) => Arc::new(Int32Array::new(ScalarBuffer::from(own), None)),
+        Values::Long(own) => Arc::new(Int64Array::new(ScalarBuffer::from(own), None)),
+        Values::Boolean(own) => Arc::new(BooleanArray::from(own)),
+        Values::String(own) => {
+            let offsets = OffsetBuffer::new(ScalarBuffer::from(own.offsets));
+            Arc::new(LargeStringArray::try_new(offsets, Buffer::from_vec(own.bytes), None)?)
+        }
+    })
+}
+
+/// Returns the values of an array that [`array`] has made.
+fn values(array: &ArrayRef) -> Values {
+    use arrow_array::types::{Float64Type, Int32Type, Int64Type};
+    match array.data_type() {
+        DataType::Int32 => Values::Integer(array.as_primitive::<Int32Type>().values().to_vec()),
+        DataType::Int64 => Values::Long(array.as_primitive::<Int64Type>().values().to_vec()),
+        DataType::Boolean => Values::Boolean(array.as_boolean().values().iter().collect()),
+        DataType::LargeUtf8 => {
+            let own = array.as_string::<i64>();
+            let (offsets, bytes) = (own.offsets().to_vec(), own.values().to_vec());
+            Values::String(results::Texts { offsets, bytes })
+        }
+        _ => Values::Real(array.as_primitive::<Float64Type>().values().to_vec()),
+    }
+}
+
+#[pymethods]
+impl Table {
+    /// Names of the columns, `time` first.
+    #[getter]
+    fn names(&self) -> Vec<&str> {
+        self.columns.iter().map(|column| column.name.as_str()).collect()
+    }
+
+    /// Units by name; `None` without unit.
+    #[getter]
+    fn units<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let units = PyDict::new(py);
+        for column in &self.columns {
+            units.set_item(&column.name, &column.unit)?;
+        }
+        Ok(units)
+    }
+
+    fn __len__(&self) -> usize {
+        self.batch.num_rows()
+    }
+
+    /// The numbers of a column for `numpy.asarray`; `None` for texts and Booleans.
+    fn numbers(&self, name: &str) -> Option<Numbers> {
+        let array = self.batch.column(self.position(name)?).clone();
+        let is_number = array.data_type().is_primitive();
+        is_number.then_some(Numbers { array })
+    }
+
+    /// The values of a column as a list.
+    fn values<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Option<Bound<'py, PyList>>> {
+        let Some(position) = self.position(name) else { return Ok(None) };
+        Ok(Some(match values(self.batch.column(position)) {
+            Values::Real(own) => PyList::new(py, own)?,
+            Values::Integer(own) => PyList::new(py, own)?,
+            Values::Long(own) => PyList::new(py, own)?,
+            Values::Boolean(own) => PyList::new(py, own)?,
+            Values::String(own) => {
+                let rows = own.offsets.len().saturating_sub(1);
+                PyList::new(py, (0..rows).map(|row| own.get(row).unwrap_or("")))?
+            }
+        }))
+    }
+
+    /// The value of a column in a row.
+    fn value<'py>(&self, py: Python<'py>, name: &str, row: usize) -> PyResult<Bound<'py, PyAny>> {
+        let position = self.position(name).ok_or_else(|| PyValueError::new_err(name.to_owned()))?;
+        if row >= self.batch.num_rows() {
+            return Err(PyValueError::new_err(format!("there is no row {row}")));
+        }
+        let one = self.batch.column(position).slice(row, 1);
+        match values(&one) {
+            Values::Real(own) => own[0].into_bound_py_any(py),
+            Values::Integer(own) => own[0].into_bound_py_any(py),
+            Values::Long(own) => own[0].into_bound_py_any(py),
+            Values::Boolean(own) => own[0].into_bound_py_any(py),
+            // The offsets of a slice count from the start of the whole array.
+            Values::String(_) => one.as_string::<i64>().value(0).into_bound_py_any(py),
+        }
+    }
+
+    /// Writes a `.csv` or `.parquet` file.
+    fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let written = py.detach(|| self.recorded().write(&path));
+        written.map_err(|error| error::results(&error).raise(py))
+    }
+
+    /// The columns as bytes, for pickle.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let bytes = py.detach(|| postcard::to_stdvec(&self.recorded()));
+        let bytes = bytes.map_err(|error| PyValueError::new_err(error.to_string()))?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        Ok((py.import("aso_ftc._core")?.getattr("table_from_bytes")?, (self.to_bytes(py)?,)))
+    }
+
+    /// The Arrow C stream interface.
+    #[pyo3(signature = (requested_schema = None))]
+    fn __arrow_c_stream__<'py>(
+        &self,
+        py: Python<'py>,
+        requested_schema: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyCapsule>> {
+        // Another schema is optional for the producer; the caller converts.
+        let _ = requested_schema;
+        let (batch, schema) = (self.batch.clone(), self.batch.schema());
+        let reader = RecordBatchIterator::new([Ok(batch)], schema);
+        let stream = FFI_ArrowArrayStream::new(Box::new(reader));
+        PyCapsule::new_with_value(py, stream, c"arrow_array_stream")
+    }
+
+    /// The Arrow C schema interface.
+    fn __arrow_c_schema__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyCapsule>> {
+        let schema = FFI_ArrowSchema::try_from(self.batch.schema().as_ref()).map_err(failed)?;
+        PyCapsule::new_with_value(py, schema, c"arrow_schema")
+    }
+}
+
+/// The columns that [`Table::to_bytes`] has written.
+#[pyfunction]
+pub(crate) fn table_from_bytes(bytes: &[u8]) -> PyResult<Table> {
+    let recorded = postcard::from_bytes(bytes);
+    let recorded = recorded.map_err(|error| PyValueError::new_err(error.to_string()))?;
+    Table::new(recorded, None)
+}
+
+/// The numbers of a column, in the memory of the results.
+#[pyclass(frozen, module = "aso_ftc._core")]
+pub(crate) struct Numbers {
+    array: ArrayRef,
+}
+
+#[pymethods]
+impl Numbers {
+    fn __len__(&self) -> usize {
+        self.array.len()
+    }
+
+    /// Address, length and type of the numbers. `NumPy` keeps this object as long as its array.
+    #[getter]
+    fn __array_interface__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        use arrow_array::types::{Float64Type, Int32Type, Int64Type};
+        let endian = if cfg!(target_endian = "little") { '<' } else { '>' };
+        let (kind, address) = match self.array.data_type() {
+            DataType::Int32 => {
+                ("i4", self.array.as_primitive::<Int32Type>().values().as_ptr().addr())
+            }
+            DataType::Int64 => {
+                ("i8", self.array.as_primitive::<Int64Type>().values().as_ptr().addr())
+            }
+            _ => ("f8", self.array.as_primitive::<Float64Type>().values().as_ptr().addr()),
+        };
+        let interface = PyDict::new(py);
+        interface.set_item("version", 3)?;
+        interface.set_item("typestr", format!("{endian}{kind}"))?;
+        interface.set_item("shape", PyTuple::new(py, [self.array.len()])?)?;
+        let read_only = true;
+        interface.set_item("data", (address, read_only))?;
+        Ok(interface)
+    }
+}

@@ -1,0 +1,76 @@
+//! Values of variables between Python and a system.
+
+use fmu_description::{Causality, Variability};
+use master::{Port, System, SystemError, Value, ValueType};
+use pyo3::IntoPyObjectExt as _;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+
+use crate::error::{self, Exception};
+
+/// Returns the port of an input without a connection or of a tunable parameter.
+pub(crate) fn settable(system: &System, name: &str) -> Result<Port, Exception> {
+    let port = system.port(name).map_err(|error| error::system(&error))?;
+    let variable = system.variable(port);
+    let is_input = variable.causality == Causality::Input;
+    let is_tunable =
+        variable.causality == Causality::Parameter && variable.variability == Variability::Tunable;
+    let found = match system.source(port) {
+        Some(connection) => format!("is connected to {}", system.name(connection.from)),
+        None if is_input || is_tunable => return Ok(port),
+        None => {
+            let (variability, causality) = (variable.variability, variable.causality);
+            format!("has causality {} and variability {}", causality.as_str(), variability.as_str())
+        }
+    };
+    let expected = "an input without a connection or a tunable parameter";
+    let sentence = format!("{name} {found}, expected {expected}");
+    Err(Exception::new("ConfigurationError", "Role", sentence))
+}
+
+/// Sets a variable to a value of Python. `time` in s appears in the error.
+pub(crate) fn set(
+    system: &mut System,
+    port: Port,
+    value: &Bound<'_, PyAny>,
+    time: f64,
+) -> PyResult<()> {
+    let converted = match ValueType::of(&system.variable(port).kind) {
+        ValueType::Real => value.extract().map(Value::Real),
+        ValueType::Integer => value.extract().map(Value::Integer),
+        ValueType::Boolean => value.is_truthy().map(Value::Boolean),
+        ValueType::String => value.extract().map(Value::String),
+        ValueType::Binary => value.extract().map(Value::Binary),
+    };
+    let py = value.py();
+    let converted = converted.map_err(|cause| {
+        let sentence = format!("{} cannot be set to {value}", system.name(port));
+        let error = Exception::new("ConfigurationError", "Value", sentence).raise(py);
+        error.set_cause(py, Some(cause));
+        error
+    })?;
+    system.set_value(port, &converted).map_err(|source| {
+        let slave = system.slaves[port.slave].0.clone();
+        error::system(&SystemError::Call { slave, time, source }).raise(py)
+    })
+}
+
+/// Reads a variable. `time` in s appears in the error.
+pub(crate) fn get<'py>(
+    py: Python<'py>,
+    system: &mut System,
+    port: Port,
+    time: f64,
+) -> PyResult<Bound<'py, PyAny>> {
+    let value = system.get_value(port).map_err(|source| {
+        let slave = system.slaves[port.slave].0.clone();
+        error::system(&SystemError::Call { slave, time, source }).raise(py)
+    })?;
+    match value {
+        Value::Real(value) => value.into_bound_py_any(py),
+        Value::Integer(value) => value.into_bound_py_any(py),
+        Value::Boolean(value) => value.into_bound_py_any(py),
+        Value::String(value) => value.into_bound_py_any(py),
+        Value::Binary(value) => Ok(PyBytes::new(py, &value).into_any()),
+    }
+}

@@ -1,0 +1,122 @@
+"""Clocks of FMI 3.0, exported by us, called through FMPy, and run by our master."""
+
+import csv
+import re
+import sys
+import zipfile
+
+import fmpy
+import pytest
+from fmpy.fmi3 import FMU3Slave
+from fmpy.validation import validate_fmu
+
+from conftest import ROOT
+
+sys.path.insert(0, str(ROOT / "scripts"))
+
+from residual_over_sample_time import CONSTANT, plant_file  # noqa: E402
+
+MODEL = "tests/models/clocks"
+
+
+@pytest.fixture(scope="module")
+def fmus(aso_ftc, root, tmp_path_factory):
+    """The FMUs by version."""
+    out = tmp_path_factory.mktemp("clocks")
+    done = aso_ftc("pack", root / MODEL, "--fmi", "both", "--out", out)
+    assert done.returncode == 0, done.stderr
+    return {2: out / "Counter.fmu", 3: out / "Counter.fmi3.fmu"}
+
+
+@pytest.fixture(scope="module")
+def description(fmus):
+    return fmpy.read_model_description(str(fmus[3]))
+
+
+def test_fmpy_reads_the_clocks_and_the_clocked_variables(fmus, description):
+    assert validate_fmu(str(fmus[3])) == []
+    variables = {own.name: own for own in description.modelVariables}
+    sample = variables["sample"]
+    assert (sample.type, sample.causality, sample.intervalVariability) == ("Clock", "input", "constant")
+    # FMPy does not read the interval.
+    xml = zipfile.ZipFile(fmus[3]).read("modelDescription.xml").decode()
+    assert re.search(r'name="sample".* intervalDecimal="0.1"', xml)
+    assert variables["third"].intervalVariability == "triggered"
+    assert [own.name for own in variables["count"].clocks] == ["sample", "restart"]
+
+
+def test_fmi_2_leaves_the_clocks_out(fmus):
+    assert validate_fmu(str(fmus[2])) == []
+    names = [own.name for own in fmpy.read_model_description(str(fmus[2])).modelVariables]
+    assert names == ["time", "count", "restarts"]
+
+
+def test_ticks_that_the_importer_sets_are_counted_and_the_output_clock_answers(fmus, description):
+    references = {own.name: own.valueReference for own in description.modelVariables}
+    own = FMU3Slave(
+        guid=description.guid, unzipDirectory=fmpy.extract(str(fmus[3])), modelIdentifier="Counter", instanceName="one"
+    )
+    own.instantiate(eventModeUsed=True, earlyReturnAllowed=True)
+    own.enterInitializationMode()
+    own.exitInitializationMode()
+    ticks = []
+    for k in range(7):
+        if k > 0:
+            own.enterEventMode()
+        own.setClock([references["sample"]], [True])
+        if k == 5:
+            own.setClock([references["restart"]], [True])
+        ticks.append(bool(own.getClock([references["third"]])[0]))
+        own.updateDiscreteStates()
+        # A clock ticks in one event only.
+        assert not own.getClock([references["sample"]])[0]
+        own.enterStepMode()
+        own.doStep(currentCommunicationPoint=0.1 * k, communicationStepSize=0.1)
+    # The sixth tick makes the counter start again and counts from there.
+    assert ticks == [False, False, True, False, False, True, False]
+    assert [own.getInt32([references[name]])[0] for name in ("count", "restarts")] == [2, 1]
+    with pytest.raises(Exception, match="fmi3SetClock"):
+        own.enterEventMode()
+        own.setClock([references["third"]], [True])
+    own.freeInstance()
+
+
+def test_our_master_ticks_a_periodic_clock_and_passes_the_ticks_of_an_output_clock_on(fmus, aso_ftc, tmp_path):
+    done = aso_ftc(
+        *["run", "--fmu", f"a={fmus[3]}", "--fmu", f"b={fmus[3]}", "--connect", "a.third=b.restart"],
+        *["--stop-time", "1", "--step", "0.05", "--out", tmp_path],
+    )
+    assert done.returncode == 0, done.stderr
+    with open(tmp_path / "results.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    last = rows[-1]
+    assert float(last["time"]) == pytest.approx(1.0)
+    # Ticks at 0, 0.1, ..., 1.0. At 0.2, 0.5 and 0.8 a ticks third; b starts again and counts from there.
+    assert last["a.count"] == "11" and last["b.restarts"] == "3"
+    assert last["b.count"] == "3"
+
+
+def test_a_sampled_controller_with_a_clock_runs_as_the_one_of_fmi_2(aso_ftc, root, tmp_path):
+    done = aso_ftc("pack", root / "fmu-controller", "--fmi", "both", "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    plant = tmp_path / "plant.toml"
+    plant.write_text(plant_file(CONSTANT, 1e-3), encoding="utf-8")
+    ends = []
+    for version in ("", ".fmi3"):
+        fmu = tmp_path / f"Sampled{version}.fmu"
+        base = tmp_path / f"AsoController{version}.fmu"
+        done = aso_ftc("design", plant, "--out", tmp_path / f"design{version}.toml", "--fmu", fmu, "--from", base)
+        # 1: the design is red, because it is not robust.
+        assert done.returncode in (0, 1), done.stderr
+        run = ["run", "--plant", root / "dist" / "FrictionPendulum.fmu", "--controller", fmu, "--step", "0.0005"]
+        done = aso_ftc(*run, "--stop-time", "10", "--out", tmp_path / f"out{version}")
+        assert done.returncode == 0, done.stderr
+        with open(tmp_path / f"out{version}" / "results.csv", newline="") as file:
+            rows = list(csv.DictReader(file))
+        last = rows[-1]
+        # There is a row for each sample.
+        assert version == "" or {row["controller.sample_clock"] for row in rows} == {"1"}
+        ends.append([float(last[name]) for name in ("plant.x_p", "plant.theta", "controller.u")])
+    variables = fmpy.read_model_description(str(tmp_path / "Sampled.fmi3.fmu")).modelVariables
+    assert [own.name for own in variables if own.type == "Clock"] == ["sample_clock"]
+    assert ends[0] == pytest.approx(ends[1], rel=1e-9)

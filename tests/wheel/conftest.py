@@ -1,0 +1,49 @@
+"""What the tests of the wheel share. They run from the installed wheel: see scripts/wheel."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import aso_ftc as af
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def pytest_sessionstart(session):
+    """The tests are of the wheel, never of the sources."""
+    del session
+    assert ROOT / "python" not in Path(af.__file__).parents, af.__file__
+
+
+@pytest.fixture
+def paper():
+    """The paper's loop with 0.2 s, so that a test takes milliseconds."""
+    system = af.paper()
+    system.experiment["stop-time"] = 0.2
+    return system
+
+
+@pytest.fixture
+def command():
+    """Runs the command of the wheel; returns its standard output."""
+
+    def run(*words):
+        done = subprocess.run(
+            [str(af.command()), *map(str, words)], check=True, capture_output=True, text=True
+        )
+        return done.stdout
+
+    return run
+
+
+@pytest.fixture
+def python():
+    """Runs a program in a new interpreter; returns the finished process."""
+
+    def run(text, **options):
+        return subprocess.run(
+            [sys.executable, "-P", "-c", text], capture_output=True, text=True, check=False, **options
+        )
+
+    return run

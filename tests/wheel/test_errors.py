@@ -1,0 +1,96 @@
+"""Errors: their classes, sentences and fields."""
+
+import copy
+import pickle
+
+import aso_ftc as af
+import pytest
+
+
+@pytest.mark.parametrize(
+    ("change", "kind", "fields"),
+    [
+        ({"start_values": {"plant.F": 1}}, "UnknownVariable", {"name": "plant.F", "variable": "F"}),
+        ({"start_values": {"wheel.F": 1}}, "UnknownSlave", {"fmu": "wheel", "known": "plant, controller"}),
+        ({"start_values": {"plant.M": "heavy"}}, "Value", {"expected": "a number"}),
+        ({"record": ["plant.z*"]}, "Selection", {}),
+        ({"faults": [af.fault("plant.M", "bias", value=1.0)]}, "Scenario", {}),
+        ({"faults": [{"connection": "controller.x_p", "bais": {}}]}, "Entry", {}),
+        ({"step": -1.0}, "Invalid", {}),
+        ({"step": "fast"}, "Entry", {}),
+        ({"algorithm": {"metod": "jacobi"}}, "Entry", {}),
+        ({"stop_time": -5.0}, "Time", {}),
+    ],
+)
+def test_a_wrong_argument_is_a_configuration_error_before_the_run(paper, change, kind, fields):
+    for call in (paper.run, paper.check):
+        if call == paper.check and kind == "Time":
+            continue
+        with pytest.raises(af.ConfigurationError) as caught:
+            call(**change)
+        error = caught.value
+        assert error.kind == kind and isinstance(error, ValueError)
+        assert {name: getattr(error, name) for name in fields} == fields
+        assert "\n" not in str(error)
+
+
+def test_values_of_wrong_types_are_refused(paper):
+    for wrong, error in [
+        ({"start_values": {"plant.M": object()}}, TypeError),
+        ({"start_values": {"plant.M": 10**30}}, ValueError),
+        ({"start_values": {"plant.M": float("nan")}}, af.ConfigurationError),
+        ({"record": "plant.x_p"}, TypeError),
+        ({"time_limit": float("nan")}, ValueError),
+        ({"file": "results.txt"}, af.ResultsError),
+    ]:
+        with pytest.raises(error):
+            paper.run(**wrong)
+    for wrong in (3, [], {"fmus": {"a": object()}}):
+        with pytest.raises(TypeError):
+            af.System(wrong)
+    with pytest.raises(TypeError, match="a path or an object with a function step, found int"):
+        af.System().add("a", 3)
+
+
+def test_an_error_in_a_file_has_its_line_and_column(tmp_path):
+    file = tmp_path / "system.toml"
+    file.write_text('[fmus]\nplant = "a.fmu"\n[algorithm]\nstep = "fast"\n', encoding="utf-8")
+    with pytest.raises(af.ConfigurationError) as caught:
+        af.System.from_toml(file)
+    assert (caught.value.path, caught.value.line, caught.value.column) == (str(file), 4, 8)
+
+
+def test_a_missing_fmu_is_an_fmu_error(tmp_path):
+    for call in (af.simulate, af.read_model_description, af.check):
+        with pytest.raises(af.FmuError, match="missing.fmu"):
+            call(tmp_path / "missing.fmu")
+    broken = tmp_path / "broken.fmu"
+    broken.write_bytes(b"no archive")
+    with pytest.raises(af.FmuError, match="broken.fmu"):
+        af.simulate(broken)
+
+
+def test_errors_survive_pickle_with_their_fields(paper):
+    with pytest.raises(af.TimeLimitError) as caught:
+        paper.run(stop_time=1e6, record_every=1.0, time_limit=0.0)
+    for error in (pickle.loads(pickle.dumps(caught.value)), copy.copy(caught.value)):
+        assert type(error) is af.TimeLimitError
+        assert (str(error), error.kind, error.time) == (str(caught.value), "TimeLimit", caught.value.time)
+    for name in af.__all__:
+        own = getattr(af, name)
+        if isinstance(own, type) and issubclass(own, af.Error):
+            error = pickle.loads(pickle.dumps(own("a sentence", "Kind", {"what": 1})))
+            assert (str(error), error.kind, error.what) == ("a sentence", "Kind", 1)
+
+
+def test_a_missing_package_is_named_with_the_command_that_installs_it(paper, monkeypatch):
+    import importlib
+
+    def refuse(name):
+        raise ImportError(name)
+
+    results = paper.run()
+    monkeypatch.setattr(importlib, "import_module", refuse)
+    for call in (results.to_arrow, results.to_pandas, results.to_polars, results.to_xarray, results.plot):
+        with pytest.raises(af.MissingPackageError, match=r"needs the package (\w+): python -m pip install \1$"):
+            call()

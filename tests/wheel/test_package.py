@@ -1,0 +1,71 @@
+"""The package: types, stubs, documentation, the command."""
+
+import doctest
+import inspect
+import subprocess
+import sys
+from pathlib import Path
+
+import aso_ftc as af
+import pytest
+
+PACKAGE = Path(af.__file__).parent
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_the_stubs_are_those_of_the_extension_and_types_are_complete(tmp_path):
+    pytest.importorskip("mypy")
+    config = ROOT / "python" / "pyproject.toml"
+    user = tmp_path / "user.py"
+    user.write_text(
+        "import aso_ftc as af\n"
+        "results = af.paper().run(stop_time=0.1, record=['plant.x_p'])\n"
+        "peak = float(results['plant.x_p'].max())\n"
+        "reveal_type(results.last())\n",
+        encoding="utf-8",
+    )
+
+    def run(*words):
+        words = [sys.executable, "-P", "-m", *map(str, words)]
+        done = subprocess.run(words, check=False, capture_output=True, text=True, cwd=tmp_path)
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
+
+    run("mypy.stubtest", "--mypy-config-file", config, "aso_ftc._core")
+    run("mypy", "--config-file", config, "-p", "aso_ftc")
+    assert "dict[str, Any]" in run("mypy", "--config-file", config, user)
+
+
+def test_every_public_name_has_a_docstring():
+    for name in af.__all__:
+        own = getattr(af, name)
+        if name == "__version__":
+            continue
+        assert inspect.getdoc(own), name
+        if inspect.isclass(own):
+            members = vars(own).items()
+            functions = [(k, v) for k, v in members if callable(v) and not k.startswith("_")]
+            assert all(inspect.getdoc(v) for _, v in functions), name
+
+
+def test_the_examples_of_docstrings_hold():
+    modules = [af, *(sys.modules[name] for name in list(sys.modules) if name.startswith("aso_ftc._"))]
+    done = [doctest.testmod(module) for module in modules]
+    assert sum(own.failed for own in done) == 0 and sum(own.attempted for own in done) >= 4
+
+
+def test_importing_loads_neither_numpy_nor_other_packages(python):
+    program = "import sys, aso_ftc; print([n for n in ('numpy', 'pyarrow', 'pandas', 'polars') if n in sys.modules])"
+    assert python(program).stdout.strip() == "[]"
+
+
+def test_the_command_and_the_module_are_one_program():
+    expected = f"aso-ftc {af.__version__}\n"
+    scripts = Path(sys.executable).parent / "aso-ftc"
+    for words in ([str(af.command())], [sys.executable, "-P", "-m", "aso_ftc"], [str(scripts)]):
+        done = subprocess.run([*words, "--version"], check=True, capture_output=True, text=True)
+        assert done.stdout == expected
+
+
+def test_a_type_checker_finds_the_marker():
+    assert (PACKAGE / "py.typed").is_file()

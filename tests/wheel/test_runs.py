@@ -1,0 +1,295 @@
+"""Runs of systems: the command is the reference."""
+
+import copy
+import logging
+import pickle
+import signal
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import aso_ftc as af
+import numpy as np
+import pytest
+
+SSP = Path(__file__).resolve().parents[2] / "dist" / "InvertedPendulum.ssp"
+
+
+def same(first, second):
+    """Whether two results have the same columns, bit for bit."""
+    return first.names == second.names and all(
+        np.array_equal(first[name], second[name], equal_nan=first[name].dtype.kind == "f")
+        for name in first
+    )
+
+
+def test_a_run_writes_the_bytes_of_the_command(paper, command, tmp_path):
+    paper.start_values["plant.F_c"] = 20
+    paper.add_fault("controller.x_p", "bias", value=0.01, start=0.1)
+    file = tmp_path / "system.toml"
+    file.write_text(paper.to_toml(), encoding="utf-8")
+    command("run", file, "--out", tmp_path / "command")
+    expected = (tmp_path / "command" / "results.csv").read_bytes()
+    for name, system in [("built", paper), ("read", af.System.from_toml(file))]:
+        system.run().to_csv(tmp_path / f"{name}.csv")
+        assert (tmp_path / f"{name}.csv").read_bytes() == expected, name
+    paper.run(file=tmp_path / "direct.csv")
+    assert (tmp_path / "direct.csv").read_bytes() == expected
+
+
+def test_the_arguments_of_a_run_do_what_the_options_of_the_command_do(paper, command, tmp_path):
+    file = tmp_path / "system.toml"
+    file.write_text(paper.to_toml(), encoding="utf-8")
+    options = ["--set", "plant.M=3.5", "--stop-time", 0.15, "--step", 0.002, "--method", "jacobi"]
+    options += ["--record", "plant.*", "--exclude", "*der*", "--record-every", "step"]
+    command("run", file, "--out", tmp_path / "command", *options)
+    results = paper.run(
+        start_values={"plant.M": 3.5},
+        stop_time=0.15,
+        step=0.002,
+        algorithm={"method": "jacobi"},
+        record=["plant.*"],
+        exclude=["*der*"],
+        record_every="step",
+    )
+    results.to_csv(tmp_path / "own.csv")
+    assert (tmp_path / "own.csv").read_bytes() == (tmp_path / "command" / "results.csv").read_bytes()
+    # The system itself keeps its settings.
+    assert "plant.M" not in paper.start_values and len(paper.run()) == 21
+
+
+def test_the_paper_is_the_experiment_of_the_command(command, tmp_path):
+    packed = af.fmus()
+    file = tmp_path / "system.toml"
+    file.write_text(
+        f"[fmus]\nplant = '{packed['FrictionPendulum']}'\ncontroller = '{packed['AsoController']}'\n",
+        encoding="utf-8",
+    )
+    options = ["--stop-time", 5, "--step", 0.001, "--record-every", 0.01]
+    command("run", file, *options, "--out", tmp_path)
+    af.reproduce(stop_time=5.0).to_csv(tmp_path / "own.csv")
+    assert (tmp_path / "own.csv").read_bytes() == (tmp_path / "results.csv").read_bytes()
+
+
+def test_a_dict_a_text_and_calls_describe_the_same_system(paper):
+    text = paper.to_toml()
+    own = paper.to_dict()
+    for other in (af.System(text), af.System(own), pickle.loads(pickle.dumps(paper)), paper.copy()):
+        assert other.to_toml() == text
+        assert same(other.run(), paper.run())
+
+
+@pytest.mark.skipif(not SSP.exists(), reason="pack --ssp makes it")
+def test_an_ssp_runs_as_by_the_command(command, tmp_path):
+    command("run", SSP, "--stop-time", 0.2, "--out", tmp_path)
+    system = af.System.from_ssp(SSP)
+    for _ in range(2):
+        system.run(stop_time=0.2).to_csv(tmp_path / "own.csv")
+        assert (tmp_path / "own.csv").read_bytes() == (tmp_path / "results.csv").read_bytes()
+    assert list(system.files()) == [str(SSP)]
+
+
+def test_files_have_hashes_and_may_be_elsewhere(paper, tmp_path):
+    packed = af.fmus()
+    assert set(paper.files()) == {str(packed["FrictionPendulum"]), str(packed["AsoController"])}
+    moved = {}
+    for path, digest in paper.files().items():
+        moved[path] = tmp_path / f"{digest}.fmu"
+        moved[path].write_bytes(Path(path).read_bytes())
+    other = paper.with_files(moved)
+    assert sorted(other.files().values()) == sorted(paper.files().values())
+    assert set(other.files()) == {str(path) for path in moved.values()}
+    assert same(other.run(), paper.run())
+
+
+def test_isolated_fmus_give_the_same_rows(paper):
+    assert same(paper.run(isolate=True, stop_time=0.05), paper.run(stop_time=0.05))
+
+
+def test_runs_in_threads_give_the_same_rows(paper):
+    values = [20.0 + k for k in range(8)]
+
+    def run(value):
+        return paper.run(start_values={"plant.F_c": value})
+
+    with ThreadPoolExecutor(4) as pool:
+        threaded = list(pool.map(run, values))
+    assert all(same(run(value), own) for value, own in zip(values, threaded))
+
+
+def test_a_run_ends_at_its_time_limit_with_the_rows_up_to_it(paper):
+    start = time.perf_counter()
+    with pytest.raises(af.TimeLimitError) as caught:
+        paper.run(stop_time=1e6, record_every=1.0, time_limit=0.1)
+    assert 0.1 <= time.perf_counter() - start < 2.0
+    error = caught.value
+    assert isinstance(error, TimeoutError) and len(error.results) > 1
+    assert error.results.end == "time limit" and error.time == error.results.end_time
+
+
+def test_another_thread_cancels_a_run(paper):
+    cancel = af.Cancel()
+    threading.Timer(0.1, cancel.cancel).start()
+    with pytest.raises(af.CancelledError):
+        paper.run(stop_time=1e6, record_every=1.0, cancel=cancel)
+    assert cancel.cancelled
+
+
+def test_ctrl_c_ends_a_run_within_a_tenth_of_a_second(paper):
+    sent = []
+
+    def interrupt():
+        time.sleep(0.2)
+        sent.append(time.perf_counter())
+        signal.raise_signal(signal.SIGINT)
+
+    thread = threading.Thread(target=interrupt)
+    thread.start()
+    with pytest.raises(KeyboardInterrupt):
+        paper.run(stop_time=1e6, record_every=1.0)
+    assert time.perf_counter() - sent[0] < 0.1
+    thread.join()
+
+
+def test_ctrl_c_ends_a_run_of_slow_steps_after_the_present_one():
+    class Slow:
+        outputs = ("y",)
+        steps = 0
+
+        def step(self, t, dt, inputs):
+            self.steps += 1
+            time.sleep(0.03)
+            if self.steps == 3:
+                signal.raise_signal(signal.SIGINT)
+
+    slow = Slow()
+    with pytest.raises(KeyboardInterrupt):
+        af.System().add("slow", slow).run(stop_time=10.0, step=0.1)
+    assert slow.steps <= 4
+
+
+def test_progress_goes_from_zero_to_one(paper):
+    seen = []
+    paper.run(stop_time=30.0, progress=seen.append)
+    assert seen == sorted(seen) and seen[-1] == 1.0 and all(0.0 <= part <= 1.0 for part in seen)
+
+    def refuse(part):
+        raise RuntimeError(f"at {part}")
+
+    with pytest.raises(RuntimeError, match="at 1.0"):
+        paper.run(progress=refuse)
+
+
+def test_warnings_go_to_logging_and_nothing_to_standard_output(paper, caplog, capfd):
+    del paper.experiment["stop-time"]
+    with caplog.at_level(logging.INFO, logger="aso_ftc"):
+        af.System().add("plant", af.fmus()["FrictionPendulum"]).run(stop_time=0.01)
+        fmu = af.fmus()["AsoController"]
+        af.System({"fmus": {"a": str(fmu), "b": str(fmu)}}).run(stop_time=0.01)
+    assert any("nothing is connected" in record.message for record in caplog.records)
+    captured = capfd.readouterr()
+    assert captured.out == "" and captured.err == ""
+
+
+def resident():
+    """Resident memory of this process in pages."""
+    return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="Linux only")
+def test_a_thousand_runs_leave_no_memory_and_no_files_open(paper):
+    def runs(count):
+        for k in range(count):
+            paper.run(stop_time=0.002, start_values={"plant.F_c": 20.0 + k % 7})
+
+    runs(300)
+    pages, files = resident(), len(list(Path("/proc/self/fd").iterdir()))
+    runs(1000)
+    assert resident() <= 1.01 * pages
+    assert len(list(Path("/proc/self/fd").iterdir())) == files
+
+
+def test_an_fmu_is_opened_once_and_closed_at_the_end(python, tmp_path):
+    program = """
+import os, aso_ftc as af
+system = af.paper()
+for _ in range(3):
+    system.run(stop_time=0.01)
+print(af._core.open_fmus(), len(os.listdir(os.environ["TMPDIR"])), flush=True)
+af.clear()
+print(af._core.open_fmus(), len(os.listdir(os.environ["TMPDIR"])), flush=True)
+system.run(stop_time=0.01)
+if os.fork() == 0:
+    raise SystemExit  # a child must not remove the files of its parent
+os.wait()
+system.run(stop_time=0.01)
+"""
+    done = python(program, env={"TMPDIR": str(tmp_path)})
+    assert done.stdout.split() == ["2", "2", "0", "0"], done.stderr
+    assert done.returncode == 0 and done.stderr == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_changed_fmu_is_opened_again(tmp_path):
+    packed, target = af.fmus(), tmp_path / "model.fmu"
+    for name in ("FrictionPendulum", "AsoController"):
+        target.write_bytes(packed[name].read_bytes())
+        names = {own.name for own in af.System().add("m", target).variables()}
+        assert f"m.{'F_c' if name == 'FrictionPendulum' else 'f_hat'}" in names
+
+
+class Proportional:
+    """A controller in Python: u = -gain y."""
+
+    inputs = ("y",)
+    outputs = {"u": 0.0, "on": False, "count": 0}
+
+    def __init__(self, gain):
+        self.gain, self.calls = gain, []
+
+    def start(self, t, inputs):
+        self.calls = [t]
+        return {"u": -self.gain * inputs["y"]}
+
+    def step(self, t, dt, inputs):
+        self.calls.append(t + dt)
+        return {"u": -self.gain * inputs["y"], "on": inputs["y"] > 0, "count": len(self.calls)}
+
+
+def loop(slave):
+    """The pendulum with a Python object in its loop."""
+    system = af.System({"algorithm": {"step": 0.001}, "experiment": {"stop-time": 0.1}})
+    system.add("plant", af.fmus()["FrictionPendulum"]).add("law", slave)
+    return system.connect("plant.x_p", "law.y").connect("law.u", "plant.u")
+
+
+def test_a_python_object_takes_part_in_the_loop():
+    law = Proportional(2.0)
+    results = loop(law).run()
+    assert np.array_equal(results["law.u"], -2.0 * results["plant.x_p"])
+    assert np.array_equal(results["law.on"][1:], results["plant.x_p"][1:] > 0)
+    assert list(results["law.count"][[0, 1, -1]]) == [0, 2, 101]
+    assert len(law.calls) == 101 and law.calls[-1] == pytest.approx(0.1)
+    again = loop(copy.deepcopy(law)).run()
+    assert same(results, again)
+
+
+def test_an_exception_of_a_python_object_is_the_cause_of_the_error():
+    class Broken(Proportional):
+        def step(self, t, dt, inputs):
+            if t > 0.05:
+                raise ArithmeticError("no solution")
+            return super().step(t, dt, inputs)
+
+    with pytest.raises(af.RunError, match="law at t = 0.05.* raised ArithmeticError: no solution") as caught:
+        loop(Broken(1.0)).run()
+    assert isinstance(caught.value.__cause__, ArithmeticError)
+    assert caught.value.fmu == "law" and len(caught.value.results) > 50
+
+    class Unknown(Proportional):
+        def step(self, t, dt, inputs):
+            return {"v": 1.0}
+
+    with pytest.raises(af.RunError, match="no output v, expected one of u, on, count"):
+        loop(Unknown(1.0)).run()
