@@ -9,7 +9,7 @@ import math
 import os
 import shlex
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -43,6 +43,12 @@ def package(name: str, purpose: str) -> Any:
         missing = name.split(".", 1)[0]
         sentence = f'{purpose} needs the package {missing}: pip install "aso-ftc[campaign]"'
         raise MissingPackageError(sentence, "MissingPackage", {"package": missing}) from error
+
+
+def batches(names: Iterable[str], size: int = 8) -> Iterator[list[str]]:
+    """Return the names in lists of a few, so that reading their columns needs little memory."""
+    known = list(names)
+    return (known[start : start + size] for start in range(0, len(known), size))
 
 
 def outside(values: NDArray[np.float64], limit: Mapping[str, float]) -> NDArray[np.bool_]:
@@ -116,7 +122,9 @@ class Outcome:
 
     # The table.
 
-    def _arrow(self, columns: list[str] | None, *, dictionaries: bool) -> pyarrow.Table:
+    def _arrow(
+        self, columns: list[str] | None, *, dictionaries: bool, runs: Sequence[int] | None = None
+    ) -> pyarrow.Table:
         """Read columns of all parts, rows sorted by ``run``."""
         dataset = package("pyarrow.dataset", "campaign.load()")
         types = package("pyarrow.types", "campaign.load()")
@@ -126,13 +134,17 @@ class Outcome:
             names = text & set(columns or plain.schema.names)
             form = dataset.ParquetFileFormat(dictionary_columns=names)
             plain = dataset.dataset(self._files, format=form)
-        return plain.to_table(columns=columns).unify_dictionaries().sort_by("run")
+        only = None if runs is None else dataset.field("run").isin(list(runs))
+        return plain.to_table(columns=columns, filter=only).unify_dictionaries().sort_by("run")
 
-    def read(self, columns: Sequence[str]) -> pandas.DataFrame:
-        """Read these columns, each once, indexed by ``run``; texts as categories."""
+    def read(self, columns: Sequence[str], runs: Sequence[int] | None = None) -> pandas.DataFrame:
+        """Read these columns, of all runs or of some, indexed by ``run``; texts as categories."""
         package("pandas", "campaign.load()")
-        names = list(dict.fromkeys(columns))
-        frame: pandas.DataFrame = self._arrow(["run", *names], dictionaries=True).to_pandas()
+        table = self._arrow(["run", *dict.fromkeys(columns)], dictionaries=True, runs=runs)
+        frame: pandas.DataFrame = table.to_pandas(split_blocks=True, self_destruct=True)
+        for name in frame.columns[frame.dtypes == "category"]:
+            # The order of the categories must not depend on the parts.
+            frame[name] = frame[name].cat.set_categories(sorted(frame[name].cat.categories))
         return frame.set_index("run")
 
     def to_arrow(self) -> pyarrow.Table:
@@ -148,6 +160,11 @@ class Outcome:
 
     def __len__(self) -> int:
         return len(self._status)
+
+    @property
+    def runs(self) -> NDArray[np.int64]:
+        """Run numbers of the rows."""
+        return np.asarray(self._status.index.to_numpy(), dtype=np.int64)
 
     @property
     def statuses(self) -> dict[str, int]:
@@ -498,18 +515,19 @@ class Outcome:
             ``highest_tenth``, ``failed`` (fraction of these runs) and ``median`` of the measure.
         """
         self._measured(measure)
-        frame = self.read([measure, *self.inputs])
-        values = np.asarray(frame[measure].to_numpy(), dtype=np.float64)
-        known = measure in self.limits
-        failed = self.failed(measure) if known else np.full(len(values), np.nan)
+        values = np.asarray(self.read([measure])[measure].to_numpy(), dtype=np.float64)
+        values = np.where(self.unfinished, np.nan, values)
+        failed = self.failed(measure) if measure in self.limits else np.full(len(values), np.nan)
         spearman = package("scipy.stats", "influence()").spearmanr
         numbers: list[dict[str, Any]] = []
         others: list[dict[str, Any]] = []
-        for name, numeric in self.inputs.items():
-            if numeric:
-                inputs = np.asarray(frame[name].to_numpy(), dtype=np.float64)
-                numbers.append({"parameter": name, **_dependence(inputs, values, failed, spearman)})
-            else:
+        for names in batches(self.inputs):
+            frame = self.read(names)
+            for name in names:
+                if self.inputs[name]:
+                    inputs = np.asarray(frame[name].to_numpy(), dtype=np.float64)
+                    numbers.append({"parameter": name, **_dependence(inputs, values, failed, spearman)})
+                    continue
                 groups = frame.groupby(name, observed=True, sort=True).indices
                 others += [
                     {"parameter": name, "value": value, **_group(values[rows], failed[rows])}
