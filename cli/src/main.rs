@@ -8,6 +8,7 @@
 #[macro_use]
 mod output;
 
+mod campaign;
 mod check;
 mod claims;
 mod crash;
@@ -48,6 +49,9 @@ enum Command {
     Run(Box<run::Options>),
     /// Design observer and feedback for the plant of a plant file
     Design(design::Options),
+    /// Do many runs of a system: sweeps, Monte Carlo, fault campaigns, sensitivity; needs the Python
+    /// package aso-ftc
+    Campaign(campaign::Options),
     /// Check an FMU against the rules of its version of FMI, and try it
     Check(check::Options),
 }
@@ -72,6 +76,7 @@ fn perform(verb: Command) -> ExitCode {
         Command::Pack(options) => pack::pack(&options),
         Command::New(options) => new::new(&options),
         Command::Run(options) => return run::run(&options),
+        Command::Campaign(options) => return campaign::campaign(&options),
         Command::Design(options) => design::design(&options),
         Command::Check(options) => check::check(&options),
     };

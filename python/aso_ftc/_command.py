@@ -26,7 +26,11 @@ def command() -> Path:
 
 
 def main() -> int:
-    """Run the command with the arguments of this process."""
+    """Run the command with the arguments of this process; campaigns are done by this package."""
+    if sys.argv[1:2] == ["campaign"]:
+        from .campaign._command import main as campaign
+
+        return campaign(sys.argv[2:])
     arguments = [str(command()), *sys.argv[1:]]
     if os.name == "nt":
         return subprocess.run(arguments, check=False).returncode

@@ -8,9 +8,6 @@ import sys
 import numpy as np
 import pytest
 
-for package in ("SALib", "pandas", "pyarrow", "scipy"):
-    pytest.importorskip(package)
-
 import pyarrow
 import pyarrow.parquet
 from aso_ftc import ConfigurationError, ResultsError
@@ -39,7 +36,7 @@ def write(
     }
     (folder / "runs").mkdir(parents=True)
     (folder / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
-    plan = {"run": np.arange(runs), **columns}
+    plan = {"row": np.arange(runs), **columns}
     for at, name in enumerate(names if unit is not None else []):
         plan[f"unit:{name}"] = unit[:, at]
     pyarrow.parquet.write_table(pyarrow.table(plan), folder / "plan.parquet")
@@ -102,7 +99,7 @@ def test_sobol_indices_are_within_their_confidence_of_the_closed_form(
     tmp_path, function, count, expected, second_order
 ):
     unit = sobol.sample(problem(count), 4096, calc_second_order=second_order, seed=1)
-    design = {"method": "saltelli", "base": 4096, "second_order": second_order}
+    design = {"method": "saltelli", "base": 4096, "second-order": second_order}
     found = campaign(tmp_path / "c", design, unit, function).sobol("y")
     assert list(found.index) == problem(count)["names"]
     for name, values in expected.items():
@@ -112,7 +109,7 @@ def test_sobol_indices_are_within_their_confidence_of_the_closed_form(
 
 def test_second_order_indices_of_ishigami_show_its_only_interaction(tmp_path):
     unit = sobol.sample(problem(3), 4096, calc_second_order=True, seed=1)
-    outcome = campaign(tmp_path / "c", {"method": "saltelli", "second_order": True}, unit, ishigami)
+    outcome = campaign(tmp_path / "c", {"method": "saltelli", "second-order": True}, unit, ishigami)
     found = outcome.sobol_second_order("y")
     expected = {
         ("plant.p0", "plant.p1"): 0.0,
@@ -122,14 +119,14 @@ def test_second_order_indices_of_ishigami_show_its_only_interaction(tmp_path):
     assert list(found.index) == list(expected)
     assert (abs(found["S2"] - list(expected.values())) <= found["S2_conf"]).all()
     without = sobol.sample(problem(3), 64, calc_second_order=False, seed=1)
-    outcome = campaign(tmp_path / "d", {"method": "saltelli", "second_order": False}, without, ishigami)
-    with pytest.raises(ConfigurationError, match="second_order = true"):
+    outcome = campaign(tmp_path / "d", {"method": "saltelli", "second-order": False}, without, ishigami)
+    with pytest.raises(ConfigurationError, match="second-order = true"):
         outcome.sobol_second_order("y")
 
 
 def test_sobol_indices_of_a_seed_are_the_same_also_in_parts(tmp_path, monkeypatch):
     unit = sobol.sample(problem(3), 1024, calc_second_order=False, seed=1)
-    outcome = campaign(tmp_path / "c", {"method": "saltelli", "second_order": False}, unit, ishigami)
+    outcome = campaign(tmp_path / "c", {"method": "saltelli", "second-order": False}, unit, ishigami)
     one = outcome.sobol("y")
     assert one.equals(outcome.sobol("y", seed=0)) and not one.equals(outcome.sobol("y", seed=1))
     wide = outcome.sobol("y", confidence=0.99)
@@ -195,7 +192,7 @@ def test_indices_of_a_design_with_lost_runs_say_how_many_and_why(tmp_path):
     values = ishigami(unit)
     values[[3, 5, 60]], values[7] = np.nan, np.inf
     columns = dict(zip(problem(3)["names"], unit.T))
-    design = {"method": "saltelli", "second_order": False}
+    design = {"method": "saltelli", "second-order": False}
     outcome = write(tmp_path / "c", design, columns, {"y": values}, unit=unit, status=status, runs=90)
     expected = "14 of 90 have no value: 2 crashed, 1 time limit, 1 without a finite 'y', 10 not run yet"
     with pytest.raises(ConfigurationError, match=expected):
@@ -428,5 +425,5 @@ def test_a_missing_package_names_the_extra(tmp_path):
     )
     done = subprocess.run([sys.executable, "-P", "-c", text], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == (
-        'failure_probability() needs the package scipy: pip install "aso-ftc[campaign]"'
+        'campaigns need the package scipy: pip install "aso-ftc[campaign]"'
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import importlib
 import json
 import math
 import os
@@ -18,7 +17,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .._errors import ConfigurationError, MissingPackageError, ResultsError
+from .._errors import ConfigurationError, ResultsError
+from ._packages import package
 
 if TYPE_CHECKING:
     import pandas
@@ -33,16 +33,6 @@ _INDEPENDENT = ("random",)
 _EVEN = ("latin-hypercube", "sobol", "halton")
 # SALib's number of bootstrap resamples; one call draws at most so many rows.
 _RESAMPLES, _ROWS_OF_A_CALL = 100, 4_000_000
-
-
-def package(name: str, purpose: str) -> Any:
-    """Import a package of the extra ``campaign`` when it is used."""
-    try:
-        return importlib.import_module(name)
-    except ImportError as error:
-        missing = name.split(".", 1)[0]
-        sentence = f'{purpose} needs the package {missing}: pip install "aso-ftc[campaign]"'
-        raise MissingPackageError(sentence, "MissingPackage", {"package": missing}) from error
 
 
 def batches(names: Iterable[str], size: int = 8) -> Iterator[list[str]]:
@@ -126,8 +116,8 @@ class Outcome:
         self, columns: list[str] | None, *, dictionaries: bool, runs: Sequence[int] | None = None
     ) -> pyarrow.Table:
         """Read columns of all parts, rows sorted by ``run``."""
-        dataset = package("pyarrow.dataset", "campaign.load()")
-        types = package("pyarrow.types", "campaign.load()")
+        dataset = package("pyarrow.dataset")
+        types = package("pyarrow.types")
         plain = dataset.dataset(self._files, format="parquet")
         if dictionaries:
             text = {field.name for field in plain.schema if types.is_string(field.type)}
@@ -139,7 +129,7 @@ class Outcome:
 
     def read(self, columns: Sequence[str], runs: Sequence[int] | None = None) -> pandas.DataFrame:
         """Read these columns, of all runs or of some, indexed by ``run``; texts as categories."""
-        package("pandas", "campaign.load()")
+        package("pandas")
         table = self._arrow(["run", *dict.fromkeys(columns)], dictionaries=True, runs=runs)
         frame: pandas.DataFrame = table.to_pandas(split_blocks=True, self_destruct=True)
         for name in frame.columns[frame.dtypes == "category"]:
@@ -154,7 +144,7 @@ class Outcome:
     @cached_property
     def table(self) -> pandas.DataFrame:
         """All runs as a table indexed by ``run``: parameters, measures, ``status``, ``reason``, ``seconds``."""
-        package("pandas", "table")
+        package("pandas")
         frame: pandas.DataFrame = self.to_arrow().to_pandas()
         return frame.set_index("run")
 
@@ -220,7 +210,7 @@ class Outcome:
     @cached_property
     def _units(self) -> list[str]:
         """The sampled parameters, in the order of the sample."""
-        parquet = package("pyarrow.parquet", "sensitivity indices")
+        parquet = package("pyarrow.parquet")
         names = parquet.read_schema(self.folder / "plan.parquet").names
         return [name.removeprefix("unit:") for name in names if name.startswith("unit:")]
 
@@ -265,7 +255,7 @@ class Outcome:
         return problem, values
 
     def _table(self, names: Any, columns: Mapping[str, Any], index: str = "parameter") -> pandas.DataFrame:
-        pandas_ = package("pandas", "sensitivity indices")
+        pandas_ = package("pandas")
         frame: pandas.DataFrame = pandas_.DataFrame(
             {name: np.asarray(values, dtype=np.float64) for name, values in columns.items()},
             index=pandas_.Index(names, name=index),
@@ -298,7 +288,7 @@ class Outcome:
         return self._table(self._units, {name: found[name] for name in ("S1", "S1_conf", "ST", "ST_conf")})
 
     def sobol_second_order(self, measure: str, confidence: float = 0.95, seed: int = 0) -> pandas.DataFrame:
-        """Return Sobol indices of second order of a design ``saltelli`` with ``second_order = true``.
+        """Return Sobol indices of second order of a design ``saltelli`` with ``second-order = true``.
 
         ``S2_ij = Var(E[Y | X_i, X_j]) / Var(Y) - S1_i - S1_j``; estimator of Saltelli (2002) in SALib.
         Same arguments and errors as :meth:`sobol`.
@@ -308,12 +298,12 @@ class Outcome:
         """
         problem, values = self._sample(measure, "saltelli", "Sobol indices")
         if self._block == len(self._units) + 2:
-            sentence = "Sobol indices of second order need the design 'saltelli' with second_order = true"
-            raise ConfigurationError(sentence, "WrongDesign", {"expected": "second_order"})
+            sentence = "Sobol indices of second order need the design 'saltelli' with second-order = true"
+            raise ConfigurationError(sentence, "WrongDesign", {"expected": "second-order"})
         found = _sobol(problem, values, True, len(values) // self._block, confidence, seed)
         upper = np.triu_indices(len(self._units), 1)
         pairs = [(self._units[i], self._units[j]) for i, j in zip(*upper)]
-        index = package("pandas", "Sobol indices").MultiIndex.from_tuples(pairs, names=["first", "second"])
+        index = package("pandas").MultiIndex.from_tuples(pairs, names=["first", "second"])
         frame = self._table(range(len(pairs)), {name: found[name][upper] for name in ("S2", "S2_conf")})
         return frame.set_axis(index)
 
@@ -321,7 +311,7 @@ class Outcome:
     def _block(self) -> int:
         """Rows of a design ``saltelli`` for one base sample: A, D times AB, D times BA, B."""
         count = len(self._units)
-        return 2 * count + 2 if self.manifest["design"].get("second_order") else count + 2
+        return 2 * count + 2 if self.manifest["design"].get("second-order") else count + 2
 
     def morris(self, measure: str, confidence: float = 0.95, seed: int = 0) -> pandas.DataFrame:
         """Return the elementary effects of a campaign with the design ``morris``.
@@ -344,13 +334,13 @@ class Outcome:
             ConfigurationError: another design, or a run without a value.
         """
         problem, values = self._sample(measure, "morris", "Morris indices")
-        parquet = package("pyarrow.parquet", "Morris indices")
+        parquet = package("pyarrow.parquet")
         plan = parquet.read_table(
-            self.folder / "plan.parquet", columns=["run", *(f"unit:{name}" for name in self._units)]
-        ).sort_by("run")
+            self.folder / "plan.parquet", columns=["row", *(f"unit:{name}" for name in self._units)]
+        ).sort_by("row")
         positions = np.column_stack([plan.column(f"unit:{name}").to_numpy() for name in self._units])
         levels = int(self.manifest["design"].get("levels", 4))
-        found = package("SALib.analyze.morris", "Morris indices").analyze(
+        found = package("SALib.analyze.morris").analyze(
             problem,
             np.asarray(positions, dtype=np.float64),
             values,
@@ -381,7 +371,7 @@ class Outcome:
             ConfigurationError: another design, or a run without a value.
         """
         problem, values = self._sample(measure, "fast", "FAST indices")
-        analyze = package("SALib.analyze.fast", "FAST indices").analyze
+        analyze = package("SALib.analyze.fast").analyze
         harmonics = int(self.manifest["design"].get("harmonics", 4))
         # SALib draws from NumPy's global generator, which is not ours to change.
         state = np.random.get_state()
@@ -470,7 +460,7 @@ class Outcome:
         if count == 0:
             raise ConfigurationError("a failure probability needs at least one finished run", "NoRuns")
         failures = int(failed[rows].sum())
-        test = package("scipy.stats", "failure_probability()").binomtest(failures, count)
+        test = package("scipy.stats").binomtest(failures, count)
         bounds = test.proportion_ci(confidence_level=confidence, method="exact")
         notes = []
         if method in _EVEN:
@@ -518,7 +508,7 @@ class Outcome:
         values = np.asarray(self.read([measure])[measure].to_numpy(), dtype=np.float64)
         values = np.where(self.unfinished, np.nan, values)
         failed = self.failed(measure) if measure in self.limits else np.full(len(values), np.nan)
-        spearman = package("scipy.stats", "influence()").spearmanr
+        spearman = package("scipy.stats").spearmanr
         numbers: list[dict[str, Any]] = []
         others: list[dict[str, Any]] = []
         for names in batches(self.inputs):
@@ -535,7 +525,7 @@ class Outcome:
                 ]
         numbers.sort(key=lambda row: -abs(np.nan_to_num(row["correlation"])))
         columns = ["parameter", "value", "runs", "correlation", "p_value", "lowest_tenth", "highest_tenth"]
-        pandas_ = package("pandas", "influence()")
+        pandas_ = package("pandas")
         found = pandas_.DataFrame(numbers + others, columns=[*columns, "failed", "median"])
         result: pandas.DataFrame = found.set_index("parameter")
         return result
@@ -601,7 +591,7 @@ def _sobol(
     A part has ``base * resamples`` random rows; with n parts of equal size, the variance of all
     resamples is the mean of the variances of the parts. Small campaigns need one part.
     """
-    analyze = package("SALib.analyze.sobol", "Sobol indices").analyze
+    analyze = package("SALib.analyze.sobol").analyze
     sizes = (_RESAMPLES, 50, 25, 10, 5, 2)
     size = next((size for size in sizes if size * base <= _ROWS_OF_A_CALL), sizes[-1])
     found: dict[str, Any] = {}

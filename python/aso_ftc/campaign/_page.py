@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._errors import ConfigurationError, ResultsError
-from ._analysis import batches, describe, package
+from ._analysis import batches, describe
+from ._packages import package
 
 if TYPE_CHECKING:
     from ._analysis import Outcome
@@ -39,7 +40,7 @@ def write(outcome: Outcome, path: Path, force: bool) -> None:
     if not force and path.exists() and _MARK not in _head(path):
         sentence = f"{path}: this file is no page of a campaign and is kept; force=True overwrites it"
         raise ConfigurationError(sentence, "FileExists", {"path": str(path)})
-    script = package("plotly.offline", "page()").get_plotlyjs()
+    script = package("plotly.offline").get_plotlyjs()
     text = _page(outcome, script)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:

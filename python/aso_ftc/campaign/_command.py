@@ -1,0 +1,119 @@
+"""The command ``aso-ftc campaign``."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+import warnings
+from pathlib import Path
+
+from .._errors import ConfigurationError, Error
+from ._analysis import Outcome, describe, load
+from ._campaign import Campaign
+from ._folder import MANIFEST, system_of
+
+__all__ = ["main"]
+
+_REPORT = "report.html"
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="aso-ftc campaign",
+        description="Do many runs of a system: sweeps, Monte Carlo, fault campaigns, sensitivity",
+    )
+    parser.add_argument(
+        "campaign", type=Path, help="a campaign.toml; with --report or --show, the folder of its results"
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="FOLDER",
+        help="folder of the results [default: results/NAME]; a folder where this campaign was interrupted goes on",
+    )
+    parser.add_argument(
+        "--workers", type=int, metavar="N", help="number of local processes [default: number of processors]"
+    )
+    parser.add_argument(
+        "--scheduler", metavar="ADDRESS", help="address of a Dask scheduler, such as tcp://host:8786"
+    )
+    parser.add_argument(
+        "--check", action="store_true", help="find what is wrong before the first run, and do not run"
+    )
+    parser.add_argument(
+        "--show", type=int, metavar="RUN", help="print the system.toml of a run, for aso-ftc run"
+    )
+    parser.add_argument(
+        "--report", type=Path, metavar="FILE", help="only write the page of the results in this folder"
+    )
+    return parser
+
+
+def main(words: list[str]) -> int:
+    """Run the command; return its exit status."""
+    chosen = _parser().parse_args(words)
+    warnings.showwarning = lambda message, *_, **__: print(f"warning: {message}", file=sys.stderr)
+    try:
+        return _perform(chosen)
+    except Error as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2 if isinstance(error, (ConfigurationError, ImportError)) else 1
+    except KeyboardInterrupt:
+        print("error: interrupted; the same command goes on where it stopped", file=sys.stderr)
+        return 130
+
+
+def _perform(chosen: argparse.Namespace) -> int:
+    given: Path = chosen.campaign
+    if chosen.show is not None:
+        sys.stdout.write(system_of(given, chosen.show).to_toml())
+        return 0
+    if chosen.report is not None:
+        load(given).page(chosen.report)
+        return 0
+    if (given / MANIFEST).is_file():
+        raise ConfigurationError(f"{given} has results: name the campaign.toml, or use --report or --show")
+    campaign = Campaign.from_toml(given)
+    folder = chosen.out if chosen.out is not None else Path("results") / campaign.name
+    if chosen.check:
+        campaign.check()
+        print(f"{campaign.name}: {len(campaign)} runs")
+        return 0
+    outcome = campaign.run(folder, workers=chosen.workers, scheduler=chosen.scheduler)
+    page = folder / _REPORT
+    outcome.page(page, force=True)
+    print(_summary(outcome))
+    print(f"report: {shlex.quote(str(page))}")
+    return 0 if (outcome.table["status"] == "ok").any() else 1
+
+
+def _summary(outcome: Outcome) -> str:
+    """What the user must know: unfinished runs, limits, and which parameter matters for each limit."""
+    runs = len(outcome)
+    lines = [f"{outcome.manifest['name']}: {runs} runs"]
+    statuses = {name: count for name, count in outcome.statuses.items() if name != "ok"}
+    if statuses:
+        shown = ", ".join(f"{count} {name}" for name, count in statuses.items())
+        lines.append(
+            f"{sum(statuses.values())} of {runs} runs did not finish ({shown}); the report has the reasons"
+        )
+    for name, limit in outcome.limits.items():
+        failures = int(outcome.failed(name).sum())
+        line = f"{name} {describe(limit)}: {runs - failures} of {runs} runs"
+        try:
+            found = outcome.failure_probability(name)
+            line += (
+                f", failure probability {found.lower:.3g} to {found.upper:.3g} ({100 * found.confidence:g} %)"
+            )
+            line += f"; {found.note}" if found.note else ""
+        except ConfigurationError:
+            # The design has no random samples: a fraction, but no probability.
+            pass
+        lines.append(line)
+        influence = outcome.influence(name)
+        numeric = influence[influence["correlation"].notna()].head(3)
+        shown = ", ".join(f"{own} {row.correlation:+.2f}" for own, row in numeric.iterrows())
+        if shown:
+            lines.append(f"  rank correlation with {name}: {shown}")
+    return "\n".join(lines)

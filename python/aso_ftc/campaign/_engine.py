@@ -1,0 +1,419 @@
+"""Does the runs of a campaign with Dask: on processes of this machine, or on any cluster."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import logging
+import os
+import pickle
+import sys
+import tempfile
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .._errors import ConfigurationError, Error
+from ._analysis import Outcome, load
+from ._campaign import Campaign
+from ._folder import Folder, column
+from ._packages import package
+from ._worker import Job, Row, holds
+
+__all__ = ["execute"]
+
+# Seconds within which a cluster must have a worker.
+_PATIENCE = 60.0
+# Tasks that wait at each thread of a worker, so that none waits for the client.
+_AHEAD = 2
+# Seconds after its start before a worker runs anything: Dask does not replace a worker that ends before
+# its nanny has noticed its start (Nanny._on_worker_exit, status "starting").
+_SETTLING = 1.0
+# Seconds for which the number of threads of a cluster is taken as known.
+_KNOWN = 5.0
+# Seconds between two looks at the tasks.
+_PAUSE = 0.005
+
+
+def execute(
+    campaign: Campaign, path: Path, *, workers: int | None, scheduler: str | None, progress: bool
+) -> Outcome:
+    """Do the runs of a campaign that its folder lacks; see :meth:`Campaign.run`."""
+    campaign.check()
+    folder = Folder(path, campaign)
+    folder.begin(campaign)
+    if not folder.manifest["complete"]:
+        work = _Work(campaign, folder, progress)
+        if work.open_parts:
+            with _client(workers, scheduler) as client:
+                work.perform(client, scheduler)
+        work.close()
+    return load(folder.path)
+
+
+@contextlib.contextmanager
+def _client(workers: int | None, scheduler: str | None) -> Iterator[Any]:
+    """A client of the scheduler at an address, or of local processes."""
+    distributed = package("distributed")
+    # What happens to workers is in the results: Dask's own messages repeat it.
+    for name in [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]:
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    if scheduler is not None:
+        if workers is not None:
+            raise ConfigurationError("workers are for local processes, a scheduler has its own")
+        try:
+            client = distributed.Client(scheduler, timeout=10, set_as_default=False)
+        except (OSError, ValueError, TimeoutError) as error:
+            raise Error(f"no Dask scheduler answers at {scheduler}: {error}", "Scheduler") from None
+        try:
+            yield client
+        finally:
+            with contextlib.suppress(Exception):
+                client.close(timeout=5)
+        return
+    count = os.cpu_count() or 1 if workers is None else workers
+    if count < 1:
+        raise ConfigurationError(f"workers = {count}: expected at least 1")
+    with tempfile.TemporaryDirectory(prefix="aso-ftc-") as place:
+        cluster = distributed.LocalCluster(
+            n_workers=count,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address=":0",
+            local_directory=place,
+        )
+        client = distributed.Client(cluster, set_as_default=False)
+        try:
+            yield client
+        finally:
+            with contextlib.suppress(Exception):
+                client.close(timeout=5)
+            cluster.close(timeout=10)
+
+
+class _Plugin:
+    """Keeps the job of a campaign on each worker, also on those that join later.
+
+    Dask calls `setup` once per worker, so that the files travel once.
+    """
+
+    def __init__(self, name: str, job: bytes) -> None:
+        self.name, self.job = name, job
+        self.runner: Any = None
+        self.error = ""
+        self.ready = 0.0
+
+    def setup(self, worker: Any) -> None:
+        self.ready = time.monotonic() + _SETTLING
+        try:
+            place = Path(worker.local_directory) / "aso-ftc-files"
+            self.runner = pickle.loads(self.job).unpack(place)
+            self.runner.check()
+        except Exception as error:
+            self.error = str(error)
+
+    def teardown(self, worker: Any) -> None:
+        del worker
+        self.runner = None
+
+
+def _state(name: str, dask_worker: Any) -> str:
+    """Runs on a worker: what is wrong with it."""
+    plugin = dask_worker.plugins.get(name)
+    return "it has not got the campaign" if plugin is None else str(plugin.error)
+
+
+def _do(name: str, *work: Any) -> list[Row]:
+    """Runs on a worker: some runs of the campaign."""
+    plugin = package("distributed").get_worker().plugins[name]
+    if plugin.error:
+        raise Error(f"this worker cannot run the campaign: {plugin.error}")
+    time.sleep(max(0.0, plugin.ready - time.monotonic()))
+    rows: list[Row] = plugin.runner.runs(*work)
+    return rows
+
+
+class _Tasks:
+    """The tasks that a cluster has at present, and their runs."""
+
+    def __init__(self, client: Any, name: str, work: Callable[[Sequence[int]], tuple[Any, ...]]) -> None:
+        self.client, self.name, self.work = client, name, work
+        self._futures: dict[Any, list[int]] = {}
+        distributed = package("distributed")
+        self._waiting = distributed.as_completed(loop=client.loop, with_results=True, raise_errors=False)
+        self._threads, self._asked, self._alive = 0, -_KNOWN, time.monotonic()
+
+    def __len__(self) -> int:
+        return len(self._futures)
+
+    def _look(self) -> None:
+        """Ask for the threads of the cluster, which may grow and shrink."""
+        now = time.monotonic()
+        if now > self._asked + _KNOWN:
+            self._threads, self._asked = sum(self.client.nthreads().values()), now
+        if self._threads:
+            self._alive = now
+        elif now > self._alive + _PATIENCE:
+            raise Error(
+                f"the scheduler has had no workers for {_PATIENCE:g} s; the same command goes on when there "
+                "are some",
+                "Scheduler",
+            )
+
+    def wanted(self) -> int:
+        """Return how many tasks keep the cluster busy."""
+        self._look()
+        return max(1, self._threads) * (1 + _AHEAD)
+
+    def submit(self, numbers: list[int]) -> None:
+        """Hand runs to the cluster as one task."""
+        key = f"{self.name}-{numbers[0]}-{len(numbers)}-{time.monotonic_ns()}"
+        future = self.client.submit(_do, self.name, *self.work(numbers), pure=False, key=key)
+        self._futures[future] = numbers
+        self._waiting.add(future)
+
+    def next(self) -> tuple[list[int], Any]:
+        """Wait for a task; return its runs and its rows, its exception, or ``None`` if it was lost."""
+        while not self._waiting.has_ready():
+            self._look()
+            time.sleep(_PAUSE)
+        future, result = next(self._waiting)
+        numbers = self._futures.pop(future)
+        status = future.status
+        future.release()
+        if status == "error":
+            return numbers, result[1]
+        return numbers, result if isinstance(result, list) else None
+
+    def cancel(self) -> None:
+        """Forget all tasks."""
+        for future in self._futures:
+            future.cancel()
+
+
+class _Work:
+    """The runs of a campaign that are to be done."""
+
+    def __init__(self, campaign: Campaign, folder: Folder, progress: bool) -> None:
+        self.campaign, self.folder = campaign, folder
+        self.total, self.size = len(campaign), campaign.runs_per_task
+        self.done = set(folder.parts())
+        self.progress = _Progress(self.total, progress and sys.stderr.isatty())
+        for first in self.done:
+            self.progress.add(min(self.size, self.total - first), 0)
+        # Rows of parts that are not whole yet, by the first run of the part.
+        self.rows: dict[int, dict[int, Row]] = {}
+        self.last = self.total
+        self._stopper = _Stopper(campaign) if campaign.stop else None
+        self._advance()
+
+    @property
+    def open_parts(self) -> list[int]:
+        """The first runs of the parts that are not done."""
+        return [first for first in range(0, self.last, self.size) if first not in self.done]
+
+    def _numbers(self, first: int) -> list[int]:
+        return list(range(first, min(first + self.size, self.total)))
+
+    def perform(self, client: Any, scheduler: str | None) -> None:
+        """Do the runs on a cluster and write each part when it is whole."""
+        distributed = package("distributed")
+        name = f"aso-ftc-{self.folder.manifest['identity'][:16]}"
+        gone = Error(
+            f"the scheduler {scheduler or 'of the local workers'} was lost; finished runs are in "
+            f"{self.folder.path}, and the same command goes on",
+            "Scheduler",
+        )
+        try:
+            self._prepare(client, name)
+            tasks = _Tasks(client, name, self._task)
+            left, suspects = iter(self.open_parts), deque[int]()
+            while True:
+                while len(tasks) < tasks.wanted() and (first := next(left, self.last)) < self.last:
+                    tasks.submit(self._numbers(first))
+                # One run of a task may have ended its worker. Each runs alone, so that none is blamed for another.
+                if not tasks and suspects:
+                    tasks.submit([suspects.popleft()])
+                if not tasks:
+                    break
+                numbers, result = tasks.next()
+                if isinstance(result, list):
+                    self._accept(result)
+                elif not isinstance(result, distributed.KilledWorker):
+                    raise gone if result is None else _of_worker(result)
+                elif len(numbers) > 1:
+                    suspects.extend(numbers)
+                else:
+                    self._accept([_lost(numbers[0])])
+                # The parts before an early end are done.
+                if self.last < self.total:
+                    tasks.cancel()
+                    break
+        except (distributed.comm.CommClosedError, OSError, TimeoutError) as error:
+            if isinstance(error, Error):
+                raise
+            raise gone from error
+        except RuntimeError as error:
+            if client.status in ("closed", "closing", "connecting"):
+                raise gone from error
+            raise
+        finally:
+            self.progress.close()
+            with contextlib.suppress(Exception):
+                if client.status == "running":
+                    client.unregister_worker_plugin(name)
+
+    def _prepare(self, client: Any, name: str) -> None:
+        """Give the job to all workers, and ask each whether it can run it."""
+        try:
+            client.wait_for_workers(1, timeout=_PATIENCE)
+        except TimeoutError:
+            raise Error(
+                f"the scheduler has no workers within {_PATIENCE:g} s: start some", "Scheduler"
+            ) from None
+        plugin = _plugin(name, pickle.dumps(Job.of(self.campaign)))
+        client.register_plugin(plugin, name=name)
+        for worker, wrong in client.run(_state, name).items():
+            if wrong:
+                raise Error(f"worker {worker}: {wrong}", "Worker", {"worker": worker})
+        # Dask's page needs the package bokeh.
+        if self.progress.shown and importlib.util.find_spec("bokeh"):
+            print(f"dashboard: {client.dashboard_link}", file=sys.stderr)
+
+    def _task(self, numbers: Sequence[int]) -> tuple[list[int], dict[str, list[Any]], list[int]]:
+        rows = [self.campaign.plan.row(number) for number in numbers]
+        names = [parameter.name for parameter in self.campaign.parameters]
+        return (
+            list(numbers),
+            {name: [row[0][name] for row in rows] for name in names},
+            [row[1] for row in rows],
+        )
+
+    def _accept(self, rows: Sequence[Row]) -> None:
+        first = rows[0].run - rows[0].run % self.size
+        part = self.rows.setdefault(first, {})
+        for row in rows:
+            if row.signals is not None:
+                self.folder.write_signals(row.run, row.signals)
+                row.signals = None
+            part[row.run] = row
+        self.progress.add(len(rows), sum(row.status != "ok" for row in rows))
+        numbers = self._numbers(first)
+        if len(part) == len(numbers):
+            self.folder.write_part(first, self._table([part[number] for number in numbers]))
+            del self.rows[first]
+            self.done.add(first)
+            self._advance()
+
+    def _table(self, rows: Sequence[Row]) -> Any:
+        arrow = package("pyarrow")
+        campaign = self.campaign
+        found = [campaign.plan.row(row.run) for row in rows]
+        columns: dict[str, Any] = {"run": arrow.array([row.run for row in rows], arrow.int64())}
+        for parameter in campaign.parameters:
+            columns[parameter.name] = column(parameter.kind, [own[0][parameter.name] for own in found])
+        if campaign.cases:
+            cases = [campaign.plan.faults[own[1]] for own in found]
+            for name, values, kind in (
+                ("fault", [case.label for case in cases], arrow.string()),
+                ("fault.connection", [case.connection for case in cases], arrow.string()),
+                ("fault.kind", [case.kind for case in cases], arrow.string()),
+                ("fault.size", [case.size for case in cases], arrow.float64()),
+                ("fault.from", [case.start for case in cases], arrow.float64()),
+            ):
+                columns[name] = arrow.array(values, kind)
+        for name in [*campaign.expressions, *campaign.functions]:
+            columns[name] = arrow.array([row.measures.get(name, np.nan) for row in rows], arrow.float64())
+        columns["status"] = arrow.array([row.status for row in rows], arrow.string())
+        columns["reason"] = arrow.array([row.reason for row in rows], arrow.string())
+        columns["seconds"] = arrow.array([row.seconds for row in rows], arrow.float64())
+        return arrow.table(columns)
+
+    def _advance(self) -> None:
+        """End the campaign where its interval is narrow enough: at a part, whatever workers there are."""
+        while self._stopper is not None and self._stopper.next in self.done:
+            if self._stopper.take(self.folder.part(self._stopper.next)):
+                self.last, self._stopper = min(self._stopper.next, self.total), None
+
+    def close(self) -> None:
+        """Remove parts behind the end of a campaign that ended early, and state that it is complete."""
+        for first in sorted(self.done):
+            if first >= self.last:
+                self.folder.part(first).unlink(missing_ok=True)
+        for path in (self.folder.path / "signals").glob("run-*.parquet"):
+            if int(path.stem[4:]) >= self.last:
+                path.unlink(missing_ok=True)
+        self.folder.finish(min(self.last, self.total))
+
+
+class _Stopper:
+    """Reads parts in their order and says when the interval of a limit is narrow enough."""
+
+    def __init__(self, campaign: Campaign) -> None:
+        self.own, self.limit = campaign.stop, campaign.limits[campaign.stop["limit"]]
+        self.size = campaign.runs_per_task
+        # The first run of the next part.
+        self.next = self.runs = self.failures = 0
+
+    def take(self, part: Path) -> bool:
+        """Count the runs of the next part."""
+        table = package("pyarrow.parquet").read_table(part, columns=[self.own["limit"], "status"])
+        pairs = zip(table[self.own["limit"]].to_pylist(), table["status"].to_pylist(), strict=True)
+        bad = sum(status != "ok" or not holds(self.limit, value) for value, status in pairs)
+        self.runs, self.failures = self.runs + table.num_rows, self.failures + bad
+        self.next += self.size
+        test = package("scipy.stats").binomtest(self.failures, self.runs)
+        bounds = test.proportion_ci(confidence_level=self.own["confidence"], method="exact")
+        return bool(bounds.high - bounds.low <= self.own["width"])
+
+
+def _plugin(name: str, job: bytes) -> Any:
+    """Return the plugin, of the class that Dask expects."""
+    base = package("distributed").diagnostics.plugin.WorkerPlugin
+    made = type("CampaignPlugin", (_Plugin, base), {"idempotent": True})
+    return made(name, job)
+
+
+def _of_worker(error: BaseException) -> Error:
+    return error if isinstance(error, Error) else Error(f"a worker failed: {error}", "Worker")
+
+
+def _lost(run: int) -> Row:
+    reason = (
+        "its worker ended several times during the run (an FMU crashed, too little memory, or killed): "
+        "isolate = true gives each FMU a process of its own"
+    )
+    return Row(run, {}, "worker lost", reason)
+
+
+class _Progress:
+    """One line on a terminal."""
+
+    def __init__(self, total: int, shown: bool) -> None:
+        self.total, self.shown = total, shown
+        self.count = self.bad = 0
+        self._begin, self._drawn, self._known = time.monotonic(), 0.0, 0
+
+    def add(self, runs: int, bad: int) -> None:
+        """Count runs; draws at most five times a second."""
+        self.count, self.bad = self.count + runs, self.bad + bad
+        now = time.monotonic()
+        if not self.shown or (now - self._drawn < 0.2 and self.count < self.total):
+            return
+        self._drawn = now
+        if not self._known:
+            self._known, self._begin = self.count, now
+        rate = (self.count - self._known) / (now - self._begin) if now > self._begin else 0.0
+        left = f", {rate:.1f} runs/s, {(self.total - self.count) / rate:.0f} s left" if rate > 0 else ""
+        bad_text = f", {self.bad} did not finish" if self.bad else ""
+        text = f"{self.count} of {self.total} runs{bad_text}{left}"
+        print(f"\r{text:<78}", end="", file=sys.stderr, flush=True)
+
+    def close(self) -> None:
+        """End the line."""
+        if self.shown:
+            print(file=sys.stderr)

@@ -1,0 +1,338 @@
+"""Parameters of a campaign, and the designs that choose their values."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._errors import ConfigurationError
+from ._packages import package
+
+__all__ = ["METHODS", "Parameter", "Place", "Sampled", "columns_of_table", "sample", "text"]
+
+Numbers = NDArray[np.float64]
+
+_RANGES = ("from", "to", "logarithmic", "steps")
+# The entries of a design beside its method, with the smallest value of those that are counts.
+METHODS: dict[str, dict[str, int | None]] = {
+    "grid": {},
+    "table": {"file": None},
+    "random": {"runs": 1},
+    "latin-hypercube": {"runs": 1},
+    "sobol": {"runs": 1},
+    "halton": {"runs": 1},
+    "saltelli": {"base": 2, "second-order": None},
+    "morris": {"trajectories": 2, "levels": 2},
+    "fast": {"base": 65, "harmonics": 1},
+}
+_OPTIONAL: dict[str, dict[str, Any]] = {
+    "saltelli": {"second-order": False},
+    "morris": {"levels": 4},
+    "fast": {"harmonics": 4},
+}
+
+
+def _fail(place: str, text: str) -> ConfigurationError:
+    return ConfigurationError(f"{place}: {text}", "Campaign", {"name": place})
+
+
+def _number(place: str, entry: str, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
+        raise _fail(place, f"{entry} = {value!r}: expected a finite number")
+    return float(value)
+
+
+@dataclass(frozen=True)
+class Place:
+    """A parameter as a run needs it: its name and what it sets."""
+
+    name: str
+    places: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter: what it sets, and which values it takes.
+
+    Attributes:
+        name: its name in the results.
+        places: what it sets: variables ``"fmu.variable"``, entries such as ``"algorithm.step"``, or
+            entries of a disturbance such as ``"noise.deviation"``.
+        unit: the unit of the values, if known.
+        levels: its values in a full factorial design; ``None`` for a distribution.
+        kind: ``"integer"``, ``"number"`` or ``"text"`` (which includes Booleans).
+        quantile: the value at a position in [0, 1).
+    """
+
+    name: str
+    places: tuple[str, ...]
+    unit: str | None
+    levels: tuple[Any, ...] | None
+    kind: str
+    quantile: Callable[[Numbers], Sequence[Any]]
+
+    @property
+    def numeric(self) -> bool:
+        """Whether all values are numbers."""
+        return self.kind != "text"
+
+    @property
+    def place(self) -> Place:
+        """Its name and what it sets."""
+        return Place(self.name, self.places)
+
+    @classmethod
+    def read(cls, name: str, entry: Any, nominal: Callable[[str], tuple[Any, str | None]]) -> Parameter:
+        """Read one entry of ``[parameters]``; ``nominal`` gives start value and unit of a variable."""
+        place = f"parameters.{name}"
+        if isinstance(entry, (list, tuple)):
+            entry = {"values": list(entry)}
+        if not isinstance(entry, Mapping):
+            raise _fail(place, f"expected a table such as {{ from = 1.0, to = 2.0 }}, found {entry!r}")
+        own = dict(entry)
+        places = own.pop("set", [name])
+        places = [places] if isinstance(places, str) else places
+        if not places or not all(isinstance(text, str) for text in places):
+            raise _fail(place, f"set = {places!r}: expected names of variables")
+        unit = own.pop("unit", None)
+        kinds = [kind for kind in ("values", "from", "relative", "distribution") if kind in own]
+        if len(kinds) != 1:
+            raise _fail(place, "expected one of values, from and to, relative, distribution")
+        value, found = (None, unit) if unit is not None and kinds[0] != "relative" else nominal(places[0])
+        unit = found if unit is None else unit
+        make = {"values": _listed, "from": _range, "relative": _relative, "distribution": _distribution}
+        levels, quantile = make[kinds[0]](place, own, value)
+        tried = quantile(np.array([0.25, 0.5])) if levels is None else levels
+        return cls(name, tuple(places), unit, levels, _kind(tried), quantile)
+
+
+def text(value: Any) -> str:
+    """Return a value as it is in the results."""
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _kind(values: Iterable[Any]) -> str:
+    if all(isinstance(value, int) and not isinstance(value, bool) for value in values):
+        return "integer"
+    return "text" if any(isinstance(value, (bool, str)) for value in values) else "number"
+
+
+def _unknown(place: str, own: Mapping[str, Any], known: Sequence[str]) -> None:
+    for entry in own:
+        if entry not in known:
+            raise _fail(place, f"unknown entry {entry}: expected {', '.join(known)}")
+
+
+def _listed(place: str, own: dict[str, Any], _: Any) -> tuple[Any, Any]:
+    _unknown(place, own, ["values", "set", "unit"])
+    values = own["values"]
+    if not isinstance(values, (list, tuple)) or not values:
+        raise _fail(place, f"values = {values!r}: expected a list of at least one value")
+    if not all(isinstance(value, (bool, int, float, str)) for value in values):
+        raise _fail(place, "values: expected numbers, true, false or texts")
+    levels = tuple(values)
+    return levels, lambda unit: [levels[int(i)] for i in np.minimum(unit * len(levels), len(levels) - 1)]
+
+
+def _between(place: str, own: Mapping[str, Any], low: float, high: float) -> tuple[Any, Any]:
+    logarithmic = own.get("logarithmic", False)
+    if not isinstance(logarithmic, bool):
+        raise _fail(place, f"logarithmic = {logarithmic!r}: expected true or false")
+    if not low < high:
+        raise _fail(place, f"from = {low}, to = {high}: expected from below to")
+    if logarithmic and low <= 0:
+        raise _fail(place, f"from = {low}: a logarithmic range starts above 0")
+
+    def quantile(unit: Numbers) -> Any:
+        if logarithmic:
+            return np.exp(np.log(low) + unit * (np.log(high) - np.log(low)))
+        return low + unit * (high - low)
+
+    levels = None
+    if "steps" in own:
+        steps = own["steps"]
+        if isinstance(steps, bool) or not isinstance(steps, int) or steps < 2:
+            raise _fail(place, f"steps = {steps!r}: expected a whole number of at least 2")
+        inner = quantile(np.linspace(0.0, 1.0, steps))[1:-1]
+        levels = (low, *(float(value) for value in inner), high)
+    return levels, quantile
+
+
+def _range(place: str, own: dict[str, Any], _: Any) -> tuple[Any, Any]:
+    _unknown(place, own, [*_RANGES, "set", "unit"])
+    if "to" not in own:
+        raise _fail(place, "from without to")
+    return _between(place, own, _number(place, "from", own["from"]), _number(place, "to", own["to"]))
+
+
+def _relative(place: str, own: dict[str, Any], value: Any) -> tuple[Any, Any]:
+    _unknown(place, own, ["relative", "steps", "set", "unit"])
+    part = _number(place, "relative", own["relative"])
+    if part <= 0:
+        raise _fail(place, f"relative = {part}: expected a number above 0")
+    if isinstance(value, (bool, str)) or value is None or value == 0:
+        raise _fail(place, f"relative needs a start value other than 0, found {value!r}")
+    ends = sorted((value * (1 - part), value * (1 + part)))
+    return _between(place, own, *ends)
+
+
+def _distribution(place: str, own: dict[str, Any], _: Any) -> tuple[Any, Any]:
+    stats = package("scipy.stats")
+    name = own["distribution"]
+    family: Any = getattr(stats, name, None) if isinstance(name, str) else None
+    discrete = isinstance(family, stats.rv_discrete)
+    if not isinstance(family, stats.rv_continuous) and not discrete:
+        raise _fail(
+            place, f"distribution = {name!r}: expected a name of scipy.stats, such as norm or uniform"
+        )
+    shapes = [] if family.shapes is None else [text.strip() for text in family.shapes.split(",")]
+    allowed = [*shapes, "loc"] if discrete else [*shapes, "loc", "scale"]
+    _unknown(place, own, ["distribution", *allowed, "set", "unit"])
+    missing = [shape for shape in shapes if shape not in own]
+    if missing:
+        raise _fail(place, f"distribution {name} needs {', '.join(missing)}")
+    frozen = family(**{key: _number(place, key, own[key]) for key in allowed if key in own})
+    if not np.isfinite(frozen.ppf([0.25, 0.5, 0.75])).all():
+        raise _fail(place, f"distribution {name} has no quantiles for these entries: they are out of range")
+    if discrete:
+        return None, lambda unit: [int(value) for value in frozen.ppf(unit)]
+    return None, frozen.ppf
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """The values of a design.
+
+    Attributes:
+        values: a column for each parameter.
+        unit: positions in [0, 1], one row for each run and one column for each parameter; ``None``
+            for a grid or a table.
+    """
+
+    values: dict[str, Any]
+    unit: Numbers | None
+    rows: int
+
+
+def _options(design: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
+    method = design.get("method")
+    if method not in METHODS:
+        raise _fail("design", f"method = {method!r}: expected one of {', '.join(METHODS)}")
+    own = {**_OPTIONAL.get(method, {}), **{key: value for key, value in design.items() if key != "method"}}
+    _unknown("design", own, list(METHODS[method]))
+    for entry, least in METHODS[method].items():
+        if entry not in own:
+            raise _fail("design", f"method {method} needs {entry}")
+        value = own[entry]
+        if least is not None and (isinstance(value, bool) or not isinstance(value, int) or value < least):
+            raise _fail("design", f"{entry} = {value!r}: expected a whole number of at least {least}")
+    return method, own
+
+
+def sample(
+    design: Mapping[str, Any], parameters: Sequence[Parameter], seed: int
+) -> tuple[dict[str, Any], Sampled]:
+    """Return the complete design and its values.
+
+    The same design, parameters and seed give the same values on every machine with the same versions
+    of NumPy, scipy and SALib; a campaign that goes on takes them from its folder.
+    """
+    method, own = _options(design)
+    complete = {"method": method, **own}
+    if method == "table":
+        values: dict[str, Any] = {own.name: list(own.levels or ()) for own in parameters}
+        return {**complete, "file": str(own["file"])}, Sampled(values, None, len(next(iter(values.values()))))
+    if not parameters:
+        if method != "grid":
+            raise _fail("parameters", f"a design {method} needs at least one parameter")
+        return complete, Sampled({}, None, 1)
+    if method == "grid":
+        return complete, _grid(parameters)
+    unit = _unit(method, own, len(parameters), seed)
+    values = {}
+    for column, parameter in enumerate(parameters):
+        found = parameter.quantile(unit[:, column])
+        if parameter.numeric and not np.isfinite(np.asarray(found, dtype=float)).all():
+            raise _fail(
+                f"parameters.{parameter.name}",
+                f"the design {method} reaches the ends of a distribution that has none: "
+                "use a bounded one, such as truncnorm, or from and to",
+            )
+        values[parameter.name] = found
+    return complete, Sampled(values, unit, len(unit))
+
+
+def _grid(parameters: Sequence[Parameter]) -> Sampled:
+    for parameter in parameters:
+        if parameter.levels is None:
+            raise _fail(f"parameters.{parameter.name}", "a grid needs values, or from and to with steps")
+    levels = [parameter.levels or () for parameter in parameters]
+    places = np.unravel_index(np.arange(np.prod([len(own) for own in levels])), [len(own) for own in levels])
+    values = {
+        parameter.name: [own[i] for i in column]
+        for parameter, own, column in zip(parameters, levels, places, strict=True)
+    }
+    return Sampled(values, None, len(places[0]))
+
+
+def columns_of_table(file: Any, folder: Path) -> dict[str, list[Any]]:
+    """Return the columns of a user's .csv or .parquet file, without a column ``run``."""
+    if not isinstance(file, (str, os.PathLike)):
+        raise _fail("design.file", f"{file!r}: expected the path of a .csv or .parquet file")
+    path = folder / file
+    kind = "parquet" if path.suffix == ".parquet" else "csv"
+    reader = package(f"pyarrow.{kind}")
+    try:
+        table = reader.read_table(path) if kind == "parquet" else reader.read_csv(path)
+    except (OSError, ValueError) as error:
+        raise _fail("design.file", f"{path} cannot be read as a table: {error}") from None
+    columns = {name: table[name].to_pylist() for name in table.column_names if name != "run"}
+    if not table.num_rows or not columns:
+        raise _fail("design.file", f"{path} has no values")
+    for name, column in columns.items():
+        for row, value in enumerate(column, 1):
+            if value is None or (isinstance(value, float) and not np.isfinite(value)):
+                raise _fail("design.file", f"{path}, row {row}: {name} has no value")
+    return columns
+
+
+def _unit(method: str, own: Mapping[str, Any], count: int, seed: int) -> Numbers:
+    if method == "random":
+        return np.random.default_rng(seed).random((own["runs"], count))
+    if method in ("latin-hypercube", "sobol", "halton"):
+        qmc = package("scipy.stats").qmc
+        engine = {"latin-hypercube": qmc.LatinHypercube, "sobol": qmc.Sobol, "halton": qmc.Halton}[method]
+        runs = own["runs"]
+        if method == "sobol" and runs & (runs - 1):
+            power = 1 << (runs - 1).bit_length()
+            warnings.warn(
+                f"design: {runs} Sobol points are not balanced, a power of two such as {power} is",
+                stacklevel=2,
+            )
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)
+            return np.asarray(engine(count, rng=np.random.default_rng(seed)).random(runs))
+    problem = {"num_vars": count, "names": [f"x{i}" for i in range(count)], "bounds": [[0.0, 1.0]] * count}
+    if method == "saltelli":
+        if own["base"] & (own["base"] - 1):
+            raise _fail("design", f"base = {own['base']}: expected a power of two")
+        sampler = package("SALib.sample.sobol")
+        return np.asarray(
+            sampler.sample(problem, own["base"], calc_second_order=own["second-order"], seed=seed)
+        )
+    if method == "morris":
+        sampler = package("SALib.sample.morris")
+        unit = sampler.sample(problem, own["trajectories"], num_levels=own["levels"], seed=seed)
+        return np.asarray(unit)
+    least = 4 * own["harmonics"] ** 2 + 1
+    if own["base"] < least:
+        raise _fail("design", f"base = {own['base']}: {own['harmonics']} harmonics need at least {least}")
+    sampler = package("SALib.sample.fast_sampler")
+    return np.asarray(sampler.sample(problem, own["base"], M=own["harmonics"], seed=seed))

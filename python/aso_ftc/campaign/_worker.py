@@ -1,0 +1,240 @@
+"""What a worker does: it keeps the files of a campaign and does runs."""
+
+from __future__ import annotations
+
+import io
+import os
+import runpy
+import tarfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from .._errors import Error, RunError, TimeLimitError
+from .._system import System
+from ._campaign import Campaign, FaultCase, Place, arguments, changes
+from ._folder import parquet_bytes
+from ._measures import Expression
+
+__all__ = ["Job", "Row", "pack"]
+
+
+@dataclass
+class Row:
+    """The outcome of one run."""
+
+    run: int
+    measures: dict[str, float]
+    status: str = "ok"
+    reason: str = ""
+    seconds: float = 0.0
+    signals: bytes | None = None
+
+
+@dataclass
+class Job:
+    """A campaign as it travels to the workers: everything but the values of the runs."""
+
+    version: str
+    system: System
+    files: dict[str, tuple[str, bytes]]
+    parameters: list[Place]
+    disturbances: dict[str, Any]
+    cases: tuple[FaultCase, ...]
+    expressions: dict[str, str]
+    functions: dict[str, tuple[str, str]]
+    limits: dict[str, Any]
+    keep: dict[str, Any]
+    seed: int
+    record_every: Any
+    options: dict[str, Any]
+    paths: dict[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, campaign: Campaign) -> Job:
+        """Return the job of a campaign; reads its files."""
+        paths = campaign.describe()["files"]
+        options: dict[str, Any] = {"time_limit": campaign.time_limit}
+        if campaign.isolate:
+            options |= {
+                "isolate": True,
+                "call_time_limit": campaign.time_limit,
+                "memory_limit": campaign.memory_limit,
+            }
+        return cls(
+            version=_core.__version__,
+            system=campaign.system.copy(),
+            files={digest: pack(path) for path, digest in paths.items()},
+            parameters=[own.place for own in campaign.parameters],
+            disturbances=campaign.disturbances,
+            cases=campaign.plan.faults,
+            expressions={name: own.text for name, own in campaign.expressions.items()},
+            functions=campaign.functions,
+            limits=campaign.limits,
+            keep=campaign.keep,
+            seed=campaign.seed,
+            record_every=campaign.record_every,
+            options=options,
+            paths=paths,
+        )
+
+    def unpack(self, folder: Path) -> Runner:
+        """Write the files that the folder lacks and return what does the runs."""
+        if self.version != _core.__version__:
+            raise Error(
+                f"this worker has aso_ftc {_core.__version__}, the campaign {self.version}: install the same version"
+            )
+        placed = {}
+        for path, digest in self.paths.items():
+            name, content = self.files[digest]
+            placed[path] = str(_place(folder / digest, name, content))
+        system = self.system.with_files(
+            {path: place for path, place in placed.items() if path not in self._sources}
+        )
+        functions = {name: (placed[path], own) for name, (path, own) in self.functions.items()}
+        return Runner(self, system, functions)
+
+    @property
+    def _sources(self) -> set[str]:
+        return {path for path, _ in self.functions.values()}
+
+
+def pack(path: str) -> tuple[str, bytes]:
+    """Return the name and the content of a file; of a folder a tar archive."""
+    own = Path(path)
+    if own.is_file():
+        return own.name, own.read_bytes()
+    buffer = io.BytesIO()
+    with tarfile.open(fileobj=buffer, mode="w") as archive:
+        archive.add(own, arcname=own.name)
+    return own.name + "/", buffer.getvalue()
+
+
+def _place(folder: Path, name: str, content: bytes) -> Path:
+    """Write a file or a folder below a folder that is named by its content, once."""
+    target = folder / name.rstrip("/")
+    if target.exists():
+        return target
+    temporary = folder.with_name(f"{folder.name}.{os.getpid()}.tmp")
+    temporary.mkdir(parents=True, exist_ok=True)
+    if name.endswith("/"):
+        with tarfile.open(fileobj=io.BytesIO(content)) as archive:
+            archive.extractall(temporary, filter="data")
+    else:
+        (temporary / name).write_bytes(content)
+    try:
+        os.replace(temporary, folder)
+    except OSError:
+        # Another worker with this folder was faster.
+        if not target.exists():
+            raise
+    return target
+
+
+class Runner:
+    """Does the runs of one campaign in this process."""
+
+    def __init__(self, job: Job, system: System, functions: Mapping[str, tuple[str, str]]) -> None:
+        self.job, self.system = job, system
+        self.expressions = {name: Expression(name, text) for name, text in job.expressions.items()}
+        self.functions: dict[str, Callable[..., Any]] = {}
+        for name, (path, own) in functions.items():
+            found = runpy.run_path(path).get(own)
+            if not callable(found):
+                raise Error(f"measures.{name}: {Path(path).name} has no function {own}")
+            self.functions[name] = found
+        signals = sorted(set().union(*(own.signals for own in self.expressions.values())))
+        # A function of the user may read every input, output and local variable.
+        self.record = ["*", *signals] if self.functions else signals or None
+
+    def check(self) -> None:
+        """Open the FMUs and resolve all names, so that an error is known before the first run."""
+        self.system.check(record=self.record)
+
+    def runs(
+        self, numbers: Sequence[int], values: Mapping[str, Sequence[Any]], cases: Sequence[int]
+    ) -> list[Row]:
+        """Do runs: their numbers, the values of the parameters and the numbers of their faults."""
+        rows = []
+        for place, (run, case) in enumerate(zip(numbers, cases, strict=True)):
+            rows.append(self.run(run, {name: column[place] for name, column in values.items()}, case))
+        return rows
+
+    def run(self, run: int, values: Mapping[str, Any], case: int) -> Row:
+        """Do one run. What goes wrong in it becomes its status and its reason."""
+        job = self.job
+        row = Row(run, {name: np.nan for name in [*self.expressions, *self.functions]})
+        begin = time.perf_counter()
+        fault = job.cases[case]
+        try:
+            own = changes(job.parameters, job.disturbances, fault, values, job.seed, run)
+            results = self._simulate(own, self.record, job.record_every)
+            start = np.nan if fault.start is None else fault.start
+            signals = _Signals(results)
+            for name, expression in self.expressions.items():
+                row.measures[name] = expression.value(signals, results.time, values, start)
+            for name, function in self.functions.items():
+                row.measures[name] = float(function(results, {**values, "fault": fault.label}))
+        except TimeLimitError as error:
+            row.status, row.reason = "time limit", str(error)
+        except RunError as error:
+            row.status, row.reason = _status(error), str(error)
+        except Exception as error:
+            row.status, row.reason = (
+                "failed",
+                f"{error}" if isinstance(error, Error) else f"{type(error).__name__}: {error}",
+            )
+        row.seconds = time.perf_counter() - begin
+        if self._kept(row):
+            try:
+                kept = self._simulate(own, job.keep.get("record"), job.keep.get("every"))
+            except RunError as error:
+                kept = error.results
+            except Exception:
+                # The run has its reason; there is nothing to keep.
+                kept = None
+            row.signals = None if kept is None else parquet_bytes(kept.to_arrow())
+        return row
+
+    def _simulate(self, own: Mapping[str, Any], record: Any, every: Any) -> Any:
+        return self.system.run(**arguments(own), **self.job.options, record=record, record_every=every)
+
+    def _kept(self, row: Row) -> bool:
+        keep = self.job.keep
+        if row.run in keep.get("runs", ()):
+            return True
+        if row.status != "ok":
+            return bool(keep.get("unfinished", False))
+        return any(not holds(self.job.limits[name], row.measures[name]) for name in keep.get("outside", ()))
+
+
+def holds(limit: Mapping[str, float], value: float) -> bool:
+    """Whether a value is within its limit; NaN is not."""
+    return value < limit["below"] if "below" in limit else value > limit["above"]
+
+
+class _Signals(Mapping[str, Any]):
+    """The recorded signals of a run by name."""
+
+    def __init__(self, results: Any) -> None:
+        self._results = results
+
+    def __getitem__(self, name: str) -> Any:
+        return self._results[name]
+
+    def __iter__(self) -> Any:
+        return iter(self._results.names)
+
+    def __len__(self) -> int:
+        return len(self._results.names)
+
+
+def _status(error: RunError) -> str:
+    if error.status in ("killed", "exited", "out of memory"):
+        return "crashed"
+    return "time limit" if error.status == "timed out" else "failed"

@@ -1,0 +1,226 @@
+"""Parameters, designs and measures of campaigns, against scipy, SALib and NumPy."""
+
+import itertools
+import json
+
+import aso_ftc as af
+import numpy as np
+import pytest
+from aso_ftc.campaign import Campaign
+from aso_ftc.campaign._measures import Expression
+from scipy import stats
+
+MEASURES = {"peak": "max(abs(plant.x_p))"}
+
+
+def paper(**entries):
+    """A campaign of the paper's loop, 0.1 s long."""
+    entries.setdefault("measures", MEASURES)
+    return Campaign("paper", experiment={"stop-time": 0.1}, **entries)
+
+
+def columns(campaign):
+    """The values of the parameters by name."""
+    return {name: list(values) for name, values in campaign.plan.sampled.values.items()}
+
+
+def test_a_grid_has_every_combination_once():
+    campaign = paper(
+        parameters={
+            "plant.F_c": {"from": 20.0, "to": 30.0, "steps": 3},
+            "controller.compensate": [True, False],
+            "plant.v_s": {"from": 1e-4, "to": 1e-2, "steps": 3, "logarithmic": True},
+        }
+    )
+    rows = list(zip(*columns(campaign).values(), strict=True))
+    expected = list(itertools.product([20.0, 25.0, 30.0], [True, False], [1e-4, 1e-3, 1e-2]))
+    assert len(rows) == len(expected) == len(campaign)
+    for found, wanted in zip(rows, expected, strict=True):
+        assert found[:2] == wanted[:2]
+        assert found[2] == pytest.approx(wanted[2], rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    "name, entries", [("norm", {"loc": 25.0, "scale": 2.0}), ("gamma", {"a": 3.0}), ("expon", {})]
+)
+def test_random_values_have_the_distribution_that_they_name(name, entries):
+    campaign = paper(
+        parameters={"plant.F_c": {"distribution": name, **entries}},
+        design={"method": "random", "runs": 2000},
+        seed=3,
+    )
+    values = columns(campaign)["plant.F_c"]
+    assert stats.kstest(values, getattr(stats, name)(**entries).cdf).pvalue > 0.01
+
+
+def test_a_discrete_distribution_gives_whole_numbers():
+    campaign = paper(
+        parameters={"controller.substeps": {"distribution": "randint", "low": 1, "high": 5}}
+        if "controller.substeps" in {v.name for v in af.paper().variables()}
+        else {"n": {"distribution": "randint", "low": 1, "high": 5, "set": "algorithm.jobs"}},
+        design={"method": "random", "runs": 400},
+    )
+    (values,) = columns(campaign).values()
+    assert {type(value) for value in values} == {int}
+    assert set(values) == {1, 2, 3, 4}
+
+
+@pytest.mark.parametrize("method", ["latin-hypercube", "sobol", "halton"])
+def test_space_filling_designs_have_less_discrepancy_than_random_ones(method):
+    ranges = {name: {"from": 0.0, "to": 1.0} for name in ("plant.x_p_0", "plant.theta_0", "plant.v_p_0")}
+    unit = {}
+    for chosen in (method, "random"):
+        campaign = paper(parameters=ranges, design={"method": chosen, "runs": 256}, seed=1)
+        unit[chosen] = stats.qmc.discrepancy(campaign.plan.sampled.unit)
+    assert unit[method] < 0.5 * unit["random"]
+
+
+def test_each_tenth_of_a_latin_hypercube_has_a_tenth_of_the_runs():
+    campaign = paper(
+        parameters={"plant.F_c": {"relative": 0.2}, "plant.F_s": {"relative": 0.1}},
+        design={"method": "latin-hypercube", "runs": 50},
+    )
+    nominal = {variable.name: variable.start for variable in af.paper().variables()}
+    for (name, values), part in zip(columns(campaign).items(), (0.2, 0.1), strict=True):
+        low, high = nominal[name] * (1 - part), nominal[name] * (1 + part)
+        assert list(np.histogram(values, bins=10, range=(low, high))[0]) == [5] * 10
+
+
+def test_the_same_seed_gives_the_same_runs_and_another_seed_others():
+    def values(seed):
+        own = paper(
+            parameters={"plant.F_c": {"relative": 0.2}},
+            disturbances={"noise": {"connection": "controller.x_p", "noise": {"deviation": 1e-5}}},
+            design={"method": "random", "runs": 5},
+            seed=seed,
+        )
+        return [json.dumps(own.changes(run)) for run in range(5)]
+
+    assert values(7) == values(7)
+    assert all(one != two for one, two in zip(values(7), values(8), strict=True))
+    seeds = {json.loads(text)["faults"][0]["noise"]["seed"] for text in values(7)}
+    assert len(seeds) == 5
+
+
+def test_a_parameter_sets_variables_steps_and_entries_of_disturbances():
+    campaign = paper(
+        parameters={
+            "mass": {"values": [2.0], "set": ["plant.m_c", "plant.m_p"], "unit": "kg"}
+            if {"plant.m_c", "plant.m_p"} <= {v.name for v in af.paper().variables()}
+            else {"values": [2.0], "set": ["plant.F_c", "plant.F_s"]},
+            "H": {"values": [0.002], "set": "algorithm.step"},
+            "late.seconds": [0.01],
+        },
+        disturbances={"late": {"connection": "plant.u", "delay": {"seconds": 0.0, "hold": True}}},
+    )
+    own = campaign.changes(0)
+    assert list(own["start_values"].values()) == [2.0, 2.0]
+    assert own["algorithm"] == {"step": 0.002}
+    assert own["faults"] == [{"connection": "plant.u", "delay": {"seconds": 0.01, "hold": True}}]
+
+
+def test_a_fault_campaign_has_each_fault_at_each_connection_time_and_size():
+    campaign = paper(
+        faults=[
+            {"bias": {"value": [0.001, 0.01], "from": [0.02, 0.05]}},
+            {"connection": "plant.u", "stuck": {}},
+        ],
+    )
+    labels = [case.label for case in campaign.plan.faults]
+    assert labels[0] == ""
+    connected = {"controller.x_p", "controller.theta", "plant.u"}
+    assert {case.connection for case in campaign.plan.faults[1:]} == connected
+    assert len(labels) == len(set(labels)) == 1 + 3 * 4 + 1
+
+
+def test_a_table_of_the_user_is_taken_row_by_row(tmp_path):
+    (tmp_path / "runs.csv").write_text("run,plant.F_c,plant.F_s\n7,20.5,30\n8,21,31\n", encoding="utf-8")
+    campaign = paper(design={"method": "table", "file": "runs.csv"}, folder=tmp_path)
+    assert columns(campaign) == {"plant.F_c": [20.5, 21.0], "plant.F_s": [30, 31]}
+
+
+TIME = np.linspace(0.0, 2.0, 2001)
+SIGNALS = {"a.x": np.exp(-3.0 * TIME) * np.cos(20.0 * TIME), "a.der(x)": TIME, "a.K[1,2]": TIME**2}
+
+
+@pytest.mark.parametrize(
+    "text, expected, tolerance",
+    [
+        ("max(abs(a.x))", 1.0, 1e-12),
+        ("max(a.x, start=0.1, end=0.5)", SIGNALS["a.x"][100:501].max(), 1e-12),
+        ("rms(signal('a.der(x)'))", 2.0 / np.sqrt(3.0), 1e-3),
+        ("integral(a.K[1, 2])", 8.0 / 3.0, 1e-5),
+        ("mean(a.K[1,2])", 4.0 / 3.0, 1e-5),
+        ("settling_time(a.x, 0.05)", None, 0.0),
+        ("first_time(abs(a.x) < 0.1)", 1.4710 / 20.0, 2e-2),
+        ("time_above(signal('a.der(x)'), 1.5)", 0.5, 2e-3),
+        ("at(a.K[1,2], 0.5)", 0.25, 1e-12),
+        ("last(a.K[1,2]) - first(a.K[1,2]) + 2 * pi", 4.0 + 2.0 * np.pi, 1e-12),
+        ("amplitude(3 * sin(pi * time))", 3.0, 1e-5),
+        ("rises(a.x > 0)", 6.0, 0.0),
+        ("parameter('k') * max(time, start=fault_start)", 6.0, 1e-12),
+        ("time_while(time > 0.5 and not time >= 1.5)", 1.0, 2e-3),
+        ("last_time(a.x > 0.5)", None, 0.0),
+        ("min(time, start=3)", np.nan, 0.0),
+    ],
+)
+def test_a_measure_has_the_value_of_its_definition(text, expected, tolerance):
+    if text.startswith("settling_time"):
+        outside = np.flatnonzero(np.abs(SIGNALS["a.x"]) > 0.05)
+        expected = TIME[outside[-1] + 1]
+    if text.startswith("last_time"):
+        expected = TIME[SIGNALS["a.x"] > 0.5][-1]
+    found = Expression("m", text).value(SIGNALS, TIME, {"k": 3.0}, 0.5)
+    assert found == pytest.approx(expected, rel=tolerance, abs=tolerance, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    "entries, words",
+    [
+        ({"parameters": {"plant.F_q": [1.0]}}, "parameters.plant.F_q"),
+        ({"parameters": {"plant.F_c": {"distribution": "nrom"}}}, "scipy.stats"),
+        ({"parameters": {"plant.F_c": {"distribution": "gamma"}}}, "needs a"),
+        ({"parameters": {"plant.F_c": {"distribution": "norm", "sigma": 1.0}}}, "unknown entry sigma"),
+        ({"parameters": {"plant.F_c": {"distribution": "norm", "scale": -1.0}}}, "out of range"),
+        ({"parameters": {"plant.F_c": {"from": 2.0, "to": 1.0}}}, "from below to"),
+        ({"parameters": {"plant.F_c": {"from": 2.0, "to": 3.0}}}, "steps"),
+        ({"parameters": {"plant.F_c": {"values": []}}}, "at least one"),
+        ({"design": {"method": "sobol", "runs": 8}}, "at least one parameter"),
+        ({"design": {"method": "monte-carlo"}}, "latin-hypercube"),
+        ({"design": {"method": "table", "file": "no.csv"}}, "no.csv"),
+        ({"measures": {"m": "max(plant.x_q)"}}, "plant.x_q"),
+        ({"measures": {"m": "plant.x_p"}}, "is a signal"),
+        ({"measures": {"m": "maximal(plant.x_p)"}}, "unknown function maximal"),
+        ({"measures": {"m": "max(plant.x_p"}}, "no expression"),
+        ({"measures": {"m": "__import__('os').system('true')"}}, "unknown function"),
+        ({"measures": {"m": "parameter('k')"}}, "no parameter k"),
+        ({"measures": {}}, "at least one measure"),
+        ({"limits": {"speed": {"below": 1.0}}}, "no measure"),
+        ({"limits": {"peak": {"below": "1 mm"}}}, "a number"),
+        ({"faults": [{"connection": "plant.u", "bias": {"value": "x"}}]}, "value"),
+        ({"faults": [{"connection": "plant.z", "bias": {"value": 1.0}}]}, "plant.z"),
+        ({"faults": [{"connection": "plant.u", "biass": {"value": 1.0}}]}, "exactly one of"),
+        ({"disturbances": {"n": {"connection": "plant.u", "noise": {"amplitud": 1.0}}}}, "amplitud"),
+        ({"stop": {"limit": "peak", "width": 0.1}}, "limit"),
+        ({"keep": {"runs": [17]}}, "0 to 0"),
+        ({"seed": -1}, "seed"),
+        ({"sistem": "paper"}, "sistem"),
+    ],
+)
+def test_what_is_wrong_is_named_before_the_first_run(entries, words):
+    with pytest.raises(af.ConfigurationError) as caught:
+        paper(**entries).check()
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_an_error_in_a_campaign_file_has_its_line(tmp_path):
+    file = tmp_path / "campaign.toml"
+    file.write_text(
+        'system = "paper"\n\n[measures]\npeak = "max(plant.x_p)"\n\n[parameters]\n"plant.F_q" = [1.0]\n',
+        encoding="utf-8",
+    )
+    with pytest.raises(af.ConfigurationError) as caught:
+        Campaign.from_toml(file)
+    assert str(caught.value).startswith(f"{file}:7: parameters.plant.F_q")
+    assert caught.value.line == 7

@@ -1,0 +1,390 @@
+"""Runs of campaigns on Dask: the same rows however they are done, and whatever is killed."""
+
+import contextlib
+import json
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import aso_ftc as af
+import numpy as np
+import pyarrow.parquet as parquet
+import pytest
+
+CAMPAIGN = """
+system = "paper"
+seed = 5
+runs-per-task = 4
+
+[experiment]
+stop-time = {stop}
+
+[design]
+method = "latin-hypercube"
+runs = {runs}
+
+[parameters]
+"plant.F_c" = {{ relative = 0.2 }}
+"noise.deviation" = {{ from = 1e-6, to = 1e-4, logarithmic = true }}
+
+[disturbances.noise]
+connection = ["controller.x_p", "controller.theta"]
+noise = {{ deviation = 0.0 }}
+
+[measures]
+peak = "max(abs(plant.x_p))"
+estimate = "rms(plant.f_fric - controller.f_hat)"
+
+[limits]
+peak = {{ below = 0.101 }}
+"""
+
+
+@pytest.fixture
+def campaign(tmp_path):
+    """Writes a campaign file; returns its path."""
+
+    def write(runs=24, stop=0.3, text=CAMPAIGN, name="small.toml"):
+        path = tmp_path / name
+        path.write_text(text.format(runs=runs, stop=stop), encoding="utf-8")
+        return path
+
+    return write
+
+
+def command(*words, **options):
+    """Starts the command; returns the process."""
+    line = [sys.executable, "-P", "-m", "aso_ftc", "campaign", *map(str, words)]
+    return subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+
+
+def done(*words, **options):
+    """Runs the command; returns exit status, output and messages."""
+    process = command(*words, **options)
+    out, messages = process.communicate(timeout=180)
+    return process.returncode, out, messages
+
+
+def rows(folder):
+    """The rows of a campaign without the wall-clock times, as bytes of each column."""
+    table = parquet.read_table(folder / "runs").drop_columns(["seconds"]).sort_by("run").combine_chunks()
+    return {
+        name: table[name].to_numpy().tobytes() if table[name].type == "double" else table[name].to_pylist()
+        for name in table.column_names
+    }
+
+
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory):
+    """The rows of the campaign, each computed by a run of its own in this process."""
+    folder = tmp_path_factory.mktemp("expected")
+    file = folder / "small.toml"
+    file.write_text(CAMPAIGN.format(runs=24, stop=0.3), encoding="utf-8")
+    own = af.campaign.Campaign.from_toml(file)
+    found = []
+    for run in range(len(own)):
+        new = own.changes(run)
+        results = af.paper().run(
+            start_values=new["start_values"], faults=new["faults"], stop_time=0.3, record_every="step"
+        )
+        error = results["plant.f_fric"] - results["controller.f_hat"]
+        found.append((np.max(np.abs(results["plant.x_p"])), np.sqrt(np.mean(np.square(error)))))
+    return {
+        name: np.array(column).tobytes()
+        for name, column in zip(("peak", "estimate"), zip(*found, strict=True), strict=True)
+    }
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_rows_are_those_of_single_runs_bit_for_bit_for_any_number_of_workers(
+    campaign, tmp_path, expected, workers
+):
+    status, out, messages = done(campaign(), "--out", tmp_path / "out", "--workers", workers)
+    assert (status, messages) == (0, "")
+    found = rows(tmp_path / "out")
+    assert {name: found[name] for name in expected} == expected
+    assert found["run"] == list(range(24))
+    assert "24 runs" in out
+
+
+def free_port():
+    """A port that is free now."""
+    with socket.socket() as own:
+        own.bind(("127.0.0.1", 0))
+        return own.getsockname()[1]
+
+
+class Cluster:
+    """A scheduler and workers, each a process of its own, as on several machines."""
+
+    def __init__(self, folder):
+        self.folder, self.address = folder, f"tcp://127.0.0.1:{free_port()}"
+        self.processes = {}
+
+    def start(self, name, *words):
+        line = [sys.executable, "-P", "-m", *words]
+        log = open(self.folder / f"{name}.log", "ab")
+        with log:
+            self.processes[name] = subprocess.Popen(line, stdout=log, stderr=log, start_new_session=True)
+
+    def scheduler(self):
+        port = self.address.rpartition(":")[2]
+        self.start(
+            "scheduler",
+            "distributed.cli.dask_scheduler",
+            "--host",
+            "127.0.0.1",
+            "--port",
+            port,
+            "--no-dashboard",
+        )
+
+    def worker(self, name):
+        place = self.folder / name
+        place.mkdir(exist_ok=True)
+        words = ["--nthreads", "1", "--local-directory", place, "--no-dashboard", "--death-timeout", "60"]
+        self.start(name, "distributed.cli.dask_worker", self.address, *map(str, words))
+
+    def kill(self, name):
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.processes[name].pid, signal.SIGKILL)
+        self.processes.pop(name).wait()
+
+
+@pytest.fixture
+def cluster(tmp_path):
+    """A scheduler and two workers with folders of their own."""
+    own = Cluster(tmp_path / "cluster")
+    own.folder.mkdir()
+    own.scheduler()
+    own.worker("one")
+    own.worker("two")
+    yield own
+    for name in list(own.processes):
+        own.kill(name)
+
+
+def parts(folder):
+    """The number of parts that are written."""
+    return len(list((folder / "runs").glob("part-*.parquet")))
+
+
+def wait_for(condition, limit=90.0):
+    """Waits until a condition holds."""
+    end = time.monotonic() + limit
+    while not condition():
+        assert time.monotonic() < end, "nothing happens"
+        time.sleep(0.02)
+
+
+def test_rows_stay_the_same_if_worker_client_and_scheduler_are_killed(campaign, tmp_path, cluster):
+    file, folder = campaign(runs=120, stop=2.0), tmp_path / "out"
+    words = (file, "--out", folder, "--scheduler", cluster.address)
+    process = command(*words, start_new_session=True)
+    wait_for(lambda: parts(folder) >= 2 or process.poll() is not None)
+    cluster.kill("one")
+    cluster.worker("three")
+    before = parts(folder)
+    wait_for(lambda: parts(folder) > before + 1 or process.poll() is not None)
+    assert process.poll() is None, process.communicate()
+    os.killpg(process.pid, signal.SIGKILL)
+    process.communicate()
+    kept = parts(folder)
+    assert 0 < kept < 30
+    process = command(*words)
+    wait_for(lambda: parts(folder) > kept or process.poll() is not None)
+    cluster.kill("scheduler")
+    out, messages = process.communicate(timeout=120)
+    assert process.returncode == 1, (out, messages)
+    assert "the same command goes on" in messages
+    assert parts(folder) < 30
+    cluster.scheduler()
+    cluster.worker("four")
+    status, out, messages = done(*words)
+    assert (status, messages) == (0, "")
+    assert not list(folder.rglob("*.tmp"))
+    status, out, messages = done(file, "--out", tmp_path / "undisturbed", "--workers", 2)
+    assert (status, messages) == (0, "")
+    assert rows(folder) == rows(tmp_path / "undisturbed")
+
+
+def test_a_campaign_that_is_done_is_not_done_again(campaign, tmp_path):
+    file, folder = campaign(runs=8), tmp_path / "out"
+    assert done(file, "--out", folder, "--workers", 1)[0] == 0
+    times = {path: path.stat().st_mtime_ns for path in (folder / "runs").iterdir()}
+    assert done(file, "--out", folder, "--workers", 1)[0] == 0
+    assert times == {path: path.stat().st_mtime_ns for path in (folder / "runs").iterdir()}
+
+
+def test_a_folder_with_another_campaign_or_with_other_files_is_left_alone(campaign, tmp_path):
+    file, folder = campaign(runs=8), tmp_path / "out"
+    assert done(file, "--out", folder, "--workers", 1)[0] == 0
+    status, _, messages = done(campaign(runs=12), "--out", folder)
+    assert status == 2
+    assert "another campaign" in messages and messages.count("\n") == 1
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "notes.txt").write_text("mine", encoding="utf-8")
+    status, _, messages = done(file, "--out", tmp_path / "mine")
+    assert status == 2
+    assert "not empty" in messages
+
+
+def test_a_run_is_repeated_by_the_command_run(campaign, tmp_path):
+    file, folder = campaign(runs=6), tmp_path / "out"
+    assert done(file, "--out", folder, "--workers", 1)[0] == 0
+    outcome = af.campaign.load(folder)
+    status, text, _ = done(folder, "--show", 4)
+    assert status == 0
+    (tmp_path / "run-4.toml").write_text(text, encoding="utf-8")
+    words = [
+        str(af.command()),
+        "run",
+        tmp_path / "run-4.toml",
+        "--out",
+        tmp_path / "again",
+        "--record-every",
+        "step",
+    ]
+    subprocess.run([*map(str, words), "--format", "parquet"], check=True, capture_output=True)
+    again = parquet.read_table(tmp_path / "again" / "results.parquet")
+    assert np.max(np.abs(again["plant.x_p"].to_numpy())) == outcome.table["peak"][4]
+
+
+FAILING = """
+system = "paper"
+time-limit = 1.0
+runs-per-task = 3
+[experiment]
+stop-time = 0.02
+[parameters]
+"plant.F_c" = [20.0, 25.0, -1.0, 30.0]
+"algorithm.step" = [0.001, 1e-8]
+[measures]
+peak = "max(abs(plant.x_p))"
+[keep]
+runs = [0]
+record = ["plant.x_p"]
+"""
+
+
+def test_runs_that_fail_or_last_too_long_have_their_reason_and_the_others_go_on(campaign, tmp_path):
+    folder = tmp_path / "out"
+    status, out, messages = done(campaign(text=FAILING), "--out", folder, "--workers", 2)
+    assert status == 0, messages
+    table = af.campaign.load(folder).table
+    assert list(table["status"]) == [
+        "ok",
+        "time limit",
+        "ok",
+        "time limit",
+        "failed",
+        "failed",
+        "ok",
+        "time limit",
+    ]
+    assert "F_c" in table["reason"][4]
+    assert np.isnan(table["peak"][4])
+    assert "5 of 8 runs did not finish" in out
+    kept = parquet.read_table(folder / "signals" / "run-000000000.parquet")
+    assert kept.column_names == ["time", "plant.x_p"]
+    assert np.max(np.abs(kept["plant.x_p"].to_numpy())) == table["peak"][0]
+
+
+KILLER = """
+import os, signal
+
+def measure(results, values):
+    if values["plant.F_c"] == 21.0:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return results["plant.x_p"][-1]
+"""
+
+
+def test_a_run_that_kills_its_worker_is_recorded_and_the_others_go_on(campaign, tmp_path):
+    (tmp_path / "killer.py").write_text(KILLER, encoding="utf-8")
+    text = (
+        'system = "paper"\nruns-per-task = 3\n[experiment]\nstop-time = 0.01\n[parameters]\n'
+        '"plant.F_c" = [20.0, 21.0, 22.0]\n[measures]\nlast = {{ python = "killer.py:measure" }}\n'
+    )
+    folder = tmp_path / "out"
+    status, _, messages = done(campaign(text=text), "--out", folder, "--workers", 1)
+    assert status == 0, messages
+    table = af.campaign.load(folder).table
+    assert list(table["status"]) == ["ok", "worker lost", "ok"]
+    assert "isolate" in table["reason"][1]
+
+
+def test_a_random_campaign_ends_when_its_bound_is_tight_whatever_the_number_of_workers(campaign, tmp_path):
+    text = (
+        'system = "paper"\nseed = 2\nruns-per-task = 10\n[experiment]\nstop-time = 0.01\n'
+        '[design]\nmethod = "random"\nruns = 4000\n[parameters]\n"plant.x_p_0" = {{ from = 0.0, to = 1.0 }}\n'
+        '[measures]\nstart = "first(plant.x_p)"\n[limits]\nstart = {{ below = 0.9 }}\n'
+        '[stop]\nlimit = "start"\nwidth = 0.1\n'
+    )
+    file = campaign(text=text)
+    ends = []
+    for workers in (1, 2):
+        folder = tmp_path / f"out-{workers}"
+        assert done(file, "--out", folder, "--workers", workers)[0] == 0
+        outcome = af.campaign.load(folder)
+        found = outcome.failure_probability("start")
+        assert found.upper - found.lower <= 0.1
+        assert found.lower < 0.1 < found.upper
+        ends.append(rows(folder))
+    assert ends[0] == ends[1]
+    assert 50 < len(ends[0]["run"]) < 400
+
+
+def test_a_scheduler_that_does_not_answer_and_one_without_workers_are_named(campaign, tmp_path):
+    address = f"tcp://127.0.0.1:{free_port()}"
+    status, _, messages = done(campaign(), "--out", tmp_path / "out", "--scheduler", address)
+    assert status == 1
+    assert messages.startswith(f"error: no Dask scheduler answers at {address}")
+
+
+def test_an_fmu_without_binaries_for_the_workers_is_named_before_the_first_run(tmp_path):
+    import zipfile
+
+    path = tmp_path / "Other.fmu"
+    with zipfile.ZipFile(af.fmus()["FrictionPendulum"]) as old, zipfile.ZipFile(path, "w") as new:
+        for name in old.namelist():
+            new.writestr(
+                name.replace("linux64", "win64").replace("x86_64-linux", "x86_64-windows"), old.read(name)
+            )
+    system = af.System().add("plant", path)
+    with pytest.raises(af.Error) as caught:
+        af.campaign.Campaign(system, measures={"m": "last(plant.x_p)"}).run(tmp_path / "out", workers=1)
+    assert "linux" in str(caught.value) or "platform" in str(caught.value)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_full_disk_ends_the_campaign_with_one_sentence(campaign, tmp_path):
+    folder = tmp_path / "out"
+    assert done(campaign(runs=8), "--out", folder, "--workers", 1)[0] == 0
+    shutil.rmtree(folder / "runs")
+    manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+    manifest["complete"] = False
+    (folder / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
+    # A file in the place of the folder of parts: writing fails as on a full disk, also for root.
+    (folder / "runs").write_text("", encoding="utf-8")
+    status, _, messages = done(campaign(runs=8), "--out", folder, "--workers", 1)
+    assert status == 1
+    assert messages.startswith("error: cannot write ") and messages.count("\n") == 1
+
+
+def test_the_command_passes_campaigns_to_python(campaign, tmp_path):
+    words = [str(af.command()), "campaign", str(campaign()), "--check"]
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    found = subprocess.run(
+        words, capture_output=True, text=True, env={**os.environ, "PATH": path}, cwd=tmp_path
+    )
+    assert (found.returncode, found.stdout, found.stderr) == (0, "small: 24 runs\n", "")
+    nowhere = {**os.environ, "ASO_FTC_PYTHON": "/nowhere/python"}
+    found = subprocess.run(words, capture_output=True, text=True, env=nowhere)
+    assert found.returncode == 2
+    assert found.stderr.startswith("error: campaigns need Python, and /nowhere/python cannot be started")
