@@ -224,7 +224,7 @@ class Outcome:
 
     def _sample(self, measure: str, method: str, what: str) -> tuple[dict[str, Any], NDArray[np.float64]]:
         """Return SALib's description of the parameters, and the measure of every row of the design."""
-        self._measured(measure)
+        entry = self._measured(measure)
         found = self.manifest["design"]["method"]
         if found != method:
             sentence = f"{what} need a campaign with the design {method!r}; this one has {found!r}"
@@ -234,7 +234,8 @@ class Outcome:
             raise ConfigurationError(sentence, "WrongDesign", {"expected": method, "found": "faults"})
         frame = self.read([measure, "status"])
         values = np.asarray(frame[measure].to_numpy(), dtype=np.float64)
-        bad = ~np.isfinite(values) | self.unfinished
+        stated = "unfinished" in entry
+        bad = ~np.isfinite(values) | (self.unfinished & (not stated))
         statuses = frame["status"][bad].value_counts()
         counts = [f"{count} {name}" for name, count in statuses.items() if count and name != "ok"]
         no_number = int((bad & ~self.unfinished).sum())

@@ -65,6 +65,12 @@ def _only(place: str, table: Mapping[str, Any], known: Iterable[str]) -> None:
             raise _fail(f"{place}.{entry}" if place else entry, f"unknown entry, expected {', '.join(known)}")
 
 
+def _finite(place: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise _fail(place, f"{value!r}: expected a finite number")
+    return float(value)
+
+
 def _positive(place: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value < math.inf:
         raise _fail(place, f"{value!r}: expected a number above 0")
@@ -118,7 +124,8 @@ class Campaign:
             that distribution in scipy.stats. ``set`` names what it sets if that is not its own name.
         design: ``method`` (``"grid"``, ``"table"``, ``"random"``, ``"latin-hypercube"``, ``"sobol"``,
             ``"halton"``, ``"saltelli"``, ``"morris"``, ``"fast"``) and its entries; default: a grid.
-        measures: expressions by name, or ``{"python": "file.py:function"}``.
+        measures: expressions by name, or tables with ``expression`` or ``python`` (``"file.py:function"``)
+            and ``unfinished``, the value for a run that does not finish (NaN).
         limits: by measure: ``{"below": number}`` or ``{"above": number}``.
         disturbances: faults that all runs have, by name; parameters can set their entries.
         faults: faults of which each run has one; lists in an entry mean every combination.
@@ -287,14 +294,18 @@ class Campaign:
             )
         self.expressions: dict[str, Expression] = {}
         self.functions: dict[str, tuple[str, str]] = {}
+        self.unfinished: dict[str, float] = {}
         columns = {"run", "status", "reason", "seconds", "fault", *(own.name for own in self.parameters)}
         for name, entry in own.items():
             if name in columns or name.startswith(("fault.", "unit:")):
                 raise _fail(f"measures.{name}", "a column of the results has this name, choose another one")
-            if isinstance(entry, str):
-                self.expressions[name] = Expression(name, entry)
-            elif isinstance(entry, Mapping) and set(entry) == {"python"}:
-                self.functions[name] = _function(f"measures.{name}", entry["python"], folder)
+            stated = {"expression": entry} if isinstance(entry, str) else _table(f"measures.{name}", entry)
+            if "unfinished" in stated:
+                self.unfinished[name] = _finite(f"measures.{name}.unfinished", stated.pop("unfinished"))
+            if set(stated) == {"expression"}:
+                self.expressions[name] = Expression(name, str(stated["expression"]))
+            elif set(stated) == {"python"}:
+                self.functions[name] = _function(f"measures.{name}", stated["python"], folder)
             else:
                 raise _fail(f"measures.{name}", 'expected an expression, or { python = "file.py:function" }')
         self.limits = _table("limits", entries.get("limits", {}))
@@ -304,9 +315,7 @@ class Campaign:
             limit = _table(f"limits.{name}", limit)
             if len(limit) != 1 or not set(limit) <= {"below", "above"}:
                 raise _fail(f"limits.{name}", "expected { below = number } or { above = number }")
-            value = next(iter(limit.values()))
-            if isinstance(value, bool) or not isinstance(value, (int, float)) or math.isnan(value):
-                raise _fail(f"limits.{name}", f"{value!r}: expected a number")
+            _finite(f"limits.{name}", next(iter(limit.values())))
 
     def _keep(self, entry: Any) -> dict[str, Any]:
         keep = _table("keep", {} if entry is None else entry)
@@ -382,10 +391,7 @@ class Campaign:
             "disturbances": self.disturbances,
             "cases": [case.entry for case in self.plan.faults],
             "faults": bool(self.cases),
-            "measures": {
-                **{name: {"expression": own.text} for name, own in self.expressions.items()},
-                **{name: {"python": f"{path}:{own}"} for name, (path, own) in self.functions.items()},
-            },
+            "measures": self._described(),
             "limits": self.limits,
             "keep": self.keep,
             "stop": self.stop,
@@ -395,6 +401,15 @@ class Campaign:
             "time-limit": self.time_limit,
             "memory-limit": self.memory_limit,
         }
+
+    def _described(self) -> dict[str, dict[str, Any]]:
+        found: dict[str, dict[str, Any]] = {
+            **{name: {"expression": own.text} for name, own in self.expressions.items()},
+            **{name: {"python": f"{path}:{own}"} for name, (path, own) in self.functions.items()},
+        }
+        for name, value in self.unfinished.items():
+            found[name]["unfinished"] = value
+        return found
 
     def check(self) -> None:
         """Find what is known before the first run: tries the first and the last run without a step.

@@ -111,9 +111,12 @@ def _summary(outcome: Outcome) -> str:
             # The design has no random samples: a fraction, but no probability.
             pass
         lines.append(line)
-        influence = outcome.influence(name)
-        numeric = influence[influence["correlation"].notna()].head(3)
-        shown = ", ".join(f"{own} {row.correlation:+.2f}" for own, row in numeric.iterrows())
+        found = outcome.influence(name).dropna(subset=["lowest_tenth", "highest_tenth"])
+        order = (found["highest_tenth"] - found["lowest_tenth"]).abs().sort_values(ascending=False)
+        shown = [
+            f"{own} {100 * found['lowest_tenth'][own]:.0f} % to {100 * found['highest_tenth'][own]:.0f} %"
+            for own in order.index[:3]
+        ]
         if shown:
-            lines.append(f"  rank correlation with {name}: {shown}")
+            lines.append(f"  runs outside, from the lowest to the highest tenth: {', '.join(shown)}")
     return "\n".join(lines)

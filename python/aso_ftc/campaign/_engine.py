@@ -11,7 +11,7 @@ import sys
 import tempfile
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -109,6 +109,8 @@ class _Plugin:
 
     def setup(self, worker: Any) -> None:
         self.ready = time.monotonic() + _SETTLING
+        # What an FMU says when it fails is in the reason of its run.
+        logging.getLogger("aso_ftc").setLevel(logging.CRITICAL)
         try:
             place = Path(worker.local_directory) / "aso-ftc-files"
             self.runner = pickle.loads(self.job).unpack(place)
@@ -248,7 +250,7 @@ class _Work:
                 elif len(numbers) > 1:
                     suspects.extend(numbers)
                 else:
-                    self._accept([_lost(numbers[0])])
+                    self._accept([_lost(numbers[0], self.campaign.unfinished)])
                 # The parts before an early end are done.
                 if self.last < self.total:
                     tasks.cancel()
@@ -382,12 +384,12 @@ def _of_worker(error: BaseException) -> Error:
     return error if isinstance(error, Error) else Error(f"a worker failed: {error}", "Worker")
 
 
-def _lost(run: int) -> Row:
+def _lost(run: int, measures: Mapping[str, float]) -> Row:
     reason = (
         "its worker ended several times during the run (an FMU crashed, too little memory, or killed): "
         "isolate = true gives each FMU a process of its own"
     )
-    return Row(run, {}, "worker lost", reason)
+    return Row(run, dict(measures), "worker lost", reason)
 
 
 class _Progress:

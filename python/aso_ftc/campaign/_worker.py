@@ -48,6 +48,7 @@ class Job:
     cases: tuple[FaultCase, ...]
     expressions: dict[str, str]
     functions: dict[str, tuple[str, str]]
+    unfinished: dict[str, float]
     limits: dict[str, Any]
     keep: dict[str, Any]
     seed: int
@@ -75,6 +76,7 @@ class Job:
             cases=campaign.plan.faults,
             expressions={name: own.text for name, own in campaign.expressions.items()},
             functions=campaign.functions,
+            unfinished=campaign.unfinished,
             limits=campaign.limits,
             keep=campaign.keep,
             seed=campaign.seed,
@@ -168,7 +170,8 @@ class Runner:
     def run(self, run: int, values: Mapping[str, Any], case: int) -> Row:
         """Do one run. What goes wrong in it becomes its status and its reason."""
         job = self.job
-        row = Row(run, {name: np.nan for name in [*self.expressions, *self.functions]})
+        names = [*self.expressions, *self.functions]
+        row = Row(run, {})
         begin = time.perf_counter()
         fault = job.cases[case]
         try:
@@ -189,6 +192,8 @@ class Runner:
                 "failed",
                 f"{error}" if isinstance(error, Error) else f"{type(error).__name__}: {error}",
             )
+        if row.status != "ok":
+            row.measures = {name: job.unfinished.get(name, np.nan) for name in names}
         row.seconds = time.perf_counter() - begin
         if self._kept(row):
             try:
