@@ -353,13 +353,14 @@ def _histogram(values: NDArray[np.float64]) -> dict[str, Any]:
     if not len(finite):
         return {"edges": [], "counts": [], "outside": 0, "others": len(values)}
     low, high = finite.min(), finite.max()
+    bins = max(5, min(_BINS, round(2 * math.sqrt(len(finite)))))
     if _is_wide(values):
-        edges = np.geomspace(low, high, _BINS + 1)
+        edges = np.geomspace(low, high, bins + 1)
     else:
         inner = np.quantile(finite, [0.001, 0.999])
         if high - low > 10 * (inner[1] - inner[0]) > 0:
             low, high = inner
-        edges = np.histogram_bin_edges(finite, _BINS, (low, high))
+        edges = np.histogram_bin_edges(finite, bins, (low, high))
     edges[0], edges[-1] = min(edges[0], low), max(edges[-1], high)
     counts, _ = np.histogram(finite, edges)
     beyond = len(finite) - int(counts.sum())
@@ -464,7 +465,7 @@ def _columns(outcome: Outcome, measures: list[str], rows: NDArray[np.int64]) -> 
 # No source is allowed: the browser itself refuses any request. plotly.js compiles its WebGL code (eval).
 _POLICY = (
     '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; '
-    "script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:\">"
+    "script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'\">"
 )
 
 _STYLE = """
@@ -527,8 +528,9 @@ const inside = value => {
   const {below, above} = measure().limit;
   return (below === undefined || value < below) && (above === undefined || value > above);
 };
-const options = {displaylogo: false, responsive: true,
-  modeBarButtonsToRemove: ['lasso2d', 'select2d', 'autoScale2d', 'zoomIn2d', 'zoomOut2d']};
+// By default plotly.js has a button that uploads the data of a picture.
+const options = {displaylogo: false, responsive: true, showSendToCloud: false, plotlyServerURL: '',
+  modeBarButtons: [['toImage', 'zoom2d', 'pan2d', 'resetScale2d']]};
 function axis(title, more) {
   return {title: {text: title}, gridcolor: color('line'), zerolinecolor: color('line'), linecolor: color('line'),
     automargin: true, ...more};
@@ -597,7 +599,7 @@ function drawParallel() {
   place.style.width = Math.max(place.parentElement.clientWidth, 120 * (dimensions.length + 1)) + 'px';
   Plotly.react(place, [{type: 'parcoords', dimensions: axes, line, labelangle: -15, labelside: 'top',
     labelfont: {size: 12}, tickfont: {size: 10}, rangefont: {size: 1, color: 'rgba(0,0,0,0)'}}],
-    layout({height: 440, margin: {l: 60, r: 60, t: 90, b: 20}}), {displaylogo: false, displayModeBar: false});
+    layout({height: 440, margin: {l: 60, r: 60, t: 90, b: 20}}), {...options, displayModeBar: false});
 }
 
 function drawScatter() {
