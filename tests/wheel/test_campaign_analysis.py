@@ -1,5 +1,6 @@
 """Analysis of a campaign, against closed forms and other formulas."""
 
+import gc
 import json
 import os
 import subprocess
@@ -39,7 +40,7 @@ def write(
     }
     (folder / "runs").mkdir(parents=True)
     (folder / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
-    plan = {"run": np.arange(runs), **columns}
+    plan = {"row": np.arange(runs), **columns}
     for at, name in enumerate(names if unit is not None else []):
         plan[f"unit:{name}"] = unit[:, at]
     pyarrow.parquet.write_table(pyarrow.table(plan), folder / "plan.parquet")
@@ -102,7 +103,7 @@ def test_sobol_indices_are_within_their_confidence_of_the_closed_form(
     tmp_path, function, count, expected, second_order
 ):
     unit = sobol.sample(problem(count), 4096, calc_second_order=second_order, seed=1)
-    design = {"method": "saltelli", "base": 4096, "second_order": second_order}
+    design = {"method": "saltelli", "base": 4096, "second-order": second_order}
     found = campaign(tmp_path / "c", design, unit, function).sobol("y")
     assert list(found.index) == problem(count)["names"]
     for name, values in expected.items():
@@ -112,7 +113,7 @@ def test_sobol_indices_are_within_their_confidence_of_the_closed_form(
 
 def test_second_order_indices_of_ishigami_show_its_only_interaction(tmp_path):
     unit = sobol.sample(problem(3), 4096, calc_second_order=True, seed=1)
-    outcome = campaign(tmp_path / "c", {"method": "saltelli", "second_order": True}, unit, ishigami)
+    outcome = campaign(tmp_path / "c", {"method": "saltelli", "second-order": True}, unit, ishigami)
     found = outcome.sobol_second_order("y")
     expected = {
         ("plant.p0", "plant.p1"): 0.0,
@@ -122,14 +123,14 @@ def test_second_order_indices_of_ishigami_show_its_only_interaction(tmp_path):
     assert list(found.index) == list(expected)
     assert (abs(found["S2"] - list(expected.values())) <= found["S2_conf"]).all()
     without = sobol.sample(problem(3), 64, calc_second_order=False, seed=1)
-    outcome = campaign(tmp_path / "d", {"method": "saltelli", "second_order": False}, without, ishigami)
-    with pytest.raises(ConfigurationError, match="second_order = true"):
+    outcome = campaign(tmp_path / "d", {"method": "saltelli", "second-order": False}, without, ishigami)
+    with pytest.raises(ConfigurationError, match="second-order = true"):
         outcome.sobol_second_order("y")
 
 
 def test_sobol_indices_of_a_seed_are_the_same_also_in_parts(tmp_path, monkeypatch):
     unit = sobol.sample(problem(3), 1024, calc_second_order=False, seed=1)
-    outcome = campaign(tmp_path / "c", {"method": "saltelli", "second_order": False}, unit, ishigami)
+    outcome = campaign(tmp_path / "c", {"method": "saltelli", "second-order": False}, unit, ishigami)
     one = outcome.sobol("y")
     assert one.equals(outcome.sobol("y", seed=0)) and not one.equals(outcome.sobol("y", seed=1))
     wide = outcome.sobol("y", confidence=0.99)
@@ -195,7 +196,7 @@ def test_indices_of_a_design_with_lost_runs_say_how_many_and_why(tmp_path):
     values = ishigami(unit)
     values[[3, 5, 60]], values[7] = np.nan, np.inf
     columns = dict(zip(problem(3)["names"], unit.T))
-    design = {"method": "saltelli", "second_order": False}
+    design = {"method": "saltelli", "second-order": False}
     outcome = write(tmp_path / "c", design, columns, {"y": values}, unit=unit, status=status, runs=90)
     expected = "14 of 90 have no value: 2 crashed, 1 time limit, 1 without a finite 'y', 10 not run yet"
     with pytest.raises(ConfigurationError, match=expected):
@@ -261,6 +262,8 @@ def test_designs_that_are_not_independent_samples_are_refused_or_noted(tmp_path)
         with pytest.raises(ConfigurationError, match=f"needs a design of random samples.* found '{method}'"):
             found.failure_probability()
     found = random_campaign(tmp_path / "part", np.zeros(8), {"below": 1.0}, runs=20)
+    assert "number of runs depends on the results" in found.failure_probability().note
+    found = random_campaign(tmp_path / "now", np.zeros(8), {"below": 1.0}, runs=20, complete=False)
     assert "8 of 20 runs have ended" in found.failure_probability().note
 
 
@@ -303,10 +306,10 @@ def test_influence_has_the_rank_correlation_and_the_failures_of_the_tenths(tmp_p
 
 
 def fault_campaign(folder, limit):
-    kinds = ["stuck", "stuck", "stuck", "gain", "gain", "gain", ""]
+    kinds = ["stuck", "stuck", "stuck", "gain", "gain", "gain", None]
     faults = {
         "fault": ["stuck 0", "stuck 0", "stuck 1", "gain 2", "gain 2", "gain 3", ""],
-        "fault.connection": ["a.y", "a.y", "b.y", "a.y", "a.y", "a.y", ""],
+        "fault.connection": ["a.y", "a.y", "b.y", "a.y", "a.y", "a.y", None],
         "fault.kind": kinds,
         "fault.size": pyarrow.array([None, None, None, 2.0, 2.0, 3.0, None], pyarrow.float64()),
         "fault.from": pyarrow.array([1.0, 1.0, 1.0, 1.0, 1.0, 5.0, None], pyarrow.float64()),
@@ -364,6 +367,19 @@ def test_the_table_has_the_runs_in_order_as_arrow_and_pandas(tmp_path):
     assert outcome.to_arrow().column("y").to_pylist() == [-float(i) for i in range(50)]
     assert outcome.read(["k", "y"]).loc[49, "k"] == "y" and outcome.statuses == {"ok": 50}
     assert repr(outcome) == "<Outcome: test, 50 of 50 runs, 0 not finished>"
+
+
+def test_many_parts_are_the_same_table_and_leave_no_file(tmp_path, monkeypatch):
+    columns = {"p": np.arange(500.0), "k": np.array(["x", "y"] * 250, dtype=object)}
+    few = write(tmp_path / "few", {"method": "grid"}, columns, {"y": -np.arange(500.0)})
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
+    many = write(tmp_path / "many", {"method": "grid"}, columns, {"y": -np.arange(500.0)}, parts=250)
+    assert many.table.equals(few.table) and many.to_arrow().equals(few.to_arrow())
+    assert len(list((tmp_path / "temporary").iterdir())) == 1
+    del many
+    gc.collect()
+    assert not list((tmp_path / "temporary").iterdir())
 
 
 def test_a_notebook_shows_the_measures_with_names_escaped(tmp_path):
@@ -427,6 +443,4 @@ def test_a_missing_package_names_the_extra(tmp_path):
         "try:\n    outcome.failure_probability()\nexcept MissingPackageError as error:\n    print(error)"
     )
     done = subprocess.run([sys.executable, "-P", "-c", text], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == (
-        'failure_probability() needs the package scipy: pip install "aso-ftc[campaign]"'
-    )
+    assert done.stdout.strip() == ('campaigns need the package scipy: pip install "aso-ftc[campaign]"')

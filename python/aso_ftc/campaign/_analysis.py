@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import html
-import importlib
 import json
 import math
 import os
 import shlex
+import shutil
+import tempfile
 import warnings
+import weakref
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,7 +20,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .._errors import ConfigurationError, MissingPackageError, ResultsError
+from .._errors import ConfigurationError, ResultsError
+from ._packages import package
 
 if TYPE_CHECKING:
     import pandas
@@ -33,16 +36,8 @@ _INDEPENDENT = ("random",)
 _EVEN = ("latin-hypercube", "sobol", "halton")
 # SALib's number of bootstrap resamples; one call draws at most so many rows.
 _RESAMPLES, _ROWS_OF_A_CALL = 100, 4_000_000
-
-
-def package(name: str, purpose: str) -> Any:
-    """Import a package of the extra ``campaign`` when it is used."""
-    try:
-        return importlib.import_module(name)
-    except ImportError as error:
-        missing = name.split(".", 1)[0]
-        sentence = f'{purpose} needs the package {missing}: pip install "aso-ftc[campaign]"'
-        raise MissingPackageError(sentence, "MissingPackage", {"package": missing}) from error
+# Parts that are read in place; more are merged first.
+_PARTS = 100
 
 
 def batches(names: Iterable[str], size: int = 8) -> Iterator[list[str]]:
@@ -114,6 +109,8 @@ class Outcome:
         self._files = sorted(str(part) for part in (folder / "runs").glob("part-*.parquet"))
         if not self._files:
             raise ResultsError(f"{folder}: no run of this campaign has ended yet", "NoRuns")
+        if len(self._files) > _PARTS:
+            self._merge()
         self._status = self.read(["status"])["status"]
         repeated = self._status.index[self._status.index.duplicated()]
         if len(repeated):
@@ -122,12 +119,29 @@ class Outcome:
 
     # The table.
 
+    def _merge(self) -> None:
+        """Copy many small parts to one temporary file: each read of a column opens every file."""
+        arrow, parquet = package("pyarrow"), package("pyarrow.parquet")
+        temporary = tempfile.mkdtemp(prefix="aso-ftc-")
+        weakref.finalize(self, shutil.rmtree, temporary, ignore_errors=True)
+        path = os.path.join(temporary, "runs.parquet")
+        schema = parquet.read_schema(self._files[0])
+        try:
+            with parquet.ParquetWriter(path, schema, compression="zstd") as writer:
+                for names in batches(self._files, _PARTS):
+                    writer.write_table(
+                        arrow.concat_tables([parquet.ParquetFile(name).read() for name in names])
+                    )
+        except (OSError, arrow.ArrowInvalid) as error:
+            raise ResultsError(f"{self.folder}: cannot read all runs: {error}", "CannotRead") from error
+        self._files = [path]
+
     def _arrow(
         self, columns: list[str] | None, *, dictionaries: bool, runs: Sequence[int] | None = None
     ) -> pyarrow.Table:
         """Read columns of all parts, rows sorted by ``run``."""
-        dataset = package("pyarrow.dataset", "campaign.load()")
-        types = package("pyarrow.types", "campaign.load()")
+        dataset = package("pyarrow.dataset")
+        types = package("pyarrow.types")
         plain = dataset.dataset(self._files, format="parquet")
         if dictionaries:
             text = {field.name for field in plain.schema if types.is_string(field.type)}
@@ -135,16 +149,21 @@ class Outcome:
             form = dataset.ParquetFileFormat(dictionary_columns=names)
             plain = dataset.dataset(self._files, format=form)
         only = None if runs is None else dataset.field("run").isin(list(runs))
-        return plain.to_table(columns=columns, filter=only).unify_dictionaries().sort_by("run")
+        table = plain.to_table(columns=columns, filter=only).unify_dictionaries()
+        numbers = table["run"].to_numpy()
+        return table if bool(np.all(numbers[1:] > numbers[:-1])) else table.sort_by("run")
 
     def read(self, columns: Sequence[str], runs: Sequence[int] | None = None) -> pandas.DataFrame:
-        """Read these columns, of all runs or of some, indexed by ``run``; texts as categories."""
-        package("pandas", "campaign.load()")
+        """Read these columns, of all runs or of some, indexed by ``run``; texts as categories.
+
+        A text that is absent, such as the connection of a run without fault, is empty.
+        """
+        package("pandas")
         table = self._arrow(["run", *dict.fromkeys(columns)], dictionaries=True, runs=runs)
         frame: pandas.DataFrame = table.to_pandas(split_blocks=True, self_destruct=True)
         for name in frame.columns[frame.dtypes == "category"]:
             # The order of the categories must not depend on the parts.
-            frame[name] = frame[name].cat.set_categories(sorted(frame[name].cat.categories))
+            frame[name] = frame[name].cat.set_categories(sorted({*frame[name].cat.categories, ""})).fillna("")
         return frame.set_index("run")
 
     def to_arrow(self) -> pyarrow.Table:
@@ -154,7 +173,7 @@ class Outcome:
     @cached_property
     def table(self) -> pandas.DataFrame:
         """All runs as a table indexed by ``run``: parameters, measures, ``status``, ``reason``, ``seconds``."""
-        package("pandas", "table")
+        package("pandas")
         frame: pandas.DataFrame = self.to_arrow().to_pandas()
         return frame.set_index("run")
 
@@ -220,7 +239,7 @@ class Outcome:
     @cached_property
     def _units(self) -> list[str]:
         """The sampled parameters, in the order of the sample."""
-        parquet = package("pyarrow.parquet", "sensitivity indices")
+        parquet = package("pyarrow.parquet")
         names = parquet.read_schema(self.folder / "plan.parquet").names
         return [name.removeprefix("unit:") for name in names if name.startswith("unit:")]
 
@@ -265,7 +284,7 @@ class Outcome:
         return problem, values
 
     def _table(self, names: Any, columns: Mapping[str, Any], index: str = "parameter") -> pandas.DataFrame:
-        pandas_ = package("pandas", "sensitivity indices")
+        pandas_ = package("pandas")
         frame: pandas.DataFrame = pandas_.DataFrame(
             {name: np.asarray(values, dtype=np.float64) for name, values in columns.items()},
             index=pandas_.Index(names, name=index),
@@ -298,7 +317,7 @@ class Outcome:
         return self._table(self._units, {name: found[name] for name in ("S1", "S1_conf", "ST", "ST_conf")})
 
     def sobol_second_order(self, measure: str, confidence: float = 0.95, seed: int = 0) -> pandas.DataFrame:
-        """Return Sobol indices of second order of a design ``saltelli`` with ``second_order = true``.
+        """Return Sobol indices of second order of a design ``saltelli`` with ``second-order = true``.
 
         ``S2_ij = Var(E[Y | X_i, X_j]) / Var(Y) - S1_i - S1_j``; estimator of Saltelli (2002) in SALib.
         Same arguments and errors as :meth:`sobol`.
@@ -308,12 +327,12 @@ class Outcome:
         """
         problem, values = self._sample(measure, "saltelli", "Sobol indices")
         if self._block == len(self._units) + 2:
-            sentence = "Sobol indices of second order need the design 'saltelli' with second_order = true"
-            raise ConfigurationError(sentence, "WrongDesign", {"expected": "second_order"})
+            sentence = "Sobol indices of second order need the design 'saltelli' with second-order = true"
+            raise ConfigurationError(sentence, "WrongDesign", {"expected": "second-order"})
         found = _sobol(problem, values, True, len(values) // self._block, confidence, seed)
         upper = np.triu_indices(len(self._units), 1)
         pairs = [(self._units[i], self._units[j]) for i, j in zip(*upper)]
-        index = package("pandas", "Sobol indices").MultiIndex.from_tuples(pairs, names=["first", "second"])
+        index = package("pandas").MultiIndex.from_tuples(pairs, names=["first", "second"])
         frame = self._table(range(len(pairs)), {name: found[name][upper] for name in ("S2", "S2_conf")})
         return frame.set_axis(index)
 
@@ -321,7 +340,7 @@ class Outcome:
     def _block(self) -> int:
         """Rows of a design ``saltelli`` for one base sample: A, D times AB, D times BA, B."""
         count = len(self._units)
-        return 2 * count + 2 if self.manifest["design"].get("second_order") else count + 2
+        return 2 * count + 2 if self.manifest["design"].get("second-order") else count + 2
 
     def morris(self, measure: str, confidence: float = 0.95, seed: int = 0) -> pandas.DataFrame:
         """Return the elementary effects of a campaign with the design ``morris``.
@@ -344,13 +363,13 @@ class Outcome:
             ConfigurationError: another design, or a run without a value.
         """
         problem, values = self._sample(measure, "morris", "Morris indices")
-        parquet = package("pyarrow.parquet", "Morris indices")
+        parquet = package("pyarrow.parquet")
         plan = parquet.read_table(
-            self.folder / "plan.parquet", columns=["run", *(f"unit:{name}" for name in self._units)]
-        ).sort_by("run")
+            self.folder / "plan.parquet", columns=["row", *(f"unit:{name}" for name in self._units)]
+        ).sort_by("row")
         positions = np.column_stack([plan.column(f"unit:{name}").to_numpy() for name in self._units])
         levels = int(self.manifest["design"].get("levels", 4))
-        found = package("SALib.analyze.morris", "Morris indices").analyze(
+        found = package("SALib.analyze.morris").analyze(
             problem,
             np.asarray(positions, dtype=np.float64),
             values,
@@ -381,7 +400,7 @@ class Outcome:
             ConfigurationError: another design, or a run without a value.
         """
         problem, values = self._sample(measure, "fast", "FAST indices")
-        analyze = package("SALib.analyze.fast", "FAST indices").analyze
+        analyze = package("SALib.analyze.fast").analyze
         harmonics = int(self.manifest["design"].get("harmonics", 4))
         # SALib draws from NumPy's global generator, which is not ours to change.
         state = np.random.get_state()
@@ -470,7 +489,7 @@ class Outcome:
         if count == 0:
             raise ConfigurationError("a failure probability needs at least one finished run", "NoRuns")
         failures = int(failed[rows].sum())
-        test = package("scipy.stats", "failure_probability()").binomtest(failures, count)
+        test = package("scipy.stats").binomtest(failures, count)
         bounds = test.proportion_ci(confidence_level=confidence, method="exact")
         notes = []
         if method in _EVEN:
@@ -478,7 +497,12 @@ class Outcome:
                 f"the rows of the design {method!r} are more even than independent samples: the bounds are "
                 f"usually wider than needed, their confidence is not exact"
             )
-        if len(self) < self.manifest["runs"]:
+        if len(self) < self.manifest["runs"] and self.manifest.get("complete"):
+            notes.append(
+                "the campaign ended when the bounds were close enough: their confidence is not exact, because the "
+                "number of runs depends on the results"
+            )
+        elif len(self) < self.manifest["runs"]:
             notes.append(
                 f"{len(self)} of {self.manifest['runs']} runs have ended: the bounds are biased if the others "
                 f"take longer because of how they behave"
@@ -518,7 +542,7 @@ class Outcome:
         values = np.asarray(self.read([measure])[measure].to_numpy(), dtype=np.float64)
         values = np.where(self.unfinished, np.nan, values)
         failed = self.failed(measure) if measure in self.limits else np.full(len(values), np.nan)
-        spearman = package("scipy.stats", "influence()").spearmanr
+        spearman = package("scipy.stats").spearmanr
         numbers: list[dict[str, Any]] = []
         others: list[dict[str, Any]] = []
         for names in batches(self.inputs):
@@ -535,7 +559,7 @@ class Outcome:
                 ]
         numbers.sort(key=lambda row: -abs(np.nan_to_num(row["correlation"])))
         columns = ["parameter", "value", "runs", "correlation", "p_value", "lowest_tenth", "highest_tenth"]
-        pandas_ = package("pandas", "influence()")
+        pandas_ = package("pandas")
         found = pandas_.DataFrame(numbers + others, columns=[*columns, "failed", "median"])
         result: pandas.DataFrame = found.set_index("parameter")
         return result
@@ -601,7 +625,7 @@ def _sobol(
     A part has ``base * resamples`` random rows; with n parts of equal size, the variance of all
     resamples is the mean of the variances of the parts. Small campaigns need one part.
     """
-    analyze = package("SALib.analyze.sobol", "Sobol indices").analyze
+    analyze = package("SALib.analyze.sobol").analyze
     sizes = (_RESAMPLES, 50, 25, 10, 5, 2)
     size = next((size for size in sizes if size * base <= _ROWS_OF_A_CALL), sizes[-1])
     found: dict[str, Any] = {}

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._errors import ConfigurationError, ResultsError
-from ._analysis import batches, describe, package
+from ._analysis import batches, describe
+from ._packages import package
 
 if TYPE_CHECKING:
     from ._analysis import Outcome
@@ -39,7 +40,7 @@ def write(outcome: Outcome, path: Path, force: bool) -> None:
     if not force and path.exists() and _MARK not in _head(path):
         sentence = f"{path}: this file is no page of a campaign and is kept; force=True overwrites it"
         raise ConfigurationError(sentence, "FileExists", {"path": str(path)})
-    script = package("plotly.offline", "page()").get_plotlyjs()
+    script = package("plotly.offline").get_plotlyjs()
     text = _page(outcome, script)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
@@ -156,8 +157,9 @@ def _summary(outcome: Outcome) -> str:
         design.setdefault("seed", manifest["seed"])
     options = ", ".join(f"{key} {json.dumps(value)}" for key, value in design.items())
     statuses = ", ".join(f"{count:,} {name}" for name, count in outcome.statuses.items())
+    early = ", ended early" if manifest.get("complete") and len(outcome) < manifest["runs"] else ""
     entries = {
-        "Runs": f"{len(outcome):,} of {manifest['runs']:,}: {statuses}",
+        "Runs": f"{len(outcome):,} of {manifest['runs']:,}{early}: {statuses}",
         "Design": f"{method} ({options})" if options else method,
         "Faults": "none",
         "Folder": str(outcome.folder),
@@ -184,7 +186,7 @@ def _parameters(outcome: Outcome) -> str:
                 ends = [float(np.nanmin(values)), float(np.nanmax(values))]
                 rows.append(_row([name, units[name] or "", *ends]))
             else:
-                found = [str(value) for value in frame[name].unique()]
+                found = sorted(str(value) for value in frame[name].unique())
                 more = f" and {len(found) - 5:,} more" if len(found) > 5 else ""
                 rows.append(_row([name, units[name] or "", ", ".join(found[:5]) + more, ""]))
     return _table(("parameter", "unit", "lowest", "highest"), rows)
@@ -295,7 +297,7 @@ def _measure(outcome: Outcome, name: str) -> dict[str, Any]:
     found: dict[str, Any] = {
         "name": name,
         "unit": entry.get("unit"),
-        "expression": str(entry.get("expression", "")),
+        "expression": str(entry.get("expression") or entry.get("python") or ""),
         "limit": {word: float(value) for word, value in limit.items()},
         "logarithmic": _is_wide(values),
         "histogram": _histogram(values),
