@@ -21,7 +21,18 @@ from scipy import stats
 
 
 def write(
-    folder, design, columns, measures, *, unit=None, limits=None, status=None, faults=None, parts=3, **more
+    folder,
+    design,
+    columns,
+    measures,
+    *,
+    unit=None,
+    limits=None,
+    status=None,
+    faults=None,
+    parts=3,
+    changes=None,
+    **more,
 ):
     """Writes the folder of a campaign: columns of parameters and measures, positions of a sample."""
     names = list(columns)
@@ -37,6 +48,7 @@ def write(
         "limits": limits or {},
         "complete": True,
         **more,
+        **(changes or {}),
     }
     (folder / "runs").mkdir(parents=True)
     (folder / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
