@@ -1,5 +1,6 @@
 """Analysis of a campaign, against closed forms and other formulas."""
 
+import gc
 import json
 import os
 import subprocess
@@ -17,7 +18,18 @@ from scipy import stats
 
 
 def write(
-    folder, design, columns, measures, *, unit=None, limits=None, status=None, faults=None, parts=3, **more
+    folder,
+    design,
+    columns,
+    measures,
+    *,
+    unit=None,
+    limits=None,
+    status=None,
+    faults=None,
+    parts=3,
+    changes=None,
+    **more,
 ):
     """Writes the folder of a campaign: columns of parameters and measures, positions of a sample."""
     names = list(columns)
@@ -33,6 +45,7 @@ def write(
         "limits": limits or {},
         "complete": True,
         **more,
+        **(changes or {}),
     }
     (folder / "runs").mkdir(parents=True)
     (folder / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
@@ -258,6 +271,8 @@ def test_designs_that_are_not_independent_samples_are_refused_or_noted(tmp_path)
         with pytest.raises(ConfigurationError, match=f"needs a design of random samples.* found '{method}'"):
             found.failure_probability()
     found = random_campaign(tmp_path / "part", np.zeros(8), {"below": 1.0}, runs=20)
+    assert "number of runs depends on the results" in found.failure_probability().note
+    found = random_campaign(tmp_path / "now", np.zeros(8), {"below": 1.0}, runs=20, complete=False)
     assert "8 of 20 runs have ended" in found.failure_probability().note
 
 
@@ -300,10 +315,10 @@ def test_influence_has_the_rank_correlation_and_the_failures_of_the_tenths(tmp_p
 
 
 def fault_campaign(folder, limit):
-    kinds = ["stuck", "stuck", "stuck", "gain", "gain", "gain", ""]
+    kinds = ["stuck", "stuck", "stuck", "gain", "gain", "gain", None]
     faults = {
         "fault": ["stuck 0", "stuck 0", "stuck 1", "gain 2", "gain 2", "gain 3", ""],
-        "fault.connection": ["a.y", "a.y", "b.y", "a.y", "a.y", "a.y", ""],
+        "fault.connection": ["a.y", "a.y", "b.y", "a.y", "a.y", "a.y", None],
         "fault.kind": kinds,
         "fault.size": pyarrow.array([None, None, None, 2.0, 2.0, 3.0, None], pyarrow.float64()),
         "fault.from": pyarrow.array([1.0, 1.0, 1.0, 1.0, 1.0, 5.0, None], pyarrow.float64()),
@@ -361,6 +376,19 @@ def test_the_table_has_the_runs_in_order_as_arrow_and_pandas(tmp_path):
     assert outcome.to_arrow().column("y").to_pylist() == [-float(i) for i in range(50)]
     assert outcome.read(["k", "y"]).loc[49, "k"] == "y" and outcome.statuses == {"ok": 50}
     assert repr(outcome) == "<Outcome: test, 50 of 50 runs, 0 not finished>"
+
+
+def test_many_parts_are_the_same_table_and_leave_no_file(tmp_path, monkeypatch):
+    columns = {"p": np.arange(500.0), "k": np.array(["x", "y"] * 250, dtype=object)}
+    few = write(tmp_path / "few", {"method": "grid"}, columns, {"y": -np.arange(500.0)})
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
+    many = write(tmp_path / "many", {"method": "grid"}, columns, {"y": -np.arange(500.0)}, parts=250)
+    assert many.table.equals(few.table) and many.to_arrow().equals(few.to_arrow())
+    assert len(list((tmp_path / "temporary").iterdir())) == 1
+    del many
+    gc.collect()
+    assert not list((tmp_path / "temporary").iterdir())
 
 
 def test_a_notebook_shows_the_measures_with_names_escaped(tmp_path):
@@ -424,6 +452,4 @@ def test_a_missing_package_names_the_extra(tmp_path):
         "try:\n    outcome.failure_probability()\nexcept MissingPackageError as error:\n    print(error)"
     )
     done = subprocess.run([sys.executable, "-P", "-c", text], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == (
-        'campaigns need the package scipy: pip install "aso-ftc[campaign]"'
-    )
+    assert done.stdout.strip() == ('campaigns need the package scipy: pip install "aso-ftc[campaign]"')

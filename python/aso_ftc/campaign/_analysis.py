@@ -7,7 +7,10 @@ import json
 import math
 import os
 import shlex
+import shutil
+import tempfile
 import warnings
+import weakref
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -33,6 +36,8 @@ _INDEPENDENT = ("random",)
 _EVEN = ("latin-hypercube", "sobol", "halton")
 # SALib's number of bootstrap resamples; one call draws at most so many rows.
 _RESAMPLES, _ROWS_OF_A_CALL = 100, 4_000_000
+# Parts that are read in place; more are merged first.
+_PARTS = 100
 
 
 def batches(names: Iterable[str], size: int = 8) -> Iterator[list[str]]:
@@ -104,6 +109,8 @@ class Outcome:
         self._files = sorted(str(part) for part in (folder / "runs").glob("part-*.parquet"))
         if not self._files:
             raise ResultsError(f"{folder}: no run of this campaign has ended yet", "NoRuns")
+        if len(self._files) > _PARTS:
+            self._merge()
         self._status = self.read(["status"])["status"]
         repeated = self._status.index[self._status.index.duplicated()]
         if len(repeated):
@@ -111,6 +118,23 @@ class Outcome:
             raise ResultsError(sentence, "RepeatedRun", {"run": int(repeated[0])})
 
     # The table.
+
+    def _merge(self) -> None:
+        """Copy many small parts to one temporary file: each read of a column opens every file."""
+        arrow, parquet = package("pyarrow"), package("pyarrow.parquet")
+        temporary = tempfile.mkdtemp(prefix="aso-ftc-")
+        weakref.finalize(self, shutil.rmtree, temporary, ignore_errors=True)
+        path = os.path.join(temporary, "runs.parquet")
+        schema = parquet.read_schema(self._files[0])
+        try:
+            with parquet.ParquetWriter(path, schema, compression="zstd") as writer:
+                for names in batches(self._files, _PARTS):
+                    writer.write_table(
+                        arrow.concat_tables([parquet.ParquetFile(name).read() for name in names])
+                    )
+        except (OSError, arrow.ArrowInvalid) as error:
+            raise ResultsError(f"{self.folder}: cannot read all runs: {error}", "CannotRead") from error
+        self._files = [path]
 
     def _arrow(
         self, columns: list[str] | None, *, dictionaries: bool, runs: Sequence[int] | None = None
@@ -125,16 +149,21 @@ class Outcome:
             form = dataset.ParquetFileFormat(dictionary_columns=names)
             plain = dataset.dataset(self._files, format=form)
         only = None if runs is None else dataset.field("run").isin(list(runs))
-        return plain.to_table(columns=columns, filter=only).unify_dictionaries().sort_by("run")
+        table = plain.to_table(columns=columns, filter=only).unify_dictionaries()
+        numbers = table["run"].to_numpy()
+        return table if bool(np.all(numbers[1:] > numbers[:-1])) else table.sort_by("run")
 
     def read(self, columns: Sequence[str], runs: Sequence[int] | None = None) -> pandas.DataFrame:
-        """Read these columns, of all runs or of some, indexed by ``run``; texts as categories."""
+        """Read these columns, of all runs or of some, indexed by ``run``; texts as categories.
+
+        A text that is absent, such as the connection of a run without fault, is empty.
+        """
         package("pandas")
         table = self._arrow(["run", *dict.fromkeys(columns)], dictionaries=True, runs=runs)
         frame: pandas.DataFrame = table.to_pandas(split_blocks=True, self_destruct=True)
         for name in frame.columns[frame.dtypes == "category"]:
             # The order of the categories must not depend on the parts.
-            frame[name] = frame[name].cat.set_categories(sorted(frame[name].cat.categories))
+            frame[name] = frame[name].cat.set_categories(sorted({*frame[name].cat.categories, ""})).fillna("")
         return frame.set_index("run")
 
     def to_arrow(self) -> pyarrow.Table:
@@ -469,7 +498,12 @@ class Outcome:
                 f"the rows of the design {method!r} are more even than independent samples: the bounds are "
                 f"usually wider than needed, their confidence is not exact"
             )
-        if len(self) < self.manifest["runs"]:
+        if len(self) < self.manifest["runs"] and self.manifest.get("complete"):
+            notes.append(
+                "the campaign ended when the bounds were close enough: their confidence is not exact, because the "
+                "number of runs depends on the results"
+            )
+        elif len(self) < self.manifest["runs"]:
             notes.append(
                 f"{len(self)} of {self.manifest['runs']} runs have ended: the bounds are biased if the others "
                 f"take longer because of how they behave"

@@ -102,21 +102,19 @@ def _summary(outcome: Outcome) -> str:
         failures = int(outcome.failed(name).sum())
         line = f"{name} {describe(limit)}: {runs - failures} of {runs} runs"
         try:
-            found = outcome.failure_probability(name)
-            line += (
-                f", failure probability {found.lower:.3g} to {found.upper:.3g} ({100 * found.confidence:g} %)"
-            )
-            line += f"; {found.note}" if found.note else ""
+            chance = outcome.failure_probability(name)
+            notes = [f"{100 * chance.confidence:g} %", *([chance.note] if chance.note else [])]
+            line += f", failure probability {chance.lower:.3g} to {chance.upper:.3g} ({'; '.join(notes)})"
         except ConfigurationError:
             # The design has no random samples: a fraction, but no probability.
             pass
         lines.append(line)
         found = outcome.influence(name).dropna(subset=["lowest_tenth", "highest_tenth"])
         order = (found["highest_tenth"] - found["lowest_tenth"]).abs().sort_values(ascending=False)
-        shown = [
+        parts = [
             f"{own} {100 * found['lowest_tenth'][own]:.0f} % to {100 * found['highest_tenth'][own]:.0f} %"
             for own in order.index[:3]
         ]
-        if shown:
-            lines.append(f"  runs outside, from the lowest to the highest tenth: {', '.join(shown)}")
+        if parts:
+            lines.append(f"  runs outside, from the lowest to the highest tenth: {', '.join(parts)}")
     return "\n".join(lines)

@@ -157,8 +157,9 @@ def _summary(outcome: Outcome) -> str:
         design.setdefault("seed", manifest["seed"])
     options = ", ".join(f"{key} {json.dumps(value)}" for key, value in design.items())
     statuses = ", ".join(f"{count:,} {name}" for name, count in outcome.statuses.items())
+    early = ", ended early" if manifest.get("complete") and len(outcome) < manifest["runs"] else ""
     entries = {
-        "Runs": f"{len(outcome):,} of {manifest['runs']:,}: {statuses}",
+        "Runs": f"{len(outcome):,} of {manifest['runs']:,}{early}: {statuses}",
         "Design": f"{method} ({options})" if options else method,
         "Faults": "none",
         "Folder": str(outcome.folder),
@@ -185,7 +186,7 @@ def _parameters(outcome: Outcome) -> str:
                 ends = [float(np.nanmin(values)), float(np.nanmax(values))]
                 rows.append(_row([name, units[name] or "", *ends]))
             else:
-                found = [str(value) for value in frame[name].unique()]
+                found = sorted(str(value) for value in frame[name].unique())
                 more = f" and {len(found) - 5:,} more" if len(found) > 5 else ""
                 rows.append(_row([name, units[name] or "", ", ".join(found[:5]) + more, ""]))
     return _table(("parameter", "unit", "lowest", "highest"), rows)
@@ -296,7 +297,7 @@ def _measure(outcome: Outcome, name: str) -> dict[str, Any]:
     found: dict[str, Any] = {
         "name": name,
         "unit": entry.get("unit"),
-        "expression": str(entry.get("expression", "")),
+        "expression": str(entry.get("expression") or entry.get("python") or ""),
         "limit": {word: float(value) for word, value in limit.items()},
         "logarithmic": _is_wide(values),
         "histogram": _histogram(values),
@@ -354,13 +355,14 @@ def _histogram(values: NDArray[np.float64]) -> dict[str, Any]:
     if not len(finite):
         return {"edges": [], "counts": [], "outside": 0, "others": len(values)}
     low, high = finite.min(), finite.max()
+    bins = max(5, min(_BINS, round(2 * math.sqrt(len(finite)))))
     if _is_wide(values):
-        edges = np.geomspace(low, high, _BINS + 1)
+        edges = np.geomspace(low, high, bins + 1)
     else:
         inner = np.quantile(finite, [0.001, 0.999])
         if high - low > 10 * (inner[1] - inner[0]) > 0:
             low, high = inner
-        edges = np.histogram_bin_edges(finite, _BINS, (low, high))
+        edges = np.histogram_bin_edges(finite, bins, (low, high))
     edges[0], edges[-1] = min(edges[0], low), max(edges[-1], high)
     counts, _ = np.histogram(finite, edges)
     beyond = len(finite) - int(counts.sum())
@@ -465,7 +467,7 @@ def _columns(outcome: Outcome, measures: list[str], rows: NDArray[np.int64]) -> 
 # No source is allowed: the browser itself refuses any request. plotly.js compiles its WebGL code (eval).
 _POLICY = (
     '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; '
-    "script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:\">"
+    "script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'\">"
 )
 
 _STYLE = """
@@ -528,8 +530,9 @@ const inside = value => {
   const {below, above} = measure().limit;
   return (below === undefined || value < below) && (above === undefined || value > above);
 };
-const options = {displaylogo: false, responsive: true,
-  modeBarButtonsToRemove: ['lasso2d', 'select2d', 'autoScale2d', 'zoomIn2d', 'zoomOut2d']};
+// By default plotly.js has a button that uploads the data of a picture.
+const options = {displaylogo: false, responsive: true, showSendToCloud: false, plotlyServerURL: '',
+  modeBarButtons: [['toImage', 'zoom2d', 'pan2d', 'resetScale2d']]};
 function axis(title, more) {
   return {title: {text: title}, gridcolor: color('line'), zerolinecolor: color('line'), linecolor: color('line'),
     automargin: true, ...more};
@@ -598,7 +601,7 @@ function drawParallel() {
   place.style.width = Math.max(place.parentElement.clientWidth, 120 * (dimensions.length + 1)) + 'px';
   Plotly.react(place, [{type: 'parcoords', dimensions: axes, line, labelangle: -15, labelside: 'top',
     labelfont: {size: 12}, tickfont: {size: 10}, rangefont: {size: 1, color: 'rgba(0,0,0,0)'}}],
-    layout({height: 440, margin: {l: 60, r: 60, t: 90, b: 20}}), {displaylogo: false, displayModeBar: false});
+    layout({height: 440, margin: {l: 60, r: 60, t: 90, b: 20}}), {...options, displayModeBar: false});
 }
 
 function drawScatter() {

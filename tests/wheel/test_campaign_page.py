@@ -1,0 +1,292 @@
+"""The page of a campaign: one file, no requests, escaped names, the numbers of the analysis."""
+
+import html.parser
+import json
+import shutil
+import subprocess
+import time
+
+import numpy as np
+import pytest
+
+for package in ("SALib", "pandas", "plotly", "pyarrow", "scipy"):
+    pytest.importorskip(package)
+
+from aso_ftc import ConfigurationError, ResultsError
+from SALib.sample import sobol
+from test_campaign_analysis import campaign, fault_campaign, ishigami, problem, random_campaign, write
+
+HOSTILE = "</script><script>alert(1)</script><img src=http://example.com/x onerror=alert(2)>\"'&%{x}"
+
+
+class Page(html.parser.HTMLParser):
+    """Tags with their attributes, text outside scripts and styles, and the data of the pictures."""
+
+    def __init__(self, path):
+        super().__init__()
+        self.tags, self.text, self.data, self.inside = [], "", "", None
+        self.source = path.read_text(encoding="utf-8")
+        self.feed(self.source)
+        self.data = json.loads(self.data)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+        self.inside = (tag, dict(attrs).get("id")) if tag in ("script", "style") else None
+
+    def handle_endtag(self, tag):
+        self.inside = None
+
+    def handle_data(self, data):
+        if self.inside is None:
+            self.text += data
+        elif self.inside == ("script", "data"):
+            self.data += data
+
+    def column(self, name, kind):
+        (found,) = [own for own in self.data["columns"] if (own["name"], own["kind"]) == (name, kind)]
+        labels = found.get("labels")
+        return [labels[value] for value in found["values"]] if labels else found["values"]
+
+
+def page(outcome, path):
+    outcome.page(path)
+    return Page(path)
+
+
+def test_the_page_is_one_file_that_makes_no_request(tmp_path):
+    found = page(random_campaign(tmp_path / "c", np.linspace(0, 2, 90), {"below": 1.0}), tmp_path / "p.html")
+    names = {name for _, attributes in found.tags for name in attributes}
+    assert not names & {"src", "href", "action", "srcset", "data", "poster", "background"}
+    policies = [
+        own["content"] for tag, own in found.tags if own.get("http-equiv") == "Content-Security-Policy"
+    ]
+    (policy,) = policies
+    assert "default-src 'none'" in policy and "http" not in policy and "connect-src" not in policy
+    style = found.source[found.source.index("<style>") : found.source.index("</style>")]
+    assert "url(" not in style and "@import" not in style
+    assert "plotly.js v" in found.source and sorted(path.name for path in tmp_path.iterdir()) == [
+        "c",
+        "p.html",
+    ]
+
+
+def test_hostile_names_are_text(tmp_path):
+    columns = {HOSTILE: np.arange(20.0), "kind": np.array([HOSTILE, "b"] * 10, dtype=object)}
+    status = ["crashed", *["ok"] * 19]
+    measures = {f"m {HOSTILE}": np.arange(20.0)}
+    limits = {f"m {HOSTILE}": {"below": 5.0}}
+    manifest = {
+        "name": HOSTILE,
+        "measures": {f"m {HOSTILE}": {"expression": HOSTILE, "unit": HOSTILE}},
+        "parameters": [{"name": name, "unit": HOSTILE, "numeric": name != "kind"} for name in columns],
+    }
+    folder = tmp_path / "c <b>&'\""
+    outcome = write(
+        folder, {"method": "random"}, columns, measures, limits=limits, status=status, changes=manifest
+    )
+    found = page(outcome, tmp_path / "p.html")
+    assert [tag for tag, _ in found.tags].count("script") == 3
+    assert not {tag for tag, _ in found.tags} & {"img", "iframe", "object", "a", "form", "link"}
+    assert not [own for _, own in found.tags if set(own) & {"onerror", "onclick", "onload"}]
+    assert found.text.count(HOSTILE) > 8 and outcome.command(0) in found.text
+    assert found.data["columns"][1]["name"] == HOSTILE and found.data["measures"][0]["unit"] == HOSTILE
+
+
+def test_the_pictures_have_the_values_of_the_runs(tmp_path):
+    generator = np.random.default_rng(2)
+    columns = {
+        "p": generator.random(700),
+        "k": np.array(["b", "a", "c", "a", "b", "c", "a"] * 100, dtype=object),
+    }
+    values = generator.normal(size=700)
+    values[3], values[4] = np.inf, np.nan
+    status = ["ok"] * 4 + ["time limit"] + ["ok"] * 695
+    outcome = write(tmp_path / "c", {"method": "random"}, columns, {"y": values}, status=status)
+    found = page(outcome, tmp_path / "p.html")
+    assert found.data["runs"] == list(range(700)) and found.column("status", "status") == status
+    assert found.column("k", "input") == list(columns["k"])
+    assert np.allclose(found.column("p", "input"), columns["p"], rtol=1e-6)
+    drawn = [np.nan if value is None else value for value in found.column("y", "measure")]
+    assert np.allclose(drawn, np.where(np.isfinite(values), values, np.nan), rtol=1e-6, equal_nan=True)
+    (own,) = found.data["measures"]
+    finite = values[np.isfinite(values)]
+    counts, _ = np.histogram(finite, own["histogram"]["edges"])
+    assert own["histogram"]["counts"] == counts.tolist() and sum(counts) == 698 == len(finite)
+    assert own["histogram"]["others"] == 2 and own["histogram"]["outside"] == 0 and not own["logarithmic"]
+    assert "5".join(found.data["command"]) == outcome.command(5) and "All runs are drawn" in found.text
+
+
+def test_outliers_and_decades_do_not_hide_the_distribution(tmp_path):
+    values = np.random.default_rng(3).normal(size=(20_000))
+    values[7] = -1e30
+    measures = {"outlier": values, "decades": 10 ** np.linspace(-6, 3, 20_000)}
+    outcome = write(tmp_path / "c", {"method": "random"}, {"p": np.arange(20_000.0)}, measures)
+    outlier, decades = page(outcome, tmp_path / "p.html").data["measures"]
+    assert outlier["histogram"]["edges"][0] > -10
+    assert sum(outlier["histogram"]["counts"]) + outlier["histogram"]["outside"] == 20_000
+    assert not outlier["logarithmic"] and decades["logarithmic"]
+    assert sum(decades["histogram"]["counts"]) == 20_000 and np.ptp(decades["histogram"]["counts"]) <= 2
+
+
+def test_of_many_runs_all_that_failed_are_drawn(tmp_path):
+    count = 200_000
+    values = np.random.default_rng(5).random(count)
+    status = np.array(["ok"] * count, dtype=object)
+    lost = np.arange(100, count, 4000)
+    status[lost] = "crashed"
+    values[lost] = np.nan
+    outcome = random_campaign(tmp_path / "c", values, {"below": 0.999}, status=status, parts=30)
+    begin = time.monotonic()
+    found = page(outcome, tmp_path / "p.html")
+    seconds = time.monotonic() - begin
+    outside = np.flatnonzero(values >= 0.999)
+    drawn = np.array(found.data["runs"])
+    assert len(drawn) == 10_000 == len(set(drawn)) and np.all(np.diff(drawn) > 0)
+    assert set(lost) | set(outside) <= set(drawn)
+    assert np.allclose(found.column("y", "measure")[1], values[drawn[1]], rtol=1e-6)
+    assert (
+        f"50 of the 50 runs that did not finish, {len(outside)} of the {len(outside)} runs outside"
+        in found.text
+    )
+    # The others are spread evenly over the run numbers.
+    others = np.setdiff1d(drawn, np.concatenate([lost, outside]))
+    parts = np.histogram(others, 10, (0, count))[0]
+    assert parts.max() - parts.min() < 20
+    assert sum(found.data["measures"][0]["histogram"]["counts"]) == count - 50
+    assert len(found.source) < 8e6 and seconds < 60
+
+
+def test_frequent_failures_leave_half_of_the_points_to_the_other_runs(tmp_path):
+    values = np.r_[np.full(60_000, 2.0), np.zeros(20_000)]
+    found = page(random_campaign(tmp_path / "c", values, {"below": 1.0}), tmp_path / "p.html")
+    assert (
+        np.count_nonzero(np.array(found.column("y", "measure")) == 2) == 5000 == len(found.data["runs"]) / 2
+    )
+
+
+def test_runs_that_did_not_finish_are_a_table_with_their_commands(tmp_path):
+    status = ["crashed", "ok"] * 60
+    outcome = random_campaign(tmp_path / "c", [0.0] * 120, {"below": 1.0}, status=status)
+    found = page(outcome, tmp_path / "p.html")
+    assert found.text.count("the FMU ended the process") == 50 == found.source.count('<button class="copy">')
+    assert outcome.command(98) in found.text and outcome.command(100) not in found.text
+    assert "And 10 more runs." in found.text
+
+
+def test_the_page_has_the_numbers_of_the_analysis(tmp_path):
+    outcome = random_campaign(tmp_path / "c", np.linspace(0, 2, 500), {"below": 1.5})
+    found = page(outcome, tmp_path / "p.html")
+    chance = outcome.failure_probability("y")
+    row = outcome.influence("y").loc["p"]
+    for number in (chance.probability, chance.lower, chance.upper, row["correlation"], row["lowest_tenth"]):
+        assert f"{number:.4g}" in found.text
+    grid = page(
+        random_campaign(tmp_path / "g", [0.0, 2.0], {"below": 1.0}, design={"method": "grid"}),
+        tmp_path / "g.html",
+    )
+    assert "No bounds: a failure probability needs a design of random samples" in grid.text
+
+
+def test_the_page_has_the_indices_of_the_design(tmp_path):
+    unit = sobol.sample(problem(3), 64, calc_second_order=False, seed=1)
+    outcome = campaign(tmp_path / "c", {"method": "saltelli", "second-order": False}, unit, ishigami)
+    indices = page(outcome, tmp_path / "p.html").data["measures"][0]["indices"]
+    table = outcome.sobol("y")
+    assert indices["names"] == list(table.index) and [bar["name"] for bar in indices["bars"]] == ["S1", "ST"]
+    for bar in indices["bars"]:
+        assert np.allclose(bar["values"], table[bar["name"]], rtol=1e-6)
+        assert np.allclose(bar["confidence"], table[bar["name"] + "_conf"], rtol=1e-6)
+    status = ["failed", *["ok"] * (len(unit) - 1)]
+    lost = campaign(
+        tmp_path / "d", {"method": "saltelli", "second-order": False}, unit, ishigami, status=status
+    )
+    found = page(lost, tmp_path / "d.html")
+    assert "1 of 320 have no value: 1 failed" in found.text and "indices" not in found.data["measures"][0]
+
+
+def test_the_heat_map_marks_faults_whose_run_did_not_finish(tmp_path):
+    found = page(fault_campaign(tmp_path / "c", {"below": 4.5}), tmp_path / "p.html")
+    heat = found.data["measures"][0]["heat"]
+    assert heat["rows"] == ["gain: a.y", "stuck: a.y", "stuck: b.y"]
+    assert sorted(heat["columns"]) == ["from 1 s", "size 2, from 1 s", "size 3, from 5 s"]
+    cells = {
+        (row, column): "lost" if lost else value
+        for row, values, marks in zip(heat["rows"], heat["values"], heat["lost"])
+        for column, value, lost in zip(heat["columns"], values, marks)
+        if lost or value is not None
+    }
+    assert cells == {
+        ("gain: a.y", "size 2, from 1 s"): 3.0,
+        ("gain: a.y", "size 3, from 5 s"): 5.0,
+        ("stuck: a.y", "from 1 s"): 4.0,
+        ("stuck: b.y", "from 1 s"): "lost",
+    }
+    assert "5 faults" not in found.text and "4 faults in 6 runs" in found.text and "(none)" in found.text
+
+
+def test_the_page_does_not_depend_on_the_parts(tmp_path):
+    unit = sobol.sample(problem(3), 16, calc_second_order=True, seed=1)
+    pages = []
+    for parts in (1, 5, 128):
+        shutil.rmtree(tmp_path / "c", ignore_errors=True)
+        status = ["ok", "crashed", "time limit", "failed"] * 32
+        outcome = campaign(
+            tmp_path / "c",
+            {"method": "saltelli", "second-order": True},
+            unit,
+            ishigami,
+            status=status,
+            parts=parts,
+        )
+        outcome.page(tmp_path / "p.html")
+        pages.append((tmp_path / "p.html").read_bytes())
+    assert pages[0] == pages[1] == pages[2]
+
+
+def test_only_pages_of_campaigns_are_overwritten(tmp_path):
+    outcome = random_campaign(tmp_path / "c", np.zeros(5), {"below": 1.0})
+    path = tmp_path / "p.html"
+    path.write_text("<html>my notes</html>", encoding="utf-8")
+    with pytest.raises(
+        ConfigurationError, match="is no page of a campaign and is kept; force=True overwrites it"
+    ):
+        outcome.page(path)
+    assert path.read_text(encoding="utf-8") == "<html>my notes</html>"
+    outcome.page(path, force=True)
+    first = path.read_bytes()
+    outcome.page(path)
+    assert path.read_bytes() == first and len(first) > 1e6
+    with pytest.raises(ResultsError, match="cannot write the page: No such file or directory"):
+        outcome.page(tmp_path / "none" / "p.html")
+    assert sorted(own.name for own in tmp_path.iterdir()) == ["c", "p.html"]
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="needs the browser chromium")
+def test_a_browser_draws_the_page_and_a_click_shows_the_command(tmp_path):
+    outcome = fault_campaign(tmp_path / "c", {"below": 4.5})
+    outcome.page(tmp_path / "p.html")
+    probe = """<script>
+    byId('scatter').emit('plotly_click', {points: [{customdata: 2}]});
+    byId('input').selectedIndex = 2;
+    byId('input').dispatchEvent(new Event('change'));
+    document.title = JSON.stringify([byId('point').querySelector('code').textContent,
+      byId('scatter').data.map(own => own.x.length), byId('heat').data.length, byId('histogram-0').data.length,
+      [...document.querySelectorAll('.modebar-btn')].map(own => own.dataset.title),
+      performance.getEntriesByType('resource').length]);
+    </script></body>"""
+    text = (tmp_path / "p.html").read_text(encoding="utf-8").replace("</body>", probe)
+    (tmp_path / "probe.html").write_text(text, encoding="utf-8")
+    words = ["--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader"]
+    words += ["--enable-unsafe-swiftshader", "--virtual-time-budget=20000", "--enable-logging=stderr"]
+    words += [f"--user-data-dir={tmp_path / 'profile'}"]
+    done = subprocess.run(
+        ["chromium", *words, "--dump-dom", (tmp_path / "probe.html").as_uri()],
+        capture_output=True, text=True, timeout=120, check=True,
+    )  # fmt: skip
+    found = html.unescape(done.stdout.split("<title>")[1].split("</title>")[0])
+    command, points, heat, histogram, buttons, requests = json.loads(found)
+    assert (
+        command == outcome.command(2) and sum(points) == 7 and heat == 1 and histogram == 2 and requests == 0
+    )
+    assert buttons == ["Download plot as a PNG", "Zoom", "Pan", "Reset axes"]
+    assert "CONSOLE" not in done.stderr, done.stderr
