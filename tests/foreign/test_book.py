@@ -72,6 +72,8 @@ def copy(tmp_path_factory):
         (programs / program).write_text(STAND_IN, encoding="utf-8")
         (programs / program).chmod(0o755)
     environment = {**os.environ, "PATH": f"{programs}{os.pathsep}{os.environ['PATH']}"}
+    # Campaigns need the wheel, which scripts/test installs here before.
+    environment["ASO_FTC_PYTHON"] = str(ROOT / "target" / "wheel" / "test" / "bin" / "python")
     options = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True, "timeout": 300}
 
     @cache

@@ -16,6 +16,8 @@ from ._folder import MANIFEST, system_of
 __all__ = ["main"]
 
 _REPORT = "report.html"
+# Faults or parameters that the summary names.
+_SHOWN = 3
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -109,12 +111,22 @@ def _summary(outcome: Outcome) -> str:
             # The design has no random samples: a fraction, but no probability.
             pass
         lines.append(line)
-        found = outcome.influence(name).dropna(subset=["lowest_tenth", "highest_tenth"])
-        order = (found["highest_tenth"] - found["lowest_tenth"]).abs().sort_values(ascending=False)
-        parts = [
-            f"{own} {100 * found['lowest_tenth'][own]:.0f} % to {100 * found['highest_tenth'][own]:.0f} %"
-            for own in order.index[:3]
-        ]
-        if parts:
-            lines.append(f"  runs outside, from the lowest to the highest tenth: {', '.join(parts)}")
+        lines += _reasons(outcome, name)
     return "\n".join(lines)
+
+
+def _reasons(outcome: Outcome, name: str) -> list[str]:
+    """Which faults, or which parameters, bring runs outside of a limit."""
+    if outcome.manifest["faults"]:
+        labels = list(dict.fromkeys(outcome.read(["fault"])["fault"][outcome.failed(name)]))
+        shown = "; ".join(label or "no fault" for label in labels[:_SHOWN])
+        more = f"; and {len(labels) - _SHOWN} more" if len(labels) > _SHOWN else ""
+        return [f"  outside: {shown}{more}"] if labels else []
+    found = outcome.influence(name).dropna(subset=["lowest_tenth", "highest_tenth"])
+    order = (found["highest_tenth"] - found["lowest_tenth"]).abs().sort_values(ascending=False)
+    parts = [
+        f"{own} {100 * found['lowest_tenth'][own]:.0f} % to {100 * found['highest_tenth'][own]:.0f} %"
+        for own in order.index[:_SHOWN]
+        if order[own] > 0
+    ]
+    return [f"  runs outside, from the lowest to the highest tenth: {', '.join(parts)}"] if parts else []
