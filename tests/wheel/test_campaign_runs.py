@@ -9,12 +9,15 @@ import socket
 import subprocess
 import sys
 import time
+import zipfile
 from pathlib import Path
 
 import aso_ftc as af
 import numpy as np
 import pyarrow.parquet as parquet
 import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
 
 CAMPAIGN = """
 system = "paper"
@@ -295,6 +298,42 @@ def test_runs_that_fail_or_last_too_long_have_their_reason_and_the_others_go_on(
     assert np.max(np.abs(kept["plant.x_p"].to_numpy())) == table["peak"][0]
 
 
+MISBEHAVING = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="Slave" guid="as it should">
+<CoSimulation modelIdentifier="slave" canHandleVariableCommunicationStepSize="true"/>
+<ModelVariables>
+<ScalarVariable name="y" valueReference="1" causality="output" initial="exact"><Real start="0"/></ScalarVariable>
+<ScalarVariable name="behaviour" valueReference="2" causality="parameter" variability="fixed">
+<String start="as it should"/></ScalarVariable>
+</ModelVariables>
+<ModelStructure><Outputs><Unknown index="1" dependencies=""/></Outputs></ModelStructure>
+</fmiModelDescription>
+"""
+
+
+def test_isolated_runs_that_crash_or_hang_are_recorded_by_their_kind(campaign, tmp_path):
+    sources = [str(ROOT / "tests" / "c" / f"{name}.c") for name in ("deeds", "life", "steps", "values")]
+    words = ["cc", "-std=c11", "-shared", "-fPIC", "-o", str(tmp_path / "slave.so"), *sources, "-lm"]
+    subprocess.run(words, check=True)
+    with zipfile.ZipFile(tmp_path / "Slave.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", MISBEHAVING)
+        archive.write(tmp_path / "slave.so", "binaries/linux64/slave.so")
+    (tmp_path / "system.toml").write_text('[fmus]\nslave = "Slave.fmu"\n', encoding="utf-8")
+    text = (
+        'system = "system.toml"\nisolate = true\ntime-limit = 2.0\nruns-per-task = 2\n'
+        "[experiment]\nstop-time = 1.0\n[algorithm]\nstep = 0.1\n[parameters]\n"
+        '"slave.behaviour" = ["as it should", "crash in fmi2DoStep", "abort in fmi2DoStep", "hang in fmi2DoStep"]\n'
+        '[measures]\nend = "last(time)"\n'
+    )
+    folder = tmp_path / "out"
+    status, _, messages = done(campaign(text=text), "--out", folder, "--workers", 1)
+    assert status == 0, messages
+    table = af.campaign.load(folder).table
+    assert list(table["status"]) == ["ok", "crashed", "crashed", "time limit"]
+    assert table["end"][0] == 1.0
+    assert all("fmi2DoStep" in reason for reason in table["reason"][1:])
+
+
 KILLER = """
 import os, signal
 
@@ -348,8 +387,6 @@ def test_a_scheduler_that_does_not_answer_and_one_without_workers_are_named(camp
 
 
 def test_an_fmu_without_binaries_for_the_workers_is_named_before_the_first_run(tmp_path):
-    import zipfile
-
     path = tmp_path / "Other.fmu"
     with zipfile.ZipFile(af.fmus()["FrictionPendulum"]) as old, zipfile.ZipFile(path, "w") as new:
         for name in old.namelist():
